@@ -1,0 +1,175 @@
+"""Where the fibres are: square, hexagonal and random arrangements of discs on the torus."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import product
+from math import fsum, pi, sqrt
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from feti_homog.errors import MeshError
+
+if TYPE_CHECKING:
+    from feti_homog.case import Cell
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.intp]
+
+# Quenched random packings jam near this area fraction.
+JAMMED = 0.84
+# Relative excess of the radii that push over those that must not overlap: the descent ends in finite time.
+SLACK = 1e-3
+STEPS = 2000
+
+
+@dataclass(frozen=True)
+class Arrangement:
+    """Discs with `centres` (N, 2) and `radii` (N,) on the torus of periods `width` and `height`; none touch."""
+
+    width: float
+    height: float
+    centres: Floats
+    radii: Floats
+
+
+def arrange(cell: Cell) -> Arrangement:
+    """The arrangement that a case asks for, whose area fraction is `cell.fibre_fraction` to rounding.
+
+    square: one disc in the middle of a 1 x 1 cell. hexagonal: 1 x sqrt(3), a disc in the middle and one at the
+    corner. random: `cell.fibres` discs in a 1 x 1 cell, see `random_arrangement`. Raises MeshError.
+    """
+    return ARRANGEMENTS[cell.geometry](cell)
+
+
+def square_arrangement(cell: Cell) -> Arrangement:
+    """One disc in the middle of the unit square."""
+    return _lattice(cell, 1.0, np.array([[0.5, 0.5]]), pi / 4)
+
+
+def hexagonal_arrangement(cell: Cell) -> Arrangement:
+    """Discs at the corner and in the middle of a 1 x sqrt(3) cell: the hexagonal lattice of distance 1."""
+    return _lattice(cell, sqrt(3), np.array([[0.0, 0.0], [0.5, sqrt(3) / 2]]), pi / (2 * sqrt(3)))
+
+
+def _lattice(cell: Cell, height: float, centres: Floats, limit: float) -> Arrangement:
+    fraction = cell.fibre_fraction
+    assert fraction is not None
+    if fraction >= limit:
+        raise MeshError(
+            f"[cell] fibre_fraction = {fraction:g}: the fibres of the {cell.geometry} cell touch at {limit:.4f}; "
+            "it must be smaller"
+        )
+    radius = sqrt(fraction * height / (pi * len(centres)))
+    return Arrangement(1.0, height, centres, np.full(len(centres), radius))
+
+
+def random_arrangement(cell: Cell) -> Arrangement:
+    """Discs at random in the unit square, periodic, the same for the same case on every machine.
+
+    Radii are uniform in mean * (1 - s, 1 + s), s = `radius_spread`, and scaled to the fraction. Any two discs, images
+    included, are at least `min_gap` mean diameters apart. Uniform random centres are moved down the gradient of
+    the overlap energy 1/2 sum max(0, R_i + R_j - |x_i - x_j|)^2 of the discs grown by half the gap, until it is
+    zero; when that jams, it starts again a few times. Last, the whole torus is shifted (`clear_shift`).
+    Raises MeshError when no arrangement is found.
+    """
+    count, gap, fraction = cell.fibres, cell.min_gap, cell.fibre_fraction
+    assert count is not None and fraction is not None
+    generator = np.random.default_rng(cell.seed)
+    radii = 1 + cell.radius_spread * generator.uniform(-1, 1, count)
+    radii *= sqrt(fraction / (pi * fsum(radii * radii)))
+    grown = radii + gap * fsum(radii) / count
+    ask = f"[cell] fibre_fraction = {fraction:g} with min_gap = {gap:g} and fibres = {count}"
+    if pi * np.sum(grown**2) > 0.9:
+        raise MeshError(
+            f"{ask}: random arrangements with this gap exist up to a fibre fraction of at most about "
+            f"{JAMMED / (1 + gap) ** 2:.2f}; lower one of them"
+        )
+    attempts, best = max(3, min(10, 100 // count)), 0.0
+    for _ in range(attempts):
+        centres, clearance = _relax(generator.random((count, 2)), grown)
+        if clearance >= 1:
+            return clear_shift(Arrangement(1.0, 1.0, centres, radii))
+        best = max(best, clearance)
+    raise MeshError(
+        f"{ask}: no arrangement found in {attempts} attempts; they reached a fibre fraction of at most about "
+        f"{fraction * best**2:.2f} with this gap; lower one of them, or change seed"
+    )
+
+
+def neighbours(centres: Floats, size: Floats, reach: float) -> tuple[Integers, Integers, Floats]:
+    """All pairs i <= j nearer than `reach`, and the vectors (k, 2) from i to that image of j.
+
+    Images of one disc are pairs i = j; each pair of images comes once or, where i = j, from both ends.
+    """
+    inside = centres % size
+    points, owner = [inside], [np.arange(len(centres))]
+    for step in product((-1, 0, 1), repeat=2):
+        image = inside + np.array(step) * size
+        near = np.all((image > -reach) & (image < size + reach), axis=1)
+        if any(step):
+            points.append(image[near])
+            owner.append(np.flatnonzero(near))
+    place, who = np.concatenate(points), np.concatenate(owner)
+    pairs = cKDTree(place).query_pairs(reach, output_type="ndarray")
+    pairs = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
+    first, second = pairs[:, 0], pairs[:, 1]
+    keep = (first < len(centres)) & (who[first] <= who[second])
+    first, second = first[keep], second[keep]
+    return who[first], who[second], place[second] - place[first]
+
+
+def _relax(centres: Floats, radii: Floats) -> tuple[Floats, float]:
+    """Centres (N, 2) moved until discs on the unit torus do not overlap, and the clearance reached.
+
+    The clearance is the smallest ratio of distance to sum of radii; at least 1 is success. Heavy-ball descent
+    x += 0.25 f + 0.9 dx: no reductions over the discs, so that every machine gets the same numbers.
+    """
+    target, step, clearance = radii * (1 + SLACK), np.zeros_like(centres), 0.0
+    for _ in range(STEPS):
+        first, second, vector = neighbours(centres, np.ones(2), 2 * target.max())
+        distance = np.sqrt(vector[:, 0] * vector[:, 0] + vector[:, 1] * vector[:, 1])
+        clearance = float(np.min(distance / (radii[first] + radii[second]), initial=2.0))
+        if clearance >= 1:
+            break
+        overlap = np.maximum(target[first] + target[second] - distance, 0.0)
+        push = overlap / np.maximum(distance, 1e-9) * (first != second)
+        force = [
+            np.bincount(second, push * vector[:, k], len(radii)) - np.bincount(first, push * vector[:, k], len(radii))
+            for k in (0, 1)
+        ]
+        step = 0.25 * np.stack(force, axis=1) + 0.9 * step
+        centres = (centres + step) % 1.0
+    return centres, clearance
+
+
+def clear_shift(arrangement: Arrangement) -> Arrangement:
+    """The arrangement moved as a whole such that the cell's boundary stays clear of tangency with the discs.
+
+    Along each axis the candidates are the middles of the widest gaps between the positions where a boundary
+    line touches a disc; among their combinations the one whose corner is farthest from a circle is taken.
+    """
+    size = np.array([arrangement.width, arrangement.height])
+    centres, radii = arrangement.centres, arrangement.radii
+    lines = []
+    for axis in (0, 1):
+        touching = np.sort(np.concatenate([centres[:, axis] - radii, centres[:, axis] + radii]) % size[axis])
+        gaps = np.diff(touching, append=touching[0] + size[axis])
+        wide = np.argsort(-gaps, kind="stable")[:4]
+        wide = wide[gaps[wide] > 0.7 * gaps[wide[0]]]
+        lines.append(touching[wide] + gaps[wide] / 2)
+    corners = np.array(list(product(*lines)))
+    offset = (centres - corners[:, None] + size / 2) % size - size / 2
+    distance = np.abs(np.linalg.norm(offset, axis=2) - radii).min(axis=1)
+    return Arrangement(*size.tolist(), (centres - corners[np.argmax(distance)]) % size, radii)
+
+
+ARRANGEMENTS: dict[str, Callable[[Cell], Arrangement]] = {
+    "square": square_arrangement,
+    "hexagonal": hexagonal_arrangement,
+    "random": random_arrangement,
+}

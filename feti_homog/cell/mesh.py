@@ -1,0 +1,112 @@
+"""The coarse periodic mesh of a rectangular cell, as it is made on rank 0."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+
+
+@dataclass(frozen=True)
+class CoarseMesh:
+    """Conforming periodic mesh of straight triangles on the cell [0, width] x [0, height]; lives on rank 0 only.
+
+    points (n, 2)        nodes in the plane
+    triangles (m, 3)     counter-clockwise; none has two edges on the same circle
+    phase (m,)           index into `phases`, whose first name is "matrix"
+    representative (n,)  node that stands for the class of a node on the torus: x = width -> x = 0, y = height -> y = 0
+    circles (k, 3)       centre and radius in the plane; periodic images are listed separately
+    arc_edges (a, 2)     edges of the mesh whose ends lie on a circle, to rounding
+    arc_circle (a,)      the circle of each of them
+    """
+
+    width: float
+    height: float
+    points: Floats
+    triangles: Ints
+    phase: Ints
+    phases: tuple[str, ...]
+    representative: Ints
+    circles: Floats
+    arc_edges: Ints
+    arc_circle: Ints
+
+
+def areas(points: Floats, triangles: Ints) -> Floats:
+    """Signed areas (m,) of triangles, positive counter-clockwise."""
+    a, b, c = (points[triangles[:, i]] for i in range(3))
+    u, v = b - a, c - a
+    return 0.5 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
+
+
+def edges(triangles: Ints) -> Ints:
+    """Directed edges (3m, 2): edge i of triangle t, opposite to its corner i, is row 3 t + i."""
+    return triangles[:, [1, 2, 2, 0, 0, 1]].reshape(-1, 2)
+
+
+def edge_keys(pairs: Ints, nodes: int) -> NDArray[np.int64]:
+    """One integer for each undirected edge (k, 2) of a mesh with that many nodes."""
+    ordered = np.sort(pairs, axis=1).astype(np.int64)
+    return ordered[:, 0] * nodes + ordered[:, 1]
+
+
+def representatives(points: Floats, width: float, height: float) -> Ints:
+    """Class representative (n,) of each node, for a mesh whose opposite sides match exactly.
+
+    A node at x = width stands with its partner at x = 0, one at y = height with its partner at y = 0, the four
+    corners with the one at the origin.
+    """
+    result = np.arange(len(points), dtype=np.int32)
+    for axis, period in ((0, width), (1, height)):
+        low = np.flatnonzero(points[:, axis] == 0.0)
+        high = np.flatnonzero(points[:, axis] == period)
+        along = points[:, 1 - axis]
+        result[high[np.argsort(along[high])]] = low[np.argsort(along[low])]
+    return result[result]
+
+
+def flip_double_arcs(triangles: Ints, phase: Ints, arc_edges: Ints, arc_circle: Ints, nodes: int) -> Ints:
+    """Triangles (m, 3) after edge flips, such that as few as possible have two edges on the same circle.
+
+    Such a triangle would have an angle of 180 degrees once its edges follow the circle. Its third edge, a chord, is
+    exchanged for the other diagonal of the two triangles beside the chord, in a few rounds.
+    """
+    triangles = triangles.copy()
+    for _ in range(8):
+        bad, corner = double_arcs(triangles, arc_edges, arc_circle, nodes)
+        keys = edge_keys(edges(triangles), nodes)
+        order = np.argsort(keys, kind="stable")
+        chord = 3 * bad + corner
+        first = np.searchsorted(keys[order], keys[chord])
+        pair = np.stack([order[first], order[np.minimum(first + 1, len(keys) - 1)]])
+        other = np.where(pair[0] == chord, pair[1], pair[0])
+        flippable = (keys[other] == keys[chord]) & (phase[other // 3] == phase[bad])
+        _, unique = np.unique(other // 3, return_index=True)
+        once = np.zeros(len(bad), dtype=bool)
+        once[unique] = True
+        chosen = flippable & once & ~np.isin(other // 3, bad)
+        if not chosen.any():
+            break
+        t, s, i, j = bad[chosen], other[chosen] // 3, corner[chosen], other[chosen] % 3
+        tip, a, b, far = triangles[t, i], triangles[t, (i + 1) % 3], triangles[t, (i + 2) % 3], triangles[s, j]
+        triangles[t] = np.stack([tip, a, far], axis=1)
+        triangles[s] = np.stack([tip, far, b], axis=1)
+    return triangles
+
+
+def double_arcs(triangles: Ints, arc_edges: Ints, arc_circle: Ints, nodes: int) -> tuple[Ints, Ints]:
+    """Triangles with two edges on the same circle, and the corner that these two edges share."""
+    if len(arc_edges) == 0:
+        return np.zeros(0, np.int32), np.zeros(0, np.int32)
+    keys = edge_keys(arc_edges, nodes)
+    order = np.argsort(keys)
+    mine = edge_keys(edges(triangles), nodes)
+    place = order[np.minimum(np.searchsorted(keys[order], mine), len(keys) - 1)]
+    circle = np.where(keys[place] == mine, arc_circle[place], -1).reshape(-1, 3)
+    shared = (np.roll(circle, -1, axis=1) == np.roll(circle, 1, axis=1)) & (np.roll(circle, 1, axis=1) >= 0)
+    bad = np.flatnonzero(shared.any(axis=1))
+    return bad.astype(np.int32), np.argmax(shared[bad], axis=1).astype(np.int32)

@@ -1,0 +1,218 @@
+"""The lines of the cell: its sides and the arcs of fibres within it, cut where they meet, with the nodes on them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from feti_homog.cell.arrangement import Arrangement
+from feti_homog.cell.sizing import circle_size, line_size
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.intp]
+
+MATRIX = -1
+# Vertices of a circle closer than this many radians are one.
+SAME = 1e-9
+TURN = 2 * np.pi
+QUARTER = TURN / 4
+# Positions at which the size is sampled along an arc and along a piece of a side.
+ARC_SAMPLES = 65
+SIDE_SAMPLES = 513
+
+Height = Callable[[Floats], Floats]
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A piece of a side or a circle from vertex to vertex, counter-clockwise around the cell or the disc.
+
+    nodes (k,)   numbers of its nodes, from end to end
+    circle       the circle it lies on; MATRIX for a piece of a side
+    inside       what is on its left: the disc of that circle, or MATRIX
+    """
+
+    nodes: Integers
+    circle: int
+    inside: int
+
+
+@dataclass(frozen=True)
+class Outline:
+    """Nodes (n, 2) on all lines, exactly in place, the curves through them, and the circles (k, 3) in the plane."""
+
+    points: Floats
+    curves: tuple[Curve, ...]
+    circles: Floats
+
+
+def images(arrangement: Arrangement) -> tuple[Floats, Integers]:
+    """Circles (k, 3) of all periodic images of fibres that reach into the cell, and the fibre (k,) of each."""
+    size = np.array([arrangement.width, arrangement.height])
+    circles, fibre = [], []
+    for step in product((-1, 0, 1), repeat=2):
+        centres = arrangement.centres + np.array(step) * size
+        outside = centres - np.clip(centres, 0, size)
+        near = np.flatnonzero((outside**2).sum(axis=1) < arrangement.radii**2)
+        circles.append(np.column_stack([centres[near], arrangement.radii[near]]))
+        fibre.append(near)
+    return np.concatenate(circles), np.concatenate(fibre)
+
+
+def outline(arrangement: Arrangement, largest: float, marks: Mapping[int, Sequence[float]]) -> Outline:
+    """All lines of the cell with nodes at distances of at most `largest`, closer in narrow passages.
+
+    Opposite sides have the same nodes. `marks` maps a fibre to angles in degrees, measured at its centre, that
+    become nodes.
+    """
+    size = np.array([arrangement.width, arrangement.height])
+    circles, fibre = images(arrangement)
+    places = [_crossings(circles, axis, size) for axis in (0, 1)]
+    border = np.concatenate([_on_side(places[axis], axis, level) for axis in (0, 1) for level in (0.0, size[1 - axis])])
+    circle, start, stop = _arcs(circles, _vertex_angles(circles, fibre, border, marks), size)
+    ends = _on_circle(circles[circle], start)
+    away = cKDTree(border).query(ends)[0] > SAME * size.max()
+    numbering = _Numbering(np.concatenate([np.unique(border, axis=0), ends[away]]))
+    height = line_size(arrangement, largest, numbering.vertices)
+
+    curves = []
+    for axis in (0, 1):
+        curves += _side_curves(axis, places[axis], circles, size, height, numbering)
+    curves += _arc_curves(circles, circle, start, stop, height, largest, numbering)
+    return Outline(numbering.points(), tuple(curves), circles)
+
+
+class _Numbering:
+    """Gives numbers to the nodes: first the vertices (v, 2), found by position, then those between."""
+
+    def __init__(self, vertices: Floats) -> None:
+        self.vertices = vertices
+        self._tree = cKDTree(vertices)
+        self._between: list[Floats] = []
+        self._count = len(vertices)
+
+    def along(self, points: Floats) -> Integers:
+        """Numbers (k,) of the nodes at `points` (k, 2) on one curve, whose ends are vertices."""
+        _, ends = self._tree.query(points[[0, -1]])
+        between = np.arange(self._count, self._count + len(points) - 2)
+        self._count += len(between)
+        self._between.append(points[1:-1])
+        return np.concatenate([ends[:1], between, ends[1:]])
+
+    def points(self) -> Floats:
+        """Positions (n, 2) of all nodes by number."""
+        return np.concatenate([self.vertices, *self._between])
+
+
+def _crossings(circles: Floats, axis: int, size: Floats) -> Floats:
+    """Sorted coordinates along `axis` of the vertices on the side at 0: its corners, and where circles cross it."""
+    depth, centre, radius = circles[:, 1 - axis], circles[:, axis], circles[:, 2]
+    half = np.sqrt(np.maximum(radius**2 - depth**2, 0.0))
+    crossing = np.concatenate([centre - half, centre + half])[np.tile(half > 0, 2)]
+    return np.concatenate([[0.0], np.sort(crossing[(crossing > 0) & (crossing < size[axis])]), [size[axis]]])
+
+
+def _on_side(places: Floats, axis: int, level: float) -> Floats:
+    """Points (k, 2) on the side along `axis` at the given level of the other coordinate."""
+    points = np.full((len(places), 2), level)
+    points[:, axis] = places
+    return points
+
+
+def _on_circle(circles: Floats, angles: Floats) -> Floats:
+    """Points (..., 2) on circles (..., 3) at angles in radians."""
+    return circles[..., :2] + circles[..., 2:] * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+
+
+def _vertex_angles(circles: Floats, fibre: Integers, border: Floats, marks: Mapping[int, Sequence[float]]) -> list[Floats]:
+    """Sorted angles in [0, 2 pi) of the vertices of each circle: where it crosses the sides, and the marks."""
+    angles = []
+    near = cKDTree(border).query_ball_point(circles[:, :2], circles[:, 2] * (1 + SAME))
+    for circle, owner, candidates in zip(circles, fibre.tolist(), near, strict=True):
+        offset = border[candidates] - circle[:2]
+        offset = offset[np.linalg.norm(offset, axis=1) > circle[2] * (1 - SAME)]
+        crossing = np.arctan2(offset[:, 1], offset[:, 0])
+        own = np.sort(np.concatenate([crossing, np.radians(marks.get(owner, ()))]) % TURN)
+        own = own if len(own) else np.zeros(1)
+        angles.append(own[np.diff(own, append=own[0] + TURN) > SAME] if len(own) > 1 else own)
+    return angles
+
+
+def _arcs(circles: Floats, angles: list[Floats], size: Floats) -> tuple[Integers, Floats, Floats]:
+    """Circle, start and stop angle (a,) of the arcs within the cell, each at most a quarter turn."""
+    circle, start, stop = [], [], []
+    for number, own in enumerate(angles):
+        for begin, span in zip(own, np.diff(own, append=own[0] + TURN), strict=True):
+            parts = max(1, int(np.ceil(span / QUARTER - SAME)))
+            stations = begin + span * np.arange(parts + 1) / parts
+            circle.append(np.full(parts, number))
+            start.append(stations[:-1])
+            stop.append(stations[1:])
+    whose, first, last = np.concatenate(circle), np.concatenate(start), np.concatenate(stop)
+    middle = _on_circle(circles[whose], (first + last) / 2)
+    within = np.all((middle > 0) & (middle < size), axis=1)
+    return whose[within], first[within], last[within]
+
+
+def _side_curves(
+    axis: int, places: Floats, circles: Floats, size: Floats, height: Height, numbering: _Numbering
+) -> list[Curve]:
+    """The pieces of the two sides along `axis`, with the same nodes on both."""
+    share = np.linspace(0, 1, SIDE_SAMPLES)
+    begin, span = places[:-1], np.diff(places)
+    samples = _on_side((begin[:, None] + span[:, None] * share).ravel(), axis, 0.0)
+    sizes = height(samples).reshape(len(span), -1)
+    curves = []
+    for level, low in ((0.0, True), (size[1 - axis], False)):
+        inside = _disc_at(_on_side(begin + span / 2, axis, level), circles)
+        # A chord of two edges or more keeps triangles with two arc edges off the side, where they could not be flipped.
+        least = np.where(_disc_at(samples.reshape(len(span), -1, 2)[:, SIDE_SAMPLES // 2], circles) == MATRIX, 1, 2)
+        for piece, stations in enumerate(_stations(share, sizes, span, least)):
+            along = begin[piece] + span[piece] * stations
+            along[[0, -1]] = places[piece : piece + 2]
+            nodes = numbering.along(_on_side(along, axis, level))
+            # Counter-clockwise around the cell: the bottom and the right side run upwards in their coordinate.
+            curves.append(Curve(nodes if low == (axis == 0) else nodes[::-1], MATRIX, int(inside[piece])))
+    return curves
+
+
+def _disc_at(points: Floats, circles: Floats) -> Integers:
+    """The circle (k,) whose disc holds each point, or MATRIX."""
+    holds = np.linalg.norm(points[:, None] - circles[:, :2], axis=2) < circles[:, 2]
+    return np.where(holds.any(axis=1), holds.argmax(axis=1), MATRIX)
+
+
+def _arc_curves(
+    circles: Floats, circle: Integers, start: Floats, stop: Floats, height: Height, largest: float, numbering: _Numbering
+) -> list[Curve]:
+    """The arcs as curves."""
+    share = np.linspace(0, 1, ARC_SAMPLES)
+    span = stop - start
+    samples = _on_circle(circles[circle, None], start[:, None] + span[:, None] * share)
+    caps = circle_size(circles[circle, 2], largest)
+    sizes = np.minimum(height(samples.reshape(-1, 2)).reshape(len(span), -1), caps[:, None])
+    curves = []
+    stations = _stations(share, sizes, span * circles[circle, 2], np.ones(len(span), dtype=np.intp))
+    for number, begin, turn, own in zip(circle.tolist(), start, span, stations, strict=True):
+        nodes = numbering.along(_on_circle(circles[number], begin + turn * own))
+        curves.append(Curve(nodes, number, number))
+    return curves
+
+
+def _stations(share: Floats, sizes: Floats, lengths: Floats, least: Integers) -> list[Floats]:
+    """For each curve the positions in [0, 1] of its nodes, equidistant in the measure ds / h.
+
+    The sizes h (c, s) are given at the positions `share` (s,), the lengths (c,) in the same unit.
+    """
+    density = lengths[:, None] / sizes
+    steps = (density[:, 1:] + density[:, :-1]) / 2 * np.diff(share)
+    measure = np.concatenate([np.zeros((len(lengths), 1)), np.cumsum(steps, axis=1)], axis=1)
+    counts = np.maximum(np.ceil(measure[:, -1] - 1e-6).astype(int), least)
+    return [
+        np.interp(np.linspace(0, own[-1], count + 1), own, share) for own, count in zip(measure, counts, strict=True)
+    ]

@@ -1,0 +1,116 @@
+"""How fine the coarse mesh is: the size of edges on the lines of the cell."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from feti_homog.cell.arrangement import Arrangement, neighbours
+
+Floats = NDArray[np.float64]
+
+# Edges around a fibre, at least.
+AROUND = 16
+# Edge length in a narrow passage, relative to its width.
+PASSAGE = 1.5
+# Growth of the edge length per distance.
+GROWTH = 0.4
+
+Source = tuple[Floats, Floats]
+
+
+def line_size(arrangement: Arrangement, largest: float, vertices: Floats) -> Callable[[Floats], Floats]:
+    """The function h(x) = min(largest, min_k (h_k + GROWTH |x - x_k|)) of positions (n, 2) on the torus.
+
+    The sources (x_k, h_k) are the two faces of each narrow passage between two fibres, or between a fibre and a
+    side or corner of the cell, with h_k proportional to its width, and the `vertices` (v, 2) that the mesh must have, with
+    the distance to the next one.
+    """
+    size = np.array([arrangement.width, arrangement.height])
+    caps = circle_size(arrangement.radii, largest)
+    sources = [
+        _between_fibres(arrangement, size, caps, largest),
+        _at_sides(arrangement, size, caps),
+        _at_corners(arrangement, size, caps),
+        _at_vertices(vertices, size, largest),
+    ]
+    places = _wrap(np.concatenate([place for place, _ in sources]), size)
+    lengths = np.concatenate([length for _, length in sources])
+    tree = cKDTree(places, boxsize=size)
+    count = min(16, len(places))
+
+    def at(points: Floats) -> Floats:
+        distance, nearest = tree.query(_wrap(points, size), k=count, distance_upper_bound=largest / GROWTH)
+        padded = np.append(lengths, np.inf)
+        graded = (padded[nearest] + GROWTH * distance).reshape(len(points), -1)
+        return np.minimum(largest, graded.min(axis=1))
+
+    return at
+
+
+def circle_size(radii: Floats, largest: float) -> Floats:
+    """Largest edge length (k,) on circles, such that each has at least AROUND edges."""
+    return np.minimum(largest, 2 * np.pi * radii / AROUND)
+
+
+def _wrap(points: Floats, size: Floats) -> Floats:
+    wrapped = points % size
+    return np.where(wrapped >= size, 0.0, wrapped)
+
+
+def _between_fibres(arrangement: Arrangement, size: Floats, caps: Floats, largest: float) -> Source:
+    """Facing points of near fibres; the edges at either suit the gap and those of the other fibre."""
+    centres, radii = arrangement.centres, arrangement.radii
+    first, second, vector = neighbours(centres, size, 2 * radii.max() + largest)
+    distance = np.linalg.norm(vector, axis=1)
+    gap = distance - radii[first] - radii[second]
+    normal = vector / distance[:, None]
+    places, lengths = [], []
+    for here, there, sign in ((first, second, 1.0), (second, first, -1.0)):
+        length = np.minimum(PASSAGE * gap, caps[there] + GROWTH * gap)
+        near = length < caps[here]
+        places.append((centres[here] + sign * radii[here, None] * normal)[near])
+        lengths.append(length[near])
+    return np.concatenate(places), np.concatenate(lengths)
+
+
+def _at_sides(arrangement: Arrangement, size: Floats, caps: Floats) -> Source:
+    """Where a circle comes near a side without crossing it, or hardly crosses it: its extreme point and the foot."""
+    centres, radii = arrangement.centres % size, arrangement.radii
+    places, lengths = [], []
+    for axis, sign in product((0, 1), (-1.0, 1.0)):
+        distance = centres[:, axis] if sign < 0 else size[axis] - centres[:, axis]
+        extreme, foot = centres.copy(), centres.copy()
+        extreme[:, axis] += sign * radii
+        foot[:, axis] += sign * distance
+        length = PASSAGE * np.abs(distance - radii)
+        near = length < caps
+        places += [extreme[near], foot[near]]
+        lengths += [length[near], length[near]]
+    return np.concatenate(places), np.concatenate(lengths)
+
+
+def _at_corners(arrangement: Arrangement, size: Floats, caps: Floats) -> Source:
+    """Where a circle passes near the corner: the corner and the nearest point of the circle."""
+    offset = (arrangement.centres + size / 2) % size - size / 2
+    distance = np.linalg.norm(offset, axis=1)
+    length = PASSAGE * np.abs(distance - arrangement.radii)
+    near = length < caps
+    facing = offset[near] * (1 - arrangement.radii[near] / distance[near])[:, None]
+    return np.concatenate([facing, np.zeros_like(facing)]), np.tile(length[near], 2)
+
+
+def _at_vertices(vertices: Floats, size: Floats, largest: float) -> Source:
+    """Vertices, once on the torus, with the distance to the nearest other one."""
+    places = _wrap(vertices, size)
+    tree = cKDTree(places, boxsize=size)
+    same = tree.query_pairs(1e-9 * size.max(), output_type="ndarray")
+    places = np.delete(places, same[:, 1], axis=0)
+    if len(places) == 1:
+        return places, np.array([largest])
+    distance, _ = cKDTree(places, boxsize=size).query(places, k=2)
+    return places, distance[:, 1]

@@ -1,0 +1,58 @@
+"""Unwrapped positions of a subdomain: where its triangles lie when it is walked without jumps on the torus."""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feti_homog.cell.piece import Piece
+from feti_homog.cell.torus import components, edge_pairs
+
+Int = NDArray[np.int64]
+Float = NDArray[np.float64]
+
+
+def unwrap(piece: Piece) -> tuple[Float, bool]:
+    """Shift of each coarse triangle to its unwrapped position, and whether the walk closes.
+
+    The walk closes when every class has one unwrapped position; then (and only then) the subdomain can
+    rotate.  A piece that winds around the torus cannot.
+
+    Returns:
+        (t, 2) shifts, whole periods; true if the subdomain is contractible.
+    """
+    part = components(len(piece.triangles), *edge_pairs(piece.triangle_edges))
+    shift = _part_shifts(piece, part)[part]
+    corners = piece.points[piece.triangles] + shift[:, None]
+    classes = piece.vertex_class[piece.triangles].ravel()
+    position = np.empty((len(piece.class_keys), 2))
+    position[classes] = corners.reshape(-1, 2)
+    closes = np.allclose(position[classes], corners.reshape(-1, 2), atol=1e-6 * piece.period.min())
+    return shift, closes
+
+
+def _part_shifts(piece: Piece, part: Int) -> Float:
+    """Shift of each plane-connected part, along a spanning tree of their contacts across the cell's boundary."""
+    part_of_edge = np.empty(len(piece.edges), np.int64)
+    part_of_edge[piece.triangle_edges] = part[:, None]
+    order = np.argsort(piece.edge_class, kind="stable")
+    twice = np.flatnonzero(np.diff(piece.edge_class[order]) == 0)
+    a, b = order[twice], order[twice + 1]
+    step = piece.points[piece.edges[a, 0]] - piece.points[piece.edges[b, 0]]
+    links, first = np.unique(np.stack([part_of_edge[a], part_of_edge[b]], axis=1), axis=0, return_index=True)
+    neighbours: dict[int, list[tuple[int, Float]]] = {k: [] for k in range(part.max() + 1)}
+    for (p, q), k in zip(links.tolist(), first, strict=True):
+        neighbours[p].append((q, step[k]))
+        neighbours[q].append((p, -step[k]))
+    shifts = np.full((part.max() + 1, 2), np.nan)
+    shifts[0] = 0.0
+    queue = deque([0])
+    while queue:
+        p = queue.popleft()
+        for q, jump in neighbours[p]:
+            if np.isnan(shifts[q, 0]):
+                shifts[q] = np.round((shifts[p] + jump) / piece.period) * piece.period
+                queue.append(q)
+    return shifts

@@ -1,0 +1,1 @@
+"""Vectorised plane elasticity on linear and (isoparametric) quadratic triangles."""

@@ -1,0 +1,47 @@
+"""Gradients of the shape functions of linear and quadratic triangles, at the points of a quadrature."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Float = NDArray[np.float64]
+
+# Linear: exact for constants.  Quadratic: degree 4 with 6 points (Dunavant 1985), so that stiffness and
+# area are exact on straight elements and of full order on curved ones.
+_A, _B = 0.445948490915965, 0.091576213509771
+_P2_POINTS = np.array([[1 - 2 * c, c] for c in (_A, _B)] + [[c, 1 - 2 * c] for c in (_A, _B)] + [[c, c] for c in (_A, _B)])
+_P2_WEIGHTS = np.tile([0.223381589678011, 0.109951743655322], 3) / 2
+
+
+@dataclass(frozen=True)
+class Quadrature:
+    """Reference gradients (q, a, 2) and weights (q,) at the q quadrature points of an a-node triangle."""
+
+    gradients: Float
+    weights: Float
+
+
+def quadrature(nodes: int) -> Quadrature:
+    """The rule for the 3- or 6-node triangle."""
+    if nodes == 3:
+        return Quadrature(np.array([[[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]]]), np.array([0.5]))
+    x, y = _P2_POINTS.T
+    z, o = 1 - x - y, np.zeros_like(x)
+    by_x = np.stack([1 - 4 * z, 4 * x - 1, o, 4 * (z - x), 4 * y, -4 * y], axis=1)
+    by_y = np.stack([1 - 4 * z, o, 4 * y - 1, -4 * x, 4 * x, 4 * (z - y)], axis=1)
+    return Quadrature(np.stack([by_x, by_y], axis=2), _P2_WEIGHTS)
+
+
+def gradients(corners: Float) -> tuple[Float, Float]:
+    """Physical gradients (e, q, a, 2) and weights times Jacobian (e, q) of elements with nodes (e, a, 2)."""
+    rule = quadrature(corners.shape[1])
+    jacobian = np.einsum("qar,ead->eqrd", rule.gradients, corners, optimize=True)
+    (xr, yr), (xs, ys) = np.moveaxis(jacobian, (2, 3), (0, 1))
+    determinant = xr * ys - yr * xs
+    inverse = np.stack([np.stack([ys, -yr], axis=2), np.stack([-xs, xr], axis=2)], axis=2) / determinant[..., None, None]
+    # x_d = J_rd r_r, so dN/dx_d = (J^-1)_dr dN/dr_r.
+    physical = np.einsum("eqdr,qar->eqad", inverse, rule.gradients, optimize=True)
+    return physical, determinant * rule.weights

@@ -1,0 +1,61 @@
+"""Direct solves with the subdomains of one rank, through PETSc's KSP and PC."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from petsc4py import PETSc
+from scipy.sparse import csr_matrix
+
+Float = NDArray[np.float64]
+
+
+class LocalSolver:
+    """x = A_s^-1 b for every SPD matrix A_s of this rank, one KSP each.
+
+    `b` and `x` are the subdomains' vectors one after the other; `offsets` says where each begins.
+    """
+
+    def __init__(self, matrices: Sequence[csr_matrix], prefix: str) -> None:
+        """Factorize.  Options under `prefix` (default: preonly, cholesky by CHOLMOD).
+
+        Raises:
+            PETSc.Error: a matrix is not positive definite.
+        """
+        self.offsets = np.cumsum([0, *(m.shape[0] for m in matrices)])
+        self.b, self.x = np.zeros(self.offsets[-1]), np.zeros(self.offsets[-1])
+        self._solves = []
+        for s, matrix in enumerate(matrices):
+            span = slice(self.offsets[s], self.offsets[s + 1])
+            if matrix.shape[0]:
+                vectors = (PETSc.Vec().createWithArray(a[span], comm=PETSc.COMM_SELF) for a in (self.b, self.x))
+                self._solves.append((_factorized(matrix, prefix), *vectors))
+
+    @property
+    def factorizations(self) -> int:
+        """How many factorizations are held; none is ever made again."""
+        return len(self._solves)
+
+    def solve(self) -> Float:
+        """Solve with `b` as it stands; returns `x`, which the next solve overwrites."""
+        for ksp, b, x in self._solves:
+            ksp.solve(b, x)
+        return self.x
+
+
+def _factorized(matrix: csr_matrix, prefix: str) -> PETSc.KSP:
+    A = PETSc.Mat().createAIJ(matrix.shape, csr=(matrix.indptr, matrix.indices, matrix.data), comm=PETSc.COMM_SELF)
+    A.setOption(PETSc.Mat.Option.SPD, True)
+    ksp = PETSc.KSP().create(PETSc.COMM_SELF)
+    ksp.setOptionsPrefix(prefix)
+    ksp.setOperators(A)
+    ksp.setType(PETSc.KSP.Type.PREONLY)
+    ksp.setErrorIfNotConverged(True)
+    pc = ksp.getPC()
+    pc.setType(PETSc.PC.Type.CHOLESKY)
+    pc.setFactorSolverType(PETSc.Mat.SolverType.CHOLMOD)
+    ksp.setFromOptions()
+    ksp.setUp()
+    return ksp

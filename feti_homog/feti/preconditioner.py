@@ -1,0 +1,116 @@
+"""Preconditioners of the dual problem: none, lumped, Dirichlet, scaled by stiffness.
+
+M^-1 = W^-1 B D^-1 S D^-1 B^T W^-1 with W = B D^-1 B^T and D the mean diagonal stiffness of each node.  W is
+block-diagonal by node class.  S is the boundary block of K (lumped), or its Schur complement (Dirichlet).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+from petsc4py import PETSc
+from scipy.sparse import block_diag, csr_matrix, diags
+
+from feti_homog.feti.assembled import assembled
+from feti_homog.feti.constraints import Constraints
+from feti_homog.feti.local import LocalSolver
+
+Int = NDArray[np.int64]
+Float = NDArray[np.float64]
+
+
+class Lumped:
+    """y = K_bb x on the boundary dofs of this rank's subdomains."""
+
+    def __init__(self, Kbb: csr_matrix) -> None:
+        self.Kbb = Kbb
+
+    def apply(self, x: Float) -> Float:
+        """K_bb x."""
+        return self.Kbb @ x
+
+
+class Dirichlet:
+    """y = S x, S = K_bb - K_bi K_ii^-1 K_ib: the stiffness seen from the boundary."""
+
+    def __init__(self, Kbb: csr_matrix, Kib: csr_matrix, interiors: Sequence[csr_matrix]) -> None:
+        self.Kbb, self.Kib, self.Kbi = Kbb, Kib, Kib.T.tocsr()
+        self.interior = LocalSolver(interiors, "feti_interior_")
+
+    def apply(self, x: Float) -> Float:
+        """S x."""
+        self.interior.b[:] = self.Kib @ x
+        return self.Kbb @ x - self.Kbi @ self.interior.solve()
+
+
+def boundary_stiffness(stiffness: Sequence[csr_matrix], boundary: NDArray[np.bool_], dirichlet: bool) -> Lumped | Dirichlet:
+    """S of all subdomains of this rank; `boundary` marks the boundary dofs, the subdomains one after the other."""
+    marks = np.split(boundary, np.cumsum([K.shape[0] for K in stiffness])[:-1])
+    Kbb = csr_matrix(block_diag([K[b][:, b] for K, b in zip(stiffness, marks, strict=True)] or [np.zeros((0, 0))]))
+    if not dirichlet:
+        return Lumped(Kbb)
+    interior_rows = [K[~b] for K, b in zip(stiffness, marks, strict=True)]
+    Kib = [rows[:, b] for rows, b in zip(interior_rows, marks, strict=True)]
+    Kii = [rows[:, ~b].tocsr() for rows, b in zip(interior_rows, marks, strict=True)]
+    return Dirichlet(Kbb, csr_matrix(block_diag(Kib or [np.zeros((0, 0))])), Kii)
+
+
+class Scaled:
+    """z = M^-1 r, with the scaling of this module around a boundary stiffness."""
+
+    def __init__(
+        self, comm: MPI.Comm, constraints: Constraints, K: Sequence[csr_matrix], S: Lumped | Dirichlet, boundary: NDArray[np.bool_]
+    ) -> None:
+        self.constraints, self.S = constraints, S
+        diagonal = np.concatenate([k.diagonal() for k in K] or [np.zeros(0)]).reshape(-1, 2).mean(axis=1)
+        flexibility = diags(1.0 / np.repeat(diagonal, 2)[boundary])
+        Bb = constraints.B[:, boundary]
+        self.BD = (Bb @ flexibility).tocsr()
+        self.DBT = self.BD.T.tocsr()
+        self.W_inverse = _inverse_blocks(_owned_blocks(comm, constraints, self.BD @ Bb.T), *constraints.blocks)
+        self._work = constraints.vector.duplicate()
+
+    def apply(self, r: PETSc.Vec, z: PETSc.Vec) -> None:
+        """z = W^-1 B D^-1 S D^-1 B^T W^-1 r."""
+        self._work.getArray()[:] = self.W_inverse @ r.getArray(readonly=True)
+        self.constraints.add(self.BD @ self.S.apply(self.DBT @ self.constraints.gather(self._work)), z)
+        z.getArray()[:] = self.W_inverse @ z.getArray(readonly=True)
+
+
+class Identity:
+    """z = r."""
+
+    def apply(self, r: PETSc.Vec, z: PETSc.Vec) -> None:
+        """z = r."""
+        r.copy(z)
+
+
+def _owned_blocks(comm: MPI.Comm, constraints: Constraints, local: csr_matrix) -> csr_matrix:
+    """The rows of W that this rank owns, summed over ranks; their columns are its own too."""
+    first, last = constraints.owned
+    W = assembled(comm, local, constraints.rows, constraints.rows, (last - first, last - first))
+    indptr, indices, values = W.getValuesCSR()
+    return csr_matrix((values, indices - first, indptr), shape=(last - first, last - first))
+
+
+def _inverse_blocks(W: csr_matrix, starts: Int, sizes: Int) -> csr_matrix:
+    """Inverse of a block-diagonal matrix whose blocks start at `starts` (ascending) and have `sizes` rows."""
+    entries = W.tocoo()
+    block = np.repeat(np.arange(len(starts)), sizes)[entries.row]
+    rows, columns, values = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)], [np.zeros(0)]
+    for size in np.unique(sizes):
+        some = np.flatnonzero(sizes == size)
+        number = np.full(len(starts), -1)
+        number[some] = np.arange(len(some))
+        mine = number[block] >= 0
+        own = block[mine]
+        dense = np.zeros((len(some), size, size))
+        dense[number[own], entries.row[mine] - starts[own], entries.col[mine] - starts[own]] = entries.data[mine]
+        at = starts[some][:, None] + np.arange(size)
+        rows.append(np.broadcast_to(at[:, :, None], dense.shape).ravel())
+        columns.append(np.broadcast_to(at[:, None, :], dense.shape).ravel())
+        values.append(np.linalg.inv(dense).ravel())
+    return csr_matrix((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=W.shape)

@@ -1,0 +1,133 @@
+"""One subdomain: its refined mesh, stiffness, load and kernel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix, diags
+
+from feti_homog.cell.piece import Piece
+from feti_homog.cell.refine import FineMesh, Lattice, refine
+from feti_homog.cell.unwrap import unwrap
+from feti_homog.errors import MeshError
+from feti_homog.fem.assembly import assemble
+
+Int = NDArray[np.int64]
+Float = NDArray[np.float64]
+
+KERNEL_TOLERANCE = 1e-10
+
+
+@dataclass(frozen=True)
+class Subdomain:
+    """A body or a piece of it, with c node classes and kernel dimension k.
+
+    Attributes:
+        piece: the coarse share.
+        mesh: the refined mesh.
+        L: (3, 3) stiffness of the material.
+        K: (2c, 2c) stiffness, the pinned class (15) eliminated by a unit row scaled like the others.
+        Q: (2c, 3) load of the unit strains: f = -Q E.
+        area: of the subdomain.
+        R: (2c, k) orthonormal kernel of K: two translations, and a rotation if the piece can turn,
+            less what the pinned class stops.
+        positions: (c, 2) unwrapped positions of the classes.
+    """
+
+    piece: Piece
+    mesh: FineMesh
+    L: Float
+    K: csr_matrix
+    Q: Float
+    area: float
+    R: Float
+    positions: Float
+
+    @classmethod
+    def build(cls, piece: Piece, lattice: Lattice, L: Float) -> Subdomain:
+        """Refine and assemble, without communication.
+
+        Raises:
+            MeshError: an element is inverted, or the rigid-body modes are not in the kernel of K.
+        """
+        mesh = refine(piece, lattice)
+        _check_corners(piece, mesh)
+        body = assemble(mesh.points, mesh.triangles, mesh.node_class, mesh.n_classes, L)
+        shift, closes = unwrap(piece)
+        positions = np.empty((mesh.n_classes, 2))
+        unwrapped = mesh.points[mesh.triangles] + np.repeat(shift, len(lattice.triangles), axis=0)[:, None]
+        positions[mesh.node_class[mesh.triangles]] = unwrapped
+        R = kernel(positions, closes, piece.pinned)
+        K, Q = _pin(body.K, body.Q, piece.pinned)
+        _check_kernel(piece, K, R)
+        return cls(piece, mesh, L, K, Q, body.area, R, positions)
+
+    def regularised(self) -> csr_matrix:
+        """K + rho Rf Rf^T, SPD; its inverse is a generalized inverse K+ of K.
+
+        Rf is the kernel restricted to fixing nodes far apart and orthonormalised, so the term is a dense
+        block of at most 6 x 6 (Brzobohaty, Dostal, Kozubek, Kovar, Markopoulos, IJNME 88, 2011).
+        """
+        if self.R.shape[1] == 0:
+            return self.K
+        dofs = (2 * self._fixing_nodes()[:, None] + np.arange(2)).ravel()
+        Rf = np.linalg.qr(self.R[dofs])[0]
+        block = self.K.diagonal()[dofs].mean() * Rf @ Rf.T
+        rows, columns = np.meshgrid(dofs, dofs, indexing="ij")
+        term = csr_matrix((block.ravel(), (rows.ravel(), columns.ravel())), shape=self.K.shape)
+        return (self.K + term).tocsr()
+
+    def _fixing_nodes(self) -> Int:
+        """Three far-apart nodes for three modes, else the one farthest from the pinned class."""
+        x = self.positions
+        origin = x[self.piece.pinned] if self.piece.pinned >= 0 else x.mean(axis=0)
+        a = np.argmax(((x - origin) ** 2).sum(axis=1))
+        if self.R.shape[1] < 3:
+            return np.array([a])
+        b = np.argmax(((x - x[a]) ** 2).sum(axis=1))
+        (dx, dy), (ex, ey) = x[b] - x[a], (x - x[a]).T
+        return np.array([a, b, np.argmax(np.abs(dx * ey - dy * ex))])
+
+
+def kernel(positions: Float, rotates: bool, pinned: int) -> Float:
+    """Orthonormal rigid-body modes (2c, k) of nodes at `positions` (c, 2); `pinned` is a node or -1."""
+    free = np.zeros((len(positions), 2, 0)) if pinned >= 0 else np.tile(np.eye(2), (len(positions), 1, 1))
+    if rotates:
+        centre = positions[pinned] if pinned >= 0 else positions.mean(axis=0)
+        x, y = (positions - centre).T
+        turn = np.stack([-y, x], axis=1)[..., None] / max(np.ptp(x), np.ptp(y))
+        free = np.concatenate([free, turn], axis=2)
+    return np.linalg.qr(free.reshape(2 * len(positions), -1))[0]
+
+
+def _pin(K: csr_matrix, Q: Float, pinned: int) -> tuple[csr_matrix, Float]:
+    if pinned < 0:
+        return K, Q
+    keep = np.ones(len(Q))
+    keep[2 * pinned : 2 * pinned + 2] = 0.0
+    mask = diags(keep)
+    return (mask @ K @ mask + diags((1 - keep) * K.diagonal().max())).tocsr(), keep[:, None] * Q
+
+
+def _check_kernel(piece: Piece, K: csr_matrix, R: Float) -> None:
+    residual = abs(K @ R).max(initial=0.0) / abs(K.data).max()
+    if residual > KERNEL_TOLERANCE:
+        raise MeshError(
+            f"subdomain {piece.index} ({piece.phase}) near ({piece.points[0, 0]:.6g}, {piece.points[0, 1]:.6g}): "
+            f"|K R| / |K| = {residual:.1e}, expected at most {KERNEL_TOLERANCE:.0e}; its elements are degenerate"
+        )
+
+
+def _check_corners(piece: Piece, mesh: FineMesh) -> None:
+    """Refuse triangles that bending towards the circles has turned over."""
+    a, b, c = (mesh.points[mesh.triangles[:, k]] for k in range(3))
+    doubled = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
+    inverted = np.flatnonzero(doubled <= 0)
+    if len(inverted):
+        x, y = mesh.points[mesh.triangles[inverted[0], :3]].mean(axis=0)
+        raise MeshError(
+            f"[cell] refine, order: {len(inverted)} refined elements of {piece.phase} are inverted, the first "
+            f"near ({x:.6g}, {y:.6g}); expected a mesh fine enough for its curved interfaces"
+        )

@@ -1,0 +1,121 @@
+"""Options of the command line: ours (double dash) and PETSc's (single dash)."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Option:
+    """A PETSc option of the solver: its name without dash, what it takes, its default, one line of help."""
+
+    name: str
+    value: str
+    default: str
+    help: str
+
+
+OPTIONS = (
+    Option("feti_ksp_type", "cg|fcg|gmres|...", "cg", "Krylov method on the projected dual operator"),
+    Option("feti_ksp_rtol", "<real>", "1e-8", "relative tolerance of the dual and the primal residuals"),
+    Option("feti_ksp_atol", "<real>", "1e-50", "absolute tolerance of the dual residual"),
+    Option("feti_ksp_max_it", "<integer>", "1000", "largest number of iterations per load case"),
+    Option("feti_ksp_monitor", "", "", "print the residual at every iteration"),
+    Option("feti_ksp_converged_reason", "", "", "print why each solve ended"),
+    Option("feti_ksp_view", "", "", "print the solver's settings"),
+    Option("feti_ksp_view_singularvalues", "", "", "print the estimated condition number"),
+    Option("feti_pc_type", "dirichlet|lumped|none", "dirichlet", "preconditioner of the dual problem"),
+    Option("feti_sub_ksp_type", "preonly|...", "preonly", "subdomain solves"),
+    Option("feti_sub_pc_type", "cholesky|lu", "cholesky", "subdomain factorizations"),
+    Option(
+        "feti_sub_pc_factor_mat_solver_type",
+        "cholmod|mumps",
+        "cholmod",
+        "library of the subdomain factorizations",
+    ),
+    Option(
+        "feti_interior_pc_type",
+        "cholesky|lu",
+        "cholesky",
+        "interior factorizations of the Dirichlet preconditioner",
+    ),
+    Option(
+        "feti_interior_pc_factor_mat_solver_type",
+        "cholmod|mumps",
+        "cholmod",
+        "library of the interior factorizations",
+    ),
+    Option("feti_coarse_pc_type", "cholesky|lu", "cholesky", "factorization of the coarse problem"),
+    Option(
+        "feti_coarse_pc_factor_mat_solver_type",
+        "cholmod|mumps",
+        "cholmod",
+        "library of the coarse factorization",
+    ),
+)
+
+PREFIXES = ("feti_ksp_", "feti_pc_", "feti_sub_", "feti_interior_", "feti_coarse_")
+"""Prefixes of PETSc solvers: what follows is PETSc's to know."""
+
+OWN_SHORT = ("-h",)
+
+
+def split_argv(argv: Sequence[str]) -> tuple[list[str], list[str]]:
+    """The words that are ours and those that are PETSc's, each in their order.
+
+    PETSc's are single-dash options with the word after each as its value, unless that word begins another
+    option; a negative number is a value.
+    """
+    ours: list[str] = []
+    petsc: list[str] = []
+    takes_value = False
+    for word in argv:
+        if _is_petsc(word):
+            petsc.append(word)
+            takes_value = True
+        elif takes_value and not word.startswith("--") and word not in OWN_SHORT:
+            petsc.append(word)
+            takes_value = False
+        else:
+            ours.append(word)
+            takes_value = False
+    return ours, petsc
+
+
+def _is_petsc(word: str) -> bool:
+    return re.match(r"-[A-Za-z]", word) is not None and word not in OWN_SHORT
+
+
+def option_names(petsc: Iterable[str]) -> list[str]:
+    """The names, without dash, of the options among PETSc's words."""
+    return [word[1:] for word in petsc if _is_petsc(word)]
+
+
+def unknown_options(names: Iterable[str]) -> list[str]:
+    """One fault for each name (without dash) that begins with feti_ but is no option of the solver."""
+    known = [option.name for option in OPTIONS]
+    unknown = [n for n in names if n.startswith("feti_") and n not in known and not _has_solver_prefix(n)]
+    faults = []
+    for name in unknown:
+        nearest = difflib.get_close_matches(name, known, n=1)
+        hint = f"did you mean -{nearest[0]}?" if nearest else f"known prefixes: -{', -'.join(PREFIXES)}"
+        faults.append(f"-{name}: unknown option; {hint}")
+    return faults
+
+
+def _has_solver_prefix(name: str) -> bool:
+    return any(name.startswith(prefix) and name != prefix for prefix in PREFIXES)
+
+
+def help_text() -> str:
+    """A table of the solver's options, one line each."""
+    usages = [f"-{option.name} {option.value}".strip() for option in OPTIONS]
+    width = max(map(len, usages))
+    lines = [
+        f"  {usage:{width}}  {option.help}" + (f" (default {option.default})" if option.default else "")
+        for usage, option in zip(usages, OPTIONS, strict=True)
+    ]
+    return "\n".join(["options of the solver, PETSc's:", *lines])

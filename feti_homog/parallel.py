@@ -1,0 +1,108 @@
+"""Calls on rank 0 and on all ranks whose exceptions every rank hears of, so that none waits for ever."""
+
+from __future__ import annotations
+
+import sys
+import time
+import traceback
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, NoReturn, ParamSpec, TypeVar
+
+from feti_homog.errors import EXIT_DEFECT, FetiHomogError
+
+if TYPE_CHECKING:
+    from mpi4py.MPI import Comm
+
+P = ParamSpec("P")
+T = TypeVar("T")
+PATIENCE = 5.0  # seconds that a rank with an error waits for the others to come with theirs
+
+
+class RemoteError(RuntimeError):
+    """A defect met on another rank; the text is that rank's traceback."""
+
+
+def on_root(comm: Comm, function: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> T:
+    """function(...) of rank 0, on every rank; what it raises is raised on every rank.
+
+    Collective. The result must be picklable; `function` must not communicate.
+    """
+    result, error = _attempt(function, *args, **kwargs) if comm.rank == 0 else (None, None)
+    result, message = comm.bcast((result, _portable(comm, error)), root=0)
+    if message is not None:
+        raise error or message
+    return result
+
+
+def on_root_only(comm: Comm, function: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> T | None:
+    """function(...) on rank 0, None on the others; what it raises is raised on every rank. Collective."""
+    result, error = _attempt(function, *args, **kwargs) if comm.rank == 0 else (None, None)
+    message = comm.bcast(_portable(comm, error), root=0)
+    if message is not None:
+        raise error or message
+    return result
+
+
+def agree(comm: Comm, function: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> T:
+    """function(...) of each rank on that rank; if it raises on any, every rank raises.
+
+    A rank that met a defect raises that; all others raise that of the first such rank or, if there was none,
+    the FetiHomogError of the first rank that met one. Collective; `function` must not communicate.
+    """
+    result, error = _attempt(function, *args, **kwargs)
+    messages = [message for message in comm.allgather(_portable(comm, error)) if message is not None]
+    if messages:
+        if error is not None and not isinstance(error, FetiHomogError):
+            raise error
+        raise next((message for message in messages if isinstance(message, RemoteError)), messages[0])
+    return result  # type: ignore[return-value]
+
+
+def run_main(comm: Comm, main: Callable[[], int]) -> int:
+    """The exit code of main(), run by every rank.
+
+    A FetiHomogError that every rank raises is told once, by rank 0, and gives its exit code. One that the
+    others do not come with in time, and any other exception, is told by its rank and aborts the job.
+    """
+    try:
+        return main()
+    except FetiHomogError as error:
+        all_came = others_come(comm, PATIENCE)
+        if comm.rank == 0 or not all_came:
+            print(*(f"error: {fault}" for fault in error.faults), sep="\n", file=sys.stderr, flush=True)
+        if not all_came:
+            abort(comm, error.exit_code)
+        return error.exit_code
+    except Exception:
+        print(f"rank {comm.rank} of {comm.size}:\n{traceback.format_exc()}", file=sys.stderr, flush=True)
+        abort(comm, EXIT_DEFECT)
+
+
+def abort(comm: Comm, exit_code: int) -> NoReturn:
+    """Ends the processes of all ranks; the exit code is that of mpirun."""
+    sys.stdout.flush()
+    comm.Abort(exit_code)
+    raise SystemExit(exit_code)
+
+
+def others_come(comm: Comm, patience: float) -> bool:
+    """Whether every rank calls this within so many seconds of this one."""
+    barrier = comm.Ibarrier()
+    deadline = time.monotonic() + patience
+    while not (all_came := barrier.Test()) and time.monotonic() < deadline:
+        time.sleep(0.001)
+    return all_came
+
+
+def _attempt(function: Callable[..., T], *args: Any, **kwargs: Any) -> tuple[T | None, Exception | None]:
+    try:
+        return function(*args, **kwargs), None
+    except Exception as error:
+        return None, error
+
+
+def _portable(comm: Comm, error: Exception | None) -> Exception | None:
+    """The exception as it is sent to other ranks: a defect as its traceback, for it may not be picklable."""
+    if error is None or isinstance(error, FetiHomogError):
+        return error
+    return RemoteError(f"on rank {comm.rank}:\n{''.join(traceback.format_exception(error))}")
