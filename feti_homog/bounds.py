@@ -75,7 +75,7 @@ def isotropic_stiffness(bulk: float, shear: float) -> Array:
 
 
 def anisotropy(stiffness: ArrayLike) -> float:
-    """||C - C_iso|| / ||C|| as fourth-order tensors, C_iso the nearest isotropic one; the same in all axes."""
+    """||C - C_iso|| / ||C|| as fourth-order tensors, C_iso the nearest isotropic; the same in all axes."""
     c = np.asarray(stiffness, dtype=float)
     mandel = np.outer([1, 1, np.sqrt(2)], [1, 1, np.sqrt(2)])  # turns the norm into that of the tensor
     rest = c - isotropic_stiffness(*isotropic_part(c))
@@ -84,7 +84,7 @@ def anisotropy(stiffness: ArrayLike) -> float:
 
 def voigt(fractions: ArrayLike, stiffnesses: ArrayLike) -> Array:
     """Upper bound sum c_i C_i, (3, 3), of fractions (n,) and stiffnesses (n, 3, 3)."""
-    return np.einsum("i,ijk->jk", np.asarray(fractions, dtype=float), np.asarray(stiffnesses, dtype=float))
+    return np.einsum("i,ijk->jk", np.asarray(fractions, float), np.asarray(stiffnesses, float))
 
 
 def reuss(fractions: ArrayLike, stiffnesses: ArrayLike) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 import re
 import tomllib
 from collections.abc import Iterable, Mapping
@@ -23,7 +24,6 @@ PETSC_WIDE = (
     "malloc_dump", "memory_view", "on_error_abort", "fp_trap", "info",
 )  # fmt: skip
 LOCKING_POISSON = 0.49
-
 
 REQUIRED = ("cell", "material", "analysis")
 TOP_LEVEL = (*SECTIONS, "material", "petsc", "name")
@@ -85,10 +85,7 @@ def load(path: str | Path) -> Case:
     except UnicodeDecodeError as error:
         line = error.object.count(b"\n", 0, error.start) + 1
         raise CaseError(f"{path}: not UTF-8 text (line {line})") from None
-    except (
-        ValueError,
-        RecursionError,
-    ) as error:  # too long a number or too deep an array is no TOMLDecodeError
+    except (ValueError, RecursionError) as error:  # of too long a number and too deep an array too
         place = f"line {content.count(chr(10)) + 1}, the end"
         raise CaseError(f"{path}: not TOML: {str(error).replace('end of document', place)}") from None
     except OSError as error:
@@ -98,28 +95,39 @@ def load(path: str | Path) -> Case:
 
 def parse(document: Mapping[str, Any], folder: Path) -> Case:
     """The case of a TOML document; its files are relative to `folder`. Raises CaseError with all faults."""
-    faults = [f"[{section}]: missing section" for section in REQUIRED if section not in document]
-    for name, value in document.items():
-        if name not in TOP_LEVEL:
-            what = f"[{named(name)}]: unknown section" if isinstance(value, dict) else f"{named(name)}: unknown key"
-            faults.append(f"{what}; {suggestion(name, TOP_LEVEL, OWNERS)}")
-    name = document.get("name", "case")
-    if not text.accepts(name):
-        faults.append(f"name = {shown(name)}: expected {text.expected}")
+    faults = _top_level_faults(document)
     geometry = accepted(Cell, document.get("cell"), "geometry")
     plane = accepted(Analysis, document.get("analysis"), "plane")
     cell = _read_section(document, "cell", faults, variant="geometry")
+    decomposition = _read_section(document, "decomposition", faults)
+    if decomposition and decomposition.subdomains and decomposition.max_dofs:
+        faults.append("[decomposition] subdomains, max_dofs: exclude each other; give one")
     parts = {
         "cell": cell and _checked_cell(cell, folder, faults),
-        "materials": _read_materials(document.get("material", {}), geometry, plane, faults),
+        "materials": _read_materials(document.get("material"), geometry, plane, faults),
         "analysis": _read_section(document, "analysis", faults),
-        "decomposition": _read_section(document, "decomposition", faults),
+        "decomposition": decomposition,
         "output": _read_section(document, "output", faults),
         "petsc": _read_petsc(document.get("petsc", {}), faults),
     }
     if faults:
         raise CaseError(*faults)
-    return Case(name=name, **parts)
+    return Case(name=document.get("name", "case"), **parts)
+
+
+def _top_level_faults(document: Mapping[str, Any]) -> list[str]:
+    """Faults of the names of sections and of the keys before the first section."""
+    faults = [f"[{section}]: missing section" for section in REQUIRED if section not in document]
+    for name, value in document.items():
+        hint = suggestion(name, TOP_LEVEL, OWNERS)
+        if name not in TOP_LEVEL and isinstance(value, dict):
+            faults.append(f"[{named(name)}]: unknown section; {hint}")
+        elif name not in TOP_LEVEL:
+            faults.append(f"{named(name)}: unknown key; {hint}")
+    name = document.get("name", "case")
+    if not text.accepts(name):
+        faults.append(f"name = {shown(name)}: expected {text.expected}")
+    return faults
 
 
 def _read_section(document: Mapping[str, Any], section: str, faults: list[str], variant: str = "") -> Any:
@@ -135,14 +143,15 @@ def _checked_cell(cell: Cell, folder: Path, faults: list[str]) -> Cell:
         crowding = (1.0 + cell.min_gap) ** 2 if cell.geometry == "random" else 1.0
         limit = TOUCHING[cell.geometry] / crowding
         if cell.fibre_fraction >= limit:
+            reason = "no circles min_gap apart are denser" if crowding > 1 else "there the fibres touch"
             faults.append(
-                f"[cell] fibre_fraction = {cell.fibre_fraction}: expected less than {limit:.4g}, where the fibres of "
-                f"geometry = {shown(cell.geometry)} " + ("are min_gap apart" if crowding > 1 else "touch")
+                f"[cell] fibre_fraction = {cell.fibre_fraction}: expected less than {limit:.4g} for "
+                f"geometry = {shown(cell.geometry)}: {reason}"
             )
     if cell.file is None:
         return cell
     file = (folder / cell.file).resolve()
-    if not file.is_file():
+    if not os.path.isfile(file):  # false, not an error, for a name too long
         faults.append(f"[cell] file = {shown(str(cell.file))}: no such file (expected at {file})")
     return dataclasses.replace(cell, file=file)
 
@@ -151,6 +160,8 @@ def _read_materials(
     table: object, geometry: str | None, plane: str | None, faults: list[str]
 ) -> dict[str, Material]:
     """The materials by phase; what depends on a geometry or plane state that is faulty is not checked."""
+    if table is None:
+        return {}
     if not isinstance(table, dict):
         faults.append(f"material = {shown(table)}: expected sections [material.matrix], [material.fibre]")
         return {}
@@ -158,13 +169,14 @@ def _read_materials(
     for phase, constants in table.items():
         section = f"material.{named(phase)}"
         if not PHASE.fullmatch(phase):
-            faults.append(f"[{section}]: unknown phase; {suggestion(phase, ('matrix', 'fibre', 'fibre:2'), OWNERS)}")
+            hint = suggestion(phase, ("matrix", "fibre", "fibre:2"), OWNERS)
+            faults.append(f"[{section}]: unknown phase; {hint}")
         elif ":" in phase and geometry in CIRCULAR:
             faults.append(f'[{section}]: belongs to geometry = "mesh", not {shown(geometry)}')
         else:
             materials[phase] = _read_material(constants, section, plane, faults)
     needed = ("matrix", "fibre") if geometry in CIRCULAR else ("matrix",)
-    faults += [f"[material.{phase}]: missing section" for phase in needed if table and phase not in table]
+    faults += [f"[material.{phase}]: missing section" for phase in needed if phase not in table]
     return materials
 
 

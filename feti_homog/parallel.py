@@ -6,14 +6,13 @@ import sys
 import time
 import traceback
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, NoReturn, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
 from feti_homog.errors import EXIT_DEFECT, FetiHomogError
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Comm
 
-P = ParamSpec("P")
 T = TypeVar("T")
 PATIENCE = 5.0  # seconds that a rank with an error waits for the others to come with theirs
 
@@ -22,10 +21,11 @@ class RemoteError(RuntimeError):
     """A defect met on another rank; the text is that rank's traceback."""
 
 
-def on_root(comm: Comm, function: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> T:
+def on_root(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs: Any) -> T:
     """function(...) of rank 0, on every rank; what it raises is raised on every rank.
 
-    Collective. The result must be picklable; `function` must not communicate.
+    Collective; the other ranks' arguments do not matter. The result must be picklable; `function` must
+    not communicate.
     """
     result, error = _attempt(function, *args, **kwargs) if comm.rank == 0 else (None, None)
     result, message = comm.bcast((result, _portable(comm, error)), root=0)
@@ -34,7 +34,7 @@ def on_root(comm: Comm, function: Callable[P, T], /, *args: P.args, **kwargs: P.
     return result
 
 
-def on_root_only(comm: Comm, function: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> T | None:
+def on_root_only(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs: Any) -> T | None:
     """function(...) on rank 0, None on the others; what it raises is raised on every rank. Collective."""
     result, error = _attempt(function, *args, **kwargs) if comm.rank == 0 else (None, None)
     message = comm.bcast(_portable(comm, error), root=0)
@@ -43,7 +43,7 @@ def on_root_only(comm: Comm, function: Callable[P, T], /, *args: P.args, **kwarg
     return result
 
 
-def agree(comm: Comm, function: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> T:
+def agree(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs: Any) -> T:
     """function(...) of each rank on that rank; if it raises on any, every rank raises.
 
     A rank that met a defect raises that; all others raise that of the first such rank or, if there was none,

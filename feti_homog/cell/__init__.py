@@ -1,1 +1,1 @@
-"""The periodic cell: arrangement of the fibres, coarse mesh by gmsh or from a file, refinement, identity on the torus."""
+"""The periodic cell: arrangement of fibres, coarse mesh by gmsh or from a file, refinement, torus."""

@@ -29,7 +29,7 @@ STEPS = 2000
 
 @dataclass(frozen=True)
 class Arrangement:
-    """Discs with `centres` (N, 2) and `radii` (N,) on the torus of periods `width` and `height`; none touch."""
+    """Discs with `centres` (N, 2) and `radii` (N,) on the torus of periods `width`, `height`; none touch."""
 
     width: float
     height: float
@@ -40,8 +40,8 @@ class Arrangement:
 def arrange(cell: Cell) -> Arrangement:
     """The arrangement that a case asks for, whose area fraction is `cell.fibre_fraction` to rounding.
 
-    square: one disc in the middle of a 1 x 1 cell. hexagonal: 1 x sqrt(3), a disc in the middle and one at the
-    corner. random: `cell.fibres` discs in a 1 x 1 cell, see `random_arrangement`. Raises MeshError.
+    square: one disc in the middle of a 1 x 1 cell. hexagonal: 1 x sqrt(3), a disc in the middle and one at
+    the corner. random: `cell.fibres` discs in a 1 x 1 cell, see `random_arrangement`. Raises MeshError.
     """
     return ARRANGEMENTS[cell.geometry](cell)
 
@@ -61,8 +61,8 @@ def _lattice(cell: Cell, height: float, centres: Floats, limit: float) -> Arrang
     assert fraction is not None
     if fraction >= limit:
         raise MeshError(
-            f"[cell] fibre_fraction = {fraction:g}: the fibres of the {cell.geometry} cell touch at {limit:.4f}; "
-            "it must be smaller"
+            f"[cell] fibre_fraction = {fraction:g}: the fibres of the {cell.geometry} cell touch at "
+            f"{limit:.4f}; it must be smaller"
         )
     radius = sqrt(fraction * height / (pi * len(centres)))
     return Arrangement(1.0, height, centres, np.full(len(centres), radius))
@@ -71,10 +71,10 @@ def _lattice(cell: Cell, height: float, centres: Floats, limit: float) -> Arrang
 def random_arrangement(cell: Cell) -> Arrangement:
     """Discs at random in the unit square, periodic, the same for the same case on every machine.
 
-    Radii are uniform in mean * (1 - s, 1 + s), s = `radius_spread`, and scaled to the fraction. Any two discs, images
-    included, are at least `min_gap` mean diameters apart. Uniform random centres are moved down the gradient of
-    the overlap energy 1/2 sum max(0, R_i + R_j - |x_i - x_j|)^2 of the discs grown by half the gap, until it is
-    zero; when that jams, it starts again a few times. Last, the whole torus is shifted (`clear_shift`).
+    Radii are uniform in mean * (1 - s, 1 + s), s = `radius_spread`, and scaled to the fraction. Any two
+    discs, images included, are at least `min_gap` mean diameters apart. Random centres are moved down the
+    gradient of the overlap energy 1/2 sum max(0, R_i + R_j - |x_i - x_j|)^2 of the discs grown by half the
+    gap until it is zero; when that jams, it starts again a few times. Last, the torus is shifted (`clear_shift`).
     Raises MeshError when no arrangement is found.
     """
     count, gap, fraction = cell.fibres, cell.min_gap, cell.fibre_fraction
@@ -137,14 +137,15 @@ def _relax(centres: Floats, radii: Floats) -> tuple[Floats, float]:
         if clearance >= 1:
             break
         overlap = np.maximum(target[first] + target[second] - distance, 0.0)
-        push = overlap / np.maximum(distance, 1e-9) * (first != second)
-        force = [
-            np.bincount(second, push * vector[:, k], len(radii)) - np.bincount(first, push * vector[:, k], len(radii))
-            for k in (0, 1)
-        ]
-        step = 0.25 * np.stack(force, axis=1) + 0.9 * step
+        push = (overlap / np.maximum(distance, 1e-9))[:, None] * vector
+        step = 0.25 * (_sum_at(second, push, len(radii)) - _sum_at(first, push, len(radii))) + 0.9 * step
         centres = (centres + step) % 1.0
     return centres, clearance
+
+
+def _sum_at(rows: Integers, vectors: Floats, count: int) -> Floats:
+    """Sums (count, 2) of the vectors (k, 2) of each row, added one after the other."""
+    return np.stack([np.bincount(rows, vectors[:, axis], count) for axis in (0, 1)], axis=1)
 
 
 def clear_shift(arrangement: Arrangement) -> Arrangement:
@@ -153,7 +154,7 @@ def clear_shift(arrangement: Arrangement) -> Arrangement:
     Along each axis the candidates are the middles of the widest gaps between the positions where a boundary
     line touches a disc; among their combinations the one whose corner is farthest from a circle is taken.
     """
-    size = np.array([arrangement.width, arrangement.height])
+    size = (arrangement.width, arrangement.height)
     centres, radii = arrangement.centres, arrangement.radii
     lines = []
     for axis in (0, 1):
@@ -162,10 +163,10 @@ def clear_shift(arrangement: Arrangement) -> Arrangement:
         wide = np.argsort(-gaps, kind="stable")[:4]
         wide = wide[gaps[wide] > 0.7 * gaps[wide[0]]]
         lines.append(touching[wide] + gaps[wide] / 2)
-    corners = np.array(list(product(*lines)))
-    offset = (centres - corners[:, None] + size / 2) % size - size / 2
+    corners, half = np.array(list(product(*lines))), np.array(size) / 2
+    offset = (centres - corners[:, None] + half) % size - half
     distance = np.abs(np.linalg.norm(offset, axis=2) - radii).min(axis=1)
-    return Arrangement(*size.tolist(), (centres - corners[np.argmax(distance)]) % size, radii)
+    return Arrangement(*size, (centres - corners[np.argmax(distance)]) % size, radii)
 
 
 ARRANGEMENTS: dict[str, Callable[[Cell], Arrangement]] = {

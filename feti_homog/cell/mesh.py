@@ -13,12 +13,13 @@ Ints = NDArray[np.int32]
 
 @dataclass(frozen=True)
 class CoarseMesh:
-    """Conforming periodic mesh of straight triangles on the cell [0, width] x [0, height]; lives on rank 0 only.
+    """Conforming periodic mesh of straight triangles on the cell [0, width] x [0, height]; on rank 0 only.
 
     points (n, 2)        nodes in the plane
     triangles (m, 3)     counter-clockwise; none has two edges on the same circle
     phase (m,)           index into `phases`, whose first name is "matrix"
-    representative (n,)  node that stands for the class of a node on the torus: x = width -> x = 0, y = height -> y = 0
+    representative (n,)  node that stands for the class of a node on the torus: x = width -> x = 0, y = height
+                         -> y = 0; idempotent
     circles (k, 3)       centre and radius in the plane; periodic images are listed separately
     arc_edges (a, 2)     edges of the mesh whose ends lie on a circle, to rounding
     arc_circle (a,)      the circle of each of them
@@ -57,8 +58,8 @@ def edge_keys(pairs: Ints, nodes: int) -> NDArray[np.int64]:
 def representatives(points: Floats, width: float, height: float) -> Ints:
     """Class representative (n,) of each node, for a mesh whose opposite sides match exactly.
 
-    A node at x = width stands with its partner at x = 0, one at y = height with its partner at y = 0, the four
-    corners with the one at the origin.
+    A node at x = width has the class of its partner at x = 0, one at y = height that of its partner at y = 0,
+    and the four corners that of the origin.
     """
     result = np.arange(len(points), dtype=np.int32)
     for axis, period in ((0, width), (1, height)):
@@ -72,8 +73,8 @@ def representatives(points: Floats, width: float, height: float) -> Ints:
 def flip_double_arcs(triangles: Ints, phase: Ints, arc_edges: Ints, arc_circle: Ints, nodes: int) -> Ints:
     """Triangles (m, 3) after edge flips, such that as few as possible have two edges on the same circle.
 
-    Such a triangle would have an angle of 180 degrees once its edges follow the circle. Its third edge, a chord, is
-    exchanged for the other diagonal of the two triangles beside the chord, in a few rounds.
+    Such a triangle would have an angle of 180 degrees once its edges follow the circle. Its third edge, a
+    chord, is exchanged for the other diagonal of the two triangles beside the chord, in a few rounds.
     """
     triangles = triangles.copy()
     for _ in range(8):
@@ -92,7 +93,8 @@ def flip_double_arcs(triangles: Ints, phase: Ints, arc_edges: Ints, arc_circle: 
         if not chosen.any():
             break
         t, s, i, j = bad[chosen], other[chosen] // 3, corner[chosen], other[chosen] % 3
-        tip, a, b, far = triangles[t, i], triangles[t, (i + 1) % 3], triangles[t, (i + 2) % 3], triangles[s, j]
+        tip, a, b = (triangles[t, (i + step) % 3] for step in range(3))
+        far = triangles[s, j]
         triangles[t] = np.stack([tip, a, far], axis=1)
         triangles[s] = np.stack([tip, far, b], axis=1)
     return triangles

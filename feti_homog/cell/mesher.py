@@ -33,16 +33,18 @@ Signed = tuple[int, Curve]
 def generate(cell: Cell, marks: Mapping[int, Sequence[float]] = NO_MARKS) -> CoarseMesh:
     """The periodic coarse mesh of a square, hexagonal or random cell, elements about mesh_size * width.
 
-    `marks` maps a fibre (its number in the arrangement) to angles in degrees, measured at its centre, at which the
-    mesh gets nodes: the tips of debonded arcs. Raises MeshError if the cell cannot be arranged. On rank 0 only.
+    `marks` maps a fibre (its number in the arrangement) to angles in degrees, measured at its centre, where
+    the mesh gets nodes: the tips of debonded arcs. A mark within MERGED of where the circle crosses the cell's
+    boundary, or of another mark, is moved there. Raises MeshError if the cell cannot be arranged.
     """
     arrangement = arrange(cell)
     lines = outline(arrangement, cell.mesh_size * arrangement.width, marks)
     points, triangles, circle = _fill(lines, cell.mesh_size * arrangement.width)
     phase = (circle != MATRIX).astype(np.int32)
     arcs = [curve for curve in lines.curves if curve.circle != MATRIX]
-    arc_edges = np.concatenate([np.stack([arc.nodes[:-1], arc.nodes[1:]], axis=1) for arc in arcs]).astype(np.int32)
-    arc_circle = np.repeat([arc.circle for arc in arcs], [len(arc.nodes) - 1 for arc in arcs]).astype(np.int32)
+    arc_edges = np.concatenate([np.stack([arc.nodes[:-1], arc.nodes[1:]], axis=1) for arc in arcs])
+    arc_edges = arc_edges.astype(np.int32)
+    arc_circle = np.repeat([arc.circle for arc in arcs], [len(arc.nodes) - 1 for arc in arcs])
     return CoarseMesh(
         width=arrangement.width,
         height=arrangement.height,
@@ -53,7 +55,7 @@ def generate(cell: Cell, marks: Mapping[int, Sequence[float]] = NO_MARKS) -> Coa
         representative=representatives(points, arrangement.width, arrangement.height),
         circles=lines.circles,
         arc_edges=arc_edges,
-        arc_circle=arc_circle,
+        arc_circle=arc_circle.astype(np.int32),
     )
 
 
@@ -96,7 +98,7 @@ def _fill(lines: Outline, largest: float) -> tuple[Floats, Integers, Integers]:
 
 
 def _add_lines(gmsh: ModuleType, lines: Outline) -> list[list[int]]:
-    """Make each edge of the outline a straight line of one element; the lines of each curve. Node n has tag n + 1."""
+    """Make each edge of the outline a line of one element, node n a point n + 1; the lines of each curve."""
     geo = gmsh.model.geo
     for tag, (x, y) in enumerate(lines.points.tolist(), 1):
         geo.addPoint(x, y, 0.0, tag=tag)

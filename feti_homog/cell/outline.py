@@ -1,4 +1,4 @@
-"""The lines of the cell: its sides and the arcs of fibres within it, cut where they meet, with the nodes on them."""
+"""The lines of the cell: its sides and the arcs of fibres in it, cut where they meet, with nodes on them."""
 
 from __future__ import annotations
 
@@ -17,15 +17,17 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.intp]
 
 MATRIX = -1
-# Vertices of a circle closer than this many radians are one.
+# Relative distance below which two positions are one.
 SAME = 1e-9
+# A mark nearer than this many radians to another vertex of its circle is that vertex.
+MERGED = np.radians(0.05)
 TURN = 2 * np.pi
 QUARTER = TURN / 4
 # Positions at which the size is sampled along an arc and along a piece of a side.
 ARC_SAMPLES = 65
 SIDE_SAMPLES = 513
 
-Height = Callable[[Floats], Floats]
+Spacing = Callable[[Floats], Floats]
 
 
 @dataclass(frozen=True)
@@ -44,7 +46,7 @@ class Curve:
 
 @dataclass(frozen=True)
 class Outline:
-    """Nodes (n, 2) on all lines, exactly in place, the curves through them, and the circles (k, 3) in the plane."""
+    """Nodes (n, 2) on all lines, exactly in place, curves through them, and circles (k, 3) in the plane."""
 
     points: Floats
     curves: tuple[Curve, ...]
@@ -52,7 +54,7 @@ class Outline:
 
 
 def images(arrangement: Arrangement) -> tuple[Floats, Integers]:
-    """Circles (k, 3) of all periodic images of fibres that reach into the cell, and the fibre (k,) of each."""
+    """Circles (k, 3) of the periodic images of fibres that reach into the cell, and their fibres (k,)."""
     size = np.array([arrangement.width, arrangement.height])
     circles, fibre = [], []
     for step in product((-1, 0, 1), repeat=2):
@@ -67,23 +69,24 @@ def images(arrangement: Arrangement) -> tuple[Floats, Integers]:
 def outline(arrangement: Arrangement, largest: float, marks: Mapping[int, Sequence[float]]) -> Outline:
     """All lines of the cell with nodes at distances of at most `largest`, closer in narrow passages.
 
-    Opposite sides have the same nodes. `marks` maps a fibre to angles in degrees, measured at its centre, that
-    become nodes.
+    Opposite sides have the same nodes. `marks` maps a fibre to angles in degrees, measured at its centre,
+    that become nodes.
     """
     size = np.array([arrangement.width, arrangement.height])
     circles, fibre = images(arrangement)
     places = [_crossings(circles, axis, size) for axis in (0, 1)]
-    border = np.concatenate([_on_side(places[axis], axis, level) for axis in (0, 1) for level in (0.0, size[1 - axis])])
+    sides = ((axis, level) for axis in (0, 1) for level in (0.0, size[1 - axis]))
+    border = np.concatenate([_on_side(places[axis], axis, level) for axis, level in sides])
     circle, start, stop = _arcs(circles, _vertex_angles(circles, fibre, border, marks), size)
     ends = _on_circle(circles[circle], start)
     away = cKDTree(border).query(ends)[0] > SAME * size.max()
     numbering = _Numbering(np.concatenate([np.unique(border, axis=0), ends[away]]))
-    height = line_size(arrangement, largest, numbering.vertices)
+    spacing = line_size(arrangement, largest, numbering.vertices)
 
     curves = []
     for axis in (0, 1):
-        curves += _side_curves(axis, places[axis], circles, size, height, numbering)
-    curves += _arc_curves(circles, circle, start, stop, height, largest, numbering)
+        curves += _side_curves(axis, places[axis], circles, size, spacing, numbering)
+    curves += _arc_curves(circles, circle, start, stop, spacing, largest, numbering)
     return Outline(numbering.points(), tuple(curves), circles)
 
 
@@ -110,7 +113,7 @@ class _Numbering:
 
 
 def _crossings(circles: Floats, axis: int, size: Floats) -> Floats:
-    """Sorted coordinates along `axis` of the vertices on the side at 0: its corners, and where circles cross it."""
+    """Sorted coordinates along `axis` of the vertices on the side at 0: corners and crossings of circles."""
     depth, centre, radius = circles[:, 1 - axis], circles[:, axis], circles[:, 2]
     half = np.sqrt(np.maximum(radius**2 - depth**2, 0.0))
     crossing = np.concatenate([centre - half, centre + half])[np.tile(half > 0, 2)]
@@ -129,17 +132,20 @@ def _on_circle(circles: Floats, angles: Floats) -> Floats:
     return circles[..., :2] + circles[..., 2:] * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
 
 
-def _vertex_angles(circles: Floats, fibre: Integers, border: Floats, marks: Mapping[int, Sequence[float]]) -> list[Floats]:
-    """Sorted angles in [0, 2 pi) of the vertices of each circle: where it crosses the sides, and the marks."""
+def _vertex_angles(
+    circles: Floats, fibre: Integers, border: Floats, marks: Mapping[int, Sequence[float]]
+) -> list[Floats]:
+    """Sorted angles in [0, 2 pi) of the vertices of each circle: crossings of the sides, and the marks."""
     angles = []
     near = cKDTree(border).query_ball_point(circles[:, :2], circles[:, 2] * (1 + SAME))
     for circle, owner, candidates in zip(circles, fibre.tolist(), near, strict=True):
         offset = border[candidates] - circle[:2]
         offset = offset[np.linalg.norm(offset, axis=1) > circle[2] * (1 - SAME)]
-        crossing = np.arctan2(offset[:, 1], offset[:, 0])
-        own = np.sort(np.concatenate([crossing, np.radians(marks.get(owner, ()))]) % TURN)
-        own = own if len(own) else np.zeros(1)
-        angles.append(own[np.diff(own, append=own[0] + TURN) > SAME] if len(own) > 1 else own)
+        own = (np.arctan2(offset[:, 1], offset[:, 0]) % TURN).tolist()
+        for mark in np.radians(marks.get(owner, ())) % TURN:
+            if all(abs((mark - angle + np.pi) % TURN - np.pi) > MERGED for angle in own):
+                own.append(mark)
+        angles.append(np.sort(own) if own else np.zeros(1))
     return angles
 
 
@@ -160,23 +166,23 @@ def _arcs(circles: Floats, angles: list[Floats], size: Floats) -> tuple[Integers
 
 
 def _side_curves(
-    axis: int, places: Floats, circles: Floats, size: Floats, height: Height, numbering: _Numbering
+    axis: int, places: Floats, circles: Floats, size: Floats, spacing: Spacing, numbering: _Numbering
 ) -> list[Curve]:
     """The pieces of the two sides along `axis`, with the same nodes on both."""
     share = np.linspace(0, 1, SIDE_SAMPLES)
     begin, span = places[:-1], np.diff(places)
     samples = _on_side((begin[:, None] + span[:, None] * share).ravel(), axis, 0.0)
-    sizes = height(samples).reshape(len(span), -1)
+    sizes = spacing(samples).reshape(len(span), -1)
     curves = []
     for level, low in ((0.0, True), (size[1 - axis], False)):
         inside = _disc_at(_on_side(begin + span / 2, axis, level), circles)
-        # A chord of two edges or more keeps triangles with two arc edges off the side, where they could not be flipped.
-        least = np.where(_disc_at(samples.reshape(len(span), -1, 2)[:, SIDE_SAMPLES // 2], circles) == MATRIX, 1, 2)
+        # A chord has two edges or more: a triangle with two arc edges beside it could not be flipped.
+        least = np.where(inside == MATRIX, 1, 2)
         for piece, stations in enumerate(_stations(share, sizes, span, least)):
             along = begin[piece] + span[piece] * stations
             along[[0, -1]] = places[piece : piece + 2]
             nodes = numbering.along(_on_side(along, axis, level))
-            # Counter-clockwise around the cell: the bottom and the right side run upwards in their coordinate.
+            # Counter-clockwise around the cell: along the coordinate at the bottom and at the right.
             curves.append(Curve(nodes if low == (axis == 0) else nodes[::-1], MATRIX, int(inside[piece])))
     return curves
 
@@ -188,14 +194,20 @@ def _disc_at(points: Floats, circles: Floats) -> Integers:
 
 
 def _arc_curves(
-    circles: Floats, circle: Integers, start: Floats, stop: Floats, height: Height, largest: float, numbering: _Numbering
+    circles: Floats,
+    circle: Integers,
+    start: Floats,
+    stop: Floats,
+    spacing: Spacing,
+    largest: float,
+    numbering: _Numbering,
 ) -> list[Curve]:
-    """The arcs as curves."""
+    """The arcs (a,) from angle `start` to `stop` on their circles as curves."""
     share = np.linspace(0, 1, ARC_SAMPLES)
     span = stop - start
     samples = _on_circle(circles[circle, None], start[:, None] + span[:, None] * share)
     caps = circle_size(circles[circle, 2], largest)
-    sizes = np.minimum(height(samples.reshape(-1, 2)).reshape(len(span), -1), caps[:, None])
+    sizes = np.minimum(spacing(samples.reshape(-1, 2)).reshape(len(span), -1), caps[:, None])
     curves = []
     stations = _stations(share, sizes, span * circles[circle, 2], np.ones(len(span), dtype=np.intp))
     for number, begin, turn, own in zip(circle.tolist(), start, span, stations, strict=True):
@@ -213,6 +225,5 @@ def _stations(share: Floats, sizes: Floats, lengths: Floats, least: Integers) ->
     steps = (density[:, 1:] + density[:, :-1]) / 2 * np.diff(share)
     measure = np.concatenate([np.zeros((len(lengths), 1)), np.cumsum(steps, axis=1)], axis=1)
     counts = np.maximum(np.ceil(measure[:, -1] - 1e-6).astype(int), least)
-    return [
-        np.interp(np.linspace(0, own[-1], count + 1), own, share) for own, count in zip(measure, counts, strict=True)
-    ]
+    pairs = zip(measure, counts, strict=True)
+    return [np.interp(np.linspace(0, own[-1], count + 1), own, share) for own, count in pairs]

@@ -17,18 +17,19 @@ Floats = NDArray[np.float64]
 AROUND = 16
 # Edge length in a narrow passage, relative to its width.
 PASSAGE = 1.5
-# Growth of the edge length per distance.
+# Growth of the edge length per distance, at most.
 GROWTH = 0.4
 
-Source = tuple[Floats, Floats]
+# Places (k, 2), edge lengths (k,) and growths (k,).
+Source = tuple[Floats, Floats, Floats]
 
 
 def line_size(arrangement: Arrangement, largest: float, vertices: Floats) -> Callable[[Floats], Floats]:
-    """The function h(x) = min(largest, min_k (h_k + GROWTH |x - x_k|)) of positions (n, 2) on the torus.
+    """The function h(x) = min(largest, min_k (h_k + g_k |x - x_k|)) of positions (n, 2) on the torus.
 
-    The sources (x_k, h_k) are the two faces of each narrow passage between two fibres, or between a fibre and a
-    side or corner of the cell, with h_k proportional to its width, and the `vertices` (v, 2) that the mesh must have, with
-    the distance to the next one.
+    The sources (x_k, h_k) are the two faces of each narrow passage between two fibres, or between a fibre and
+    a side or corner of the cell, with h_k proportional to its width, and the `vertices` (v, 2) that the mesh
+    must have, with the distance to the next one.
     """
     size = np.array([arrangement.width, arrangement.height])
     caps = circle_size(arrangement.radii, largest)
@@ -38,15 +39,16 @@ def line_size(arrangement: Arrangement, largest: float, vertices: Floats) -> Cal
         _at_corners(arrangement, size, caps),
         _at_vertices(vertices, size, largest),
     ]
-    places = _wrap(np.concatenate([place for place, _ in sources]), size)
-    lengths = np.concatenate([length for _, length in sources])
+    places, lengths, growths = (np.concatenate(parts) for parts in zip(*sources, strict=True))
+    lengths, growths = np.append(lengths, np.inf), np.append(growths, GROWTH)
+    places = _wrap(places, size)
     tree = cKDTree(places, boxsize=size)
     count = min(16, len(places))
 
     def at(points: Floats) -> Floats:
+        # Beyond the bound the tree gives the source behind the last, which is infinite.
         distance, nearest = tree.query(_wrap(points, size), k=count, distance_upper_bound=largest / GROWTH)
-        padded = np.append(lengths, np.inf)
-        graded = (padded[nearest] + GROWTH * distance).reshape(len(points), -1)
+        graded = (lengths[nearest] + growths[nearest] * distance).reshape(len(points), -1)
         return np.minimum(largest, graded.min(axis=1))
 
     return at
@@ -69,19 +71,26 @@ def _between_fibres(arrangement: Arrangement, size: Floats, caps: Floats, larges
     distance = np.linalg.norm(vector, axis=1)
     gap = distance - radii[first] - radii[second]
     normal = vector / distance[:, None]
-    places, lengths = [], []
+    growth = _growth(gap, 1 / radii[first] + 1 / radii[second])
+    places, lengths, growths = [], [], []
     for here, there, sign in ((first, second, 1.0), (second, first, -1.0)):
         length = np.minimum(PASSAGE * gap, caps[there] + GROWTH * gap)
         near = length < caps[here]
         places.append((centres[here] + sign * radii[here, None] * normal)[near])
         lengths.append(length[near])
-    return np.concatenate(places), np.concatenate(lengths)
+        growths.append(growth[near])
+    return np.concatenate(places), np.concatenate(lengths), np.concatenate(growths)
+
+
+def _growth(width: Floats, curvature: Floats) -> Floats:
+    """Growth with which edges stay below twice the width w + c s^2 / 2 of a passage of curvature c."""
+    return np.minimum(GROWTH, np.sqrt((4 - 2 * PASSAGE) * 2 * width * curvature))
 
 
 def _at_sides(arrangement: Arrangement, size: Floats, caps: Floats) -> Source:
-    """Where a circle comes near a side without crossing it, or hardly crosses it: its extreme point and the foot."""
+    """Where a circle comes near a side, or hardly crosses it: its extreme point and the foot on the side."""
     centres, radii = arrangement.centres % size, arrangement.radii
-    places, lengths = [], []
+    places, lengths, growths = [], [], []
     for axis, sign in product((0, 1), (-1.0, 1.0)):
         distance = centres[:, axis] if sign < 0 else size[axis] - centres[:, axis]
         extreme, foot = centres.copy(), centres.copy()
@@ -90,8 +99,9 @@ def _at_sides(arrangement: Arrangement, size: Floats, caps: Floats) -> Source:
         length = PASSAGE * np.abs(distance - radii)
         near = length < caps
         places += [extreme[near], foot[near]]
-        lengths += [length[near], length[near]]
-    return np.concatenate(places), np.concatenate(lengths)
+        lengths += [length[near]] * 2
+        growths += [_growth(length[near] / PASSAGE, 1 / radii[near])] * 2
+    return np.concatenate(places), np.concatenate(lengths), np.concatenate(growths)
 
 
 def _at_corners(arrangement: Arrangement, size: Floats, caps: Floats) -> Source:
@@ -101,7 +111,8 @@ def _at_corners(arrangement: Arrangement, size: Floats, caps: Floats) -> Source:
     length = PASSAGE * np.abs(distance - arrangement.radii)
     near = length < caps
     facing = offset[near] * (1 - arrangement.radii[near] / distance[near])[:, None]
-    return np.concatenate([facing, np.zeros_like(facing)]), np.tile(length[near], 2)
+    places = np.concatenate([facing, np.zeros_like(facing)])
+    return places, np.tile(length[near], 2), np.full(len(places), GROWTH)
 
 
 def _at_vertices(vertices: Floats, size: Floats, largest: float) -> Source:
@@ -111,6 +122,6 @@ def _at_vertices(vertices: Floats, size: Floats, largest: float) -> Source:
     same = tree.query_pairs(1e-9 * size.max(), output_type="ndarray")
     places = np.delete(places, same[:, 1], axis=0)
     if len(places) == 1:
-        return places, np.array([largest])
+        return places, np.array([largest]), np.array([GROWTH])
     distance, _ = cKDTree(places, boxsize=size).query(places, k=2)
-    return places, distance[:, 1]
+    return places, distance[:, 1], np.full(len(places), GROWTH)

@@ -79,7 +79,7 @@ def _metis(mask: NDArray[np.bool_], left: Int, right: Int, count: int) -> Int:
     # Two triangles that share two edges (on a very coarse torus) count once.
     graph = coo_matrix((np.ones(2 * len(a), np.int8), (np.r_[a, b], np.r_[b, a])), shape=(n, n)).tocsr()
     options = pymetis.Options(contig=1, seed=0)
-    _, part = pymetis.part_graph(count, xadj=graph.indptr, adjncy=graph.indices, options=options)
+    _, part = pymetis.part_graph(count, pymetis.CSRAdjacency(graph.indptr, graph.indices), options=options)
     return np.asarray(part, np.int64)
 
 

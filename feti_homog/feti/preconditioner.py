@@ -7,6 +7,7 @@ block-diagonal by node class.  S is the boundary block of K (lumped), or its Sch
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 from mpi4py import MPI
@@ -48,7 +49,8 @@ class Dirichlet:
 
 def boundary_stiffness(stiffness: Sequence[csr_matrix], boundary: NDArray[np.bool_], dirichlet: bool) -> Lumped | Dirichlet:
     """S of all subdomains of this rank; `boundary` marks the boundary dofs, the subdomains one after the other."""
-    marks = np.split(boundary, np.cumsum([K.shape[0] for K in stiffness])[:-1])
+    offsets = np.cumsum([0, *(K.shape[0] for K in stiffness)])
+    marks = [boundary[first:last] for first, last in pairwise(offsets)]
     Kbb = csr_matrix(block_diag([K[b][:, b] for K, b in zip(stiffness, marks, strict=True)] or [np.zeros((0, 0))]))
     if not dirichlet:
         return Lumped(Kbb)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from feti_homog.cell.refine import Lattice
-from feti_homog.errors import CaseError, ConvergenceError
+from feti_homog.errors import CaseError
 from feti_homog.feti.coarse import CoarseProblem
 from feti_homog.feti.constraints import Constraints
 from feti_homog.feti.local import LocalSolver
@@ -68,8 +68,7 @@ class FetiSolver:
     def solve(self, f: Float) -> Solution:
         """Solve for the local loads f (local dofs,).
 
-        Raises:
-            ConvergenceError: the Krylov method diverged or broke down (collectively).
+        Not to converge is no error here: the solution says so in its `reason`.
         """
         lam, rhs, w = self._lam0, self._rhs, self._w
         self.coarse.balance(f, lam)
@@ -81,6 +80,11 @@ class FetiSolver:
             self.ksp.solve(rhs, w)
         lam.axpy(1.0, w)
         return self._recover(f, lam)
+
+    @property
+    def rtol(self) -> float:
+        """Relative tolerance of the primal residuals."""
+        return float(self.ksp.getTolerances()[0])
 
     def _recover(self, f: Float, lam: PETSc.Vec) -> Solution:
         """u = K+ (f - B^T lam) + R alpha, Eq. (34), with alpha from the jump of the first term."""

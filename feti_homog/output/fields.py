@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -27,7 +26,7 @@ Integers = NDArray[np.integer[Any]]
 NAME = "result.h5"
 INTEGERS = {name: np.int32 for name in ("body", "subdomain", "phase", "fibre")}
 TYPES = INTEGERS | {"triangles": np.int64, "status": np.int8}  # all other tables are float64
-RESERVE = 1 << 20  # bytes left on the disk for what HDF5 itself adds to the tables
+RESERVE = 1 << 17  # bytes for what HDF5 itself adds to the tables of a group
 
 
 @dataclass(frozen=True)
@@ -53,7 +52,7 @@ class MeshPart:
     """
 
     points: Floats  # (n, 2)
-    triangles: Integers  # (m, 3), or (m, 6): vertices, then the mid-edge nodes 01, 12, 20; this rank's numbers
+    triangles: Integers  # (m, 3), or (m, 6): vertices, then mid-edge nodes 01, 12, 20; this rank's numbers
     body: Integers  # (m,)
     subdomain: Integers  # (m,)
     phase: Integers  # (m,) index into Header.phases
@@ -124,7 +123,7 @@ class FieldFile:
         self._nodes = _Rows.of(comm, len(mesh.points))
         self._elements = _Rows.of(comm, len(mesh.triangles))
         self._interface = _Rows.of(comm, len(interface.points))
-        on_root(comm, _told, self._path, _probe, self._part)
+        on_root(comm, _told, self._path, _probe, self._part, comm.size)
         self._file = agree(comm, _told, self._path, _create, self._part, comm)
         self._together(_set_attributes, self._file, asdict(header) | {"created_by": "feti_homog"})
         elements = {"triangles": mesh.triangles + np.int64(self._nodes.start), "body": mesh.body}
@@ -135,7 +134,7 @@ class FieldFile:
         self._view("interface/normal", self._interface)
 
     def write_state(self, number: int, state: StatePart) -> None:
-        """Adds state `number` (0, 1, ...) and flushes; strain, stress_mean and load_factor are the same on all ranks."""
+        """Adds state `number` (0, 1, ...) and flushes. The cell's own numbers are the same on all ranks."""
         name = f"state/{number}"
         self._write(name, self._nodes, {"displacement": state.displacement, "fluctuation": state.fluctuation})
         self._write(name, self._elements, {"stress": state.stress})
@@ -165,8 +164,8 @@ class FieldFile:
     def _write(self, group: str, rows: _Rows, tables: Mapping[str, Any]) -> None:
         """Makes the tables of a group, each rank giving its rows."""
         arrays = agree(self._comm, _arrays, group, rows.count, tables)
-        size = sum(rows.total * array.dtype.itemsize * int(np.prod(array.shape[1:])) for array in arrays.values())
-        self._together(_need_space, self._comm.rank, self._part.parent, size)
+        row = sum(array.dtype.itemsize * int(np.prod(array.shape[1:])) for array in arrays.values())
+        self._together(_reserve, self._comm.rank, self._part, row * rows.total)
         for name, array in arrays.items():
             self._together(_write_rows, self._file, f"{group}/{name}", rows, array)
 
@@ -178,7 +177,7 @@ class FieldFile:
             self._together(self._file.create_virtual_dataset, f"vector/{name}", layout, 0.0)
 
     def _together(self, function: Callable[..., object], *args: Any) -> None:
-        """function(*args) on all ranks; if the file cannot be written on any, removes it and raises on all."""
+        """function(*args) on all ranks; if any cannot write, the file is removed and all raise."""
         try:
             agree(self._comm, _told, self._path, function, *args)
         except FetiHomogError:
@@ -208,18 +207,16 @@ def _told(path: Path, function: Callable[..., Any], *args: Any) -> Any:
         raise FetiHomogError(f"cannot write {path}: {error}") from error
 
 
-def _probe(part: Path) -> None:
+def _probe(part: Path, ranks: int) -> None:
     """Finds out in plain terms whether the file can be made, before MPI-IO tries."""
+    if ranks > 1 and not h5py.get_config().mpi:
+        raise FetiHomogError(f"h5py is built without MPI: {ranks} ranks cannot write {part.stem}")
     part.parent.mkdir(parents=True, exist_ok=True)
     part.open("wb").close()
 
 
 def _create(part: Path, comm: Comm) -> Any:
-    if h5py.get_config().mpi:
-        return h5py.File(part, "w", driver="mpio", comm=comm)
-    if comm.size == 1:
-        return h5py.File(part, "w")
-    raise FetiHomogError(f"h5py has no MPI: {comm.size} ranks cannot write {part.name}; set output.fields = false")
+    return h5py.File(part, "w", driver="mpio", comm=comm) if h5py.get_config().mpi else h5py.File(part, "w")
 
 
 def _set_attributes(target: Any, attributes: Mapping[str, Any]) -> None:
@@ -228,16 +225,19 @@ def _set_attributes(target: Any, attributes: Mapping[str, Any]) -> None:
 
 
 def _arrays(group: str, count: int, tables: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
-    arrays = {name: np.ascontiguousarray(table, TYPES.get(name, np.float64)) for name, table in tables.items()}
+    types = {name: TYPES.get(name, np.float64) for name in tables}
+    arrays = {name: np.ascontiguousarray(table, types[name]) for name, table in tables.items()}
     for name, array in arrays.items():
         if len(array) != count:
             raise ValueError(f"/{group}/{name} has {len(array)} rows, not {count}")
     return arrays
 
 
-def _need_space(rank: int, directory: Path, size: int) -> None:
-    if rank == 0 and (free := shutil.disk_usage(directory).free) < size + RESERVE:
-        raise OSError(f"{size / 1e6:.1f} MB are needed and {free / 1e6:.1f} MB are free on the disk")
+def _reserve(rank: int, part: Path, size: int) -> None:
+    """Takes the space on the disk: where it ends while MPI-IO writes, some ranks may not hear of it and hang."""
+    if rank == 0:
+        with part.open("r+b") as stream:
+            os.posix_fallocate(stream.fileno(), stream.seek(0, os.SEEK_END), size + RESERVE)
 
 
 def _write_rows(file: Any, name: str, rows: _Rows, array: NDArray[Any]) -> None:

@@ -17,7 +17,7 @@ NAME = "result.json"
 
 
 def write(directory: Path, document: Mapping[str, Any]) -> Path:
-    """Writes the document as `directory`/result.json, makes the directory if needed, and returns the file's path.
+    """Writes `directory`/result.json, whose folder is made if needed; returns its path.
 
     NumPy arrays and scalars become lists and numbers, tuples lists, paths text. The file is replaced in one
     step: a reader finds the old document or the new one. Call on one rank.

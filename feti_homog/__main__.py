@@ -1,0 +1,7 @@
+"""`python -m feti_homog`."""
+
+import sys
+
+from feti_homog.cli import main
+
+sys.exit(main())

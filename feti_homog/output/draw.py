@@ -1,0 +1,106 @@
+"""What the pictures show of result.h5: at most about LIMIT triangles, read in blocks, and the outlines of the bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[Any]
+
+LIMIT = 100_000  # triangles in a picture
+BLOCK = 1 << 18  # rows of a table read at once
+QUARTERS = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])  # of a six-node triangle
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """The drawn triangles: those of the file, or the coarser ones of which each holds `group` of them."""
+
+    group: int
+    pieces: int  # drawn triangles per element: 4 for a curved one
+    nodes: Array  # (p,) numbers in the file of the nodes drawn, ascending
+    points: Array  # (p, 2)
+    triangles: Array  # (q, 3) into points
+    body: Array  # (q,)
+    subdomain: Array  # (q,)
+    phase: Array  # (q,)
+
+
+def drawing(file: Any, limit: int = LIMIT) -> Drawing:
+    """The finest nested mesh of an open result.h5 with at most `limit` triangles, or the coarsest there is."""
+    table = file["mesh/triangles"]
+    refine, curved = int(file.attrs["refine"]), table.shape[1] == 6
+    level = next((j for j in range(refine) if len(table) <= limit * 4**j), refine)
+    group = 4**level
+    pieces = 4 if curved and level == 0 and 4 * len(table) <= limit else 1
+    corners = _blocks(table, group, lambda rows: _corners(rows, pieces))
+    nodes, triangles = np.unique(corners, return_inverse=True)
+    labels = {
+        name: np.repeat(_blocks(file[f"mesh/{name}"], group, lambda rows: rows[:, 0]), pieces)
+        for name in ("body", "subdomain", "phase")
+    }
+    points = _picked(file["mesh/points"], nodes)
+    return Drawing(group, pieces, nodes, points, triangles.reshape(-1, 3), **labels)
+
+
+def on_nodes(table: Any, drawn: Drawing) -> Array:
+    """The rows (p, 2) of a table on nodes at the nodes drawn."""
+    return _picked(table, drawn.nodes)
+
+
+def on_triangles(table: Any, column: int, drawn: Drawing) -> Array:
+    """The means (q,) of a column of a table on elements over each triangle drawn."""
+    means = _blocks(table, drawn.group, lambda rows: rows[..., column].mean(axis=1))
+    return np.repeat(means, drawn.pieces)
+
+
+def outlines(drawn: Drawing, label: Array) -> Array:
+    """The edges (e, 2) between triangles of different label, on both sides, and those of the cell.
+
+    Nodes are torn, so an edge with one triangle is on the border of a subdomain; it has a twin in the same place
+    across the border, and none on the border of the cell.
+    """
+    edges = np.concatenate([drawn.triangles[:, pair] for pair in ([0, 1], [1, 2], [2, 0])])
+    owner = np.tile(label, 3)
+    ordered = np.sort(edges, axis=1)
+    _, first, count = np.unique(ordered[:, 0] * len(drawn.nodes) + ordered[:, 1], return_index=True, return_counts=True)
+    border, owner = ordered[first[count == 1]], owner[first[count == 1]]
+    size = np.ptp(drawn.points, axis=0).max()
+    middle = np.round(drawn.points[border].mean(axis=1) / (1e-7 * size)).astype(np.int64)
+    # Twins agree to rounding: a grid of 1e-7 could part two of them, which only draws one line too many.
+    place = np.unique(middle, axis=0, return_inverse=True)[1].ravel()
+    least, most = np.full(len(border), np.iinfo(np.int64).max), np.full(len(border), -1)
+    np.minimum.at(least, place, owner)
+    np.maximum.at(most, place, owner)
+    alone = np.bincount(place, minlength=len(border)) == 1
+    return border[(alone | (least < most))[place]]
+
+
+def _corners(rows: Array, pieces: int) -> Array:
+    """The drawn triangles (q, 3) of groups of rows (g, group, 3 or 6): corner i is vertex i of a group's member."""
+    if pieces > 1:
+        return rows[:, 0][:, QUARTERS].reshape(-1, 3)
+    members = np.arange(3) * ((rows.shape[1] - 1) // 3)
+    return rows[:, members, np.arange(3)]
+
+
+def _blocks(table: Any, group: int, function: Callable[[Array], Array]) -> Array:
+    """function of each block of a table, its rows in groups: (g, group, columns)."""
+    step = max(group, BLOCK - BLOCK % group)
+    blocks = (table[start : start + step] for start in range(0, len(table), step))
+    return np.concatenate([function(rows.reshape(-1, group, *rows.shape[1:])) for rows in blocks])
+
+
+def _picked(table: Any, numbers: Array) -> Array:
+    """The rows `numbers` (ascending) of a table."""
+    return np.concatenate(list(_picks(table, numbers)))
+
+
+def _picks(table: Any, numbers: Array) -> Iterator[Array]:
+    for start in range(0, len(table), BLOCK):
+        first, last = np.searchsorted(numbers, (start, start + BLOCK))
+        yield table[start : start + BLOCK][numbers[first:last] - start]

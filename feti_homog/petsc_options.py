@@ -1,0 +1,51 @@
+"""PETSc's options for one run: the case's defaults below the command line's, none ignored in silence."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+
+from petsc4py import PETSc
+
+from feti_homog.errors import CaseError
+from feti_homog.options import unknown_options
+
+
+@contextmanager
+def case_options(options: Mapping[str, str | int | float | bool]) -> Iterator[None]:
+    """Insert the options that the command line does not give, and remove them afterwards.
+
+    Raises:
+        CaseError: an option of ours is misspelt.
+    """
+    database = PETSc.Options()
+    faults = unknown_options([*database.getAll(), *options])
+    if faults:
+        raise CaseError(*faults)
+    own = {name: value for name, value in options.items() if not database.hasName(name)}
+    for name, value in own.items():
+        database.setValue(name, value)
+    try:
+        yield
+    finally:
+        for name in own:
+            database.delValue(name)
+
+
+def refuse_unused() -> None:
+    """Call when all solvers are set up.
+
+    Raises:
+        CaseError: an option with our prefix was read by no solver.
+    """
+    unused = [name for name in PETSc.Options().getAll() if name.startswith("feti_") and not _used(name)]
+    if unused:
+        raise CaseError(*(f"-{name}: no solver of this run has such an option" for name in unused))
+
+
+def _used(name: str) -> bool:
+    # petsc4py 3.18 does not bind PetscOptionsUsed; its extension module resolves PETSc's symbols.
+    used = ctypes.c_int()
+    ctypes.CDLL(PETSc.__file__).PetscOptionsUsed(None, name.encode(), ctypes.byref(used))
+    return bool(used.value)

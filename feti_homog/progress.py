@@ -1,0 +1,55 @@
+"""Stages of a run: told on rank 0, timed on every rank, and shown by PETSc's -log_view."""
+
+from __future__ import annotations
+
+import resource
+import sys
+import time
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from typing import TypeVar
+
+from mpi4py import MPI
+from petsc4py import PETSc
+from tqdm import tqdm
+
+T = TypeVar("T")
+
+
+class Progress:
+    """Prints a line a stage and a line a solve on rank 0, unless quiet, and keeps the stages' times."""
+
+    def __init__(self, comm: MPI.Comm, quiet: bool) -> None:
+        self.comm = comm
+        self.telling = comm.rank == 0 and not quiet
+        self.seconds: dict[str, float] = {}
+
+    def say(self, line: str) -> None:
+        """Print one line on rank 0, past the progress bar if there is one."""
+        if self.telling:
+            tqdm.write(line, file=sys.stdout)
+            sys.stdout.flush()
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[list[str]]:
+        """A PETSc log stage; the block may append words to the list, which are told with its time."""
+        words: list[str] = []
+        start = time.perf_counter()
+        with PETSc.Log.Stage(name):
+            yield words
+        took = time.perf_counter() - start
+        self.seconds[name] = self.seconds.get(name, 0.0) + took
+        self.say(f"{name:<9} {took:8.2f} s  {' '.join(words)}".rstrip())
+
+    def bar(self, items: Iterable[T], label: str) -> Iterator[T]:
+        """The items, with a progress bar if rank 0 writes to a terminal."""
+        return iter(tqdm(items, desc=label, leave=False, disable=not (self.telling and sys.stdout.isatty())))
+
+    def timings(self) -> dict[str, float]:
+        """Seconds of each stage, the maximum over ranks."""
+        return {name: self.comm.allreduce(took, MPI.MAX) for name, took in self.seconds.items()}
+
+    def memory(self) -> int:
+        """Peak resident memory in bytes, the maximum over ranks."""
+        peak: int = self.comm.allreduce(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024, MPI.MAX)
+        return peak

@@ -1,0 +1,170 @@
+"""The torn cell: from a case to subdomains on their ranks and a solver that is set up for them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from feti_homog import case as cases
+from feti_homog.case import Case
+from feti_homog.cell.mesh import CoarseMesh
+from feti_homog.cell.piece import Piece, cut
+from feti_homog.cell.refine import Lattice
+from feti_homog.cell.torus import Torus
+from feti_homog.feti.decomposition import decompose, pieces_for_count, pieces_for_size
+from feti_homog.feti.shared import Shared, share
+from feti_homog.feti.solver import FetiSolver
+from feti_homog.feti.subdomain import Subdomain
+from feti_homog.material import plane_stiffness
+from feti_homog.parallel import agree, on_root_only
+from feti_homog.progress import Progress
+
+Int = NDArray[np.int64]
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What rank 0 tells every rank of the whole cell."""
+
+    width: float
+    height: float
+    phases: tuple[str, ...]
+    bodies: int
+    subdomains: int
+    coarse_triangles: int
+
+    @property
+    def area(self) -> float:
+        """|UC|."""
+        return self.width * self.height
+
+
+@dataclass(frozen=True)
+class TornCell:
+    """The cell on all ranks; `subdomains` are this rank's."""
+
+    comm: MPI.Comm
+    case: Case
+    plan: Plan
+    lattice: Lattice
+    subdomains: list[Subdomain]
+    solver: FetiSolver
+
+    @cached_property
+    def offsets(self) -> Int:
+        """Where each subdomain begins in this rank's vectors of degrees of freedom."""
+        return np.cumsum([0, *(len(s.Q) for s in self.subdomains)])
+
+    @cached_property
+    def Q(self) -> Float:
+        """(local dofs, 3) loads of the unit strains, f = -Q E."""
+        return np.concatenate([s.Q for s in self.subdomains] or [np.zeros((0, 3))])
+
+    def areas(self) -> dict[str, float]:
+        """Meshed area of each phase; collective."""
+        local = dict.fromkeys(self.plan.phases, 0.0)
+        for s in self.subdomains:
+            local[s.piece.phase] += s.area
+        return {phase: self.comm.allreduce(area) for phase, area in local.items()}
+
+    def total(self, number: int) -> int:
+        """Sum of a number over ranks; collective."""
+        return int(self.comm.allreduce(number))
+
+
+def tear(case: Case, comm: MPI.Comm, progress: Progress) -> TornCell:
+    """Mesh the cell on rank 0, deal out its pieces, and refine, assemble and factor them where they are.
+
+    Raises:
+        CaseError, MeshError: on every rank.
+    """
+    lattice = Lattice.of(case.cell.refine, case.cell.order)
+    with progress.stage("mesh") as words:
+        mesh = on_root_only(comm, coarse_mesh, case)
+        shares = on_root_only(comm, _deal, case, mesh, lattice, comm.size)
+        plan, pieces, shared = comm.scatter(shares)
+        words.append(f"{plan.coarse_triangles} triangles, {plan.bodies} bodies, {plan.subdomains} subdomains")
+    with progress.stage("assemble") as words:
+        subdomains = agree(comm, _assemble, case, pieces, lattice)
+        dofs = comm.allreduce(sum(len(s.Q) for s in subdomains))
+        words.append(f"{dofs} degrees of freedom, refine = {case.cell.refine}, order = {case.cell.order}")
+    with progress.stage("factor") as words:
+        solver = FetiSolver(comm, shared, subdomains, lattice)
+        made = comm.allreduce(solver.local.factorizations)
+        words.append(
+            f"{made} subdomain factorizations, {solver.constraints.total} multipliers, "
+            f"coarse dimension {solver.coarse.dimension}"
+        )
+    return TornCell(comm, case, plan, lattice, subdomains, solver)
+
+
+def coarse_mesh(case: Case) -> CoarseMesh:
+    """The coarse mesh that the case describes, its phases checked against the materials; on rank 0."""
+    # gmsh is loaded where it is used: only rank 0 has use for it.
+    if case.cell.file is not None:
+        from feti_homog.cell.reader import read
+
+        mesh = read(case.cell.file)
+    else:
+        from feti_homog.cell.mesher import generate
+
+        mesh = generate(case.cell)
+    cases.check_phases(case, mesh.phases)
+    return mesh
+
+
+def describe(case: Case, n_ranks: int) -> str:
+    """What a run of the case on `n_ranks` ranks would do, in words; on rank 0."""
+    lattice = Lattice.of(case.cell.refine, case.cell.order)
+    shares = _deal(case, coarse_mesh(case), lattice, n_ranks)
+    plan = shares[0][0]
+    triangles = [sum(len(p.triangles) for p in pieces) for _, pieces, _ in shares]
+    nodes = [t * lattice.intervals**2 // 2 for t in triangles]
+    lines = [
+        f"case       {case.name}: {case.analysis.type}, plane {case.analysis.plane}",
+        f"cell       {plan.width:g} x {plan.height:g}, phases {', '.join(plan.phases)}",
+        f"mesh       {plan.coarse_triangles} coarse triangles, {plan.coarse_triangles * len(lattice.triangles)} "
+        f"elements of order {case.cell.order}, about {2 * sum(nodes)} degrees of freedom",
+        f"tearing    {plan.bodies} bodies, {plan.subdomains} subdomains, {shares[0][2].total} multipliers",
+        *(
+            f"rank {rank:<5} {len(pieces)} subdomains, about {2 * n} degrees of freedom"
+            for rank, ((_, pieces, _), n) in enumerate(zip(shares, nodes, strict=True))
+        ),
+        *(f"warning    {warning}" for warning in case.warnings()),
+        "the case is valid",
+    ]
+    return "\n".join(lines)
+
+
+def _deal(case: Case, mesh: CoarseMesh, lattice: Lattice, n_ranks: int) -> list[tuple[Plan, list[Piece], Shared]]:
+    """For each rank: the plan, its pieces and the table of what they share with others."""
+    torus = Torus.of(mesh)
+    parts = torus.constituent if case.cell.bodies == "torus" else torus.plane_parts()
+    decomposition = decompose(torus, parts, _pieces(case, np.bincount(parts), lattice, n_ranks), n_ranks)
+    pieces = list(cut(torus, decomposition.subdomain))
+    tables = share(torus, pieces, decomposition.rank, lattice.intervals - 1, n_ranks)
+    bodies = int(parts.max()) + 1
+    plan = Plan(mesh.width, mesh.height, mesh.phases, bodies, len(pieces), len(mesh.triangles))
+    own: list[list[Piece]] = [[] for _ in range(n_ranks)]
+    for piece, rank in zip(pieces, decomposition.rank, strict=True):
+        own[rank].append(piece)
+    return list(zip([plan] * n_ranks, own, tables, strict=True))
+
+
+def _pieces(case: Case, load: Int, lattice: Lattice, n_ranks: int) -> Int:
+    """Wanted pieces of each body: as the case says, else as many as it takes to give every rank one."""
+    wanted = case.decomposition
+    if wanted.max_dofs is not None:
+        # A triangle of the lattice brings about M^2 / 2 nodes.
+        return pieces_for_size(load, lattice.intervals**2, wanted.max_dofs)
+    return pieces_for_count(load, wanted.subdomains or n_ranks)
+
+
+def _assemble(case: Case, pieces: list[Piece], lattice: Lattice) -> list[Subdomain]:
+    plane = case.analysis.plane
+    return [Subdomain.build(p, lattice, plane_stiffness(case.material_of(p.phase), plane)) for p in pieces]

@@ -1,0 +1,77 @@
+"""Check that every module that feti_homog needs is there and fit for use; names what is missing, exit code 1.
+
+With --quick, only that the modules are found, without importing them.
+"""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import os
+import shutil
+import sys
+from collections.abc import Callable
+from typing import Any
+
+# module: what provides it
+PROVIDERS = {
+    "mpi4py.MPI": "Debian package python3-mpi4py, or your cluster's mpi4py module",
+    "petsc4py.PETSc": "Debian packages python3-petsc4py python3-petsc4py-real, or your cluster's PETSc "
+    "module that has petsc4py, with PETSC_DIR set",
+    "h5py": "Debian packages python3-h5py python3-h5py-mpi, or your cluster's h5py module built with MPI",
+    "gmsh": "scripts/requirements.txt; its libraries: Debian packages libglu1-mesa libgl1 libxrender1 "
+    "libxcursor1 libxft2 libxinerama1 libgomp1",
+    **dict.fromkeys(
+        [
+            "numpy",
+            "scipy",
+            "matplotlib",
+            "pymetis",
+            "tqdm",
+            "pytest",
+            "ruff",
+            "mypy",
+            "clarabel",
+            "feti_homog",
+        ],
+        "scripts/requirements.txt and pip install -e .",
+    ),
+}
+
+# module: (what else it must fulfil, in words; the test)
+DEMANDS: dict[str, tuple[str, Callable[[Any], bool]]] = {
+    "numpy": ("version below 2", lambda numpy: int(numpy.__version__.split(".")[0]) < 2),
+    "h5py": ("built with MPI", lambda h5py: h5py.get_config().mpi),
+    "petsc4py.PETSc": ("built with real numbers", lambda petsc: petsc.ScalarType().dtype.kind == "f"),
+}
+
+
+def fault_found(module: str) -> str:
+    """Empty if the module's package is on the path, else the reason (nothing is imported)."""
+    return "" if importlib.util.find_spec(module.split(".")[0]) else "not found"
+
+
+def fault_imported(module: str) -> str:
+    """Empty if the module can be imported and fulfils its demand, else the reason."""
+    try:
+        imported = importlib.import_module(module)
+    except Exception as error:  # a broken module may raise anything
+        return f"{type(error).__name__}: {error}"
+    words, fulfils = DEMANDS.get(module, ("", lambda _: True))
+    return "" if fulfils(imported) else f"must be {words}"
+
+
+def main() -> int:
+    os.environ["H5PY_ALWAYS_USE_MPI"] = "1"
+    fault = fault_found if "--quick" in sys.argv else fault_imported
+    faults = {module: fault(module) for module in PROVIDERS}
+    lines = [f"{module}: {text} (from: {PROVIDERS[module]})" for module, text in faults.items() if text]
+    if not shutil.which("mpirun"):
+        lines.append("mpirun: not found (from: Debian package openmpi-bin, or your cluster's MPI module)")
+    if lines:
+        print("missing or unfit:", *lines, sep="\n  ", file=sys.stderr)
+    return int(bool(lines))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

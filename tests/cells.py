@@ -1,0 +1,59 @@
+"""Cases for the tests, and the program's stages run on them without files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import twin
+
+from feti_homog import case as cases
+from feti_homog.homogenization import effective_stiffness
+from feti_homog.petsc_options import case_options
+from feti_homog.progress import Progress
+from feti_homog.torn import tear
+
+MATRIX, FIBRE = {"young": 88.0, "poisson": 0.299}, {"young": 200.0, "poisson": 0.222}
+
+
+def make_case(*, matrix=MATRIX, fibre=FIBRE, plane="strain", petsc=None, decomposition=None, folder=".", **cell):
+    """A case of the given cell, tight enough (1e-10) for comparisons."""
+    circular = {} if cell.get("geometry") == "mesh" else {"fibre_fraction": 0.4, "mesh_size": 0.15}
+    document = {
+        "cell": {"geometry": "hexagonal"} | circular | cell,
+        "material": {"matrix": matrix, "fibre": fibre},
+        "analysis": {"type": "stiffness", "plane": plane},
+        "petsc": {"feti_ksp_rtol": 1e-10} | (petsc or {}),
+        "decomposition": decomposition or {},
+    }
+    return cases.parse(document, Path(folder))
+
+
+def solve(case, comm):
+    """The torn cell, L^ef and the responses."""
+    progress = Progress(comm, quiet=True)
+    with case_options(case.petsc):
+        cell = tear(case, comm, progress)
+        return cell, *effective_stiffness(cell, progress)
+
+
+def twin_stiffness(cell):
+    """L^ef of the same refined mesh by the twin, on every rank."""
+    parts = cell.comm.gather([(s.mesh.points, s.mesh.triangles, s.L) for s in cell.subdomains])
+    result = None
+    if cell.comm.rank == 0:
+        own = [part for parts_of_rank in parts for part in parts_of_rank]
+        first = np.cumsum([0] + [len(points) for points, _, _ in own])
+        result = twin.effective_stiffness(
+            np.concatenate([points for points, _, _ in own]),
+            np.concatenate([triangles + n for (_, triangles, _), n in zip(own, first, strict=False)]),
+            np.concatenate([np.broadcast_to(L, (len(triangles), 3, 3)) for _, triangles, L in own]),
+            cell.plan.width,
+            cell.plan.height,
+        )
+    return cell.comm.bcast(result)
+
+
+def relative_error(L, expected):
+    """Largest difference of entries, relative to the largest entry."""
+    return np.abs(L - expected).max() / np.abs(expected).max()

@@ -1,0 +1,72 @@
+"""The same tests on every rank: only rank 0 shows them, and a rank that fails does not hang the others."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Generator
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+import support
+
+from feti_homog.parallel import others_come
+
+RANK = int(os.environ.get("OMPI_COMM_WORLD_RANK", os.environ.get("PMI_RANK", "0")))
+PATIENCE = 5.0  # seconds that a failing rank waits for the others to end the same test
+
+
+@cache
+def report_comm() -> Any:
+    """A communicator of its own: reports never meet what a test left unfinished on the world's."""
+    from mpi4py import MPI
+
+    return MPI.COMM_WORLD.Dup()
+
+
+@pytest.fixture
+def comm() -> Any:
+    from mpi4py import MPI
+
+    return MPI.COMM_WORLD
+
+
+@pytest.fixture
+def shared_path(comm: Any, tmp_path: Path) -> Path:
+    """Rank 0's temporary folder, on every rank."""
+    return Path(comm.bcast(tmp_path, root=0))
+
+
+@pytest.fixture
+def mpirun() -> Callable[..., Any]:
+    return support.mpirun
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_configure(config: pytest.Config) -> None:
+    if RANK != 0:
+        config.get_terminal_writer()._file = open(os.devnull, "w")  # noqa: SIM115 (open to the end)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """If a rank fails a phase of a parallel test, all do, and rank 0 reports for them."""
+    report = yield
+    if item.get_closest_marker("parallel") is None:
+        return report
+    comm = report_comm()
+    failure = f"rank {comm.rank}:\n{report.longreprtext}" if report.failed else ""
+    if not others_come(comm, PATIENCE if failure else float("inf")):
+        print(
+            f"{item.nodeid}: the other ranks do not end this test;\n{failure}",
+            file=sys.__stderr__,
+            flush=True,
+        )
+        comm.Abort(1)
+    failures = [text for text in comm.allgather(failure) if text]
+    if failures:
+        report.outcome = "failed"
+        report.longrepr = "\n\n".join(failures)
+    return report

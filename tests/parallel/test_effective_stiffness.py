@@ -1,0 +1,164 @@
+"""L^ef of the torn cell against a monolithic twin, closed forms and laws, at any number of ranks."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from cells import FIBRE, MATRIX, make_case, relative_error, solve, twin_stiffness
+
+pytestmark = pytest.mark.parallel
+
+TIGHT = 1e-9
+
+
+@pytest.mark.parametrize("bodies", ["torus", "plane"])
+@pytest.mark.parametrize("pieces", [{}, {"subdomains": 9}, {"max_dofs": 150}])
+@pytest.mark.parametrize(
+    "cell",
+    [
+        {"geometry": "square"},
+        {"geometry": "hexagonal", "refine": 1},
+        {"geometry": "hexagonal", "order": 2},
+        {"geometry": "random", "fibres": 5, "fibre_fraction": 0.45, "min_gap": 0.15, "seed": 3, "order": 2},
+    ],
+    ids=["square", "hexagonal", "quadratic", "random"],
+)
+def test_equals_the_monolithic_twin(comm, cell, pieces, bodies):
+    torn, L, responses = solve(make_case(bodies=bodies, decomposition=pieces, **cell), comm)
+    assert relative_error(L, twin_stiffness(torn)) < TIGHT
+    assert all(r.solution.reason > 0 for r in responses)
+    assert max(max(r.checks.values()) for r in responses) < 1e-8
+
+
+@pytest.mark.parametrize("preconditioner", ["none", "lumped"])
+def test_preconditioner_changes_only_the_iterations(comm, preconditioner):
+    petsc = {"feti_pc_type": preconditioner, "feti_ksp_rtol": 1e-11}
+    _, L, _ = solve(make_case(petsc=petsc), comm)
+    _, expected, _ = solve(make_case(), comm)
+    assert relative_error(L, expected) < TIGHT
+
+
+@pytest.mark.parametrize("option", ["feti_sub_pc_factor_mat_solver_type", "feti_interior_pc_factor_mat_solver_type"])
+def test_mumps_in_the_place_of_cholmod(comm, option):
+    _, L, _ = solve(make_case(petsc={option: "mumps"}), comm)
+    _, expected, _ = solve(make_case(), comm)
+    assert relative_error(L, expected) < TIGHT
+
+
+@pytest.mark.parametrize("plane", ["strain", "stress"])
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize(
+    "material",
+    [
+        {"young": 3.0, "poisson": 0.3},
+        {"E1": 10.0, "E2": 2.0, "E3": 3.0, "nu12": 0.3, "nu13": 0.25, "nu23": 0.2, "G12": 1.5, "angle": 25.0},
+    ],
+    ids=["isotropic", "orthotropic"],
+)
+def test_homogeneous_cell_is_exact(comm, material, order, plane):
+    case = make_case(matrix=material, fibre=material, order=order, plane=plane, mesh_size=0.2)
+    torn, L, _ = solve(case, comm)
+    expected = homogeneous(material, plane)
+    assert np.abs(L - expected).max() <= 1e-10 * np.abs(expected).max()
+
+
+def homogeneous(material, plane):
+    """(3, 3) plane stiffness by tensor algebra: invert the 3-D compliance, rotate the fourth-order tensor."""
+    m = material
+    if "young" in m:
+        m = {f"E{i}": m["young"] for i in (1, 2, 3)} | {f"nu{i}": m["poisson"] for i in (12, 13, 23)}
+        m |= {"G12": m["E1"] / (2 + 2 * m["nu12"]), "angle": 0.0}
+    S = np.diag([1 / m["E1"], 1 / m["E2"], 1 / m["E3"]])
+    S[0, 1] = S[1, 0] = -m["nu12"] / m["E1"]
+    S[0, 2] = S[2, 0] = -m["nu13"] / m["E1"]
+    S[1, 2] = S[2, 1] = -m["nu23"] / m["E2"]
+    C2 = np.linalg.inv(S)[:2, :2] if plane == "strain" else np.linalg.inv(S[:2, :2])
+    C = np.zeros((2, 2, 2, 2))
+    for i in range(2):
+        for j in range(2):
+            C[i, i, j, j] = C2[i, j]
+    for i, j in ((0, 1), (1, 0)):
+        C[i, j, i, j] = C[i, j, j, i] = m["G12"]
+    t = np.radians(m["angle"])
+    Q = np.array([[np.cos(t), -np.sin(t)], [np.sin(t), np.cos(t)]])
+    C = np.einsum("ai,bj,ck,dl,ijkl->abcd", Q, Q, Q, Q, C)
+    pairs = [(0, 0), (1, 1), (0, 1)]
+    return np.array([[C[a][b] for b in pairs] for a in pairs])
+
+
+@pytest.mark.parametrize("cell", [{"geometry": "square"}, {"geometry": "hexagonal", "fibre_fraction": 0.6}])
+def test_equal_shear_moduli_obey_hill(comm, cell):
+    """sum c_i / (k_i + mu) = 1 / (k* + mu), exact for any geometry (Hill 1964)."""
+    mu, k = 30.0, np.array([50.0, 170.0])
+    # E and nu of plane bulk modulus k = lambda + mu and shear modulus mu in plane strain.
+    nu = (k - mu) / (2 * k)
+    phases = [{"young": 2 * mu * (1 + n), "poisson": n} for n in nu]
+    torn, L, _ = solve(make_case(matrix=phases[0], fibre=phases[1], order=2, refine=1, **{"mesh_size": 0.1} | cell), comm)
+    areas = torn.areas()
+    c = np.array([areas["matrix"], areas["fibre"]]) / torn.plan.area
+    expected = 1 / (c / (k + mu)).sum() - mu
+    assert abs((L[0, 0] + L[0, 1]) / 2 - expected) < 2e-6 * expected
+    assert abs(L[2, 2] - mu) < 2e-6 * mu
+
+
+@pytest.mark.parametrize("contrast", [1e-4, 1e-2, 1e3, 1e6])
+def test_contrast_converges(comm, contrast):
+    fibre = {"young": contrast, "poisson": 0.3}
+    case = make_case(matrix={"young": 1.0, "poisson": 0.3}, fibre=fibre, decomposition={"subdomains": 6})
+    torn, L, responses = solve(case, comm)
+    assert all(r.solution.reason > 0 for r in responses)
+    assert relative_error(L, twin_stiffness(torn)) < 1e-7
+
+
+def test_nearly_incompressible_matrix(comm):
+    """Quadratic elements do not lock: halving the elements changes L^ef little, unlike with linear ones."""
+    matrix = {"young": 88.0, "poisson": 0.4999}
+    L = {}
+    for order in (1, 2):
+        for refine in (0, 1):
+            cell = {"geometry": "square", "order": order, "refine": refine, "mesh_size": 0.1}
+            _, L[order, refine], responses = solve(make_case(matrix=matrix, **cell), comm)
+            assert all(r.solution.reason > 0 for r in responses)
+    shear = {key: value[2, 2] for key, value in L.items()}
+    assert abs(shear[2, 0] / shear[2, 1] - 1) < 5e-3
+    assert abs(shear[1, 0] / shear[2, 1] - 1) > 5e-2
+
+
+def test_dual_operator_and_projector_laws(comm):
+    torn, _, _ = solve(make_case(geometry="hexagonal", decomposition={"subdomains": 7}), comm)
+    solver = torn.solver
+    x, y, Fx, Fy = (solver.constraints.vector.duplicate() for _ in range(4))
+    for seed, v in enumerate((x, y)):
+        first, last = v.getOwnershipRange()
+        v.setArray(np.random.default_rng(seed).standard_normal(solver.constraints.total)[first:last])
+    solver.operator.mult(x, Fx)
+    solver.operator.mult(y, Fy)
+    assert abs(x.dot(Fy) - y.dot(Fx)) < 1e-11 * abs(x.dot(Fx))
+    for v in (x, y):
+        solver.coarse.apply(v)
+    once = x.copy()
+    solver.coarse.apply(x)
+    assert (x - once).norm() < 1e-12 * once.norm()
+    along = solver.coarse.G.createVecRight()
+    solver.coarse.G.multTranspose(x, along)
+    assert along.norm() < 1e-11 * x.norm()
+    solver.operator.mult(x, Fx)
+    assert x.dot(Fx) > 0
+    solver.preconditioner.apply(x, Fx)
+    solver.preconditioner.apply(y, Fy)
+    assert abs(x.dot(Fy) - y.dot(Fx)) < 1e-10 * abs(x.dot(Fx))
+    assert x.dot(Fx) > 0
+
+
+def test_swapped_phases_lie_within_voigt_and_reuss(comm):
+    from feti_homog import bounds
+    from feti_homog.material import plane_stiffness
+
+    for matrix, fibre in ((MATRIX, FIBRE), (FIBRE, MATRIX)):
+        torn, L, _ = solve(make_case(geometry="square", matrix=matrix, fibre=fibre), comm)
+        areas = torn.areas()
+        c = np.array([areas["matrix"], areas["fibre"]]) / torn.plan.area
+        phases = [plane_stiffness(torn.case.material_of(p), "strain") for p in ("matrix", "fibre")]
+        L = (L + L.T) / 2
+        assert np.linalg.eigvalsh(bounds.voigt(c, phases) - L).min() > 0
+        assert np.linalg.eigvalsh(L - bounds.reuss(c, phases)).min() > 0

@@ -1,0 +1,357 @@
+"""Case files with one fault each (or as many as said), and what must be said of it."""
+
+from __future__ import annotations
+
+BASE = """\
+[cell]
+geometry = "hexagonal"
+fibre_fraction = 0.4
+mesh_size = 0.05
+
+[material.matrix]
+young = 88.0
+poisson = 0.299
+
+[material.fibre]
+young = 200.0
+poisson = 0.222
+
+[analysis]
+type = "stiffness"
+plane = "strain"
+"""
+
+RANDOM = 'geometry = "random"\nfibres = 20\n'
+FIBRE = "[material.fibre]\nyoung = 200.0\npoisson = 0.222\n"
+ORTHOTROPIC = "E1 = 10.0\nE2 = 5.0\nnu12 = 0.3\nG12 = 2.0\n"
+OUT_OF_PLANE = "E3 = 5.0\nnu13 = 0.3\nnu23 = 0.3\n"
+
+
+def changed(*edits: tuple[str, str], end: str = "") -> str:
+    """The right case with its words exchanged and lines added at its end."""
+    document = BASE
+    for old, new in edits:
+        assert document.count(old) >= 1, old
+        document = document.replace(old, new, 1)
+    return document + end
+
+
+def fibre(constants: str, plane: str = "strain") -> str:
+    return changed((FIBRE, f"[material.fibre]\n{constants}"), ('"strain"', f'"{plane}"'))
+
+
+def cell(old: str, new: str) -> str:
+    return changed((old, new))
+
+
+def ended(text: str) -> str:
+    return changed(end=text)
+
+
+def fraction(value: str) -> str:
+    return cell("fibre_fraction = 0.4", f"fibre_fraction = {value}")
+
+
+# name: (content of the file, words that must stand in its faults)
+FAULTY_CASES: dict[str, tuple[str, tuple[str, ...]]] = {
+    # the file
+    "empty": ("", ("[cell]: missing section", "[material]: missing section", "[analysis]: missing section")),
+    "syntax": (cell("mesh_size = 0.05", "mesh_size 0.05"), ("not TOML", "line 4")),
+    "syntax_unclosed": (ended('[output]\nlength_unit = """'), ("not TOML", "line 18, the end")),
+    "key_twice": (cell("mesh_size = 0.05", "mesh_size = 0.05\nmesh_size = 0.1"), ("not TOML", "line 5")),
+    "section_twice": (ended("[cell]\n"), ("not TOML", "line 17")),
+    "number_too_long": (cell("0.05", "1" * 5000), ("not TOML",)),
+    # sections
+    "no_cell": (BASE[BASE.index("[material.matrix]") :], ("[cell]: missing section",)),
+    "no_material": (
+        cell(BASE[BASE.index("[material.matrix]") : BASE.index("[analysis]")], ""),
+        ("[material]: missing section",),
+    ),
+    "no_analysis": (BASE[: BASE.index("[analysis]")], ("[analysis]: missing section",)),
+    "unknown_section": (ended("[anlysis]\n"), ("[anlysis]: unknown section; did you mean analysis?",)),
+    "strange_section": (ended('["a\\nb"]\n'), ('["a\\nb"]: unknown section; known here: cell, analysis',)),
+    "cell_is_a_number": (
+        "cell = 3\n" + BASE[BASE.index("[material.matrix]") :],
+        ("cell = 3: expected a section [cell]",),
+    ),
+    "cell_is_an_array": (cell("[cell]", "[[cell]]"), ("expected a section [cell]",)),
+    "material_is_a_number": (
+        "material = 3\n" + BASE.replace(BASE[BASE.index("[material.matrix]") : BASE.index("[analysis]")], ""),
+        ("material = 3: expected sections [material.matrix], [material.fibre]",),
+    ),
+    "key_before_sections": ("refine = 2\n" + BASE, ("refine: unknown key; it belongs to [cell]",)),
+    "name_is_a_number": ("name = 3\n" + BASE, ("name = 3: expected a text",)),
+    # [cell]
+    "unknown_key": (
+        cell("mesh_size", "mesh_sise"),
+        ("[cell] mesh_sise = 0.05: unknown key; did you mean mesh_size?",),
+    ),
+    "american_key": (
+        cell("fibre_fraction", "fiber_fraction"),
+        (
+            "[cell] fiber_fraction = 0.4: unknown key; did you mean fibre_fraction?",
+            "[cell] fibre_fraction: missing",
+        ),
+    ),
+    "key_of_other_section": (
+        cell("mesh_size", "subdomains = 3\nmesh_size"),
+        ("it belongs to [decomposition]",),
+    ),
+    "no_geometry": (cell('geometry = "hexagonal"\n', ""), ("[cell] geometry: missing; expected one of",)),
+    "unknown_geometry": (
+        cell('"hexagonal"', '"hexagon"'),
+        ('[cell] geometry = "hexagon": expected one of "square"',),
+    ),
+    "geometry_is_a_number": (cell('"hexagonal"', "6"), ("[cell] geometry = 6: expected one of",)),
+    "no_fraction": (
+        cell("fibre_fraction = 0.4\n", ""),
+        ("[cell] fibre_fraction: missing; expected a number",),
+    ),
+    "fraction_zero": (
+        fraction("0.0"),
+        ("[cell] fibre_fraction = 0.0: expected a number above 0 and below 1",),
+    ),
+    "fraction_above_one": (
+        fraction("40"),
+        ("[cell] fibre_fraction = 40: expected a number above 0 and below 1",),
+    ),
+    "fraction_is_text": (fraction('"0.4"'), ('[cell] fibre_fraction = "0.4": expected a number',)),
+    "fraction_is_true": (fraction("true"), ("[cell] fibre_fraction = true: expected a number",)),
+    "fraction_is_nan": (fraction("nan"), ("[cell] fibre_fraction = nan: expected a number",)),
+    "fraction_is_infinite": (fraction("-inf"), ("[cell] fibre_fraction = -inf: expected a number",)),
+    "fraction_is_a_date": (
+        fraction("2026-01-01"),
+        ('[cell] fibre_fraction = "2026-01-01": expected a number',),
+    ),
+    "fibres_touch": (fraction("0.91"), ("[cell] fibre_fraction = 0.91: expected less than 0.9069", "touch")),
+    "fibres_touch_in_square": (
+        changed(('"hexagonal"', '"square"'), ("= 0.4", "= 0.79")),
+        ("[cell] fibre_fraction = 0.79: expected less than 0.7854", "touch"),
+    ),
+    "mesh_size_zero": (
+        cell("= 0.05", "= 0"),
+        ("[cell] mesh_size = 0: expected a number at least 0.0001 and at most 0.5",),
+    ),
+    "mesh_size_huge": (cell("= 0.05", f"= 1{'0' * 400}"), ("[cell] mesh_size = 1000000",)),
+    "refine_negative": (
+        cell("mesh_size", "refine = -1\nmesh_size"),
+        ("[cell] refine = -1: expected an integer at least 0",),
+    ),
+    "refine_too_large": (
+        cell("mesh_size", "refine = 9\nmesh_size"),
+        ("[cell] refine = 9: expected", "at most 8"),
+    ),
+    "refine_is_real": (
+        cell("mesh_size", "refine = 2.0\nmesh_size"),
+        ("[cell] refine = 2.0: expected an integer",),
+    ),
+    "order_three": (
+        cell("mesh_size", "order = 3\nmesh_size"),
+        ("[cell] order = 3: expected an integer at least 1 and at most 2",),
+    ),
+    "unknown_bodies": (
+        cell("mesh_size", 'bodies = "tours"\nmesh_size'),
+        ('[cell] bodies = "tours": expected one of "torus", "plane"',),
+    ),
+    "fibres_of_hexagonal": (
+        cell("mesh_size", "fibres = 50\nmesh_size"),
+        ('[cell] fibres = 50: belongs to geometry = "random", not "hexagonal"',),
+    ),
+    "file_of_hexagonal": (
+        cell("mesh_size", 'file = "cell.msh"\nmesh_size'),
+        ('[cell] file = "cell.msh": belongs to geometry = "mesh", not "hexagonal"',),
+    ),
+    "random_without_fibres": (
+        cell('"hexagonal"', '"random"'),
+        ("[cell] fibres: missing; expected an integer",),
+    ),
+    "random_too_dense": (
+        changed(('geometry = "hexagonal"\n', RANDOM + "min_gap = 0.5\n"), ("= 0.4", "= 0.5")),
+        ("[cell] fibre_fraction = 0.5: expected less than 0.4031", "no circles min_gap apart are denser"),
+    ),
+    "random_negative_gap": (
+        changed(('geometry = "hexagonal"\n', RANDOM + "min_gap = -0.1\n")),
+        ("[cell] min_gap = -0.1: expected a number at least 0",),
+    ),
+    "random_negative_seed": (
+        changed(('geometry = "hexagonal"\n', RANDOM + "seed = -1\n")),
+        ("[cell] seed = -1: expected an integer at least 0",),
+    ),
+    "mesh_without_file": (
+        cell('"hexagonal"\nfibre_fraction = 0.4\nmesh_size = 0.05', '"mesh"'),
+        ("[cell] file: missing; expected the name of a .msh file",),
+    ),
+    "mesh_not_there": (
+        cell('"hexagonal"\nfibre_fraction = 0.4\nmesh_size = 0.05', '"mesh"\nfile = "none.msh"'),
+        ('[cell] file = "none.msh": no such file', "none.msh)"),
+    ),
+    "mesh_is_no_msh": (
+        cell('"hexagonal"\nfibre_fraction = 0.4\nmesh_size = 0.05', '"mesh"\nfile = "cell.geo"'),
+        ('[cell] file = "cell.geo": expected the name of a .msh file',),
+    ),
+    "mesh_with_fraction": (
+        cell('"hexagonal"', '"mesh"'),
+        ('[cell] fibre_fraction = 0.4: belongs to geometry = "square" or "hexagonal" or "random", not',),
+    ),
+    # [material]
+    "no_fibre": (cell(FIBRE, ""), ("[material.fibre]: missing section",)),
+    "no_matrix": (
+        cell("[material.matrix]\nyoung = 88.0\npoisson = 0.299\n", ""),
+        ("[material.matrix]: missing section",),
+    ),
+    "empty_material": (
+        cell(BASE[BASE.index("[material.matrix]") : BASE.index("[analysis]")], "[material]\n"),
+        ("[material.matrix]: missing section", "[material.fibre]: missing section"),
+    ),
+    "constants_of_no_phase": (
+        ended("[material]\nyoung = 3.0\n"),
+        ("[material.young]: unknown phase; it belongs to [material.PHASE]",),
+    ),
+    "american_phase": (
+        cell("material.fibre", "material.fiber"),
+        ("[material.fiber]: unknown phase; did you mean fibre?", "[material.fibre]: missing section"),
+    ),
+    "phase_of_mesh": (
+        ended('[material."fibre:2"]\nyoung = 1.0\npoisson = 0.2\n'),
+        ('[material."fibre:2"]: belongs to geometry = "mesh", not "hexagonal"',),
+    ),
+    "young_negative": (
+        cell("200.0", "-200.0"),
+        ("[material.fibre] young = -200.0: expected a number above 0",),
+    ),
+    "young_missing": (
+        cell("young = 200.0\n", ""),
+        ("[material.fibre] young: missing; expected a number above 0",),
+    ),
+    "young_mistyped": (
+        cell("young = 200.0", "yuong = 200.0"),
+        ("[material.fibre] yuong = 200.0: unknown key; did you mean young?",),
+    ),
+    "poisson_half": (
+        cell("0.299", "0.5"),
+        ("[material.matrix] poisson = 0.5: expected less than 0.5 in plane strain",),
+    ),
+    "poisson_above_half": (
+        changed(("0.299", "0.51"), ('"strain"', '"stress"')),
+        ("[material.matrix] poisson = 0.51: expected a number above -1 and at most 0.5",),
+    ),
+    "poisson_minus_one": (
+        cell("0.299", "-1"),
+        ("[material.matrix] poisson = -1: expected a number above -1",),
+    ),
+    "two_kinds": (
+        fibre("young = 1.0\npoisson = 0.2\nE1 = 2.0\n"),
+        ("[material.fibre] young, poisson (isotropic) and E1 (orthotropic): exclude each other",),
+    ),
+    "angle_of_isotropic": (
+        fibre("young = 1.0\npoisson = 0.2\nangle = 30.0\n"),
+        ("[material.fibre] young, poisson (isotropic) and angle (orthotropic): exclude each other",),
+    ),
+    "orthotropic_incomplete": (
+        fibre("E1 = 10.0\nE2 = 5.0\nnu12 = 0.3\n", "stress"),
+        ("[material.fibre] G12: missing",),
+    ),
+    "orthotropic_no_third": (
+        fibre(ORTHOTROPIC),
+        ("[material.fibre] E3, nu13, nu23: missing; plane strain needs them",),
+    ),
+    "orthotropic_unstable": (
+        fibre(ORTHOTROPIC.replace("0.3", "1.5"), "stress"),
+        ("[material.fibre] nu12 = 1.5: expected nu12^2 < E1/E2 = 2",),
+    ),
+    "orthotropic_unstable_third": (
+        fibre(ORTHOTROPIC + OUT_OF_PLANE.replace("nu13 = 0.3", "nu13 = 1.4")),
+        ("[material.fibre] E1, E2, E3, nu12, nu13, nu23: expected a positive definite compliance",),
+    ),
+    "stiffness_not_square": (
+        fibre("stiffness = [[1, 0], [0, 1]]\n"),
+        ("[material.fibre] stiffness = [[1, 0], [0, 1]]: expected a symmetric 3x3 array of numbers",),
+    ),
+    "stiffness_not_numbers": (
+        fibre('stiffness = [[3, 1, "0"], [1, 3, 0], [0, 0, 1]]\n'),
+        ("[material.fibre] stiffness = ", "expected a symmetric 3x3 array of numbers"),
+    ),
+    "stiffness_not_symmetric": (
+        fibre("stiffness = [[3, 1, 0], [2, 3, 0], [0, 0, 1]]\n"),
+        (
+            "[material.fibre] stiffness = [[3.0, 1.0, 0.0], [2.0, 3.0, ",
+            "expected a symmetric matrix",
+        ),
+    ),
+    "stiffness_indefinite": (
+        fibre("stiffness = [[1, 2, 0], [2, 1, 0], [0, 0, 1]]\n"),
+        ("[material.fibre] stiffness = ", "expected a positive definite matrix"),
+    ),
+    # [analysis], [decomposition], [output]
+    "no_type": (cell('type = "stiffness"\n', ""), ('[analysis] type: missing; expected one of "stiffness"',)),
+    "unknown_type": (
+        cell('"stiffness"', '"stifness"'),
+        ('[analysis] type = "stifness": expected one of "stiffness"',),
+    ),
+    "unknown_plane": (
+        cell('"strain"', '"plane strain"'),
+        ('[analysis] plane = "plane strain": expected one of "strain", "stress"',),
+    ),
+    "no_plane": (
+        cell('plane = "strain"\n', ""),
+        ('[analysis] plane: missing; expected one of "strain", "stress"',),
+    ),
+    "no_subdomains": (
+        ended("[decomposition]\nsubdomains = 0\n"),
+        ("[decomposition] subdomains = 0: expected an integer at least 1",),
+    ),
+    "max_dofs_small": (
+        ended("[decomposition]\nmax_dofs = 3\n"),
+        ("[decomposition] max_dofs = 3: expected an integer at least 100",),
+    ),
+    "two_decompositions": (
+        ended("[decomposition]\nsubdomains = 4\nmax_dofs = 1000\n"),
+        ("[decomposition] subdomains, max_dofs: exclude each other; give one",),
+    ),
+    "pictures_is_a_number": (
+        ended("[output]\npictures = 1\n"),
+        ("[output] pictures = 1: expected true or false",),
+    ),
+    "unknown_stress": (
+        ended('[output]\nstress = "S33"\n'),
+        ('[output] stress = "S33": expected one of "S11", "S22", "S12"',),
+    ),
+    "unit_of_two_lines": (
+        ended('[output]\nstress_unit = "G\\nPa"\n'),
+        ('[output] stress_unit = "G\\nPa": expected a text in one line',),
+    ),
+    "scale_negative": (
+        ended("[output]\ndeformation_scale = -1\n"),
+        ("[output] deformation_scale = -1: expected a number at least 0",),
+    ),
+    # [petsc]
+    "petsc_dash": (
+        ended("[petsc]\n-feti_ksp_rtol = 1e-8\n"),
+        ("[petsc] -feti_ksp_rtol = 1e-08: expected the option's name without its dash",),
+    ),
+    "petsc_without_prefix": (
+        ended("[petsc]\nksp_rtol = 1e-8\n"),
+        ("[petsc] ksp_rtol = 1e-08: expected the prefix feti_",),
+    ),
+    "petsc_array": (
+        ended("[petsc]\nfeti_ksp_rtol = [1e-8]\n"),
+        ("[petsc] feti_ksp_rtol = [1e-08]: expected a text, a number, true or false",),
+    ),
+    "petsc_nested": (
+        ended("[petsc.feti]\nksp_rtol = 1e-8\n"),
+        ("[petsc] feti = ", "expected the prefix feti_"),
+    ),
+    # several at once
+    "many": (
+        changed(
+            ("0.4", "4"), ("88.0", '"88"'), ('"strain"', '"strian"'), end="[ouput]\n[petsc]\nlogview = true\n"
+        ),
+        (
+            "[cell] fibre_fraction = 4: ",
+            '[material.matrix] young = "88": ',
+            '[analysis] plane = "strian": ',
+            "[ouput]: unknown section; did you mean output?",
+            "[petsc] logview = true: ",
+        ),
+    ),
+}
