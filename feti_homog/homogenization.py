@@ -12,7 +12,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from feti_homog.errors import ConvergenceError
-from feti_homog.feti.solver import Solution
+from feti_homog.feti.solver import DualSolution
 from feti_homog.progress import Progress
 from feti_homog.torn import TornCell
 
@@ -28,46 +28,52 @@ class Response:
     Attributes:
         strain: (3,) E.
         stress: (3,) Sigma = <sigma>.
-        solution: fluctuating displacements and multipliers.
+        solution: multipliers, jumps and amplitudes.
+        u: (local dofs,) fluctuating displacement u*, this rank's subdomains one after the other.
         checks: relative errors of the laws: `strain` <eps> = E, Eq. (3); `hill` <sigma:eps> = Sigma:E,
             Eq. (8); `jump`, the largest opening of a glued node relative to the largest displacement.
     """
 
     strain: Float
     stress: Float
-    solution: Solution
+    solution: DualSolution
+    u: Float
     checks: dict[str, float]
 
 
-def respond(cell: TornCell, strain: Float) -> Response:
-    """Solve the unit-cell problem under the macroscopic `strain` and average.  Collective.
+def respond(cell: TornCell, strain: Float, start: Float) -> Response:
+    """Solve the unit-cell problem under the macroscopic `strain` and average; `start` are first multipliers.
+
+    Collective.
 
     Raises:
         ConvergenceError: the solve broke down and left no numbers.
     """
-    solution = cell.solver.solve(-cell.Q @ strain)
-    if not np.isfinite(solution.jump_norm):
+    solver = cell.solver
+    solution = solver.solve(strain, start)
+    if not np.isfinite(solution.residual):
         raise ConvergenceError(
             f"strain {strain.tolist()}: the Krylov method broke down after {solution.iterations} iterations "
             f"(KSPConvergedReason {solution.reason})"
         )
-    means = _averages(cell, strain, solution.u) / cell.plan.area
+    u = solver.displacement(solution)
+    means = _averages(cell, strain, u) / cell.plan.area
     stress, star, energy = means[:3], means[3:6], means[6]
     checks = {
         "strain": float(np.abs(star).max() / np.abs(strain).max()),
         "hill": float(abs(energy - stress @ strain) / abs(energy)),
-        "jump": _largest(cell, solution.jump) / _largest(cell, displacement(cell, strain, solution.u)),
+        "jump": _largest(cell, solver.active.mask * solution.jump) / _largest(cell, displacement(cell, strain, u)),
     }
-    return Response(strain, stress, solution, checks)
+    return Response(strain, stress, solution, u, checks)
 
 
 def effective_stiffness(cell: TornCell, progress: Progress) -> tuple[Float, list[Response]]:
     """L^ef, whose columns are the stresses under the unit strains (39), and those three responses."""
     responses = []
     for name, strain in zip(progress.bar(CASES, "load cases"), np.eye(3), strict=True):
-        response = respond(cell, strain)
+        response = respond(cell, strain, np.zeros(cell.solver.rows))
         solution = response.solution
-        progress.say(f"  {name}: {solution.iterations} iterations, relative jump {solution.jump_norm:.1e}")
+        progress.say(f"  {name}: {solution.iterations} iterations, relative jump {solution.residual:.1e}")
         responses.append(response)
     return np.stack([r.stress for r in responses], axis=1), responses
 

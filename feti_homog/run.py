@@ -59,7 +59,7 @@ def _solve(cell: TornCell, progress: Progress) -> tuple[dict[str, Any], list[Res
     checks = {name: max(r.checks[name] for r in responses) for name in ("strain", "hill", "jump")}
     checks["symmetry"] = asymmetry(L)
     faults = [
-        f"{name}: no convergence after {r.solution.iterations} iterations, relative jump {r.solution.jump_norm:.1e} "
+        f"{name}: no convergence after {r.solution.iterations} iterations, relative jump {r.solution.residual:.1e} "
         f"(KSPConvergedReason {r.solution.reason}); result marked"
         for name, r in zip(("E11", "E22", "G12"), responses, strict=True)
         if r.solution.reason < 0
@@ -98,7 +98,7 @@ def _document(
             "ranks": cell.comm.size,
             "bodies": plan.bodies,
             "subdomains": plan.subdomains,
-            "dofs": cell.total(len(cell.Q)),
+            "dofs": cell.total(len(cell.solver.Q)),
             "multipliers": solver.constraints.total,
             "kernel_dim": solver.coarse.dimension,
             "coarse_dim": solver.coarse.dimension,
@@ -180,7 +180,7 @@ def _interface_part(cell: TornCell) -> InterfacePart:
 
 
 def _state_part(cell: TornCell, response: Response) -> StatePart:
-    u, nodes = response.solution.u, cell.solver.constraints.nodes
+    u, nodes = response.u, cell.solver.constraints.nodes
     pair = nodes.row[:, None] + np.arange(2)
     return StatePart(
         strain=response.strain,
@@ -189,7 +189,7 @@ def _state_part(cell: TornCell, response: Response) -> StatePart:
         displacement=displacement(cell, response.strain, u),
         fluctuation=fluctuation(cell, u),
         stress=_element_stress(cell, response),
-        traction=response.solution.lam.getArray(readonly=True)[pair] / nodes.length[:, None],
+        traction=response.solution.lam[pair] / nodes.length[:, None],
         jump=response.solution.jump[pair],
         status=np.zeros(len(nodes.row), np.int8),
     )
@@ -199,7 +199,7 @@ def _element_stress(cell: TornCell, response: Response) -> Float:
     """(elements, 3) mean stresses."""
     stresses = [np.zeros((0, 3))]
     for s, offset in zip(cell.subdomains, cell.offsets, strict=False):
-        own = response.solution.u[offset : offset + len(s.Q)].reshape(-1, 2)
+        own = response.u[offset : offset + len(s.Q)].reshape(-1, 2)
         strain, _ = element_strain(s.mesh.points, s.mesh.triangles, s.mesh.node_class, own)
         stresses.append((strain + response.strain) @ s.L)
     return np.concatenate(stresses)

@@ -60,11 +60,6 @@ class TornCell:
         """Where each subdomain begins in this rank's vectors of degrees of freedom."""
         return np.cumsum([0, *(len(s.Q) for s in self.subdomains)])
 
-    @cached_property
-    def Q(self) -> Float:
-        """(local dofs, 3) loads of the unit strains, f = -Q E."""
-        return np.concatenate([s.Q for s in self.subdomains] or [np.zeros((0, 3))])
-
     def areas(self) -> dict[str, float]:
         """Meshed area of each phase; collective."""
         local = dict.fromkeys(self.plan.phases, 0.0)

@@ -1,4 +1,4 @@
-"""A structured mesh of the unit square, with a square fibre and exact linear fields, as the ranks would hand it over."""
+"""A structured mesh of the unit square with a square fibre, and fields on it, as ranks hand them over."""
 
 from __future__ import annotations
 
@@ -9,7 +9,9 @@ import numpy as np
 
 from feti_homog.output.fields import Header, InterfacePart, MeshPart, StatePart
 
-GRADIENTS = (np.array([[1.0, 0.0], [0.0, 0.0]]), np.array([[0.0, 0.0], [0.0, 1.0]]), np.array([[0.0, 0.5], [0.5, 0.0]]))
+GRADIENTS = tuple(
+    np.array([[a, b], [b, c]]) for a, b, c in ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.5, 0.0))
+)
 
 
 @dataclass(frozen=True)
@@ -21,9 +23,9 @@ class Sample:
 
 
 def sample(cells: int = 8, refine: int = 0, order: int = 1) -> Sample:
-    """The whole unit square on `cells` x `cells` coarse squares of two triangles; the fibre is the middle quarter.
+    """The unit square on `cells` x `cells` coarse squares of two triangles; the fibre is the middle quarter.
 
-    Bodies are torn: matrix 0 in two pieces (left, right of x = 1/2), fibre 1. `cells` must be a multiple of 4.
+    Body 0, the matrix, is torn in two (left, right of x = 1/2); body 1 is the fibre. 4 divides `cells`.
     """
     corners, phase = _coarse(cells)
     piece = np.where(phase == 1, 2, (corners.mean(axis=1)[:, 0] > 0.5).astype(int))
@@ -38,7 +40,7 @@ def sample(cells: int = 8, refine: int = 0, order: int = 1) -> Sample:
     phase = (piece == 2).astype(int)
     mesh = MeshPart(points, triangles, body=phase, subdomain=piece, phase=phase)
     header = Header("sample", "0", 1.0, 1.0, order, refine, ("matrix", "fibre"), "mm", "GPa")
-    return Sample(header, mesh, _interface(), tuple(_state(mesh, gradient, order) for gradient in GRADIENTS))
+    return Sample(header, mesh, _interface(), tuple(_state(mesh, gradient) for gradient in GRADIENTS))
 
 
 def part_of(whole: Sample, rank: int, size: int) -> Sample:
@@ -90,10 +92,11 @@ def _interface() -> InterfacePart:
     s = np.linspace(0.25, 0.75, 5)
     sides = [np.stack([s, 0 * s + 0.25], 1), np.stack([s, 0 * s + 0.75], 1)]
     normals = [np.tile([0.0, -1.0], (5, 1)), np.tile([0.0, 1.0], (5, 1))]
-    return InterfacePart(np.concatenate(sides), np.concatenate(normals), np.full(10, 0.125), np.zeros(10, int))
+    length, fibre = np.full(10, 0.125), np.zeros(10, int)
+    return InterfacePart(np.concatenate(sides), np.concatenate(normals), length, fibre)
 
 
-def _state(mesh: MeshPart, gradient: np.ndarray, order: int) -> StatePart:
+def _state(mesh: MeshPart, gradient: np.ndarray) -> StatePart:
     """u = gradient x plus a bubble; the stress of an element is linear in its centre's position."""
     x = mesh.points
     bubble = 0.05 * np.sin(2 * np.pi * x)[:, ::-1]
@@ -101,8 +104,9 @@ def _state(mesh: MeshPart, gradient: np.ndarray, order: int) -> StatePart:
     strain = np.array([gradient[0, 0], gradient[1, 1], 2 * gradient[0, 1]])
     stress = np.stack([1.0 + centre[:, 0], 2.0 + centre[:, 1], centre[:, 0] - centre[:, 1]], axis=1)
     k = np.arange(10.0)
-    traction, jump = np.stack([k, -k], 1), np.stack([0.1 * k, 0.2 * k], 1)
-    return StatePart(strain, strain * 3, 1.0, x @ gradient.T + bubble, bubble, stress, traction, jump, np.arange(10) % 3)
+    traction, jump, status = np.stack([k, -k], 1), np.stack([0.1 * k, 0.2 * k], 1), np.arange(10) % 3
+    displacement = x @ gradient.T + bubble
+    return StatePart(strain, strain * 3, 1.0, displacement, bubble, stress, traction, jump, status)
 
 
 def _cut(state: StatePart, nodes: Any, rows: Any, owned: Any) -> StatePart:

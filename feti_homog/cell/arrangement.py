@@ -74,7 +74,7 @@ def random_arrangement(cell: Cell) -> Arrangement:
     Radii are uniform in mean * (1 - s, 1 + s), s = `radius_spread`, and scaled to the fraction. Any two
     discs, images included, are at least `min_gap` mean diameters apart. Random centres are moved down the
     gradient of the overlap energy 1/2 sum max(0, R_i + R_j - |x_i - x_j|)^2 of the discs grown by half the
-    gap until it is zero; when that jams, it starts again a few times. Last, the torus is shifted (`clear_shift`).
+    gap until it is zero; when that jams, it starts again a few times. Last, all is shifted (`clear_shift`).
     Raises MeshError when no arrangement is found.
     """
     count, gap, fraction = cell.fibres, cell.min_gap, cell.fibre_fraction

@@ -194,9 +194,9 @@ def missing_corners(plane: Floats, origin: Floats, size: Floats) -> list[str]:
     return [f"no node at the corner {names} of the cell"] if missing else []
 
 
-def uncovered(mesh: RawMesh, plane: Floats, size: Floats) -> list[str]:
+def uncovered(plane: Floats, triangles: NDArray[np.int32], size: Floats) -> list[str]:
     """Triangles that do not add up to the rectangle."""
-    total, whole = areas(plane, mesh.triangles).sum(), size.prod()
+    total, whole = areas(plane, triangles).sum(), size.prod()
     if abs(abs(total) - whole) <= 1e-6 * whole:
         return []
     what = "overlap" if abs(total) > whole else "leave parts uncovered"

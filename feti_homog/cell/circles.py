@@ -31,9 +31,9 @@ class _Loop:
 def with_circles(mesh: CoarseMesh) -> CoarseMesh:
     """The mesh with the round interfaces as circles, their nodes moved onto them exactly.
 
-    A closed interface between two phases is a circle if all its nodes are within ROUND radii of one, there are
-    at least FEWEST edges, none lies on a side of the cell or is longer than the radius, and no corner of the
-    cell is on it. Others stay polygons.
+    A closed interface between two phases is a circle if all its nodes are within ROUND radii of one, there
+    are at least FEWEST edges, none on a side of the cell or longer than the radius, and no corner of the cell
+    is on it. Others stay polygons.
     """
     pairs = interface_edges(mesh)
     size = np.array([mesh.width, mesh.height])
@@ -55,11 +55,12 @@ def with_circles(mesh: CoarseMesh) -> CoarseMesh:
         for image, its_edges in _images(mesh, loop, circle, own, size):
             circles.append(image)
             arc_edges.append(its_edges)
-    return _without_double_arcs(_with_arcs(replace(mesh, points=_copied(mesh, points, size)), circles, arc_edges))
+    mesh = replace(mesh, points=_copied(mesh, points, size))
+    return _without_double_arcs(_with_arcs(mesh, circles, arc_edges))
 
 
 def interface_edges(mesh: CoarseMesh) -> NDArray[np.int32]:
-    """Edges (k, 2) between triangles of different phases, seen on the torus; of those on sides the low copy."""
+    """Edges (k, 2) between triangles of different phases on the torus; of those on sides the low copy."""
     pairs = edges(mesh.triangles)
     for axis, period in ((0, mesh.width), (1, mesh.height)):
         low, high = (np.flatnonzero(mesh.points[:, axis] == level) for level in (0.0, period))
@@ -100,7 +101,7 @@ def _loops(mesh: CoarseMesh, pairs: NDArray[np.int32], size: Floats) -> list[_Lo
 
 
 def _fit(places: Floats) -> Floats | None:
-    """Centre and radius (3,) of the circle through a closed chain of places (k, 2), or None if it is not round."""
+    """Centre and radius (3,) of the circle through a closed chain of places (k, 2); None if not round."""
     middle = places.mean(axis=0)
     offset = places - middle
     scale = np.abs(offset).max()
@@ -117,7 +118,7 @@ def _fit(places: Floats) -> Floats | None:
 
 
 def _moved(points: Floats, places: Floats, circle: Floats, size: Floats) -> Floats | None:
-    """Points (k, 2) of the plane moved onto the circle, along the side they are on; None if that cannot be."""
+    """Points (k, 2) of the plane moved onto the circle, along the side they are on; None if impossible."""
     centres = circle[:2] - np.round((places - points) / size) * size
     spokes = points - centres
     moved = centres + circle[2] * spokes / np.linalg.norm(spokes, axis=1)[:, None]
@@ -171,10 +172,10 @@ def _with_arcs(mesh: CoarseMesh, circles: list[Floats], arc_edges: list[NDArray[
 
 
 def _without_double_arcs(mesh: CoarseMesh) -> CoarseMesh:
-    """The mesh with edges flipped where a triangle has two on one circle; where this fails it is a polygon."""
+    """The mesh with edges flipped where a triangle has two on one circle; if this fails, it is a polygon."""
     nodes = len(mesh.points)
     triangles = flip_double_arcs(mesh.triangles, mesh.phase, mesh.arc_edges, mesh.arc_circle, nodes)
-    bad, corner = double_arcs(triangles, mesh.arc_edges, mesh.arc_circle, nodes)
+    bad, _ = double_arcs(triangles, mesh.arc_edges, mesh.arc_circle, nodes)
     if len(bad) == 0:
         return replace(mesh, triangles=triangles)
     keys = edge_keys(mesh.arc_edges, nodes)

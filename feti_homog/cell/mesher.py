@@ -34,7 +34,7 @@ def generate(cell: Cell, marks: Mapping[int, Sequence[float]] = NO_MARKS) -> Coa
     """The periodic coarse mesh of a square, hexagonal or random cell, elements about mesh_size * width.
 
     `marks` maps a fibre (its number in the arrangement) to angles in degrees, measured at its centre, where
-    the mesh gets nodes: the tips of debonded arcs. A mark within MERGED of where the circle crosses the cell's
+    the mesh gets nodes: tips of debonded arcs. A mark within MERGED of where the circle crosses the cell's
     boundary, or of another mark, is moved there. Raises MeshError if the cell cannot be arranged.
     """
     arrangement = arrange(cell)

@@ -64,20 +64,24 @@ def cut(torus: Torus, subdomain: Int) -> Iterator[Piece]:
 
 
 def pinned_class(torus: Torus) -> int:
-    """The class held fixed, Eq. (15): the corner, or the nearest one to it that no interface passes through.
+    """The class held fixed, Eq. (15): that inside the matrix nearest to the cell's corner.
 
-    A corner on an interface would tie the faces together where they must be able to part.
+    On an interface it would tie faces that must be able to part, in a fibre it would tie one that may come
+    loose; u* is the same up to a constant.
     """
     mesh = torus.mesh
-    corner_class, corner_body = torus.node_class[mesh.triangles].ravel(), np.repeat(torus.constituent, 3)
+    body = np.repeat(torus.constituent, 3)
+    corner = torus.node_class[mesh.triangles].ravel()
     n = torus.node_class.max() + 1
-    low, high = np.full(n, corner_body.max()), np.zeros(n, np.int64)
-    np.minimum.at(low, corner_class, corner_body)
-    np.maximum.at(high, corner_class, corner_body)
+    low, high = np.full(n, body.max()), np.zeros(n, np.int64)
+    np.minimum.at(low, corner, body)
+    np.maximum.at(high, corner, body)
     away = mesh.points - np.round(mesh.points / [mesh.width, mesh.height]) * [mesh.width, mesh.height]
     distance = np.full(n, np.inf)
     np.minimum.at(distance, torus.node_class, np.hypot(*away.T))
-    return int(np.argmin(np.where(low == high, distance, np.inf)))
+    in_matrix = torus.constituent_phase[high] == 0
+    # By preference inside the matrix, else inside any body.
+    return int(np.lexsort((distance, ~in_matrix, low != high))[0])
 
 
 def _piece(torus: Torus, index: int, members: Int, pinned: int) -> Piece:

@@ -19,22 +19,30 @@ Floats = NDArray[np.float64]
 
 # How a mesh file of gmsh begins; other text would be run as a script.
 HEADERS = ("$MeshFormat", "$Comments", "$PhysicalNames", "$NOD")
+# What to do about other elements, by order and dimension.
+REMEDY = {
+    (1, 2): "do not recombine",
+    (2, 2): "mesh with Mesh.ElementOrder = 1 and set order = 2 in [cell]",
+    (1, 3): "mesh the surfaces only",
+    (2, 3): "mesh the surfaces only",
+}
 
 
 def read(path: Path) -> CoarseMesh:
     """The coarse mesh in a .msh file of any gmsh version, moved to [0, width] x [0, height].
 
     It consists of 3-node triangles in physical surfaces "matrix", "fibre", "fibre:2", ..., fills a rectangle,
-    and has matching nodes on opposite sides. Round interfaces become circles (`with_circles`). Raises MeshError
-    with all faults of the first stage that has any: file, labels, shapes, connections, sides.
+    and has matching nodes on opposite sides. Round interfaces become circles (`with_circles`). Raises
+    MeshError with all faults of the first stage that has any: file, labels, shapes, connections, sides.
     """
     raw = _load(path)
     _refuse(path, checks.unlabelled(raw), checks.unknown_phases(raw))
     _refuse(path, checks.not_finite(raw))
     _refuse(path, checks.not_planar(raw), checks.flat_or_inverted(raw), checks.duplicate_nodes(raw))
     origin, size, plane = _on_rectangle(raw.points[:, :2])
-    _refuse(path, checks.overlapping(raw), checks.open_edges(raw, plane, size))
-    _refuse(path, checks.missing_corners(plane, origin, size), checks.uncovered(raw, plane, size))
+    corners = checks.missing_corners(plane, origin, size)
+    _refuse(path, checks.overlapping(raw), checks.open_edges(raw, plane, size), corners)
+    _refuse(path, checks.uncovered(plane, raw.triangles, size))
     _refuse(path, checks.not_periodic(raw, plane, size))
     return with_circles(_coarse_mesh(raw, _matched(plane, size), size))
 
@@ -56,18 +64,12 @@ def _load(path: Path) -> RawMesh:
     if not start.startswith(HEADERS):
         raise MeshError(f"{path.name}: not a gmsh mesh file: it does not begin with {HEADERS[0]}")
     with gmsh_session() as gmsh:
-        gmsh.logger.start()
         try:
             gmsh.open(str(path))
-        except Exception:
-            raise MeshError(f"{path.name}: gmsh cannot read it: {_last_error(gmsh)}") from None
+        except Exception as error:  # gmsh raises nothing more specific
+            raise MeshError(f"{path.name}: gmsh cannot read it: {error}") from None
         _refuse(path, _other_kinds(gmsh))
         return _raw_mesh(gmsh)
-
-
-def _last_error(gmsh: ModuleType) -> str:
-    errors = [line for line in gmsh.logger.get() if line.startswith("Error")]
-    return errors[0].removeprefix("Error: ") if errors else "unknown error"
 
 
 def _other_kinds(gmsh: ModuleType) -> list[str]:
@@ -77,12 +79,12 @@ def _other_kinds(gmsh: ModuleType) -> list[str]:
     for kind in kinds:
         if kind != TRIANGLE:
             tags, nodes = gmsh.model.mesh.getElementsByType(kind)
-            name, _, order, *_ = gmsh.model.mesh.getElementProperties(kind)
+            name, dimension, order, *_ = gmsh.model.mesh.getElementProperties(kind)
             points = [gmsh.model.mesh.getNode(node)[0] for node in nodes[: len(nodes) // len(tags)]]
-            remedy = "mesh with Mesh.ElementOrder = 1 and set order = 2 in [cell]" if order > 1 else "do not recombine"
+            first = f"element {tags[0]} at {checks.at(np.mean(points, axis=0))}"
             faults.append(
-                f"{len(tags)} elements of the kind {name}, first element {tags[0]} at "
-                f"{checks.at(np.mean(points, axis=0))}: only 3-node triangles can be used ({remedy})"
+                f"{first}, the first of {len(tags)}, is a {name}: only 3-node triangles can be used "
+                f"({REMEDY[min(order, 2), dimension]})"
             )
     if TRIANGLE not in kinds and not faults:
         faults.append("no triangles in it: mesh the surfaces and put them in physical surfaces before saving")

@@ -7,7 +7,7 @@ cell's boundary cuts is one constituent.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -50,9 +50,14 @@ class Torus:
         left, right = edge_pairs(torus_edge[triangle_edges])
         same = mesh.phase[left] == mesh.phase[right]
         label = components(len(mesh.triangles), left[same], right[same])
-        order = np.lexsort((np.arange(len(label)), mesh.phase))
-        constituent = _renumber(label, order)
-        return cls(mesh, node_class, edges, triangle_edges, torus_edge, constituent)
+        torus = cls(mesh, node_class, edges, triangle_edges, torus_edge, label)
+        # Fibres on circles are numbered in the order of the circles, which is that of the arrangement.
+        circle = np.full(len(edges), len(mesh.circles))
+        circle[torus.arcs] = mesh.arc_circle
+        first = np.full(label.max() + 1, len(mesh.circles))
+        np.minimum.at(first, np.repeat(label, 3), circle[triangle_edges].ravel())
+        order = np.lexsort((np.arange(len(label)), first[label], mesh.phase))
+        return replace(torus, constituent=_renumber(label, order))
 
     @cached_property
     def triangle_torus_edges(self) -> Int:
@@ -62,13 +67,18 @@ class Torus:
     @cached_property
     def edge_circles(self) -> Float:
         """(e, 3) centre and radius of the circle that each plane edge lies on; radius 0 where it is straight."""
-        mesh, n = self.mesh, len(self.mesh.points)
         circles = np.zeros((len(self.edges), 3))
+        circles[self.arcs] = self.mesh.circles[self.mesh.arc_circle]
+        return circles
+
+    @cached_property
+    def arcs(self) -> Int:
+        """(a,) plane edge of each of the mesh's `arc_edges`."""
+        n = len(self.mesh.points)
         key = np.sort(self.edges, axis=1) @ [n, 1]
         order = np.argsort(key)
-        at = np.searchsorted(key[order], np.sort(mesh.arc_edges.astype(np.int64), axis=1) @ [n, 1])
-        circles[order[at]] = mesh.circles[mesh.arc_circle]
-        return circles
+        wanted = np.sort(self.mesh.arc_edges.astype(np.int64), axis=1) @ [n, 1]
+        return order[np.searchsorted(key[order], wanted)]
 
     @cached_property
     def constituent_phase(self) -> Int:

@@ -69,16 +69,18 @@ class Constraints:
         here = PETSc.IS().createGeneral(self.rows.astype(PETSc.IntType), comm=PETSc.COMM_SELF)
         self._scatter = PETSc.Scatter().create(self.vector, here, self._local, None)
 
-    def gather(self, lam: PETSc.Vec) -> Float:
-        """The local rows of a multiplier vector, as an array that the next call overwrites."""
-        self._scatter.scatter(lam, self._local)
+    def gather(self, owned: Float) -> Float:
+        """The local rows of a vector of which each rank has its own; overwritten by the next call."""
+        self.vector.getArray()[:] = owned
+        self._scatter.scatter(self.vector, self._local)
         return self._local.getArray(readonly=True)
 
-    def add(self, local: Float, out: PETSc.Vec) -> None:
-        """out = sum over ranks of `local` rows."""
-        out.zeroEntries()
+    def sum(self, local: Float) -> Float:
+        """The owned rows of the sum over ranks of `local` rows."""
+        self.vector.zeroEntries()
         self._local.getArray()[:] = local
-        self._scatter.scatter(self._local, out, addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+        self._scatter.scatter(self._local, self.vector, addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+        return self.vector.getArray(readonly=True).copy()
 
 
 class _Layout:

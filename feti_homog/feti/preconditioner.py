@@ -1,18 +1,18 @@
 """Preconditioners of the dual problem: none, lumped, Dirichlet, scaled by stiffness.
 
-M^-1 = W^-1 B D^-1 S D^-1 B^T W^-1 with W = B D^-1 B^T and D the mean diagonal stiffness of each node.  W is
-block-diagonal by node class.  S is the boundary block of K (lumped), or its Schur complement (Dirichlet).
+M^-1 = W^-1 B D^-1 S D^-1 B^T W^-1 on the active rows, with W = B D^-1 B^T and D the mean diagonal stiffness of
+each node.  W is block-diagonal by node.  S is the boundary block of K (lumped), or its Schur complement (Dirichlet).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import Protocol
 
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
-from petsc4py import PETSc
 from scipy.sparse import block_diag, csr_matrix, diags
 
 from feti_homog.feti.assembled import assembled
@@ -21,6 +21,27 @@ from feti_homog.feti.local import LocalSolver
 
 Int = NDArray[np.int64]
 Float = NDArray[np.float64]
+
+
+class Preconditioner(Protocol):
+    """z = M^-1 r on the owned rows."""
+
+    def activate(self, active: Float) -> None:
+        """Restrict to the rows where `active` is 1."""
+
+    def apply(self, r: Float) -> Float:
+        """M^-1 r; r and the result are 0 on inactive rows."""
+
+
+class Identity:
+    """z = r."""
+
+    def activate(self, active: Float) -> None:
+        """Nothing depends on the rows."""
+
+    def apply(self, r: Float) -> Float:
+        """r."""
+        return r.copy()
 
 
 class Lumped:
@@ -47,24 +68,32 @@ class Dirichlet:
         return self.Kbb @ x - self.Kbi @ self.interior.solve()
 
 
-def boundary_stiffness(stiffness: Sequence[csr_matrix], boundary: NDArray[np.bool_], dirichlet: bool) -> Lumped | Dirichlet:
+def boundary_stiffness(
+    stiffness: Sequence[csr_matrix], boundary: NDArray[np.bool_], dirichlet: bool
+) -> Lumped | Dirichlet:
     """S of all subdomains of this rank; `boundary` marks the boundary dofs, the subdomains one after the other."""
     offsets = np.cumsum([0, *(K.shape[0] for K in stiffness)])
     marks = [boundary[first:last] for first, last in pairwise(offsets)]
-    Kbb = csr_matrix(block_diag([K[b][:, b] for K, b in zip(stiffness, marks, strict=True)] or [np.zeros((0, 0))]))
+    nothing = [csr_matrix((0, 0))]
+    Kbb = block_diag([K[b][:, b] for K, b in zip(stiffness, marks, strict=True)] or nothing, format="csr")
     if not dirichlet:
         return Lumped(Kbb)
     interior_rows = [K[~b] for K, b in zip(stiffness, marks, strict=True)]
-    Kib = [rows[:, b] for rows, b in zip(interior_rows, marks, strict=True)]
-    Kii = [rows[:, ~b].tocsr() for rows, b in zip(interior_rows, marks, strict=True)]
-    return Dirichlet(Kbb, csr_matrix(block_diag(Kib or [np.zeros((0, 0))])), Kii)
+    Kib = block_diag([K[:, b] for K, b in zip(interior_rows, marks, strict=True)] or nothing, format="csr")
+    Kii = [K[:, ~b].tocsr() for K, b in zip(interior_rows, marks, strict=True)]
+    return Dirichlet(Kbb, Kib, Kii)
 
 
 class Scaled:
-    """z = M^-1 r, with the scaling of this module around a boundary stiffness."""
+    """M^-1 with the scaling of this module around a boundary stiffness."""
 
     def __init__(
-        self, comm: MPI.Comm, constraints: Constraints, K: Sequence[csr_matrix], S: Lumped | Dirichlet, boundary: NDArray[np.bool_]
+        self,
+        comm: MPI.Comm,
+        constraints: Constraints,
+        K: Sequence[csr_matrix],
+        S: Lumped | Dirichlet,
+        boundary: NDArray[np.bool_],
     ) -> None:
         self.constraints, self.S = constraints, S
         diagonal = np.concatenate([k.diagonal() for k in K] or [np.zeros(0)]).reshape(-1, 2).mean(axis=1)
@@ -72,22 +101,17 @@ class Scaled:
         Bb = constraints.B[:, boundary]
         self.BD = (Bb @ flexibility).tocsr()
         self.DBT = self.BD.T.tocsr()
-        self.W_inverse = _inverse_blocks(_owned_blocks(comm, constraints, self.BD @ Bb.T), *constraints.blocks)
-        self._work = constraints.vector.duplicate()
+        self.W = _Blocks(_owned_blocks(comm, constraints, self.BD @ Bb.T), *constraints.blocks)
+        self.activate(np.ones(self.W.rows))
 
-    def apply(self, r: PETSc.Vec, z: PETSc.Vec) -> None:
-        """z = W^-1 B D^-1 S D^-1 B^T W^-1 r."""
-        self._work.getArray()[:] = self.W_inverse @ r.getArray(readonly=True)
-        self.constraints.add(self.BD @ self.S.apply(self.DBT @ self.constraints.gather(self._work)), z)
-        z.getArray()[:] = self.W_inverse @ z.getArray(readonly=True)
+    def activate(self, active: Float) -> None:
+        """Invert the active part of W."""
+        self.W_inverse = self.W.inverse(active)
 
-
-class Identity:
-    """z = r."""
-
-    def apply(self, r: PETSc.Vec, z: PETSc.Vec) -> None:
-        """z = r."""
-        r.copy(z)
+    def apply(self, r: Float) -> Float:
+        """W^-1 B D^-1 S D^-1 B^T W^-1 r."""
+        x = self.DBT @ self.constraints.gather(self.W_inverse @ r)
+        return self.W_inverse @ self.constraints.sum(self.BD @ self.S.apply(x))
 
 
 def _owned_blocks(comm: MPI.Comm, constraints: Constraints, local: csr_matrix) -> csr_matrix:
@@ -98,21 +122,34 @@ def _owned_blocks(comm: MPI.Comm, constraints: Constraints, local: csr_matrix) -
     return csr_matrix((values, indices - first, indptr), shape=(last - first, last - first))
 
 
-def _inverse_blocks(W: csr_matrix, starts: Int, sizes: Int) -> csr_matrix:
-    """Inverse of a block-diagonal matrix whose blocks start at `starts` (ascending) and have `sizes` rows."""
-    entries = W.tocoo()
-    block = np.repeat(np.arange(len(starts)), sizes)[entries.row]
-    rows, columns, values = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)], [np.zeros(0)]
-    for size in np.unique(sizes):
-        some = np.flatnonzero(sizes == size)
-        number = np.full(len(starts), -1)
-        number[some] = np.arange(len(some))
-        mine = number[block] >= 0
-        own = block[mine]
-        dense = np.zeros((len(some), size, size))
-        dense[number[own], entries.row[mine] - starts[own], entries.col[mine] - starts[own]] = entries.data[mine]
-        at = starts[some][:, None] + np.arange(size)
-        rows.append(np.broadcast_to(at[:, :, None], dense.shape).ravel())
-        columns.append(np.broadcast_to(at[:, None, :], dense.shape).ravel())
-        values.append(np.linalg.inv(dense).ravel())
-    return csr_matrix((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=W.shape)
+class _Blocks:
+    """A block-diagonal matrix of small dense blocks, by size."""
+
+    def __init__(self, matrix: csr_matrix, starts: Int, sizes: Int) -> None:
+        """`starts` (ascending) and `sizes` are those of the blocks."""
+        self.rows = matrix.shape[0]
+        self.blocks: list[tuple[Int, Float]] = []
+        entries = matrix.tocoo()
+        block = np.repeat(np.arange(len(starts)), sizes)[entries.row]
+        for size in np.unique(sizes):
+            some = np.flatnonzero(sizes == size)
+            number = np.full(len(starts), -1)
+            number[some] = np.arange(len(some))
+            mine = number[block] >= 0
+            own = block[mine]
+            dense = np.zeros((len(some), size, size))
+            dense[number[own], entries.row[mine] - starts[own], entries.col[mine] - starts[own]] = entries.data[mine]
+            self.blocks.append((starts[some][:, None] + np.arange(size), dense))
+
+    def inverse(self, active: Float) -> csr_matrix:
+        """Inverse of the active rows and columns, 0 on the others."""
+        rows, columns, values = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)], [np.zeros(0)]
+        for at, dense in self.blocks:
+            mask = active[at]
+            both = mask[:, :, None] * mask[:, None, :]
+            unit = np.eye(at.shape[1]) * (1 - mask)[:, :, None]
+            rows.append(np.broadcast_to(at[:, :, None], dense.shape).ravel())
+            columns.append(np.broadcast_to(at[:, None, :], dense.shape).ravel())
+            values.append((np.linalg.inv(both * dense + unit) * both).ravel())
+        shape = (self.rows, self.rows)
+        return csr_matrix((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=shape)

@@ -1,9 +1,15 @@
-"""The FETI solver: set up once for a mesh, then one projected Krylov solve a load, Eqs. (34), (36), (37)."""
+"""The FETI solver: set up once for a mesh, then one projected Krylov solve a load and a set of active rows.
+
+With f = -Q E for the macroscopic strain E, Eqs. (34), (36), (37) read on the active rows
+
+    F lam - G alpha = d E,  G^T lam = 0,  u* = K+ (-Q E - B^T lam) + R alpha,  d = -B K+ Q.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from mpi4py import MPI
@@ -14,9 +20,10 @@ from feti_homog.cell.refine import Lattice
 from feti_homog.errors import CaseError
 from feti_homog.feti.coarse import CoarseProblem
 from feti_homog.feti.constraints import Constraints
+from feti_homog.feti.contexts import ActiveRows, PrimalTest, ProjectedOperator, ProjectedPreconditioner
 from feti_homog.feti.local import LocalSolver
 from feti_homog.feti.operator import DualOperator
-from feti_homog.feti.preconditioner import Identity, Scaled, boundary_stiffness
+from feti_homog.feti.preconditioner import Identity, Preconditioner, Scaled, boundary_stiffness
 from feti_homog.feti.shared import Shared
 from feti_homog.feti.subdomain import Subdomain
 
@@ -27,31 +34,31 @@ RTOL = 1e-8
 
 
 @dataclass(frozen=True)
-class Solution:
-    """The response to one load, this rank's share.
+class DualSolution:
+    """The multipliers under one macroscopic strain and what follows from them on the interface.
 
     Attributes:
-        u: (local dofs,) fluctuating displacement u*, the subdomains one after the other.
-        lam: multipliers, nodal forces between the faces.
-        jump: (owned rows,) B u.
+        strain: (3,) E.
+        lam: (owned rows,) multipliers, nodal forces between the faces; 0 on inactive rows.
+        jump: (owned rows,) B u*, 0 up to tolerance on active rows, gap and slip on the others.
+        alpha: (dimension,) rigid-body amplitudes.
         iterations, reason: of the Krylov method (PETSc's KSPConvergedReason).
-        jump_norm: |B u| relative to the jump of the torn cell under this load.
-        residuals: history of the jump, one an iteration.
+        residual: |B u*| on the active rows, relative to the jump of the torn cell.
     """
 
-    u: Float
-    lam: PETSc.Vec
+    strain: Float
+    lam: Float
     jump: Float
+    alpha: Float
     iterations: int
     reason: int
-    jump_norm: float
-    residuals: tuple[float, ...]
+    residual: float
 
 
 class FetiSolver:
-    """K u = f - B^T lam on every subdomain, B u = 0 between them.
+    """Set-up of the dual problem; all factorizations of subdomains are made here, once.
 
-    All factorizations and the coarse problem are made here, once.  Options have the prefix `feti_`.
+    Options have the prefix `feti_`.
     """
 
     def __init__(self, comm: MPI.Comm, shared: Shared, subdomains: Sequence[Subdomain], lattice: Lattice) -> None:
@@ -59,47 +66,84 @@ class FetiSolver:
         self.constraints = Constraints(comm, shared, subdomains, lattice)
         self.local = LocalSolver([s.regularised() for s in subdomains], "feti_sub_")
         self.operator = DualOperator(self.constraints, self.local)
-        self.coarse = CoarseProblem(comm, self.constraints, [s.R for s in subdomains])
+        self.coarse = CoarseProblem(comm, self.constraints, subdomains)
         self.preconditioner = self._preconditioner()
-        self._lam0, self._rhs, self._w = (self.constraints.vector.duplicate() for _ in range(3))
-        self._monitor = _PrimalTest()
+        self.active = ActiveRows(self.rows)
+        self._projected = ProjectedPreconditioner(self.preconditioner, self.coarse)
+        self._test = PrimalTest(self._projected)
+        self._rhs, self._w = self.constraints.vector.duplicate(), self.constraints.vector.duplicate()
         self.ksp = self._krylov()
 
-    def solve(self, f: Float) -> Solution:
-        """Solve for the local loads f (local dofs,).
-
-        Not to converge is no error here: the solution says so in its `reason`.
-        """
-        lam, rhs, w = self._lam0, self._rhs, self._w
-        self.coarse.balance(f, lam)
-        self.operator.jump(self.operator.displacement(f, lam), rhs)
-        self.coarse.apply(rhs)
-        self._monitor.start(rhs.norm())
-        w.zeroEntries()
-        if rhs.getSize() and self._monitor.reference > 0:
-            self.ksp.solve(rhs, w)
-        lam.axpy(1.0, w)
-        return self._recover(f, lam)
+    @property
+    def rows(self) -> int:
+        """Number of multipliers that this rank owns."""
+        return self.constraints.owned[1] - self.constraints.owned[0]
 
     @property
     def rtol(self) -> float:
         """Relative tolerance of the primal residuals."""
         return float(self.ksp.getTolerances()[0])
 
-    def _recover(self, f: Float, lam: PETSc.Vec) -> Solution:
-        """u = K+ (f - B^T lam) + R alpha, Eq. (34), with alpha from the jump of the first term."""
-        u = self.operator.displacement(f, lam)
-        jump = self.constraints.vector.duplicate()
-        self.operator.jump(u, jump)
-        u -= self.coarse.rigid_motion(jump)
-        self.operator.jump(u, jump)
-        iterations, reason = self.ksp.getIterationNumber(), int(self.ksp.getConvergedReason())
-        norm = jump.norm() / (self._monitor.reference or 1.0)
-        return Solution(
-            u, lam.copy(), jump.getArray().copy(), iterations, reason, norm, tuple(self._monitor.jumps)
-        )
+    @cached_property
+    def Q(self) -> Float:
+        """(local dofs, 3) loads of the unit strains, f = -Q E."""
+        return np.concatenate([s.Q for s in self.subdomains] or [np.zeros((0, 3))])
 
-    def _preconditioner(self) -> Identity | Scaled:
+    @cached_property
+    def d(self) -> Float:
+        """(owned rows, 3) jumps of the torn cell, -B K+ Q, under the unit strains."""
+        nothing = np.zeros(self.rows)
+        columns = [self.operator.jump(self.operator.displacement(-q, nothing)) for q in self.Q.T]
+        return np.stack(columns, axis=1)
+
+    def activate(self, active: Float) -> None:
+        """Let only the owned rows where `active` is 1 carry multipliers; refactors the coarse problem alone."""
+        if self.comm.allreduce(bool((active != self.active.mask).any()), MPI.LOR):
+            self.active.mask = active
+            self.coarse.activate(active)
+            self.preconditioner.activate(active)
+
+    def solve(self, strain: Float, start: Float) -> DualSolution:
+        """Solve for the strain (3,), beginning with the multipliers `start` (owned rows,).
+
+        Not to converge is no error here: the solution says so in its `reason`.
+        """
+        lam, torn = start * self.active.mask, self.d @ strain
+        self.coarse.project(lam)
+        free = self.active.mask * torn
+        self.coarse.project(free)
+        closing = self.preconditioner.apply(free)
+        self.coarse.project(closing)
+        self._test.start(self._norm(free), self._norm(closing))
+        iterations, reason = 0, int(PETSc.KSP.ConvergedReason.CONVERGED_ATOL)
+        if self._test.jump > 0:
+            self._w.zeroEntries()
+            residual = free - self.active.mask * self.operator.apply(lam)
+            self.coarse.project(residual)
+            self._rhs.setArray(residual)
+            self.ksp.solve(self._rhs, self._w)
+            iterations, reason = self.ksp.getIterationNumber(), int(self.ksp.getConvergedReason())
+            lam += self._w.getArray(readonly=True)
+        return self._recover(strain, lam, torn, iterations, reason)
+
+    def displacement(self, solution: DualSolution) -> Float:
+        """(local dofs,) u* of a solution, Eq. (34)."""
+        u = self.operator.displacement(-self.Q @ solution.strain, solution.lam)
+        return u + self.coarse.motion(solution.alpha)
+
+    def _recover(self, strain: Float, lam: Float, torn: Float, iterations: int, reason: int) -> DualSolution:
+        jump = torn - self.operator.apply(lam)
+        alpha = np.zeros(self.coarse.dimension)
+        if self.coarse.dimension:
+            alpha -= self.coarse.amplitudes(self.active.mask * jump)
+            jump += self.coarse.G @ alpha
+        residual = self._norm(self.active.mask * jump) / (self._test.jump or 1.0)
+        return DualSolution(strain, lam, jump, alpha, iterations, reason, residual)
+
+    def _norm(self, x: Float) -> float:
+        return float(np.sqrt(self.comm.allreduce(x @ x)))
+
+    def _preconditioner(self) -> Preconditioner:
         name = PETSc.Options("feti_").getString("pc_type", "dirichlet")
         if name not in PRECONDITIONERS:
             raise CaseError(f"-feti_pc_type {name}: expected one of {', '.join(PRECONDITIONERS)}")
@@ -113,7 +157,7 @@ class FetiSolver:
     def _krylov(self) -> PETSc.KSP:
         vector = self.constraints.vector
         sizes = (vector.getSizes(), vector.getSizes())
-        A = PETSc.Mat().createPython(sizes, _ProjectedOperator(self.operator, self.coarse), comm=self.comm)
+        A = PETSc.Mat().createPython(sizes, ProjectedOperator(self.operator, self.coarse, self.active), comm=self.comm)
         A.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         A.setUp()
         ksp = PETSc.KSP().create(self.comm)
@@ -121,62 +165,10 @@ class FetiSolver:
         ksp.setOperators(A)
         ksp.setType(PETSc.KSP.Type.CG)
         ksp.setTolerances(rtol=RTOL, atol=0.0, max_it=2000)
-        ksp.setConvergenceTest(self._monitor.test)
+        ksp.setConvergenceTest(self._test)
         pc = ksp.getPC()
         pc.setType(PETSc.PC.Type.PYTHON)
         pc.setOptionsPrefix("feti_projected_")
-        pc.setPythonContext(_ProjectedPreconditioner(self.preconditioner, self.coarse, self._monitor))
+        pc.setPythonContext(self._projected)
         ksp.setFromOptions()
         return ksp
-
-
-class _ProjectedOperator:
-    """y = P F x; x is in the range of P."""
-
-    def __init__(self, operator: DualOperator, coarse: CoarseProblem) -> None:
-        self.operator, self.coarse = operator, coarse
-
-    def mult(self, mat: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        self.operator.mult(x, y)
-        self.coarse.apply(y)
-
-
-class _ProjectedPreconditioner:
-    """z = P M^-1 r; notes |r|, which is the interface jump |B u| of the iterate."""
-
-    def __init__(self, preconditioner: Identity | Scaled, coarse: CoarseProblem, monitor: _PrimalTest) -> None:
-        self.preconditioner, self.coarse, self.monitor = preconditioner, coarse, monitor
-
-    def apply(self, pc: PETSc.PC, r: PETSc.Vec, z: PETSc.Vec) -> None:
-        self.monitor.jumps.append(r.norm())
-        self.preconditioner.apply(r, z)
-        self.coarse.apply(z)
-
-
-class _PrimalTest:
-    """Converged when both primal residuals are below rtol: the jump, and the forces it takes to close it.
-
-    The jump is |P r| relative to that of the torn cell; the forces are the Krylov method's preconditioned
-    residual relative to its first.  A small dual residual alone can hide a large one of these.
-    """
-
-    def __init__(self) -> None:
-        self.reference, self.forces = 0.0, 0.0
-        self.jumps: list[float] = []
-
-    def start(self, reference: float) -> None:
-        self.reference, self.jumps = reference, []
-
-    def test(self, ksp: PETSc.KSP, iteration: int, residual: float) -> PETSc.KSP.ConvergedReason:
-        rtol, atol, divtol, _ = ksp.getTolerances()
-        if not np.isfinite(residual):
-            return PETSc.KSP.ConvergedReason.DIVERGED_NANORINF
-        if iteration == 0:
-            self.forces = residual
-        if residual > divtol * self.forces:
-            return PETSc.KSP.ConvergedReason.DIVERGED_DTOL
-        if residual <= atol:
-            return PETSc.KSP.ConvergedReason.CONVERGED_ATOL
-        if residual <= rtol * self.forces and self.jumps[-1] <= rtol * self.reference:
-            return PETSc.KSP.ConvergedReason.CONVERGED_RTOL
-        return PETSc.KSP.ConvergedReason.ITERATING

@@ -1,4 +1,4 @@
-"""What the pictures show of result.h5: at most about LIMIT triangles, read in blocks, and the outlines of the bodies."""
+"""What the pictures show of result.h5: about LIMIT triangles at most, read in blocks, and their outlines."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 Array = NDArray[Any]
 
@@ -18,7 +19,7 @@ QUARTERS = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])  # of a six-no
 
 @dataclass(frozen=True)
 class Drawing:
-    """The drawn triangles: those of the file, or the coarser ones of which each holds `group` of them."""
+    """The drawn triangles: those of the file, or coarser ones that hold `group` of them each."""
 
     group: int
     pieces: int  # drawn triangles per element: 4 for a curved one
@@ -31,7 +32,7 @@ class Drawing:
 
 
 def drawing(file: Any, limit: int = LIMIT) -> Drawing:
-    """The finest nested mesh of an open result.h5 with at most `limit` triangles, or the coarsest there is."""
+    """The finest nested mesh of an open result.h5 with at most `limit` triangles, or else its coarsest."""
     table = file["mesh/triangles"]
     refine, curved = int(file.attrs["refine"]), table.shape[1] == 6
     level = next((j for j in range(refine) if len(table) <= limit * 4**j), refine)
@@ -61,27 +62,24 @@ def on_triangles(table: Any, column: int, drawn: Drawing) -> Array:
 def outlines(drawn: Drawing, label: Array) -> Array:
     """The edges (e, 2) between triangles of different label, on both sides, and those of the cell.
 
-    Nodes are torn, so an edge with one triangle is on the border of a subdomain; it has a twin in the same place
-    across the border, and none on the border of the cell.
+    Nodes are torn, so an edge with one triangle is on the border of a subdomain; it has a twin in the same
+    place across the border, and none on the border of the cell.
     """
     edges = np.concatenate([drawn.triangles[:, pair] for pair in ([0, 1], [1, 2], [2, 0])])
     owner = np.tile(label, 3)
     ordered = np.sort(edges, axis=1)
-    _, first, count = np.unique(ordered[:, 0] * len(drawn.nodes) + ordered[:, 1], return_index=True, return_counts=True)
+    keys = ordered[:, 0] * len(drawn.nodes) + ordered[:, 1]
+    _, first, count = np.unique(keys, return_index=True, return_counts=True)
     border, owner = ordered[first[count == 1]], owner[first[count == 1]]
-    size = np.ptp(drawn.points, axis=0).max()
-    middle = np.round(drawn.points[border].mean(axis=1) / (1e-7 * size)).astype(np.int64)
-    # Twins agree to rounding: a grid of 1e-7 could part two of them, which only draws one line too many.
-    place = np.unique(middle, axis=0, return_inverse=True)[1].ravel()
-    least, most = np.full(len(border), np.iinfo(np.int64).max), np.full(len(border), -1)
-    np.minimum.at(least, place, owner)
-    np.maximum.at(most, place, owner)
-    alone = np.bincount(place, minlength=len(border)) == 1
-    return border[(alone | (least < most))[place]]
+    middle = drawn.points[border].mean(axis=1)
+    twins = cKDTree(middle).query_pairs(1e-6 * np.ptp(drawn.points, axis=0).max(), output_type="ndarray")
+    kept = np.ones(len(border), dtype=bool)
+    kept[twins[owner[twins[:, 0]] == owner[twins[:, 1]]].ravel()] = False
+    return border[kept]
 
 
 def _corners(rows: Array, pieces: int) -> Array:
-    """The drawn triangles (q, 3) of groups of rows (g, group, 3 or 6): corner i is vertex i of a group's member."""
+    """The drawn triangles (q, 3) of rows (g, group, 3 or 6): corner i is vertex i of one of the group."""
     if pieces > 1:
         return rows[:, 0][:, QUARTERS].reshape(-1, 3)
     members = np.arange(3) * ((rows.shape[1] - 1) // 3)

@@ -234,7 +234,7 @@ def _arrays(group: str, count: int, tables: Mapping[str, Any]) -> dict[str, NDAr
 
 
 def _reserve(rank: int, part: Path, size: int) -> None:
-    """Takes the space on the disk: where it ends while MPI-IO writes, some ranks may not hear of it and hang."""
+    """Takes the space on the disk: were it to end while MPI-IO writes, some ranks might wait for ever."""
     if rank == 0:
         with part.open("r+b") as stream:
             os.posix_fallocate(stream.fileno(), stream.seek(0, os.SEEK_END), size + RESERVE)

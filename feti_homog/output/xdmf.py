@@ -18,10 +18,10 @@ NUMBERS = {"f": "Float", "i": "Int"}
 
 
 def write(directory: Path) -> Path:
-    """Writes `directory`/result.xdmf for the complete result.h5 beside it; returns its path. Call on one rank.
+    """Writes `directory`/result.xdmf for the result.h5 beside it; returns its path. Call on one rank.
 
     Two temporal collections, the time being the number of the state: "cell" with the fields on nodes and
-    elements and, if there are interface nodes, "interface" with those at points.
+    elements and, if there are interface nodes, "interface" with those at its points.
 
     Raises:
         FetiHomogError: result.h5 cannot be read or the file cannot be written.

@@ -85,7 +85,8 @@ def test_states_are_on_disk_as_they_come(comm: Any, shared_path: Path) -> None:
 def test_an_exception_leaves_the_old_file(comm: Any, shared_path: Path) -> None:
     old = write(shared_path, comm, sample(4), states=1)
     part = part_of(sample(4), comm.rank, comm.size)
-    with pytest.raises(ZeroDivisionError), FieldFile(shared_path, comm, part.header, part.mesh, part.interface):
+    arguments = (shared_path, comm, part.header, part.mesh, part.interface)
+    with pytest.raises(ZeroDivisionError), FieldFile(*arguments):
         raise ZeroDivisionError
     with h5py.File(old, "r") as file:
         assert list(file["state"]) == ["0"]

@@ -1,0 +1,149 @@
+"""The printed summary of result.json's document."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from textwrap import wrap
+from typing import Any
+
+WIDTH = 79
+LABEL = 12  # columns of the labels at the left
+STIFF = ("C11", "C22", "C33")
+MODULI = ("E1", "E2", "G12", "bulk", "shear")  # in the unit of the stresses; the others are ratios
+
+Document = Mapping[str, Any]
+
+
+def summary(document: Document) -> str:
+    """The document in lines of at most 79 columns (but for long names), without a newline at the end.
+
+    Cell, solver, effective stiffness, moduli between their bounds, checks, timings, memory, warnings and status.
+    Keys that it does not know are left out. Raises KeyError if one that DESIGN names is missing.
+    """
+    case = document["case"]
+    unit = case.get("output", {}).get("stress_unit", "")
+    stress = f" ({unit})" if unit else ""
+    title = f"{case.get('name', '')}: effective stiffness, plane {case['analysis']['plane']}".lstrip(": ")
+    blocks = [
+        [title, "=" * min(len(title), WIDTH)],
+        [*_cell(document), *_solver(document["solver"])],
+        _matrix(f"Effective stiffness{stress}", document["effective_stiffness"]),
+        _moduli(f"Engineering moduli{stress}", document["moduli"]),
+        _bounds(f"Bounds{stress}", document),
+        _checks(document),
+        [
+            *_timings(document["timings"]),
+            *_field("Memory", [f"{_bytes(document['memory'])} per rank at most"]),
+        ],
+        [*_remarks("Warning", document.get("warnings", ())), *_remarks("Fault", document.get("faults", ()))],
+        _field("Status", [str(document["status"])]),
+    ]
+    return "\n\n".join("\n".join(block) for block in blocks if block)
+
+
+def _cell(document: Document) -> list[str]:
+    cell, case = document["cell"], document["case"]
+    unit = case.get("output", {}).get("length_unit", "")
+    size = f"{cell['width']:.6g} x {cell['height']:.6g} {unit}".rstrip()
+    shape, fractions = case["cell"], cell.get("fractions", {})
+    shares = ", ".join(f"{phase} {share:.6f}" for phase, share in fractions.items())
+    mesh = [_number(cell["elements"], "element"), _number(cell["nodes"], "node")]
+    mesh += [f"order {shape['order']}"] * ("order" in shape) + [f"refine {shape['refine']}"] * (
+        "refine" in shape
+    )
+    return [
+        *_field("Cell", [str(shape["geometry"]), size]),
+        *_field(
+            "Meshed", [f"fibre fraction {cell['fibre_fraction']:.6f}", *([f"({shares})"] if shares else [])]
+        ),
+        *_field("Mesh", mesh),
+    ]
+
+
+def _solver(solver: Document) -> list[str]:
+    parts = [_number(solver["ranks"], "rank"), _number(solver["subdomains"], "subdomain")]
+    dual = [_number(solver["multipliers"], "multiplier"), f"kernel {solver['kernel_dim']}"]
+    return [
+        *_field("Solver", [*parts, _number(solver["dofs"], "dof")]),
+        *_field("Dual", [*dual, f"coarse problem {solver['coarse_dim']}"]),
+        *_field("Iterations", [str(count) for count in _listed(solver["iterations"])]),
+    ]
+
+
+def _matrix(title: str, rows: Sequence[Sequence[float]]) -> list[str]:
+    # Zero to rounding is shown as 0.
+    floor = 1e-9 * max(abs(entry) for row in rows for entry in row)
+    lines = [f"{title:<{2 * LABEL}}" + "".join(f"{name:>16}" for name in ("E11", "E22", "gamma12"))]
+    for name, row in zip(("S11", "S22", "S12"), rows, strict=True):
+        entries = (f"{entry if abs(entry) > floor else 0.0:>16.9g}" for entry in row)
+        lines.append(f"  {name:<{2 * LABEL - 2}}" + "".join(entries))
+    return lines
+
+
+def _moduli(title: str, moduli: Document) -> list[str]:
+    stiff = [f"{name:<6}{moduli[name]:>13.7g}" for name in MODULI if name in moduli]
+    ratios = [f"{name:<11}{_tidy(value):>13.6g}" for name, value in moduli.items() if name not in MODULI]
+    count = max(len(stiff), len(ratios))
+    pairs = zip(stiff + [""] * (count - len(stiff)), ratios + [""] * (count - len(ratios)), strict=True)
+    return [title, *(f"  {left:<30}{right}".rstrip() for left, right in pairs)]
+
+
+def _bounds(title: str, document: Document) -> list[str]:
+    moduli, bounds, here = document["moduli"], document["bounds"], document["effective_stiffness"]
+    lines = [f"{title:<{2 * LABEL}}{'lower':>14}{'computed':>14}{'upper':>14}"]
+    for i, name in enumerate(STIFF):
+        lines.append(
+            _between(f"{name} Reuss, Voigt", bounds["reuss"][i][i], here[i][i], bounds["voigt"][i][i])
+        )
+    for name, (lower, upper) in (bounds["hashin_shtrikman"] or {}).items():
+        lines.append(_between(f"{name} Hashin-Shtr.", lower, moduli[name], upper))
+    return lines
+
+
+def _between(label: str, lower: float, value: float, upper: float) -> str:
+    inside = lower - 1e-9 * abs(lower) <= value <= upper + 1e-9 * abs(upper)
+    note = "" if inside else "  outside"
+    return f"  {label:<{2 * LABEL - 2}}{lower:>14.7g}{value:>14.7g}{upper:>14.7g}{note}"
+
+
+def _checks(document: Document) -> list[str]:
+    tolerance = document.get("check_tolerance")
+    limit = "" if tolerance is None else f" (relative, at most {tolerance:.1e})"
+    lines = [f"Checks{limit}"]
+    for name, error in document["checks"].items():
+        verdict = "" if tolerance is None else "pass" if error <= tolerance else "FAIL"
+        lines.append(f"  {name:<{2 * LABEL - 2}}{error:>14.1e}    {verdict}".rstrip())
+    return lines
+
+
+def _timings(timings: Document) -> list[str]:
+    stages = [f"{stage} {seconds:.2f} s" for stage, seconds in timings.items()]
+    return _field("Time", stages)
+
+
+def _remarks(label: str, remarks: Iterable[str]) -> list[str]:
+    return [line for remark in remarks for line in _field(label, [str(remark)])]
+
+
+def _field(label: str, words: Sequence[str]) -> list[str]:
+    """A label and its words, separated by commas, in as many lines as it takes."""
+    text = ", ".join(words).replace(", (", " (")
+    return wrap(
+        text, WIDTH, initial_indent=f"{label:<{LABEL}}", subsequent_indent=" " * LABEL, break_long_words=False
+    )
+
+
+def _listed(value: Any) -> list[Any]:
+    return list(value) if isinstance(value, list | tuple) else [value]
+
+
+def _tidy(value: float) -> float:
+    return value if abs(value) > 1e-9 else 0.0
+
+
+def _number(count: int, name: str) -> str:
+    return f"{count:,} {name}{'' if count == 1 else 's'}".replace(",", " ")
+
+
+def _bytes(size: float) -> str:
+    return f"{size / 2**20:.0f} MiB" if size < 2**30 else f"{size / 2**30:.2f} GiB"

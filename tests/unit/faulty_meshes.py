@@ -1,0 +1,243 @@
+"""Meshes that cannot be used: name -> (function writing the file, part of the message)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+Nodes = dict[int, tuple[float, float, float]]
+# Element tag -> (gmsh element type, physical surface, entity, node tags).
+Elements = dict[int, tuple[int, int, int, tuple[int, ...]]]
+MATRIX, FIBRE = 1, 2
+N = 4
+
+
+@dataclass(frozen=True)
+class MshFile:
+    """A .msh file of version 2.2, by node and element tags."""
+
+    nodes: Nodes
+    elements: Elements
+    names: dict[int, str] = field(default_factory=lambda: {MATRIX: "matrix", FIBRE: "fibre"})
+
+    def write(self, path: Path) -> None:
+        lines = ["$MeshFormat", "2.2 0 8", "$EndMeshFormat", "$PhysicalNames", str(len(self.names))]
+        lines += [f'2 {tag} "{name}"' for tag, name in self.names.items()]
+        lines += ["$EndPhysicalNames", "$Nodes", str(len(self.nodes))]
+        lines += [f"{tag} {x!r} {y!r} {z!r}" for tag, (x, y, z) in self.nodes.items()]
+        lines += ["$EndNodes", "$Elements", str(len(self.elements))]
+        for tag, (kind, physical, entity, nodes) in self.elements.items():
+            lines.append(" ".join(map(str, (tag, kind, 2, physical, entity, *nodes))))
+        path.write_text("\n".join([*lines, "$EndElements", ""]))
+
+    def moved(self, **places: Sequence[float]) -> MshFile:
+        """With nodes n7=(x, y[, z]) elsewhere."""
+        changed = {int(name[1:]): (*place, 0.0)[:3] for name, place in places.items()}
+        return replace(self, nodes={**self.nodes, **changed})
+
+    def without(self, *tags: int) -> MshFile:
+        """Without these elements."""
+        return replace(self, elements={tag: e for tag, e in self.elements.items() if tag not in tags})
+
+    def with_element(self, tag: int, kind: int, physical: int, nodes: Sequence[int]) -> MshFile:
+        """With this element, in place of any of the same tag."""
+        element = (kind, physical, physical or 9, tuple(nodes))
+        return replace(self, elements={**self.elements, tag: element})
+
+
+def node(i: int, j: int) -> int:
+    """Tag of the node at (i, j) / 4."""
+    return 1 + i + (N + 1) * j
+
+
+def _middle(x: float, y: float) -> bool:
+    return abs(x - 0.5) < 0.25 and abs(y - 0.5) < 0.25
+
+
+def grid(fibre: Callable[[float, float], bool] = _middle) -> MshFile:
+    """A good mesh of 4 x 4 squares, elements 2 k + 1 and 2 k + 2 the lower and the upper half of square k."""
+    nodes = {node(i, j): (i / N, j / N, 0.0) for j in range(N + 1) for i in range(N + 1)}
+    elements = {}
+    for j in range(N):
+        for i in range(N):
+            phase = FIBRE if fibre((i + 0.5) / N, (j + 0.5) / N) else MATRIX
+            a, b, c, d = node(i, j), node(i + 1, j), node(i + 1, j + 1), node(i, j + 1)
+            first = 2 * (i + N * j) + 1
+            elements[first] = (2, phase, phase, (a, b, c))
+            elements[first + 1] = (2, phase, phase, (a, c, d))
+    return MshFile(nodes, elements)
+
+
+def _reversed(*tags: int) -> MshFile:
+    mesh = grid()
+    for tag in tags:
+        kind, physical, _, nodes = mesh.elements[tag]
+        mesh = mesh.with_element(tag, kind, physical, nodes[::-1])
+    return mesh
+
+
+def _split_node(at: int, elements: Sequence[int]) -> MshFile:
+    """A second node 99 in the place of one, used by these elements."""
+    mesh = grid()
+    mesh = replace(mesh, nodes={**mesh.nodes, 99: mesh.nodes[at]})
+    for tag in elements:
+        kind, physical, _, nodes = mesh.elements[tag]
+        mesh = mesh.with_element(tag, kind, physical, [99 if n == at else n for n in nodes])
+    return mesh
+
+
+def _hanging(offset: float = 0.0) -> MshFile:
+    """Element 11 split at the middle of its diagonal, neighbour 12 not; the new node moved by an offset."""
+    mesh = grid()
+    a, b, c = mesh.elements[11][3]
+    middle = (np.array(mesh.nodes[a]) + np.array(mesh.nodes[c])) / 2 + (offset, -offset, 0)
+    mesh = replace(mesh, nodes={**mesh.nodes, 99: tuple(middle.tolist())})
+    return mesh.without(11).with_element(101, 2, FIBRE, (a, b, 99)).with_element(102, 2, FIBRE, (b, c, 99))
+
+
+def _quadrilaterals() -> MshFile:
+    a, b, c = grid().elements[11][3]
+    return grid().without(11, 12).with_element(50, 3, FIBRE, (a, b, c, grid().elements[12][3][2]))
+
+
+def _second_order() -> MshFile:
+    """Two 6-node triangles on the unit square."""
+    places = [(0, 0), (2, 0), (2, 2), (0, 2), (1, 0), (2, 1), (1, 1), (1, 2), (0, 1)]
+    nodes = {k: (x / 2, y / 2, 0.0) for k, (x, y) in enumerate(places, 1)}
+    return MshFile(nodes, {1: (9, 1, 1, (1, 2, 3, 5, 6, 7)), 2: (9, 1, 1, (1, 3, 4, 7, 8, 9))})
+
+
+def _sheared() -> MshFile:
+    mesh = grid()
+    return replace(mesh, nodes={tag: (x + 0.3 * y, y, z) for tag, (x, y, z) in mesh.nodes.items()})
+
+
+def _doubled() -> MshFile:
+    """Two layers of the same mesh, one shifted a little: nothing shared, all covered twice."""
+    mesh = grid()
+    nodes = {**mesh.nodes, **{tag + 100: (x, y, z) for tag, (x, y, z) in mesh.nodes.items()}}
+    for tag, (x, y, z) in mesh.nodes.items():
+        inner = 0 < x < 1 and 0 < y < 1
+        nodes[tag + 100] = (x + 0.02 * inner, y + 0.01 * inner, z)
+    layer = {tag + 100: (*e[:3], tuple(n + 100 for n in e[3])) for tag, e in mesh.elements.items()}
+    on_border = {tag + 100: tag for tag, (x, y, _) in mesh.nodes.items() if x in (0, 1) or y in (0, 1)}
+    layer = {tag: (*e[:3], tuple(on_border.get(n, n) for n in e[3])) for tag, e in layer.items()}
+    used = {n for e in layer.values() for n in e[3]} | set(mesh.nodes)
+    return MshFile({tag: place for tag, place in nodes.items() if tag in used}, {**mesh.elements, **layer})
+
+
+def _two_islands() -> MshFile:
+    """Two separate triangles in opposite corners of their bounding box, on its sides."""
+    places = [(0, 0), (1, 0), (0, 1), (3, 3), (2, 3), (3, 2)]
+    nodes = {k: (float(x), float(y), 0.0) for k, (x, y) in enumerate(places, 1)}
+    return MshFile(nodes, {1: (2, 1, 1, (1, 2, 3)), 2: (2, 1, 1, (4, 5, 6))})
+
+
+def _cut_corner() -> MshFile:
+    """The last corner node moved inwards along the upper side: the corner is cut off."""
+    return grid().moved(n25=(0.875, 1.0))
+
+
+def _unbalanced() -> MshFile:
+    """The lowest left square in three triangles, with a node on the lower side that the upper one lacks."""
+    mesh = replace(grid(), nodes={**grid().nodes, 99: (0.125, 0.0, 0.0)})
+    return mesh.without(1).with_element(51, 2, 1, (1, 99, 7)).with_element(52, 2, 1, (99, 2, 7))
+
+
+def _text(content: str) -> Callable[[Path], None]:
+    return lambda path: path.write_text(content) and None
+
+
+def _mesh(build: Callable[[], MshFile]) -> Callable[[Path], None]:
+    return lambda path: build().write(path)
+
+
+def _broken(path: Path) -> None:
+    """A good file that ends in the middle of its nodes."""
+    grid().write(path)
+    text = path.read_text()
+    path.write_text(text[: text.index("$EndNodes") - 40])
+
+
+def _unknown_node(path: Path) -> None:
+    grid().with_element(1, 2, 1, (1, 2, 77)).write(path)
+
+
+def _missing(path: Path) -> None:
+    path.unlink(missing_ok=True)
+
+
+FAULTY_MESHES: dict[str, tuple[Callable[[Path], None], str]] = {
+    "missing file": (_missing, "cannot be read"),
+    "empty file": (_text(""), "not a gmsh mesh file"),
+    "geometry": (_text("Point(1) = {0, 0, 0};\n"), "not a gmsh mesh file"),
+    "other text": (_text("Dear gmsh,\n"), "not a gmsh mesh file"),
+    "header only": (_text("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n"), "no triangles"),
+    "broken off": (_broken, "gmsh cannot read it"),
+    "unknown node": (_unknown_node, "gmsh cannot read it"),
+    "no elements": (_mesh(lambda: grid().without(*range(1, 33))), "no triangles"),
+    "only lines": (_mesh(lambda: MshFile(grid().nodes, {1: (1, 1, 1, (1, 2))})), "no triangles"),
+    "quadrilaterals": (
+        _mesh(_quadrilaterals),
+        "element 50 at (0.375, 0.375), the first of 1, is a Quadrilateral 4",
+    ),
+    "second order": (_mesh(_second_order), "set order = 2 in [cell]"),
+    "tetrahedra": (
+        _mesh(lambda: grid().moved(n13=(0.5, 0.5, 1)).with_element(60, 4, 1, (1, 2, 7, 13))),
+        "Tetrahedron",
+    ),
+    "unlabelled": (
+        _mesh(lambda: grid().with_element(5, 2, 0, (3, 4, 9))),
+        "element 5 at (0.666666667, 0.0833333333): not in any physical surface",
+    ),
+    "no name": (_mesh(lambda: replace(grid(), names={MATRIX: "matrix"})), '"number 2" is not a phase'),
+    "misspelt": (_mesh(lambda: replace(grid(), names={1: "matrix", 2: "fiber"})), '"fiber" is not a phase'),
+    "empty variant": (
+        _mesh(lambda: replace(grid(), names={1: "matrix", 2: "fibre:"})),
+        '"fibre:" is not a phase',
+    ),
+    "no matrix": (_mesh(lambda: replace(grid(), names={1: "fibre:2", 2: "fibre"})), 'named "matrix"'),
+    "nan": (
+        _mesh(lambda: grid().moved(n7=(float("nan"), 0.25))),
+        "node 7 (nan, 0.25): coordinates are not finite",
+    ),
+    "infinite": (_mesh(lambda: grid().moved(n7=(0.25, float("inf")))), "coordinates are not finite"),
+    "not planar": (_mesh(lambda: grid().moved(n7=(0.25, 0.25, 0.1))), "node 7 (0.25, 0.25) has z = 0.1"),
+    "inverted": (_mesh(lambda: _reversed(3)), "element 3 at (0.416666667, 0.0833333333): inverted"),
+    "inverted matrix": (_mesh(lambda: _reversed(*range(1, 9))), "and 5 more: inverted"),
+    "tangled": (_mesh(lambda: grid().moved(n7=(0.6, 0.25))), "inverted"),
+    "zero area": (_mesh(lambda: grid().moved(n7=(0.25, 0.0))), "zero area"),
+    "repeated corner": (_mesh(lambda: grid().with_element(1, 2, 1, (1, 2, 2))), "element 1 at"),
+    "duplicate nodes": (
+        _mesh(lambda: _split_node(13, [11, 12])),
+        "nodes at the same place: node 13 (0.5, 0.5) and node 99 (0.5, 0.5)",
+    ),
+    "repeated element": (
+        _mesh(lambda: grid().with_element(77, 2, 1, (1, 2, 7))),
+        "overlapping elements",
+    ),
+    "folded": (
+        _mesh(lambda: grid().without(12).with_element(77, 2, 1, (13, 7, 9))),
+        "overlapping elements",
+    ),
+    "hanging": (
+        _mesh(_hanging),
+        "hanging nodes: node 99 (0.375, 0.375) on the edge between node 7 (0.25, 0.25)",
+    ),
+    "nearly hanging": (_mesh(lambda: _hanging(1e-4)), "hanging nodes: node 99"),
+    "hole": (_mesh(lambda: grid().without(11, 12)), "a hole or its boundary is not a rectangle"),
+    "sheared": (_mesh(_sheared), "a hole or its boundary is not a rectangle"),
+    "dent": (_mesh(lambda: grid().moved(n11=(0.1, 0.5))), "node 11 (0.1, 0.5)"),
+    "lost corner": (_mesh(lambda: grid().without(31, 32)), "no node at the corner (1, 1) of the cell"),
+    "cut corner": (_mesh(_cut_corner), "a hole or its boundary is not a rectangle"),
+    "islands": (_mesh(_two_islands), "a hole or its boundary is not a rectangle"),
+    "two layers": (_mesh(_doubled), "overlap"),
+    "not periodic, right": (
+        _mesh(lambda: grid().moved(n10=(1.0, 0.3))),
+        "node 10 (1, 0.3), expected at (0, 0.3)",
+    ),
+    "not periodic, lower": (_mesh(_unbalanced), "node 99 (0.125, 0), expected at (0.125, 1)"),
+}
