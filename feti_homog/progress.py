@@ -22,6 +22,8 @@ class Progress:
     def __init__(self, comm: MPI.Comm, quiet: bool) -> None:
         self.comm = comm
         self.telling = comm.rank == 0 and not quiet
+        # mpirun gives rank 0 a terminal for its output even where it has none itself, but not for its errors.
+        self.on_terminal = self.telling and sys.stdout.isatty() and sys.stderr.isatty()
         self.seconds: dict[str, float] = {}
 
     def say(self, line: str) -> None:
@@ -43,7 +45,7 @@ class Progress:
 
     def bar(self, items: Iterable[T], label: str) -> Iterator[T]:
         """The items, with a progress bar if rank 0 writes to a terminal."""
-        return iter(tqdm(items, desc=label, leave=False, disable=not (self.telling and sys.stdout.isatty())))
+        return iter(tqdm(items, desc=label, leave=False, disable=not self.on_terminal))
 
     def timings(self) -> dict[str, float]:
         """Seconds of each stage, the maximum over ranks."""

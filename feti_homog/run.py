@@ -43,9 +43,12 @@ def run(case: Case, directory: Path, comm: MPI.Comm, quiet: bool) -> None:
         progress.say(f"warning: {warning}")
     with case_options(case.petsc):
         cell = tear(case, comm, progress)
-        refuse_unused()
-        document, responses = _solve(cell, progress)
-        _write(cell, directory, document, responses, progress)
+        try:
+            refuse_unused()
+            document, responses = _solve(cell, progress)
+            _write(cell, directory, document, responses, progress)
+        finally:
+            cell.solver.destroy()
     faults = document["faults"]
     if faults:
         raise ConvergenceError(*faults)

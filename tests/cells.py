@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import twin
+from petsc4py import PETSc
 
 from feti_homog import case as cases
 from feti_homog.homogenization import effective_stiffness
@@ -31,6 +32,7 @@ def make_case(*, matrix=MATRIX, fibre=FIBRE, plane="strain", petsc=None, decompo
 
 def solve(case, comm):
     """The torn cell, L^ef and the responses."""
+    PETSc.garbage_cleanup(comm)
     progress = Progress(comm, quiet=True)
     with case_options(case.petsc):
         cell = tear(case, comm, progress)

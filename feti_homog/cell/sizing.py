@@ -17,6 +17,8 @@ Floats = NDArray[np.float64]
 AROUND = 16
 # Edge length in a narrow passage, relative to its width.
 PASSAGE = 1.5
+# The angle between a circle and a side that it crosses, relative to the turn of the circle along an edge there.
+WEDGE = 3
 # Growth of the edge length per distance, at most.
 GROWTH = 0.4
 
@@ -88,7 +90,7 @@ def _growth(width: Floats, curvature: Floats) -> Floats:
 
 
 def _at_sides(arrangement: Arrangement, size: Floats, caps: Floats) -> Source:
-    """Where a circle comes near a side, or hardly crosses it: its extreme point and the foot on the side."""
+    """Where a circle comes near a side, or hardly crosses it: extreme point, foot on the side, crossings."""
     centres, radii = arrangement.centres % size, arrangement.radii
     places, lengths, growths = [], [], []
     for axis, sign in product((0, 1), (-1.0, 1.0)):
@@ -101,6 +103,15 @@ def _at_sides(arrangement: Arrangement, size: Floats, caps: Floats) -> Source:
         places += [extreme[near], foot[near]]
         lengths += [length[near]] * 2
         growths += [_growth(length[near] / PASSAGE, 1 / radii[near])] * 2
+        angle = np.arccos(np.minimum(distance / radii, 1.0))
+        length = angle * radii / WEDGE
+        sharp = (length < caps) & (angle > 0)
+        for turn in (-1.0, 1.0):
+            crossing = foot[sharp]
+            crossing[:, 1 - axis] += turn * (radii * np.sin(angle))[sharp]
+            places.append(crossing)
+            lengths.append(length[sharp])
+            growths.append(np.full(len(crossing), GROWTH))
     return np.concatenate(places), np.concatenate(lengths), np.concatenate(growths)
 
 

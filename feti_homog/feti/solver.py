@@ -126,6 +126,11 @@ class FetiSolver:
             lam += self._w.getArray(readonly=True)
         return self._recover(strain, lam, torn, iterations, reason)
 
+    def destroy(self) -> None:
+        """Free the shell objects, collectively: left to PETSc's finalization they would call a Python that is gone."""
+        self.ksp.getOperators()[0].destroy()
+        self.ksp.destroy()
+
     def displacement(self, solution: DualSolution) -> Float:
         """(local dofs,) u* of a solution, Eq. (34)."""
         u = self.operator.displacement(-self.Q @ solution.strain, solution.lam)

@@ -8,6 +8,7 @@ from typing import Any
 
 WIDTH = 79
 LABEL = 12  # columns of the labels at the left
+NAME = 28  # columns of the names of table rows
 STIFF = ("C11", "C22", "C33")
 MODULI = ("E1", "E2", "G12", "bulk", "shear")  # in the unit of the stresses; the others are ratios
 
@@ -17,7 +18,7 @@ Document = Mapping[str, Any]
 def summary(document: Document) -> str:
     """The document in lines of at most 79 columns (but for long names), without a newline at the end.
 
-    Cell, solver, effective stiffness, moduli between their bounds, checks, timings, memory, warnings and status.
+    Cell, solver, effective stiffness, moduli, bounds, checks, timings, memory, warnings and status.
     Keys that it does not know are left out. Raises KeyError if one that DESIGN names is missing.
     """
     case = document["case"]
@@ -73,10 +74,10 @@ def _solver(solver: Document) -> list[str]:
 def _matrix(title: str, rows: Sequence[Sequence[float]]) -> list[str]:
     # Zero to rounding is shown as 0.
     floor = 1e-9 * max(abs(entry) for row in rows for entry in row)
-    lines = [f"{title:<{2 * LABEL}}" + "".join(f"{name:>16}" for name in ("E11", "E22", "gamma12"))]
+    lines = [f"{title:<{NAME}}" + "".join(f"{name:>16}" for name in ("E11", "E22", "gamma12"))]
     for name, row in zip(("S11", "S22", "S12"), rows, strict=True):
         entries = (f"{entry if abs(entry) > floor else 0.0:>16.9g}" for entry in row)
-        lines.append(f"  {name:<{2 * LABEL - 2}}" + "".join(entries))
+        lines.append(f"  {name:<{NAME - 2}}" + "".join(entries))
     return lines
 
 
@@ -90,20 +91,20 @@ def _moduli(title: str, moduli: Document) -> list[str]:
 
 def _bounds(title: str, document: Document) -> list[str]:
     moduli, bounds, here = document["moduli"], document["bounds"], document["effective_stiffness"]
-    lines = [f"{title:<{2 * LABEL}}{'lower':>14}{'computed':>14}{'upper':>14}"]
+    lines = [f"{title:<{NAME}}{'lower':>14}{'computed':>14}{'upper':>14}"]
     for i, name in enumerate(STIFF):
-        lines.append(
-            _between(f"{name} Reuss, Voigt", bounds["reuss"][i][i], here[i][i], bounds["voigt"][i][i])
-        )
+        lower, upper = bounds["reuss"][i][i], bounds["voigt"][i][i]
+        inside = lower - 1e-9 * abs(lower) <= here[i][i] <= upper + 1e-9 * abs(upper)
+        note = "" if inside else "  outside"
+        lines.append(_between(f"{name} Reuss, Voigt", lower, here[i][i], upper) + note)
+    # These hold for isotropic cells only, so a value outside is no fault.
     for name, (lower, upper) in (bounds["hashin_shtrikman"] or {}).items():
         lines.append(_between(f"{name} Hashin-Shtr.", lower, moduli[name], upper))
     return lines
 
 
 def _between(label: str, lower: float, value: float, upper: float) -> str:
-    inside = lower - 1e-9 * abs(lower) <= value <= upper + 1e-9 * abs(upper)
-    note = "" if inside else "  outside"
-    return f"  {label:<{2 * LABEL - 2}}{lower:>14.7g}{value:>14.7g}{upper:>14.7g}{note}"
+    return f"  {label:<{NAME - 2}}{lower:>14.7g}{value:>14.7g}{upper:>14.7g}"
 
 
 def _checks(document: Document) -> list[str]:
@@ -112,7 +113,7 @@ def _checks(document: Document) -> list[str]:
     lines = [f"Checks{limit}"]
     for name, error in document["checks"].items():
         verdict = "" if tolerance is None else "pass" if error <= tolerance else "FAIL"
-        lines.append(f"  {name:<{2 * LABEL - 2}}{error:>14.1e}    {verdict}".rstrip())
+        lines.append(f"  {name:<{NAME - 2}}{error:>14.1e}    {verdict}".rstrip())
     return lines
 
 
