@@ -19,7 +19,7 @@ from feti_homog.errors import EXIT_DONE, CaseError
 from feti_homog.options import help_text, split_argv
 
 if TYPE_CHECKING:
-    from mpi4py.MPI import Comm
+    from mpi4py.MPI import Intracomm
 
 
 class _Parser(argparse.ArgumentParser):
@@ -41,7 +41,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     return run_main(MPI.COMM_WORLD, lambda: _command(ours, MPI.COMM_WORLD))
 
 
-def _command(words: Sequence[str], comm: Comm) -> int:
+def _command(words: Sequence[str], comm: Intracomm) -> int:
     # Help and version are printed once.
     with contextlib.redirect_stdout(sys.stdout if comm.rank == 0 else io.StringIO()):
         arguments = _parser().parse_args(words)
@@ -72,7 +72,7 @@ def _parser() -> _Parser:
     return parser
 
 
-def _run(arguments: argparse.Namespace, comm: Comm) -> None:
+def _run(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog import case as cases
     from feti_homog.output import folder
     from feti_homog.parallel import on_root
@@ -83,7 +83,7 @@ def _run(arguments: argparse.Namespace, comm: Comm) -> None:
     run(case, arguments.out, comm, arguments.quiet)
 
 
-def _check(arguments: argparse.Namespace, comm: Comm) -> None:
+def _check(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog import case as cases
     from feti_homog.parallel import on_root, on_root_only
     from feti_homog.petsc_options import case_options
@@ -96,7 +96,7 @@ def _check(arguments: argparse.Namespace, comm: Comm) -> None:
         print(text)
 
 
-def _plot(arguments: argparse.Namespace, comm: Comm) -> None:
+def _plot(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.output import plots
     from feti_homog.parallel import on_root_only
 

@@ -62,7 +62,8 @@ def respond(cell: TornCell, strain: Float, start: Float) -> Response:
     checks = {
         "strain": float(np.abs(star).max() / np.abs(strain).max()),
         "hill": float(abs(energy - stress @ strain) / abs(energy)),
-        "jump": _largest(cell, solver.active.mask * solution.jump) / _largest(cell, displacement(cell, strain, u)),
+        "jump": _largest(cell, solver.active.mask * solution.jump)
+        / _largest(cell, displacement(cell, strain, u)),
     }
     return Response(strain, stress, solution, u, checks)
 

@@ -19,7 +19,7 @@ T = TypeVar("T")
 class Progress:
     """Prints a line a stage and a line a solve on rank 0, unless quiet, and keeps the stages' times."""
 
-    def __init__(self, comm: MPI.Comm, quiet: bool) -> None:
+    def __init__(self, comm: MPI.Intracomm, quiet: bool) -> None:
         self.comm = comm
         self.telling = comm.rank == 0 and not quiet
         # mpirun gives rank 0 a terminal for its output even where it has none itself, but not for its errors.

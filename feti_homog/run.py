@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from feti_homog import __version__, bounds
 from feti_homog.case import Case
 from feti_homog.errors import ConvergenceError
+from feti_homog.fem.assembly import element_strain
 from feti_homog.homogenization import Response, asymmetry, displacement, effective_stiffness, fluctuation
 from feti_homog.material import plane_stiffness
 from feti_homog.output import folder, plots, results, xdmf
@@ -22,7 +23,6 @@ from feti_homog.output.summary import summary
 from feti_homog.parallel import on_root, on_root_only
 from feti_homog.petsc_options import case_options, refuse_unused
 from feti_homog.progress import Progress
-from feti_homog.fem.assembly import element_strain
 from feti_homog.torn import TornCell, tear
 
 Float = NDArray[np.float64]
@@ -31,7 +31,7 @@ Float = NDArray[np.float64]
 CHECK_MARGIN = 1e3
 
 
-def run(case: Case, directory: Path, comm: MPI.Comm, quiet: bool) -> None:
+def run(case: Case, directory: Path, comm: MPI.Intracomm, quiet: bool) -> None:
     """Run the case and write its results to `directory`.  Collective.
 
     Raises:
@@ -77,12 +77,19 @@ def _solve(cell: TornCell, progress: Progress) -> tuple[dict[str, Any], list[Res
 
 
 def _document(
-    cell: TornCell, L: Float, responses: Sequence[Response], checks: dict[str, float], tolerance: float, faults: list[str]
+    cell: TornCell,
+    L: Float,
+    responses: Sequence[Response],
+    checks: dict[str, float],
+    tolerance: float,
+    faults: list[str],
 ) -> dict[str, Any]:
     """result.json; collective."""
     plan, solver, areas = cell.plan, cell.solver, cell.areas()
     fractions = {phase: area / sum(areas.values()) for phase, area in areas.items()}
-    phases = [plane_stiffness(cell.case.material_of(phase), cell.case.analysis.plane) for phase in plan.phases]
+    phases = [
+        plane_stiffness(cell.case.material_of(phase), cell.case.analysis.plane) for phase in plan.phases
+    ]
     shares = list(fractions.values())
     isotropic = all(bounds.is_isotropic(stiffness) for stiffness in phases)
     return {
@@ -126,7 +133,11 @@ def _document(
 
 
 def _write(
-    cell: TornCell, directory: Path, document: dict[str, Any], responses: Sequence[Response], progress: Progress
+    cell: TornCell,
+    directory: Path,
+    document: dict[str, Any],
+    responses: Sequence[Response],
+    progress: Progress,
 ) -> None:
     comm, output = cell.comm, cell.case.output
     with progress.stage("output") as words:

@@ -48,7 +48,7 @@ class Plan:
 class TornCell:
     """The cell on all ranks; `subdomains` are this rank's."""
 
-    comm: MPI.Comm
+    comm: MPI.Intracomm
     case: Case
     plan: Plan
     lattice: Lattice
@@ -72,7 +72,7 @@ class TornCell:
         return int(self.comm.allreduce(number))
 
 
-def tear(case: Case, comm: MPI.Comm, progress: Progress) -> TornCell:
+def tear(case: Case, comm: MPI.Intracomm, progress: Progress) -> TornCell:
     """Mesh the cell on rank 0, deal out its pieces, and refine, assemble and factor them where they are.
 
     Raises:
@@ -82,7 +82,7 @@ def tear(case: Case, comm: MPI.Comm, progress: Progress) -> TornCell:
     with progress.stage("mesh") as words:
         mesh = on_root_only(comm, coarse_mesh, case)
         shares = on_root_only(comm, _deal, case, mesh, lattice, comm.size)
-        plan, pieces, shared = comm.scatter(shares)
+        plan, pieces, shared = comm.scatter(shares or [])
         words.append(f"{plan.coarse_triangles} triangles, {plan.bodies} bodies, {plan.subdomains} subdomains")
     with progress.stage("assemble") as words:
         subdomains = agree(comm, _assemble, case, pieces, lattice)
@@ -136,7 +136,9 @@ def describe(case: Case, n_ranks: int) -> str:
     return "\n".join(lines)
 
 
-def _deal(case: Case, mesh: CoarseMesh, lattice: Lattice, n_ranks: int) -> list[tuple[Plan, list[Piece], Shared]]:
+def _deal(
+    case: Case, mesh: CoarseMesh, lattice: Lattice, n_ranks: int
+) -> list[tuple[Plan, list[Piece], Shared]]:
     """For each rank: the plan, its pieces and the table of what they share with others."""
     torus = Torus.of(mesh)
     parts = torus.constituent if case.cell.bodies == "torus" else torus.plane_parts()

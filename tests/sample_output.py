@@ -9,9 +9,7 @@ import numpy as np
 
 from feti_homog.output.fields import Header, InterfacePart, MeshPart, StatePart
 
-GRADIENTS = tuple(
-    np.array([[a, b], [b, c]]) for a, b, c in ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.5, 0.0))
-)
+GRADIENTS = tuple(np.array([[a, b], [b, c]]) for a, b, c in ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.5, 0.0)))
 
 
 @dataclass(frozen=True)

@@ -37,7 +37,7 @@ def line_size(arrangement: Arrangement, largest: float, vertices: Floats) -> Cal
     caps = circle_size(arrangement.radii, largest)
     sources = [
         _between_fibres(arrangement, size, caps, largest),
-        _at_sides(arrangement, size, caps),
+        _at_sides(arrangement, size, caps, largest),
         _at_corners(arrangement, size, caps),
         _at_vertices(vertices, size, largest),
     ]
@@ -89,30 +89,37 @@ def _growth(width: Floats, curvature: Floats) -> Floats:
     return np.minimum(GROWTH, np.sqrt((4 - 2 * PASSAGE) * 2 * width * curvature))
 
 
-def _at_sides(arrangement: Arrangement, size: Floats, caps: Floats) -> Source:
-    """Where a circle comes near a side, or hardly crosses it: extreme point, foot on the side, crossings."""
+def _at_sides(arrangement: Arrangement, size: Floats, caps: Floats, largest: float) -> Source:
+    """Where a circle comes near a side or hardly crosses it: extreme point, foot on the side, and crossings."""
     centres, radii = arrangement.centres % size, arrangement.radii
-    places, lengths, growths = [], [], []
+    sources: list[Source] = []
     for axis, sign in product((0, 1), (-1.0, 1.0)):
         distance = centres[:, axis] if sign < 0 else size[axis] - centres[:, axis]
         extreme, foot = centres.copy(), centres.copy()
         extreme[:, axis] += sign * radii
         foot[:, axis] += sign * distance
-        length = PASSAGE * np.abs(distance - radii)
-        near = length < caps
-        places += [extreme[near], foot[near]]
-        lengths += [length[near]] * 2
-        growths += [_growth(length[near] / PASSAGE, 1 / radii[near])] * 2
+        width = np.abs(distance - radii)
+        growth = _growth(width, 1 / radii)
+        length = np.minimum(PASSAGE * width, caps + GROWTH * width)
+        sources += [
+            _where(length < caps, extreme, length, growth),
+            _where(length < largest, foot, length, growth),
+        ]
         angle = np.arccos(np.minimum(distance / radii, 1.0))
         length = angle * radii / WEDGE
-        sharp = (length < caps) & (angle > 0)
         for turn in (-1.0, 1.0):
-            crossing = foot[sharp]
-            crossing[:, 1 - axis] += turn * (radii * np.sin(angle))[sharp]
-            places.append(crossing)
-            lengths.append(length[sharp])
-            growths.append(np.full(len(crossing), GROWTH))
-    return np.concatenate(places), np.concatenate(lengths), np.concatenate(growths)
+            crossing = foot.copy()
+            crossing[:, 1 - axis] += turn * radii * np.sin(angle)
+            sharp = (length < caps) & (angle > 0)
+            sources.append(_where(sharp, crossing, length, np.full(len(radii), GROWTH)))
+    places, lengths, growths = (np.concatenate(parts) for parts in zip(*sources, strict=True))
+    return places, lengths, growths
+
+
+def _where(chosen: NDArray[np.bool_], *source: Floats) -> Source:
+    """The chosen rows of places, lengths and growths."""
+    places, lengths, growths = (part[chosen] for part in source)
+    return places, lengths, growths
 
 
 def _at_corners(arrangement: Arrangement, size: Floats, caps: Floats) -> Source:

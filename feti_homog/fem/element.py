@@ -12,7 +12,9 @@ Float = NDArray[np.float64]
 # Linear: exact for constants.  Quadratic: degree 4 with 6 points (Dunavant 1985), so that stiffness and
 # area are exact on straight elements and of full order on curved ones.
 _A, _B = 0.445948490915965, 0.091576213509771
-_P2_POINTS = np.array([[1 - 2 * c, c] for c in (_A, _B)] + [[c, 1 - 2 * c] for c in (_A, _B)] + [[c, c] for c in (_A, _B)])
+_P2_POINTS = np.array(
+    [[1 - 2 * c, c] for c in (_A, _B)] + [[c, 1 - 2 * c] for c in (_A, _B)] + [[c, c] for c in (_A, _B)]
+)
 _P2_WEIGHTS = np.tile([0.223381589678011, 0.109951743655322], 3) / 2
 
 
@@ -41,7 +43,10 @@ def gradients(corners: Float) -> tuple[Float, Float]:
     jacobian = np.einsum("qar,ead->eqrd", rule.gradients, corners, optimize=True)
     (xr, yr), (xs, ys) = np.moveaxis(jacobian, (2, 3), (0, 1))
     determinant = xr * ys - yr * xs
-    inverse = np.stack([np.stack([ys, -yr], axis=2), np.stack([-xs, xr], axis=2)], axis=2) / determinant[..., None, None]
+    inverse = (
+        np.stack([np.stack([ys, -yr], axis=2), np.stack([-xs, xr], axis=2)], axis=2)
+        / determinant[..., None, None]
+    )
     # x_d = J_rd r_r, so dN/dx_d = (J^-1)_dr dN/dr_r.
     physical = np.einsum("eqdr,qar->eqad", inverse, rule.gradients, optimize=True)
     return physical, determinant * rule.weights

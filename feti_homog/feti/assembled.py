@@ -11,7 +11,9 @@ from scipy.sparse import csr_matrix
 Int = NDArray[np.int64]
 
 
-def assembled(comm: MPI.Comm, local: csr_matrix, rows: Int, columns: Int, owned: tuple[int, int]) -> PETSc.Mat:
+def assembled(
+    comm: MPI.Intracomm, local: csr_matrix, rows: Int, columns: Int, owned: tuple[int, int]
+) -> PETSc.Mat:
     """The sum over ranks of `local`, whose rows and columns have the given global numbers.
 
     Args:

@@ -28,7 +28,7 @@ class CoarseProblem:
     multiplier and a column a kernel mode; every rank holds its own rows and a factor of G^T G.
     """
 
-    def __init__(self, comm: MPI.Comm, constraints: Constraints, subdomains: Sequence[Subdomain]) -> None:
+    def __init__(self, comm: MPI.Intracomm, constraints: Constraints, subdomains: Sequence[Subdomain]) -> None:
         kernels = [s.R for s in subdomains]
         modes = sum(R.shape[1] for R in kernels)
         first = comm.exscan(modes) or 0
@@ -41,7 +41,7 @@ class CoarseProblem:
         pinned = [s.piece.body for s in subdomains if s.piece.pinned >= 0]
         self.held = comm.allreduce(max(pinned, default=-1), MPI.MAX)
         owned = constraints.owned[1] - constraints.owned[0]
-        columns = first + np.arange(modes)
+        columns = np.arange(first, first + modes)
         indptr, indices, values = assembled(
             comm, constraints.B @ self.R, constraints.rows, columns, (owned, modes)
         ).getValuesCSR()

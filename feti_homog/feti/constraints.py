@@ -57,7 +57,9 @@ class Constraints:
         vector: a multiplier vector to duplicate.
     """
 
-    def __init__(self, comm: MPI.Comm, shared: Shared, subdomains: Sequence[Subdomain], lattice: Lattice) -> None:
+    def __init__(
+        self, comm: MPI.Intracomm, shared: Shared, subdomains: Sequence[Subdomain], lattice: Lattice
+    ) -> None:
         layout = _Layout(shared, subdomains, lattice)
         self.owned = shared.owned
         self.total = shared.total
@@ -79,7 +81,9 @@ class Constraints:
         """The owned rows of the sum over ranks of `local` rows."""
         self.vector.zeroEntries()
         self._local.getArray()[:] = local
-        self._scatter.scatter(self._local, self.vector, addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+        self._scatter.scatter(
+            self._local, self.vector, addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE
+        )
         return self.vector.getArray(readonly=True).copy()
 
 
@@ -91,7 +95,8 @@ class _Layout:
         copies = shared.copies
         n_rows = shared.nodes * 2 * (copies - 1)
         self.first = np.cumsum(n_rows) - n_rows
-        self.rows = np.repeat(shared.first_row - self.first, n_rows) + np.arange(n_rows.sum())
+        shift: Int = np.repeat(shared.first_row - self.first, n_rows)
+        self.rows: Int = shift + np.arange(n_rows.sum(), dtype=np.int64)
         self.dofs = np.cumsum([0, *(2 * s.mesh.n_classes for s in subdomains)])
         self.base = self._first_nodes()
 
@@ -147,7 +152,11 @@ class _Layout:
             dof = 2 * (base + p)[local]
             for r in np.flatnonzero(contrasts[:, j]):
                 turn = frame if r == k - 2 else identity
-                rows.append(np.broadcast_to((first[local] + 2 * r)[:, None, None] + [[0], [1]], (len(dof), 2, 2)).ravel())
+                rows.append(
+                    np.broadcast_to(
+                        (first[local] + 2 * r)[:, None, None] + [[0], [1]], (len(dof), 2, 2)
+                    ).ravel()
+                )
                 columns.append(np.broadcast_to(dof[:, None, None] + [[0, 1]], (len(dof), 2, 2)).ravel())
                 values.append((contrasts[r, j] * turn[local]).ravel())
         return np.concatenate(rows), np.concatenate(columns), np.concatenate(values)
@@ -171,7 +180,9 @@ class _Layout:
     def interface_nodes(self, owned: tuple[int, int]) -> InterfaceNodes:
         shared, m = self.shared, self.lattice.intervals
         mine = (shared.first_row >= owned[0]) & (shared.first_row < owned[1])
-        entity, p = _expand(np.flatnonzero(mine & (shared.fibre >= 0)), shared.nodes[mine & (shared.fibre >= 0)])
+        entity, p = _expand(
+            np.flatnonzero(mine & (shared.fibre >= 0)), shared.nodes[mine & (shared.fibre >= 0)]
+        )
         k = shared.copies[entity]
         # Row sums of the interface mass matrix: halves for linear, Simpson's rule for quadratic elements.
         quadratic = self.lattice.triangles.shape[1] == 6
@@ -211,7 +222,9 @@ def _contrasts(sizes: Int) -> Float:
             row = np.zeros(k)
             row[end - size : end - size + i], row[end - size + i] = 1.0, -i
             rows.append(row / np.sqrt(i * (i + 1)))
-    for (b, nb), (c, nc) in zip(zip(ends, sizes, strict=True), zip(ends[1:], sizes[1:], strict=True), strict=False):
+    for (b, nb), (c, nc) in zip(
+        zip(ends, sizes, strict=True), zip(ends[1:], sizes[1:], strict=True), strict=False
+    ):
         row = np.zeros(k)
         row[b - nb : b], row[c - nc : c] = 1.0 / nb, -1.0 / nc
         rows.append(row)

@@ -30,7 +30,9 @@ class LocalSolver:
         for s, matrix in enumerate(matrices):
             span = slice(self.offsets[s], self.offsets[s + 1])
             if matrix.shape[0]:
-                vectors = (PETSc.Vec().createWithArray(a[span], comm=PETSc.COMM_SELF) for a in (self.b, self.x))
+                vectors = (
+                    PETSc.Vec().createWithArray(a[span], comm=PETSc.COMM_SELF) for a in (self.b, self.x)
+                )
                 self._solves.append((_factorized(matrix, prefix), *vectors))
 
     @property
@@ -46,7 +48,9 @@ class LocalSolver:
 
 
 def _factorized(matrix: csr_matrix, prefix: str) -> PETSc.KSP:
-    A = PETSc.Mat().createAIJ(matrix.shape, csr=(matrix.indptr, matrix.indices, matrix.data), comm=PETSc.COMM_SELF)
+    A = PETSc.Mat().createAIJ(
+        matrix.shape, csr=(matrix.indptr, matrix.indices, matrix.data), comm=PETSc.COMM_SELF
+    )
     A.setOption(PETSc.Mat.Option.SPD, True)
     ksp = PETSc.KSP().create(PETSc.COMM_SELF)
     ksp.setOptionsPrefix(prefix)

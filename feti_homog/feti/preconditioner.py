@@ -89,7 +89,7 @@ class Scaled:
 
     def __init__(
         self,
-        comm: MPI.Comm,
+        comm: MPI.Intracomm,
         constraints: Constraints,
         K: Sequence[csr_matrix],
         S: Lumped | Dirichlet,
@@ -114,7 +114,7 @@ class Scaled:
         return self.W_inverse @ self.constraints.sum(self.BD @ self.S.apply(x))
 
 
-def _owned_blocks(comm: MPI.Comm, constraints: Constraints, local: csr_matrix) -> csr_matrix:
+def _owned_blocks(comm: MPI.Intracomm, constraints: Constraints, local: csr_matrix) -> csr_matrix:
     """The rows of W that this rank owns, summed over ranks; their columns are its own too."""
     first, last = constraints.owned
     W = assembled(comm, local, constraints.rows, constraints.rows, (last - first, last - first))
@@ -138,7 +138,9 @@ class _Blocks:
             mine = number[block] >= 0
             own = block[mine]
             dense = np.zeros((len(some), size, size))
-            dense[number[own], entries.row[mine] - starts[own], entries.col[mine] - starts[own]] = entries.data[mine]
+            dense[number[own], entries.row[mine] - starts[own], entries.col[mine] - starts[own]] = (
+                entries.data[mine]
+            )
             self.blocks.append((starts[some][:, None] + np.arange(size), dense))
 
     def inverse(self, active: Float) -> csr_matrix:
@@ -150,6 +152,9 @@ class _Blocks:
             unit = np.eye(at.shape[1]) * (1 - mask)[:, :, None]
             rows.append(np.broadcast_to(at[:, :, None], dense.shape).ravel())
             columns.append(np.broadcast_to(at[:, None, :], dense.shape).ravel())
-            values.append((np.linalg.inv(both * dense + unit) * both).ravel())
+            inverse: Float = np.linalg.inv(both * dense + unit)
+            values.append((both * inverse).ravel())
         shape = (self.rows, self.rows)
-        return csr_matrix((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=shape)
+        return csr_matrix(
+            (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=shape
+        )

@@ -58,7 +58,7 @@ class Shared:
 
 def share(torus: Torus, pieces: Sequence[Piece], rank: Int, inner: int, n_ranks: int) -> list[Shared]:
     """The tables of all ranks; `rank` (s,) is each subdomain's, `inner` the fine nodes inside a coarse edge."""
-    pinned = [p.class_keys[p.pinned] for p in pieces if p.pinned >= 0][0]
+    pinned = next(p.class_keys[p.pinned] for p in pieces if p.pinned >= 0)
     held = [np.setdiff1d(p.class_keys, pinned, assume_unique=True) for p in pieces]
     kinds = [_sharers(held, pieces)]
     if inner:
@@ -106,10 +106,13 @@ def _sharers(keys: Sequence[Int], pieces: Sequence[Piece]) -> tuple[Int, Int, In
 def _ranges(start: Int, count: Int) -> Int:
     """start[0] .. start[0] + count[0] - 1, start[1] .. and so on."""
     ends = np.cumsum(count)
-    return np.arange(ends[-1] if len(ends) else 0) + np.repeat(start - ends + count, count)
+    shift: Int = np.repeat(start - ends + count, count)
+    return shift + np.arange(count.sum(), dtype=np.int64)
 
 
-def _interface(torus: Torus, key: Int, is_edge: NDArray[np.bool_], pointer: Int, body: Int) -> tuple[Int, Float, Float]:
+def _interface(
+    torus: Torus, key: Int, is_edge: NDArray[np.bool_], pointer: Int, body: Int
+) -> tuple[Int, Float, Float]:
     """Fibre, normals and length of the entities where exactly one fibre meets the matrix."""
     is_fibre = torus.constituent_phase > 0
     low, high = body[pointer[:-1]], body[pointer[1:] - 1]

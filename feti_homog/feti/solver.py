@@ -61,7 +61,9 @@ class FetiSolver:
     Options have the prefix `feti_`.
     """
 
-    def __init__(self, comm: MPI.Comm, shared: Shared, subdomains: Sequence[Subdomain], lattice: Lattice) -> None:
+    def __init__(
+        self, comm: MPI.Intracomm, shared: Shared, subdomains: Sequence[Subdomain], lattice: Lattice
+    ) -> None:
         self.comm, self.subdomains = comm, subdomains
         self.constraints = Constraints(comm, shared, subdomains, lattice)
         self.local = LocalSolver([s.regularised() for s in subdomains], "feti_sub_")
@@ -162,7 +164,9 @@ class FetiSolver:
     def _krylov(self) -> PETSc.KSP:
         vector = self.constraints.vector
         sizes = (vector.getSizes(), vector.getSizes())
-        A = PETSc.Mat().createPython(sizes, ProjectedOperator(self.operator, self.coarse, self.active), comm=self.comm)
+        A = PETSc.Mat().createPython(
+            sizes, ProjectedOperator(self.operator, self.coarse, self.active), comm=self.comm
+        )
         A.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         A.setUp()
         ksp = PETSc.KSP().create(self.comm)

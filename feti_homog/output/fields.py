@@ -114,9 +114,7 @@ class FieldFile:
         FetiHomogError: the file cannot be written; on every rank, and what there was of it is removed.
     """
 
-    def __init__(
-        self, directory: Path, comm: Comm, header: Header, mesh: MeshPart, interface: InterfacePart
-    ) -> None:
+    def __init__(self, directory: Path, comm: Comm, header: Header, mesh: MeshPart, interface: InterfacePart) -> None:
         self._comm = comm
         self._path = Path(directory) / NAME
         self._part = self._path.with_name(f"{NAME}.part")

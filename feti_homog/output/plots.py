@@ -134,9 +134,7 @@ def _left(attributes: Any, drawn: Drawing, borders: Array) -> Array:
 def _figure(attributes: Any, panels: int) -> tuple[Figure, Sequence[Axes]]:
     width, height = float(attributes["width"]), float(attributes["height"])
     inches = SIDE / max(width, height)
-    figure = Figure(
-        figsize=(panels * (width * inches + 0.7) + 0.1, height * inches + 1.2), layout="constrained"
-    )
+    figure = Figure(figsize=(panels * (width * inches + 0.7) + 0.1, height * inches + 1.2), layout="constrained")
     return figure, figure.subplots(1, panels, squeeze=False)[0]
 
 
@@ -153,9 +151,7 @@ def _frame(axes: Axes, attributes: Any) -> None:
 def _paint(axes: Axes, drawn: Drawing, points: Array, colours: Array, edges: bool, **mapping: Any) -> Any:
     """Fills the triangles with values, or with colours (q, 4); antialiasing would leave seams."""
     fill = {"array": colours} if colours.ndim == 1 else {"facecolors": colours}
-    lines = (
-        {"edgecolors": "0.55", "linewidths": 0.15} if edges else {"edgecolors": "none", "antialiased": False}
-    )
+    lines = {"edgecolors": "0.55", "linewidths": 0.15} if edges else {"edgecolors": "none", "antialiased": False}
     style: dict[str, Any] = fill | lines | mapping
     corners: Any = points[drawn.triangles]
     shapes = PolyCollection(corners, **style)
@@ -166,9 +162,7 @@ def _paint(axes: Axes, drawn: Drawing, points: Array, colours: Array, edges: boo
 def _lines(axes: Axes, segments: Array, colour: str, width: float) -> None:
     """Draws segments (e, 2, 2) as one path, in which they join without spots."""
     path = Path2D(segments.reshape(-1, 2), [Path2D.MOVETO, Path2D.LINETO] * len(segments))
-    axes.add_patch(
-        PathPatch(path, fill=False, edgecolor=colour, linewidth=width, capstyle="butt", snap=False)
-    )
+    axes.add_patch(PathPatch(path, fill=False, edgecolor=colour, linewidth=width, capstyle="butt", snap=False))
 
 
 def _shades(drawn: Drawing, phases: list[str]) -> tuple[Array, list[Patch]]:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from math import floor, log10
 from textwrap import wrap
 from typing import Any
 
 WIDTH = 79
 LABEL = 12  # columns of the labels at the left
 NAME = 28  # columns of the names of table rows
+GLUE = "\N{NO-BREAK SPACE}"  # at which no line is broken
 STIFF = ("C11", "C22", "C33")
 MODULI = ("E1", "E2", "G12", "bulk", "shear")  # in the unit of the stresses; the others are ratios
 
@@ -39,7 +41,7 @@ def summary(document: Document) -> str:
         [*_remarks("Warning", document.get("warnings", ())), *_remarks("Fault", document.get("faults", ()))],
         _field("Status", [str(document["status"])]),
     ]
-    return "\n\n".join("\n".join(block) for block in blocks if block)
+    return "\n\n".join("\n".join(block) for block in blocks if block).replace(GLUE, " ")
 
 
 def _cell(document: Document) -> list[str]:
@@ -49,14 +51,10 @@ def _cell(document: Document) -> list[str]:
     shape, fractions = case["cell"], cell.get("fractions", {})
     shares = ", ".join(f"{phase} {share:.6f}" for phase, share in fractions.items())
     mesh = [_number(cell["elements"], "element"), _number(cell["nodes"], "node")]
-    mesh += [f"order {shape['order']}"] * ("order" in shape) + [f"refine {shape['refine']}"] * (
-        "refine" in shape
-    )
+    mesh += [f"order {shape['order']}"] * ("order" in shape) + [f"refine {shape['refine']}"] * ("refine" in shape)
     return [
         *_field("Cell", [str(shape["geometry"]), size]),
-        *_field(
-            "Meshed", [f"fibre fraction {cell['fibre_fraction']:.6f}", *([f"({shares})"] if shares else [])]
-        ),
+        *_field("Meshed", [f"fibre fraction {cell['fibre_fraction']:.6f}", *([f"({shares})"] if shares else [])]),
         *_field("Mesh", mesh),
     ]
 
@@ -72,18 +70,18 @@ def _solver(solver: Document) -> list[str]:
 
 
 def _matrix(title: str, rows: Sequence[Sequence[float]]) -> list[str]:
-    # Zero to rounding is shown as 0.
-    floor = 1e-9 * max(abs(entry) for row in rows for entry in row)
+    # All entries to the digit that is the eighth of the largest.
+    largest = max(abs(entry) for row in rows for entry in row)
+    form = f".{7 - floor(log10(largest))}f" if 1e-4 < largest < 1e8 else ".7e"
     lines = [f"{title:<{NAME}}" + "".join(f"{name:>16}" for name in ("E11", "E22", "gamma12"))]
     for name, row in zip(("S11", "S22", "S12"), rows, strict=True):
-        entries = (f"{entry if abs(entry) > floor else 0.0:>16.9g}" for entry in row)
-        lines.append(f"  {name:<{NAME - 2}}" + "".join(entries))
+        lines.append(f"  {name:<{NAME - 2}}" + "".join(f"{_signless(entry, form):>16}" for entry in row))
     return lines
 
 
 def _moduli(title: str, moduli: Document) -> list[str]:
     stiff = [f"{name:<6}{moduli[name]:>13.7g}" for name in MODULI if name in moduli]
-    ratios = [f"{name:<11}{_tidy(value):>13.6g}" for name, value in moduli.items() if name not in MODULI]
+    ratios = [f"{name:<11}{_signless(value, '.6f'):>13}" for name, value in moduli.items() if name not in MODULI]
     count = max(len(stiff), len(ratios))
     pairs = zip(stiff + [""] * (count - len(stiff)), ratios + [""] * (count - len(ratios)), strict=True)
     return [title, *(f"  {left:<30}{right}".rstrip() for left, right in pairs)]
@@ -118,7 +116,7 @@ def _checks(document: Document) -> list[str]:
 
 
 def _timings(timings: Document) -> list[str]:
-    stages = [f"{stage} {seconds:.2f} s" for stage, seconds in timings.items()]
+    stages = [f"{stage}{GLUE}{seconds:.2f}{GLUE}s" for stage, seconds in timings.items()]
     return _field("Time", stages)
 
 
@@ -129,17 +127,17 @@ def _remarks(label: str, remarks: Iterable[str]) -> list[str]:
 def _field(label: str, words: Sequence[str]) -> list[str]:
     """A label and its words, separated by commas, in as many lines as it takes."""
     text = ", ".join(words).replace(", (", " (")
-    return wrap(
-        text, WIDTH, initial_indent=f"{label:<{LABEL}}", subsequent_indent=" " * LABEL, break_long_words=False
-    )
+    return wrap(text, WIDTH, initial_indent=f"{label:<{LABEL}}", subsequent_indent=" " * LABEL, break_long_words=False)
 
 
 def _listed(value: Any) -> list[Any]:
     return list(value) if isinstance(value, list | tuple) else [value]
 
 
-def _tidy(value: float) -> float:
-    return value if abs(value) > 1e-9 else 0.0
+def _signless(value: float, form: str) -> str:
+    """The number, without the sign of a zero that it is rounded to."""
+    text = f"{value:{form}}"
+    return text.removeprefix("-") if float(text) == 0.0 else text
 
 
 def _number(count: int, name: str) -> str:

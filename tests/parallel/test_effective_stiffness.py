@@ -38,7 +38,9 @@ def test_preconditioner_changes_only_the_iterations(comm, preconditioner):
     assert relative_error(L, expected) < TIGHT
 
 
-@pytest.mark.parametrize("option", ["feti_sub_pc_factor_mat_solver_type", "feti_interior_pc_factor_mat_solver_type"])
+@pytest.mark.parametrize(
+    "option", ["feti_sub_pc_factor_mat_solver_type", "feti_interior_pc_factor_mat_solver_type"]
+)
 def test_mumps_in_the_place_of_cholmod(comm, option):
     _, L, _ = solve(make_case(petsc={option: "mumps"}), comm)
     _, expected, _ = solve(make_case(), comm)
@@ -57,7 +59,7 @@ def test_mumps_in_the_place_of_cholmod(comm, option):
 )
 def test_homogeneous_cell_is_exact(comm, material, order, plane):
     case = make_case(matrix=material, fibre=material, order=order, plane=plane, mesh_size=0.2)
-    torn, L, _ = solve(case, comm)
+    _, L, _ = solve(case, comm)
     expected = homogeneous(material, plane)
     assert np.abs(L - expected).max() <= 1e-10 * np.abs(expected).max()
 
@@ -93,7 +95,9 @@ def test_equal_shear_moduli_obey_hill(comm, cell):
     # E and nu of plane bulk modulus k = lambda + mu and shear modulus mu in plane strain.
     nu = (k - mu) / (2 * k)
     phases = [{"young": 2 * mu * (1 + n), "poisson": n} for n in nu]
-    torn, L, _ = solve(make_case(matrix=phases[0], fibre=phases[1], order=2, refine=1, **{"mesh_size": 0.1} | cell), comm)
+    torn, L, _ = solve(
+        make_case(matrix=phases[0], fibre=phases[1], order=2, refine=1, **{"mesh_size": 0.1} | cell), comm
+    )
     areas = torn.areas()
     c = np.array([areas["matrix"], areas["fibre"]]) / torn.plan.area
     expected = 1 / (c / (k + mu)).sum() - mu
@@ -128,7 +132,9 @@ def test_dual_operator_and_projector_laws(comm):
     torn, _, _ = solve(make_case(geometry="hexagonal", decomposition={"subdomains": 7}), comm)
     solver = torn.solver
     first, last = solver.constraints.owned
-    x, y = (np.random.default_rng(seed).standard_normal(solver.constraints.total)[first:last] for seed in (1, 2))
+    x, y = (
+        np.random.default_rng(seed).standard_normal(solver.constraints.total)[first:last] for seed in (1, 2)
+    )
 
     def dot(a, b):
         return comm.allreduce(a @ b)

@@ -118,9 +118,7 @@ def test_the_colour_range(values: Any, expected: tuple[float, float, str, str]) 
     assert (colours, extend) == expected[2:]
 
 
-@pytest.mark.parametrize(
-    ("largest", "scale"), [(1.0, 0.1), (1.2, 0.1), (0.01, 10.0), (0.3e-4, 5e3), (0.0, 1.0)]
-)
+@pytest.mark.parametrize(("largest", "scale"), [(1.0, 0.1), (1.2, 0.1), (0.01, 10.0), (0.3e-4, 5e3), (0.0, 1.0)])
 def test_the_deformation_scale(largest: float, scale: float) -> None:
     points = np.array([[0.0, 0.0], [1.0, 2.0]])
     assert plots._scale(np.array([[largest, 0.0], [0.0, 0.0]]), points) == pytest.approx(scale)

@@ -24,7 +24,7 @@ DOCUMENT: dict[str, Any] = {
         "ranks": 1, "subdomains": 3, "dofs": 12600, "multipliers": 400, "kernel_dim": 8,
         "coarse_dim": 8, "iterations": [12, 12, 11], "converged_reason": [2, 2, 2],
     },
-    "effective_stiffness": [[149.69, 56.97, 1e-13], [56.97, 149.69, 0.0], [1e-13, 0.0, 46.36]],
+    "effective_stiffness": [[149.69, 56.97, 1e-13], [56.97, 149.69, 0.0], [-1e-13, 0.0, 46.36]],
     "moduli": {"E1": 128.0, "E2": 128.0, "nu12": 0.38, "nu21": 0.38, "G12": 46.36, "eta1": 1e-16,
                "bulk": 103.33, "shear": 46.36},
     "bounds": {
@@ -53,24 +53,30 @@ def test_it_is_aligned_and_narrow() -> None:
     lines = summary(DOCUMENT).splitlines()
     assert max(map(len, lines)) < 80
     assert all(text == text.rstrip() for text in lines)
-    matrix = [
-        lines[i] for i in range(len(lines)) if lines[i].startswith(("Effective", "  S11", "  S22", "  S12"))
-    ]
+    matrix = [lines[i] for i in range(len(lines)) if lines[i].startswith(("Effective", "  S11", "  S22", "  S12"))]
     assert len(matrix) == 4 and len({len(text) for text in matrix}) == 1
 
 
 def test_it_says_what_was_computed() -> None:
     text = summary(DOCUMENT)
-    assert line(text, "S22").split() == ["S22", "56.97", "149.69", "0"]
-    assert line(text, "S11").split()[-1] == "0"
+    assert line(text, "S22").split() == ["S22", "56.97000", "149.69000", "0.00000"]
+    assert line(text, "S11").split()[-1] == "0.00000"
     assert line(text, "Solver") == "Solver      1 rank, 3 subdomains, 12 600 dofs"
     assert line(text, "Iterations").endswith("12, 12, 11")
     assert "fibre fraction 0.400000 (matrix 0.600000, fibre 0.400000)" in text
-    assert line(text, "E1").split() == ["E1", "128", "nu12", "0.38"]
+    assert line(text, "E1").split() == ["E1", "128", "nu12", "0.380000"]
     assert line(text, "bulk H").split()[-3:] == ["103.3", "103.33", "104.8"]
     assert line(text, "Memory").endswith("200 MiB per rank at most")
     assert "Effective stiffness (GPa)" in text and "1.73205 mm" in text
     assert line(text, "Status").split() == ["Status", "done"]
+
+
+@pytest.mark.parametrize(("entry", "text"), [(2.0e11, "2.0000000e+11"), (0.5, "0.50000000"), (12345.678, "12345.678")])
+def test_stiffnesses_of_any_size(entry: float, text: str) -> None:
+    stiffness = [[entry, 0.0, 0.0], [0.0, entry, 0.0], [0.0, 0.0, entry]]
+    lines = summary(changed(effective_stiffness=stiffness)).splitlines()
+    assert next(words for words in lines if words.startswith("  S11")).split()[1].startswith(text)
+    assert max(map(len, lines)) < 80
 
 
 def test_checks_pass_and_fail() -> None:
@@ -102,9 +108,7 @@ def test_no_units_no_hashin_shtrikman_and_unknown_keys() -> None:
     assert "GPa" not in text and "Hashin" not in text and "()" not in text
 
 
-@pytest.mark.parametrize(
-    "key", ["cell", "solver", "effective_stiffness", "checks", "timings", "memory", "status"]
-)
+@pytest.mark.parametrize("key", ["cell", "solver", "effective_stiffness", "checks", "timings", "memory", "status"])
 def test_what_must_be_there(key: str) -> None:
     document = changed()
     del document[key]
