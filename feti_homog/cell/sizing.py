@@ -17,7 +17,7 @@ Floats = NDArray[np.float64]
 AROUND = 16
 # Edge length in a narrow passage, relative to its width.
 PASSAGE = 1.5
-# The angle between a circle and a side that it crosses, relative to the turn of the circle along an edge there.
+# Angle between a circle and a side that it crosses, relative to the turn of the circle along an edge there.
 WEDGE = 3
 # Growth of the edge length per distance, at most.
 GROWTH = 0.4
@@ -90,7 +90,7 @@ def _growth(width: Floats, curvature: Floats) -> Floats:
 
 
 def _at_sides(arrangement: Arrangement, size: Floats, caps: Floats, largest: float) -> Source:
-    """Where a circle comes near a side or hardly crosses it: extreme point, foot on the side, and crossings."""
+    """Where a circle comes near a side or hardly crosses it: extreme point, foot on the side, crossings."""
     centres, radii = arrangement.centres % size, arrangement.radii
     sources: list[Source] = []
     for axis, sign in product((0, 1), (-1.0, 1.0)):
