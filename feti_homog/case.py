@@ -11,10 +11,23 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from feti_homog.bonding import read_bonding
 from feti_homog.errors import CaseError
 from feti_homog.material import KINDS, Isotropic, Material, plane_stiffness
 from feti_homog.schema import accepted, is_real, keys_of, named, read, shown, suggestion, text, written
-from feti_homog.sections import CIRCULAR, SECTIONS, TOUCHING, Analysis, Cell, Decomposition, Output
+from feti_homog.sections import (
+    CIRCULAR,
+    SECTIONS,
+    TOUCHING,
+    Analysis,
+    Angle,
+    Arc,
+    Cell,
+    Decomposition,
+    Interface,
+    LoadPath,
+    Output,
+)
 
 Scalar = str | int | float | bool
 
@@ -27,19 +40,30 @@ LOCKING_POISSON = 0.49
 
 REQUIRED = ("cell", "material", "analysis")
 TOP_LEVEL = (*SECTIONS, "material", "petsc", "name")
-OWNERS = {name: section for section, cls in SECTIONS.items() for name in keys_of(cls)} | {
-    name: "material.PHASE" for cls in KINDS.values() for name in keys_of(cls)
+HOMES: list[tuple[str, type[Any]]] = [
+    *((f"[{section}]", cls) for section, cls in SECTIONS.items()),
+    *(("[material.PHASE]", cls) for cls in KINDS.values()),
+    ("an arc of [interface] debonded", Arc),
+]
+OWNERS = {
+    name: " or ".join(home for home, cls in HOMES if name in keys_of(cls)) for _, cls in HOMES for name in keys_of(cls)
 }
 
 
 @dataclass(frozen=True, kw_only=True)
 class Case:
-    """A checked case; `materials` by phase, in the file's order; `petsc` options without dash."""
+    """A checked case; `materials` by phase, in the file's order; `petsc` options without dash.
+
+    Without `interface` the bonding is perfect; `angle` and `path` are there if the analysis is of that type.
+    """
 
     name: str
     cell: Cell
     materials: dict[str, Material]
     analysis: Analysis
+    interface: Interface | None
+    angle: Angle | None
+    path: LoadPath | None
     decomposition: Decomposition
     output: Output
     petsc: dict[str, Scalar]
@@ -60,20 +84,18 @@ class Case:
 
     def resolved(self) -> dict[str, Any]:
         """The case with its defaults as a plain document, of which `parse` makes the same case again."""
-        cell = written(self.cell, self.cell.geometry)
-        materials = {phase: written(material) for phase, material in self.materials.items()}
-        for table in materials.values():
-            if "stiffness" in table:
-                table["stiffness"] = [list(row) for row in table["stiffness"]]
-        return {
-            "name": self.name,
-            "cell": cell | ({"file": str(cell["file"])} if "file" in cell else {}),
-            "material": materials,
-            "analysis": written(self.analysis),
-            "decomposition": written(self.decomposition),
-            "output": written(self.output),
-            "petsc": dict(self.petsc),
-        }
+        document: dict[str, Any] = {"name": self.name}
+        document["cell"] = written(self.cell, self.cell.geometry)
+        document["material"] = {phase: written(material) for phase, material in self.materials.items()}
+        document["analysis"] = written(self.analysis)
+        if self.interface is not None:
+            document["interface"] = written(self.interface, self.analysis.type)
+        if self.angle is not None:
+            document["angle"] = written(self.angle)
+        if self.path is not None:
+            document["path"] = written(self.path, self.path.method)
+        document |= {"decomposition": written(self.decomposition), "output": written(self.output)}
+        return document | {"petsc": dict(self.petsc)}
 
 
 def load(path: str | Path) -> Case:
@@ -98,7 +120,8 @@ def parse(document: Mapping[str, Any], folder: Path) -> Case:
     faults = _top_level_faults(document)
     geometry = accepted(Cell, document.get("cell"), "geometry")
     plane = accepted(Analysis, document.get("analysis"), "plane")
-    cell = _read_section(document, "cell", faults, variant="geometry")
+    analysis = accepted(Analysis, document.get("analysis"), "type")
+    cell = _read_section(document, "cell", faults, "geometry", geometry)
     decomposition = _read_section(document, "decomposition", faults)
     if decomposition and decomposition.subdomains and decomposition.max_dofs:
         faults.append("[decomposition] subdomains, max_dofs: exclude each other; give one")
@@ -106,6 +129,7 @@ def parse(document: Mapping[str, Any], folder: Path) -> Case:
         "cell": cell and _checked_cell(cell, folder, faults),
         "materials": _read_materials(document.get("material"), geometry, plane, faults),
         "analysis": _read_section(document, "analysis", faults),
+        **read_bonding(document, geometry, analysis, faults, OWNERS),
         "decomposition": decomposition,
         "output": _read_section(document, "output", faults),
         "petsc": _read_petsc(document.get("petsc", {}), faults),
@@ -130,11 +154,13 @@ def _top_level_faults(document: Mapping[str, Any]) -> list[str]:
     return faults
 
 
-def _read_section(document: Mapping[str, Any], section: str, faults: list[str], variant: str = "") -> Any:
+def _read_section(
+    document: Mapping[str, Any], section: str, faults: list[str], variant: str = "", chosen: str | None = None
+) -> Any:
     """The dataclass of a section, or None if that is faulty or was already found to be missing."""
     if section in REQUIRED and section not in document:
         return None
-    return read(SECTIONS[section], document.get(section, {}), section, faults, variant, OWNERS)
+    return read(SECTIONS[section], document.get(section, {}), section, faults, variant, chosen, OWNERS)
 
 
 def _checked_cell(cell: Cell, folder: Path, faults: list[str]) -> Cell:
@@ -156,9 +182,7 @@ def _checked_cell(cell: Cell, folder: Path, faults: list[str]) -> Cell:
     return dataclasses.replace(cell, file=file)
 
 
-def _read_materials(
-    table: object, geometry: str | None, plane: str | None, faults: list[str]
-) -> dict[str, Material]:
+def _read_materials(table: object, geometry: str | None, plane: str | None, faults: list[str]) -> dict[str, Material]:
     """The materials by phase; what depends on a geometry or plane state that is faulty is not checked."""
     if table is None:
         return {}

@@ -10,7 +10,7 @@ import contextlib
 import io
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
@@ -22,13 +22,23 @@ if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
 
 
-class _Parser(argparse.ArgumentParser):
+class Parser(argparse.ArgumentParser):
+    """Whose errors are told once and give exit code 2, like those of the case."""
+
     def error(self, message: str) -> NoReturn:
         raise CaseError(f"command line: {message} (see --help)")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command on all ranks; returns the exit code of DESIGN section 4."""
+    return launch(_command, argv)
+
+
+def launch(command: Callable[[Sequence[str], Intracomm], int], argv: Sequence[str] | None = None) -> int:
+    """Start PETSc with its options among `argv` (default: the process's) and run command(the rest, world).
+
+    Returns the exit code of `run_main`. For programs of their own, such as those in drivers/.
+    """
     ours, petsc = split_argv(sys.argv[1:] if argv is None else argv)
     # Debian's h5py is the MPI build only if it is told so before its first import.
     os.environ["H5PY_ALWAYS_USE_MPI"] = "1"
@@ -38,26 +48,30 @@ def main(argv: Sequence[str] | None = None) -> int:
     petsc4py.init([sys.argv[0], *petsc], comm=MPI.COMM_WORLD)
     from feti_homog.parallel import run_main
 
-    return run_main(MPI.COMM_WORLD, lambda: _command(ours, MPI.COMM_WORLD))
+    return run_main(MPI.COMM_WORLD, lambda: command(ours, MPI.COMM_WORLD))
+
+
+def parsed(parser: argparse.ArgumentParser, words: Sequence[str], comm: Intracomm) -> argparse.Namespace:
+    """The arguments; help and version are printed once."""
+    with contextlib.redirect_stdout(sys.stdout if comm.rank == 0 else io.StringIO()):
+        return parser.parse_args(words)
 
 
 def _command(words: Sequence[str], comm: Intracomm) -> int:
-    # Help and version are printed once.
-    with contextlib.redirect_stdout(sys.stdout if comm.rank == 0 else io.StringIO()):
-        arguments = _parser().parse_args(words)
+    arguments = parsed(_parser(), words, comm)
     arguments.action(arguments, comm)
     return EXIT_DONE
 
 
-def _parser() -> _Parser:
-    parser = _Parser(
+def _parser() -> Parser:
+    parser = Parser(
         prog="feti-homog",
         description="Effective stiffness of fibre composites by FETI, on any number of MPI ranks.",
         epilog=f"PETSc's options, with a single dash:\n{help_text()}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"feti-homog {__version__}")
-    actions = parser.add_subparsers(dest="command", required=True, parser_class=_Parser)
+    actions = parser.add_subparsers(dest="command", required=True, parser_class=Parser)
     run = actions.add_parser("run", help="run a case file and write its results to a folder")
     run.add_argument("case", type=Path, metavar="CASE.toml")
     run.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the results")

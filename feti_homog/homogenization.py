@@ -6,19 +6,18 @@ Voigt order [11, 22, 12] with engineering shear; stresses in the unit of the mod
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
 from feti_homog.errors import ConvergenceError
-from feti_homog.feti.solver import DualSolution
-from feti_homog.progress import Progress
+from feti_homog.feti.blocks import NodeBlocks
+from feti_homog.interface.contact import BONDED, CLOSED, OPEN, Equilibrium, Interface, Status
 from feti_homog.torn import TornCell
 
 Float = NDArray[np.float64]
-
-CASES = ("E11", "E22", "G12")
 
 
 @dataclass(frozen=True)
@@ -28,55 +27,96 @@ class Response:
     Attributes:
         strain: (3,) E.
         stress: (3,) Sigma = <sigma>.
-        solution: multipliers, jumps and amplitudes.
+        scale: the response is `scale` times `state`.
+        state: interface states, multipliers, jumps and amplitudes.
         u: (local dofs,) fluctuating displacement u*, this rank's subdomains one after the other.
-        checks: relative errors of the laws: `strain` <eps> = E, Eq. (3); `hill` <sigma:eps> = Sigma:E,
-            Eq. (8); `jump`, the largest opening of a glued node relative to the largest displacement.
+        checks: relative errors of the laws: `strain` <eps> = E, Eq. (3), with the opening of debonded faces as
+            part of <eps>; `hill` <sigma:eps> = Sigma:E, Eq. (8); `jump`, the largest opening of a glued
+            node relative to the largest displacement; and the KKT certificate of contact.
+        counts: numbers of `bonded`, `open` and `closed` interface nodes.
     """
 
     strain: Float
     stress: Float
-    solution: DualSolution
+    scale: float
+    state: Equilibrium
     u: Float
     checks: dict[str, float]
+    counts: dict[str, int]
 
 
-def respond(cell: TornCell, strain: Float, start: Float) -> Response:
-    """Solve the unit-cell problem under the macroscopic `strain` and average; `start` are first multipliers.
+class Homogenization:
+    """Averages over a torn cell with its interfaces."""
 
-    Collective.
+    def __init__(self, cell: TornCell, contact: bool) -> None:
+        self.cell = cell
+        self.interface = Interface(cell.solver, contact, np.array([cell.plan.width, cell.plan.height]))
 
-    Raises:
-        ConvergenceError: the solve broke down and left no numbers.
-    """
-    solver = cell.solver
-    solution = solver.solve(strain, start)
-    if not np.isfinite(solution.residual):
-        raise ConvergenceError(
-            f"strain {strain.tolist()}: the Krylov method broke down after {solution.iterations} iterations "
-            f"(KSPConvergedReason {solution.reason})"
+    def respond(self, strain: Float, status: Status, start: Float) -> Response:
+        """Solve the unit-cell problem under `strain` and average.  Collective.
+
+        `status` says which nodes are debonded and guesses who is in contact; `start` are first multipliers.
+
+        Raises:
+            ConvergenceError: the solve broke down and left no numbers.
+        """
+        state = self.interface.equilibrium(strain, status, start)
+        if not np.isfinite(state.solution.residual):
+            raise ConvergenceError(
+                f"strain {strain.tolist()}: the Krylov method broke down after {state.iterations} iterations "
+                f"(KSPConvergedReason {state.solution.reason})"
+            )
+        return self.response(state, 1.0)
+
+    def response(self, state: Equilibrium, scale: float) -> Response:
+        """`scale` times an equilibrium, averaged.  Collective."""
+        cell, solver = self.cell, self.cell.solver
+        strain, u = state.solution.strain, solver.displacement(state.solution)
+        stress, star, energy = self._averages(strain, u)
+        opening = cell.comm.allreduce(self._strain_of_jumps.T @ (state.solution.jump * (1 - solver.active.mask)))
+        largest = self._largest(displacement(cell, strain, u)) or 1.0
+        checks = {
+            "strain": float(np.abs(star - opening / cell.plan.area).max() / (np.abs(strain).max() or 1.0)),
+            "hill": float(abs(energy - stress @ strain) / (abs(energy) or 1.0)),
+            "jump": self._largest(solver.active.mask * state.solution.jump) / largest,
+        }
+        counts = self.counts(state.status)
+        return Response(
+            scale * strain, scale * stress, scale, state, scale * u, checks | state.certificate, counts
         )
-    u = solver.displacement(solution)
-    means = _averages(cell, strain, u) / cell.plan.area
-    stress, star, energy = means[:3], means[3:6], means[6]
-    checks = {
-        "strain": float(np.abs(star).max() / np.abs(strain).max()),
-        "hill": float(abs(energy - stress @ strain) / abs(energy)),
-        "jump": _largest(cell, solver.active.mask * solution.jump)
-        / _largest(cell, displacement(cell, strain, u)),
-    }
-    return Response(strain, stress, solution, u, checks)
 
+    def counts(self, status: Status) -> dict[str, int]:
+        """Interface nodes in each state; collective."""
+        numbers = np.array([(status == kind).sum() for kind in (BONDED, OPEN, CLOSED)])
+        total = self.cell.comm.allreduce(numbers)
+        return dict(zip(("bonded", "open", "closed"), total.tolist(), strict=True))
 
-def effective_stiffness(cell: TornCell, progress: Progress) -> tuple[Float, list[Response]]:
-    """L^ef, whose columns are the stresses under the unit strains (39), and those three responses."""
-    responses = []
-    for name, strain in zip(progress.bar(CASES, "load cases"), np.eye(3), strict=True):
-        response = respond(cell, strain, np.zeros(cell.solver.rows))
-        solution = response.solution
-        progress.say(f"  {name}: {solution.iterations} iterations, relative jump {solution.residual:.1e}")
-        responses.append(response)
-    return np.stack([r.stress for r in responses], axis=1), responses
+    @cached_property
+    def _strain_of_jumps(self) -> Float:
+        """(owned rows, 3) nu with int eps* = nu^T B u for every displacement u: nu = (B B^T)^-1 B int B_e."""
+        B = self.cell.solver.constraints.B
+        unit = [np.linalg.solve(s.L, s.Q.T).T for s in self.cell.subdomains]
+        local = B @ np.concatenate(unit or [np.zeros((0, 3))])
+        summed = np.stack([self.cell.solver.constraints.sum(column) for column in local.T], axis=1)
+        gram = NodeBlocks(self.cell.comm, self.cell.solver.constraints, B @ B.T)
+        return np.asarray(gram.inverse(np.ones(gram.rows)) @ summed)
+
+    def _averages(self, E: Float, u: Float) -> tuple[Float, Float, float]:
+        """<sigma>, <eps*> over the bodies, and <sigma:eps>; collective."""
+        cell, total = self.cell, np.zeros(7)
+        for s, offset in zip(cell.subdomains, cell.offsets, strict=False):
+            own = u[offset : offset + len(s.Q)]
+            from_u = s.Q.T @ own
+            total[:3] += s.area * s.L @ E + from_u
+            total[3:6] += np.linalg.solve(s.L, from_u)
+            total[6] += s.area * E @ s.L @ E + 2 * E @ from_u + own @ (s.K @ own)
+        cell.comm.Allreduce(MPI.IN_PLACE, total)
+        total /= cell.plan.area
+        return total[:3], total[3:6], float(total[6])
+
+    def _largest(self, values: Float) -> float:
+        """max |values| over all ranks."""
+        return float(self.cell.comm.allreduce(np.abs(values).max(initial=0.0), MPI.MAX))
 
 
 def asymmetry(L: Float) -> float:
@@ -96,21 +136,3 @@ def fluctuation(cell: TornCell, u: Float) -> Float:
     parts = zip(cell.subdomains, cell.offsets, strict=False)
     own = [u[o : o + len(s.Q)].reshape(-1, 2)[s.mesh.node_class] for s, o in parts]
     return np.concatenate(own or [np.zeros((0, 2))])
-
-
-def _averages(cell: TornCell, E: Float, u: Float) -> Float:
-    """(7,) integrals over the cell of sigma, eps* and sigma:eps; collective."""
-    total = np.zeros(7)
-    for s, offset in zip(cell.subdomains, cell.offsets, strict=False):
-        own = u[offset : offset + len(s.Q)]
-        from_u = s.Q.T @ own
-        total[:3] += s.area * s.L @ E + from_u
-        total[3:6] += np.linalg.solve(s.L, from_u)
-        total[6] += s.area * E @ s.L @ E + 2 * E @ from_u + own @ (s.K @ own)
-    cell.comm.Allreduce(MPI.IN_PLACE, total)
-    return total
-
-
-def _largest(cell: TornCell, values: Float) -> float:
-    """max |values| over all ranks."""
-    return float(cell.comm.allreduce(np.abs(values).max(initial=0.0), MPI.MAX))

@@ -21,8 +21,8 @@ class Option:
 OPTIONS = (
     Option("feti_ksp_type", "cg|fcg|gmres|...", "cg", "Krylov method on the projected dual operator"),
     Option("feti_ksp_rtol", "<real>", "1e-8", "relative tolerance of the dual and the primal residuals"),
-    Option("feti_ksp_atol", "<real>", "1e-50", "absolute tolerance of the dual residual"),
-    Option("feti_ksp_max_it", "<integer>", "1000", "largest number of iterations per load case"),
+    Option("feti_ksp_atol", "<real>", "0", "absolute tolerance of the dual residual"),
+    Option("feti_ksp_max_it", "<integer>", "2000", "largest number of iterations per load case"),
     Option("feti_ksp_monitor", "", "", "print the residual at every iteration"),
     Option("feti_ksp_converged_reason", "", "", "print why each solve ended"),
     Option("feti_ksp_view", "", "", "print the solver's settings"),

@@ -9,6 +9,7 @@ import math
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any, TypeVar
 
@@ -79,14 +80,24 @@ boolean = Kind("true or false", lambda value: isinstance(value, bool), bool)
 text = Kind("a text in one line", lambda value: isinstance(value, str) and value.isprintable(), str)
 
 
+def are_reals(value: object, count: int | None = None) -> bool:
+    """Whether the value is a list of numbers, so many if a count is given."""
+    return isinstance(value, list) and count in (None, len(value)) and all(map(is_real, value))
+
+
+def as_reals(value: Iterable[Any]) -> tuple[float, ...]:
+    return tuple(map(float, value))
+
+
 def choice(*options: str) -> Kind:
     return Kind("one of " + ", ".join(map(shown, options)), lambda value: value in options, str)
 
 
 def accepted(cls: type[Any], table: object, name: str) -> Any:
-    """The value of a key if it is there and right, else None."""
-    value = table.get(name) if isinstance(table, dict) else None
-    return value if name and keys_of(cls)[name].kind.accepts(value) else None
+    """The value of a key if it is right, its default if it is not there, None if it is faulty."""
+    default = getattr(cls, name, None)
+    value = table.get(name, default) if isinstance(table, dict) else default
+    return value if keys_of(cls)[name].kind.accepts(value) else None
 
 
 # Words of the faults
@@ -112,7 +123,7 @@ def suggestion(name: str, known: Iterable[str], owners: Mapping[str, str] = NOWH
     known = list(known)
     nearest = difflib.get_close_matches(name, known, n=1)
     if name in owners:
-        return f"it belongs to [{owners[name]}]"
+        return f"it belongs to {owners[name]}"
     if nearest:
         return f"did you mean {named(nearest[0])}?"
     return "known here: " + ", ".join(map(named, known))
@@ -136,33 +147,43 @@ def read(
     section: str,
     faults: list[str],
     variant: str = "",
+    chosen: str | None = None,
     owners: Mapping[str, str] = NOWHERE,
+    prefix: str = "",
 ) -> T | None:
     """The table as an instance of `cls`; None, and one line per fault added to `faults`, if it is faulty.
 
-    `variant` names the key whose value decides which others belong; `owners` gives the sections of keys that
-    belong elsewhere.
+    `variant` names the key whose value `chosen` (None if that is faulty) decides which others belong; `owners`
+    says where keys belong that belong elsewhere; `prefix` stands before the keys of a table within a section.
     """
     if not isinstance(table, dict):
         faults.append(f"{section} = {shown(table)}: expected a section [{section}]")
         return None
     keys = keys_of(cls)
-    chosen = accepted(cls, table, variant)
     found = {
         name: f" = {shown(value)}: unknown key; {suggestion(name, keys, owners)}"
         for name, value in table.items()
         if name not in keys
     }
     found |= {name: _fault(name, entry, table, variant, chosen) for name, entry in keys.items()}
-    lines = [f"[{section}] {named(name)}{words}" for name, words in found.items() if words]
+    lines = [f"[{section}] {prefix}{named(name)}{words}" for name, words in found.items() if words]
     faults += lines
     return None if lines else cls(**{name: keys[name].kind.store(value) for name, value in table.items()})
 
 
 def written(instance: Any, chosen: str = "") -> dict[str, Any]:
-    """The table that `read` makes the instance of, without the keys that are absent or of other variants."""
+    """The table, of TOML's values, that `read` makes the instance of; without the keys of other variants."""
     return {
-        name: getattr(instance, name)
+        name: _plain(getattr(instance, name), chosen)
         for name, entry in keys_of(type(instance)).items()
         if getattr(instance, name) is not None and (not entry.only or chosen in entry.only)
     }
+
+
+def _plain(value: Any, chosen: str) -> Any:
+    """The value as TOML has it."""
+    if isinstance(value, tuple):
+        return [_plain(entry, chosen) for entry in value]
+    if isinstance(value, Path):
+        return str(value)
+    return written(value, chosen) if dataclasses.is_dataclass(value) else value

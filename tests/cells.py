@@ -9,7 +9,9 @@ import twin
 from petsc4py import PETSc
 
 from feti_homog import case as cases
-from feti_homog.homogenization import effective_stiffness
+from feti_homog.analysis import stiffness
+from feti_homog.analysis.study import Study
+from feti_homog.homogenization import Homogenization
 from feti_homog.petsc_options import case_options
 from feti_homog.progress import Progress
 from feti_homog.torn import tear
@@ -38,7 +40,14 @@ def solve(case, comm):
     progress = Progress(comm, quiet=True)
     with case_options(case.petsc):
         cell = tear(case, comm, progress)
-        return cell, *effective_stiffness(cell, progress)
+        responses = []
+        study = Study(
+            Homogenization(cell, contact=False),
+            lambda opening: np.zeros(len(cell.solver.constraints.nodes.row), bool),
+            progress,
+            lambda response, load_factor: responses.append(response),
+        )
+        return cell, stiffness.run(study)["effective_stiffness"], responses
 
 
 def twin_stiffness(cell):

@@ -47,6 +47,8 @@ class CoarseProblem:
         ).getValuesCSR()
         self.G = csr_matrix((values, indices, indptr), shape=(owned, self.dimension))
         self.factorizations = 0
+        squares = np.asarray(self.G.power(2).sum(axis=0)).ravel()
+        self.scale = float(comm.allreduce(squares).max(initial=0.0))
         self.activate(np.ones(owned))
 
     def activate(self, active: Float) -> None:
@@ -57,10 +59,9 @@ class CoarseProblem:
         self.Ga = (diags(active) @ self.G).tocsr()
         self.GaT = self.Ga.T.tocsr()
         gram = self._gram()
-        self.free = _null_vectors(gram, self.body, self.held)
+        self.free = _null_vectors(gram, self.body, self.held, FREE * self.scale)
         if self.dimension:
-            scale = gram.diagonal().max()
-            held = gram + scale * csr_matrix(self.free @ self.free.T) if self.free.shape[1] else gram
+            held = gram + self.scale * csr_matrix(self.free @ self.free.T)
             self._solver = LocalSolver([held.tocsr()], "feti_coarse_")
             self.factorizations += 1
 
@@ -86,8 +87,8 @@ class CoarseProblem:
         return self.R @ amplitudes[self.own]
 
 
-def _null_vectors(gram: csr_matrix, body: Int, held: int) -> Float:
-    """(dimension, z) orthonormal null space of G^T G.
+def _null_vectors(gram: csr_matrix, body: Int, held: int, tolerance: float) -> Float:
+    """(dimension, z) orthonormal null space of G^T G: its eigenvectors of eigenvalues below `tolerance`.
 
     The pieces of the body `held` are glued to the pinned class and cannot move; the others are examined
     together where they touch, so each eigenproblem has the size of a fibre's kernel.
@@ -101,7 +102,7 @@ def _null_vectors(gram: csr_matrix, body: Int, held: int) -> Float:
     vectors = [np.zeros((0, len(body)))]
     for some in np.split(order, np.flatnonzero(np.diff(group[order])) + 1):
         values, basis = np.linalg.eigh(rest[some][:, some].toarray())
-        null = basis[:, values < FREE * gram.diagonal().max()]
+        null = basis[:, values < tolerance]
         vectors.append(np.zeros((null.shape[1], len(body))))
         vectors[-1][:, loose[some]] = null.T
     return np.concatenate(vectors).T

@@ -15,7 +15,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy.sparse import block_diag, csr_matrix, diags
 
-from feti_homog.feti.assembled import assembled
+from feti_homog.feti.blocks import NodeBlocks
 from feti_homog.feti.constraints import Constraints
 from feti_homog.feti.local import LocalSolver
 
@@ -101,7 +101,7 @@ class Scaled:
         Bb = constraints.B[:, boundary]
         self.BD = (Bb @ flexibility).tocsr()
         self.DBT = self.BD.T.tocsr()
-        self.W = _Blocks(_owned_blocks(comm, constraints, self.BD @ Bb.T), *constraints.blocks)
+        self.W = NodeBlocks(comm, constraints, self.BD @ Bb.T)
         self.activate(np.ones(self.W.rows))
 
     def activate(self, active: Float) -> None:
@@ -112,49 +112,3 @@ class Scaled:
         """W^-1 B D^-1 S D^-1 B^T W^-1 r."""
         x = self.DBT @ self.constraints.gather(self.W_inverse @ r)
         return self.W_inverse @ self.constraints.sum(self.BD @ self.S.apply(x))
-
-
-def _owned_blocks(comm: MPI.Intracomm, constraints: Constraints, local: csr_matrix) -> csr_matrix:
-    """The rows of W that this rank owns, summed over ranks; their columns are its own too."""
-    first, last = constraints.owned
-    W = assembled(comm, local, constraints.rows, constraints.rows, (last - first, last - first))
-    indptr, indices, values = W.getValuesCSR()
-    return csr_matrix((values, indices - first, indptr), shape=(last - first, last - first))
-
-
-class _Blocks:
-    """A block-diagonal matrix of small dense blocks, by size."""
-
-    def __init__(self, matrix: csr_matrix, starts: Int, sizes: Int) -> None:
-        """`starts` (ascending) and `sizes` are those of the blocks."""
-        self.rows = matrix.shape[0]
-        self.blocks: list[tuple[Int, Float]] = []
-        entries = matrix.tocoo()
-        block = np.repeat(np.arange(len(starts)), sizes)[entries.row]
-        for size in np.unique(sizes):
-            some = np.flatnonzero(sizes == size)
-            number = np.full(len(starts), -1)
-            number[some] = np.arange(len(some))
-            mine = number[block] >= 0
-            own = block[mine]
-            dense = np.zeros((len(some), size, size))
-            dense[number[own], entries.row[mine] - starts[own], entries.col[mine] - starts[own]] = (
-                entries.data[mine]
-            )
-            self.blocks.append((starts[some][:, None] + np.arange(size), dense))
-
-    def inverse(self, active: Float) -> csr_matrix:
-        """Inverse of the active rows and columns, 0 on the others."""
-        rows, columns, values = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)], [np.zeros(0)]
-        for at, dense in self.blocks:
-            mask = active[at]
-            both = mask[:, :, None] * mask[:, None, :]
-            unit = np.eye(at.shape[1]) * (1 - mask)[:, :, None]
-            rows.append(np.broadcast_to(at[:, :, None], dense.shape).ravel())
-            columns.append(np.broadcast_to(at[:, None, :], dense.shape).ravel())
-            inverse: Float = np.linalg.inv(both * dense + unit)
-            values.append((both * inverse).ravel())
-        shape = (self.rows, self.rows)
-        return csr_matrix(
-            (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=shape
-        )

@@ -92,11 +92,27 @@ class FetiSolver:
         return np.concatenate([s.Q for s in self.subdomains] or [np.zeros((0, 3))])
 
     @cached_property
-    def d(self) -> Float:
-        """(owned rows, 3) jumps of the torn cell, -B K+ Q, under the unit strains."""
+    def _torn(self) -> Float:
+        """(local dofs, 3) K+ (-Q), the torn cell under the unit strains."""
         nothing = np.zeros(self.rows)
-        columns = [self.operator.jump(self.operator.displacement(-q, nothing)) for q in self.Q.T]
+        columns = [self.operator.displacement(-q, nothing) for q in self.Q.T]
         return np.stack(columns, axis=1)
+
+    @cached_property
+    def d(self) -> Float:
+        """(owned rows, 3) jumps -B K+ Q of the torn cell under the unit strains."""
+        return np.stack([self.operator.jump(u) for u in self._torn.T], axis=1)
+
+    @cached_property
+    def torn_stiffness(self) -> Float:
+        """(3, 3) sum |Omega_s| L_s - Q^T K+ Q: the stress integral of the torn cell under the unit strains."""
+        local = sum((s.area * s.L for s in self.subdomains), self.Q.T @ self._torn)
+        return np.asarray(self.comm.allreduce(local))
+
+    def stress_integral(self, solution: DualSolution) -> Float:
+        """(3,) |UC| Sigma = int sigma, from the multipliers alone: the torn cell's plus d^T lam."""
+        forces = self.comm.allreduce(self.d.T @ solution.lam)
+        return np.asarray(self.torn_stiffness @ solution.strain + forces)
 
     def activate(self, active: Float) -> None:
         """Let only the owned rows where `active` is 1 carry multipliers; refactors the coarse problem alone."""
@@ -118,7 +134,9 @@ class FetiSolver:
         self.coarse.project(closing)
         self._test.start(self._norm(free), self._norm(closing))
         iterations, reason = 0, int(PETSc.KSP.ConvergedReason.CONVERGED_ATOL)
-        if self._test.jump > 0:
+        if self._test.jump == 0:
+            lam[:] = 0.0
+        else:
             self._w.zeroEntries()
             residual = free - self.active.mask * self.operator.apply(lam)
             self.coarse.project(residual)

@@ -8,13 +8,28 @@ import pickle
 from pathlib import Path
 
 import pytest
-from unit.faulty_cases import BASE, FAULTY_CASES, FIBRE, RANDOM, changed, fibre
+from unit.faulty_cases import (
+    ANGLE,
+    ARC,
+    BARE_ARC,
+    BASE,
+    FAULTY_CASES,
+    FIBRE,
+    MESH_CELL,
+    PATH,
+    RANDOM,
+    changed,
+    debonded,
+    fibre,
+    of_type,
+)
 
 from feti_homog.case import check_phases, load, parse
 from feti_homog.errors import CaseError
 from feti_homog.material import General, Isotropic, Orthotropic
+from feti_homog.sections import Angle, Arc, Interface, LoadPath
 
-MESH = changed(('"hexagonal"\nfibre_fraction = 0.4\nmesh_size = 0.05', '"mesh"\nfile = "cell.msh"'))
+MESH = changed(MESH_CELL)
 
 
 def case_of(tmp_path: Path, content: str, name: str = "cell.toml"):
@@ -37,7 +52,8 @@ def test_defaults(tmp_path):
     ]
     assert (case.analysis.type, case.analysis.plane) == ("stiffness", "strain")
     assert (case.decomposition.subdomains, case.decomposition.max_dofs) == (None, None)
-    assert (case.output.fields, case.output.pictures, case.output.stress) == (True, True, "S11")
+    assert (case.output.fields, case.output.pictures, case.output.stress) == (True, True, "auto")
+    assert (case.interface, case.angle, case.path) == (None, None, None)
     assert case.petsc == {}
     assert case.warnings() == ()
 
@@ -105,19 +121,55 @@ def test_integers_are_numbers(tmp_path):
         MESH + '[material."fibre:2"]\nstiffness = [[3, 1, 0], [1, 3, 0], [0, 0, 1]]\n',
         fibre("E1 = 10.0\nE2 = 5.0\nE3 = 5.0\nnu12 = 0.3\nnu13 = 0.3\nnu23 = 0.2\nG12 = 2.0\nangle = 30\n"),
         BASE + '[output]\nfields = false\nstress = "S12"\ndeformation_scale = 2\nlength_unit = "µm"\n',
+        BASE + f"[interface]\ndebonded = [{ARC}]\n",
+        BASE + "[interface]\ncontact = false\ndebonded = []\n",
+        MESH + "[interface]\n",
+        of_type("angle", ANGLE, BARE_ARC, "contact = false"),
+        of_type("angle", ANGLE, "strain = [0, 0, 0.2]", '[[interface.debonded]]\nfibre = "all"\ncentre = 90'),
+        of_type("path", PATH),
+        of_type("path", "[path]\nwaypoints = [[1, 0, 0], [0, 0, 0]]\nmax_events = 7"),
+        of_type("path", PATH, 'method = "increments"\nincrements = 50\nrelease = "worst"'),
+        debonded("{fibre = [1, 2], angle = 360}", "normal_strength = inf\ntangential_strength = 3"),
+        debonded(f'{ARC}, {{fibre = "all", angle = 0}}', 'normal_strength = 1\ncriterion = "quadratic"'),
     ],
 )
 def test_resolved_makes_the_same_case_again(tmp_path, content):
     case = case_of(tmp_path, content)
-    written = json.loads(json.dumps(case.resolved()))
+    written = json.loads(json.dumps(case.resolved(), allow_nan=False))
+    assert written == case.resolved()
     assert parse(written, Path("/nowhere")) == case
     assert pickle.loads(pickle.dumps(case)) == case
 
 
+def test_interface(tmp_path):
+    case = case_of(tmp_path, debonded('{fibre = "all", centre = -30, angle = 60}, {fibre = 2, angle = 10.5}'))
+    arcs = (Arc(fibre="all", centre=-30.0, angle=60.0), Arc(fibre=(2,), centre=0.0, angle=10.5))
+    assert case.interface == Interface(debonded=arcs)
+    assert (case.interface.contact, case.interface.criterion) == (True, "max")
+    assert (case.interface.normal_strength, case.interface.tangential_strength) == (None, None)
+    strong = case_of(tmp_path, of_type("path", PATH, "[interface]", "normal_strength = inf", "tangential_strength = 2"))
+    assert (strong.interface.normal_strength, strong.interface.tangential_strength) == (None, 2.0)
+
+
+def test_angle(tmp_path):
+    case = case_of(tmp_path, of_type("angle", "[angle]", "values = [0, 30, 360.0]", BARE_ARC))
+    assert case.angle == Angle(values=(0.0, 30.0, 360.0), strain=None)
+    assert case.interface == Interface(debonded=(Arc(fibre=(1,), angle=None),))
+
+
+def test_path(tmp_path):
+    case = case_of(tmp_path, of_type("path", PATH))
+    assert case.path == LoadPath(strain=(0.2, 0.0, 0.0))
+    assert case.path.targets == ((0.2, 0.0, 0.0),)
+    assert (case.path.method, case.path.increments, case.path.max_events) == ("events", None, 100_000)
+    there_and_back = case_of(tmp_path, of_type("path", "[path]\nwaypoints = [[1, 0, 0], [0, 0, 0]]"))
+    assert there_and_back.path.targets == ((1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+
 def test_kinds_of_material(tmp_path):
-    assert case_of(tmp_path, fibre("stiffness = [[3, 1, 0], [1, 3, 0], [0, 0, 1]]\n")).materials[
-        "fibre"
-    ] == General(((3.0, 1.0, 0.0), (1.0, 3.0, 0.0), (0.0, 0.0, 1.0)))
+    assert case_of(tmp_path, fibre("stiffness = [[3, 1, 0], [1, 3, 0], [0, 0, 1]]\n")).materials["fibre"] == General(
+        ((3.0, 1.0, 0.0), (1.0, 3.0, 0.0), (0.0, 0.0, 1.0))
+    )
     constants = "E1 = 10.0\nE2 = 5.0\nnu12 = 0.3\nG12 = 2.0\n"
     assert case_of(tmp_path, fibre(constants, "stress")).materials["fibre"] == Orthotropic(
         E1=10.0, E2=5.0, nu12=0.3, G12=2.0
@@ -137,9 +189,7 @@ def test_check_phases(tmp_path):
     assert case.material_of("fibre:2") == Isotropic(200.0, 0.222)
     with pytest.raises(CaseError, match=r"^\[material.fibre\]: the mesh has no such phase; it has matrix$"):
         check_phases(case, ["matrix"])
-    with pytest.raises(
-        CaseError, match=r'^\[material."fibre:2"\]: missing section; the mesh has this phase$'
-    ):
+    with pytest.raises(CaseError, match=r'^\[material."fibre:2"\]: missing section; the mesh has this phase$'):
         check_phases(case_of(tmp_path, MESH.replace(FIBRE, "")), ["matrix", "fibre:2"])
     own = case_of(tmp_path, MESH + '[material."fibre:2"]\nyoung = 1\npoisson = 0\n')
     assert own.material_of("fibre:2") == Isotropic(1.0, 0.0)

@@ -1,0 +1,42 @@
+"""`analysis.type = "angle"`: the response against the debonding angle, Fig. 3."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feti_homog.analysis.study import Study
+from feti_homog.homogenization import Response, asymmetry
+
+Float = NDArray[np.float64]
+
+
+def run(study: Study, values: Sequence[float], strain: Float | None) -> dict[str, Any]:
+    """`angle`, a list of points: under `strain` the stress, else the stiffness from the three unit cases.
+
+    Each angle begins with the multipliers of the one before it.
+    """
+    unit = strain is None
+    starts = [study.nothing()] * (3 if unit else 1)
+    points = []
+    for value in study.progress.bar(values, "angles"):
+        status, label = study.status(value), f"{value:g} deg "
+        point: dict[str, Any] = {"angle": value}
+        responses: list[Response]
+        if unit:
+            L, responses = study.unit_responses(label, status, starts, 1.0)
+            point["stiffness"] = L
+            if not (study.homogenization.interface.contact and responses[0].counts["bonded"] < len(status)):
+                study.check(label.strip(), {"symmetry": asymmetry(L)})
+        else:
+            responses = [study.homogenization.respond(np.asarray(strain), status, starts[0])]
+            study.note(label.strip(), responses[0])
+            point |= {"strain": responses[0].strain, "stress": responses[0].stress}
+        for response in responses:
+            study.record(response, value)
+        starts = [r.state.solution.lam for r in responses]
+        points.append(point | study.point(responses))
+    return {"angle": points}

@@ -1,0 +1,28 @@
+"""`analysis.type = "stiffness"`: L^ef, with debonding and contact the secants to plus and minus each unit strain."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from feti_homog.analysis.study import Study
+from feti_homog.homogenization import asymmetry
+
+
+def run(study: Study) -> dict[str, Any]:
+    """`effective_stiffness`, whose columns are the stresses under the unit strains; with contact between debonded
+    faces also `effective_stiffness_compression`, its columns -Sigma(-E)."""
+    status = study.status(None)
+    nothing = [study.nothing()] * 3
+    one_sided = study.homogenization.interface.contact and study.homogenization.counts(status)["open"] > 0
+    L, responses = study.unit_responses("", status, nothing, 1.0)
+    for response in responses:
+        study.record(response, 1.0)
+    document: dict[str, Any] = {"effective_stiffness": L}
+    if one_sided:
+        minus, responses = study.unit_responses("", status, nothing, -1.0)
+        for response in responses:
+            study.record(response, -1.0)
+        document["effective_stiffness_compression"] = minus
+    else:
+        study.check("L^ef", {"symmetry": asymmetry(L)})
+    return document

@@ -1,0 +1,1 @@
+"""Imperfect bonding: which interface multipliers act."""

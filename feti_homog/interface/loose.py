@@ -1,0 +1,80 @@
+"""Where fibres lie that nothing holds: rigid motions that open all their gaps, or the nodes that squeeze them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+from scipy.optimize import linprog
+from scipy.sparse import csr_matrix
+
+from feti_homog.feti.coarse import CoarseProblem
+from feti_homog.feti.constraints import InterfaceNodes
+from feti_homog.feti.solver import DualSolution
+
+Float = NDArray[np.float64]
+Bool = NDArray[np.bool_]
+
+# Motions whose gaps are smaller than this, relative to the largest, slide without opening (a round fibre turns).
+SLIDING = 1e-9
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Amplitudes (dimension,) to add to alpha, and the open nodes (k,) that must close for lack of room."""
+
+    alpha: Float
+    squeezed: Bool
+
+    @classmethod
+    def none(cls, nodes: int) -> Placement:
+        """Nothing moves, nothing is squeezed."""
+        return cls(np.zeros(0), np.zeros(nodes, bool))
+
+    def jump(self, coarse: CoarseProblem) -> Float:
+        """(owned rows,) G alpha."""
+        return np.asarray(coarse.G @ self.alpha)
+
+
+def place(
+    comm: MPI.Intracomm, coarse: CoarseProblem, nodes: InterfaceNodes, is_open: Bool, solution: DualSolution, noise: float
+) -> Placement:
+    """Move the loose fibres so that no open node overlaps by more than `noise`; collective, decided on rank 0.
+
+    A fibre that overlaps is put where its smallest gap is largest: a linear programme in its rigid motions.  If even
+    that overlaps, the programme's dual solution is a system of contact forces in balance, and its nodes close.
+    """
+    motion = np.asarray((coarse.G[nodes.row] @ csr_matrix(coarse.free)).todense())
+    parts = comm.gather((solution.jump[nodes.row], motion, nodes.fibre, is_open))
+    answer = _place_all(parts, noise) if parts is not None else None
+    amplitudes, squeezed = comm.bcast(answer)
+    first = comm.exscan(len(nodes.row)) or 0
+    return Placement(coarse.free @ amplitudes, squeezed[first : first + len(nodes.row)])
+
+
+def _place_all(parts: list[tuple[Float, Float, NDArray[np.int64], Bool]], noise: float) -> tuple[Float, Bool]:
+    gap, motion, fibre, is_open = (np.concatenate(p) for p in zip(*parts, strict=True))
+    squeezed, amplitudes = np.zeros(len(gap), bool), np.zeros(motion.shape[1])
+    moving = np.abs(motion) > SLIDING * np.abs(motion).max(initial=0.0)
+    for f in np.unique(fibre[is_open & (gap < -noise) & moving.any(axis=1)]):
+        own = np.flatnonzero((fibre == f) & is_open)
+        modes = np.flatnonzero(moving[own].any(axis=0))
+        amplitudes[modes], room, forces = _largest_gap(gap[own], motion[np.ix_(own, modes)])
+        if room < -noise:
+            squeezed[own[forces > 1e-6 * forces.max()]] = True
+    return amplitudes, squeezed
+
+
+def _largest_gap(gap: Float, motion: Float) -> tuple[Float, float, Float]:
+    """max s with gap + motion a >= s: a, s, and the multipliers of the inequalities."""
+    scale = np.abs(gap).max()
+    size = np.abs(motion).max()
+    rows = np.column_stack([-motion / size, np.ones(len(gap))])
+    cost = np.r_[np.zeros(motion.shape[1]), -1.0]
+    # Bounds keep a fibre in place that has room without end on one side.
+    bounds = [(-1e3, 1e3)] * motion.shape[1] + [(None, 1.0)]
+    result = linprog(cost, A_ub=rows, b_ub=gap / scale, bounds=bounds, method="highs")
+    a, s = result.x[:-1], result.x[-1]
+    return a * scale / size, float(s * scale), -result.ineqlin.marginals

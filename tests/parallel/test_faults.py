@@ -1,0 +1,97 @@
+"""Every faulty case and mesh through the command line, by all ranks together: told once, nothing written."""
+
+from __future__ import annotations
+
+import pytest
+from support import parallel_assert
+from unit.faulty_cases import BASE, FAULTY_CASES
+from unit.faulty_meshes import FAULTY_MESHES
+
+from feti_homog import cli
+
+pytestmark = pytest.mark.parallel
+
+CELL = 'geometry = "hexagonal"\nfibre_fraction = 0.4\nmesh_size = 0.05'
+MESH_CASE = BASE.replace(CELL, 'geometry = "mesh"\nfile = "faulty.msh"')
+# The case is looked at first, and tells it in its own words.
+BY_CASE = {"missing file": "no such file"}
+
+
+@pytest.mark.parametrize("command", ["run", "check"])
+@pytest.mark.parametrize("name", FAULTY_CASES)
+def test_faulty_case(comm, shared_path, capsys, command, name):
+    content, expected = FAULTY_CASES[name]
+    if comm.rank == 0:
+        (shared_path / "cell.toml").write_text(content, encoding="utf-8")
+    refused(comm, shared_path, capsys, command, expected)
+
+
+@pytest.mark.parametrize("command", ["run", "check"])
+@pytest.mark.parametrize("name", FAULTY_MESHES)
+def test_faulty_mesh(comm, shared_path, capsys, command, name):
+    write, message = FAULTY_MESHES[name]
+    if comm.rank == 0:
+        (shared_path / "cell.toml").write_text(MESH_CASE)
+        write(shared_path / "faulty.msh")
+    refused(comm, shared_path, capsys, command, [BY_CASE.get(name, message)])
+
+
+@pytest.mark.parametrize(
+    ("cell", "message"),
+    [
+        ("fibre_fraction = 0.95", "fibre_fraction = 0.95"),
+        ('geometry = "random"\nfibres = 30\nfibre_fraction = 0.75', "lower one of them"),
+        ('geometry = "random"\nfibres = 9\nfibre_fraction = 0.78\nmin_gap = 0.0', "no arrangement found"),
+    ],
+)
+def test_cell_that_cannot_be_made(comm, shared_path, capsys, cell, message):
+    words = CELL.splitlines()
+    own = [line.split(" = ")[0] for line in cell.splitlines()]
+    lines = [line for line in words if line.split(" = ")[0] not in own]
+    if comm.rank == 0:
+        (shared_path / "cell.toml").write_text(BASE.replace(CELL, "\n".join([*lines, cell])))
+    refused(comm, shared_path, capsys, "run", [message])
+
+
+def test_there_are_enough_faults():
+    assert len(FAULTY_CASES) + len(FAULTY_MESHES) >= 40
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ([], "the following arguments are required: command"),
+        (["rum"], "invalid choice: 'rum'"),
+        (["run"], "the following arguments are required: CASE.toml, --out"),
+        (["run", "none.toml"], "the following arguments are required: --out"),
+        (["run", "none.toml", "--out", "results/none"], "none.toml: cannot be read: No such file"),
+        (["run", "none.toml", "--out", "results/none", "--quite"], "unrecognized arguments: --quite"),
+        (["check", "."], "cannot be read: Is a directory"),
+    ],
+)
+def test_faulty_command(comm, capsys, words, message):
+    assert cli.main(words) == 2
+    told_once(comm, capsys, [message])
+
+
+def refused(comm, folder, capsys, command, expected):
+    """The command ends with exit code 2 on every rank; rank 0 tells the faults, a line each."""
+    comm.barrier()
+    out = ["--out", str(folder / "results")] if command == "run" else []
+    before = sorted(folder.iterdir())
+    code = cli.main([command, str(folder / "cell.toml"), *out])
+    parallel_assert(comm, code == 2, f"exit code {code}")
+    assert sorted(folder.iterdir()) == before
+    told_once(comm, capsys, expected)
+
+
+def told_once(comm, capsys, expected):
+    errors = capsys.readouterr().err
+    lines = errors.splitlines()
+    if comm.rank == 0:
+        missing = [words for words in expected if words not in errors]
+        good = not missing and all(line.startswith("error: ") for line in lines)
+        good = good and len(set(lines)) == len(lines)
+    else:
+        good = not lines
+    parallel_assert(comm, good, errors)

@@ -1,0 +1,192 @@
+"""A slow independent twin with debonding and contact: the displacements of all bodies by quadratic programming.
+
+It shares the refined meshes with the program, nothing else.  Bonded nodes are one, debonded ones are two and,
+with contact, obey n.(u_matrix - u_fibre) >= 0: clarabel minimises the energy, and a direct solve of the KKT
+system with the constraints that it finds active makes the answer exact to rounding.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import clarabel
+import numpy as np
+import twin
+from scipy.sparse import bmat, coo_matrix, csc_matrix, csr_matrix, diags, identity
+from scipy.sparse.linalg import splu
+
+EXACT = 1e-9  # relative, of the KKT conditions of an answer
+
+
+@dataclass(frozen=True)
+class State:
+    """Energy, Sigma (3,), displacements (n, 2), and of the interface nodes: gap and slip, and the force on the
+    fibre, both (k, 2) in n and t; `closed` (k,) of the debonded nodes."""
+
+    energy: float
+    stress: np.ndarray
+    u: np.ndarray
+    jump: np.ndarray
+    force: np.ndarray
+    closed: np.ndarray
+
+
+def keys(points, size):
+    """One integer for each position on the torus."""
+    reduced = np.round(points / size * 1e8).astype(np.int64) % 10**8
+    return reduced[:, 0] * 10**8 + reduced[:, 1]
+
+
+class QPTwin:
+    """The cell of round fibres made of meshed parts (points, triangles, body, is matrix, L).
+
+    `centres` and `radii` are those of the fibres; interface nodes are sorted by `key`.
+    """
+
+    def __init__(self, parts, centres, radii, size):
+        self.size = np.array(size)
+        labels = [np.stack([np.full(len(p), body), keys(p, size)], axis=1) for p, _, body, _, _ in parts]
+        classes, number = np.unique(np.concatenate(labels), axis=0, return_inverse=True)
+        first = np.cumsum([0] + [len(label) for label in labels])
+        self.n = len(classes)
+        self.points = np.zeros((self.n, 2))
+        self.points[number.ravel()] = np.concatenate([p for p, *_ in parts])
+        matrix, middle = np.zeros(self.n, bool), np.zeros(self.n, bool)
+        self.mean, self.Q = np.zeros((3, 3)), np.zeros((2 * self.n, 3))
+        rows, columns, values = [], [], []
+        for (points, triangles, _, is_matrix, L), start in zip(parts, first, strict=False):
+            nodes = number.ravel()[start:][triangles]
+            matrix[nodes] = is_matrix
+            middle[nodes[:, 3:]] = True
+            for own, corners in zip(nodes, points[triangles], strict=True):
+                k, q, area = twin.element(corners, L)
+                dofs = (2 * own[:, None] + [0, 1]).ravel()
+                rows.append(np.repeat(dofs, len(dofs)))
+                columns.append(np.tile(dofs, len(dofs)))
+                values.append(k.ravel())
+                np.add.at(self.Q, dofs, q)
+                self.mean += area * L
+        entries = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
+        self.K = coo_matrix(entries).tocsc()
+        self.scale = self.K.diagonal().max()
+        _, on_matrix, on_fibre = np.intersect1d(
+            np.where(matrix, classes[:, 1], -1), np.where(matrix, -2, classes[:, 1]), return_indices=True
+        )
+        self.matrix, self.fibre_node = on_matrix, on_fibre
+        self.key, self.middle = classes[on_fibre, 1], middle[on_fibre]
+        self.pinned = int(np.setdiff1d(np.flatnonzero(matrix), on_matrix)[0])
+        arm = self.points[on_fibre][:, None] - centres
+        arm -= np.round(arm / self.size) * self.size
+        self.fibre = np.argmin(np.abs(np.hypot(*np.moveaxis(arm, 2, 0)) - radii), axis=1)
+        arm = arm[np.arange(len(arm)), self.fibre]
+        self.normal = arm / np.hypot(*arm.T)[:, None]
+        self.angle = np.degrees(np.arctan2(arm[:, 1], arm[:, 0]))
+        self.radius = np.asarray(radii)[self.fibre]
+
+    def lengths(self):
+        """(k,) tributary arc lengths: halves of the arcs between linear nodes, Simpson's shares of quadratic ones."""
+        result = np.zeros(len(self.key))
+        for f in np.unique(self.fibre):
+            own = np.flatnonzero((self.fibre == f) & ~self.middle)
+            own = own[np.argsort(self.angle[own])]
+            arc = np.radians(np.diff(self.angle[own], append=self.angle[own[0]] + 360)) * self.radius[own]
+            vertex = 1 / 6 if self.middle.any() else 1 / 2
+            result[own] = vertex * (arc + np.roll(arc, 1))
+            middles = np.flatnonzero((self.fibre == f) & self.middle)
+            before = np.searchsorted(self.angle[own], self.angle[middles]) - 1
+            result[middles] = 4 / 6 * arc[before]
+        return result
+
+    def solve(self, strain, bonded, contact):
+        """The state under a strain (3,) with the `bonded` (k,) nodes held together."""
+        number = np.arange(self.n)
+        number[self.fibre_node[bonded]] = self.matrix[bonded]
+        kept = np.setdiff1d(number, self.pinned)
+        place = np.full(self.n, -1)
+        place[kept] = np.arange(len(kept))
+        dof = (2 * place[number][:, None] + np.where(place[number] >= 0, [[0], [1]], [[0], [0]]).T).ravel()
+        held = np.repeat(place[number] < 0, 2)
+        T = csr_matrix(
+            (np.ones((~held).sum()), (np.flatnonzero(~held), dof[~held])), shape=(2 * self.n, 2 * len(kept))
+        )
+        free = np.flatnonzero(~bonded)
+        gap = self._gaps(free)
+        K, f = (T.T @ self.K @ T).tocsc() / self.scale, -T.T @ (self.Q @ strain) / self.scale
+        C = (gap @ T).tocsr() if contact else csr_matrix((0, 2 * len(kept)))
+        v, force = _minimise(K, f, C, self._fibre_springs(T), np.abs(self.size).max() * np.abs(strain).max())
+        u = T @ v
+        residual = self.K @ u + self.Q @ strain
+        energy = strain @ self.mean @ strain / 2 + strain @ self.Q.T @ u + u @ (self.K @ u) / 2
+        stress = (self.mean @ strain + self.Q.T @ u) / self.size.prod()
+        closed = np.zeros(len(bonded), bool)
+        closed[free[: len(force)]] = force > 0
+        u = u.reshape(-1, 2)
+        frame = np.stack([self.normal, self.normal[:, ::-1] * [-1, 1]], axis=1)
+        apart = u[self.matrix] - u[self.fibre_node]
+        reaction = residual.reshape(-1, 2)[self.fibre_node]
+        turned = [np.einsum("kij,kj->ki", frame, x) for x in (apart, reaction)]
+        return State(float(energy), stress, u, *turned, closed)
+
+    def _gaps(self, which):
+        """Rows n.(u_matrix - u_fibre) of the interface nodes `which`."""
+        k = len(which)
+        nodes = np.stack([self.matrix[which], self.fibre_node[which]], axis=1)
+        columns = (2 * nodes[:, :, None] + [0, 1]).reshape(k, 4)
+        values = np.concatenate([self.normal[which], -self.normal[which]], axis=1)
+        rows = np.repeat(np.arange(k), 4)
+        return csr_matrix((values.ravel(), (rows, columns.ravel())), shape=(k, 2 * self.n))
+
+    def _fibre_springs(self, T):
+        """Diagonal that marks the dofs of the fibres, which may be loose."""
+        mark = np.ones(self.n)
+        mark[np.unique(self.matrix)] = 1.0
+        return diags(np.asarray(T.T @ np.repeat(mark, 2)).ravel())
+
+
+def _minimise(K, f, C, springs, size):
+    """min v.K.v / 2 - f.v, C v >= 0: v and the forces of the constraints, exact to `EXACT`."""
+    if C.shape[0] == 0:
+        return _bordered(K, f, C, springs, np.zeros(len(f)))
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-10
+    cones = [clarabel.NonnegativeConeT(C.shape[0])]
+    upper = csc_matrix(np.triu(K.toarray())) if K.shape[0] < 200 else csc_matrix(coo_upper(K))
+    unit = max(np.abs(f).max(), 1e-300)
+    found = clarabel.DefaultSolver(upper, -f / unit, csc_matrix(-C), np.zeros(C.shape[0]), cones, settings).solve()
+    v, s, z = unit * np.array(found.x), np.array(found.s), np.array(found.z)
+    active = z / (np.abs(z).max() or 1.0) > s / (np.abs(s).max() or 1.0)
+    for _ in range(50):
+        v, own = _bordered(K, f, C[active], springs, v)
+        force = np.zeros(C.shape[0])
+        force[active] = own
+        gap = C @ v
+        pulled = force < -EXACT * max(np.abs(force).max(), EXACT * unit)
+        overlap = ~active & (gap < -EXACT * size)
+        if not (pulled | overlap).any():
+            return v, force
+        active = (active & ~pulled) | overlap
+    raise AssertionError("the twin finds no state of contact")
+
+
+def coo_upper(K):
+    """The upper triangle."""
+    K = K.tocoo()
+    up = K.row <= K.col
+    return coo_matrix((K.data[up], (K.row[up], K.col[up])), shape=K.shape)
+
+
+def _bordered(K, f, C, springs, v):
+    """K v - C^T force = f, C v = 0 by a direct solve with weak springs and refinement from v on, for loose fibres."""
+    m = C.shape[0]
+    weak = 1e-8
+    matrix = bmat([[K + weak * springs, -C.T], [-C, -weak * weak * identity(m)]]).tocsc()
+    exact = bmat([[K, -C.T], [-C, None]]).tocsr() if m else K
+    factor = splu(matrix)
+    x, b = np.r_[v, np.zeros(m)], np.r_[f, np.zeros(m)]
+    for _ in range(30):
+        r = b - exact @ x
+        x += factor.solve(r)
+        if np.abs(r).max() < 1e-15 * np.abs(f).max():
+            break
+    return x[: len(v)], x[len(v) :]
