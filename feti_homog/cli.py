@@ -58,7 +58,7 @@ def parsed(parser: argparse.ArgumentParser, words: Sequence[str], comm: Intracom
 
 
 def _command(words: Sequence[str], comm: Intracomm) -> int:
-    arguments = parsed(_parser(), words, comm)
+    arguments = parsed(_parser(), words or ["--help"], comm)
     arguments.action(arguments, comm)
     return EXIT_DONE
 

@@ -28,6 +28,12 @@ OPTIONS = (
     Option("feti_ksp_view", "", "", "print the solver's settings"),
     Option("feti_ksp_view_singularvalues", "", "", "print the estimated condition number"),
     Option("feti_pc_type", "dirichlet|lumped|none", "dirichlet", "preconditioner of the dual problem"),
+    Option(
+        "feti_dual_operator",
+        "auto|implicit|explicit",
+        "auto",
+        "dual operator by two triangular solves, or by dense matrices on the interfaces",
+    ),
     Option("feti_sub_ksp_type", "preonly|...", "preonly", "subdomain solves"),
     Option("feti_sub_pc_type", "cholesky|lu", "cholesky", "subdomain factorizations"),
     Option(

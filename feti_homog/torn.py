@@ -26,6 +26,9 @@ from feti_homog.progress import Progress
 Int = NDArray[np.int64]
 Float = NDArray[np.float64]
 
+# Typical numbers, for the choice between implicit and explicit operators.
+ITERATIONS_OF_A_SOLVE, SOLVES_OF_A_CONTACT, SOLVES_OF_A_PATH = 12, 3, 100
+
 
 @dataclass(frozen=True)
 class Plan:
@@ -89,7 +92,7 @@ def tear(case: Case, comm: MPI.Intracomm, progress: Progress) -> TornCell:
         dofs = comm.allreduce(sum(len(s.Q) for s in subdomains))
         words.append(f"{dofs} degrees of freedom, refine = {case.cell.refine}, order = {case.cell.order}")
     with progress.stage("factor") as words:
-        solver = FetiSolver(comm, shared, subdomains, lattice)
+        solver = FetiSolver(comm, shared, subdomains, lattice, _applications(case))
         made = comm.allreduce(solver.local.factorizations)
         words.append(
             f"{made} subdomain factorizations, {solver.constraints.total} multipliers, "
@@ -160,6 +163,17 @@ def _pieces(case: Case, load: Int, lattice: Lattice, n_ranks: int) -> Int:
         # A triangle of the lattice brings about M^2 / 2 nodes.
         return pieces_for_size(load, lattice.intervals**2, wanted.max_dofs)
     return pieces_for_count(load, wanted.subdomains or n_ranks)
+
+
+def _applications(case: Case) -> int:
+    """About how many times the analysis applies the dual operator."""
+    solves = 3
+    if case.angle is not None:
+        solves = len(case.angle.values) * (3 if case.angle.strain is None else 1)
+    if case.path is not None:
+        solves = SOLVES_OF_A_PATH
+    contact = case.interface is not None and case.interface.contact
+    return ITERATIONS_OF_A_SOLVE * solves * (SOLVES_OF_A_CONTACT if contact else 1)
 
 
 def _assemble(case: Case, pieces: list[Piece], lattice: Lattice) -> list[Subdomain]:

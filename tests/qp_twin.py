@@ -12,10 +12,12 @@ from dataclasses import dataclass
 import clarabel
 import numpy as np
 import twin
-from scipy.sparse import bmat, coo_matrix, csc_matrix, csr_matrix, diags, identity
-from scipy.sparse.linalg import splu
+from scipy.sparse import bmat, coo_matrix, csc_matrix, csr_matrix, diags, triu
+from scipy.sparse.linalg import LinearOperator, gmres, splu
 
 EXACT = 1e-9  # relative, of the KKT conditions of an answer
+WEAK = 1e-7  # relative to the stiffest node
+ROUNDING = 1e-15
 
 
 @dataclass(frozen=True)
@@ -99,33 +101,32 @@ class QPTwin:
 
     def solve(self, strain, bonded, contact):
         """The state under a strain (3,) with the `bonded` (k,) nodes held together."""
-        number = np.arange(self.n)
-        number[self.fibre_node[bonded]] = self.matrix[bonded]
-        kept = np.setdiff1d(number, self.pinned)
-        place = np.full(self.n, -1)
-        place[kept] = np.arange(len(kept))
-        dof = (2 * place[number][:, None] + np.where(place[number] >= 0, [[0], [1]], [[0], [0]]).T).ravel()
-        held = np.repeat(place[number] < 0, 2)
-        T = csr_matrix(
-            (np.ones((~held).sum()), (np.flatnonzero(~held), dof[~held])), shape=(2 * self.n, 2 * len(kept))
-        )
-        free = np.flatnonzero(~bonded)
-        gap = self._gaps(free)
+        T = self._together(bonded)
+        free = np.flatnonzero(~bonded) if contact else np.zeros(0, int)
         K, f = (T.T @ self.K @ T).tocsc() / self.scale, -T.T @ (self.Q @ strain) / self.scale
-        C = (gap @ T).tocsr() if contact else csr_matrix((0, 2 * len(kept)))
-        v, force = _minimise(K, f, C, self._fibre_springs(T), np.abs(self.size).max() * np.abs(strain).max())
+        reach = self.size.max() * np.abs(strain).max()
+        v, pressure = _minimise(K, f, (self._gaps(free) @ T).tocsr(), reach)
         u = T @ v
         residual = self.K @ u + self.Q @ strain
         energy = strain @ self.mean @ strain / 2 + strain @ self.Q.T @ u + u @ (self.K @ u) / 2
         stress = (self.mean @ strain + self.Q.T @ u) / self.size.prod()
         closed = np.zeros(len(bonded), bool)
-        closed[free[: len(force)]] = force > 0
-        u = u.reshape(-1, 2)
+        closed[free] = pressure > 0
         frame = np.stack([self.normal, self.normal[:, ::-1] * [-1, 1]], axis=1)
+        u, residual = u.reshape(-1, 2), residual.reshape(-1, 2)
         apart = u[self.matrix] - u[self.fibre_node]
-        reaction = residual.reshape(-1, 2)[self.fibre_node]
-        turned = [np.einsum("kij,kj->ki", frame, x) for x in (apart, reaction)]
+        turned = [np.einsum("kij,kj->ki", frame, x) for x in (apart, residual[self.fibre_node])]
         return State(float(energy), stress, u, *turned, closed)
+
+    def _together(self, bonded):
+        """(2n, free dofs) displacements of all nodes from those that are free; bonded nodes move as one."""
+        number = np.arange(self.n)
+        number[self.fibre_node[bonded]] = self.matrix[bonded]
+        kept = np.setdiff1d(number, self.pinned)
+        node = np.flatnonzero(number != self.pinned)
+        rows = (2 * node[:, None] + [0, 1]).ravel()
+        columns = (2 * np.searchsorted(kept, number[node])[:, None] + [0, 1]).ravel()
+        return csr_matrix((np.ones(len(rows)), (rows, columns)), shape=(2 * self.n, 2 * len(kept)))
 
     def _gaps(self, which):
         """Rows n.(u_matrix - u_fibre) of the interface nodes `which`."""
@@ -136,57 +137,42 @@ class QPTwin:
         rows = np.repeat(np.arange(k), 4)
         return csr_matrix((values.ravel(), (rows, columns.ravel())), shape=(k, 2 * self.n))
 
-    def _fibre_springs(self, T):
-        """Diagonal that marks the dofs of the fibres, which may be loose."""
-        mark = np.ones(self.n)
-        mark[np.unique(self.matrix)] = 1.0
-        return diags(np.asarray(T.T @ np.repeat(mark, 2)).ravel())
 
-
-def _minimise(K, f, C, springs, size):
-    """min v.K.v / 2 - f.v, C v >= 0: v and the forces of the constraints, exact to `EXACT`."""
-    if C.shape[0] == 0:
-        return _bordered(K, f, C, springs, np.zeros(len(f)))
-    settings = clarabel.DefaultSettings()
-    settings.verbose = False
-    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-10
-    cones = [clarabel.NonnegativeConeT(C.shape[0])]
-    upper = csc_matrix(np.triu(K.toarray())) if K.shape[0] < 200 else csc_matrix(coo_upper(K))
-    unit = max(np.abs(f).max(), 1e-300)
-    found = clarabel.DefaultSolver(upper, -f / unit, csc_matrix(-C), np.zeros(C.shape[0]), cones, settings).solve()
-    v, s, z = unit * np.array(found.x), np.array(found.s), np.array(found.z)
-    active = z / (np.abs(z).max() or 1.0) > s / (np.abs(s).max() or 1.0)
+def _minimise(K, f, C, reach):
+    """min v.K.v / 2 - f.v, C v >= 0: v and the forces of the constraints; gaps up to EXACT * reach are zero."""
+    active, v, unit = np.zeros(C.shape[0], bool), np.zeros(len(f)), np.abs(f).max() or 1.0
+    if C.shape[0]:
+        settings = clarabel.DefaultSettings()
+        settings.verbose = False
+        settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-10
+        cones = [clarabel.NonnegativeConeT(C.shape[0])]
+        problem = triu(K, format="csc"), -f / unit, csc_matrix(-C), np.zeros(C.shape[0]), cones
+        found = clarabel.DefaultSolver(*problem, settings).solve()
+        v, s, z = unit * np.array(found.x), np.array(found.s), np.array(found.z)
+        active = z / z.max() > s / s.max()
     for _ in range(50):
-        v, own = _bordered(K, f, C[active], springs, v)
+        v, own = _bordered(K, f, C[active], v)
         force = np.zeros(C.shape[0])
         force[active] = own
-        gap = C @ v
-        pulled = force < -EXACT * max(np.abs(force).max(), EXACT * unit)
-        overlap = ~active & (gap < -EXACT * size)
+        pulled = force < -EXACT * max(np.abs(force).max(initial=0.0), EXACT * unit)
+        overlap = ~active & (C @ v < -EXACT * reach)
         if not (pulled | overlap).any():
             return v, force
         active = (active & ~pulled) | overlap
     raise AssertionError("the twin finds no state of contact")
 
 
-def coo_upper(K):
-    """The upper triangle."""
-    K = K.tocoo()
-    up = K.row <= K.col
-    return coo_matrix((K.data[up], (K.row[up], K.col[up])), shape=K.shape)
-
-
-def _bordered(K, f, C, springs, v):
-    """K v - C^T force = f, C v = 0 by a direct solve with weak springs and refinement from v on, for loose fibres."""
-    m = C.shape[0]
-    weak = 1e-8
-    matrix = bmat([[K + weak * springs, -C.T], [-C, -weak * weak * identity(m)]]).tocsc()
-    exact = bmat([[K, -C.T], [-C, None]]).tocsr() if m else K
-    factor = splu(matrix)
+def _bordered(K, f, C, v):
+    """K v - C^T force = f, C v = 0 by a direct solve, refined from v on; WEAK springs hold what is loose."""
+    n, m = len(f), C.shape[0]
+    exact = bmat([[K, -C.T], [-C, csr_matrix((m, m))]]).tocsr()
+    factor = splu((exact + WEAK * diags(np.r_[np.ones(n), -np.ones(m)])).tocsc())
+    inverse = LinearOperator(exact.shape, factor.solve)
     x, b = np.r_[v, np.zeros(m)], np.r_[f, np.zeros(m)]
-    for _ in range(30):
-        r = b - exact @ x
-        x += factor.solve(r)
-        if np.abs(r).max() < 1e-15 * np.abs(f).max():
+    for _ in range(10):
+        residual = b - exact @ x
+        if np.abs(residual).max() <= ROUNDING * np.abs(f).max():
             break
-    return x[: len(v)], x[len(v) :]
+        # The springs are felt by fibres that hang on few nodes: a few Krylov steps take that away.
+        x += gmres(exact, residual, M=inverse, rtol=1e-12, restart=20, maxiter=1)[0]
+    return x[:n], x[n:]

@@ -23,6 +23,7 @@ class CoarseMesh:
     circles (k, 3)       centre and radius in the plane; periodic images are listed separately
     arc_edges (a, 2)     edges of the mesh whose ends lie on a circle, to rounding
     arc_circle (a,)      the circle of each of them
+    debonded_edges (d, 2)  edges between a fibre and the matrix that are debonded from the start
     """
 
     width: float
@@ -35,6 +36,7 @@ class CoarseMesh:
     circles: Floats
     arc_edges: Ints
     arc_circle: Ints
+    debonded_edges: Ints
 
 
 def areas(points: Floats, triangles: Ints) -> Floats:

@@ -56,6 +56,7 @@ def generate(cell: Cell, marks: Mapping[int, Sequence[float]] = NO_MARKS) -> Coa
         circles=lines.circles,
         arc_edges=arc_edges,
         arc_circle=arc_circle.astype(np.int32),
+        debonded_edges=np.zeros((0, 2), np.int32),
     )
 
 

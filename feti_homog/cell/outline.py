@@ -54,7 +54,7 @@ class Outline:
 
 
 def images(arrangement: Arrangement) -> tuple[Floats, Integers]:
-    """Circles (k, 3) of the periodic images of fibres that reach into the cell, and their fibres (k,)."""
+    """Circles (k, 3) of the periodic images that reach into the cell, fibre by fibre, and their fibres (k,)."""
     size = np.array([arrangement.width, arrangement.height])
     circles, fibre = [], []
     for step in product((-1, 0, 1), repeat=2):
@@ -63,7 +63,9 @@ def images(arrangement: Arrangement) -> tuple[Floats, Integers]:
         near = np.flatnonzero((outside**2).sum(axis=1) < arrangement.radii**2)
         circles.append(np.column_stack([centres[near], arrangement.radii[near]]))
         fibre.append(near)
-    return np.concatenate(circles), np.concatenate(fibre)
+    owner = np.concatenate(fibre)
+    order = np.argsort(owner, kind="stable")
+    return np.concatenate(circles)[order], owner[order]
 
 
 def outline(arrangement: Arrangement, largest: float, marks: Mapping[int, Sequence[float]]) -> Outline:

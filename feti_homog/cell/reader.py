@@ -156,4 +156,5 @@ def _coarse_mesh(raw: RawMesh, plane: Floats, size: Floats) -> CoarseMesh:
         circles=np.zeros((0, 3)),
         arc_edges=np.zeros((0, 2), np.int32),
         arc_circle=np.zeros(0, np.int32),
+        debonded_edges=np.zeros((0, 2), np.int32),
     )

@@ -74,11 +74,14 @@ class Torus:
     @cached_property
     def arcs(self) -> Int:
         """(a,) plane edge of each of the mesh's `arc_edges`."""
+        return self.plane_edges(self.mesh.arc_edges)
+
+    def plane_edges(self, pairs: NDArray[np.int32]) -> Int:
+        """(k,) plane edge between each pair (k, 2) of plane nodes."""
         n = len(self.mesh.points)
         key = np.sort(self.edges, axis=1) @ [n, 1]
         order = np.argsort(key)
-        wanted = np.sort(self.mesh.arc_edges.astype(np.int64), axis=1) @ [n, 1]
-        return order[np.searchsorted(key[order], wanted)]
+        return order[np.searchsorted(key[order], np.sort(pairs.astype(np.int64), axis=1) @ [n, 1])]
 
     @cached_property
     def constituent_phase(self) -> Int:

@@ -35,6 +35,8 @@ class InterfaceNodes:
         normal: (k, 2) from fibre to matrix; the tangent is (-n_y, n_x).
         length: (k,) tributary interface length: traction = nodal force / length.
         fibre: (k,) constituent.
+        vertex: (k,) whether the node is one of the coarse mesh.
+        precracked: (k,) whether the mesh has it debonded from the start.
     """
 
     row: Int
@@ -42,6 +44,8 @@ class InterfaceNodes:
     normal: Float
     length: Float
     fibre: Int
+    vertex: NDArray[np.bool_]
+    precracked: NDArray[np.bool_]
 
 
 class Constraints:
@@ -195,6 +199,8 @@ class _Layout:
             normal=self._normals(entity, p),
             length=share * shared.length[entity] / m,
             fibre=shared.fibre[entity],
+            vertex=~shared.is_edge[entity],
+            precracked=shared.precracked[entity],
         )
 
 

@@ -7,7 +7,6 @@ each node.  W is block-diagonal by node.  S is the boundary block of K (lumped),
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
@@ -31,6 +30,13 @@ class Preconditioner(Protocol):
 
     def apply(self, r: Float) -> Float:
         """M^-1 r; r and the result are 0 on inactive rows."""
+
+
+class BoundaryStiffness(Protocol):
+    """y = S x on the boundary dofs of this rank's subdomains, one after the other."""
+
+    def apply(self, x: Float) -> Float:
+        """S x."""
 
 
 class Identity:
@@ -69,19 +75,17 @@ class Dirichlet:
 
 
 def boundary_stiffness(
-    stiffness: Sequence[csr_matrix], boundary: NDArray[np.bool_], dirichlet: bool
+    stiffness: Sequence[csr_matrix], boundary: Sequence[Int], dirichlet: bool
 ) -> Lumped | Dirichlet:
-    """S of all subdomains of this rank; `boundary` marks the boundary dofs, the subdomains one after the other."""
-    offsets = np.cumsum([0, *(K.shape[0] for K in stiffness)])
-    marks = [boundary[first:last] for first, last in pairwise(offsets)]
+    """S of all subdomains of this rank; `boundary` holds the boundary dofs of each."""
     nothing = [csr_matrix((0, 0))]
-    Kbb = block_diag([K[b][:, b] for K, b in zip(stiffness, marks, strict=True)] or nothing, format="csr")
+    Kbb = block_diag([K[b][:, b] for K, b in zip(stiffness, boundary, strict=True)] or nothing, format="csr")
     if not dirichlet:
         return Lumped(Kbb)
-    interior_rows = [K[~b] for K, b in zip(stiffness, marks, strict=True)]
-    Kib = block_diag([K[:, b] for K, b in zip(interior_rows, marks, strict=True)] or nothing, format="csr")
-    Kii = [K[:, ~b].tocsr() for K, b in zip(interior_rows, marks, strict=True)]
-    return Dirichlet(Kbb, Kib, Kii)
+    inner = [np.setdiff1d(np.arange(K.shape[0]), b) for K, b in zip(stiffness, boundary, strict=True)]
+    rows = [K[i] for K, i in zip(stiffness, inner, strict=True)]
+    Kib = block_diag([r[:, b] for r, b in zip(rows, boundary, strict=True)] or nothing, format="csr")
+    return Dirichlet(Kbb, Kib, [r[:, i].tocsr() for r, i in zip(rows, inner, strict=True)])
 
 
 class Scaled:
@@ -92,13 +96,15 @@ class Scaled:
         comm: MPI.Intracomm,
         constraints: Constraints,
         K: Sequence[csr_matrix],
-        S: Lumped | Dirichlet,
-        boundary: NDArray[np.bool_],
+        S: BoundaryStiffness,
+        boundary: Sequence[Int],
     ) -> None:
         self.constraints, self.S = constraints, S
         diagonal = np.concatenate([k.diagonal() for k in K] or [np.zeros(0)]).reshape(-1, 2).mean(axis=1)
-        flexibility = diags(1.0 / np.repeat(diagonal, 2)[boundary])
-        Bb = constraints.B[:, boundary]
+        offsets = np.cumsum([0, *(k.shape[0] for k in K)])
+        dofs = np.concatenate([o + b for o, b in zip(offsets, boundary, strict=False)] or [np.zeros(0, np.int64)])
+        flexibility = diags(1.0 / np.repeat(diagonal, 2)[dofs])
+        Bb = constraints.B[:, dofs]
         self.BD = (Bb @ flexibility).tocsr()
         self.DBT = self.BD.T.tocsr()
         self.W = NodeBlocks(comm, constraints, self.BD @ Bb.T)

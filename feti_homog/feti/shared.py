@@ -33,6 +33,7 @@ class Shared:
         fibre: (n,) the fibre that may debond here from the matrix, or -1 where nothing can break.
         normal: (n, 2, 2) unit normals from fibre to matrix at the start and the end of the entity.
         length: (n,) interface length of the edge, or of all edges that meet in the vertex.
+        precracked: (n,) whether the mesh has the edge, or all edges that meet in the vertex, debonded.
         owned: (2,) first row of this rank and the one after its last.
         total: number of rows on all ranks.
     """
@@ -47,6 +48,7 @@ class Shared:
     fibre: Int
     normal: Float
     length: Float
+    precracked: NDArray[np.bool_]
     owned: tuple[int, int]
     total: int
 
@@ -75,7 +77,7 @@ def share(torus: Torus, pieces: Sequence[Piece], rank: Int, inner: int, n_ranks:
     ends = np.r_[0, np.cumsum(rows)]
     body = np.array([p.body for p in pieces])[sharer]
     pointer = np.r_[0, np.cumsum(copies)]
-    fibre, normal, length = _interface(torus, key, is_edge, pointer, body)
+    fibre, normal, length, precracked = _interface(torus, key, is_edge, pointer, body)
     limits = ends[np.searchsorted(owner, np.arange(n_ranks + 1))]
     tables = []
     for r in range(n_ranks):
@@ -86,7 +88,7 @@ def share(torus: Torus, pieces: Sequence[Piece], rank: Int, inner: int, n_ranks:
             Shared(
                 key[here], is_edge[here], nodes[here], ends[:-1][here], np.r_[0, np.cumsum(copies[here])],
                 sharer[entries], body[entries], fibre[here], normal[here], length[here],
-                (int(limits[r]), int(limits[r + 1])), int(ends[-1]),
+                precracked[here], (int(limits[r]), int(limits[r + 1])), int(ends[-1]),
             )
         )  # fmt: skip
     return tables
@@ -112,8 +114,8 @@ def _ranges(start: Int, count: Int) -> Int:
 
 def _interface(
     torus: Torus, key: Int, is_edge: NDArray[np.bool_], pointer: Int, body: Int
-) -> tuple[Int, Float, Float]:
-    """Fibre, normals and length of the entities where exactly one fibre meets the matrix."""
+) -> tuple[Int, Float, Float, NDArray[np.bool_]]:
+    """Fibre, normals, length and precrack of the entities where exactly one fibre meets the matrix."""
     is_fibre = torus.constituent_phase > 0
     low, high = body[pointer[:-1]], body[pointer[1:] - 1]
     copies = np.diff(pointer)
@@ -124,18 +126,24 @@ def _interface(
     n_edges, n_classes = torus.torus_edge.max() + 1, torus.node_class.max() + 1
     edge_normal, edge_length = np.zeros((n_edges, 2, 2)), np.zeros(n_edges)
     edge_normal[edge], edge_length[edge] = normal, length
+    bonded = np.zeros(n_edges, bool)
+    bonded[edge] = True
+    bonded[torus.torus_edge[torus.plane_edges(torus.mesh.debonded_edges)]] = False
     plane = np.unique(torus.torus_edge, return_index=True)[1]
     ends = torus.node_class[torus.edges[plane]]
     vertex_normal, vertex_length = np.zeros((n_classes, 2)), np.zeros(n_classes)
     for end in range(2):
         np.add.at(vertex_normal, ends[:, end], edge_normal[:, end] * edge_length[:, None])
         np.add.at(vertex_length, ends[:, end], edge_length)
+    holding = np.bincount(ends[bonded].ravel(), minlength=n_classes)
     vertex_normal /= np.maximum(np.hypot(*vertex_normal.T), 1e-300)[:, None]
     vertices, edges = key[~is_edge], key[is_edge]
     normals, lengths = np.empty((len(key), 2, 2)), np.empty(len(key))
     normals[~is_edge], normals[is_edge] = vertex_normal[vertices][:, None], edge_normal[edges]
     lengths[~is_edge], lengths[is_edge] = vertex_length[vertices], edge_length[edges]
-    return np.where(breakable, high, -1), normals, lengths
+    precracked = np.empty(len(key), bool)
+    precracked[~is_edge], precracked[is_edge] = holding[vertices] == 0, ~bonded[edges]
+    return np.where(breakable, high, -1), normals, lengths, precracked & breakable
 
 
 def _edge_geometry(torus: Torus) -> tuple[Int, Float, Float]:

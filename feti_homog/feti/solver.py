@@ -21,15 +21,27 @@ from feti_homog.errors import CaseError
 from feti_homog.feti.coarse import CoarseProblem
 from feti_homog.feti.constraints import Constraints
 from feti_homog.feti.contexts import ActiveRows, PrimalTest, ProjectedOperator, ProjectedPreconditioner
+from feti_homog.feti.explicit import DenseBlocks, ExplicitDualOperator, schur_complements
 from feti_homog.feti.local import LocalSolver
 from feti_homog.feti.operator import DualOperator
-from feti_homog.feti.preconditioner import Identity, Preconditioner, Scaled, boundary_stiffness
+from feti_homog.feti.preconditioner import (
+    Dirichlet,
+    Identity,
+    Lumped,
+    Preconditioner,
+    Scaled,
+    boundary_stiffness,
+)
 from feti_homog.feti.shared import Shared
 from feti_homog.feti.subdomain import Subdomain
 
+Int = NDArray[np.int64]
 Float = NDArray[np.float64]
 
 PRECONDITIONERS = ("none", "lumped", "dirichlet")
+DUAL_OPERATORS = ("auto", "implicit", "explicit")
+# Boundary dofs of a subdomain up to which a dense operator (8 n^2 bytes) is ever chosen by itself.
+LARGEST_DENSE = 6000
 RTOL = 1e-8
 
 
@@ -62,12 +74,25 @@ class FetiSolver:
     """
 
     def __init__(
-        self, comm: MPI.Intracomm, shared: Shared, subdomains: Sequence[Subdomain], lattice: Lattice
+        self,
+        comm: MPI.Intracomm,
+        shared: Shared,
+        subdomains: Sequence[Subdomain],
+        lattice: Lattice,
+        applications: int,
     ) -> None:
+        """Set up; `applications` is how many times the dual operator is expected to be applied."""
         self.comm, self.subdomains = comm, subdomains
         self.constraints = Constraints(comm, shared, subdomains, lattice)
-        self.local = LocalSolver([s.regularised() for s in subdomains], "feti_sub_")
-        self.operator = DualOperator(self.constraints, self.local)
+        self.boundary = self._boundary_dofs()
+        # A single subdomain has no boundary: any of its nodes can be fixed.
+        candidates = [
+            np.unique(dofs // 2) if len(dofs) else np.arange(s.mesh.n_classes)
+            for s, dofs in zip(subdomains, self.boundary, strict=True)
+        ]
+        matrices = [s.regularised(nodes) for s, nodes in zip(subdomains, candidates, strict=True)]
+        self.local = LocalSolver(matrices, "feti_sub_")
+        self.operator = self._dual_operator(applications)
         self.coarse = CoarseProblem(comm, self.constraints, subdomains)
         self.preconditioner = self._preconditioner()
         self.active = ActiveRows(self.rows)
@@ -175,9 +200,28 @@ class FetiSolver:
         if name == "none":
             return Identity()
         K = [s.K for s in self.subdomains]
-        boundary = self.constraints.B.getnnz(axis=0) > 0
-        S = boundary_stiffness(K, boundary, name == "dirichlet")
-        return Scaled(self.comm, self.constraints, K, S, boundary)
+        S: Lumped | Dirichlet | DenseBlocks
+        if isinstance(self.operator, ExplicitDualOperator) and name == "dirichlet":
+            S = schur_complements(self.operator.flexibility, self.subdomains, self.boundary)
+        else:
+            S = boundary_stiffness(K, self.boundary, name == "dirichlet")
+        return Scaled(self.comm, self.constraints, K, S, self.boundary)
+
+    def _boundary_dofs(self) -> list[Int]:
+        """Local numbers of the dofs of each subdomain that constraints act on, both directions of a node."""
+        touched = self.constraints.B.getnnz(axis=0).reshape(-1, 2).any(axis=1)
+        nodes = np.split(touched, np.cumsum([s.mesh.n_classes for s in self.subdomains]))[:-1]
+        return [(2 * np.flatnonzero(n)[:, None] + np.arange(2)).ravel() for n in nodes]
+
+    def _dual_operator(self, applications: int) -> DualOperator:
+        """Explicit where it pays: a boundary column costs about a quarter of the two solves that an iteration saves."""
+        kind = PETSc.Options("feti_").getString("dual_operator", "auto")
+        if kind not in DUAL_OPERATORS:
+            raise CaseError(f"-feti_dual_operator {kind}: expected one of {', '.join(DUAL_OPERATORS)}")
+        largest = self.comm.allreduce(max((len(dofs) for dofs in self.boundary), default=0), MPI.MAX)
+        if kind == "explicit" or (kind == "auto" and largest <= min(8 * applications, LARGEST_DENSE)):
+            return ExplicitDualOperator(self.constraints, self.local, self.boundary)
+        return DualOperator(self.constraints, self.local)
 
     def _krylov(self) -> PETSc.KSP:
         vector = self.constraints.vector

@@ -64,31 +64,35 @@ class Subdomain:
         _check_kernel(piece, K, R)
         return cls(piece, mesh, L, K, Q, body.area, R, positions)
 
-    def regularised(self) -> csr_matrix:
-        """K + rho Rf Rf^T, SPD; its inverse is a generalized inverse K+ of K.
+    def fixing(self, candidates: Int) -> tuple[Int, Float]:
+        """Degrees of freedom and dense block rho Rf Rf^T that make K + block an SPD matrix.
 
-        Rf is the kernel restricted to fixing nodes far apart and orthonormalised, so the term is a dense
-        block of at most 6 x 6 (Brzobohaty, Dostal, Kozubek, Kovar, Markopoulos, IJNME 88, 2011).
+        Its inverse is a generalized inverse K+ of K.  Rf is the kernel restricted to at most three of the
+        `candidates` (nodes), far apart, and orthonormalised (Brzobohaty, Dostal, Kozubek, Kovar, Markopoulos,
+        IJNME 88, 2011).
         """
         if self.R.shape[1] == 0:
-            return self.K
-        dofs = (2 * self._fixing_nodes()[:, None] + np.arange(2)).ravel()
+            return np.zeros(0, np.int64), np.zeros((0, 0))
+        dofs = (2 * self._far_apart(candidates)[:, None] + np.arange(2)).ravel()
         Rf = np.linalg.qr(self.R[dofs])[0]
-        block = self.K.diagonal()[dofs].mean() * Rf @ Rf.T
-        rows, columns = np.meshgrid(dofs, dofs, indexing="ij")
-        term = csr_matrix((block.ravel(), (rows.ravel(), columns.ravel())), shape=self.K.shape)
-        return (self.K + term).tocsr()
+        return dofs, self.K.diagonal()[dofs].mean() * Rf @ Rf.T
 
-    def _fixing_nodes(self) -> Int:
+    def regularised(self, candidates: Int) -> csr_matrix:
+        """K with the block of `fixing`."""
+        dofs, block = self.fixing(candidates)
+        rows, columns = np.meshgrid(dofs, dofs, indexing="ij")
+        return (self.K + csr_matrix((block.ravel(), (rows.ravel(), columns.ravel())), shape=self.K.shape)).tocsr()
+
+    def _far_apart(self, candidates: Int) -> Int:
         """Three far-apart nodes for three modes, else the one farthest from the pinned class."""
-        x = self.positions
-        origin = x[self.piece.pinned] if self.piece.pinned >= 0 else x.mean(axis=0)
+        x = self.positions[candidates]
+        origin = self.positions[self.piece.pinned] if self.piece.pinned >= 0 else x.mean(axis=0)
         a = np.argmax(((x - origin) ** 2).sum(axis=1))
         if self.R.shape[1] < 3:
-            return np.array([a])
+            return candidates[[a]]
         b = np.argmax(((x - x[a]) ** 2).sum(axis=1))
         (dx, dy), (ex, ey) = x[b] - x[a], (x - x[a]).T
-        return np.array([a, b, np.argmax(np.abs(dx * ey - dy * ex))])
+        return candidates[[a, b, np.argmax(np.abs(dx * ey - dy * ex))]]
 
 
 def kernel(positions: Float, rotates: bool, pinned: int) -> Float:

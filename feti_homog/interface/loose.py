@@ -17,7 +17,7 @@ from feti_homog.feti.solver import DualSolution
 Float = NDArray[np.float64]
 Bool = NDArray[np.bool_]
 
-# Motions whose gaps are smaller than this, relative to the largest, slide without opening (a round fibre turns).
+# Motions whose gaps are smaller than this, relative to their slips, do not open (a round fibre turns).
 SLIDING = 1e-9
 
 
@@ -46,18 +46,19 @@ def place(
     A fibre that overlaps is put where its smallest gap is largest: a linear programme in its rigid motions.  If even
     that overlaps, the programme's dual solution is a system of contact forces in balance, and its nodes close.
     """
-    motion = np.asarray((coarse.G[nodes.row] @ csr_matrix(coarse.free)).todense())
-    parts = comm.gather((solution.jump[nodes.row], motion, nodes.fibre, is_open))
+    free = csr_matrix(coarse.free)
+    opening, slip = (np.asarray((coarse.G[nodes.row + i] @ free).todense()) for i in range(2))
+    parts = comm.gather((solution.jump[nodes.row], opening, slip, nodes.fibre, is_open))
     answer = _place_all(parts, noise) if parts is not None else None
     amplitudes, squeezed = comm.bcast(answer)
     first = comm.exscan(len(nodes.row)) or 0
     return Placement(coarse.free @ amplitudes, squeezed[first : first + len(nodes.row)])
 
 
-def _place_all(parts: list[tuple[Float, Float, NDArray[np.int64], Bool]], noise: float) -> tuple[Float, Bool]:
-    gap, motion, fibre, is_open = (np.concatenate(p) for p in zip(*parts, strict=True))
+def _place_all(parts: list[tuple[Float, Float, Float, NDArray[np.int64], Bool]], noise: float) -> tuple[Float, Bool]:
+    gap, motion, slip, fibre, is_open = (np.concatenate(p) for p in zip(*parts, strict=True))
     squeezed, amplitudes = np.zeros(len(gap), bool), np.zeros(motion.shape[1])
-    moving = np.abs(motion) > SLIDING * np.abs(motion).max(initial=0.0)
+    moving = np.abs(motion) > SLIDING * np.hypot(motion, slip).max(axis=0, initial=0.0)
     for f in np.unique(fibre[is_open & (gap < -noise) & moving.any(axis=1)]):
         own = np.flatnonzero((fibre == f) & is_open)
         modes = np.flatnonzero(moving[own].any(axis=0))

@@ -199,8 +199,8 @@ def test_square_fibre(comm, shared_path, cell):
 @pytest.mark.parametrize("order", [1, 2])
 def test_iterations_do_not_grow(comm, order, refine):
     """Hexagonal cell, bodies on the torus, from 5 000 to 80 000 degrees of freedom."""
-    case = make_case(mesh_size=0.067, order=order, refine=refine + 2 - order, decomposition={"subdomains": 1})
+    case = make_case(mesh_size=0.062, order=order, refine=refine + 2 - order, decomposition={"subdomains": 1})
     torn, _, responses = solve(case, comm)
     assert torn.plan.subdomains == 3
-    assert torn.total(len(torn.solver.Q)) == pytest.approx(5_200 * 4**refine, rel=0.1)
+    assert torn.total(len(torn.solver.Q)) == pytest.approx(5_000 * 4**refine, rel=0.2)
     assert max(r.solution.iterations for r in responses) <= 14

@@ -1,0 +1,87 @@
+"""Torn cells with interfaces for the tests, and the same cells for the twins."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from cells import make_case
+from petsc4py import PETSc
+from qp_twin import QPTwin, keys
+
+from feti_homog import torn
+from feti_homog.cell.arrangement import arrange
+from feti_homog.interface.contact import BONDED, OPEN, Interface
+from feti_homog.petsc_options import case_options
+from feti_homog.progress import Progress
+from feti_homog.torn import TornCell
+
+
+@dataclass(frozen=True)
+class Bonds:
+    """A torn cell, its twin (None but on rank 0) and, there, the twin's number of each node in the ranks' order."""
+
+    cell: TornCell
+    twin: QPTwin | None
+    order: np.ndarray
+
+    def interface(self, contact):
+        return Interface(self.cell.solver, contact, np.array([self.cell.plan.width, self.cell.plan.height]))
+
+    def status(self, bonded):
+        """The status on this rank, debonded nodes open, of the twin's `bonded` (k,) on rank 0.  Collective."""
+        comm = self.cell.comm
+        bonded = comm.bcast(bonded[self.order] if comm.rank == 0 else None)
+        first = comm.exscan(self.here) or 0
+        return np.where(bonded[first : first + self.here], BONDED, OPEN).astype(np.int8)
+
+    def of_twin(self, values):
+        """Values of the interface nodes in the twin's order, on every rank.  Collective."""
+        parts = self.cell.comm.gather(values)
+        if parts is not None:
+            values = np.concatenate(parts)
+            result = np.empty_like(values)
+            result[self.order] = values
+            return self.cell.comm.bcast(result)
+        return self.cell.comm.bcast(None)
+
+    @property
+    def here(self):
+        return len(self.cell.solver.constraints.nodes.row)
+
+    def start(self):
+        return np.zeros(self.cell.solver.rows)
+
+
+def build(comm, **case):
+    """The bonds of the case that `make_case` makes.  Collective."""
+    PETSc.garbage_cleanup(comm)
+    case = make_case(**case)
+    with case_options(case.petsc):
+        cell = torn.tear(case, comm, Progress(comm, quiet=True))
+    size = np.array([cell.plan.width, cell.plan.height])
+    parts = [(s.mesh.points, s.mesh.triangles, s.piece.body, s.piece.phase == "matrix", s.L) for s in cell.subdomains]
+    parts, points = comm.gather(parts), comm.gather(cell.solver.constraints.nodes.points)
+    if parts is None:
+        return Bonds(cell, None, np.zeros(0, int))
+    fibres = arrange(case.cell)
+    twin = QPTwin([part for own in parts for part in own], fibres.centres, fibres.radii, size)
+    key = keys(np.concatenate(points), size)
+    order = np.searchsorted(twin.key, key)
+    assert (np.sort(key) == twin.key).all()
+    return Bonds(cell, twin, order)
+
+
+def energy(cell, solution):
+    """Strain energy of the cell from its displacements.  Collective."""
+    E, u = solution.strain, cell.solver.displacement(solution)
+    total = 0.0
+    for s, offset in zip(cell.subdomains, cell.offsets, strict=False):
+        own = u[offset : offset + len(s.Q)]
+        total += s.area * E @ s.L @ E / 2 + E @ s.Q.T @ own + own @ (s.K @ own) / 2
+    return cell.comm.allreduce(total)
+
+
+def stress(cell, solution):
+    """Sigma from the multipliers.  Collective."""
+    return cell.solver.stress_integral(solution) / cell.plan.area

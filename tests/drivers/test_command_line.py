@@ -1,0 +1,192 @@
+"""The command line in processes of its own: run, check, plot, and their options."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import xml.etree.ElementTree as ET
+
+import numpy as np
+import pytest
+from commands import case_file, feti_homog
+from matplotlib.image import imread
+
+import feti_homog.output  # noqa: F401 (chooses the build of h5py)
+
+PICTURES = ("cell.png", "case_E11.png", "case_E22.png", "case_G12.png")
+FILES = {"result.json", "result.h5", "result.xdmf", *PICTURES}
+DOCUMENT = {
+    "version", "case", "cell", "solver", "effective_stiffness", "checks", "timings", "memory", "status",
+}  # fmt: skip
+CELL = {"width", "height", "area", "fibre_fraction", "elements", "nodes"}
+SOLVER = {
+    "ranks", "subdomains", "dofs", "multipliers", "kernel_dim", "coarse_dim", "iterations", "converged_reason",
+}  # fmt: skip
+STAGES = ("mesh", "assemble", "factor", "solve", "output")
+
+
+def numbers(value):
+    """All numbers in a document."""
+    if isinstance(value, dict | list):
+        for item in value.values() if isinstance(value, dict) else value:
+            yield from numbers(item)
+    elif isinstance(value, int | float):
+        yield value
+
+
+def contents(path):
+    """All tables of a result.h5."""
+    import h5py
+
+    tables = {}
+    with h5py.File(path, "r") as file:
+        file.visititems(lambda name, item: tables.update({name: item[()]} if hasattr(item, "shape") else {}))
+    return tables
+
+
+def assert_pictures(folder):
+    for name in PICTURES:
+        assert imread(folder / name)[..., :3].std() > 0.05, f"{name} is nearly blank"
+
+
+@pytest.mark.parametrize("ranks", [0, 1, 2, 4])
+def test_run(tmp_path, ranks):
+    out = tmp_path / "new" / "results"
+    job = feti_homog(ranks, "run", case_file(tmp_path), "--out", out)
+    assert job.returncode == 0, job.stderr
+    assert {path.name for path in out.iterdir()} == FILES
+    for words in (*STAGES, "E11: ", "G12: ", "Effective stiffness", "Hashin-Shtr.", "Status      done"):
+        assert words in job.stdout
+    assert_document(json.loads((out / "result.json").read_text()), max(ranks, 1))
+    assert_fields(out)
+    assert_pictures(out)
+
+
+def assert_document(document, ranks):
+    assert document.keys() >= DOCUMENT
+    assert document["cell"].keys() >= CELL and document["solver"].keys() >= SOLVER
+    assert document["checks"].keys() >= {"strain", "hill", "symmetry", "jump"}
+    assert document["timings"].keys() >= set(STAGES) - {"output"}
+    assert all(map(math.isfinite, numbers(document)))
+    assert document["status"] == "done" and document["solver"]["ranks"] == ranks
+    assert document["solver"]["subdomains"] >= max(ranks, 3)
+    assert document["cell"]["area"] == pytest.approx(math.sqrt(3))
+    L = np.array(document["effective_stiffness"])
+    assert np.abs(L[[0, 0, 2], [0, 1, 2]] / [149.690255, 56.975975, 46.357140] - 1).max() < 0.01
+
+
+def assert_fields(out):
+    tables = contents(out / "result.h5")
+    nodes, elements = len(tables["mesh/points"]), len(tables["mesh/triangles"])
+    document = json.loads((out / "result.json").read_text())
+    assert (nodes, elements) == (document["cell"]["nodes"], document["cell"]["elements"])
+    assert tables["mesh/triangles"].max() == nodes - 1
+    assert set(tables["mesh/body"]) == set(range(3))
+    k = len(tables["interface/points"])
+    for state in map(str, range(3)):
+        assert tables[f"state/{state}/displacement"].shape == (nodes, 2)
+        assert tables[f"state/{state}/fluctuation"].shape == (nodes, 2)
+        assert tables[f"state/{state}/stress"].shape == (elements, 3)
+        assert tables[f"state/{state}/traction"].shape == tables[f"state/{state}/jump"].shape == (k, 2)
+        assert tables[f"state/{state}/status"].shape == (k,) and not tables[f"state/{state}/status"].any()
+    assert all(np.isfinite(table).all() for table in tables.values())
+    text = "".join(ET.parse(out / "result.xdmf").getroot().itertext())
+    sources = re.findall(r"result\.h5:/?(\S+)", text)
+    assert {name.split("&")[0] for name in sources} and "result.h5" in text
+
+
+def test_fields_do_not_depend_on_the_ranks(tmp_path):
+    """Traction and jump at the same interface nodes, whatever rank owns them."""
+    tractions = []
+    for ranks in (1, 2):
+        out = tmp_path / str(ranks)
+        end = "[decomposition]\nsubdomains = 3\n[output]\npictures = false\n[petsc]\nfeti_ksp_rtol = 1e-11\n"
+        assert feti_homog(ranks, "run", case_file(tmp_path, end), "--out", out, "--quiet").returncode == 0
+        tables = contents(out / "result.h5")
+        order = np.lexsort(tables["interface/points"].round(9).T)
+        tractions.append(tables["state/0/traction"][order])
+    assert np.abs(tractions[0] - tractions[1]).max() < 1e-7 * np.abs(tractions[0]).max()
+
+
+def test_plot_needs_the_fields_alone(tmp_path):
+    out = tmp_path / "results"
+    feti_homog(2, "run", case_file(tmp_path), "--out", out)
+    for path in out.iterdir():
+        if path.name != "result.h5":
+            path.unlink()
+    job = feti_homog(2, "plot", out)
+    assert job.returncode == 0, job.stderr
+    assert job.stdout.split() == [str(out / name) for name in PICTURES]
+    assert_pictures(out)
+
+
+def test_plot_of_nothing(tmp_path):
+    job = feti_homog(1, "plot", tmp_path)
+    assert job.returncode not in (0, 1) or "Traceback" not in job.stderr
+    assert "result.h5" in job.stderr
+
+
+def test_no_fields_and_no_pictures(tmp_path):
+    out = tmp_path / "results"
+    feti_homog(2, "run", case_file(tmp_path, "[output]\nfields = false\n"), "--out", out)
+    assert {path.name for path in out.iterdir()} == {"result.json"}
+
+
+def test_quiet(tmp_path):
+    job = feti_homog(2, "run", case_file(tmp_path), "--out", tmp_path / "results", "--quiet")
+    assert (job.returncode, job.stdout) == (0, "")
+
+
+@pytest.mark.parametrize("ranks", [1, 2, 4])
+def test_check(tmp_path, ranks):
+    path = case_file(tmp_path)
+    job = feti_homog(ranks, "check", path)
+    assert job.returncode == 0 and list(tmp_path.iterdir()) == [path]
+    assert job.stdout.count("the case is valid") == 1 and "3 bodies" in job.stdout
+    assert len(re.findall(r"^rank \d", job.stdout, re.MULTILINE)) == ranks
+
+
+@pytest.mark.parametrize("words", [["--help"], ["run", "--help"], ["--version"], []])
+def test_help(words):
+    job = feti_homog(2, *words)
+    assert job.returncode == 0 and not job.stderr
+    assert job.stdout.count("feti-homog") >= 1 and job.stdout.count("usage:") <= 1
+    if words != ["--version"] and "run" not in words:
+        assert "-feti_ksp_rtol <real>" in job.stdout
+
+
+def test_petscs_own_help(tmp_path):
+    job = feti_homog(1, "run", case_file(tmp_path), "--out", tmp_path / "results", "-help")
+    assert job.returncode == 0
+    assert "-feti_ksp_max_it" in job.stdout and "-feti_sub_pc_type" in job.stdout
+
+
+def test_monitor_and_log(tmp_path):
+    words = ["-feti_ksp_monitor", "-feti_ksp_converged_reason", "-log_view"]
+    job = feti_homog(2, "run", case_file(tmp_path), "--out", tmp_path / "results", *words)
+    assert job.returncode == 0
+    assert job.stdout.count("0 KSP Residual norm") >= 3
+    assert job.stdout.count("Linear feti_ solve converged due to CONVERGED_RTOL") == 3
+    stages = re.findall(r"^ *\d+: +([\w ]+): +\S+ +[\d.]+%", job.stdout, re.MULTILINE)
+    assert set(STAGES) <= set(stages)
+    for event in ("FETIDual", "FETIPrecond"):
+        assert re.search(rf"^{event} +[1-9]", job.stdout, re.MULTILINE)
+
+
+def test_command_line_overrides_the_case(tmp_path):
+    path = case_file(tmp_path, "[petsc]\nfeti_ksp_rtol = 1e-10\nfeti_pc_type = 'lumped'\n")
+    documents = []
+    for number, words in enumerate([[], ["-feti_ksp_rtol", "1e-4"]]):
+        out = tmp_path / str(number)
+        assert feti_homog(1, "run", path, "--out", out, *words).returncode == 0
+        documents.append(json.loads((out / "result.json").read_text())["solver"])
+    assert [document["rtol"] for document in documents] == [1e-10, 1e-4]
+    assert max(documents[1]["iterations"]) < min(documents[0]["iterations"])
+
+
+def test_locking_is_warned_of(tmp_path):
+    path = case_file(tmp_path)
+    path.write_text(path.read_text().replace("0.299", "0.4999"))
+    job = feti_homog(1, "run", path, "--out", tmp_path / "results")
+    assert job.returncode == 0 and "warning: [material.matrix] poisson = 0.4999" in job.stdout

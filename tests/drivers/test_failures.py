@@ -1,0 +1,137 @@
+"""How a job of the command line ends when something is wrong: exit codes, messages, no rank left waiting."""
+
+from __future__ import annotations
+
+import json
+import time
+
+import pytest
+from commands import case_file, feti_homog
+from support import mpirun
+from unit.faulty_cases import FAULTY_CASES
+from unit.faulty_meshes import FAULTY_MESHES
+
+CASES = ("empty", "syntax", "unknown_key", "many")
+MESH_CASE = 'geometry = "mesh"\nfile = "faulty.msh"'
+
+# The command line with a fault in the dual operator of the last rank, at the application of a given number.
+SABOTAGED = """
+import os, signal, sys
+from feti_homog import cli
+
+def launch():
+    from feti_homog.feti.operator import DualOperator
+    from mpi4py import MPI
+    comm, apply, count = MPI.COMM_WORLD, DualOperator.apply, 0
+
+    def sabotaged(self, x):
+        nonlocal count
+        count += 1
+        if comm.rank == comm.size - 1 and count == {application}:
+            {fault}
+        return apply(self, x)
+
+    DualOperator.apply = sabotaged
+
+def command(words, comm):
+    launch()
+    return cli._command(words, comm)
+
+sys.exit(cli.launch(command))
+"""
+
+
+def assert_refused(job, expected, out):
+    assert job.returncode == 2, job.stderr
+    lines = [line for line in job.stderr.splitlines() if line.startswith("error: ")]
+    assert len(set(lines)) == len(lines)
+    for words in expected:
+        assert any(words in line for line in lines), job.stderr
+    assert not out.exists() and not job.stdout
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("name", CASES)
+def test_faulty_case(tmp_path, name, ranks):
+    content, expected = FAULTY_CASES[name]
+    (tmp_path / "cell.toml").write_text(content)
+    job = feti_homog(ranks, "run", tmp_path / "cell.toml", "--out", tmp_path / "results")
+    assert_refused(job, expected, tmp_path / "results")
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("name", ["hanging", "not periodic, right", "inverted", "no matrix"])
+def test_faulty_mesh(tmp_path, name, ranks):
+    write, message = FAULTY_MESHES[name]
+    write(tmp_path / "faulty.msh")
+    path = case_file(tmp_path)
+    words = 'geometry = "hexagonal"\nfibre_fraction = 0.4\nmesh_size = 0.15'
+    path.write_text(path.read_text().replace(words, MESH_CASE))
+    job = feti_homog(ranks, "run", path, "--out", tmp_path / "results", "--quiet")
+    assert_refused(job, [message], tmp_path / "results")
+
+
+@pytest.mark.parametrize(
+    ("option", "message"),
+    [
+        (["-feti_ksp_rtoll", "1e-3"], "-feti_ksp_rtoll"),
+        (["-feti_foo"], "-feti_foo: unknown option"),
+        (["-feti_pc_typ", "none"], "-feti_pc_typ"),
+        (["-feti_pc_type", "dirichlett"], "-feti_pc_type dirichlett: expected one of none, lumped, dirichlet"),
+    ],
+)
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_mistyped_option(tmp_path, ranks, option, message):
+    job = feti_homog(ranks, "run", case_file(tmp_path), "--out", tmp_path / "results", "--quiet", *option)
+    assert_refused(job, [message], tmp_path / "results")
+
+
+def test_mistyped_option_of_the_case(tmp_path):
+    path = case_file(tmp_path, "[petsc]\nfeti_ksp_rtoll = 1e-3\n")
+    job = feti_homog(2, "run", path, "--out", tmp_path / "results", "--quiet")
+    assert_refused(job, ["feti_ksp_rtoll"], tmp_path / "results")
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_folder_that_is_a_file(tmp_path, ranks):
+    out = tmp_path / "results"
+    out.write_text("mine")
+    for folder in (out, out / "deeper"):
+        job = feti_homog(ranks, "run", case_file(tmp_path), "--out", folder)
+        assert job.returncode == 2 and job.stderr.count("is a file") == 1
+    assert out.read_text() == "mine"
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_not_converging(tmp_path, ranks):
+    out = tmp_path / "results"
+    job = feti_homog(ranks, "run", case_file(tmp_path), "--out", out, "-feti_ksp_max_it", "2")
+    assert job.returncode == 3
+    assert job.stderr.count("error: E11: no convergence after 2 iterations") == 1
+    document = json.loads((out / "result.json").read_text())
+    assert document["status"] == "not converged"
+    assert document["solver"]["iterations"] == [2, 2, 2]
+    assert (out / "result.h5").exists()
+
+
+@pytest.mark.parametrize("ranks", [1, 2, 4])
+@pytest.mark.parametrize("application", [1, 3], ids=["outside PETSc", "inside PETSc's callback"])
+def test_rank_that_raises(tmp_path, ranks, application):
+    job = sabotaged(tmp_path, ranks, application, "raise ArithmeticError('lost my way')")
+    assert job.returncode not in (0, 2, 3)
+    assert "Traceback" in job.stderr and "ArithmeticError: lost my way" in job.stderr
+    assert f"rank {ranks - 1} of {ranks}:" in job.stderr
+
+
+def test_rank_that_is_killed(tmp_path):
+    assert sabotaged(tmp_path, 2, 3, "os.kill(os.getpid(), signal.SIGKILL)").returncode != 0
+
+
+def sabotaged(folder, ranks, application, fault):
+    """The job, which must end soon."""
+    script = folder / "sabotaged.py"
+    script.write_text(SABOTAGED.format(application=application, fault=fault))
+    start = time.monotonic()
+    job = mpirun(ranks, script, "run", case_file(folder), "--out", folder / "results", timeout=30.0)
+    assert time.monotonic() - start < 10.0
+    return job
