@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import hashlib
+import json
 import os
 import re
 import tomllib
@@ -68,6 +70,11 @@ class Case:
     output: Output
     petsc: dict[str, Scalar]
 
+    @property
+    def arcs(self) -> tuple[Arc, ...]:
+        """What is debonded from the start; none if the bonding is perfect."""
+        return () if self.interface is None else self.interface.debonded
+
     def material_of(self, phase: str) -> Material:
         """The material of a phase; "fibre:2" without its own has that of "fibre". Raises KeyError."""
         return self.materials[_provider(phase, self.materials)]
@@ -96,6 +103,13 @@ class Case:
             document["path"] = written(self.path, self.path.method)
         document |= {"decomposition": written(self.decomposition), "output": written(self.output)}
         return document | {"petsc": dict(self.petsc)}
+
+    def digest(self) -> str:
+        """Short name of what the case computes: the same whatever its name, output, PETSc options and max_events."""
+        document = {k: v for k, v in self.resolved().items() if k not in ("name", "output", "petsc")}
+        document.get("path", {}).pop("max_events", None)
+        content = b"" if self.cell.file is None else self.cell.file.read_bytes()
+        return hashlib.sha256(json.dumps(document, sort_keys=True).encode() + content).hexdigest()[:16]
 
 
 def load(path: str | Path) -> Case:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import asdict
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,7 @@ from feti_homog.homogenization import Homogenization, Response
 from feti_homog.interface.law import Law
 from feti_homog.material import plane_stiffness
 from feti_homog.output import folder, plots, results, states, tables, xdmf
-from feti_homog.output.checkpoint import Checkpoint
+from feti_homog.output.checkpoint import Checkpoint, finished
 from feti_homog.output.fields import FieldFile
 from feti_homog.output.summary import summary
 from feti_homog.parallel import on_root, on_root_only
@@ -31,19 +32,21 @@ from feti_homog.progress import Progress
 from feti_homog.torn import TornCell, tear
 
 Float = NDArray[np.float64]
-Bool = NDArray[np.bool_]
 
 
 def run(case: Case, directory: Path, comm: MPI.Intracomm, quiet: bool, resume: bool = False) -> None:
     """Run the case and write its results to `directory`; `resume` goes on from a path's checkpoint.  Collective.
 
     Raises:
-        CaseError, MeshError: before anything is written.
+        CaseError, MeshError: before any result is written; also for a checkpoint of another run.
         ConvergenceError: after what was computed has been written, marked as such.
     """
     progress = Progress(comm, quiet)
     for warning in case.warnings():
         progress.say(f"warning: {warning}")
+    if resume and on_root(comm, finished, directory, case):
+        progress.say(f"{directory} holds the finished result of this case: nothing to do")
+        return
     with case_options(case.petsc):
         cell = tear(case, comm, progress)
         try:
@@ -65,7 +68,7 @@ def _run(cell: TornCell, directory: Path, progress: Progress, resume: bool) -> l
         with progress.stage("output"):
             file = FieldFile(directory, comm, states.header(cell), states.mesh_part(cell), states.interface_part(cell))
     with file or nullcontext():
-        study = Study(homogenization, _prescribed(cell), progress, _recorder(cell, file))
+        study = Study(homogenization, cell.debonded, progress, _recorder(cell, file))
         with progress.stage("solve") as words:
             analysis = _analyse(study, directory, resume)
             words.append(f"{len(study.iterations)} states, {sum(study.iterations)} iterations")
@@ -78,13 +81,17 @@ def _analyse(study: Study, directory: Path, resume: bool) -> dict[str, Any]:
     cell = study.homogenization.cell
     case = cell.case
     if case.path is not None:
-        signature = f"{case.digest()}, {cell.plan.subdomains} subdomains on {cell.comm.size} ranks"
-        checkpoint = Checkpoint(directory, cell.comm, signature)
-        return path.run(study, case.path, _law(case), checkpoint, resume)
+        return path.run(study, case.path, _law(case), _checkpoint(cell, directory), resume)
     if case.angle is not None:
         strain = None if case.angle.strain is None else np.array(case.angle.strain)
         return angle.run(study, case.angle.values, strain)
     return stiffness.run(study)
+
+
+def _checkpoint(cell: TornCell, directory: Path) -> Checkpoint:
+    plan, multipliers = cell.plan, cell.solver.constraints.total
+    parts = f"{plan.subdomains} subdomains on {cell.comm.size} ranks, {multipliers} multipliers"
+    return Checkpoint(directory, cell.comm, f"case {cell.case.digest()}, {parts}")
 
 
 def _law(case: Case) -> Law:
@@ -94,23 +101,13 @@ def _law(case: Case) -> Law:
     return Law(bond.normal_strength or math.inf, bond.tangential_strength or math.inf, bond.criterion)
 
 
-def _prescribed(cell: TornCell) -> Callable[[float | None], Bool]:
-    """Opening of the arcs -> which of this rank's interface nodes are debonded from the start."""
-    nodes, case, plan = cell.solver.constraints.nodes, cell.case, cell.plan
-
-    def debonded(opening: float | None) -> Bool:
-        return np.zeros(len(nodes.row), bool)
-
-    return debonded
-
-
-def _recorder(cell: TornCell, file: FieldFile | None) -> Callable[[Response, float], None]:
+def _recorder(cell: TornCell, file: FieldFile | None) -> Callable[[Response, float, str], None]:
     """Writes each response as the next state."""
-    number = iter(range(10**9))
+    number = count()
 
-    def record(response: Response, load_factor: float) -> None:
+    def record(response: Response, load_factor: float, label: str) -> None:
         if file is not None:
-            file.write_state(next(number), states.state_part(cell, response, load_factor))
+            file.write_state(next(number), states.state_part(cell, response, load_factor, label))
 
     return record
 
@@ -123,6 +120,7 @@ def _document(study: Study, analysis: dict[str, Any]) -> dict[str, Any]:
     document = {
         "version": __version__,
         "case": cell.case.resolved(),
+        "digest": cell.case.digest(),
         "cell": {
             "width": plan.width,
             "height": plan.height,
@@ -144,6 +142,7 @@ def _document(study: Study, analysis: dict[str, Any]) -> dict[str, Any]:
             "factorizations": cell.total(solver.local.factorizations),
             "coarse_factorizations": solver.coarse.factorizations,
             "rtol": solver.rtol,
+            "solves": solver.solves,
             "iterations": study.iterations,
             "converged_reason": study.reasons,
         },
@@ -181,8 +180,8 @@ def _write(study: Study, directory: Path, document: dict[str, Any]) -> None:
     document["timings"], document["memory"] = progress.timings(), progress.memory()
     on_root_only(comm, results.write, directory, document)
     on_root_only(comm, tables.write, directory, document)
-    if cell.case.path is not None:
-        Checkpoint(directory, comm, "").clear()
+    if cell.case.path is not None and not study.faults:
+        _checkpoint(cell, directory).clear()
     if output.pictures:
         with progress.stage("pictures") as words:
             words.append(", ".join(p.name for p in on_root_only(comm, plots.plot, directory) or []))

@@ -11,28 +11,38 @@ from numpy.typing import NDArray
 
 from feti_homog import case as cases
 from feti_homog.case import Case
+from feti_homog.cell.centres import fibre_centres
 from feti_homog.cell.mesh import CoarseMesh
+from feti_homog.cell.outline import MERGED
 from feti_homog.cell.piece import Piece, cut
 from feti_homog.cell.refine import Lattice
 from feti_homog.cell.torus import Torus
+from feti_homog.errors import CaseError
 from feti_homog.feti.decomposition import decompose, pieces_for_count, pieces_for_size
 from feti_homog.feti.shared import Shared, share
 from feti_homog.feti.solver import FetiSolver
 from feti_homog.feti.subdomain import Subdomain
+from feti_homog.interface import arcs
 from feti_homog.material import plane_stiffness
 from feti_homog.parallel import agree, on_root_only
 from feti_homog.progress import Progress
 
 Int = NDArray[np.int64]
 Float = NDArray[np.float64]
+Bool = NDArray[np.bool_]
 
 # Typical numbers, for the choice between implicit and explicit operators.
 ITERATIONS_OF_A_SOLVE, SOLVES_OF_A_CONTACT, SOLVES_OF_A_PATH = 12, 3, 100
+FIBRES_OF = {"square": 1, "hexagonal": 2}
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What rank 0 tells every rank of the whole cell."""
+    """What rank 0 tells every rank of the whole cell.
+
+    Fibre number 1 of the case file is the constituent `first_fibre`; `centres` (constituents, 2) are NaN where
+    there is none.
+    """
 
     width: float
     height: float
@@ -40,6 +50,13 @@ class Plan:
     bodies: int
     subdomains: int
     coarse_triangles: int
+    first_fibre: int
+    centres: Float
+
+    @property
+    def period(self) -> Float:
+        """(2,) width and height."""
+        return np.array([self.width, self.height])
 
     @property
     def area(self) -> float:
@@ -62,6 +79,24 @@ class TornCell:
     def offsets(self) -> Int:
         """Where each subdomain begins in this rank's vectors of degrees of freedom."""
         return np.cumsum([0, *(len(s.Q) for s in self.subdomains)])
+
+    @cached_property
+    def directions(self) -> Float:
+        """(k,) directions in degrees of this rank's interface nodes about the centres of their fibres."""
+        nodes = self.solver.constraints.nodes
+        return arcs.angles(nodes.points, nodes.fibre, self.plan.centres, self.plan.period)
+
+    def debonded(self, opening: float | None) -> Bool:
+        """(k,) which of this rank's interface nodes are debonded from the start.
+
+        Arcs without an angle have that `opening`; None if there are none.
+        """
+        nodes = self.solver.constraints.nodes
+        # The mesher moves a tip to a vertex that is as near as this.
+        moved = nodes.vertex & (self.case.cell.file is None)
+        near = np.where(moved, np.degrees(MERGED), arcs.SAME)
+        number = nodes.fibre - self.plan.first_fibre + 1
+        return nodes.precracked | arcs.debonded(self.case.arcs, opening, number, self.directions, near)
 
     def areas(self) -> dict[str, float]:
         """Meshed area of each phase; collective."""
@@ -111,7 +146,8 @@ def coarse_mesh(case: Case) -> CoarseMesh:
     else:
         from feti_homog.cell.mesher import generate
 
-        mesh = generate(case.cell)
+        fibres = case.cell.fibres or FIBRES_OF[case.cell.geometry]
+        mesh = generate(case.cell, arcs.tips(case.arcs, case.angle.values if case.angle else (), fibres))
     cases.check_phases(case, mesh.phases)
     return mesh
 
@@ -128,6 +164,7 @@ def describe(case: Case, n_ranks: int) -> str:
         f"cell       {plan.width:g} x {plan.height:g}, phases {', '.join(plan.phases)}",
         f"mesh       {plan.coarse_triangles} coarse triangles, {plan.coarse_triangles * len(lattice.triangles)} "
         f"elements of order {case.cell.order}, about {2 * sum(nodes)} degrees of freedom",
+        *([f"fibres     {len(plan.centres) - plan.first_fibre}, numbered from 1"] if case.interface else []),
         f"tearing    {plan.bodies} bodies, {plan.subdomains} subdomains, {shares[0][2].total} multipliers",
         *(
             f"rank {rank:<5} {len(pieces)} subdomains, about {2 * n} degrees of freedom"
@@ -144,12 +181,19 @@ def _deal(
 ) -> list[tuple[Plan, list[Piece], Shared]]:
     """For each rank: the plan, its pieces and the table of what they share with others."""
     torus = Torus.of(mesh)
+    first_fibre = int(np.count_nonzero(torus.constituent_phase == 0))
+    centres = fibre_centres(torus)
+    faults = arcs.faults(case.arcs, centres[first_fibre:])
+    if faults:
+        raise CaseError(*faults)
     parts = torus.constituent if case.cell.bodies == "torus" else torus.plane_parts()
     decomposition = decompose(torus, parts, _pieces(case, np.bincount(parts), lattice, n_ranks), n_ranks)
     pieces = list(cut(torus, decomposition.subdomain))
     tables = share(torus, pieces, decomposition.rank, lattice.intervals - 1, n_ranks)
     bodies = int(parts.max()) + 1
-    plan = Plan(mesh.width, mesh.height, mesh.phases, bodies, len(pieces), len(mesh.triangles))
+    plan = Plan(
+        mesh.width, mesh.height, mesh.phases, bodies, len(pieces), len(mesh.triangles), first_fibre, centres
+    )  # fmt: skip
     own: list[list[Piece]] = [[] for _ in range(n_ranks)]
     for piece, rank in zip(pieces, decomposition.rank, strict=True):
         own[rank].append(piece)

@@ -33,6 +33,6 @@ def case_file(folder: Path, end: str = "", geometry: str = "hexagonal") -> Path:
     return path
 
 
-def feti_homog(ranks: int, *words: str | Path, timeout: float = 60.0):
+def command_line(ranks: int, *words: str | Path, timeout: float = 60.0):
     """`python -m feti_homog words...` on so many ranks; none: without mpirun."""
     return mpirun(ranks, "-m", "feti_homog", *words, timeout=timeout)

@@ -104,7 +104,7 @@ def _state(mesh: MeshPart, gradient: np.ndarray) -> StatePart:
     k = np.arange(10.0)
     traction, jump, status = np.stack([k, -k], 1), np.stack([0.1 * k, 0.2 * k], 1), np.arange(10) % 3
     displacement = x @ gradient.T + bubble
-    return StatePart(strain, strain * 3, 1.0, displacement, bubble, stress, traction, jump, status)
+    return StatePart(strain, strain * 3, 1.0, "a state", displacement, bubble, stress, traction, jump, status)
 
 
 def _cut(state: StatePart, nodes: Any, rows: Any, owned: Any) -> StatePart:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from feti_homog.analysis.study import Study
+from feti_homog.analysis.study import UNIT_CASES, Study
 from feti_homog.homogenization import Response, asymmetry
 
 Float = NDArray[np.float64]
@@ -23,20 +23,20 @@ def run(study: Study, values: Sequence[float], strain: Float | None) -> dict[str
     starts = [study.nothing()] * (3 if unit else 1)
     points = []
     for value in study.progress.bar(values, "angles"):
-        status, label = study.status(value), f"{value:g} deg "
+        status, label = study.status(value), f"{value:g} deg"
         point: dict[str, Any] = {"angle": value}
         responses: list[Response]
         if unit:
-            L, responses = study.unit_responses(label, status, starts, 1.0)
+            L, responses = study.unit_responses(f"{label} ", status, starts, 1.0)
             point["stiffness"] = L
             if not (study.homogenization.interface.contact and responses[0].counts["bonded"] < len(status)):
-                study.check(label.strip(), {"symmetry": asymmetry(L)})
+                study.check(label, {"symmetry": asymmetry(L)})
         else:
             responses = [study.homogenization.respond(np.asarray(strain), status, starts[0])]
-            study.note(label.strip(), responses[0])
+            study.note(label, responses[0])
             point |= {"strain": responses[0].strain, "stress": responses[0].stress}
-        for response in responses:
-            study.record(response, value)
+        for name, response in zip(UNIT_CASES if unit else ("",), responses, strict=True):
+            study.record(response, 1.0, f"{label} {name}".strip())
         starts = [r.state.solution.lam for r in responses]
         points.append(point | study.point(responses))
     return {"angle": points}

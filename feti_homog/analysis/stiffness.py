@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from feti_homog.analysis.study import Study
+from feti_homog.analysis.study import UNIT_CASES, Study
 from feti_homog.homogenization import asymmetry
 
 
@@ -15,13 +15,13 @@ def run(study: Study) -> dict[str, Any]:
     nothing = [study.nothing()] * 3
     one_sided = study.homogenization.interface.contact and study.homogenization.counts(status)["open"] > 0
     L, responses = study.unit_responses("", status, nothing, 1.0)
-    for response in responses:
-        study.record(response, 1.0)
+    for name, response in zip(UNIT_CASES, responses, strict=True):
+        study.record(response, 1.0, name)
     document: dict[str, Any] = {"effective_stiffness": L}
     if one_sided:
         minus, responses = study.unit_responses("", status, nothing, -1.0)
-        for response in responses:
-            study.record(response, -1.0)
+        for name, response in zip(UNIT_CASES, responses, strict=True):
+            study.record(response, -1.0, f"-{name}")
         document["effective_stiffness_compression"] = minus
     else:
         study.check("L^ef", {"symmetry": asymmetry(L)})

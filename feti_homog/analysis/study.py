@@ -29,7 +29,7 @@ class Study:
     Attributes:
         homogenization: the cell and its interfaces.
         debonded: opening angle (or None for the arcs' own) -> (k,) prescribed debonded nodes of this rank.
-        record: called with each response that is to be kept as a state, and its load factor.
+        record: called with each response that is to be kept as a state, its load factor and its name.
         iterations, reasons: of every dual solve so far.
         checks: largest error of each law so far.
         faults: what did not converge or hold, in words.
@@ -38,7 +38,7 @@ class Study:
     homogenization: Homogenization
     debonded: Callable[[float | None], NDArray[np.bool_]]
     progress: Progress
-    record: Callable[[Response, float], None]
+    record: Callable[[Response, float, str], None]
     iterations: list[int] = field(default_factory=list)
     reasons: list[int] = field(default_factory=list)
     checks: dict[str, float] = field(default_factory=dict)

@@ -157,6 +157,7 @@ class FetiSolver:
         self.coarse.project(free)
         closing = self.preconditioner.apply(free)
         self.coarse.project(closing)
+        self.solves += 1
         self._test.start(self._norm(free), self._norm(closing))
         iterations, reason = 0, int(PETSc.KSP.ConvergedReason.CONVERGED_ATOL)
         if self._test.jump == 0:

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from feti_homog.schema import shown
 from feti_homog.sections import Arc
 
 Int = NDArray[np.int64]
@@ -60,3 +61,21 @@ def debonded(
         within = (away < whole / 2 - tolerance) | (whole >= 360.0)
         inside |= within & (np.isin(fibre, arc.fibre) if isinstance(arc.fibre, tuple) else True)
     return inside
+
+
+def faults(arcs: Sequence[Arc], centres: Float) -> list[str]:
+    """What is wrong with arcs on a cell whose fibres have these centres (fibres, 2), NaN where there is none."""
+    found = []
+    for place, arc in enumerate(arcs):
+        chosen = range(1, len(centres) + 1) if isinstance(arc.fibre, str) else arc.fibre
+        written = arc.fibre if isinstance(arc.fibre, str) or len(arc.fibre) > 1 else arc.fibre[0]
+        line = f"[interface] debonded[{place}].fibre = {shown(written)}: "
+        if max(chosen, default=0) > len(centres):
+            found.append(f"{line}expected at most {len(centres)}; the cell has {len(centres)} fibres, counted from 1")
+        winding = [number for number in chosen if number <= len(centres) and np.isnan(centres[number - 1, 0])]
+        if winding and arc.angle not in (0.0, 360.0):
+            found.append(
+                f"{line}fibre {winding[0]} has no centre, for it winds around the cell; expected angle = 360, or "
+                'a physical curve "debonded" in the mesh'
+            )
+    return found

@@ -75,6 +75,7 @@ class StatePart:
     strain: Floats  # (3,) E11, E22, gamma12 of the cell
     stress_mean: Floats  # (3,) S11, S22, S12 of the cell
     load_factor: float
+    label: str  # what the state is, in words: "60 deg E11", "event 12"
     displacement: Floats  # (n, 2)
     fluctuation: Floats  # (n, 2)
     stress: Floats  # (m, 3) element means of S11, S22, S12
@@ -103,7 +104,7 @@ class FieldFile:
     - /mesh: points (n,2), triangles (m,3 or 6), body, subdomain, phase (m,)
     - /interface: points, normal (k,2), length, fibre (k,)
     - /state/K: displacement, fluctuation (n,2), stress (m,3), traction, jump (k,2), status (k,);
-      attributes strain (3,), stress (3,), load_factor
+      attributes strain (3,), stress (3,), load_factor, label
     - /vector/interface/normal, /vector/state/K/displacement, fluctuation: with a third component 0, as
       virtual datasets, which take no space
 
@@ -139,6 +140,7 @@ class FieldFile:
         interface = {"traction": state.traction, "jump": state.jump, "status": state.status}
         self._write(name, self._interface, interface)
         means = {"strain": state.strain, "stress": state.stress_mean, "load_factor": state.load_factor}
+        means |= {"label": state.label}
         self._together(_set_attributes, self._file[name], means)
         self._view(f"{name}/displacement", self._nodes)
         self._view(f"{name}/fluctuation", self._nodes)

@@ -53,7 +53,7 @@ def interface_part(cell: TornCell) -> InterfacePart:
     return InterfacePart(nodes.points, nodes.normal, nodes.length, nodes.fibre.astype(np.int32))
 
 
-def state_part(cell: TornCell, response: Response, load_factor: float) -> StatePart:
+def state_part(cell: TornCell, response: Response, load_factor: float, label: str) -> StatePart:
     """The fields of a response; tractions and jumps are scaled like it."""
     nodes, solution = cell.solver.constraints.nodes, response.state.solution
     pair = nodes.row[:, None] + np.arange(2)
@@ -61,6 +61,7 @@ def state_part(cell: TornCell, response: Response, load_factor: float) -> StateP
         strain=response.strain,
         stress_mean=response.stress,
         load_factor=load_factor,
+        label=label,
         displacement=displacement(cell, response.strain, response.u),
         fluctuation=fluctuation(cell, response.u),
         stress=_element_stress(cell, response),

@@ -9,7 +9,7 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
-from commands import case_file, feti_homog
+from commands import case_file, command_line
 from matplotlib.image import imread
 
 import feti_homog.output  # noqa: F401 (chooses the build of h5py)
@@ -53,7 +53,7 @@ def assert_pictures(folder):
 @pytest.mark.parametrize("ranks", [0, 1, 2, 4])
 def test_run(tmp_path, ranks):
     out = tmp_path / "new" / "results"
-    job = feti_homog(ranks, "run", case_file(tmp_path), "--out", out)
+    job = command_line(ranks, "run", case_file(tmp_path), "--out", out)
     assert job.returncode == 0, job.stderr
     assert {path.name for path in out.iterdir()} == FILES
     for words in (*STAGES, "E11: ", "G12: ", "Effective stiffness", "Hashin-Shtr.", "Status      done"):
@@ -102,7 +102,7 @@ def test_fields_do_not_depend_on_the_ranks(tmp_path):
     for ranks in (1, 2):
         out = tmp_path / str(ranks)
         end = "[decomposition]\nsubdomains = 3\n[output]\npictures = false\n[petsc]\nfeti_ksp_rtol = 1e-11\n"
-        assert feti_homog(ranks, "run", case_file(tmp_path, end), "--out", out, "--quiet").returncode == 0
+        assert command_line(ranks, "run", case_file(tmp_path, end), "--out", out, "--quiet").returncode == 0
         tables = contents(out / "result.h5")
         order = np.lexsort(tables["interface/points"].round(9).T)
         tractions.append(tables["state/0/traction"][order])
@@ -111,37 +111,37 @@ def test_fields_do_not_depend_on_the_ranks(tmp_path):
 
 def test_plot_needs_the_fields_alone(tmp_path):
     out = tmp_path / "results"
-    feti_homog(2, "run", case_file(tmp_path), "--out", out)
+    command_line(2, "run", case_file(tmp_path), "--out", out)
     for path in out.iterdir():
         if path.name != "result.h5":
             path.unlink()
-    job = feti_homog(2, "plot", out)
+    job = command_line(2, "plot", out)
     assert job.returncode == 0, job.stderr
     assert job.stdout.split() == [str(out / name) for name in PICTURES]
     assert_pictures(out)
 
 
 def test_plot_of_nothing(tmp_path):
-    job = feti_homog(1, "plot", tmp_path)
+    job = command_line(1, "plot", tmp_path)
     assert job.returncode not in (0, 1) or "Traceback" not in job.stderr
     assert "result.h5" in job.stderr
 
 
 def test_no_fields_and_no_pictures(tmp_path):
     out = tmp_path / "results"
-    feti_homog(2, "run", case_file(tmp_path, "[output]\nfields = false\n"), "--out", out)
+    command_line(2, "run", case_file(tmp_path, "[output]\nfields = false\n"), "--out", out)
     assert {path.name for path in out.iterdir()} == {"result.json"}
 
 
 def test_quiet(tmp_path):
-    job = feti_homog(2, "run", case_file(tmp_path), "--out", tmp_path / "results", "--quiet")
+    job = command_line(2, "run", case_file(tmp_path), "--out", tmp_path / "results", "--quiet")
     assert (job.returncode, job.stdout) == (0, "")
 
 
 @pytest.mark.parametrize("ranks", [1, 2, 4])
 def test_check(tmp_path, ranks):
     path = case_file(tmp_path)
-    job = feti_homog(ranks, "check", path)
+    job = command_line(ranks, "check", path)
     assert job.returncode == 0 and list(tmp_path.iterdir()) == [path]
     assert job.stdout.count("the case is valid") == 1 and "3 bodies" in job.stdout
     assert len(re.findall(r"^rank \d", job.stdout, re.MULTILINE)) == ranks
@@ -149,7 +149,7 @@ def test_check(tmp_path, ranks):
 
 @pytest.mark.parametrize("words", [["--help"], ["run", "--help"], ["--version"], []])
 def test_help(words):
-    job = feti_homog(2, *words)
+    job = command_line(2, *words)
     assert job.returncode == 0 and not job.stderr
     assert job.stdout.count("feti-homog") >= 1 and job.stdout.count("usage:") <= 1
     if words != ["--version"] and "run" not in words:
@@ -157,14 +157,14 @@ def test_help(words):
 
 
 def test_petscs_own_help(tmp_path):
-    job = feti_homog(1, "run", case_file(tmp_path), "--out", tmp_path / "results", "-help")
+    job = command_line(1, "run", case_file(tmp_path), "--out", tmp_path / "results", "-help")
     assert job.returncode == 0
     assert "-feti_ksp_max_it" in job.stdout and "-feti_sub_pc_type" in job.stdout
 
 
 def test_monitor_and_log(tmp_path):
     words = ["-feti_ksp_monitor", "-feti_ksp_converged_reason", "-log_view"]
-    job = feti_homog(2, "run", case_file(tmp_path), "--out", tmp_path / "results", *words)
+    job = command_line(2, "run", case_file(tmp_path), "--out", tmp_path / "results", *words)
     assert job.returncode == 0
     assert job.stdout.count("0 KSP Residual norm") >= 3
     assert job.stdout.count("Linear feti_ solve converged due to CONVERGED_RTOL") == 3
@@ -179,7 +179,7 @@ def test_command_line_overrides_the_case(tmp_path):
     documents = []
     for number, words in enumerate([[], ["-feti_ksp_rtol", "1e-4"]]):
         out = tmp_path / str(number)
-        assert feti_homog(1, "run", path, "--out", out, *words).returncode == 0
+        assert command_line(1, "run", path, "--out", out, *words).returncode == 0
         documents.append(json.loads((out / "result.json").read_text())["solver"])
     assert [document["rtol"] for document in documents] == [1e-10, 1e-4]
     assert max(documents[1]["iterations"]) < min(documents[0]["iterations"])
@@ -188,5 +188,5 @@ def test_command_line_overrides_the_case(tmp_path):
 def test_locking_is_warned_of(tmp_path):
     path = case_file(tmp_path)
     path.write_text(path.read_text().replace("0.299", "0.4999"))
-    job = feti_homog(1, "run", path, "--out", tmp_path / "results")
+    job = command_line(1, "run", path, "--out", tmp_path / "results")
     assert job.returncode == 0 and "warning: [material.matrix] poisson = 0.4999" in job.stdout

@@ -6,7 +6,7 @@ import json
 import time
 
 import pytest
-from commands import case_file, feti_homog
+from commands import case_file, command_line
 from support import mpirun
 from unit.faulty_cases import FAULTY_CASES
 from unit.faulty_meshes import FAULTY_MESHES
@@ -55,7 +55,7 @@ def assert_refused(job, expected, out):
 def test_faulty_case(tmp_path, name, ranks):
     content, expected = FAULTY_CASES[name]
     (tmp_path / "cell.toml").write_text(content)
-    job = feti_homog(ranks, "run", tmp_path / "cell.toml", "--out", tmp_path / "results")
+    job = command_line(ranks, "run", tmp_path / "cell.toml", "--out", tmp_path / "results")
     assert_refused(job, expected, tmp_path / "results")
 
 
@@ -67,7 +67,7 @@ def test_faulty_mesh(tmp_path, name, ranks):
     path = case_file(tmp_path)
     words = 'geometry = "hexagonal"\nfibre_fraction = 0.4\nmesh_size = 0.15'
     path.write_text(path.read_text().replace(words, MESH_CASE))
-    job = feti_homog(ranks, "run", path, "--out", tmp_path / "results", "--quiet")
+    job = command_line(ranks, "run", path, "--out", tmp_path / "results", "--quiet")
     assert_refused(job, [message], tmp_path / "results")
 
 
@@ -82,13 +82,13 @@ def test_faulty_mesh(tmp_path, name, ranks):
 )
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_mistyped_option(tmp_path, ranks, option, message):
-    job = feti_homog(ranks, "run", case_file(tmp_path), "--out", tmp_path / "results", "--quiet", *option)
+    job = command_line(ranks, "run", case_file(tmp_path), "--out", tmp_path / "results", "--quiet", *option)
     assert_refused(job, [message], tmp_path / "results")
 
 
 def test_mistyped_option_of_the_case(tmp_path):
     path = case_file(tmp_path, "[petsc]\nfeti_ksp_rtoll = 1e-3\n")
-    job = feti_homog(2, "run", path, "--out", tmp_path / "results", "--quiet")
+    job = command_line(2, "run", path, "--out", tmp_path / "results", "--quiet")
     assert_refused(job, ["feti_ksp_rtoll"], tmp_path / "results")
 
 
@@ -97,7 +97,7 @@ def test_folder_that_is_a_file(tmp_path, ranks):
     out = tmp_path / "results"
     out.write_text("mine")
     for folder in (out, out / "deeper"):
-        job = feti_homog(ranks, "run", case_file(tmp_path), "--out", folder)
+        job = command_line(ranks, "run", case_file(tmp_path), "--out", folder)
         assert job.returncode == 2 and job.stderr.count("is a file") == 1
     assert out.read_text() == "mine"
 
@@ -105,7 +105,7 @@ def test_folder_that_is_a_file(tmp_path, ranks):
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_not_converging(tmp_path, ranks):
     out = tmp_path / "results"
-    job = feti_homog(ranks, "run", case_file(tmp_path), "--out", out, "-feti_ksp_max_it", "2")
+    job = command_line(ranks, "run", case_file(tmp_path), "--out", out, "-feti_ksp_max_it", "2")
     assert job.returncode == 3
     assert job.stderr.count("error: E11: no convergence after 2 iterations") == 1
     document = json.loads((out / "result.json").read_text())

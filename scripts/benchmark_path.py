@@ -1,0 +1,106 @@
+"""Time of a debonding event against a monolithic factor-and-solve of the same mesh, on one rank.
+
+The hexagonal cell of the paper debonds under E = [0.2, 0, 0] in plane stress.  An event is all that it takes to go
+from one break to the next: contact states, projected Krylov solves, coarse factorizations, stresses.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+import petsc4py
+
+petsc4py.init(sys.argv[:1])
+
+from monolithic import factor_and_solve, glued  # noqa: E402
+from mpi4py import MPI  # noqa: E402
+
+from feti_homog import case as cases  # noqa: E402
+from feti_homog.homogenization import Homogenization  # noqa: E402
+from feti_homog.interface.contact import BONDED  # noqa: E402
+from feti_homog.interface.debonding import events, unloaded  # noqa: E402
+from feti_homog.interface.law import Law  # noqa: E402
+from feti_homog.petsc_options import case_options  # noqa: E402
+from feti_homog.progress import Progress  # noqa: E402
+from feti_homog.torn import tear  # noqa: E402
+
+STRAIN = [0.2, 0.0, 0.0]
+STRENGTH = 10.0
+
+
+def main() -> None:
+    """Print a table of times and ratios."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--mesh-size", type=float, default=0.0435)
+    parser.add_argument("--refine", type=int, default=3)
+    parser.add_argument("--events", type=int, default=50)
+    parser.add_argument("--operator", choices=["auto", "implicit", "explicit"], default="auto")
+    arguments = parser.parse_args()
+    comm = MPI.COMM_WORLD
+    if comm.size > 1:
+        parser.error("the peer is sequential: start this on one rank")
+    case = cases.parse(document(arguments), Path())
+    with case_options(case.petsc):
+        start = time.perf_counter()
+        cell = tear(case, comm, Progress(comm, quiet=False))
+        homogenization = Homogenization(cell, contact=True)
+        interface = homogenization.interface
+        interface.solver.torn_stiffness
+        setup = time.perf_counter() - start
+        seconds, iterations, solves = run_events(homogenization, arguments.events)
+    K, Q = glued(cell)
+    factor, solve = factor_and_solve(K, Q[:, :1])
+    peer = factor + solve
+    mean = float(np.mean(seconds))
+    print(f"degrees of freedom          {len(cell.solver.Q)} torn, {K.shape[0]} glued")
+    print(f"set-up                      {setup:8.2f} s, {setup / peer:6.2f} of the peer")
+    print(f"monolithic factor and solve {peer:8.2f} s  (factor {factor:.2f}, solve {solve:.3f})")
+    print(f"an event, mean of {len(seconds):4d}      {mean:8.3f} s, 1/{peer / mean:.1f} of the peer")
+    print(f"an event, worst             {max(seconds):8.3f} s, 1/{peer / max(seconds):.1f} of the peer")
+    print(f"dual problems an event      {np.mean(solves):8.1f}, Krylov iterations an event {np.mean(iterations):.1f}")
+    print(f"subdomain factorizations    {cell.solver.local.factorizations} in all; coarse {cell.solver.coarse.factorizations}")
+    print(f"all events with set-up      {setup + sum(seconds):8.1f} s, the peer's {len(seconds)} {peer * len(seconds):.1f} s")
+    cell.solver.destroy()
+
+
+def document(arguments: argparse.Namespace) -> dict:
+    """The case: bonded at first, strengths low enough that many nodes break."""
+    return {
+        "cell": {
+            "geometry": "hexagonal",
+            "fibre_fraction": 0.4,
+            "mesh_size": arguments.mesh_size,
+            "refine": arguments.refine,
+        },
+        "material": {"matrix": {"young": 88.0, "poisson": 0.299}, "fibre": {"young": 200.0, "poisson": 0.222}},
+        "analysis": {"type": "path", "plane": "stress"},
+        "interface": {"normal_strength": STRENGTH, "tangential_strength": STRENGTH},
+        "path": {"strain": STRAIN},
+        "petsc": {"feti_dual_operator": arguments.operator},
+    }
+
+
+def run_events(homogenization: Homogenization, count: int) -> tuple[list[float], list[int], list[int]]:
+    """Seconds, Krylov iterations and dual problems of each event."""
+    interface = homogenization.interface
+    bonded = np.full(len(interface.nodes.row), BONDED, np.int8)
+    found = events(interface, Law(STRENGTH, STRENGTH, "max"), np.array([STRAIN]), unloaded(interface, bonded))
+    seconds, iterations, solves = [], [], []
+    start = time.perf_counter()
+    for point in islice(found, count):
+        homogenization.interface.solver.stress_integral(point.state.solution)
+        now = time.perf_counter()
+        seconds.append(now - start)
+        iterations.append(point.state.iterations)
+        solves.append(point.state.solves)
+        start = now
+    return seconds, iterations, solves
+
+
+if __name__ == "__main__":
+    main()
