@@ -108,6 +108,7 @@ class Case:
         """Short name of what the case computes: the same whatever its name, output, PETSc options and max_events."""
         document = {k: v for k, v in self.resolved().items() if k not in ("name", "output", "petsc")}
         document.get("path", {}).pop("max_events", None)
+        document["cell"].pop("file", None)
         content = b"" if self.cell.file is None else self.cell.file.read_bytes()
         return hashlib.sha256(json.dumps(document, sort_keys=True).encode() + content).hexdigest()[:16]
 

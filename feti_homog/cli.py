@@ -76,6 +76,7 @@ def _parser() -> Parser:
     run.add_argument("case", type=Path, metavar="CASE.toml")
     run.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the results")
     run.add_argument("--quiet", action="store_true", help="print nothing but errors")
+    run.add_argument("--resume", action="store_true", help="go on from where a path to the same folder was ended")
     run.set_defaults(action=_run)
     check = actions.add_parser("check", help="validate a case file, mesh its cell and print what would run")
     check.add_argument("case", type=Path, metavar="CASE.toml")
@@ -93,8 +94,10 @@ def _run(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.run import run
 
     case = on_root(comm, cases.load, arguments.case)
+    if arguments.resume and case.path is None:
+        raise CaseError(f'--resume: only for [analysis] type = "path"; this case has "{case.analysis.type}"')
     on_root(comm, folder.usable, arguments.out)
-    run(case, arguments.out, comm, arguments.quiet)
+    run(case, arguments.out, comm, arguments.quiet, arguments.resume)
 
 
 def _check(arguments: argparse.Namespace, comm: Intracomm) -> None:

@@ -63,7 +63,7 @@ OPTIONS = (
     ),
 )
 
-PREFIXES = ("feti_ksp_", "feti_pc_", "feti_sub_", "feti_interior_", "feti_coarse_")
+PREFIXES = ("feti_ksp_", "feti_pc_", "feti_sub_", "feti_interior_", "feti_schur_", "feti_coarse_")
 """Prefixes of PETSc solvers: what follows is PETSc's to know."""
 
 OWN_SHORT = ("-h",)

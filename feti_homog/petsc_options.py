@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 
 from petsc4py import PETSc
 
+from feti_homog import petsc_c
 from feti_homog.errors import CaseError
 from feti_homog.options import unknown_options
 
@@ -39,13 +39,7 @@ def refuse_unused() -> None:
     Raises:
         CaseError: an option with our prefix was read by no solver.
     """
-    unused = [name for name in PETSc.Options().getAll() if name.startswith("feti_") and not _used(name)]
+    given = [name for name in PETSc.Options().getAll() if name.startswith("feti_")]
+    unused = [name for name in given if not petsc_c.option_was_used(name)]
     if unused:
         raise CaseError(*(f"-{name}: no solver of this run has such an option" for name in unused))
-
-
-def _used(name: str) -> bool:
-    # petsc4py 3.18 does not bind PetscOptionsUsed; its extension module resolves PETSc's symbols.
-    used = ctypes.c_int()
-    ctypes.CDLL(PETSc.__file__).PetscOptionsUsed(None, name.encode(), ctypes.byref(used))
-    return bool(used.value)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from feti_homog import __version__, bounds
 from feti_homog.analysis import angle, path, stiffness
-from feti_homog.analysis.study import Study
+from feti_homog.analysis.study import CONTACT_TOLERANCE, Study
 from feti_homog.case import Case
 from feti_homog.errors import ConvergenceError
 from feti_homog.homogenization import Homogenization, Response
@@ -91,7 +91,7 @@ def _analyse(study: Study, directory: Path, resume: bool) -> dict[str, Any]:
 def _checkpoint(cell: TornCell, directory: Path) -> Checkpoint:
     plan, multipliers = cell.plan, cell.solver.constraints.total
     parts = f"{plan.subdomains} subdomains on {cell.comm.size} ranks, {multipliers} multipliers"
-    return Checkpoint(directory, cell.comm, f"case {cell.case.digest()}, {parts}")
+    return Checkpoint(directory, cell.comm, f"case {on_root(cell.comm, cell.case.digest)}, {parts}")
 
 
 def _law(case: Case) -> Law:
@@ -120,7 +120,7 @@ def _document(study: Study, analysis: dict[str, Any]) -> dict[str, Any]:
     document = {
         "version": __version__,
         "case": cell.case.resolved(),
-        "digest": cell.case.digest(),
+        "digest": on_root(cell.comm, cell.case.digest),
         "cell": {
             "width": plan.width,
             "height": plan.height,
@@ -148,6 +148,7 @@ def _document(study: Study, analysis: dict[str, Any]) -> dict[str, Any]:
         },
         "checks": study.checks,
         "check_tolerance": study.tolerance("jump"),
+        "kkt_tolerance": CONTACT_TOLERANCE,
         "warnings": list(cell.case.warnings()),
         "faults": study.faults,
         "status": "not converged" if study.faults else "done",

@@ -87,7 +87,7 @@ class TornCell:
         return arcs.angles(nodes.points, nodes.fibre, self.plan.centres, self.plan.period)
 
     def debonded(self, opening: float | None) -> Bool:
-        """(k,) which of this rank's interface nodes are debonded from the start.
+        """(k,) which of this rank's interface nodes are debonded from the start: none without an [interface].
 
         Arcs without an angle have that `opening`; None if there are none.
         """
@@ -96,7 +96,8 @@ class TornCell:
         moved = nodes.vertex & (self.case.cell.file is None)
         near = np.where(moved, np.degrees(MERGED), arcs.SAME)
         number = nodes.fibre - self.plan.first_fibre + 1
-        return nodes.precracked | arcs.debonded(self.case.arcs, opening, number, self.directions, near)
+        cracks = nodes.precracked & (self.case.interface is not None)
+        return cracks | arcs.debonded(self.case.arcs, opening, number, self.directions, near)
 
     def areas(self) -> dict[str, float]:
         """Meshed area of each phase; collective."""
@@ -121,6 +122,8 @@ def tear(case: Case, comm: MPI.Intracomm, progress: Progress) -> TornCell:
         mesh = on_root_only(comm, coarse_mesh, case)
         shares = on_root_only(comm, _deal, case, mesh, lattice, comm.size)
         plan, pieces, shared = comm.scatter(shares or [])
+        if mesh is not None and len(mesh.debonded_edges) and case.interface is None:
+            words.append("its debonded curve is bonded, for there is no [interface]")
         words.append(f"{plan.coarse_triangles} triangles, {plan.bodies} bodies, {plan.subdomains} subdomains")
     with progress.stage("assemble") as words:
         subdomains = agree(comm, _assemble, case, pieces, lattice)
@@ -176,9 +179,7 @@ def describe(case: Case, n_ranks: int) -> str:
     return "\n".join(lines)
 
 
-def _deal(
-    case: Case, mesh: CoarseMesh, lattice: Lattice, n_ranks: int
-) -> list[tuple[Plan, list[Piece], Shared]]:
+def _deal(case: Case, mesh: CoarseMesh, lattice: Lattice, n_ranks: int) -> list[tuple[Plan, list[Piece], Shared]]:
     """For each rank: the plan, its pieces and the table of what they share with others."""
     torus = Torus.of(mesh)
     first_fibre = int(np.count_nonzero(torus.constituent_phase == 0))

@@ -45,7 +45,7 @@ def solve(case, comm):
             Homogenization(cell, contact=False),
             lambda opening: np.zeros(len(cell.solver.constraints.nodes.row), bool),
             progress,
-            lambda response, load_factor: responses.append(response),
+            lambda response, *_: responses.append(response),
         )
         return cell, stiffness.run(study)["effective_stiffness"], responses
 

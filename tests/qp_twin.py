@@ -12,12 +12,10 @@ from dataclasses import dataclass
 import clarabel
 import numpy as np
 import twin
-from scipy.sparse import bmat, coo_matrix, csc_matrix, csr_matrix, diags, triu
-from scipy.sparse.linalg import LinearOperator, gmres, splu
+from scipy.sparse import bmat, coo_matrix, csc_matrix, csr_matrix, triu
+from scipy.sparse.linalg import splu
 
 EXACT = 1e-9  # relative, of the KKT conditions of an answer
-WEAK = 1e-7  # relative to the stiffest node
-ROUNDING = 1e-15
 
 
 @dataclass(frozen=True)
@@ -77,13 +75,14 @@ class QPTwin:
         self.matrix, self.fibre_node = on_matrix, on_fibre
         self.key, self.middle = classes[on_fibre, 1], middle[on_fibre]
         self.pinned = int(np.setdiff1d(np.flatnonzero(matrix), on_matrix)[0])
-        arm = self.points[on_fibre][:, None] - centres
-        arm -= np.round(arm / self.size) * self.size
-        self.fibre = np.argmin(np.abs(np.hypot(*np.moveaxis(arm, 2, 0)) - radii), axis=1)
-        arm = arm[np.arange(len(arm)), self.fibre]
-        self.normal = arm / np.hypot(*arm.T)[:, None]
-        self.angle = np.degrees(np.arctan2(arm[:, 1], arm[:, 0]))
-        self.radius = np.asarray(radii)[self.fibre]
+        fibre, arm = _nearest(self.points, np.asarray(centres), np.asarray(radii), self.size)
+        self.fibre, self.radius = fibre[on_fibre], np.asarray(radii)[fibre[on_fibre]]
+        self.normal = arm[on_fibre] / np.hypot(*arm[on_fibre].T)[:, None]
+        self.angle = np.degrees(np.arctan2(*arm[on_fibre].T[::-1]))
+        self.rigid = np.zeros((self.n, 2, len(radii), 3))
+        own = np.flatnonzero(~matrix)
+        self.rigid[own, 0, fibre[own], 0] = self.rigid[own, 1, fibre[own], 1] = 1.0
+        self.rigid[own, :, fibre[own], 2] = arm[own][:, ::-1] * [-1, 1] / np.asarray(radii)[fibre[own], None]
 
     def lengths(self):
         """(k,) tributary arc lengths: halves of the arcs between linear nodes, Simpson's shares of quadratic ones."""
@@ -101,11 +100,11 @@ class QPTwin:
 
     def solve(self, strain, bonded, contact):
         """The state under a strain (3,) with the `bonded` (k,) nodes held together."""
-        T = self._together(bonded)
+        T, reach = self._together(bonded), self.size.max() * np.abs(strain).max()
         free = np.flatnonzero(~bonded) if contact else np.zeros(0, int)
         K, f = (T.T @ self.K @ T).tocsc() / self.scale, -T.T @ (self.Q @ strain) / self.scale
-        reach = self.size.max() * np.abs(strain).max()
-        v, pressure = _minimise(K, f, (self._gaps(free) @ T).tocsr(), reach)
+        C = (self._gaps(free) @ T).tocsr()
+        v, pressure = _minimise(K, f, C, lambda active: self._loose(T, bonded, C[active]), reach)
         u = T @ v
         residual = self.K @ u + self.Q @ strain
         energy = strain @ self.mean @ strain / 2 + strain @ self.Q.T @ u + u @ (self.K @ u) / 2
@@ -128,6 +127,17 @@ class QPTwin:
         columns = (2 * np.searchsorted(kept, number[node])[:, None] + [0, 1]).ravel()
         return csr_matrix((np.ones(len(rows)), (rows, columns)), shape=(2 * self.n, 2 * len(kept)))
 
+    def _loose(self, T, bonded, C):
+        """(free dofs, z) rigid motions of the fibres that no bonded node nor a row of C resists."""
+        motions = []
+        for f in range(self.rigid.shape[2]):
+            rigid = self.rigid[:, :, f].reshape(2 * self.n, 3)
+            v = (T.T @ rigid) / np.maximum(T.T @ np.ones(2 * self.n), 1.0)[:, None]
+            held = [self.rigid[self.fibre_node[bonded], :, f].reshape(-1, 3), C @ v]
+            _, size, modes = np.linalg.svd(np.concatenate([*held, np.zeros((3, 3))]), full_matrices=False)
+            motions.append(v @ modes[size < 1e-9].T)
+        return np.concatenate(motions, axis=1)
+
     def _gaps(self, which):
         """Rows n.(u_matrix - u_fibre) of the interface nodes `which`."""
         k = len(which)
@@ -138,8 +148,19 @@ class QPTwin:
         return csr_matrix((values.ravel(), (rows, columns.ravel())), shape=(k, 2 * self.n))
 
 
-def _minimise(K, f, C, reach):
-    """min v.K.v / 2 - f.v, C v >= 0: v and the forces of the constraints; gaps up to EXACT * reach are zero."""
+def _nearest(points, centres, radii, size):
+    """The circle to which each point is nearest, and the arm from its centre."""
+    arm = points[:, None] - centres
+    arm -= np.round(arm / size) * size
+    fibre = np.argmin(np.hypot(*np.moveaxis(arm, 2, 0)) - radii, axis=1)
+    return fibre, arm[np.arange(len(arm)), fibre]
+
+
+def _minimise(K, f, C, loose, reach):
+    """min v.K.v / 2 - f.v, C v >= 0: v and the forces of the constraints; gaps up to EXACT * reach are zero.
+
+    `loose` gives the null vectors of K on the active constraints.
+    """
     active, v, unit = np.zeros(C.shape[0], bool), np.zeros(len(f)), np.abs(f).max() or 1.0
     if C.shape[0]:
         settings = clarabel.DefaultSettings()
@@ -149,9 +170,9 @@ def _minimise(K, f, C, reach):
         problem = triu(K, format="csc"), -f / unit, csc_matrix(-C), np.zeros(C.shape[0]), cones
         found = clarabel.DefaultSolver(*problem, settings).solve()
         v, s, z = unit * np.array(found.x), np.array(found.s), np.array(found.z)
-        active = z / z.max() > s / s.max()
+        active = z * reach > s * unit
     for _ in range(50):
-        v, own = _bordered(K, f, C[active], v)
+        v, own = _bordered(K, f, C[active], loose(active), v)
         force = np.zeros(C.shape[0])
         force[active] = own
         pulled = force < -EXACT * max(np.abs(force).max(initial=0.0), EXACT * unit)
@@ -162,17 +183,12 @@ def _minimise(K, f, C, reach):
     raise AssertionError("the twin finds no state of contact")
 
 
-def _bordered(K, f, C, v):
-    """K v - C^T force = f, C v = 0 by a direct solve, refined from v on; WEAK springs hold what is loose."""
-    n, m = len(f), C.shape[0]
-    exact = bmat([[K, -C.T], [-C, csr_matrix((m, m))]]).tocsr()
-    factor = splu((exact + WEAK * diags(np.r_[np.ones(n), -np.ones(m)])).tocsc())
-    inverse = LinearOperator(exact.shape, factor.solve)
-    x, b = np.r_[v, np.zeros(m)], np.r_[f, np.zeros(m)]
-    for _ in range(10):
-        residual = b - exact @ x
-        if np.abs(residual).max() <= ROUNDING * np.abs(f).max():
-            break
-        # The springs are felt by fibres that hang on few nodes: a few Krylov steps take that away.
-        x += gmres(exact, residual, M=inverse, rtol=1e-12, restart=20, maxiter=1)[0]
-    return x[:n], x[n:]
+def _bordered(K, f, C, loose, v):
+    """K v - C^T force = f, C v = 0 by a direct solve that leaves the amplitudes of loose motions as they are in v."""
+    n, m, z = len(f), C.shape[0], loose.shape[1]
+    matrix = bmat([[K, -C.T, csr_matrix(loose)], [-C, csr_matrix((m, m)), None], [csr_matrix(loose.T), None, None]])
+    factor = splu(matrix.tocsc())
+    b = np.r_[f, np.zeros(m), loose.T @ v]
+    x = factor.solve(b)
+    x += factor.solve(b - matrix @ x)
+    return x[:n], x[n : n + m]

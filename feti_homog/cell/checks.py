@@ -21,6 +21,8 @@ SAME = 1e-7
 HANGING = 1e-2
 # Area of a triangle relative to its longest edge squared that counts as zero.
 FLAT = 1e-9
+# The physical curve of the edges that are debonded from the start.
+DEBONDED = "debonded"
 PHASE = re.compile(r"matrix|fibre(:\S+)?")
 SIDES = {(0, 0): "left", (0, 1): "right", (1, 0): "lower", (1, 1): "upper"}
 
@@ -30,7 +32,8 @@ class RawMesh:
     """Triangles of a mesh file: nodes in use with their tags, elements with their tags and group.
 
     node_tags (n,), points (n, 3), element_tags (m,), triangles (m, 3) node numbers, group (m,) index into
-    `groups`, the lists of physical surfaces that the elements' entities belong to.
+    `groups`, the lists of physical surfaces that the elements' entities belong to, and debonded (d, 2), the node
+    tags of the lines in the physical curve DEBONDED.
     """
 
     node_tags: Integers
@@ -39,6 +42,7 @@ class RawMesh:
     triangles: NDArray[np.int32]
     group: Integers
     groups: tuple[tuple[str, ...], ...]
+    debonded: Integers
 
     def node(self, number: int) -> str:
         """A node in words."""
@@ -201,6 +205,21 @@ def uncovered(plane: Floats, triangles: NDArray[np.int32], size: Floats) -> list
         return []
     what = "overlap" if abs(total) > whole else "leave parts uncovered"
     return [f"the elements {what}: their area is {abs(total):.9g}, that of the cell {whole:.9g}"]
+
+
+def loose_lines(mesh: RawMesh) -> list[str]:
+    """Debonded lines whose ends are not nodes of triangles."""
+    bad = mesh.debonded[~np.isin(mesh.debonded, mesh.node_tags).all(axis=1)]
+    names = (f"that between nodes {start} and {stop}" for start, stop in bad)
+    what = f'lines in the physical curve "{DEBONDED}" that are no edges of triangles'
+    return [f"{what}: {first_of(names, len(bad))}"] if len(bad) else []
+
+
+def cannot_debond(mesh: RawMesh, pairs: NDArray[np.int32], fit: NDArray[np.bool_]) -> list[str]:
+    """Debonded lines (d, 2) that are not edges between a fibre and the matrix; `fit` (d,) tells which are."""
+    bad = pairs[~fit]
+    what = f'lines in the physical curve "{DEBONDED}" that are not between a fibre and the matrix'
+    return [f"{what}: {first_of(map(mesh.edge, bad), len(bad))}"] if len(bad) else []
 
 
 def not_periodic(mesh: RawMesh, plane: Floats, size: Floats) -> list[str]:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components, depth_first_order
 
+from feti_homog.cell.interfaces import interface_edges
 from feti_homog.cell.mesh import CoarseMesh, double_arcs, edge_keys, edges, flip_double_arcs
 
 Floats = NDArray[np.float64]
@@ -57,22 +58,6 @@ def with_circles(mesh: CoarseMesh) -> CoarseMesh:
             arc_edges.append(its_edges)
     mesh = replace(mesh, points=_copied(mesh, points, size))
     return _without_double_arcs(_with_arcs(mesh, circles, arc_edges))
-
-
-def interface_edges(mesh: CoarseMesh) -> NDArray[np.int32]:
-    """Edges (k, 2) between triangles of different phases on the torus; of those on sides the low copy."""
-    pairs = edges(mesh.triangles)
-    for axis, period in ((0, mesh.width), (1, mesh.height)):
-        low, high = (np.flatnonzero(mesh.points[:, axis] == level) for level in (0.0, period))
-        along = mesh.points[:, 1 - axis]
-        partner = np.zeros(len(mesh.points), dtype=np.int32)
-        partner[high[np.argsort(along[high])]] = low[np.argsort(along[low])]
-        on_high = np.all(mesh.points[pairs, axis] == period, axis=1)
-        pairs = np.where(on_high[:, None], partner[pairs], pairs)
-    keys = edge_keys(pairs, len(mesh.points))
-    order = np.argsort(keys, kind="stable").reshape(-1, 2)
-    between = mesh.phase[order[:, 0] // 3] != mesh.phase[order[:, 1] // 3]
-    return pairs[order[between, 0]]
 
 
 def _loops(mesh: CoarseMesh, pairs: NDArray[np.int32], size: Floats) -> list[_Loop]:

@@ -23,8 +23,8 @@ Integers = NDArray[np.intp]
 
 NO_MARKS: Mapping[int, Sequence[float]] = MappingProxyType({})
 FRONTAL_DELAUNAY = 6
-# gmsh's element type.
-TRIANGLE = 2
+# gmsh's element types.
+LINE, TRIANGLE = 1, 2
 
 # Curves of the outline are numbered from 1; a negative number is a curve run backwards.
 Signed = tuple[int, Curve]

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from feti_homog.cell import checks
 from feti_homog.cell.checks import RawMesh
 from feti_homog.cell.circles import with_circles
+from feti_homog.cell.interfaces import can_debond
 from feti_homog.cell.mesh import CoarseMesh, areas, representatives
-from feti_homog.cell.mesher import TRIANGLE, gmsh_session
+from feti_homog.cell.mesher import LINE, TRIANGLE, gmsh_session
 from feti_homog.errors import MeshError
 
 Floats = NDArray[np.float64]
@@ -32,11 +33,12 @@ def read(path: Path) -> CoarseMesh:
     """The coarse mesh in a .msh file of any gmsh version, moved to [0, width] x [0, height].
 
     It consists of 3-node triangles in physical surfaces "matrix", "fibre", "fibre:2", ..., fills a rectangle,
-    and has matching nodes on opposite sides. Round interfaces become circles (`with_circles`). Raises
-    MeshError with all faults of the first stage that has any: file, labels, shapes, connections, sides.
+    and has matching nodes on opposite sides. Lines in the physical curve "debonded" are edges between a fibre
+    and the matrix that are debonded. Round interfaces become circles (`with_circles`). Raises MeshError with
+    all faults of the first stage that has any: file, labels, shapes, connections, sides, debonded lines.
     """
     raw = _load(path)
-    _refuse(path, checks.unlabelled(raw), checks.unknown_phases(raw))
+    _refuse(path, checks.unlabelled(raw), checks.unknown_phases(raw), checks.loose_lines(raw))
     _refuse(path, checks.not_finite(raw))
     _refuse(path, checks.not_planar(raw), checks.flat_or_inverted(raw), checks.duplicate_nodes(raw))
     origin, size, plane = _on_rectangle(raw.points[:, :2])
@@ -44,7 +46,9 @@ def read(path: Path) -> CoarseMesh:
     _refuse(path, checks.overlapping(raw), checks.open_edges(raw, plane, size), corners)
     _refuse(path, checks.uncovered(plane, raw.triangles, size))
     _refuse(path, checks.not_periodic(raw, plane, size))
-    return with_circles(_coarse_mesh(raw, _matched(plane, size), size))
+    mesh = _coarse_mesh(raw, _matched(plane, size), size)
+    _refuse(path, checks.cannot_debond(raw, mesh.debonded_edges, can_debond(mesh, mesh.debonded_edges)))
+    return with_circles(mesh)
 
 
 def _refuse(path: Path, *faults: list[str]) -> None:
@@ -114,7 +118,18 @@ def _raw_mesh(gmsh: ModuleType) -> RawMesh:
         triangles=triangles.reshape(-1, 3).astype(np.int32),
         group=np.concatenate(group),
         groups=tuple(groups),
+        debonded=_debonded_lines(gmsh),
     )
+
+
+def _debonded_lines(gmsh: ModuleType) -> NDArray[np.int64]:
+    """Node tags (d, 2) of the lines in the physical curve "debonded"."""
+    lines = [np.zeros(0, np.int64)]
+    for _, entity in gmsh.model.getEntities(1):
+        groups = gmsh.model.getPhysicalGroupsForEntity(1, entity)
+        if any(gmsh.model.getPhysicalName(1, tag) == checks.DEBONDED for tag in groups):
+            lines.append(gmsh.model.mesh.getElementsByType(LINE, entity)[1].astype(np.int64))
+    return np.concatenate(lines).reshape(-1, 2)
 
 
 def _on_rectangle(plane: Floats) -> tuple[Floats, Floats, Floats]:
@@ -156,5 +171,5 @@ def _coarse_mesh(raw: RawMesh, plane: Floats, size: Floats) -> CoarseMesh:
         circles=np.zeros((0, 3)),
         arc_edges=np.zeros((0, 2), np.int32),
         arc_circle=np.zeros(0, np.int32),
-        debonded_edges=np.zeros((0, 2), np.int32),
+        debonded_edges=np.searchsorted(raw.node_tags, raw.debonded).astype(np.int32),
     )

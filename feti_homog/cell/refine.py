@@ -52,9 +52,7 @@ class Lattice:
         number[nodes[:, 1], nodes[:, 2]] = np.arange(len(nodes))
         return cls(m, nodes, number[corners[..., 1], corners[..., 2]])
 
-    def number(
-        self, vertices: Int, edges: Int, backwards: NDArray[np.bool_], n_vertices: int, n_edges: int
-    ) -> Int:
+    def number(self, vertices: Int, edges: Int, backwards: NDArray[np.bool_], n_vertices: int, n_edges: int) -> Int:
         """(t, q) node numbers: vertices first, then M - 1 nodes an edge along its direction, then interiors."""
         inner = self.intervals - 1
         p = np.arange(inner)
@@ -87,9 +85,7 @@ def refine(piece: Piece, lattice: Lattice) -> FineMesh:
     edges, back, inner = piece.triangle_edges, piece.backwards, lattice.intervals - 1
     plane = lattice.number(piece.triangles, edges, back, len(piece.points), len(piece.edges))
     n_classes, n_edges = len(piece.class_keys), len(piece.edge_keys)
-    torus = lattice.number(
-        piece.vertex_class[piece.triangles], piece.edge_class[edges], back, n_classes, n_edges
-    )
+    torus = lattice.number(piece.vertex_class[piece.triangles], piece.edge_class[edges], back, n_classes, n_edges)
     n = len(piece.points) + len(piece.edges) * inner + len(plane) * (len(lattice.nodes) - 3 - 3 * inner)
     points, node_class = np.empty((n, 2)), np.empty(n, np.int64)
     points[plane] = _positions(piece, lattice)

@@ -12,6 +12,10 @@ from feti_homog.feti.preconditioner import Preconditioner
 
 Float = NDArray[np.float64]
 
+# Methods that apply the preconditioner to the residual itself, so that the jump can be read off there; with the
+# others the test is on the forces alone, and the response's own checks tell of the jump.
+SEES_RESIDUAL = (PETSc.KSP.Type.CG, PETSc.KSP.Type.FCG)
+
 
 class ActiveRows:
     """Which owned rows carry multipliers: 1 where they do, else 0."""
@@ -76,6 +80,7 @@ class PrimalTest:
             return PETSc.KSP.ConvergedReason.DIVERGED_DTOL
         if residual <= atol:
             return PETSc.KSP.ConvergedReason.CONVERGED_ATOL
-        if residual <= rtol * self.forces and self.preconditioner.jump <= rtol * self.jump:
+        closed = ksp.getType() not in SEES_RESIDUAL or self.preconditioner.jump <= rtol * self.jump
+        if residual <= rtol * self.forces and closed:
             return PETSc.KSP.ConvergedReason.CONVERGED_RTOL
         return PETSc.KSP.ConvergedReason.ITERATING

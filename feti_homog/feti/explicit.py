@@ -1,6 +1,6 @@
-"""Explicit local operators: dense flexibilities and Schur complements on the boundary dofs of each subdomain.
+"""Explicit local operators: dense Schur complements and flexibilities on the boundary dofs of each subdomain.
 
-They cost a solve a boundary dof and pay after some hundred applications, as a debonding path makes.
+They cost about a further factorization and pay after some ten to hundred applications, as a debonding path makes.
 """
 
 from __future__ import annotations
@@ -10,7 +10,11 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+from petsc4py import PETSc
+from scipy.linalg.lapack import dpotrf, dpotri
+from scipy.sparse import csr_matrix
 
+from feti_homog import petsc_c
 from feti_homog.feti.constraints import Constraints
 from feti_homog.feti.local import LocalSolver
 from feti_homog.feti.operator import DualOperator
@@ -36,29 +40,64 @@ class DenseBlocks:
 
 
 class ExplicitDualOperator(DualOperator):
-    """F with the boundary part of every K+ as a dense matrix."""
+    """F with the boundary part of every K+ as a dense matrix.
 
-    def __init__(self, constraints: Constraints, solver: LocalSolver, boundary: Sequence[Int]) -> None:
+    With the fixing nodes on the boundary, eliminating the interior from K + rho Rf Rf^T leaves S + rho Rf Rf^T, whose
+    inverse is that boundary part; S is what the Dirichlet preconditioner needs.
+    """
+
+    def __init__(
+        self, constraints: Constraints, solver: LocalSolver, subdomains: Sequence[Subdomain], boundary: Sequence[Int]
+    ) -> None:
         super().__init__(constraints, solver)
         own = [solver.offsets[s] + dofs for s, dofs in enumerate(boundary)]
         self._Bb = self.B[:, np.concatenate(own or [np.zeros(0, np.int64)])]
         self._BbT = self._Bb.T.tocsr()
-        self.flexibility = DenseBlocks([solver.columns(s, dofs) for s, dofs in enumerate(boundary)])
+        schur, flexibility = [], []
+        for subdomain, dofs in zip(subdomains, boundary, strict=True):
+            nodes = np.unique(dofs // 2)
+            S = schur_complement(subdomain.regularised(nodes), dofs)
+            flexibility.append(_inverse(S))
+            fixed, term = subdomain.fixing(nodes)
+            at = np.searchsorted(dofs, fixed)
+            S[np.ix_(at, at)] -= term
+            schur.append(S)
+        self.flexibility, self.schur = DenseBlocks(flexibility), DenseBlocks(schur)
 
     def apply(self, x: Float) -> Float:
         """sum_s B K+ B^T x."""
         return self.constraints.sum(self._Bb @ self.flexibility.apply(self._BbT @ self.constraints.gather(x)))
 
 
-def schur_complements(
-    flexibility: DenseBlocks, subdomains: Sequence[Subdomain], boundary: Sequence[Int]
-) -> DenseBlocks:
-    """S_s = (K+_bb)^-1 - rho Rf Rf^T: the fixing nodes lie on the boundary, so elimination leaves their block."""
-    blocks = []
-    for block, subdomain, dofs in zip(flexibility.blocks, subdomains, boundary, strict=True):
-        S = np.linalg.inv(block)
-        fixed, term = subdomain.fixing(np.unique(dofs // 2))
-        at = np.searchsorted(dofs, fixed)
-        S[np.ix_(at, at)] -= term
-        blocks.append((S + S.T) / 2)
-    return DenseBlocks(blocks)
+def schur_complement(matrix: csr_matrix, dofs: Int) -> Float:
+    """(n, n) Schur complement of an SPD matrix on `dofs`, by MUMPS' partial factorization.
+
+    Options have the prefix `feti_schur_`.
+    """
+    A = PETSc.Mat().createAIJ(matrix.shape, csr=(matrix.indptr, matrix.indices, matrix.data), comm=PETSc.COMM_SELF)
+    A.setOption(PETSc.Mat.Option.SPD, True)
+    pc = PETSc.PC().create(PETSc.COMM_SELF)
+    pc.setOptionsPrefix("feti_schur_")
+    pc.setOperators(A)
+    pc.setType(PETSc.PC.Type.CHOLESKY)
+    pc.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
+    pc.setFromOptions()
+    pc.setFactorSetUpSolverType()
+    rows = PETSc.IS().createGeneral(dofs.astype(PETSc.IntType), comm=PETSc.COMM_SELF)
+    petsc_c.set_schur(pc.getFactorMatrix(), rows)
+    pc.setUp()
+    S = petsc_c.schur_complement(pc.getFactorMatrix(), len(dofs))
+    pc.destroy()
+    A.destroy()
+    return S
+
+
+def _inverse(S: Float) -> Float:
+    """Inverse of an SPD matrix, whole."""
+    factor, info = dpotrf(S, lower=1)
+    if info == 0:
+        inverse, info = dpotri(factor, lower=1)
+    if info:
+        raise np.linalg.LinAlgError(f"a regularised Schur complement is not positive definite (LAPACK info {info})")
+    lower = np.tril(inverse)
+    return lower + np.tril(lower, -1).T

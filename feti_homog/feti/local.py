@@ -9,11 +9,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix
 
-Int = NDArray[np.int64]
 Float = NDArray[np.float64]
-
-# Right-hand sides that are solved for together.
-BLOCK = 64
 
 
 class LocalSolver:
@@ -43,25 +39,6 @@ class LocalSolver:
     def factorizations(self) -> int:
         """How many factorizations are held; none is ever made again."""
         return len(self._solves)
-
-    def columns(self, s: int, dofs: Int) -> Float:
-        """A_s^-1 at rows and columns `dofs`, (n, n), from solves with blocks of unit vectors."""
-        ksp = self._solves[s][0]
-        factor, size = ksp.getPC().getFactorMatrix(), ksp.getOperators()[0].getSize()[0]
-        inverse = np.empty((len(dofs), len(dofs)))
-        for first in range(0, len(dofs), BLOCK):
-            some = dofs[first : first + BLOCK]
-            units, found = (PETSc.Mat().createDense((size, len(some)), comm=PETSc.COMM_SELF) for _ in range(2))
-            for matrix in (units, found):
-                matrix.setUp()
-            units.getDenseArray()[some, np.arange(len(some))] = 1.0
-            for matrix in (units, found):
-                matrix.assemble()
-            factor.matSolve(units, found)
-            inverse[:, first : first + BLOCK] = found.getDenseArray()[dofs]
-            for matrix in (units, found):
-                matrix.destroy()
-        return inverse
 
     def solve(self) -> Float:
         """Solve with `b` as it stands; returns `x`, which the next solve overwrites."""

@@ -56,26 +56,31 @@ def place(
 
 
 def _place_all(parts: list[tuple[Float, Float, Float, NDArray[np.int64], Bool]], noise: float) -> tuple[Float, Bool]:
-    gap, motion, slip, fibre, is_open = (np.concatenate(p) for p in zip(*parts, strict=True))
-    squeezed, amplitudes = np.zeros(len(gap), bool), np.zeros(motion.shape[1])
-    moving = np.abs(motion) > SLIDING * np.hypot(motion, slip).max(axis=0, initial=0.0)
-    for f in np.unique(fibre[is_open & (gap < -noise) & moving.any(axis=1)]):
+    gap, opening, slip, fibre, is_open = (np.concatenate(p) for p in zip(*parts, strict=True))
+    squeezed, amplitudes = np.zeros(len(gap), bool), np.zeros(opening.shape[1])
+    for f in np.unique(fibre[is_open & (gap < -noise)]):
         own = np.flatnonzero((fibre == f) & is_open)
-        modes = np.flatnonzero(moving[own].any(axis=0))
-        amplitudes[modes], room, forces = _largest_gap(gap[own], motion[np.ix_(own, modes)])
-        if room < -noise:
-            squeezed[own[forces > 1e-6 * forces.max()]] = True
+        modes = _opening_modes(opening[own], slip[own])
+        if modes.shape[1]:
+            a, room, forces = _largest_gap(gap[own], opening[own] @ modes)
+            amplitudes += modes @ a
+            if room < -noise:
+                squeezed[own[forces > 1e-6 * forces.max()]] = True
     return amplitudes, squeezed
+
+
+def _opening_modes(opening: Float, slip: Float) -> Float:
+    """(modes, m) the combinations of modes that open gaps: neither those of other fibres nor those that slide."""
+    _, size, basis = np.linalg.svd(opening, full_matrices=False)
+    return np.asarray(basis[size > SLIDING * max(size[0], np.abs(slip).max())].T)
 
 
 def _largest_gap(gap: Float, motion: Float) -> tuple[Float, float, Float]:
     """max s with gap + motion a >= s: a, s, and the multipliers of the inequalities."""
-    scale = np.abs(gap).max()
-    size = np.abs(motion).max()
+    scale, size = np.abs(gap).max(), np.abs(motion).max(axis=0)
     rows = np.column_stack([-motion / size, np.ones(len(gap))])
-    cost = np.r_[np.zeros(motion.shape[1]), -1.0]
+    cost = np.r_[np.zeros(len(size)), -1.0]
     # Bounds keep a fibre in place that has room without end on one side.
-    bounds = [(-1e3, 1e3)] * motion.shape[1] + [(None, 1.0)]
+    bounds = [(-1e3, 1e3)] * len(size) + [(None, 1.0)]
     result = linprog(cost, A_ub=rows, b_ub=gap / scale, bounds=bounds, method="highs")
-    a, s = result.x[:-1], result.x[-1]
-    return a * scale / size, float(s * scale), -result.ineqlin.marginals
+    return result.x[:-1] * scale / size, float(result.x[-1] * scale), -result.ineqlin.marginals

@@ -1,10 +1,12 @@
 """Checkpoints of a path: one small HDF5 file an event, written whole or not at all.
 
-Rank 0 writes what the ranks' parts add up to; it concerns the interfaces only.
+Rank 0 writes what the ranks' parts add up to; it concerns the interfaces only.  The events' files are numbered
+without gaps; each carries the run that it belongs to and a checksum.
 """
 
 from __future__ import annotations
 
+import hashlib
 import os
 import shutil
 from collections.abc import Mapping
@@ -16,7 +18,9 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from feti_homog.case import Case
 from feti_homog.errors import CaseError, FetiHomogError
+from feti_homog.output import results
 from feti_homog.parallel import on_root, on_root_only
 
 FOLDER = "checkpoint"
@@ -24,11 +28,19 @@ FOLDER = "checkpoint"
 Arrays = dict[str, NDArray[Any]]
 
 
+def finished(directory: Path, case: Case) -> bool:
+    """Whether `directory` holds the finished result of this case, and no checkpoint of a later run.  Call on one rank."""
+    if (directory / FOLDER).is_dir() or not (directory / results.NAME).is_file():
+        return False
+    document = results.read(directory)
+    return document.get("status") == "done" and document.get("digest") == case.digest()
+
+
 class Checkpoint:
     """The events of one path in `directory`/checkpoint; every method is collective.
 
     Attributes:
-        signature: text that an event must carry to belong to this run: case, mesh and ranks.
+        signature: text that an event must carry to belong to this run: case, subdomains and ranks.
     """
 
     def __init__(self, directory: Path, comm: MPI.Intracomm, signature: str) -> None:
@@ -59,29 +71,36 @@ class Checkpoint:
         on_root(self.comm, self._write, number, whole, gathered)
 
     def _clear(self) -> int:
-        count = len(self._files())
-        shutil.rmtree(self.folder, ignore_errors=True)
+        """Under its own name the folder is there as a whole or not at all."""
+        count, dropped = len(self._files()), self.folder.with_suffix(".dropped")
+        shutil.rmtree(dropped, ignore_errors=True)
+        if self.folder.is_dir():
+            os.replace(self.folder, dropped)
+            shutil.rmtree(dropped, ignore_errors=True)
         return count
 
     def _files(self) -> list[Path]:
         return sorted(self.folder.glob("[0-9]*.h5")) if self.folder.is_dir() else []
 
     def _read_all(self) -> list[Arrays]:
-        events = []
-        for number, path in enumerate(self._files()):
-            try:
-                with h5py.File(path, "r") as file:
-                    signature = file.attrs["signature"]
-                    events.append({name: table[()] for name, table in file.items()})
-            except (OSError, KeyError, RuntimeError) as error:
-                raise CaseError(f"--resume: {path} is no readable event of a path: {error}") from error
-            if signature != self.signature:
-                raise CaseError(
-                    f"--resume: {path} is of another run: expected {self.signature}, found {signature}"
-                )
-            if path.stem != f"{number:06d}":
-                raise CaseError(f"--resume: event {number:06d} is missing in {self.folder}")
-        return events
+        files = self._files()
+        missing = next((n for n, path in enumerate(files) if path.stem != f"{n:06d}"), None)
+        if missing is not None:
+            raise CaseError(f"--resume: event {missing:06d} is missing in {self.folder}")
+        return [self._read_event(path) for path in files]
+
+    def _read_event(self, path: Path) -> Arrays:
+        try:
+            with h5py.File(path, "r") as file:
+                signature, checksum = file.attrs["signature"], file.attrs["checksum"]
+                event = {name: table[()] for name, table in file.items()}
+        except (OSError, KeyError, RuntimeError) as error:
+            raise CaseError(f"--resume: {path} is no readable event of a path: {error}") from error
+        if signature != self.signature:
+            raise CaseError(f"--resume: {path} is of another run: expected {self.signature}; found {signature}")
+        if checksum != _checksum(event):
+            raise CaseError(f"--resume: {path} is damaged: its checksum is wrong")
+        return event
 
     def _write(self, number: int, whole: Mapping[str, Any], gathered: Mapping[str, list[NDArray[Any]]]) -> None:
         path = self.folder / f"{number:06d}.h5"
@@ -89,15 +108,22 @@ class Checkpoint:
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
             with h5py.File(part, "w") as file:
-                file.attrs["signature"] = self.signature
-                for name, value in whole.items():
+                event = {name: np.asarray(value) for name, value in whole.items()}
+                event |= {name: np.concatenate(parts) for name, parts in gathered.items()}
+                event |= {f"{name}_ends": np.cumsum([len(p) for p in parts]) for name, parts in gathered.items()}
+                for name, value in event.items():
                     file[name] = value
-                for name, parts in gathered.items():
-                    file[name] = np.concatenate(parts)
-                    file[f"{name}_ends"] = np.cumsum([len(p) for p in parts])
+                file.attrs.update(signature=self.signature, checksum=_checksum(event))
             os.replace(part, path)
         except (OSError, RuntimeError) as error:
             raise FetiHomogError(f"cannot write {path}: {error}") from error
+
+
+def _checksum(event: Arrays) -> str:
+    content = hashlib.sha256()
+    for name in sorted(event):
+        content.update(name.encode() + np.ascontiguousarray(event[name]).tobytes())
+    return content.hexdigest()
 
 
 def _part(event: Arrays, rank: int) -> Arrays:

@@ -7,11 +7,15 @@ from math import floor, log10
 from textwrap import wrap
 from typing import Any
 
+from feti_homog.output.listing import angle_table, path_table
+
 WIDTH = 79
 LABEL = 12  # columns of the labels at the left
 NAME = 28  # columns of the names of table rows
 GLUE = "\N{NO-BREAK SPACE}"  # at which no line is broken
 STIFF = ("C11", "C22", "C33")
+LISTED = 12  # numbers of iterations that are told one by one
+TITLES = {"stiffness": "effective stiffness", "angle": "debonding angle", "path": "load path"}
 MODULI = ("E1", "E2", "G12", "bulk", "shear")  # in the unit of the stresses; the others are ratios
 
 Document = Mapping[str, Any]
@@ -20,19 +24,19 @@ Document = Mapping[str, Any]
 def summary(document: Document) -> str:
     """The document in lines of at most 79 columns (but for long names), without a newline at the end.
 
-    Cell, solver, effective stiffness, moduli, bounds, checks, timings, memory, warnings and status.
+    Cell, solver, effective stiffness with moduli and bounds or else the points of `angle` or `path`, checks,
+    timings, memory, warnings and status.
     Keys that it does not know are left out. Raises KeyError if one that DESIGN names is missing.
     """
     case = document["case"]
     unit = case.get("output", {}).get("stress_unit", "")
     stress = f" ({unit})" if unit else ""
-    title = f"{case.get('name', '')}: effective stiffness, plane {case['analysis']['plane']}".lstrip(": ")
+    what = TITLES[case["analysis"]["type"]]
+    title = f"{case.get('name', '')}: {what}, plane {case['analysis']['plane']}".lstrip(": ")
     blocks = [
         [title, "=" * min(len(title), WIDTH)],
         [*_cell(document), *_solver(document["solver"])],
-        _matrix(f"Effective stiffness{stress}", document["effective_stiffness"]),
-        _moduli(f"Engineering moduli{stress}", document["moduli"]),
-        _bounds(f"Bounds{stress}", document),
+        *_answer(document, stress),
         _checks(document),
         [
             *_timings(document["timings"]),
@@ -42,6 +46,22 @@ def summary(document: Document) -> str:
         _field("Status", [str(document["status"])]),
     ]
     return "\n\n".join("\n".join(block) for block in blocks if block).replace(GLUE, " ")
+
+
+def _answer(document: Document, stress: str) -> list[list[str]]:
+    """The blocks of what was asked for."""
+    if "angle" in document:
+        return [angle_table(document["angle"], stress)]
+    if "path" in document:
+        return [path_table(document["path"], stress)]
+    blocks = [_matrix(f"Effective stiffness{stress}", document["effective_stiffness"])]
+    if "effective_stiffness_compression" in document:
+        blocks.append(_matrix(f"Under minus E{stress}", document["effective_stiffness_compression"]))
+    return [
+        *blocks,
+        _moduli(f"Engineering moduli{stress}", document["moduli"]),
+        _bounds(f"Bounds{stress}", document),
+    ]
 
 
 def _cell(document: Document) -> list[str]:
@@ -65,8 +85,22 @@ def _solver(solver: Document) -> list[str]:
     return [
         *_field("Solver", [*parts, _number(solver["dofs"], "dof")]),
         *_field("Dual", [*dual, f"coarse problem {solver['coarse_dim']}"]),
-        *_field("Iterations", [str(count) for count in _listed(solver["iterations"])]),
+        *_factorized(solver),
+        *_field("Iterations", _iterations(_listed(solver["iterations"]))),
     ]
+
+
+def _factorized(solver: Document) -> list[str]:
+    if "factorizations" not in solver:
+        return []
+    coarse = _number(solver.get("coarse_factorizations", 0), "coarse one")
+    return _field("Factorized", [_number(solver["factorizations"], "subdomain"), coarse])
+
+
+def _iterations(counts: Sequence[int]) -> list[str]:
+    if len(counts) <= LISTED:
+        return [str(count) for count in counts]
+    return [f"{min(counts)} to {max(counts)} a state", f"{sum(counts)} for {len(counts)} states"]
 
 
 def _matrix(title: str, rows: Sequence[Sequence[float]]) -> list[str]:
@@ -109,7 +143,11 @@ def _checks(document: Document) -> list[str]:
     tolerance = document.get("check_tolerance")
     limit = "" if tolerance is None else f" (relative, at most {tolerance:.1e})"
     lines = [f"Checks{limit}"]
+    contact = document.get("kkt_tolerance", tolerance)
+    if any(name.startswith("kkt_") for name in document["checks"]) and contact != tolerance:
+        lines[0] = lines[0].replace(")", f"; of contact {contact:.1e})")
     for name, error in document["checks"].items():
+        tolerance = contact if name.startswith("kkt_") else document.get("check_tolerance")
         verdict = "" if tolerance is None else "pass" if error <= tolerance else "FAIL"
         lines.append(f"  {name:<{NAME - 2}}{error:>14.1e}    {verdict}".rstrip())
     return lines

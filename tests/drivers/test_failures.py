@@ -132,6 +132,7 @@ def sabotaged(folder, ranks, application, fault):
     script = folder / "sabotaged.py"
     script.write_text(SABOTAGED.format(application=application, fault=fault))
     start = time.monotonic()
-    job = mpirun(ranks, script, "run", case_file(folder), "--out", folder / "results", timeout=30.0)
+    words = ["run", case_file(folder), "--out", folder / "results", "-feti_dual_operator", "implicit"]
+    job = mpirun(ranks, script, *words, timeout=30.0)
     assert time.monotonic() - start < 10.0
     return job

@@ -11,7 +11,7 @@ import numpy as np
 Nodes = dict[int, tuple[float, float, float]]
 # Element tag -> (gmsh element type, physical surface, entity, node tags).
 Elements = dict[int, tuple[int, int, int, tuple[int, ...]]]
-MATRIX, FIBRE = 1, 2
+MATRIX, FIBRE, CURVE = 1, 2, 7
 N = 4
 
 
@@ -22,9 +22,12 @@ class MshFile:
     nodes: Nodes
     elements: Elements
     names: dict[int, str] = field(default_factory=lambda: {MATRIX: "matrix", FIBRE: "fibre"})
+    curves: dict[int, str] = field(default_factory=dict)
 
     def write(self, path: Path) -> None:
-        lines = ["$MeshFormat", "2.2 0 8", "$EndMeshFormat", "$PhysicalNames", str(len(self.names))]
+        lines = ["$MeshFormat", "2.2 0 8", "$EndMeshFormat", "$PhysicalNames"]
+        lines += [str(len(self.names) + len(self.curves))]
+        lines += [f'1 {tag} "{name}"' for tag, name in self.curves.items()]
         lines += [f'2 {tag} "{name}"' for tag, name in self.names.items()]
         lines += ["$EndPhysicalNames", "$Nodes", str(len(self.nodes))]
         lines += [f"{tag} {x!r} {y!r} {z!r}" for tag, (x, y, z) in self.nodes.items()]
@@ -46,6 +49,11 @@ class MshFile:
         """With this element, in place of any of the same tag."""
         element = (kind, physical, physical or 9, tuple(nodes))
         return replace(self, elements={**self.elements, tag: element})
+
+    def with_curve(self, lines: Sequence[tuple[int, int]], name: str = "debonded") -> MshFile:
+        """With lines between pairs of nodes in a physical curve."""
+        elements = {900 + k: (1, CURVE, CURVE, tuple(pair)) for k, pair in enumerate(lines)}
+        return replace(self, elements={**self.elements, **elements}, curves={CURVE: name})
 
 
 def node(i: int, j: int) -> int:
@@ -69,6 +77,15 @@ def grid(fibre: Callable[[float, float], bool] = _middle) -> MshFile:
             elements[first] = (2, phase, phase, (a, b, c))
             elements[first + 1] = (2, phase, phase, (a, c, d))
     return MshFile(nodes, elements)
+
+
+RIGHT_SIDE = ((node(3, 1), node(3, 2)), (node(3, 2), node(3, 3)))
+"""Two lines of the interface of `grid()`, and all of them:"""
+ALL_SIDES = (
+    *RIGHT_SIDE,
+    *((node(1, j), node(1, j + 1)) for j in (1, 2)),
+    *((node(i, j), node(i + 1, j)) for i in (1, 2) for j in (1, 3)),
+)
 
 
 def _reversed(*tags: int) -> MshFile:

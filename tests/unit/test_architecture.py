@@ -17,7 +17,7 @@ LONGEST = 400
 # Each line may import from itself and from the lines above it.
 ROOMS = (
     ("errors",),
-    ("schema", "sections", "material", "case"),
+    ("schema", "sections", "material", "bonding", "case"),
     ("bounds",),
     ("parallel",),
     ("options", "petsc_options", "progress"),
@@ -26,8 +26,8 @@ ROOMS = (
     ("feti",),
     ("interface",),
     ("torn", "homogenization"),
-    ("analysis",),
     ("output",),
+    ("analysis",),
     ("run",),
     ("cli",),
     ("__main__",),

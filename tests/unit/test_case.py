@@ -8,27 +8,15 @@ import pickle
 from pathlib import Path
 
 import pytest
-from unit.faulty_cases import (
-    ANGLE,
-    ARC,
-    BARE_ARC,
-    BASE,
-    FAULTY_CASES,
-    FIBRE,
-    MESH_CELL,
-    PATH,
-    RANDOM,
-    changed,
-    debonded,
-    fibre,
-    of_type,
-)
+from unit.faulty_bonding import ANGLE, ARC, BARE_ARC, FAULTY_BONDINGS, PATH, debonded, of_type
+from unit.faulty_cases import BASE, FAULTY_CASES, FIBRE, MESH_CELL, RANDOM, changed, fibre
 
 from feti_homog.case import check_phases, load, parse
 from feti_homog.errors import CaseError
 from feti_homog.material import General, Isotropic, Orthotropic
 from feti_homog.sections import Angle, Arc, Interface, LoadPath
 
+FAULTY = FAULTY_CASES | FAULTY_BONDINGS
 MESH = changed(MESH_CELL)
 
 
@@ -58,9 +46,9 @@ def test_defaults(tmp_path):
     assert case.warnings() == ()
 
 
-@pytest.mark.parametrize("name", FAULTY_CASES)
+@pytest.mark.parametrize("name", FAULTY)
 def test_fault(tmp_path, name):
-    content, expected = FAULTY_CASES[name]
+    content, expected = FAULTY[name]
     with pytest.raises(CaseError) as caught:
         case_of(tmp_path, content)
     faults = caught.value.faults
@@ -70,17 +58,17 @@ def test_fault(tmp_path, name):
     assert caught.value.exit_code == 2
 
 
-@pytest.mark.parametrize("name", [name for name, (_, expected) in FAULTY_CASES.items() if len(expected) == 1])
+@pytest.mark.parametrize("name", [name for name, (_, expected) in FAULTY.items() if len(expected) == 1])
 def test_one_fault_is_one_line(tmp_path, name):
     with pytest.raises(CaseError) as caught:
-        case_of(tmp_path, FAULTY_CASES[name][0])
+        case_of(tmp_path, FAULTY[name][0])
     # a mistyped key that is required is also missing; a mesh has none of the three keys of the hexagonal cell
     related = {"young_mistyped": 2, "mesh_with_fraction": 3}
     assert len(caught.value.faults) == related.get(name, 1), caught.value.faults
 
 
 def test_there_are_enough_faulty_cases():
-    assert len(FAULTY_CASES) >= 40
+    assert len(FAULTY) == len(FAULTY_CASES) + len(FAULTY_BONDINGS) >= 100
 
 
 def test_file_not_there(tmp_path):

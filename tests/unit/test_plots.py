@@ -12,7 +12,7 @@ from matplotlib.image import imread
 from sample_output import Sample, sample, without_interface
 
 from feti_homog.errors import FetiHomogError
-from feti_homog.output import draw, plots, xdmf
+from feti_homog.output import canvas, draw, plots, xdmf
 from feti_homog.output.fields import FieldFile
 
 
@@ -113,7 +113,7 @@ def test_the_case_chooses_component_and_scale(tmp_path: Path) -> None:
     ],
 )
 def test_the_colour_range(values: Any, expected: tuple[float, float, str, str]) -> None:
-    norm, colours, extend = plots._colours(values)
+    norm, colours, extend = canvas.colour_range(values)
     assert (norm.vmin, norm.vmax) == pytest.approx(expected[:2], abs=0.02)
     assert (colours, extend) == expected[2:]
 
@@ -121,7 +121,7 @@ def test_the_colour_range(values: Any, expected: tuple[float, float, str, str]) 
 @pytest.mark.parametrize(("largest", "scale"), [(1.0, 0.1), (1.2, 0.1), (0.01, 10.0), (0.3e-4, 5e3), (0.0, 1.0)])
 def test_the_deformation_scale(largest: float, scale: float) -> None:
     points = np.array([[0.0, 0.0], [1.0, 2.0]])
-    assert plots._scale(np.array([[largest, 0.0], [0.0, 0.0]]), points) == pytest.approx(scale)
+    assert canvas.magnification(np.array([[largest, 0.0], [0.0, 0.0]]), points) == pytest.approx(scale)
 
 
 def test_no_result_or_a_broken_one(tmp_path: Path) -> None:

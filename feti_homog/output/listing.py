@@ -1,0 +1,75 @@
+"""The lists of points of result.json, `angle` and `path`, as short tables for the printed summary."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+ROWS = 15  # of a path's table
+ENTRIES = {"C11": (0, 0), "C22": (1, 1), "C12": (0, 1), "C33": (2, 2)}
+STRAINS, STRESSES = ("E11", "E22", "gamma12"), ("S11", "S22", "S12")
+STATES = ("bonded", "open", "closed")
+
+Point = Mapping[str, Any]
+
+
+def leading(points: Sequence[Point]) -> int:
+    """The component of strain that is the largest on a path."""
+    largest = [max(abs(point["strain"][i]) for point in points) for i in range(3)]
+    return largest.index(max(largest))
+
+
+def chosen(points: Sequence[Point], rows: int) -> list[int]:
+    """Numbers of at most `rows` points of a path: the first, the last, and between them as evenly as bonds broke."""
+    if len(points) <= rows:
+        return list(range(len(points)))
+    broken = [sum(point["broke"] for point in points[: n + 1]) for n in range(len(points))]
+    least, most = broken[0], broken[-1]
+    wanted = [least + (most - least) * k / (rows - 1) for k in range(1, rows - 1)]
+    between = {min(range(len(points)), key=lambda n: abs(broken[n] - w)) for w in wanted}
+    return sorted(between | {0, len(points) - 1})
+
+
+def angle_table(points: Sequence[Point], stress: str) -> list[str]:
+    """A row for each angle: stiffnesses or stresses, and the states of the interface nodes."""
+    stiff = "stiffness" in points[0]
+    names = tuple(ENTRIES) if stiff else STRESSES
+    lines = [
+        f"{'Stiffness' if stiff else 'Stress'}{stress} against the debonding angle (degrees)",
+        f"{'angle':>9}" + "".join(f"{name:>12}" for name in names) + _heads(),
+    ]
+    for point in points:
+        values = [point["stiffness"][i][j] for i, j in ENTRIES.values()] if stiff else point["stress"]
+        lines.append(f"{point['angle']:>9.5g}" + "".join(map(_number, values)) + _counts(point))
+    return lines
+
+
+def path_table(points: Sequence[Point], stress: str) -> list[str]:
+    """Totals of the path, and rows of some of its points."""
+    which = leading(points)
+    numbers = chosen(points, ROWS)
+    broke, last = sum(point["broke"] for point in points), points[-1]
+    some = "" if len(numbers) == len(points) else f", {len(numbers)} shown"
+    lines = [
+        f"Path{stress}: {len(points)} points{some}; {broke} bonds broke, "
+        f"{last['dissipated']:.6g} dissipated per area",
+        f"{'point':>5}{'load':>10}{STRAINS[which]:>11}" + "".join(f"{name:>11}" for name in STRESSES) + _heads(),
+    ]
+    for number in numbers:
+        point = points[number]
+        values = "".join(_number(value, 11) for value in (point["strain"][which], *point["stress"]))
+        lines.append(f"{number:>5}{point['load_factor']:>10.6f}{values}{_counts(point)}")
+    return lines
+
+
+def _heads() -> str:
+    return "".join(f"{state:>7}" for state in STATES)
+
+
+def _counts(point: Point) -> str:
+    return "".join(f"{point[state]:>7}" for state in STATES)
+
+
+def _number(value: float, width: int = 12) -> str:
+    """The number; what the solver leaves of a zero is one."""
+    return f" {value:>{width - 1}.5g}" if abs(value) > 1e-12 else f"{0:>{width}}"

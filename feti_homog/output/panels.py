@@ -1,0 +1,159 @@
+"""The deformed cell at several states of an angle or path, side by side and as an animation."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from PIL import Image
+
+from feti_homog.output import listing
+from feti_homog.output.canvas import STRESSES, colour_range, lines, load_label, magnification, paint, save, unit_label
+from feti_homog.output.draw import Array, Drawing, drawing, on_nodes, on_triangles, outlines
+from feti_homog.output.faces import WORDS, Faces, legend
+
+PANELS = 6
+FRAMES, FRAME_TIME = 30, 200  # of the animation; milliseconds
+FRAME_LIMIT = 8000  # triangles in a frame
+INCHES = 6.4  # of all panels of a row
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What is the same in every panel."""
+
+    file: Any
+    drawn: Drawing
+    borders: Array
+    faces: Faces
+    component: str
+    norm: Normalize
+    colours: str
+    extend: str
+    scale: float
+
+    @classmethod
+    def of(cls, file: Any, numbers: Sequence[int], output: Mapping[str, Any], true: bool, limit: int) -> Scene:
+        """Colours that suit all these states; the `true` scale of displacements unless the case has another."""
+        drawn = drawing(file, limit)
+        borders = outlines(drawn, drawn.body)
+        strain = np.abs([file[f"state/{n}"].attrs["strain"] for n in numbers]).max(axis=0)
+        component = output.get("stress", "auto")
+        if component not in STRESSES:
+            component = list(STRESSES)[int(np.argmax(strain))]
+        column = list(STRESSES).index(component)
+        states = [file[f"state/{n}"] for n in numbers]
+        norm, colours, extend = colour_range(np.concatenate([on_triangles(s["stress"], column, drawn) for s in states]))
+        automatic = 1.0 if true else min(magnification(on_nodes(s["displacement"], drawn), drawn.points) for s in states)
+        scale = output.get("deformation_scale") or automatic
+        return cls(file, drawn, borders, Faces.of(file, drawn, borders), component, norm, colours, extend, scale)
+
+    def moved(self, number: int) -> Array:
+        """(p, 2) places of the drawn nodes."""
+        places: Array = self.drawn.points + self.scale * on_nodes(self.file[f"state/{number}/displacement"], self.drawn)
+        return places
+
+    def draw(self, axes: Axes, number: int) -> Any:
+        """The deformed cell of a state; returns its coloured triangles."""
+        state, moved = self.file[f"state/{number}"], self.moved(number)
+        stress = on_triangles(state["stress"], list(STRESSES).index(self.component), self.drawn)
+        shapes = paint(axes, self.drawn, moved, stress, edges=False, norm=self.norm, cmap=self.colours)
+        lines(axes, moved[self.borders], "black", 0.5)
+        self.faces.mark(axes, moved, state["status"][:], magnified=0.8)
+        axes.set_aspect("equal")
+        axes.set_axis_off()
+        return shapes
+
+    @property
+    def label(self) -> str:
+        """Of the colour bar."""
+        unit = unit_label(self.file.attrs["stress_unit"]) or "(unit of the moduli)"
+        return f"${STRESSES[self.component]}$ {unit}"
+
+
+def plot(directory: Path, file: Any, document: Mapping[str, Any]) -> list[Path]:
+    """`angle_states.png`, or `path_states.png` and `path.gif`."""
+    output, count = document["case"]["output"], len(file.get("state", ()))
+    if not count:
+        return []
+    if "angle" in document:
+        # The first of the unit cases, if there are three an angle.
+        every = range(0, count, count // len(document["angle"]) or 1)
+        numbers = [every[round(k)] for k in np.linspace(0, len(every) - 1, min(PANELS, len(every)))]
+        true = document["case"]["angle"].get("strain") is not None
+        return [save(_side_by_side(file, numbers, output, true), directory / "angle_states.png")]
+    points = document["path"][:count]
+    paths = [save(_side_by_side(file, listing.chosen(points, PANELS), output, True), directory / "path_states.png")]
+    return [*paths, _animation(file, listing.chosen(points, FRAMES), output, directory / "path.gif")]
+
+
+def _side_by_side(file: Any, numbers: Sequence[int], output: Mapping[str, Any], true: bool) -> Figure:
+    scene = Scene.of(file, numbers, output, true, limit=30_000)
+    size = _extent(scene, numbers)
+    columns = min(len(numbers), max(1, round(math.sqrt(1.4 * len(numbers) * size[1] / size[0]))))
+    rows = -(-len(numbers) // columns)
+    panel = INCHES / columns
+    figure = Figure(figsize=(INCHES + 1.0, rows * (panel * size[1] / size[0] + 0.5) + 0.7), layout="constrained")
+    grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
+    for axes, number in zip(grid, numbers, strict=False):
+        shapes = scene.draw(axes, number)
+        axes.set_title(_title(file[f"state/{number}"]), fontsize=9)
+    for axes in grid[len(numbers) :]:
+        axes.set_axis_off()
+    grid[0].autoscale_view()
+    bar = figure.colorbar(shapes, ax=list(grid), extend=scene.extend, shrink=0.8, aspect=30, pad=0.02)
+    bar.set_label(scene.label)
+    scale = "true scale" if scene.scale == 1 else f"displacement × {scene.scale:g}"
+    figure.suptitle(", ".join(filter(None, (file.attrs["title"], scale))), fontsize=11)
+    found = {int(kind) for n in numbers for kind in np.unique(scene.faces.state(file[f"state/{n}/status"][:]))}
+    handles = legend([kind for kind in WORDS if kind in found])
+    if handles:
+        figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False)
+    return figure
+
+
+def _animation(file: Any, numbers: Sequence[int], output: Mapping[str, Any], path: Path) -> Path:
+    scene = Scene.of(file, numbers, output, True, limit=FRAME_LIMIT)
+    size = _extent(scene, numbers)
+    figure = Figure(figsize=(3.6, 3.6 * size[1] / size[0] + 0.7), dpi=100, layout="constrained")
+    canvas, axes = FigureCanvasAgg(figure), figure.subplots()
+    low, high = _corners(scene, numbers)
+    frames = []
+    for number in numbers:
+        axes.clear()
+        scene.draw(axes, number)
+        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+        axes.set_title(_title(file[f"state/{number}"]), fontsize=8)
+        canvas.draw()
+        picture = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
+        frames.append(picture.quantize(64, dither=Image.Dither.NONE))
+    times = [FRAME_TIME] * (len(frames) - 1) + [6 * FRAME_TIME]
+    frames[0].save(path, save_all=True, append_images=frames[1:], duration=times, loop=0, optimize=True)
+    return path
+
+
+def _title(state: Any) -> str:
+    attributes = state.attrs
+    return f"{attributes['label']}\n{load_label(attributes['strain'])}"
+
+
+def _extent(scene: Scene, numbers: Sequence[int]) -> Array:
+    low, high = _corners(scene, numbers)
+    size: Array = high - low
+    return size
+
+
+def _corners(scene: Scene, numbers: Sequence[int]) -> tuple[Array, Array]:
+    """Lower left and upper right corner of all states."""
+    places = [scene.moved(number) for number in numbers]
+    low, high = np.min([p.min(axis=0) for p in places], axis=0), np.max([p.max(axis=0) for p in places], axis=0)
+    margin = 0.02 * (high - low)
+    return low - margin, high + margin

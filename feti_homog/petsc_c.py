@@ -1,0 +1,44 @@
+"""The few functions of PETSc's C interface that petsc4py 3.18 does not bind.
+
+petsc4py's extension module resolves PETSc's symbols, so no library has to be found.
+"""
+
+from __future__ import annotations
+
+import ctypes
+
+import numpy as np
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+Float = NDArray[np.float64]
+Pointer = ctypes.c_void_p
+
+
+def option_was_used(name: str) -> bool:
+    """Whether any object has read the option `name` (without dash)."""
+    used = ctypes.c_int()
+    _call("PetscOptionsUsed", None, name.encode(), ctypes.byref(used))
+    return bool(used.value)
+
+
+def set_schur(factor: PETSc.Mat, rows: PETSc.IS) -> None:
+    """Ask the factor matrix, before it is factored, to leave the Schur complement on `rows`."""
+    _call("MatFactorSetSchurIS", Pointer(factor.handle), Pointer(rows.handle))
+
+
+def schur_complement(factor: PETSc.Mat, size: int) -> Float:
+    """The dense (size, size) Schur complement that a symmetric factorization has left."""
+    schur, values = Pointer(), ctypes.POINTER(ctypes.c_double)()
+    _call("MatFactorCreateSchurComplement", Pointer(factor.handle), ctypes.byref(schur), None)
+    try:
+        _call("MatDenseGetArrayRead", schur, ctypes.byref(values))
+        return np.ctypeslib.as_array(values, (size, size)).copy()
+    finally:
+        _call("MatDestroy", ctypes.byref(schur))
+
+
+def _call(function: str, *arguments: object) -> None:
+    code = getattr(ctypes.CDLL(PETSc.__file__), function)(*arguments)
+    if code:
+        raise PETSc.Error(code)

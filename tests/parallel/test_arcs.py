@@ -1,0 +1,188 @@
+"""Which nodes are debonded from the start, at any number of ranks, bodies and pieces."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cells import FIBRE, MATRIX
+from petsc4py import PETSc
+from support import parallel_assert
+from unit.faulty_meshes import ALL_SIDES, RIGHT_SIDE, grid
+
+from feti_homog import case as cases
+from feti_homog.cell.arrangement import arrange
+from feti_homog.errors import CaseError
+from feti_homog.progress import Progress
+from feti_homog.torn import coarse_mesh, tear
+
+pytestmark = pytest.mark.parallel
+
+CIRCULAR = {"geometry": "hexagonal", "fibre_fraction": 0.4, "mesh_size": 0.2}
+SQUARE = CIRCULAR | {"geometry": "square"}
+RANDOM = CIRCULAR | {"geometry": "random", "fibres": 5, "fibre_fraction": 0.45, "min_gap": 0.15, "seed": 3}
+ARC = {"fibre": "all", "angle": 60.0}
+
+
+def case_of(cell, debonded, folder=".", subdomains=None, **sections):
+    document = {
+        "cell": cell,
+        "material": {"matrix": MATRIX, "fibre": FIBRE},
+        "analysis": {"type": "angle" if "angle" in sections else "stiffness", "plane": "strain"},
+        "interface": {"debonded": debonded},
+        "decomposition": {"subdomains": subdomains} if subdomains else {},
+    }
+    return cases.parse(document | sections, Path(folder))
+
+
+def torn(case, comm):
+    """The torn cell; number, direction and state of all interface nodes by the opening, on every rank."""
+    PETSc.garbage_cleanup(comm)
+    cell = tear(case, comm, Progress(comm, quiet=True))
+    number = cell.solver.constraints.nodes.fibre - cell.plan.first_fibre + 1
+
+    def nodes(opening=None):
+        parts = comm.allgather((number, cell.directions, cell.debonded(opening)))
+        return [np.concatenate(p) for p in zip(*parts, strict=True)]
+
+    return cell, nodes
+
+
+def edges_inside(case, arcs):
+    """For each fibre with arcs (centre, angle): its coarse edges on the torus whose middle is within one of them."""
+    mesh, arrangement = coarse_mesh(case), arrange(case.cell)
+    size = np.array([mesh.width, mesh.height])
+    middle = mesh.points[mesh.arc_edges].mean(axis=1)
+    found = {}
+    for fibre, own in arcs.items():
+        offset = middle - arrangement.centres[fibre - 1]
+        offset -= np.round(offset / size) * size
+        on_fibre = np.linalg.norm(offset, axis=1) < arrangement.radii[fibre - 1]
+        angle = np.degrees(np.arctan2(offset[:, 1], offset[:, 0]))
+        away = [np.abs((angle - centre + 180) % 360 - 180) < opening / 2 for centre, opening in own]
+        found[fibre] = [np.count_nonzero(on_fibre & within) for within in away]
+    return found
+
+
+def check(comm, case, nodes, cell, arcs, opening=None):
+    """Tips are bonded nodes, and a chain of e edges of M intervals has e M - 1 debonded nodes."""
+    number, direction, state = nodes(opening)
+    edges = comm.bcast(edges_inside(case, arcs) if comm.rank == 0 else None)
+    for fibre in range(1, len(cell.plan.centres) - cell.plan.first_fibre + 1):
+        own = number == fibre
+        for centre, angle in arcs.get(fibre, []):
+            for tip in (centre - angle / 2, centre + angle / 2):
+                away = np.abs((direction[own] - tip + 180) % 360 - 180)
+                parallel_assert(comm, away.min() < 1e-9 and not state[own][np.argmin(away)], f"{fibre}, {tip}")
+        chains = edges.get(fibre, [])
+        expected = sum(e * cell.lattice.intervals - 1 for e in chains)
+        parallel_assert(comm, np.count_nonzero(state[own]) == expected, f"fibre {fibre}")
+        parallel_assert(comm, min(chains, default=1) > 0, f"fibre {fibre}")
+
+
+@pytest.mark.parametrize("bodies", ["torus", "plane"])
+@pytest.mark.parametrize("mesh", [{"order": 1, "refine": 1}, {"order": 2}])
+@pytest.mark.parametrize("cell", [SQUARE, CIRCULAR, RANDOM], ids=["square", "hexagonal", "random"])
+def test_tips_are_nodes_and_stay_bonded(comm, cell, mesh, bodies):
+    case = case_of(cell | mesh | {"bodies": bodies}, [ARC])
+    cell, nodes = torn(case, comm)
+    fibres = len(cell.plan.centres) - cell.plan.first_fibre
+    check(comm, case, nodes, cell, {fibre: [(0.0, 60.0)] for fibre in range(1, fibres + 1)})
+
+
+def test_several_arcs_on_chosen_fibres(comm):
+    arcs = [
+        {"fibre": [1, 4], "angle": 40.0, "centre": 200.0},
+        {"fibre": 4, "angle": 30.0},
+        {"fibre": 2, "angle": 100.0, "centre": -170.0},
+    ]
+    case = case_of(RANDOM, arcs, subdomains=9)
+    cell, nodes = torn(case, comm)
+    check(comm, case, nodes, cell, {1: [(200.0, 40.0)], 2: [(-170.0, 100.0)], 4: [(200.0, 40.0), (0.0, 30.0)]})
+    number, _, state = nodes()
+    parallel_assert(comm, not state[np.isin(number, [3, 5])].any())
+
+
+def test_every_opening_has_its_tips(comm):
+    openings = [0.0, 30.0, 75.0, 180.0, 359.0, 360.0]
+    case = case_of(CIRCULAR, [{"fibre": 2, "centre": 20.0}], angle={"values": openings})
+    cell, nodes = torn(case, comm)
+    for opening in openings[1:-1]:
+        check(comm, case, nodes, cell, {2: [(20.0, opening)]}, opening)
+    for opening in (0.0, 360.0):
+        number, _, state = nodes(opening)
+        parallel_assert(comm, bool(np.all(state == ((opening > 0) & (number == 2)))))
+
+
+def test_a_tip_beside_a_crossing_is_the_crossing(comm):
+    """The side of the cell crosses the fibre at its corner at 90 degrees, which becomes the tip."""
+    case = case_of(CIRCULAR, [{"fibre": 1, "centre": 60.0, "angle": 60.04}])
+    _, nodes = torn(case, comm)
+    number, direction, state = nodes()
+    near = (number == 1) & (np.abs(direction - 90.0) < 1e-9)
+    parallel_assert(comm, near.sum() == 1 and not state[near].any())
+    inside = (number == 1) & (direction > 29.99) & (direction < 89.9)
+    parallel_assert(comm, np.array_equal(np.flatnonzero(state), np.flatnonzero(inside)))
+
+
+@pytest.mark.parametrize("bodies", ["torus", "plane"])
+@pytest.mark.parametrize(("order", "refine"), [(1, 0), (2, 0), (2, 1)])
+def test_debonded_curve_of_a_mesh(comm, shared_path, order, refine, bodies):
+    cell = {"geometry": "mesh", "file": "grid.msh", "order": order, "refine": refine, "bodies": bodies}
+    for lines, vertices in ((RIGHT_SIDE, 1), (ALL_SIDES, 8)):
+        if comm.rank == 0:
+            grid().with_curve(lines).write(shared_path / "grid.msh")
+        comm.barrier()
+        torn_cell, nodes = torn(case_of(cell, [], shared_path, 3), comm)
+        _, direction, state = nodes()
+        inner = len(lines) * (torn_cell.lattice.intervals - 1)
+        parallel_assert(comm, np.count_nonzero(state) == inner + vertices)
+        if lines == RIGHT_SIDE:
+            parallel_assert(comm, bool(np.all(np.abs(direction[state]) < 44.99)))
+        comm.barrier()
+
+
+def test_curve_and_arcs_go_together(comm, shared_path):
+    if comm.rank == 0:
+        grid().with_curve(RIGHT_SIDE).write(shared_path / "grid.msh")
+    comm.barrier()
+    cell = {"geometry": "mesh", "file": "grid.msh"}
+    _, nodes = torn(case_of(cell, [{"fibre": 1, "centre": 180.0, "angle": 10.0}], shared_path), comm)
+    _, direction, state = nodes()
+    found = np.round(np.abs(np.sort(direction[state])), 9).tolist()
+    parallel_assert(comm, found in ([0.0, 180.0], [180.0, 0.0]))
+    comm.barrier()
+
+
+def test_without_an_interface_section_all_is_bonded(comm, shared_path):
+    if comm.rank == 0:
+        grid().with_curve(RIGHT_SIDE).write(shared_path / "grid.msh")
+    comm.barrier()
+    case = case_of({"geometry": "mesh", "file": "grid.msh"}, [], shared_path)
+    document = {name: section for name, section in case.resolved().items() if name != "interface"}
+    _, nodes = torn(cases.parse(document, shared_path), comm)
+    parallel_assert(comm, not nodes()[2].any())
+    comm.barrier()
+
+
+def test_arcs_of_fibres_that_are_not_there(comm):
+    arcs = [{"fibre": [1, 7], "angle": 60.0}, {"fibre": 6, "angle": 60.0}, {"fibre": 5, "angle": 60.0}]
+    with pytest.raises(CaseError) as caught:
+        tear(case_of(RANDOM, arcs), comm, Progress(comm, quiet=True))
+    first, second = caught.value.faults
+    expected = "expected at most 5; the cell has 5 fibres, counted from 1"
+    assert first == f"[interface] debonded[0].fibre = [1, 7]: {expected}"
+    assert second == f"[interface] debonded[1].fibre = 6: {expected}"
+
+
+def test_arcs_of_a_fibre_without_centre(comm, shared_path):
+    if comm.rank == 0:
+        grid(lambda x, y: abs(y - 0.5) < 0.25).write(shared_path / "grid.msh")
+    comm.barrier()
+    cell = {"geometry": "mesh", "file": "grid.msh"}
+    with pytest.raises(CaseError, match=r'^\[interface\] debonded\[0\].fibre = "all": fibre 1 has no centre, for it'):
+        tear(case_of(cell, [ARC], shared_path), comm, Progress(comm, quiet=True))
+    _, nodes = torn(case_of(cell, [ARC | {"angle": 360.0}], shared_path), comm)
+    parallel_assert(comm, len(nodes()[2]) == 8 and bool(nodes()[2].all()))
+    comm.barrier()
