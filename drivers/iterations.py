@@ -33,7 +33,7 @@ def main(words: Sequence[str], comm: Intracomm) -> int:
             },
             "material": {"matrix": {"young": 88.0, "poisson": 0.299}, "fibre": {"young": 200.0, "poisson": 0.222}},
             "analysis": {"type": "stiffness", "plane": "strain"},
-            "output": {"fields": False},
+            "output": {"fields": False, "pictures": False},
             "petsc": {"feti_ksp_rtol": 1e-10},
         }  # fmt: skip
         start = time.perf_counter()

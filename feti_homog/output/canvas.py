@@ -20,6 +20,7 @@ from feti_homog.output.draw import Array, Drawing
 
 STRAINS = (r"E_{11}", r"E_{22}", r"\gamma_{12}")
 STRESSES = {"S11": r"\sigma_{11}", "S22": r"\sigma_{22}", "S12": r"\sigma_{12}"}
+SAME = 1e-6  # values that differ by less, relatively, are one
 SIDE = 4.8  # inches, the longer side of a drawn cell
 STYLE = {"font.size": 10, "axes.titlesize": 11, "axes.linewidth": 0.8, "savefig.dpi": 200}
 
@@ -65,21 +66,31 @@ def lines(axes: Axes, segments: Array, colour: str, width: float, cap: Literal["
 
 
 def colour_range(values: Array) -> tuple[Normalize, str, str]:
-    """Colour range, map and the ends at which values lie outside; the extreme 0.5 % may, at either end."""
+    """Colour range, map and the ends at which values lie outside; zero is white if both signs matter."""
+    norm, extend = value_range(values)
+    least, most = float(norm.vmin or 0.0), float(norm.vmax or 0.0)
+    if min(-least, most) <= 0.05 * max(-least, most) or np.ptp(values) <= SAME * np.abs(values).max():
+        return norm, "viridis", extend
+    most = max(-least, most)
+    return Normalize(-most, most), "RdBu_r", _outside(values, -most, most)
+
+
+def value_range(values: Array) -> tuple[Normalize, str]:
+    """Colour range and the ends at which values lie outside; the extreme 0.5 % may, at either end."""
     low, high = float(values.min()), float(values.max())
-    least, most = (float(value) for value in np.percentile(values, (0.5, 99.5)))
-    if high - low <= 1e-6 * max(abs(low), abs(high), 1e-300):
+    if high - low <= SAME * max(abs(low), abs(high), 1e-300):
         middle = 0.5 * (low + high)
         half = 0.5 * (abs(middle) or 1.0)
-        return Normalize(middle - half, middle + half), "viridis", "neither"
+        return Normalize(middle - half, middle + half), "neither"
+    least, most = (float(value) for value in np.percentile(values, (0.5, 99.5)))
     slack = 0.05 * (most - least)
     least, most = (low if least - low < slack else least), (high if high - most < slack else most)
-    colours = "viridis"
-    if min(-least, most) > 0.05 * max(-least, most):
-        colours, most = "RdBu_r", max(-least, most)
-        least = -most
-    extend = {(0, 0): "neither", (1, 0): "min", (0, 1): "max", (1, 1): "both"}[low < least, high > most]
-    return Normalize(least, most), colours, extend
+    return Normalize(least, most), _outside(values, least, most)
+
+
+def _outside(values: Array, least: float, most: float) -> str:
+    ends = (bool(values.min() < least), bool(values.max() > most))
+    return {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}[ends]
 
 
 def magnification(displacement: Array, points: Array) -> float:

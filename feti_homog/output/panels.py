@@ -11,19 +11,19 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from PIL import Image
 
 from feti_homog.output import listing
-from feti_homog.output.canvas import STRESSES, colour_range, lines, load_label, magnification, paint, save, unit_label
+from feti_homog.output.canvas import STRESSES, lines, load_label, magnification, paint, save, unit_label, value_range
 from feti_homog.output.draw import Array, Drawing, drawing, on_nodes, on_triangles, outlines
 from feti_homog.output.faces import WORDS, Faces, legend
 
 PANELS = 6
-FRAMES, FRAME_TIME = 30, 200  # of the animation; milliseconds
+FRAMES, FRAME_TIME = 24, 250  # of the animation; milliseconds
 FRAME_LIMIT = 8000  # triangles in a frame
-INCHES = 6.4  # of all panels of a row
+INCHES, BAR = 8.0, 0.55  # of all panels of a row, and of the colour bar in each
 
 
 @dataclass(frozen=True)
@@ -35,48 +35,50 @@ class Scene:
     borders: Array
     faces: Faces
     component: str
-    norm: Normalize
-    colours: str
-    extend: str
     scale: float
 
     @classmethod
     def of(cls, file: Any, numbers: Sequence[int], output: Mapping[str, Any], true: bool, limit: int) -> Scene:
-        """Colours that suit all these states; the `true` scale of displacements unless the case has another."""
+        """The stress that suits all these states; the `true` scale of displacements unless the case has another."""
         drawn = drawing(file, limit)
         borders = outlines(drawn, drawn.body)
         strain = np.abs([file[f"state/{n}"].attrs["strain"] for n in numbers]).max(axis=0)
         component = output.get("stress", "auto")
         if component not in STRESSES:
             component = list(STRESSES)[int(np.argmax(strain))]
-        column = list(STRESSES).index(component)
         states = [file[f"state/{n}"] for n in numbers]
-        norm, colours, extend = colour_range(np.concatenate([on_triangles(s["stress"], column, drawn) for s in states]))
         automatic = 1.0 if true else min(magnification(on_nodes(s["displacement"], drawn), drawn.points) for s in states)
         scale = output.get("deformation_scale") or automatic
-        return cls(file, drawn, borders, Faces.of(file, drawn, borders), component, norm, colours, extend, scale)
+        return cls(file, drawn, borders, Faces.of(file, drawn, borders), component, scale)
 
     def moved(self, number: int) -> Array:
         """(p, 2) places of the drawn nodes."""
         places: Array = self.drawn.points + self.scale * on_nodes(self.file[f"state/{number}/displacement"], self.drawn)
         return places
 
-    def draw(self, axes: Axes, number: int) -> Any:
-        """The deformed cell of a state; returns its coloured triangles."""
+    def draw(self, axes: Axes, number: int) -> None:
+        """The deformed cell of a state with its own range of colours: stresses grow along a path."""
         state, moved = self.file[f"state/{number}"], self.moved(number)
         stress = on_triangles(state["stress"], list(STRESSES).index(self.component), self.drawn)
-        shapes = paint(axes, self.drawn, moved, stress, edges=False, norm=self.norm, cmap=self.colours)
+        norm, extend = value_range(stress)
+        shapes = paint(axes, self.drawn, moved, stress, edges=False, norm=norm, cmap="viridis")
         lines(axes, moved[self.borders], "black", 0.5)
         self.faces.mark(axes, moved, state["status"][:], magnified=0.8)
         axes.set_aspect("equal")
         axes.set_axis_off()
-        return shapes
+        attributes = state.attrs
+        axes.set_title(f"{attributes['label']}\n{load_label(attributes['strain'])}", fontsize=9)
+        bar = axes.figure.colorbar(shapes, cax=axes.inset_axes((1.02, 0.1, 0.035, 0.8)), extend=extend)
+        bar.ax.tick_params(labelsize=7, pad=1, length=2)
+        bar.locator = MaxNLocator(5)
+        bar.outline.set_linewidth(0.5)
 
     @property
-    def label(self) -> str:
-        """Of the colour bar."""
+    def words(self) -> str:
+        """What is drawn."""
         unit = unit_label(self.file.attrs["stress_unit"]) or "(unit of the moduli)"
-        return f"${STRESSES[self.component]}$ {unit}"
+        scale = "true scale" if self.scale == 1 else f"displacement × {self.scale:g}"
+        return f"${STRESSES[self.component]}$ {unit}, {scale}"
 
 
 def plot(directory: Path, file: Any, document: Mapping[str, Any]) -> list[Path]:
@@ -98,21 +100,17 @@ def plot(directory: Path, file: Any, document: Mapping[str, Any]) -> list[Path]:
 def _side_by_side(file: Any, numbers: Sequence[int], output: Mapping[str, Any], true: bool) -> Figure:
     scene = Scene.of(file, numbers, output, true, limit=30_000)
     size = _extent(scene, numbers)
-    columns = min(len(numbers), max(1, round(math.sqrt(1.4 * len(numbers) * size[1] / size[0]))))
-    rows = -(-len(numbers) // columns)
-    panel = INCHES / columns
-    figure = Figure(figsize=(INCHES + 1.0, rows * (panel * size[1] / size[0] + 0.5) + 0.7), layout="constrained")
+    rows = max(1, round(math.sqrt(0.7 * len(numbers) * size[0] / size[1])))
+    columns = -(-len(numbers) // rows)
+    panel = (INCHES - BAR * columns) / columns
+    figure = Figure(figsize=(INCHES, rows * (panel * size[1] / size[0] + 0.5) + 0.7), layout="constrained")
     grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
     for axes, number in zip(grid, numbers, strict=False):
-        shapes = scene.draw(axes, number)
-        axes.set_title(_title(file[f"state/{number}"]), fontsize=9)
+        scene.draw(axes, number)
     for axes in grid[len(numbers) :]:
         axes.set_axis_off()
     grid[0].autoscale_view()
-    bar = figure.colorbar(shapes, ax=list(grid), extend=scene.extend, shrink=0.8, aspect=30, pad=0.02)
-    bar.set_label(scene.label)
-    scale = "true scale" if scene.scale == 1 else f"displacement × {scene.scale:g}"
-    figure.suptitle(", ".join(filter(None, (file.attrs["title"], scale))), fontsize=11)
+    figure.suptitle(f"{file.attrs['title']}: {scene.words}".lstrip(": "), fontsize=11)
     found = {int(kind) for n in numbers for kind in np.unique(scene.faces.state(file[f"state/{n}/status"][:]))}
     handles = legend([kind for kind in WORDS if kind in found])
     if handles:
@@ -123,26 +121,21 @@ def _side_by_side(file: Any, numbers: Sequence[int], output: Mapping[str, Any], 
 def _animation(file: Any, numbers: Sequence[int], output: Mapping[str, Any], path: Path) -> Path:
     scene = Scene.of(file, numbers, output, True, limit=FRAME_LIMIT)
     size = _extent(scene, numbers)
-    figure = Figure(figsize=(3.6, 3.6 * size[1] / size[0] + 0.7), dpi=100, layout="constrained")
-    canvas, axes = FigureCanvasAgg(figure), figure.subplots()
+    figure = Figure(figsize=(3.6 + BAR, 3.6 * size[1] / size[0] + 0.7), dpi=100, layout="constrained")
+    canvas = FigureCanvasAgg(figure)
     low, high = _corners(scene, numbers)
     frames = []
     for number in numbers:
-        axes.clear()
+        figure.clear()
+        axes = figure.subplots()
         scene.draw(axes, number)
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-        axes.set_title(_title(file[f"state/{number}"]), fontsize=8)
         canvas.draw()
         picture = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
-        frames.append(picture.quantize(64, dither=Image.Dither.NONE))
+        frames.append(picture.quantize(128, dither=Image.Dither.NONE))
     times = [FRAME_TIME] * (len(frames) - 1) + [6 * FRAME_TIME]
     frames[0].save(path, save_all=True, append_images=frames[1:], duration=times, loop=0, optimize=True)
     return path
-
-
-def _title(state: Any) -> str:
-    attributes = state.attrs
-    return f"{attributes['label']}\n{load_label(attributes['strain'])}"
 
 
 def _extent(scene: Scene, numbers: Sequence[int]) -> Array:

@@ -90,7 +90,7 @@ def _labels(file: Any, figure: Figure, grid: Any, names: list[str]) -> None:
     for axes in grid[-1]:
         axes.set_xlabel("direction of the normal (degrees)")
     for axes in grid[0]:
-        axes.legend(frameon=False, fontsize=9, loc="upper right", ncols=2)
+        axes.legend(frameon=False, fontsize=9, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.1, ncols=2)
     patches = [Patch(color=COLOURS[kind], alpha=0.18, linewidth=0, label=WORDS[kind]) for kind in (OPEN, CLOSED)]
     figure.legend(handles=patches, loc="outside lower center", ncols=2, frameon=False)
     first, last = (file[f"state/{name}"].attrs for name in (names[0], names[-1]))

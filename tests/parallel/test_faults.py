@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 from support import parallel_assert
+from unit.faulty_bonding import FAULTY_BONDINGS
 from unit.faulty_cases import BASE, FAULTY_CASES
 from unit.faulty_meshes import FAULTY_MESHES
 
@@ -11,6 +12,7 @@ from feti_homog import cli
 
 pytestmark = pytest.mark.parallel
 
+FAULTY = FAULTY_CASES | FAULTY_BONDINGS
 CELL = 'geometry = "hexagonal"\nfibre_fraction = 0.4\nmesh_size = 0.05'
 MESH_CASE = BASE.replace(CELL, 'geometry = "mesh"\nfile = "faulty.msh"')
 RANDOM = 'geometry = "random"\nfibres = 30\n'
@@ -20,9 +22,9 @@ BY_CASE = {"missing file": "no such file"}
 
 
 @pytest.mark.parametrize("command", ["run", "check"])
-@pytest.mark.parametrize("name", FAULTY_CASES)
+@pytest.mark.parametrize("name", FAULTY)
 def test_faulty_case(comm, shared_path, capsys, command, name):
-    content, expected = FAULTY_CASES[name]
+    content, expected = FAULTY[name]
     if comm.rank == 0:
         (shared_path / "cell.toml").write_text(content, encoding="utf-8")
     refused(comm, shared_path, capsys, command, expected)
@@ -55,7 +57,7 @@ def test_cell_that_cannot_be_made(comm, shared_path, capsys, cell, message):
 
 
 def test_there_are_enough_faults():
-    assert len(FAULTY_CASES) + len(FAULTY_MESHES) >= 40
+    assert len(FAULTY) + len(FAULTY_MESHES) >= 40
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,91 @@
+"""Fig. 3 of the paper: response of the hexagonal cell (38) with 40 % of fibres against the debonding angle.
+
+    mpirun -n 2 .venv/bin/python drivers/debonding_angle.py --out results/debonding_angle
+
+a: L^ef in plane strain and plane stress, debonded faces overlapping freely.
+b: Sigma in plane strain under E = [0, 0, 0.2] (40), with and without contact.
+
+Convention: every fibre has one debonded arc, centred on the positive x1 axis through its own centre; the angle is the
+arc's whole opening in degrees, measured at that centre.  0 is perfect bonding, 360 a loose fibre.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import figures
+import numpy as np
+from figures import INK
+from mpi4py.MPI import Intracomm
+
+from feti_homog.cli import launch, parsed
+
+SHEAR = [0.0, 0.0, 0.2]
+STIFFNESSES = {"11": (0, 0), "22": (1, 1), "12": (0, 1), "33": (2, 2)}
+STRESSES = ("11", "22", "12")
+PLANES = {"strain": "--", "stress": "-."}
+CONTACT = {"with contact": "-", "without contact": "--"}
+
+
+def main(words: Sequence[str], comm: Intracomm) -> int:
+    options = figures.parser(__doc__ or "", "debonding_angle", mesh_size=0.06, refine=0, order=2)
+    options.add_argument("--step", type=float, default=15.0, help="of the angle, in degrees")
+    given = parsed(options, words, comm)
+    angles = [*np.arange(0.0, 360.0, 90.0 if given.quick else given.step).tolist(), 360.0]
+
+    def points(name: str, plane: str, contact: bool, **load: Any) -> list[dict[str, Any]]:
+        document = figures.solved(
+            given, comm, name, "hexagonal", figures.EQUATION_38,
+            analysis={"type": "angle", "plane": plane},
+            interface={"contact": contact, "debonded": [{"fibre": "all", "centre": 0.0}]},
+            angle={"values": angles, **load},
+        )  # fmt: skip
+        return list(document["angle"])
+
+    i, j = np.array(list(STIFFNESSES.values())).T
+    free = {p: np.array([np.array(q["stiffness"])[i, j] for q in points(f"plane {p}", p, False)]) for p in PLANES}
+    shear = {
+        word: np.array([q["stress"] for q in points(f"shear {word}", "strain", word == "with contact", strain=SHEAR)])
+        for word in CONTACT
+    }
+    return figures.finish(comm, write, given.out, angles, free, shear)
+
+
+def write(folder: Path, angles: list[float], free: dict[str, Any], shear: dict[str, Any]) -> list[Path]:
+    """debonding_angle.csv and debonding_angle.png."""
+    from matplotlib.figure import Figure
+
+    header = ["angle", *(f"L{e} plane {plane}" for plane in free for e in STIFFNESSES)]
+    header += [f"S{e} {word}" for word in shear for e in STRESSES]
+    rows = np.column_stack([angles, *free.values(), *shear.values()]).tolist()
+    figure = Figure(figsize=(9.6, 4.2), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    _curves(left, angles, free, PLANES, "L", list(STIFFNESSES), "plane ")
+    left.set(title="a. effective stiffness, no contact", ylabel="effective stiffness (GPa)", ylim=(0, None))
+    _curves(right, angles, shear, CONTACT, r"\Sigma", STRESSES, "")
+    right.set(title=r"b. $E = [0, 0, 0.2]$, plane strain", ylabel="macroscopic stress (GPa)")
+    figure.savefig(folder / "debonding_angle.png")
+    return [figures.tabulate(folder / "debonding_angle.csv", header, rows), folder / "debonding_angle.png"]
+
+
+def _curves(
+    axes: Any, angles: list[float], values: dict[str, Any], styles: dict[str, str], letter: str,
+    entries: Sequence[str], prefix: str,
+) -> None:  # fmt: skip
+    """A colour an entry, a line style a case."""
+    for entry, ink in zip(entries, INK, strict=False):
+        axes.plot([], [], color=ink, label=f"${letter}_{{{entry}}}$")
+    for name, style in styles.items():
+        for column, ink in zip(values[name].T, INK, strict=False):
+            axes.plot(angles, column, style, color=ink, linewidth=1.6)
+        axes.plot([], [], style, color="0.3", label=f"{prefix}{name}")
+    axes.set(xlabel="debonding angle (degrees)", xlim=(0, 360), xticks=range(0, 361, 60))
+    axes.grid(color="0.92", linewidth=0.6)
+    axes.legend(frameon=False, fontsize=9)
+
+
+if __name__ == "__main__":
+    sys.exit(launch(main))

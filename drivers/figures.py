@@ -1,0 +1,75 @@
+"""What the drivers of the paper's Figures 3 to 5 share: options, cases, tables."""
+
+from __future__ import annotations
+
+import argparse
+import csv
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from mpi4py.MPI import Intracomm
+
+from feti_homog.cli import Parser
+
+EQUATION_38 = {"matrix": {"young": 88.0, "poisson": 0.299}, "fibre": {"young": 200.0, "poisson": 0.222}}  # GPa
+EQUATION_42 = {"matrix": {"young": 100.0, "poisson": 0.4}, "fibre": {"young": 500.0, "poisson": 0.2}}  # GPa
+STYLE = {"font.size": 10, "savefig.dpi": 200, "axes.spines.top": False, "axes.spines.right": False}
+INK = ("#1f4e9c", "#c44e00", "#2a7f3f", "#7a3e9d")
+
+
+def parser(description: str, name: str, mesh_size: float, refine: int, order: int) -> Parser:
+    """The options that they all have; results go to results/`name` by default."""
+    options = Parser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options.add_argument("--out", type=Path, default=Path("results") / name, metavar="DIR")
+    options.add_argument("--mesh-size", type=float, default=mesh_size, help="coarse element size / cell width")
+    options.add_argument("--refine", type=int, default=refine, help="times that every element is cut in four")
+    options.add_argument("--order", type=int, default=order, choices=(1, 2), help="of the elements; 2 are curved")
+    options.add_argument("--fibre-fraction", type=float, default=0.4)
+    options.add_argument("--fields", action="store_true", help="write fields and pictures of every case")
+    options.add_argument("--quick", action="store_true", help="a coarse mesh and few points")
+    return options
+
+
+def solved(
+    options: argparse.Namespace, comm: Intracomm, name: str, geometry: str, material: Mapping[str, Any], **rest: Any
+) -> dict[str, Any]:
+    """result.json, on every rank, of the case `name`, in a folder of its own; `rest` are its other sections."""
+    from feti_homog.case import parse
+    from feti_homog.output import results
+    from feti_homog.parallel import on_root
+    from feti_homog.run import run
+
+    cell = {
+        "geometry": geometry,
+        "fibre_fraction": options.fibre_fraction,
+        "mesh_size": 0.15 if options.quick else options.mesh_size,
+        "refine": 0 if options.quick else options.refine,
+        "order": options.order,
+    }
+    output = {"stress_unit": "GPa", "fields": options.fields, "pictures": options.fields}
+    case = parse({"name": name, "cell": cell, "material": dict(material), "output": output, **rest}, Path())
+    folder = options.out / name.replace(" ", "_")
+    run(case, folder, comm, quiet=True)
+    return on_root(comm, results.read, folder)
+
+
+def tabulate(path: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> Path:
+    """Write a table."""
+    with path.open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.writer(stream)
+        writer.writerow(header)
+        writer.writerows(rows)
+    return path
+
+
+def finish(comm: Intracomm, write: Callable[..., list[Path]], *args: Any) -> int:
+    """Let rank 0 write its files and tell which; the exit code."""
+    import matplotlib as mpl
+
+    from feti_homog.parallel import on_root_only
+
+    with mpl.rc_context(STYLE):
+        for path in on_root_only(comm, write, *args) or []:
+            print(path)
+    return 0

@@ -1,0 +1,75 @@
+"""Fig. 5 of the paper: stress-strain curves of a single-fibre cell (42) that debonds under E = [0.2, 0, 0] (41).
+
+    mpirun -n 2 .venv/bin/python drivers/stress_strain.py --out results/stress_strain
+
+Plane stress, 40 % of fibres, contact after debonding.  Each curve is for one pair of strengths R^n, R^t, tractions in
+GPa.  Thick: the strain only rises, so the stress drops where bonds break; thin: all equilibria, snap-back included.
+After its first drop a curve depends on the mesh: the mesh is in the title, compare others with --mesh-size.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import figures
+import numpy as np
+from figures import INK
+from mpi4py.MPI import Intracomm
+
+from feti_homog.cli import launch, parsed
+
+STRENGTHS = [(5.0, 5.0), (10.0, 10.0), (10.0, 5.0), (5.0, 1.5)]  # GPa: R^n, R^t
+STRAIN = [0.2, 0.0, 0.0]
+COLUMNS = ("Rn", "Rt", "load_factor", "E11", "S11", "S22", "S12", "bonded", "open", "closed", "dissipated")
+
+
+def main(words: Sequence[str], comm: Intracomm) -> int:
+    options = figures.parser(__doc__ or "", "stress_strain", mesh_size=0.06, refine=0, order=1)
+    given = parsed(options, words, comm)
+    curves = {}
+    for normal, tangential in STRENGTHS[:2] if given.quick else STRENGTHS:
+        document = figures.solved(
+            given, comm, f"Rn {normal:g} Rt {tangential:g}", "square", figures.EQUATION_42,
+            analysis={"type": "path", "plane": "stress"},
+            interface={"normal_strength": normal, "tangential_strength": tangential},
+            path={"strain": STRAIN},
+        )  # fmt: skip
+        curves[normal, tangential] = document["path"]
+    return figures.finish(comm, write, given.out, curves, document["cell"])
+
+
+def write(folder: Path, curves: dict[tuple[float, float], Any], cell: dict[str, Any]) -> list[Path]:
+    """stress_strain.csv and stress_strain.png."""
+    from matplotlib.figure import Figure
+
+    from feti_homog.output.curves import strain_controlled
+
+    rows = []
+    figure = Figure(figsize=(9.6, 4.4), layout="constrained")
+    grid = figure.subplots(1, 2, sharex=True)
+    for ((normal, tangential), points), ink in zip(curves.items(), INK, strict=False):
+        keys = ("bonded", "open", "closed", "dissipated")
+        for point in points:
+            row = [point["load_factor"], point["strain"][0], *point["stress"], *(point[key] for key in keys)]
+            rows.append([normal, tangential, *row])
+        held = strain_controlled(points, 0)
+        every = np.array([[0.0] * 4, *([*p["stress"], p["strain"][0]] for p in points)])
+        label = f"$R^\\mathrm{{n}}$ = {normal:g}, $R^\\mathrm{{t}}$ = {tangential:g} GPa"
+        for k, axes in enumerate(grid):
+            axes.plot(every[:, 3], every[:, k], color=ink, linewidth=0.6, alpha=0.8)
+            axes.plot(held[:, 3], held[:, k], color=ink, linewidth=1.8, label=label)
+    for axes, component, where in zip(grid, ("11", "22"), ("along", "across"), strict=True):
+        axes.set(xlabel="$E_{11}$", ylabel=f"$\\Sigma_{{{component}}}$ (GPa)", title=f"{where} the strain")
+        axes.axhline(0.0, color="0.6", linewidth=0.6, zorder=0)
+        axes.grid(color="0.92", linewidth=0.6)
+    grid[0].legend(frameon=False, fontsize=9)
+    figure.suptitle(f"Single-fibre cell, plane stress, {cell['elements']} elements", fontsize=11)
+    figure.savefig(folder / "stress_strain.png")
+    return [figures.tabulate(folder / "stress_strain.csv", COLUMNS, rows), folder / "stress_strain.png"]
+
+
+if __name__ == "__main__":
+    sys.exit(launch(main))

@@ -1,0 +1,39 @@
+"""The drivers run as their docstrings say, and print what they promise."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from matplotlib.image import imread
+from support import ROOT, mpirun
+
+
+def test_effective_stiffness(tmp_path):
+    job = mpirun(2, ROOT / "drivers/effective_stiffness.py", "--out", tmp_path, "--fractions", "0.2", "0.4")
+    assert job.returncode == 0, job.stderr
+    rows = re.findall(r"^(square|hexagonal) +(strain|stress) (.*)$", job.stdout, re.MULTILINE)
+    assert len(rows) == 4
+    for *_, columns in rows:
+        assert max(map(float, columns.split()[1::2])) < 2e-5
+    assert len(list(tmp_path.glob("*/result.json"))) == 5
+    assert imread(tmp_path / "entries.png")[..., :3].std() > 0.05
+
+
+@pytest.mark.parametrize("ranks", [1, 4])
+def test_iterations(tmp_path, ranks):
+    words = ["--out", tmp_path, "--refine", "0", "1", "--mesh-size", "0.1"]
+    job = mpirun(ranks, ROOT / "drivers/iterations.py", *words)
+    assert job.returncode == 0, job.stderr
+    rows = [line.replace(",", "").split() for line in job.stdout.splitlines()[1:]]
+    assert [row[0] for row in rows] == ["0", "1"]
+    assert int(rows[1][1]) > 3 * int(rows[0][1])
+
+
+@pytest.mark.parametrize("driver", ["effective_stiffness", "iterations"])
+def test_help_and_faults(tmp_path, driver):
+    job = mpirun(2, ROOT / f"drivers/{driver}.py", "--help")
+    assert job.returncode == 0 and job.stdout.count("usage:") == 1
+    job = mpirun(2, ROOT / f"drivers/{driver}.py", "--out", tmp_path / "new", "--mesh-size", "7")
+    assert job.returncode == 2 and job.stderr.count("[cell] mesh_size = 7.0: expected a number") == 1
+    assert not (tmp_path / "new").exists()
