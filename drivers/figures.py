@@ -47,7 +47,7 @@ def solved(
         "refine": 0 if options.quick else options.refine,
         "order": options.order,
     }
-    output = {"stress_unit": "GPa", "fields": options.fields, "pictures": options.fields}
+    output = {"stress_unit": "GPa", "fields": options.fields, "pictures": options.fields} | rest.pop("output", {})
     case = parse({"name": name, "cell": cell, "material": dict(material), "output": output, **rest}, Path())
     folder = options.out / name.replace(" ", "_")
     run(case, folder, comm, quiet=True)

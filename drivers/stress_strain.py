@@ -50,7 +50,8 @@ def write(folder: Path, curves: dict[tuple[float, float], Any], cell: dict[str, 
     rows = []
     figure = Figure(figsize=(9.6, 4.4), layout="constrained")
     grid = figure.subplots(1, 2, sharex=True)
-    for ((normal, tangential), points), ink in zip(curves.items(), INK, strict=False):
+    # Narrower from curve to curve, so that those beneath are seen where they coincide.
+    for ((normal, tangential), points), ink, width in zip(curves.items(), INK, (3.0, 2.4, 1.8, 1.2), strict=False):
         keys = ("bonded", "open", "closed", "dissipated")
         for point in points:
             row = [point["load_factor"], point["strain"][0], *point["stress"], *(point[key] for key in keys)]
@@ -60,7 +61,7 @@ def write(folder: Path, curves: dict[tuple[float, float], Any], cell: dict[str, 
         label = f"$R^\\mathrm{{n}}$ = {normal:g}, $R^\\mathrm{{t}}$ = {tangential:g} GPa"
         for k, axes in enumerate(grid):
             axes.plot(every[:, 3], every[:, k], color=ink, linewidth=0.6, alpha=0.8)
-            axes.plot(held[:, 3], held[:, k], color=ink, linewidth=1.8, label=label)
+            axes.plot(held[:, 3], held[:, k], color=ink, linewidth=width, label=label)
     for axes, component, where in zip(grid, ("11", "22"), ("along", "across"), strict=True):
         axes.set(xlabel="$E_{11}$", ylabel=f"$\\Sigma_{{{component}}}$ (GPa)", title=f"{where} the strain")
         axes.axhline(0.0, color="0.6", linewidth=0.6, zorder=0)

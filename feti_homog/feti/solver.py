@@ -225,7 +225,8 @@ class FetiSolver:
         if kind not in DUAL_OPERATORS:
             raise CaseError(f"-feti_dual_operator {kind}: expected one of {', '.join(DUAL_OPERATORS)}")
         largest = self.comm.allreduce(max((len(dofs) for dofs in self.boundary), default=0), MPI.MAX)
-        if kind == "explicit" or (kind == "auto" and applications >= PAYS and largest <= LARGEST_DENSE):
+        pays = applications >= PAYS and largest <= LARGEST_DENSE and PETSc.Sys.hasExternalPackage("mumps")
+        if kind == "explicit" or (kind == "auto" and pays):
             return ExplicitDualOperator(self.constraints, self.local, self.subdomains, self.boundary)
         return DualOperator(self.constraints, self.local)
 

@@ -26,6 +26,8 @@ Bool = NDArray[np.bool_]
 TIE = 1e-6
 # Least steps along a later leg, past a change of contact; with loose fibres, whose gaps are not unique, larger.
 STEP, LOOSE_STEP = 1e-6, 0.02
+# Shares of a leg that are not told apart.
+RESOLUTION = 1e-9
 BISECTIONS = 60
 
 
@@ -119,27 +121,30 @@ def _later_leg(
     interface: Interface, law: Law, ends: tuple[Float, Float], leg: int, legs: int, begin: Stand
 ) -> Iterator[Point]:
     status, lam, s = begin.status, begin.lam, begin.position
+    safe, due = s, False
     while True:
         state = interface.equilibrium(ends[0] + s * (ends[1] - ends[0]), status, lam)
-        status, lam = state.status, state.solution.lam
         load, worst = _worst(interface, law, state)
-        if load > 1.0 + TIE:
+        if load > 1.0 + TIE and s - safe > RESOLUTION:
+            # A change of contact on the way has brought the break forward.
+            s, due = (safe + s) / 2, False
+            continue
+        status, lam = state.status, state.solution.lam
+        if load > 1.0 + TIE or (due and load > 1.0 - TIE):
             broke = interface.solver.comm.allreduce(int(worst.sum()))
             status = interface.debond(status, worst, lam)
             yield Point((leg + s) / legs, 1.0, state, broke, Stand(leg, s, status, lam))
+            safe, due = s, False
             continue
         if s == 1.0:
             yield Point((leg + 1) / legs, 1.0, state, 0, Stand(leg + 1, 0.0, status, lam))
             return
         ahead = interface.linear(ends[1], status, lam)
         breaks, changes = _first_break(interface, law, state, ahead), _first_change(interface, state, ahead)
-        least = (LOOSE_STEP if state.loose else STEP) / (1.0 - s)
-        if breaks <= changes and breaks < 1.0:
-            # A hair beyond, so that the bond is over its limit there.
-            s, lam = s + (breaks + 2 * TIE) * (1.0 - s), (1 - breaks) * lam + breaks * ahead.lam
-        else:
-            s, lam = s + max(changes, least) * (1.0 - s), ahead.lam
-        s = min(s, 1.0)
+        least = 0.0 if breaks <= changes and not due else LOOSE_STEP if state.loose else STEP
+        safe, due = s, breaks <= changes and breaks < 1.0 and not due
+        s = min(1.0, s + max(min(breaks, changes) * (1.0 - s), least))
+        lam = ahead.lam
 
 
 def _utilisation(interface: Interface, law: Law, status: Status, solution: DualSolution) -> Float:

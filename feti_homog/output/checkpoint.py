@@ -29,7 +29,7 @@ Arrays = dict[str, NDArray[Any]]
 
 
 def finished(directory: Path, case: Case) -> bool:
-    """Whether `directory` holds the finished result of this case, and no checkpoint of a later run.  Call on one rank."""
+    """Whether `directory` has the finished result of this case and no checkpoint of a later run.  Call on one rank."""
     if (directory / FOLDER).is_dir() or not (directory / results.NAME).is_file():
         return False
     document = results.read(directory)
@@ -94,7 +94,7 @@ class Checkpoint:
             with h5py.File(path, "r") as file:
                 signature, checksum = file.attrs["signature"], file.attrs["checksum"]
                 event = {name: table[()] for name, table in file.items()}
-        except (OSError, KeyError, RuntimeError) as error:
+        except Exception as error:  # of damaged files h5py says anything
             raise CaseError(f"--resume: {path} is no readable event of a path: {error}") from error
         if signature != self.signature:
             raise CaseError(f"--resume: {path} is of another run: expected {self.signature}; found {signature}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -99,7 +100,7 @@ def strain_controlled(points: Sequence[Mapping[str, Any]], which: int) -> Array:
     values = np.array([[*point["stress"], point["strain"][which]] for point in points])
     records = np.flatnonzero(load >= np.maximum.accumulate(load))
     vertices = [np.zeros(4), values[records[0]]]
-    for before, after in zip(records[:-1], records[1:], strict=True):
+    for before, after in pairwise(records):
         vertices += [values[after] * load[before] / load[after], values[after]]
     return np.array(vertices)
 

@@ -46,8 +46,8 @@ class Scene:
         component = output.get("stress", "auto")
         if component not in STRESSES:
             component = list(STRESSES)[int(np.argmax(strain))]
-        states = [file[f"state/{n}"] for n in numbers]
-        automatic = 1.0 if true else min(magnification(on_nodes(s["displacement"], drawn), drawn.points) for s in states)
+        displacements = (on_nodes(file[f"state/{n}/displacement"], drawn) for n in numbers)
+        automatic = 1.0 if true else min(magnification(d, drawn.points) for d in displacements)
         scale = output.get("deformation_scale") or automatic
         return cls(file, drawn, borders, Faces.of(file, drawn, borders), component, scale)
 
@@ -56,7 +56,7 @@ class Scene:
         places: Array = self.drawn.points + self.scale * on_nodes(self.file[f"state/{number}/displacement"], self.drawn)
         return places
 
-    def draw(self, axes: Axes, number: int) -> None:
+    def draw(self, figure: Figure, axes: Axes, number: int) -> None:
         """The deformed cell of a state with its own range of colours: stresses grow along a path."""
         state, moved = self.file[f"state/{number}"], self.moved(number)
         stress = on_triangles(state["stress"], list(STRESSES).index(self.component), self.drawn)
@@ -68,10 +68,9 @@ class Scene:
         axes.set_axis_off()
         attributes = state.attrs
         axes.set_title(f"{attributes['label']}\n{load_label(attributes['strain'])}", fontsize=9)
-        bar = axes.figure.colorbar(shapes, cax=axes.inset_axes((1.02, 0.1, 0.035, 0.8)), extend=extend)
+        bar = figure.colorbar(shapes, cax=axes.inset_axes((1.02, 0.1, 0.035, 0.8)), extend=extend)
         bar.ax.tick_params(labelsize=7, pad=1, length=2)
         bar.locator = MaxNLocator(5)
-        bar.outline.set_linewidth(0.5)
 
     @property
     def words(self) -> str:
@@ -106,7 +105,7 @@ def _side_by_side(file: Any, numbers: Sequence[int], output: Mapping[str, Any], 
     figure = Figure(figsize=(INCHES, rows * (panel * size[1] / size[0] + 0.5) + 0.7), layout="constrained")
     grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
     for axes, number in zip(grid, numbers, strict=False):
-        scene.draw(axes, number)
+        scene.draw(figure, axes, number)
     for axes in grid[len(numbers) :]:
         axes.set_axis_off()
     grid[0].autoscale_view()
@@ -128,7 +127,7 @@ def _animation(file: Any, numbers: Sequence[int], output: Mapping[str, Any], pat
     for number in numbers:
         figure.clear()
         axes = figure.subplots()
-        scene.draw(axes, number)
+        scene.draw(figure, axes, number)
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
         canvas.draw()
         picture = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")

@@ -53,7 +53,7 @@ def assert_pictures(folder):
 @pytest.mark.parametrize("ranks", [0, 1, 2, 4])
 def test_run(tmp_path, ranks):
     out = tmp_path / "new" / "results"
-    job = command_line(ranks, "run", case_file(tmp_path), "--out", out)
+    job = command_line(ranks, "run", case_file(tmp_path, ""), "--out", out)
     assert job.returncode == 0, job.stderr
     assert {path.name for path in out.iterdir()} == FILES
     for words in (*STAGES, "E11: ", "G12: ", "Effective stiffness", "Hashin-Shtr.", "Status      done"):
@@ -111,7 +111,7 @@ def test_fields_do_not_depend_on_the_ranks(tmp_path):
 
 def test_plot_needs_the_fields_alone(tmp_path):
     out = tmp_path / "results"
-    command_line(2, "run", case_file(tmp_path), "--out", out)
+    command_line(2, "run", case_file(tmp_path, ""), "--out", out)
     for path in out.iterdir():
         if path.name != "result.h5":
             path.unlink()
@@ -175,7 +175,7 @@ def test_monitor_and_log(tmp_path):
 
 
 def test_command_line_overrides_the_case(tmp_path):
-    path = case_file(tmp_path, "[petsc]\nfeti_ksp_rtol = 1e-10\nfeti_pc_type = 'lumped'\n")
+    path = case_file(tmp_path, "[petsc]\nfeti_ksp_rtol = 1e-10\nfeti_pc_type = 'lumped'\n[output]\npictures = false\n")
     documents = []
     for number, words in enumerate([[], ["-feti_ksp_rtol", "1e-4"]]):
         out = tmp_path / str(number)

@@ -203,4 +203,4 @@ def test_iterations_do_not_grow(comm, order, refine):
     torn, _, responses = solve(case, comm)
     assert torn.plan.subdomains == 3
     assert torn.total(len(torn.solver.Q)) == pytest.approx(5_000 * 4**refine, rel=0.2)
-    assert max(r.solution.iterations for r in responses) <= 14
+    assert max(r.state.iterations for r in responses) <= 14

@@ -20,7 +20,7 @@ ROOMS = (
     ("schema", "sections", "material", "bonding", "case"),
     ("bounds",),
     ("parallel",),
-    ("options", "petsc_options", "progress"),
+    ("options", "petsc_c", "petsc_options", "progress"),
     ("cell",),
     ("fem",),
     ("feti",),

@@ -1,0 +1,86 @@
+"""The drivers of Figures 3 to 5 run, draw, and obey the laws that need no numbers."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.image import imread
+from support import mpirun
+
+# Fully debonded without contact: a cell with holes.  Fourier solutions, plane strain: C11, C12, C33.
+BONDED, VOID = (149.690255, 56.975975, 46.357140), (36.123857, 14.523762, 10.800047)
+
+
+def driven(name: str, folder: Path, *options: str) -> list[dict[str, str]]:
+    """Run a driver and return its table."""
+    job = mpirun(2, f"drivers/{name}.py", "--quick", "--out", folder, *options)
+    assert job.returncode == 0, job.stderr
+    assert job.stdout.split() == [str(folder / f"{name}.csv"), str(folder / f"{name}.png")]
+    picture = imread(folder / f"{name}.png")
+    assert min(picture.shape[:2]) > 500 and picture[..., :3].std() > 0.05
+    with (folder / f"{name}.csv").open(encoding="utf-8") as stream:
+        return list(csv.DictReader(stream))
+
+
+def column(rows: list[dict[str, str]], name: str) -> np.ndarray:
+    return np.array([float(row[name]) for row in rows])
+
+
+def test_debonding_angle(tmp_path):
+    rows = driven("debonding_angle", tmp_path)
+    assert column(rows, "angle").tolist() == [0.0, 90.0, 180.0, 270.0, 360.0]
+    for entry in ("L11", "L22", "L33"):
+        strain, stress = column(rows, f"{entry} plane strain"), column(rows, f"{entry} plane stress")
+        assert (np.diff(strain) < 1e-9).all() and (np.diff(stress) < 1e-9).all()
+        assert (strain > stress).all()
+    for k, entry in enumerate(("L11", "L12", "L33")):
+        values = column(rows, f"{entry} plane strain")
+        assert values[[0, -1]] == pytest.approx([BONDED[k], VOID[k]], rel=0.02)
+    contact, free = column(rows, "S12 with contact"), column(rows, "S12 without contact")
+    assert (np.diff(contact) < 1e-9).all() and (contact[1:] > free[1:]).all()
+    assert contact[0] == pytest.approx(free[0]) == pytest.approx(0.2 * BONDED[2], rel=0.02)
+    # Faces that meet under shear push the cell apart.
+    assert (column(rows, "S11 with contact")[2:] < -0.1).all() and (column(rows, "S22 with contact")[2:] < -0.1).all()
+
+
+def test_deformed_cell(tmp_path):
+    free, contact = driven("deformed_cell", tmp_path)
+    assert float(contact["S12"]) > float(free["S12"]) > 0.0
+    assert int(free["closed"]) == 0 < int(contact["closed"])
+    assert int(free["bonded"]) == int(contact["bonded"]) > 0
+    assert float(contact["largest overlap"]) < 1e-7 < 1e-3 < float(free["largest overlap"])
+
+
+def test_stress_strain(tmp_path):
+    rows = driven("stress_strain", tmp_path)
+    strengths = sorted({(row["Rn"], row["Rt"]) for row in rows})
+    assert len(strengths) == 2
+    onset = {}
+    for pair in strengths:
+        curve = [row for row in rows if (row["Rn"], row["Rt"]) == pair]
+        load, stress = column(curve, "load_factor"), column(curve, "S11")
+        assert load[-1] == 1.0 and (load > 0).all() and (load <= 1.0).all()
+        assert (np.diff(column(curve, "bonded")) <= 0).all() and (np.diff(column(curve, "dissipated")) >= -1e-12).all()
+        # Nothing is stiffer than the bonded cell, of which the first event is the last.
+        assert (stress <= stress[0] / load[0] * load * (1 + 1e-9)).all()
+        assert int(curve[0]["open"]) == 0 and load[0] < 1.0
+        onset[float(pair[0])] = load[0]
+    # Onset is proportional to the strength: here to R^n, which is reached first.
+    low, high = sorted(onset)
+    assert onset[high] / onset[low] == pytest.approx(high / low, rel=1e-6)
+
+
+def test_pictures_of_every_case(tmp_path):
+    driven("stress_strain", tmp_path, "--fields")
+    folder = tmp_path / "Rn_5_Rt_5"
+    for name in ("path", "path_states", "interface", "cell"):
+        assert imread(folder / f"{name}.png")[..., :3].std() > 0.05, f"{name}.png is nearly blank"
+    assert (folder / "path.gif").read_bytes()[:6] == b"GIF89a"
+    with (folder / "path.csv").open(encoding="utf-8") as stream:
+        loads = [float(row["load_factor"]) for row in csv.DictReader(stream)]
+    assert loads == [point["load_factor"] for point in json.loads((folder / "result.json").read_text())["path"]]
+    assert loads[-1] == 1.0

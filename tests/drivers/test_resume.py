@@ -1,0 +1,216 @@
+"""A path that is killed at any moment goes on with --resume, and foreign checkpoints are refused."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from commands import command_line
+from support import LAUNCHER_VARIABLES, ROOT, RUN_VARIABLES
+
+CASE = """\
+[cell]
+geometry = "square"
+fibre_fraction = 0.4
+mesh_size = 0.1
+refine = 1
+
+[material.matrix]
+young = 100.0
+poisson = 0.4
+
+[material.fibre]
+young = 500.0
+poisson = 0.2
+
+[analysis]
+type = "path"
+plane = "stress"
+
+[interface]
+normal_strength = 4.0
+tangential_strength = 3.0
+
+[path]
+strain = [0.2, 0.0, 0.05]
+
+[output]
+pictures = false
+"""
+INCREMENTS = 'waypoints = [[0.1, 0.0, 0.0], [-0.05, 0.02, 0.0]]\nmethod = "increments"\nincrements = 24'
+LATER_LEGS = "waypoints = [[0.02, 0.0, 0.0], [-0.05, 0.02, 0.0], [0.1, 0.0, 0.0]]"
+
+
+def case_file(folder: Path, name: str = "case", **changes: str) -> Path:
+    text = CASE
+    for old, new in changes.items():
+        text = re.sub(rf"^{old} = .*$", new, text, flags=re.MULTILINE)
+    path = folder / f"{name}.toml"
+    path.write_text(text)
+    return path
+
+
+def document(out: Path):
+    return json.loads((out / "result.json").read_text())
+
+
+def events(out: Path) -> int:
+    return len(list((out / "checkpoint").glob("[0-9]*.h5")))
+
+
+def descendants(pid: int) -> list[int]:
+    children = []
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            fields = stat.read_text().rpartition(")")[2].split()
+        except OSError:
+            continue
+        if int(fields[1]) == pid:
+            child = int(stat.parent.name)
+            children += [child, *descendants(child)]
+    return children
+
+
+def killed(case: Path, out: Path, at: int, later: float, *words: str) -> int:
+    """Run until there are `at` events and so many seconds longer, then kill -9; returns how many events are there."""
+    inherited = {k: v for k, v in os.environ.items() if not k.startswith(LAUNCHER_VARIABLES)}
+    process = subprocess.Popen(
+        ["mpirun", "--oversubscribe", "-n", "2", sys.executable, "-m", "feti_homog", "run", case, "--out", out, *words],
+        cwd=ROOT, env=inherited | RUN_VARIABLES, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+    )  # fmt: skip
+    deadline = time.monotonic() + 100
+    while events(out) < at and process.poll() is None and time.monotonic() < deadline:
+        time.sleep(0.001)
+    time.sleep(later)
+    for pid in [*descendants(process.pid), process.pid]:
+        try:
+            os.kill(pid, signal.SIGKILL)
+        except ProcessLookupError:
+            continue
+    process.wait()
+    return events(out)
+
+
+def assert_same_curve(found, expected):
+    assert len(found) == len(expected)
+    for key in ("load_factor", "strain", "stress", "dissipated"):
+        a, b = (np.array([point[key] for point in points]) for points in (found, expected))
+        assert np.abs(a - b).max() <= 1e-6 * np.abs(b).max(), key
+    for key in ("broke", "bonded", "open", "closed"):
+        assert [point[key] for point in found] == [point[key] for point in expected], key
+
+
+@pytest.fixture(scope="module")
+def reference(tmp_path_factory):
+    """The uninterrupted run."""
+    folder = tmp_path_factory.mktemp("reference")
+    job = command_line(2, "run", case_file(folder), "--out", folder / "out")
+    assert job.returncode == 0, job.stderr
+    return folder / "out"
+
+
+@pytest.fixture(scope="module")
+def interrupted(tmp_path_factory):
+    """A folder with some events of an ended run."""
+    folder = tmp_path_factory.mktemp("interrupted")
+    assert killed(case_file(folder), folder / "out", 5, 0.0) >= 5
+    return folder / "out"
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_killed_again_and_again(tmp_path, reference, seed):
+    chance, case, out = random.Random(seed), case_file(tmp_path), tmp_path / "out"
+    expected, last = document(reference), 0
+    for _ in range(3):
+        at = last + chance.randint(1, 12)
+        kept = killed(case, out, at, chance.uniform(0.0, 0.05), *(["--resume"] if last else []))
+        assert kept >= last and not (out / "result.json").exists()
+        last = kept
+    job = command_line(2, "run", case, "--out", out, "--resume")
+    assert job.returncode == 0, job.stderr
+    found = document(out)
+    assert f"{last} events are taken from the checkpoint" in job.stdout and found["resumed"] == last
+    assert job.stdout.count("from the checkpoint") == last + 1
+    assert_same_curve(found["path"], expected["path"])
+    # A finished event costs no solve: those left took at least one each, and no more than in the whole run.
+    assert len(found["path"]) - last <= found["solver"]["solves"] <= expected["solver"]["solves"] - last
+    assert not (out / "checkpoint").exists()
+
+
+@pytest.mark.parametrize("path", [INCREMENTS, LATER_LEGS], ids=["increments", "later legs"])
+def test_other_paths(tmp_path, path):
+    case = case_file(tmp_path, strain=path)
+    assert command_line(2, "run", case, "--out", tmp_path / "whole").returncode == 0
+    kept = killed(case, tmp_path / "out", 8, 0.0)
+    job = command_line(2, "run", case, "--out", tmp_path / "out", "--resume")
+    assert job.returncode == 0, job.stderr
+    assert document(tmp_path / "out")["resumed"] == kept >= 8
+    assert_same_curve(document(tmp_path / "out")["path"], document(tmp_path / "whole")["path"])
+
+
+def test_a_finished_run_is_left_alone(tmp_path, reference):
+    before = {path.name: path.stat().st_mtime_ns for path in reference.iterdir()}
+    job = command_line(2, "run", case_file(tmp_path, name="again"), "--out", reference, "--resume")
+    assert job.returncode == 0 and "nothing to do" in job.stdout
+    assert before == {path.name: path.stat().st_mtime_ns for path in reference.iterdir()}
+
+
+def test_no_checkpoint_and_no_resume(tmp_path, interrupted):
+    job = command_line(2, "run", case_file(tmp_path), "--out", tmp_path / "new", "--resume")
+    assert job.returncode == 0 and "there is no checkpoint" in job.stdout
+    shutil.copytree(interrupted, tmp_path / "old")
+    job = command_line(2, "run", case_file(tmp_path), "--out", tmp_path / "old")
+    assert job.returncode == 0 and "events of an earlier run are dropped" in job.stdout
+
+
+@pytest.mark.parametrize(
+    ("ranks", "changes", "message"),
+    [
+        (2, {"normal_strength": "normal_strength = 4.1"}, "is of another run: expected case"),
+        (2, {"refine": "refine = 0"}, "is of another run: expected case"),
+        (1, {}, "on 1 ranks"),
+        (2, {r"\[output\]": "[decomposition]\nsubdomains = 4\n\n[output]"}, "is of another run"),
+    ],
+)
+def test_foreign_checkpoints(tmp_path, interrupted, ranks, changes, message):
+    shutil.copytree(interrupted, tmp_path / "out")
+    text = CASE
+    for old, new in changes.items():
+        text, count = re.subn(rf"^{old}.*$", new, text, flags=re.MULTILINE)
+        assert count == 1
+    (tmp_path / "case.toml").write_text(text)
+    kept = events(tmp_path / "out")
+    job = command_line(ranks, "run", tmp_path / "case.toml", "--out", tmp_path / "out", "--resume")
+    assert job.returncode == 2 and message in job.stderr and "Traceback" not in job.stderr
+    assert job.stderr.count("error: --resume:") == 1
+    assert events(tmp_path / "out") == kept
+
+
+@pytest.mark.parametrize("damage", ["truncated", "garbage", "missing"])
+def test_unreadable_checkpoints(tmp_path, interrupted, damage):
+    shutil.copytree(interrupted, tmp_path / "out")
+    path = tmp_path / "out" / "checkpoint" / "000002.h5"
+    if damage == "missing":
+        path.unlink()
+    else:
+        path.write_bytes(path.read_bytes()[:1000] if damage == "truncated" else os.urandom(3000))
+    job = command_line(2, "run", case_file(tmp_path), "--out", tmp_path / "out", "--resume")
+    assert job.returncode == 2 and "--resume: " in job.stderr and "000002" in job.stderr
+    assert "Traceback" not in job.stderr
+
+
+def test_only_paths_resume(tmp_path):
+    from commands import case_file as stiffness_case
+
+    job = command_line(1, "run", stiffness_case(tmp_path), "--out", tmp_path / "out", "--resume")
+    assert job.returncode == 2 and '--resume: only for [analysis] type = "path"' in job.stderr
