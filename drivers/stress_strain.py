@@ -23,6 +23,7 @@ from feti_homog.cli import launch, parsed
 
 STRENGTHS = [(5.0, 5.0), (10.0, 10.0), (10.0, 5.0), (5.0, 1.5)]  # GPa: R^n, R^t
 STRAIN = [0.2, 0.0, 0.0]
+HEADS = "    Rn    Rt  nodes  onset E11       S11 after drop   debonded  S11 at end"
 COLUMNS = ("Rn", "Rt", "load_factor", "E11", "S11", "S22", "S12", "bonded", "open", "closed", "dissipated")
 
 
@@ -41,12 +42,26 @@ def main(words: Sequence[str], comm: Intracomm) -> int:
     return figures.finish(comm, write, given.out, curves, document["cell"])
 
 
+def drop(normal: float, tangential: float, points: list[dict[str, Any]]) -> str:
+    """Onset, what is left after the first drop under rising strain, and the end."""
+    onset, end = points[0], points[-1]
+    total = sum(onset[state] for state in ("bonded", "open", "closed"))
+    after = next((p for p in points[1:] if p["load_factor"] >= onset["load_factor"]), end)
+    fallen = after["stress"][0] * onset["load_factor"] / after["load_factor"]
+    share = 1.0 - after["bonded"] / total
+    return (
+        f"{normal:>6g}{tangential:>6g}{total:>7}{onset['strain'][0]:>11.6f}{onset['stress'][0]:>10.4f}"
+        f"{fallen:>10.4f}{100 * share:>9.1f} %{end['stress'][0]:>10.4f}"
+    )
+
+
 def write(folder: Path, curves: dict[tuple[float, float], Any], cell: dict[str, Any]) -> list[Path]:
     """stress_strain.csv and stress_strain.png."""
     from matplotlib.figure import Figure
 
     from feti_homog.output.curves import strain_controlled
 
+    print(HEADS)
     rows = []
     figure = Figure(figsize=(9.6, 4.4), layout="constrained")
     grid = figure.subplots(1, 2, sharex=True)
@@ -57,6 +72,7 @@ def write(folder: Path, curves: dict[tuple[float, float], Any], cell: dict[str, 
             row = [point["load_factor"], point["strain"][0], *point["stress"], *(point[key] for key in keys)]
             rows.append([normal, tangential, *row])
         held = strain_controlled(points, 0)
+        print(drop(normal, tangential, points))
         every = np.array([[0.0] * 4, *([*p["stress"], p["strain"][0]] for p in points)])
         label = f"$R^\\mathrm{{n}}$ = {normal:g}, $R^\\mathrm{{t}}$ = {tangential:g} GPa"
         for k, axes in enumerate(grid):

@@ -11,9 +11,10 @@ from feti_homog import petsc_c
 from feti_homog.errors import CaseError
 from feti_homog.options import unknown_options
 
-
 # Options that PETSc looks for only in KSPSolve.
-READ_WHEN_SOLVING = {"feti_ksp_converged_reason", "feti_ksp_converged_rate", "feti_ksp_view", "feti_ksp_view_final_residual"}
+READ_WHEN_SOLVING = {
+    f"feti_ksp_{name}" for name in ("converged_reason", "converged_rate", "view", "view_final_residual")
+}
 
 
 @contextmanager

@@ -65,7 +65,8 @@ def _run(cell: TornCell, directory: Path, progress: Progress, resume: bool) -> l
     on_root(comm, folder.make, directory)
     file = None
     if case.output.fields:
-        with progress.stage("output"):
+        with progress.stage("output") as words:
+            words.append(f"{directory}: result.h5 with the mesh, the states follow")
             file = FieldFile(directory, comm, states.header(cell), states.mesh_part(cell), states.interface_part(cell))
     with file or nullcontext():
         study = Study(homogenization, cell.debonded, progress, _recorder(cell, file))
@@ -186,5 +187,5 @@ def _write(study: Study, directory: Path, document: dict[str, Any]) -> None:
     if output.pictures:
         with progress.stage("pictures") as words:
             words.append(", ".join(p.name for p in on_root_only(comm, plots.plot, directory) or []))
-    if progress.telling:
-        progress.say("\n" + summary(document))
+    timings = progress.timings()
+    progress.say("\n" + summary(document | {"timings": timings}))

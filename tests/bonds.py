@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from cells import make_case
 from petsc4py import PETSc
 from qp_twin import QPTwin, keys
 
-from feti_homog import torn
+from feti_homog import sections, torn
 from feti_homog.cell.arrangement import arrange
 from feti_homog.interface.contact import BONDED, OPEN, Interface
 from feti_homog.petsc_options import case_options
@@ -26,7 +26,7 @@ class Bonds:
     order: np.ndarray
 
     def interface(self, contact):
-        return Interface(self.cell.solver, contact, np.array([self.cell.plan.width, self.cell.plan.height]))
+        return interface(self.cell, contact)
 
     def status(self, bonded):
         """The status on this rank, debonded nodes open, of the twin's `bonded` (k,) on rank 0.  Collective."""
@@ -53,18 +53,28 @@ class Bonds:
         return np.zeros(self.cell.solver.rows)
 
 
-def build(comm, **case):
-    """The bonds of the case that `make_case` makes.  Collective."""
+def tear(comm, arcs=(), **case):
+    """The torn cell of the case that `make_case` makes, the tips of arcs at its nodes.  Collective."""
     PETSc.garbage_cleanup(comm)
-    case = make_case(**case)
+    case = replace(make_case(**case), interface=sections.Interface(debonded=tuple(arcs)))
     with case_options(case.petsc):
-        cell = torn.tear(case, comm, Progress(comm, quiet=True))
+        return torn.tear(case, comm, Progress(comm, quiet=True))
+
+
+def interface(cell, contact):
+    """Its interfaces."""
+    return Interface(cell.solver, contact, np.array([cell.plan.width, cell.plan.height]))
+
+
+def build(comm, **case):
+    """The cell of `tear` and its twin.  Collective."""
+    cell = tear(comm, **case)
     size = np.array([cell.plan.width, cell.plan.height])
     parts = [(s.mesh.points, s.mesh.triangles, s.piece.body, s.piece.phase == "matrix", s.L) for s in cell.subdomains]
     parts, points = comm.gather(parts), comm.gather(cell.solver.constraints.nodes.points)
     if parts is None:
         return Bonds(cell, None, np.zeros(0, int))
-    fibres = arrange(case.cell)
+    fibres = arrange(cell.case.cell)
     twin = QPTwin([part for own in parts for part in own], fibres.centres, fibres.radii, size)
     key = keys(np.concatenate(points), size)
     order = np.searchsorted(twin.key, key)

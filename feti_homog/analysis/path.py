@@ -93,7 +93,7 @@ def run(study: Study, path: LoadPath, law: Law, checkpoint: Checkpoint, resume: 
             }
             | study.point([response])
         )
-        if number + 1 == path.max_events:
+        if number + 1 == path.max_events and point.load_factor < 1.0:
             study.faults.append(f"[path] max_events = {number + 1}: the path was not finished; result marked")
             break
     return {"path": points, "resumed": len(known)}

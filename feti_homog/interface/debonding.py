@@ -28,6 +28,7 @@ TIE = 1e-6
 STEP, LOOSE_STEP = 1e-6, 0.02
 # Shares of a leg that are not told apart.
 RESOLUTION = 1e-9
+ROUNDING = 1e-13
 BISECTIONS = 60
 
 
@@ -88,8 +89,8 @@ def increments(
     corners = np.vstack([np.zeros(3), waypoints])
     status, lam = begin.status, begin.lam
     for step in range(begin.leg + 1, steps + 1):
-        place = step / steps * len(waypoints)
-        strain = np.array([np.interp(place, np.arange(len(corners)), c) for c in corners.T])
+        leg = (step * len(waypoints) - 1) // steps
+        strain = _between(corners[leg], corners[leg + 1], step * len(waypoints) / steps - leg)
         broke = 0
         while True:
             state = interface.equilibrium(strain, status, lam)
@@ -123,7 +124,7 @@ def _later_leg(
     status, lam, s = begin.status, begin.lam, begin.position
     safe, due = s, False
     while True:
-        state = interface.equilibrium(ends[0] + s * (ends[1] - ends[0]), status, lam)
+        state = interface.equilibrium(_between(*ends, s), status, lam)
         load, worst = _worst(interface, law, state)
         if load > 1.0 + TIE and s - safe > RESOLUTION:
             # A change of contact on the way has brought the break forward.
@@ -144,7 +145,14 @@ def _later_leg(
         least = 0.0 if breaks <= changes and not due else LOOSE_STEP if state.loose else STEP
         safe, due = s, breaks <= changes and breaks < 1.0 and not due
         s = min(1.0, s + max(min(breaks, changes) * (1.0 - s), least))
-        lam = ahead.lam
+        way = (s - safe) / (1.0 - safe)
+        lam = (1.0 - way) * lam + way * ahead.lam
+
+
+def _between(before: Float, after: Float, share: float) -> Float:
+    """The strain after a share of a leg; what is left of zero by rounding is zero."""
+    strain = (1.0 - share) * before + share * after
+    return np.where(np.abs(strain).max() > ROUNDING * np.abs([before, after]).max(), strain, 0.0)
 
 
 def _utilisation(interface: Interface, law: Law, status: Status, solution: DualSolution) -> Float:
@@ -187,7 +195,7 @@ def _first_change(interface: Interface, state: Equilibrium, ahead: DualSolution)
     opens = (state.status == CLOSED) & (force > noise * largest)
     closes = (state.status == OPEN) & (gap < -noise * np.abs(ahead.strain).max())
     shares = [np.ones(1)]
-    for which, here, there in ((opens, state.solution.lam[row], force), (closes, state.solution.jump[row], gap)):
-        a, b = here[which], there[which]
-        shares.append(np.clip(a / (a - b), 0.0, 1.0))
+    for which, here, there in ((opens, -state.solution.lam[row], -force), (closes, state.solution.jump[row], gap)):
+        a, b = np.maximum(here[which], 0.0), there[which]
+        shares.append(a / (a - b))
     return float(comm.allreduce(np.concatenate(shares).min(), MPI.MIN))

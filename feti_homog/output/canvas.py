@@ -104,7 +104,7 @@ def magnification(displacement: Array, points: Array) -> float:
 
 
 def load_label(strain: Array) -> str:
-    return ", ".join(f"${STRAINS[i]} = {strain[i]:.4g}$" for i in range(3) if strain[i] != 0.0) or "no strain"
+    return ", ".join(f"${STRAINS[i]} = {{{strain[i]:.4g}}}$" for i in range(3) if strain[i] != 0.0) or "no strain"
 
 
 def unit_label(label: str) -> str:

@@ -67,22 +67,31 @@ def _path(document: Mapping[str, Any]) -> Figure:
     few = len(points) <= FEW
     style: dict[str, Any] = {"marker": "o", "markersize": 2.5} if few else {}
     held = strain_controlled(points, which) if _has_envelope(case) else None
+    legs = len(case["path"].get("waypoints", [0]))
+    first = len(points) if case["path"]["method"] == "increments" else _first_leg(points, legs)
     for i, (name, ink) in enumerate(zip(MACROSCOPIC, INK, strict=False)):
         width = 0.8 if held is not None else 1.4
         upper.plot(
-            np.append(0.0, strain), np.append(0.0, stress[:, i]), color=ink, linewidth=width, alpha=0.8, **style,
-            label=None if held is not None else f"${name}$",
+            np.append(0.0, strain[:first]), np.append(0.0, stress[:first, i]), color=ink, linewidth=width, alpha=0.8,
+            label=None if held is not None else f"${name}$", **style,
         )  # fmt: skip
+        if first < len(points):
+            upper.plot(strain[first - 1 :], stress[first - 1 :, i], ":", color=ink, linewidth=0.8, marker="o", ms=3)
         if held is not None:
             upper.plot(held[:, 3], held[:, i], color=ink, linewidth=2.0, label=f"${name}$")
     if held is not None:
         upper.plot([], [], color="0.3", linewidth=0.8, **style, label="all equilibria")
         upper.plot([], [], color="0.3", linewidth=2.0, label="rising strain")
+    if first < len(points):
+        upper.plot([], [], ":", color="0.3", linewidth=0.8, marker="o", ms=3, label="events of later legs")
     upper.set_ylabel(f"macroscopic stress {_stress_unit(case)}")
     upper.set_title(f"{case.get('name', '')}: plane {case['analysis']['plane']}, {_strengths(case)}".lstrip(": "))
     for kind, key in STATES.items():
         ink = "0.2" if kind == BONDED else COLOURS[kind]
-        lower.plot(strain, [point[key] for point in points], color=ink, linewidth=1.4, label=WORDS[kind], **style)
+        number = [point[key] for point in points]
+        lower.plot(strain[:first], number[:first], color=ink, linewidth=1.4, label=WORDS[kind], **style)
+        if first < len(points):
+            lower.plot(strain[first - 1 :], number[first - 1 :], ":", color=ink, linewidth=0.8, marker="o", ms=2.5)
     lower.set_ylabel("interface nodes")
     lower.set_xlabel(f"macroscopic strain ${STRAINS[which]}$")
     for axes in (upper, lower):
@@ -103,6 +112,11 @@ def strain_controlled(points: Sequence[Mapping[str, Any]], which: int) -> Array:
     for before, after in pairwise(records):
         vertices += [values[after] * load[before] / load[after], values[after]]
     return np.array(vertices)
+
+
+def _first_leg(points: Sequence[Mapping[str, Any]], legs: int) -> int:
+    """How many points are on the first leg; on later ones contact may change between the points."""
+    return next((n for n, point in enumerate(points) if point["load_factor"] > (1.0 + 1e-9) / legs), len(points))
 
 
 def _has_envelope(case: Mapping[str, Any]) -> bool:

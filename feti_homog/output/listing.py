@@ -53,12 +53,12 @@ def path_table(points: Sequence[Point], stress: str) -> list[str]:
     lines = [
         f"Path{stress}: {len(points)} points{some}; {broke} bonds broke, "
         f"{last['dissipated']:.6g} dissipated per area",
-        f"{'point':>5}{'load':>10}{STRAINS[which]:>11}" + "".join(f"{name:>11}" for name in STRESSES) + _heads(),
+        f"{'point':>5}{'load':>9}{STRAINS[which]:>11}" + "".join(f"{name:>11}" for name in STRESSES) + _heads(),
     ]
     for number in numbers:
         point = points[number]
         values = "".join(_number(value, 11) for value in (point["strain"][which], *point["stress"]))
-        lines.append(f"{number:>5}{point['load_factor']:>10.6f}{values}{_counts(point)}")
+        lines.append(f"{number:>5}{point['load_factor']:>9.6f}{values}{_counts(point)}")
     return lines
 
 

@@ -76,7 +76,7 @@ def _pictures(directory: Path, document: Mapping[str, Any], output: Mapping[str,
                 state = file[f"state/{number}"]
                 figure = _deformed(file, state, drawn, borders, faces, output)
                 paths.append(save(figure, directory / f"{_name(number, state.attrs['strain'])}.png"))
-        return paths + tractions.plot(directory, file)
+        return paths + tractions.plot(directory, file, "path" in document)
 
 
 def _name(number: str, strain: Array) -> str:

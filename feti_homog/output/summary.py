@@ -57,6 +57,8 @@ def _answer(document: Document, stress: str) -> list[list[str]]:
     blocks = [_matrix(f"Effective stiffness{stress}", document["effective_stiffness"])]
     if "effective_stiffness_compression" in document:
         blocks.append(_matrix(f"Under minus E{stress}", document["effective_stiffness_compression"]))
+    if document["case"].get("interface"):  # moduli and bounds are of bonded, linear composites
+        return blocks
     return [
         *blocks,
         _moduli(f"Engineering moduli{stress}", document["moduli"]),

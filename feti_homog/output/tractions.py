@@ -20,8 +20,8 @@ INK = ("#1f4e9c", "#2a7f3f")
 NAMES = {"traction": (r"$t_\mathrm{n}$", r"$t_\mathrm{t}$"), "jump": ("gap", "slip")}
 
 
-def plot(directory: Path, file: Any) -> list[Path]:
-    """interface.png of the last state and the first, if any state has debonded nodes."""
+def plot(directory: Path, file: Any, is_path: bool) -> list[Path]:
+    """interface.png, if any state has debonded nodes: of a path's last state and first, else of one state."""
     names = sorted(file.get("state", ()), key=int)
     debonded = {name: int((file[f"state/{name}/status"][:] != BONDED).sum()) for name in names}
     if not any(debonded.values()):
@@ -29,7 +29,9 @@ def plot(directory: Path, file: Any) -> list[Path]:
     total = len(file["interface/points"])
     # After all bonds are gone there is not much left to see, unless the faces touch.
     last = next((n for n in reversed(names) if 0 < debonded[n] < total or _touching(file, n)), names[-1])
-    return [save(_figure(file, [names[0], last] if names[0] != last else [last]), directory / "interface.png")]
+    partly = [name for name in names if 0 < debonded[name] < total]
+    shown = list(dict.fromkeys([names[0], last])) if is_path else [(partly or [last])[len(partly) // 2]]
+    return [save(_figure(file, shown), directory / "interface.png")]
 
 
 def _touching(file: Any, name: str) -> bool:

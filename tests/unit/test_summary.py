@@ -114,3 +114,49 @@ def test_what_must_be_there(key: str) -> None:
     del document[key]
     with pytest.raises(KeyError, match=key):
         summary(document)
+
+
+def counted(bonded: int, **values: Any) -> dict[str, Any]:
+    return values | {"bonded": bonded, "open": 9, "closed": 1, "iterations": 7}
+
+
+def test_an_angle() -> None:
+    stiffness = [[9.0, 2, 0], [2, 8, 0], [0, 0, 3]]
+    document = changed(angle=[counted(20 - k, angle=90.0 * k, stiffness=stiffness) for k in (0, 4)])
+    del document["effective_stiffness"], document["moduli"], document["bounds"]
+    document["case"]["analysis"]["type"] = "angle"
+    text = summary(document)
+    assert text.startswith("pair: debonding angle, plane strain") and max(map(len, text.splitlines())) < 80
+    assert line(text, "angle ").split() == ["angle", "C11", "C22", "C12", "C33", "bonded", "open", "closed"]
+    assert line(text, "360 ").split() == ["360", "9", "8", "2", "3", "16", "9", "1"]
+
+
+def test_a_path() -> None:
+    points = [
+        counted(100 - k, load_factor=0.01 * k, strain=[0, -2e-3 * k, 1e-5], stress=[1e-15, -3.5 * k, -2.0], broke=1,
+                dissipated=0.5 * k)
+        for k in range(101)
+    ]  # fmt: skip
+    document = changed(path=points, kkt_tolerance=1e-6)
+    del document["effective_stiffness"], document["moduli"], document["bounds"]
+    document["case"]["analysis"]["type"] = "path"
+    document["checks"] |= {"kkt_tension": 9e-7, "kkt_penetration": 2e-6}
+    document["solver"] |= {"iterations": [*range(5, 30)], "factorizations": 3, "coarse_factorizations": 30}
+    text = summary(document)
+    assert max(map(len, text.splitlines())) < 80
+    assert "101 points, 15 shown; 101 bonds broke, 50 dissipated per area" in text
+    rows = [words.split() for words in text.splitlines() if words[:5].strip().isdigit()]
+    assert len(rows) == 15
+    assert rows[0] == ["0", "0.000000", "0", "0", "0", "-2", "100", "9", "1"]
+    assert rows[-1] == ["100", "1.000000", "-0.2", "0", "-350", "-2", "0", "9", "1"]
+    assert line(text, "Iterations").endswith("5 to 29 a state, 425 for 25 states")
+    assert line(text, "Factorized").split(maxsplit=1)[1] == "3 subdomains, 30 coarse ones"
+    assert line(text, "kkt_tension").endswith("pass") and line(text, "kkt_penetration").endswith("FAIL")
+    assert "at most 1.0e-07; of contact 1.0e-06" in text
+
+
+def test_bounds_of_bonded_cells_only() -> None:
+    document = changed(effective_stiffness_compression=[[150.0, 57, 0], [57, 150, 0], [0, 0, 46]])
+    document["case"]["interface"] = {"contact": True, "debonded": [{"fibre": "all", "centre": 0.0, "angle": 60.0}]}
+    text = summary(document)
+    assert "Under minus E (GPa)" in text and "Bounds" not in text and "moduli" not in text

@@ -1,0 +1,174 @@
+"""Debonding and contact against quadratic programming, published numbers and laws, at any number of ranks."""
+
+from __future__ import annotations
+
+import bonds
+import numpy as np
+import pytest
+from cells import relative_error
+from random_bonds import random_bonded, random_cell, random_strain
+
+from feti_homog.interface.contact import BONDED, CLOSED, MOST_SOLVES, OPEN
+from feti_homog.sections import Arc
+
+pytestmark = pytest.mark.parallel
+
+EQUAL = 1e-7
+CERTIFIED = 1e-9
+CASES_OF_A_CELL = 5
+STRAINS = np.eye(3)
+
+
+def directions(cell):
+    """Degrees of this rank's interface nodes about their fibre's centre."""
+    normal = cell.solver.constraints.nodes.normal
+    return np.degrees(np.arctan2(normal[:, 1], normal[:, 0]))
+
+
+def response(cell, contact, strain, status):
+    """Sigma and the equilibrium from the multipliers zero."""
+    state = bonds.interface(cell, contact).equilibrium(np.array(strain, float), status, np.zeros(cell.solver.rows))
+    return bonds.stress(cell, state.solution), state
+
+
+def stiffness(cell, status):
+    """The stiffness without contact."""
+    return np.array([response(cell, False, strain, status)[0] for strain in STRAINS]).T
+
+
+@pytest.mark.parametrize("number", range(16))
+def test_random_cells_equal_the_quadratic_programme(comm, number):
+    # Other cells on other numbers of ranks: 240 cases at 1, 2 and 4.
+    rng = np.random.default_rng([comm.size, number])
+    case = bonds.build(comm, **random_cell(rng))
+    for _ in range(CASES_OF_A_CELL):
+        bonded, strain = random_bonded(rng, case.twin) if case.twin else None, None
+        bonded, strain = comm.bcast((bonded, random_strain(rng)))
+        contact = bool(comm.bcast(rng.random() < 0.85))
+        stress, state = response(case.cell, contact, strain, case.status(bonded))
+        energy = bonds.energy(case.cell, state.solution)
+        assert state.solution.reason > 0
+        assert state.solves < MOST_SOLVES // 10
+        assert max(state.certificate.values()) < CERTIFIED
+        expected = comm.bcast(case.twin and case.twin.solve(strain, bonded, contact))
+        assert abs(energy - expected.energy) < EQUAL * expected.energy
+        assert relative_error(stress, expected.stress) < EQUAL
+        status = case.of_twin(state.status)
+        assert ((status == BONDED) == bonded).all()
+        if contact:
+            tight = expected.force[:, 0] < -1e-6 * np.abs(expected.force).max()
+            assert (status[tight & ~bonded] == CLOSED).all()
+
+
+def test_sigma_is_homogeneous_of_degree_one(comm):
+    rng = np.random.default_rng(5)
+    cell = bonds.tear(comm, geometry="hexagonal", order=2, mesh_size=0.25)
+    status = np.where(np.abs(directions(cell) - 20) < 70, OPEN, BONDED).astype(np.int8)
+    for strain in rng.normal(size=(3, 3)):
+        stress, _ = response(cell, True, strain, status)
+        for t in (1e-6, 30.0):
+            assert relative_error(response(cell, True, t * strain, status)[0], t * stress) < 1e-8
+        assert relative_error(response(cell, True, -strain, status)[0], -stress) > 1e-3
+
+
+def test_sign_of_shear_flips_only_the_shear_stress(comm):
+    cell = bonds.tear(comm, [Arc(fibre="all", angle=120.0)], geometry="square", mesh_size=0.07, order=2)
+    status = np.where(np.abs(directions(cell)) < 60 - 1e-6, OPEN, BONDED).astype(np.int8)
+    plus, minus = (response(cell, True, [-0.5, 0.2, sign * 0.7], status)[0] for sign in (1, -1))
+    # The mesh is not symmetric.
+    assert relative_error(plus, minus * [1, 1, -1]) < 1e-3
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_energy_of_free_contact_and_bonded_faces_rises(comm, seed):
+    rng = np.random.default_rng(seed)
+    cell = bonds.tear(comm, geometry="random", fibres=4, min_gap=0.1, seed=seed, mesh_size=0.2)
+    status = np.where(np.cos(np.radians(3 * directions(cell))) < 0.3, OPEN, BONDED).astype(np.int8)
+    for strain in rng.normal(size=(4, 3)):
+        free, contact, bonded = (
+            bonds.energy(cell, response(cell, touch, strain, states)[1].solution)
+            for touch, states in ((False, status), (True, status), (True, np.full_like(status, BONDED)))
+        )
+        assert free * (1 + 1e-6) < contact < bonded * (1 - 1e-6)
+
+
+def test_debonded_fibre_with_contact_is_a_void_under_tension(comm):
+    cell = bonds.tear(comm, geometry="square", order=2, mesh_size=0.2)
+    status = np.full(len(directions(cell)), OPEN, np.int8)
+    stress, state = response(cell, True, [1, 0, 0], status)
+    assert relative_error(stress, stiffness(cell, status)[:, 0]) < 1e-9
+    assert comm.allreduce(int((state.status != OPEN).sum())) == 0
+
+
+@pytest.mark.parametrize(
+    ("geometry", "expected"),
+    [("square", (40.268438, 9.710096, 6.303568)), ("hexagonal", (36.123857, 14.523762, 10.800047))],
+)
+def test_debonded_fibres_without_contact_are_voids(comm, geometry, expected):
+    cell = bonds.tear(comm, geometry=geometry, order=2, mesh_size=0.1, refine=1)
+    L = stiffness(cell, np.full(len(directions(cell)), OPEN, np.int8))
+    assert np.abs([L[0, 0] / expected[0], L[0, 1] / expected[1], L[2, 2] / expected[2]] - np.ones(3)).max() < 1e-4
+
+
+def test_arc_of_120_degrees_has_the_published_stiffness(comm):
+    """The tips are singular, so the error falls with the element size: extrapolated from two meshes."""
+    results = []
+    for refine in (1, 2):
+        arc = [Arc(fibre="all", angle=120.0)]
+        cell = bonds.tear(comm, arc, geometry="square", order=2, mesh_size=0.1, refine=refine)
+        status = np.where(np.abs(directions(cell)) < 60 - 1e-6, OPEN, BONDED).astype(np.int8)
+        L, pressed = stiffness(cell, status), response(cell, True, [-1, 0, 0], status)[0]
+        results.append(np.array([L[0, 0], L[1, 1], L[0, 1], L[2, 2], pressed[0], pressed[1]]))
+    expected = [72.549, 128.352, 29.259, 28.884, -146.256, -60.185]
+    assert np.abs((2 * results[1] - results[0]) / expected - 1).max() < 1e-3
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_masked_rows_equal_constraints_built_without_them(comm, order):
+    """The paper's first way against its second: the saddle-point problem of B without the debonded rows, dense."""
+    cell = bonds.tear(comm, geometry="hexagonal", order=order, mesh_size=0.25 * order, decomposition={"subdomains": 6})
+    interface = bonds.interface(cell, False)
+    status = np.where(np.abs(directions(cell) - 30) < 50, OPEN, BONDED).astype(np.int8)
+    active = np.concatenate(comm.allgather(interface.active(status))) > 0
+    solver = cell.solver
+    first, last = solver.constraints.owned
+    F = []
+    for row in range(solver.constraints.total):
+        unit = (np.arange(first, last) == row).astype(float)
+        F.append(np.concatenate(comm.allgather(solver.operator.apply(unit))))
+    G, d = (np.concatenate(comm.allgather(x)) for x in (solver.coarse.G.toarray(), solver.d))
+    F, G, d = np.array(F)[np.ix_(active, active)], G[active], d[active]
+    saddle = np.block([[F, -G], [-G.T, np.zeros((G.shape[1],) * 2)]])
+    for strain in STRAINS:
+        x = np.linalg.solve(saddle, np.r_[d @ strain, np.zeros(G.shape[1])])
+        stress, state = response(cell, False, strain, status)
+        lam = np.concatenate(comm.allgather(state.solution.lam))
+        assert relative_error(lam[active], x[: len(F)]) < 1e-8
+        assert (lam[~active] == 0).all()
+        expected = (solver.torn_stiffness @ strain + d.T @ x[: len(F)]) / cell.plan.area
+        assert relative_error(stress, expected) < 1e-10
+
+
+@pytest.mark.parametrize("bodies", ["torus", "plane"])
+@pytest.mark.parametrize("subdomains", [1, 12])
+def test_loose_fibres_are_counted(comm, bodies, subdomains):
+    pieces = {"subdomains": subdomains}
+    cell = bonds.tear(comm, geometry="hexagonal", mesh_size=0.2, bodies=bodies, decomposition=pieces)
+    fibre = cell.solver.constraints.nodes.fibre
+    both = np.full(len(fibre), OPEN, np.int8)
+    lowest = comm.allreduce(fibre.min(initial=1000), min)
+    one = np.where(fibre == lowest, OPEN, BONDED).astype(np.int8)
+    pressed, pulled = [-1, -1, 0.1], [1, 1, 0.1]
+    # Three motions each; pressed, the round fibres can only turn.
+    for contact, status, strain, expected in (
+        (False, both, pressed, 6), (False, one, pulled, 3), (True, both, pulled, 6), (True, both, pressed, 2),
+        (True, one, pressed, 1),
+    ):  # fmt: skip
+        assert response(cell, contact, strain, status)[1].loose == expected
+
+
+def test_no_strain_is_no_stress(comm):
+    cell = bonds.tear(comm, geometry="square", mesh_size=0.2)
+    stress, state = response(cell, True, [0, 0, 0], np.full(len(directions(cell)), OPEN, np.int8))
+    assert (stress == 0).all()
+    assert max(state.certificate.values()) == 0
