@@ -51,7 +51,7 @@ def write(folder: Path, points: dict[str, Any]) -> list[Path]:
     for axes, (name, point) in zip(grid, points.items(), strict=True):
         with h5py.File(folder / name.replace(" ", "_") / "result.h5", "r") as file:
             scene = Scene.of(file, [0], {}, true=True, limit=60_000)
-            scene.draw(figure, axes, 0)
+            scene.draw(figure, axes, 0, scene.moved(0))
             words = scene.words
             overlap = max(0.0, -float(file["state/0/jump"][:, 0].min(initial=0.0)))
         axes.autoscale_view()

@@ -28,7 +28,7 @@ COLUMNS = ("Rn", "Rt", "load_factor", "E11", "S11", "S22", "S12", "bonded", "ope
 
 
 def main(words: Sequence[str], comm: Intracomm) -> int:
-    options = figures.parser(__doc__ or "", "stress_strain", mesh_size=0.06, refine=0, order=1)
+    options = figures.parser(__doc__ or "", "stress_strain", mesh_size=0.04, refine=0, order=1)
     given = parsed(options, words, comm)
     curves = {}
     for normal, tangential in STRENGTHS[:2] if given.quick else STRENGTHS:

@@ -1,4 +1,4 @@
-"""A slow independent twin of load paths: every state anew by `qp_twin`, whose bonded nodes are one and debonded ones two.
+"""A slow independent twin of load paths: every state anew by `qp_twin`, bonded nodes being one, debonded ones two.
 
 Tractions are nodal reactions by the arc length that each node stands for.
 """

@@ -185,7 +185,7 @@ def _minimise(K, f, C, loose, reach):
 
 def _bordered(K, f, C, loose, v):
     """K v - C^T force = f, C v = 0 by a direct solve that leaves the amplitudes of loose motions as they are in v."""
-    n, m, z = len(f), C.shape[0], loose.shape[1]
+    n, m = len(f), C.shape[0]
     matrix = bmat([[K, -C.T, csr_matrix(loose)], [-C, csr_matrix((m, m)), None], [csr_matrix(loose.T), None, None]])
     factor = splu(matrix.tocsc())
     b = np.r_[f, np.zeros(m), loose.T @ v]

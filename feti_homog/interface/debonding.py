@@ -26,9 +26,8 @@ Bool = NDArray[np.bool_]
 TIE = 1e-6
 # Least steps along a later leg, past a change of contact; with loose fibres, whose gaps are not unique, larger.
 STEP, LOOSE_STEP = 1e-6, 0.02
-# Shares of a leg that are not told apart.
-RESOLUTION = 1e-9
-ROUNDING = 1e-13
+# Shares of a leg that are not told apart, and strains that are zero, relative to those at its ends.
+RESOLUTION, ROUNDING = 1e-9, 1e-13
 BISECTIONS = 60
 
 

@@ -39,7 +39,12 @@ class Placement:
 
 
 def place(
-    comm: MPI.Intracomm, coarse: CoarseProblem, nodes: InterfaceNodes, is_open: Bool, solution: DualSolution, noise: float
+    comm: MPI.Intracomm,
+    coarse: CoarseProblem,
+    nodes: InterfaceNodes,
+    is_open: Bool,
+    solution: DualSolution,
+    noise: float,
 ) -> Placement:
     """Move the loose fibres so that no open node overlaps by more than `noise`; collective, decided on rank 0.
 

@@ -15,7 +15,7 @@ from feti_homog.output.draw import Array, Drawing
 
 BONDED, CLOSED, OPEN = 0, 1, 2
 WORDS = {BONDED: "bonded", CLOSED: "in contact", OPEN: "open"}
-COLOURS = {BONDED: "black", CLOSED: "#ffb000", OPEN: "#d6006c"}
+COLOURS = {BONDED: "black", CLOSED: "#ff7f0e", OPEN: "#d6006c"}
 WIDTHS = {BONDED: 0.8, CLOSED: 2.6, OPEN: 2.0}
 NEAR = 1e-6  # of the width of the cell
 

@@ -56,9 +56,9 @@ class Scene:
         places: Array = self.drawn.points + self.scale * on_nodes(self.file[f"state/{number}/displacement"], self.drawn)
         return places
 
-    def draw(self, figure: Figure, axes: Axes, number: int) -> None:
-        """The deformed cell of a state with its own range of colours: stresses grow along a path."""
-        state, moved = self.file[f"state/{number}"], self.moved(number)
+    def draw(self, figure: Figure, axes: Axes, number: int, moved: Array) -> None:
+        """The cell of a state, drawn nodes at `moved`, in its own range of colours: stresses grow along a path."""
+        state = self.file[f"state/{number}"]
         stress = on_triangles(state["stress"], list(STRESSES).index(self.component), self.drawn)
         norm, extend = value_range(stress)
         shapes = paint(axes, self.drawn, moved, stress, edges=False, norm=norm, cmap="viridis")
@@ -98,14 +98,15 @@ def plot(directory: Path, file: Any, document: Mapping[str, Any]) -> list[Path]:
 
 def _side_by_side(file: Any, numbers: Sequence[int], output: Mapping[str, Any], true: bool) -> Figure:
     scene = Scene.of(file, numbers, output, true, limit=30_000)
-    size = _extent(scene, numbers)
+    places = [scene.moved(number) for number in numbers]
+    size = np.subtract(*_corners(places)[::-1])
     rows = max(1, round(math.sqrt(0.7 * len(numbers) * size[0] / size[1])))
     columns = -(-len(numbers) // rows)
     panel = (INCHES - BAR * columns) / columns
     figure = Figure(figsize=(INCHES, rows * (panel * size[1] / size[0] + 0.5) + 0.7), layout="constrained")
     grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
-    for axes, number in zip(grid, numbers, strict=False):
-        scene.draw(figure, axes, number)
+    for axes, number, moved in zip(grid, numbers, places, strict=False):
+        scene.draw(figure, axes, number, moved)
     for axes in grid[len(numbers) :]:
         axes.set_axis_off()
     grid[0].autoscale_view()
@@ -119,15 +120,16 @@ def _side_by_side(file: Any, numbers: Sequence[int], output: Mapping[str, Any], 
 
 def _animation(file: Any, numbers: Sequence[int], output: Mapping[str, Any], path: Path) -> Path:
     scene = Scene.of(file, numbers, output, True, limit=FRAME_LIMIT)
-    size = _extent(scene, numbers)
+    places = [scene.moved(number) for number in numbers]
+    low, high = _corners(places)
+    size = high - low
     figure = Figure(figsize=(3.6 + BAR, 3.6 * size[1] / size[0] + 0.7), dpi=100, layout="constrained")
     canvas = FigureCanvasAgg(figure)
-    low, high = _corners(scene, numbers)
     frames = []
-    for number in numbers:
+    for number, moved in zip(numbers, places, strict=True):
         figure.clear()
         axes = figure.subplots()
-        scene.draw(figure, axes, number)
+        scene.draw(figure, axes, number, moved)
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
         canvas.draw()
         picture = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
@@ -137,15 +139,8 @@ def _animation(file: Any, numbers: Sequence[int], output: Mapping[str, Any], pat
     return path
 
 
-def _extent(scene: Scene, numbers: Sequence[int]) -> Array:
-    low, high = _corners(scene, numbers)
-    size: Array = high - low
-    return size
-
-
-def _corners(scene: Scene, numbers: Sequence[int]) -> tuple[Array, Array]:
-    """Lower left and upper right corner of all states."""
-    places = [scene.moved(number) for number in numbers]
+def _corners(places: Sequence[Array]) -> tuple[Array, Array]:
+    """Lower left and upper right corner of all states, with a margin."""
     low, high = np.min([p.min(axis=0) for p in places], axis=0), np.max([p.max(axis=0) for p in places], axis=0)
     margin = 0.02 * (high - low)
     return low - margin, high + margin

@@ -9,10 +9,12 @@ import h5py
 import numpy as np
 import pytest
 from matplotlib.image import imread
+from PIL import Image
 from sample_output import Sample, sample, without_interface
 
 from feti_homog.errors import FetiHomogError
 from feti_homog.output import canvas, draw, plots, xdmf
+from feti_homog.output.faces import Faces
 from feti_homog.output.fields import FieldFile
 
 
@@ -91,6 +93,58 @@ def test_all_pictures_are_made(tmp_path: Path, order: int, refine: int) -> None:
     for path in paths:
         picture = imread(path)
         assert min(picture.shape[:2]) > 500 and picture[..., :3].std() > 0.1
+
+
+def listed(kind: str, **points: Any) -> dict[str, Any]:
+    """A document with a list of three points, as many as the sample has states."""
+    counts = {"bonded": 4, "open": 3, "closed": 3, "broke": 1}
+    section = {"strain": [0.0, 0.0, 1.0]} | ({"method": "events"} if kind == "path" else {"values": [0, 90, 180]})
+    case = {"name": "a", "analysis": {"type": kind, "plane": "strain"}, "interface": {"contact": True}, kind: section}
+    rows = [counts | {key: values[k] for key, values in points.items()} for k in range(3)]
+    return {"case": case | {"output": {"stress_unit": "GPa"}}, kind: rows}
+
+
+LISTS = [
+    (listed("path", load_factor=[0.5, 0.2, 1], strain=[[0.5, 0, 0], [0.2, 0, 0], [1, 0, 0]], stress=[[3, 1, 0]] * 3),
+     ["path_states.png", "path.gif", "interface.png", "path.png"]),
+    (listed("angle", angle=[0, 90, 180], strain=[[0, 0, 1]] * 3, stress=[[1, 2, 3]] * 3),
+     ["angle_states.png", "interface.png", "angle.png"]),
+    (listed("angle", angle=[0, 90, 180], stiffness=[[[9, 2, 0], [2, 8, 0], [0, 0, 3]]] * 3),
+     ["angle_states.png", "interface.png", "angle.png"]),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("document", "names"), LISTS, ids=["path", "angle, strain", "angle, stiffness"])
+def test_pictures_of_lists(tmp_path: Path, document: dict[str, Any], names: list[str]) -> None:
+    write(tmp_path, sample(4, refine=1))
+    (tmp_path / "result.json").write_text(json.dumps(document))
+    paths = plots.plot(tmp_path)
+    assert [path.name for path in paths] == ["cell.png", *names]
+    for path in paths:
+        with Image.open(path) as picture:
+            assert getattr(picture, "n_frames", 1) == (3 if path.suffix == ".gif" else 1)
+            assert np.asarray(picture.convert("RGB")).std() > 20 and min(picture.size) > 300
+
+
+def test_curves_alone_without_fields(tmp_path: Path) -> None:
+    document = LISTS[0][0] | {"case": LISTS[0][0]["case"] | {"output": {"fields": False}}}
+    (tmp_path / "result.json").write_text(json.dumps(document))
+    assert [path.name for path in plots.plot(tmp_path)] == ["path.png"]
+
+
+def test_faces_are_as_their_worst_node(tmp_path: Path) -> None:
+    with h5py.File(write(tmp_path, sample(8)), "r") as file:
+        drawn = draw.drawing(file)
+        faces = Faces.of(file, drawn, draw.outlines(drawn, drawn.body))
+        ends = file["interface/points"][:][faces.nodes]
+        states = faces.state(file["state/0/status"][:])
+    np.testing.assert_allclose(ends, drawn.points[faces.edges], atol=1e-12)
+    # Two sides of five nodes: bonded, closed, open, bonded, closed and open, bonded, closed, open, bonded.
+    expected = {(0.25, x): state for x, state in zip((5, 7, 9, 11), (1, 2, 2, 1), strict=True)}
+    expected |= {(0.75, x): state for x, state in zip((5, 7, 9, 11), (2, 1, 2, 2), strict=True)}
+    middle = ends.mean(axis=1)
+    assert len(states) == 2 * len(expected)
+    assert [expected[y, round(16 * x)] for x, y in middle] == states.tolist()
 
 
 def test_the_case_chooses_component_and_scale(tmp_path: Path) -> None:

@@ -1,0 +1,203 @@
+"""Load-induced debonding against a slow twin, published numbers and laws, at any number of ranks."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import bonds
+import numpy as np
+import pytest
+from cells import relative_error
+from path_twin import PathTwin
+from support import parallel_assert
+
+from feti_homog.interface.contact import BONDED, OPEN
+from feti_homog.interface.debonding import events, increments, unloaded
+from feti_homog.interface.law import Law
+
+pytestmark = pytest.mark.parallel
+
+SQUARE = {"geometry": "square", "mesh_size": 0.2}
+HEXAGONAL = {"geometry": "hexagonal", "mesh_size": 0.4, "order": 2, "plane": "stress"}
+THREE = {"geometry": "random", "fibres": 3, "min_gap": 0.1, "seed": 4, "mesh_size": 0.2, "radius_spread": 0.3}
+CELLS = [
+    SQUARE,
+    SQUARE | {"order": 2, "mesh_size": 0.35, "plane": "stress"},
+    HEXAGONAL | {"bodies": "plane", "decomposition": {"subdomains": 7}},
+    THREE,
+]
+TENSION, MIXED, SHEAR = [1.0, 0.1, 0.2], [0.6, -0.8, 0.3], [0.2, -0.1, 1.0]
+
+
+def bonded_status(cell):
+    return np.full(len(cell.solver.constraints.nodes.row), BONDED, np.int8)
+
+
+def follow(cell, contact, law, waypoints, begin=None):
+    """All points of an events path from the wholly bonded cell."""
+    interface = bonds.interface(cell, contact)
+    return list(events(interface, law, np.array(waypoints), begin or unloaded(interface, bonded_status(cell))))
+
+
+def curve(cell, points):
+    """(points, 4) load factor and Sigma."""
+    return np.array([[p.load_factor, *(p.scale * bonds.stress(cell, p.state.solution))] for p in points])
+
+
+def broken(case, points):
+    """For each point, which of the twin's nodes are broken after it."""
+    return np.array([case.of_twin(p.after.status) != BONDED for p in points])
+
+
+def is_certified(points):
+    return all(p.state.solution.reason > 0 and max(p.state.certificate.values()) < 1e-8 for p in points)
+
+
+@pytest.mark.parametrize("cell", CELLS, ids=["square", "stress", "hexagonal", "three"])
+@pytest.mark.parametrize(
+    ("criterion", "contact", "strain"),
+    [("max", True, MIXED), ("quadratic", True, SHEAR), ("max", False, TENSION), ("quadratic", False, MIXED)],
+)
+def test_events_equal_the_twins(comm, cell, criterion, contact, strain):
+    case = bonds.build(comm, matrix={"young": 1.0, "poisson": 0.35}, fibre={"young": 5.0, "poisson": 0.2}, **cell)
+    twin = comm.bcast(case.twin)
+    strengths = (0.15, 0.3) if criterion == "max" else (0.25, 0.2)
+    path = PathTwin(twin, contact, *strengths, criterion)
+    expected = path.proportional(np.array(strain), np.ones(len(twin.key), bool))
+    points = follow(case.cell, contact, Law(*strengths, criterion), [strain])
+    assert len(points) == len(expected) > 3
+    assert is_certified(points)
+    np.testing.assert_array_equal(broken(case, points), np.cumsum([e.broke for e in expected], axis=0) > 0)
+    wanted = np.array([[e.load_factor, *e.stress] for e in expected])
+    assert relative_error(curve(case.cell, points)[:, 0], wanted[:, 0]) < 1e-7
+    assert relative_error(curve(case.cell, points)[:, 1:], wanted[:, 1:]) < 1e-7
+    assert points[-1].load_factor == 1.0
+    assert [p.broke for p in points] == [e.broke.sum() for e in expected]
+
+
+@pytest.mark.parametrize("back", [[0.0, 0.0, 0.0], [-0.6, 0.8, -0.3]], ids=["unloading", "reversal"])
+def test_later_legs_equal_small_steps(comm, back):
+    case = bonds.build(comm, matrix={"young": 1.0, "poisson": 0.35}, fibre={"young": 5.0, "poisson": 0.2}, **SQUARE)
+    twin, legs = comm.bcast(case.twin), np.array([[0.3, -0.4, 0.15], back, [0.9, -0.9, 0.7]])
+    path = PathTwin(twin, True, 0.15, 0.3, "max")
+    found = path.proportional(legs[0], np.ones(len(twin.key), bool))
+    expected = [(e.load_factor / 3, e) for e in found]
+    for leg in (1, 2):
+        left = ~np.any([e.broke for _, e in expected], axis=0)
+        expected += [((leg + e.load_factor) / 3, e) for e in path.leg(legs[leg - 1], legs[leg], left, 12)]
+    points = follow(case.cell, True, Law(0.15, 0.3, "max"), legs)
+    assert len(points) == len(expected) > 8
+    assert is_certified(points)
+    np.testing.assert_array_equal(broken(case, points), np.cumsum([e.broke for _, e in expected], axis=0) > 0)
+    wanted = np.array([[load, *e.stress] for load, e in expected])
+    assert np.abs(curve(case.cell, points) - wanted).max() < 1e-5 * np.abs(wanted[:, 1:]).max()
+    if not np.any(back):
+        unloaded_at = [p for p in points if p.load_factor == 2 / 3 and p.broke == 0]
+        assert len(unloaded_at) == 1
+        assert (bonds.stress(case.cell, unloaded_at[0].state.solution) == 0).all()
+
+
+def test_onset_in_the_square_cell(comm):
+    cell = bonds.tear(comm, geometry="square", order=2, mesh_size=0.08, refine=1)
+    interface = bonds.interface(cell, True)
+    first = next(events(interface, Law(0.1, 0.1, "max"), np.eye(3)[:1], unloaded(interface, bonded_status(cell))))
+    stress = first.scale * bonds.stress(cell, first.state.solution)
+    assert np.abs(np.r_[first.load_factor, stress[:2]] / [5.57799e-4, 0.0843146, 0.0309787] - 1).max() < 1e-3
+    normal, shear = interface.traction(first.state.solution).T
+    assert abs(comm.allreduce(normal.max(initial=0), max) / 179.276113 - 1) < 1e-3
+    assert abs(comm.allreduce(np.abs(shear).max(initial=0), max) / 55.058455 - 1) < 1e-3
+    away = np.degrees(np.arctan2(*interface.nodes.normal.T[::-1]))
+    largest = normal == comm.allreduce(normal.max(initial=0), max)
+    parallel_assert(comm, bool((np.minimum(np.abs(away), 180 - np.abs(away))[largest] < 5).all()))
+
+
+@pytest.mark.parametrize("contact", [True, False])
+def test_debonding_grows_and_dissipates(comm, contact):
+    case = bonds.build(comm, **THREE)
+    points = follow(case.cell, contact, Law(20.0, 30.0, "quadratic"), [SHEAR])
+    after = broken(case, points)
+    assert (after[1:] >= after[:-1]).all()
+    for before, now in pairwise(points):
+        drop = bonds.stress(case.cell, before.state.solution) - bonds.stress(case.cell, now.state.solution)
+        assert drop @ SHEAR > -1e-9 * np.abs(drop).max()
+
+
+def test_increments_meet_events_and_the_curve_between_them_converges_with_first_order(comm):
+    """Releasing the worst bonds one after the other, an increment ends where events end that break no later."""
+    cell = bonds.tear(comm, **SQUARE)
+    law, strain = Law(0.05, 0.05, "max"), np.array([[1e-3, 0.0, 0.0]])
+    exact = curve(cell, follow(cell, True, law, strain))[:, :2]
+    interface, loads, errors = bonds.interface(cell, True), np.linspace(0, 1, 20001), []
+    begin = unloaded(interface, bonded_status(cell))
+    for steps in (10, 40, 160):
+        found = curve(cell, list(increments(interface, law, strain, steps, True, begin)))[:, :2]
+        assert relative_error(found[:, 1], rising(exact, found[:, 0])) < 1e-7
+        errors.append(np.abs(np.interp(loads, *np.vstack([[0, 0], found]).T) - rising(exact, loads)).mean())
+    # A drop within a step h is smeared over it: an error of between a quarter and a half of the drop times h.
+    constants = np.array(errors) * [10, 40, 160]
+    assert constants.max() < 2.1 * constants.min()
+
+
+def test_onset_by_increments_is_late_by_less_than_one(comm):
+    cell = bonds.tear(comm, **SQUARE)
+    law, strain = Law(0.05, 0.05, "max"), np.array([[1e-3, 0.0, 0.0]])
+    interface, exact = bonds.interface(cell, True), follow(cell, True, law, strain)[0].load_factor
+    for steps in (10, 40):
+        points = list(increments(interface, law, strain, steps, False, unloaded(interface, bonded_status(cell))))
+        onset = next(p.load_factor for p in points if p.broke)
+        assert 0 <= onset - exact < 1 / steps
+        assert [p.load_factor for p in points] == pytest.approx(np.arange(1, steps + 1) / steps)
+
+
+def rising(exact, loads):
+    """Sigma11 under rising strain: on the ray to the first point that no later break at this load or less follows."""
+    first = [np.flatnonzero(exact[:, 0] > load * (1 - 1e-12))[0] for load in np.minimum(loads, 1 - 1e-9)]
+    return loads * (exact[:, 1] / exact[:, 0])[first]
+
+
+def test_goes_on_from_any_point(comm):
+    case = bonds.build(comm, **SQUARE)
+    law, waypoints = Law(20.0, 30.0, "max"), [[0.7, -0.8, 0.5], [0.0, 0.0, 0.0], [-1.0, 1.0, 1.5]]
+    points = follow(case.cell, True, law, waypoints)
+    whole, sets = curve(case.cell, points), broken(case, points)
+    for k in range(0, len(points) - 1, max(1, len(points) // 6)):
+        rest = follow(case.cell, True, law, waypoints, points[k].after)
+        assert relative_error(curve(case.cell, rest), whole[k + 1 :]) < 1e-7
+        np.testing.assert_array_equal(broken(case, rest), sets[k + 1 :])
+    assert follow(case.cell, True, law, waypoints, points[-1].after) == []
+
+
+def test_bodies_and_pieces_change_nothing(comm):
+    law, curves = Law(20.0, 30.0, "max"), []
+    for variant in ({}, {"bodies": "plane"}, {"decomposition": {"subdomains": 9}}):
+        cell = bonds.tear(comm, geometry="hexagonal", mesh_size=0.25, **variant)
+        curves.append(curve(cell, follow(cell, True, law, [MIXED])))
+    for other in curves[1:]:
+        assert relative_error(other, curves[0]) < 1e-7
+
+
+def test_infinite_strengths_never_break(comm):
+    cell = bonds.tear(comm, **SQUARE)
+    points = follow(cell, True, Law(np.inf, np.inf, "quadratic"), [TENSION, SHEAR])
+    assert [(p.load_factor, p.broke) for p in points] == [(0.5, 0), (1.0, 0)]
+    status = np.full(len(bonded_status(cell)), OPEN, np.int8)
+    interface = bonds.interface(cell, True)
+    points = list(events(interface, Law(1.0, 1.0, "max"), np.array([SHEAR, MIXED]), unloaded(interface, status)))
+    assert [(p.load_factor, p.broke) for p in points] == [(0.5, 0), (1.0, 0)]
+    assert is_certified(points)
+
+
+def test_twenty_fibres_to_the_end(comm):
+    if comm.size > 2:
+        pytest.skip("one test, two cores")
+    many = {"geometry": "random", "fibres": 20, "fibre_fraction": 0.4, "min_gap": 0.1, "seed": 2, "mesh_size": 0.08}
+    cell = bonds.tear(comm, **many)
+    points = follow(cell, True, Law(30.0, 15.0, "max"), [[1.0, -0.3, 0.4]])
+    assert is_certified(points)
+    assert points[-1].load_factor == 1.0
+    left = comm.allreduce(int((points[-1].state.status == BONDED).sum()))
+    assert left < comm.allreduce(len(bonded_status(cell)))
+    for before, now in pairwise(points):
+        parallel_assert(comm, bool(((before.after.status != BONDED) <= (now.after.status != BONDED)).all()))
+        drop = bonds.stress(cell, before.state.solution) - bonds.stress(cell, now.state.solution)
+        assert drop @ [1.0, -0.3, 0.4] > -1e-9 * np.abs(drop).max()
