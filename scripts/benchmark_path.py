@@ -49,8 +49,7 @@ def main() -> None:
         start = time.perf_counter()
         cell = tear(case, comm, Progress(comm, quiet=False))
         homogenization = Homogenization(cell, contact=True)
-        interface = homogenization.interface
-        interface.solver.torn_stiffness
+        stiffness = homogenization.interface.solver.torn_stiffness
         setup = time.perf_counter() - start
         seconds, iterations, solves = run_events(homogenization, arguments.events)
     K, Q = glued(cell)
@@ -58,13 +57,15 @@ def main() -> None:
     peer = factor + solve
     mean = float(np.mean(seconds))
     print(f"degrees of freedom          {len(cell.solver.Q)} torn, {K.shape[0]} glued")
+    print(f"torn stiffness C11          {stiffness[0, 0] / cell.plan.area:.6g}")
     print(f"set-up                      {setup:8.2f} s, {setup / peer:6.2f} of the peer")
     print(f"monolithic factor and solve {peer:8.2f} s  (factor {factor:.2f}, solve {solve:.3f})")
     print(f"an event, mean of {len(seconds):4d}      {mean:8.3f} s, 1/{peer / mean:.1f} of the peer")
     print(f"an event, worst             {max(seconds):8.3f} s, 1/{peer / max(seconds):.1f} of the peer")
     print(f"dual problems an event      {np.mean(solves):8.1f}, Krylov iterations an event {np.mean(iterations):.1f}")
-    print(f"subdomain factorizations    {cell.solver.local.factorizations} in all; coarse {cell.solver.coarse.factorizations}")
-    print(f"all events with set-up      {setup + sum(seconds):8.1f} s, the peer's {len(seconds)} {peer * len(seconds):.1f} s")
+    made, coarse = cell.solver.local.factorizations, cell.solver.coarse.factorizations
+    print(f"factorizations              {made} of subdomains in all, {coarse} of the coarse problem")
+    print(f"all events with set-up      {setup + sum(seconds):8.1f} s, the peer {peer * len(seconds):.1f} s")
     cell.solver.destroy()
 
 
