@@ -154,7 +154,7 @@ def _document(study: Study, analysis: dict[str, Any]) -> dict[str, Any]:
         "faults": study.faults,
         "status": "not converged" if study.faults else "done",
     }
-    if "effective_stiffness" in analysis:
+    if "effective_stiffness" in analysis and cell.case.interface is None:
         document |= _beside(cell, analysis["effective_stiffness"], fractions)
     return document | analysis
 

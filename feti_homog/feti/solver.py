@@ -46,6 +46,8 @@ LARGEST_DENSE = 6000
 # Applications after which it has paid; measured: about 50 on 120 000 dofs in three subdomains.
 PAYS = 60
 RTOL = 1e-8
+# A jump that the active rows see of the torn cell's is none if it is as small as this.
+ROUNDING = 1e-13
 
 
 @dataclass(frozen=True)
@@ -164,9 +166,10 @@ class FetiSolver:
         closing = self.preconditioner.apply(free)
         self.coarse.project(closing)
         self.solves += 1
-        self._test.start(self._norm(free), self._norm(closing))
+        jump, least = self._norm(free), ROUNDING * self._norm(torn)
+        self._test.start(max(jump, least), self._norm(closing))
         iterations, reason = 0, int(PETSc.KSP.ConvergedReason.CONVERGED_ATOL)
-        if self._test.jump == 0:
+        if jump <= least:
             lam[:] = 0.0
         else:
             self._w.zeroEntries()
