@@ -127,7 +127,9 @@ def test_arc_of_120_degrees_has_the_published_stiffness(comm):
 def test_masked_rows_equal_constraints_built_without_them(comm, order):
     """The paper's first way against its second: the saddle-point problem of B without the debonded rows, dense."""
     pieces, tight = {"subdomains": 6}, {"feti_ksp_rtol": 1e-13}
-    cell = bonds.tear(comm, geometry="hexagonal", order=order, mesh_size=0.25 * order, decomposition=pieces, petsc=tight)
+    cell = bonds.tear(
+        comm, geometry="hexagonal", order=order, mesh_size=0.25 * order, decomposition=pieces, petsc=tight
+    )
     interface = bonds.interface(cell, False)
     status = np.where(np.abs(directions(cell) - 30) < 50, OPEN, BONDED).astype(np.int8)
     active = np.concatenate(comm.allgather(interface.active(status))) > 0
