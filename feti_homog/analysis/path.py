@@ -79,7 +79,8 @@ def run(study: Study, path: LoadPath, law: Law, checkpoint: Checkpoint, resume: 
             dissipated, source = dissipation.recall(known[number][1], point, response), ", from the checkpoint"
         else:
             dissipated = dissipation.at(point, response)
-            checkpoint.write(number, *_stored(point, dissipated))
+            if point.state.solution.reason > 0:
+                checkpoint.write(number, *_stored(point, dissipated))
         study.note(f"{label} at {point.load_factor:.6f}{source}", response)
         study.record(response, point.load_factor, label)
         points.append(
@@ -93,6 +94,9 @@ def run(study: Study, path: LoadPath, law: Law, checkpoint: Checkpoint, resume: 
             }
             | study.point([response])
         )
+        if point.state.solution.reason < 0:
+            # What broke next was decided on a state that does not hold.
+            break
         if number + 1 == path.max_events and point.load_factor < 1.0:
             study.faults.append(f"[path] max_events = {number + 1}: the path was not finished; result marked")
             break

@@ -175,6 +175,9 @@ class FetiSolver:
             self._w.zeroEntries()
             residual = free - self.active.mask * self.operator.apply(lam)
             self.coarse.project(residual)
+            if self._norm(residual) > jump:
+                # No help: nothing is a better beginning.
+                lam[:], residual = 0.0, free
             self._rhs.setArray(residual)
             self.ksp.solve(self._rhs, self._w)
             iterations, reason = self.ksp.getIterationNumber(), int(self.ksp.getConvergedReason())

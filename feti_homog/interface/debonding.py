@@ -66,7 +66,10 @@ def unloaded(interface: Interface, status: Status) -> Stand:
 
 
 def events(interface: Interface, law: Law, waypoints: Float, begin: Stand) -> Iterator[Point]:
-    """Every break along zero -> waypoints[0] -> ... (n, 3), then the end of each leg.  Collective."""
+    """Every break along zero -> waypoints[0] -> ... (n, 3), and the end of each leg.  Collective.
+
+    On later legs also the changes of contact, with `broke` = 0: between points the response is straight.
+    """
     legs = len(waypoints)
     if begin.leg == 0 and begin.position < 1.0:
         for point in _first_leg(interface, law, waypoints[0], legs, begin):
@@ -121,7 +124,7 @@ def _later_leg(
     interface: Interface, law: Law, ends: tuple[Float, Float], leg: int, legs: int, begin: Stand
 ) -> Iterator[Point]:
     status, lam, s = begin.status, begin.lam, begin.position
-    safe, due = s, False
+    safe, due, told = s, False, s
     while True:
         state = interface.equilibrium(_between(*ends, s), status, lam)
         load, worst = _worst(interface, law, state)
@@ -129,16 +132,20 @@ def _later_leg(
             # A change of contact on the way has brought the break forward.
             s, due = (safe + s) / 2, False
             continue
+        changed = interface.solver.comm.allreduce(bool((state.status != status).any()), MPI.LOR)
         status, lam = state.status, state.solution.lam
         if load > 1.0 + TIE or (due and load > 1.0 - TIE):
             broke = interface.solver.comm.allreduce(int(worst.sum()))
             status = interface.debond(status, worst, lam)
             yield Point((leg + s) / legs, 1.0, state, broke, Stand(leg, s, status, lam))
-            safe, due = s, False
+            safe, due, told = s, False, s
             continue
         if s == 1.0:
             yield Point((leg + 1) / legs, 1.0, state, 0, Stand(leg + 1, 0.0, status, lam))
             return
+        if changed and s > told:
+            told = s
+            yield Point((leg + s) / legs, 1.0, state, 0, Stand(leg, s, status, lam))
         ahead = interface.linear(ends[1], status, lam)
         breaks, changes = _first_break(interface, law, state, ahead), _first_change(interface, state, ahead)
         least = 0.0 if breaks <= changes and not due else LOOSE_STEP if state.loose else STEP

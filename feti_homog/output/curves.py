@@ -76,7 +76,7 @@ def _path(document: Mapping[str, Any]) -> Figure:
             label=None if held is not None else f"${name}$", **style,
         )  # fmt: skip
         if first < len(points):
-            upper.plot(strain[first - 1 :], stress[first - 1 :, i], ":", color=ink, linewidth=0.8, marker="o", ms=3)
+            upper.plot(strain[first - 1 :], stress[first - 1 :, i], color=ink, linewidth=0.8, marker="o", ms=2)
         if held is not None:
             upper.plot(held[:, 3], held[:, i], color=ink, linewidth=2.0, label=f"${name}$")
     if held is not None:
@@ -115,7 +115,7 @@ def strain_controlled(points: Sequence[Mapping[str, Any]], which: int) -> Array:
 
 
 def _first_leg(points: Sequence[Mapping[str, Any]], legs: int) -> int:
-    """How many points are on the first leg; on later ones contact may change between the points."""
+    """How many points are on the first leg."""
     return next((n for n, point in enumerate(points) if point["load_factor"] > (1.0 + 1e-9) / legs), len(points))
 
 
