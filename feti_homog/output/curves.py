@@ -83,7 +83,7 @@ def _path(document: Mapping[str, Any]) -> Figure:
         upper.plot([], [], color="0.3", linewidth=0.8, **style, label="all equilibria")
         upper.plot([], [], color="0.3", linewidth=2.0, label="rising strain")
     if first < len(points):
-        upper.plot([], [], ":", color="0.3", linewidth=0.8, marker="o", ms=3, label="events of later legs")
+        upper.plot([], [], color="0.3", linewidth=0.8, marker="o", ms=2, label="later legs")
     upper.set_ylabel(f"macroscopic stress {_stress_unit(case)}")
     upper.set_title(f"{case.get('name', '')}: plane {case['analysis']['plane']}, {_strengths(case)}".lstrip(": "))
     for kind, key in STATES.items():
