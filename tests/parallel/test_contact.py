@@ -8,6 +8,7 @@ import pytest
 from cells import relative_error
 from random_bonds import random_bonded, random_cell, random_strain
 
+from feti_homog.interface import contact as contact_room
 from feti_homog.interface.contact import BONDED, CLOSED, MOST_SOLVES, OPEN
 from feti_homog.sections import Arc
 
@@ -175,3 +176,18 @@ def test_no_strain_is_no_stress(comm):
     stress, state = response(cell, True, [0, 0, 0], np.full(len(directions(cell)), OPEN, np.int8))
     assert (stress == 0).all()
     assert max(state.certificate.values()) == 0
+
+
+@pytest.mark.parametrize("half", [60, 170])
+def test_single_pivots_find_the_same_state(comm, monkeypatch, half):
+    """Murty's rule alone, one node at a time, ends where the block pivots do."""
+    cell = bonds.tear(comm, geometry="square", mesh_size=0.25)
+    status = np.where(np.abs(directions(cell)) < half, OPEN, BONDED).astype(np.int8)
+    strain = [0.3, -0.6, 0.5]
+    expected, block = response(cell, True, strain, status)
+    pivots = contact_room._Pivots
+    monkeypatch.setattr(contact_room, "_Pivots", lambda comm: pivots(comm, fewest=0, patience=0))
+    stress, single = response(cell, True, strain, status)
+    assert 1 < single.solves < MOST_SOLVES
+    assert comm.allreduce(int((single.status != block.status).sum())) == 0
+    assert relative_error(stress, expected) < 1e-9
