@@ -5,25 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from support import mpirun
+from unit.faulty_cases import BASE
 
-CASE = """\
-[cell]
-geometry = "hexagonal"
-fibre_fraction = 0.4
-mesh_size = 0.15
-
-[material.matrix]
-young = 88.0
-poisson = 0.299
-
-[material.fibre]
-young = 200.0
-poisson = 0.222
-
-[analysis]
-type = "stiffness"
-plane = "strain"
-"""
+CASE = BASE.replace("mesh_size = 0.05", "mesh_size = 0.15")
 
 
 def case_file(folder: Path, end: str = "[output]\npictures = false\n") -> Path:

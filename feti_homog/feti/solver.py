@@ -43,7 +43,7 @@ PRECONDITIONERS = ("none", "lumped", "dirichlet")
 DUAL_OPERATORS = ("auto", "implicit", "explicit")
 # Boundary dofs of a subdomain up to which a dense operator (8 n^2 bytes) is ever chosen by itself.
 LARGEST_DENSE = 6000
-# Applications after which it has paid; measured: about 50 on 120 000 dofs in three subdomains.
+# Applications from which on it is taken to pay; three bonded load cases make fewer.
 PAYS = 60
 RTOL = 1e-8
 # A jump that the active rows see of the torn cell's is none if it is as small as this.
