@@ -15,12 +15,15 @@ from numpy.typing import NDArray
 from feti_homog.cell.piece import Piece
 
 Int = NDArray[np.int64]
+Int32 = NDArray[np.int32]
 Float = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Lattice:
     """The reference triangle with corners (0,0), (M,0), (0,M), cut into 4**refine triangles.
+
+    Two are the same only if they are one object, so that what follows from one can be kept.
 
     Attributes:
         intervals: M.
@@ -65,34 +68,45 @@ class Lattice:
 
 @dataclass(frozen=True)
 class FineMesh:
-    """The refined subdomain: n plane nodes of c classes, m elements.
+    """The refined subdomain: n plane nodes of c classes, t coarse triangles of m elements in all.
 
     Attributes:
         points: (n, 2) plane positions.
-        triangles: (m, 3 or 6) plane nodes; vertices, then mid-edge nodes 01, 12, 20.
+        nodes: (t, q) plane node of each lattice node of each coarse triangle.
+        curved: (t,) whether an edge of the coarse triangle lies on a circle; the others are affine images of
+            the lattice.
         node_class: (n,) class of each plane node; a class is what the degrees of freedom belong to.
         n_classes: c.
+        lattice: of every coarse triangle.
     """
 
     points: Float
-    triangles: Int
-    node_class: Int
+    nodes: Int32
+    curved: NDArray[np.bool_]
+    node_class: Int32
     n_classes: int
+    lattice: Lattice
+
+    @property
+    def triangles(self) -> Int32:
+        """(m, 3 or 6) plane nodes of the elements; vertices, then mid-edge nodes 01, 12, 20."""
+        elements = self.lattice.triangles
+        return self.nodes[:, elements].reshape(-1, elements.shape[1])
 
 
 def refine(piece: Piece, lattice: Lattice) -> FineMesh:
     """Refine the subdomain; new nodes on circles lie on them."""
     edges, back, inner = piece.triangle_edges, piece.backwards, lattice.intervals - 1
-    plane = lattice.number(piece.triangles, edges, back, len(piece.points), len(piece.edges))
+    plane = lattice.number(piece.triangles, edges, back, len(piece.points), len(piece.edges)).astype(np.int32)
     n_classes, n_edges = len(piece.class_keys), len(piece.edge_keys)
     torus = lattice.number(piece.vertex_class[piece.triangles], piece.edge_class[edges], back, n_classes, n_edges)
     n = len(piece.points) + len(piece.edges) * inner + len(plane) * (len(lattice.nodes) - 3 - 3 * inner)
-    points, node_class = np.empty((n, 2)), np.empty(n, np.int64)
+    points, node_class = np.empty((n, 2)), np.empty(n, np.int32)
     points[plane] = _positions(piece, lattice)
     node_class[plane] = torus
     c = n_classes + n_edges * inner + n - len(piece.points) - len(piece.edges) * inner
-    triangles = plane[:, lattice.triangles].reshape(-1, lattice.triangles.shape[1])
-    return FineMesh(points, triangles, node_class, c)
+    curved = (piece.circles[edges, 2] > 0).any(axis=1)
+    return FineMesh(points, plane, curved, node_class, c, lattice)
 
 
 def edge_node(n_classes: int, edge: Int, position: Int, lattice: Lattice) -> Int:

@@ -72,6 +72,14 @@ class Torus:
         return circles
 
     @cached_property
+    def edge_lengths(self) -> Float:
+        """Length of each torus edge, of its chord if it lies on a circle."""
+        ends = self.mesh.points[self.edges]
+        lengths = np.empty(self.torus_edge.max() + 1)
+        lengths[self.torus_edge] = np.hypot(*(ends[:, 1] - ends[:, 0]).T)
+        return lengths
+
+    @cached_property
     def arcs(self) -> Int:
         """(a,) plane edge of each of the mesh's `arc_edges`."""
         return self.plane_edges(self.mesh.arc_edges)
@@ -103,6 +111,12 @@ def edge_pairs(triangle_edges: Int) -> tuple[Int, Int]:
     order = np.argsort(flat, kind="stable")
     twice = flat[order][1:] == flat[order][:-1]
     return order[:-1][twice] // 3, order[1:][twice] // 3
+
+
+def shared_edges(triangle_edges: Int) -> Int:
+    """The edges that two triangles share, in the order of `edge_pairs`."""
+    flat = np.sort(triangle_edges, axis=None)
+    return flat[:-1][flat[1:] == flat[:-1]]
 
 
 def components(n: int, left: Int, right: Int) -> Int:

@@ -23,6 +23,9 @@ def unwrap(piece: Piece) -> tuple[Float, bool]:
     Returns:
         (t, 2) shifts, whole periods; true if the subdomain is contractible.
     """
+    if len(piece.class_keys) == len(piece.points):
+        # No two vertices are images of each other: the plane positions are unwrapped.
+        return np.zeros((len(piece.triangles), 2)), True
     part = components(len(piece.triangles), *edge_pairs(piece.triangle_edges))
     shift = _part_shifts(piece, part)[part]
     corners = piece.points[piece.triangles] + shift[:, None]

@@ -1,6 +1,7 @@
 """Assembly of one body of uniform material: stiffness, load of the unit strains, averages.
 
-Voigt order [11, 22, 12] with engineering shear; degrees of freedom are (node, direction), node-major.
+Voigt order [11, 22, 12] with engineering shear; degrees of freedom are (node, direction), node-major.  Elements
+are summed triangle by coarse triangle first, and an affine one needs no integration of its own.
 """
 
 from __future__ import annotations
@@ -12,9 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_matrix, csr_matrix
 
+from feti_homog.cell.refine import FineMesh
 from feti_homog.fem.element import gradients
+from feti_homog.fem.macro import Macro, integrals, products
 
 Int = NDArray[np.int64]
+Int32 = NDArray[np.int32]
 Float = NDArray[np.float64]
 
 _VOIGT = np.array([[0, 2], [2, 1]])
@@ -37,32 +41,30 @@ class Assembly:
     area: float
 
 
-def assemble(points: Float, triangles: Int, node_class: Int, n_classes: int, L: Float) -> Assembly:
-    """Assemble `triangles` (m, 3 or 6) with nodes at `points` (n, 2) of material `L` (3, 3)."""
-    classes = node_class[triangles]
-    blocks, area = [], 0.0
-    Q = np.zeros((n_classes, 2, 3))
-    for part, g, w in element_gradients(points, triangles):
-        blocks.append(_stiffness(g, w, L))
-        mean = np.einsum("eqad,eq->ead", g, w)
-        load = mean @ L[_VOIGT].transpose(1, 0, 2).reshape(2, 6)
-        # sum_d int dN_a/dx_d L[(i,d), :]
-        for v in range(3):
-            for i in range(2):
-                Q[:, i, v] += np.bincount(classes[part].ravel(), load[..., 3 * i + v].ravel(), n_classes)
-        area += float(w.sum())
-    K = _sparse(np.concatenate(blocks), classes, n_classes)
-    return Assembly(K, Q.reshape(-1, 3), area)
+def assemble(mesh: FineMesh, L: Float) -> Assembly:
+    """Assemble the subdomain `mesh` of material `L` (3, 3)."""
+    macro, tensor = Macro.of(mesh.lattice), _tensor(L)
+    couples, loads = np.empty((len(mesh.nodes), len(macro.rows), 4)), np.empty((*mesh.nodes.shape, 2))
+    area = 0.0
+    for part in _parts(mesh):
+        integrate = _curved if mesh.curved[part[0]] else _affine
+        couples[part], loads[part], own = integrate(macro, mesh, part, tensor)
+        area += own
+    classes, n = mesh.node_class[mesh.nodes], mesh.n_classes
+    load = np.stack([np.bincount(classes.ravel(), loads[..., k].ravel(), n) for k in range(2)], axis=1)
+    # sum_k int dN/dx_k L[(i,k), :]
+    Q = np.einsum("ck,ikv->civ", load, L[_VOIGT]).reshape(-1, 3)
+    return Assembly(_sparse(couples, classes[:, macro.rows], classes[:, macro.columns], n), Q, area)
 
 
-def element_gradients(points: Float, triangles: Int) -> Iterator[tuple[slice, Float, Float]]:
+def element_gradients(points: Float, triangles: Int32) -> Iterator[tuple[slice, Float, Float]]:
     """Gradients (e, q, a, 2) and weights (e, q) by chunks of elements, so that memory stays bounded."""
     for first in range(0, len(triangles), _CHUNK):
         part = slice(first, min(first + _CHUNK, len(triangles)))
         yield part, *gradients(points[triangles[part]])
 
 
-def element_strain(points: Float, triangles: Int, node_class: Int, u: Float) -> tuple[Float, Float]:
+def element_strain(points: Float, triangles: Int32, node_class: Int32, u: Float) -> tuple[Float, Float]:
     """Mean strains (m, 3) of the elements under nodal displacements u (c, 2), and their areas (m,)."""
     strain, area = np.empty((len(triangles), 3)), np.empty(len(triangles))
     for part, g, w in element_gradients(points, triangles):
@@ -75,19 +77,41 @@ def element_strain(points: Float, triangles: Int, node_class: Int, u: Float) -> 
     return strain, area
 
 
-def _stiffness(g: Float, w: Float, L: Float) -> Float:
-    """(e, a, b, 4) element stiffness K_(a i)(b j) = int dN_a/dx_k L_(ik)(jl) dN_b/dx_l, with (i, j) flat."""
-    e, q, a, _ = g.shape
-    flat = g.reshape(e, q, 2 * a)
-    outer = np.matmul((flat * w[..., None]).transpose(0, 2, 1), flat)
-    tensor = L[_VOIGT[:, :, None, None], _VOIGT[None, None]].transpose(1, 3, 0, 2).reshape(4, 4)
-    return outer.reshape(e, a, 2, a, 2).transpose(0, 1, 3, 2, 4).reshape(e, a, a, 4) @ tensor
+def _parts(mesh: FineMesh) -> Iterator[Int]:
+    """Coarse triangles, affine and curved ones apart, in groups that keep memory bounded."""
+    most = max(1, _CHUNK // len(mesh.lattice.triangles))
+    for kind in (~mesh.curved, mesh.curved):
+        members = np.flatnonzero(kind)
+        yield from (members[first : first + most] for first in range(0, len(members), most))
 
 
-def _sparse(blocks: Float, classes: Int, n_classes: int) -> csr_matrix:
-    dofs = (2 * classes[..., None] + np.arange(2)).astype(np.int32)
-    m, a, _ = dofs.shape
-    rows = np.broadcast_to(dofs[:, :, None, :, None], (m, a, a, 2, 2)).ravel()
-    columns = np.broadcast_to(dofs[:, None, :, None, :], (m, a, a, 2, 2)).ravel()
+def _affine(macro: Macro, mesh: FineMesh, part: Int, tensor: Float) -> tuple[Float, Float, float]:
+    """Couples (t, p, 4), loads (t, q, 2) and area of affine coarse triangles: pulled back to the unit triangle."""
+    g, w = gradients(mesh.points[mesh.nodes[part, :3]])
+    # The last two of the three linear functions are the reference coordinates: inverse_rk = dr_r / dx_k.
+    inverse, determinant = g[:, 0, 1:], 2 * w[..., None]
+    pulled = np.einsum("trk,tsl->trskl", inverse, inverse).reshape(-1, 4, 4) @ tensor
+    return macro.products @ (determinant * pulled), macro.integrals @ (determinant * inverse), float(w.sum())
+
+
+def _curved(macro: Macro, mesh: FineMesh, part: Int, tensor: Float) -> tuple[Float, Float, float]:
+    """The same of coarse triangles with curved edges, by integration over each of their elements."""
+    elements = mesh.lattice.triangles
+    g, w = gradients(mesh.points[mesh.nodes[part][:, elements].reshape(-1, elements.shape[1])])
+    return macro.couples(products(g, w)) @ tensor, macro.nodes(integrals(g, w)), float(w.sum())
+
+
+def _tensor(L: Float) -> Float:
+    """(4, 4) that turns int dN_a/dx_k dN_b/dx_l into K_(a i)(b j), with (k, l) and (i, j) flat."""
+    tensor: Float = L[_VOIGT[:, :, None, None], _VOIGT[None, None]].transpose(1, 3, 0, 2).reshape(4, 4)
+    return tensor
+
+
+def _sparse(couples: Float, rows: Int32, columns: Int32, n_classes: int) -> csr_matrix:
+    """(2c, 2c) sum of the couples (t, p, 4) of classes `rows` and `columns` (t, p)."""
+    i, j = np.empty((2, *rows.shape, 2, 2), np.int32)
+    for k in range(2):
+        i[..., k, :] = (2 * rows + k)[..., None]
+        j[..., k] = (2 * columns + k)[..., None]
     n = 2 * n_classes
-    return coo_matrix((blocks.ravel(), (rows, columns)), shape=(n, n)).tocsr()
+    return coo_matrix((couples.ravel(), (i.ravel(), j.ravel())), shape=(n, n)).tocsr()

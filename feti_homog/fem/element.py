@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,7 @@ class Quadrature:
     weights: Float
 
 
+@cache
 def quadrature(nodes: int) -> Quadrature:
     """The rule for the 3- or 6-node triangle."""
     if nodes == 3:
@@ -40,13 +42,10 @@ def quadrature(nodes: int) -> Quadrature:
 def gradients(corners: Float) -> tuple[Float, Float]:
     """Physical gradients (e, q, a, 2) and weights times Jacobian (e, q) of elements with nodes (e, a, 2)."""
     rule = quadrature(corners.shape[1])
-    jacobian = np.einsum("qar,ead->eqrd", rule.gradients, corners, optimize=True)
-    (xr, yr), (xs, ys) = np.moveaxis(jacobian, (2, 3), (0, 1))
+    (xr, xs), (yr, ys) = np.moveaxis(np.tensordot(corners, rule.gradients, (1, 1)), (1, 3), (0, 1))
     determinant = xr * ys - yr * xs
-    inverse = (
-        np.stack([np.stack([ys, -yr], axis=2), np.stack([-xs, xr], axis=2)], axis=2)
-        / determinant[..., None, None]
-    )
+    by_r, by_s = np.moveaxis(rule.gradients, 2, 0)
     # x_d = J_rd r_r, so dN/dx_d = (J^-1)_dr dN/dr_r.
-    physical = np.einsum("eqdr,qar->eqad", inverse, rule.gradients, optimize=True)
-    return physical, determinant * rule.weights
+    by_x = ys[..., None] * by_r - yr[..., None] * by_s
+    by_y = xr[..., None] * by_s - xs[..., None] * by_r
+    return np.stack([by_x, by_y], axis=3) / determinant[..., None, None], determinant * rule.weights

@@ -8,11 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 import pymetis
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix
+from scipy.sparse import coo_matrix, csr_matrix
 
-from feti_homog.cell.torus import Torus, components, edge_pairs
+from feti_homog.cell.torus import Torus, components, edge_pairs, shared_edges
 
 Int = NDArray[np.int64]
+
+# METIS takes whole numbers: of so many classes of length.
+LENGTHS = 100
+# How much more load the fullest rank may have if that keeps neighbours together.
+UNEVEN = 1.03
 
 
 @dataclass(frozen=True)
@@ -28,17 +33,17 @@ def decompose(torus: Torus, parts: Int, pieces: Int, n_ranks: int) -> Decomposit
 
     Args:
         parts: (m,) body of each triangle: `torus.constituent`, or `torus.plane_parts()`.
-        pieces: (b,) wanted pieces of each body; METIS cuts a body that has more than one.
+        pieces: (b,) wanted pieces of each body; METIS cuts a body that has more than one, by short cuts: so
+            they rather cross narrow gaps than run along them, which converges better.
         n_ranks: ranks to share the subdomains; some get none if there are more ranks than subdomains.
 
     Every subdomain is connected through edges: pieces that METIS leaves in several parts are split.
     """
     left, right = edge_pairs(torus.triangle_torus_edges)
     inside = parts[left] == parts[right]
-    left, right = left[inside], right[inside]
-    piece = np.zeros(len(parts), np.int64)
-    for body in np.flatnonzero(pieces > 1):
-        piece[parts == body] = _metis(parts == body, left, right, int(pieces[body]))
+    length = torus.edge_lengths[shared_edges(torus.triangle_torus_edges)]
+    weight = np.ceil(LENGTHS * length / length.max()).astype(np.int64)
+    piece = _cut(parts, pieces, left[inside], right[inside], weight[inside])
     key = parts * (piece.max() + 1) + piece
     together = key[left] == key[right]
     connected = components(len(parts), left[together], right[together])
@@ -48,7 +53,8 @@ def decompose(torus: Torus, parts: Int, pieces: Int, n_ranks: int) -> Decomposit
     number = np.empty_like(first)
     number[np.argsort(first)] = np.arange(len(first))
     subdomain = number[connected]
-    return Decomposition(subdomain, _deal(np.bincount(subdomain), n_ranks))
+    load, apart = np.bincount(subdomain), ~together
+    return Decomposition(subdomain, _deal(load, subdomain[left[apart]], subdomain[right[apart]], n_ranks))
 
 
 def pieces_for_count(load: Int, wanted: int) -> Int:
@@ -70,20 +76,51 @@ def pieces_for_size(load: Int, dofs_per_load: float, max_dofs: int) -> Int:
     return np.minimum(np.ceil(load * dofs_per_load / max_dofs).astype(np.int64), load)
 
 
-def _metis(mask: NDArray[np.bool_], left: Int, right: Int, count: int) -> Int:
-    """Part of each masked triangle, cut through the edges (left, right)."""
-    number = np.cumsum(mask) - 1
-    own = mask[left]
-    a, b = number[left[own]], number[right[own]]
-    n = int(mask.sum())
-    # Two triangles that share two edges (on a very coarse torus) count once.
-    graph = coo_matrix((np.ones(2 * len(a), np.int8), (np.r_[a, b], np.r_[b, a])), shape=(n, n)).tocsr()
-    options = pymetis.Options(contig=1, seed=0)
-    _, part = pymetis.part_graph(count, pymetis.CSRAdjacency(graph.indptr, graph.indices), options=options)
+def _cut(parts: Int, pieces: Int, left: Int, right: Int, weight: Int) -> Int:
+    """Piece of each triangle among those of its body; `weight` is the cost of parting neighbours (left, right)."""
+    members, own = np.argsort(parts, kind="stable"), np.argsort(parts[left], kind="stable")
+    load, edges = np.bincount(parts, minlength=len(pieces)), np.bincount(parts[left], minlength=len(pieces))
+    first, first_edge = np.cumsum(load) - load, np.cumsum(edges) - edges
+    number = np.empty(len(parts), np.int64)
+    number[members] = np.arange(len(parts)) - np.repeat(first, load)
+    piece = np.zeros(len(parts), np.int64)
+    for body in np.flatnonzero(pieces > 1):
+        those = own[first_edge[body] : first_edge[body] + edges[body]]
+        graph = _graph(load[body], number[left[those]], number[right[those]], weight[those])
+        piece[members[first[body] : first[body] + load[body]]] = _metis(graph, int(pieces[body]))
+    return piece
+
+
+def _graph(n: int, left: Int, right: Int, weight: Int) -> csr_matrix:
+    """(n, n) symmetric: sums of the weights of the pairs (left, right)."""
+    both = (np.r_[left, right], np.r_[right, left])
+    return coo_matrix((np.r_[weight, weight], both), shape=(n, n)).tocsr()
+
+
+def _metis(graph: csr_matrix, count: int, load: Int | None = None) -> Int:
+    """Part of each vertex; parts of about equal `load`, or number of vertices, with edges of small weight between."""
+    options = pymetis.Options(contig=int(load is None), seed=0)
+    _, part = pymetis.part_graph(
+        count,
+        pymetis.CSRAdjacency(graph.indptr, graph.indices),
+        eweights=graph.data,
+        vweights=load,
+        options=options,
+    )
     return np.asarray(part, np.int64)
 
 
-def _deal(load: Int, n_ranks: int) -> Int:
+def _deal(load: Int, left: Int, right: Int, n_ranks: int) -> Int:
+    """Rank of each subdomain: neighbours (left, right) on the same one as far as the loads stay even."""
+    even = _dealt_evenly(load, n_ranks)
+    if n_ranks == 1 or len(load) <= n_ranks:
+        return even
+    near = _metis(_graph(len(load), left, right, np.ones_like(left)), n_ranks, load)
+    most = [np.bincount(ranks, load, n_ranks).max() for ranks in (near, even)]
+    return near if most[0] <= UNEVEN * most[1] else even
+
+
+def _dealt_evenly(load: Int, n_ranks: int) -> Int:
     """Rank of each subdomain: the largest goes first, each to the least loaded rank."""
     ranks = np.zeros(len(load), np.int64)
     heap = [(0, rank) for rank in range(n_ranks)]

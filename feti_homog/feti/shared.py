@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feti_homog.cell.piece import Piece
-from feti_homog.cell.torus import Torus, edge_pairs
+from feti_homog.cell.torus import Torus, edge_pairs, shared_edges
 
 Int = NDArray[np.int64]
 Float = NDArray[np.float64]
@@ -60,8 +60,7 @@ class Shared:
 
 def share(torus: Torus, pieces: Sequence[Piece], rank: Int, inner: int, n_ranks: int) -> list[Shared]:
     """The tables of all ranks; `rank` (s,) is each subdomain's, `inner` the fine nodes inside a coarse edge."""
-    pinned = next(p.class_keys[p.pinned] for p in pieces if p.pinned >= 0)
-    held = [np.setdiff1d(p.class_keys, pinned, assume_unique=True) for p in pieces]
+    held = [p.class_keys if p.pinned < 0 else np.delete(p.class_keys, p.pinned) for p in pieces]
     kinds = [_sharers(held, pieces)]
     if inner:
         kinds.append(_sharers([p.edge_keys for p in pieces], pieces))
@@ -152,8 +151,7 @@ def _edge_geometry(torus: Torus) -> tuple[Int, Float, Float]:
     left, right = edge_pairs(torus.triangle_torus_edges)
     mixed = is_fibre[torus.constituent[left]] != is_fibre[torus.constituent[right]]
     fibre = np.where(is_fibre[torus.constituent[left]], left, right)[mixed]
-    edge = np.sort(torus.triangle_torus_edges.ravel())
-    edge = edge[:-1][edge[1:] == edge[:-1]][mixed]
+    edge = shared_edges(torus.triangle_torus_edges)[mixed]
     k = np.argmax(torus.triangle_torus_edges[fibre] == edge[:, None], axis=1)
     start, end = mesh.triangles[fibre, k], mesh.triangles[fibre, (k + 1) % 3]
     plane = torus.triangle_edges[fibre, k]

@@ -54,11 +54,10 @@ class Subdomain:
         """
         mesh = refine(piece, lattice)
         _check_corners(piece, mesh)
-        body = assemble(mesh.points, mesh.triangles, mesh.node_class, mesh.n_classes, L)
+        body = assemble(mesh, L)
         shift, closes = unwrap(piece)
         positions = np.empty((mesh.n_classes, 2))
-        unwrapped = mesh.points[mesh.triangles] + np.repeat(shift, len(lattice.triangles), axis=0)[:, None]
-        positions[mesh.node_class[mesh.triangles]] = unwrapped
+        positions[mesh.node_class[mesh.nodes]] = mesh.points[mesh.nodes] + shift[:, None]
         R = kernel(positions, closes, piece.pinned)
         K, Q = _pin(body.K, body.Q, piece.pinned)
         _check_kernel(piece, K, R)
@@ -126,11 +125,12 @@ def _check_kernel(piece: Piece, K: csr_matrix, R: Float) -> None:
 
 def _check_corners(piece: Piece, mesh: FineMesh) -> None:
     """Refuse triangles that bending towards the circles has turned over."""
-    a, b, c = (mesh.points[mesh.triangles[:, k]] for k in range(3))
+    triangles = mesh.nodes[mesh.curved][:, mesh.lattice.triangles[:, :3]].reshape(-1, 3)
+    a, b, c = (mesh.points[triangles[:, k]] for k in range(3))
     doubled = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
     inverted = np.flatnonzero(doubled <= 0)
     if len(inverted):
-        x, y = mesh.points[mesh.triangles[inverted[0], :3]].mean(axis=0)
+        x, y = mesh.points[triangles[inverted[0]]].mean(axis=0)
         raise MeshError(
             f"[cell] refine, order: {len(inverted)} refined elements of {piece.phase} are inverted, the first "
             f"near ({x:.6g}, {y:.6g}); expected a mesh fine enough for its curved interfaces"
