@@ -52,8 +52,8 @@ def stiffness(
 ) -> list[list[float]] | None:
     """L^ef of one cell on rank 0, None on the others; its results go to a folder of its own."""
     from feti_homog.case import parse
+    from feti_homog.job import run
     from feti_homog.output import results
-    from feti_homog.run import run
 
     name = f"{geometry}_{plane}_{round(100 * fraction)}"
     document: dict[str, Any] = {

@@ -36,9 +36,9 @@ def solved(
 ) -> dict[str, Any]:
     """result.json, on every rank, of the case `name`, in a folder of its own; `rest` are its other sections."""
     from feti_homog.case import parse
+    from feti_homog.job import run
     from feti_homog.output import results
     from feti_homog.parallel import on_root
-    from feti_homog.run import run
 
     cell = {
         "geometry": geometry,

@@ -19,8 +19,8 @@ from feti_homog.cli import Parser, launch, parsed
 def main(words: Sequence[str], comm: Intracomm) -> int:
     """Print degrees of freedom, multipliers, iterations of the three unit strains, and seconds of the run."""
     from feti_homog.case import parse
+    from feti_homog.job import run
     from feti_homog.output import results
-    from feti_homog.run import run
 
     arguments = parsed(_parser(), words, comm)
     if comm.rank == 0:

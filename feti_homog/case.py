@@ -41,6 +41,7 @@ PETSC_WIDE = (
 LOCKING_POISSON = 0.49
 
 REQUIRED = ("cell", "material", "analysis")
+SWEEP = "sweep"
 TOP_LEVEL = (*SECTIONS, "material", "petsc", "name")
 HOMES: list[tuple[str, type[Any]]] = [
     *((f"[{section}]", cls) for section, cls in SECTIONS.items()),
@@ -69,6 +70,16 @@ class Case:
     decomposition: Decomposition
     output: Output
     petsc: dict[str, Scalar]
+
+    @classmethod
+    def load(cls, path: str | Path) -> Case:
+        """The case in a file; see `load`."""
+        return load(path)
+
+    @classmethod
+    def parse(cls, document: Mapping[str, Any], folder: str | Path = ".") -> Case:
+        """The case of a document of TOML's values; see `parse`."""
+        return parse(document, Path(folder))
 
     @property
     def arcs(self) -> tuple[Arc, ...]:
@@ -115,6 +126,11 @@ class Case:
 
 def load(path: str | Path) -> Case:
     """The case in a file, named after the file unless it says otherwise. Raises CaseError with all faults."""
+    return parse(read_document(path), Path(path).parent)
+
+
+def read_document(path: str | Path) -> dict[str, Any]:
+    """The TOML document in a file, named after the file. Raises CaseError if it is none."""
     path = Path(path)
     try:
         content = path.read_bytes().decode("utf-8-sig")
@@ -127,7 +143,7 @@ def load(path: str | Path) -> Case:
         raise CaseError(f"{path}: not TOML: {str(error).replace('end of document', place)}") from None
     except OSError as error:
         raise CaseError(f"{path}: cannot be read: {error.strerror}") from None
-    return parse({"name": path.stem} | document, path.parent)
+    return {"name": path.stem} | document
 
 
 def parse(document: Mapping[str, Any], folder: Path) -> Case:
@@ -159,7 +175,9 @@ def _top_level_faults(document: Mapping[str, Any]) -> list[str]:
     faults = [f"[{section}]: missing section" for section in REQUIRED if section not in document]
     for name, value in document.items():
         hint = suggestion(name, TOP_LEVEL, OWNERS)
-        if name not in TOP_LEVEL and isinstance(value, dict):
+        if name == SWEEP:
+            faults.append("[sweep]: this file describes many cases; `feti-homog sweep` runs them")
+        elif name not in TOP_LEVEL and isinstance(value, dict):
             faults.append(f"[{named(name)}]: unknown section; {hint}")
         elif name not in TOP_LEVEL:
             faults.append(f"{named(name)}: unknown key; {hint}")

@@ -1,4 +1,4 @@
-"""The command line: `feti-homog run CASE.toml --out DIR`, `check CASE.toml`, `plot DIR`.
+"""The command line: `feti-homog run CASE.toml --out DIR`, `check CASE.toml`, `plot DIR`, `sweep`, `collect`.
 
 Options with a double dash are ours, with a single dash PETSc's.
 """
@@ -20,6 +20,13 @@ from feti_homog.options import help_text, split_argv
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
+
+
+SWEEP_HELP = (
+    "Expand the file into numbered cases, check all of them, and run them one after the other. Finished cases are "
+    "skipped, so after an interruption the same command goes on. Cases that fail are kept with their error and told "
+    "of at the end, with exit code 3."
+)
 
 
 class Parser(argparse.ArgumentParser):
@@ -84,14 +91,41 @@ def _parser() -> Parser:
     plot = actions.add_parser("plot", help="make the pictures of a results folder again")
     plot.add_argument("directory", type=Path, metavar="DIR")
     plot.set_defaults(action=_plot)
+    _add_sweep(actions.add_parser("sweep", help="run the cases of a file with [sweep]", description=SWEEP_HELP))
+    collect = actions.add_parser(
+        "collect",
+        help="make one table and pictures of the cases of a sweep's folder",
+        description="Write sweep.h5 and sweep.csv, with the inputs and outputs of all cases and their statistics over "
+        "realisations, and draw what varies. The sweep may still be running: what is there is collected.",
+    )
+    collect.add_argument("directory", type=Path, metavar="DIR", help="--out of the sweep")
+    collect.add_argument("--no-pictures", action="store_true", help="make the tables alone")
+    collect.set_defaults(action=_collect)
     return parser
+
+
+def _add_sweep(sweep: argparse.ArgumentParser) -> None:
+    sweep.add_argument("case", type=Path, metavar="CASE.toml", help="a case file with a section [sweep]")
+    sweep.add_argument("--out", type=Path, metavar="DIR", help="folder of the sweep, in which each case has its own")
+    one = sweep.add_mutually_exclusive_group()
+    one.add_argument("--list", action="store_true", help="print the cases, with --out also their status; run none")
+    one.add_argument("--index", type=int, metavar="K", help="run case K alone, counted from 1, as a job array does")
+    sweep.add_argument("--retry", action="store_true", help="compute again what failed before")
+    sweep.add_argument(
+        "--ranks-per-case",
+        type=int,
+        metavar="R",
+        help="run as many cases at once as there are groups of R ranks (by default one, on all ranks)",
+    )
+    sweep.add_argument("--quiet", action="store_true", help="print nothing but errors and what failed")
+    sweep.set_defaults(action=_sweep)
 
 
 def _run(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog import case as cases
+    from feti_homog.job import run
     from feti_homog.output import folder
     from feti_homog.parallel import on_root
-    from feti_homog.run import run
 
     case = on_root(comm, cases.load, arguments.case)
     if arguments.resume and case.path is None:
@@ -102,15 +136,23 @@ def _run(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 def _check(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog import case as cases
+    from feti_homog.case import SWEEP
     from feti_homog.parallel import on_root, on_root_only
     from feti_homog.petsc_options import case_options
+    from feti_homog.sweep import plan
     from feti_homog.torn import describe
 
-    case = on_root(comm, cases.load, arguments.case)
+    document = on_root(comm, cases.read_document, arguments.case)
+    if SWEEP in document:
+        sweep = on_root(comm, plan.load, arguments.case)
+        case, points = sweep.cases[0], len({entry.point for entry in sweep.entries})
+        words = f"sweep      {len(sweep.cases)} cases, {points} points, all of them valid; the first:\n"
+    else:
+        case, words = on_root(comm, cases.load, arguments.case), ""
     with case_options(case.petsc):
         text = on_root_only(comm, describe, case, comm.size)
     if text is not None:
-        print(text)
+        print(words + text)
 
 
 def _plot(arguments: argparse.Namespace, comm: Intracomm) -> None:
@@ -119,3 +161,33 @@ def _plot(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
     for path in on_root_only(comm, plots.plot, arguments.directory) or []:
         print(path)
+
+
+def _sweep(arguments: argparse.Namespace, comm: Intracomm) -> None:
+    from feti_homog.output import folder
+    from feti_homog.parallel import on_root, on_root_only
+    from feti_homog.sweep import execute, plan
+
+    if arguments.out is None and not arguments.list:
+        raise CaseError("command line: the following arguments are required: --out (see --help)")
+    group = comm.size if arguments.ranks_per_case is None else arguments.ranks_per_case
+    if group < 1 or comm.size % group:
+        raise CaseError(f"--ranks-per-case {group}: expected a divisor of the {comm.size} ranks")
+    sweep = on_root(comm, plan.load, arguments.case)
+    if arguments.list:
+        for line in on_root_only(comm, execute.listed, sweep, arguments.out) or []:
+            print(line)
+        return
+    on_root(comm, folder.usable, arguments.out)
+    if arguments.index is None:
+        execute.run_all(sweep, arguments.out, comm, group, arguments.retry, arguments.quiet)
+    else:
+        execute.run_one(sweep, arguments.index, arguments.out, comm, arguments.retry, arguments.quiet)
+
+
+def _collect(arguments: argparse.Namespace, comm: Intracomm) -> None:
+    from feti_homog.parallel import on_root_only
+    from feti_homog.sweep import collect
+
+    for line in on_root_only(comm, collect.collect, arguments.directory, not arguments.no_pictures) or []:
+        print(line)

@@ -5,6 +5,7 @@ Voigt order [11, 22, 12] with engineering shear; stresses in the unit of the mod
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from feti_homog.errors import ConvergenceError
 from feti_homog.feti.blocks import NodeBlocks
+from feti_homog.feti.subdomain import Subdomain
 from feti_homog.interface.contact import BONDED, CLOSED, OPEN, Equilibrium, Interface, Status
 from feti_homog.torn import TornCell
 
@@ -29,7 +31,7 @@ class Response:
         stress: (3,) Sigma = <sigma>.
         scale: the response is `scale` times `state`.
         state: interface states, multipliers, jumps and amplitudes.
-        u: (local dofs,) fluctuating displacement u*, this rank's subdomains one after the other.
+        u: (boundary dofs,) fluctuating displacement u* on the boundaries of this rank's subdomains.
         checks: relative errors of the laws: `strain` <eps> = E, Eq. (3), with the opening of debonded faces as
             part of <eps>; `hill` <sigma:eps> = Sigma:E, Eq. (8); `jump`, the largest opening of a glued
             node relative to the largest displacement; and the KKT certificate of contact.
@@ -52,29 +54,30 @@ class Homogenization:
         self.cell = cell
         self.interface = Interface(cell.solver, contact, np.array([cell.plan.width, cell.plan.height]))
 
-    def respond(self, strain: Float, status: Status, start: Float) -> Response:
-        """Solve the unit-cell problem under `strain` and average.  Collective.
+    def respond(self, strains: Float, status: Status, starts: Sequence[Float]) -> list[Response]:
+        """Solve the unit-cell problem under every strain of (k, 3) and average.  Collective.
 
-        `status` says which nodes are debonded and guesses who is in contact; `start` are first multipliers.
+        `status` says which nodes are debonded and guesses who is in contact; `starts` are first multipliers.
 
         Raises:
-            ConvergenceError: the solve broke down and left no numbers.
+            ConvergenceError: a solve broke down and left no numbers.
         """
-        state = self.interface.equilibrium(strain, status, start)
-        if not np.isfinite(state.solution.residual):
-            raise ConvergenceError(
-                f"strain {strain.tolist()}: the Krylov method broke down after {state.iterations} iterations "
-                f"(KSPConvergedReason {state.solution.reason})"
-            )
-        return self.response(state, 1.0)
+        states = self.interface.equilibria(strains, status, starts)
+        for state in states:
+            if not np.isfinite(state.solution.residual):
+                raise ConvergenceError(
+                    f"strain {state.solution.strain.tolist()}: the Krylov method broke down after {state.iterations} "
+                    f"iterations (KSPConvergedReason {state.solution.reason})"
+                )
+        return [self.response(state, 1.0) for state in states]
 
     def response(self, state: Equilibrium, scale: float) -> Response:
         """`scale` times an equilibrium, averaged.  Collective."""
         cell, solver = self.cell, self.cell.solver
-        strain, u = state.solution.strain, solver.displacement(state.solution)
+        strain, u = state.solution.strain, solver.boundary_displacement(state.solution)
         stress, star, energy = self._averages(strain, u)
         opening = cell.comm.allreduce(self._strain_of_jumps.T @ (state.solution.jump * (1 - solver.active.mask)))
-        largest = self._largest(displacement(cell, strain, u)) or 1.0
+        largest = (self._largest(u) + self.interface.imposed(strain)) or 1.0
         checks = {
             "strain": float(np.abs(star - opening / cell.plan.area).max() / (np.abs(strain).max() or 1.0)),
             "hill": float(abs(energy - stress @ strain) / (abs(energy) or 1.0)),
@@ -94,25 +97,30 @@ class Homogenization:
     @cached_property
     def _strain_of_jumps(self) -> Float:
         """(owned rows, 3) nu with int eps* = nu^T B u for every displacement u: nu = (B B^T)^-1 B int B_e."""
-        B = self.cell.solver.constraints.B
-        unit = [np.linalg.solve(s.L, s.Q.T).T for s in self.cell.subdomains]
-        local = B @ np.concatenate(unit or [np.zeros((0, 3))])
-        summed = np.stack([self.cell.solver.constraints.sum(column) for column in local.T], axis=1)
+        solver = self.cell.solver
+        B = solver.boundary.B
+        unit = [np.linalg.solve(s.L, Q.T).T for s, Q in self._loads()]
+        summed = solver.constraints.sum(B @ np.concatenate([np.zeros((0, 3)), *unit]))
         gram = NodeBlocks(self.cell.comm, self.cell.solver.constraints, B @ B.T)
         return np.asarray(gram.inverse(np.ones(gram.rows)) @ summed)
 
     def _averages(self, E: Float, u: Float) -> tuple[Float, Float, float]:
         """<sigma>, <eps*> over the bodies, and <sigma:eps>; collective."""
         cell, total = self.cell, np.zeros(7)
-        for s, offset in zip(cell.subdomains, cell.offsets, strict=False):
-            own = u[offset : offset + len(s.Q)]
-            from_u = s.Q.T @ own
+        for (s, Q), span in zip(self._loads(), cell.solver.boundary.spans, strict=True):
+            from_u = Q.T @ u[span]
             total[:3] += s.area * s.L @ E + from_u
             total[3:6] += np.linalg.solve(s.L, from_u)
-            total[6] += s.area * E @ s.L @ E + 2 * E @ from_u + own @ (s.K @ own)
+            total[6] += s.area * E @ s.L @ E + 2 * E @ from_u
+        total[6] += u @ cell.solver.boundary.stiffness(u)
         cell.comm.Allreduce(MPI.IN_PLACE, total)
         total /= cell.plan.area
         return total[:3], total[3:6], float(total[6])
+
+    def _loads(self) -> list[tuple[Subdomain, Float]]:
+        """The subdomains and their Q on the boundary dofs; inside a uniform body it vanishes."""
+        solver = self.cell.solver
+        return [(s, solver.loads[span]) for s, span in zip(solver.subdomains, solver.boundary.spans, strict=True)]
 
     def _largest(self, values: Float) -> float:
         """max |values| over all ranks."""

@@ -32,8 +32,16 @@ OPTIONS = (
         "feti_dual_operator",
         "auto|implicit|explicit",
         "auto",
-        "dual operator by two triangular solves, or by dense matrices on the interfaces",
+        "subdomains by triangular solves, or by dense matrices on their boundaries",
     ),
+    Option(
+        "feti_coarse_space",
+        "auto|natural|adaptive",
+        "auto",
+        "rigid-body motions only, or soft modes of the subdomains too",
+    ),
+    Option("feti_coarse_threshold", "<real>", "0.2", "modes softer than this are deflated; fewer iterations if larger"),
+    Option("feti_view", "", "", "print subdomains, coarse space and estimated condition numbers"),
     Option("feti_sub_ksp_type", "preonly|...", "preonly", "subdomain solves"),
     Option("feti_sub_pc_type", "cholesky|lu", "cholesky", "subdomain factorizations"),
     Option(
@@ -54,16 +62,17 @@ OPTIONS = (
         "cholmod",
         "library of the interior factorizations",
     ),
-    Option("feti_coarse_pc_type", "cholesky|lu", "cholesky", "factorization of the coarse problem"),
+    Option("feti_natural_pc_type", "cholesky|lu", "cholesky", "factorization of the rigid-body coarse problem"),
     Option(
-        "feti_coarse_pc_factor_mat_solver_type",
+        "feti_natural_pc_factor_mat_solver_type",
         "cholmod|mumps",
         "cholmod",
-        "library of the coarse factorization",
+        "library of the rigid-body coarse factorization",
     ),
+    Option("feti_coarse_pc_type", "cholesky|lu", "cholesky", "factorization of the adaptive coarse problem"),
 )
 
-PREFIXES = ("feti_ksp_", "feti_pc_", "feti_sub_", "feti_interior_", "feti_schur_", "feti_coarse_")
+PREFIXES = ("feti_ksp_", "feti_pc_", "feti_sub_", "feti_interior_", "feti_schur_", "feti_natural_", "feti_coarse_")
 """Prefixes of PETSc solvers: what follows is PETSc's to know."""
 
 OWN_SHORT = ("-h",)

@@ -10,13 +10,14 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from feti_homog import case as cases
+from feti_homog import cost
 from feti_homog.case import Case
 from feti_homog.cell.centres import fibre_centres
 from feti_homog.cell.mesh import CoarseMesh
 from feti_homog.cell.outline import MERGED
 from feti_homog.cell.piece import Piece, cut
 from feti_homog.cell.refine import Lattice
-from feti_homog.cell.torus import Torus
+from feti_homog.cell.torus import Torus, edge_pairs
 from feti_homog.errors import CaseError
 from feti_homog.feti.decomposition import decompose, pieces_for_count, pieces_for_size
 from feti_homog.feti.shared import Shared, share
@@ -33,6 +34,9 @@ Bool = NDArray[np.bool_]
 
 # Typical numbers, for the choice between implicit and explicit operators.
 ITERATIONS_OF_A_SOLVE, SOLVES_OF_A_CONTACT, SOLVES_OF_A_PATH = 12, 3, 100
+# Degrees of freedom of a piece that make set-up and solve fastest, and from which on a body is cut into such pieces;
+# boundary degrees of freedom of a body from which on it is cut where bonds break (`scripts/benchmark`).
+FASTEST, LARGE, WIDE = 3000, 8000, 2500
 FIBRES_OF = {"square": 1, "hexagonal": 2}
 
 
@@ -131,10 +135,8 @@ def tear(case: Case, comm: MPI.Intracomm, progress: Progress) -> TornCell:
         words.append(f"{dofs} degrees of freedom, refine = {case.cell.refine}, order = {case.cell.order}")
     with progress.stage("factor") as words:
         solver = FetiSolver(comm, shared, subdomains, lattice, _applications(case))
-        made = comm.allreduce(solver.local.factorizations)
         words.append(
-            f"{made} subdomain factorizations, {solver.constraints.total} multipliers, "
-            f"coarse dimension {solver.coarse.dimension}"
+            f"{solver.constraints.total} multipliers, coarse dimension {solver.coarse.vectors}"
         )
     return TornCell(comm, case, plan, lattice, subdomains, solver)
 
@@ -162,6 +164,8 @@ def describe(case: Case, n_ranks: int) -> str:
     plan = shares[0][0]
     triangles = [sum(len(p.triangles) for p in pieces) for _, pieces, _ in shares]
     nodes = [t * lattice.intervals**2 // 2 for t in triangles]
+    own = [len(pieces) for _, pieces, _ in shares]
+    taken = cost.estimate([2 * n for n in nodes], own, plan.coarse_triangles, plan.bodies, _applications(case))
     lines = [
         f"case       {case.name}: {case.analysis.type}, plane {case.analysis.plane}",
         f"cell       {plan.width:g} x {plan.height:g}, phases {', '.join(plan.phases)}",
@@ -173,6 +177,7 @@ def describe(case: Case, n_ranks: int) -> str:
             f"rank {rank:<5} {len(pieces)} subdomains, about {2 * n} degrees of freedom"
             for rank, ((_, pieces, _), n) in enumerate(zip(shares, nodes, strict=True))
         ),
+        *cost.words(taken, n_ranks),
         *(f"warning    {warning}" for warning in case.warnings()),
         "the case is valid",
     ]
@@ -188,7 +193,8 @@ def _deal(case: Case, mesh: CoarseMesh, lattice: Lattice, n_ranks: int) -> list[
     if faults:
         raise CaseError(*faults)
     parts = torus.constituent if case.cell.bodies == "torus" else torus.plane_parts()
-    decomposition = decompose(torus, parts, _pieces(case, np.bincount(parts), lattice, n_ranks), n_ranks)
+    wanted = _pieces(case, np.bincount(parts), _outer_edges(torus, parts), lattice, n_ranks)
+    decomposition = decompose(torus, parts, wanted, n_ranks)
     pieces = list(cut(torus, decomposition.subdomain))
     tables = share(torus, pieces, decomposition.rank, lattice.intervals - 1, n_ranks)
     bodies = int(parts.max()) + 1
@@ -201,13 +207,29 @@ def _deal(case: Case, mesh: CoarseMesh, lattice: Lattice, n_ranks: int) -> list[
     return list(zip([plan] * n_ranks, own, tables, strict=True))
 
 
-def _pieces(case: Case, load: Int, lattice: Lattice, n_ranks: int) -> Int:
-    """Wanted pieces of each body: as the case says, else as many as it takes to give every rank one."""
+def _pieces(case: Case, load: Int, edges: Int, lattice: Lattice, n_ranks: int) -> Int:
+    """Wanted pieces of each body of `load` coarse triangles and `edges` coarse edges to others.
+
+    As the case says; else large bodies are cut to the size that is fastest, and every rank gets a piece.
+    """
     wanted = case.decomposition
+    # A triangle of the lattice brings about M^2 / 2 nodes.
+    dofs_of_triangle = lattice.intervals**2
     if wanted.max_dofs is not None:
-        # A triangle of the lattice brings about M^2 / 2 nodes.
-        return pieces_for_size(load, lattice.intervals**2, wanted.max_dofs)
-    return pieces_for_count(load, wanted.subdomains or n_ranks)
+        return pieces_for_size(load, dofs_of_triangle, wanted.max_dofs)
+    if wanted.subdomains is not None:
+        return pieces_for_count(load, wanted.subdomains)
+    # A debonding cell is solved so often that whole bodies pay, as long as their dense matrices are small.
+    large = load * dofs_of_triangle > LARGE if case.interface is None else edges * 2 * lattice.intervals > WIDE
+    pieces = np.where(large, pieces_for_size(load, dofs_of_triangle, FASTEST), 1)
+    return pieces if pieces.sum() >= n_ranks else pieces_for_count(load, n_ranks)
+
+
+def _outer_edges(torus: Torus, parts: Int) -> Int:
+    """(b,) coarse edges of each body that others share."""
+    left, right = edge_pairs(torus.triangle_torus_edges)
+    outer = parts[left] != parts[right]
+    return np.bincount(np.r_[parts[left[outer]], parts[right[outer]]], minlength=int(parts.max()) + 1)
 
 
 def _applications(case: Case) -> int:

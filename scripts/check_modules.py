@@ -28,6 +28,7 @@ PROVIDERS = {
             "matplotlib",
             "pymetis",
             "tqdm",
+            "tomli_w",
             "pytest",
             "ruff",
             "mypy",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 
 import numpy as np
+from glued import Nodes
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix
 
@@ -13,16 +14,9 @@ from feti_homog.torn import TornCell
 
 
 def glued(cell: TornCell) -> tuple[csr_matrix, np.ndarray]:
-    """K and Q of the perfectly bonded cell, the subdomains (all on one rank) glued by position on the torus."""
-    period = np.array([cell.plan.width, cell.plan.height])
-    positions = []
-    for s in cell.subdomains:
-        own = np.empty((s.mesh.n_classes, 2))
-        own[s.mesh.node_class] = s.mesh.points
-        positions.append(own)
-    reduced = np.round(np.concatenate(positions) / period * 1e9).astype(np.int64) % 10**9
-    node = np.unique(reduced @ [10**9, 1], return_inverse=True)[1]
-    dofs = (2 * node[:, None] + np.arange(2)).ravel()
+    """K and Q of the perfectly bonded cell, the subdomains (all on one rank) glued on the torus."""
+    local = Nodes.of(cell.comm, cell.subdomains, cell.lattice).local
+    dofs = (2 * np.concatenate(local)[:, None] + np.arange(2)).ravel()
     n, first = int(dofs.max()) + 1, 0
     K, Q = csr_matrix((n, n)), np.zeros((n, 3))
     for s in cell.subdomains:

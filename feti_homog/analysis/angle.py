@@ -29,10 +29,11 @@ def run(study: Study, values: Sequence[float], strain: Float | None) -> dict[str
         if unit:
             L, responses = study.unit_responses(f"{label} ", status, starts, 1.0)
             point["stiffness"] = L
-            if not (study.homogenization.interface.contact and responses[0].counts["bonded"] < len(status)):
+            debonded = responses[0].counts["open"] + responses[0].counts["closed"]
+            if not (study.homogenization.interface.contact and debonded):
                 study.check(label, {"symmetry": asymmetry(L)})
         else:
-            responses = [study.homogenization.respond(np.asarray(strain), status, starts[0])]
+            responses = study.homogenization.respond(np.array([strain]), status, starts)
             study.note(label, responses[0])
             point |= {"strain": responses[0].strain, "stress": responses[0].stress}
         for name, response in zip(UNIT_CASES if unit else ("",), responses, strict=True):

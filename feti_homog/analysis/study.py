@@ -89,10 +89,9 @@ class Study:
         self, label: str, status: Status, starts: Sequence[Float], sign: float
     ) -> tuple[Float, list[Response]]:
         """Secant stiffness (3, 3) to plus or minus each unit strain (39), and the responses."""
-        responses = []
-        for name, strain, start in zip(UNIT_CASES, sign * np.eye(3), starts, strict=True):
-            responses.append(self.homogenization.respond(strain, status, start))
-            self.note(f"{label}{'-' if sign < 0 else ''}{name}", responses[-1])
+        responses = self.homogenization.respond(sign * np.eye(3), status, starts)
+        for name, response in zip(UNIT_CASES, responses, strict=True):
+            self.note(f"{label}{'-' if sign < 0 else ''}{name}", response)
         return np.stack([sign * r.stress for r in responses], axis=1), responses
 
     def point(self, responses: Sequence[Response]) -> dict[str, Any]:

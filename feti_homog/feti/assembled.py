@@ -1,4 +1,4 @@
-"""A distributed PETSc matrix out of the contributions of all ranks."""
+"""Distributed sparse matrices out of the contributions of all ranks."""
 
 from __future__ import annotations
 
@@ -28,3 +28,34 @@ def assembled(
     )
     A.assemble()
     return A.convert(PETSc.Mat.Type.AIJ)
+
+
+def summed(comm: MPI.Intracomm, local: csr_matrix, rows: Int, owned: int) -> csr_matrix:
+    """The same rows of the sum over ranks of `local`, whose rows have the global numbers `rows`.
+
+    Args:
+        local: (rows, n), with the same n columns on every rank.
+        owned: number of rows that this rank owns.
+    """
+    if comm.size == 1:
+        return local
+    n = local.shape[1]
+    share = n // comm.size + (comm.rank < n % comm.size)
+    used, indices = np.unique(local.indices, return_inverse=True)
+    narrow = csr_matrix((local.data, indices, local.indptr), shape=(len(rows), len(used)))
+    A = assembled(comm, narrow, rows, used, (owned, share))
+    # Backwards: PETSc 3.18 mixes up the columns if every rank asks for all rows in their order.
+    here = PETSc.IS().createGeneral(rows[::-1].astype(PETSc.IntType), comm=PETSc.COMM_SELF)
+    all_columns = PETSc.IS().createStride(n, 0, 1, comm=PETSc.COMM_SELF)
+    indptr, indices, data = A.createSubMatrices(here, all_columns)[0].getValuesCSR()
+    return csr_matrix((data, indices, indptr), shape=local.shape)[::-1]
+
+
+def total(comm: MPI.Intracomm, own: csr_matrix) -> csr_matrix:
+    """The sum over ranks of small matrices, on every rank."""
+    if comm.size == 1:
+        return own
+    part = own.tocoo()
+    parts = comm.allgather((part.data, part.row, part.col))
+    data, rows, columns = (np.concatenate(p) for p in zip(*parts, strict=True))
+    return csr_matrix((data, (rows, columns)), shape=own.shape)

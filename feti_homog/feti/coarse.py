@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy.sparse import block_diag, csr_matrix, diags
 
 from feti_homog.cell.torus import components
-from feti_homog.feti.assembled import assembled
+from feti_homog.feti.assembled import assembled, total
+from feti_homog.feti.boundary import Boundary
 from feti_homog.feti.constraints import Constraints
-from feti_homog.feti.local import LocalSolver
-from feti_homog.feti.subdomain import Subdomain
+from feti_homog.feti.local import DirectSolver
 
 Int = NDArray[np.int64]
 Float = NDArray[np.float64]
@@ -28,8 +26,9 @@ class CoarseProblem:
     multiplier and a column a kernel mode; every rank holds its own rows and a factor of G^T G.
     """
 
-    def __init__(self, comm: MPI.Intracomm, constraints: Constraints, subdomains: Sequence[Subdomain]) -> None:
-        kernels = [s.R for s in subdomains]
+    def __init__(self, comm: MPI.Intracomm, constraints: Constraints, boundary: Boundary) -> None:
+        subdomains = boundary.subdomains
+        kernels = [s.R[dofs] for s, dofs in zip(subdomains, boundary.dofs, strict=True)]
         modes = sum(R.shape[1] for R in kernels)
         first = comm.exscan(modes) or 0
         self.comm = comm
@@ -43,13 +42,13 @@ class CoarseProblem:
         owned = constraints.owned[1] - constraints.owned[0]
         columns = np.arange(first, first + modes)
         indptr, indices, values = assembled(
-            comm, constraints.B @ self.R, constraints.rows, columns, (owned, modes)
+            comm, boundary.B @ self.R, constraints.rows, columns, (owned, modes)
         ).getValuesCSR()
         self.G = csr_matrix((values, indices, indptr), shape=(owned, self.dimension))
         self.factorizations = 0
         squares = np.asarray(self.G.power(2).sum(axis=0)).ravel()
         self.scale = float(comm.allreduce(squares).max(initial=0.0))
-        self.activate(np.ones(owned))
+        CoarseProblem.activate(self, np.ones(owned))
 
     def activate(self, active: Float) -> None:
         """Factorize for the owned rows of which `active` is 1; the others, 0, carry no multiplier.
@@ -58,32 +57,53 @@ class CoarseProblem:
         """
         self.Ga = (diags(active) @ self.G).tocsr()
         self.GaT = self.Ga.T.tocsr()
-        gram = self._gram()
+        gram = total(self.comm, (self.GaT @ self.Ga).tocsr())
         self.free = _null_vectors(gram, self.body, self.held, FREE * self.scale)
         if self.dimension:
             held = gram + self.scale * csr_matrix(self.free @ self.free.T)
-            self._solver = LocalSolver([held.tocsr()], "feti_coarse_")
+            self._solver = DirectSolver(held.tocsr(), "feti_natural_", definite=True)
             self.factorizations += 1
 
-    def _gram(self) -> csr_matrix:
-        """G^T G on every rank."""
-        own = (self.GaT @ self.Ga).tocoo()
-        parts = self.comm.allgather((own.data, own.row, own.col))
-        data, rows, columns = (np.concatenate(part) for part in zip(*parts, strict=True))
-        return csr_matrix((data, (rows, columns)), shape=(self.dimension, self.dimension))
+    @property
+    def vectors(self) -> int:
+        """Dimension of the space that every residual is orthogonal to."""
+        return self.dimension
 
     def amplitudes(self, x: Float) -> Float:
-        """(G^T G)^-1 G^T x on every rank, for the owned rows x."""
-        self.comm.Allreduce(self.GaT @ x, self._solver.b)
-        return self._solver.solve()
+        """(G^T G)^-1 G^T x on every rank, for the owned rows x (rows,) or (rows, k)."""
+        return self._solver.solve(self.everywhere(self.GaT @ x))
+
+    def everywhere(self, part: Float) -> Float:
+        """The sum over ranks."""
+        whole = np.empty_like(part)
+        self.comm.Allreduce(part, whole)
+        return whole
 
     def project(self, x: Float) -> None:
         """x <- P x for the owned rows x, whose inactive ones are 0: what no rigid-body motion works on."""
         if self.dimension:
             x -= self.Ga @ self.amplitudes(x)
 
+    def projected(self, x: Float) -> Float:
+        """P x."""
+        y = x.copy()
+        self.project(y)
+        return y
+
+    def admissible(self, z: Float) -> Float:
+        """The part of a correction z that the Krylov method may use."""
+        return self.projected(z)
+
+    def residual(self, r: Float) -> Float:
+        """The part of a residual r that the Krylov method has to remove."""
+        return self.projected(r)
+
+    def correction(self, r: Float) -> Float:
+        """What the coarse space by itself adds to multipliers with the residual r."""
+        return np.zeros_like(r)
+
     def motion(self, amplitudes: Float) -> Float:
-        """R alpha on the local dofs."""
+        """R alpha on the boundary dofs."""
         return self.R @ amplitudes[self.own]
 
 

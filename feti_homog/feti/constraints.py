@@ -58,6 +58,7 @@ class Constraints:
         nodes: the interface nodes that this rank owns.
         owned: first global row of this rank and the one after its last.
         total: number of rows on all ranks.
+        shared: the vertices and edges that the rows belong to.
         vector: a multiplier vector to duplicate.
     """
 
@@ -65,30 +66,64 @@ class Constraints:
         self, comm: MPI.Intracomm, shared: Shared, subdomains: Sequence[Subdomain], lattice: Lattice
     ) -> None:
         layout = _Layout(shared, subdomains, lattice)
+        self.shared, self._first, self._count = shared, layout.first, layout.count
         self.owned = shared.owned
         self.total = shared.total
         self.rows, self.B = layout.rows, layout.matrix()
         self.blocks = layout.blocks(shared.owned)
         self.nodes = layout.interface_nodes(shared.owned)
         self.vector = PETSc.Vec().createMPI((shared.owned[1] - shared.owned[0], shared.total), comm=comm)
-        self._local = PETSc.Vec().createSeq(len(self.rows))
-        here = PETSc.IS().createGeneral(self.rows.astype(PETSc.IntType), comm=PETSc.COMM_SELF)
-        self._scatter = PETSc.Scatter().create(self.vector, here, self._local, None)
+        self._exchanges: dict[int, _Exchange] = {}
+
+    def rows_of(self, entities: Int) -> Int:
+        """Local rows of the nodes on some of the shared entities, one entity after the other."""
+        entity, p = _expand(entities, self._count[entities])
+        return np.asarray(self._first[entity] + p)
 
     def gather(self, owned: Float) -> Float:
-        """The local rows of a vector of which each rank has its own; overwritten by the next call."""
-        self.vector.getArray()[:] = owned
-        self._scatter.scatter(self.vector, self._local)
-        return self._local.getArray(readonly=True)
+        """The local rows of vectors (owned rows,) or (owned rows, k) of which each rank has its own rows."""
+        return self._exchange(owned).gather(owned)
 
     def sum(self, local: Float) -> Float:
-        """The owned rows of the sum over ranks of `local` rows."""
-        self.vector.zeroEntries()
-        self._local.getArray()[:] = local
+        """The owned rows of the sum over ranks of `local`, (local rows,) or (local rows, k)."""
+        return self._exchange(local).sum(local)
+
+    def _exchange(self, x: Float) -> _Exchange:
+        columns = x.size // len(x) if len(x) else int(np.prod(x.shape[1:]))
+        if columns not in self._exchanges:
+            self._exchanges[columns] = _Exchange(self.vector, self.rows, columns)
+        return self._exchanges[columns]
+
+
+class _Exchange:
+    """Scatters between the owned and the local rows of vectors with k columns; a copy where both are the same."""
+
+    def __init__(self, vector: PETSc.Vec, rows: Int, columns: int) -> None:
+        self._same = vector.comm.size == 1 and np.array_equal(rows, np.arange(len(rows)))
+        if self._same:
+            return
+        sizes = tuple(columns * n for n in vector.getSizes())
+        self._owned = PETSc.Vec().createMPI(sizes, bsize=columns, comm=vector.comm)
+        self._local = PETSc.Vec().createSeq(columns * len(rows), bsize=columns)
+        here = PETSc.IS().createBlock(columns, rows.astype(PETSc.IntType), comm=PETSc.COMM_SELF)
+        self._scatter = PETSc.Scatter().create(self._owned, here, self._local, None)
+
+    def gather(self, owned: Float) -> Float:
+        if self._same:
+            return owned
+        self._owned.getArray()[:] = owned.ravel()
+        self._scatter.scatter(self._owned, self._local)
+        return self._local.getArray(readonly=True).reshape(-1, *owned.shape[1:]).copy()
+
+    def sum(self, local: Float) -> Float:
+        if self._same:
+            return local
+        self._owned.zeroEntries()
+        self._local.getArray()[:] = local.ravel()
         self._scatter.scatter(
-            self._local, self.vector, addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE
+            self._local, self._owned, addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE
         )
-        return self.vector.getArray(readonly=True).copy()
+        return self._owned.getArray(readonly=True).reshape(-1, *local.shape[1:]).copy()
 
 
 class _Layout:
@@ -97,10 +132,10 @@ class _Layout:
     def __init__(self, shared: Shared, subdomains: Sequence[Subdomain], lattice: Lattice) -> None:
         self.shared, self.subdomains, self.lattice = shared, subdomains, lattice
         copies = shared.copies
-        n_rows = shared.nodes * 2 * (copies - 1)
-        self.first = np.cumsum(n_rows) - n_rows
-        shift: Int = np.repeat(shared.first_row - self.first, n_rows)
-        self.rows: Int = shift + np.arange(n_rows.sum(), dtype=np.int64)
+        self.count = shared.nodes * 2 * (copies - 1)
+        self.first = np.cumsum(self.count) - self.count
+        shift: Int = np.repeat(shared.first_row - self.first, self.count)
+        self.rows: Int = shift + np.arange(self.count.sum(), dtype=np.int64)
         self.dofs = np.cumsum([0, *(2 * s.mesh.n_classes for s in subdomains)])
         self.base = self._first_nodes()
 

@@ -1,4 +1,7 @@
-"""PETSc contexts of the projected dual problem: shell matrix, shell preconditioner, convergence test."""
+"""PETSc contexts of the projected dual problem: shell matrix, shell preconditioner, convergence test.
+
+A vector holds k multiplier vectors, the k values of a row side by side, so that load cases are solved together.
+"""
 
 from __future__ import annotations
 
@@ -23,43 +26,47 @@ class ActiveRows:
     def __init__(self, rows: int) -> None:
         self.mask = np.ones(rows)
 
+    def restrict(self, x: Float) -> Float:
+        """x (rows,) or (rows, k) with 0 on the inactive rows."""
+        return np.asarray((self.mask if x.ndim == 1 else self.mask[:, None]) * x)
+
 
 class ProjectedOperator:
-    """y = P F x on the active rows; x is in the range of P."""
+    """y = T^T F x on the active rows; x is in the range of T (P, if the coarse problem is the natural one)."""
 
-    def __init__(self, operator: DualOperator, coarse: CoarseProblem, active: ActiveRows) -> None:
+    def __init__(self, operator: DualOperator, coarse: CoarseProblem, active: ActiveRows, columns: int) -> None:
         self.operator, self.coarse, self.active = operator, coarse, active
+        self.shape = (-1, columns)
         self.event = PETSc.Log.Event("FETIDual")
 
     def mult(self, mat: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """y = P F x."""
+        """y = T^T F x."""
         with self.event:
-            result = self.active.mask * self.operator.apply(x.getArray(readonly=True))
-            self.coarse.project(result)
-            y.setArray(result)
+            result = self.operator.apply(x.getArray(readonly=True).reshape(self.shape))
+            y.setArray(self.coarse.residual(self.active.restrict(result)).ravel())
 
 
 class ProjectedPreconditioner:
-    """z = P M^-1 r; notes |r|, which is the interface jump |B u| of the iterate."""
+    """z = T M^-1 r; notes |r|, which is the interface jump |B u| of the iterate."""
 
-    def __init__(self, preconditioner: Preconditioner, coarse: CoarseProblem) -> None:
+    def __init__(self, preconditioner: Preconditioner, coarse: CoarseProblem, columns: int) -> None:
         self.preconditioner, self.coarse = preconditioner, coarse
+        self.shape = (-1, columns)
         self.event = PETSc.Log.Event("FETIPrecond")
         self.jump = 0.0
 
     def apply(self, pc: PETSc.PC, r: PETSc.Vec, z: PETSc.Vec) -> None:
-        """z = P M^-1 r."""
+        """z = T M^-1 r."""
         with self.event:
             self.jump = r.norm()
-            result = self.preconditioner.apply(r.getArray(readonly=True))
-            self.coarse.project(result)
-            z.setArray(result)
+            result = self.preconditioner.apply(r.getArray(readonly=True).reshape(self.shape))
+            z.setArray(self.coarse.admissible(result).ravel())
 
 
 class PrimalTest:
     """Converged when both primal residuals are below rtol: the jump, and the forces it takes to close it.
 
-    The jump is |P r| relative to that of the torn cell; the forces are |P M^-1 r| relative to the torn cell's.
+    The jump is |r| relative to that of the torn cell; the forces are |T M^-1 r| relative to the torn cell's.
     A small dual residual alone can hide a large one of these.
     """
 
@@ -84,3 +91,53 @@ class PrimalTest:
         if residual <= rtol * self.forces and closed:
             return PETSc.KSP.ConvergedReason.CONVERGED_RTOL
         return PETSc.KSP.ConvergedReason.ITERATING
+
+
+class Krylov:
+    """PETSc's Krylov solver for k load cases at once; options have the prefix `feti_`."""
+
+    def __init__(
+        self,
+        vector: PETSc.Vec,
+        operator: DualOperator,
+        preconditioner: Preconditioner,
+        coarse: CoarseProblem,
+        active: ActiveRows,
+        columns: int,
+        rtol: float,
+    ) -> None:
+        """Set up; `vector` is one of the multiplier vectors."""
+        own, whole = vector.getSizes()
+        sizes = (own * columns, whole * columns)
+        self.projected = ProjectedPreconditioner(preconditioner, coarse, columns)
+        self.test = PrimalTest(self.projected)
+        A = PETSc.Mat().createPython(
+            (sizes, sizes), ProjectedOperator(operator, coarse, active, columns), comm=vector.comm
+        )
+        A.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        A.setUp()
+        self.right, self.solution = A.createVecs()
+        self.ksp = PETSc.KSP().create(vector.comm)
+        self.ksp.setOptionsPrefix("feti_")
+        self.ksp.setOperators(A)
+        self.ksp.setType(PETSc.KSP.Type.CG)
+        self.ksp.setNormType(PETSc.KSP.NormType.PRECONDITIONED)
+        self.ksp.setTolerances(rtol=rtol, atol=0.0, max_it=2000)
+        self.ksp.setConvergenceTest(self.test)
+        pc = self.ksp.getPC()
+        pc.setType(PETSc.PC.Type.PYTHON)
+        pc.setOptionsPrefix("feti_projected_")
+        pc.setPythonContext(self.projected)
+        self.ksp.setFromOptions()
+
+    def solve(self, residual: Float) -> Float:
+        """The multipliers (rows, k) that remove the residual (rows, k)."""
+        self.right.setArray(residual.ravel())
+        self.solution.zeroEntries()
+        self.ksp.solve(self.right, self.solution)
+        return self.solution.getArray(readonly=True).reshape(residual.shape).copy()
+
+    def destroy(self) -> None:
+        """Free PETSc's shell objects; collective."""
+        self.ksp.getOperators()[0].destroy()
+        self.ksp.destroy()

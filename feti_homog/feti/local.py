@@ -1,4 +1,4 @@
-"""Direct solves with the subdomains of one rank, through PETSc's KSP and PC."""
+"""Direct solves on one rank, through PETSc's KSP and PC."""
 
 from __future__ import annotations
 
@@ -10,6 +10,9 @@ from petsc4py import PETSc
 from scipy.sparse import csr_matrix
 
 Float = NDArray[np.float64]
+
+# Per cent of MUMPS' estimate of workspace that it may need more for pivoting.
+PIVOTING_ROOM = 200
 
 
 class LocalSolver:
@@ -33,7 +36,7 @@ class LocalSolver:
                 vectors = (
                     PETSc.Vec().createWithArray(a[span], comm=PETSc.COMM_SELF) for a in (self.b, self.x)
                 )
-                self._solves.append((_factorized(matrix, prefix), *vectors))
+                self._solves.append((factorized(matrix, prefix), *vectors))
 
     @property
     def factorizations(self) -> int:
@@ -47,11 +50,33 @@ class LocalSolver:
         return self.x
 
 
-def _factorized(matrix: csr_matrix, prefix: str) -> PETSc.KSP:
+class DirectSolver:
+    """X = A^-1 B for one symmetric matrix A and any number of right-hand sides."""
+
+    def __init__(self, matrix: csr_matrix, prefix: str, definite: bool) -> None:
+        """Factorize.  Options under `prefix` (default: preonly, cholesky by CHOLMOD, or by MUMPS if indefinite)."""
+        self._ksp = factorized(matrix, prefix, definite)
+
+    def solve(self, B: Float) -> Float:
+        """A^-1 B for B (n,) or (n, k)."""
+        columns = B.reshape(len(B), -1)
+        X = np.empty(columns.shape, order="F")
+        if columns.shape[1] == 1:
+            b, x = (PETSc.Vec().createWithArray(a, comm=PETSc.COMM_SELF) for a in (columns.ravel(), X.ravel("K")))
+            self._ksp.solve(b, x)
+            return x.getArray().reshape(B.shape)
+        right = np.asfortranarray(columns)
+        matrices = (PETSc.Mat().createDense(X.shape, array=a, comm=PETSc.COMM_SELF) for a in (right, X))
+        self._ksp.getPC().matApply(*matrices)
+        return X
+
+
+def factorized(matrix: csr_matrix, prefix: str, definite: bool = True) -> PETSc.KSP:
+    """A KSP with the factorization of a symmetric matrix; options under `prefix`."""
     A = PETSc.Mat().createAIJ(
         matrix.shape, csr=(matrix.indptr, matrix.indices, matrix.data), comm=PETSc.COMM_SELF
     )
-    A.setOption(PETSc.Mat.Option.SPD, True)
+    A.setOption(PETSc.Mat.Option.SPD if definite else PETSc.Mat.Option.SYMMETRIC, True)
     ksp = PETSc.KSP().create(PETSc.COMM_SELF)
     ksp.setOptionsPrefix(prefix)
     ksp.setOperators(A)
@@ -59,7 +84,10 @@ def _factorized(matrix: csr_matrix, prefix: str) -> PETSc.KSP:
     ksp.setErrorIfNotConverged(True)
     pc = ksp.getPC()
     pc.setType(PETSc.PC.Type.CHOLESKY)
-    pc.setFactorSolverType(PETSc.Mat.SolverType.CHOLMOD)
+    pc.setFactorSolverType(PETSc.Mat.SolverType.CHOLMOD if definite else PETSc.Mat.SolverType.MUMPS)
     ksp.setFromOptions()
+    if not definite and pc.getFactorSolverType() == PETSc.Mat.SolverType.MUMPS:
+        pc.setFactorSetUpSolverType()
+        pc.getFactorMatrix().setMumpsIcntl(14, PIVOTING_ROOM)
     ksp.setUp()
     return ksp

@@ -19,32 +19,24 @@ from petsc4py import PETSc
 
 from feti_homog.cell.refine import Lattice
 from feti_homog.errors import CaseError
+from feti_homog.feti import boundary as boundaries
+from feti_homog.feti import preconditioner as preconditioners
+from feti_homog.feti import view
+from feti_homog.feti.adaptive import THRESHOLD, AdaptiveCoarse
+from feti_homog.feti.boundary import Boundary
 from feti_homog.feti.coarse import CoarseProblem
+from feti_homog.feti.condensed import Condensed
 from feti_homog.feti.constraints import Constraints
-from feti_homog.feti.contexts import ActiveRows, PrimalTest, ProjectedOperator, ProjectedPreconditioner
-from feti_homog.feti.explicit import DenseBlocks, ExplicitDualOperator
-from feti_homog.feti.local import LocalSolver
+from feti_homog.feti.contexts import ActiveRows, Krylov
 from feti_homog.feti.operator import DualOperator
-from feti_homog.feti.preconditioner import (
-    Dirichlet,
-    Identity,
-    Lumped,
-    Preconditioner,
-    Scaled,
-    boundary_stiffness,
-)
+from feti_homog.feti.preconditioner import Scaled
 from feti_homog.feti.shared import Shared
 from feti_homog.feti.subdomain import Subdomain
 
 Int = NDArray[np.int64]
 Float = NDArray[np.float64]
 
-PRECONDITIONERS = ("none", "lumped", "dirichlet")
-DUAL_OPERATORS = ("auto", "implicit", "explicit")
-# Boundary dofs of a subdomain up to which a dense operator (8 n^2 bytes) is ever chosen by itself.
-LARGEST_DENSE = 6000
-# Applications from which on it is taken to pay; three bonded load cases make fewer.
-PAYS = 60
+COARSE_SPACES = ("auto", "natural", "adaptive")
 RTOL = 1e-8
 # A jump that the active rows see of the torn cell's is none if it is as small as this.
 ROUNDING = 1e-13
@@ -89,25 +81,24 @@ class FetiSolver:
         """Set up; `applications` is how many times the dual operator is expected to be applied."""
         self.comm, self.subdomains = comm, subdomains
         self.constraints = Constraints(comm, shared, subdomains, lattice)
-        self.boundary = self._boundary_dofs()
-        # A single subdomain has no boundary: any of its nodes can be fixed.
-        candidates = [
-            np.unique(dofs // 2) if len(dofs) else np.arange(s.mesh.n_classes)
-            for s, dofs in zip(subdomains, self.boundary, strict=True)
-        ]
-        matrices = [s.regularised(nodes) for s, nodes in zip(subdomains, candidates, strict=True)]
-        self.local = LocalSolver(matrices, "feti_sub_")
-        self.operator = self._dual_operator(applications)
-        self.coarse = CoarseProblem(comm, self.constraints, subdomains)
-        self.preconditioner = self._preconditioner()
+        kind = _choice("dual_operator", boundaries.KINDS, "auto")
+        space = _choice("coarse_space", COARSE_SPACES, "auto")
+        soft = space == "adaptive" or (space == "auto" and _cut(comm, subdomains))
+        self.boundary = Boundary(self.constraints, subdomains, kind, applications, soft)
+        self.operator = DualOperator(self.constraints, self.boundary)
+        self.preconditioner = preconditioners.preconditioner(
+            _choice("pc_type", preconditioners.KINDS, "dirichlet"), comm, self.constraints, self.boundary
+        )
+        self.coarse = self._coarse(space, soft)
         self.active = ActiveRows(self.rows)
-        self._projected = ProjectedPreconditioner(self.preconditioner, self.coarse)
-        self._test = PrimalTest(self._projected)
-        self._rhs, self._w = self.constraints.vector.duplicate(), self.constraints.vector.duplicate()
-        self.ksp = self._krylov()
+        self._view = PETSc.Options("feti_").getBool("view", False)
+        self._krylov: dict[int, Krylov] = {}
         # Left to PETSc's finalization, the shells would call a Python that is gone.
-        self._release = weakref.finalize(self, _free, self.ksp)
+        self._release = weakref.finalize(self, _free, self._krylov)
+        self.rtol = float(self._solver_for(1).ksp.getTolerances()[0])
         self.solves = 0
+        if self._view:
+            PETSc.Sys.Print(view.setup(comm, self.boundary, self.coarse), comm=comm)
 
     @property
     def rows(self) -> int:
@@ -115,31 +106,34 @@ class FetiSolver:
         return self.constraints.owned[1] - self.constraints.owned[0]
 
     @property
-    def rtol(self) -> float:
-        """Relative tolerance of the primal residuals."""
-        return float(self.ksp.getTolerances()[0])
+    def ksp(self) -> PETSc.KSP:
+        """The Krylov method for one load case."""
+        return self._solver_for(1).ksp
 
-    @cached_property
+    @property
     def Q(self) -> Float:
         """(local dofs, 3) loads of the unit strains, f = -Q E."""
-        return np.concatenate([s.Q for s in self.subdomains] or [np.zeros((0, 3))])
+        return np.concatenate([np.zeros((0, 3)), *(s.Q for s in self.subdomains)])
+
+    @cached_property
+    def loads(self) -> Float:
+        """(boundary dofs, 3) Q there; inside the uniform bodies it vanishes."""
+        return self.Q[self.boundary.local]
 
     @cached_property
     def _torn(self) -> Float:
-        """(local dofs, 3) K+ (-Q), the torn cell under the unit strains."""
-        nothing = np.zeros(self.rows)
-        columns = [self.operator.displacement(-q, nothing) for q in self.Q.T]
-        return np.stack(columns, axis=1)
+        """(boundary dofs, 3) K+ (-Q), the torn cell under the unit strains."""
+        return self.boundary.flexibility(-self.loads)
 
     @cached_property
     def d(self) -> Float:
         """(owned rows, 3) jumps -B K+ Q of the torn cell under the unit strains."""
-        return np.stack([self.operator.jump(u) for u in self._torn.T], axis=1)
+        return self.operator.jump(self._torn)
 
     @cached_property
     def torn_stiffness(self) -> Float:
         """(3, 3) sum |Omega_s| L_s - Q^T K+ Q: the stress integral of the torn cell under the unit strains."""
-        local = sum((s.area * s.L for s in self.subdomains), self.Q.T @ self._torn)
+        local = sum((s.area * s.L for s in self.subdomains), self.loads.T @ self._torn)
         return np.asarray(self.comm.allreduce(local))
 
     def stress_integral(self, solution: DualSolution) -> Float:
@@ -159,106 +153,119 @@ class FetiSolver:
 
         Not to converge is no error here: the solution says so in its `reason`.
         """
-        lam, torn = start * self.active.mask, self.d @ strain
-        self.coarse.project(lam)
-        free = self.active.mask * torn
-        self.coarse.project(free)
-        closing = self.preconditioner.apply(free)
-        self.coarse.project(closing)
-        self.solves += 1
-        jump, least = self._norm(free), ROUNDING * self._norm(torn)
-        self._test.start(max(jump, least), self._norm(closing))
+        return self.solve_together(strain[None], start[:, None])[0]
+
+    def solve_together(self, strains: Float, starts: Float) -> list[DualSolution]:
+        """Solve for k strains (k, 3) at once, beginning with the multipliers `starts` (owned rows, k).
+
+        One Krylov method works on all of them side by side, each scaled by the jump of its torn cell.
+        """
+        k = len(strains)
+        krylov = self._solver_for(k)
+        torn = self.d @ strains.T
+        free = self.coarse.projected(self.active.restrict(torn))
+        jump, least = self._norms(free), ROUNDING * self._norms(torn)
+        # A load that the active rows do not see has no multipliers.
+        seen = jump > least
+        scale = np.where(seen, jump, 1.0)
+        free = np.where(seen, free, 0.0) / scale
+        self.solves += k
+        closing = self.coarse.projected(self.preconditioner.apply(free))
+        krylov.test.start(float(np.sqrt(seen.sum())), float(np.linalg.norm(self._norms(closing))))
+        lam = np.where(seen, self.coarse.projected(self.active.restrict(starts)), 0.0) / scale
         iterations, reason = 0, int(PETSc.KSP.ConvergedReason.CONVERGED_ATOL)
-        if jump <= least:
-            lam[:] = 0.0
-        else:
-            self._w.zeroEntries()
-            residual = free - self.active.mask * self.operator.apply(lam)
-            self.coarse.project(residual)
-            if self._norm(residual) > jump:
-                # No help: nothing is a better beginning.
-                lam[:], residual = 0.0, free
-            self._rhs.setArray(residual)
-            self.ksp.solve(self._rhs, self._w)
-            iterations, reason = self.ksp.getIterationNumber(), int(self.ksp.getConvergedReason())
-            lam += self._w.getArray(readonly=True)
-        return self._recover(strain, lam, torn, iterations, reason)
+        if seen.any():
+            lam, residual = self._begin(lam, free)
+            lam = lam + krylov.solve(residual)
+            iterations, reason = krylov.ksp.getIterationNumber(), int(krylov.ksp.getConvergedReason())
+            if self._view:
+                PETSc.Sys.Print(view.solve(krylov.ksp, k), comm=self.comm)
+        return self._recover(strains, lam * scale, torn, iterations, reason, np.maximum(jump, least))
 
     def destroy(self) -> None:
         """Free PETSc's shell objects; collective.  Otherwise it is done when the solver, or Python, ends."""
         self._release()
 
+    def boundary_displacement(self, solution: DualSolution) -> Float:
+        """(boundary dofs,) u* of a solution, Eq. (34)."""
+        u = self._torn @ solution.strain - self.operator.displacement(solution.lam)
+        return np.asarray(u + self.coarse.motion(solution.alpha))
+
     def displacement(self, solution: DualSolution) -> Float:
-        """(local dofs,) u* of a solution, Eq. (34)."""
-        u = self.operator.displacement(-self.Q @ solution.strain, solution.lam)
-        return u + self.coarse.motion(solution.alpha)
+        """(local dofs,) u* of a solution; factors the interiors when first called."""
+        return self.boundary.extend(self.boundary_displacement(solution))
 
-    def _recover(self, strain: Float, lam: Float, torn: Float, iterations: int, reason: int) -> DualSolution:
+    def _begin(self, lam: Float, free: Float) -> tuple[Float, Float]:
+        """First multipliers, improved by the coarse space, and the residual that they leave."""
+        residual = free
+        if self._norms(lam).any():
+            residual = self.coarse.projected(free - self.active.restrict(self.operator.apply(lam)))
+        # Where they are no help, nothing is a better beginning.
+        worse = self._norms(residual) > self._norms(free)
+        lam, residual = np.where(worse, 0.0, lam), np.where(worse, free, residual)
+        coarse = self.coarse.correction(residual)
+        return lam + coarse, self.coarse.residual(residual - self.active.restrict(self.operator.apply(coarse)))
+
+    def _recover(
+        self, strains: Float, lam: Float, torn: Float, iterations: int, reason: int, scale: Float
+    ) -> list[DualSolution]:
         jump = torn - self.operator.apply(lam)
-        alpha = np.zeros(self.coarse.dimension)
+        alpha = np.zeros((self.coarse.dimension, len(strains)))
         if self.coarse.dimension:
-            alpha -= self.coarse.amplitudes(self.active.mask * jump)
-            jump += self.coarse.G @ alpha
-        residual = self._norm(self.active.mask * jump) / (self._test.jump or 1.0)
-        return DualSolution(strain, lam, jump, alpha, iterations, reason, residual)
+            alpha -= self.coarse.amplitudes(self.active.restrict(jump))
+            jump = jump + self.coarse.G @ alpha
+        residual = self._norms(self.active.restrict(jump)) / np.where(scale > 0, scale, 1.0)
+        return [
+            DualSolution(
+                strain, lam[:, k].copy(), jump[:, k].copy(), alpha[:, k].copy(), iterations, reason, float(residual[k])
+            )
+            for k, strain in enumerate(strains)
+        ]
 
-    def _norm(self, x: Float) -> float:
-        return float(np.sqrt(self.comm.allreduce(x @ x)))
+    def _norms(self, x: Float) -> Float:
+        """Norms of the columns of x (owned rows, k)."""
+        return np.sqrt(self.coarse.everywhere(np.einsum("ik,ik->k", x, x)))
 
-    def _preconditioner(self) -> Preconditioner:
-        name = PETSc.Options("feti_").getString("pc_type", "dirichlet")
-        if name not in PRECONDITIONERS:
-            raise CaseError(f"-feti_pc_type {name}: expected one of {', '.join(PRECONDITIONERS)}")
-        if name == "none":
-            return Identity()
-        K = [s.K for s in self.subdomains]
-        S: Lumped | Dirichlet | DenseBlocks
-        if isinstance(self.operator, ExplicitDualOperator) and name == "dirichlet":
-            S = self.operator.schur
-        else:
-            S = boundary_stiffness(K, self.boundary, name == "dirichlet")
-        return Scaled(self.comm, self.constraints, K, S, self.boundary)
+    def _solver_for(self, columns: int) -> Krylov:
+        if columns not in self._krylov:
+            self._krylov[columns] = Krylov(
+                self.constraints.vector, self.operator, self.preconditioner, self.coarse, self.active, columns, RTOL
+            )
+            if self._view:
+                self._krylov[columns].ksp.setComputeSingularValues(True)
+        return self._krylov[columns]
 
-    def _boundary_dofs(self) -> list[Int]:
-        """Local numbers of the dofs of each subdomain that constraints act on, both directions of a node."""
-        touched = self.constraints.B.getnnz(axis=0).reshape(-1, 2).any(axis=1)
-        nodes = np.split(touched, np.cumsum([s.mesh.n_classes for s in self.subdomains]))[:-1]
-        return [(2 * np.flatnonzero(n)[:, None] + np.arange(2)).ravel() for n in nodes]
-
-    def _dual_operator(self, applications: int) -> DualOperator:
-        """Explicit where it pays: where the dense matrices are small and the operator is applied often enough."""
-        kind = PETSc.Options("feti_").getString("dual_operator", "auto")
-        if kind not in DUAL_OPERATORS:
-            raise CaseError(f"-feti_dual_operator {kind}: expected one of {', '.join(DUAL_OPERATORS)}")
-        largest = self.comm.allreduce(max((len(dofs) for dofs in self.boundary), default=0), MPI.MAX)
-        pays = applications >= PAYS and largest <= LARGEST_DENSE and PETSc.Sys.hasExternalPackage("mumps")
-        if kind == "explicit" or (kind == "auto" and pays):
-            return ExplicitDualOperator(self.constraints, self.local, self.subdomains, self.boundary)
-        return DualOperator(self.constraints, self.local)
-
-    def _krylov(self) -> PETSc.KSP:
-        vector = self.constraints.vector
-        sizes = (vector.getSizes(), vector.getSizes())
-        A = PETSc.Mat().createPython(
-            sizes, ProjectedOperator(self.operator, self.coarse, self.active), comm=self.comm
-        )
-        A.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-        A.setUp()
-        ksp = PETSc.KSP().create(self.comm)
-        ksp.setOptionsPrefix("feti_")
-        ksp.setOperators(A)
-        ksp.setType(PETSc.KSP.Type.CG)
-        ksp.setNormType(PETSc.KSP.NormType.PRECONDITIONED)
-        ksp.setTolerances(rtol=RTOL, atol=0.0, max_it=2000)
-        ksp.setConvergenceTest(self._test)
-        pc = ksp.getPC()
-        pc.setType(PETSc.PC.Type.PYTHON)
-        pc.setOptionsPrefix("feti_projected_")
-        pc.setPythonContext(self._projected)
-        ksp.setFromOptions()
-        return ksp
+    def _coarse(self, space: str, soft: bool) -> CoarseProblem:
+        """Adaptive where bodies are cut and all subdomains have dense operators; else the natural one."""
+        threshold = PETSc.Options("feti_").getReal("coarse_threshold", THRESHOLD)
+        dense = all(isinstance(o, Condensed) for o in self.boundary.operators)
+        able = self.comm.allreduce(dense and isinstance(self.preconditioner, Scaled), MPI.LAND)
+        if space == "adaptive" and not able:
+            raise CaseError(
+                "-feti_coarse_space adaptive: needs -feti_pc_type dirichlet and -feti_dual_operator explicit"
+            )
+        if isinstance(self.preconditioner, Scaled) and able and soft:
+            return AdaptiveCoarse(
+                self.comm, self.constraints, self.boundary, self.preconditioner, threshold
+            )
+        return CoarseProblem(self.comm, self.constraints, self.boundary)
 
 
-def _free(ksp: PETSc.KSP) -> None:
-    ksp.getOperators()[0].destroy()
-    ksp.destroy()
+def _cut(comm: MPI.Intracomm, subdomains: Sequence[Subdomain]) -> bool:
+    """Whether bodies are cut into pieces: the webs that METIS makes of a matrix have soft modes."""
+    bodies = comm.allreduce(max((s.piece.body for s in subdomains), default=-1), MPI.MAX) + 1
+    return bool(comm.allreduce(len(subdomains)) > bodies)
+
+
+def _choice(name: str, known: Sequence[str], default: str) -> str:
+    """The value of the option -feti_`name`."""
+    value = PETSc.Options("feti_").getString(name, default)
+    if value not in known:
+        raise CaseError(f"-feti_{name} {value}: expected one of {', '.join(known)}")
+    return str(value)
+
+
+def _free(krylov: dict[int, Krylov]) -> None:
+    for solver in krylov.values():
+        solver.destroy()
+    krylov.clear()

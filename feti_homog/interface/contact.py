@@ -8,6 +8,7 @@ does (Murty's rule), so that no cycle is possible.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -123,6 +124,15 @@ class Interface:
         self.solver.activate(self.active(status))
         return self.solver.solve(strain, start)
 
+    def equilibria(self, strains: Float, status: Status, starts: Sequence[Float]) -> list[Equilibrium]:
+        """Solve for every strain of (k, 3): together where the problem is linear, with nobody to touch.  Collective."""
+        if self.contact and self.solver.comm.allreduce(bool((status != BONDED).any()), MPI.LOR):
+            return [self.equilibrium(E, status, start) for E, start in zip(strains, starts, strict=True)]
+        self.solver.activate(self.active(status))
+        free = self.solver.coarse.free.shape[1]
+        solutions = self.solver.solve_together(strains, np.stack(starts, axis=1))
+        return [Equilibrium(status, s, s.iterations, 1, free, self._certificate(status, s)) for s in solutions]
+
     def equilibrium(self, strain: Float, status: Status, start: Float) -> Equilibrium:
         """Solve for the strain (3,), with `status` a first guess of who is in contact.  Collective."""
         comm, pivots = self.solver.comm, _Pivots(self.solver.comm)
@@ -148,9 +158,9 @@ class Interface:
 
     def _tolerance(self, strain: Float) -> float:
         """Gaps smaller than this are noise."""
-        return NOISE * self.solver.rtol * self._displacement(strain)
+        return NOISE * self.solver.rtol * self.imposed(strain)
 
-    def _displacement(self, strain: Float) -> float:
+    def imposed(self, strain: Float) -> float:
         """Largest displacement E y that the strain imposes on the cell."""
         E = np.array([[strain[0], strain[2] / 2], [strain[2] / 2, strain[1]]])
         corners = self.size * np.array([[1, 0], [0, 1], [1, 1]])
@@ -175,7 +185,7 @@ class Interface:
         ])
         self.solver.comm.Allreduce(MPI.IN_PLACE, worst, MPI.MAX)
         penetration, tension, product, largest_traction, largest_force = (float(w) for w in worst)
-        scale = self._displacement(solution.strain) or 1.0
+        scale = self.imposed(solution.strain) or 1.0
         return {
             "kkt_penetration": penetration / scale,
             "kkt_tension": tension / (largest_traction or 1.0),

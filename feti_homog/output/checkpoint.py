@@ -119,6 +119,22 @@ class Checkpoint:
             raise FetiHomogError(f"cannot write {path}: {error}") from error
 
 
+class NoCheckpoint(Checkpoint):
+    """Keeps nothing, for runs that leave no files."""
+
+    def __init__(self, comm: MPI.Intracomm) -> None:
+        super().__init__(Path(), comm, "")
+
+    def clear(self) -> int:
+        return 0
+
+    def read(self) -> list[Arrays]:
+        return []
+
+    def write(self, number: int, whole: Mapping[str, Any], distributed: Mapping[str, NDArray[Any]]) -> None:
+        """Nothing."""
+
+
 def _checksum(event: Arrays) -> str:
     content = hashlib.sha256()
     for name in sorted(event):

@@ -99,6 +99,22 @@ def _path(document: Mapping[str, Any]) -> Figure:
     return figure
 
 
+def straight(document: Mapping[str, Any]) -> Array | None:
+    """(v, 4) S11, S22, S12 and the leading strain's size along a path with one waypoint, the strain only rising.
+
+    None of any other result.
+    """
+    points, case = document.get("path"), document["case"]
+    if not points or len(case["path"].get("waypoints", [0])) != 1:
+        return None
+    which = listing.leading(points)
+    if case["path"]["method"] == "events":
+        held = strain_controlled(points, which)
+    else:
+        held = np.array([[0.0] * 4, *([*point["stress"], point["strain"][which]] for point in points)])
+    return held * [1.0, 1.0, 1.0, np.sign(held[-1, 3])]
+
+
 def strain_controlled(points: Sequence[Mapping[str, Any]], which: int) -> Array:
     """(v, 4) S11, S22, S12 and the strain `which` along a straight path when the strain only rises.
 

@@ -62,6 +62,19 @@ def path_table(points: Sequence[Point], stress: str) -> list[str]:
     return lines
 
 
+def sweep_table(rows: Sequence[tuple[str, str, str]]) -> list[str]:
+    """A line for each case of a sweep: folder, status (if any is known) and inputs."""
+    width = max(len(status) for _, status, _ in rows)
+    return [f"{folder}  {status:<{width}}  {inputs}".replace("    ", "  ").rstrip() for folder, status, inputs in rows]
+
+
+def sweep_failures(rows: Sequence[tuple[str, str, str]]) -> list[str]:
+    """Folder, inputs and reason of each case that failed."""
+    return ["", f"{len(rows)} failed:"] + [
+        line for folder, inputs, reason in rows for line in (f"  {folder}  {inputs}", f"    {reason}")
+    ]
+
+
 def _heads() -> str:
     return "".join(f"{state:>7}" for state in STATES)
 

@@ -56,26 +56,27 @@ def interface_part(cell: TornCell) -> InterfacePart:
 def state_part(cell: TornCell, response: Response, load_factor: float, label: str) -> StatePart:
     """The fields of a response; tractions and jumps are scaled like it."""
     nodes, solution = cell.solver.constraints.nodes, response.state.solution
+    u = response.scale * cell.solver.displacement(solution)
     pair = nodes.row[:, None] + np.arange(2)
     return StatePart(
         strain=response.strain,
         stress_mean=response.stress,
         load_factor=load_factor,
         label=label,
-        displacement=displacement(cell, response.strain, response.u),
-        fluctuation=fluctuation(cell, response.u),
-        stress=_element_stress(cell, response),
+        displacement=displacement(cell, response.strain, u),
+        fluctuation=fluctuation(cell, u),
+        stress=_element_stress(cell, response.strain, u),
         traction=response.scale * solution.lam[pair] / nodes.length[:, None],
         jump=response.scale * solution.jump[pair],
         status=response.state.status,
     )
 
 
-def _element_stress(cell: TornCell, response: Response) -> Float:
+def _element_stress(cell: TornCell, E: Float, u: Float) -> Float:
     """(elements, 3) mean stresses."""
     stresses = [np.zeros((0, 3))]
     for s, offset in zip(cell.subdomains, cell.offsets, strict=False):
-        own = response.u[offset : offset + len(s.Q)].reshape(-1, 2)
+        own = u[offset : offset + len(s.Q)].reshape(-1, 2)
         strain, _ = element_strain(s.mesh.points, s.mesh.triangles, s.mesh.node_class, own)
-        stresses.append((strain + response.strain) @ s.L)
+        stresses.append((strain + E) @ s.L)
     return np.concatenate(stresses)

@@ -1,10 +1,10 @@
-"""One case from its file to its result: tear, solve, homogenize, check, write."""
+"""One case from its description to its result: tear, solve, homogenize, check, and write if there is a folder."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from contextlib import nullcontext
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
 from dataclasses import asdict
 from itertools import count
 from pathlib import Path
@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
+from petsc4py import PETSc
 
 from feti_homog import __version__, bounds
 from feti_homog.analysis import angle, path, stiffness
@@ -23,12 +24,13 @@ from feti_homog.homogenization import Homogenization, Response
 from feti_homog.interface.law import Law
 from feti_homog.material import plane_stiffness
 from feti_homog.output import folder, plots, results, states, tables, xdmf
-from feti_homog.output.checkpoint import Checkpoint, finished
+from feti_homog.output.checkpoint import Checkpoint, NoCheckpoint, finished
 from feti_homog.output.fields import FieldFile
 from feti_homog.output.summary import summary
 from feti_homog.parallel import on_root, on_root_only
 from feti_homog.petsc_options import case_options, refuse_unused
 from feti_homog.progress import Progress
+from feti_homog.result import Result
 from feti_homog.torn import TornCell, tear
 
 Float = NDArray[np.float64]
@@ -47,21 +49,45 @@ def run(case: Case, directory: Path, comm: MPI.Intracomm, quiet: bool, resume: b
     if resume and on_root(comm, finished, directory, case):
         progress.say(f"{directory} holds the finished result of this case: nothing to do")
         return
+    with _torn(case, comm, progress) as cell:
+        faults = _run(cell, directory, progress, resume)
+    if faults:
+        raise ConvergenceError(*faults)
+
+
+def compute(case: Case, comm: MPI.Intracomm) -> Result:
+    """The case's result on every rank, without a file or a word.  Collective.
+
+    Raises:
+        CaseError, MeshError: the case cannot be run.
+        ConvergenceError: a solve did not converge or a check failed.
+    """
+    progress = Progress(comm, quiet=True)
+    with _torn(case, comm, progress) as cell:
+        study = _study(cell, progress, None)
+        document = _document(study, _analyse(study, NoCheckpoint(comm), resume=False))
+        document |= {"timings": study.progress.timings(), "memory": study.progress.memory()}
+    if study.faults:
+        raise ConvergenceError(*study.faults)
+    return Result.of(document)
+
+
+@contextmanager
+def _torn(case: Case, comm: MPI.Intracomm, progress: Progress) -> Iterator[TornCell]:
+    """The torn cell, with the case's options set, while the block lasts."""
+    PETSc.garbage_cleanup(comm)  # what earlier cases left: parallel objects are freed by all ranks together
     with case_options(case.petsc):
         cell = tear(case, comm, progress)
         try:
             refuse_unused()
-            faults = _run(cell, directory, progress, resume)
+            yield cell
         finally:
             cell.solver.destroy()
-    if faults:
-        raise ConvergenceError(*faults)
 
 
 def _run(cell: TornCell, directory: Path, progress: Progress, resume: bool) -> list[str]:
     """Analyse and write; returns what did not hold."""
     case, comm = cell.case, cell.comm
-    homogenization = Homogenization(cell, case.interface is not None and case.interface.contact)
     on_root(comm, folder.make, directory)
     file = None
     if case.output.fields:
@@ -69,20 +95,31 @@ def _run(cell: TornCell, directory: Path, progress: Progress, resume: bool) -> l
             words.append(f"{directory}: result.h5 with the mesh, the states follow")
             file = FieldFile(directory, comm, states.header(cell), states.mesh_part(cell), states.interface_part(cell))
     with file or nullcontext():
-        study = Study(homogenization, cell.debonded, progress, _recorder(cell, file))
-        with progress.stage("solve") as words:
-            analysis = _analyse(study, directory, resume)
-            words.append(f"{len(study.iterations)} states, {sum(study.iterations)} iterations")
-    document = _document(study, analysis)
-    _write(study, directory, document)
+        study = _study(cell, progress, file)
+        checkpoint = _checkpoint(cell, directory)
+        analysis = _analyse(study, checkpoint, resume)
+    _write(study, directory, _document(study, analysis), checkpoint)
     return study.faults
 
 
-def _analyse(study: Study, directory: Path, resume: bool) -> dict[str, Any]:
-    cell = study.homogenization.cell
-    case = cell.case
+def _study(cell: TornCell, progress: Progress, file: FieldFile | None) -> Study:
+    """The analysis of a cell, whose states go to the file if there is one."""
+    contact = cell.case.interface is not None and cell.case.interface.contact
+    return Study(Homogenization(cell, contact), cell.debonded, progress, _recorder(cell, file))
+
+
+def _analyse(study: Study, checkpoint: Checkpoint, resume: bool) -> dict[str, Any]:
+    """The numbers of the analysis asked for, as they stand in result.json."""
+    with study.progress.stage("solve") as words:
+        analysis = _analysis(study, checkpoint, resume)
+        words.append(f"{len(study.iterations)} states, {sum(study.iterations)} iterations")
+    return analysis
+
+
+def _analysis(study: Study, checkpoint: Checkpoint, resume: bool) -> dict[str, Any]:
+    case = study.homogenization.cell.case
     if case.path is not None:
-        return path.run(study, case.path, _law(case), _checkpoint(cell, directory), resume)
+        return path.run(study, case.path, _law(case), checkpoint, resume)
     if case.angle is not None:
         strain = None if case.angle.strain is None else np.array(case.angle.strain)
         return angle.run(study, case.angle.values, strain)
@@ -139,8 +176,8 @@ def _document(study: Study, analysis: dict[str, Any]) -> dict[str, Any]:
             "multipliers": solver.constraints.total,
             "interface_nodes": cell.total(len(solver.constraints.nodes.row)),
             "kernel_dim": solver.coarse.dimension,
-            "coarse_dim": solver.coarse.dimension,
-            "factorizations": cell.total(solver.local.factorizations),
+            "coarse_dim": solver.coarse.vectors,
+            "factorizations": plan.subdomains,
             "coarse_factorizations": solver.coarse.factorizations,
             "rtol": solver.rtol,
             "solves": solver.solves,
@@ -174,7 +211,7 @@ def _beside(cell: TornCell, L: Float, fractions: dict[str, float]) -> dict[str, 
     }
 
 
-def _write(study: Study, directory: Path, document: dict[str, Any]) -> None:
+def _write(study: Study, directory: Path, document: dict[str, Any], checkpoint: Checkpoint) -> None:
     cell, progress = study.homogenization.cell, study.progress
     comm, output = cell.comm, cell.case.output
     if output.fields:
@@ -183,7 +220,7 @@ def _write(study: Study, directory: Path, document: dict[str, Any]) -> None:
     on_root_only(comm, results.write, directory, document)
     on_root_only(comm, tables.write, directory, document)
     if cell.case.path is not None and not study.faults:
-        _checkpoint(cell, directory).clear()
+        checkpoint.clear()
     if output.pictures:
         with progress.stage("pictures") as words:
             words.append(", ".join(p.name for p in on_root_only(comm, plots.plot, directory) or []))

@@ -1,0 +1,91 @@
+"""Effective stiffness over the fibre fraction: square, hexagonal and random cells, in plane strain, with bounds.
+
+    mpirun -n 2 .venv/bin/python drivers/fibre_fraction_sweep.py --out results/fibre_fraction_sweep
+
+Fibres with E = 200, nu = 0.222 in a matrix with E = 88, nu = 0.299 (GPa), perfectly bonded.  Each random point is the
+mean of several arrangements.  It is a sweep: started again it goes on; sweep.csv and moduli.png are its table and its
+picture.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from figures import EQUATION_38
+from mpi4py.MPI import Intracomm
+
+from feti_homog.cli import Parser, launch, parsed
+
+HEADS = f"{'cell':<11}{'fraction':>8}{'C11':>11}{'C12':>11}{'C33':>11}{'isotropy':>11}{'+- C11':>10}{'+- C33':>10}"
+
+
+def main(words: Sequence[str], comm: Intracomm) -> int:
+    """Run the sweep, print its points and draw them."""
+    from feti_homog.parallel import on_root, on_root_only
+    from feti_homog.sweep import collect, execute, plan
+
+    given = parsed(_parser(), words, comm)
+    sweep = on_root(comm, plan.expand, document(given), Path())
+    group = given.ranks_per_case or comm.size
+    execute.run_all(sweep, given.out, comm, group, retry=True, quiet=given.quiet)
+    for line in on_root_only(comm, report, collect.read, given.out) or []:
+        print(line)
+    for line in on_root_only(comm, collect.collect, given.out, True) or []:
+        print(line)
+    return 0
+
+
+def document(given: argparse.Namespace) -> dict[str, Any]:
+    """The sweep as a TOML file would have it."""
+    cell = {"refine": given.refine, "order": given.order, "mesh_size": given.mesh_size}
+    random = {"geometry": "random", "fibres": given.fibres}
+    return {
+        "name": "fibre fraction",
+        "cell": cell,
+        "material": EQUATION_38,
+        "analysis": {"type": "stiffness", "plane": "strain"},
+        "output": {"fields": False, "pictures": False, "stress_unit": "GPa"},
+        "sweep": {
+            "realisations": given.realisations,
+            "cell": [{"geometry": "square"}, {"geometry": "hexagonal"}, random],
+            "cell.fibre_fraction": given.fractions,
+        },
+    }
+
+
+def report(read: Any, folder: Path) -> list[str]:
+    """A line for each point; isotropy is |C33 - (C11 - C12)/2| / C33, +- the 95 % confidence interval of a mean."""
+    table = read(folder)
+    lines = [f"stiffness in {table.stress_unit}", HEADS]
+    for number, point in enumerate(table.points):
+        row = table.rows(point)[0]
+        C11, C12, C33 = (table.statistics[name].mean[number] for name in ("C11", "C12", "C33"))
+        spread = [table.statistics[name].ci95[number] for name in ("C11", "C33")]
+        spreads = "".join(f"{'' if np.isnan(value) else format(value, '.4f'):>10}" for value in spread)
+        isotropy = abs(C33 - (C11 - C12) / 2) / C33
+        geometry, fraction = (table.inputs[f"cell.{key}"][row] for key in ("geometry", "fibre_fraction"))
+        lines.append(f"{geometry:<11}{fraction:>8g}{C11:>11.5f}{C12:>11.5f}{C33:>11.5f}{isotropy:>11.1e}{spreads}")
+    return lines
+
+
+def _parser() -> Parser:
+    parser = Parser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--out", type=Path, default=Path("results/fibre_fraction_sweep"), metavar="DIR")
+    parser.add_argument("--fractions", type=float, nargs="+", default=[0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.65])
+    parser.add_argument("--fibres", type=int, default=30, help="of the random cells")
+    parser.add_argument("--realisations", type=int, default=5, help="arrangements of each random cell")
+    parser.add_argument("--mesh-size", type=float, default=0.1, help="coarse element size / cell width")
+    parser.add_argument("--refine", type=int, default=0)
+    parser.add_argument("--order", type=int, choices=(1, 2), default=2)
+    parser.add_argument("--ranks-per-case", type=int, metavar="R", help="by default all")
+    parser.add_argument("--quiet", action="store_true", help="do not tell of every case")
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(launch(main))

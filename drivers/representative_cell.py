@@ -1,0 +1,116 @@
+"""How many fibres make a representative cell: apparent stiffness and its scatter against the size of the cell.
+
+    mpirun -n 2 .venv/bin/python drivers/representative_cell.py --out results/representative_cell
+
+Random cells of 50 % fibres with E = 200, nu = 0.222 in a matrix with E = 88, nu = 0.299 (GPa), plane strain, several
+arrangements of each number of fibres.  A cell is representative where the mean no longer moves by more than its
+confidence interval, and one arrangement scatters by less than what is asked for.  It is a sweep: started again it
+goes on; sweep.csv and cell_size.png are its table and its picture.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from figures import EQUATION_38
+from mpi4py.MPI import Intracomm
+
+from feti_homog.cli import Parser, launch, parsed
+
+NAMES = ("C11", "bulk", "shear")
+
+
+def main(words: Sequence[str], comm: Intracomm) -> int:
+    """Run the sweep, print means and scatter for each size, say which is representative, and draw."""
+    from feti_homog.parallel import on_root, on_root_only
+    from feti_homog.sweep import collect, execute, plan
+
+    given = parsed(_parser(), words, comm)
+    sweep = on_root(comm, plan.expand, document(given), Path())
+    group = given.ranks_per_case or comm.size
+    execute.run_all(sweep, given.out, comm, group, retry=True, quiet=given.quiet)
+    for line in on_root_only(comm, report, collect.read, given.out, given.tolerance) or []:
+        print(line)
+    for line in on_root_only(comm, collect.collect, given.out, True) or []:
+        print(line)
+    return 0
+
+
+def document(given: argparse.Namespace) -> dict[str, Any]:
+    """The sweep as a TOML file would have it.  The mesh is as fine beside each fibre, whatever their number."""
+    cell = {
+        "geometry": "random", "fibre_fraction": given.fibre_fraction, "min_gap": given.min_gap,
+        "refine": given.refine, "order": given.order, "seed": given.seed,
+    }  # fmt: skip
+    return {
+        "name": "representative cell",
+        "cell": cell,
+        "material": EQUATION_38,
+        "analysis": {"type": "stiffness", "plane": "strain"},
+        "output": {"fields": False, "pictures": False, "stress_unit": "GPa"},
+        "sweep": {
+            "mode": "zip",
+            "realisations": given.realisations,
+            "cell.fibres": given.fibres,
+            "cell.mesh_size": [round(min(0.5, given.mesh_size / fibres**0.5), 4) for fibres in given.fibres],
+        },
+    }
+
+
+def report(read: Any, folder: Path, tolerance: float) -> list[str]:
+    """A line for each number of fibres: mean, half of its 95 % interval, and standard deviation of one cell."""
+    table = read(folder)
+    heads = "".join(f"{name + ' (GPa)':>12}{'+-':>9}{'std %':>8}" for name in NAMES)
+    lines, more = [f"{'fibres':>6}{heads}"], []
+    enough = None
+    for number, point in enumerate(table.points):
+        fibres = table.inputs["cell.fibres"][table.rows(point)[0]]
+        line, worst = f"{fibres:>6}", 0.0
+        for name in NAMES:
+            found = table.statistics[name]
+            scatter = float(found.std[number] / found.mean[number])
+            line += f"{found.mean[number]:>12.4f}{found.ci95[number]:>9.4f}{100 * scatter:>8.3f}"
+            worst = max(worst, scatter)
+        lines.append(line)
+        more.append(f"{fibres:>6} fibres: {_laws(table.statistics, number)}")
+        enough = fibres if enough is None and worst <= tolerance else enough if worst <= tolerance else None
+    answer = f"from {enough} fibres on" if enough is not None else "no cell here is that large"
+    return [*lines, *more, f"one cell scatters by less than {100 * tolerance:g} %: {answer}"]
+
+
+def _laws(statistics: Any, number: int) -> str:
+    """Whether the means are isotropic and between the Hashin-Shtrikman bounds, in words."""
+    found = []
+    for name, words in (("anisotropy_axial", "C11 - C22"), ("anisotropy_shear", "C33 - (C11 + C22 - 2 C12)/4")):
+        mean, half = statistics[name].mean[number], statistics[name].ci95[number]
+        found.append(f"{words} = {mean:.4f} +- {half:.4f}")
+    for name in ("bulk", "shear"):
+        lower, upper = (statistics[f"{name}_{side}"].mean[number] for side in ("lower", "upper"))
+        inside = lower <= statistics[name].mean[number] <= upper
+        found.append(f"{name} {'between' if inside else 'outside of'} {lower:.4f} and {upper:.4f}")
+    return "; ".join(found)
+
+
+def _parser() -> Parser:
+    parser = Parser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--out", type=Path, default=Path("results/representative_cell"), metavar="DIR")
+    parser.add_argument("--fibres", type=int, nargs="+", default=[4, 8, 16, 32, 64], help="numbers of fibres")
+    parser.add_argument("--realisations", type=int, default=20, help="arrangements of each number")
+    parser.add_argument("--seed", type=int, default=0, help="of the first arrangement")
+    parser.add_argument("--fibre-fraction", type=float, default=0.5)
+    parser.add_argument("--min-gap", type=float, default=0.05, help="smallest gap / diameter of a fibre")
+    parser.add_argument("--mesh-size", type=float, default=0.5, help="of the coarse elements / pitch of fibres")
+    parser.add_argument("--refine", type=int, default=0)
+    parser.add_argument("--order", type=int, choices=(1, 2), default=2)
+    parser.add_argument("--tolerance", type=float, default=0.005, help="relative scatter of a representative cell")
+    parser.add_argument("--ranks-per-case", type=int, metavar="R", help="by default all")
+    parser.add_argument("--quiet", action="store_true", help="do not tell of every case")
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(launch(main))

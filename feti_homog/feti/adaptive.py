@@ -1,0 +1,256 @@
+"""The adaptive coarse problem: soft modes of the subdomains deflated beside the rigid-body motions.
+
+U = M^-1 B V for the kernels and the soft modes V of all subdomains, so U holds Q G with Q = M^-1.  A correction z keeps
+what no coarse vector can do better,
+
+    T z = z - U c,   [U^T F U   U^T G] [c]   [U^T F z]
+                     [G^T U     0    ] [a] = [G^T z  ],
+
+and a residual r loses the rigid-body part that makes U^T r vanish (Spillane & Rixen, IJNME 95, 2013, Section 5).
+Once some rows are inactive, M^-1 is another and Q G no longer among its range; then G itself joins U.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+from scipy.sparse import bmat, csr_matrix, diags, hstack
+
+from feti_homog.feti.assembled import summed, total
+from feti_homog.feti.boundary import Boundary
+from feti_homog.feti.coarse import CoarseProblem
+from feti_homog.feti.constraints import Constraints
+from feti_homog.feti.local import DirectSolver
+from feti_homog.feti.neighbours import Neighbours
+from feti_homog.feti.preconditioner import Scaled
+from feti_homog.feti.spectral import DualBlock, coarse_vectors, dual_blocks
+
+Int = NDArray[np.int64]
+Float = NDArray[np.float64]
+
+THRESHOLD = 0.2
+# Columns of U with less energy than this part of the largest have lost all their active rows.
+VANISHED = 1e-14
+# Largest G^T T z that a usable coarse problem leaves, relative to G^T z.
+LEAK = 1e-7
+# Subdomains whose dense contributions are held at once.
+CHUNK = 64
+
+
+class AdaptiveCoarse(CoarseProblem):
+    """The coarse space of this module.  Every rank holds its rows of U and a factor of the coarse matrix.
+
+    Attributes:
+        threshold: tau.
+        counts: soft modes of each of this rank's subdomains.
+    """
+
+    def __init__(
+        self,
+        comm: MPI.Intracomm,
+        constraints: Constraints,
+        boundary: Boundary,
+        scaling: Scaled,
+        threshold: float,
+    ) -> None:
+        """Find the soft modes and factor.  All boundary operators must be dense.  Collective."""
+        super().__init__(comm, constraints, boundary)
+        self.threshold = threshold
+        self.constraints = constraints
+        neighbours: Neighbours[Float] = Neighbours(comm, constraints, boundary.subdomains)
+        self._rows = neighbours.rows
+        self._blocks = dual_blocks(comm, constraints, boundary, scaling, self._rows)
+        V = coarse_vectors(self._blocks, neighbours, threshold)
+        self.counts = [v.shape[1] - b.R.shape[1] for v, b in zip(V, self._blocks, strict=True)]
+        self._mask = np.ones(len(constraints.rows))
+        own = (boundary.B @ self.R).tocsr()
+        shape = (own.shape[0], self.dimension)
+        self._motions = csr_matrix((own.data, own.indices + self.own.start, own.indptr), shape=shape)
+        self._complete = False
+        self._E: csr_matrix
+        self._FU: csr_matrix
+        self._span(_preconditioned(comm, constraints, self._blocks, neighbours, V))
+        self._factor(np.ones(self.U.shape[0]))
+
+    @property
+    def vectors(self) -> int:
+        """Dimension of the space that every residual is orthogonal to."""
+        return int(self.U.shape[1])
+
+    def activate(self, active: Float) -> None:
+        """Factorize for the owned rows of which `active` is 1; U is restricted to them."""
+        super().activate(active)
+        if not self._complete:
+            G = summed(self.comm, self._motions, self.constraints.rows, len(active))
+            self._complete = True
+            self._span(hstack([self._U, G]).tocsr())
+        mask = self.constraints.gather(active).copy()
+        changed = mask != self._mask
+        touched = [i for i, rows in enumerate(self._rows) if changed[rows].any()]
+        E, FU = self._energies(touched)
+        self._mask = mask
+        E_now, FU_now = self._energies(touched)
+        self._E, self._FU = self._E + (E_now - E), self._FU + (FU_now - FU)
+        self._factor(active)
+
+    def admissible(self, z: Float) -> Float:
+        """T z."""
+        if not self._usable:
+            return self.projected(z)
+        c, _ = self._solve(self._FU.T @ z, self.GaT @ z)
+        return np.asarray(z - self._column(z) * (self.U @ c))
+
+    def residual(self, r: Float) -> Float:
+        """r - G a with U^T (r - G a) = 0 as far as that can be."""
+        if not self._usable:
+            return self.projected(r)
+        _, a = self._solve(self.UT @ r, np.zeros((self.dimension, *r.shape[1:])))
+        return np.asarray(r - self.Ga @ a)
+
+    def correction(self, r: Float) -> Float:
+        """U c with U^T (r - F U c - G a) = 0 and G^T U c = 0."""
+        if not self._usable:
+            return np.zeros_like(r)
+        c, _ = self._solve(self.UT @ r, np.zeros((self.dimension, *r.shape[1:])))
+        return np.asarray(self._column(r) * (self.U @ c))
+
+    def _column(self, x: Float) -> Float:
+        """The active rows, to multiply x with."""
+        return self._active if x.ndim == 1 else self._active[:, None]
+
+    def _solve(self, energy: Float, work: Float) -> tuple[Float, Float]:
+        """c and a of the coarse problem whose right-hand sides are the sums over ranks of the arguments."""
+        right = self.everywhere(np.concatenate([energy, work]))
+        scale = self._scale if right.ndim == 1 else self._scale[:, None]
+        x = scale * self._kkt.solve(scale * right)
+        return x[: self.vectors], x[self.vectors :]
+
+    def _factor(self, active: Float) -> None:
+        self._active = active
+        E = total(self.comm, self._E)
+        K = total(self.comm, (self.GaT @ self.U).tocsr())
+        energy = E.diagonal()
+        vanished = energy <= VANISHED * energy.max(initial=0.0)
+        self._scale = np.ones(self.vectors + self.dimension)
+        self._scale[: self.vectors] = 1.0 / np.sqrt(np.where(vanished, 1.0, energy))
+        K = K @ diags(self._scale[: self.vectors])
+        length = np.sqrt(np.asarray(K.multiply(K).sum(axis=1)).ravel())
+        self._scale[self.vectors :] = 1.0 / np.where(length > 0, length, 1.0)
+        K = diags(self._scale[self.vectors :]) @ K
+        D = diags(self._scale[: self.vectors])
+        # Motions that nothing resists have amplitude 0.
+        free = csr_matrix(self.free @ self.free.T)
+        matrix = bmat([[D @ E @ D + diags(vanished.astype(float)), K.T], [K, -free]])
+        self._kkt = DirectSolver(matrix.tocsr(), "feti_coarse_", definite=False)
+        self._usable = True
+        self._usable = self._closes()
+
+    def _closes(self) -> bool:
+        """Whether T leaves no work of rigid-body motions; without the rows it needs, U cannot balance it."""
+        z = self._active * np.cos(np.arange(len(self._active)) + 1.0)
+        before, after = (self.everywhere(self.GaT @ x) for x in (z, self.admissible(z)))
+        return bool(np.abs(after).max(initial=0.0) <= LEAK * np.abs(before).max(initial=0.0))
+
+    def _span(self, U: csr_matrix) -> None:
+        """Let the columns of U (local rows, vectors) be the coarse vectors.  Collective."""
+        self._U, self.U = U, self._own(U)
+        self.UT = self.U.T.tocsr()
+        self._E, self._FU = self._energies(range(len(self._blocks)))
+
+    def _energies(self, some: Sequence[int]) -> tuple[csr_matrix, csr_matrix]:
+        """Shares of some of this rank's subdomains in U^T F U (vectors, vectors), on this rank, and in F U
+        (owned rows, vectors), summed over ranks; U on the active rows.  Collective."""
+        E, FU = _Sum((self.vectors, self.vectors)), _Sum(self._U.shape)
+        for i in some:
+            block, rows = self._blocks[i], self._rows[i]
+            columns, dense = _compressed(self._U, rows)
+            X = block.B.T @ (self._mask[rows, None] * dense)
+            Y = block.operator.S_plus @ X
+            E.add(columns, columns, X.T @ Y)
+            FU.add(rows, columns, block.B @ Y)
+        first, last = self.constraints.owned
+        every = summed(self.comm, FU.matrix(), self.constraints.rows, last - first)
+        return E.matrix(), self._own(every)
+
+    def _own(self, local: csr_matrix) -> csr_matrix:
+        """The owned of the local rows."""
+        first, last = self.constraints.owned
+        at = np.searchsorted(self.constraints.rows, first)
+        return local[at : at + last - first]
+
+
+def _preconditioned(
+    comm: MPI.Intracomm,
+    constraints: Constraints,
+    blocks: Sequence[DualBlock],
+    neighbours: Neighbours[Float],
+    V: Sequence[Float],
+) -> csr_matrix:
+    """(local rows, vectors) U = M^-1 B V.  Collective."""
+    counts = np.array([v.shape[1] for v in V], dtype=np.int64)
+    every = np.zeros(len(neighbours.rank), np.int64)
+    every[neighbours.index] = counts
+    comm.Allreduce(MPI.IN_PLACE, every)
+    ends = np.cumsum(every)
+
+    def jumps() -> Iterator[tuple[int, int, Float]]:
+        for i, (block, v) in enumerate(zip(blocks, V, strict=True)):
+            Z = block.B @ v
+            for s, common in neighbours.common[i].items():
+                yield i, s, Z[common]
+
+    received: list[list[tuple[int, Float]]] = [[] for _ in blocks]
+    for (i, sender), Z in neighbours.exchange(jumps()).items():
+        received[i].append((sender, Z))
+
+    U = _Sum((len(constraints.rows), int(every.sum())))
+    for i, (block, rows) in enumerate(zip(blocks, neighbours.rows, strict=True)):
+        if not received[i]:
+            continue
+        jump = np.zeros((len(rows), sum(Z.shape[1] for _, Z in received[i])))
+        columns, at = [], 0
+        for s, Z in received[i]:
+            jump[neighbours.common[i][s], at : at + Z.shape[1]] = Z
+            columns.append(np.arange(ends[s] - every[s], ends[s]))
+            at += Z.shape[1]
+        U.add(rows, np.concatenate(columns), block.BW @ (block.operator.S @ (block.BW.T @ jump)))
+    return summed(comm, U.matrix(), constraints.rows, constraints.owned[1] - constraints.owned[0])
+
+
+def _compressed(matrix: csr_matrix, rows: Int) -> tuple[Int, Float]:
+    """Some rows as a dense matrix: its nonzero columns and their values."""
+    part = matrix[rows]
+    columns, at = np.unique(part.indices, return_inverse=True)
+    dense = np.zeros((len(rows), len(columns)))
+    dense[np.repeat(np.arange(len(rows)), np.diff(part.indptr)), at] = part.data
+    return columns, dense
+
+
+class _Sum:
+    """A sparse sum of dense blocks; few of them are held at once."""
+
+    def __init__(self, shape: tuple[int, int]) -> None:
+        self._whole = csr_matrix(shape)
+        self._held: list[tuple[Int, Int, Float]] = []
+
+    def add(self, rows: Int, columns: Int, values: Float) -> None:
+        """Add `values` (rows, columns)."""
+        self._held.append((rows, columns, values))
+        if len(self._held) == CHUNK:
+            self._flush()
+
+    def matrix(self) -> csr_matrix:
+        """The sum so far."""
+        self._flush()
+        return self._whole
+
+    def _flush(self) -> None:
+        if self._held:
+            rows = np.concatenate([np.repeat(r, len(c)) for r, c, _ in self._held])
+            columns = np.concatenate([np.tile(c, len(r)) for r, c, _ in self._held])
+            values = np.concatenate([v.ravel() for _, _, v in self._held])
+            self._whole = self._whole + csr_matrix((values, (rows, columns)), shape=self._whole.shape)
+            self._held = []

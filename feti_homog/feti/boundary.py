@@ -1,0 +1,116 @@
+"""All subdomains of this rank as the dual problem sees them: through their boundary dofs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from petsc4py import PETSc
+from scipy.sparse import block_diag, csr_matrix
+
+from feti_homog.feti.condensed import Condensed
+from feti_homog.feti.constraints import Constraints
+from feti_homog.feti.factored import Factored, Interior
+from feti_homog.feti.subdomain import Subdomain
+
+Int = NDArray[np.int64]
+Float = NDArray[np.float64]
+
+KINDS = ("auto", "implicit", "explicit")
+# Boundary dofs of a subdomain up to which dense matrices (two of 8 n^2 bytes) are ever chosen by themselves.
+LARGEST_DENSE = 6000
+# Seconds, up to a common factor, for the choice: of a dense inverse per n^3, and of one application of the dual
+# operator and the preconditioner by triangular solves per dof (both measured with `scripts/benchmark_path`).
+INVERSE, SOLVES = 5e-10, 3.5e-7
+
+
+class Boundary:
+    """The boundary dofs of this rank's subdomains, one subdomain after the other, n in all.
+
+    Attributes:
+        dofs: local numbers, sorted, of each subdomain's.
+        offsets: where each subdomain begins among the n.
+        operators: dense or factored, of each subdomain.
+        B: (local rows, n) the constraints on them.
+    """
+
+    def __init__(
+        self, constraints: Constraints, subdomains: Sequence[Subdomain], kind: str, applications: int, soft: bool
+    ) -> None:
+        """Factor every subdomain, once.
+
+        Args:
+            kind: of KINDS; auto is dense where that pays.
+            applications: how many times the operators are expected to be applied.
+            soft: whether soft modes will be looked for, which takes dense matrices.
+        """
+        self.subdomains = subdomains
+        self.dofs = _touched(constraints.B, subdomains)
+        self.offsets = np.cumsum([0, *(len(d) for d in self.dofs)])
+        first = np.cumsum([0, *(s.K.shape[0] for s in subdomains)])
+        self.local = np.concatenate([o + d for o, d in zip(first, self.dofs, strict=False)] or [np.zeros(0, np.int64)])
+        self.B = constraints.B[:, self.local].tocsr()
+        self.BT = self.B.T.tocsr()
+        self.operators: list[Condensed | Factored] = []
+        for subdomain, dofs in zip(subdomains, self.dofs, strict=True):
+            pays = soft or INVERSE * len(dofs) ** 3 <= SOLVES * subdomain.K.shape[0] * applications
+            dense = kind == "explicit" or (kind == "auto" and pays and _fits(len(dofs)))
+            self.operators.append(Condensed(subdomain, dofs) if dense and len(dofs) else Factored(subdomain, dofs))
+
+    @property
+    def spans(self) -> list[slice]:
+        """The dofs of each subdomain among the n."""
+        return [slice(a, b) for a, b in pairwise(self.offsets.tolist())]
+
+    def stiffness(self, x: Float) -> Float:
+        """S x for x (n,) or (n, k)."""
+        return self._each([o.stiffness for o in self.operators], x)
+
+    def flexibility(self, x: Float) -> Float:
+        """The boundary part of K+ x for x (n,) or (n, k)."""
+        return self._each([o.flexibility for o in self.operators], x)
+
+    def _each(self, applied: Sequence[Callable[[Float, Float], None]], x: Float) -> Float:
+        y = np.empty_like(x)
+        for apply, (first, last) in zip(applied, pairwise(self.offsets.tolist()), strict=True):
+            apply(x[first:last], y[first:last])
+        return y
+
+    @cached_property
+    def Kbb(self) -> csr_matrix:
+        """(n, n) boundary block of K."""
+        blocks = [s.K[d][:, d] for s, d in zip(self.subdomains, self.dofs, strict=True)]
+        return csr_matrix(block_diag(blocks or [csr_matrix((0, 0))]))
+
+    @cached_property
+    def _interiors(self) -> list[Interior]:
+        return [Interior(s, d) for s, d in zip(self.subdomains, self.dofs, strict=True)]
+
+    def extend(self, x: Float) -> Float:
+        """(local dofs,) displacements that have the values x (n,) on the boundaries, with interiors in equilibrium.
+
+        The first call factors the interiors.
+        """
+        parts = [np.zeros(0)]
+        for subdomain, dofs, interior, span in zip(
+            self.subdomains, self.dofs, self._interiors, self.spans, strict=True
+        ):
+            u = np.empty(subdomain.K.shape[0])
+            u[dofs], u[interior.dofs] = x[span], interior.extend(x[span])
+            parts.append(u)
+        return np.concatenate(parts)
+
+
+def _touched(B: csr_matrix, subdomains: Sequence[Subdomain]) -> list[Int]:
+    """Local numbers of the dofs of each subdomain that constraints act on, both directions of a node."""
+    touched = B.getnnz(axis=0).reshape(-1, 2).any(axis=1)
+    nodes = np.split(touched, np.cumsum([s.mesh.n_classes for s in subdomains]))[:-1]
+    return [(2 * np.flatnonzero(n)[:, None] + np.arange(2)).ravel() for n in nodes]
+
+
+def _fits(boundary: int) -> bool:
+    """Whether dense matrices of that many boundary dofs can be made."""
+    return boundary <= LARGEST_DENSE and bool(PETSc.Sys.hasExternalPackage("mumps"))

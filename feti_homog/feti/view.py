@@ -1,0 +1,40 @@
+"""What -feti_view prints."""
+
+from __future__ import annotations
+
+import numpy as np
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from feti_homog.feti.adaptive import AdaptiveCoarse
+from feti_homog.feti.boundary import Boundary
+from feti_homog.feti.coarse import CoarseProblem
+from feti_homog.feti.condensed import Condensed
+
+
+def setup(comm: MPI.Intracomm, boundary: Boundary, coarse: CoarseProblem) -> str:
+    """Subdomains, their operators and the coarse space; collective."""
+    sizes = np.array([n for part in comm.allgather([len(d) for d in boundary.dofs]) for n in part])
+    dense = comm.allreduce(sum(isinstance(o, Condensed) for o in boundary.operators))
+    lines = [
+        f"FETI: {len(sizes)} subdomains, {dense} with dense boundary operators",
+        f"  boundary dofs of a subdomain: {sizes.min()} to {sizes.max()}, mean {sizes.mean():.0f}",
+        f"  kernels: {coarse.dimension} rigid-body modes",
+    ]
+    if isinstance(coarse, AdaptiveCoarse):
+        counts = np.array([n for part in comm.allgather(coarse.counts) for n in part])
+        lines.append(
+            f"  soft modes below {coarse.threshold:g}: {counts.sum()}, at most {counts.max()} of a subdomain, "
+            f"mean {counts.mean():.2f}"
+        )
+    lines.append(f"  coarse dimension {coarse.vectors}, {coarse.vectors / len(sizes):.2f} a subdomain")
+    return "\n".join(lines)
+
+
+def solve(ksp: PETSc.KSP, load_cases: int) -> str:
+    """Iterations and condition number of a solve, as the Krylov method estimates it."""
+    words = f"FETI: {load_cases} load cases, {ksp.getIterationNumber()} iterations"
+    if ksp.getType() not in (PETSc.KSP.Type.CG, PETSc.KSP.Type.GMRES, PETSc.KSP.Type.FGMRES):
+        return words
+    largest, smallest = ksp.computeExtremeSingularValues()
+    return f"{words}, condition number about {largest / smallest:.3g} ({smallest:.3g} to {largest:.3g})"

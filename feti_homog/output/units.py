@@ -1,0 +1,25 @@
+"""The units of what a sweep varies and of what comes out."""
+
+from __future__ import annotations
+
+import re
+
+STRESSES = ("young", "E1", "E2", "E3", "G12", "stiffness", "normal_strength", "tangential_strength", "dissipated")
+MODULI = re.compile(r"(C\d\d|S\d\d|bulk|shear)(_\w+)?|anisotropy_\w+|\w+_(C|S)\d\d")
+FIXED = {"angle": "degrees", "centre": "degrees", "values": "degrees", "memory": "bytes"}
+
+
+def unit(name: str, stress_unit: str) -> str:
+    """The unit of a key of a case file, dotted, or of a column of a sweep's table; empty if it has none."""
+    last = name.rpartition(".")[2]
+    if last.startswith("seconds_"):
+        return "s"
+    if last in STRESSES or MODULI.fullmatch(last):
+        return stress_unit
+    return FIXED.get(last, "")
+
+
+def with_unit(name: str, stress_unit: str) -> str:
+    """The name and, in brackets, the unit that it has."""
+    own = unit(name, stress_unit)
+    return f"{name} ({own})" if own else name

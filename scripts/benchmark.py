@@ -1,0 +1,106 @@
+"""This program against other solvers, on the same mesh and with the same tolerance.
+
+Each tool is an MPI job of its own that meshes, tears, refines and assembles the case with this program's functions
+("mesh", "assemble": the same for all) and then goes its own way: the others glue the subdomains to one periodic
+matrix ("glue"), set up and solve for one to three unit strains.  A tool may be followed by @ and its number of
+ranks.  Memory is the largest resident memory of each rank, summed over ranks.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from benchmark_report import Row, compare, notes, plot, table, write
+from peers import PEERS
+
+HERE = Path(__file__).parent
+TOOLS = "feti,cholmod,mumps@1,mumps,gamg,hypre,hypre_rigid,fetidp,bddc"
+
+
+def main() -> int:
+    """Run the tools one after the other; print and write what they took."""
+    parser = _parser()
+    arguments = parser.parse_args()
+    if not arguments.case.is_file():
+        parser.error(f"{arguments.case}: no such file")
+    rows: list[Row] = []
+    for spec in arguments.tools.split(","):
+        rows.append(best(spec, arguments))
+        print(f"{rows[-1].name:14}{rows[-1].total:9.1f} s  {rows[-1].status}", flush=True)
+    compare(rows)
+    print("", *table(rows), *notes(rows), sep="\n")
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    files = arguments.out / "benchmark.csv", arguments.out / "benchmark.png"
+    write(files[0], rows)
+    plot(files[1], rows, f"{arguments.case.stem}, {arguments.loads} loads, rtol {arguments.rtol:g}")
+    print(*files)
+    return int(any(row.tool == "feti" and row.status != "done" for row in rows))
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("case", type=Path, nargs="?", default=HERE / "cases/benchmark.toml", metavar="CASE.toml")
+    parser.add_argument("--tools", default=TOOLS, type=_tools, help=f"of feti, {', '.join(PEERS)}; default {TOOLS}")
+    parser.add_argument("--ranks", type=int, default=2)
+    parser.add_argument("--loads", type=int, choices=(1, 2, 3), default=3, help="unit strains to solve for")
+    parser.add_argument("--rtol", type=float, default=1e-8)
+    parser.add_argument("--repeat", type=int, default=1, help="the fastest of so many runs of each tool counts")
+    parser.add_argument("--timeout", type=float, default=300.0, metavar="S", help="seconds that a run may take")
+    parser.add_argument("--out", type=Path, default=Path("results"), metavar="DIR")
+    return parser
+
+
+def _tools(text: str) -> str:
+    for spec in text.split(","):
+        tool, _, ranks = spec.partition("@")
+        if tool not in ("feti", *PEERS) or (ranks and not ranks.isdecimal()):
+            raise argparse.ArgumentTypeError(f"{spec}: expected one of feti, {', '.join(PEERS)}, or one with @RANKS")
+    return text
+
+
+def best(spec: str, arguments: argparse.Namespace) -> Row:
+    """The fastest run of a tool; the first that does not end well if there is one."""
+    tool, _, ranks = spec.partition("@")
+    alone = tool in PEERS and PEERS[tool].sequential
+    rows: list[Row] = []
+    while len(rows) < arguments.repeat and all(row.status == "done" for row in rows):
+        rows.append(run(tool, int(ranks or (1 if alone else arguments.ranks)), arguments))
+    return min(rows, key=lambda row: (row.status == "done", row.solver))
+
+
+def run(tool: str, ranks: int, arguments: argparse.Namespace) -> Row:
+    """One run of a tool."""
+    with tempfile.TemporaryDirectory() as folder:
+        report = Path(folder) / "report.json"
+        command = ["mpirun", "--oversubscribe", "-n", str(ranks), sys.executable, str(HERE / "benchmark_tool.py")]
+        command += [tool, str(arguments.case), str(report)]
+        command += ["--loads", str(arguments.loads), "--rtol", str(arguments.rtol)]
+        with (Path(folder) / "words").open("w+") as words:
+            process = subprocess.Popen(command, stdout=words, stderr=words)
+            try:
+                process.wait(arguments.timeout)
+            except subprocess.TimeoutExpired:
+                process.terminate()  # mpirun ends its ranks
+                process.wait()
+                return Row(tool, ranks, f"not done in {arguments.timeout:g} s")
+            words.seek(0)
+            if process.returncode or not report.exists():
+                return Row(tool, ranks, f"failed: {_reason(words.read()) or f'exit code {process.returncode}'}")
+        document = json.loads(report.read_text())
+    status = "done" if document.pop("converged") else "not converged"
+    return Row(tool, ranks, status, **document)
+
+
+def _reason(words: str) -> str:
+    """The last line that tells of an error, empty if there is none."""
+    lines = [line.strip() for line in words.splitlines() if "rror" in line and "mpirun" not in line]
+    return lines[-1] if lines else ""
+
+
+if __name__ == "__main__":
+    sys.exit(main())

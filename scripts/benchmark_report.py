@@ -1,0 +1,135 @@
+"""What the benchmark's tools took, as a table, a CSV file and a picture."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field, fields
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+from peers import PEERS
+
+mpl.use("Agg")
+
+import matplotlib.pyplot as plt
+
+STAGES = ("mesh", "assemble", "glue", "set-up", "solve")
+INK = ("#c9c9c9", "#9a9a9a", "#d9b38c", "#1f4e9c", "#c44e00")
+# A result that is farther from the direct solvers' than this is wrong whatever the tool says.
+WRONG = 1e-4
+
+
+@dataclass
+class Row:
+    """What a tool took: seconds of each stage, iterations of each load, MB; `difference` of L^ef, relative."""
+
+    tool: str
+    ranks: int
+    status: str
+    dofs: int = 0
+    subdomains: int = 0
+    seconds: dict[str, float] = field(default_factory=dict)
+    iterations: tuple[int, ...] = ()
+    memory: float = 0.0
+    stiffness: tuple[tuple[float, ...], ...] = ()
+    difference: float = float("nan")
+
+    @property
+    def solver(self) -> float:
+        """Seconds of set-up and solves."""
+        return self.seconds.get("set-up", 0.0) + self.seconds.get("solve", 0.0)
+
+    @property
+    def total(self) -> float:
+        """Seconds of all stages."""
+        return sum(self.seconds.values())
+
+    @property
+    def name(self) -> str:
+        """The tool and its ranks."""
+        return f"{self.tool}@{self.ranks}"
+
+
+def compare(rows: Sequence[Row]) -> None:
+    """Fill in `difference` to the first direct solver that is done, or else to the first tool; mark wrong results."""
+    done = [row for row in rows if row.status == "done"]
+    direct = [row for row in done if row.tool in PEERS and PEERS[row.tool].direct]
+    for row in rows:
+        if row.stiffness and done:
+            exact = np.array((direct or done)[0].stiffness)
+            row.difference = float(np.abs(np.array(row.stiffness) - exact).max() / np.abs(exact).max())
+            if row.status == "done" and not row.difference <= WRONG:
+                row.status = "wrong"
+
+
+def table(rows: Sequence[Row]) -> list[str]:
+    """Aligned lines; the ratios are this program's to each tool's."""
+    lines = [
+        f"{'':34}{'seconds':^50}{'':14}{'':9}  feti / tool",
+        f"{'tool@ranks':14}{'dofs':>9}{'domains':>9}  " + "".join(f"{s:>9}" for s in STAGES)
+        + f"{'iterations':>14}{'MB':>8}{'solver':>9}{'total':>7}{'MB':>7}{'difference':>12}  status",
+    ]  # fmt: skip
+    ours = next((row for row in rows if row.tool == "feti" and row.status == "done"), None)
+    for row in rows:
+        times = "".join(f"{row.seconds[s]:9.2f}" if s in row.seconds else f"{'-':>9}" for s in STAGES)
+        ratios = f"{'-':>9}{'-':>7}{'-':>7}"
+        if ours and row.seconds:
+            pairs = [(ours.solver, row.solver), (ours.total, row.total), (ours.memory, row.memory)]
+            ratios = "  " + "".join(f"{a / b:7.2f}" for a, b in pairs)
+        lines.append(
+            f"{row.name:14}{row.dofs:9}{row.subdomains:9}  {times}{'/'.join(map(str, row.iterations)):>14}"
+            f"{row.memory:8.0f}{ratios}{row.difference:12.0e}  {row.status}"
+        )
+    return lines
+
+
+def notes(rows: Sequence[Row]) -> list[str]:
+    """What must be known to read the table."""
+    largest = max((row.difference for row in rows if row.status == "done"), default=0.0)
+    peers = dict.fromkeys(row.tool for row in rows if row.tool in PEERS and PEERS[row.tool].note)
+    return [
+        "",
+        "solver: set-up and solves; total: all stages; dofs: feti of the torn cell, the others of the glued one",
+        f"largest difference of L^ef between tools that are done: {largest:.1e}; wrong from {WRONG:g}",
+        *(f"{tool}: {PEERS[tool].note}" for tool in peers),
+    ]
+
+
+def write(path: Path, rows: Sequence[Row]) -> None:
+    """The rows as CSV, a column for each stage."""
+    names = [f.name for f in fields(Row) if f.name not in ("seconds", "stiffness")]
+    with path.open("w", newline="") as stream:
+        writer = csv.DictWriter(stream, [*names, *STAGES, "solver", "total"], extrasaction="ignore")
+        writer.writeheader()
+        for row in rows:
+            iterations = " ".join(map(str, row.iterations))
+            writer.writerow(
+                asdict(row) | row.seconds | {"iterations": iterations, "solver": row.solver, "total": row.total}
+            )
+
+
+def plot(path: Path, rows: Sequence[Row], title: str) -> None:
+    """Write the bars of all tools, from top to bottom in their order."""
+    names = [row.name for row in rows]
+    height = 1.4 + 0.36 * len(rows)
+    figure, (times, memory) = plt.subplots(1, 2, figsize=(9.5, height), sharey=True, width_ratios=(5, 3))
+    start = [0.0] * len(rows)
+    for stage, ink in zip(STAGES, INK, strict=True):
+        seconds = [row.seconds.get(stage, 0.0) for row in rows]
+        times.barh(names, seconds, left=start, color=ink, label=stage)
+        start = [a + b for a, b in zip(start, seconds, strict=True)]
+    memory.barh(names, [row.memory for row in rows], color="#2a7f3f")
+    for y, row in enumerate(rows):
+        if row.status != "done":
+            times.annotate(row.status[:40], (start[y], y), (4, 0), textcoords="offset points", va="center", fontsize=8)
+    times.invert_yaxis()
+    times.set(xlabel="seconds", title=title)
+    memory.set(xlabel="peak memory of all ranks, MB")
+    times.legend(fontsize=8)
+    for axes in (times, memory):
+        axes.spines[["top", "right"]].set_visible(False)
+    figure.tight_layout()
+    figure.savefig(path, dpi=200)
+    plt.close(figure)

@@ -1,0 +1,152 @@
+"""The bonded cell glued together again, as solvers of one global matrix take it: distributed, periodic, pinned.
+
+A fine node on the torus is a vertex class, a place on a torus edge, or inside a coarse triangle, so its number
+follows from coarse numbers alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from feti_homog.cell.refine import Lattice
+from feti_homog.feti.subdomain import Subdomain
+
+Int = NDArray[np.int64]
+Float = NDArray[np.float64]
+ADD = PETSc.InsertMode.ADD_VALUES
+
+
+@dataclass(frozen=True)
+class Nodes:
+    """The n nodes of this rank on the torus.
+
+    Attributes:
+        local: for each subdomain, (c,) number on this rank of each of its classes.
+        number: (n,) global number; those that a rank owns follow each other.
+        owned: (n,) whether this rank owns it.
+    """
+
+    local: list[Int]
+    number: Int
+    owned: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, comm: MPI.Intracomm, subdomains: list[Subdomain], lattice: Lattice) -> Nodes:
+        """Number the nodes; one that several ranks hold is owned by the lowest of them.  Collective."""
+        keys, several = _keys(comm, subdomains, lattice)
+        sizes = np.cumsum([len(k) for k in keys])[:-1]
+        unique, first, which = np.unique(np.concatenate(keys), return_index=True, return_inverse=True)
+        # In the order in which the subdomains come, so that numbers near each other are so in place.
+        order = np.argsort(first)
+        place = np.empty_like(order)
+        place[order] = np.arange(len(order))
+        held = unique[order]
+        owner = np.full(several, comm.size)
+        owner[held[held < several]] = comm.rank
+        comm.Allreduce(MPI.IN_PLACE, owner, MPI.MIN)
+        owned = held >= several
+        owned[~owned] = owner[held[~owned]] == comm.rank
+        end = comm.scan(int(owned.sum()))
+        number = np.full(len(held), -1)
+        number[owned] = np.arange(end - owned.sum(), end)
+        told = np.full(several, -1)
+        told[held[held < several]] = number[held < several]
+        comm.Allreduce(MPI.IN_PLACE, told, MPI.MAX)
+        number[~owned] = told[held[~owned]]
+        return cls(np.split(place[which], sizes), number, owned)
+
+
+def _keys(comm: MPI.Intracomm, subdomains: list[Subdomain], lattice: Lattice) -> tuple[list[Int], int]:
+    """A key for each class of each subdomain, the same wherever the node is, and from which on keys are not shared."""
+    inner = lattice.intervals - 1
+    inside = [s.mesh.n_classes - len(s.piece.class_keys) - len(s.piece.edge_keys) * inner for s in subdomains]
+    vertices = comm.allreduce(max(int(s.piece.class_keys.max()) + 1 for s in subdomains), MPI.MAX)
+    edges = comm.allreduce(max(int(s.piece.edge_keys.max()) + 1 for s in subdomains), MPI.MAX)
+    several = vertices + edges * inner
+    ends = several + comm.scan(sum(inside)) - sum(inside) + np.cumsum(inside)
+    keys = [
+        np.concatenate(
+            [
+                s.piece.class_keys,
+                (vertices + s.piece.edge_keys[:, None] * inner + np.arange(inner)).ravel(),
+                np.arange(end - count, end),
+            ]
+        )
+        for s, count, end in zip(subdomains, inside, ends, strict=True)
+    ]
+    return keys, several
+
+
+@dataclass(frozen=True)
+class Glued:
+    """A u = -Q E on all ranks, the pinned class held by its diagonal.
+
+    Attributes:
+        A: MATIS, with the sum of a rank's subdomains as its local matrix.
+        Q: for each unit strain its load.
+        stiffness: (3, 3) sum |Omega_s| L_s of all subdomains.
+        points: (owned nodes, 2) where they are in the plane.
+    """
+
+    A: PETSc.Mat
+    Q: list[PETSc.Vec]
+    stiffness: Float
+    points: Float
+
+    def rigid(self) -> PETSc.NullSpace:
+        """Two translations and a rotation, which leaps where the cell's sides meet; orthonormal."""
+        x, y = (self.points - 0.5).T
+        modes = [self.A.createVecLeft() for _ in range(3)]
+        for mode, values in zip(modes, ([1 + 0 * x, 0 * y], [0 * x, 1 + 0 * y], [-y, x]), strict=True):
+            mode.setArray(np.stack(values, axis=1).ravel())
+        for i, mode in enumerate(modes):
+            for before in modes[:i]:
+                mode.axpy(-before.dot(mode), before)
+            mode.normalize()
+        return PETSc.NullSpace().create(vectors=modes, comm=self.A.comm)
+
+    def stress(self, u: PETSc.Vec) -> Float:
+        """(3,) int sigma of the fluctuation alone, to which `stiffness` times the strain adds."""
+        return np.array([q.dot(u) for q in self.Q])
+
+
+def glue(comm: MPI.Intracomm, subdomains: list[Subdomain], lattice: Lattice) -> Glued:
+    """Glue the subdomains, which are taken from the list one by one to save memory.  Collective."""
+    nodes = Nodes.of(comm, subdomains, lattice)
+    n = len(nodes.number)
+    entries, Q, x = np.zeros(2 * n, np.int32), np.zeros((2 * n, 3)), np.zeros((n, 2))
+    stiffness = np.asarray(comm.allreduce(sum(s.area * s.L for s in subdomains)))
+    for s, local in zip(subdomains, nodes.local, strict=True):
+        own = _dofs(local)
+        entries[own] += np.diff(s.K.indptr)
+        Q[own] += s.Q
+        x[local[s.mesh.node_class]] = s.mesh.points
+    K = PETSc.Mat().createAIJ((2 * n, 2 * n), nnz=entries, comm=PETSc.COMM_SELF)
+    K.setBlockSize(2)
+    while subdomains:
+        s, own = subdomains.pop(), _dofs(nodes.local.pop())
+        K.setValuesIJV(s.K.indptr, own[s.K.indices], s.K.data, ADD, own)
+    K.assemble()
+    lgmap = PETSc.LGMap().create(nodes.number.astype(np.int32), 2, comm)
+    size = (2 * int(nodes.owned.sum()), None)
+    A = PETSc.Mat().create(comm)
+    A.setSizes((size, size), 2)
+    A.setType(PETSc.Mat.Type.IS)
+    A.setLGMap(lgmap, lgmap)
+    A.setISLocalMat(K)
+    A.assemble()
+    A.setOption(PETSc.Mat.Option.SPD, True)
+    loads = [A.createVecLeft() for _ in range(3)]
+    for load, q in zip(loads, Q.T, strict=True):
+        load.setValuesBlocked(nodes.number.astype(np.int32), q, ADD)
+        load.assemble()
+    return Glued(A, loads, stiffness, x[nodes.owned])
+
+
+def _dofs(nodes: Int) -> NDArray[np.int32]:
+    return (2 * nodes[:, None] + np.arange(2)).ravel().astype(np.int32)

@@ -1,0 +1,338 @@
+"""`feti-homog sweep` and `collect`: finished cases are kept whatever happens, and nothing is mixed."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import tomllib
+from functools import partial
+from pathlib import Path
+
+import pytest
+from commands import command_line
+from matplotlib.image import imread
+from processes import kill_when, started, wait_until
+from support import ROOT, RUN_VARIABLES, mpirun
+from sweeps import CASE, FAILING, FAILING_POINTS, RANDOM, rows, sweep_file
+
+import feti_homog.output  # noqa: F401 (chooses the build of h5py)
+
+TWO = "cell.fibre_fraction = [0.2, 0.3]\n"
+FORTY = "cell.fibre_fraction = {from = 0.1, to = 0.4, count = 20}\nmaterial.fibre.young = [150.0, 200.0]\n"
+
+LIMITED = """
+import resource, sys
+from mpi4py import MPI
+from feti_homog import cli
+resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, {limit}))
+sys.exit(cli.main(sys.argv[1:]))
+"""
+
+
+def results(out: Path) -> dict[str, int]:
+    """When each result was written."""
+    return {str(path.relative_to(out)): path.stat().st_mtime_ns for path in out.glob("case-*/result.json")}
+
+
+def contents(out: Path) -> dict[Path, bytes]:
+    """Of all files but the locks."""
+    return {path: path.read_bytes() for path in out.rglob("*") if path.is_file() and "lock" not in path.name}
+
+
+def swept(out: Path, path: Path, *words: str, ranks: int = 1, code: int = 0):
+    job = command_line(ranks, "sweep", path, "--out", out, *words)
+    assert job.returncode == code, job.stdout + job.stderr
+    assert "Traceback" not in job.stderr
+    return job
+
+
+def collected(out: Path):
+    job = command_line(0, "collect", out)
+    assert job.returncode == 0, job.stderr
+    return job
+
+
+@pytest.mark.parametrize(("ranks", "words"), [(0, []), (1, []), (2, []), (4, ["--ranks-per-case", "2"])])
+def test_sweep(tmp_path, ranks, words):
+    out = tmp_path / "new" / "sweep"
+    job = swept(out, sweep_file(tmp_path, TWO), *words, ranks=ranks)
+    assert "2 of 2 cases done" in job.stdout and job.stdout.count("cell.fibre_fraction = 0.3") == 1
+    assert {p.name for p in out.iterdir()} == {
+        "case-0001", "case-0002", "cases.csv", "sweep.json", "lock", "index.lock",
+    }  # fmt: skip
+    assert {p.name for p in (out / "case-0002").iterdir()} == {"case.toml", "lock", "result.json"}
+    document = json.loads((out / "case-0002" / "result.json").read_text())
+    assert document["case"]["cell"]["fibre_fraction"] == 0.3 and document["solver"]["ranks"] == min(max(ranks, 1), 2)
+    case = tomllib.loads((out / "case-0002" / "case.toml").read_text())
+    assert case["cell"] == document["case"]["cell"] and case["material"] == document["case"]["material"]
+    assert (out / "cases.csv").read_text().splitlines()[2] == "2,case-0002,2,1,0.3"
+    before = results(out)
+    swept(out, sweep_file(tmp_path, TWO), *words, ranks=ranks)
+    assert results(out) == before
+
+
+def test_the_case_files_run_by_themselves(tmp_path):
+    swept(tmp_path / "out", sweep_file(tmp_path, TWO))
+    job = command_line(1, "run", tmp_path / "out/case-0002/case.toml", "--out", tmp_path / "single")
+    assert job.returncode == 0, job.stderr
+    found = [json.loads((f / "result.json").read_text()) for f in (tmp_path / "out/case-0002", tmp_path / "single")]
+    assert found[0]["effective_stiffness"] == found[1]["effective_stiffness"]
+
+
+def test_list(tmp_path):
+    path, out = sweep_file(tmp_path, TWO + "material.matrix.young = [80.0]\n"), tmp_path / "out"
+    job = command_line(2, "sweep", path, "--list")
+    assert job.stdout.splitlines() == [
+        f"case-000{k}  cell.fibre_fraction = 0.{k + 1}, material.matrix.young = 80.0 GPa" for k in (1, 2)
+    ]
+    swept(out, path, "--index", "2")
+    job = command_line(0, "sweep", path, "--out", out, "--list")
+    assert [line.split()[1] for line in job.stdout.splitlines()] == ["waiting", "done"]
+    assert len(list(tmp_path.glob("**/result.json"))) == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ([], "arguments are required: --out"),
+        (["--out", "results/none", "--index", "3"], "--index 3: expected the number of a case, 1 to 2"),
+        (["--out", "results/none", "--index", "0"], "--index 0: expected the number of a case, 1 to 2"),
+        (["--out", "results/none", "--ranks-per-case", "3"], "--ranks-per-case 3: expected a divisor of the 2 ranks"),
+        (["--list", "--index", "1"], "not allowed with argument"),
+    ],
+)
+def test_faulty_commands(tmp_path, words, message):
+    job = command_line(2, "sweep", sweep_file(tmp_path, TWO), *words)
+    assert job.returncode == 2 and job.stderr.count(message) == 1
+    assert not Path(ROOT / "results/none").exists()
+
+
+def test_faults_of_all_points_before_anything_runs(tmp_path):
+    path = sweep_file(tmp_path, "cell.fibre_fraction = [0.2, 0.95, 0.99]\n")
+    for words in (["sweep", path, "--out", tmp_path / "out"], ["check", path]):
+        job = command_line(2, *words)
+        assert job.returncode == 2 and not (tmp_path / "out").exists()
+        faults = [line for line in job.stderr.splitlines() if line.startswith("error: ")]
+        assert [line.split(":")[1].strip() for line in faults] == ["case-0002", "case-0003"]
+
+
+def test_a_sweep_is_not_run_as_a_case_nor_a_case_as_a_sweep(tmp_path):
+    job = command_line(1, "run", sweep_file(tmp_path, TWO), "--out", tmp_path / "out")
+    assert job.returncode == 2 and "`feti-homog sweep` runs them" in job.stderr
+    job = command_line(1, "sweep", sweep_file(tmp_path, ""), "--out", tmp_path / "out")
+    assert job.returncode == 2 and "`feti-homog run` runs a single case" in job.stderr
+
+
+def test_check_of_a_sweep(tmp_path):
+    job = command_line(2, "check", sweep_file(tmp_path, "realisations = 3\n" + TWO, RANDOM))
+    assert job.returncode == 0 and "6 cases, 2 points" in job.stdout and "would suit it" in job.stdout
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_failed_cases_are_kept_and_told(tmp_path, ranks):
+    out, path = tmp_path / "out", sweep_file(tmp_path, FAILING_POINTS, FAILING)
+    job = swept(out, path, "--ranks-per-case", "1", ranks=ranks, code=3)
+    assert "1 failed:\n  case-0002  cell.fibre_fraction = 0.745\n    MeshError: " in job.stdout
+    assert job.stderr.count("1 of 3 cases failed; --retry computes them again") == 1
+    assert sorted(results(out)) == ["case-0001/result.json", "case-0003/result.json"]
+    assert (out / "case-0002/error.txt").read_text().startswith("MeshError: ")
+    before, failed = results(out), (out / "case-0002/error.txt").stat().st_mtime_ns
+    swept(out, path, ranks=ranks, code=3)
+    assert (out / "case-0002/error.txt").stat().st_mtime_ns == failed
+    swept(out, path, "--retry", "--ranks-per-case", "1", ranks=ranks, code=3)
+    assert (out / "case-0002/error.txt").stat().st_mtime_ns > failed and results(out) == before
+    job = swept(out, path, "--index", "2", ranks=ranks, code=3)
+    assert "it failed before" in job.stderr
+    assert "2 done, 1 failed" in collected(out).stdout
+    assert [row["status"] for row in rows(out)][:3] == ["done", "failed", "done"]
+
+
+def test_not_converged_and_retried(tmp_path):
+    out, path = tmp_path / "out", sweep_file(tmp_path, TWO)
+    job = swept(out, path, "-feti_ksp_max_it", "2", code=3)
+    assert job.stdout.count("no convergence after 2 iterations") >= 2
+    collected(out)
+    assert [row["status"] for row in rows(out)][:2] == ["not converged"] * 2
+    swept(out, path, code=3)
+    swept(out, path, "--retry")
+    collected(out)
+    assert [row["status"] for row in rows(out)][:2] == ["done"] * 2
+    assert (out / "case-0001/result.json.not_converged").exists() and not (out / "case-0001/error.txt").exists()
+
+
+def test_killed_in_the_middle(tmp_path):
+    """kill -9 twice: no finished case is computed again, and the table is that of a sweep left in peace."""
+    path, whole, out = sweep_file(tmp_path, FORTY), tmp_path / "whole", tmp_path / "out"
+    swept(whole, path)
+    assert len(results(whole)) == 40
+    kept: dict[str, int] = {}
+    for ranks, words, wanted in ((2, ["--ranks-per-case", "1"], 10), (1, [], 24)):
+        process = started(ranks, "sweep", path, "--out", out, *words)
+        kill_when(process, partial(lambda count: len(results(out)) >= count, wanted))
+        assert kept.items() <= results(out).items() and wanted <= len(results(out)) < 40
+        kept = results(out)
+        assert f"{len(kept)} done" in collected(out).stdout
+    job = swept(out, path, "--ranks-per-case", "1", ranks=2)
+    assert kept.items() <= results(out).items() and len(results(out)) == 40
+    assert job.stdout.count(": done") == 40 - len(kept)
+    collected(out)
+    collected(whole)
+    assert rows(out) == rows(whole) and len(rows(out)) == 40 * 5
+
+
+def test_two_sweeps_in_one_folder(tmp_path):
+    """The second is refused while the first runs, even for one case; the first is not disturbed."""
+    path, out = sweep_file(tmp_path, FORTY), tmp_path / "out"
+    first = started(0, "sweep", path, "--out", out)
+    wait_until(first, lambda: len(results(out)) >= 2)
+    first.send_signal(signal.SIGSTOP)
+    kept = results(out)
+    for words in ([], ["--index", "40"]):
+        job = command_line(1, "sweep", path, "--out", out, *words)
+        assert job.returncode == 2 and "this sweep is being run by" in job.stderr and f"process {first.pid}" in job.stderr
+    assert results(out) == kept and len(kept) < 40
+    first.send_signal(signal.SIGCONT)
+    assert first.wait(60) == 0 and len(results(out)) == 40
+
+
+def test_another_sweep_in_the_folder(tmp_path):
+    out = tmp_path / "out"
+    swept(out, sweep_file(tmp_path, TWO))
+    before = contents(out)
+    other = sweep_file(tmp_path, "cell.fibre_fraction = [0.2, 0.35]\n", name="other")
+    for words in ([], ["--index", "1"]):
+        job = swept(out, other, *words, code=2)
+        assert "holds another sweep: its case-0002 (cell.fibre_fraction = 0.3) differs" in job.stderr
+    assert before == contents(out)
+
+
+def test_more_realisations_go_on(tmp_path):
+    out = tmp_path / "out"
+    swept(out, sweep_file(tmp_path, "realisations = 2\n" + TWO, RANDOM))
+    before = results(out)
+    swept(out, sweep_file(tmp_path, "realisations = 3\n" + TWO, RANDOM))
+    assert before.items() <= results(out).items() and len(results(out)) == 6
+    job = swept(out, sweep_file(tmp_path, "realisations = 2\n" + TWO, RANDOM), code=2)
+    assert "it has 6 cases, this file 4" in job.stderr
+
+
+def test_indices_at_the_same_time(tmp_path):
+    """Different cases of an array share the folder; the same one twice does not."""
+    path, out = sweep_file(tmp_path, TWO, CASE + "[petsc]\nfeti_ksp_rtol = 1e-9\n"), tmp_path / "out"
+    jobs = [started(0, "sweep", path, "--out", out, "--index", str(k)) for k in (1, 2)]
+    assert [job.wait(60) for job in jobs] == [0, 0] and len(results(out)) == 2
+    held = subprocess.Popen(
+        [sys.executable, "-c", f"from feti_homog.sweep.locks import Lock; from pathlib import Path; import time\n"
+         f"Lock(Path({str(out / 'case-0001/lock')!r})).acquire(); print('held', flush=True); time.sleep(60)"],
+        stdout=subprocess.PIPE,
+    )  # fmt: skip
+    assert held.stdout is not None and held.stdout.readline() == b"held\n"
+    (out / "case-0001/result.json").unlink()
+    job = swept(out, path, "--index", "1", code=2)
+    assert "--index 1: case-0001 is being computed by" in job.stderr and str(held.pid) in job.stderr
+    assert "1 running, 1 done" in collected(out).stdout
+    held.send_signal(signal.SIGKILL)
+    held.wait()
+    swept(out, path, "--index", "1")
+
+
+@pytest.mark.parametrize("damage", ["truncated", "garbage", "foreign"])
+def test_a_corrupt_result(tmp_path, damage):
+    out, path = tmp_path / "out", sweep_file(tmp_path, TWO)
+    swept(out, path)
+    result = out / "case-0002/result.json"
+    content = {
+        "truncated": result.read_bytes()[:500], "garbage": os.urandom(500),
+        "foreign": (out / "case-0001/result.json").read_bytes(),
+    }[damage]  # fmt: skip
+    result.write_bytes(content)
+    job = collected(out)
+    assert "1 done, 1 damaged" in job.stdout and "case-0002/result.json is" in job.stdout
+    assert [row["status"] for row in rows(out)][:2] == ["done", "damaged"]
+    job = swept(out, path)
+    assert "case-0002: " in job.stdout and "set aside, the case is computed again" in job.stdout
+    assert (out / "case-0002/result.json.damaged").read_bytes() == content
+    assert "2 done" in collected(out).stdout
+
+
+def test_a_damaged_list_of_cases(tmp_path):
+    out, path = tmp_path / "out", sweep_file(tmp_path, TWO)
+    swept(out, path)
+    (out / "sweep.json").write_text('{"cases": [')
+    for words in (["sweep", path, "--out", out], ["collect", out]):
+        job = command_line(1, *words)
+        assert job.returncode == 2 and "sweep.json is damaged" in job.stderr and "Traceback" not in job.stderr
+    assert len(results(out)) == 2
+
+
+@pytest.mark.parametrize("limit", [1500, 200])
+def test_a_full_disk(tmp_path, limit):
+    """No file may be longer than the limit: results of more than 1500 bytes cannot be written, then not even the list."""
+    out, path, script = tmp_path / "out", sweep_file(tmp_path, TWO), tmp_path / "limited.py"
+    script.write_text(LIMITED.format(limit=limit))
+    job = mpirun(0, script, "sweep", path, "--out", out, timeout=60)
+    assert job.returncode == 1 and "Traceback" not in job.stderr, job.stderr
+    assert "cannot write" in job.stderr and "File too large" in job.stderr
+    assert not results(out) and not list(out.rglob("*.part"))
+    swept(out, path)
+    assert len(results(out)) == 2
+
+
+def test_a_full_disk_while_collecting(tmp_path):
+    out, script = tmp_path / "out", tmp_path / "limited.py"
+    swept(out, sweep_file(tmp_path, TWO))
+    collected(out)
+    before = (out / "sweep.csv").read_bytes()
+    script.write_text(LIMITED.format(limit=300))
+    job = mpirun(0, script, "collect", out, timeout=60)
+    assert job.returncode == 1 and "cannot write" in job.stderr and "Traceback" not in job.stderr
+    assert (out / "sweep.csv").read_bytes() == before
+
+
+def test_an_unwritable_folder(tmp_path):
+    """As a user who may not write: root may everywhere."""
+    folder = Path(tempfile.mkdtemp())
+    try:
+        folder.chmod(0o755)
+        path, program = sweep_file(folder, TWO), ["-m", "feti_homog", "sweep"]
+        user = {"user": 65534, "group": 65534} if os.geteuid() == 0 else {}
+        if not user:
+            folder.chmod(0o555)
+        words = [sys.executable, *program, path, "--out", folder / "out"]
+        environment = {"PATH": os.environ["PATH"], "HOME": "/nonexistent", "MPLCONFIGDIR": "/tmp"} | RUN_VARIABLES
+        job = subprocess.run(
+            list(map(str, words)), cwd=ROOT, env=environment, text=True, capture_output=True, timeout=60, **user
+        )
+        assert job.returncode == 2, job.stderr
+        assert f"--out {folder / 'out'}: expected a folder that can be written to" in job.stderr
+        assert not (folder / "out").exists()
+    finally:
+        folder.chmod(0o755)
+        shutil.rmtree(folder)
+
+
+def test_collect_of_nothing(tmp_path):
+    job = command_line(1, "collect", tmp_path)
+    assert job.returncode == 2 and "expected the folder of a sweep" in job.stderr
+
+
+def test_collect(tmp_path):
+    import h5py
+
+    out = tmp_path / "out"
+    swept(out, sweep_file(tmp_path, "realisations = 3\ncell.fibre_fraction = [0.2, 0.3]\n", RANDOM))
+    names = ("sweep.csv", "sweep.h5", "moduli.png")
+    assert collected(out).stdout.splitlines() == ["6 cases: 6 done", *(str(out / name) for name in names)]
+    assert imread(out / "moduli.png")[..., :3].std() > 0.02
+    table = rows(out, measured=True)
+    assert [row["row"] for row in table] == ["case"] * 6 + ["count", "mean", "std", "ci95"] * 2
+    means = [float(row["bulk (GPa)"]) for row in table if row["row"] == "mean"]
+    with h5py.File(out / "sweep.h5") as file:
+        assert file["statistics/mean/bulk"][()].tolist() == means and file["outputs/bulk"].attrs["unit"] == "GPa"
+        bulk, point = file["outputs/bulk"][()], file["cases/point"][()]
+    assert means == pytest.approx([bulk[point == 1].mean(), bulk[point == 2].mean()], rel=1e-14)

@@ -1,0 +1,44 @@
+"""The drivers that are sweeps: tables, pictures, and the laws that their numbers obey."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+from matplotlib.image import imread
+from support import ROOT, mpirun
+from sweeps import rows
+
+
+def driven(name, folder, *options):
+    job = mpirun(2, ROOT / f"drivers/{name}.py", "--out", folder, "--quiet", "--ranks-per-case", "1", *options)
+    assert job.returncode == 0, job.stderr
+    return job.stdout
+
+
+def test_fibre_fraction_sweep(tmp_path):
+    options = ("--fractions", "0.2", "0.4", "--fibres", "6", "--realisations", "3", "--mesh-size", "0.25")
+    output = driven("fibre_fraction_sweep", tmp_path, *options)
+    found = {
+        (m[1], float(m[2])): [float(x) for x in m[3].split()]
+        for m in re.finditer(r"^(square|hexagonal|random) +([\d.]+) (.*)$", output, re.MULTILINE)
+    }
+    assert len(found) == 6 and all(len(v) == (6 if key[0] == "random" else 4) for key, v in found.items())
+    assert found["hexagonal", 0.4][:3] == pytest.approx([149.690255, 56.975975, 46.357140], rel=1e-3)
+    assert found["square", 0.4][:3] == pytest.approx([151.155859, 55.537426, 45.078553], rel=1e-3)
+    assert found["hexagonal", 0.2][3] < 1e-3 < 1e-2 < found["square", 0.2][3]
+    assert all(output.count(str(tmp_path / name)) == 1 for name in ("sweep.csv", "moduli.png"))
+    assert imread(tmp_path / "moduli.png")[..., :3].std() > 0.05
+    assert driven("fibre_fraction_sweep", tmp_path, *options) == output
+
+
+def test_representative_cell(tmp_path):
+    output = driven("representative_cell", tmp_path, "--fibres", "2", "8", "--realisations", "4", "--tolerance", "0.5")
+    table = np.array([[float(x) for x in line.split()] for line in re.findall(r"^ +\d.*$", output, re.MULTILINE)])
+    assert table.shape == (2, 10) and table[:, 0].tolist() == [2, 8]
+    assert (table[:, 2::3] > 0).all() and (table[:, 3::3] > 0).all()
+    assert "one cell scatters by less than 50 %: from 2 fibres on" in output
+    assert imread(tmp_path / "cell_size.png")[..., :3].std() > 0.02
+    means = [row for row in rows(tmp_path) if row["row"] == "mean"]
+    assert [float(row["bulk (GPa)"]) for row in means] == pytest.approx(table[:, 4], rel=1e-4)

@@ -1,0 +1,107 @@
+"""`from feti_homog import Case, run` in a program of its own: arrays, no files, and communicators of any size."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from cells import MATRIX, make_case
+from mpi4py import MPI
+from support import LAUNCHER_VARIABLES, parallel_assert
+
+from feti_homog import Case, CaseError, ConvergenceError, run
+
+pytestmark = pytest.mark.parallel
+
+
+def with_fraction(fraction, **rest):
+    return make_case(fibre_fraction=fraction, mesh_size=0.25, **rest)
+
+
+def test_result(comm, shared_path, monkeypatch):
+    """The same arrays on every rank, and no file."""
+    monkeypatch.chdir(shared_path)
+    result = run(with_fraction(0.4, order=2), comm)
+    L = result.effective_stiffness
+    assert L.shape == (3, 3) and result.effective_stiffness_compression is None and not result.points
+    parallel_assert(comm, all(np.array_equal(L, other) for other in comm.allgather(L)))
+    assert L[[0, 0, 2], [0, 1, 2]] == pytest.approx([149.690255, 56.975975, 46.357140], rel=1e-3)
+    assert result.bounds["reuss"][0, 0] < L[0, 0] < result.bounds["voigt"][0, 0]
+    assert result.moduli["shear"] == pytest.approx(L[2, 2], rel=1e-3) and max(result.checks.values()) < 1e-7
+    assert result.document["solver"]["ranks"] == comm.size
+    comm.barrier()
+    parallel_assert(comm, not list(shared_path.iterdir()))
+
+
+def test_path_and_angle(comm):
+    document = with_fraction(0.4, geometry="square").resolved()
+    document |= {"interface": {"normal_strength": 5.0}, "path": {"strain": [0.2, 0.0, 0.0]}}
+    points = run(Case.parse(document | {"analysis": {"type": "path", "plane": "stress"}}), comm).points
+    n = len(points["load_factor"])
+    assert n > 1 and points["strain"].shape == points["stress"].shape == (n, 3) and points["load_factor"][-1] == 1.0
+    document |= {"angle": {"values": [0, 90]}, "interface": {"debonded": [{"fibre": 1}]}}
+    del document["path"]
+    result = run(Case.parse(document | {"analysis": {"type": "angle", "plane": "stress"}}), comm)
+    assert result.points["stiffness"].shape == (2, 3, 3) and result.effective_stiffness is None
+    assert result.points["stiffness"][1, 0, 0] < result.points["stiffness"][0, 0, 0]
+
+
+def test_several_cases_at_once(comm):
+    """Each half of the ranks runs cases of its own; every rank alone finds the same."""
+    colour = comm.rank % 2
+    group = comm.Split(colour)
+    for fraction in (0.3, 0.4):
+        case = with_fraction(fraction + 0.05 * colour)
+        together, alone = run(case, group), run(case, MPI.COMM_SELF)
+        assert together.document["solver"]["ranks"] == group.size
+        assert together.effective_stiffness == pytest.approx(alone.effective_stiffness, rel=1e-8, abs=1e-6)
+    group.Free()
+
+
+def test_a_function_to_minimise(comm):
+    """Many runs one after the other, as an optimiser does, leave nothing behind that fails the next."""
+    found = [
+        run(make_case(matrix=MATRIX | {"young": young}, mesh_size=0.3), comm).effective_stiffness[2, 2]
+        for young in np.linspace(60.0, 90.0, 12)
+    ]
+    assert (np.diff(found) > 0).all()
+
+
+def test_errors(comm):
+    with pytest.raises(CaseError, match="fibre_fraction"):
+        Case.parse({"cell": {"geometry": "square", "fibre_fraction": 0.9}})
+    with pytest.raises(ConvergenceError, match="no convergence after 2 iterations"):
+        run(with_fraction(0.4, petsc={"feti_ksp_max_it": 2}), comm)
+    assert run(with_fraction(0.4), comm).checks
+
+
+ALONE = """
+import sys
+from mpi4py import MPI
+from feti_homog import Case, run
+assert "petsc4py" not in sys.modules
+comm = MPI.COMM_WORLD
+case = Case.load({path!r})
+if comm.rank == 0:
+    print(run(case, MPI.COMM_SELF).effective_stiffness[0, 0])
+"""
+
+
+def test_a_program_whose_other_ranks_run_nothing(comm, shared_path):
+    """PETSc, started by the first run, does not wait for them; here in a program of its own."""
+    if comm.rank == 0:
+        import tomli_w
+
+        path = shared_path / "case.toml"
+        path.write_text(tomli_w.dumps({k: v for k, v in with_fraction(0.4).resolved().items() if v != {}}))
+        inherited = {k: v for k, v in os.environ.items() if not k.startswith(LAUNCHER_VARIABLES)}
+        root = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+        words = ["mpirun", "--oversubscribe", "-n", "2", sys.executable, "-c", ALONE.format(path=str(path))]
+        job = subprocess.run(words, env=inherited | root, capture_output=True, text=True, timeout=60)
+        found = job.returncode == 0 and float(job.stdout) == pytest.approx(149.7, rel=0.02)
+    else:
+        found = True
+    parallel_assert(comm, found)

@@ -1,0 +1,91 @@
+"""Sweeps in process: against references and bounds, and the same numbers on any number of ranks."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from support import parallel_assert
+from sweeps import CASE, RANDOM
+
+from feti_homog import run
+from feti_homog.errors import ConvergenceError
+from feti_homog.parallel import on_root
+from feti_homog.sweep import collect, execute, plan, store
+
+pytestmark = pytest.mark.parallel
+
+FRACTIONS = "'cell.fibre_fraction' = {from = 0.1, to = 0.6, step = 0.1}\n"
+# Fourier solution, hexagonal cell of 40 %, plane strain.
+REFERENCE = {"C11": 149.690255, "C12": 56.975975, "C33": 46.357140}
+
+
+def swept(comm, folder, table, case=CASE, ranks_per_case=None):
+    """The collected table of a sweep, on every rank."""
+    sweep = plan.expand({"name": "sweep"} | tomllib.loads(f"{case}[sweep]\n{table}"), Path())
+    execute.run_all(sweep, folder / "out", comm, ranks_per_case or comm.size, retry=False, quiet=True)
+    return on_root(comm, collect.read, folder / "out")
+
+
+def test_hexagonal_cells_against_reference_and_bounds(comm, shared_path):
+    case = CASE.replace("mesh_size = 0.3", "mesh_size = 0.15\norder = 2")
+    table = swept(comm, shared_path, FRACTIONS, case)
+    found = table.outputs
+    fractions = np.array(table.inputs["cell.fibre_fraction"])
+    for name, value in REFERENCE.items():
+        assert found[name][fractions == 0.4] == pytest.approx(value, rel=3e-4)
+    for modulus in ("bulk", "shear"):
+        below, above = (found[f"{modulus}_{side}"] for side in ("lower", "upper"))
+        assert (found[modulus] > below).all() and (found[modulus] < above).all(), modulus
+    for name in ("C11", "C33"):
+        assert (found[f"{name}_reuss"] < found[name]).all() and (found[name] < found[f"{name}_voigt"]).all()
+    isotropic = (found["C11"] - found["C12"]) / 2
+    assert np.abs(found["C33"] / isotropic - 1).max() < 2e-4
+
+
+def test_the_same_seeds_give_the_same_numbers(comm, shared_path):
+    """On all ranks together, on each alone, and in the sweep."""
+    table = swept(comm, shared_path, "realisations = 3\n", RANDOM)
+    names = [f"C{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3)]
+    found = np.array([table.outputs[name] for name in names]).T
+    for row, seed in enumerate(table.inputs["cell.seed"]):
+        case = plan.expand({"sweep": {"cell.seed": [seed]}} | tomllib.loads(RANDOM), Path()).cases[0]
+        alone = run(case, MPI.COMM_SELF).effective_stiffness
+        assert found[row] == pytest.approx(alone.ravel(), rel=1e-6, abs=1e-5)
+    assert np.abs(found[0] - found[1]).max() > 0.1
+
+
+def test_groups_of_ranks(comm, shared_path):
+    """As many cases at once as there are ranks: each is computed once, by one rank."""
+    table = swept(comm, shared_path, FRACTIONS, ranks_per_case=1)
+    assert set(table.status) == {"done"} and set(table.outputs["ranks"]) == {1.0}
+    times = {p: p.stat().st_mtime_ns for p in shared_path.glob("out/case-*/result.json")}
+    comm.barrier()
+    swept(comm, shared_path, FRACTIONS, ranks_per_case=1)
+    parallel_assert(comm, times == {p: p.stat().st_mtime_ns for p in shared_path.glob("out/case-*/result.json")})
+
+
+def test_mean_of_random_cells(comm, shared_path):
+    """Between the bounds, and isotropic within its confidence interval: a small one of README's 30 realisations."""
+    case = RANDOM.replace("fibres = 3", "fibres = 8").replace("mesh_size = 0.3", "mesh_size = 0.2")
+    table = swept(comm, shared_path, "realisations = 12\n", case, ranks_per_case=1)
+    s = table.statistics
+    for modulus in ("bulk", "shear"):
+        lower, upper = (s[f"{modulus}_{side}"].mean[0] for side in ("lower", "upper"))
+        assert lower - s[modulus].ci95[0] < s[modulus].mean[0] < upper + s[modulus].ci95[0]
+    deviation = table.outputs["C11"] - table.outputs["C22"]
+    assert abs(deviation.mean()) < 3.1 * deviation.std(ddof=1) / 12**0.5  # 99 % of Student's t
+    assert s["C11"].count.tolist() == [12.0] and s["C11"].std[0] > 0
+
+
+def test_failures_end_as_one(comm, shared_path):
+    case = CASE + "[petsc]\nfeti_ksp_max_it = 2\n"
+    with pytest.raises(ConvergenceError, match="2 of 2 cases failed"):
+        swept(comm, shared_path, "cell.fibre_fraction = [0.2, 0.3]\n", case, ranks_per_case=1)
+    table = on_root(comm, collect.read, shared_path / "out")
+    assert table.status == ["not converged"] * 2 and "no convergence" in table.reason[0]
+    entries = on_root(comm, store.read_index, shared_path / "out").entries
+    assert [entry.folder for entry in entries] == table.folder
