@@ -106,7 +106,7 @@ def _parser() -> Parser:
     parser.add_argument("--mesh-size", type=float, default=0.5, help="of the coarse elements / pitch of fibres")
     parser.add_argument("--refine", type=int, default=0)
     parser.add_argument("--order", type=int, choices=(1, 2), default=2)
-    parser.add_argument("--tolerance", type=float, default=0.005, help="relative scatter of a representative cell")
+    parser.add_argument("--tolerance", type=float, default=0.002, help="relative scatter of a representative cell")
     parser.add_argument("--ranks-per-case", type=int, metavar="R", help="by default all")
     parser.add_argument("--quiet", action="store_true", help="do not tell of every case")
     return parser

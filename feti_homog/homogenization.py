@@ -62,14 +62,19 @@ class Homogenization:
         Raises:
             ConvergenceError: a solve broke down and left no numbers.
         """
-        states = self.interface.equilibria(strains, status, starts)
-        for state in states:
-            if not np.isfinite(state.solution.residual):
-                raise ConvergenceError(
-                    f"strain {state.solution.strain.tolist()}: the Krylov method broke down after {state.iterations} "
-                    f"iterations (KSPConvergedReason {state.solution.reason})"
-                )
-        return [self.response(state, 1.0) for state in states]
+        if self.interface.is_linear(status):
+            return [self._finite(state) for state in self.interface.equilibria(strains, status, starts)]
+        pairs = zip(strains, starts, strict=True)
+        return [self._finite(self.interface.equilibrium(strain, status, start)) for strain, start in pairs]
+
+    def _finite(self, state: Equilibrium) -> Response:
+        """The response of the state that was just found, unless it is no state."""
+        if not np.isfinite(state.solution.residual):
+            raise ConvergenceError(
+                f"strain {state.solution.strain.tolist()}: the Krylov method broke down after {state.iterations} "
+                f"iterations (KSPConvergedReason {state.solution.reason})"
+            )
+        return self.response(state, 1.0)
 
     def response(self, state: Equilibrium, scale: float) -> Response:
         """`scale` times an equilibrium, averaged.  Collective."""

@@ -39,8 +39,8 @@ realisations = {cases}
 def main() -> None:
     """Print both times and their ratio."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--cases", type=int, default=16)
-    parser.add_argument("--refine", type=int, default=1)
+    parser.add_argument("--cases", type=int, default=20)
+    parser.add_argument("--refine", type=int, default=2)
     parser.add_argument("--ranks", type=int, default=2)
     parser.add_argument("--repeats", type=int, default=2)
     given = parser.parse_args()

@@ -51,7 +51,11 @@ PEERS = {
         _DIRECT | {"pc_factor_mat_solver_type": "cholmod"}, "sequential: one rank", sequential=True, direct=True
     ),
     "mumps": Peer(_DIRECT | {"pc_factor_mat_solver_type": "mumps"}, "", direct=True),
-    "gamg": Peer(_CG | {"pc_type": "gamg"}, "CG; smoothed aggregation on the rigid-body modes", rigid=True),
+    "gamg": Peer(
+        _CG | {"pc_type": "gamg", "pc_gamg_threshold": "0.05"},
+        "CG; smoothed aggregation on the rigid-body modes",
+        rigid=True,
+    ),
     "hypre": Peer(_CG | {"pc_type": "hypre"}, "CG; BoomerAMG by unknowns, which has no use for rigid-body modes"),
     "hypre_rigid": Peer(
         _CG

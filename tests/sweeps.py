@@ -13,7 +13,7 @@ RANDOM_CELL = 'geometry = "random"\nfibres = 3\nfibre_fraction = 0.4\nmesh_size 
 RANDOM = CASE.replace('geometry = "hexagonal"\nfibre_fraction = 0.4\nmesh_size = 0.3', RANDOM_CELL)
 
 # Of the second point no arrangement can be made.
-FAILING = RANDOM.replace("fibres = 3", "fibres = 30\nmin_gap = 0.1")
+FAILING = RANDOM.replace("fibres = 3", "fibres = 12\nmin_gap = 0.1")
 FAILING_POINTS = "cell.fibre_fraction = [0.2, 0.745, 0.25]\n"
 
 

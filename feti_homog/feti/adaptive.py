@@ -32,10 +32,8 @@ Int = NDArray[np.int64]
 Float = NDArray[np.float64]
 
 THRESHOLD = 0.2
-# Columns of U with less energy than this part of the largest have lost all their active rows.
-VANISHED = 1e-14
-# Largest G^T T z that a usable coarse problem leaves, relative to G^T z.
-LEAK = 1e-7
+# Largest T T z - T z, and G^T T z, of a usable coarse problem, relative to T z and G^T z.
+LEAK = 1e-6
 # Subdomains whose dense contributions are held at once.
 CHUNK = 64
 
@@ -133,7 +131,7 @@ class AdaptiveCoarse(CoarseProblem):
         E = total(self.comm, self._E)
         K = total(self.comm, (self.GaT @ self.U).tocsr())
         energy = E.diagonal()
-        vanished = energy <= VANISHED * energy.max(initial=0.0)
+        vanished = self.everywhere(abs(self.UT) @ active) == 0.0
         self._scale = np.ones(self.vectors + self.dimension)
         self._scale[: self.vectors] = 1.0 / np.sqrt(np.where(vanished, 1.0, energy))
         K = K @ diags(self._scale[: self.vectors])
@@ -146,13 +144,19 @@ class AdaptiveCoarse(CoarseProblem):
         matrix = bmat([[D @ E @ D + diags(vanished.astype(float)), K.T], [K, -free]])
         self._kkt = DirectSolver(matrix.tocsr(), "feti_coarse_", definite=False)
         self._usable = True
-        self._usable = self._closes()
+        self._usable = self._projects()
 
-    def _closes(self) -> bool:
-        """Whether T leaves no work of rigid-body motions; without the rows it needs, U cannot balance it."""
+    def _projects(self) -> bool:
+        """Whether T is a projector that leaves no work of rigid-body motions.
+
+        With few active rows the columns of U depend on each other and the coarse matrix is singular.
+        """
         z = self._active * np.cos(np.arange(len(self._active)) + 1.0)
-        before, after = (self.everywhere(self.GaT @ x) for x in (z, self.admissible(z)))
-        return bool(np.abs(after).max(initial=0.0) <= LEAK * np.abs(before).max(initial=0.0))
+        once = self.admissible(z)
+        twice = self.admissible(once)
+        before, after = (np.abs(self.everywhere(self.GaT @ x)).max(initial=0.0) for x in (z, once))
+        size, change = self.everywhere(np.array([once @ once, (twice - once) @ (twice - once)]))
+        return bool(after <= LEAK * before and change <= LEAK**2 * size)
 
     def _span(self, U: csr_matrix) -> None:
         """Let the columns of U (local rows, vectors) be the coarse vectors.  Collective."""

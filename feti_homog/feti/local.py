@@ -11,9 +11,6 @@ from scipy.sparse import csr_matrix
 
 Float = NDArray[np.float64]
 
-# Per cent of MUMPS' estimate of workspace that it may need more for pivoting.
-PIVOTING_ROOM = 200
-
 
 class LocalSolver:
     """x = A_s^-1 b for every SPD matrix A_s of this rank, one KSP each.
@@ -54,7 +51,7 @@ class DirectSolver:
     """X = A^-1 B for one symmetric matrix A and any number of right-hand sides."""
 
     def __init__(self, matrix: csr_matrix, prefix: str, definite: bool) -> None:
-        """Factorize.  Options under `prefix` (default: preonly, cholesky by CHOLMOD, or by MUMPS if indefinite)."""
+        """Factorize.  Options under `prefix` (default: preonly, cholesky by CHOLMOD, or lu by UMFPACK if indefinite)."""
         self._ksp = factorized(matrix, prefix, definite)
 
     def solve(self, B: Float) -> Float:
@@ -83,11 +80,9 @@ def factorized(matrix: csr_matrix, prefix: str, definite: bool = True) -> PETSc.
     ksp.setType(PETSc.KSP.Type.PREONLY)
     ksp.setErrorIfNotConverged(True)
     pc = ksp.getPC()
-    pc.setType(PETSc.PC.Type.CHOLESKY)
-    pc.setFactorSolverType(PETSc.Mat.SolverType.CHOLMOD if definite else PETSc.Mat.SolverType.MUMPS)
+    pc.setType(PETSc.PC.Type.CHOLESKY if definite else PETSc.PC.Type.LU)
+    # MUMPS' symmetric indefinite factors lose all digits of coarse problems with contrasts of 1e6.
+    pc.setFactorSolverType(PETSc.Mat.SolverType.CHOLMOD if definite else PETSc.Mat.SolverType.UMFPACK)
     ksp.setFromOptions()
-    if not definite and pc.getFactorSolverType() == PETSc.Mat.SolverType.MUMPS:
-        pc.setFactorSetUpSolverType()
-        pc.getFactorMatrix().setMumpsIcntl(14, PIVOTING_ROOM)
     ksp.setUp()
     return ksp

@@ -124,10 +124,12 @@ class Interface:
         self.solver.activate(self.active(status))
         return self.solver.solve(strain, start)
 
+    def is_linear(self, status: Status) -> bool:
+        """Whether no face can come to touch another; collective."""
+        return not (self.contact and self.solver.comm.allreduce(bool((status != BONDED).any()), MPI.LOR))
+
     def equilibria(self, strains: Float, status: Status, starts: Sequence[Float]) -> list[Equilibrium]:
-        """Solve for every strain of (k, 3): together where the problem is linear, with nobody to touch.  Collective."""
-        if self.contact and self.solver.comm.allreduce(bool((status != BONDED).any()), MPI.LOR):
-            return [self.equilibrium(E, status, start) for E, start in zip(strains, starts, strict=True)]
+        """Solve a linear problem for every strain of (k, 3) together.  Collective."""
         self.solver.activate(self.active(status))
         free = self.solver.coarse.free.shape[1]
         solutions = self.solver.solve_together(strains, np.stack(starts, axis=1))

@@ -194,7 +194,8 @@ def test_two_sweeps_in_one_folder(tmp_path):
     kept = results(out)
     for words in ([], ["--index", "40"]):
         job = command_line(1, "sweep", path, "--out", out, *words)
-        assert job.returncode == 2 and "this sweep is being run by" in job.stderr and f"process {first.pid}" in job.stderr
+        assert job.returncode == 2 and "this sweep is being run by" in job.stderr
+        assert f"process {first.pid}" in job.stderr
     assert results(out) == kept and len(kept) < 40
     first.send_signal(signal.SIGCONT)
     assert first.wait(60) == 0 and len(results(out)) == 40
@@ -272,7 +273,7 @@ def test_a_damaged_list_of_cases(tmp_path):
 
 @pytest.mark.parametrize("limit", [1500, 200])
 def test_a_full_disk(tmp_path, limit):
-    """No file may be longer than the limit: results of more than 1500 bytes cannot be written, then not even the list."""
+    """No file may be longer than the limit: below 1500 bytes no result can be written, below 200 not even the list."""
     out, path, script = tmp_path / "out", sweep_file(tmp_path, TWO), tmp_path / "limited.py"
     script.write_text(LIMITED.format(limit=limit))
     job = mpirun(0, script, "sweep", path, "--out", out, timeout=60)

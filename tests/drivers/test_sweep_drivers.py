@@ -35,10 +35,12 @@ def test_fibre_fraction_sweep(tmp_path):
 
 def test_representative_cell(tmp_path):
     output = driven("representative_cell", tmp_path, "--fibres", "2", "8", "--realisations", "4", "--tolerance", "0.5")
-    table = np.array([[float(x) for x in line.split()] for line in re.findall(r"^ +\d.*$", output, re.MULTILINE)])
+    lines = re.findall(r"^ +\d+ +\d+\..*$", output, re.MULTILINE)
+    table = np.array([[float(x) for x in line.split()] for line in lines])
     assert table.shape == (2, 10) and table[:, 0].tolist() == [2, 8]
     assert (table[:, 2::3] > 0).all() and (table[:, 3::3] > 0).all()
     assert "one cell scatters by less than 50 %: from 2 fibres on" in output
+    assert output.count("C11 - C22 = ") == output.count("bulk between ") == 2
     assert imread(tmp_path / "cell_size.png")[..., :3].std() > 0.02
     means = [row for row in rows(tmp_path) if row["row"] == "mean"]
     assert [float(row["bulk (GPa)"]) for row in means] == pytest.approx(table[:, 4], rel=1e-4)
