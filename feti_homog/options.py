@@ -69,7 +69,7 @@ OPTIONS = (
         "cholmod",
         "library of the rigid-body coarse factorization",
     ),
-    Option("feti_coarse_pc_factor_mat_solver_type", "umfpack|superlu|mumps", "umfpack", "library of the coarse factor"),
+    Option("feti_coarse_pc_factor_mat_solver_type", "mumps|...", "mumps", "library of the coarse factor"),
 )
 
 PREFIXES = ("feti_ksp_", "feti_pc_", "feti_sub_", "feti_interior_", "feti_schur_", "feti_natural_", "feti_coarse_")

@@ -23,7 +23,7 @@ from feti_homog.feti.assembled import summed, total
 from feti_homog.feti.boundary import Boundary
 from feti_homog.feti.coarse import CoarseProblem
 from feti_homog.feti.constraints import Constraints
-from feti_homog.feti.local import DirectSolver
+from feti_homog.feti.local import IndefiniteSolver
 from feti_homog.feti.neighbours import Neighbours
 from feti_homog.feti.preconditioner import Scaled
 from feti_homog.feti.spectral import DualBlock, coarse_vectors, dual_blocks
@@ -59,7 +59,7 @@ class AdaptiveCoarse(CoarseProblem):
         self.threshold = threshold
         self.constraints = constraints
         neighbours: Neighbours[Float] = Neighbours(comm, constraints, boundary.subdomains)
-        self._rows = neighbours.rows
+        self._rows, self._boundary = neighbours.rows, boundary
         self._blocks = dual_blocks(comm, constraints, boundary, scaling, self._rows)
         V = coarse_vectors(self._blocks, neighbours, threshold)
         self.counts = [v.shape[1] - b.R.shape[1] for v, b in zip(V, self._blocks, strict=True)]
@@ -69,7 +69,8 @@ class AdaptiveCoarse(CoarseProblem):
         self._motions = csr_matrix((own.data, own.indices + self.own.start, own.indptr), shape=shape)
         self._complete = False
         self._E: csr_matrix
-        self._FU: csr_matrix
+        # (columns, S+ B^T U there) of each subdomain
+        self._answers: list[tuple[Int, Float]]
         self._span(_preconditioned(comm, constraints, self._blocks, neighbours, V))
         self._factor(np.ones(self.U.shape[0]))
 
@@ -88,31 +89,37 @@ class AdaptiveCoarse(CoarseProblem):
         mask = self.constraints.gather(active).copy()
         changed = mask != self._mask
         touched = [i for i, rows in enumerate(self._rows) if changed[rows].any()]
-        E, FU = self._energies(touched)
+        change = _Sum(self._E.shape)
+        for i in touched:
+            columns, loads = self._loads(i)
+            change.add(columns, columns, -loads.T @ self._answers[i][1])
         self._mask = mask
-        E_now, FU_now = self._energies(touched)
-        self._E, self._FU = self._E + (E_now - E), self._FU + (FU_now - FU)
+        for i in touched:
+            columns, loads = self._loads(i)
+            self._answers[i] = columns, self._blocks[i].operator.answer(loads)
+            change.add(columns, columns, loads.T @ self._answers[i][1])
+        self._E = self._E + change.matrix()
         self._factor(active)
 
     def admissible(self, z: Float) -> Float:
         """T z."""
         if not self._usable:
             return self.projected(z)
-        c, _ = self._solve(self._FU.T @ z, self.GaT @ z)
+        c, _ = self._solve(self._energy(z), self.GaT @ z)
         return np.asarray(z - self._column(z) * (self.U @ c))
 
     def residual(self, r: Float) -> Float:
         """r - G a with U^T (r - G a) = 0 as far as that can be."""
         if not self._usable:
             return self.projected(r)
-        _, a = self._solve(self.UT @ r, np.zeros((self.dimension, *r.shape[1:])))
+        _, a = self._solve(self.U.T @ r, np.zeros((self.dimension, *r.shape[1:])))
         return np.asarray(r - self.Ga @ a)
 
     def correction(self, r: Float) -> Float:
         """U c with U^T (r - F U c - G a) = 0 and G^T U c = 0."""
         if not self._usable:
             return np.zeros_like(r)
-        c, _ = self._solve(self.UT @ r, np.zeros((self.dimension, *r.shape[1:])))
+        c, _ = self._solve(self.U.T @ r, np.zeros((self.dimension, *r.shape[1:])))
         return np.asarray(self._column(r) * (self.U @ c))
 
     def _column(self, x: Float) -> Float:
@@ -131,7 +138,7 @@ class AdaptiveCoarse(CoarseProblem):
         E = total(self.comm, self._E)
         K = total(self.comm, (self.GaT @ self.U).tocsr())
         energy = E.diagonal()
-        vanished = self.everywhere(abs(self.UT) @ active) == 0.0
+        vanished = self.everywhere(abs(self.U.T) @ active) == 0.0
         self._scale = np.ones(self.vectors + self.dimension)
         self._scale[: self.vectors] = 1.0 / np.sqrt(np.where(vanished, 1.0, energy))
         K = K @ diags(self._scale[: self.vectors])
@@ -142,7 +149,7 @@ class AdaptiveCoarse(CoarseProblem):
         # Motions that nothing resists have amplitude 0.
         free = csr_matrix(self.free @ self.free.T)
         matrix = bmat([[D @ E @ D + diags(vanished.astype(float)), K.T], [K, -free]])
-        self._kkt = DirectSolver(matrix.tocsr(), "feti_coarse_", definite=False)
+        self._kkt = IndefiniteSolver(matrix.tocsr(), "feti_coarse_")
         self._usable = True
         self._usable = self._projects()
 
@@ -161,23 +168,27 @@ class AdaptiveCoarse(CoarseProblem):
     def _span(self, U: csr_matrix) -> None:
         """Let the columns of U (local rows, vectors) be the coarse vectors.  Collective."""
         self._U, self.U = U, self._own(U)
-        self.UT = self.U.T.tocsr()
-        self._E, self._FU = self._energies(range(len(self._blocks)))
+        E = _Sum((self.vectors, self.vectors))
+        self._answers = []
+        for i, block in enumerate(self._blocks):
+            columns, loads = self._loads(i)
+            self._answers.append((columns, block.operator.answer(loads)))
+            E.add(columns, columns, loads.T @ self._answers[i][1])
+        self._E = E.matrix()
 
-    def _energies(self, some: Sequence[int]) -> tuple[csr_matrix, csr_matrix]:
-        """Shares of some of this rank's subdomains in U^T F U (vectors, vectors), on this rank, and in F U
-        (owned rows, vectors), summed over ranks; U on the active rows.  Collective."""
-        E, FU = _Sum((self.vectors, self.vectors)), _Sum(self._U.shape)
-        for i in some:
-            block, rows = self._blocks[i], self._rows[i]
-            columns, dense = _compressed(self._U, rows)
-            X = block.B.T @ (self._mask[rows, None] * dense)
-            Y = block.operator.S_plus @ X
-            E.add(columns, columns, X.T @ Y)
-            FU.add(rows, columns, block.B @ Y)
-        first, last = self.constraints.owned
-        every = summed(self.comm, FU.matrix(), self.constraints.rows, last - first)
-        return E.matrix(), self._own(every)
+    def _loads(self, i: int) -> tuple[Int, Float]:
+        """B^T U of subdomain i, on the active rows: its nonzero columns, and (boundary dofs, columns)."""
+        rows = self._rows[i]
+        columns, dense = _compressed(self._U, rows)
+        return columns, self._blocks[i].B.T @ (self._mask[rows, None] * dense)
+
+    def _energy(self, z: Float) -> Float:
+        """This rank's share of U^T F z, (vectors,) or (vectors, k)."""
+        x = self._boundary.BT @ self.constraints.gather(z)
+        energy = np.zeros((self.vectors, *z.shape[1:]))
+        for (columns, answer), span in zip(self._answers, self._boundary.spans, strict=True):
+            energy[columns] += answer.T @ x[span]
+        return energy
 
     def _own(self, local: csr_matrix) -> csr_matrix:
         """The owned of the local rows."""
@@ -207,9 +218,7 @@ def _preconditioned(
                 yield i, s, Z[common]
 
     received: list[list[tuple[int, Float]]] = [[] for _ in blocks]
-    for (i, sender), Z in neighbours.exchange(jumps()).items():
-        received[i].append((sender, Z))
-
+    neighbours.exchange(jumps(), lambda i, sender, Z: received[i].append((sender, Z)))
     U = _Sum((len(constraints.rows), int(every.sum())))
     for i, (block, rows) in enumerate(zip(blocks, neighbours.rows, strict=True)):
         if not received[i]:

@@ -35,6 +35,7 @@ class Boundary:
         offsets: where each subdomain begins among the n.
         operators: dense or factored, of each subdomain.
         B: (local rows, n) the constraints on them.
+        diagonal: (n,) of K.
     """
 
     def __init__(
@@ -54,16 +55,25 @@ class Boundary:
         self.local = np.concatenate([o + d for o, d in zip(first, self.dofs, strict=False)] or [np.zeros(0, np.int64)])
         self.B = constraints.B[:, self.local].tocsr()
         self.BT = self.B.T.tocsr()
+        diagonals = [s.K.diagonal()[d] for s, d in zip(subdomains, self.dofs, strict=True)]
+        self.diagonal = np.concatenate([np.zeros(0), *diagonals])
         self.operators: list[Condensed | Factored] = []
         for subdomain, dofs in zip(subdomains, self.dofs, strict=True):
             pays = soft or INVERSE * len(dofs) ** 3 <= SOLVES * subdomain.K.shape[0] * applications
             dense = kind == "explicit" or (kind == "auto" and pays and _fits(len(dofs)))
             self.operators.append(Condensed(subdomain, dofs) if dense and len(dofs) else Factored(subdomain, dofs))
+            subdomain.release()
 
     @property
     def spans(self) -> list[slice]:
         """The dofs of each subdomain among the n."""
         return [slice(a, b) for a, b in pairwise(self.offsets.tolist())]
+
+    def release(self) -> None:
+        """Free what only the set-up of a coarse space needs."""
+        for operator in self.operators:
+            if isinstance(operator, Condensed):
+                operator.release()
 
     def stiffness(self, x: Float) -> Float:
         """S x for x (n,) or (n, k)."""

@@ -61,7 +61,7 @@ class CoarseProblem:
         self.free = _null_vectors(gram, self.body, self.held, FREE * self.scale)
         if self.dimension:
             held = gram + self.scale * csr_matrix(self.free @ self.free.T)
-            self._solver = DirectSolver(held.tocsr(), "feti_natural_", definite=True)
+            self._solver = DirectSolver(held.tocsr(), "feti_natural_")
             self.factorizations += 1
 
     @property

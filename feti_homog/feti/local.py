@@ -11,6 +11,9 @@ from scipy.sparse import csr_matrix
 
 Float = NDArray[np.float64]
 
+# Per cent of MUMPS' estimate of workspace that it may need more for pivoting.
+PIVOTING_ROOM = 200
+
 
 class LocalSolver:
     """x = A_s^-1 b for every SPD matrix A_s of this rank, one KSP each.
@@ -50,22 +53,31 @@ class LocalSolver:
 class DirectSolver:
     """X = A^-1 B for one symmetric matrix A and any number of right-hand sides."""
 
-    def __init__(self, matrix: csr_matrix, prefix: str, definite: bool) -> None:
-        """Factorize.  Options under `prefix` (default: preonly, cholesky by CHOLMOD, or lu by UMFPACK if indefinite)."""
-        self._ksp = factorized(matrix, prefix, definite)
+    def __init__(self, matrix: csr_matrix, prefix: str) -> None:
+        """Factorize a definite matrix.  Options under `prefix` (default: cholesky by CHOLMOD)."""
+        self._ksp = factorized(matrix, prefix)
 
     def solve(self, B: Float) -> Float:
         """A^-1 B for B (n,) or (n, k)."""
-        columns = B.reshape(len(B), -1)
-        X = np.empty(columns.shape, order="F")
-        if columns.shape[1] == 1:
-            b, x = (PETSc.Vec().createWithArray(a, comm=PETSc.COMM_SELF) for a in (columns.ravel(), X.ravel("K")))
-            self._ksp.solve(b, x)
-            return x.getArray().reshape(B.shape)
-        right = np.asfortranarray(columns)
+        X = np.empty((len(B), B.size // max(len(B), 1)), order="F")
+        right = np.asfortranarray(B.reshape(X.shape))
         matrices = (PETSc.Mat().createDense(X.shape, array=a, comm=PETSc.COMM_SELF) for a in (right, X))
         self._ksp.getPC().matApply(*matrices)
-        return X
+        return X.reshape(B.shape)
+
+
+class IndefiniteSolver(DirectSolver):
+    """The same for an indefinite matrix whose rows and columns are scaled, with one step of iterative refinement."""
+
+    def __init__(self, matrix: csr_matrix, prefix: str) -> None:
+        """Factorize.  Options under `prefix` (default: cholesky by MUMPS)."""
+        self._matrix = matrix
+        self._ksp = factorized(matrix, prefix, definite=False)
+
+    def solve(self, B: Float) -> Float:
+        """A^-1 B for B (n,) or (n, k)."""
+        X = super().solve(B)
+        return X + super().solve(B - self._matrix @ X)
 
 
 def factorized(matrix: csr_matrix, prefix: str, definite: bool = True) -> PETSc.KSP:
@@ -80,9 +92,13 @@ def factorized(matrix: csr_matrix, prefix: str, definite: bool = True) -> PETSc.
     ksp.setType(PETSc.KSP.Type.PREONLY)
     ksp.setErrorIfNotConverged(True)
     pc = ksp.getPC()
-    pc.setType(PETSc.PC.Type.CHOLESKY if definite else PETSc.PC.Type.LU)
-    # MUMPS' symmetric indefinite factors lose all digits of coarse problems with contrasts of 1e6.
-    pc.setFactorSolverType(PETSc.Mat.SolverType.CHOLMOD if definite else PETSc.Mat.SolverType.UMFPACK)
+    pc.setType(PETSc.PC.Type.CHOLESKY)
+    pc.setFactorSolverType(PETSc.Mat.SolverType.CHOLMOD if definite else PETSc.Mat.SolverType.MUMPS)
     ksp.setFromOptions()
+    if not definite and pc.getFactorSolverType() == PETSc.Mat.SolverType.MUMPS:
+        pc.setFactorSetUpSolverType()
+        # Its own scaling loses all digits of coarse problems with contrasts of 1e6; these come scaled.
+        pc.getFactorMatrix().setMumpsIcntl(8, 0)
+        pc.getFactorMatrix().setMumpsIcntl(14, PIVOTING_ROOM)
     ksp.setUp()
     return ksp

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -50,15 +50,21 @@ class Neighbours(Generic[Message]):
         for i, s, rows in groups:
             self.common[i][s] = np.searchsorted(self.rows[i], rows)
 
-    def exchange(self, messages: Iterable[tuple[int, int, Message]]) -> Mapping[tuple[int, int], Message]:
-        """Deliver (from local subdomain i, to subdomain s, message): {(local i, from s): message}.  Collective."""
+    def exchange(
+        self, messages: Iterable[tuple[int, int, Message]], deliver: Callable[[int, int, Message], None]
+    ) -> None:
+        """For each (from local subdomain i, to subdomain s, message) call deliver(local s, i's number, message) on the
+        rank of s; messages within a rank are delivered as they come.  Collective."""
         outgoing: list[list[tuple[int, int, Message]]] = [[] for _ in range(self.comm.size)]
         for i, s, message in messages:
-            outgoing[self.rank[s]].append((self.index[i], s, message))
-        here = outgoing[self.comm.rank]
-        outgoing[self.comm.rank] = []
-        incoming = self.comm.alltoall(outgoing) if self.comm.size > 1 else []
-        return {(self.local[to], sender): message for part in [here, *incoming] for sender, to, message in part}
+            if s in self.local:
+                deliver(self.local[s], self.index[i], message)
+            else:
+                outgoing[self.rank[s]].append((self.index[i], s, message))
+        if self.comm.size > 1:
+            for part in self.comm.alltoall(outgoing):
+                for sender, to, message in part:
+                    deliver(self.local[to], sender, message)
 
 
 def _pairs(pointer: Int, sharer: Int, own: Sequence[int]) -> tuple[Int, Int, Int]:

@@ -6,7 +6,7 @@ each node.  W is block-diagonal by node.  S is the boundary block of K (lumped),
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
@@ -17,7 +17,6 @@ from scipy.sparse import csr_matrix, diags
 from feti_homog.feti.blocks import NodeBlocks
 from feti_homog.feti.boundary import Boundary
 from feti_homog.feti.constraints import Constraints
-from feti_homog.feti.subdomain import Subdomain
 
 Int = NDArray[np.int64]
 Float = NDArray[np.float64]
@@ -57,7 +56,8 @@ class Scaled:
         self, comm: MPI.Intracomm, constraints: Constraints, boundary: Boundary, stiffness: Callable[[Float], Float]
     ) -> None:
         self.constraints, self.stiffness = constraints, stiffness
-        flexibility = diags(1.0 / _nodal_stiffness(boundary.subdomains)[boundary.local])
+        # Both directions of a node are on the boundary.
+        flexibility = diags(np.repeat(2.0 / boundary.diagonal.reshape(-1, 2).sum(axis=1), 2))
         self.BD: csr_matrix = (boundary.B @ flexibility).tocsr()
         self.DBT = self.BD.T.tocsr()
         self.W = NodeBlocks(comm, constraints, self.BD @ boundary.B.T)
@@ -80,9 +80,3 @@ def preconditioner(kind: str, comm: MPI.Intracomm, constraints: Constraints, bou
     return Scaled(
         comm, constraints, boundary, boundary.stiffness if kind == "dirichlet" else boundary.Kbb.__matmul__
     )
-
-
-def _nodal_stiffness(subdomains: Sequence[Subdomain]) -> Float:
-    """(local dofs,) mean diagonal entry of K at each node."""
-    diagonal = np.concatenate([s.K.diagonal() for s in subdomains] or [np.zeros(0)])
-    return np.repeat(diagonal.reshape(-1, 2).mean(axis=1), 2)

@@ -90,6 +90,7 @@ class FetiSolver:
             _choice("pc_type", preconditioners.KINDS, "dirichlet"), comm, self.constraints, self.boundary
         )
         self.coarse = self._coarse(space, soft)
+        self.boundary.release()
         self.active = ActiveRows(self.rows)
         self._view = PETSc.Options("feti_").getBool("view", False)
         self._krylov: dict[int, Krylov] = {}

@@ -83,9 +83,11 @@ def coarse_vectors(blocks: Sequence[DualBlock], neighbours: Neighbours[Float], t
             for s, common in neighbours.common[i].items():
                 yield i, s, M[np.ix_(common, common)]
 
-    for (i, sender), M in neighbours.exchange(shares()).items():
+    def add(i: int, sender: int, M: Float) -> None:
         at = neighbours.common[i][sender]
         N[i][np.ix_(at, at)] += M
+
+    neighbours.exchange(shares(), add)
     return [np.hstack([b.R, soft_modes(b, b.B.T @ (b.B.T @ n).T, threshold)]) for b, n in zip(blocks, N, strict=True)]
 
 
@@ -95,7 +97,7 @@ def soft_modes(block: DualBlock, N: Float, threshold: float) -> Float:
     NR = N @ block.R
     rest = N - NR @ np.linalg.solve(block.R.T @ NR, NR.T)
     above = (1.0 / threshold, np.inf)
-    modes = eigh(rest, block.operator.held(), subset_by_value=above, overwrite_a=True, overwrite_b=True)[1]
+    modes = eigh(rest, block.operator.held, subset_by_value=above, overwrite_a=True)[1]
     return np.asarray(modes)
 
 

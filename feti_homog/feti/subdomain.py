@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +29,6 @@ class Subdomain:
         piece: the coarse share.
         mesh: the refined mesh.
         L: (3, 3) stiffness of the material.
-        K: (2c, 2c) stiffness, the pinned class (15) eliminated by a unit row scaled like the others.
         Q: (2c, 3) load of the unit strains: f = -Q E.
         area: of the subdomain.
         R: (2c, k) orthonormal kernel of K: two translations, and a rotation if the piece can turn,
@@ -39,7 +39,6 @@ class Subdomain:
     piece: Piece
     mesh: FineMesh
     L: Float
-    K: csr_matrix
     Q: Float
     area: float
     R: Float
@@ -59,9 +58,23 @@ class Subdomain:
         positions = np.empty((mesh.n_classes, 2))
         positions[mesh.node_class[mesh.nodes]] = mesh.points[mesh.nodes] + shift[:, None]
         R = kernel(positions, closes, piece.pinned)
-        K, Q = _pin(body.K, body.Q, piece.pinned)
+        K = _pinned(body.K, piece.pinned)
         _check_kernel(piece, K, R)
-        return cls(piece, mesh, L, K, Q, body.area, R, positions)
+        Q = body.Q
+        if piece.pinned >= 0:
+            Q[2 * piece.pinned : 2 * piece.pinned + 2] = 0.0
+        subdomain = cls(piece, mesh, L, Q, body.area, R, positions)
+        subdomain.__dict__["K"] = K
+        return subdomain
+
+    @cached_property
+    def K(self) -> csr_matrix:
+        """(2c, 2c) stiffness, the pinned class (15) eliminated by a unit row scaled like the others."""
+        return _pinned(assemble(self.mesh, self.L).K, self.piece.pinned)
+
+    def release(self) -> None:
+        """Free the memory of K, which is assembled again when it is wanted."""
+        self.__dict__.pop("K", None)
 
     def fixing(self, candidates: Int) -> tuple[Int, Float]:
         """Degrees of freedom and dense block rho Rf Rf^T that make K + block an SPD matrix.
@@ -105,13 +118,13 @@ def kernel(positions: Float, rotates: bool, pinned: int) -> Float:
     return np.linalg.qr(free.reshape(2 * len(positions), -1))[0]
 
 
-def _pin(K: csr_matrix, Q: Float, pinned: int) -> tuple[csr_matrix, Float]:
+def _pinned(K: csr_matrix, pinned: int) -> csr_matrix:
     if pinned < 0:
-        return K, Q
-    keep = np.ones(len(Q))
+        return K
+    keep = np.ones(K.shape[0])
     keep[2 * pinned : 2 * pinned + 2] = 0.0
     mask = diags(keep)
-    return (mask @ K @ mask + diags((1 - keep) * K.diagonal().max())).tocsr(), keep[:, None] * Q
+    return (mask @ K @ mask + diags((1 - keep) * K.diagonal().max())).tocsr()
 
 
 def _check_kernel(piece: Piece, K: csr_matrix, R: Float) -> None:
