@@ -32,6 +32,8 @@ Int = NDArray[np.int64]
 Float = NDArray[np.float64]
 
 THRESHOLD = 0.2
+# Active rows per coarse vector below which the vectors are taken to depend on each other.
+ROOM = 4
 # Largest T T z - T z, and G^T T z, of a usable coarse problem, relative to T z and G^T z.
 LEAK = 1e-6
 # Subdomains whose dense contributions are held at once.
@@ -146,12 +148,18 @@ class AdaptiveCoarse(CoarseProblem):
         self._scale[self.vectors :] = 1.0 / np.where(length > 0, length, 1.0)
         K = diags(self._scale[self.vectors :]) @ K
         D = diags(self._scale[: self.vectors])
-        # Motions that nothing resists have amplitude 0.
+        # Motions that nothing resists have amplitude 0, and no part in the columns of G.
         free = csr_matrix(self.free @ self.free.T)
-        matrix = bmat([[D @ E @ D + diags(vanished.astype(float)), K.T], [K, -free]])
+        E = D @ E @ D + diags(vanished.astype(float))
+        if self._complete:
+            first = self.vectors - self.dimension
+            at = free.tocoo()
+            E = E + csr_matrix((at.data, (at.row + first, at.col + first)), shape=E.shape)
+        matrix = bmat([[E, K.T], [K, -free]])
         self._kkt = IndefiniteSolver(matrix.tocsr(), "feti_coarse_")
-        self._usable = True
-        self._usable = self._projects()
+        rows = int(self.everywhere(np.array([active.sum()]))[0])
+        self._usable = rows >= ROOM * self.vectors
+        self._usable = self._usable and self._projects()
 
     def _projects(self) -> bool:
         """Whether T is a projector that leaves no work of rigid-body motions.
