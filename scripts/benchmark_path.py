@@ -36,6 +36,7 @@ STRENGTH = 10.0
 def main() -> None:
     """Print a table of times and ratios."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--fibres", type=int, default=0, help="of a random cell; 0: the hexagonal cell")
     parser.add_argument("--mesh-size", type=float, default=0.0435)
     parser.add_argument("--refine", type=int, default=3)
     parser.add_argument("--events", type=int, default=50)
@@ -63,7 +64,7 @@ def main() -> None:
     print(f"an event, mean of {len(seconds):4d}      {mean:8.3f} s, 1/{peer / mean:.1f} of the peer")
     print(f"an event, worst             {max(seconds):8.3f} s, 1/{peer / max(seconds):.1f} of the peer")
     print(f"dual problems an event      {np.mean(solves):8.1f}, Krylov iterations an event {np.mean(iterations):.1f}")
-    made, coarse = cell.solver.local.factorizations, cell.solver.coarse.factorizations
+    made, coarse = len(cell.subdomains), cell.solver.coarse.factorizations
     print(f"factorizations              {made} of subdomains in all, {coarse} of the coarse problem")
     print(f"all events with set-up      {setup + sum(seconds):8.1f} s, the peer {peer * len(seconds):.1f} s")
     cell.solver.destroy()
@@ -71,13 +72,11 @@ def main() -> None:
 
 def document(arguments: argparse.Namespace) -> dict:
     """The case: bonded at first, strengths low enough that many nodes break."""
+    geometry = {"geometry": "hexagonal", "fibre_fraction": 0.4}
+    if arguments.fibres:
+        geometry = {"geometry": "random", "fibre_fraction": 0.5, "min_gap": 0.06, "fibres": arguments.fibres}
     return {
-        "cell": {
-            "geometry": "hexagonal",
-            "fibre_fraction": 0.4,
-            "mesh_size": arguments.mesh_size,
-            "refine": arguments.refine,
-        },
+        "cell": geometry | {"mesh_size": arguments.mesh_size, "refine": arguments.refine},
         "material": {"matrix": {"young": 88.0, "poisson": 0.299}, "fibre": {"young": 200.0, "poisson": 0.222}},
         "analysis": {"type": "path", "plane": "stress"},
         "interface": {"normal_strength": STRENGTH, "tangential_strength": STRENGTH},

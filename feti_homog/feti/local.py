@@ -56,14 +56,19 @@ class DirectSolver:
     def __init__(self, matrix: csr_matrix, prefix: str) -> None:
         """Factorize a definite matrix.  Options under `prefix` (default: cholesky by CHOLMOD)."""
         self._ksp = factorized(matrix, prefix)
+        self._x, self._b = self._ksp.getOperators()[0].createVecs()
 
     def solve(self, B: Float) -> Float:
         """A^-1 B for B (n,) or (n, k)."""
-        X = np.empty((len(B), B.size // max(len(B), 1)), order="F")
-        right = np.asfortranarray(B.reshape(X.shape))
+        if B.size == len(B):
+            self._b.setArray(B.ravel())
+            self._ksp.solve(self._b, self._x)
+            return self._x.getArray(readonly=True).reshape(B.shape).copy()
+        X = np.empty(B.shape, order="F")
+        right = np.asfortranarray(B)
         matrices = (PETSc.Mat().createDense(X.shape, array=a, comm=PETSc.COMM_SELF) for a in (right, X))
         self._ksp.getPC().matApply(*matrices)
-        return X.reshape(B.shape)
+        return X
 
 
 class IndefiniteSolver(DirectSolver):
@@ -73,6 +78,7 @@ class IndefiniteSolver(DirectSolver):
         """Factorize.  Options under `prefix` (default: cholesky by MUMPS)."""
         self._matrix = matrix
         self._ksp = factorized(matrix, prefix, definite=False)
+        self._x, self._b = self._ksp.getOperators()[0].createVecs()
 
     def solve(self, B: Float) -> Float:
         """A^-1 B for B (n,) or (n, k)."""
