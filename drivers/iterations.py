@@ -1,4 +1,4 @@
-"""Iterations of the dual problem over the refinement of the hexagonal cell: they do not grow with the mesh.
+"""Iterations of the dual problem over the refinement of the hexagonal cell, its bodies whole: they do not grow.
 
     mpirun -n 2 .venv/bin/python drivers/iterations.py --refine 1 2 3 4 5
 """
@@ -33,6 +33,7 @@ def main(words: Sequence[str], comm: Intracomm) -> int:
             },
             "material": {"matrix": {"young": 88.0, "poisson": 0.299}, "fibre": {"young": 200.0, "poisson": 0.222}},
             "analysis": {"type": "stiffness", "plane": "strain"},
+            "decomposition": {"subdomains": 1},
             "output": {"fields": False, "pictures": False},
             "petsc": {"feti_ksp_rtol": 1e-10},
         }  # fmt: skip

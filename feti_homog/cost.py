@@ -1,7 +1,9 @@
 """What a case takes: seconds, memory, and how many ranks are worth while; estimates before anything is solved.
 
-The constants are those that `.venv/bin/python scripts/measure_cost.py` prints, on a 2-core machine.  Times are
-good to a factor of about two; a job's time limit should leave room for that.
+About linear in the degrees of freedom, for bodies are cut into pieces of one size.  The constants are those that
+`.venv/bin/python scripts/measure_cost.py` prints, on a 2-core machine.  Times are good to a factor of about two, and
+up to four times longer where elements are so coarse that most nodes of a piece lie on its boundary; a job's time limit
+should leave room for that.
 """
 
 from __future__ import annotations
@@ -10,13 +12,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil
 
-START_SECONDS = 1.5  # Python, MPI, PETSc and gmsh
-MESH_SECONDS = 3.8e-5  # a coarse triangle, on rank 0
-SETUP_SECONDS = 1.4e-5  # a degree of freedom: assembling and factoring
-SUBDOMAIN_SECONDS = 1.1e-3  # a subdomain
-APPLY_SECONDS = 1.6e-7  # a degree of freedom in one application of operator and preconditioner
-BASE_BYTES = 1.7e8  # of a rank with nothing on it
-DOF_BYTES = 2.4e3
+START_SECONDS = 1.3  # Python, MPI, PETSc and gmsh
+MESH_SECONDS = 4.4e-5  # a coarse triangle, on rank 0
+SETUP_SECONDS = 1.1e-5  # a degree of freedom: assembling and factoring
+SUBDOMAIN_SECONDS = 3.5e-3  # a subdomain
+APPLY_SECONDS = 1.0e-7  # a degree of freedom in one application of operator and preconditioner
+BASE_BYTES = 1.9e8  # of a rank with nothing on it
+DOF_BYTES = 8.1e2
 DOFS_OF_A_RANK = 50_000  # fewer on a rank, and its waiting for others takes more than it saves
 
 

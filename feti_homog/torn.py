@@ -34,9 +34,10 @@ Bool = NDArray[np.bool_]
 
 # Typical numbers, for the choice between implicit and explicit operators.
 ITERATIONS_OF_A_SOLVE, SOLVES_OF_A_CONTACT, SOLVES_OF_A_PATH = 12, 3, 100
-# Degrees of freedom of a piece that make set-up and solve fastest, and from which on a body is cut into such pieces;
-# boundary degrees of freedom of a body from which on it is cut where bonds break (`scripts/benchmark`).
-FASTEST, LARGE, WIDE = 3000, 8000, 2500
+# Degrees of freedom of a piece that make set-up and solve fastest, unless there would be more than so many pieces: the
+# coarse problem grows faster than they do.  A body is cut that is larger than a piece by a factor, or, where bonds
+# break, that has more boundary degrees of freedom than is good for dense matrices.
+FASTEST, MOST, LARGE, WIDE = 3000, 1600, 2.5, 2500
 FIBRES_OF = {"square": 1, "hexagonal": 2}
 
 
@@ -220,8 +221,9 @@ def _pieces(case: Case, load: Int, edges: Int, lattice: Lattice, n_ranks: int) -
     if wanted.subdomains is not None:
         return pieces_for_count(load, wanted.subdomains)
     # A debonding cell is solved so often that whole bodies pay, as long as their dense matrices are small.
-    large = load * dofs_of_triangle > LARGE if case.interface is None else edges * 2 * lattice.intervals > WIDE
-    pieces = np.where(large, pieces_for_size(load, dofs_of_triangle, FASTEST), 1)
+    size = max(FASTEST, int(load.sum()) * dofs_of_triangle // MOST)
+    large = load * dofs_of_triangle > LARGE * size if case.interface is None else edges * 2 * lattice.intervals > WIDE
+    pieces = np.where(large, pieces_for_size(load, dofs_of_triangle, size), 1)
     return pieces if pieces.sum() >= n_ranks else pieces_for_count(load, n_ranks)
 
 

@@ -13,6 +13,7 @@ import json
 import subprocess
 import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 from benchmark_report import Row, compare, notes, plot, table, write
@@ -77,23 +78,28 @@ def run(tool: str, ranks: int, arguments: argparse.Namespace) -> Row:
     """One run of a tool."""
     with tempfile.TemporaryDirectory() as folder:
         report = Path(folder) / "report.json"
-        command = ["mpirun", "--oversubscribe", "-n", str(ranks), sys.executable, str(HERE / "benchmark_tool.py")]
-        command += [tool, str(arguments.case), str(report)]
-        command += ["--loads", str(arguments.loads), "--rtol", str(arguments.rtol)]
-        with (Path(folder) / "words").open("w+") as words:
-            process = subprocess.Popen(command, stdout=words, stderr=words)
-            try:
-                process.wait(arguments.timeout)
-            except subprocess.TimeoutExpired:
-                process.terminate()  # mpirun ends its ranks
-                process.wait()
-                return Row(tool, ranks, f"not done in {arguments.timeout:g} s")
-            words.seek(0)
-            if process.returncode or not report.exists():
-                return Row(tool, ranks, f"failed: {_reason(words.read()) or f'exit code {process.returncode}'}")
+        words = [HERE / "benchmark_tool.py", tool, arguments.case, report]
+        fault = job(ranks, [*words, "--loads", arguments.loads, "--rtol", arguments.rtol], arguments.timeout)
+        if fault:
+            return Row(tool, ranks, fault)
         document = json.loads(report.read_text())
     status = "done" if document.pop("converged") else "not converged"
     return Row(tool, ranks, status, **document)
+
+
+def job(ranks: int, words: Sequence[object], timeout: float) -> str:
+    """Run a Python script with its arguments as an MPI job of its own; why it failed, empty if it did not."""
+    command = ["mpirun", "--oversubscribe", "-n", str(ranks), sys.executable, *map(str, words)]
+    with tempfile.TemporaryFile("w+") as told:
+        process = subprocess.Popen(command, stdout=told, stderr=told)
+        try:
+            process.wait(timeout)
+        except subprocess.TimeoutExpired:
+            process.terminate()  # mpirun ends its ranks
+            process.wait()
+            return f"not done in {timeout:g} s"
+        told.seek(0)
+        return f"failed: {_reason(told.read()) or f'exit code {process.returncode}'}" if process.returncode else ""
 
 
 def _reason(words: str) -> str:

@@ -54,7 +54,7 @@ def main() -> int:
         report = feti(case, progress, arguments.loads, arguments.rtol)
     else:
         report = peer(PEERS[arguments.tool], case, progress, arguments.loads, arguments.rtol)
-    report |= {"seconds": progress.timings(), "memory": sum(progress.comm.allgather(_peak()))}
+    report |= {"seconds": progress.timings(), "memory": sum(progress.comm.allgather(peak()))}
     if progress.comm.rank == 0:
         arguments.report.write_text(json.dumps(report))
     return 0
@@ -145,7 +145,7 @@ def _report(
     }
 
 
-def _peak() -> float:
+def peak() -> float:
     """Largest resident memory of this rank so far in megabytes."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / MEGABYTE
 

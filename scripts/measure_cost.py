@@ -2,7 +2,8 @@
 
     .venv/bin/python scripts/measure_cost.py
 
-Each kind of cell is refined several times; the constants are least-squares fits without negative ones.
+Each kind of cell is refined several times; the constants make the logarithms of estimates and measurements agree best,
+so that twice as much is as far off as half.
 """
 
 from __future__ import annotations
@@ -10,11 +11,12 @@ from __future__ import annotations
 import subprocess
 import sys
 import tempfile
+import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.optimize import nnls
+from scipy.optimize import least_squares
 
 from feti_homog import cost
 from feti_homog.output import results
@@ -40,6 +42,7 @@ CELLS = (
     'geometry = "hexagonal"\nfibre_fraction = 0.4\nmesh_size = 0.05',
     'geometry = "random"\nfibre_fraction = 0.5\nmesh_size = 0.1\nfibres = 16',
     'geometry = "random"\nfibre_fraction = 0.5\nmesh_size = 0.05\nfibres = 64',
+    'geometry = "random"\nfibre_fraction = 0.6\nmesh_size = 0.03\nfibres = 20\nmin_gap = 0.04',
 )
 REFINEMENTS = (0, 1, 2, 3)
 
@@ -51,22 +54,30 @@ def main() -> None:
     stages = ("mesh", "assemble", "factor", "solve")
     seconds = {name: np.array([run["timings"][name] for run in runs]) for name in stages}
     coarse = np.array([run["cell"]["elements"] / 4 ** run["case"]["cell"]["refine"] for run in runs])
-    mesh = fitted(seconds["mesh"], coarse)
-    setup = fitted(seconds["assemble"] + seconds["factor"], dofs, subdomains)
-    apply = fitted(seconds["solve"], dofs * iterations)
-    memory = fitted(np.array([run["memory"] for run in runs]), np.ones(len(runs)), dofs)
-    print(f"MESH_SECONDS = {mesh[0]:.1e}\nSETUP_SECONDS = {setup[0]:.1e}\nSUBDOMAIN_SECONDS = {setup[1]:.1e}")
-    print(f"APPLY_SECONDS = {apply[0]:.1e}\nBASE_BYTES = {memory[0]:.1e}\nDOF_BYTES = {memory[1]:.1e}")
+    wall = np.array([run["wall"] for run in runs])
+    memory = np.array([run["memory"] for run in runs])
+    found = {
+        "START": fitted(wall - sum(seconds.values()), np.ones(len(runs))),
+        "MESH": fitted(seconds["mesh"], coarse),
+        "SETUP, SUBDOMAIN": fitted(seconds["assemble"] + seconds["factor"], dofs, subdomains),
+        "APPLY": fitted(seconds["solve"], dofs * iterations),
+        "BASE_BYTES, DOF_BYTES": fitted(memory, np.ones(len(runs)), dofs),
+    }
+    for names, (constants, ratios) in found.items():
+        for name, value in zip(names.split(", "), constants, strict=True):
+            print(f"{name if 'BYTES' in name else f'{name}_SECONDS'} = {value:.1e}")
+        print(f"    estimates are {ratios.min():.2f} to {ratios.max():.2f} times what was measured")
 
 
 def document(cell: str, refine: int) -> dict[str, Any]:
-    """result.json of one run."""
+    """result.json of one run, and the seconds of its whole process as `wall`."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "case.toml"
         path.write_text(CASE.format(cell=cell, refine=refine))
         words = ["-m", "feti_homog", "run", path, "--out", folder, "--quiet"]
+        start = time.perf_counter()
         subprocess.run([sys.executable, *map(str, words)], check=True)
-        return results.read(Path(folder))
+        return results.read(Path(folder)) | {"wall": time.perf_counter() - start}
 
 
 def cost_of(run: dict[str, Any]) -> tuple[int, int, int]:
@@ -75,11 +86,14 @@ def cost_of(run: dict[str, Any]) -> tuple[int, int, int]:
     return solver["dofs"], solver["subdomains"], sum(solver["iterations"])
 
 
-def fitted(values: Any, *columns: Any) -> Any:
-    """Constants with values = sum of constant * column, in relative terms, none negative."""
-    return nnls(np.stack(columns, axis=1) / values[:, None], np.ones(len(values)))[0]
+def fitted(values: Any, *columns: Any) -> tuple[Any, Any]:
+    """Positive constants with values about the sum of constant * column, and that sum over the values."""
+    matrix = np.stack(columns, axis=1) / values[:, None]
+    first = np.log(1.0 / np.median(matrix, axis=0) / len(columns))
+    constants = np.exp(least_squares(lambda logarithms: np.log(matrix @ np.exp(logarithms)), first).x)
+    return constants, matrix @ constants
 
 
 if __name__ == "__main__":
     main()
-    print(f"now: {({name: value for name, value in vars(cost).items() if name.isupper()})}")
+    print("now:", {name: value for name, value in vars(cost).items() if name.isupper()})

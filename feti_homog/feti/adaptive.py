@@ -37,7 +37,7 @@ ROOM = 4
 # Largest T T z - T z, and G^T T z, of a usable coarse problem, relative to T z and G^T z.
 LEAK = 1e-6
 # Subdomains whose dense contributions are held at once.
-CHUNK = 64
+CHUNK = 16
 
 
 class AdaptiveCoarse(CoarseProblem):
@@ -60,7 +60,7 @@ class AdaptiveCoarse(CoarseProblem):
         super().__init__(comm, constraints, boundary)
         self.threshold = threshold
         self.constraints = constraints
-        neighbours: Neighbours[Float] = Neighbours(comm, constraints, boundary.subdomains)
+        neighbours = Neighbours(comm, constraints, boundary.subdomains)
         self._rows, self._boundary = neighbours.rows, boundary
         self._blocks = dual_blocks(comm, constraints, boundary, scaling, self._rows)
         V = coarse_vectors(self._blocks, neighbours, threshold)
@@ -73,7 +73,8 @@ class AdaptiveCoarse(CoarseProblem):
         self._E: csr_matrix
         # (columns, S+ B^T U there) of each subdomain
         self._answers: list[tuple[Int, Float]]
-        self._span(_preconditioned(comm, constraints, self._blocks, neighbours, V))
+        U = _preconditioned(comm, constraints, self._blocks, neighbours, V)
+        self._span(U)
         self._factor(np.ones(self.U.shape[0]))
 
     @property
@@ -85,7 +86,7 @@ class AdaptiveCoarse(CoarseProblem):
         """Factorize for the owned rows of which `active` is 1; U is restricted to them."""
         super().activate(active)
         if not self._complete:
-            G = summed(self.comm, self._motions, self.constraints.rows, len(active))
+            G = summed(self.comm, self._motions, self.constraints.rows, self.constraints.foreign, len(active))
             self._complete = True
             self._span(hstack([self._U, G]).tocsr())
         mask = self.constraints.gather(active).copy()
@@ -209,7 +210,7 @@ def _preconditioned(
     comm: MPI.Intracomm,
     constraints: Constraints,
     blocks: Sequence[DualBlock],
-    neighbours: Neighbours[Float],
+    neighbours: Neighbours,
     V: Sequence[Float],
 ) -> csr_matrix:
     """(local rows, vectors) U = M^-1 B V.  Collective."""
@@ -237,8 +238,9 @@ def _preconditioned(
             jump[neighbours.common[i][s], at : at + Z.shape[1]] = Z
             columns.append(np.arange(ends[s] - every[s], ends[s]))
             at += Z.shape[1]
-        U.add(rows, np.concatenate(columns), block.BW @ (block.operator.S @ (block.BW.T @ jump)))
-    return summed(comm, U.matrix(), constraints.rows, constraints.owned[1] - constraints.owned[0])
+        U.add(rows, np.concatenate(columns), block.BW @ block.operator.forces(block.BW.T @ jump))
+    owned = constraints.owned[1] - constraints.owned[0]
+    return summed(comm, U.matrix(), constraints.rows, constraints.foreign, owned)
 
 
 def _compressed(matrix: csr_matrix, rows: Int) -> tuple[Int, Float]:
@@ -270,8 +272,8 @@ class _Sum:
 
     def _flush(self) -> None:
         if self._held:
-            rows = np.concatenate([np.repeat(r, len(c)) for r, c, _ in self._held])
-            columns = np.concatenate([np.tile(c, len(r)) for r, c, _ in self._held])
+            rows = np.concatenate([np.repeat(r.astype(np.int32), len(c)) for r, c, _ in self._held])
+            columns = np.concatenate([np.tile(c.astype(np.int32), len(r)) for r, c, _ in self._held])
             values = np.concatenate([v.ravel() for _, _, v in self._held])
             self._whole = self._whole + csr_matrix((values, (rows, columns)), shape=self._whole.shape)
             self._held = []

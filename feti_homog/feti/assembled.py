@@ -6,7 +6,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
-from scipy.sparse import csr_matrix
+from scipy.sparse import csr_matrix, diags
 
 Int = NDArray[np.int64]
 
@@ -30,25 +30,28 @@ def assembled(
     return A.convert(PETSc.Mat.Type.AIJ)
 
 
-def summed(comm: MPI.Intracomm, local: csr_matrix, rows: Int, owned: int) -> csr_matrix:
+def summed(comm: MPI.Intracomm, local: csr_matrix, rows: Int, foreign: NDArray[np.bool_], owned: int) -> csr_matrix:
     """The same rows of the sum over ranks of `local`, whose rows have the global numbers `rows`.
 
     Args:
         local: (rows, n), with the same n columns on every rank.
+        foreign: which rows other ranks have too; only these travel.
         owned: number of rows that this rank owns.
     """
     if comm.size == 1:
         return local
-    n = local.shape[1]
+    part, n = local[foreign], local.shape[1]
     share = n // comm.size + (comm.rank < n % comm.size)
-    used, indices = np.unique(local.indices, return_inverse=True)
-    narrow = csr_matrix((local.data, indices, local.indptr), shape=(len(rows), len(used)))
-    A = assembled(comm, narrow, rows, used, (owned, share))
+    used, indices = np.unique(part.indices, return_inverse=True)
+    narrow = csr_matrix((part.data, indices, part.indptr), shape=(part.shape[0], len(used)))
+    A = assembled(comm, narrow, rows[foreign], used, (owned, share))
     # Backwards: PETSc 3.18 mixes up the columns if every rank asks for all rows in their order.
-    here = PETSc.IS().createGeneral(rows[::-1].astype(PETSc.IntType), comm=PETSc.COMM_SELF)
+    here = PETSc.IS().createGeneral(rows[foreign][::-1].astype(PETSc.IntType), comm=PETSc.COMM_SELF)
     all_columns = PETSc.IS().createStride(n, 0, 1, comm=PETSc.COMM_SELF)
     indptr, indices, data = A.createSubMatrices(here, all_columns)[0].getValuesCSR()
-    return csr_matrix((data, indices, indptr), shape=local.shape)[::-1]
+    at = np.flatnonzero(foreign)[::-1]
+    place = csr_matrix((np.ones(len(at)), (at, np.arange(len(at)))), shape=(len(rows), len(at)))
+    return diags((~foreign).astype(float)) @ local + place @ csr_matrix((data, indices, indptr), shape=(len(at), n))
 
 
 def total(comm: MPI.Intracomm, own: csr_matrix) -> csr_matrix:

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
-from scipy.linalg.blas import dtpmv, dtpsv, dtrsm
+from scipy.linalg.blas import dtpmv, dtpsv, dtrmm, dtrsm
 from scipy.linalg.lapack import dpotrf, dtpttr, dtrttp
 from scipy.sparse import csr_matrix
 
@@ -62,6 +62,13 @@ class Condensed:
         """S+ X for many columns X (n, m)."""
         factor = dtpttr(self.n, self._factor, uplo="L")[0]
         return np.asarray(dtrsm(1.0, factor, dtrsm(1.0, factor, X, lower=1), lower=1, trans_a=1, overwrite_b=1))
+
+    def forces(self, X: Float) -> Float:
+        """S X for many columns X (n, m)."""
+        factor = dtpttr(self.n, self._factor, uplo="L")[0]
+        Y = dtrmm(1.0, factor, dtrmm(1.0, factor, X, lower=1, trans_a=1), lower=1, overwrite_b=1)
+        Y[self._fixed] -= self._term @ X[self._fixed]
+        return np.asarray(Y)
 
     @property
     def held(self) -> Float:

@@ -59,6 +59,7 @@ class Constraints:
         owned: first global row of this rank and the one after its last.
         total: number of rows on all ranks.
         shared: the vertices and edges that the rows belong to.
+        foreign: whether other ranks have each local row too.
         vector: a multiplier vector to duplicate.
     """
 
@@ -67,6 +68,8 @@ class Constraints:
     ) -> None:
         layout = _Layout(shared, subdomains, lattice)
         self.shared, self._first, self._count = shared, layout.first, layout.count
+        elsewhere = np.bincount(np.repeat(np.arange(len(shared.key)), shared.copies), layout.base < 0, len(shared.key))
+        self.foreign = np.repeat(elsewhere > 0, layout.count)
         self.owned = shared.owned
         self.total = shared.total
         self.rows, self.B = layout.rows, layout.matrix()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import Generic, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from mpi4py import MPI
@@ -17,7 +17,7 @@ Int = NDArray[np.int64]
 Message = TypeVar("Message")
 
 
-class Neighbours(Generic[Message]):
+class Neighbours:
     """The pairs of a subdomain t of this rank and any subdomain s that shares nodes with it, itself among them.
 
     Attributes:

@@ -28,6 +28,7 @@ from feti_homog.feti.preconditioner import Scaled
 
 Int = NDArray[np.int64]
 Float = NDArray[np.float64]
+Single = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
@@ -61,7 +62,7 @@ def dual_blocks(
     at = np.searchsorted(constraints.rows, constraints.owned[0])
     shape = (len(constraints.rows), constraints.total)
     wide = csr_matrix((inverse.data, (inverse.row + at, inverse.col + constraints.owned[0])), shape=shape)
-    W_inverse = summed(comm, wide, constraints.rows, owned)[:, constraints.rows]
+    W_inverse = summed(comm, wide, constraints.rows, constraints.foreign, owned)[:, constraints.rows]
     B, BW = boundary.B.tocsc(), (W_inverse @ scaling.BD).tocsc()
     blocks = []
     for i, (subdomain, operator) in enumerate(zip(boundary.subdomains, boundary.operators, strict=True)):
@@ -73,22 +74,32 @@ def dual_blocks(
     return blocks
 
 
-def coarse_vectors(blocks: Sequence[DualBlock], neighbours: Neighbours[Float], threshold: float) -> list[Float]:
-    """For each subdomain of this rank: (n, k + m) its kernel and its m modes below the threshold.  Collective."""
-    N = [np.zeros((len(rows), len(rows))) for rows in neighbours.rows]
+def coarse_vectors(blocks: Sequence[DualBlock], neighbours: Neighbours, threshold: float) -> list[Float]:
+    """For each subdomain of this rank: (n, k + m) its kernel and its m modes below the threshold.  Collective.
 
-    def shares() -> Iterator[tuple[int, int, Float]]:
+    The dense matrices of the operators are released.
+    """
+    # Of the neighbours' shares in M^-1 the rows that both have; single precision is enough to tell soft from stiff.
+    others: list[list[tuple[int, Single]]] = [[] for _ in blocks]
+
+    def shares() -> Iterator[tuple[int, int, Single]]:
         for i, block in enumerate(blocks):
             M = block.preconditioner
             for s, common in neighbours.common[i].items():
-                yield i, s, M[np.ix_(common, common)]
+                if s != neighbours.index[i]:
+                    yield i, s, M[np.ix_(common, common)].astype(np.float32)
 
-    def add(i: int, sender: int, M: Float) -> None:
-        at = neighbours.common[i][sender]
-        N[i][np.ix_(at, at)] += M
-
-    neighbours.exchange(shares(), add)
-    return [np.hstack([b.R, soft_modes(b, b.B.T @ (b.B.T @ n).T, threshold)]) for b, n in zip(blocks, N, strict=True)]
+    neighbours.exchange(shares(), lambda i, sender, M: others[i].append((sender, M)))
+    vectors = []
+    for i, block in enumerate(blocks):
+        M = block.preconditioner
+        for sender, share in others[i]:
+            at = neighbours.common[i][sender]
+            M[np.ix_(at, at)] += share
+        others[i].clear()
+        vectors.append(np.hstack([block.R, soft_modes(block, block.B.T @ (block.B.T @ M).T, threshold)]))
+        block.operator.release()
+    return vectors
 
 
 def soft_modes(block: DualBlock, N: Float, threshold: float) -> Float:

@@ -1,0 +1,150 @@
+"""Weak and strong scaling by ranks, cost by size, and a model of what 64 and 1 024 ranks would do.
+
+Each run is an MPI job of its own: a random cell of fibre fraction 0.6 with gaps of 4 %, cut as by default, three unit
+strains together to 1e-8.  More ranks than cores take turns: their iterations and messages count, their times do not.
+A run whose report is in DIR/scaling is not made again, so that a long list can be worked off in parts.  The tables,
+the picture and the model are of all runs of the three studies that are there.  Remove the folder to measure anew.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import tempfile
+from pathlib import Path
+from typing import NamedTuple
+
+from benchmark import job
+from scaling_forecast import assumptions, checks, forecast, table, verdict
+from scaling_model import Machine, measured
+from scaling_plot import plot
+from scaling_report import Row, by_ranks, by_size, speedups, write
+
+HERE = Path(__file__).parent
+STUDIES = {
+    "weak": "weak scaling: as many dofs on every rank",
+    "strong": "strong scaling: one cell",
+    "sizes": "cost by size: microseconds of a rank per dof",
+}
+
+
+class Run(NamedTuple):
+    """A cell of about so many dofs, on so many ranks."""
+
+    fibres: int
+    dofs: int
+    refine: int
+    ranks: int
+
+    def report(self, out: Path) -> Path:
+        """Where its report is."""
+        return out / "scaling" / f"{self.fibres}_fibres_{self.dofs}_dofs_refine_{self.refine}_ranks_{self.ranks}.json"
+
+
+def main() -> int:
+    """Work off the studies that are wanted; print and write what there is of all."""
+    parser = _parser()
+    arguments = parser.parse_args()
+    if unknown := set(arguments.studies) - set(STUDIES):
+        parser.error(f"{', '.join(unknown)}: expected some of {', '.join(STUDIES)}")
+    arguments.out.joinpath("scaling").mkdir(parents=True, exist_ok=True)
+    runs = planned(arguments)
+    wanted = dict.fromkeys(run for study in arguments.studies for run in runs[study])
+    done = [work_off(run, arguments) for run in wanted]
+    found = {study: [row for run in some for row in read(run.report(arguments.out))] for study, some in runs.items()}
+    print(*report(found, arguments), sep="\n")
+    write(arguments.out / "scaling.csv", found)
+    return int(not all(done) or any(not row.converged for rows in found.values() for row in rows))
+
+
+def planned(arguments: argparse.Namespace) -> dict[str, list[Run]]:
+    """The runs of each study; the cell of strong scaling is that of weak scaling on most ranks."""
+    fibres, dofs, refine, most = arguments.fibres, arguments.dofs, arguments.refine, max(arguments.ranks)
+    ladder = [(max(1, round(fibres * size / dofs)), size) for size in arguments.sizes]
+    return {
+        "weak": [Run(fibres * p, dofs * p, refine, p) for p in arguments.ranks],
+        "strong": [Run(fibres * most, dofs * most, refine, p) for p in arguments.ranks],
+        "sizes": [Run(*cell, refine, arguments.size_ranks) for cell in ladder],
+    }
+
+
+def work_off(run: Run, arguments: argparse.Namespace) -> bool:
+    """Make a run unless there is its report; of several, the fastest set-up and solve counts.  Whether it went well."""
+    path = run.report(arguments.out)
+    times = arguments.repeat if run.ranks <= arguments.cores else 1
+    if path.exists():
+        return True
+    best: list[tuple[float, str]] = []
+    with tempfile.TemporaryDirectory() as folder:
+        report = Path(folder) / path.name
+        for _ in range(times):
+            words = [HERE / "scaling_tool.py", report, "--fibres", run.fibres, "--dofs", run.dofs]
+            fault = job(run.ranks, [*words, "--refine", run.refine], arguments.timeout)
+            if fault:
+                print(f"{run.ranks} ranks, {run.dofs} dofs: {fault}", flush=True)
+                return False
+            best.append((read(report)[0].solver, report.read_text()))
+    seconds, text = min(best)
+    path.write_text(text)
+    print(f"{run.ranks} ranks, {run.dofs} dofs: {seconds:.1f} s set-up and solve", flush=True)
+    return True
+
+
+def read(path: Path) -> list[Row]:
+    """The run of a report; none if there is no report."""
+    return [Row(**json.loads(path.read_text()))] if path.exists() else []
+
+
+def report(found: dict[str, list[Row]], arguments: argparse.Namespace) -> list[str]:
+    """All tables and what the model says; draws the picture."""
+    lines: list[str] = []
+    for study, rows in found.items():
+        if rows:
+            lines += ["", STUDIES[study]]
+            lines += by_size(rows) if study == "sizes" else by_ranks(rows, arguments.cores)
+            lines += [] if study == "sizes" else speedups(rows, arguments.cores)
+    rows = list({(row.dofs, row.ranks): row for some in found.values() for row in some}.values())
+    if not any(row.ranks == 1 for row in rows) or not any(row.ranks > 1 for row in rows):
+        return [*lines, "", "the cost model needs a run on one rank and one on more"]
+    lines += [
+        "",
+        f"counted bytes of multipliers and PETSc's log differ by {max(r.miscounted for r in rows):.1%} at most",
+    ]
+    machine = Machine(1e-6 * arguments.latency, 1e9 * arguments.bandwidth)
+    rates = measured(rows, arguments.cores)
+    lines += ["", *assumptions(rates, machine), "", *checks(rates, machine, rows, arguments.cores)]
+    futures = forecast(rates, machine)
+    for title, series in futures.items():
+        lines += ["", *table(title, series)]
+    lines += ["", *(line for title, series in futures.items() for line in verdict(title, series))]
+    picture = arguments.out / "scaling.png"
+    plot(picture, found, futures)
+    return [*lines, "", f"{picture} {arguments.out / 'scaling.csv'}"]
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument(
+        "studies", nargs="*", default=["weak", "strong"], help="of weak, strong, sizes; default first two"
+    )
+    parser.add_argument("--ranks", type=int, nargs="+", default=[1, 2, 4, 8, 16])
+    parser.add_argument("--dofs", type=int, default=40_000, help="of a rank in weak scaling")
+    parser.add_argument("--fibres", type=int, default=4, help="for so many dofs, in all studies")
+    parser.add_argument("--refine", type=int, default=3)
+    parser.add_argument(
+        "--sizes", type=int, nargs="+", default=[100_000, 300_000, 1_000_000, 3_000_000, 10_000_000], help="dofs"
+    )
+    parser.add_argument("--size-ranks", type=int, default=2, help="ranks for sizes")
+    parser.add_argument("--cores", type=int, default=os.cpu_count(), help="ranks up to which times count")
+    parser.add_argument("--repeat", type=int, default=1, help="the fastest of so many timed runs counts")
+    parser.add_argument("--timeout", type=float, default=1800.0, metavar="S", help="seconds that a run may take")
+    parser.add_argument("--latency", type=float, default=2.0, help="assumed, microseconds a message")
+    parser.add_argument("--bandwidth", type=float, default=10.0, help="assumed, GB/s")
+    parser.add_argument("--out", type=Path, default=Path("results"), metavar="DIR")
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main())

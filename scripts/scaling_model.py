@@ -1,0 +1,159 @@
+"""A cost model of the solver on more ranks than there are here, with rates measured on few.
+
+Every term is one that the program has today: a mesh and a tearing on rank 0, work on subdomains that ranks share, a
+coarse problem that every rank factors and solves for itself, and messages.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from math import ceil, log2, sqrt
+
+from scaling_report import COARSE_SUMS, GATHERS, SCALARS, SUMS, VALUE_BYTES, Row
+
+MESH, LOCAL, COARSE, MESSAGES = "mesh on rank 0", "subdomains", "redundant coarse problem", "messages"
+COARSE_POWER = 1.5
+
+
+@dataclass(frozen=True)
+class Machine:
+    """The network: seconds of a message, bytes per second."""
+
+    latency: float
+    bandwidth: float
+
+
+@dataclass(frozen=True)
+class Rates:
+    """Measured: seconds per unit of work, and sizes per dof.
+
+    Attributes:
+        mesh: seconds per coarse triangle.
+        assemble, setup, apply: seconds per dof, `apply` of an iteration.
+        factor, solve: seconds per n^1.5 and n log2 n of the coarse unknowns n.
+        loads: load cases solved together.
+        triangles, subdomains, coarse, coarse_bytes: per dof.
+        largest_coarse: most coarse unknowns that were timed.
+        iterations: most of all runs.
+        surface: values that a rank tells or hears in an exchange per root of its dofs.
+        neighbours: ranks told or heard of in an exchange.
+        imbalance: dofs of the fullest rank relative to the mean.
+    """
+
+    mesh: float
+    assemble: float
+    setup: float
+    apply: float
+    factor: float
+    solve: float
+    loads: int
+    triangles: float
+    subdomains: float
+    coarse: float
+    coarse_bytes: float
+    largest_coarse: int
+    iterations: int
+    surface: float
+    neighbours: int
+    imbalance: float
+
+
+def measured(rows: Sequence[Row], cores: int) -> Rates:
+    """Rates from the rows: local work from those on one rank, sizes and counts from all."""
+    timed = [row for row in rows if row.ranks <= cores]
+    alone = [row for row in rows if row.ranks == 1]
+    most = max(rows, key=lambda row: (row.ranks, row.dofs))
+    return Rates(
+        mesh=_rate((row.seconds["mesh"], row.triangles) for row in timed),
+        assemble=_rate((row.seconds["assemble"], row.dofs) for row in alone),
+        setup=_rate((row.seconds["set-up"] - row.coarse_factor, row.dofs) for row in alone),
+        apply=_rate(
+            (row.seconds["solve"] - COARSE_SUMS * row.iterations * row.coarse_solve, row.iterations * row.dofs)
+            for row in alone
+        ),
+        factor=_rate((row.coarse_factor, row.coarse**COARSE_POWER) for row in timed),
+        solve=_rate((row.coarse_solve, row.coarse * log2(row.coarse)) for row in timed),
+        loads=rows[0].loads,
+        triangles=_rate((row.triangles, row.dofs) for row in rows),
+        subdomains=_rate((row.subdomains, row.dofs) for row in rows),
+        coarse=_rate((row.coarse, row.dofs) for row in rows),
+        coarse_bytes=_rate((row.coarse_bytes, row.dofs) for row in rows),
+        largest_coarse=max(row.coarse for row in timed),
+        iterations=max(row.iterations for row in rows),
+        surface=max(row.values / sqrt(row.dofs / row.ranks) for row in rows),
+        neighbours=max(max(row.neighbours) for row in rows),
+        imbalance=most.fullest * most.ranks / most.dofs,
+    )
+
+
+def _rate(pairs: Iterable[tuple[float, float]]) -> float:
+    """All seconds over all work, so that large runs count most."""
+    seconds, work = (sum(values) for values in zip(*pairs, strict=True))
+    return max(seconds / work, 0.0)
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Seconds of each part of a run of `dofs` on `ranks`."""
+
+    dofs: float
+    ranks: int
+    mesh: float
+    assemble: float
+    setup: float
+    coarse_factor: float
+    apply: float
+    coarse_solve: float
+    messages: float
+
+    @property
+    def parts(self) -> dict[str, float]:
+        """Seconds by what they are spent on."""
+        return {
+            MESH: self.mesh,
+            LOCAL: self.assemble + self.setup + self.apply,
+            COARSE: self.coarse_factor + self.coarse_solve,
+            MESSAGES: self.messages,
+        }
+
+    @property
+    def solver(self) -> float:
+        """Seconds of set-up and solve."""
+        return self.setup + self.coarse_factor + self.apply + self.coarse_solve + self.messages
+
+    @property
+    def total(self) -> float:
+        """Seconds of all."""
+        return sum(self.parts.values())
+
+
+def predict(rates: Rates, machine: Machine, dofs: float, ranks: int) -> Prediction:
+    """What a cell of `dofs` takes on `ranks`."""
+    subdomains = max(rates.subdomains * dofs, 1.0)
+    # A rank has whole subdomains, and none is cut for its sake.
+    whole = ceil(subdomains / ranks) * ranks / subdomains
+    own = dofs / ranks * max(rates.imbalance if ranks > 1 else 1.0, whole)
+    coarse = max(rates.coarse * dofs, 2.0)
+    return Prediction(
+        dofs=dofs,
+        ranks=ranks,
+        mesh=rates.mesh * rates.triangles * dofs,
+        assemble=rates.assemble * own,
+        setup=rates.setup * own,
+        coarse_factor=rates.factor * coarse**COARSE_POWER,
+        apply=rates.iterations * rates.apply * own,
+        coarse_solve=rates.iterations * COARSE_SUMS * rates.solve * coarse * log2(coarse),
+        messages=_messages(rates, machine, dofs, ranks, coarse) if ranks > 1 else 0.0,
+    )
+
+
+def _messages(rates: Rates, machine: Machine, dofs: float, ranks: int, coarse: float) -> float:
+    """Seconds of all messages: those of the iterations, and the coarse matrix that every rank is told."""
+    values = rates.surface * sqrt(dofs / ranks)
+    exchange = machine.latency * rates.neighbours + VALUE_BYTES * values / machine.bandwidth
+    tree = machine.latency * ceil(log2(ranks))
+    # A sum of a long vector over ranks moves it twice.
+    coarse_sum = tree + 2 * VALUE_BYTES * coarse * rates.loads / machine.bandwidth
+    iteration = (GATHERS + SUMS) * exchange + COARSE_SUMS * coarse_sum + SCALARS * tree
+    return rates.iterations * iteration + rates.coarse_bytes * dofs / machine.bandwidth

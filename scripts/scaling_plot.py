@@ -1,0 +1,76 @@
+"""The scaling study and what its model says as a picture."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+from scaling_model import Prediction
+from scaling_report import STAGES, Row
+
+mpl.use("Agg")
+
+import matplotlib.pyplot as plt
+from matplotlib.axes import Axes
+
+STAGE_INK = ("#c9c9c9", "#9a9a9a", "#1f4e9c", "#c44e00")
+PART_INK = ("#c9c9c9", "#1f4e9c", "#c44e00", "#3b8a5a")
+STUDY_INK = {"weak": "#1f4e9c", "strong": "#c44e00"}
+
+
+def plot(path: Path, studies: dict[str, list[Row]], futures: dict[str, list[Prediction]]) -> None:
+    """Iterations and messages by ranks, seconds by size, and the shares of the predicted times."""
+    figure, ((left, middle), (right, shares)) = plt.subplots(2, 2, figsize=(11, 7.5))
+    for study, ink in STUDY_INK.items():
+        rows = studies[study]
+        ranks = [row.ranks for row in rows]
+        left.plot(ranks, [row.iterations for row in rows], "o-", color=ink, label=study)
+        several = [row for row in rows if row.ranks > 1]
+        sent = [row.sent / 1e3 for row in several]
+        middle.plot([row.ranks for row in several], sent, "o-", color=ink, label=f"{study}: multipliers sent")
+        middle.plot(ranks, [row.summed / 1e3 for row in rows], "s--", color=ink, label=f"{study}: coarse sums")
+    left.set(xlabel="ranks", ylabel="iterations")
+    left.set_ylim(0, 1.3 * max(row.iterations for study in STUDY_INK for row in studies[study]))
+    middle.set(xlabel="ranks", ylabel="kB of the busiest rank in an iteration", yscale="log")
+    for axes in (left, middle):
+        axes.set_xscale("log", base=2)
+        axes.xaxis.set_major_formatter("{x:g}")
+    _sizes(right, studies["sizes"])
+    _shares(shares, futures)
+    for axes in (left, middle, right, shares):
+        # Above the axes, where there are no data.
+        axes.legend(fontsize=8, ncols=2, loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False)
+        axes.spines[["top", "right"]].set_visible(False)
+    figure.tight_layout()
+    figure.savefig(path, dpi=150)
+    plt.close(figure)
+
+
+def _sizes(axes: Axes, rows: Sequence[Row]) -> None:
+    places, start = np.arange(len(rows)), np.zeros(len(rows))
+    for stage, ink in zip(STAGES, STAGE_INK, strict=True):
+        values = np.array([1e6 * row.ranks * row.seconds[stage] / row.dofs for row in rows])
+        axes.bar(places, values, bottom=start, color=ink, label=stage)
+        start = start + values
+    axes.set_xticks(places, [_short(row.dofs) for row in rows])
+    axes.set(xlabel="dofs", ylabel="microseconds of a rank per dof")
+
+
+def _shares(axes: Axes, futures: dict[str, list[Prediction]]) -> None:
+    """Where the model sees the time go."""
+    found = [p for series in futures.values() for p in series]
+    names = [f"{title.split()[0]}, p = {p.ranks}: {p.total:.0f} s" for title, series in futures.items() for p in series]
+    places, start = np.arange(len(found)), np.zeros(len(found))
+    for part, ink in zip(found[0].parts, PART_INK, strict=True):
+        values = np.array([p.parts[part] / p.total for p in found])
+        axes.barh(places, values, left=start, color=ink, label=part)
+        start += values
+    axes.set_yticks(places, names, fontsize=8)
+    axes.invert_yaxis()
+    axes.set(xlabel="share of the predicted time")
+
+
+def _short(dofs: int) -> str:
+    return f"{dofs / 1e6:.2g} M" if dofs >= 1e6 else f"{dofs / 1e3:.0f} k"

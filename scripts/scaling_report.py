@@ -1,0 +1,151 @@
+"""The runs of the scaling study, as tables and a CSV file."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+STAGES = ("mesh", "assemble", "set-up", "solve")
+COLUMNS = (
+    "fibres", "ranks", "dofs", "subdomains", "vectors", "kernel", "iterations", "converged", "memory", "sent",
+    "messages", "summed", "coarse_factor", "coarse_solve", "coarse_bytes", "solver", "total",
+)  # fmt: skip
+VALUE_BYTES = 8
+# What one iteration does: exchanges of multipliers (a gather and a sum each for the operator and the preconditioner,
+# a gather for the coarse problem), sums over ranks of coarse vectors, and of single numbers by the Krylov method.
+GATHERS, SUMS, COARSE_SUMS, SCALARS = 3, 2, 2, 3
+
+
+@dataclass(frozen=True)
+class Row:
+    """A run: what was asked for, sizes, seconds of each stage, and the counts of `scaling_tool`.
+
+    `wanted` are the dofs asked for, `fullest` those of the rank with most, `memory` the MB of all ranks.
+    """
+
+    fibres: int
+    wanted: int
+    refine: int
+    loads: int
+    ranks: int
+    dofs: int
+    fullest: int
+    triangles: int
+    subdomains: int
+    vectors: int
+    kernel: int
+    iterations: int
+    converged: bool
+    seconds: dict[str, float]
+    memory: float
+    told: tuple[int, ...]
+    heard: tuple[int, ...]
+    neighbours: tuple[int, ...]
+    exchanges: int
+    logged: tuple[float, ...]
+    coarse_factor: float
+    coarse_solve: float
+    coarse_bytes: int
+
+    @property
+    def solver(self) -> float:
+        """Seconds of set-up and solve."""
+        return self.seconds["set-up"] + self.seconds["solve"]
+
+    @property
+    def total(self) -> float:
+        """Seconds of all stages."""
+        return sum(self.seconds.values())
+
+    @property
+    def coarse(self) -> int:
+        """Unknowns of the coarse problem: vectors and kernel modes."""
+        return self.vectors + self.kernel
+
+    @property
+    def values(self) -> int:
+        """Values that the rank with most sends and receives in an exchange."""
+        return max(told + heard for told, heard in zip(self.told, self.heard, strict=True))
+
+    @property
+    def sent(self) -> int:
+        """Bytes of multipliers that the rank with most sends in an iteration."""
+        pairs = zip(self.told, self.heard, strict=True)
+        return VALUE_BYTES * max(GATHERS * told + SUMS * heard for told, heard in pairs)
+
+    @property
+    def messages(self) -> int:
+        """Messages with multipliers that the rank with most sends and receives in an iteration."""
+        return (GATHERS + SUMS) * max(self.neighbours)
+
+    @property
+    def summed(self) -> int:
+        """Bytes that every rank puts into the sums over ranks of an iteration."""
+        return VALUE_BYTES * (COARSE_SUMS * self.coarse * self.loads + SCALARS)
+
+    @property
+    def miscounted(self) -> float:
+        """Relative difference of the counted bytes from those that PETSc logged, on the worst rank."""
+        counted = [VALUE_BYTES * self.exchanges * sum(pair) for pair in zip(self.told, self.heard, strict=True)]
+        return max(abs(a - b) / max(b, 1.0) for a, b in zip(counted, self.logged, strict=True))
+
+
+def by_ranks(rows: Sequence[Row], cores: int) -> list[str]:
+    """Aligned lines, without the times of ranks that take turns."""
+    lines = [
+        f"{'':50}{'iteration of the busiest rank':^31}{'seconds':^45}",
+        f"{'ranks':>5}{'fibres':>8}{'dofs':>10}{'domains':>8}{'coarse':>8}{'iterations':>11}{'kB sent':>10}"
+        f"{'messages':>10}{'kB summed':>11}" + "".join(f"{s:>9}" for s in (*STAGES, "total")),
+    ]
+    for row in rows:
+        times = [*(row.seconds[s] for s in STAGES), row.total]
+        shown = (f"{t:9.2f}" if row.ranks <= cores else f"{'-':>9}" for t in times)
+        lines.append(
+            f"{row.ranks:5}{row.fibres:8}{row.dofs:10}{row.subdomains:8}{row.coarse:8}{row.iterations:11}"
+            f"{row.sent / 1e3:10.1f}{row.messages:10}{row.summed / 1e3:11.1f}{''.join(shown)}"
+        )
+    return lines
+
+
+def by_size(rows: Sequence[Row]) -> list[str]:
+    """Aligned lines: microseconds of a rank per dof, and memory of all ranks per dof."""
+    lines = [
+        f"{'dofs':>10}{'ranks':>6}{'fibres':>8}{'coarse':>8}{'iterations':>11}{'seconds':>9}"
+        + "".join(f"{s:>9}" for s in (*STAGES, "total")) + f"{'MB':>9}{'kB/dof':>8}",
+    ]  # fmt: skip
+    for row in rows:
+        each = "".join(f"{_per_dof(row, t):9.2f}" for t in (*(row.seconds[s] for s in STAGES), row.total))
+        lines.append(
+            f"{row.dofs:10}{row.ranks:6}{row.fibres:8}{row.coarse:8}{row.iterations:11}{row.total:9.2f}{each}"
+            f"{row.memory:9.0f}{row.memory * 1024 / row.dofs:8.2f}"
+        )
+    grown = _per_dof(rows[-1], rows[-1].total) / _per_dof(rows[0], rows[0].total) - 1.0
+    return [*lines, f"seconds per dof: {grown:+.0%} from {rows[0].dofs} to {rows[-1].dofs} dofs"]
+
+
+def _per_dof(row: Row, seconds: float) -> float:
+    return 1e6 * row.ranks * seconds / row.dofs
+
+
+def speedups(rows: Sequence[Row], cores: int) -> list[str]:
+    """How many times as many dofs a second as on one rank."""
+    lines = []
+    for one in (row for row in rows if row.ranks == 1):
+        for row in (row for row in rows if 1 < row.ranks <= cores):
+            pairs = {s: (one.seconds[s], row.seconds[s]) for s in STAGES}
+            pairs |= {"set-up and solve": (one.solver, row.solver), "all": (one.total, row.total)}
+            words = (f"{name} {row.dofs / one.dofs * a / b:.2f}" for name, (a, b) in pairs.items())
+            lines.append(f"{row.ranks} ranks against one, times the dofs per second: {', '.join(words)}")
+    return lines
+
+
+def write(path: Path, studies: dict[str, list[Row]]) -> None:
+    """All rows as CSV; bytes and messages are those of an iteration."""
+    with path.open("w", newline="") as stream:
+        writer = csv.writer(stream)
+        writer.writerow(["study", *COLUMNS, *STAGES])
+        for study, rows in studies.items():
+            for row in rows:
+                writer.writerow([study, *(getattr(row, c) for c in COLUMNS), *(row.seconds[s] for s in STAGES)])

@@ -1,0 +1,161 @@
+"""One run of the scaling study in an MPI job of its own: tear, set up and solve a random cell, count its messages.
+
+The cell has fibre fraction 0.6 and gaps of 4 % of the fibres' diameter; it is cut as it would be by default, and the
+three unit strains are solved together.  Rank 0 writes the report.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import petsc4py
+
+petsc4py.init(sys.argv[:1])
+
+import numpy as np  # noqa: E402
+from benchmark_tool import peak  # noqa: E402
+from mpi4py import MPI  # noqa: E402
+from petsc4py import PETSc  # noqa: E402
+
+from feti_homog import case as cases  # noqa: E402
+from feti_homog.case import Case  # noqa: E402
+from feti_homog.feti.adaptive import AdaptiveCoarse  # noqa: E402
+from feti_homog.feti.coarse import CoarseProblem  # noqa: E402
+from feti_homog.feti.constraints import Constraints  # noqa: E402
+from feti_homog.parallel import run_main  # noqa: E402
+from feti_homog.petsc_options import case_options  # noqa: E402
+from feti_homog.progress import Progress  # noqa: E402
+from feti_homog.torn import TornCell, tear  # noqa: E402
+
+LOADS = 3
+RTOL = 1e-8
+# Triangles of a mesh with equal sides h in a unit square are 2.31 / h^2; the narrow gaps add about so many times the
+# root of a fibre's share of them.
+TRIANGLES, IN_GAPS = 2.31, 6.0
+# Solves of the coarse problem that are timed; the fastest counts.
+TIMED = 5
+# Bytes of an entry of the coarse matrix on its way: value, row, column.
+ENTRY_BYTES = 16
+
+
+def main() -> int:
+    """Run the cell that the command line describes."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("report", type=Path)
+    parser.add_argument("--fibres", type=int, required=True)
+    parser.add_argument("--dofs", type=int, required=True, help="about so many degrees of freedom")
+    parser.add_argument("--refine", type=int, required=True)
+    arguments = parser.parse_args()
+    case = random_cell(arguments.fibres, arguments.dofs, arguments.refine)
+    PETSc.Log.begin()
+    progress = Progress(MPI.COMM_WORLD, quiet=True)
+    with case_options(case.petsc):
+        report = measure(case, progress)
+    if progress.comm.rank == 0:
+        asked = {"fibres": arguments.fibres, "wanted": arguments.dofs, "refine": arguments.refine, "loads": LOADS}
+        arguments.report.write_text(json.dumps(asked | report, indent=1))
+    return 0
+
+
+def random_cell(fibres: int, dofs: int, refine: int) -> Case:
+    """A case with about so many degrees of freedom."""
+    each = dofs / fibres / 4**refine
+    regular = (np.sqrt(each + (IN_GAPS / 2) ** 2) - IN_GAPS / 2) ** 2
+    document = {
+        "cell": {
+            "geometry": "random", "fibres": fibres, "fibre_fraction": 0.6, "min_gap": 0.04,
+            "mesh_size": float(np.sqrt(TRIANGLES / regular / fibres)), "refine": refine,
+        },
+        "material": {"matrix": {"young": 3.0, "poisson": 0.35}, "fibre": {"young": 70.0, "poisson": 0.2}},
+        "analysis": {"type": "stiffness", "plane": "strain"},
+        "petsc": {"feti_ksp_rtol": RTOL, "feti_coarse_space": "adaptive"},
+    }  # fmt: skip
+    return cases.parse(document, Path())
+
+
+def measure(case: Case, progress: Progress) -> dict[str, Any]:
+    """Seconds, iterations, sizes and messages of a case."""
+    comm = progress.comm
+    cell = tear(case, comm, progress)
+    solver = cell.solver
+    progress.seconds["set-up"] = progress.seconds.pop("factor")
+    with progress.stage("solve"):
+        solutions = solver.solve_together(np.eye(LOADS), np.zeros((solver.rows, LOADS)))
+    memory = sum(comm.allgather(peak()))
+    if not isinstance(solver.coarse, AdaptiveCoarse):
+        raise TypeError("the study is of the adaptive coarse space")
+    own = comm.allgather(len(solver.Q))
+    report = {
+        "ranks": comm.size,
+        "dofs": sum(own),
+        "fullest": max(own),
+        "triangles": cell.plan.coarse_triangles,
+        "subdomains": cell.plan.subdomains,
+        "vectors": solver.coarse.vectors,
+        "kernel": solver.coarse.dimension,
+        "iterations": solutions[0].iterations,
+        "converged": solutions[0].reason > 0,
+        "seconds": progress.timings(),
+        "memory": memory,
+        **_messages(cell),
+        **_coarse(solver.coarse, comm),
+    }
+    solver.destroy()
+    return report
+
+
+def _messages(cell: TornCell) -> dict[str, Any]:
+    """What a rank sends and receives in one exchange of multipliers, and how many exchanges the solves made.
+
+    `told` and `heard` count the values, for all loads, and `neighbours` the ranks that a rank tells or hears of in a
+    gather; in a sum they change places.  `logged` are the bytes, both ways, that PETSc counted in the solves.
+    """
+    comm = cell.comm
+    counts = LOADS * np.array(comm.allgather(_foreign(cell.solver.constraints, comm)))
+    log = PETSc.Log.Event("VecScatterBegin").getPerfInfo(PETSc.Log.Stage("solve").id)
+    return {
+        "told": counts.sum(axis=0).tolist(),
+        "heard": counts.sum(axis=1).tolist(),
+        "neighbours": ((counts > 0).sum(axis=0) + (counts > 0).sum(axis=1)).tolist(),
+        "exchanges": log["count"],
+        "logged": comm.allgather(log["messageLength"]),
+    }
+
+
+def _foreign(constraints: Constraints, comm: MPI.Intracomm) -> np.ndarray:
+    """(ranks,) local rows that each of the other ranks owns."""
+    ends = np.array(comm.allgather(constraints.owned[1]))
+    counts = np.bincount(np.searchsorted(ends, constraints.rows, side="right"), minlength=comm.size)
+    counts[comm.rank] = 0
+    return counts
+
+
+def _coarse(coarse: AdaptiveCoarse, comm: MPI.Intracomm) -> dict[str, float]:
+    """Seconds to sum and factor the coarse matrices and to solve with them once, and bytes that every rank is told."""
+    right = np.ones((coarse.vectors + coarse.dimension, LOADS))
+
+    def factor() -> None:
+        CoarseProblem.activate(coarse, coarse._active)
+        coarse._factor(coarse._active)
+
+    return {
+        "coarse_factor": comm.allreduce(_seconds(factor), MPI.MAX),
+        "coarse_solve": comm.allreduce(min(_seconds(lambda: coarse._kkt.solve(right)) for _ in range(TIMED)), MPI.MAX),
+        "coarse_bytes": ENTRY_BYTES * coarse._kkt._matrix.nnz,
+    }
+
+
+def _seconds(work: Callable[[], object]) -> float:
+    start = time.perf_counter()
+    work()
+    return time.perf_counter() - start
+
+
+if __name__ == "__main__":
+    sys.exit(run_main(MPI.COMM_WORLD, main))

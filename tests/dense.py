@@ -1,0 +1,110 @@
+"""A dense twin of the dual problem: Schur complements, preconditioner and deflation by NumPy alone, on every rank.
+
+It takes K and B of each subdomain from the program, nothing else.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+KERNEL = 1e-9
+
+
+def boundary_of(B):
+    """Dofs that the constraints B (rows, n) act on, both directions of each node."""
+    nodes = np.unique(np.flatnonzero(abs(B).sum(axis=0)) // 2)
+    return (2 * nodes[:, None] + np.arange(2)).ravel()
+
+
+def schur(K, boundary):
+    """K_bb - K_bi K_ii^-1 K_ib."""
+    inside = np.setdiff1d(np.arange(len(K)), boundary)
+    Kib = K[np.ix_(inside, boundary)]
+    return K[np.ix_(boundary, boundary)] - Kib.T @ np.linalg.solve(K[np.ix_(inside, inside)], Kib)
+
+
+def kernel(S):
+    """Orthonormal null space of a positive semidefinite matrix."""
+    values, vectors = np.linalg.eigh(S)
+    return vectors[:, values < KERNEL * values[-1]]
+
+
+def gathered(cell, own):
+    """The rows that the ranks own, one rank after the other, on every rank.  Collective."""
+    return np.concatenate(cell.comm.allgather(own))
+
+
+def matrix(cell, function):
+    """(total, total) of a linear function of the owned rows (rows, k).  Collective."""
+    first, last = cell.solver.constraints.owned
+    return gathered(cell, function(np.eye(cell.solver.constraints.total)[first:last]))
+
+
+class DualTwin:
+    """The subdomains of all ranks in the order of their numbers, on their boundaries.
+
+    Attributes:
+        S, B, D: of each subdomain: Schur complement (n, n), constraints (total, n), mean stiffness of nodes (n,).
+        G: (total, kernels) B R, with kernels R of S.
+        F: (total, total) sum B pinv(S) B^T; differs from the program's by G Y^T + Y G^T.
+    """
+
+    def __init__(self, cell):
+        """Collective."""
+        constraints = cell.solver.constraints
+        own = []
+        for s, first in zip(cell.subdomains, cell.offsets, strict=False):
+            B = np.zeros((constraints.total, len(s.Q)))
+            B[constraints.rows] = constraints.B[:, first : first + len(s.Q)].toarray()
+            own.append((s.piece.index, s.K.toarray(), B))
+        parts = sorted((part for parts in cell.comm.allgather(own) for part in parts), key=lambda part: part[0])
+        boundaries = [boundary_of(B) for _, _, B in parts]
+        self.B = [B[:, at] for (_, _, B), at in zip(parts, boundaries, strict=True)]
+        self.S = [schur(K, at) for (_, K, _), at in zip(parts, boundaries, strict=True)]
+        self.D = [
+            np.repeat(np.diag(K)[at].reshape(-1, 2).mean(axis=1), 2)
+            for (_, K, _), at in zip(parts, boundaries, strict=True)
+        ]
+        self.total = constraints.total
+        self.kernels = [kernel(S) for S in self.S]
+        self.G = np.hstack([B @ R for B, R in zip(self.B, self.kernels, strict=True)])
+        inverse = [np.linalg.pinv(S, rcond=KERNEL, hermitian=True) for S in self.S]
+        self.F = sum(B @ X @ B.T for B, X in zip(self.B, inverse, strict=True))
+
+    def preconditioner(self, active):
+        """(total, total) M^-1 = W^-1 B D^-1 S D^-1 B^T W^-1, W = B D^-1 B^T, of the rows where `active` is true."""
+        W = sum(B / d @ B.T for B, d in zip(self.B, self.D, strict=True))
+        inverse = np.zeros_like(W)
+        inverse[np.ix_(active, active)] = np.linalg.inv(W[np.ix_(active, active)])
+        scaled = [inverse @ (B / d) for B, d in zip(self.B, self.D, strict=True)]
+        return sum(A @ S @ A.T for A, S in zip(scaled, self.S, strict=True))
+
+
+def projector(G):
+    """I - G (G^T G)^-1 G^T."""
+    return np.eye(len(G)) - G @ np.linalg.pinv(G)
+
+
+def deflation(F, U, G):
+    """T: of all z - U c with G^T (z - U c) = 0 that of least energy; U is to contain vectors that work on G."""
+    GU = G.T @ U
+    particular = np.linalg.pinv(GU, rcond=1e-11) @ G.T
+    rank = np.linalg.matrix_rank(GU, tol=1e-11 * np.linalg.norm(GU, 2))
+    V = U @ np.linalg.svd(GU)[2][rank:].T
+    T = np.eye(len(F)) - U @ particular
+    return T - V @ np.linalg.pinv(V.T @ F @ V, rcond=1e-13, hermitian=True) @ (V.T @ F @ T)
+
+
+def extreme_eigenvalues(T, F, M):
+    """Least and largest eigenvalues of T M^-1 T^T F on the range of T; `M` is M^-1."""
+    root = T @ np.linalg.cholesky(M)
+    values = np.linalg.eigvalsh(root.T @ F @ root)
+    values = values[values > 1e-7 * values[-1]]
+    return values[0], values[-1]
+
+
+def distance(U, V):
+    """The largest sine of an angle from a column of U to the range of V."""
+    U, V = (X / np.linalg.norm(X, axis=0) for X in (U, V))
+    Q = np.linalg.svd(V, full_matrices=False)[0][:, : np.linalg.matrix_rank(V, tol=1e-10)]
+    return np.linalg.norm(U - Q @ (Q.T @ U), axis=0).max()

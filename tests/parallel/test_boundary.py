@@ -1,0 +1,207 @@
+"""The subdomains through their boundaries: extension, loads, kinds of operators and the default pieces."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import bonds
+import numpy as np
+import pytest
+from cells import make_case, relative_error, solve
+from dense import DualTwin, boundary_of, gathered, matrix, projector
+from mpi4py import MPI
+
+from feti_homog import sections, torn
+from feti_homog.cell.refine import Lattice
+from feti_homog.errors import CaseError
+from feti_homog.feti import boundary as boundaries
+from feti_homog.feti.adaptive import AdaptiveCoarse
+from feti_homog.feti.boundary import Boundary
+from feti_homog.feti.condensed import Condensed
+from feti_homog.feti.factored import Factored
+from feti_homog.progress import Progress
+
+pytestmark = pytest.mark.parallel
+
+RANDOM = {"geometry": "random", "fibres": 5, "fibre_fraction": 0.45, "min_gap": 0.1, "seed": 3}
+CELLS = pytest.mark.parametrize(
+    "case",
+    [
+        {"geometry": "hexagonal"},
+        {"geometry": "hexagonal", "order": 2, "mesh_size": 0.25, "decomposition": {"subdomains": 8}},
+        RANDOM | {"bodies": "plane", "mesh_size": 0.25},
+        RANDOM | {"decomposition": {"subdomains": 12}},
+    ],
+    ids=["whole", "quadratic", "plane", "cut"],
+)
+
+
+@CELLS
+def test_extension_is_harmonic(comm, case):
+    """K u = 0 but on the boundary, where it is S x."""
+    cell = bonds.tear(comm, **case)
+    boundary = cell.solver.boundary
+    x = np.random.default_rng(comm.rank).standard_normal(boundary.offsets[-1])
+    u, forces = boundary.extend(x), boundary.stiffness(x)
+    for s, dofs, first, span in zip(cell.subdomains, boundary.dofs, cell.offsets, boundary.spans, strict=False):
+        own = u[first : first + len(s.Q)]
+        assert (own[dofs] == x[span]).all()
+        residual, scale = s.K @ own, np.abs(s.K @ np.abs(own)).max()
+        assert np.abs(residual[dofs] - forces[span]).max() < 1e-11 * scale
+        residual[dofs] = 0
+        assert np.abs(residual).max() < 1e-11 * scale
+
+
+@CELLS
+def test_boundary_is_where_the_constraints_act(comm, case):
+    cell = bonds.tear(comm, **case)
+    B = cell.solver.constraints.B.toarray()
+    for s, dofs, first in zip(cell.subdomains, cell.solver.boundary.dofs, cell.offsets, strict=False):
+        assert (dofs == boundary_of(B[:, first : first + len(s.Q)])).all()
+    assert (cell.solver.boundary.B.toarray() == B[:, cell.solver.boundary.local]).all()
+    # Something is inside, else the tests here would hold of anything.
+    assert comm.allreduce(B.shape[1] - len(cell.solver.boundary.local)) > 0
+
+
+@CELLS
+def test_load_vanishes_inside_the_bodies(comm, case):
+    cell = bonds.tear(comm, **case)
+    inside = cell.solver.Q.copy()
+    inside[cell.solver.boundary.local] = 0
+    largest = comm.allreduce(np.abs(cell.solver.Q).max(initial=0.0), MPI.MAX)
+    assert largest > 0
+    assert np.abs(inside).max(initial=0.0) < 1e-13 * largest
+
+
+@CELLS
+@pytest.mark.parametrize("kind", ["implicit", "explicit"])
+def test_torn_cell_equals_the_dense_one(comm, case, kind):
+    """P d, P^T F P and the torn cell's stiffness do not depend on the generalized inverse."""
+    cell = bonds.tear(comm, **case, petsc={"feti_dual_operator": kind})
+    twin, solver = DualTwin(cell), cell.solver
+    P = projector(twin.G)
+    F = matrix(cell, solver.operator.apply)
+    assert relative_error(P @ F @ P, P @ twin.F @ P) < 1e-10
+    own_jump, own_stiffness = np.zeros((twin.total, 3)), np.zeros((3, 3))
+    for s, first in zip(cell.subdomains, cell.offsets, strict=False):
+        u = np.linalg.pinv(s.K.toarray(), rcond=1e-10, hermitian=True) @ -s.Q
+        own_jump[solver.constraints.rows] += solver.constraints.B[:, first : first + len(u)] @ u
+        own_stiffness += s.area * s.L + s.Q.T @ u
+    jump = P @ comm.allreduce(own_jump)
+    assert relative_error(P @ gathered(cell, solver.d), jump) < 1e-10
+    # Free pieces take the strain off: then it vanishes.
+    mean = comm.allreduce(sum((s.area * s.L for s in cell.subdomains), np.zeros((3, 3))))
+    assert np.abs(solver.torn_stiffness - comm.allreduce(own_stiffness)).max() < 1e-10 * mean.max()
+
+
+@CELLS
+def test_preconditioner_equals_the_dense_one(comm, case):
+    cell = bonds.tear(comm, **case)
+    active = np.ones(cell.solver.constraints.total, bool)
+    expected = DualTwin(cell).preconditioner(active)
+    assert relative_error(matrix(cell, cell.solver.preconditioner.apply), expected) < 1e-11
+
+
+def test_implicit_and_explicit_operators_give_the_same(comm):
+    case = RANDOM | {"decomposition": {"subdomains": 12}}
+    found = []
+    for kind, operators in (("implicit", Factored), ("explicit", Condensed)):
+        cell, L, _ = solve(make_case(**case, petsc={"feti_dual_operator": kind}), comm)
+        assert all(isinstance(o, operators) for o in cell.solver.boundary.operators)
+        found.append((L, matrix(cell, cell.solver.operator.apply)))
+    for first, second in zip(*found, strict=True):
+        assert relative_error(first, second) < 1e-9
+
+
+def test_dense_operators_where_they_pay(comm, monkeypatch):
+    cell = bonds.tear(comm, geometry="hexagonal", petsc={"feti_coarse_space": "natural"})
+
+    def kinds(applications, soft):
+        boundary = Boundary(cell.solver.constraints, cell.subdomains, "auto", applications, soft)
+        return set().union(*comm.allgather({type(o) for o in boundary.operators}))
+
+    assert kinds(0, False) == {Factored}
+    assert kinds(10**6, False) == {Condensed}
+    assert kinds(0, True) == {Condensed}
+    monkeypatch.setattr(boundaries, "LARGEST_DENSE", 10)
+    assert kinds(10**6, True) == {Factored}
+
+
+def test_adaptive_space_is_refused_where_boundaries_are_too_large(comm, monkeypatch):
+    case = {"geometry": "hexagonal", "decomposition": {"subdomains": 8}}
+    monkeypatch.setattr(boundaries, "LARGEST_DENSE", 10)
+    assert not isinstance(bonds.tear(comm, **case).solver.coarse, AdaptiveCoarse)
+    with pytest.raises(CaseError, match="-feti_coarse_space adaptive: needs"):
+        bonds.tear(comm, **case, petsc={"feti_coarse_space": "adaptive"})
+
+
+@pytest.fixture
+def sizes(monkeypatch):
+    """Pieces of 100 dofs, at most 50 of a cell; bodies are cut above 250 dofs, or 80 of the boundary."""
+    for name, value in {"FASTEST": 100, "MOST": 50, "LARGE": 2.5, "WIDE": 80}.items():
+        monkeypatch.setattr(torn, name, value)
+
+
+def wanted(load, edges, interface=None, n_ranks=1, refine=0):
+    """Default pieces of bodies of so many triangles and outer edges."""
+    case = replace(make_case(refine=refine), interface=interface)
+    return torn._pieces(case, np.array(load), np.array(edges), Lattice.of(refine, 1), n_ranks).tolist()
+
+
+def test_large_bodies_are_cut(sizes):
+    assert wanted([240, 260, 30, 1000], [90, 10, 10, 10]) == [1, 3, 1, 10]
+    # Four elements a triangle.
+    assert wanted([60, 65], [10, 10], refine=1) == [1, 3]
+
+
+def test_pieces_of_very_large_bodies_are_larger(sizes):
+    assert wanted([5000], [10]) == [50]
+    assert wanted([20_000, 30], [10, 10]) == [50, 1]
+
+
+def test_bodies_that_debond_are_whole_unless_their_boundary_is_wide(sizes):
+    bonds_break = sections.Interface()
+    assert wanted([260, 3000, 260], [10, 39, 41], bonds_break) == [1, 1, 3]
+    assert wanted([70, 70], [19, 21], bonds_break, refine=1) == [1, 3]
+
+
+@pytest.mark.parametrize("interface", [None, sections.Interface()])
+def test_there_are_pieces_for_all_ranks(sizes, interface):
+    assert wanted([200, 40], [10, 10], interface, n_ranks=2) == [1, 1]
+    assert wanted([200, 40], [10, 10], interface, n_ranks=5) == [4, 1]
+    assert wanted([260, 70], [10, 41], n_ranks=3) == [3, 1]
+
+
+def torn_by_default(comm, interface):
+    """A cell of two fibres and a matrix; the bodies of its pieces and the triangles of the largest piece."""
+    case = replace(make_case(geometry="hexagonal", mesh_size=0.1), interface=interface)
+    cell = torn.tear(case, comm, Progress(comm, quiet=True))
+    own = comm.allgather([s.piece.body for s in cell.subdomains])
+    largest = comm.allreduce(max((len(s.piece.triangles) for s in cell.subdomains), default=0), MPI.MAX)
+    assert min(map(len, own)) > 0
+    return cell, sorted(body for bodies in own for body in bodies), largest
+
+
+@pytest.mark.parametrize("case", [{"geometry": "square"}, RANDOM, RANDOM | {"bodies": "plane", "mesh_size": 0.25}])
+def test_default_pieces_give_every_rank_one(comm, case):
+    cell = bonds.tear(comm, **case)
+    assert min(comm.allgather(len(cell.subdomains))) > 0
+    assert cell.plan.subdomains == max(cell.plan.bodies, comm.size)
+
+
+def test_default_pieces_of_a_bonded_cell(comm, sizes):
+    cell, bodies, largest = torn_by_default(comm, None)
+    assert len(bodies) > 4
+    assert largest < 1.5 * 100
+    assert isinstance(cell.solver.coarse, AdaptiveCoarse)
+
+
+def test_default_pieces_of_a_debonding_cell(comm, sizes, monkeypatch):
+    monkeypatch.setattr(torn, "WIDE", 1000)
+    cell, bodies, largest = torn_by_default(comm, sections.Interface())
+    assert len(bodies) == max(3, comm.size)
+    assert isinstance(cell.solver.coarse, AdaptiveCoarse) == (comm.size > 3)
+    monkeypatch.setattr(torn, "WIDE", 80)
+    cell, bodies, narrowed = torn_by_default(comm, sections.Interface())
+    assert len(bodies) > 4
+    assert narrowed < min(largest, 1.5 * 100)

@@ -1,0 +1,466 @@
+"""The adaptive coarse space against dense algebra, the natural one and the monolithic twin."""
+
+from __future__ import annotations
+
+import re
+
+import bonds
+import dense
+import numpy as np
+import pytest
+from cells import make_case, relative_error, solve, twin_stiffness
+from mpi4py import MPI
+from scipy.linalg import eigh
+
+from feti_homog.errors import CaseError
+from feti_homog.feti.adaptive import ROOM, THRESHOLD, AdaptiveCoarse
+from feti_homog.feti.assembled import total
+from feti_homog.feti.boundary import Boundary
+from feti_homog.feti.neighbours import Neighbours
+from feti_homog.feti.preconditioner import preconditioner
+from feti_homog.feti.spectral import coarse_vectors, dual_blocks
+from feti_homog.interface.contact import BONDED, CLOSED, OPEN
+from feti_homog.petsc_options import case_options
+
+pytestmark = pytest.mark.parallel
+
+# Sixteen fibres almost touch; the matrix is cut across the gaps.
+NARROW = {
+    "geometry": "random", "fibres": 16, "fibre_fraction": 0.5, "min_gap": 0.02, "mesh_size": 0.12, "seed": 1,
+    "decomposition": {"subdomains": 24},
+}  # fmt: skip
+# Many rows of few subdomains, so that many may be inactive.
+BREAKING = {"geometry": "hexagonal", "mesh_size": 0.12, "refine": 1, "decomposition": {"subdomains": 8}}
+STRAINS = np.eye(3)
+# Of the largest eigenvalue and 1 / threshold.
+BOUND = 1.3
+# N may be told among subdomains in single precision.
+SINGLE = 2e-6
+
+
+class Narrow:
+    """The narrow cell at one threshold, its twin, U, T and the preconditioner as dense matrices."""
+
+    def __init__(self, threshold):
+        self.threshold = threshold
+        self.cell = bonds.tear(MPI.COMM_WORLD, **NARROW, petsc={"feti_coarse_threshold": threshold})
+        self.solver = self.cell.solver
+        self.coarse = self.solver.coarse
+        self.twin = dense.DualTwin(self.cell)
+        self.M = self.twin.preconditioner(np.ones(self.twin.total, bool))
+        self.U = dense.gathered(self.cell, self.coarse.U.toarray())
+        self.T = dense.deflation(self.twin.F, self.U, self.twin.G)
+
+    def soft_modes(self):
+        """For each subdomain: (n,) all theta of S p = theta N p, rising, and (n, n) the modes."""
+        for B, S in zip(self.twin.B, self.twin.S, strict=True):
+            yield eigh(S, B.T @ self.M @ B)
+
+    def own(self, whole):
+        """This rank's rows."""
+        first, last = self.solver.constraints.owned
+        return whole[first:last]
+
+    def random(self, seed, columns=()):
+        """A vector on all rows."""
+        return np.random.default_rng(seed).standard_normal((self.twin.total, *columns))
+
+
+@pytest.fixture(scope="module")
+def narrow():
+    cell = Narrow(THRESHOLD)
+    yield cell
+    cell.solver.destroy()
+
+
+def together(cell, strains=STRAINS, starts=None):
+    """The dual solutions under some strains, with the options of the case."""
+    with case_options(cell.case.petsc):
+        zero = np.zeros((cell.solver.rows, len(strains)))
+        return cell.solver.solve_together(strains, zero if starts is None else starts)
+
+
+def of_all(comm, coarse, cell):
+    """Soft modes of all subdomains in the order of their numbers."""
+    own = zip((s.piece.index for s in cell.subdomains), coarse.counts, strict=True)
+    return [count for _, count in sorted(pair for part in comm.allgather(list(own)) for pair in part)]
+
+
+# The coarse vectors.
+
+
+def test_soft_modes_are_counted_as_dense_eigenvalues(comm, narrow):
+    expected = [
+        int((theta < THRESHOLD).sum()) - R.shape[1]
+        for (theta, _), R in zip(narrow.soft_modes(), narrow.twin.kernels, strict=True)
+    ]
+    assert of_all(comm, narrow.coarse, narrow.cell) == expected
+    assert max(expected) > 2
+    assert min(expected) == 0
+    assert narrow.coarse.vectors == sum(expected) + narrow.twin.G.shape[1]
+
+
+def test_soft_modes_solve_the_eigenproblem(comm, narrow):
+    """S p = theta N p for the modes made N-orthogonal to the kernel; N from all ranks' data."""
+    constraints, subdomains = narrow.solver.constraints, narrow.cell.subdomains
+    boundary = Boundary(constraints, subdomains, "explicit", 1, True)
+    neighbours = Neighbours(comm, constraints, subdomains)
+    scaled = preconditioner("dirichlet", comm, constraints, boundary)
+    blocks = dual_blocks(comm, constraints, boundary, scaled, neighbours.rows)
+    found = coarse_vectors(blocks, neighbours, THRESHOLD)
+    for s, V, count in zip(subdomains, found, narrow.coarse.counts, strict=True):
+        B, S = narrow.twin.B[s.piece.index], narrow.twin.S[s.piece.index]
+        N, k = B.T @ narrow.M @ B, s.R.shape[1]
+        R, p = V[:, :k], V[:, k:]
+        assert p.shape == (len(S), count)
+        assert np.abs(S @ R).max() < 1e-10 * np.abs(S).max()
+        p = p - R @ np.linalg.solve(R.T @ N @ R, R.T @ N @ p)
+        theta = np.einsum("ik,ij,jk->k", p, S, p) / np.einsum("ik,ij,jk->k", p, N, p)
+        assert (theta < THRESHOLD).all() and (theta > 1e-8).all()
+        residual = S @ p - (N @ p) * theta
+        assert np.abs(residual).max(initial=0.0) < SINGLE * np.abs(S @ p).max(initial=1.0)
+
+
+def test_coarse_vectors_are_preconditioned_jumps(comm, narrow):
+    """U = M^-1 B V of the kernels and the modes, the same space from dense ones."""
+    jumps = [
+        B @ modes[:, theta < THRESHOLD]
+        for B, (theta, modes) in zip(narrow.twin.B, narrow.soft_modes(), strict=True)
+    ]
+    expected = narrow.M @ np.hstack(jumps)
+    assert expected.shape == narrow.U.shape
+    assert dense.distance(narrow.U, expected) < SINGLE
+    assert dense.distance(expected, narrow.U) < SINGLE
+
+
+# The coarse problem.
+
+
+def test_admissible_corrections_are_the_best(narrow):
+    """T z is what no coarse vector can improve; dense, with another generalized inverse."""
+    T = dense.matrix(narrow.cell, narrow.coarse.admissible)
+    assert relative_error(T, narrow.T) < 1e-9
+    assert np.abs(T @ T - T).max() < 1e-9 * np.abs(T).max()
+    assert np.abs(narrow.twin.G.T @ T).max() < 1e-9 * np.abs(T).max()
+    V = narrow.U @ null_space(narrow.twin.G.T @ narrow.U)
+    V /= np.linalg.norm(V, axis=0)
+    assert V.shape[1] > 10
+    F = dense.matrix(narrow.cell, narrow.solver.operator.apply)
+    assert np.abs(V.T @ F @ T).max() < 1e-9 * np.abs(V.T @ F).max()
+
+
+def test_many_columns_at_once(narrow):
+    x = narrow.own(narrow.random(0, (3,)))
+    for function in (narrow.coarse.admissible, narrow.coarse.residual, narrow.coarse.correction):
+        columns = function(x)
+        for k in range(3):
+            alone = function(x[:, k].copy())
+            assert np.abs(alone - columns[:, k]).max(initial=0.0) < 1e-10 * np.abs(columns).max(initial=1.0)
+
+
+def test_projected_operator(narrow):
+    """residual(F T z) = T^T F T z."""
+    coarse, F = narrow.coarse, narrow.solver.operator
+    found = dense.matrix(narrow.cell, lambda z: coarse.residual(F.apply(coarse.admissible(z))))
+    assert relative_error(found, narrow.T.T @ narrow.twin.F @ narrow.T) < 1e-9
+
+
+def test_residual_and_correction(narrow):
+    """After a correction nothing is left that a coarse vector sees; what is taken off is of rigid-body motions."""
+    coarse, F = narrow.coarse, dense.matrix(narrow.cell, narrow.solver.operator.apply)
+    r = narrow.random(1)
+    c = dense.gathered(narrow.cell, coarse.correction(narrow.own(r)))
+    left = dense.gathered(narrow.cell, coarse.residual(narrow.own(r - F @ c)))
+    lengths = np.linalg.norm(narrow.U, axis=0)
+    assert np.abs(narrow.U.T @ left / lengths).max() < 1e-9 * np.abs(narrow.U.T @ r / lengths).max()
+    taken = r - F @ c - left
+    P = dense.projector(narrow.twin.G)
+    assert np.linalg.norm(P @ taken) < 1e-9 * np.linalg.norm(taken)
+    again = dense.gathered(narrow.cell, coarse.residual(narrow.own(left)))
+    assert np.linalg.norm(again - left) < 1e-9 * np.linalg.norm(left)
+
+
+def test_correction_has_the_least_energy(narrow):
+    """z^T F z / 2 - z^T r is least of all z = U c with G^T z = 0."""
+    F, r = narrow.twin.F, narrow.random(2)
+    V = narrow.U @ null_space(narrow.twin.G.T @ narrow.U)
+    V /= np.linalg.norm(V, axis=0)
+    expected = V @ np.linalg.lstsq(V.T @ F @ V, V.T @ r, rcond=1e-13)[0]
+    found = dense.gathered(narrow.cell, narrow.coarse.correction(narrow.own(r)))
+    assert relative_error(found, expected) < 1e-8
+    assert np.abs(narrow.twin.G.T @ found).max() < 1e-9 * np.abs(found).max()
+
+    def energy(z):
+        return z @ F @ z / 2 - z @ r
+
+    steps = V @ np.random.default_rng(3).standard_normal((V.shape[1], 20))
+    assert energy(found) < 0
+    assert all(energy(found) < energy(found + t * step) for step in steps.T for t in (-1e-3, 1e-3))
+
+
+def null_space(A):
+    """Orthonormal null space of a wide matrix, its columns scaled."""
+    scale = 1 / np.linalg.norm(A, axis=0)
+    values, rows = np.linalg.svd(A * scale)[1:]
+    return scale[:, None] * rows[(values > 1e-11 * values[0]).sum() :].T
+
+
+# The spectrum.
+
+
+def test_deflation_bounds_the_spectrum(narrow):
+    least, largest = dense.extreme_eigenvalues(narrow.T, narrow.twin.F, narrow.M)
+    natural = dense.extreme_eigenvalues(dense.projector(narrow.twin.G), narrow.twin.F, narrow.M)[1]
+    assert least > 1 - 1e-8
+    assert largest < BOUND / THRESHOLD
+    assert natural > 20 * largest
+
+
+def test_threshold_trades_vectors_for_conditioning(narrow):
+    found = []
+    for threshold in (0.03, THRESHOLD, 0.5):
+        cell = narrow if threshold == THRESHOLD else Narrow(threshold)
+        assert cell.coarse.threshold == threshold
+        largest = dense.extreme_eigenvalues(cell.T, cell.twin.F, cell.M)[1]
+        assert largest < BOUND / threshold
+        found.append((cell.coarse.vectors, -largest))
+    assert found == sorted(found)
+    assert found[0][0] < found[1][0] < found[2][0]
+
+
+# Inactive rows.
+
+
+def statuses(cell, seed):
+    """Statuses of this rank's nodes: an arc of each fibre open, some more nodes open or closed, at random."""
+    rng, nodes = np.random.default_rng(seed), cell.solver.constraints.nodes
+    points = np.concatenate(cell.comm.allgather(nodes.points))
+    place = np.empty(len(points), int)
+    place[np.lexsort(np.round(points, 8).T)] = np.arange(len(points))
+    first = cell.comm.exscan(len(nodes.row)) or 0
+    draws = rng.random(len(points))[place[first : first + len(nodes.row)]]
+    away = (cell.directions - rng.uniform(0, 360) + 180) % 360 - 180
+    status = np.where(draws < 0.1, OPEN, np.where(draws < 0.25, CLOSED, BONDED))
+    return np.where(np.abs(away) < 40, OPEN, status).astype(np.int8)
+
+
+def masks(cell, seeds):
+    interface = bonds.interface(cell, True)
+    return [interface.active(statuses(cell, seed)) for seed in seeds]
+
+
+def energies(cell, coarse):
+    """The coarse matrix of U, dense, and the same by applying F to U."""
+    active = cell.solver.active.mask[:, None]
+    U = active * coarse.U.toarray()
+    expected = cell.comm.allreduce(U.T @ cell.solver.operator.apply(U))
+    return total(cell.comm, coarse._E).toarray(), expected
+
+
+def test_updated_coarse_matrix_equals_one_from_scratch(comm):
+    cell, fresh = bonds.tear(comm, **BREAKING), bonds.tear(comm, **BREAKING)
+    steps = masks(cell, range(3))
+    for active in steps:
+        cell.solver.activate(active)
+        found, expected = energies(cell, cell.solver.coarse)
+        assert relative_error(found, expected) < 1e-10
+    fresh.solver.activate(steps[-1])
+    scratch, _ = energies(fresh, fresh.solver.coarse)
+    assert relative_error(found, scratch) < 1e-12
+    first, second = (dense.matrix(c, c.solver.coarse.admissible) for c in (cell, fresh))
+    assert relative_error(first, second) < 1e-8
+
+
+def test_masked_corrections_are_the_best(comm):
+    """T against a dense one of the active rows; the space is in use, not fallen back from."""
+    cell = bonds.tear(comm, **BREAKING)
+    twin = dense.DualTwin(cell)
+    for active in masks(cell, range(2)):
+        cell.solver.activate(active)
+        on = dense.gathered(cell, active) > 0
+        assert 0.05 < (~on).mean() < 0.5
+        U = dense.gathered(cell, cell.solver.coarse.U.toarray())[on]
+        assert on.sum() > ROOM * U.shape[1]
+        expected = dense.deflation(twin.F[np.ix_(on, on)], U, twin.G[on])
+        T = dense.matrix(cell, lambda z, a=active: cell.solver.coarse.admissible(a[:, None] * z))
+        assert (T[~on] == 0).all() and (T[:, ~on] == 0).all()
+        assert relative_error(T[np.ix_(on, on)], expected) < 1e-7
+        M = twin.preconditioner(on)
+        assert relative_error(dense.matrix(cell, cell.solver.preconditioner.apply), M) < 1e-11
+
+
+@pytest.mark.parametrize("case", [BREAKING, NARROW], ids=["breaking", "narrow"])
+def test_inactive_rows_give_the_natural_spaces_solution(comm, case):
+    adaptive, natural = (
+        bonds.tear(comm, **case, petsc={"feti_coarse_space": space}) for space in ("adaptive", "natural")
+    )
+    assert isinstance(adaptive.solver.coarse, AdaptiveCoarse)
+    assert not isinstance(natural.solver.coarse, AdaptiveCoarse)
+    first = together(adaptive)
+    steps = masks(adaptive, range(3))
+    for active in [*steps, np.ones(len(steps[0]))]:
+        for cell in (adaptive, natural):
+            cell.solver.activate(active)
+        found, expected = (together(c) for c in (adaptive, natural))
+        compare(comm, adaptive, found, expected)
+        assert found[0].iterations <= expected[0].iterations
+    compare(comm, adaptive, found, first)
+
+
+def compare(comm, cell, found, expected):
+    for a, b in zip(found, expected, strict=True):
+        assert a.reason > 0 and b.reason > 0
+        assert relative_error(bonds.stress(cell, a), bonds.stress(cell, b)) < 1e-8
+        lam, other = (dense.gathered(cell, s.lam) for s in (a, b))
+        assert relative_error(lam, other) < 1e-6
+        jump, other = (dense.gathered(cell, s.jump) for s in (a, b))
+        opening = np.abs(dense.gathered(cell, cell.solver.d)).max()
+        assert np.abs(jump - other).max() < 1e-6 * opening
+
+
+@pytest.mark.parametrize("which", ["one", "all"])
+@pytest.mark.parametrize("case", [BREAKING, NARROW], ids=["breaking", "narrow"])
+def test_loose_fibres(comm, case, which):
+    """Without contact, fibres whose interface is wholly open; with few rows left the space may give up."""
+    results = []
+    for space in ("adaptive", "natural"):
+        cell = bonds.tear(comm, **case, petsc={"feti_coarse_space": space})
+        fibre = cell.solver.constraints.nodes.fibre
+        lowest = comm.allreduce(fibre.min(initial=1000), MPI.MIN)
+        status = np.where((fibre == lowest) | (which == "all"), OPEN, BONDED).astype(np.int8)
+        cell.solver.activate(bonds.interface(cell, False).active(status))
+        fibres = len(set().union(*comm.allgather(set(fibre)))) if which == "all" else 1
+        assert cell.solver.coarse.free.shape[1] == 3 * fibres
+        results.append(together(cell))
+    for found, expected in zip(*results, strict=True):
+        assert found.reason > 0
+        assert relative_error(*(bonds.stress(cell, solution) for solution in (found, expected))) < 1e-8
+
+
+# Solutions.
+
+
+def test_together_as_one_by_one(narrow):
+    solver = narrow.solver
+    strains = np.array([[1.0, 0, 0], [0.2, -3.0, 1e-3], [0, 0, 1e-4]])
+    starts = narrow.own(narrow.random(4, (3,))) * [0.0, 1e-2, 0.0]
+    solutions = together(narrow.cell, strains, starts)
+    for strain, start, found in zip(strains, starts.T, solutions, strict=True):
+        (alone,) = together(narrow.cell, strain[None], start[:, None])
+        assert alone.reason > 0 and found.reason > 0
+        assert (found.strain == strain).all()
+        assert relative_error(*(dense.gathered(narrow.cell, s.lam) for s in (found, alone))) < 1e-7
+        assert relative_error(*(solver.stress_integral(s) for s in (found, alone))) < 1e-9
+        assert abs(found.iterations - alone.iterations) <= 4
+
+
+def test_a_load_without_multipliers_among_others(narrow):
+    zero, found = together(narrow.cell, np.array([[0.0, 0, 0], [1.0, 0, 0]]))
+    assert (zero.lam == 0).all()
+    (alone,) = together(narrow.cell, STRAINS[:1])
+    assert relative_error(*(dense.gathered(narrow.cell, s.lam) for s in (found, alone))) < 1e-7
+
+
+def test_ranks_do_not_matter(comm):
+    """The same cell on this and on one rank."""
+    found = []
+    for some in (comm, MPI.COMM_SELF):
+        cell = bonds.tear(some, **NARROW)
+        solution = cell.solver.solve(np.array([1.0, -0.5, 0.3]), np.zeros(cell.solver.rows))
+        soft = of_all(some, cell.solver.coarse, cell)
+        found.append((cell.solver.coarse.vectors, soft, solution.iterations, bonds.stress(cell, solution)))
+    (vectors, soft, iterations, stress), (of_one, soft_of_one, iterations_of_one, stress_of_one) = found
+    assert vectors == of_one
+    assert soft == soft_of_one
+    assert abs(iterations - iterations_of_one) <= 1
+    assert relative_error(stress, stress_of_one) < 1e-9
+
+
+@pytest.mark.parametrize("pieces", [24, 50], ids=["matrix cut", "all cut"])
+@pytest.mark.parametrize("contrast", [1e-3, 1.0, 1e6])
+def test_contrasts_converge_fast(comm, contrast, pieces):
+    case = NARROW | {
+        "matrix": {"young": 1.0, "poisson": 0.3}, "fibre": {"young": contrast, "poisson": 0.3},
+        "petsc": {"feti_ksp_rtol": 1e-8}, "decomposition": {"subdomains": pieces},
+    }  # fmt: skip
+    torn, L, responses = solve(make_case(**case), comm)
+    assert isinstance(torn.solver.coarse, AdaptiveCoarse)
+    assert all(r.state.solution.reason > 0 for r in responses)
+    assert max(r.state.iterations for r in responses) <= 30
+    # The tolerance is on the three load cases together.
+    assert max(r.state.solution.residual for r in responses) <= np.sqrt(3) * 1e-8
+    assert relative_error(L, twin_stiffness(torn)) < 1e-7
+
+
+# Options.
+
+
+@pytest.mark.parametrize(
+    ("case", "space", "adaptive"),
+    [
+        (BREAKING, "auto", True),
+        (BREAKING, "natural", False),
+        ({"geometry": "hexagonal"}, "adaptive", True),
+        ({"geometry": "hexagonal", "decomposition": {"subdomains": 1}}, "auto", False),
+    ],
+)
+def test_choice_of_the_coarse_space(comm, case, space, adaptive):
+    coarse = bonds.tear(comm, **case, petsc={"feti_coarse_space": space}).solver.coarse
+    assert isinstance(coarse, AdaptiveCoarse) == adaptive
+
+
+@pytest.mark.parametrize(
+    ("petsc", "words"),
+    [
+        ({"feti_coarse_space": "deluxe"}, "-feti_coarse_space deluxe: expected one of auto, natural, adaptive"),
+        ({"feti_dual_operator": "direct"}, "-feti_dual_operator direct: expected one of auto, implicit, explicit"),
+        ({"feti_coarse_space": "adaptive", "feti_dual_operator": "implicit"}, "-feti_coarse_space adaptive: needs"),
+        ({"feti_coarse_space": "adaptive", "feti_pc_type": "none"}, "-feti_coarse_space adaptive: needs"),
+        ({"feti_coarse_space": "adaptive", "feti_pc_type": "lumped"}, "-feti_coarse_space adaptive: needs"),
+    ],
+)
+def test_wrong_options_are_refused(comm, petsc, words):
+    with pytest.raises(CaseError) as caught:
+        bonds.tear(comm, **BREAKING, petsc=petsc)
+    (fault,) = caught.value.faults
+    assert fault.startswith(words)
+
+
+@pytest.mark.parametrize("petsc", [{"feti_dual_operator": "implicit"}, {"feti_pc_type": "lumped"}])
+def test_natural_space_where_the_adaptive_one_cannot_be(comm, petsc):
+    cell = bonds.tear(comm, **BREAKING, petsc=petsc)
+    assert not isinstance(cell.solver.coarse, AdaptiveCoarse)
+
+
+def printed(comm, capfd, **case):
+    """What a torn cell and one solve print on rank 0, on every rank."""
+    capfd.readouterr()
+    cell = bonds.tear(comm, **case)
+    cell.solver.solve(np.array([1.0, -0.5, 0.3]), np.zeros(cell.solver.rows))
+    return cell, comm.bcast(capfd.readouterr().out)
+
+
+def number(pattern, text):
+    return float(re.search(pattern + r" ([\d.e+]+)", text)[1])
+
+
+def test_view(comm, narrow, capfd):
+    cell, text = printed(comm, capfd, **NARROW, petsc={"feti_view": True})
+    assert number("coarse dimension", text) == narrow.coarse.vectors
+    assert number("kernels:", text) == narrow.coarse.dimension
+    assert number("soft modes below", text) == THRESHOLD
+    assert f"soft modes below {THRESHOLD:g}: {narrow.coarse.vectors - narrow.coarse.dimension}," in text
+    assert f"{cell.plan.subdomains} subdomains, {cell.plan.subdomains} with dense boundary operators" in text
+    least, largest = dense.extreme_eigenvalues(narrow.T, narrow.twin.F, narrow.M)
+    assert 0.7 * largest / least < number("condition number about", text) < 1.01 * largest / least
+
+
+def test_view_of_the_natural_space(comm, narrow, capfd):
+    _, text = printed(comm, capfd, **NARROW, petsc={"feti_view": True, "feti_coarse_space": "natural"})
+    assert number("coarse dimension", text) == narrow.coarse.dimension
+    assert "soft modes" not in text
+    assert number("condition number about", text) > 10 * BOUND / THRESHOLD
+
+
+def test_nothing_is_printed_unasked(comm, capfd):
+    assert printed(comm, capfd, **BREAKING)[1] == ""
