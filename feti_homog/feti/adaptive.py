@@ -19,6 +19,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy.sparse import bmat, csr_matrix, diags, hstack
 
+from feti_homog import heap
 from feti_homog.feti.assembled import summed, total
 from feti_homog.feti.boundary import Boundary
 from feti_homog.feti.coarse import CoarseProblem
@@ -64,6 +65,7 @@ class AdaptiveCoarse(CoarseProblem):
         self._rows, self._boundary = neighbours.rows, boundary
         self._blocks = dual_blocks(comm, constraints, boundary, scaling, self._rows)
         V = coarse_vectors(self._blocks, neighbours, threshold)
+        heap.trim()
         self.counts = [v.shape[1] - b.R.shape[1] for v, b in zip(V, self._blocks, strict=True)]
         self._mask = np.ones(len(constraints.rows))
         own = (boundary.B @ self.R).tocsr()

@@ -17,6 +17,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from feti_homog import heap
 from feti_homog.cell.refine import Lattice
 from feti_homog.errors import CaseError
 from feti_homog.feti import boundary as boundaries
@@ -91,6 +92,7 @@ class FetiSolver:
         )
         self.coarse = self._coarse(space, soft)
         self.boundary.release()
+        heap.trim()
         self.active = ActiveRows(self.rows)
         self._view = PETSc.Options("feti_").getBool("view", False)
         self._krylov: dict[int, Krylov] = {}

@@ -19,7 +19,7 @@ ROOMS = (
     ("errors",),
     ("schema", "sections", "material", "bonding", "case"),
     ("bounds",),
-    ("parallel",),
+    ("parallel", "heap"),
     ("options", "petsc_c", "petsc_options", "progress"),
     ("cell",),
     ("fem",),
