@@ -33,11 +33,11 @@ Float = NDArray[np.float64]
 Bool = NDArray[np.bool_]
 
 # Typical numbers, for the choice between implicit and explicit operators.
-ITERATIONS_OF_A_SOLVE, SOLVES_OF_A_CONTACT, SOLVES_OF_A_PATH = 12, 3, 100
+ITERATIONS_OF_A_SOLVE, SOLVES_OF_A_CONTACT, SOLVES_OF_A_PATH = 20, 3, 100
 # Degrees of freedom of a piece that make set-up and solve fastest, unless there would be more than so many pieces: the
-# coarse problem grows faster than they do.  A body is cut that is larger than a piece by a factor, or, where bonds
-# break, that has more boundary degrees of freedom than is good for dense matrices.
-FASTEST, MOST, LARGE, WIDE = 3000, 1600, 2.5, 2500
+# coarse problem grows faster than they do; a piece gets `NARROW` of its boundary to other bodies at most.  A body is
+# cut that is larger than a piece by a factor, or, where bonds break, whose boundary is too long for dense matrices.
+FASTEST, MOST, NARROW, LARGE, WIDE = 3000, 1600, 500, 2.5, 2500
 FIBRES_OF = {"square": 1, "hexagonal": 2}
 
 
@@ -222,8 +222,13 @@ def _pieces(case: Case, load: Int, edges: Int, lattice: Lattice, n_ranks: int) -
         return pieces_for_count(load, wanted.subdomains)
     # A debonding cell is solved so often that whole bodies pay, as long as their dense matrices are small.
     size = max(FASTEST, int(load.sum()) * dofs_of_triangle // MOST)
-    large = load * dofs_of_triangle > LARGE * size if case.interface is None else edges * 2 * lattice.intervals > WIDE
-    pieces = np.where(large, pieces_for_size(load, dofs_of_triangle, size), 1)
+    boundary = edges * 2 * lattice.intervals
+    large = (load * dofs_of_triangle > LARGE * size) | (boundary > LARGE * NARROW)
+    if case.interface is not None:
+        large = boundary > WIDE
+    by_size = pieces_for_size(load, dofs_of_triangle, size)
+    by_boundary = np.minimum(-(-boundary // NARROW), load)
+    pieces = np.where(large, np.maximum(by_size, by_boundary), 1)
     return pieces if pieces.sum() >= n_ranks else pieces_for_count(load, n_ranks)
 
 

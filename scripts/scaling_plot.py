@@ -49,6 +49,7 @@ def plot(path: Path, studies: dict[str, list[Row]], futures: dict[str, list[Pred
 
 
 def _sizes(axes: Axes, rows: Sequence[Row]) -> None:
+    axes.set_visible(len(rows) > 0)
     places, start = np.arange(len(rows)), np.zeros(len(rows))
     for stage, ink in zip(STAGES, STAGE_INK, strict=True):
         values = np.array([1e6 * row.ranks * row.seconds[stage] / row.dofs for row in rows])

@@ -54,17 +54,13 @@ class DualTwin:
         constraints = cell.solver.constraints
         own = []
         for s, first in zip(cell.subdomains, cell.offsets, strict=False):
-            B = np.zeros((constraints.total, len(s.Q)))
+            K, B = s.K.toarray(), np.zeros((constraints.total, len(s.Q)))
             B[constraints.rows] = constraints.B[:, first : first + len(s.Q)].toarray()
-            own.append((s.piece.index, s.K.toarray(), B))
+            at = boundary_of(B)
+            diagonal = np.diag(K)[at].reshape(-1, 2)
+            own.append((s.piece.index, schur(K, at), B[:, at], np.repeat(diagonal.mean(axis=1), 2)))
         parts = sorted((part for parts in cell.comm.allgather(own) for part in parts), key=lambda part: part[0])
-        boundaries = [boundary_of(B) for _, _, B in parts]
-        self.B = [B[:, at] for (_, _, B), at in zip(parts, boundaries, strict=True)]
-        self.S = [schur(K, at) for (_, K, _), at in zip(parts, boundaries, strict=True)]
-        self.D = [
-            np.repeat(np.diag(K)[at].reshape(-1, 2).mean(axis=1), 2)
-            for (_, K, _), at in zip(parts, boundaries, strict=True)
-        ]
+        self.S, self.B, self.D = ([part[i] for part in parts] for i in (1, 2, 3))
         self.total = constraints.total
         self.kernels = [kernel(S) for S in self.S]
         self.G = np.hstack([B @ R for B, R in zip(self.B, self.kernels, strict=True)])

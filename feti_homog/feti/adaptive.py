@@ -34,7 +34,7 @@ Float = NDArray[np.float64]
 
 THRESHOLD = 0.2
 # Active rows per coarse vector below which the vectors are taken to depend on each other.
-ROOM = 4
+ROOM = 2
 # Largest T T z - T z, and G^T T z, of a usable coarse problem, relative to T z and G^T z.
 LEAK = 1e-6
 # Subdomains whose dense contributions are held at once.
@@ -76,6 +76,7 @@ class AdaptiveCoarse(CoarseProblem):
         # (columns, S+ B^T U there) of each subdomain
         self._answers: list[tuple[Int, Float]]
         U = _preconditioned(comm, constraints, self._blocks, neighbours, V)
+        heap.trim()
         self._span(U)
         self._factor(np.ones(self.U.shape[0]))
 
@@ -159,6 +160,7 @@ class AdaptiveCoarse(CoarseProblem):
             at = free.tocoo()
             E = E + csr_matrix((at.data, (at.row + first, at.col + first)), shape=E.shape)
         matrix = bmat([[E, K.T], [K, -free]])
+        heap.trim()
         self._kkt = IndefiniteSolver(matrix.tocsr(), "feti_coarse_")
         rows = int(self.everywhere(np.array([active.sum()]))[0])
         self._usable = rows >= ROOM * self.vectors

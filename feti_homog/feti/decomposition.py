@@ -117,7 +117,7 @@ def _deal(load: Int, left: Int, right: Int, n_ranks: int) -> Int:
         return even
     near = _metis(_graph(len(load), left, right, np.ones_like(left)), n_ranks, load)
     most = [np.bincount(ranks, load, n_ranks).max() for ranks in (near, even)]
-    return near if most[0] <= UNEVEN * most[1] else even
+    return near if most[0] <= UNEVEN * most[1] and len(np.unique(near)) == n_ranks else even
 
 
 def _dealt_evenly(load: Int, n_ranks: int) -> Int:

@@ -87,10 +87,9 @@ class FetiSolver:
         soft = space == "adaptive" or (space == "auto" and _cut(comm, subdomains))
         self.boundary = Boundary(self.constraints, subdomains, kind, applications, soft)
         self.operator = DualOperator(self.constraints, self.boundary)
-        self.preconditioner = preconditioners.preconditioner(
-            _choice("pc_type", preconditioners.KINDS, "dirichlet"), comm, self.constraints, self.boundary
-        )
-        self.coarse = self._coarse(space, soft)
+        pc = _choice("pc_type", preconditioners.KINDS, "dirichlet")
+        self.preconditioner = preconditioners.preconditioner(pc, comm, self.constraints, self.boundary)
+        self.coarse = self._coarse(space, soft, pc == "dirichlet")
         self.boundary.release()
         heap.trim()
         self.active = ActiveRows(self.rows)
@@ -98,6 +97,7 @@ class FetiSolver:
         self._krylov: dict[int, Krylov] = {}
         # Left to PETSc's finalization, the shells would call a Python that is gone.
         self._release = weakref.finalize(self, _free, self._krylov)
+        self.rtol = RTOL
         self.rtol = float(self._solver_for(1).ksp.getTolerances()[0])
         self.solves = 0
         if self._view:
@@ -232,17 +232,17 @@ class FetiSolver:
     def _solver_for(self, columns: int) -> Krylov:
         if columns not in self._krylov:
             self._krylov[columns] = Krylov(
-                self.constraints.vector, self.operator, self.preconditioner, self.coarse, self.active, columns, RTOL
+                self.constraints.vector, self.operator, self.preconditioner, self.coarse, self.active, columns, self.rtol
             )
             if self._view:
                 self._krylov[columns].ksp.setComputeSingularValues(True)
         return self._krylov[columns]
 
-    def _coarse(self, space: str, soft: bool) -> CoarseProblem:
+    def _coarse(self, space: str, soft: bool, dirichlet: bool) -> CoarseProblem:
         """Adaptive where bodies are cut and all subdomains have dense operators; else the natural one."""
         threshold = PETSc.Options("feti_").getReal("coarse_threshold", THRESHOLD)
         dense = all(isinstance(o, Condensed) for o in self.boundary.operators)
-        able = self.comm.allreduce(dense and isinstance(self.preconditioner, Scaled), MPI.LAND)
+        able = self.comm.allreduce(dense and dirichlet, MPI.LAND)
         if space == "adaptive" and not able:
             raise CaseError(
                 "-feti_coarse_space adaptive: needs -feti_pc_type dirichlet and -feti_dual_operator explicit"

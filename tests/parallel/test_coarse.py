@@ -41,12 +41,13 @@ SINGLE = 2e-6
 class Narrow:
     """The narrow cell at one threshold, its twin, U, T and the preconditioner as dense matrices."""
 
-    def __init__(self, threshold):
+    def __init__(self, threshold, twin=None):
+        """The twin does not depend on the threshold.  Collective."""
         self.threshold = threshold
         self.cell = bonds.tear(MPI.COMM_WORLD, **NARROW, petsc={"feti_coarse_threshold": threshold})
         self.solver = self.cell.solver
         self.coarse = self.solver.coarse
-        self.twin = dense.DualTwin(self.cell)
+        self.twin = twin or dense.DualTwin(self.cell)
         self.M = self.twin.preconditioner(np.ones(self.twin.total, bool))
         self.U = dense.gathered(self.cell, self.coarse.U.toarray())
         self.T = dense.deflation(self.twin.F, self.U, self.twin.G)
@@ -219,7 +220,7 @@ def test_deflation_bounds_the_spectrum(narrow):
 def test_threshold_trades_vectors_for_conditioning(narrow):
     found = []
     for threshold in (0.03, THRESHOLD, 0.5):
-        cell = narrow if threshold == THRESHOLD else Narrow(threshold)
+        cell = narrow if threshold == THRESHOLD else Narrow(threshold, narrow.twin)
         assert cell.coarse.threshold == threshold
         largest = dense.extreme_eigenvalues(cell.T, cell.twin.F, cell.M)[1]
         assert largest < BOUND / threshold
@@ -289,8 +290,14 @@ def test_masked_corrections_are_the_best(comm):
         assert relative_error(dense.matrix(cell, cell.solver.preconditioner.apply), M) < 1e-11
 
 
-@pytest.mark.parametrize("case", [BREAKING, NARROW], ids=["breaking", "narrow"])
-def test_inactive_rows_give_the_natural_spaces_solution(comm, case):
+@pytest.mark.parametrize(
+    ("case", "share"),
+    # With few rows the space may give up, and is the natural one but for rounding.
+    [(BREAKING, 0.9), (NARROW, 1.1), (NARROW | {"refine": 1}, 0.4)],
+    ids=["breaking", "narrow", "refined"],
+)
+def test_inactive_rows_give_the_natural_spaces_solution(comm, case, share):
+    """In that share of the iterations."""
     adaptive, natural = (
         bonds.tear(comm, **case, petsc={"feti_coarse_space": space}) for space in ("adaptive", "natural")
     )
@@ -303,7 +310,7 @@ def test_inactive_rows_give_the_natural_spaces_solution(comm, case):
             cell.solver.activate(active)
         found, expected = (together(c) for c in (adaptive, natural))
         compare(comm, adaptive, found, expected)
-        assert found[0].iterations <= expected[0].iterations
+        assert found[0].iterations <= share * expected[0].iterations
     compare(comm, adaptive, found, first)
 
 
