@@ -37,7 +37,7 @@ ITERATIONS_OF_A_SOLVE, SOLVES_OF_A_CONTACT, SOLVES_OF_A_PATH = 20, 3, 100
 # Degrees of freedom of a piece that make set-up and solve fastest, unless there would be more than so many pieces: the
 # coarse problem grows faster than they do; a piece gets `NARROW` of its boundary to other bodies at most.  A body is
 # cut that is larger than a piece by a factor, or, where bonds break, whose boundary is too long for dense matrices.
-FASTEST, MOST, NARROW, LARGE, WIDE = 3000, 1600, 500, 2.5, 2500
+FASTEST, MOST, NARROW, LARGE, WIDE = 3000, 4000, 500, 2.5, 2500
 FIBRES_OF = {"square": 1, "hexagonal": 2}
 
 

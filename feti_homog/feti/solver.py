@@ -231,9 +231,8 @@ class FetiSolver:
 
     def _solver_for(self, columns: int) -> Krylov:
         if columns not in self._krylov:
-            self._krylov[columns] = Krylov(
-                self.constraints.vector, self.operator, self.preconditioner, self.coarse, self.active, columns, self.rtol
-            )
+            vector, parts = self.constraints.vector, (self.operator, self.preconditioner, self.coarse, self.active)
+            self._krylov[columns] = Krylov(vector, *parts, columns, self.rtol)
             if self._view:
                 self._krylov[columns].ksp.setComputeSingularValues(True)
         return self._krylov[columns]

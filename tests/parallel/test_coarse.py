@@ -1,18 +1,15 @@
-"""The adaptive coarse space against dense algebra, the natural one and the monolithic twin."""
+"""The adaptive coarse space against dense algebra."""
 
 from __future__ import annotations
-
-import re
 
 import bonds
 import dense
 import numpy as np
 import pytest
-from cells import make_case, relative_error, solve, twin_stiffness
+from cells import relative_error
 from mpi4py import MPI
-from scipy.linalg import eigh
+from narrow_cells import BOUND, BREAKING, NARROW, SINGLE, Narrow, of_all, together
 
-from feti_homog.errors import CaseError
 from feti_homog.feti.adaptive import ROOM, THRESHOLD, AdaptiveCoarse
 from feti_homog.feti.assembled import total
 from feti_homog.feti.boundary import Boundary
@@ -20,71 +17,8 @@ from feti_homog.feti.neighbours import Neighbours
 from feti_homog.feti.preconditioner import preconditioner
 from feti_homog.feti.spectral import coarse_vectors, dual_blocks
 from feti_homog.interface.contact import BONDED, CLOSED, OPEN
-from feti_homog.petsc_options import case_options
 
 pytestmark = pytest.mark.parallel
-
-# Sixteen fibres almost touch; the matrix is cut across the gaps.
-NARROW = {
-    "geometry": "random", "fibres": 16, "fibre_fraction": 0.5, "min_gap": 0.02, "mesh_size": 0.12, "seed": 1,
-    "decomposition": {"subdomains": 24},
-}  # fmt: skip
-# Many rows of few subdomains, so that many may be inactive.
-BREAKING = {"geometry": "hexagonal", "mesh_size": 0.12, "refine": 1, "decomposition": {"subdomains": 8}}
-STRAINS = np.eye(3)
-# Of the largest eigenvalue and 1 / threshold.
-BOUND = 1.3
-# N may be told among subdomains in single precision.
-SINGLE = 2e-6
-
-
-class Narrow:
-    """The narrow cell at one threshold, its twin, U, T and the preconditioner as dense matrices."""
-
-    def __init__(self, threshold, twin=None):
-        """The twin does not depend on the threshold.  Collective."""
-        self.threshold = threshold
-        self.cell = bonds.tear(MPI.COMM_WORLD, **NARROW, petsc={"feti_coarse_threshold": threshold})
-        self.solver = self.cell.solver
-        self.coarse = self.solver.coarse
-        self.twin = twin or dense.DualTwin(self.cell)
-        self.M = self.twin.preconditioner(np.ones(self.twin.total, bool))
-        self.U = dense.gathered(self.cell, self.coarse.U.toarray())
-        self.T = dense.deflation(self.twin.F, self.U, self.twin.G)
-
-    def soft_modes(self):
-        """For each subdomain: (n,) all theta of S p = theta N p, rising, and (n, n) the modes."""
-        for B, S in zip(self.twin.B, self.twin.S, strict=True):
-            yield eigh(S, B.T @ self.M @ B)
-
-    def own(self, whole):
-        """This rank's rows."""
-        first, last = self.solver.constraints.owned
-        return whole[first:last]
-
-    def random(self, seed, columns=()):
-        """A vector on all rows."""
-        return np.random.default_rng(seed).standard_normal((self.twin.total, *columns))
-
-
-@pytest.fixture(scope="module")
-def narrow():
-    cell = Narrow(THRESHOLD)
-    yield cell
-    cell.solver.destroy()
-
-
-def together(cell, strains=STRAINS, starts=None):
-    """The dual solutions under some strains, with the options of the case."""
-    with case_options(cell.case.petsc):
-        zero = np.zeros((cell.solver.rows, len(strains)))
-        return cell.solver.solve_together(strains, zero if starts is None else starts)
-
-
-def of_all(comm, coarse, cell):
-    """Soft modes of all subdomains in the order of their numbers."""
-    own = zip((s.piece.index for s in cell.subdomains), coarse.counts, strict=True)
-    return [count for _, count in sorted(pair for part in comm.allgather(list(own)) for pair in part)]
 
 
 # The coarse vectors.
@@ -342,132 +276,3 @@ def test_loose_fibres(comm, case, which):
     for found, expected in zip(*results, strict=True):
         assert found.reason > 0
         assert relative_error(*(bonds.stress(cell, solution) for solution in (found, expected))) < 1e-8
-
-
-# Solutions.
-
-
-def test_together_as_one_by_one(narrow):
-    solver = narrow.solver
-    strains = np.array([[1.0, 0, 0], [0.2, -3.0, 1e-3], [0, 0, 1e-4]])
-    starts = narrow.own(narrow.random(4, (3,))) * [0.0, 1e-2, 0.0]
-    solutions = together(narrow.cell, strains, starts)
-    for strain, start, found in zip(strains, starts.T, solutions, strict=True):
-        (alone,) = together(narrow.cell, strain[None], start[:, None])
-        assert alone.reason > 0 and found.reason > 0
-        assert (found.strain == strain).all()
-        assert relative_error(*(dense.gathered(narrow.cell, s.lam) for s in (found, alone))) < 1e-7
-        assert relative_error(*(solver.stress_integral(s) for s in (found, alone))) < 1e-9
-        assert abs(found.iterations - alone.iterations) <= 4
-
-
-def test_a_load_without_multipliers_among_others(narrow):
-    zero, found = together(narrow.cell, np.array([[0.0, 0, 0], [1.0, 0, 0]]))
-    assert (zero.lam == 0).all()
-    (alone,) = together(narrow.cell, STRAINS[:1])
-    assert relative_error(*(dense.gathered(narrow.cell, s.lam) for s in (found, alone))) < 1e-7
-
-
-def test_ranks_do_not_matter(comm):
-    """The same cell on this and on one rank."""
-    found = []
-    for some in (comm, MPI.COMM_SELF):
-        cell = bonds.tear(some, **NARROW)
-        solution = cell.solver.solve(np.array([1.0, -0.5, 0.3]), np.zeros(cell.solver.rows))
-        soft = of_all(some, cell.solver.coarse, cell)
-        found.append((cell.solver.coarse.vectors, soft, solution.iterations, bonds.stress(cell, solution)))
-    (vectors, soft, iterations, stress), (of_one, soft_of_one, iterations_of_one, stress_of_one) = found
-    assert vectors == of_one
-    assert soft == soft_of_one
-    assert abs(iterations - iterations_of_one) <= 1
-    assert relative_error(stress, stress_of_one) < 1e-9
-
-
-@pytest.mark.parametrize("pieces", [24, 50], ids=["matrix cut", "all cut"])
-@pytest.mark.parametrize("contrast", [1e-3, 1.0, 1e6])
-def test_contrasts_converge_fast(comm, contrast, pieces):
-    case = NARROW | {
-        "matrix": {"young": 1.0, "poisson": 0.3}, "fibre": {"young": contrast, "poisson": 0.3},
-        "petsc": {"feti_ksp_rtol": 1e-8}, "decomposition": {"subdomains": pieces},
-    }  # fmt: skip
-    torn, L, responses = solve(make_case(**case), comm)
-    assert isinstance(torn.solver.coarse, AdaptiveCoarse)
-    assert all(r.state.solution.reason > 0 for r in responses)
-    assert max(r.state.iterations for r in responses) <= 30
-    # The tolerance is on the three load cases together.
-    assert max(r.state.solution.residual for r in responses) <= np.sqrt(3) * 1e-8
-    assert relative_error(L, twin_stiffness(torn)) < 1e-7
-
-
-# Options.
-
-
-@pytest.mark.parametrize(
-    ("case", "space", "adaptive"),
-    [
-        (BREAKING, "auto", True),
-        (BREAKING, "natural", False),
-        ({"geometry": "hexagonal"}, "adaptive", True),
-        ({"geometry": "hexagonal", "decomposition": {"subdomains": 1}}, "auto", False),
-    ],
-)
-def test_choice_of_the_coarse_space(comm, case, space, adaptive):
-    coarse = bonds.tear(comm, **case, petsc={"feti_coarse_space": space}).solver.coarse
-    assert isinstance(coarse, AdaptiveCoarse) == adaptive
-
-
-@pytest.mark.parametrize(
-    ("petsc", "words"),
-    [
-        ({"feti_coarse_space": "deluxe"}, "-feti_coarse_space deluxe: expected one of auto, natural, adaptive"),
-        ({"feti_dual_operator": "direct"}, "-feti_dual_operator direct: expected one of auto, implicit, explicit"),
-        ({"feti_coarse_space": "adaptive", "feti_dual_operator": "implicit"}, "-feti_coarse_space adaptive: needs"),
-        ({"feti_coarse_space": "adaptive", "feti_pc_type": "none"}, "-feti_coarse_space adaptive: needs"),
-        ({"feti_coarse_space": "adaptive", "feti_pc_type": "lumped"}, "-feti_coarse_space adaptive: needs"),
-    ],
-)
-def test_wrong_options_are_refused(comm, petsc, words):
-    with pytest.raises(CaseError) as caught:
-        bonds.tear(comm, **BREAKING, petsc=petsc)
-    (fault,) = caught.value.faults
-    assert fault.startswith(words)
-
-
-@pytest.mark.parametrize("petsc", [{"feti_dual_operator": "implicit"}, {"feti_pc_type": "lumped"}])
-def test_natural_space_where_the_adaptive_one_cannot_be(comm, petsc):
-    cell = bonds.tear(comm, **BREAKING, petsc=petsc)
-    assert not isinstance(cell.solver.coarse, AdaptiveCoarse)
-
-
-def printed(comm, capfd, **case):
-    """What a torn cell and one solve print on rank 0, on every rank."""
-    capfd.readouterr()
-    cell = bonds.tear(comm, **case)
-    cell.solver.solve(np.array([1.0, -0.5, 0.3]), np.zeros(cell.solver.rows))
-    return cell, comm.bcast(capfd.readouterr().out)
-
-
-def number(pattern, text):
-    return float(re.search(pattern + r" ([\d.e+]+)", text)[1])
-
-
-def test_view(comm, narrow, capfd):
-    cell, text = printed(comm, capfd, **NARROW, petsc={"feti_view": True})
-    assert number("coarse dimension", text) == narrow.coarse.vectors
-    assert number("kernels:", text) == narrow.coarse.dimension
-    assert number("soft modes below", text) == THRESHOLD
-    assert f"soft modes below {THRESHOLD:g}: {narrow.coarse.vectors - narrow.coarse.dimension}," in text
-    assert f"{cell.plan.subdomains} subdomains, {cell.plan.subdomains} with dense boundary operators" in text
-    least, largest = dense.extreme_eigenvalues(narrow.T, narrow.twin.F, narrow.M)
-    assert 0.7 * largest / least < number("condition number about", text) < 1.01 * largest / least
-
-
-def test_view_of_the_natural_space(comm, narrow, capfd):
-    _, text = printed(comm, capfd, **NARROW, petsc={"feti_view": True, "feti_coarse_space": "natural"})
-    assert number("coarse dimension", text) == narrow.coarse.dimension
-    assert "soft modes" not in text
-    assert number("condition number about", text) > 10 * BOUND / THRESHOLD
-
-
-def test_nothing_is_printed_unasked(comm, capfd):
-    assert printed(comm, capfd, **BREAKING)[1] == ""

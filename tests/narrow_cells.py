@@ -1,0 +1,66 @@
+"""The cells of the tests of the adaptive coarse space."""
+
+from __future__ import annotations
+
+import bonds
+import dense
+import numpy as np
+from mpi4py import MPI
+from scipy.linalg import eigh
+
+from feti_homog.petsc_options import case_options
+
+# Sixteen fibres almost touch; the matrix is cut across the gaps.
+NARROW = {
+    "geometry": "random", "fibres": 16, "fibre_fraction": 0.5, "min_gap": 0.02, "mesh_size": 0.12, "seed": 1,
+    "decomposition": {"subdomains": 24},
+}  # fmt: skip
+# Many rows of few subdomains, so that many may be inactive.
+BREAKING = {"geometry": "hexagonal", "mesh_size": 0.12, "refine": 1, "decomposition": {"subdomains": 8}}
+STRAINS = np.eye(3)
+# Of the largest eigenvalue and 1 / threshold.
+BOUND = 1.3
+# N may be told among subdomains in single precision.
+SINGLE = 2e-6
+
+
+class Narrow:
+    """The narrow cell at one threshold, its twin, U, T and the preconditioner as dense matrices."""
+
+    def __init__(self, threshold, twin=None):
+        """The twin does not depend on the threshold.  Collective."""
+        self.threshold = threshold
+        self.cell = bonds.tear(MPI.COMM_WORLD, **NARROW, petsc={"feti_coarse_threshold": threshold})
+        self.solver = self.cell.solver
+        self.coarse = self.solver.coarse
+        self.twin = twin or dense.DualTwin(self.cell)
+        self.M = self.twin.preconditioner(np.ones(self.twin.total, bool))
+        self.U = dense.gathered(self.cell, self.coarse.U.toarray())
+        self.T = dense.deflation(self.twin.F, self.U, self.twin.G)
+
+    def soft_modes(self):
+        """For each subdomain: (n,) all theta of S p = theta N p, rising, and (n, n) the modes."""
+        for B, S in zip(self.twin.B, self.twin.S, strict=True):
+            yield eigh(S, B.T @ self.M @ B)
+
+    def own(self, whole):
+        """This rank's rows."""
+        first, last = self.solver.constraints.owned
+        return whole[first:last]
+
+    def random(self, seed, columns=()):
+        """A vector on all rows."""
+        return np.random.default_rng(seed).standard_normal((self.twin.total, *columns))
+
+
+def together(cell, strains=STRAINS, starts=None):
+    """The dual solutions under some strains, with the options of the case."""
+    with case_options(cell.case.petsc):
+        zero = np.zeros((cell.solver.rows, len(strains)))
+        return cell.solver.solve_together(strains, zero if starts is None else starts)
+
+
+def of_all(comm, coarse, cell):
+    """Soft modes of all subdomains in the order of their numbers."""
+    own = zip((s.piece.index for s in cell.subdomains), coarse.counts, strict=True)
+    return [count for _, count in sorted(pair for part in comm.allgather(list(own)) for pair in part)]

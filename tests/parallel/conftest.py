@@ -1,0 +1,17 @@
+"""Fixtures of the tests under mpirun."""
+
+from __future__ import annotations
+
+import pytest
+
+
+@pytest.fixture(scope="module")
+def narrow():
+    """The narrow cell at the default threshold."""
+    from narrow_cells import Narrow
+
+    from feti_homog.feti.adaptive import THRESHOLD
+
+    cell = Narrow(THRESHOLD)
+    yield cell
+    cell.solver.destroy()

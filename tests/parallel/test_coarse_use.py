@@ -1,0 +1,147 @@
+"""Solutions with the adaptive coarse space, and its options."""
+
+from __future__ import annotations
+
+import re
+
+import bonds
+import dense
+import numpy as np
+import pytest
+from cells import make_case, relative_error, solve, twin_stiffness
+from mpi4py import MPI
+from narrow_cells import BOUND, BREAKING, NARROW, STRAINS, of_all, together
+
+from feti_homog.errors import CaseError
+from feti_homog.feti.adaptive import THRESHOLD, AdaptiveCoarse
+
+pytestmark = pytest.mark.parallel
+
+
+# Solutions.
+
+
+def test_together_as_one_by_one(narrow):
+    solver = narrow.solver
+    strains = np.array([[1.0, 0, 0], [0.2, -3.0, 1e-3], [0, 0, 1e-4]])
+    starts = narrow.own(narrow.random(4, (3,))) * [0.0, 1e-2, 0.0]
+    solutions = together(narrow.cell, strains, starts)
+    for strain, start, found in zip(strains, starts.T, solutions, strict=True):
+        (alone,) = together(narrow.cell, strain[None], start[:, None])
+        assert alone.reason > 0 and found.reason > 0
+        assert (found.strain == strain).all()
+        assert relative_error(*(dense.gathered(narrow.cell, s.lam) for s in (found, alone))) < 1e-7
+        assert relative_error(*(solver.stress_integral(s) for s in (found, alone))) < 1e-9
+        assert abs(found.iterations - alone.iterations) <= 4
+
+
+def test_a_load_without_multipliers_among_others(narrow):
+    zero, found = together(narrow.cell, np.array([[0.0, 0, 0], [1.0, 0, 0]]))
+    assert (zero.lam == 0).all()
+    (alone,) = together(narrow.cell, STRAINS[:1])
+    assert relative_error(*(dense.gathered(narrow.cell, s.lam) for s in (found, alone))) < 1e-7
+
+
+def test_ranks_do_not_matter(comm):
+    """The same cell on this and on one rank."""
+    found = []
+    for some in (comm, MPI.COMM_SELF):
+        cell = bonds.tear(some, **NARROW)
+        solution = cell.solver.solve(np.array([1.0, -0.5, 0.3]), np.zeros(cell.solver.rows))
+        soft = of_all(some, cell.solver.coarse, cell)
+        found.append((cell.solver.coarse.vectors, soft, solution.iterations, bonds.stress(cell, solution)))
+    (vectors, soft, iterations, stress), (of_one, soft_of_one, iterations_of_one, stress_of_one) = found
+    assert vectors == of_one
+    assert soft == soft_of_one
+    assert abs(iterations - iterations_of_one) <= 1
+    assert relative_error(stress, stress_of_one) < 1e-9
+
+
+@pytest.mark.parametrize("pieces", [24, 50], ids=["matrix cut", "all cut"])
+@pytest.mark.parametrize("contrast", [1e-3, 1.0, 1e6])
+def test_contrasts_converge_fast(comm, contrast, pieces):
+    case = NARROW | {
+        "matrix": {"young": 1.0, "poisson": 0.3}, "fibre": {"young": contrast, "poisson": 0.3},
+        "petsc": {"feti_ksp_rtol": 1e-8}, "decomposition": {"subdomains": pieces},
+    }  # fmt: skip
+    torn, L, responses = solve(make_case(**case), comm)
+    assert isinstance(torn.solver.coarse, AdaptiveCoarse)
+    assert all(r.state.solution.reason > 0 for r in responses)
+    assert max(r.state.iterations for r in responses) <= 30
+    # The tolerance is on the three load cases together.
+    assert max(r.state.solution.residual for r in responses) <= np.sqrt(3) * 1e-8
+    assert relative_error(L, twin_stiffness(torn)) < 1e-7
+
+
+# Options.
+
+
+@pytest.mark.parametrize(
+    ("case", "space", "adaptive"),
+    [
+        (BREAKING, "auto", True),
+        (BREAKING, "natural", False),
+        ({"geometry": "hexagonal"}, "adaptive", True),
+        ({"geometry": "hexagonal", "decomposition": {"subdomains": 1}}, "auto", False),
+    ],
+)
+def test_choice_of_the_coarse_space(comm, case, space, adaptive):
+    coarse = bonds.tear(comm, **case, petsc={"feti_coarse_space": space}).solver.coarse
+    assert isinstance(coarse, AdaptiveCoarse) == adaptive
+
+
+@pytest.mark.parametrize(
+    ("petsc", "words"),
+    [
+        ({"feti_coarse_space": "deluxe"}, "-feti_coarse_space deluxe: expected one of auto, natural, adaptive"),
+        ({"feti_dual_operator": "direct"}, "-feti_dual_operator direct: expected one of auto, implicit, explicit"),
+        ({"feti_coarse_space": "adaptive", "feti_dual_operator": "implicit"}, "-feti_coarse_space adaptive: needs"),
+        ({"feti_coarse_space": "adaptive", "feti_pc_type": "none"}, "-feti_coarse_space adaptive: needs"),
+        ({"feti_coarse_space": "adaptive", "feti_pc_type": "lumped"}, "-feti_coarse_space adaptive: needs"),
+    ],
+)
+def test_wrong_options_are_refused(comm, petsc, words):
+    with pytest.raises(CaseError) as caught:
+        bonds.tear(comm, **BREAKING, petsc=petsc)
+    (fault,) = caught.value.faults
+    assert fault.startswith(words)
+
+
+@pytest.mark.parametrize("petsc", [{"feti_dual_operator": "implicit"}, {"feti_pc_type": "lumped"}])
+def test_natural_space_where_the_adaptive_one_cannot_be(comm, petsc):
+    cell = bonds.tear(comm, **BREAKING, petsc=petsc)
+    assert not isinstance(cell.solver.coarse, AdaptiveCoarse)
+
+
+def printed(comm, capfd, **case):
+    """What a torn cell and one solve print on rank 0, on every rank."""
+    capfd.readouterr()
+    cell = bonds.tear(comm, **case)
+    cell.solver.solve(np.array([1.0, -0.5, 0.3]), np.zeros(cell.solver.rows))
+    return cell, comm.bcast(capfd.readouterr().out)
+
+
+def number(pattern, text):
+    return float(re.search(pattern + r" ([\d.e+]+)", text)[1])
+
+
+def test_view(comm, narrow, capfd):
+    cell, text = printed(comm, capfd, **NARROW, petsc={"feti_view": True})
+    assert number("coarse dimension", text) == narrow.coarse.vectors
+    assert number("kernels:", text) == narrow.coarse.dimension
+    assert number("soft modes below", text) == THRESHOLD
+    assert f"soft modes below {THRESHOLD:g}: {narrow.coarse.vectors - narrow.coarse.dimension}," in text
+    assert f"{cell.plan.subdomains} subdomains, {cell.plan.subdomains} with dense boundary operators" in text
+    least, largest = dense.extreme_eigenvalues(narrow.T, narrow.twin.F, narrow.M)
+    assert 0.7 * largest / least < number("condition number about", text) < 1.01 * largest / least
+
+
+def test_view_of_the_natural_space(comm, narrow, capfd):
+    _, text = printed(comm, capfd, **NARROW, petsc={"feti_view": True, "feti_coarse_space": "natural"})
+    assert number("coarse dimension", text) == narrow.coarse.dimension
+    assert "soft modes" not in text
+    assert number("condition number about", text) > 10 * BOUND / THRESHOLD
+
+
+def test_nothing_is_printed_unasked(comm, capfd):
+    assert printed(comm, capfd, **BREAKING)[1] == ""
