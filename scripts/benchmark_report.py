@@ -113,7 +113,7 @@ def write(path: Path, rows: Sequence[Row]) -> None:
 def plot(path: Path, rows: Sequence[Row], title: str) -> None:
     """Write the bars of all tools, from top to bottom in their order."""
     names = [row.name for row in rows]
-    height = 1.4 + 0.36 * len(rows)
+    height = 1.7 + 0.36 * len(rows)
     figure, (times, memory) = plt.subplots(1, 2, figsize=(9.5, height), sharey=True, width_ratios=(5, 3))
     start = [0.0] * len(rows)
     for stage, ink in zip(STAGES, INK, strict=True):
@@ -127,9 +127,9 @@ def plot(path: Path, rows: Sequence[Row], title: str) -> None:
     times.invert_yaxis()
     times.set(xlabel="seconds", title=title)
     memory.set(xlabel="peak memory of all ranks, MB")
-    times.legend(fontsize=8)
+    figure.legend(*times.get_legend_handles_labels(), loc="lower left", ncols=5, fontsize=8, frameon=False)
     for axes in (times, memory):
         axes.spines[["top", "right"]].set_visible(False)
-    figure.tight_layout()
+    figure.tight_layout(rect=(0, 0.3 / height, 1, 1))
     figure.savefig(path, dpi=200)
     plt.close(figure)
