@@ -34,7 +34,7 @@ Float = NDArray[np.float64]
 
 THRESHOLD = 0.2
 # Active rows per coarse vector below which the vectors are taken to depend on each other.
-ROOM = 2
+ROOM = 4
 # Largest T T z - T z, and G^T T z, of a usable coarse problem, relative to T z and G^T z.
 LEAK = 1e-6
 # Subdomains whose dense contributions are held at once.
@@ -106,6 +106,11 @@ class AdaptiveCoarse(CoarseProblem):
             change.add(columns, columns, loads.T @ self._answers[i][1])
         self._E = self._E + change.matrix()
         self._factor(active)
+
+    def simplify(self) -> bool:
+        """Leave it at rigid-body motions until rows change; whether that is a change."""
+        usable, self._usable = self._usable, False
+        return usable
 
     def admissible(self, z: Float) -> Float:
         """T z."""

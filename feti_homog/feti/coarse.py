@@ -90,6 +90,10 @@ class CoarseProblem:
         self.project(y)
         return y
 
+    def simplify(self) -> bool:
+        """Make the coarse space simpler after the Krylov method broke down; whether it could be."""
+        return False
+
     def admissible(self, z: Float) -> Float:
         """The part of a correction z that the Krylov method may use."""
         return self.projected(z)

@@ -39,6 +39,7 @@ Float = NDArray[np.float64]
 
 COARSE_SPACES = ("auto", "natural", "adaptive")
 RTOL = 1e-8
+BROKEN = (PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_PC, PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_MAT)
 # A jump that the active rows see of the torn cell's is none if it is as small as this.
 ROUNDING = 1e-13
 
@@ -178,12 +179,20 @@ class FetiSolver:
         lam = np.where(seen, self.coarse.projected(self.active.restrict(starts)), 0.0) / scale
         iterations, reason = 0, int(PETSc.KSP.ConvergedReason.CONVERGED_ATOL)
         if seen.any():
-            lam, residual = self._begin(lam, free)
-            lam = lam + krylov.solve(residual)
-            iterations, reason = krylov.ksp.getIterationNumber(), int(krylov.ksp.getConvergedReason())
+            lam, iterations, reason = self._krylov_solve(krylov, lam, free)
+            # Coarse vectors that depend on each other make the preconditioner indefinite by rounding.
+            if reason in BROKEN and self.coarse.simplify():
+                lam, more, reason = self._krylov_solve(krylov, lam, free)
+                iterations += more
             if self._view:
                 PETSc.Sys.Print(view.solve(krylov.ksp, k), comm=self.comm)
         return self._recover(strains, lam * scale, torn, iterations, reason, np.maximum(jump, least))
+
+    def _krylov_solve(self, krylov: Krylov, lam: Float, free: Float) -> tuple[Float, int, int]:
+        """Better multipliers, iterations, and why they ended."""
+        lam, residual = self._begin(lam, free)
+        lam = lam + krylov.solve(residual)
+        return lam, krylov.ksp.getIterationNumber(), int(krylov.ksp.getConvergedReason())
 
     def destroy(self) -> None:
         """Free PETSc's shell objects; collective.  Otherwise it is done when the solver, or Python, ends."""
