@@ -71,7 +71,7 @@ class AdaptiveCoarse(CoarseProblem):
         own = (boundary.B @ self.R).tocsr()
         shape = (own.shape[0], self.dimension)
         self._motions = csr_matrix((own.data, own.indices + self.own.start, own.indptr), shape=shape)
-        self._complete = False
+        self._complete, self._usable = False, True
         self._E: csr_matrix
         # (columns, S+ B^T U there) of each subdomain
         self._answers: list[tuple[Int, Float]]
