@@ -159,14 +159,14 @@ def test_help(words):
 def test_petscs_own_help(tmp_path):
     job = command_line(1, "run", case_file(tmp_path), "--out", tmp_path / "results", "-help")
     assert job.returncode == 0
-    assert "-feti_ksp_max_it" in job.stdout and "-feti_sub_pc_type" in job.stdout
+    assert "-feti_ksp_max_it" in job.stdout and "-feti_schur_pc_type" in job.stdout
 
 
 def test_monitor_and_log(tmp_path):
     words = ["-feti_ksp_monitor", "-feti_ksp_converged_reason", "-log_view"]
     job = command_line(2, "run", case_file(tmp_path), "--out", tmp_path / "results", *words)
     assert job.returncode == 0
-    assert job.stdout.count("0 KSP Residual norm") >= 3
+    assert job.stdout.count("0 KSP Residual norm") >= 1
     assert job.stdout.count("Linear feti_ solve converged due to CONVERGED_RTOL") == 3
     stages = re.findall(r"^ *\d+: +([\w ]+): +\S+ +[\d.]+%", job.stdout, re.MULTILINE)
     assert set(STAGES) <= set(stages)
