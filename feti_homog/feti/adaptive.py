@@ -12,7 +12,7 @@ Once some rows are inactive, M^-1 is another and Q G no longer among its range; 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from mpi4py import MPI
@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.sparse import bmat, csr_matrix, diags, hstack
 
 from feti_homog import heap
-from feti_homog.feti.assembled import summed, total
+from feti_homog.feti.assembled import Blocks, summed, total
 from feti_homog.feti.boundary import Boundary
 from feti_homog.feti.coarse import CoarseProblem
 from feti_homog.feti.constraints import Constraints
@@ -37,8 +37,6 @@ THRESHOLD = 0.2
 ROOM = 4
 # Largest T T z - T z, and G^T T z, of a usable coarse problem, relative to T z and G^T z.
 LEAK = 1e-6
-# Subdomains whose dense contributions are held at once.
-CHUNK = 16
 
 
 class AdaptiveCoarse(CoarseProblem):
@@ -95,7 +93,7 @@ class AdaptiveCoarse(CoarseProblem):
         mask = self.constraints.gather(active).copy()
         changed = mask != self._mask
         touched = [i for i, rows in enumerate(self._rows) if changed[rows].any()]
-        change = _Sum(self._E.shape)
+        change = Blocks(self._E.shape)
         for i in touched:
             columns, loads = self._loads(i)
             change.add(columns, columns, -loads.T @ self._answers[i][1])
@@ -126,12 +124,13 @@ class AdaptiveCoarse(CoarseProblem):
         _, a = self._solve(self.U.T @ r, np.zeros((self.dimension, *r.shape[1:])))
         return np.asarray(r - self.Ga @ a)
 
-    def correction(self, r: Float) -> Float:
-        """U c with U^T (r - F U c - G a) = 0 and G^T U c = 0."""
+    def improved(self, lam: Float, residual: Float, apply: Callable[[Float], Float]) -> tuple[Float, Float]:
+        """lam + U c with U^T (r - F U c - G a) = 0 and G^T U c = 0, and its residual."""
         if not self._usable:
-            return np.zeros_like(r)
-        c, _ = self._solve(self.U.T @ r, np.zeros((self.dimension, *r.shape[1:])))
-        return np.asarray(self._column(r) * (self.U @ c))
+            return lam, residual
+        c, _ = self._solve(self.U.T @ residual, np.zeros((self.dimension, *residual.shape[1:])))
+        z = self._column(residual) * (self.U @ c)
+        return lam + z, self.residual(residual - apply(z))
 
     def _column(self, x: Float) -> Float:
         """The active rows, to multiply x with."""
@@ -186,7 +185,7 @@ class AdaptiveCoarse(CoarseProblem):
     def _span(self, U: csr_matrix) -> None:
         """Let the columns of U (local rows, vectors) be the coarse vectors.  Collective."""
         self._U, self.U = U, self._own(U)
-        E = _Sum((self.vectors, self.vectors))
+        E = Blocks((self.vectors, self.vectors))
         self._answers = []
         for i, block in enumerate(self._blocks):
             columns, loads = self._loads(i)
@@ -237,7 +236,7 @@ def _preconditioned(
 
     received: list[list[tuple[int, Float]]] = [[] for _ in blocks]
     neighbours.exchange(jumps(), lambda i, sender, Z: received[i].append((sender, Z)))
-    U = _Sum((len(constraints.rows), int(every.sum())))
+    U = Blocks((len(constraints.rows), int(every.sum())))
     for i, (block, rows) in enumerate(zip(blocks, neighbours.rows, strict=True)):
         if not received[i]:
             continue
@@ -259,30 +258,3 @@ def _compressed(matrix: csr_matrix, rows: Int) -> tuple[Int, Float]:
     dense = np.zeros((len(rows), len(columns)))
     dense[np.repeat(np.arange(len(rows)), np.diff(part.indptr)), at] = part.data
     return columns, dense
-
-
-class _Sum:
-    """A sparse sum of dense blocks; few of them are held at once."""
-
-    def __init__(self, shape: tuple[int, int]) -> None:
-        self._whole = csr_matrix(shape)
-        self._held: list[tuple[Int, Int, Float]] = []
-
-    def add(self, rows: Int, columns: Int, values: Float) -> None:
-        """Add `values` (rows, columns)."""
-        self._held.append((rows, columns, values))
-        if len(self._held) == CHUNK:
-            self._flush()
-
-    def matrix(self) -> csr_matrix:
-        """The sum so far."""
-        self._flush()
-        return self._whole
-
-    def _flush(self) -> None:
-        if self._held:
-            rows = np.concatenate([np.repeat(r.astype(np.int32), len(c)) for r, c, _ in self._held])
-            columns = np.concatenate([np.tile(c.astype(np.int32), len(r)) for r, c, _ in self._held])
-            values = np.concatenate([v.ravel() for _, _, v in self._held])
-            self._whole = self._whole + csr_matrix((values, (rows, columns)), shape=self._whole.shape)
-            self._held = []

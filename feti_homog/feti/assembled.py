@@ -9,6 +9,10 @@ from petsc4py import PETSc
 from scipy.sparse import csr_matrix, diags
 
 Int = NDArray[np.int64]
+Float = NDArray[np.float64]
+
+# Dense contributions that are held at once.
+CHUNK = 16
 
 
 def assembled(
@@ -62,3 +66,30 @@ def total(comm: MPI.Intracomm, own: csr_matrix) -> csr_matrix:
     parts = comm.allgather((part.data, part.row, part.col))
     data, rows, columns = (np.concatenate(p) for p in zip(*parts, strict=True))
     return csr_matrix((data, (rows, columns)), shape=own.shape)
+
+
+class Blocks:
+    """A sparse sum of dense blocks; few of them are held at once."""
+
+    def __init__(self, shape: tuple[int, int]) -> None:
+        self._whole = csr_matrix(shape)
+        self._held: list[tuple[Int, Int, Float]] = []
+
+    def add(self, rows: Int, columns: Int, values: Float) -> None:
+        """Add `values` (rows, columns)."""
+        self._held.append((rows, columns, values))
+        if len(self._held) == CHUNK:
+            self._flush()
+
+    def matrix(self) -> csr_matrix:
+        """The sum so far."""
+        self._flush()
+        return self._whole
+
+    def _flush(self) -> None:
+        if self._held:
+            rows = np.concatenate([np.repeat(r.astype(np.int32), len(c)) for r, c, _ in self._held])
+            columns = np.concatenate([np.tile(c.astype(np.int32), len(r)) for r, c, _ in self._held])
+            values = np.concatenate([v.ravel() for _, _, v in self._held])
+            self._whole = self._whole + csr_matrix((values, (rows, columns)), shape=self._whole.shape)
+            self._held = []

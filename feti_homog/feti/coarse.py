@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
@@ -102,9 +104,12 @@ class CoarseProblem:
         """The part of a residual r that the Krylov method has to remove."""
         return self.projected(r)
 
-    def correction(self, r: Float) -> Float:
-        """What the coarse space by itself adds to multipliers with the residual r."""
-        return np.zeros_like(r)
+    def improved(self, lam: Float, residual: Float, apply: Callable[[Float], Float]) -> tuple[Float, Float]:
+        """First multipliers and their residual (rows, k), after what the coarse space by itself does for them.
+
+        `apply` is the dual operator on the active rows.
+        """
+        return lam, residual
 
     def motion(self, amplitudes: Float) -> Float:
         """R alpha on the boundary dofs."""

@@ -22,6 +22,9 @@ from feti_homog.feti.subdomain import Subdomain
 Int = NDArray[np.int64]
 Float = NDArray[np.float64]
 
+# Columns up to which packed products, one after the other, are faster than to unpack for all of them.
+FEW = 4
+
 
 class Condensed:
     """S and S+ of one subdomain on its n boundary dofs.
@@ -49,12 +52,18 @@ class Condensed:
 
     def stiffness(self, x: Float, out: Float) -> None:
         """S x for x (n,) or (n, k)."""
+        if x.size > FEW * self.n:
+            out[:] = self.forces(x)
+            return
         for column, result in _columns(x, out):
             result[:] = dtpmv(self.n, self._factor, dtpmv(self.n, self._factor, column, lower=1, trans=1), lower=1)
         out[self._fixed] -= self._term @ x[self._fixed]
 
     def flexibility(self, x: Float, out: Float) -> None:
         """S+ x for x (n,) or (n, k)."""
+        if x.size > FEW * self.n:
+            out[:] = self.answer(x)
+            return
         for column, result in _columns(x, out):
             result[:] = dtpsv(self.n, self._factor, dtpsv(self.n, self._factor, column, lower=1), lower=1, trans=1)
 

@@ -112,6 +112,7 @@ class _Exchange:
         self._scatter = PETSc.Scatter().create(self._owned, here, self._local, None)
 
     def gather(self, owned: Float) -> Float:
+        """The local rows of x (owned rows,) or (owned rows, k)."""
         if self._same:
             return owned
         self._owned.getArray()[:] = owned.ravel()
@@ -119,6 +120,7 @@ class _Exchange:
         return self._local.getArray(readonly=True).reshape(-1, *owned.shape[1:]).copy()
 
     def sum(self, local: Float) -> Float:
+        """The owned rows of the sum over ranks of x (local rows,) or (local rows, k)."""
         if self._same:
             return local
         self._owned.zeroEntries()

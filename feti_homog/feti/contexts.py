@@ -15,6 +15,7 @@ from feti_homog.feti.preconditioner import Preconditioner
 
 Float = NDArray[np.float64]
 
+RTOL = 1e-8
 # Methods that apply the preconditioner to the residual itself, so that the jump can be read off there; with the
 # others the test is on the forces alone, and the response's own checks tell of the jump.
 SEES_RESIDUAL = (PETSc.KSP.Type.CG, PETSc.KSP.Type.FCG)
@@ -109,7 +110,6 @@ class Krylov:
         coarse: CoarseProblem,
         active: ActiveRows,
         columns: int,
-        rtol: float,
     ) -> None:
         """Set up; `vector` is one of the multiplier vectors."""
         own, whole = vector.getSizes()
@@ -127,7 +127,7 @@ class Krylov:
         self.ksp.setOperators(A)
         self.ksp.setType(PETSc.KSP.Type.CG)
         self.ksp.setNormType(PETSc.KSP.NormType.PRECONDITIONED)
-        self.ksp.setTolerances(rtol=rtol, atol=0.0, max_it=2000)
+        self.ksp.setTolerances(rtol=RTOL, atol=0.0, max_it=2000)
         self.ksp.setConvergenceTest(self.test)
         pc = self.ksp.getPC()
         pc.setType(PETSc.PC.Type.PYTHON)

@@ -21,8 +21,6 @@ from feti_homog.feti.constraints import Constraints
 Int = NDArray[np.int64]
 Float = NDArray[np.float64]
 
-KINDS = ("none", "lumped", "dirichlet")
-
 
 class Preconditioner(Protocol):
     """z = M^-1 r on the owned rows, for r (owned rows,) or (owned rows, k)."""
@@ -32,6 +30,9 @@ class Preconditioner(Protocol):
 
     def apply(self, r: Float) -> Float:
         """M^-1 r; r and the result are 0 on inactive rows."""
+
+    def first(self, start: Float, closing: Float) -> Float:
+        """First multipliers of a solve: `start`, those of an earlier one, or `closing`, P M^-1 of the jump."""
 
 
 class Identity:
@@ -43,6 +44,10 @@ class Identity:
     def apply(self, r: Float) -> Float:
         """r."""
         return r.copy()
+
+    def first(self, start: Float, closing: Float) -> Float:
+        """What solved an earlier problem."""
+        return start
 
 
 class Scaled:
@@ -72,11 +77,20 @@ class Scaled:
         x = self.DBT @ self.constraints.gather(self.W_inverse @ r)
         return np.asarray(self.W_inverse @ self.constraints.sum(self.BD @ self.stiffness(x)))
 
+    def first(self, start: Float, closing: Float) -> Float:
+        """What solved an earlier problem."""
+        return start
 
-def preconditioner(kind: str, comm: MPI.Intracomm, constraints: Constraints, boundary: Boundary) -> Preconditioner:
-    """The preconditioner of a kind in KINDS."""
-    if kind == "none":
-        return Identity()
-    return Scaled(
-        comm, constraints, boundary, boundary.stiffness if kind == "dirichlet" else boundary.Kbb.__matmul__
-    )
+
+class Dirichlet(Scaled):
+    """Around the Schur complements."""
+
+    def __init__(self, comm: MPI.Intracomm, constraints: Constraints, boundary: Boundary) -> None:
+        super().__init__(comm, constraints, boundary, boundary.stiffness)
+
+
+class Lumped(Scaled):
+    """Around the boundary blocks of K."""
+
+    def __init__(self, comm: MPI.Intracomm, constraints: Constraints, boundary: Boundary) -> None:
+        super().__init__(comm, constraints, boundary, boundary.Kbb.__matmul__)

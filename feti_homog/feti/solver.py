@@ -19,26 +19,16 @@ from petsc4py import PETSc
 
 from feti_homog import heap
 from feti_homog.cell.refine import Lattice
-from feti_homog.errors import CaseError
-from feti_homog.feti import boundary as boundaries
-from feti_homog.feti import preconditioner as preconditioners
-from feti_homog.feti import view
-from feti_homog.feti.adaptive import THRESHOLD, AdaptiveCoarse
-from feti_homog.feti.boundary import Boundary
-from feti_homog.feti.coarse import CoarseProblem
-from feti_homog.feti.condensed import Condensed
+from feti_homog.feti import settings, view
 from feti_homog.feti.constraints import Constraints
 from feti_homog.feti.contexts import ActiveRows, Krylov
 from feti_homog.feti.operator import DualOperator
-from feti_homog.feti.preconditioner import Scaled
 from feti_homog.feti.shared import Shared
 from feti_homog.feti.subdomain import Subdomain
 
 Int = NDArray[np.int64]
 Float = NDArray[np.float64]
 
-COARSE_SPACES = ("auto", "natural", "adaptive")
-RTOL = 1e-8
 BROKEN = (PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_PC, PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_MAT)
 # A jump that the active rows see of the torn cell's is none if it is as small as this.
 ROUNDING = 1e-13
@@ -83,14 +73,10 @@ class FetiSolver:
         """Set up; `applications` is how many times the dual operator is expected to be applied."""
         self.comm, self.subdomains = comm, subdomains
         self.constraints = Constraints(comm, shared, subdomains, lattice)
-        kind = _choice("dual_operator", boundaries.KINDS, "auto")
-        space = _choice("coarse_space", COARSE_SPACES, "auto")
-        soft = space == "adaptive" or (space == "auto" and _cut(comm, subdomains))
-        self.boundary = Boundary(self.constraints, subdomains, kind, applications, soft)
+        self.boundary, self.preconditioner, self.coarse = settings.parts(
+            comm, self.constraints, subdomains, applications
+        )
         self.operator = DualOperator(self.constraints, self.boundary)
-        pc = _choice("pc_type", preconditioners.KINDS, "dirichlet")
-        self.preconditioner = preconditioners.preconditioner(pc, comm, self.constraints, self.boundary)
-        self.coarse = self._coarse(space, soft, pc == "dirichlet")
         self.boundary.release()
         heap.trim()
         self.active = ActiveRows(self.rows)
@@ -98,8 +84,7 @@ class FetiSolver:
         self._krylov: dict[int, Krylov] = {}
         # Left to PETSc's finalization, the shells would call a Python that is gone.
         self._release = weakref.finalize(self, _free, self._krylov)
-        self.rtol = RTOL
-        self.rtol = float(self._solver_for(1).ksp.getTolerances()[0])
+        self._solver_for(1)
         self.solves = 0
         if self._view:
             PETSc.Sys.Print(view.setup(comm, self.boundary, self.coarse), comm=comm)
@@ -113,6 +98,11 @@ class FetiSolver:
     def ksp(self) -> PETSc.KSP:
         """The Krylov method for one load case."""
         return self._solver_for(1).ksp
+
+    @property
+    def rtol(self) -> float:
+        """Relative tolerance of the Krylov method."""
+        return float(self.ksp.getTolerances()[0])
 
     @property
     def Q(self) -> Float:
@@ -176,7 +166,8 @@ class FetiSolver:
         self.solves += k
         closing = self.coarse.projected(self.preconditioner.apply(free))
         krylov.test.start(float(np.sqrt(seen.sum())), float(np.linalg.norm(self._norms(closing))))
-        lam = np.where(seen, self.coarse.projected(self.active.restrict(starts)), 0.0) / scale
+        starts = np.where(seen, self.coarse.projected(self.active.restrict(starts)), 0.0) / scale
+        lam = self.preconditioner.first(starts, closing)
         iterations, reason = 0, int(PETSc.KSP.ConvergedReason.CONVERGED_ATOL)
         if seen.any():
             lam, iterations, reason = self._krylov_solve(krylov, lam, free)
@@ -215,8 +206,7 @@ class FetiSolver:
         # Where they are no help, nothing is a better beginning.
         worse = self._norms(residual) > self._norms(free)
         lam, residual = np.where(worse, 0.0, lam), np.where(worse, free, residual)
-        coarse = self.coarse.correction(residual)
-        return lam + coarse, self.coarse.residual(residual - self.active.restrict(self.operator.apply(coarse)))
+        return self.coarse.improved(lam, residual, lambda z: self.active.restrict(self.operator.apply(z)))
 
     def _recover(
         self, strains: Float, lam: Float, torn: Float, iterations: int, reason: int, scale: Float
@@ -241,39 +231,10 @@ class FetiSolver:
     def _solver_for(self, columns: int) -> Krylov:
         if columns not in self._krylov:
             vector, parts = self.constraints.vector, (self.operator, self.preconditioner, self.coarse, self.active)
-            self._krylov[columns] = Krylov(vector, *parts, columns, self.rtol)
+            self._krylov[columns] = Krylov(vector, *parts, columns)
             if self._view:
                 self._krylov[columns].ksp.setComputeSingularValues(True)
         return self._krylov[columns]
-
-    def _coarse(self, space: str, soft: bool, dirichlet: bool) -> CoarseProblem:
-        """Adaptive where bodies are cut and all subdomains have dense operators; else the natural one."""
-        threshold = PETSc.Options("feti_").getReal("coarse_threshold", THRESHOLD)
-        dense = all(isinstance(o, Condensed) for o in self.boundary.operators)
-        able = self.comm.allreduce(dense and dirichlet, MPI.LAND)
-        if space == "adaptive" and not able:
-            raise CaseError(
-                "-feti_coarse_space adaptive: needs -feti_pc_type dirichlet and -feti_dual_operator explicit"
-            )
-        if isinstance(self.preconditioner, Scaled) and able and soft:
-            return AdaptiveCoarse(
-                self.comm, self.constraints, self.boundary, self.preconditioner, threshold
-            )
-        return CoarseProblem(self.comm, self.constraints, self.boundary)
-
-
-def _cut(comm: MPI.Intracomm, subdomains: Sequence[Subdomain]) -> bool:
-    """Whether bodies are cut into pieces: the webs that METIS makes of a matrix have soft modes."""
-    bodies = comm.allreduce(max((s.piece.body for s in subdomains), default=-1), MPI.MAX) + 1
-    return bool(comm.allreduce(len(subdomains)) > bodies)
-
-
-def _choice(name: str, known: Sequence[str], default: str) -> str:
-    """The value of the option -feti_`name`."""
-    value = PETSc.Options("feti_").getString(name, default)
-    if value not in known:
-        raise CaseError(f"-feti_{name} {value}: expected one of {', '.join(known)}")
-    return str(value)
 
 
 def _free(krylov: dict[int, Krylov]) -> None:

@@ -1,0 +1,123 @@
+"""The inverse of the dual operator by influence columns, against dense algebra and the other preconditioners."""
+
+from __future__ import annotations
+
+import bonds
+import numpy as np
+import pytest
+from cells import relative_error
+from dense import DualTwin, gathered, matrix
+from narrow_cells import BREAKING, NARROW, together
+from scipy.linalg import null_space
+
+from feti_homog.errors import CaseError
+from feti_homog.feti.condensed import Condensed
+from feti_homog.feti.influence import Influence
+from feti_homog.feti.settings import MANY
+from feti_homog.interface.contact import BONDED, CLOSED, OPEN
+
+pytestmark = pytest.mark.parallel
+
+INFLUENCE = {"feti_pc_type": "influence"}
+CELLS = pytest.mark.parametrize(
+    "case",
+    [
+        {"geometry": "square"},
+        {"geometry": "hexagonal", "bodies": "plane", "order": 2},
+        {"geometry": "random", "fibres": 3, "fibre_fraction": 0.3, "min_gap": 0.1},
+        BREAKING,
+    ],
+    ids=["square", "plane bodies", "random", "cut"],
+)
+
+
+def inverse(twin, active):
+    """(total, total) N (N^T F N)^-1 N^T for a basis N of the forces on the active rows that are in equilibrium."""
+    N = np.eye(twin.total)[:, active]
+    N = N @ null_space(twin.G.T @ N)
+    return N @ np.linalg.solve(N.T @ twin.F @ N, N.T)
+
+
+def activate(cell, status):
+    """The active rows, on all ranks, of a status; the solver is set to them."""
+    active = bonds.interface(cell, True).active(status)
+    cell.solver.activate(active)
+    return gathered(cell, active) > 0
+
+
+def states(cell):
+    """Statuses that open, close, bond again and loosen a whole fibre."""
+    nodes = cell.solver.constraints.nodes
+    angle = np.degrees(np.arctan2(nodes.normal[:, 1], nodes.normal[:, 0]))
+    bonded = np.full(len(nodes.row), BONDED, np.int8)
+    arc = np.where(np.abs(angle) < 40, OPEN, bonded)
+    closed = np.where(np.abs(angle) < 15, CLOSED, arc)
+    longer = np.where(np.abs(angle) < 70, OPEN, bonded)
+    loose = np.where(nodes.fibre == 0, OPEN, longer)
+    return [bonded, arc, closed, longer, loose, arc, bonded]
+
+
+@CELLS
+def test_is_the_inverse_for_any_active_rows(comm, case):
+    cell = bonds.tear(comm, **case, petsc=INFLUENCE)
+    twin, influence = DualTwin(cell), cell.solver.preconditioner
+    assert isinstance(influence, Influence)
+    for status in states(cell):
+        active = activate(cell, status)
+        expected = inverse(twin, active)
+        found = matrix(cell, influence.apply)
+        assert relative_error(found, expected) < 1e-8
+        assert np.abs(found[~active]).max(initial=0.0) == 0.0
+        alone = gathered(cell, influence.apply(np.ones(cell.solver.rows)))
+        assert relative_error(alone, expected @ np.ones(twin.total)) < 1e-8
+
+
+@CELLS
+def test_leaves_nothing_to_iterate(comm, case):
+    cell = bonds.tear(comm, **case, petsc=INFLUENCE)
+    other = bonds.tear(comm, **case, petsc={"feti_pc_type": "dirichlet"})
+    for status in states(cell):
+        activate(cell, status)
+        activate(other, status)
+        for found, expected in zip(together(cell), together(other), strict=True):
+            assert found.reason > 0 and found.iterations <= 1
+            assert expected.iterations > 1
+            lam = [gathered(c, s.lam) for c, s in ((cell, found), (other, expected))]
+            assert relative_error(*lam) < 1e-5
+
+
+def test_narrow_gaps_and_contrasts(comm):
+    for contrast in (1e-6, 1e6):
+        cell = bonds.tear(comm, **NARROW, fibre={"young": 3.0 * contrast, "poisson": 0.3}, petsc=INFLUENCE)
+        solutions = together(cell)
+        assert all(s.reason > 0 and s.iterations <= 3 and s.residual < 1e-7 for s in solutions)
+
+
+@pytest.mark.parametrize(
+    ("applications", "petsc", "chosen"),
+    [
+        (MANY, {}, True),
+        (60, {}, False),
+        (MANY, {"feti_pc_type": "dirichlet"}, False),
+        (MANY, {"feti_coarse_space": "adaptive"}, False),
+        (MANY, {"feti_dual_operator": "implicit"}, False),
+    ],
+    ids=["path", "stiffness", "dirichlet", "adaptive", "implicit"],
+)
+def test_chosen_for_many_applications(comm, monkeypatch, applications, petsc, chosen):
+    monkeypatch.setattr("feti_homog.torn._applications", lambda case: applications)
+    solver = bonds.tear(comm, **BREAKING, petsc=petsc).solver
+    assert isinstance(solver.preconditioner, Influence) == chosen
+    if chosen:
+        assert all(isinstance(o, Condensed) for o in solver.boundary.operators)
+
+
+def test_not_chosen_where_the_bonded_cell_is_too_large(comm, monkeypatch):
+    monkeypatch.setattr("feti_homog.torn._applications", lambda case: MANY)
+    monkeypatch.setattr("feti_homog.feti.settings.LARGEST_BONDED", 10)
+    assert not isinstance(bonds.tear(comm, **BREAKING).solver.preconditioner, Influence)
+
+
+def test_needs_dense_operators(comm):
+    with pytest.raises(CaseError, match="-feti_pc_type influence: needs -feti_dual_operator explicit"):
+        bonds.tear(comm, **BREAKING, petsc=INFLUENCE | {"feti_dual_operator": "implicit"})
