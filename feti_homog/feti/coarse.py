@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
-from scipy.sparse import block_diag, csr_matrix, diags
+from scipy.sparse import block_diag, csr_matrix, diags, hstack
 
 from feti_homog.cell.torus import components
 from feti_homog.feti.assembled import assembled, total
@@ -127,11 +127,20 @@ def _null_vectors(gram: csr_matrix, body: Int, held: int, tolerance: float) -> F
     number = np.unique(body[loose], return_inverse=True)[1]
     group = components(int(number.max(initial=-1)) + 1, number[rest.row], number[rest.col])[number]
     order = np.argsort(group, kind="stable")
-    rest = rest.tocsr()
-    vectors = [np.zeros((0, len(body)))]
-    for some in np.split(order, np.flatnonzero(np.diff(group[order])) + 1):
-        values, basis = np.linalg.eigh(rest[some][:, some].toarray())
-        null = basis[:, values < tolerance]
-        vectors.append(np.zeros((null.shape[1], len(body))))
-        vectors[-1][:, loose[some]] = null.T
-    return np.concatenate(vectors).T
+    sizes, rest = np.bincount(group), rest.tocsr()
+    starts = np.cumsum(sizes) - sizes
+    parts = [csr_matrix((len(body), 0))]
+    for size in np.unique(sizes):
+        members = order[starts[sizes == size][:, None] + np.arange(size)]
+        values, vectors = np.linalg.eigh(_blocks(rest, members))
+        which, mode = np.nonzero(values < tolerance)
+        at = loose[members[which]].ravel(), np.repeat(np.arange(len(which)), size)
+        null = vectors[which, :, mode].ravel()
+        parts.append(csr_matrix((null, at), shape=(len(body), len(which))))
+    return np.asarray(hstack(parts).toarray())
+
+
+def _blocks(matrix: csr_matrix, members: Int) -> Float:
+    """(b, m, m) dense blocks of the rows and columns `members` (b, m)."""
+    rows, columns = np.broadcast_arrays(members[:, :, None], members[:, None, :])
+    return np.asarray(matrix[rows.ravel(), columns.ravel()]).reshape(rows.shape)

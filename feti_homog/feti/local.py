@@ -51,7 +51,13 @@ class LocalSolver:
 
 
 class DirectSolver:
-    """X = A^-1 B for one symmetric matrix A and any number of right-hand sides."""
+    """X = A^-1 B for one symmetric matrix A and any number of right-hand sides.
+
+    Attributes:
+        few: right-hand sides up to which the library is faster with one at a time.
+    """
+
+    few = 16
 
     def __init__(self, matrix: csr_matrix, prefix: str) -> None:
         """Factorize a definite matrix.  Options under `prefix` (default: cholesky by CHOLMOD)."""
@@ -60,10 +66,13 @@ class DirectSolver:
 
     def solve(self, B: Float) -> Float:
         """A^-1 B for B (n,) or (n, k)."""
-        if B.size == len(B):
-            self._b.setArray(B.ravel())
-            self._ksp.solve(self._b, self._x)
-            return self._x.getArray(readonly=True).reshape(B.shape).copy()
+        if B.size <= self.few * len(B):
+            X = np.empty_like(B)
+            for x, b in zip(X.reshape(len(B), -1).T, B.reshape(len(B), -1).T, strict=True):
+                self._b.setArray(b)
+                self._ksp.solve(self._b, self._x)
+                x[:] = self._x.getArray(readonly=True)
+            return X
         X = np.empty(B.shape, order="F")
         right = np.asfortranarray(B)
         matrices = (PETSc.Mat().createDense(X.shape, array=a, comm=PETSc.COMM_SELF) for a in (right, X))
@@ -73,6 +82,8 @@ class DirectSolver:
 
 class IndefiniteSolver(DirectSolver):
     """The same for an indefinite matrix whose rows and columns are scaled, with one step of iterative refinement."""
+
+    few = 1
 
     def __init__(self, matrix: csr_matrix, prefix: str) -> None:
         """Factorize.  Options under `prefix` (default: cholesky by MUMPS)."""
