@@ -27,7 +27,12 @@ OPTIONS = (
     Option("feti_ksp_converged_reason", "", "", "print why each solve ended"),
     Option("feti_ksp_view", "", "", "print the solver's settings"),
     Option("feti_ksp_view_singularvalues", "", "", "print the estimated condition number"),
-    Option("feti_pc_type", "dirichlet|lumped|none", "dirichlet", "preconditioner of the dual problem"),
+    Option(
+        "feti_pc_type",
+        "auto|dirichlet|influence|lumped|none",
+        "auto",
+        "preconditioner of the dual problem; influence: exact, by columns of unit jumps",
+    ),
     Option(
         "feti_dual_operator",
         "auto|implicit|explicit",
@@ -69,10 +74,14 @@ OPTIONS = (
         "cholmod",
         "library of the rigid-body coarse factorization",
     ),
-    Option("feti_coarse_pc_factor_mat_solver_type", "mumps|...", "mumps", "library of the coarse factor"),
+    Option("feti_coarse_pc_factor_mat_solver_type", "cholmod|mumps", "cholmod", "library of the coarse factor"),
+    Option("feti_bonded_pc_factor_mat_solver_type", "cholmod|mumps", "cholmod", "library of the bonded cell's factor"),
 )
 
-PREFIXES = ("feti_ksp_", "feti_pc_", "feti_sub_", "feti_interior_", "feti_schur_", "feti_natural_", "feti_coarse_")
+PREFIXES = (
+    "feti_ksp_", "feti_pc_", "feti_sub_", "feti_interior_", "feti_schur_", "feti_natural_", "feti_coarse_",
+    "feti_bonded_",
+)  # fmt: skip
 """Prefixes of PETSc solvers: what follows is PETSc's to know."""
 
 OWN_SHORT = ("-h",)

@@ -17,16 +17,16 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
-from scipy.sparse import bmat, csr_matrix, diags, hstack
+from scipy.sparse import csr_matrix, diags, hstack
 
 from feti_homog import heap
 from feti_homog.feti.assembled import Blocks, summed, total
 from feti_homog.feti.boundary import Boundary
 from feti_homog.feti.coarse import CoarseProblem
 from feti_homog.feti.constraints import Constraints
-from feti_homog.feti.local import IndefiniteSolver
 from feti_homog.feti.neighbours import Neighbours
 from feti_homog.feti.preconditioner import Scaled
+from feti_homog.feti.saddle import SaddlePoint
 from feti_homog.feti.spectral import DualBlock, coarse_vectors, dual_blocks
 
 Int = NDArray[np.int64]
@@ -139,36 +139,31 @@ class AdaptiveCoarse(CoarseProblem):
     def _solve(self, energy: Float, work: Float) -> tuple[Float, Float]:
         """c and a of the coarse problem whose right-hand sides are the sums over ranks of the arguments."""
         right = self.everywhere(np.concatenate([energy, work]))
-        scale = self._scale if right.ndim == 1 else self._scale[:, None]
-        x = scale * self._kkt.solve(scale * right)
-        return x[: self.vectors], x[self.vectors :]
+        return self.saddle.solve(right[: self.vectors], right[self.vectors :])
 
     def _factor(self, active: Float) -> None:
         self._active = active
-        E = total(self.comm, self._E)
-        K = total(self.comm, (self.GaT @ self.U).tocsr())
-        energy = E.diagonal()
-        vanished = self.everywhere(abs(self.U.T) @ active) == 0.0
-        self._scale = np.ones(self.vectors + self.dimension)
-        self._scale[: self.vectors] = 1.0 / np.sqrt(np.where(vanished, 1.0, energy))
-        K = K @ diags(self._scale[: self.vectors])
-        length = np.sqrt(np.asarray(K.multiply(K).sum(axis=1)).ravel())
-        self._scale[self.vectors :] = 1.0 / np.where(length > 0, length, 1.0)
-        K = diags(self._scale[self.vectors :]) @ K
-        D = diags(self._scale[: self.vectors])
-        # Motions that nothing resists have amplitude 0, and no part in the columns of G.
-        free = csr_matrix(self.free @ self.free.T)
-        E = D @ E @ D + diags(vanished.astype(float))
-        if self._complete:
-            first = self.vectors - self.dimension
-            at = free.tocoo()
-            E = E + csr_matrix((at.data, (at.row + first, at.col + first)), shape=E.shape)
-        matrix = bmat([[E, K.T], [K, -free]])
-        heap.trim()
-        self._kkt = IndefiniteSolver(matrix.tocsr(), "feti_coarse_")
         rows = int(self.everywhere(np.array([active.sum()]))[0])
-        self._usable = rows >= ROOM * self.vectors
-        self._usable = self._usable and self._projects()
+        self._usable = rows >= ROOM * self.vectors and self._factored() and self._projects()
+
+    def _factored(self) -> bool:
+        """Factor the coarse matrix; whether it could be.  Collective."""
+        seen = self.everywhere(abs(self.U.T) @ self._active) > 0.0
+        mask = diags(seen.astype(float))
+        E = mask @ total(self.comm, self._E) @ mask + diags((~seen).astype(float))
+        # Motions that nothing resists have no part in the columns of G.
+        free = csr_matrix(self.free @ self.free.T)
+        if self._complete:
+            at, first = free.tocoo(), self.vectors - self.dimension
+            resistance = at.data * E.diagonal()[first:].mean(), (at.row + first, at.col + first)
+            E = E + csr_matrix(resistance, shape=E.shape)
+        K = total(self.comm, (self.GaT @ self.U).tocsr()) @ mask
+        heap.trim()
+        try:
+            self.saddle = SaddlePoint(E.tocsr(), K.tocsr(), free, "feti_coarse_")
+        except np.linalg.LinAlgError:
+            return False
+        return True
 
     def _projects(self) -> bool:
         """Whether T is a projector that leaves no work of rigid-body motions.

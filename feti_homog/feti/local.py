@@ -11,6 +11,7 @@ from scipy.sparse import csr_matrix
 
 Float = NDArray[np.float64]
 
+
 # Per cent of MUMPS' estimate of workspace that it may need more for pivoting.
 PIVOTING_ROOM = 200
 
@@ -38,11 +39,6 @@ class LocalSolver:
                 )
                 self._solves.append((factorized(matrix, prefix), *vectors))
 
-    @property
-    def factorizations(self) -> int:
-        """How many factorizations are held; none is ever made again."""
-        return len(self._solves)
-
     def solve(self) -> Float:
         """Solve with `b` as it stands; returns `x`, which the next solve overwrites."""
         for ksp, b, x in self._solves:
@@ -51,18 +47,22 @@ class LocalSolver:
 
 
 class DirectSolver:
-    """X = A^-1 B for one symmetric matrix A and any number of right-hand sides.
+    """X = A^-1 B for one symmetric definite matrix A and any number of right-hand sides."""
 
-    Attributes:
-        few: right-hand sides up to which the library is faster with one at a time.
-    """
-
+    # Right-hand sides up to which the library is faster with one at a time.
     few = 16
 
     def __init__(self, matrix: csr_matrix, prefix: str) -> None:
-        """Factorize a definite matrix.  Options under `prefix` (default: cholesky by CHOLMOD)."""
-        self._ksp = factorized(matrix, prefix)
-        self._x, self._b = self._ksp.getOperators()[0].createVecs()
+        """Factorize.  Options under `prefix` (default: cholesky by CHOLMOD).
+
+        Raises:
+            PETSc.Error: the matrix is not positive definite.
+        """
+        self._hold(factorized(matrix, prefix))
+
+    def _hold(self, ksp: PETSc.KSP) -> None:
+        self._ksp = ksp
+        self._x, self._b = ksp.getOperators()[0].createVecs()
 
     def solve(self, B: Float) -> Float:
         """A^-1 B for B (n,) or (n, k)."""
@@ -81,41 +81,42 @@ class DirectSolver:
 
 
 class IndefiniteSolver(DirectSolver):
-    """The same for an indefinite matrix whose rows and columns are scaled, with one step of iterative refinement."""
+    """The same for an indefinite matrix whose rows and columns are scaled."""
 
     few = 1
 
     def __init__(self, matrix: csr_matrix, prefix: str) -> None:
-        """Factorize.  Options under `prefix` (default: cholesky by MUMPS)."""
-        self._matrix = matrix
-        self._ksp = factorized(matrix, prefix, definite=False)
-        self._x, self._b = self._ksp.getOperators()[0].createVecs()
+        """Factorize by MUMPS, L D L^T.
 
-    def solve(self, B: Float) -> Float:
-        """A^-1 B for B (n,) or (n, k)."""
-        X = super().solve(B)
-        return X + super().solve(B - self._matrix @ X)
+        Raises:
+            PETSc.Error: the matrix is singular.
+        """
+        ksp = _unfactored(matrix, prefix, PETSc.Mat.Option.SYMMETRIC)
+        ksp.getPC().setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
+        ksp.getPC().setFactorSetUpSolverType()
+        # Its own scaling loses all digits of coarse problems with contrasts of 1e6; these come scaled.
+        ksp.getPC().getFactorMatrix().setMumpsIcntl(8, 0)
+        ksp.getPC().getFactorMatrix().setMumpsIcntl(14, PIVOTING_ROOM)
+        ksp.setUp()
+        self._hold(ksp)
 
 
-def factorized(matrix: csr_matrix, prefix: str, definite: bool = True) -> PETSc.KSP:
-    """A KSP with the factorization of a symmetric matrix; options under `prefix`."""
-    A = PETSc.Mat().createAIJ(
-        matrix.shape, csr=(matrix.indptr, matrix.indices, matrix.data), comm=PETSc.COMM_SELF
-    )
-    A.setOption(PETSc.Mat.Option.SPD if definite else PETSc.Mat.Option.SYMMETRIC, True)
+def factorized(matrix: csr_matrix, prefix: str) -> PETSc.KSP:
+    """A KSP with the factorization of a symmetric definite matrix; options under `prefix`."""
+    ksp = _unfactored(matrix, prefix, PETSc.Mat.Option.SPD)
+    ksp.getPC().setFactorSolverType(PETSc.Mat.SolverType.CHOLMOD)
+    ksp.setFromOptions()
+    ksp.setUp()
+    return ksp
+
+
+def _unfactored(matrix: csr_matrix, prefix: str, kind: PETSc.Mat.Option) -> PETSc.KSP:
+    A = PETSc.Mat().createAIJ(matrix.shape, csr=(matrix.indptr, matrix.indices, matrix.data), comm=PETSc.COMM_SELF)
+    A.setOption(kind, True)
     ksp = PETSc.KSP().create(PETSc.COMM_SELF)
     ksp.setOptionsPrefix(prefix)
     ksp.setOperators(A)
     ksp.setType(PETSc.KSP.Type.PREONLY)
     ksp.setErrorIfNotConverged(True)
-    pc = ksp.getPC()
-    pc.setType(PETSc.PC.Type.CHOLESKY)
-    pc.setFactorSolverType(PETSc.Mat.SolverType.CHOLMOD if definite else PETSc.Mat.SolverType.MUMPS)
-    ksp.setFromOptions()
-    if not definite and pc.getFactorSolverType() == PETSc.Mat.SolverType.MUMPS:
-        pc.setFactorSetUpSolverType()
-        # Its own scaling loses all digits of coarse problems with contrasts of 1e6; these come scaled.
-        pc.getFactorMatrix().setMumpsIcntl(8, 0)
-        pc.getFactorMatrix().setMumpsIcntl(14, PIVOTING_ROOM)
-    ksp.setUp()
+    ksp.getPC().setType(PETSc.PC.Type.CHOLESKY)
     return ksp
