@@ -11,8 +11,8 @@ from scipy.sparse import csr_matrix, diags
 Int = NDArray[np.int64]
 Float = NDArray[np.float64]
 
-# Dense contributions that are held at once.
-CHUNK = 16
+# Entries of dense blocks that are held before they are summed up, at least.
+HELD = 2_000_000
 
 
 def assembled(
@@ -69,16 +69,18 @@ def total(comm: MPI.Intracomm, own: csr_matrix) -> csr_matrix:
 
 
 class Blocks:
-    """A sparse sum of dense blocks; few of them are held at once."""
+    """A sparse sum of dense blocks; never more of their entries are held than the sum has so far, or HELD."""
 
     def __init__(self, shape: tuple[int, int]) -> None:
         self._whole = csr_matrix(shape)
         self._held: list[tuple[Int, Int, Float]] = []
+        self._entries = 0
 
     def add(self, rows: Int, columns: Int, values: Float) -> None:
         """Add `values` (rows, columns)."""
         self._held.append((rows, columns, values))
-        if len(self._held) == CHUNK:
+        self._entries += values.size
+        if self._entries > max(HELD, self._whole.nnz):
             self._flush()
 
     def matrix(self) -> csr_matrix:
@@ -92,4 +94,4 @@ class Blocks:
             columns = np.concatenate([np.tile(c.astype(np.int32), len(r)) for r, c, _ in self._held])
             values = np.concatenate([v.ravel() for _, _, v in self._held])
             self._whole = self._whole + csr_matrix((values, (rows, columns)), shape=self._whole.shape)
-            self._held = []
+            self._held, self._entries = [], 0
