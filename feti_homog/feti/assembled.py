@@ -15,23 +15,17 @@ Float = NDArray[np.float64]
 HELD = 2_000_000
 
 
-def assembled(
-    comm: MPI.Intracomm, local: csr_matrix, rows: Int, columns: Int, owned: tuple[int, int]
-) -> PETSc.Mat:
-    """The sum over ranks of `local`, whose rows and columns have the given global numbers.
+def assembled(comm: MPI.Intracomm, local: csr_matrix, rows: Int, columns: Int, owned: tuple[int, int]) -> csr_matrix:
+    """The owned rows of the sum over ranks of `local`, whose rows and columns have the given global numbers.
 
     Args:
         owned: numbers of rows and columns that this rank owns.
     """
-    maps = [PETSc.LGMap().create(i.astype(PETSc.IntType), comm=comm) for i in (rows, columns)]
-    sizes = tuple((n, comm.allreduce(n)) for n in owned)
-    A = PETSc.Mat().createIS(sizes, *maps, comm=comm)
-    csr = csr_matrix(local)
-    A.setISLocalMat(
-        PETSc.Mat().createAIJ(csr.shape, csr=(csr.indptr, csr.indices, csr.data), comm=PETSc.COMM_SELF)
-    )
-    A.assemble()
-    return A.convert(PETSc.Mat.Type.AIJ)
+    A = _assembled(comm, local, rows, columns, owned)
+    indptr, indices, values = A.getValuesCSR()
+    sizes = A.getLocalSize()[0], A.getSize()[1]
+    A.destroy()
+    return csr_matrix((values, indices, indptr), shape=sizes)
 
 
 def summed(comm: MPI.Intracomm, local: csr_matrix, rows: Int, foreign: NDArray[np.bool_], owned: int) -> csr_matrix:
@@ -48,14 +42,32 @@ def summed(comm: MPI.Intracomm, local: csr_matrix, rows: Int, foreign: NDArray[n
     share = n // comm.size + (comm.rank < n % comm.size)
     used, indices = np.unique(part.indices, return_inverse=True)
     narrow = csr_matrix((part.data, indices, part.indptr), shape=(part.shape[0], len(used)))
-    A = assembled(comm, narrow, rows[foreign], used, (owned, share))
+    A = _assembled(comm, narrow, rows[foreign], used, (owned, share))
     # Backwards: PETSc 3.18 mixes up the columns if every rank asks for all rows in their order.
     here = PETSc.IS().createGeneral(rows[foreign][::-1].astype(PETSc.IntType), comm=PETSc.COMM_SELF)
     all_columns = PETSc.IS().createStride(n, 0, 1, comm=PETSc.COMM_SELF)
-    indptr, indices, data = A.createSubMatrices(here, all_columns)[0].getValuesCSR()
+    asked = A.createSubMatrices(here, all_columns)[0]
+    indptr, indices, data = asked.getValuesCSR()
+    for thing in (asked, A, here, all_columns):
+        thing.destroy()
     at = np.flatnonzero(foreign)[::-1]
     place = csr_matrix((np.ones(len(at)), (at, np.arange(len(at)))), shape=(len(rows), len(at)))
     return diags((~foreign).astype(float)) @ local + place @ csr_matrix((data, indices, indptr), shape=(len(at), n))
+
+
+def _assembled(comm: MPI.Intracomm, local: csr_matrix, rows: Int, columns: Int, owned: tuple[int, int]) -> PETSc.Mat:
+    maps = [PETSc.LGMap().create(i.astype(PETSc.IntType), comm=comm) for i in (rows, columns)]
+    sizes = tuple((n, comm.allreduce(n)) for n in owned)
+    A = PETSc.Mat().createIS(sizes, *maps, comm=comm)
+    csr = csr_matrix(local)
+    part = PETSc.Mat().createAIJ(csr.shape, csr=(csr.indptr, csr.indices, csr.data), comm=PETSc.COMM_SELF)
+    A.setISLocalMat(part)
+    A.assemble()
+    whole = PETSc.Mat()
+    A.convert(PETSc.Mat.Type.AIJ, whole)
+    for thing in (A, part, *maps):
+        thing.destroy()
+    return whole
 
 
 def total(comm: MPI.Intracomm, own: csr_matrix) -> csr_matrix:

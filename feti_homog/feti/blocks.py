@@ -20,8 +20,7 @@ class NodeBlocks:
     def __init__(self, comm: MPI.Intracomm, constraints: Constraints, local: csr_matrix) -> None:
         first, last = constraints.owned
         matrix = assembled(comm, local, constraints.rows, constraints.rows, (last - first, last - first))
-        indptr, indices, values = matrix.getValuesCSR()
-        entries = csr_matrix((values, indices - first, indptr), shape=(last - first, last - first)).tocoo()
+        entries = matrix[:, first:last].tocoo()
         starts, sizes = constraints.blocks
         self.rows = last - first
         self.blocks: list[tuple[Int, Float]] = []

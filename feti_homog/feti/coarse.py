@@ -43,10 +43,7 @@ class CoarseProblem:
         self.held = comm.allreduce(max(pinned, default=-1), MPI.MAX)
         owned = constraints.owned[1] - constraints.owned[0]
         columns = np.arange(first, first + modes)
-        indptr, indices, values = assembled(
-            comm, boundary.B @ self.R, constraints.rows, columns, (owned, modes)
-        ).getValuesCSR()
-        self.G = csr_matrix((values, indices, indptr), shape=(owned, self.dimension))
+        self.G = assembled(comm, boundary.B @ self.R, constraints.rows, columns, (owned, modes))
         self.factorizations = 0
         squares = np.asarray(self.G.power(2).sum(axis=0)).ravel()
         self.scale = float(comm.allreduce(squares).max(initial=0.0))

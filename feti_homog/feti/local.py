@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Sequence
 
 import numpy as np
@@ -30,7 +31,8 @@ class LocalSolver:
         """
         self.offsets = np.cumsum([0, *(m.shape[0] for m in matrices)])
         self.b, self.x = np.zeros(self.offsets[-1]), np.zeros(self.offsets[-1])
-        self._solves = []
+        self._solves: list[tuple[PETSc.KSP, PETSc.Vec, PETSc.Vec]] = []
+        weakref.finalize(self, _free, self._solves)
         for s, matrix in enumerate(matrices):
             span = slice(self.offsets[s], self.offsets[s + 1])
             if matrix.shape[0]:
@@ -63,6 +65,7 @@ class DirectSolver:
     def _hold(self, ksp: PETSc.KSP) -> None:
         self._ksp = ksp
         self._x, self._b = ksp.getOperators()[0].createVecs()
+        weakref.finalize(self, _free, [(ksp, self._x, self._b)])
 
     def solve(self, B: Float) -> Float:
         """A^-1 B for B (n,) or (n, k)."""
@@ -75,8 +78,10 @@ class DirectSolver:
             return X
         X = np.empty(B.shape, order="F")
         right = np.asfortranarray(B)
-        matrices = (PETSc.Mat().createDense(X.shape, array=a, comm=PETSc.COMM_SELF) for a in (right, X))
+        matrices = [PETSc.Mat().createDense(X.shape, array=a, comm=PETSc.COMM_SELF) for a in (right, X)]
         self._ksp.getPC().matApply(*matrices)
+        for matrix in matrices:
+            matrix.destroy()
         return X
 
 
@@ -108,6 +113,13 @@ def factorized(matrix: csr_matrix, prefix: str) -> PETSc.KSP:
     ksp.setFromOptions()
     ksp.setUp()
     return ksp
+
+
+def _free(solves: list[tuple[PETSc.KSP, PETSc.Vec, PETSc.Vec]]) -> None:
+    """Free factors at once; PETSc would keep what Python drops until it is told to clean up."""
+    for ksp, *vectors in solves:
+        for thing in (ksp.getOperators()[0], ksp, *vectors):
+            thing.destroy()
 
 
 def _unfactored(matrix: csr_matrix, prefix: str, kind: PETSc.Mat.Option) -> PETSc.KSP:
