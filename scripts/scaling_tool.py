@@ -26,7 +26,6 @@ from petsc4py import PETSc  # noqa: E402
 from feti_homog import case as cases  # noqa: E402
 from feti_homog.case import Case  # noqa: E402
 from feti_homog.feti.adaptive import AdaptiveCoarse  # noqa: E402
-from feti_homog.feti.coarse import CoarseProblem  # noqa: E402
 from feti_homog.feti.constraints import Constraints  # noqa: E402
 from feti_homog.parallel import run_main  # noqa: E402
 from feti_homog.petsc_options import case_options  # noqa: E402
@@ -138,16 +137,12 @@ def _foreign(constraints: Constraints, comm: MPI.Intracomm) -> np.ndarray:
 
 def _coarse(coarse: AdaptiveCoarse, comm: MPI.Intracomm) -> dict[str, float]:
     """Seconds to sum and factor the coarse matrices and to solve with them once, and bytes that every rank is told."""
-    right = np.ones((coarse.vectors + coarse.dimension, LOADS))
-
-    def factor() -> None:
-        CoarseProblem.activate(coarse, coarse._active)
-        coarse._factor(coarse._active)
-
+    right = np.ones((coarse.vectors, LOADS)), np.ones((coarse.dimension, LOADS))
+    solve = min(_seconds(lambda: coarse.saddle.solve(*right)) for _ in range(TIMED))
     return {
-        "coarse_factor": comm.allreduce(_seconds(factor), MPI.MAX),
-        "coarse_solve": comm.allreduce(min(_seconds(lambda: coarse._kkt.solve(right)) for _ in range(TIMED)), MPI.MAX),
-        "coarse_bytes": ENTRY_BYTES * coarse._kkt._matrix.nnz,
+        "coarse_factor": comm.allreduce(_seconds(coarse.factor), MPI.MAX),
+        "coarse_solve": comm.allreduce(solve, MPI.MAX),
+        "coarse_bytes": ENTRY_BYTES * coarse.saddle.entries,
     }
 
 

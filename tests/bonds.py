@@ -61,6 +61,14 @@ def tear(comm, arcs=(), **case):
         return torn.tear(case, comm, Progress(comm, quiet=True))
 
 
+def printed(comm, capfd, **case):
+    """What a torn cell and one solve print on rank 0, on every rank."""
+    capfd.readouterr()
+    cell = tear(comm, **case)
+    cell.solver.solve(np.array([1.0, -0.5, 0.3]), np.zeros(cell.solver.rows))
+    return cell, comm.bcast(capfd.readouterr().out)
+
+
 def interface(cell, contact):
     """Its interfaces."""
     return Interface(cell.solver, contact, np.array([cell.plan.width, cell.plan.height]))

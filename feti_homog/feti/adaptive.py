@@ -76,7 +76,8 @@ class AdaptiveCoarse(CoarseProblem):
         U = _preconditioned(comm, constraints, self._blocks, neighbours, V)
         heap.trim()
         self._span(U)
-        self._factor(np.ones(self.U.shape[0]))
+        self._active = np.ones(self.U.shape[0])
+        self.factor()
 
     @property
     def vectors(self) -> int:
@@ -103,7 +104,8 @@ class AdaptiveCoarse(CoarseProblem):
             self._answers[i] = columns, self._blocks[i].operator.answer(loads)
             change.add(columns, columns, loads.T @ self._answers[i][1])
         self._E = self._E + change.matrix()
-        self._factor(active)
+        self._active = active
+        self.factor()
 
     def simplify(self) -> bool:
         """Leave it at rigid-body motions until rows change; whether that is a change."""
@@ -141,13 +143,12 @@ class AdaptiveCoarse(CoarseProblem):
         right = self.everywhere(np.concatenate([energy, work]))
         return self.saddle.solve(right[: self.vectors], right[self.vectors :])
 
-    def _factor(self, active: Float) -> None:
-        self._active = active
-        rows = int(self.everywhere(np.array([active.sum()]))[0])
+    def factor(self) -> None:
+        """Factor the coarse matrix, and find out whether it is any good.  Collective."""
+        rows = int(self.everywhere(np.array([self._active.sum()]))[0])
         self._usable = rows >= ROOM * self.vectors and self._factored() and self._projects()
 
     def _factored(self) -> bool:
-        """Factor the coarse matrix; whether it could be.  Collective."""
         seen = self.everywhere(abs(self.U.T) @ self._active) > 0.0
         mask = diags(seen.astype(float))
         E = mask @ total(self.comm, self._E) @ mask + diags((~seen).astype(float))

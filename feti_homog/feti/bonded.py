@@ -18,7 +18,11 @@ Float = NDArray[np.float64]
 
 
 class BondedCell:
-    """Z^T S Z of all subdomains, factored once; every rank holds the factor."""
+    """Z^T S Z of all subdomains, factored once; every rank holds the factor.
+
+    Attributes:
+        size: dofs on the shared nodes of all ranks, two each.
+    """
 
     def __init__(self, comm: MPI.Intracomm, constraints: Constraints, boundary: Boundary) -> None:
         """Assemble and factor; all boundary operators must be dense and hold their matrices.  Collective.
@@ -27,15 +31,15 @@ class BondedCell:
         """
         self.comm = comm
         self._shared = _shared_dofs(comm, constraints, boundary)
-        n = shared_dofs(comm, constraints)
-        stiffness = Blocks((n, n))
+        self.size = shared_dofs(comm, constraints)
+        stiffness = Blocks((self.size, self.size))
         for operator, span in zip(boundary.operators, boundary.spans, strict=True):
             if not isinstance(operator, Condensed):
                 raise TypeError("the bonded cell needs dense boundary operators")
             stiffness.add(self._shared[span], self._shared[span], operator.S)
         self._solver = DirectSolver(total(comm, stiffness.matrix()), "feti_bonded_")
         entries = np.ones(len(self._shared)), (self._shared, np.arange(len(self._shared)))
-        self._ZT = csr_matrix(entries, shape=(n, len(self._shared)))
+        self._ZT = csr_matrix(entries, shape=(self.size, len(self._shared)))
 
     def relaxed(self, forces: Float) -> Float:
         """-Z (Z^T S Z)^-1 Z^T f for boundary forces f (n,) or (n, k): the motion that takes them off shared nodes."""
@@ -45,7 +49,7 @@ class BondedCell:
 
 
 def shared_dofs(comm: MPI.Intracomm, constraints: Constraints) -> int:
-    """How many dofs the bonded cell has on its shared nodes, two each; collective."""
+    """The size of the bonded cell; collective."""
     return int(comm.allreduce(2 * len(constraints.blocks[0])))
 
 

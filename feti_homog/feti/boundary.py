@@ -97,7 +97,11 @@ class Boundary:
 
     @cached_property
     def _interiors(self) -> list[Interior]:
-        return [Interior(s, d) for s, d in zip(self.subdomains, self.dofs, strict=True)]
+        interiors = []
+        for subdomain, dofs, operator in zip(self.subdomains, self.dofs, self.operators, strict=True):
+            interiors.append(operator.interior if isinstance(operator, Factored) else Interior(subdomain, dofs))
+            subdomain.release()
+        return interiors
 
     def extend(self, x: Float) -> Float:
         """(local dofs,) displacements that have the values x (n,) on the boundaries, with interiors in equilibrium.
@@ -108,7 +112,7 @@ class Boundary:
         for subdomain, dofs, interior, span in zip(
             self.subdomains, self.dofs, self._interiors, self.spans, strict=True
         ):
-            u = np.empty(subdomain.K.shape[0])
+            u = np.empty(len(subdomain.Q))
             u[dofs], u[interior.dofs] = x[span], interior.extend(x[span])
             parts.append(u)
         return np.concatenate(parts)

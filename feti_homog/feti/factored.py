@@ -20,15 +20,21 @@ class Factored:
 
     def __init__(self, subdomain: Subdomain, dofs: Int) -> None:
         """Factor K + rho Rf Rf^T; `dofs` (n,) are sorted local numbers."""
-        self.dofs = dofs
+        self.dofs, self._subdomain = dofs, subdomain
         # A single subdomain has no boundary: any of its nodes can be fixed.
         nodes = np.unique(dofs // 2) if len(dofs) else np.arange(subdomain.mesh.n_classes)
         self.solver = LocalSolver([subdomain.regularised(nodes)], "feti_sub_")
-        self._interior = Interior(subdomain, dofs)
+
+    @cached_property
+    def interior(self) -> Interior:
+        """The interior, factored when first asked for."""
+        interior = Interior(self._subdomain, self.dofs)
+        self._subdomain.release()
+        return interior
 
     def stiffness(self, x: Float, out: Float) -> None:
         """S x = K_bb x - K_bi K_ii^-1 K_ib x for x (n,) or (n, k)."""
-        out[:] = self._interior.Kbb @ x + self._interior.Kib.T @ self._interior.extend(x)
+        out[:] = self.interior.Kbb @ x + self.interior.Kib.T @ self.interior.extend(x)
 
     def flexibility(self, x: Float, out: Float) -> None:
         """The boundary part of K+ x for x (n,) or (n, k)."""
@@ -45,17 +51,13 @@ class Interior:
     """The dofs of one subdomain that no constraint acts on."""
 
     def __init__(self, subdomain: Subdomain, dofs: Int) -> None:
-        """Split K; `dofs` (n,) are the boundary's."""
+        """Split K and factor K_ii; `dofs` (n,) are the boundary's."""
         inside = np.ones(subdomain.K.shape[0], bool)
         inside[dofs] = False
         self.dofs = np.flatnonzero(inside)
-        self._K = subdomain.K
-        self.Kib = self._K[self.dofs][:, dofs]
-        self.Kbb = self._K[dofs][:, dofs]
-
-    @cached_property
-    def _solver(self) -> LocalSolver:
-        return LocalSolver([self._K[self.dofs][:, self.dofs].tocsr()], "feti_interior_")
+        rows = subdomain.K[self.dofs]
+        self.Kib, self.Kbb = rows[:, dofs], subdomain.K[dofs][:, dofs]
+        self._solver = LocalSolver([rows[:, self.dofs].tocsr()], "feti_interior_")
 
     def extend(self, x: Float) -> Float:
         """-K_ii^-1 K_ib x: the interior in equilibrium with boundary displacements x (n,) or (n, k)."""

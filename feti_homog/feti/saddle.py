@@ -13,9 +13,10 @@ Float = NDArray[np.float64]
 
 # Of the constraints in the augmented matrix; each solve with it shrinks their error by about this factor.
 WEIGHT = 1e7
-SOLVES = 2
-# Relative residuals that show the augmented matrix to be good enough.
-ACCURATE = 1e-11
+# Relative residual that a coarse solve must reach, for T takes away nearly all of what it is applied to where materials
+# differ much; and the most solves that may be made to reach it.
+ACCURATE = 1e-13
+MOST_SOLVES = 4
 
 
 class SaddlePoint:
@@ -37,13 +38,15 @@ class SaddlePoint:
         self._E = (diags(self._columns) @ E @ diags(self._columns)).tocsr()
         self._K = (diags(self._rows) @ K).tocsr()
         self._KT = self._K.T.tocsr()
+        self._solves = 2
         self._inner: _Augmented | _Indefinite
         try:
             self._inner = _Augmented(self._E, self._K, prefix)
-            accurate = self._error() <= ACCURATE
+            accurate = self._refine()
         except PETSc.Error:
             accurate = False
         if not accurate:
+            self._solves = 2
             try:
                 self._inner = _Indefinite(self._E, self._K, free, prefix)
             except PETSc.Error as error:
@@ -57,10 +60,18 @@ class SaddlePoint:
 
     def _solve(self, f: Float, g: Float) -> tuple[Float, Float]:
         c, a = self._inner.solve(f, g)
-        for _ in range(SOLVES - 1):
+        for _ in range(self._solves - 1):
             dc, da = self._inner.solve(f - self._E @ c - self._KT @ a, g - self._K @ c)
             c, a = c + dc, a + da
         return c, a
+
+    def _refine(self) -> bool:
+        """Make as many solves as it takes; whether that was enough."""
+        while self._error() > ACCURATE:
+            self._solves += 1
+            if self._solves > MOST_SOLVES:
+                return False
+        return True
 
     def _error(self) -> float:
         """Relative residual of some system."""

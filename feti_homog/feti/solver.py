@@ -87,7 +87,7 @@ class FetiSolver:
         self._solver_for(1)
         self.solves = 0
         if self._view:
-            PETSc.Sys.Print(view.setup(comm, self.boundary, self.coarse), comm=comm)
+            PETSc.Sys.Print(view.setup(comm, self.boundary, self.preconditioner, self.coarse), comm=comm)
 
     @property
     def rows(self) -> int:

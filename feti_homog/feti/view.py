@@ -10,10 +10,12 @@ from feti_homog.feti.adaptive import AdaptiveCoarse
 from feti_homog.feti.boundary import Boundary
 from feti_homog.feti.coarse import CoarseProblem
 from feti_homog.feti.condensed import Condensed
+from feti_homog.feti.influence import Influence
+from feti_homog.feti.preconditioner import Preconditioner
 
 
-def setup(comm: MPI.Intracomm, boundary: Boundary, coarse: CoarseProblem) -> str:
-    """Subdomains, their operators and the coarse space; collective."""
+def setup(comm: MPI.Intracomm, boundary: Boundary, preconditioner: Preconditioner, coarse: CoarseProblem) -> str:
+    """Subdomains, their operators, the preconditioner and the coarse space; collective."""
     sizes = np.array([n for part in comm.allgather([len(d) for d in boundary.dofs]) for n in part])
     dense = comm.allreduce(sum(isinstance(o, Condensed) for o in boundary.operators))
     lines = [
@@ -21,6 +23,8 @@ def setup(comm: MPI.Intracomm, boundary: Boundary, coarse: CoarseProblem) -> str
         f"  boundary dofs of a subdomain: {sizes.min()} to {sizes.max()}, mean {sizes.mean():.0f}",
         f"  kernels: {coarse.dimension} rigid-body modes",
     ]
+    if isinstance(preconditioner, Influence):
+        lines.append(f"  influence columns by the bonded cell, {preconditioner.bonded.size} dofs on its shared nodes")
     if isinstance(coarse, AdaptiveCoarse):
         counts = np.array([n for part in comm.allgather(coarse.counts) for n in part])
         lines.append(
@@ -33,8 +37,9 @@ def setup(comm: MPI.Intracomm, boundary: Boundary, coarse: CoarseProblem) -> str
 
 def solve(ksp: PETSc.KSP, load_cases: int) -> str:
     """Iterations and condition number of a solve, as the Krylov method estimates it."""
-    words = f"FETI: {load_cases} load cases, {ksp.getIterationNumber()} iterations"
-    if ksp.getType() not in (PETSc.KSP.Type.CG, PETSc.KSP.Type.GMRES, PETSc.KSP.Type.FGMRES):
+    iterations = ksp.getIterationNumber()
+    words = f"FETI: {load_cases} load case{'s' * (load_cases > 1)}, {iterations} iterations"
+    if not iterations or ksp.getType() not in (PETSc.KSP.Type.CG, PETSc.KSP.Type.GMRES, PETSc.KSP.Type.FGMRES):
         return words
     largest, smallest = ksp.computeExtremeSingularValues()
     return f"{words}, condition number about {largest / smallest:.3g} ({smallest:.3g} to {largest:.3g})"

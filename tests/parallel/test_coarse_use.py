@@ -113,20 +113,12 @@ def test_natural_space_where_the_adaptive_one_cannot_be(comm, petsc):
     assert not isinstance(cell.solver.coarse, AdaptiveCoarse)
 
 
-def printed(comm, capfd, **case):
-    """What a torn cell and one solve print on rank 0, on every rank."""
-    capfd.readouterr()
-    cell = bonds.tear(comm, **case)
-    cell.solver.solve(np.array([1.0, -0.5, 0.3]), np.zeros(cell.solver.rows))
-    return cell, comm.bcast(capfd.readouterr().out)
-
-
 def number(pattern, text):
     return float(re.search(pattern + r" ([\d.e+]+)", text)[1])
 
 
 def test_view(comm, narrow, capfd):
-    cell, text = printed(comm, capfd, **NARROW, petsc={"feti_view": True})
+    cell, text = bonds.printed(comm, capfd, **NARROW, petsc={"feti_view": True})
     assert number("coarse dimension", text) == narrow.coarse.vectors
     assert number("kernels:", text) == narrow.coarse.dimension
     assert number("soft modes below", text) == THRESHOLD
@@ -137,11 +129,11 @@ def test_view(comm, narrow, capfd):
 
 
 def test_view_of_the_natural_space(comm, narrow, capfd):
-    _, text = printed(comm, capfd, **NARROW, petsc={"feti_view": True, "feti_coarse_space": "natural"})
+    _, text = bonds.printed(comm, capfd, **NARROW, petsc={"feti_view": True, "feti_coarse_space": "natural"})
     assert number("coarse dimension", text) == narrow.coarse.dimension
     assert "soft modes" not in text
     assert number("condition number about", text) > 10 * BOUND / THRESHOLD
 
 
 def test_nothing_is_printed_unasked(comm, capfd):
-    assert printed(comm, capfd, **BREAKING)[1] == ""
+    assert bonds.printed(comm, capfd, **BREAKING)[1] == ""

@@ -105,7 +105,7 @@ def test_narrow_gaps_and_contrasts(comm):
     ids=["path", "stiffness", "dirichlet", "adaptive", "implicit"],
 )
 def test_chosen_for_many_applications(comm, monkeypatch, applications, petsc, chosen):
-    monkeypatch.setattr("feti_homog.torn._applications", lambda case: applications)
+    monkeypatch.setattr("feti_homog.cost.applications", lambda case: applications)
     solver = bonds.tear(comm, **BREAKING, petsc=petsc).solver
     assert isinstance(solver.preconditioner, Influence) == chosen
     if chosen:
@@ -113,7 +113,7 @@ def test_chosen_for_many_applications(comm, monkeypatch, applications, petsc, ch
 
 
 def test_not_chosen_where_the_bonded_cell_is_too_large(comm, monkeypatch):
-    monkeypatch.setattr("feti_homog.torn._applications", lambda case: MANY)
+    monkeypatch.setattr("feti_homog.cost.applications", lambda case: MANY)
     monkeypatch.setattr("feti_homog.feti.settings.LARGEST_BONDED", 10)
     assert not isinstance(bonds.tear(comm, **BREAKING).solver.preconditioner, Influence)
 
@@ -121,3 +121,10 @@ def test_not_chosen_where_the_bonded_cell_is_too_large(comm, monkeypatch):
 def test_needs_dense_operators(comm):
     with pytest.raises(CaseError, match="-feti_pc_type influence: needs -feti_dual_operator explicit"):
         bonds.tear(comm, **BREAKING, petsc=INFLUENCE | {"feti_dual_operator": "implicit"})
+
+
+def test_is_told_by_view(comm, capfd):
+    cell, text = bonds.printed(comm, capfd, **BREAKING, petsc=INFLUENCE | {"feti_view": True})
+    size = 2 * comm.allreduce(len(cell.solver.constraints.blocks[0]))
+    assert f"influence columns by the bonded cell, {size} dofs on its shared nodes" in text
+    assert "1 load case, 0 iterations" in text
