@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from figures import EQUATION_38
 from mpi4py.MPI import Intracomm
 
 from feti_homog.cli import Parser, launch, parsed
@@ -62,7 +63,7 @@ def stiffness(
             "geometry": geometry, "fibre_fraction": fraction,
             "mesh_size": arguments.mesh_size, "refine": arguments.refine, "order": arguments.order,
         },
-        "material": {"matrix": {"young": 88.0, "poisson": 0.299}, "fibre": {"young": 200.0, "poisson": 0.222}},
+        "material": EQUATION_38,
         "analysis": {"type": "stiffness", "plane": plane},
         "output": {"fields": arguments.fields, "pictures": arguments.fields, "stress_unit": "GPa"},
     }  # fmt: skip

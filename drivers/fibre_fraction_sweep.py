@@ -12,11 +12,10 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from figures import EQUATION_38
+import sweeping
 from mpi4py.MPI import Intracomm
 
 from feti_homog.cli import Parser, launch, parsed
@@ -26,18 +25,8 @@ HEADS = f"{'cell':<11}{'fraction':>8}{'C11':>11}{'C12':>11}{'C33':>11}{'isotropy
 
 def main(words: Sequence[str], comm: Intracomm) -> int:
     """Run the sweep, print its points and draw them."""
-    from feti_homog.parallel import on_root, on_root_only
-    from feti_homog.sweep import collect, execute, plan
-
     given = parsed(_parser(), words, comm)
-    sweep = on_root(comm, plan.expand, document(given), Path())
-    group = given.ranks_per_case or comm.size
-    execute.run_all(sweep, given.out, comm, group, retry=True, quiet=given.quiet)
-    for line in on_root_only(comm, report, collect.read, given.out) or []:
-        print(line)
-    for line in on_root_only(comm, collect.collect, given.out, True) or []:
-        print(line)
-    return 0
+    return sweeping.swept(given, comm, document(given), report)
 
 
 def document(given: argparse.Namespace) -> dict[str, Any]:
@@ -47,9 +36,7 @@ def document(given: argparse.Namespace) -> dict[str, Any]:
     return {
         "name": "fibre fraction",
         "cell": cell,
-        "material": EQUATION_38,
-        "analysis": {"type": "stiffness", "plane": "strain"},
-        "output": {"fields": False, "pictures": False, "stress_unit": "GPa"},
+        **sweeping.STIFFNESS,
         "sweep": {
             "realisations": given.realisations,
             "cell": [{"geometry": "square"}, {"geometry": "hexagonal"}, random],
@@ -58,9 +45,8 @@ def document(given: argparse.Namespace) -> dict[str, Any]:
     }
 
 
-def report(read: Any, folder: Path) -> list[str]:
+def report(table: Any) -> list[str]:
     """A line for each point; isotropy is |C33 - (C11 - C12)/2| / C33, +- the 95 % confidence interval of a mean."""
-    table = read(folder)
     lines = [f"stiffness in {table.stress_unit}", HEADS]
     for number, point in enumerate(table.points):
         row = table.rows(point)[0]
@@ -74,17 +60,12 @@ def report(read: Any, folder: Path) -> list[str]:
 
 
 def _parser() -> Parser:
-    parser = Parser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", type=Path, default=Path("results/fibre_fraction_sweep"), metavar="DIR")
-    parser.add_argument("--fractions", type=float, nargs="+", default=[0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.65])
-    parser.add_argument("--fibres", type=int, default=30, help="of the random cells")
-    parser.add_argument("--realisations", type=int, default=5, help="arrangements of each random cell")
-    parser.add_argument("--mesh-size", type=float, default=0.1, help="coarse element size / cell width")
-    parser.add_argument("--refine", type=int, default=0)
-    parser.add_argument("--order", type=int, choices=(1, 2), default=2)
-    parser.add_argument("--ranks-per-case", type=int, metavar="R", help="by default all")
-    parser.add_argument("--quiet", action="store_true", help="do not tell of every case")
-    return parser
+    options = sweeping.parser(__doc__ or "", "fibre_fraction_sweep")
+    options.add_argument("--fractions", type=float, nargs="+", default=[0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.65])
+    options.add_argument("--fibres", type=int, default=30, help="of the random cells")
+    options.add_argument("--realisations", type=int, default=5, help="arrangements of each random cell")
+    options.add_argument("--mesh-size", type=float, default=0.1, help="coarse element size / cell width")
+    return options
 
 
 if __name__ == "__main__":

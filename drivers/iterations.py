@@ -11,6 +11,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
+from figures import EQUATION_38
 from mpi4py.MPI import Intracomm
 
 from feti_homog.cli import Parser, launch, parsed
@@ -31,7 +32,7 @@ def main(words: Sequence[str], comm: Intracomm) -> int:
                 "geometry": "hexagonal", "fibre_fraction": 0.4, "bodies": arguments.bodies,
                 "mesh_size": arguments.mesh_size, "refine": refine, "order": arguments.order,
             },
-            "material": {"matrix": {"young": 88.0, "poisson": 0.299}, "fibre": {"young": 200.0, "poisson": 0.222}},
+            "material": EQUATION_38,
             "analysis": {"type": "stiffness", "plane": "strain"},
             "decomposition": {"subdomains": 1},
             "output": {"fields": False, "pictures": False},

@@ -13,10 +13,10 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
-from pathlib import Path
+from functools import partial
 from typing import Any
 
-from figures import EQUATION_38
+import sweeping
 from mpi4py.MPI import Intracomm
 
 from feti_homog.cli import Parser, launch, parsed
@@ -26,18 +26,8 @@ NAMES = ("C11", "bulk", "shear")
 
 def main(words: Sequence[str], comm: Intracomm) -> int:
     """Run the sweep, print means and scatter for each size, say which is representative, and draw."""
-    from feti_homog.parallel import on_root, on_root_only
-    from feti_homog.sweep import collect, execute, plan
-
     given = parsed(_parser(), words, comm)
-    sweep = on_root(comm, plan.expand, document(given), Path())
-    group = given.ranks_per_case or comm.size
-    execute.run_all(sweep, given.out, comm, group, retry=True, quiet=given.quiet)
-    for line in on_root_only(comm, report, collect.read, given.out, given.tolerance) or []:
-        print(line)
-    for line in on_root_only(comm, collect.collect, given.out, True) or []:
-        print(line)
-    return 0
+    return sweeping.swept(given, comm, document(given), partial(report, tolerance=given.tolerance))
 
 
 def document(given: argparse.Namespace) -> dict[str, Any]:
@@ -49,9 +39,7 @@ def document(given: argparse.Namespace) -> dict[str, Any]:
     return {
         "name": "representative cell",
         "cell": cell,
-        "material": EQUATION_38,
-        "analysis": {"type": "stiffness", "plane": "strain"},
-        "output": {"fields": False, "pictures": False, "stress_unit": "GPa"},
+        **sweeping.STIFFNESS,
         "sweep": {
             "mode": "zip",
             "realisations": given.realisations,
@@ -61,9 +49,8 @@ def document(given: argparse.Namespace) -> dict[str, Any]:
     }
 
 
-def report(read: Any, folder: Path, tolerance: float) -> list[str]:
+def report(table: Any, tolerance: float) -> list[str]:
     """A line for each number of fibres: mean, half of its 95 % interval, and standard deviation of one cell."""
-    table = read(folder)
     heads = "".join(f"{name + ' (GPa)':>12}{'+-':>9}{'std %':>8}" for name in NAMES)
     lines, more = [f"{'fibres':>6}{heads}"], []
     enough = None
@@ -96,20 +83,15 @@ def _laws(statistics: Any, number: int) -> str:
 
 
 def _parser() -> Parser:
-    parser = Parser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", type=Path, default=Path("results/representative_cell"), metavar="DIR")
-    parser.add_argument("--fibres", type=int, nargs="+", default=[4, 8, 16, 32, 64], help="numbers of fibres")
-    parser.add_argument("--realisations", type=int, default=20, help="arrangements of each number")
-    parser.add_argument("--seed", type=int, default=0, help="of the first arrangement")
-    parser.add_argument("--fibre-fraction", type=float, default=0.5)
-    parser.add_argument("--min-gap", type=float, default=0.05, help="smallest gap / diameter of a fibre")
-    parser.add_argument("--mesh-size", type=float, default=0.5, help="of the coarse elements / pitch of fibres")
-    parser.add_argument("--refine", type=int, default=0)
-    parser.add_argument("--order", type=int, choices=(1, 2), default=2)
-    parser.add_argument("--tolerance", type=float, default=0.002, help="relative scatter of a representative cell")
-    parser.add_argument("--ranks-per-case", type=int, metavar="R", help="by default all")
-    parser.add_argument("--quiet", action="store_true", help="do not tell of every case")
-    return parser
+    options = sweeping.parser(__doc__ or "", "representative_cell")
+    options.add_argument("--fibres", type=int, nargs="+", default=[4, 8, 16, 32, 64], help="numbers of fibres")
+    options.add_argument("--realisations", type=int, default=20, help="arrangements of each number")
+    options.add_argument("--seed", type=int, default=0, help="of the first arrangement")
+    options.add_argument("--fibre-fraction", type=float, default=0.5)
+    options.add_argument("--min-gap", type=float, default=0.05, help="smallest gap / diameter of a fibre")
+    options.add_argument("--mesh-size", type=float, default=0.5, help="of the coarse elements / pitch of fibres")
+    options.add_argument("--tolerance", type=float, default=0.002, help="relative scatter of a representative cell")
+    return options
 
 
 if __name__ == "__main__":

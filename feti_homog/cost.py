@@ -12,6 +12,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil
 
+from feti_homog.case import Case
+
 START_SECONDS = 1.3  # Python, MPI, PETSc and gmsh
 MESH_SECONDS = 4.4e-5  # a coarse triangle, on rank 0
 SETUP_SECONDS = 1.1e-5  # a degree of freedom: assembling and factoring
@@ -20,6 +22,8 @@ APPLY_SECONDS = 1.0e-7  # a degree of freedom in one application of operator and
 BASE_BYTES = 1.9e8  # of a rank with nothing on it
 DOF_BYTES = 8.1e2
 DOFS_OF_A_RANK = 50_000  # fewer on a rank, and its waiting for others takes more than it saves
+# Typical numbers, by which a case is estimated and its operators are chosen.
+ITERATIONS_OF_A_SOLVE, SOLVES_OF_A_CONTACT, SOLVES_OF_A_PATH = 20, 3, 100
 
 
 @dataclass(frozen=True)
@@ -29,6 +33,17 @@ class Estimate:
     seconds: float
     memory: float
     ranks: int
+
+
+def applications(case: Case) -> int:
+    """About how many times the analysis applies the dual operator."""
+    solves = 3
+    if case.angle is not None:
+        solves = len(case.angle.values) * (3 if case.angle.strain is None else 1)
+    if case.path is not None:
+        solves = SOLVES_OF_A_PATH
+    contact = case.interface is not None and case.interface.contact
+    return ITERATIONS_OF_A_SOLVE * solves * (SOLVES_OF_A_CONTACT if contact else 1)
 
 
 def estimate(

@@ -89,9 +89,7 @@ class Homogenization:
             "jump": self._largest(solver.active.mask * state.solution.jump) / largest,
         }
         counts = self.counts(state.status)
-        return Response(
-            scale * strain, scale * stress, scale, state, scale * u, checks | state.certificate, counts
-        )
+        return Response(scale * strain, scale * stress, scale, state, scale * u, checks | state.certificate, counts)
 
     def counts(self, status: Status) -> dict[str, int]:
         """Interface nodes in each state; collective."""

@@ -15,7 +15,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from feti_homog import __version__, bounds
+from feti_homog import __version__, bounds, heap
 from feti_homog.analysis import angle, path, stiffness
 from feti_homog.analysis.study import CONTACT_TOLERANCE, Study
 from feti_homog.case import Case
@@ -76,6 +76,7 @@ def compute(case: Case, comm: MPI.Intracomm) -> Result:
 def _torn(case: Case, comm: MPI.Intracomm, progress: Progress) -> Iterator[TornCell]:
     """The torn cell, with the case's options set, while the block lasts."""
     PETSc.garbage_cleanup(comm)  # what earlier cases left: parallel objects are freed by all ranks together
+    heap.forget_peak()
     with case_options(case.petsc):
         cell = tear(case, comm, progress)
         try:
@@ -177,7 +178,7 @@ def _document(study: Study, analysis: dict[str, Any]) -> dict[str, Any]:
             "interface_nodes": cell.total(len(solver.constraints.nodes.row)),
             "kernel_dim": solver.coarse.dimension,
             "coarse_dim": solver.coarse.vectors,
-            "factorizations": plan.subdomains,
+            "factorizations": cell.total(len(solver.boundary.operators)),
             "coarse_factorizations": solver.coarse.factorizations,
             "rtol": solver.rtol,
             "solves": solver.solves,

@@ -102,9 +102,7 @@ def _orthotropic_compliance(material: Orthotropic, plane: str) -> Array:
     E1, E2, G12, nu12 = material.E1, material.E2, material.G12, material.nu12
     compliance = np.array([[1 / E1, -nu12 / E1, 0.0], [-nu12 / E1, 1 / E2, 0.0], [0.0, 0.0, 1 / G12]])
     if not is_positive_definite(compliance):
-        raise ValueError(
-            f"nu12 = {nu12}: expected nu12^2 < E1/E2 = {E1 / E2:.6g}; no material is stable otherwise"
-        )
+        raise ValueError(f"nu12 = {nu12}: expected nu12^2 < E1/E2 = {E1 / E2:.6g}; no material is stable otherwise")
     if plane == "stress":
         return compliance
     E3, nu13, nu23 = material.E3, material.nu13, material.nu23
@@ -124,9 +122,7 @@ def rotated(stiffness: Array, angle: float) -> Array:
     C = T^T C' T, where T takes strains [E11, E22, gamma12] to the material axes.
     """
     c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
-    strain_to_axes = np.array(
-        [[c * c, s * s, c * s], [s * s, c * c, -c * s], [-2 * c * s, 2 * c * s, c * c - s * s]]
-    )
+    strain_to_axes = np.array([[c * c, s * s, c * s], [s * s, c * c, -c * s], [-2 * c * s, 2 * c * s, c * c - s * s]])
     return np.asarray(strain_to_axes.T @ stiffness @ strain_to_axes)
 
 

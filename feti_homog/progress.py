@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import resource
 import sys
 import time
 from collections.abc import Iterable, Iterator
@@ -12,6 +11,8 @@ from typing import TypeVar
 from mpi4py import MPI
 from petsc4py import PETSc
 from tqdm import tqdm
+
+from feti_homog import heap
 
 T = TypeVar("T")
 
@@ -52,6 +53,6 @@ class Progress:
         return {name: self.comm.allreduce(took, MPI.MAX) for name, took in self.seconds.items()}
 
     def memory(self) -> int:
-        """Peak resident memory in bytes, the maximum over ranks."""
-        peak: int = self.comm.allreduce(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024, MPI.MAX)
+        """Peak resident memory of the case in bytes, the maximum over ranks."""
+        peak: int = self.comm.allreduce(heap.peak(), MPI.MAX)
         return peak

@@ -9,18 +9,13 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from feti_homog import case as cases
 from feti_homog import cost
 from feti_homog.case import Case
-from feti_homog.cell.centres import fibre_centres
-from feti_homog.cell.mesh import CoarseMesh
 from feti_homog.cell.outline import MERGED
-from feti_homog.cell.piece import Piece, cut
+from feti_homog.cell.piece import Piece
 from feti_homog.cell.refine import Lattice
-from feti_homog.cell.torus import Torus, edge_pairs
-from feti_homog.errors import CaseError
-from feti_homog.feti.decomposition import decompose, pieces_for_count, pieces_for_size
-from feti_homog.feti.shared import Shared, share
+from feti_homog.cutting import Plan, coarse_mesh, deal
+from feti_homog.feti.shared import Shared
 from feti_homog.feti.solver import FetiSolver
 from feti_homog.feti.subdomain import Subdomain
 from feti_homog.interface import arcs
@@ -31,42 +26,6 @@ from feti_homog.progress import Progress
 Int = NDArray[np.int64]
 Float = NDArray[np.float64]
 Bool = NDArray[np.bool_]
-
-# Typical numbers, for the choice between implicit and explicit operators.
-ITERATIONS_OF_A_SOLVE, SOLVES_OF_A_CONTACT, SOLVES_OF_A_PATH = 20, 3, 100
-# Degrees of freedom of a piece that make set-up and solve fastest, unless there would be more than so many pieces: the
-# coarse problem grows faster than they do; a piece gets `NARROW` of its boundary to other bodies at most.  A body is
-# cut that is larger than a piece by a factor, or, where bonds break, whose boundary is too long for dense matrices.
-FASTEST, MOST, NARROW, LARGE, WIDE = 3000, 4000, 500, 2.5, 2500
-FIBRES_OF = {"square": 1, "hexagonal": 2}
-
-
-@dataclass(frozen=True)
-class Plan:
-    """What rank 0 tells every rank of the whole cell.
-
-    Fibre number 1 of the case file is the constituent `first_fibre`; `centres` (constituents, 2) are NaN where
-    there is none.
-    """
-
-    width: float
-    height: float
-    phases: tuple[str, ...]
-    bodies: int
-    subdomains: int
-    coarse_triangles: int
-    first_fibre: int
-    centres: Float
-
-    @property
-    def period(self) -> Float:
-        """(2,) width and height."""
-        return np.array([self.width, self.height])
-
-    @property
-    def area(self) -> float:
-        """|UC|."""
-        return self.width * self.height
 
 
 @dataclass(frozen=True)
@@ -117,56 +76,54 @@ class TornCell:
 
 
 def tear(case: Case, comm: MPI.Intracomm, progress: Progress) -> TornCell:
-    """Mesh the cell on rank 0, deal out its pieces, and refine, assemble and factor them where they are.
+    """The torn cell of a case, its subdomains factored.  Collective.
 
     Raises:
         CaseError, MeshError: on every rank.
     """
+    plan, shared, lattice, subdomains = assembled(case, comm, progress)
+    with progress.stage("factor") as words:
+        solver = FetiSolver(comm, shared, subdomains, lattice, cost.applications(case))
+        words.append(f"{solver.constraints.total} multipliers, coarse dimension {solver.coarse.vectors}")
+    return TornCell(comm, case, plan, lattice, subdomains, solver)
+
+
+def assembled(case: Case, comm: MPI.Intracomm, progress: Progress) -> tuple[Plan, Shared, Lattice, list[Subdomain]]:
+    """Mesh the cell on rank 0, deal out its pieces, and refine and assemble them where they are.  Collective.
+
+    Returns the plan, what this rank's pieces share with others, the lattice of the refinement, and the subdomains.
+    Raises as `tear`.
+    """
     lattice = Lattice.of(case.cell.refine, case.cell.order)
     with progress.stage("mesh") as words:
         mesh = on_root_only(comm, coarse_mesh, case)
-        shares = on_root_only(comm, _deal, case, mesh, lattice, comm.size)
+        shares = on_root_only(comm, deal, case, mesh, lattice, comm.size)
         plan, pieces, shared = comm.scatter(shares or [])
         if mesh is not None and len(mesh.debonded_edges) and case.interface is None:
             words.append("its debonded curve is bonded, for there is no [interface]")
         words.append(f"{plan.coarse_triangles} triangles, {plan.bodies} bodies, {plan.subdomains} subdomains")
+        del mesh, shares
     with progress.stage("assemble") as words:
         subdomains = agree(comm, _assemble, case, pieces, lattice)
         dofs = comm.allreduce(sum(len(s.Q) for s in subdomains))
         words.append(f"{dofs} degrees of freedom, refine = {case.cell.refine}, order = {case.cell.order}")
-    with progress.stage("factor") as words:
-        solver = FetiSolver(comm, shared, subdomains, lattice, _applications(case))
-        words.append(
-            f"{solver.constraints.total} multipliers, coarse dimension {solver.coarse.vectors}"
-        )
-    return TornCell(comm, case, plan, lattice, subdomains, solver)
+    return plan, shared, lattice, subdomains
 
 
-def coarse_mesh(case: Case) -> CoarseMesh:
-    """The coarse mesh that the case describes, its phases checked against the materials; on rank 0."""
-    # gmsh is loaded where it is used: only rank 0 has use for it.
-    if case.cell.file is not None:
-        from feti_homog.cell.reader import read
-
-        mesh = read(case.cell.file)
-    else:
-        from feti_homog.cell.mesher import generate
-
-        fibres = case.cell.fibres or FIBRES_OF[case.cell.geometry]
-        mesh = generate(case.cell, arcs.tips(case.arcs, case.angle.values if case.angle else (), fibres))
-    cases.check_phases(case, mesh.phases)
-    return mesh
+def _assemble(case: Case, pieces: list[Piece], lattice: Lattice) -> list[Subdomain]:
+    plane = case.analysis.plane
+    return [Subdomain.build(p, lattice, plane_stiffness(case.material_of(p.phase), plane)) for p in pieces]
 
 
 def describe(case: Case, n_ranks: int) -> str:
     """What a run of the case on `n_ranks` ranks would do, in words; on rank 0."""
     lattice = Lattice.of(case.cell.refine, case.cell.order)
-    shares = _deal(case, coarse_mesh(case), lattice, n_ranks)
+    shares = deal(case, coarse_mesh(case), lattice, n_ranks)
     plan = shares[0][0]
     triangles = [sum(len(p.triangles) for p in pieces) for _, pieces, _ in shares]
     nodes = [t * lattice.intervals**2 // 2 for t in triangles]
     own = [len(pieces) for _, pieces, _ in shares]
-    taken = cost.estimate([2 * n for n in nodes], own, plan.coarse_triangles, plan.bodies, _applications(case))
+    taken = cost.estimate([2 * n for n in nodes], own, plan.coarse_triangles, plan.bodies, cost.applications(case))
     lines = [
         f"case       {case.name}: {case.analysis.type}, plane {case.analysis.plane}",
         f"cell       {plan.width:g} x {plan.height:g}, phases {', '.join(plan.phases)}",
@@ -183,73 +140,3 @@ def describe(case: Case, n_ranks: int) -> str:
         "the case is valid",
     ]
     return "\n".join(lines)
-
-
-def _deal(case: Case, mesh: CoarseMesh, lattice: Lattice, n_ranks: int) -> list[tuple[Plan, list[Piece], Shared]]:
-    """For each rank: the plan, its pieces and the table of what they share with others."""
-    torus = Torus.of(mesh)
-    first_fibre = int(np.count_nonzero(torus.constituent_phase == 0))
-    centres = fibre_centres(torus)
-    faults = arcs.faults(case.arcs, centres[first_fibre:])
-    if faults:
-        raise CaseError(*faults)
-    parts = torus.constituent if case.cell.bodies == "torus" else torus.plane_parts()
-    wanted = _pieces(case, np.bincount(parts), _outer_edges(torus, parts), lattice, n_ranks)
-    decomposition = decompose(torus, parts, wanted, n_ranks)
-    pieces = list(cut(torus, decomposition.subdomain))
-    tables = share(torus, pieces, decomposition.rank, lattice.intervals - 1, n_ranks)
-    bodies = int(parts.max()) + 1
-    plan = Plan(
-        mesh.width, mesh.height, mesh.phases, bodies, len(pieces), len(mesh.triangles), first_fibre, centres
-    )  # fmt: skip
-    own: list[list[Piece]] = [[] for _ in range(n_ranks)]
-    for piece, rank in zip(pieces, decomposition.rank, strict=True):
-        own[rank].append(piece)
-    return list(zip([plan] * n_ranks, own, tables, strict=True))
-
-
-def _pieces(case: Case, load: Int, edges: Int, lattice: Lattice, n_ranks: int) -> Int:
-    """Wanted pieces of each body of `load` coarse triangles and `edges` coarse edges to others.
-
-    As the case says; else large bodies are cut to the size that is fastest, and every rank gets a piece.
-    """
-    wanted = case.decomposition
-    # A triangle of the lattice brings about M^2 / 2 nodes.
-    dofs_of_triangle = lattice.intervals**2
-    if wanted.max_dofs is not None:
-        return pieces_for_size(load, dofs_of_triangle, wanted.max_dofs)
-    if wanted.subdomains is not None:
-        return pieces_for_count(load, wanted.subdomains)
-    # A debonding cell is solved so often that whole bodies pay, as long as their dense matrices are small.
-    size = max(FASTEST, int(load.sum()) * dofs_of_triangle // MOST)
-    boundary = edges * 2 * lattice.intervals
-    large = (load * dofs_of_triangle > LARGE * size) | (boundary > LARGE * NARROW)
-    if case.interface is not None:
-        large = boundary > WIDE
-    by_size = pieces_for_size(load, dofs_of_triangle, size)
-    by_boundary = np.minimum(-(-boundary // NARROW), load)
-    pieces = np.where(large, np.maximum(by_size, by_boundary), 1)
-    return pieces if pieces.sum() >= n_ranks else pieces_for_count(load, n_ranks)
-
-
-def _outer_edges(torus: Torus, parts: Int) -> Int:
-    """(b,) coarse edges of each body that others share."""
-    left, right = edge_pairs(torus.triangle_torus_edges)
-    outer = parts[left] != parts[right]
-    return np.bincount(np.r_[parts[left[outer]], parts[right[outer]]], minlength=int(parts.max()) + 1)
-
-
-def _applications(case: Case) -> int:
-    """About how many times the analysis applies the dual operator."""
-    solves = 3
-    if case.angle is not None:
-        solves = len(case.angle.values) * (3 if case.angle.strain is None else 1)
-    if case.path is not None:
-        solves = SOLVES_OF_A_PATH
-    contact = case.interface is not None and case.interface.contact
-    return ITERATIONS_OF_A_SOLVE * solves * (SOLVES_OF_A_CONTACT if contact else 1)
-
-
-def _assemble(case: Case, pieces: list[Piece], lattice: Lattice) -> list[Subdomain]:
-    plane = case.analysis.plane
-    return [Subdomain.build(p, lattice, plane_stiffness(case.material_of(p.phase), plane)) for p in pieces]

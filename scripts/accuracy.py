@@ -22,6 +22,7 @@ import petsc4py
 
 petsc4py.init(sys.argv[:1])
 
+from composite import STIFFNESS  # noqa: E402
 from monolithic import glued  # noqa: E402
 from mpi4py import MPI  # noqa: E402
 from petsc4py import PETSc  # noqa: E402
@@ -109,17 +110,8 @@ def row(geometry: str, order: int, target: float, repeat: int) -> Row:
 def measure(geometry: str, order: int, mesh_size: float, refine: int) -> tuple[int, float, float, tuple[float, ...]]:
     """Degrees of freedom, error of L^ef, its difference to the direct solve, seconds of mesh, FETI, direct solve."""
     comm = MPI.COMM_WORLD
-    case = cases.parse(
-        {
-            "cell": {
-                "geometry": geometry, "fibre_fraction": 0.4,
-                "mesh_size": mesh_size, "refine": refine, "order": order,
-            },
-            "material": {"matrix": {"young": 88.0, "poisson": 0.299}, "fibre": {"young": 200.0, "poisson": 0.222}},
-            "analysis": {"type": "stiffness", "plane": "strain"},
-        },
-        Path(),
-    )  # fmt: skip
+    cell = {"geometry": geometry, "fibre_fraction": 0.4, "mesh_size": mesh_size, "refine": refine, "order": order}
+    case = cases.parse({"cell": cell} | STIFFNESS, Path())
     progress = Progress(comm, quiet=True)
     with case_options(case.petsc):
         start = time.perf_counter()

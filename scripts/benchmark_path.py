@@ -17,6 +17,7 @@ import petsc4py
 
 petsc4py.init(sys.argv[:1])
 
+from composite import MATERIAL  # noqa: E402
 from monolithic import factor_and_solve, glued  # noqa: E402
 from mpi4py import MPI  # noqa: E402
 
@@ -77,7 +78,7 @@ def document(arguments: argparse.Namespace) -> dict:
         geometry = {"geometry": "random", "fibre_fraction": 0.5, "min_gap": 0.06, "fibres": arguments.fibres}
     return {
         "cell": geometry | {"mesh_size": arguments.mesh_size, "refine": arguments.refine},
-        "material": {"matrix": {"young": 88.0, "poisson": 0.299}, "fibre": {"young": 200.0, "poisson": 0.222}},
+        "material": MATERIAL,
         "analysis": {"type": "path", "plane": "stress"},
         "interface": {"normal_strength": STRENGTH, "tangential_strength": STRENGTH},
         "path": {"strain": STRAIN},

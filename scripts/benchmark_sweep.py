@@ -12,28 +12,10 @@ import tempfile
 import time
 from pathlib import Path
 
-SWEEP = """\
-[cell]
-geometry = "random"
-fibre_fraction = 0.5
-fibres = 20
-mesh_size = 0.1
-refine = {refine}
-[material.matrix]
-young = 88.0
-poisson = 0.299
-[material.fibre]
-young = 200.0
-poisson = 0.222
-[analysis]
-type = "stiffness"
-plane = "strain"
-[output]
-fields = false
-pictures = false
-[sweep]
-realisations = {cases}
-"""
+import tomli_w
+from composite import STIFFNESS
+
+CELL = {"geometry": "random", "fibre_fraction": 0.5, "fibres": 20, "mesh_size": 0.1}
 
 
 def main() -> None:
@@ -46,7 +28,8 @@ def main() -> None:
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "sweep.toml"
-        path.write_text(SWEEP.format(refine=given.refine, cases=given.cases))
+        document = {"cell": CELL | {"refine": given.refine}, "sweep": {"realisations": given.cases}} | STIFFNESS
+        path.write_text(tomli_w.dumps(document))
         times: dict[int, list[float]] = {1: [], given.ranks: []}
         for repeat in range(given.repeats):
             for ranks, found in times.items():

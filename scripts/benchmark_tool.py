@@ -9,7 +9,6 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import json
-import resource
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -26,17 +25,16 @@ from peers import PEERS, Peer  # noqa: E402
 from petsc4py import PETSc  # noqa: E402
 
 from feti_homog import case as cases  # noqa: E402
-from feti_homog import torn  # noqa: E402
+from feti_homog import heap, torn  # noqa: E402
 from feti_homog.analysis.study import Study  # noqa: E402
 from feti_homog.case import Case  # noqa: E402
-from feti_homog.cell.refine import Lattice  # noqa: E402
 from feti_homog.homogenization import Homogenization  # noqa: E402
-from feti_homog.parallel import agree, on_root_only, run_main  # noqa: E402
+from feti_homog.parallel import run_main  # noqa: E402
 from feti_homog.petsc_options import case_options  # noqa: E402
 from feti_homog.progress import Progress  # noqa: E402
 
 PREFIX = "peer_"
-MEGABYTE = 1024  # kilobytes, in which Linux counts
+MEGABYTE = 2**20
 
 
 def main() -> int:
@@ -81,14 +79,8 @@ def feti(case: Case, progress: Progress, loads: int, rtol: float) -> dict[str, A
 
 def peer(tool: Peer, case: Case, progress: Progress, loads: int, rtol: float) -> dict[str, Any]:
     """One of the others."""
-    comm, lattice = progress.comm, Lattice.of(case.cell.refine, case.cell.order)
-    with progress.stage("mesh"):
-        mesh = on_root_only(comm, torn.coarse_mesh, case)
-        shares = on_root_only(comm, torn._deal, case, mesh, lattice, comm.size)
-        plan, pieces, _ = comm.scatter(shares or [])
-        del mesh, shares
-    with progress.stage("assemble"):
-        subdomains = agree(comm, torn._assemble, case, pieces, lattice)
+    comm = progress.comm
+    plan, _, lattice, subdomains = torn.assembled(case, comm, progress)
     with progress.stage("glue"):
         cell = glue(comm, subdomains, lattice)
         A = _operator(tool, cell)
@@ -147,7 +139,7 @@ def _report(
 
 def peak() -> float:
     """Largest resident memory of this rank so far in megabytes."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / MEGABYTE
+    return heap.peak() / MEGABYTE
 
 
 if __name__ == "__main__":

@@ -16,33 +16,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import tomli_w
+from composite import STIFFNESS
 from scipy.optimize import least_squares
 
 from feti_homog import cost
 from feti_homog.output import results
 
-CASE = """\
-[cell]
-{cell}
-refine = {refine}
-[material.matrix]
-young = 88.0
-poisson = 0.299
-[material.fibre]
-young = 200.0
-poisson = 0.222
-[analysis]
-type = "stiffness"
-plane = "strain"
-[output]
-fields = false
-pictures = false
-"""
 CELLS = (
-    'geometry = "hexagonal"\nfibre_fraction = 0.4\nmesh_size = 0.05',
-    'geometry = "random"\nfibre_fraction = 0.5\nmesh_size = 0.1\nfibres = 16',
-    'geometry = "random"\nfibre_fraction = 0.5\nmesh_size = 0.05\nfibres = 64',
-    'geometry = "random"\nfibre_fraction = 0.6\nmesh_size = 0.03\nfibres = 20\nmin_gap = 0.04',
+    {"geometry": "hexagonal", "fibre_fraction": 0.4, "mesh_size": 0.05},
+    {"geometry": "random", "fibre_fraction": 0.5, "mesh_size": 0.1, "fibres": 16},
+    {"geometry": "random", "fibre_fraction": 0.5, "mesh_size": 0.05, "fibres": 64},
+    {"geometry": "random", "fibre_fraction": 0.6, "mesh_size": 0.03, "fibres": 20, "min_gap": 0.04},
 )
 REFINEMENTS = (0, 1, 2, 3)
 
@@ -69,11 +54,11 @@ def main() -> None:
         print(f"    estimates are {ratios.min():.2f} to {ratios.max():.2f} times what was measured")
 
 
-def document(cell: str, refine: int) -> dict[str, Any]:
+def document(cell: dict[str, Any], refine: int) -> dict[str, Any]:
     """result.json of one run, and the seconds of its whole process as `wall`."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "case.toml"
-        path.write_text(CASE.format(cell=cell, refine=refine))
+        path.write_text(tomli_w.dumps({"cell": cell | {"refine": refine}} | STIFFNESS))
         words = ["-m", "feti_homog", "run", path, "--out", folder, "--quiet"]
         start = time.perf_counter()
         subprocess.run([sys.executable, *map(str, words)], check=True)

@@ -19,9 +19,7 @@ from feti_homog.torn import tear
 MATRIX, FIBRE = {"young": 88.0, "poisson": 0.299}, {"young": 200.0, "poisson": 0.222}
 
 
-def make_case(
-    *, matrix=MATRIX, fibre=FIBRE, plane="strain", petsc=None, decomposition=None, folder=".", **cell
-):
+def make_case(*, matrix=MATRIX, fibre=FIBRE, plane="strain", petsc=None, decomposition=None, folder=".", **cell):
     """A case of the given cell, tight enough (1e-10) for comparisons."""
     circular = {} if cell.get("geometry") == "mesh" else {"fibre_fraction": 0.4, "mesh_size": 0.15}
     document = {

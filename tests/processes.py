@@ -5,12 +5,11 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
 
-from support import LAUNCHER_VARIABLES, ROOT, RUN_VARIABLES
+from support import launched
 
 DEADLINE = 100.0  # seconds
 
@@ -31,17 +30,14 @@ def descendants(pid: int) -> list[int]:
 
 def started(ranks: int, *words: str | Path) -> subprocess.Popen[bytes]:
     """`python -m feti_homog words...` on so many ranks, in the background."""
-    launcher = ["mpirun", "--oversubscribe", "-n", str(ranks)] if ranks else []
-    inherited = {k: v for k, v in os.environ.items() if not k.startswith(LAUNCHER_VARIABLES)}
-    return subprocess.Popen(
-        [*launcher, sys.executable, "-m", "feti_homog", *map(str, words)],
-        cwd=ROOT, env=inherited | RUN_VARIABLES, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-    )  # fmt: skip
+    silent = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    return launched(ranks, "-m", "feti_homog", *words, **silent)
 
 
-def kill_when(process: subprocess.Popen[bytes], reached: Callable[[], bool]) -> None:
-    """kill -9 of a process and all that it started, as soon as something is reached (or it has ended)."""
+def kill_when(process: subprocess.Popen[bytes], reached: Callable[[], bool], later: float = 0.0) -> None:
+    """kill -9 of a process and all that it started, so many seconds after something is reached (or it has ended)."""
     wait_until(process, reached)
+    time.sleep(later)
     for pid in [*descendants(process.pid), process.pid]:
         try:
             os.kill(pid, signal.SIGKILL)
@@ -54,4 +50,4 @@ def wait_until(process: subprocess.Popen[bytes], reached: Callable[[], bool]) ->
     """Until something is reached or the process has ended."""
     deadline = time.monotonic() + DEADLINE
     while not reached() and process.poll() is None and time.monotonic() < deadline:
-        time.sleep(0.002)
+        time.sleep(0.001)

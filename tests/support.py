@@ -25,19 +25,23 @@ def parallel_assert(comm: Any, condition: bool, message: str = "") -> None:
     assert not failing, f"{message} (on ranks {failing})"
 
 
-def mpirun(
-    ranks: int, *args: str | Path, timeout: float = 120.0, cwd: Path = ROOT
-) -> subprocess.CompletedProcess[str]:
-    """`python args...` on so many ranks, with its output as text; ranks = 0 starts it without mpirun.
+def environment() -> dict[str, str]:
+    """Of a job of its own: without what the launcher of these tests has set."""
+    return {k: v for k, v in os.environ.items() if not k.startswith(LAUNCHER_VARIABLES)} | RUN_VARIABLES
+
+
+def launched(ranks: int, *args: str | Path, cwd: Path = ROOT, **options: Any) -> subprocess.Popen[Any]:
+    """`python args...` on so many ranks, started; ranks = 0 starts it without mpirun.  Options are those of Popen."""
+    launcher = ["mpirun", "--oversubscribe", "-n", str(ranks)] if ranks else []
+    return subprocess.Popen([*launcher, sys.executable, *map(str, args)], cwd=cwd, env=environment(), **options)
+
+
+def mpirun(ranks: int, *args: str | Path, timeout: float = 120.0, cwd: Path = ROOT) -> subprocess.CompletedProcess[str]:
+    """As `launched`, to its end, with its output as text.
 
     Raises subprocess.TimeoutExpired if it takes longer than `timeout` seconds; nothing is left running.
     """
-    launcher = ["mpirun", "--oversubscribe", "-n", str(ranks)] if ranks else []
-    inherited = {k: v for k, v in os.environ.items() if not k.startswith(LAUNCHER_VARIABLES)}
-    process = subprocess.Popen(
-        [*launcher, sys.executable, *map(str, args)],
-        cwd=cwd, env=inherited | RUN_VARIABLES, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-    )  # fmt: skip
+    process = launched(ranks, *args, cwd=cwd, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     try:
         output, errors = process.communicate(timeout=timeout)
     except subprocess.TimeoutExpired:

@@ -76,9 +76,7 @@ class Study:
         for law, error in errors.items():
             self.checks[law] = max(error, self.checks.get(law, 0.0))
             if error > (tolerance := self.tolerance(law)):
-                self.faults.append(
-                    f"{name}: check {law}: {error:.1e}, expected at most {tolerance:.1e}; result marked"
-                )
+                self.faults.append(f"{name}: check {law}: {error:.1e}, expected at most {tolerance:.1e}; result marked")
 
     def tolerance(self, law: str) -> float:
         """Largest error of a check that passes."""

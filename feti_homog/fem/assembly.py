@@ -71,9 +71,7 @@ def element_strain(points: Float, triangles: Int32, node_class: Int32, u: Float)
         area[part] = w.sum(axis=1)
         mean = np.einsum("eqad,eq->ead", g, w) / area[part, None, None]
         gradient = np.einsum("eai,ead->eid", u[node_class[triangles[part]]], mean)
-        strain[part] = np.stack(
-            [gradient[:, 0, 0], gradient[:, 1, 1], gradient[:, 0, 1] + gradient[:, 1, 0]], axis=1
-        )
+        strain[part] = np.stack([gradient[:, 0, 0], gradient[:, 1, 1], gradient[:, 0, 1] + gradient[:, 1, 0]], axis=1)
     return strain, area
 
 

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix, diags, hstack
 
 from feti_homog import heap
-from feti_homog.feti.assembled import Blocks, summed, total
+from feti_homog.feti.assembled import Blocks, summed
 from feti_homog.feti.boundary import Boundary
 from feti_homog.feti.coarse import CoarseProblem
 from feti_homog.feti.constraints import Constraints
@@ -70,6 +70,7 @@ class AdaptiveCoarse(CoarseProblem):
         shape = (own.shape[0], self.dimension)
         self._motions = csr_matrix((own.data, own.indices + self.own.start, own.indptr), shape=shape)
         self._complete, self._usable = False, True
+        self.saddle: SaddlePoint | None = None
         self._E: csr_matrix
         # (columns, S+ B^T U there) of each subdomain
         self._answers: list[tuple[Int, Float]]
@@ -120,8 +121,11 @@ class AdaptiveCoarse(CoarseProblem):
         return np.asarray(z - self._column(z) * (self.U @ c))
 
     def residual(self, r: Float) -> Float:
-        """r - G a with U^T (r - G a) = 0 as far as that can be."""
-        if not self._usable:
+        """r - G a with U^T (r - G a) = 0 as far as that can be; while all rows are active, P r.
+
+        Then U has M^-1 G among its range, and T M^-1 takes away what is left of rigid-body motions.
+        """
+        if not (self._usable and self._complete):
             return self.projected(r)
         _, a = self._solve(self.U.T @ r, np.zeros((self.dimension, *r.shape[1:])))
         return np.asarray(r - self.Ga @ a)
@@ -140,6 +144,8 @@ class AdaptiveCoarse(CoarseProblem):
 
     def _solve(self, energy: Float, work: Float) -> tuple[Float, Float]:
         """c and a of the coarse problem whose right-hand sides are the sums over ranks of the arguments."""
+        if self.saddle is None:
+            raise RuntimeError("the coarse problem has been freed")
         right = self.everywhere(np.concatenate([energy, work]))
         return self.saddle.solve(right[: self.vectors], right[self.vectors :])
 
@@ -151,20 +157,30 @@ class AdaptiveCoarse(CoarseProblem):
     def _factored(self) -> bool:
         seen = self.everywhere(abs(self.U.T) @ self._active) > 0.0
         mask = diags(seen.astype(float))
-        E = mask @ total(self.comm, self._E) @ mask + diags((~seen).astype(float))
+        E, K = mask @ self._E @ mask, (self.GaT @ self.U).tocsr() @ mask
         # Motions that nothing resists have no part in the columns of G.
         free = csr_matrix(self.free @ self.free.T)
+        if self.comm.rank == 0:
+            E = E + diags((~seen).astype(float))
         if self._complete:
-            at, first = free.tocoo(), self.vectors - self.dimension
-            resistance = at.data * E.diagonal()[first:].mean(), (at.row + first, at.col + first)
-            E = E + csr_matrix(resistance, shape=E.shape)
-        K = total(self.comm, (self.GaT @ self.U).tocsr()) @ mask
+            first = self.vectors - self.dimension
+            stiffness = self.everywhere(E.diagonal())[first:].mean()
+            at = free.tocoo()
+            if self.comm.rank == 0:
+                E = E + csr_matrix((stiffness * at.data, (at.row + first, at.col + first)), shape=E.shape)
         heap.trim()
+        self.destroy()
         try:
-            self.saddle = SaddlePoint(E.tocsr(), K.tocsr(), free, "feti_coarse_")
+            self.saddle = SaddlePoint(self.comm, E.tocsr(), K.tocsr(), free, "feti_coarse_")
         except np.linalg.LinAlgError:
             return False
         return True
+
+    def destroy(self) -> None:
+        """Free the factor.  Collective."""
+        if self.saddle is not None:
+            self.saddle.destroy()
+            self.saddle = None
 
     def _projects(self) -> bool:
         """Whether T is a projector that leaves no work of rigid-body motions.

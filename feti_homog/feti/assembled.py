@@ -39,10 +39,9 @@ def summed(comm: MPI.Intracomm, local: csr_matrix, rows: Int, foreign: NDArray[n
     if comm.size == 1:
         return local
     part, n = local[foreign], local.shape[1]
-    share = n // comm.size + (comm.rank < n % comm.size)
     used, indices = np.unique(part.indices, return_inverse=True)
     narrow = csr_matrix((part.data, indices, part.indptr), shape=(part.shape[0], len(used)))
-    A = _assembled(comm, narrow, rows[foreign], used, (owned, share))
+    A = _assembled(comm, narrow, rows[foreign], used, (owned, _share(comm, n)))
     # Backwards: PETSc 3.18 mixes up the columns if every rank asks for all rows in their order.
     here = PETSc.IS().createGeneral(rows[foreign][::-1].astype(PETSc.IntType), comm=PETSc.COMM_SELF)
     all_columns = PETSc.IS().createStride(n, 0, 1, comm=PETSc.COMM_SELF)
@@ -53,6 +52,11 @@ def summed(comm: MPI.Intracomm, local: csr_matrix, rows: Int, foreign: NDArray[n
     at = np.flatnonzero(foreign)[::-1]
     place = csr_matrix((np.ones(len(at)), (at, np.arange(len(at)))), shape=(len(rows), len(at)))
     return diags((~foreign).astype(float)) @ local + place @ csr_matrix((data, indices, indptr), shape=(len(at), n))
+
+
+def _share(comm: MPI.Intracomm, n: int) -> int:
+    """How many of n things are this rank's when they are dealt out evenly."""
+    return n // comm.size + (comm.rank < n % comm.size)
 
 
 def _assembled(comm: MPI.Intracomm, local: csr_matrix, rows: Int, columns: Int, owned: tuple[int, int]) -> PETSc.Mat:
@@ -68,6 +72,23 @@ def _assembled(comm: MPI.Intracomm, local: csr_matrix, rows: Int, columns: Int, 
     for thing in (A, part, *maps):
         thing.destroy()
     return whole
+
+
+def distributed(comm: MPI.Intracomm, part: csr_matrix) -> PETSc.Mat:
+    """The sum over ranks of parts of one shape, its rows dealt evenly to the ranks.  Collective."""
+    rows, columns = (np.flatnonzero(np.diff(m.indptr)) for m in (part.tocsr(), part.tocsc()))
+    shares = (_share(comm, part.shape[0]), _share(comm, part.shape[1]))
+    return _assembled(comm, part[rows][:, columns], rows, columns, shares)
+
+
+def own_rows(comm: MPI.Intracomm, part: csr_matrix) -> csr_matrix:
+    """The rows of the sum over ranks of `part` that are this rank's when they are dealt out evenly.  Collective."""
+    if comm.size == 1:
+        return part
+    A = distributed(comm, part)
+    indptr, indices, values = A.getValuesCSR()
+    A.destroy()
+    return csr_matrix((values, indices, indptr), shape=(len(indptr) - 1, part.shape[1]))
 
 
 def total(comm: MPI.Intracomm, own: csr_matrix) -> csr_matrix:

@@ -96,21 +96,29 @@ class IndefiniteSolver(DirectSolver):
         Raises:
             PETSc.Error: the matrix is singular.
         """
-        ksp = _unfactored(matrix, prefix, PETSc.Mat.Option.SYMMETRIC)
-        ksp.getPC().setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
-        ksp.getPC().setFactorSetUpSolverType()
-        # Its own scaling loses all digits of coarse problems with contrasts of 1e6; these come scaled.
-        ksp.getPC().getFactorMatrix().setMumpsIcntl(8, 0)
-        ksp.getPC().getFactorMatrix().setMumpsIcntl(14, PIVOTING_ROOM)
-        ksp.setUp()
-        self._hold(ksp)
+        self._hold(factored_by_mumps(_sequential(matrix), prefix, definite=False))
 
 
 def factorized(matrix: csr_matrix, prefix: str) -> PETSc.KSP:
     """A KSP with the factorization of a symmetric definite matrix; options under `prefix`."""
-    ksp = _unfactored(matrix, prefix, PETSc.Mat.Option.SPD)
+    A = _sequential(matrix)
+    A.setOption(PETSc.Mat.Option.SPD, True)
+    ksp = _unfactored(A, prefix)
     ksp.getPC().setFactorSolverType(PETSc.Mat.SolverType.CHOLMOD)
     ksp.setFromOptions()
+    ksp.setUp()
+    return ksp
+
+
+def factored_by_mumps(A: PETSc.Mat, prefix: str, definite: bool) -> PETSc.KSP:
+    """A KSP with MUMPS' factorization of a symmetric matrix whose rows and columns are scaled; on any communicator."""
+    A.setOption(PETSc.Mat.Option.SPD if definite else PETSc.Mat.Option.SYMMETRIC, True)
+    ksp = _unfactored(A, prefix)
+    ksp.getPC().setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
+    ksp.getPC().setFactorSetUpSolverType()
+    # Its own scaling loses all digits of coarse problems with contrasts of 1e6.
+    ksp.getPC().getFactorMatrix().setMumpsIcntl(8, 0)
+    ksp.getPC().getFactorMatrix().setMumpsIcntl(14, PIVOTING_ROOM)
     ksp.setUp()
     return ksp
 
@@ -122,10 +130,12 @@ def _free(solves: list[tuple[PETSc.KSP, PETSc.Vec, PETSc.Vec]]) -> None:
             thing.destroy()
 
 
-def _unfactored(matrix: csr_matrix, prefix: str, kind: PETSc.Mat.Option) -> PETSc.KSP:
-    A = PETSc.Mat().createAIJ(matrix.shape, csr=(matrix.indptr, matrix.indices, matrix.data), comm=PETSc.COMM_SELF)
-    A.setOption(kind, True)
-    ksp = PETSc.KSP().create(PETSc.COMM_SELF)
+def _sequential(matrix: csr_matrix) -> PETSc.Mat:
+    return PETSc.Mat().createAIJ(matrix.shape, csr=(matrix.indptr, matrix.indices, matrix.data), comm=PETSc.COMM_SELF)
+
+
+def _unfactored(A: PETSc.Mat, prefix: str) -> PETSc.KSP:
+    ksp = PETSc.KSP().create(A.comm)
     ksp.setOptionsPrefix(prefix)
     ksp.setOperators(A)
     ksp.setType(PETSc.KSP.Type.PREONLY)

@@ -3,67 +3,101 @@
 from __future__ import annotations
 
 import numpy as np
+from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
-from scipy.sparse import bmat, csr_matrix, diags
+from scipy.sparse import bmat, csr_matrix, diags, vstack
 
-from feti_homog.feti.local import DirectSolver, IndefiniteSolver
+from feti_homog.feti import together
+from feti_homog.feti.assembled import own_rows
 
 Float = NDArray[np.float64]
+Solver = together.Redundant | together.Distributed
 
 # Of the constraints in the augmented matrix; each solve with it shrinks their error by about this factor.
 WEIGHT = 1e7
 # Relative residual that a coarse solve must reach, for T takes away nearly all of what it is applied to where materials
-# differ much; and the most solves that may be made to reach it.
-ACCURATE = 1e-13
-MOST_SOLVES = 4
+# differ much; and the fewest and most solves that are made to reach it.
+ACCURATE = 1e-14
+FEWEST_SOLVES, MOST_SOLVES = 3, 4
 
 
 class SaddlePoint:
     """c and a for symmetric E (n, n), definite on the kernel of K (m, n), whose rows may depend on each other.
 
-    The unknowns are scaled to a unit diagonal of E and unit rows of K.
+    Every rank has all of f, g, c and a, and parts of the matrices.  The unknowns are scaled to a unit diagonal of E and
+    unit rows of K.
+
+    Attributes:
+        entries: nonzero ones of this rank's part of the augmented matrix.
     """
 
-    def __init__(self, E: csr_matrix, K: csr_matrix, free: csr_matrix, prefix: str) -> None:
-        """Factor.  `free` (m, m) is a projector to all a with K^T a = 0; options under `prefix`.
+    def __init__(self, comm: MPI.Intracomm, E: csr_matrix, K: csr_matrix, free: csr_matrix, prefix: str) -> None:
+        """Factor the sums over ranks of E and K.  `free` (m, m) is a projector to all a with K^T a = 0.  Collective.
+
+        Options under `prefix`.
 
         Raises:
             LinAlgError: the matrix is singular.
         """
-        self._columns = 1.0 / np.sqrt(E.diagonal())
-        K = K @ diags(self._columns)
+        self.comm = comm
+        self._columns = 1.0 / np.sqrt(self.sum(E.diagonal()))
+        K = own_rows(comm, (K @ diags(self._columns)).tocsr())
         length = np.sqrt(np.asarray(K.multiply(K).sum(axis=1)).ravel())
-        self._rows = 1.0 / np.where(length > 0, length, 1.0)
+        length = np.where(length > 0, length, 1.0)
         self._E = (diags(self._columns) @ E @ diags(self._columns)).tocsr()
-        self._K = (diags(self._rows) @ K).tocsr()
+        self._K = (diags(1.0 / length) @ K).tocsr()
         self._KT = self._K.T.tocsr()
-        self._solves = 2
+        lengths = comm.allgather(length)
+        self._rows = 1.0 / np.concatenate(lengths)
+        first = sum(len(part) for part in lengths[: comm.rank])
+        self._own = slice(first, first + len(length))
+        self._solves = FEWEST_SOLVES
         self._inner: _Augmented | _Indefinite
+        augmented = (self._E + WEIGHT * (self._KT @ self._K)).tocsr()
+        self.entries = int(augmented.nnz)
         try:
-            self._inner = _Augmented(self._E, self._K, prefix)
-            accurate = self._refine()
+            self._inner = _Augmented(self, together.solver(comm, augmented, prefix, definite=True))
+            if self._refine():
+                return
+            self.destroy()
         except PETSc.Error:
-            accurate = False
-        if not accurate:
-            self._solves = 2
-            try:
-                self._inner = _Indefinite(self._E, self._K, free, prefix)
-            except PETSc.Error as error:
-                raise np.linalg.LinAlgError(f"a coarse matrix is singular: {error}") from error
+            pass
+        self._solves = 2
+        try:
+            self._inner = _Indefinite(together.solver(comm, self._whole(free), prefix, definite=False))
+        except PETSc.Error as error:
+            raise np.linalg.LinAlgError(f"a coarse matrix is singular: {error}") from error
 
     def solve(self, f: Float, g: Float) -> tuple[Float, Float]:
-        """c and a for f (n,) and g (m,), or (n, k) and (m, k)."""
+        """c and a for f (n,) and g (m,), or (n, k) and (m, k).  Collective."""
         columns, rows = (s if f.ndim == 1 else s[:, None] for s in (self._columns, self._rows))
         c, a = self._solve(columns * f, rows * g)
         return columns * c, rows * a
 
+    def destroy(self) -> None:
+        """Free the factor.  Collective."""
+        self._inner.solver.destroy()
+
+    def constraints(self, c: Float) -> Float:
+        """K c.  Collective."""
+        return np.concatenate(self.comm.allgather(self._K @ c))
+
+    def reactions(self, a: Float) -> Float:
+        """This rank's part of K^T a."""
+        return np.asarray(self._KT @ a[self._own])
+
     def _solve(self, f: Float, g: Float) -> tuple[Float, Float]:
         c, a = self._inner.solve(f, g)
         for _ in range(self._solves - 1):
-            dc, da = self._inner.solve(f - self._E @ c - self._KT @ a, g - self._K @ c)
+            df, dg = self._left(f, g, c, a)
+            dc, da = self._inner.solve(df, dg)
             c, a = c + dc, a + da
         return c, a
+
+    def _left(self, f: Float, g: Float, c: Float, a: Float) -> tuple[Float, Float]:
+        """f - E c - K^T a and g - K c."""
+        return f - self.sum(self._E @ c + self.reactions(a)), g - self.constraints(c)
 
     def _refine(self) -> bool:
         """Make as many solves as it takes; whether that was enough."""
@@ -75,11 +109,22 @@ class SaddlePoint:
 
     def _error(self) -> float:
         """Relative residual of some system."""
-        c, a = (np.cos(np.arange(n) + 1.0) for n in self._KT.shape)
-        f, g = self._E @ c + self._KT @ a, self._K @ c
-        c, a = self._solve(f, g)
-        left = (f - self._E @ c - self._KT @ a, g - self._K @ c)
+        c, a = (np.cos(np.arange(n) + 1.0) for n in (len(self._columns), len(self._rows)))
+        f, g = self._left(np.zeros_like(c), np.zeros_like(a), c, a)
+        left = self._left(f, g, *self._solve(f, g))
         return float(max(np.linalg.norm(r) / (np.linalg.norm(b) or 1.0) for r, b in zip(left, (f, g), strict=True)))
+
+    def _whole(self, free: csr_matrix) -> csr_matrix:
+        """This rank's part of [E K^T; K -free]."""
+        empty = [csr_matrix((n, self._K.shape[1])) for n in (self._own.start, len(self._rows) - self._own.stop)]
+        K = vstack([empty[0], self._K, empty[1]])
+        return bmat([[self._E, K.T], [K, -free if self.comm.rank == 0 else None]]).tocsr()
+
+    def sum(self, part: Float) -> Float:
+        """Of the parts of all ranks.  Collective."""
+        whole = np.empty_like(part)
+        self.comm.Allreduce(part, whole)
+        return whole
 
 
 class _Augmented:
@@ -88,21 +133,20 @@ class _Augmented:
     For columns that overlap widely K^T K has no entry that E has not, so this costs a quarter of an indefinite factor.
     """
 
-    def __init__(self, E: csr_matrix, K: csr_matrix, prefix: str) -> None:
-        self._K, self._KT = K, K.T.tocsr()
-        self._solver = DirectSolver((E + WEIGHT * (self._KT @ K)).tocsr(), prefix)
+    def __init__(self, system: SaddlePoint, solver: Solver) -> None:
+        self._system, self.solver = system, solver
 
     def solve(self, f: Float, g: Float) -> tuple[Float, Float]:
-        c = self._solver.solve(f + WEIGHT * (self._KT @ g))
-        return c, WEIGHT * (self._K @ c - g)
+        c = self.solver.solve(f + WEIGHT * self._system.sum(self._system.reactions(g)))
+        return c, WEIGHT * (self._system.constraints(c) - g)
 
 
 class _Indefinite:
     """By an LDL^T factor of the whole, for matrices that are too badly conditioned for the other."""
 
-    def __init__(self, E: csr_matrix, K: csr_matrix, free: csr_matrix, prefix: str) -> None:
-        self._solver = IndefiniteSolver(bmat([[E, K.T], [K, -free]]).tocsr(), prefix)
+    def __init__(self, solver: Solver) -> None:
+        self.solver = solver
 
     def solve(self, f: Float, g: Float) -> tuple[Float, Float]:
-        x = self._solver.solve(np.concatenate([f, g]))
+        x = self.solver.solve(np.concatenate([f, g]))
         return x[: len(f)], x[len(f) :]

@@ -51,8 +51,7 @@ def path_table(points: Sequence[Point], stress: str) -> list[str]:
     broke, last = sum(point["broke"] for point in points), points[-1]
     some = "" if len(numbers) == len(points) else f", {len(numbers)} shown"
     lines = [
-        f"Path{stress}: {len(points)} points{some}; {broke} bonds broke, "
-        f"{last['dissipated']:.6g} dissipated per area",
+        f"Path{stress}: {len(points)} points{some}; {broke} bonds broke, {last['dissipated']:.6g} dissipated per area",
         f"{'point':>5}{'load':>9}{STRAINS[which]:>11}" + "".join(f"{name:>11}" for name in STRESSES) + _heads(),
     ]
     for number in numbers:

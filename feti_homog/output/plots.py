@@ -111,9 +111,7 @@ def _cell(attributes: Any, drawn: Drawing, borders: Array) -> Figure:
     return figure
 
 
-def _deformed(
-    file: Any, state: Any, drawn: Drawing, borders: Array, faces: Faces, output: Mapping[str, Any]
-) -> Figure:
+def _deformed(file: Any, state: Any, drawn: Drawing, borders: Array, faces: Faces, output: Mapping[str, Any]) -> Figure:
     """The magnified deformed cell with a stress component in colour, and the outline it has left."""
     attributes, strain = file.attrs, state.attrs["strain"]
     figure, (axes,) = figure_of(attributes, panels=1)

@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from support import LAUNCHER_VARIABLES, ROOT, RUN_VARIABLES
+from support import ROOT, environment
 from sweeps import CASE, FAILING, FAILING_POINTS, rows, sweep_file
 
 SCRIPTS = sorted([*(ROOT / "scripts/slurm").iterdir(), *(ROOT / "scripts/pbs").iterdir()])
@@ -71,9 +71,8 @@ def scheduler(tmp_path):
     for name, text in {"srun": LAUNCH, "mpirun": LAUNCH, "sbatch": SBATCH, "qsub": QSUB}.items():
         (folder / name).write_text(text)
         (folder / name).chmod(0o755)
-    inherited = {k: v for k, v in os.environ.items() if not k.startswith(LAUNCHER_VARIABLES)}
     own = {"PATH": f"{folder}:{os.environ['PATH']}", "NOTES": str(tmp_path / "notes"), "SPOOL": str(tmp_path)}
-    return inherited | RUN_VARIABLES | own
+    return environment() | own
 
 
 def submitted(scheduler, script, *words, code=0):
@@ -131,9 +130,9 @@ def test_a_single_case(tmp_path, scheduler):
     path, words = sweep_file(tmp_path, "", CASE), ["--resume-not"]
     _, notes = submitted(scheduler, ROOT / "scripts/slurm/case", path, tmp_path / "slurm", "-feti_ksp_rtol", "1e-6")
     assert notes[-1].startswith("srun") and notes[-1].endswith("-feti_ksp_rtol 1e-6")
-    environment = scheduler | {"CASE": str(path), "DIR": str(tmp_path / "pbs"), "PBS_NODEFILE": str(tmp_path / "nodes")}
+    variables = scheduler | {"CASE": str(path), "DIR": str(tmp_path / "pbs"), "PBS_NODEFILE": str(tmp_path / "nodes")}
     (tmp_path / "nodes").write_text("a\na\nb\n")
-    _, notes = submitted(environment, ROOT / "scripts/pbs/case")
+    _, notes = submitted(variables, ROOT / "scripts/pbs/case")
     assert "mpirun task= threads=1 -n 3 .venv/bin/python -m feti_homog run" in notes[-1]
     assert all((tmp_path / kind / "result.json").exists() for kind in ("slurm", "pbs"))
     job, _ = submitted(scheduler, ROOT / "scripts/slurm/case", path, tmp_path / "other", *words, code=2)

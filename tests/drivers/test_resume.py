@@ -7,16 +7,12 @@ import os
 import random
 import re
 import shutil
-import signal
-import subprocess
-import sys
-import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 from commands import command_line
-from support import LAUNCHER_VARIABLES, ROOT, RUN_VARIABLES
+from processes import kill_when, started
 
 CASE = """\
 [cell]
@@ -68,36 +64,9 @@ def events(out: Path) -> int:
     return len(list((out / "checkpoint").glob("[0-9]*.h5")))
 
 
-def descendants(pid: int) -> list[int]:
-    children = []
-    for stat in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            fields = stat.read_text().rpartition(")")[2].split()
-        except OSError:
-            continue
-        if int(fields[1]) == pid:
-            child = int(stat.parent.name)
-            children += [child, *descendants(child)]
-    return children
-
-
 def killed(case: Path, out: Path, at: int, later: float, *words: str) -> int:
     """Run until there are `at` events and so many seconds longer, then kill -9; returns how many events are there."""
-    inherited = {k: v for k, v in os.environ.items() if not k.startswith(LAUNCHER_VARIABLES)}
-    process = subprocess.Popen(
-        ["mpirun", "--oversubscribe", "-n", "2", sys.executable, "-m", "feti_homog", "run", case, "--out", out, *words],
-        cwd=ROOT, env=inherited | RUN_VARIABLES, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-    )  # fmt: skip
-    deadline = time.monotonic() + 100
-    while events(out) < at and process.poll() is None and time.monotonic() < deadline:
-        time.sleep(0.001)
-    time.sleep(later)
-    for pid in [*descendants(process.pid), process.pid]:
-        try:
-            os.kill(pid, signal.SIGKILL)
-        except ProcessLookupError:
-            continue
-    process.wait()
+    kill_when(started(2, "run", case, "--out", out, *words), lambda: events(out) >= at, later)
     return events(out)
 
 

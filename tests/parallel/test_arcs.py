@@ -13,9 +13,10 @@ from unit.faulty_meshes import ALL_SIDES, RIGHT_SIDE, grid
 
 from feti_homog import case as cases
 from feti_homog.cell.arrangement import arrange
+from feti_homog.cutting import coarse_mesh
 from feti_homog.errors import CaseError
 from feti_homog.progress import Progress
-from feti_homog.torn import coarse_mesh, tear
+from feti_homog.torn import tear
 
 pytestmark = pytest.mark.parallel
 

@@ -11,7 +11,7 @@ from cells import make_case, relative_error, solve
 from dense import DualTwin, boundary_of, gathered, matrix, projector
 from mpi4py import MPI
 
-from feti_homog import sections, torn
+from feti_homog import cutting, sections, torn
 from feti_homog.cell.refine import Lattice
 from feti_homog.errors import CaseError
 from feti_homog.feti import boundary as boundaries
@@ -139,13 +139,13 @@ def test_adaptive_space_is_refused_where_boundaries_are_too_large(comm, monkeypa
 def sizes(monkeypatch):
     """Pieces of 100 dofs, at most 50 of a cell; bodies are cut above 250 dofs, or 80 of the boundary."""
     for name, value in {"FASTEST": 100, "MOST": 50, "LARGE": 2.5, "WIDE": 80}.items():
-        monkeypatch.setattr(torn, name, value)
+        monkeypatch.setattr(cutting, name, value)
 
 
 def wanted(load, edges, interface=None, n_ranks=1, refine=0):
     """Default pieces of bodies of so many triangles and outer edges."""
     case = replace(make_case(refine=refine), interface=interface)
-    return torn._pieces(case, np.array(load), np.array(edges), Lattice.of(refine, 1), n_ranks).tolist()
+    return cutting.wanted_pieces(case, np.array(load), np.array(edges), Lattice.of(refine, 1), n_ranks).tolist()
 
 
 def test_large_bodies_are_cut(sizes):
@@ -197,11 +197,11 @@ def test_default_pieces_of_a_bonded_cell(comm, sizes):
 
 
 def test_default_pieces_of_a_debonding_cell(comm, sizes, monkeypatch):
-    monkeypatch.setattr(torn, "WIDE", 1000)
+    monkeypatch.setattr(cutting, "WIDE", 1000)
     cell, bodies, largest = torn_by_default(comm, sections.Interface())
     assert len(bodies) == max(3, comm.size)
     assert isinstance(cell.solver.coarse, AdaptiveCoarse) == (comm.size > 3)
-    monkeypatch.setattr(torn, "WIDE", 80)
+    monkeypatch.setattr(cutting, "WIDE", 80)
     cell, bodies, narrowed = torn_by_default(comm, sections.Interface())
     assert len(bodies) > 4
     assert narrowed < min(largest, 1.5 * 100)

@@ -14,6 +14,8 @@ from narrow_cells import BOUND, BREAKING, NARROW, STRAINS, of_all, together
 
 from feti_homog.errors import CaseError
 from feti_homog.feti.adaptive import THRESHOLD, AdaptiveCoarse
+from feti_homog.feti.saddle import _Augmented
+from feti_homog.feti.together import Distributed, Redundant
 
 pytestmark = pytest.mark.parallel
 
@@ -105,6 +107,21 @@ def test_wrong_options_are_refused(comm, petsc, words):
         bonds.tear(comm, **BREAKING, petsc=petsc)
     (fault,) = caught.value.faults
     assert fault.startswith(words)
+
+
+@pytest.mark.parametrize("contrast", [23.0, 1e6], ids=["augmented", "indefinite"])
+def test_a_distributed_coarse_problem_gives_the_same(comm, monkeypatch, contrast):
+    case = NARROW | {"fibre": {"young": 3.0 * contrast, "poisson": 0.3}, "decomposition": {"subdomains": 50}}
+    found = []
+    for largest, kind in ((10**6, Redundant), (0, Redundant if comm.size == 1 else Distributed)):
+        monkeypatch.setattr("feti_homog.feti.together.LARGEST_REDUNDANT", largest)
+        cell = bonds.tear(comm, **case)
+        assert isinstance(cell.solver.coarse.saddle._inner.solver, kind)
+        assert isinstance(cell.solver.coarse.saddle._inner, _Augmented) == (contrast < 1e3)
+        found.append(together(cell))
+    for one, other in zip(*found, strict=True):
+        assert one.reason > 0 and other.reason > 0 and abs(one.iterations - other.iterations) <= 1
+        assert relative_error(*(dense.gathered(cell, s.lam) for s in (one, other))) < 1e-7
 
 
 @pytest.mark.parametrize("petsc", [{"feti_dual_operator": "implicit"}, {"feti_pc_type": "lumped"}])

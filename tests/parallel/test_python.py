@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 from cells import MATRIX, make_case
 from mpi4py import MPI
-from support import LAUNCHER_VARIABLES, parallel_assert
+from support import mpirun, parallel_assert
 
 from feti_homog import Case, CaseError, ConvergenceError, run
 
@@ -97,10 +93,7 @@ def test_a_program_whose_other_ranks_run_nothing(comm, shared_path):
 
         path = shared_path / "case.toml"
         path.write_text(tomli_w.dumps({k: v for k, v in with_fraction(0.4).resolved().items() if v != {}}))
-        inherited = {k: v for k, v in os.environ.items() if not k.startswith(LAUNCHER_VARIABLES)}
-        root = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
-        words = ["mpirun", "--oversubscribe", "-n", "2", sys.executable, "-c", ALONE.format(path=str(path))]
-        job = subprocess.run(words, env=inherited | root, capture_output=True, text=True, timeout=60)
+        job = mpirun(2, "-c", ALONE.format(path=str(path)), timeout=60.0)
         found = job.returncode == 0 and float(job.stdout) == pytest.approx(149.7, rel=0.02)
     else:
         found = True

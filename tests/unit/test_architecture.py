@@ -26,6 +26,7 @@ ROOMS = (
     ("feti",),
     ("interface",),
     ("cost",),
+    ("cutting",),
     ("torn", "homogenization"),
     ("output",),
     ("analysis",),

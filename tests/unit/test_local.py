@@ -69,7 +69,7 @@ def test_saddle_points(monkeypatch, spread, accurate, inner):
     K[-1] = K[0] + K[1]
     null = np.array([1.0, 1, 0, 0, 0, -1]) / np.sqrt(3)
     c, a = rng.standard_normal((n, 2)), rng.standard_normal((m, 2))
-    saddle = SaddlePoint(*(csr_matrix(x) for x in (E, K, np.outer(null, null))), "test_")
+    saddle = SaddlePoint(MPI.COMM_WORLD, *(csr_matrix(x) for x in (E, K, np.outer(null, null))), "test_")
     found, work = saddle.solve(E @ c + K.T @ a, K @ c)
     np.testing.assert_allclose(found, c, atol=1e-6)
     np.testing.assert_allclose(K.T @ work, K.T @ a, rtol=1e-6, atol=1e-6 * spread)
@@ -81,7 +81,7 @@ def test_saddle_points(monkeypatch, spread, accurate, inner):
 def test_singular_saddle_points_are_told():
     E, K, free = np.ones((3, 3)), np.zeros((1, 3)), np.zeros((1, 1))
     with pytest.raises(np.linalg.LinAlgError, match="singular"):
-        SaddlePoint(csr_matrix(E), csr_matrix(K), csr_matrix(free), "test_")
+        SaddlePoint(MPI.COMM_WORLD, csr_matrix(E), csr_matrix(K), csr_matrix(free), "test_")
 
 
 def test_blocks_sum_whatever_is_held(monkeypatch):

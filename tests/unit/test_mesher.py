@@ -2,30 +2,16 @@
 
 from __future__ import annotations
 
-import time
 from collections import Counter
 from functools import cache
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from circular import cell
 
 from feti_homog.cell.arrangement import arrange
 from feti_homog.cell.mesh import areas, flip_double_arcs
 from feti_homog.cell.mesher import generate
-
-
-def cell(geometry="random", fraction=0.4, size=0.05, fibres=16, gap=0.06, seed=0, spread=0.0):
-    return SimpleNamespace(
-        geometry=geometry,
-        fibre_fraction=fraction,
-        mesh_size=size,
-        fibres=fibres,
-        min_gap=gap,
-        seed=seed,
-        radius_spread=spread,
-    )
-
 
 CELLS = {
     "square": cell("square"),
@@ -201,8 +187,6 @@ def test_marks_that_nearly_meet_are_one_node():
     assert least_angle(mesh.points, mesh.triangles).min() > 13
 
 
-def test_a_thousand_fibres_take_seconds():
-    start = time.perf_counter()
+def test_a_thousand_fibres():
     mesh = generate(cell(fibres=1000, fraction=0.6, gap=0.03))
-    assert time.perf_counter() - start < 60
     assert least_angle(mesh.points, mesh.triangles).min() > 10

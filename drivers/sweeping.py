@@ -1,0 +1,45 @@
+"""What the drivers that are sweeps share: options, sections, and the way from cases to tables and pictures."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from figures import EQUATION_38
+from mpi4py.MPI import Intracomm
+
+from feti_homog.cli import Parser
+
+STIFFNESS = {
+    "material": EQUATION_38,
+    "analysis": {"type": "stiffness", "plane": "strain"},
+    "output": {"fields": False, "pictures": False, "stress_unit": "GPa"},
+}
+
+
+def parser(description: str, name: str) -> Parser:
+    """The options that they all have; results go to results/`name` by default."""
+    options = Parser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options.add_argument("--out", type=Path, default=Path("results") / name, metavar="DIR")
+    options.add_argument("--refine", type=int, default=0, help="times that every element is cut in four")
+    options.add_argument("--order", type=int, choices=(1, 2), default=2, help="of the elements; 2 are curved")
+    options.add_argument("--ranks-per-case", type=int, metavar="R", help="by default all")
+    options.add_argument("--quiet", action="store_true", help="do not tell of every case")
+    return options
+
+
+def swept(
+    given: argparse.Namespace, comm: Intracomm, document: dict[str, Any], report: Callable[[Any], list[str]]
+) -> int:
+    """Run the sweep, print the report of its table, and draw; the exit code."""
+    from feti_homog.parallel import on_root, on_root_only
+    from feti_homog.sweep import collect, execute, plan
+
+    sweep = on_root(comm, plan.expand, document, Path())
+    execute.run_all(sweep, given.out, comm, given.ranks_per_case or comm.size, retry=True, quiet=given.quiet)
+    for tell in (lambda: report(collect.read(given.out)), lambda: collect.collect(given.out, True)):
+        for line in on_root_only(comm, tell) or []:
+            print(line)
+    return 0

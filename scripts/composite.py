@@ -1,0 +1,10 @@
+"""What the cases of the scripts share: the composite of Eq. (38), in GPa, and its stiffness without files of fields."""
+
+from __future__ import annotations
+
+MATERIAL = {"matrix": {"young": 88.0, "poisson": 0.299}, "fibre": {"young": 200.0, "poisson": 0.222}}
+STIFFNESS = {
+    "material": MATERIAL,
+    "analysis": {"type": "stiffness", "plane": "strain"},
+    "output": {"fields": False, "pictures": False},
+}

@@ -1,0 +1,18 @@
+"""Cells of circular fibres as the geometry is told of them."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+
+def cell(geometry="random", fraction=0.4, size=0.05, fibres=16, gap=0.06, seed=0, spread=0.0):
+    """What arrangements and the mesher read of [cell]."""
+    return SimpleNamespace(
+        geometry=geometry,
+        fibre_fraction=fraction,
+        mesh_size=size,
+        fibres=fibres,
+        min_gap=gap,
+        seed=seed,
+        radius_spread=spread,
+    )
