@@ -1,7 +1,7 @@
 """A cost model of the solver on more ranks than there are here, with rates measured on few.
 
 Every term is one that the program has today: a mesh and a tearing on rank 0, work on subdomains that ranks share, a
-coarse problem that every rank factors and solves for itself, and messages.
+coarse problem that every rank factors and solves for itself, or all together if it is large, and messages.
 """
 
 from __future__ import annotations
@@ -12,8 +12,11 @@ from math import ceil, log2, sqrt
 
 from scaling_report import COARSE_SUMS, GATHERS, SCALARS, SUMS, VALUE_BYTES, Row
 
-MESH, LOCAL, COARSE, MESSAGES = "mesh on rank 0", "subdomains", "redundant coarse problem", "messages"
-COARSE_POWER = 1.5
+from feti_homog.feti.together import LARGEST_REDUNDANT
+
+MESH, LOCAL, COARSE, MESSAGES = "mesh on rank 0", "subdomains", "coarse problem", "messages"
+# Powers: of the coarse unknowns, in their factorization; of the ranks, by which they are faster together.
+COARSE_POWER, TOGETHER = 1.5, 0.5
 
 
 @dataclass(frozen=True)
@@ -33,7 +36,7 @@ class Rates:
         assemble, setup, apply: seconds per dof, `apply` of an iteration.
         factor, solve: seconds per n^1.5 and n log2 n of the coarse unknowns n.
         loads: load cases solved together.
-        triangles, subdomains, coarse, coarse_bytes: per dof.
+        triangles, subdomains, vectors, coarse, coarse_bytes: per dof.
         largest_coarse: most coarse unknowns that were timed.
         iterations: most of all runs.
         surface: values that a rank tells or hears in an exchange per root of its dofs.
@@ -50,6 +53,7 @@ class Rates:
     loads: int
     triangles: float
     subdomains: float
+    vectors: float
     coarse: float
     coarse_bytes: float
     largest_coarse: int
@@ -69,7 +73,7 @@ def measured(rows: Sequence[Row], cores: int) -> Rates:
         assemble=_rate((row.seconds["assemble"], row.dofs) for row in alone),
         setup=_rate((row.seconds["set-up"] - row.coarse_factor, row.dofs) for row in alone),
         apply=_rate(
-            (row.seconds["solve"] - COARSE_SUMS * row.iterations * row.coarse_solve, row.iterations * row.dofs)
+            (row.seconds["solve"] - row.iterations * row.coarse_solve, row.iterations * row.dofs)
             for row in alone
         ),
         factor=_rate((row.coarse_factor, row.coarse**COARSE_POWER) for row in timed),
@@ -77,6 +81,7 @@ def measured(rows: Sequence[Row], cores: int) -> Rates:
         loads=rows[0].loads,
         triangles=_rate((row.triangles, row.dofs) for row in rows),
         subdomains=_rate((row.subdomains, row.dofs) for row in rows),
+        vectors=_rate((row.vectors, row.dofs) for row in rows),
         coarse=_rate((row.coarse, row.dofs) for row in rows),
         coarse_bytes=_rate((row.coarse_bytes, row.dofs) for row in rows),
         largest_coarse=max(row.coarse for row in timed),
@@ -135,15 +140,16 @@ def predict(rates: Rates, machine: Machine, dofs: float, ranks: int) -> Predicti
     whole = ceil(subdomains / ranks) * ranks / subdomains
     own = dofs / ranks * max(rates.imbalance if ranks > 1 else 1.0, whole)
     coarse = max(rates.coarse * dofs, 2.0)
+    together = ranks**TOGETHER if rates.vectors * dofs > LARGEST_REDUNDANT else 1.0
     return Prediction(
         dofs=dofs,
         ranks=ranks,
         mesh=rates.mesh * rates.triangles * dofs,
         assemble=rates.assemble * own,
         setup=rates.setup * own,
-        coarse_factor=rates.factor * coarse**COARSE_POWER,
+        coarse_factor=rates.factor * coarse**COARSE_POWER / together,
         apply=rates.iterations * rates.apply * own,
-        coarse_solve=rates.iterations * COARSE_SUMS * rates.solve * coarse * log2(coarse),
+        coarse_solve=rates.iterations * rates.solve * coarse * log2(coarse) / together,
         messages=_messages(rates, machine, dofs, ranks, coarse) if ranks > 1 else 0.0,
     )
 

@@ -69,7 +69,7 @@ class AdaptiveCoarse(CoarseProblem):
         own = (boundary.B @ self.R).tocsr()
         shape = (own.shape[0], self.dimension)
         self._motions = csr_matrix((own.data, own.indices + self.own.start, own.indptr), shape=shape)
-        self._complete, self._usable = False, True
+        self._complete, self._usable, self._sufficient = False, True, False
         self.saddle: SaddlePoint | None = None
         self._E: csr_matrix
         # (columns, S+ B^T U there) of each subdomain
@@ -121,11 +121,11 @@ class AdaptiveCoarse(CoarseProblem):
         return np.asarray(z - self._column(z) * (self.U @ c))
 
     def residual(self, r: Float) -> Float:
-        """r - G a with U^T (r - G a) = 0 as far as that can be; while all rows are active, P r.
+        """r - G a with U^T (r - G a) = 0 as far as that can be; or P r, where that does as well.
 
-        Then U has M^-1 G among its range, and T M^-1 takes away what is left of rigid-body motions.
+        While all rows are active U has M^-1 G in its range, so T M^-1 takes away what P leaves of it, to rounding.
         """
-        if not (self._usable and self._complete):
+        if not self._usable or (self._sufficient and not self._complete):
             return self.projected(r)
         _, a = self._solve(self.U.T @ r, np.zeros((self.dimension, *r.shape[1:])))
         return np.asarray(r - self.Ga @ a)
@@ -153,6 +153,8 @@ class AdaptiveCoarse(CoarseProblem):
         """Factor the coarse matrix, and find out whether it is any good.  Collective."""
         rows = int(self.everywhere(np.array([self._active.sum()]))[0])
         self._usable = rows >= ROOM * self.vectors and self._factored() and self._projects()
+        # Of a badly conditioned coarse problem T would not take away enough.
+        self._sufficient = self.saddle is not None and self.saddle.benign
 
     def _factored(self) -> bool:
         seen = self.everywhere(abs(self.U.T) @ self._active) > 0.0

@@ -75,6 +75,11 @@ class SaddlePoint:
         c, a = self._solve(columns * f, rows * g)
         return columns * c, rows * a
 
+    @property
+    def benign(self) -> bool:
+        """Whether the augmented matrix was good enough."""
+        return isinstance(self._inner, _Augmented)
+
     def destroy(self) -> None:
         """Free the factor.  Collective."""
         self._inner.solver.destroy()
