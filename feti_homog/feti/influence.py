@@ -42,9 +42,9 @@ class Influence:
         self.boundary, self.bonded = boundary, BondedCell(comm, constraints, boundary)
         self.scaled = Scaled(comm, constraints, boundary, self._forces)
         rows = constraints.owned[1] - self.start
-        # Rows that have ever been inactive, ascending; H there: (owned rows, known) and (known, known).
+        # Rows that have ever been inactive, as they came, and H there, (known, known); its columns, with room for more.
         self._known: Int = np.zeros(0, np.int64)
-        self._columns, self._table = np.zeros((rows, 0)), np.zeros((0, 0))
+        self._table, self._room = np.zeros((0, 0)), np.zeros((rows, CHUNK), order="F")
         self.activate(np.ones(rows))
 
     def activate(self, active: Float) -> None:
@@ -52,11 +52,17 @@ class Influence:
         self._active = active
         inactive = np.concatenate(self.comm.allgather(self.start + np.flatnonzero(active == 0)))
         self._learn(np.setdiff1d(inactive, self._known))
-        self._at = np.searchsorted(self._known, inactive)
+        order = np.argsort(self._known)
+        self._at = order[np.searchsorted(self._known, inactive, sorter=order)]
         held = self._table[np.ix_(self._at, self._at)]
         largest = held.diagonal().max(initial=0.0)
         factor, order, rank, _ = dpstrf(held, tol=SINGULAR * largest, lower=1) if len(held) else (held, self._at, 0, 0)
         self._factor, self._order = factor[:rank, :rank], order[:rank] - 1
+
+    @property
+    def _columns(self) -> Float:
+        """(owned rows, known) of H."""
+        return self._room[:, : len(self._known)]
 
     def apply(self, r: Float) -> Float:
         """H_D r for r (owned rows,) or (owned rows, k); 0 on inactive rows."""
@@ -84,23 +90,23 @@ class Influence:
 
     def _learn(self, rows: Int) -> None:
         """Find the columns of H for these rows.  Collective."""
-        parts = [self._columns]
         for some in np.split(rows, np.arange(CHUNK, len(rows), CHUNK)) if len(rows) else []:
             unit = np.zeros((len(self._active), len(some)))
             mine = (some >= self.start) & (some < self.start + len(unit))
             unit[some[mine] - self.start, np.flatnonzero(mine)] = 1.0
-            parts.append(self.scaled.apply(unit))
-        if len(parts) == 1:
-            return
-        known = np.concatenate([self._known, rows])
-        order = np.argsort(known)
-        old = len(self._known)
-        self._known, self._columns = known[order], np.concatenate(parts, axis=1)[:, order]
-        table = np.zeros((len(known), len(known)))
+            self._add(some, self.scaled.apply(unit))
+
+    def _add(self, rows: Int, columns: Float) -> None:
+        old, self._known = len(self._known), np.concatenate([self._known, rows])
+        n = len(self._known)
+        if n > self._room.shape[1]:
+            self._room = np.concatenate([self._room.T, np.empty((n, len(columns)))]).T
+        self._room[:, old:n] = columns
+        table = np.empty((n, n))
         table[:old, :old] = self._table
-        new = self._everywhere(self._columns[:, np.argsort(order)[old:]], known)
-        table[:, old:], table[old:, :old] = new, new[:old].T
-        self._table = table[np.ix_(order, order)]
+        table[:, old:] = self._everywhere(columns, self._known)
+        table[old:, :old] = table[:old, old:].T
+        self._table = table
 
     def _everywhere(self, x: Float, rows: Int) -> Float:
         """The values of x (owned rows, ...) on some global rows, on every rank."""
