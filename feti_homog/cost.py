@@ -14,13 +14,13 @@ from math import ceil
 
 from feti_homog.case import Case
 
-START_SECONDS = 1.3  # Python, MPI, PETSc and gmsh
-MESH_SECONDS = 4.4e-5  # a coarse triangle, on rank 0
-SETUP_SECONDS = 1.1e-5  # a degree of freedom: assembling and factoring
-SUBDOMAIN_SECONDS = 3.5e-3  # a subdomain
-APPLY_SECONDS = 1.0e-7  # a degree of freedom in one application of operator and preconditioner
-BASE_BYTES = 1.9e8  # of a rank with nothing on it
-DOF_BYTES = 8.1e2
+START_SECONDS = 1.2  # Python, MPI, PETSc and gmsh
+MESH_SECONDS = 3.9e-5  # a coarse triangle, on rank 0
+SETUP_SECONDS = 9.5e-6  # a degree of freedom: assembling and factoring
+SUBDOMAIN_SECONDS = 5.2e-3  # a subdomain
+APPLY_SECONDS = 8.8e-8  # a degree of freedom in one application of operator and preconditioner
+BASE_BYTES = 2.1e8  # of a rank with nothing on it
+DOF_BYTES = 6.7e2
 DOFS_OF_A_RANK = 50_000  # fewer on a rank, and its waiting for others takes more than it saves
 # Typical numbers, by which a case is estimated and its operators are chosen.
 ITERATIONS_OF_A_SOLVE, SOLVES_OF_A_CONTACT, SOLVES_OF_A_PATH = 20, 3, 100
