@@ -77,8 +77,8 @@ class SaddlePoint:
 
     @property
     def benign(self) -> bool:
-        """Whether the augmented matrix was good enough."""
-        return isinstance(self._inner, _Augmented)
+        """Whether the augmented matrix was good enough, and no solve more than the fewest was wanted."""
+        return isinstance(self._inner, _Augmented) and self._solves == FEWEST_SOLVES
 
     def destroy(self) -> None:
         """Free the factor.  Collective."""
