@@ -1,8 +1,7 @@
 """Iterations to 1e-8 at every combination of fibres, fibre fraction, gap, cut of the matrix, contrast and mesh size.
 
 Each line of the CSV is one cell with its three load cases; cells that the file holds already are not run again, so that
-a long list can be worked off in parts.  "uncut" leaves the matrix whole and looks for soft modes none the less; it is
-skipped where its boundary is too large for dense matrices.
+a long list can be worked off in parts.  "uncut" leaves the matrix whole and looks for soft modes none the less.
 """
 
 from __future__ import annotations
@@ -25,12 +24,10 @@ from petsc4py import PETSc  # noqa: E402
 
 from feti_homog import case as cases  # noqa: E402
 from feti_homog.case import Case  # noqa: E402
-from feti_homog.feti.boundary import LARGEST_DENSE  # noqa: E402
 from feti_homog.petsc_options import case_options  # noqa: E402
 from feti_homog.progress import Progress  # noqa: E402
 from feti_homog.torn import tear  # noqa: E402
 
-UNCUT = 0
 # Coarse elements along the side of a cell with one fibre.
 ELEMENTS = 5
 
@@ -53,9 +50,6 @@ class Cell:
 
     def case(self, space: str) -> Case:
         """The case, with that kind of coarse space."""
-        petsc = {"feti_ksp_rtol": 1e-8, "feti_coarse_space": space}
-        if self.pieces == UNCUT:
-            petsc["feti_dual_operator"] = "explicit"
         return cases.parse(
             {
                 "cell": {
@@ -68,7 +62,7 @@ class Cell:
                 },
                 "analysis": {"type": "stiffness", "plane": "strain"},
                 "decomposition": {"subdomains": self.fibres * (1 + self.pieces) or 1},
-                "petsc": petsc,
+                "petsc": {"feti_ksp_rtol": 1e-8, "feti_coarse_space": space},
             },
             Path(),
         )  # fmt: skip
@@ -101,13 +95,10 @@ def main() -> None:
     ]  # fmt: skip
     known = {tuple(asdict(row)[f.name] for f in fields(Cell)) for row in done}
     wanted = [cell for cell in grid if cell.possible and tuple(asdict(cell).values()) not in known]
-    skipped = [cell for cell in wanted if cell.pieces == UNCUT and _uncut_boundary(cell) > LARGEST_DENSE]
     if comm.rank == 0:
-        print(f"{len(grid)} combinations, {len(done)} done, {len(wanted) - len(skipped)} to do, {len(skipped)} skipped")
+        print(f"{len(grid)} combinations, {len(done)} done, {len(wanted)} to do")
         print("fibres fraction   gap pieces contrast refine     dofs subdom. boundary vectors iterations seconds")
     for cell in wanted:
-        if cell in skipped:
-            continue
         row = measure(cell, arguments.space, comm)
         done.append(row)
         if comm.rank == 0:
@@ -144,12 +135,6 @@ def measure(cell: Cell, space: str, comm: MPI.Intracomm) -> Row:
                iterations=iterations, seconds=seconds)  # fmt: skip
 
 
-def _uncut_boundary(cell: Cell) -> float:
-    """About the boundary dofs of a whole matrix: all circles, in elements no longer than the wanted size."""
-    radius = (cell.fraction / (np.pi * cell.fibres)) ** 0.5
-    return float(2 * cell.fibres * 2 * np.pi * radius * ELEMENTS * cell.fibres**0.5 * 2**cell.refine * 1.7)
-
-
 def _read(path: Path) -> list[Row]:
     if not path.exists():
         return []
@@ -171,7 +156,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--fibres", type=int, nargs="+", default=[16, 64, 256])
     parser.add_argument("--fractions", type=float, nargs="+", default=[0.3, 0.5, 0.65])
     parser.add_argument("--gaps", type=float, nargs="+", default=[0.2, 0.06, 0.02])
-    parser.add_argument("--pieces", type=int, nargs="+", default=[UNCUT, 1, 4], help="per fibre, 0: matrix uncut")
+    parser.add_argument("--pieces", type=int, nargs="+", default=[0, 1, 4], help="per fibre, 0: matrix uncut")
     parser.add_argument("--contrasts", type=float, nargs="+", default=[1e-3, 2.0, 1e3, 1e6])
     parser.add_argument("--refine", type=int, nargs="+", default=[0, 1, 2])
     parser.add_argument("--space", choices=("natural", "adaptive"), default="adaptive")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,6 +61,29 @@ def cut(torus: Torus, subdomain: Int) -> Iterator[Piece]:
     order = np.argsort(subdomain, kind="stable")
     for index, members in enumerate(np.split(order, np.cumsum(np.bincount(subdomain))[:-1])):
         yield _piece(torus, index, members, pinned)
+
+
+def part(piece: Piece, members: Int) -> Piece:
+    """The coarse triangles `members` (m,) of a piece, as a piece of its own."""
+    vertices, triangles = np.unique(piece.triangles[members], return_inverse=True)
+    edges, triangle_edges = np.unique(piece.triangle_edges[members], return_inverse=True)
+    classes, vertex_class = np.unique(piece.vertex_class[vertices], return_inverse=True)
+    torus_edges, edge_class = np.unique(piece.edge_class[edges], return_inverse=True)
+    held = np.flatnonzero(classes == piece.pinned)
+    return replace(
+        piece,
+        points=piece.points[vertices],
+        triangles=triangles.reshape(-1, 3),
+        triangle_edges=triangle_edges.reshape(-1, 3),
+        backwards=piece.backwards[members],
+        edges=np.searchsorted(vertices, piece.edges[edges]),
+        circles=piece.circles[edges],
+        vertex_class=vertex_class,
+        edge_class=edge_class,
+        class_keys=piece.class_keys[classes],
+        edge_keys=piece.edge_keys[torus_edges],
+        pinned=int(held[0]) if len(held) else -1,
+    )
 
 
 def pinned_class(torus: Torus) -> int:

@@ -31,12 +31,17 @@ from feti_homog.feti.spectral import DualBlock, coarse_vectors, dual_blocks
 
 Int = NDArray[np.int64]
 Float = NDArray[np.float64]
+# Rows of the receiver, numbers of coarse vectors, and their jumps there (rows, vectors).
+Jumps = tuple[Int, Int, Float]
 
-THRESHOLD = 0.2
+THRESHOLD = 0.22
 # Active rows per coarse vector below which the vectors are taken to depend on each other.
 ROOM = 4
 # Largest T T z - T z, and G^T T z, of a usable coarse problem, relative to T z and G^T z.
 LEAK = 1e-6
+# Coarse vectors that are found at once; and entries, relative to the largest, that those of a large body do without:
+# they decay within few fibres.
+CHUNK, FAINT = 128, 1e-5
 
 
 class AdaptiveCoarse(CoarseProblem):
@@ -154,7 +159,8 @@ class AdaptiveCoarse(CoarseProblem):
         rows = int(self.everywhere(np.array([self._active.sum()]))[0])
         self._usable = rows >= ROOM * self.vectors and self._factored() and self._projects()
         # Of a badly conditioned coarse problem T would not take away enough.
-        self._sufficient = self.saddle is not None and self.saddle.benign
+        exact = not self.comm.allreduce(any(block.large for block in self._blocks), MPI.LOR)
+        self._sufficient = exact and self.saddle is not None and self.saddle.benign
 
     def _factored(self) -> bool:
         seen = self.everywhere(abs(self.U.T) @ self._active) > 0.0
@@ -242,27 +248,46 @@ def _preconditioned(
     comm.Allreduce(MPI.IN_PLACE, every)
     ends = np.cumsum(every)
 
-    def jumps() -> Iterator[tuple[int, int, Float]]:
+    def jumps() -> Iterator[tuple[int, int, tuple[Int, Float]]]:
         for i, (block, v) in enumerate(zip(blocks, V, strict=True)):
-            Z = block.B @ v
+            Z, last = block.B @ v, ends[neighbours.index[i]]
             for s, common in neighbours.common[i].items():
-                yield i, s, Z[common]
+                seen = np.flatnonzero(Z[common].any(axis=0))
+                yield i, s, (last - v.shape[1] + seen, Z[np.ix_(common, seen)])
 
-    received: list[list[tuple[int, Float]]] = [[] for _ in blocks]
-    neighbours.exchange(jumps(), lambda i, sender, Z: received[i].append((sender, Z)))
+    received: list[list[Jumps]] = [[] for _ in blocks]
+    neighbours.exchange(jumps(), lambda i, sender, of: received[i].append((neighbours.common[i][sender], *of)))
     U = Blocks((len(constraints.rows), int(every.sum())))
     for i, (block, rows) in enumerate(zip(blocks, neighbours.rows, strict=True)):
-        if not received[i]:
-            continue
-        jump = np.zeros((len(rows), sum(Z.shape[1] for _, Z in received[i])))
-        columns, at = [], 0
-        for s, Z in received[i]:
-            jump[neighbours.common[i][s], at : at + Z.shape[1]] = Z
-            columns.append(np.arange(ends[s] - every[s], ends[s]))
-            at += Z.shape[1]
-        U.add(rows, np.concatenate(columns), block.BW @ block.operator.forces(block.BW.T @ jump))
+        for some in _groups(received[i]):
+            columns = np.concatenate([c for _, c, _ in some])
+            jump, at = np.zeros((len(rows), len(columns))), 0
+            for where, _, Z in some:
+                jump[where, at : at + Z.shape[1]] = Z
+                at += Z.shape[1]
+            vectors = block.BW @ block.operator.forces(block.BW.T @ jump)
+            if block.large:
+                U.add_larger(rows, columns, vectors, FAINT * np.abs(vectors).max())
+            else:
+                U.add(rows, columns, vectors)
     owned = constraints.owned[1] - constraints.owned[0]
     return summed(comm, U.matrix(), constraints.rows, constraints.foreign, owned)
+
+
+def _groups(messages: Sequence[Jumps]) -> Iterator[list[Jumps]]:
+    """The same jumps, at most CHUNK columns at a time."""
+    group: list[Jumps] = []
+    width = 0
+    for where, columns, Z in messages:
+        for first in range(0, len(columns), CHUNK):
+            some = slice(first, first + CHUNK)
+            if width + len(columns[some]) > CHUNK:
+                yield group
+                group, width = [], 0
+            group.append((where, columns[some], Z[:, some]))
+            width += len(columns[some])
+    if group:
+        yield group
 
 
 def _compressed(matrix: csr_matrix, rows: Int) -> tuple[Int, Float]:

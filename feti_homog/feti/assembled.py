@@ -9,6 +9,7 @@ from petsc4py import PETSc
 from scipy.sparse import csr_matrix, diags
 
 Int = NDArray[np.int64]
+Int32 = NDArray[np.int32]
 Float = NDArray[np.float64]
 
 # Entries of dense blocks that are held before they are summed up, at least.
@@ -106,13 +107,22 @@ class Blocks:
 
     def __init__(self, shape: tuple[int, int]) -> None:
         self._whole = csr_matrix(shape)
-        self._held: list[tuple[Int, Int, Float]] = []
+        self._held: list[tuple[Int32, Int32, Float]] = []
         self._entries = 0
 
     def add(self, rows: Int, columns: Int, values: Float) -> None:
         """Add `values` (rows, columns)."""
+        self._add(np.repeat(rows.astype(np.int32), len(columns)), np.tile(columns.astype(np.int32), len(rows)),
+                  values.ravel())  # fmt: skip
+
+    def add_larger(self, rows: Int, columns: Int, values: Float, least: float) -> None:
+        """Add those of `values` (rows, columns) that are larger than `least` in modulus."""
+        i, j = np.nonzero(np.abs(values) > least)
+        self._add(rows.astype(np.int32)[i], columns.astype(np.int32)[j], values[i, j])
+
+    def _add(self, rows: Int32, columns: Int32, values: Float) -> None:
         self._held.append((rows, columns, values))
-        self._entries += values.size
+        self._entries += len(values)
         if self._entries > max(HELD, self._whole.nnz):
             self._flush()
 
@@ -123,8 +133,6 @@ class Blocks:
 
     def _flush(self) -> None:
         if self._held:
-            rows = np.concatenate([np.repeat(r.astype(np.int32), len(c)) for r, c, _ in self._held])
-            columns = np.concatenate([np.tile(c.astype(np.int32), len(r)) for r, c, _ in self._held])
-            values = np.concatenate([v.ravel() for _, _, v in self._held])
+            rows, columns, values = (np.concatenate(part) for part in zip(*self._held, strict=True))
             self._whole = self._whole + csr_matrix((values, (rows, columns)), shape=self._whole.shape)
             self._held, self._entries = [], 0

@@ -22,6 +22,8 @@ Float = NDArray[np.float64]
 KINDS = ("auto", "implicit", "explicit")
 # Boundary dofs of a subdomain up to which dense matrices (two of 8 n^2 bytes) are ever chosen by themselves.
 LARGEST_DENSE = 6000
+# Boundary dofs up to which a subdomain's soft modes come from one dense eigenproblem; above, from one for each face.
+LARGEST_WHOLE = 2000
 # Seconds, up to a common factor, for the choice: of a dense inverse per n^3, and of one application of the dual
 # operator and the preconditioner by triangular solves per dof (both measured with `scripts/benchmark_path`).
 INVERSE, SOLVES = 5e-10, 3.5e-7
@@ -39,14 +41,14 @@ class Boundary:
     """
 
     def __init__(
-        self, constraints: Constraints, subdomains: Sequence[Subdomain], kind: str, applications: int, soft: bool
+        self, constraints: Constraints, subdomains: Sequence[Subdomain], kind: str, applications: int, wanted: int
     ) -> None:
         """Factor every subdomain, once.
 
         Args:
             kind: of KINDS; auto is dense where that pays.
             applications: how many times the operators are expected to be applied.
-            soft: whether soft modes will be looked for, which takes dense matrices.
+            wanted: boundary dofs up to which dense matrices are wanted for more than these applications.
         """
         self.subdomains = subdomains
         self.dofs = _touched(constraints.B, subdomains)
@@ -59,7 +61,8 @@ class Boundary:
         self.diagonal = np.concatenate([np.zeros(0), *diagonals])
         self.operators: list[Condensed | Factored] = []
         for subdomain, dofs in zip(subdomains, self.dofs, strict=True):
-            pays = soft or INVERSE * len(dofs) ** 3 <= SOLVES * subdomain.K.shape[0] * applications
+            pays = INVERSE * len(dofs) ** 3 <= SOLVES * subdomain.K.shape[0] * applications
+            pays = pays or len(dofs) <= wanted
             dense = kind == "explicit" or (kind == "auto" and pays and _fits(len(dofs)))
             self.operators.append(Condensed(subdomain, dofs) if dense and len(dofs) else Factored(subdomain, dofs))
             subdomain.release()
@@ -72,8 +75,7 @@ class Boundary:
     def release(self) -> None:
         """Free what only the set-up of a coarse space needs."""
         for operator in self.operators:
-            if isinstance(operator, Condensed):
-                operator.release()
+            operator.release()
 
     def stiffness(self, x: Float) -> Float:
         """S x for x (n,) or (n, k)."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import weakref
-from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,40 +11,8 @@ from scipy.sparse import csr_matrix
 
 Float = NDArray[np.float64]
 
-
 # Per cent of MUMPS' estimate of workspace that it may need more for pivoting.
 PIVOTING_ROOM = 200
-
-
-class LocalSolver:
-    """x = A_s^-1 b for every SPD matrix A_s of this rank, one KSP each.
-
-    `b` and `x` are the subdomains' vectors one after the other; `offsets` says where each begins.
-    """
-
-    def __init__(self, matrices: Sequence[csr_matrix], prefix: str) -> None:
-        """Factorize.  Options under `prefix` (default: preonly, cholesky by CHOLMOD).
-
-        Raises:
-            PETSc.Error: a matrix is not positive definite.
-        """
-        self.offsets = np.cumsum([0, *(m.shape[0] for m in matrices)])
-        self.b, self.x = np.zeros(self.offsets[-1]), np.zeros(self.offsets[-1])
-        self._solves: list[tuple[PETSc.KSP, PETSc.Vec, PETSc.Vec]] = []
-        weakref.finalize(self, _free, self._solves)
-        for s, matrix in enumerate(matrices):
-            span = slice(self.offsets[s], self.offsets[s + 1])
-            if matrix.shape[0]:
-                vectors = (
-                    PETSc.Vec().createWithArray(a[span], comm=PETSc.COMM_SELF) for a in (self.b, self.x)
-                )
-                self._solves.append((factorized(matrix, prefix), *vectors))
-
-    def solve(self) -> Float:
-        """Solve with `b` as it stands; returns `x`, which the next solve overwrites."""
-        for ksp, b, x in self._solves:
-            ksp.solve(b, x)
-        return self.x
 
 
 class DirectSolver:
@@ -65,7 +32,7 @@ class DirectSolver:
     def _hold(self, ksp: PETSc.KSP) -> None:
         self._ksp = ksp
         self._x, self._b = ksp.getOperators()[0].createVecs()
-        weakref.finalize(self, _free, [(ksp, self._x, self._b)])
+        weakref.finalize(self, _free, ksp, self._x, self._b)
 
     def solve(self, B: Float) -> Float:
         """A^-1 B for B (n,) or (n, k)."""
@@ -123,11 +90,10 @@ def factored_by_mumps(A: PETSc.Mat, prefix: str, definite: bool) -> PETSc.KSP:
     return ksp
 
 
-def _free(solves: list[tuple[PETSc.KSP, PETSc.Vec, PETSc.Vec]]) -> None:
-    """Free factors at once; PETSc would keep what Python drops until it is told to clean up."""
-    for ksp, *vectors in solves:
-        for thing in (ksp.getOperators()[0], ksp, *vectors):
-            thing.destroy()
+def _free(ksp: PETSc.KSP, *vectors: PETSc.Vec) -> None:
+    """Free a factor at once; PETSc would keep what Python drops until it is told to clean up."""
+    for thing in (ksp.getOperators()[0], ksp, *vectors):
+        thing.destroy()
 
 
 def _sequential(matrix: csr_matrix) -> PETSc.Mat:

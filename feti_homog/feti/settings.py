@@ -11,7 +11,7 @@ from feti_homog.errors import CaseError
 from feti_homog.feti import boundary as boundaries
 from feti_homog.feti.adaptive import THRESHOLD, AdaptiveCoarse
 from feti_homog.feti.bonded import shared_dofs
-from feti_homog.feti.boundary import Boundary
+from feti_homog.feti.boundary import LARGEST_DENSE, LARGEST_WHOLE, Boundary
 from feti_homog.feti.coarse import CoarseProblem
 from feti_homog.feti.condensed import Condensed
 from feti_homog.feti.constraints import Constraints
@@ -39,17 +39,21 @@ def parts(
     space = _choice("coarse_space", COARSE_SPACES, "auto")
     threshold = PETSc.Options("feti_").getReal("coarse_threshold", THRESHOLD)
     soft = space == "adaptive" or (space == "auto" and _cut(comm, subdomains))
-    boundary = Boundary(constraints, subdomains, operator, applications, soft or pc == "influence")
-    dense = comm.allreduce(all(isinstance(o, Condensed) for o in boundary.operators), MPI.LAND)
+    wanted = LARGEST_DENSE if pc == "influence" else LARGEST_WHOLE if soft else 0
+    boundary = Boundary(constraints, subdomains, operator, applications, wanted)
+    sizes = [len(dofs) for dofs in boundary.dofs]
+    condensed = [isinstance(o, Condensed) for o in boundary.operators]
+    dense = comm.allreduce(all(condensed), MPI.LAND)
+    small = comm.allreduce(all(c or n > LARGEST_WHOLE for c, n in zip(condensed, sizes, strict=True)), MPI.LAND)
     if pc == "influence" and not dense:
         raise CaseError("-feti_pc_type influence: needs -feti_dual_operator explicit")
     if pc == "auto":
         pays = applications >= MANY and space != "adaptive" and dense and _fits(comm, constraints)
         pc = "influence" if pays else "dirichlet"
-    if space == "adaptive" and not (dense and pc == "dirichlet"):
+    if space == "adaptive" and not (small and pc == "dirichlet"):
         raise CaseError("-feti_coarse_space adaptive: needs -feti_pc_type dirichlet and -feti_dual_operator explicit")
     preconditioner = _preconditioner(pc, comm, constraints, boundary)
-    if soft and dense and isinstance(preconditioner, Dirichlet):
+    if soft and small and isinstance(preconditioner, Dirichlet):
         return boundary, preconditioner, AdaptiveCoarse(comm, constraints, boundary, preconditioner, threshold)
     return boundary, preconditioner, CoarseProblem(comm, constraints, boundary)
 

@@ -1,0 +1,82 @@
+"""Rings: what surrounds the faces of a body too large to be examined as one.
+
+For displacements p of a face the energy of the body is at least that of the ring around it, whatever else moves:
+
+    min { x^T S x : x = p on the face } >= p^T S_ring p.
+
+So displacements that are soft in the body, x, are soft in some ring, on its face; there may be more of these.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feti_homog.cell.piece import part
+from feti_homog.cell.torus import components, edge_pairs
+from feti_homog.feti.condensed import Condensed
+from feti_homog.feti.subdomain import Subdomain
+
+Int = NDArray[np.int64]
+Float = NDArray[np.float64]
+
+# Coarse triangles from the face to the far side of its ring.
+LAYERS = 2
+
+
+@dataclass(frozen=True)
+class Ring:
+    """The neighbourhood of a face in its body, as a subdomain of its own, condensed to the face's n dofs.
+
+    Attributes:
+        at: (n,) positions of these dofs among the boundary dofs of the body.
+        operator: its dense boundary operators.
+        R: (n, k) its kernel on the face.
+    """
+
+    at: Int
+    operator: Condensed
+    R: Float
+
+
+def rings(body: Subdomain, dofs: Int, face: Int) -> list[Ring]:
+    """The rings around a face, one for each connected part of its neighbourhood.
+
+    Args:
+        dofs: (n,) boundary dofs of the body, sorted.
+        face: positions among `dofs` of the face's, both directions of each node.
+    """
+    on_face = np.zeros(body.mesh.n_classes, bool)
+    on_face[dofs[face] // 2] = True
+    near = _near(body, on_face)
+    edges = body.piece.edge_class[body.piece.triangle_edges[near]]
+    label = components(len(near), *edge_pairs(edges))
+    found = []
+    for k in range(label.max() + 1):
+        members = near[label == k]
+        ring = Subdomain.build(part(body.piece, members), body.mesh.lattice, body.L)
+        of_body = np.empty(ring.mesh.n_classes, np.int64)
+        of_body[ring.mesh.node_class[ring.mesh.nodes]] = body.mesh.node_class[body.mesh.nodes[members]]
+        nodes = np.flatnonzero(on_face[of_body])
+        if len(nodes):
+            own, of_body = (_dofs(n) for n in (nodes, of_body[nodes]))
+            found.append(Ring(np.searchsorted(dofs, of_body), Condensed(ring, own), ring.R[own]))
+    return found
+
+
+def _near(body: Subdomain, on_face: NDArray[np.bool_]) -> Int:
+    """Coarse triangles within LAYERS of the marked nodes."""
+    classes = body.mesh.node_class[body.mesh.nodes]
+    near = on_face[classes].any(axis=1)
+    for _ in range(LAYERS - 1):
+        corners = np.zeros(len(on_face), bool)
+        corners[classes[near, :3]] = True
+        near |= corners[classes[:, :3]].any(axis=1)
+    return np.flatnonzero(near)
+
+
+def _dofs(nodes: Int) -> Int:
+    """Both directions of the nodes."""
+    return (2 * nodes[:, None] + np.arange(2)).ravel()

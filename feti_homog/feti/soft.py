@@ -1,0 +1,146 @@
+"""Soft modes of one subdomain, examined as one or face by face.
+
+For a subdomain s with Schur complement S_s and constraints B_s, the displacements p of its boundary with
+
+    S_s p = theta N_s p,  N_s = B_s^T M^-1 B_s,  theta < tau
+
+are soft in s but stiff in the eyes of the preconditioner.  On a large boundary that takes a dense eigenproblem beyond
+reach, but what makes p stiff is what it shares a face with: each face is examined with the ring around it for S_s,
+and the neighbour's share of M^-1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import eigh
+from scipy.sparse import csr_matrix
+
+from feti_homog.feti.boundary import LARGEST_WHOLE
+from feti_homog.feti.condensed import Condensed
+from feti_homog.feti.factored import Factored
+from feti_homog.feti.rings import rings
+from feti_homog.feti.subdomain import Subdomain
+
+Int = NDArray[np.int64]
+Float = NDArray[np.float64]
+Single = NDArray[np.float32]
+
+# Of a symmetric matrix, relative to its largest entry: eigenvalues that are none.
+NULL = 1e-10
+# The threshold of a face, over tau, for what other faces and the rest of the body add is not in its eigenproblem.
+FACE = 1.25
+
+
+@dataclass(frozen=True)
+class DualBlock:
+    """One subdomain on the rows of its nodes.
+
+    Attributes:
+        subdomain, dofs: what it is, and its (n,) boundary dofs.
+        operator: its boundary operators.
+        B: (rows, n) constraints.
+        BW: (rows, n) scaled constraints W^-1 B D^-1.
+    """
+
+    subdomain: Subdomain
+    dofs: Int
+    operator: Condensed | Factored
+    B: csr_matrix
+    BW: csr_matrix
+
+    @property
+    def R(self) -> Float:
+        """(n, k) kernel on the boundary."""
+        return self.subdomain.R[self.dofs]
+
+    @property
+    def large(self) -> bool:
+        """Whether the boundary is too large to be examined as one."""
+        return len(self.dofs) > LARGEST_WHOLE
+
+
+class Whole:
+    """Examined as one.  `common` names the rows that it has in common with each subdomain, itself among them."""
+
+    def __init__(self, block: DualBlock, operator: Condensed, common: Mapping[int, Int]) -> None:
+        self.block, self.operator, self.common = block, operator, common
+
+    @property
+    def preconditioner(self) -> Float:
+        """(rows, rows) its share W^-1 B D^-1 S D^-1 B^T W^-1 of M^-1."""
+        return np.asarray(self.block.BW @ (self.block.BW @ self.operator.S).T)
+
+    def shares(self) -> Iterator[tuple[int, Float]]:
+        """Its share of M^-1 on the rows in common with each."""
+        M = self.preconditioner
+        for s, rows in self.common.items():
+            yield s, M[np.ix_(rows, rows)]
+
+    def modes(self, shares: Sequence[tuple[int, Single]], threshold: float) -> Float:
+        """(n, m) soft modes besides the kernel, for the shares of others in M^-1."""
+        M, B = self.preconditioner, self.block.B
+        for s, share in shares:
+            M[np.ix_(self.common[s], self.common[s])] += share
+        return soft_modes(self.operator.held, self.block.R, B.T @ (B.T @ M).T, threshold)
+
+
+class Faces:
+    """Examined face by face; see `Whole`."""
+
+    def __init__(self, block: DualBlock, common: Mapping[int, Int]) -> None:
+        self.block, self.common = block, common
+        faces = {s: np.unique(block.B[rows].indices // 2) for s, rows in common.items()}
+        self._rings = {
+            s: rings(block.subdomain, block.dofs, (2 * nodes[:, None] + np.arange(2)).ravel())
+            for s, nodes in faces.items()
+            if s != block.subdomain.piece.index
+        }
+
+    def shares(self) -> Iterator[tuple[int, Float]]:
+        """The share of M^-1 on the rows in common with each that the rings vouch for."""
+        for s, found in self._rings.items():
+            share = np.zeros((len(self.common[s]),) * 2)
+            for ring in found:
+                BW = self.block.BW[self.common[s]][:, ring.at]
+                share += BW @ (BW @ ring.operator.S).T
+            yield s, share
+
+    def modes(self, shares: Sequence[tuple[int, Single]], threshold: float) -> Float:
+        """(n, m) soft modes of the faces, for the shares of others in M^-1."""
+        parts = [np.zeros((len(self.block.dofs), 0))]
+        for s, share in shares:
+            for ring in self._rings[s]:
+                B = self.block.B[self.common[s]][:, ring.at]
+                soft = soft_modes(ring.operator.held, ring.R, B.T @ (B.T @ share).T, FACE * threshold)
+                parts.append(np.zeros((len(self.block.dofs), soft.shape[1])))
+                parts[-1][ring.at] = soft
+        return np.hstack(parts)
+
+
+def examined(block: DualBlock, common: Mapping[int, Int]) -> Whole | Faces:
+    """How a subdomain of that size is examined.
+
+    Raises:
+        TypeError: as one, but without dense boundary operators.
+    """
+    if block.large:
+        return Faces(block, common)
+    if not isinstance(block.operator, Condensed):
+        raise TypeError("soft modes of small boundaries need dense operators")
+    return Whole(block, block.operator, common)
+
+
+def soft_modes(held: Float, R: Float, N: Float, threshold: float) -> Float:
+    """(n, m) eigenvectors p, S p = theta N p with theta < threshold, besides the kernel R (n, k) of S.
+
+    `held` is S with its kernel held.
+    """
+    # Less the kernel's part, N has eigenvectors N-orthogonal to the kernel, and S may be held.
+    NR = N @ R
+    inner = np.linalg.pinv(R.T @ NR, rcond=NULL, hermitian=True)
+    above = (1.0 / threshold, np.inf)
+    return np.asarray(eigh(N - NR @ inner @ NR.T, held, subset_by_value=above, overwrite_a=True)[1])
