@@ -5,9 +5,11 @@ from __future__ import annotations
 import bonds
 import dense
 import numpy as np
+from cells import relative_error
 from mpi4py import MPI
 from scipy.linalg import eigh
 
+from feti_homog.interface.contact import BONDED, CLOSED, OPEN
 from feti_homog.petsc_options import case_options
 
 # Sixteen fibres almost touch; the matrix is cut across the gaps.
@@ -64,3 +66,34 @@ def of_all(comm, coarse, cell):
     """Soft modes of all subdomains in the order of their numbers."""
     own = zip((s.piece.index for s in cell.subdomains), coarse.counts, strict=True)
     return [count for _, count in sorted(pair for part in comm.allgather(list(own)) for pair in part)]
+
+
+def statuses(cell, seed):
+    """Statuses of this rank's nodes: an arc of each fibre open, some more nodes open or closed, at random."""
+    rng, nodes = np.random.default_rng(seed), cell.solver.constraints.nodes
+    points = np.concatenate(cell.comm.allgather(nodes.points))
+    place = np.empty(len(points), int)
+    place[np.lexsort(np.round(points, 8).T)] = np.arange(len(points))
+    first = cell.comm.exscan(len(nodes.row)) or 0
+    draws = rng.random(len(points))[place[first : first + len(nodes.row)]]
+    away = (cell.directions - rng.uniform(0, 360) + 180) % 360 - 180
+    status = np.where(draws < 0.1, OPEN, np.where(draws < 0.25, CLOSED, BONDED))
+    return np.where(np.abs(away) < 40, OPEN, status).astype(np.int8)
+
+
+def masks(cell, seeds):
+    """This rank's active rows for statuses drawn at random.  Collective."""
+    interface = bonds.interface(cell, True)
+    return [interface.active(statuses(cell, seed)) for seed in seeds]
+
+
+def agree(cell, found, expected):
+    """That solutions are the same.  Collective."""
+    for a, b in zip(found, expected, strict=True):
+        assert a.reason > 0 and b.reason > 0
+        assert relative_error(bonds.stress(cell, a), bonds.stress(cell, b)) < 1e-8
+        lam, other = (dense.gathered(cell, s.lam) for s in (a, b))
+        assert relative_error(lam, other) < 1e-6
+        jump, other = (dense.gathered(cell, s.jump) for s in (a, b))
+        opening = np.abs(dense.gathered(cell, cell.solver.d)).max()
+        assert np.abs(jump - other).max() < 1e-6 * opening

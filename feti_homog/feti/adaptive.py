@@ -60,7 +60,7 @@ class AdaptiveCoarse(CoarseProblem):
         scaling: Scaled,
         threshold: float,
     ) -> None:
-        """Find the soft modes and factor.  All boundary operators must be dense.  Collective."""
+        """Find the soft modes and factor.  All boundary operators must be dense but of large bodies.  Collective."""
         super().__init__(comm, constraints, boundary)
         self.threshold = threshold
         self.constraints = constraints
@@ -159,7 +159,7 @@ class AdaptiveCoarse(CoarseProblem):
         rows = int(self.everywhere(np.array([self._active.sum()]))[0])
         self._usable = rows >= ROOM * self.vectors and self._factored() and self._projects()
         # Of a badly conditioned coarse problem T would not take away enough.
-        exact = not self.comm.allreduce(any(block.large for block in self._blocks), MPI.LOR)
+        exact = not self.comm.allreduce(any(self._boundary.large), MPI.LOR)
         self._sufficient = exact and self.saddle is not None and self.saddle.benign
 
     def _factored(self) -> bool:
@@ -267,7 +267,7 @@ def _preconditioned(
                 at += Z.shape[1]
             vectors = block.BW @ block.operator.forces(block.BW.T @ jump)
             if block.large:
-                U.add_larger(rows, columns, vectors, FAINT * np.abs(vectors).max())
+                U.add_larger(rows, columns, vectors, FAINT * np.abs(vectors).max(axis=0))
             else:
                 U.add(rows, columns, vectors)
     owned = constraints.owned[1] - constraints.owned[0]

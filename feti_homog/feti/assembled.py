@@ -115,8 +115,8 @@ class Blocks:
         self._add(np.repeat(rows.astype(np.int32), len(columns)), np.tile(columns.astype(np.int32), len(rows)),
                   values.ravel())  # fmt: skip
 
-    def add_larger(self, rows: Int, columns: Int, values: Float, least: float) -> None:
-        """Add those of `values` (rows, columns) that are larger than `least` in modulus."""
+    def add_larger(self, rows: Int, columns: Int, values: Float, least: Float) -> None:
+        """Add those of `values` (rows, columns) that are larger in modulus than `least` (columns,)."""
         i, j = np.nonzero(np.abs(values) > least)
         self._add(rows.astype(np.int32)[i], columns.astype(np.int32)[j], values[i, j])
 

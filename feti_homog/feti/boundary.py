@@ -14,6 +14,7 @@ from scipy.sparse import block_diag, csr_matrix
 from feti_homog.feti.condensed import Condensed
 from feti_homog.feti.constraints import Constraints
 from feti_homog.feti.factored import Factored, Interior
+from feti_homog.feti.shared import Shared
 from feti_homog.feti.subdomain import Subdomain
 
 Int = NDArray[np.int64]
@@ -22,7 +23,7 @@ Float = NDArray[np.float64]
 KINDS = ("auto", "implicit", "explicit")
 # Boundary dofs of a subdomain up to which dense matrices (two of 8 n^2 bytes) are ever chosen by themselves.
 LARGEST_DENSE = 6000
-# Boundary dofs up to which a subdomain's soft modes come from one dense eigenproblem; above, from one for each face.
+# Boundary dofs above which a whole body's soft modes come from a dense eigenproblem for each face, not from one.
 LARGEST_WHOLE = 2000
 # Seconds, up to a common factor, for the choice: of a dense inverse per n^3, and of one application of the dual
 # operator and the preconditioner by triangular solves per dof (both measured with `scripts/benchmark_path`).
@@ -36,19 +37,20 @@ class Boundary:
         dofs: local numbers, sorted, of each subdomain's.
         offsets: where each subdomain begins among the n.
         operators: dense or factored, of each subdomain.
+        large: whether each is a whole body, and its boundary too large for one dense eigenproblem.
         B: (local rows, n) the constraints on them.
         diagonal: (n,) of K.
     """
 
     def __init__(
-        self, constraints: Constraints, subdomains: Sequence[Subdomain], kind: str, applications: int, wanted: int
+        self, constraints: Constraints, subdomains: Sequence[Subdomain], kind: str, applications: int, soft: bool
     ) -> None:
         """Factor every subdomain, once.
 
         Args:
             kind: of KINDS; auto is dense where that pays.
             applications: how many times the operators are expected to be applied.
-            wanted: boundary dofs up to which dense matrices are wanted for more than these applications.
+            soft: whether soft modes will be looked for, which takes dense matrices but of large bodies.
         """
         self.subdomains = subdomains
         self.dofs = _touched(constraints.B, subdomains)
@@ -59,10 +61,12 @@ class Boundary:
         self.BT = self.B.T.tocsr()
         diagonals = [s.K.diagonal()[d] for s, d in zip(subdomains, self.dofs, strict=True)]
         self.diagonal = np.concatenate([np.zeros(0), *diagonals])
+        whole = _whole(constraints.shared, [s.piece.index for s in subdomains])
+        self.large = [w and len(d) > LARGEST_WHOLE for w, d in zip(whole, self.dofs, strict=True)]
         self.operators: list[Condensed | Factored] = []
-        for subdomain, dofs in zip(subdomains, self.dofs, strict=True):
+        for subdomain, dofs, large in zip(subdomains, self.dofs, self.large, strict=True):
             pays = INVERSE * len(dofs) ** 3 <= SOLVES * subdomain.K.shape[0] * applications
-            pays = pays or len(dofs) <= wanted
+            pays = pays or (soft and not large)
             dense = kind == "explicit" or (kind == "auto" and pays and _fits(len(dofs)))
             self.operators.append(Condensed(subdomain, dofs) if dense and len(dofs) else Factored(subdomain, dofs))
             subdomain.release()
@@ -125,6 +129,15 @@ def _touched(B: csr_matrix, subdomains: Sequence[Subdomain]) -> list[Int]:
     touched = B.getnnz(axis=0).reshape(-1, 2).any(axis=1)
     nodes = np.split(touched, np.cumsum([s.mesh.n_classes for s in subdomains]))[:-1]
     return [(2 * np.flatnonzero(n)[:, None] + np.arange(2)).ravel() for n in nodes]
+
+
+def _whole(shared: Shared, subdomains: Sequence[int]) -> list[bool]:
+    """Whether all that each of the subdomains shares, it shares with one other body."""
+    entity = np.repeat(np.arange(len(shared.key)), shared.copies)
+    first, last = shared.pointer[:-1], shared.pointer[1:] - 1
+    pairs = (shared.copies == 2) & (shared.body[first] != shared.body[last])
+    broken = set(shared.sharer[~pairs[entity]].tolist())
+    return [s not in broken for s in subdomains]
 
 
 def _fits(boundary: int) -> bool:

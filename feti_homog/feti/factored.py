@@ -48,7 +48,7 @@ class Factored:
         """The boundary part of K+ X for X (n,) or (n, k)."""
 
         def solve(part: Float) -> Float:
-            load = np.zeros((self._size, *part.shape[1:]))
+            load = np.zeros((self._size, *part.shape[1:]), order="F")
             load[self.dofs] = part
             return self._solver.solve(load)[self.dofs]
 

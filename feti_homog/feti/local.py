@@ -19,7 +19,7 @@ class DirectSolver:
     """X = A^-1 B for one symmetric definite matrix A and any number of right-hand sides."""
 
     # Right-hand sides up to which the library is faster with one at a time.
-    few = 16
+    few = 2
 
     def __init__(self, matrix: csr_matrix, prefix: str) -> None:
         """Factorize.  Options under `prefix` (default: cholesky by CHOLMOD).

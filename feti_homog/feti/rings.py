@@ -4,7 +4,8 @@ For displacements p of a face the energy of the body is at least that of the rin
 
     min { x^T S x : x = p on the face } >= p^T S_ring p.
 
-So displacements that are soft in the body, x, are soft in some ring, on its face; there may be more of these.
+So displacements that are soft in the body, x, are soft in some ring, on its face; there may be more of these.  With
+all but the face held, the ring is stiffer than the body:  S restricted to the face <= S_clamped.
 """
 
 from __future__ import annotations
@@ -16,14 +17,17 @@ from numpy.typing import NDArray
 
 from feti_homog.cell.piece import part
 from feti_homog.cell.torus import components, edge_pairs
-from feti_homog.feti.condensed import Condensed
+from feti_homog.feti.condensed import Condensed, schur_complement
 from feti_homog.feti.subdomain import Subdomain
 
 Int = NDArray[np.int64]
 Float = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 # Coarse triangles from the face to the far side of its ring.
 LAYERS = 2
+# Nodes that hold a ring; a face with fewer can do little but move as one.
+FEWEST = 2
 
 
 @dataclass(frozen=True)
@@ -34,15 +38,17 @@ class Ring:
         at: (n,) positions of these dofs among the boundary dofs of the body.
         operator: its dense boundary operators.
         R: (n, k) its kernel on the face.
+        clamped: (n, n) stiffness of the face if other faces, and what is outside the ring, are held.
     """
 
     at: Int
     operator: Condensed
     R: Float
+    clamped: Float
 
 
 def rings(body: Subdomain, dofs: Int, face: Int) -> list[Ring]:
-    """The rings around a face, one for each connected part of its neighbourhood.
+    """The rings around a face, one for each connected part of its neighbourhood that has enough of it.
 
     Args:
         dofs: (n,) boundary dofs of the body, sorted.
@@ -50,23 +56,35 @@ def rings(body: Subdomain, dofs: Int, face: Int) -> list[Ring]:
     """
     on_face = np.zeros(body.mesh.n_classes, bool)
     on_face[dofs[face] // 2] = True
+    others = np.zeros_like(on_face)
+    others[dofs // 2] = ~on_face[dofs // 2]
     near = _near(body, on_face)
     edges = body.piece.edge_class[body.piece.triangle_edges[near]]
     label = components(len(near), *edge_pairs(edges))
     found = []
     for k in range(label.max() + 1):
-        members = near[label == k]
-        ring = Subdomain.build(part(body.piece, members), body.mesh.lattice, body.L)
-        of_body = np.empty(ring.mesh.n_classes, np.int64)
-        of_body[ring.mesh.node_class[ring.mesh.nodes]] = body.mesh.node_class[body.mesh.nodes[members]]
-        nodes = np.flatnonzero(on_face[of_body])
-        if len(nodes):
-            own, of_body = (_dofs(n) for n in (nodes, of_body[nodes]))
-            found.append(Ring(np.searchsorted(dofs, of_body), Condensed(ring, own), ring.R[own]))
+        ring = _ring(body, dofs, near[label == k], on_face, others)
+        found += [ring] if ring else []
     return found
 
 
-def _near(body: Subdomain, on_face: NDArray[np.bool_]) -> Int:
+def _ring(body: Subdomain, dofs: Int, members: Int, on_face: Mask, others: Mask) -> Ring | None:
+    """That of the coarse triangles `members`, if it has enough of the face."""
+    outside = np.zeros_like(on_face)
+    outside[body.mesh.node_class[np.delete(body.mesh.nodes, members, axis=0)]] = True
+    ring = Subdomain.build(part(body.piece, members), body.mesh.lattice, body.L)
+    of_body = np.empty(ring.mesh.n_classes, np.int64)
+    of_body[ring.mesh.node_class[ring.mesh.nodes]] = body.mesh.node_class[body.mesh.nodes[members]]
+    nodes = np.flatnonzero(on_face[of_body])
+    if len(nodes) < FEWEST:
+        return None
+    own, at = _dofs(nodes), np.searchsorted(dofs, _dofs(of_body[nodes]))
+    free = _dofs(np.flatnonzero(on_face[of_body] | ~(outside | others)[of_body]))
+    clamped = schur_complement(ring.K[free][:, free].tocsr(), np.searchsorted(free, own))
+    return Ring(at, Condensed(ring, own), ring.R[own], clamped)
+
+
+def _near(body: Subdomain, on_face: Mask) -> Int:
     """Coarse triangles within LAYERS of the marked nodes."""
     classes = body.mesh.node_class[body.mesh.nodes]
     near = on_face[classes].any(axis=1)

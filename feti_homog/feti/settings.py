@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
@@ -11,7 +12,7 @@ from feti_homog.errors import CaseError
 from feti_homog.feti import boundary as boundaries
 from feti_homog.feti.adaptive import THRESHOLD, AdaptiveCoarse
 from feti_homog.feti.bonded import shared_dofs
-from feti_homog.feti.boundary import LARGEST_DENSE, LARGEST_WHOLE, Boundary
+from feti_homog.feti.boundary import Boundary
 from feti_homog.feti.coarse import CoarseProblem
 from feti_homog.feti.condensed import Condensed
 from feti_homog.feti.constraints import Constraints
@@ -34,26 +35,24 @@ def parts(
     Raises:
         CaseError: an option has no such value, or two exclude each other.
     """
-    operator = _choice("dual_operator", boundaries.KINDS, "auto")
     pc = _choice("pc_type", PRECONDITIONERS, "auto")
+    operator = _choice("dual_operator", boundaries.KINDS, "explicit" if pc == "influence" else "auto")
     space = _choice("coarse_space", COARSE_SPACES, "auto")
     threshold = PETSc.Options("feti_").getReal("coarse_threshold", THRESHOLD)
     soft = space == "adaptive" or (space == "auto" and _cut(comm, subdomains))
-    wanted = LARGEST_DENSE if pc == "influence" else LARGEST_WHOLE if soft else 0
-    boundary = Boundary(constraints, subdomains, operator, applications, wanted)
-    sizes = [len(dofs) for dofs in boundary.dofs]
+    boundary = Boundary(constraints, subdomains, operator, applications, soft)
     condensed = [isinstance(o, Condensed) for o in boundary.operators]
     dense = comm.allreduce(all(condensed), MPI.LAND)
-    small = comm.allreduce(all(c or n > LARGEST_WHOLE for c, n in zip(condensed, sizes, strict=True)), MPI.LAND)
+    examinable = comm.allreduce(all(np.logical_or(condensed, boundary.large)), MPI.LAND)
     if pc == "influence" and not dense:
         raise CaseError("-feti_pc_type influence: needs -feti_dual_operator explicit")
     if pc == "auto":
         pays = applications >= MANY and space != "adaptive" and dense and _fits(comm, constraints)
         pc = "influence" if pays else "dirichlet"
-    if space == "adaptive" and not (small and pc == "dirichlet"):
+    if space == "adaptive" and not (examinable and pc == "dirichlet"):
         raise CaseError("-feti_coarse_space adaptive: needs -feti_pc_type dirichlet and -feti_dual_operator explicit")
     preconditioner = _preconditioner(pc, comm, constraints, boundary)
-    if soft and small and isinstance(preconditioner, Dirichlet):
+    if soft and examinable and isinstance(preconditioner, Dirichlet):
         return boundary, preconditioner, AdaptiveCoarse(comm, constraints, boundary, preconditioner, threshold)
     return boundary, preconditioner, CoarseProblem(comm, constraints, boundary)
 

@@ -5,8 +5,9 @@ For a subdomain s with Schur complement S_s and constraints B_s, the displacemen
     S_s p = theta N_s p,  N_s = B_s^T M^-1 B_s,  theta < tau
 
 are soft in s but stiff in the eyes of the preconditioner.  On a large boundary that takes a dense eigenproblem beyond
-reach, but what makes p stiff is what it shares a face with: each face is examined with the ring around it for S_s,
-and the neighbour's share of M^-1.
+reach.  But where each node is shared with one other body only, the weights of M^-1 hardly change along the boundary,
+its own share is no more than S_s, and what makes p stiff is the neighbour's: so each face is examined by itself, with
+the ring around it for S_s.
 """
 
 from __future__ import annotations
@@ -19,7 +20,6 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 from scipy.sparse import csr_matrix
 
-from feti_homog.feti.boundary import LARGEST_WHOLE
 from feti_homog.feti.condensed import Condensed
 from feti_homog.feti.factored import Factored
 from feti_homog.feti.rings import rings
@@ -44,6 +44,7 @@ class DualBlock:
         operator: its boundary operators.
         B: (rows, n) constraints.
         BW: (rows, n) scaled constraints W^-1 B D^-1.
+        large: whether it is to be examined face by face.
     """
 
     subdomain: Subdomain
@@ -51,16 +52,12 @@ class DualBlock:
     operator: Condensed | Factored
     B: csr_matrix
     BW: csr_matrix
+    large: bool
 
     @property
     def R(self) -> Float:
         """(n, k) kernel on the boundary."""
         return self.subdomain.R[self.dofs]
-
-    @property
-    def large(self) -> bool:
-        """Whether the boundary is too large to be examined as one."""
-        return len(self.dofs) > LARGEST_WHOLE
 
 
 class Whole:
@@ -101,12 +98,12 @@ class Faces:
         }
 
     def shares(self) -> Iterator[tuple[int, Float]]:
-        """The share of M^-1 on the rows in common with each that the rings vouch for."""
+        """No less than its share of M^-1 on the rows in common with each."""
         for s, found in self._rings.items():
             share = np.zeros((len(self.common[s]),) * 2)
             for ring in found:
                 BW = self.block.BW[self.common[s]][:, ring.at]
-                share += BW @ (BW @ ring.operator.S).T
+                share += BW @ (BW @ ring.clamped).T
             yield s, share
 
     def modes(self, shares: Sequence[tuple[int, Single]], threshold: float) -> Float:

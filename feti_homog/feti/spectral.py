@@ -38,8 +38,8 @@ def dual_blocks(
     B, BW = boundary.B.tocsc(), (W_inverse @ scaling.BD).tocsc()
     blocks = []
     for i, (subdomain, operator) in enumerate(zip(boundary.subdomains, boundary.operators, strict=True)):
-        constraints_of = (_columns(matrix, boundary.spans[i], rows[i]) for matrix in (B, BW))
-        blocks.append(DualBlock(subdomain, boundary.dofs[i], operator, *constraints_of))
+        own, scaled = (_columns(matrix, boundary.spans[i], rows[i]) for matrix in (B, BW))
+        blocks.append(DualBlock(subdomain, boundary.dofs[i], operator, own, scaled, boundary.large[i]))
     return blocks
 
 

@@ -85,7 +85,9 @@ class Subdomain:
         """
         if self.R.shape[1] == 0:
             return np.zeros(0, np.int64), np.zeros((0, 0))
-        dofs = (2 * self._far_apart(candidates)[:, None] + np.arange(2)).ravel()
+        # On a straight line two are enough, and the third is one of them.
+        nodes = np.unique(self._far_apart(candidates))
+        dofs = (2 * nodes[:, None] + np.arange(2)).ravel()
         Rf = np.linalg.qr(self.R[dofs])[0]
         return dofs, self.K.diagonal()[dofs].mean() * Rf @ Rf.T
 

@@ -116,15 +116,15 @@ def test_implicit_and_explicit_operators_give_the_same(comm):
 def test_dense_operators_where_they_pay(comm, monkeypatch):
     cell = bonds.tear(comm, geometry="hexagonal", petsc={"feti_coarse_space": "natural"})
 
-    def kinds(applications, wanted):
-        boundary = Boundary(cell.solver.constraints, cell.subdomains, "auto", applications, wanted)
+    def kinds(applications, soft):
+        boundary = Boundary(cell.solver.constraints, cell.subdomains, "auto", applications, soft)
         return set().union(*comm.allgather({type(o) for o in boundary.operators}))
 
-    assert kinds(0, 0) == {Factored}
-    assert kinds(10**6, 0) == {Condensed}
-    assert kinds(0, 2000) == {Condensed}
+    assert kinds(0, False) == {Factored}
+    assert kinds(10**6, False) == {Condensed}
+    assert kinds(0, True) == {Condensed}
     monkeypatch.setattr(boundaries, "LARGEST_DENSE", 10)
-    assert kinds(10**6, 2000) == {Factored}
+    assert kinds(10**6, True) == {Factored}
 
 
 def test_adaptive_space_is_refused_where_boundaries_are_too_large(comm, monkeypatch):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from cells import relative_error
 from mpi4py import MPI
-from narrow_cells import BOUND, BREAKING, NARROW, SINGLE, Narrow, of_all, together
+from narrow_cells import BOUND, BREAKING, NARROW, SINGLE, Narrow, agree, masks, of_all, together
 
 from feti_homog.feti.adaptive import ROOM, THRESHOLD, AdaptiveCoarse
 from feti_homog.feti.assembled import total
@@ -16,7 +16,7 @@ from feti_homog.feti.boundary import Boundary
 from feti_homog.feti.neighbours import Neighbours
 from feti_homog.feti.preconditioner import Dirichlet
 from feti_homog.feti.spectral import coarse_vectors, dual_blocks
-from feti_homog.interface.contact import BONDED, CLOSED, OPEN
+from feti_homog.interface.contact import BONDED, OPEN
 
 pytestmark = pytest.mark.parallel
 
@@ -177,24 +177,6 @@ def test_threshold_trades_vectors_for_conditioning(narrow):
 # Inactive rows.
 
 
-def statuses(cell, seed):
-    """Statuses of this rank's nodes: an arc of each fibre open, some more nodes open or closed, at random."""
-    rng, nodes = np.random.default_rng(seed), cell.solver.constraints.nodes
-    points = np.concatenate(cell.comm.allgather(nodes.points))
-    place = np.empty(len(points), int)
-    place[np.lexsort(np.round(points, 8).T)] = np.arange(len(points))
-    first = cell.comm.exscan(len(nodes.row)) or 0
-    draws = rng.random(len(points))[place[first : first + len(nodes.row)]]
-    away = (cell.directions - rng.uniform(0, 360) + 180) % 360 - 180
-    status = np.where(draws < 0.1, OPEN, np.where(draws < 0.25, CLOSED, BONDED))
-    return np.where(np.abs(away) < 40, OPEN, status).astype(np.int8)
-
-
-def masks(cell, seeds):
-    interface = bonds.interface(cell, True)
-    return [interface.active(statuses(cell, seed)) for seed in seeds]
-
-
 def energies(cell, coarse):
     """The coarse matrix of U, dense, and the same by applying F to U."""
     active = cell.solver.active.mask[:, None]
@@ -254,20 +236,9 @@ def test_inactive_rows_give_the_natural_spaces_solution(comm, case, share):
         for cell in (adaptive, natural):
             cell.solver.activate(active)
         found, expected = (together(c) for c in (adaptive, natural))
-        compare(comm, adaptive, found, expected)
+        agree(adaptive, found, expected)
         assert found[0].iterations <= share * expected[0].iterations
-    compare(comm, adaptive, found, first)
-
-
-def compare(comm, cell, found, expected):
-    for a, b in zip(found, expected, strict=True):
-        assert a.reason > 0 and b.reason > 0
-        assert relative_error(bonds.stress(cell, a), bonds.stress(cell, b)) < 1e-8
-        lam, other = (dense.gathered(cell, s.lam) for s in (a, b))
-        assert relative_error(lam, other) < 1e-6
-        jump, other = (dense.gathered(cell, s.jump) for s in (a, b))
-        opening = np.abs(dense.gathered(cell, cell.solver.d)).max()
-        assert np.abs(jump - other).max() < 1e-6 * opening
+    agree(adaptive, found, first)
 
 
 @pytest.mark.parametrize("which", ["one", "all"])

@@ -1,0 +1,152 @@
+"""Soft modes of bodies too large to be examined as one: by the rings around their faces."""
+
+from __future__ import annotations
+
+import bonds
+import dense
+import numpy as np
+import pytest
+from cells import make_case, relative_error, solve, twin_stiffness
+from mpi4py import MPI
+from narrow_cells import NARROW, agree, masks, of_all, together
+
+from feti_homog.feti import boundary as boundaries
+from feti_homog.feti import rings as rings_module
+from feti_homog.feti.adaptive import AdaptiveCoarse
+from feti_homog.feti.neighbours import Neighbours
+from feti_homog.feti.rings import rings
+
+pytestmark = pytest.mark.parallel
+
+# The matrix is left whole.
+WHOLE = NARROW | {"decomposition": {"subdomains": 17}}
+CASES = {
+    "whole": WHOLE,
+    "all cut": NARROW | {"decomposition": {"subdomains": 50}},
+    "plane, quadratic": {"geometry": "hexagonal", "mesh_size": 0.2, "order": 2, "bodies": "plane"},
+}
+TIGHT = 1e-9
+
+
+@pytest.fixture(params=CASES.values(), ids=CASES.keys())
+def faces(request, comm):
+    """(subdomain, boundary dofs, S, face) of all pairs of neighbours."""
+    cell = bonds.tear(comm, **request.param, petsc={"feti_coarse_space": "natural"})
+    solver, found = cell.solver, []
+    neighbours = Neighbours(comm, solver.constraints, cell.subdomains)
+    for i, s in enumerate(cell.subdomains):
+        B, dofs = solver.boundary.B[:, solver.boundary.spans[i]], solver.boundary.dofs[i]
+        S = dense.schur(s.K.toarray(), dofs)
+        for other, common in neighbours.common[i].items():
+            if other != s.piece.index:
+                nodes = np.unique(B[neighbours.rows[i][common]].indices // 2)
+                found.append((s, dofs, S, (2 * nodes[:, None] + np.arange(2)).ravel()))
+    return found
+
+
+@pytest.fixture
+def large(monkeypatch):
+    """Call nearly all boundaries large."""
+    monkeypatch.setattr(boundaries, "LARGEST_WHOLE", 30)
+
+
+# Rings.
+
+
+def test_the_energy_of_a_body_lies_between_those_of_rings(comm, faces):
+    covered = []
+    for s, dofs, S, face in faces:
+        found = rings(s, dofs, face)
+        at = np.concatenate([np.zeros(0, int), *(ring.at for ring in found)])
+        assert set(at) <= set(face)
+        covered.append([len(set(at)), len(face)])
+        rest = S.copy()
+        for ring in found:
+            rest[np.ix_(ring.at, ring.at)] -= ring.operator.S
+            more = ring.clamped - S[np.ix_(ring.at, ring.at)]
+            assert np.linalg.eigvalsh(more)[0] > -TIGHT * np.abs(S).max()
+        assert np.linalg.eigvalsh(rest)[0] > -TIGHT * np.abs(S).max()
+    examined, whole = comm.allreduce(np.sum(covered, axis=0))
+    assert examined > 0.9 * whole
+
+
+def test_kernels_of_rings(comm, faces):
+    kernels = set()
+    for s, dofs, _, face in faces:
+        for ring in rings(s, dofs, face):
+            S = ring.operator.S
+            assert np.abs(S @ ring.R).max(initial=0.0) < TIGHT * np.abs(S).max()
+            assert dense.kernel(S).shape[1] == ring.R.shape[1]
+            assert np.linalg.eigvalsh(ring.operator.held)[0] > 0
+            kernels.add(ring.R.shape[1])
+    assert 3 in set().union(*comm.allgather(kernels))
+
+
+def test_a_ring_of_the_whole_body_is_as_stiff(faces, monkeypatch):
+    monkeypatch.setattr(rings_module, "LAYERS", 100)
+    for s, dofs, S, face in faces:
+        if len(face) < 2 * rings_module.FEWEST:
+            continue
+        (ring,) = rings(s, dofs, face)
+        expected = np.zeros_like(S)
+        expected[np.ix_(face, face)] = dense.schur(S, face)
+        found = np.zeros_like(S)
+        found[np.ix_(ring.at, ring.at)] = ring.operator.S
+        assert relative_error(found, expected) < TIGHT
+
+
+# Solutions.
+
+
+@pytest.mark.usefixtures("large")
+@pytest.mark.parametrize("contrast", [1e-3, 2.0, 1e6])
+def test_contrasts_converge_fast(comm, contrast):
+    case = WHOLE | {
+        "matrix": {"young": 1.0, "poisson": 0.3}, "fibre": {"young": contrast, "poisson": 0.3},
+        "petsc": {"feti_ksp_rtol": 1e-8, "feti_coarse_space": "adaptive"},
+    }  # fmt: skip
+    torn, L, responses = solve(make_case(**case), comm)
+    assert isinstance(torn.solver.coarse, AdaptiveCoarse)
+    assert comm.allreduce(any(torn.solver.boundary.large), MPI.LOR)
+    assert all(r.state.solution.reason > 0 for r in responses)
+    assert max(r.state.iterations for r in responses) <= 25
+    assert relative_error(L, twin_stiffness(torn)) < 1e-7
+
+
+def test_a_whole_matrix_converges_as_with_one_eigenproblem(comm, monkeypatch):
+    """By faces, in one, and with rigid-body motions alone; a few more modes come by faces."""
+    case = WHOLE | {"refine": 1, "min_gap": 0.01, "fibre_fraction": 0.65}
+    iterations, vectors = [], []
+    for whole, space in ((300, "adaptive"), (4000, "adaptive"), (4000, "natural")):
+        monkeypatch.setattr(boundaries, "LARGEST_WHOLE", whole)
+        cell = bonds.tear(comm, **case, petsc={"feti_coarse_space": space, "feti_ksp_rtol": 1e-8})
+        iterations.append(together(cell)[0].iterations)
+        vectors.append(cell.solver.coarse.vectors)
+    assert iterations[0] <= iterations[1] + 5
+    assert max(iterations[:2]) <= 25 < iterations[2] / 1.5
+    assert vectors[2] < vectors[1] < vectors[0] < 2 * vectors[1]
+
+
+@pytest.mark.usefixtures("large")
+def test_ranks_do_not_matter(comm):
+    found = []
+    for some in (comm, MPI.COMM_SELF):
+        cell = bonds.tear(some, **WHOLE, petsc={"feti_coarse_space": "adaptive"})
+        solution = cell.solver.solve(np.array([1.0, -0.5, 0.3]), np.zeros(cell.solver.rows))
+        found.append((of_all(some, cell.solver.coarse, cell), solution.iterations, bonds.stress(cell, solution)))
+    (soft_modes, iterations, stress), (of_one, iterations_of_one, stress_of_one) = found
+    assert soft_modes == of_one
+    assert abs(iterations - iterations_of_one) <= 1
+    assert relative_error(stress, stress_of_one) < 1e-9
+
+
+@pytest.mark.usefixtures("large")
+def test_inactive_rows_give_the_natural_spaces_solution(comm):
+    adaptive, natural = (
+        bonds.tear(comm, **WHOLE, refine=1, petsc={"feti_coarse_space": space}) for space in ("adaptive", "natural")
+    )
+    assert isinstance(adaptive.solver.coarse, AdaptiveCoarse)
+    for active in masks(adaptive, range(2)):
+        for cell in (adaptive, natural):
+            cell.solver.activate(active)
+        agree(adaptive, *(together(cell) for cell in (adaptive, natural)))
