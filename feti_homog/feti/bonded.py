@@ -30,7 +30,7 @@ class BondedCell:
         Options have the prefix `feti_bonded_` (default: cholesky by CHOLMOD).
         """
         self.comm = comm
-        self._shared = _shared_dofs(comm, constraints, boundary)
+        self._shared = _originals(comm, constraints, boundary)
         self.size = shared_dofs(comm, constraints)
         stiffness = Blocks((self.size, self.size))
         for operator, span in zip(boundary.operators, boundary.spans, strict=True):
@@ -53,7 +53,7 @@ def shared_dofs(comm: MPI.Intracomm, constraints: Constraints) -> int:
     return int(comm.allreduce(2 * len(constraints.blocks[0])))
 
 
-def _shared_dofs(comm: MPI.Intracomm, constraints: Constraints, boundary: Boundary) -> Int:
+def _originals(comm: MPI.Intracomm, constraints: Constraints, boundary: Boundary) -> Int:
     """The global number of the shared dof that each boundary dof is a copy of."""
     starts, sizes = constraints.blocks
     order = np.argsort(starts)

@@ -89,6 +89,9 @@ class CoarseProblem:
         self.project(y)
         return y
 
+    def destroy(self) -> None:
+        """Nothing is held that ranks would have to free together."""
+
     def simplify(self) -> bool:
         """Make the coarse space simpler after the Krylov method broke down; whether it could be."""
         return False

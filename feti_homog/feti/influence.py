@@ -43,6 +43,7 @@ class Influence:
         self.scaled = Scaled(comm, constraints, boundary, self._forces)
         rows = constraints.owned[1] - self.start
         # Rows that have ever been inactive, as they came, and H there, (known, known); its columns, with room for more.
+        # `_inactive` tells which of them are so now, `_kept` which of those the factor is of.
         self._known: Int = np.zeros(0, np.int64)
         self._table, self._room = np.zeros((0, 0)), np.zeros((rows, CHUNK), order="F")
         self.activate(np.ones(rows))
@@ -53,11 +54,11 @@ class Influence:
         inactive = np.concatenate(self.comm.allgather(self.start + np.flatnonzero(active == 0)))
         self._learn(np.setdiff1d(inactive, self._known))
         order = np.argsort(self._known)
-        self._at = order[np.searchsorted(self._known, inactive, sorter=order)]
-        held = self._table[np.ix_(self._at, self._at)]
-        largest = held.diagonal().max(initial=0.0)
-        factor, order, rank, _ = dpstrf(held, tol=SINGULAR * largest, lower=1) if len(held) else (held, self._at, 0, 0)
-        self._factor, self._order = factor[:rank, :rank], order[:rank] - 1
+        self._inactive = order[np.searchsorted(self._known, inactive, sorter=order)]
+        if len(inactive):
+            held = self._table[np.ix_(self._inactive, self._inactive)]
+            factor, order, rank, _ = dpstrf(held, tol=SINGULAR * held.diagonal().max(), lower=1)
+            self._factor, self._kept = factor[:rank, :rank], order[:rank] - 1
 
     @property
     def _columns(self) -> Float:
@@ -67,7 +68,7 @@ class Influence:
     def apply(self, r: Float) -> Float:
         """H_D r for r (owned rows,) or (owned rows, k); 0 on inactive rows."""
         z = self.scaled.apply(r)
-        if len(self._at):
+        if len(self._inactive):
             z -= self._columns @ self._forces_on_inactive(self._everywhere(z, self._known))
         return (self._active if z.ndim == 1 else self._active[:, None]) * z
 
@@ -77,7 +78,7 @@ class Influence:
 
     def _forces_on_inactive(self, z: Float) -> Float:
         """Jumps (known rows, ...) that take the forces z off the inactive rows; 0 on the others."""
-        some = self._at[self._order]
+        some = self._inactive[self._kept]
         jumps = np.zeros_like(z)
         half = solve_triangular(self._factor, z[some], lower=True)
         jumps[some] = solve_triangular(self._factor, half, lower=True, trans=1)
@@ -90,7 +91,8 @@ class Influence:
 
     def _learn(self, rows: Int) -> None:
         """Find the columns of H for these rows.  Collective."""
-        for some in np.split(rows, np.arange(CHUNK, len(rows), CHUNK)) if len(rows) else []:
+        for first in range(0, len(rows), CHUNK):
+            some = rows[first : first + CHUNK]
             unit = np.zeros((len(self._active), len(some)))
             mine = (some >= self.start) & (some < self.start + len(unit))
             unit[some[mine] - self.start, np.flatnonzero(mine)] = 1.0

@@ -20,6 +20,8 @@ WEIGHT = 1e7
 # differ much; and the fewest and most solves that are made to reach it.
 ACCURATE = 1e-14
 FEWEST_SOLVES, MOST_SOLVES = 3, 4
+# Of the indefinite factor.
+INDEFINITE_SOLVES = 2
 
 
 class SaddlePoint:
@@ -41,31 +43,27 @@ class SaddlePoint:
             LinAlgError: the matrix is singular.
         """
         self.comm = comm
-        self._columns = 1.0 / np.sqrt(self.sum(E.diagonal()))
+        self._columns = 1.0 / np.sqrt(_sum(comm, E.diagonal()))
         K = own_rows(comm, (K @ diags(self._columns)).tocsr())
         length = np.sqrt(np.asarray(K.multiply(K).sum(axis=1)).ravel())
         length = np.where(length > 0, length, 1.0)
         self._E = (diags(self._columns) @ E @ diags(self._columns)).tocsr()
-        self._K = (diags(1.0 / length) @ K).tocsr()
-        self._KT = self._K.T.tocsr()
-        lengths = comm.allgather(length)
-        self._rows = 1.0 / np.concatenate(lengths)
-        first = sum(len(part) for part in lengths[: comm.rank])
-        self._own = slice(first, first + len(length))
+        self._rows = 1.0 / np.concatenate(comm.allgather(length))
+        self._K = _Constraints(comm, (diags(1.0 / length) @ K).tocsr())
         self._solves = FEWEST_SOLVES
         self._inner: _Augmented | _Indefinite
-        augmented = (self._E + WEIGHT * (self._KT @ self._K)).tocsr()
+        augmented = (self._E + WEIGHT * (self._K.KT @ self._K.K)).tocsr()
         self.entries = int(augmented.nnz)
         try:
-            self._inner = _Augmented(self, together.solver(comm, augmented, prefix, definite=True))
+            self._inner = _Augmented(self._K, together.solver(comm, augmented, prefix, definite=True))
             if self._refine():
                 return
             self.destroy()
         except PETSc.Error:
             pass
-        self._solves = 2
+        self._solves = INDEFINITE_SOLVES
         try:
-            self._inner = _Indefinite(together.solver(comm, self._whole(free), prefix, definite=False))
+            self._inner = _Indefinite(together.solver(comm, self._K.beside(self._E, free), prefix, definite=False))
         except PETSc.Error as error:
             raise np.linalg.LinAlgError(f"a coarse matrix is singular: {error}") from error
 
@@ -84,14 +82,6 @@ class SaddlePoint:
         """Free the factor.  Collective."""
         self._inner.solver.destroy()
 
-    def constraints(self, c: Float) -> Float:
-        """K c.  Collective."""
-        return np.concatenate(self.comm.allgather(self._K @ c))
-
-    def reactions(self, a: Float) -> Float:
-        """This rank's part of K^T a."""
-        return np.asarray(self._KT @ a[self._own])
-
     def _solve(self, f: Float, g: Float) -> tuple[Float, Float]:
         c, a = self._inner.solve(f, g)
         for _ in range(self._solves - 1):
@@ -102,7 +92,7 @@ class SaddlePoint:
 
     def _left(self, f: Float, g: Float, c: Float, a: Float) -> tuple[Float, Float]:
         """f - E c - K^T a and g - K c."""
-        return f - self.sum(self._E @ c + self.reactions(a)), g - self.constraints(c)
+        return f - _sum(self.comm, self._E @ c + self._K.part(a)), g - self._K.applied(c)
 
     def _refine(self) -> bool:
         """Make as many solves as it takes; whether that was enough."""
@@ -119,17 +109,34 @@ class SaddlePoint:
         left = self._left(f, g, *self._solve(f, g))
         return float(max(np.linalg.norm(r) / (np.linalg.norm(b) or 1.0) for r, b in zip(left, (f, g), strict=True)))
 
-    def _whole(self, free: csr_matrix) -> csr_matrix:
-        """This rank's part of [E K^T; K -free]."""
-        empty = [csr_matrix((n, self._K.shape[1])) for n in (self._own.start, len(self._rows) - self._own.stop)]
-        K = vstack([empty[0], self._K, empty[1]])
-        return bmat([[self._E, K.T], [K, -free if self.comm.rank == 0 else None]]).tocsr()
 
-    def sum(self, part: Float) -> Float:
-        """Of the parts of all ranks.  Collective."""
-        whole = np.empty_like(part)
-        self.comm.Allreduce(part, whole)
-        return whole
+class _Constraints:
+    """K (m, n), of which every rank has some rows."""
+
+    def __init__(self, comm: MPI.Intracomm, K: csr_matrix) -> None:
+        """`K` are this rank's rows."""
+        self.comm, self.K, self.KT = comm, K, K.T.tocsr()
+        counts = comm.allgather(K.shape[0])
+        first = sum(counts[: comm.rank])
+        self.own, self.total = slice(first, first + K.shape[0]), sum(counts)
+
+    def applied(self, c: Float) -> Float:
+        """K c.  Collective."""
+        return np.concatenate(self.comm.allgather(self.K @ c))
+
+    def part(self, a: Float) -> Float:
+        """This rank's part of K^T a."""
+        return np.asarray(self.KT @ a[self.own])
+
+    def reactions(self, a: Float) -> Float:
+        """K^T a.  Collective."""
+        return _sum(self.comm, self.part(a))
+
+    def beside(self, E: csr_matrix, free: csr_matrix) -> csr_matrix:
+        """This rank's part of [E K^T; K -free]."""
+        empty = [csr_matrix((n, self.K.shape[1])) for n in (self.own.start, self.total - self.own.stop)]
+        K = vstack([empty[0], self.K, empty[1]])
+        return bmat([[E, K.T], [K, -free if self.comm.rank == 0 else None]]).tocsr()
 
 
 class _Augmented:
@@ -138,12 +145,12 @@ class _Augmented:
     For columns that overlap widely K^T K has no entry that E has not, so this costs a quarter of an indefinite factor.
     """
 
-    def __init__(self, system: SaddlePoint, solver: Solver) -> None:
-        self._system, self.solver = system, solver
+    def __init__(self, K: _Constraints, solver: Solver) -> None:
+        self._K, self.solver = K, solver
 
     def solve(self, f: Float, g: Float) -> tuple[Float, Float]:
-        c = self.solver.solve(f + WEIGHT * self._system.sum(self._system.reactions(g)))
-        return c, WEIGHT * (self._system.constraints(c) - g)
+        c = self.solver.solve(f + WEIGHT * self._K.reactions(g))
+        return c, WEIGHT * (self._K.applied(c) - g)
 
 
 class _Indefinite:
@@ -155,3 +162,10 @@ class _Indefinite:
     def solve(self, f: Float, g: Float) -> tuple[Float, Float]:
         x = self.solver.solve(np.concatenate([f, g]))
         return x[: len(f)], x[len(f) :]
+
+
+def _sum(comm: MPI.Intracomm, part: Float) -> Float:
+    """Of the parts of all ranks.  Collective."""
+    whole = np.empty_like(part)
+    comm.Allreduce(part, whole)
+    return whole

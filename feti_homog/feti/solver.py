@@ -186,8 +186,9 @@ class FetiSolver:
         return lam, krylov.ksp.getIterationNumber(), int(krylov.ksp.getConvergedReason())
 
     def destroy(self) -> None:
-        """Free PETSc's shell objects; collective.  Otherwise it is done when the solver, or Python, ends."""
+        """Free PETSc's shell objects and the coarse factor; collective.  The shells go with the solver anyway."""
         self._release()
+        self.coarse.destroy()
 
     def boundary_displacement(self, solution: DualSolution) -> Float:
         """(boundary dofs,) u* of a solution, Eq. (34)."""
