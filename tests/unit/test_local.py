@@ -97,3 +97,9 @@ def test_blocks_sum_whatever_is_held(monkeypatch):
         np.testing.assert_allclose(blocks.matrix().toarray(), expected, atol=1e-12)
 
 
+def test_small_entries_of_blocks_are_left_out():
+    blocks = Blocks((4, 3))
+    values = np.array([[1.0, -2.0], [0.1, -5.0]])
+    blocks.add_larger(np.array([2, 0]), np.array([1, 2]), values, np.array([0.5, 2.0]))
+    np.testing.assert_array_equal(blocks.matrix().toarray(), [[0, 0, -5.0], [0, 0, 0], [0, 1.0, 0], [0, 0, 0]])
+    assert blocks.matrix().nnz == 2
