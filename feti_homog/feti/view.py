@@ -31,6 +31,8 @@ def setup(comm: MPI.Intracomm, boundary: Boundary, preconditioner: Preconditione
             f"  soft modes below {coarse.threshold:g}: {counts.sum()}, at most {counts.max()} of a subdomain, "
             f"mean {counts.mean():.2f}"
         )
+        large = comm.allreduce(sum(boundary.large))
+        lines += [f"  {large} examined face by face"] if large else []
     lines.append(f"  coarse dimension {coarse.vectors}, {coarse.vectors / len(sizes):.2f} a subdomain")
     return "\n".join(lines)
 
