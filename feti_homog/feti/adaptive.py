@@ -12,7 +12,7 @@ Once some rows are inactive, M^-1 is another and Q G no longer among its range; 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable
 
 import numpy as np
 from mpi4py import MPI
@@ -27,21 +27,17 @@ from feti_homog.feti.constraints import Constraints
 from feti_homog.feti.neighbours import Neighbours
 from feti_homog.feti.preconditioner import Scaled
 from feti_homog.feti.saddle import SaddlePoint
-from feti_homog.feti.spectral import DualBlock, coarse_vectors, dual_blocks
+from feti_homog.feti.spectral import coarse_vectors, dual_blocks
+from feti_homog.feti.vectors import preconditioned
 
 Int = NDArray[np.int64]
 Float = NDArray[np.float64]
-# Rows of the receiver, numbers of coarse vectors, and their jumps there (rows, vectors).
-Jumps = tuple[Int, Int, Float]
 
 THRESHOLD = 0.22
 # Active rows per coarse vector below which the vectors are taken to depend on each other.
 ROOM = 4
 # Largest T T z - T z, and G^T T z, of a usable coarse problem, relative to T z and G^T z.
 LEAK = 1e-6
-# Coarse vectors that are found at once; and entries, relative to the largest, that those of a large body do without:
-# they decay within few fibres.
-CHUNK, FAINT = 128, 1e-5
 
 
 class AdaptiveCoarse(CoarseProblem):
@@ -79,7 +75,7 @@ class AdaptiveCoarse(CoarseProblem):
         self._E: csr_matrix
         # (columns, S+ B^T U there) of each subdomain
         self._answers: list[tuple[Int, Float]]
-        U = _preconditioned(comm, constraints, self._blocks, neighbours, V)
+        U = preconditioned(comm, constraints, self._blocks, neighbours, V)
         heap.trim()
         self._span(U)
         self._active = np.ones(self.U.shape[0])
@@ -232,62 +228,6 @@ class AdaptiveCoarse(CoarseProblem):
         first, last = self.constraints.owned
         at = np.searchsorted(self.constraints.rows, first)
         return local[at : at + last - first]
-
-
-def _preconditioned(
-    comm: MPI.Intracomm,
-    constraints: Constraints,
-    blocks: Sequence[DualBlock],
-    neighbours: Neighbours,
-    V: Sequence[Float],
-) -> csr_matrix:
-    """(local rows, vectors) U = M^-1 B V.  Collective."""
-    counts = np.array([v.shape[1] for v in V], dtype=np.int64)
-    every = np.zeros(len(neighbours.rank), np.int64)
-    every[neighbours.index] = counts
-    comm.Allreduce(MPI.IN_PLACE, every)
-    ends = np.cumsum(every)
-
-    def jumps() -> Iterator[tuple[int, int, tuple[Int, Float]]]:
-        for i, (block, v) in enumerate(zip(blocks, V, strict=True)):
-            Z, last = block.B @ v, ends[neighbours.index[i]]
-            for s, common in neighbours.common[i].items():
-                seen = np.flatnonzero(Z[common].any(axis=0))
-                yield i, s, (last - v.shape[1] + seen, Z[np.ix_(common, seen)])
-
-    received: list[list[Jumps]] = [[] for _ in blocks]
-    neighbours.exchange(jumps(), lambda i, sender, of: received[i].append((neighbours.common[i][sender], *of)))
-    U = Blocks((len(constraints.rows), int(every.sum())))
-    for i, (block, rows) in enumerate(zip(blocks, neighbours.rows, strict=True)):
-        for some in _groups(received[i]):
-            columns = np.concatenate([c for _, c, _ in some])
-            jump, at = np.zeros((len(rows), len(columns))), 0
-            for where, _, Z in some:
-                jump[where, at : at + Z.shape[1]] = Z
-                at += Z.shape[1]
-            vectors = block.BW @ block.operator.forces(block.BW.T @ jump)
-            if block.large:
-                U.add_larger(rows, columns, vectors, FAINT * np.abs(vectors).max(axis=0))
-            else:
-                U.add(rows, columns, vectors)
-    owned = constraints.owned[1] - constraints.owned[0]
-    return summed(comm, U.matrix(), constraints.rows, constraints.foreign, owned)
-
-
-def _groups(messages: Sequence[Jumps]) -> Iterator[list[Jumps]]:
-    """The same jumps, at most CHUNK columns at a time."""
-    group: list[Jumps] = []
-    width = 0
-    for where, columns, Z in messages:
-        for first in range(0, len(columns), CHUNK):
-            some = slice(first, first + CHUNK)
-            if width + len(columns[some]) > CHUNK:
-                yield group
-                group, width = [], 0
-            group.append((where, columns[some], Z[:, some]))
-            width += len(columns[some])
-    if group:
-        yield group
 
 
 def _compressed(matrix: csr_matrix, rows: Int) -> tuple[Int, Float]:
