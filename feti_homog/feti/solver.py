@@ -29,7 +29,12 @@ from feti_homog.feti.subdomain import Subdomain
 Int = NDArray[np.int64]
 Float = NDArray[np.float64]
 
-BROKEN = (PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_PC, PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_MAT)
+# What a coarse space that is accurate to too few digits can end in.
+BROKEN = (
+    PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_PC,
+    PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_MAT,
+    PETSc.KSP.ConvergedReason.DIVERGED_MAX_IT,
+)
 # A jump that the active rows see of the torn cell's is none if it is as small as this.
 ROUNDING = 1e-13
 
@@ -171,7 +176,7 @@ class FetiSolver:
         iterations, reason = 0, int(PETSc.KSP.ConvergedReason.CONVERGED_ATOL)
         if seen.any():
             lam, iterations, reason = self._krylov_solve(krylov, lam, free)
-            # Coarse vectors that depend on each other make the preconditioner indefinite by rounding.
+            # Coarse vectors that depend on each other make the preconditioner indefinite by rounding, or it stagnates.
             if reason in BROKEN and self.coarse.simplify():
                 lam, more, reason = self._krylov_solve(krylov, lam, free)
                 iterations += more
