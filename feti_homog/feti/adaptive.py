@@ -86,6 +86,11 @@ class AdaptiveCoarse(CoarseProblem):
         """Dimension of the space that every residual is orthogonal to."""
         return int(self.U.shape[1])
 
+    @property
+    def deflates(self) -> bool:
+        """Whether the coarse vectors are in use."""
+        return self._usable
+
     def activate(self, active: Float) -> None:
         """Factorize for the owned rows of which `active` is 1; U is restricted to them."""
         super().activate(active)

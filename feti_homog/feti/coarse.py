@@ -68,6 +68,11 @@ class CoarseProblem:
         """Dimension of the space that every residual is orthogonal to."""
         return self.dimension
 
+    @property
+    def deflates(self) -> bool:
+        """Whether more than rigid-body motions is taken out of the Krylov method."""
+        return False
+
     def amplitudes(self, x: Float) -> Float:
         """(G^T G)^-1 G^T x on every rank, for the owned rows x (rows,) or (rows, k)."""
         return self._solver.solve(self.everywhere(self.GaT @ x))

@@ -29,12 +29,13 @@ from feti_homog.feti.subdomain import Subdomain
 Int = NDArray[np.int64]
 Float = NDArray[np.float64]
 
-# What a coarse space that is accurate to too few digits can end in.
+# What a coarse space that is accurate to too few digits can end in, and how often to go on from there with it.
 BROKEN = (
     PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_PC,
     PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_MAT,
-    PETSc.KSP.ConvergedReason.DIVERGED_MAX_IT,
+    PETSc.KSP.ConvergedReason.DIVERGED_BREAKDOWN,
 )
+RESTARTS = 2
 # A jump that the active rows see of the torn cell's is none if it is as small as this.
 ROUNDING = 1e-13
 
@@ -175,17 +176,29 @@ class FetiSolver:
         lam = self.preconditioner.first(starts, closing)
         iterations, reason = 0, int(PETSc.KSP.ConvergedReason.CONVERGED_ATOL)
         if seen.any():
-            lam, iterations, reason = self._krylov_solve(krylov, lam, free)
-            # Coarse vectors that depend on each other make the preconditioner indefinite by rounding, or it stagnates.
-            if reason in BROKEN and self.coarse.simplify():
-                lam, more, reason = self._krylov_solve(krylov, lam, free)
-                iterations += more
+            lam, iterations, reason = self._converged(krylov, lam, free)
             if self._view:
                 PETSc.Sys.Print(view.solve(krylov.ksp, k), comm=self.comm)
         return self._recover(strains, lam * scale, torn, iterations, reason, np.maximum(jump, least))
 
-    def _krylov_solve(self, krylov: Krylov, lam: Float, free: Float) -> tuple[Float, int, int]:
-        """Better multipliers, iterations, and why they ended."""
+    def _converged(self, krylov: Krylov, lam: Float, free: Float) -> tuple[Float, int, int]:
+        """Multipliers, iterations, and why they ended.
+
+        Of coarse vectors that depend on each other, rounding makes the preconditioner indefinite or the iteration
+        stagnate.  A fresh start takes away what the coarse space can; if that is not enough, rigid-body motions are.
+        """
+        iterations = 0
+        for restart in range(RESTARTS + 2):
+            if restart > RESTARTS and not self.coarse.simplify():
+                break
+            lam, more, reason = self._improved(krylov, lam, free)
+            iterations += more
+            if reason not in BROKEN:
+                break
+        return lam, iterations, reason
+
+    def _improved(self, krylov: Krylov, lam: Float, free: Float) -> tuple[Float, int, int]:
+        """The same by one Krylov solve."""
         lam, residual = self._begin(lam, free)
         lam = lam + krylov.solve(residual)
         return lam, krylov.ksp.getIterationNumber(), int(krylov.ksp.getConvergedReason())
