@@ -110,7 +110,8 @@ def schur_complement(matrix: csr_matrix, dofs: Int) -> Float:
     """
     if len(dofs) == matrix.shape[0]:
         return matrix.toarray()
-    A = PETSc.Mat().createAIJ(matrix.shape, csr=(matrix.indptr, matrix.indices, matrix.data), comm=PETSc.COMM_SELF)
+    csr = matrix.indptr, matrix.indices, matrix.data
+    A = PETSc.Mat().createAIJWithArrays(matrix.shape, csr, comm=PETSc.COMM_SELF)
     A.setOption(PETSc.Mat.Option.SPD, True)
     pc = PETSc.PC().create(PETSc.COMM_SELF)
     pc.setOptionsPrefix("feti_schur_")

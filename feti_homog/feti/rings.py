@@ -14,11 +14,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
 
 from feti_homog.cell.piece import part
 from feti_homog.cell.torus import components, edge_pairs
 from feti_homog.feti.condensed import Condensed, schur_complement
 from feti_homog.feti.subdomain import Subdomain
+from feti_homog.feti.traces import trace
 
 Int = NDArray[np.int64]
 Float = NDArray[np.float64]
@@ -38,12 +40,14 @@ class Ring:
         at: (n,) positions of these dofs among the boundary dofs of the body.
         operator: its dense boundary operators.
         R: (n, k) its kernel on the face.
+        P: (n, m) its trace space.
         clamped: (n, n) stiffness of the face if other faces, and what is outside the ring, are held.
     """
 
     at: Int
     operator: Condensed
     R: Float
+    P: csr_matrix
     clamped: Float
 
 
@@ -81,7 +85,8 @@ def _ring(body: Subdomain, dofs: Int, members: Int, on_face: Mask, others: Mask)
     own, at = _dofs(nodes), np.searchsorted(dofs, _dofs(of_body[nodes]))
     free = _dofs(np.flatnonzero(on_face[of_body] | ~(outside | others)[of_body]))
     clamped = schur_complement(ring.K[free][:, free].tocsr(), np.searchsorted(free, own))
-    return Ring(at, Condensed(ring, own), ring.R[own], clamped)
+    P = trace(ring.piece, ring.mesh.lattice, nodes)
+    return Ring(at, Condensed(ring, own), ring.R[own], P, clamped)
 
 
 def _near(body: Subdomain, on_face: Mask) -> Int:

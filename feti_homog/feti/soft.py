@@ -24,6 +24,7 @@ from feti_homog.feti.condensed import Condensed
 from feti_homog.feti.factored import Factored
 from feti_homog.feti.rings import rings
 from feti_homog.feti.subdomain import Subdomain
+from feti_homog.feti.traces import trace
 
 Int = NDArray[np.int64]
 Float = NDArray[np.float64]
@@ -79,10 +80,13 @@ class Whole:
 
     def modes(self, shares: Sequence[tuple[int, Single]], threshold: float) -> Float:
         """(n, m) soft modes besides the kernel, for the shares of others in M^-1."""
-        M, B = self.preconditioner, self.block.B
+        subdomain = self.block.subdomain
+        P = trace(subdomain.piece, subdomain.mesh.lattice, self.block.dofs[::2] // 2)
+        jumps = self.block.B @ spanned(P, self.block.R)
+        N = congruent(self.block.BW.T @ jumps, self.operator.S)
         for s, share in shares:
-            M[np.ix_(self.common[s], self.common[s])] += share
-        return soft_modes(self.operator.held, self.block.R, B.T @ (B.T @ M).T, threshold)
+            add_congruent(N, jumps[self.common[s]], share)
+        return np.asarray(P @ soft_modes(congruent(P, self.operator.held), N, threshold))
 
 
 class Faces:
@@ -112,7 +116,8 @@ class Faces:
         for s, share in shares:
             for ring in self._rings[s]:
                 B = self.block.B[self.common[s]][:, ring.at]
-                soft = soft_modes(ring.operator.held, ring.R, B.T @ (B.T @ share).T, FACE * threshold)
+                N = congruent(B @ spanned(ring.P, ring.R), share)
+                soft = ring.P @ soft_modes(congruent(ring.P, ring.operator.held), N, FACE * threshold)
                 parts.append(np.zeros((len(self.block.dofs), soft.shape[1])))
                 parts[-1][ring.at] = soft
         return np.hstack(parts)
@@ -131,13 +136,31 @@ def examined(block: DualBlock, common: Mapping[int, Int]) -> Whole | Faces:
     return Whole(block, block.operator, common)
 
 
-def soft_modes(held: Float, R: Float, N: Float, threshold: float) -> Float:
-    """(n, m) eigenvectors p, S p = theta N p with theta < threshold, besides the kernel R (n, k) of S.
+def spanned(P: csr_matrix, R: Float) -> Float:
+    """(n, m + k) [P R] of the trace space and the kernel."""
+    return np.hstack([P.toarray(), R])
 
-    `held` is S with its kernel held.
+
+def congruent(T: csr_matrix | Float, A: Float | Single) -> Float:
+    """T^T A T for symmetric A."""
+    return np.asarray(T.T @ (T.T @ A).T)
+
+
+def add_congruent(N: Float, T: Float, A: Single) -> None:
+    """N <- N + T^T A T for symmetric A and T of which few columns are not zero."""
+    used = np.flatnonzero(T.any(axis=0))
+    N[np.ix_(used, used)] += congruent(T[:, used], A)
+
+
+def soft_modes(held: Float, N: Float, threshold: float) -> Float:
+    """(m, j) eigenvectors q of P^T S P q = theta P^T N P q with theta < threshold, besides the kernel of S.
+
+    Args:
+        held: (m, m) P^T S P, the kernel of S held.
+        N: (m + k, m + k) that of [P R], with the kernel R (n, k) of S.
     """
+    m = len(held)
+    NR, RNR = N[:m, m:], N[m:, m:]
     # Less the kernel's part, N has eigenvectors N-orthogonal to the kernel, and S may be held.
-    NR = N @ R
-    inner = np.linalg.pinv(R.T @ NR, rcond=NULL, hermitian=True)
-    above = (1.0 / threshold, np.inf)
-    return np.asarray(eigh(N - NR @ inner @ NR.T, held, subset_by_value=above, overwrite_a=True)[1])
+    rest = N[:m, :m] - NR @ np.linalg.pinv(RNR, rcond=NULL, hermitian=True) @ NR.T
+    return np.asarray(eigh(rest, held, subset_by_value=(1.0 / threshold, np.inf), overwrite_a=True)[1])

@@ -1,0 +1,68 @@
+"""Trace spaces of refined boundaries, and the soft modes that are found there."""
+
+from __future__ import annotations
+
+import bonds
+import numpy as np
+import pytest
+from narrow_cells import NARROW, together
+
+from feti_homog.cell.refine import edge_node
+from feti_homog.feti import traces
+from feti_homog.feti.traces import ENOUGH, trace
+
+pytestmark = pytest.mark.parallel
+
+REFINED = NARROW | {"refine": 2}
+ALL = 10**9
+
+
+def tear(comm, enough, monkeypatch, **cell):
+    monkeypatch.setattr(traces, "ENOUGH", enough)
+    return bonds.tear(comm, **REFINED | cell)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("enough", [0, 60, 150, ALL])
+def test_piecewise_linear_along_the_coarse_edges(comm, monkeypatch, enough, order):
+    cell = tear(comm, enough, monkeypatch, order=order, refine=3 - order)
+    for s, dofs in zip(cell.subdomains, cell.solver.boundary.dofs, strict=True):
+        nodes, M = dofs[::2] // 2, s.mesh.lattice.intervals
+        P = trace(s.piece, s.mesh.lattice, nodes)
+        assert P.shape[0] == len(dofs)
+        assert P.shape[1] >= min(enough, len(dofs))
+        u = np.full((s.mesh.n_classes, 2), np.nan)
+        u[nodes] = (P @ np.random.default_rng(s.piece.index).standard_normal(P.shape[1])).reshape(-1, 2)
+        u[s.piece.pinned] = 0.0 if s.piece.pinned >= 0 else u[s.piece.pinned]
+        kept = np.arange(s.mesh.n_classes) < len(s.piece.class_keys)
+        kept[nodes] |= P.max(axis=1).toarray()[::2, 0] == 1.0
+        for (a, b), edge in zip(s.piece.vertex_class[s.piece.edges], s.piece.edge_class, strict=True):
+            between = edge_node(len(s.piece.class_keys), edge, np.arange(1, M), s.mesh.lattice)
+            line = np.concatenate([[a], between, [b]])
+            if not np.isnan(u[line]).any():
+                at = np.flatnonzero(kept[line])
+                assert {0, M} <= set(at)
+                for values in u[line].T:
+                    assert np.allclose(values, np.interp(np.arange(M + 1), at, values[at]), atol=1e-13)
+
+
+def test_few_dofs_are_all_kept(comm, monkeypatch):
+    cell = tear(comm, ALL, monkeypatch)
+    for s, dofs in zip(cell.subdomains, cell.solver.boundary.dofs, strict=True):
+        P = trace(s.piece, s.mesh.lattice, dofs[::2] // 2)
+        assert P.shape == (len(dofs),) * 2
+        assert np.array_equal(P.toarray(), np.eye(len(dofs)))
+
+
+@pytest.mark.parametrize("pieces", [17, 24], ids=["whole", "cut"])
+def test_coarser_traces_find_as_good_modes(comm, monkeypatch, pieces):
+    found = []
+    for enough in (ALL, ENOUGH):
+        cell = tear(comm, enough, monkeypatch, decomposition={"subdomains": pieces})
+        solutions = together(cell)
+        vectors = cell.solver.coarse.vectors
+        found.append((vectors, solutions[0].iterations, [cell.solver.stress_integral(s) for s in solutions]))
+    (every, most, stress), (fewer, iterations, same) = found
+    assert 0.8 * every <= fewer <= 1.05 * every
+    assert iterations <= most + 2
+    assert np.abs(np.subtract(same, stress)).max() < 1e-7 * np.abs(stress).max()
