@@ -71,6 +71,8 @@ class AdaptiveCoarse(CoarseProblem):
         shape = (own.shape[0], self.dimension)
         self._motions = csr_matrix((own.data, own.indices + self.own.start, own.indptr), shape=shape)
         self._complete, self._usable, self._sufficient = False, True, False
+        # Faintest entries of U are dropped for large bodies.
+        self._exact = not comm.allreduce(any(boundary.large), MPI.LOR)
         self.saddle: SaddlePoint | None = None
         self._E: csr_matrix
         # (columns, S+ B^T U there) of each subdomain
@@ -160,8 +162,7 @@ class AdaptiveCoarse(CoarseProblem):
         rows = int(self.everywhere(np.array([self._active.sum()]))[0])
         self._usable = rows >= ROOM * self.vectors and self._factored() and self._projects()
         # Of a badly conditioned coarse problem T would not take away enough.
-        exact = not self.comm.allreduce(any(self._boundary.large), MPI.LOR)
-        self._sufficient = exact and self.saddle is not None and self.saddle.benign
+        self._sufficient = self._exact and self.saddle is not None and self.saddle.benign
 
     def _factored(self) -> bool:
         seen = self.everywhere(abs(self.U.T) @ self._active) > 0.0

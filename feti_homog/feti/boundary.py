@@ -15,7 +15,7 @@ from feti_homog.feti.condensed import Condensed
 from feti_homog.feti.constraints import Constraints
 from feti_homog.feti.factored import Factored, Interior
 from feti_homog.feti.shared import Shared
-from feti_homog.feti.subdomain import Subdomain
+from feti_homog.feti.subdomain import Subdomain, both_directions
 
 Int = NDArray[np.int64]
 Float = NDArray[np.float64]
@@ -128,7 +128,7 @@ def _touched(B: csr_matrix, subdomains: Sequence[Subdomain]) -> list[Int]:
     """Local numbers of the dofs of each subdomain that constraints act on, both directions of a node."""
     touched = B.getnnz(axis=0).reshape(-1, 2).any(axis=1)
     nodes = np.split(touched, np.cumsum([s.mesh.n_classes for s in subdomains]))[:-1]
-    return [(2 * np.flatnonzero(n)[:, None] + np.arange(2)).ravel() for n in nodes]
+    return [both_directions(np.flatnonzero(n)) for n in nodes]
 
 
 def _whole(shared: Shared, subdomains: Sequence[int]) -> list[bool]:

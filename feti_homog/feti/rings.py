@@ -19,7 +19,7 @@ from scipy.sparse import csr_matrix
 from feti_homog.cell.piece import part
 from feti_homog.cell.torus import components, edge_pairs
 from feti_homog.feti.condensed import Condensed, schur_complement
-from feti_homog.feti.subdomain import Subdomain
+from feti_homog.feti.subdomain import Subdomain, both_directions
 from feti_homog.feti.traces import trace
 
 Int = NDArray[np.int64]
@@ -82,8 +82,8 @@ def _ring(body: Subdomain, dofs: Int, members: Int, on_face: Mask, others: Mask)
     nodes = np.flatnonzero(on_face[of_body])
     if len(nodes) < FEWEST:
         return None
-    own, at = _dofs(nodes), np.searchsorted(dofs, _dofs(of_body[nodes]))
-    free = _dofs(np.flatnonzero(on_face[of_body] | ~(outside | others)[of_body]))
+    own, at = both_directions(nodes), np.searchsorted(dofs, both_directions(of_body[nodes]))
+    free = both_directions(np.flatnonzero(on_face[of_body] | ~(outside | others)[of_body]))
     clamped = schur_complement(ring.K[free][:, free].tocsr(), np.searchsorted(free, own))
     P = trace(ring.piece, ring.mesh.lattice, nodes)
     return Ring(at, Condensed(ring, own), ring.R[own], P, clamped)
@@ -99,7 +99,3 @@ def _near(body: Subdomain, on_face: Mask) -> Int:
         near |= corners[classes[:, :3]].any(axis=1)
     return np.flatnonzero(near)
 
-
-def _dofs(nodes: Int) -> Int:
-    """Both directions of the nodes."""
-    return (2 * nodes[:, None] + np.arange(2)).ravel()

@@ -50,7 +50,7 @@ def parts(
         pays = applications >= MANY and space != "adaptive" and dense and _fits(comm, constraints)
         pc = "influence" if pays else "dirichlet"
     if space == "adaptive" and not (examinable and pc == "dirichlet"):
-        raise CaseError("-feti_coarse_space adaptive: needs -feti_pc_type dirichlet and -feti_dual_operator explicit")
+        raise CaseError("-feti_coarse_space adaptive: needs -feti_pc_type dirichlet, -feti_dual_operator not implicit")
     preconditioner = _preconditioner(pc, comm, constraints, boundary)
     if soft and examinable and isinstance(preconditioner, Dirichlet):
         return boundary, preconditioner, AdaptiveCoarse(comm, constraints, boundary, preconditioner, threshold)

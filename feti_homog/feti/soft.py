@@ -23,7 +23,7 @@ from scipy.sparse import csr_matrix
 from feti_homog.feti.condensed import Condensed
 from feti_homog.feti.factored import Factored
 from feti_homog.feti.rings import rings
-from feti_homog.feti.subdomain import Subdomain
+from feti_homog.feti.subdomain import Subdomain, both_directions
 from feti_homog.feti.traces import trace
 
 Int = NDArray[np.int64]
@@ -96,7 +96,7 @@ class Faces:
         self.block, self.common = block, common
         faces = {s: np.unique(block.B[rows].indices // 2) for s, rows in common.items()}
         self._rings = {
-            s: rings(block.subdomain, block.dofs, (2 * nodes[:, None] + np.arange(2)).ravel())
+            s: rings(block.subdomain, block.dofs, both_directions(nodes))
             for s, nodes in faces.items()
             if s != block.subdomain.piece.index
         }

@@ -87,7 +87,7 @@ class Subdomain:
             return np.zeros(0, np.int64), np.zeros((0, 0))
         # On a straight line two are enough, and the third is one of them.
         nodes = np.unique(self._far_apart(candidates))
-        dofs = (2 * nodes[:, None] + np.arange(2)).ravel()
+        dofs = both_directions(nodes)
         Rf = np.linalg.qr(self.R[dofs])[0]
         return dofs, self.K.diagonal()[dofs].mean() * Rf @ Rf.T
 
@@ -107,6 +107,11 @@ class Subdomain:
         b = np.argmax(((x - x[a]) ** 2).sum(axis=1))
         (dx, dy), (ex, ey) = x[b] - x[a], (x - x[a]).T
         return candidates[[a, b, np.argmax(np.abs(dx * ey - dy * ex))]]
+
+
+def both_directions(nodes: Int) -> Int:
+    """(2n,) degrees of freedom of the nodes (n,)."""
+    return np.asarray((2 * nodes[:, None] + np.arange(2)).ravel())
 
 
 def kernel(positions: Float, rotates: bool, pinned: int) -> Float:

@@ -12,6 +12,7 @@ from scipy.sparse import csr_matrix
 
 from feti_homog.cell.piece import Piece
 from feti_homog.cell.refine import Lattice
+from feti_homog.feti.subdomain import both_directions
 
 Int = NDArray[np.int64]
 
@@ -48,5 +49,5 @@ def trace(piece: Piece, lattice: Lattice, nodes: Int) -> csr_matrix:
     values = np.concatenate([np.ones(keep.sum()), 1 - weight, weight])
     moves = columns >= 0
     rows, columns, values = rows[moves], columns[moves], values[moves]
-    both = (2 * rows[:, None] + np.arange(2)).ravel(), (2 * columns[:, None] + np.arange(2)).ravel()
-    return csr_matrix((np.repeat(values, 2), both), shape=(2 * len(nodes), 2 * int(keep.sum())))
+    entries = np.repeat(values, 2), (both_directions(rows), both_directions(columns))
+    return csr_matrix(entries, shape=(2 * len(nodes), 2 * int(keep.sum())))
