@@ -7,7 +7,7 @@ For a subdomain s with Schur complement S_s and constraints B_s, the displacemen
 are soft in s but stiff in the eyes of the preconditioner.  On a large boundary that takes a dense eigenproblem beyond
 reach.  But where each node is shared with one other body only, the weights of M^-1 hardly change along the boundary,
 its own share is no more than S_s, and what makes p stiff is the neighbour's: so each face is examined by itself, with
-the ring around it for S_s.
+the ring around it for S_s.  The eigenproblems are projected to trace spaces.
 """
 
 from __future__ import annotations
