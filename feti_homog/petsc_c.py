@@ -6,6 +6,7 @@ petsc4py's extension module resolves PETSc's symbols, so no library has to be fo
 from __future__ import annotations
 
 import ctypes
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +40,11 @@ def schur_complement(factor: PETSc.Mat, size: int) -> Float:
 
 
 def _call(function: str, *arguments: object) -> None:
-    code = getattr(ctypes.CDLL(PETSc.__file__), function)(*arguments)
+    code = getattr(_library(), function)(*arguments)
     if code:
         raise PETSc.Error(code)
+
+
+@cache
+def _library() -> ctypes.CDLL:
+    return ctypes.CDLL(PETSc.__file__)

@@ -29,8 +29,7 @@ FEW = 4
 class Condensed:
     """S and S+ of one subdomain on its n boundary dofs.
 
-    With the fixing nodes on the boundary, eliminating the interior from K + rho Rf Rf^T leaves S + rho Rf Rf^T, whose
-    inverse is the boundary part of K+.
+    With the fixing nodes on the boundary, the inverse of S + rho Rf Rf^T is the boundary part of K+.
     """
 
     def __init__(self, subdomain: Subdomain, dofs: Int) -> None:
@@ -39,11 +38,11 @@ class Condensed:
         Raises:
             LinAlgError: the Schur complement is not positive definite.
         """
-        nodes = np.unique(dofs // 2)
-        fixed, self._term = subdomain.fixing(nodes)
+        fixed, self._term = subdomain.fixing(np.unique(dofs // 2))
         self._fixed = np.searchsorted(dofs, fixed)
         self.n = len(dofs)
-        held = schur_complement(subdomain.regularised(nodes), dofs)
+        held = schur_complement(subdomain.K, dofs)
+        held[np.ix_(self._fixed, self._fixed)] += self._term
         factor, info = dpotrf(held, lower=1)
         if info:
             raise np.linalg.LinAlgError(f"a held Schur complement is not positive definite (LAPACK info {info})")
@@ -104,7 +103,7 @@ def _columns(x: Float, out: Float) -> Iterator[tuple[Float, Float]]:
 
 
 def schur_complement(matrix: csr_matrix, dofs: Int) -> Float:
-    """(n, n) Schur complement of an SPD matrix on `dofs`, by MUMPS' partial factorization.
+    """(n, n) Schur complement of a matrix on `dofs`, by MUMPS' partial factorization; the rest has to be SPD.
 
     Options have the prefix `feti_schur_`.
     """

@@ -73,10 +73,11 @@ class Whole:
         return np.asarray(self.block.BW @ (self.block.BW @ self.operator.S).T)
 
     def shares(self) -> Iterator[tuple[int, Float]]:
-        """Its share of M^-1 on the rows in common with each."""
+        """Its share of M^-1 on the rows in common with each other subdomain."""
         M = self.preconditioner
         for s, rows in self.common.items():
-            yield s, M[np.ix_(rows, rows)]
+            if s != self.block.subdomain.piece.index:
+                yield s, M[np.ix_(rows, rows)]
 
     def modes(self, shares: Sequence[tuple[int, Single]], threshold: float) -> Float:
         """(n, m) soft modes besides the kernel, for the shares of others in M^-1."""
@@ -102,7 +103,7 @@ class Faces:
         }
 
     def shares(self) -> Iterator[tuple[int, Float]]:
-        """No less than its share of M^-1 on the rows in common with each."""
+        """No less than its share of M^-1 on the rows in common with each other subdomain."""
         for s, found in self._rings.items():
             share = np.zeros((len(self.common[s]),) * 2)
             for ring in found:

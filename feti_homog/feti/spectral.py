@@ -55,8 +55,7 @@ def coarse_vectors(blocks: Sequence[DualBlock], neighbours: Neighbours, threshol
     def shares() -> Iterator[tuple[int, int, Single]]:
         for i, subdomain in enumerate(subdomains):
             for s, share in subdomain.shares():
-                if s != neighbours.index[i]:
-                    yield i, s, share.astype(np.float32)
+                yield i, s, share.astype(np.float32)
 
     neighbours.exchange(shares(), lambda i, sender, share: others[i].append((sender, share)))
     vectors = []
