@@ -13,7 +13,7 @@ Int32 = NDArray[np.int32]
 Float = NDArray[np.float64]
 
 # Entries of dense blocks that are held before they are summed up, at least.
-HELD = 2_000_000
+HELD = 500_000
 
 
 def assembled(comm: MPI.Intracomm, local: csr_matrix, rows: Int, columns: Int, owned: tuple[int, int]) -> csr_matrix:

@@ -25,7 +25,7 @@ class BondedCell:
     """
 
     def __init__(self, comm: MPI.Intracomm, constraints: Constraints, boundary: Boundary) -> None:
-        """Assemble and factor; all boundary operators must be dense and hold their matrices.  Collective.
+        """Assemble and factor; all boundary operators must be dense.  Collective.
 
         Options have the prefix `feti_bonded_` (default: cholesky by CHOLMOD).
         """

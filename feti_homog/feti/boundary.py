@@ -21,7 +21,7 @@ Int = NDArray[np.int64]
 Float = NDArray[np.float64]
 
 KINDS = ("auto", "implicit", "explicit")
-# Boundary dofs of a subdomain up to which dense matrices (two of 8 n^2 bytes) are ever chosen by themselves.
+# Boundary dofs of a subdomain up to which dense matrices (8 n^2 bytes) are ever chosen by themselves.
 LARGEST_DENSE = 6000
 # Boundary dofs above which a whole body's soft modes come from a dense eigenproblem for each face, not from one.
 LARGEST_WHOLE = 2000
@@ -75,11 +75,6 @@ class Boundary:
     def spans(self) -> list[slice]:
         """The dofs of each subdomain among the n."""
         return [slice(a, b) for a, b in pairwise(self.offsets.tolist())]
-
-    def release(self) -> None:
-        """Free what only the set-up of a coarse space needs."""
-        for operator in self.operators:
-            operator.release()
 
     def stiffness(self, x: Float) -> Float:
         """S x for x (n,) or (n, k)."""

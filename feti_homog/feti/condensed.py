@@ -1,8 +1,8 @@
 """Dense boundary operators of a subdomain: its Schur complement S and the flexibility S+.
 
-Both live in the Cholesky factor of S + rho Rf Rf^T, in packed storage: products and solves with it read n^2 / 2 numbers
-twice, faster than a dense matrix.  S comes from one partial factorization (MUMPS) whose factors are not kept: all that
-the dual problem needs lives on the boundary, since the load of a macroscopic strain vanishes inside a uniform body.
+Both are symmetric and share one square array: a product reads n^2 / 2 numbers once.  S comes from one partial
+factorization (MUMPS) whose factors are not kept: all that the dual problem needs lives on the boundary, since the load
+of a macroscopic strain vanishes inside a uniform body.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
-from scipy.linalg.blas import dtpmv, dtpsv, dtrmm, dtrsm
-from scipy.linalg.lapack import dpotrf, dtpttr, dtrttp
+from scipy.linalg.blas import dsymm, dsymv
+from scipy.linalg.lapack import dpotrf, dpotri
 from scipy.sparse import csr_matrix
 
 from feti_homog import petsc_c
@@ -22,8 +22,8 @@ from feti_homog.feti.subdomain import Subdomain
 Int = NDArray[np.int64]
 Float = NDArray[np.float64]
 
-# Columns up to which packed products, one after the other, are faster than to unpack for all of them.
-FEW = 4
+# Columns up to which products one after the other are faster than all at once.
+FEW = 6
 
 
 class Condensed:
@@ -46,55 +46,55 @@ class Condensed:
         factor, info = dpotrf(held, lower=1)
         if info:
             raise np.linalg.LinAlgError(f"a held Schur complement is not positive definite (LAPACK info {info})")
-        self._factor = dtrttp(factor, uplo="L")[0]
-        self._held: Float | None = held
+        inverse = dpotri(factor, lower=1, overwrite_c=1)[0]
+        # Of the same size as S, so that the diagonals, of which one is kept beside, may be taken off each other.
+        self._scale = held.diagonal().mean() / inverse.diagonal().mean()
+        self._difference = self._scale * inverse.diagonal() - held.diagonal()
+        # S held below the diagonal and on it, the scaled inverse above.
+        self._both = np.asfortranarray(np.tril(held) + self._scale * np.tril(inverse, -1).T)
 
     def stiffness(self, x: Float, out: Float) -> None:
         """S x for x (n,) or (n, k)."""
         if x.size > FEW * self.n:
-            out[:] = self.forces(x)
-            return
-        for column, result in _columns(x, out):
-            result[:] = dtpmv(self.n, self._factor, dtpmv(self.n, self._factor, column, lower=1, trans=1), lower=1)
+            out[:] = dsymm(1.0, self._both, x, lower=1)
+        else:
+            for column, result in _columns(x, out):
+                result[:] = dsymv(1.0, self._both, column, lower=1)
         out[self._fixed] -= self._term @ x[self._fixed]
 
     def flexibility(self, x: Float, out: Float) -> None:
         """S+ x for x (n,) or (n, k)."""
         if x.size > FEW * self.n:
-            out[:] = self.answer(x)
-            return
-        for column, result in _columns(x, out):
-            result[:] = dtpsv(self.n, self._factor, dtpsv(self.n, self._factor, column, lower=1), lower=1, trans=1)
+            out[:] = dsymm(1.0 / self._scale, self._both, x, lower=0)
+        else:
+            for column, result in _columns(x, out):
+                result[:] = dsymv(1.0 / self._scale, self._both, column, lower=0)
+        out += (self._difference / self._scale * x.T).T
 
     def answer(self, X: Float) -> Float:
-        """S+ X for many columns X (n, m)."""
-        factor = dtpttr(self.n, self._factor, uplo="L")[0]
-        return np.asarray(dtrsm(1.0, factor, dtrsm(1.0, factor, X, lower=1), lower=1, trans_a=1, overwrite_b=1))
+        """S+ X for X (n,) or (n, k)."""
+        out = np.empty_like(X)
+        self.flexibility(X, out)
+        return out
 
     def forces(self, X: Float) -> Float:
-        """S X for many columns X (n, m)."""
-        factor = dtpttr(self.n, self._factor, uplo="L")[0]
-        Y = dtrmm(1.0, factor, dtrmm(1.0, factor, X, lower=1, trans_a=1), lower=1, overwrite_b=1)
-        Y[self._fixed] -= self._term @ X[self._fixed]
-        return np.asarray(Y)
+        """S X for X (n,) or (n, k)."""
+        out = np.empty_like(X)
+        self.stiffness(X, out)
+        return out
 
     @property
     def held(self) -> Float:
-        """(n, n) S + rho Rf Rf^T, positive definite; only until `release`."""
-        if self._held is None:
-            raise RuntimeError("the dense Schur complement has been released")
-        return self._held
+        """(n, n) S + rho Rf Rf^T, positive definite."""
+        lower = np.tril(self._both)
+        return np.asarray(lower + np.tril(lower, -1).T)
 
     @property
     def S(self) -> Float:
-        """(n, n) a copy of S; only until `release`."""
-        S = self.held.copy()
+        """(n, n) S."""
+        S = self.held
         S[np.ix_(self._fixed, self._fixed)] -= self._term
         return S
-
-    def release(self) -> None:
-        """Free the dense matrix; its factor serves from now on."""
-        self._held = None
 
 
 def _columns(x: Float, out: Float) -> Iterator[tuple[Float, Float]]:

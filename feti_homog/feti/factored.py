@@ -58,9 +58,6 @@ class Factored:
         """S X for X (n,) or (n, k)."""
         return _by_chunks(self.interior.reactions, X)
 
-    def release(self) -> None:
-        """Nothing is held that only a coarse space needs."""
-
 
 class Interior:
     """The dofs of one subdomain that no constraint acts on."""

@@ -37,7 +37,7 @@ class Influence:
     """z = H_D r on the active rows.  A Krylov method has nothing left to do but to confirm."""
 
     def __init__(self, comm: MPI.Intracomm, constraints: Constraints, boundary: Boundary) -> None:
-        """Factor the bonded cell; all boundary operators must be dense and hold their matrices.  Collective."""
+        """Factor the bonded cell; all boundary operators must be dense.  Collective."""
         self.comm, self.start = comm, constraints.owned[0]
         self.boundary, self.bonded = boundary, BondedCell(comm, constraints, boundary)
         self.scaled = Scaled(comm, constraints, boundary, self._forces)

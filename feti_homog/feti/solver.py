@@ -83,7 +83,6 @@ class FetiSolver:
             comm, self.constraints, subdomains, applications
         )
         self.operator = DualOperator(self.constraints, self.boundary)
-        self.boundary.release()
         heap.trim()
         self.active = ActiveRows(self.rows)
         self._view = PETSc.Options("feti_").getBool("view", False)

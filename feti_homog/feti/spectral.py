@@ -44,10 +44,7 @@ def dual_blocks(
 
 
 def coarse_vectors(blocks: Sequence[DualBlock], neighbours: Neighbours, threshold: float) -> list[Float]:
-    """For each subdomain of this rank: (n, k + m) its kernel and its m modes below the threshold.  Collective.
-
-    The dense matrices of the operators are released.
-    """
+    """For each subdomain of this rank: (n, k + m) its kernel and its m modes below the threshold.  Collective."""
     subdomains = [examined(*of) for of in zip(blocks, neighbours.common, strict=True)]
     # Of the neighbours' shares in M^-1 the rows that both have; single precision is enough to tell soft from stiff.
     others: list[list[tuple[int, Single]]] = [[] for _ in blocks]
@@ -62,7 +59,6 @@ def coarse_vectors(blocks: Sequence[DualBlock], neighbours: Neighbours, threshol
     for block, subdomain, received in zip(blocks, subdomains, others, strict=True):
         vectors.append(np.hstack([block.R, subdomain.modes(received, threshold)]))
         received.clear()
-        block.operator.release()
     return vectors
 
 
