@@ -51,7 +51,7 @@ class Condensed:
         self._scale = held.diagonal().mean() / inverse.diagonal().mean()
         self._difference = self._scale * inverse.diagonal() - held.diagonal()
         # S held below the diagonal and on it, the scaled inverse above.
-        self._both = np.asfortranarray(np.tril(held) + self._scale * np.tril(inverse, -1).T)
+        self._both = np.asfortranarray(np.where(np.tri(self.n, dtype=bool), held, self._scale * inverse.T))
 
     def stiffness(self, x: Float, out: Float) -> None:
         """S x for x (n,) or (n, k)."""
@@ -86,8 +86,7 @@ class Condensed:
     @property
     def held(self) -> Float:
         """(n, n) S + rho Rf Rf^T, positive definite."""
-        lower = np.tril(self._both)
-        return np.asarray(lower + np.tril(lower, -1).T)
+        return np.where(np.tri(self.n, dtype=bool), self._both, self._both.T)
 
     @property
     def S(self) -> Float:

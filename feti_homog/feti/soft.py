@@ -84,7 +84,8 @@ class Whole:
         subdomain = self.block.subdomain
         P = trace(subdomain.piece, subdomain.mesh.lattice, self.block.dofs[::2] // 2)
         jumps = self.block.B @ spanned(P, self.block.R)
-        N = congruent(self.block.BW.T @ jumps, self.operator.S)
+        scaled = self.block.BW.T @ jumps
+        N = scaled.T @ self.operator.forces(scaled)
         for s, share in shares:
             add_congruent(N, jumps[self.common[s]], share)
         return np.asarray(P @ soft_modes(congruent(P, self.operator.held), N, threshold))
