@@ -26,6 +26,8 @@ Float = NDArray[np.float64]
 # coarse problem grows faster than they do; a piece gets `NARROW` of its boundary to other bodies at most.  A body is
 # cut that is larger than a piece by a factor, or, where bonds break, whose boundary is too long for dense matrices.
 FASTEST, MOST, NARROW, LARGE, WIDE = 3000, 4000, 500, 2.5, 2500
+# Bodies of short boundary stay whole up to a larger factor, if they are no more than a fraction of a rank's load.
+LARGEST, FRACTION = 12.0, 1 / 16
 FIBRES_OF = {"square": 1, "hexagonal": 2}
 
 
@@ -109,7 +111,9 @@ def wanted_pieces(case: Case, load: Int, edges: Int, lattice: Lattice, n_ranks: 
     # A debonding cell is solved so often that whole bodies pay, as long as their dense matrices are small.
     size = max(FASTEST, int(load.sum()) * dofs_of_triangle // MOST)
     boundary = edges * 2 * lattice.intervals
-    large = (load * dofs_of_triangle > LARGE * size) | (boundary > LARGE * NARROW)
+    share = int(load.sum()) * dofs_of_triangle / n_ranks
+    whole = max(LARGE * size, min(LARGEST * size, FRACTION * share))
+    large = (load * dofs_of_triangle > whole) | (boundary > LARGE * NARROW)
     if case.interface is not None:
         large = boundary > WIDE
     by_size = pieces_for_size(load, dofs_of_triangle, size)

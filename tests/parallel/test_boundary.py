@@ -159,6 +159,14 @@ def test_pieces_of_very_large_bodies_are_larger(sizes):
     assert wanted([20_000, 30], [10, 10]) == [50, 1]
 
 
+def test_bodies_that_can_be_dealt_evenly_are_whole_up_to_a_larger_size(sizes, monkeypatch):
+    monkeypatch.setattr(cutting, "MOST", 1000)
+    load, edges = [600] * 100 + [1300], [10] * 101
+    assert wanted(load, edges) == [1] * 100 + [13]
+    assert wanted(load, edges, n_ranks=16) == [6] * 100 + [13]
+    assert wanted([600] * 2, [400, 800]) == [6, 6]
+
+
 def test_bodies_that_debond_are_whole_unless_their_boundary_is_wide(sizes):
     bonds_break = sections.Interface()
     assert wanted([260, 3000, 260], [10, 39, 41], bonds_break) == [1, 1, 3]
