@@ -12,7 +12,7 @@ from math import ceil, log2, sqrt
 
 from scaling_report import COARSE_SUMS, GATHERS, SCALARS, SUMS, VALUE_BYTES, Row
 
-from feti_homog.feti.together import LARGEST_REDUNDANT
+from feti_homog.feti.limits import LARGEST_REDUNDANT
 
 MESH, LOCAL, COARSE, MESSAGES = "mesh on rank 0", "subdomains", "coarse problem", "messages"
 # Powers: of the coarse unknowns, in their factorization; of the ranks, by which they are faster together.

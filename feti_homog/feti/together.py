@@ -8,12 +8,10 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
 from feti_homog.feti.assembled import distributed, total
+from feti_homog.feti.limits import LARGEST_REDUNDANT
 from feti_homog.feti.local import DirectSolver, IndefiniteSolver, factored_by_mumps
 
 Float = NDArray[np.float64]
-
-# Rows up to which every rank factors the whole matrix, which saves messages in every solve.
-LARGEST_REDUNDANT = 20_000
 
 
 class Redundant:

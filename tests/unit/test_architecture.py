@@ -82,3 +82,10 @@ def test_files_are_short():
     files = [path for folder in FOLDERS for path in (ROOT / folder).rglob("*.py")]
     lengths = {path: len(path.read_text(encoding="utf-8").splitlines()) for path in files}
     assert not {str(path): n for path, n in lengths.items() if n > LONGEST}
+
+
+@pytest.mark.parametrize("script", ["benchmark", "benchmark_sweep", "measure_cost", "scaling"])
+def test_scripts_that_start_jobs_do_not_start_mpi(script):
+    """mpirun would refuse to start from a program that MPI runs in."""
+    code = f"import sys; sys.path.insert(0, 'scripts'); import {script}; sys.exit('mpi4py.MPI' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=False).returncode == 0
