@@ -71,7 +71,7 @@ class AdaptiveCoarse(CoarseProblem):
         shape = (own.shape[0], self.dimension)
         self._motions = csr_matrix((own.data, own.indices + self.own.start, own.indptr), shape=shape)
         self._complete, self._usable, self._sufficient = False, True, False
-        # Faintest entries of U are dropped for large bodies.
+        # The faintest entries of U are dropped for large bodies.
         self._exact = not comm.allreduce(any(boundary.large), MPI.LOR)
         self.saddle: SaddlePoint | None = None
         self._E: csr_matrix

@@ -34,8 +34,9 @@ def trace(piece: Piece, lattice: Lattice, nodes: Int) -> csr_matrix:
     while lattice.intervals % (2 * k) == 0 and 2 * kept(2 * k).sum() >= ENOUGH:
         k *= 2
     keep = kept(k)
+    m = int(keep.sum())
     number = np.full(vertices + len(piece.edge_keys) * inner, -1)
-    number[nodes[keep]] = np.arange(keep.sum())
+    number[nodes[keep]] = np.arange(m)
     between = np.flatnonzero(~keep)
     edge, lower = edge[between], position[between] // k * k
     ends = np.empty((len(piece.edge_keys), 2), np.int64)
@@ -45,9 +46,9 @@ def trace(piece: Piece, lattice: Lattice, nodes: Int) -> csr_matrix:
     right = np.where(lower + k == lattice.intervals, ends[edge, 1], first + lower + k)
     weight = (position[between] - lower) / k
     rows = np.concatenate([np.flatnonzero(keep), between, between])
-    columns = np.concatenate([np.arange(keep.sum()), number[left], number[right]])
-    values = np.concatenate([np.ones(keep.sum()), 1 - weight, weight])
+    columns = np.concatenate([np.arange(m), number[left], number[right]])
+    values = np.concatenate([np.ones(m), 1 - weight, weight])
     moves = columns >= 0
     rows, columns, values = rows[moves], columns[moves], values[moves]
     entries = np.repeat(values, 2), (both_directions(rows), both_directions(columns))
-    return csr_matrix(entries, shape=(2 * len(nodes), 2 * int(keep.sum())))
+    return csr_matrix(entries, shape=(2 * len(nodes), 2 * m))

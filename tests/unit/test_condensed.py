@@ -123,8 +123,6 @@ def test_schur_complement_of_any_definite_matrix():
 
 def test_indefinite_subdomain_is_refused():
     K = csr_matrix(np.diag([1.0, 1.0, -1.0, 1.0]))
-    subdomain = SimpleNamespace(
-        fixing=lambda nodes: (np.zeros(0, np.int64), np.zeros((0, 0))), K=K
-    )
+    subdomain = SimpleNamespace(fixing=lambda nodes: (np.zeros(0, np.int64), np.zeros((0, 0))), K=K)
     with pytest.raises(np.linalg.LinAlgError, match="not positive definite"):
         Condensed(subdomain, np.arange(4))
