@@ -29,12 +29,12 @@ def set_schur(factor: PETSc.Mat, rows: PETSc.IS) -> None:
 
 
 def schur_complement(factor: PETSc.Mat, size: int) -> Float:
-    """The dense (size, size) Schur complement that a symmetric factorization has left."""
+    """The dense (size, size) Schur complement, in Fortran order, that a symmetric factorization has left."""
     schur, values = Pointer(), ctypes.POINTER(ctypes.c_double)()
     _call("MatFactorCreateSchurComplement", Pointer(factor.handle), ctypes.byref(schur), None)
     try:
         _call("MatDenseGetArrayRead", schur, ctypes.byref(values))
-        return np.ctypeslib.as_array(values, (size, size)).copy()
+        return np.ctypeslib.as_array(values, (size, size)).T.copy(order="F")
     finally:
         _call("MatDestroy", ctypes.byref(schur))
 

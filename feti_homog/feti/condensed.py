@@ -12,8 +12,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
-from scipy.linalg.blas import dsymm, dsymv
-from scipy.linalg.lapack import dpotrf, dpotri
+from scipy.linalg.blas import dsymm, dsymv, dtrmm
+from scipy.linalg.lapack import dlauum, dpotrf, dtrtri
 from scipy.sparse import csr_matrix
 
 from feti_homog import petsc_c
@@ -24,6 +24,8 @@ Float = NDArray[np.float64]
 
 # Columns up to which products one after the other are faster than all at once.
 FEW = 6
+# Rows up to which LAPACK inverts a triangle, and of the blocks that are mirrored.
+SMALL, BLOCK = 48, 64
 
 
 class Condensed:
@@ -41,35 +43,32 @@ class Condensed:
         fixed, self._term = subdomain.fixing(np.unique(dofs // 2))
         self._fixed = np.searchsorted(dofs, fixed)
         self.n = len(dofs)
-        held = schur_complement(subdomain.K, dofs)
-        held[np.ix_(self._fixed, self._fixed)] += self._term
-        factor, info = dpotrf(held, lower=1)
-        if info:
-            raise np.linalg.LinAlgError(f"a held Schur complement is not positive definite (LAPACK info {info})")
-        inverse = dpotri(factor, lower=1, overwrite_c=1)[0]
-        # Of the same size as S, so that the diagonals, of which one is kept beside, may be taken off each other.
-        self._scale = held.diagonal().mean() / inverse.diagonal().mean()
-        self._difference = self._scale * inverse.diagonal() - held.diagonal()
-        # S held below the diagonal and on it, the scaled inverse above.
-        self._both = np.asfortranarray(np.where(np.tri(self.n, dtype=bool), held, self._scale * inverse.T))
+        both = schur_complement(subdomain.K, dofs)
+        both[np.ix_(self._fixed, self._fixed)] += self._term
+        self._stiffness = both.diagonal().copy()
+        inverted_upper(both)
+        self._flexibility = both.diagonal().copy()
+        # S held below the diagonal, its inverse above.
+        np.fill_diagonal(both, 0.0)
+        self._both = both
 
     def stiffness(self, x: Float, out: Float) -> None:
         """S x for x (n,) or (n, k)."""
-        if x.size > FEW * self.n:
-            out[:] = dsymm(1.0, self._both, x, lower=1)
-        else:
-            for column, result in _columns(x, out):
-                result[:] = dsymv(1.0, self._both, column, lower=1)
+        self._product(x, out, self._stiffness, lower=1)
         out[self._fixed] -= self._term @ x[self._fixed]
 
     def flexibility(self, x: Float, out: Float) -> None:
         """S+ x for x (n,) or (n, k)."""
+        self._product(x, out, self._flexibility, lower=0)
+
+    def _product(self, x: Float, out: Float, diagonal: Float, lower: int) -> None:
+        """The symmetric matrix of one triangle of the array, and of a diagonal, times x."""
         if x.size > FEW * self.n:
-            out[:] = dsymm(1.0 / self._scale, self._both, x, lower=0)
+            out[:] = dsymm(1.0, self._both, x, lower=lower)
         else:
             for column, result in _columns(x, out):
-                result[:] = dsymv(1.0 / self._scale, self._both, column, lower=0)
-        out += (self._difference / self._scale * x.T).T
+                result[:] = dsymv(1.0, self._both, column, lower=lower)
+        out += (diagonal * x.T).T
 
     def answer(self, X: Float) -> Float:
         """S+ X for X (n,) or (n, k)."""
@@ -86,7 +85,9 @@ class Condensed:
     @property
     def held(self) -> Float:
         """(n, n) S + rho Rf Rf^T, positive definite."""
-        return np.where(np.tri(self.n, dtype=bool), self._both, self._both.T)
+        held = _mirrored(self._both)
+        np.fill_diagonal(held, self._stiffness)
+        return held
 
     @property
     def S(self) -> Float:
@@ -101,13 +102,51 @@ def _columns(x: Float, out: Float) -> Iterator[tuple[Float, Float]]:
     return iter([(x, out)]) if x.ndim == 1 else zip(x.T.copy(), out.T, strict=True)
 
 
+def inverted_upper(A: Float) -> None:
+    """Let the upper triangle and the diagonal of the SPD matrix A (n, n), in Fortran order, become those of A^-1.
+
+    The strict lower triangle stays.
+
+    Raises:
+        LinAlgError: A is not positive definite.
+    """
+    info = dpotrf(A, lower=0, clean=0, overwrite_a=1)[1]
+    if info:
+        raise np.linalg.LinAlgError(f"a held Schur complement is not positive definite (LAPACK info {info})")
+    _invert_triangle(A)
+    dlauum(A, lower=0, overwrite_c=1)
+
+
+def _invert_triangle(U: Float) -> None:
+    """U <- U^-1 for the upper triangle of U, by halves: OpenBLAS inverts large ones column by column."""
+    n = len(U)
+    if n <= SMALL:
+        U[:] = dtrtri(U, lower=0)[0]
+        return
+    first, corner, last = U[: n // 2, : n // 2], U[: n // 2, n // 2 :], U[n // 2 :, n // 2 :]
+    _invert_triangle(first)
+    _invert_triangle(last)
+    corner[:] = dtrmm(1.0, last, dtrmm(-1.0, first, corner), side=1, overwrite_b=1)
+
+
+def _mirrored(A: Float) -> Float:
+    """The symmetric matrix whose lower triangle is that of A (n, n), by blocks that fit the cache."""
+    whole = A.copy(order="F")
+    for j in range(0, len(A), BLOCK):
+        some = slice(j, j + BLOCK)
+        whole[:j, some] = whole[some, :j].T
+        corner = np.tril(whole[some, some])
+        whole[some, some] = corner + np.tril(corner, -1).T
+    return whole
+
+
 def schur_complement(matrix: csr_matrix, dofs: Int) -> Float:
-    """(n, n) Schur complement of a matrix on `dofs`, by MUMPS' partial factorization; the rest has to be SPD.
+    """(n, n) Schur complement of a matrix on `dofs`, in Fortran order; the rest of the matrix has to be SPD.
 
     Options have the prefix `feti_schur_`.
     """
     if len(dofs) == matrix.shape[0]:
-        return matrix.toarray()
+        return matrix.toarray(order="F")
     csr = matrix.indptr, matrix.indices, matrix.data
     A = PETSc.Mat().createAIJWithArrays(matrix.shape, csr, comm=PETSc.COMM_SELF)
     A.setOption(PETSc.Mat.Option.SPD, True)

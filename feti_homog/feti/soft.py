@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
-from scipy.sparse import csr_matrix
+from scipy.sparse import csr_matrix, hstack
 
 from feti_homog.feti.condensed import Condensed
 from feti_homog.feti.factored import Factored
@@ -84,10 +84,10 @@ class Whole:
         subdomain = self.block.subdomain
         P = trace(subdomain.piece, subdomain.mesh.lattice, self.block.dofs[::2] // 2)
         jumps = self.block.B @ spanned(P, self.block.R)
-        scaled = self.block.BW.T @ jumps
-        N = scaled.T @ self.operator.forces(scaled)
+        N = congruent((self.block.BW.T @ jumps).tocsr(), self.operator.S)
+        dense = jumps.toarray()
         for s, share in shares:
-            add_congruent(N, jumps[self.common[s]], share)
+            add_congruent(N, dense[self.common[s]], share)
         return np.asarray(P @ soft_modes(congruent(P, self.operator.held), N, threshold))
 
 
@@ -138,9 +138,9 @@ def examined(block: DualBlock, common: Mapping[int, Int]) -> Whole | Faces:
     return Whole(block, block.operator, common)
 
 
-def spanned(P: csr_matrix, R: Float) -> Float:
+def spanned(P: csr_matrix, R: Float) -> csr_matrix:
     """(n, m + k) [P R] of the trace space and the kernel."""
-    return np.hstack([P.toarray(), R])
+    return hstack([P, csr_matrix(R)]).tocsr()
 
 
 def congruent(T: csr_matrix | Float, A: Float | Single) -> Float:
