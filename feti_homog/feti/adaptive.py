@@ -239,7 +239,9 @@ class AdaptiveCoarse(CoarseProblem):
 def _compressed(matrix: csr_matrix, rows: Int) -> tuple[Int, Float]:
     """Some rows as a dense matrix: its nonzero columns and their values."""
     part = matrix[rows]
-    columns, at = np.unique(part.indices, return_inverse=True)
+    seen = np.zeros(part.shape[1], bool)
+    seen[part.indices] = True
+    columns, number = np.flatnonzero(seen), np.cumsum(seen) - 1
     dense = np.zeros((len(rows), len(columns)))
-    dense[np.repeat(np.arange(len(rows)), np.diff(part.indptr)), at] = part.data
+    dense[np.repeat(np.arange(len(rows)), np.diff(part.indptr)), number[part.indices]] = part.data
     return columns, dense

@@ -63,12 +63,13 @@ class Condensed:
 
     def _product(self, x: Float, out: Float, diagonal: Float, lower: int) -> None:
         """The symmetric matrix of one triangle of the array, and of a diagonal, times x."""
+        A = self._both
         if x.size > FEW * self.n:
-            out[:] = dsymm(1.0, self._both, x, lower=lower)
+            own = np.asfortranarray(diagonal[:, None] * x)
+            out[:] = dsymm(1.0, A, x, beta=1.0, c=own, overwrite_c=1, lower=lower)
         else:
             for column, result in _columns(x, out):
-                result[:] = dsymv(1.0, self._both, column, lower=lower)
-        out += (diagonal * x.T).T
+                result[:] = dsymv(1.0, A, column, beta=1.0, y=diagonal * column, overwrite_y=1, lower=lower)
 
     def answer(self, X: Float) -> Float:
         """S+ X for X (n,) or (n, k)."""
