@@ -12,20 +12,18 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
-from scipy.linalg.blas import dsymm, dsymv, dtrmm
-from scipy.linalg.lapack import dlauum, dpotrf, dtrtri
+from scipy.linalg.blas import dsymm, dsymv
 from scipy.sparse import csr_matrix
 
 from feti_homog import petsc_c
 from feti_homog.feti.subdomain import Subdomain
+from feti_homog.feti.triangles import invert_upper, mirrored
 
 Int = NDArray[np.int64]
 Float = NDArray[np.float64]
 
 # Columns up to which products one after the other are faster than all at once.
 FEW = 6
-# Rows up to which LAPACK inverts a triangle, and of the blocks that are mirrored.
-SMALL, BLOCK = 48, 64
 
 
 class Condensed:
@@ -46,7 +44,7 @@ class Condensed:
         both = schur_complement(subdomain.K, dofs)
         both[np.ix_(self._fixed, self._fixed)] += self._term
         self._stiffness = both.diagonal().copy()
-        inverted_upper(both)
+        invert_upper(both)
         self._flexibility = both.diagonal().copy()
         # S held below the diagonal, its inverse above.
         np.fill_diagonal(both, 0.0)
@@ -86,7 +84,7 @@ class Condensed:
     @property
     def held(self) -> Float:
         """(n, n) S + rho Rf Rf^T, positive definite."""
-        held = _mirrored(self._both)
+        held = mirrored(self._both)
         np.fill_diagonal(held, self._stiffness)
         return held
 
@@ -101,44 +99,6 @@ class Condensed:
 def _columns(x: Float, out: Float) -> Iterator[tuple[Float, Float]]:
     """The columns of x and of the result, views where these have one only."""
     return iter([(x, out)]) if x.ndim == 1 else zip(x.T.copy(), out.T, strict=True)
-
-
-def inverted_upper(A: Float) -> None:
-    """Let the upper triangle and the diagonal of the SPD matrix A (n, n), in Fortran order, become those of A^-1.
-
-    The strict lower triangle stays.
-
-    Raises:
-        LinAlgError: A is not positive definite.
-    """
-    info = dpotrf(A, lower=0, clean=0, overwrite_a=1)[1]
-    if info:
-        raise np.linalg.LinAlgError(f"a held Schur complement is not positive definite (LAPACK info {info})")
-    _invert_triangle(A)
-    dlauum(A, lower=0, overwrite_c=1)
-
-
-def _invert_triangle(U: Float) -> None:
-    """U <- U^-1 for the upper triangle of U, by halves: OpenBLAS inverts large ones column by column."""
-    n = len(U)
-    if n <= SMALL:
-        U[:] = dtrtri(U, lower=0)[0]
-        return
-    first, corner, last = U[: n // 2, : n // 2], U[: n // 2, n // 2 :], U[n // 2 :, n // 2 :]
-    _invert_triangle(first)
-    _invert_triangle(last)
-    corner[:] = dtrmm(1.0, last, dtrmm(-1.0, first, corner), side=1, overwrite_b=1)
-
-
-def _mirrored(A: Float) -> Float:
-    """The symmetric matrix whose lower triangle is that of A (n, n), by blocks that fit the cache."""
-    whole = A.copy(order="F")
-    for j in range(0, len(A), BLOCK):
-        some = slice(j, j + BLOCK)
-        whole[:j, some] = whole[some, :j].T
-        corner = np.tril(whole[some, some])
-        whole[some, some] = corner + np.tril(corner, -1).T
-    return whole
 
 
 def schur_complement(matrix: csr_matrix, dofs: Int) -> Float:

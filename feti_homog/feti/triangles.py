@@ -1,0 +1,51 @@
+"""Dense symmetric matrices by one of their triangles, so that a square array has room for two."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg.blas import dtrmm
+from scipy.linalg.lapack import dlauum, dpotrf, dtrtri
+
+Float = NDArray[np.float64]
+
+# Rows up to which LAPACK inverts a triangle, and of the blocks that are mirrored.
+SMALL, BLOCK = 48, 64
+
+
+def invert_upper(A: Float) -> None:
+    """Let the upper triangle and the diagonal of the SPD matrix A (n, n), in Fortran order, become those of A^-1.
+
+    The strict lower triangle stays.
+
+    Raises:
+        LinAlgError: A is not positive definite.
+    """
+    info = dpotrf(A, lower=0, clean=0, overwrite_a=1)[1]
+    if info:
+        raise np.linalg.LinAlgError(f"a dense matrix is not positive definite (LAPACK info {info})")
+    _invert_triangle(A)
+    dlauum(A, lower=0, overwrite_c=1)
+
+
+def _invert_triangle(U: Float) -> None:
+    """U <- U^-1 for the upper triangle of U, by halves: OpenBLAS inverts large ones column by column."""
+    n = len(U)
+    if n <= SMALL:
+        U[:] = dtrtri(U, lower=0)[0]
+        return
+    first, corner, last = U[: n // 2, : n // 2], U[: n // 2, n // 2 :], U[n // 2 :, n // 2 :]
+    _invert_triangle(first)
+    _invert_triangle(last)
+    corner[:] = dtrmm(1.0, last, dtrmm(-1.0, first, corner), side=1, overwrite_b=1)
+
+
+def mirrored(A: Float) -> Float:
+    """The symmetric matrix whose lower triangle is that of A (n, n), by blocks that fit the cache."""
+    whole = A.copy(order="F")
+    for j in range(0, len(A), BLOCK):
+        some = slice(j, j + BLOCK)
+        whole[:j, some] = whole[some, :j].T
+        corner = np.tril(whole[some, some])
+        whole[some, some] = corner + np.tril(corner, -1).T
+    return whole
