@@ -88,6 +88,11 @@ class Condensed:
         np.fill_diagonal(held, self._stiffness)
         return held
 
+    def holding(self, P: csr_matrix) -> Float:
+        """(m, m) P^T rho Rf Rf^T P for P (n, m)."""
+        at_fixed = P[self._fixed].toarray()
+        return np.asarray(at_fixed.T @ self._term @ at_fixed)
+
     @property
     def S(self) -> Float:
         """(n, n) S."""

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
+from scipy.linalg.lapack import dpotrf
 from scipy.sparse import csr_matrix, hstack
 
 from feti_homog.feti.condensed import Condensed
@@ -84,11 +85,13 @@ class Whole:
         subdomain = self.block.subdomain
         P = trace(subdomain.piece, subdomain.mesh.lattice, self.block.dofs[::2] // 2)
         jumps = self.block.B @ spanned(P, self.block.R)
-        N = congruent((self.block.BW.T @ jumps).tocsr(), self.operator.S)
+        S = self.operator.S
+        N = congruent((self.block.BW.T @ jumps).tocsr(), S)
         dense = jumps.toarray()
         for s, share in shares:
             add_congruent(N, dense[self.common[s]], share)
-        return np.asarray(P @ soft_modes(congruent(P, self.operator.held), N, threshold))
+        held = congruent(P, S) + self.operator.holding(P)
+        return np.asarray(P @ soft_modes(held, N, threshold))
 
 
 class Faces:
@@ -165,4 +168,7 @@ def soft_modes(held: Float, N: Float, threshold: float) -> Float:
     NR, RNR = N[:m, m:], N[m:, m:]
     # Less the kernel's part, N has eigenvectors N-orthogonal to the kernel, and S may be held.
     rest = N[:m, :m] - NR @ np.linalg.pinv(RNR, rcond=NULL, hermitian=True) @ NR.T
+    # A Cholesky factorization tells at a twentieth of the cost whether there are any.
+    if not dpotrf(held - threshold * rest, lower=1)[1]:
+        return np.zeros((m, 0))
     return np.asarray(eigh(rest, held, subset_by_value=(1.0 / threshold, np.inf), overwrite_a=True)[1])

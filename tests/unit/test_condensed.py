@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from dense import boundary_of, kernel, schur
 from mpi4py import MPI
-from scipy.sparse import csr_matrix, diags
+from scipy.sparse import csr_matrix, diags, identity
 
 from feti_homog.feti.condensed import Condensed, schur_complement
 from feti_homog.feti.factored import Factored
@@ -105,6 +105,8 @@ def test_dense_matrices(parts):
         assert np.abs(operator.S - S).max() < TIGHT * np.abs(S).max()
         held = operator.held
         assert np.linalg.eigvalsh(held)[0] > 0
+        holding = operator.holding(identity(len(dofs)).tocsr())
+        assert np.abs(holding - (held - operator.S)).max() < TIGHT * np.abs(S).max()
         inverse = applied(operator.flexibility, np.eye(len(dofs)))
         assert np.abs(held @ inverse - np.eye(len(dofs))).max() < 1e-8
 
