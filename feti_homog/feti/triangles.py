@@ -41,11 +41,11 @@ def _invert_triangle(U: Float) -> None:
 
 
 def mirrored(A: Float) -> Float:
-    """The symmetric matrix whose lower triangle is that of A (n, n), by blocks that fit the cache."""
+    """The symmetric matrix, in C order, whose lower triangle is that of A (n, n); by blocks that fit the cache."""
     whole = A.copy(order="F")
     for j in range(0, len(A), BLOCK):
         some = slice(j, j + BLOCK)
         whole[:j, some] = whole[some, :j].T
         corner = np.tril(whole[some, some])
         whole[some, some] = corner + np.tril(corner, -1).T
-    return whole
+    return whole.T
