@@ -54,6 +54,8 @@ def main() -> int:
     wanted = dict.fromkeys(run for study in arguments.studies for run in runs[study])
     done = [work_off(run, arguments) for run in wanted]
     found = {study: [row for run in some for row in read(run.report(arguments.out))] for study, some in runs.items()}
+    # The largest run of weak scaling is one of strong scaling too; by itself it tells nothing.
+    found = {study: rows if study in arguments.studies or len(rows) > 1 else [] for study, rows in found.items()}
     print(*report(found, arguments), sep="\n")
     write(arguments.out / "scaling.csv", found)
     return int(not all(done) or any(not row.converged for rows in found.values() for row in rows))
