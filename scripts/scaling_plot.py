@@ -23,10 +23,10 @@ STUDY_INK = {"weak": "#1f4e9c", "strong": "#c44e00"}
 def plot(path: Path, studies: dict[str, list[Row]], futures: dict[str, list[Prediction]]) -> None:
     """Iterations and messages by ranks, seconds by size, and the shares of the predicted times."""
     figure, ((left, middle), (right, shares)) = plt.subplots(2, 2, figsize=(11, 7.5))
-    for study, rows in studies.items():
-        if study not in STUDY_INK or not rows:
+    for study, ink in STUDY_INK.items():
+        rows = studies[study]
+        if not rows:
             continue
-        ink = STUDY_INK[study]
         ranks = [row.ranks for row in rows]
         left.plot(ranks, [row.iterations for row in rows], "o-", color=ink, label=study)
         several = [row for row in rows if row.ranks > 1]

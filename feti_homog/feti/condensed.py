@@ -44,7 +44,10 @@ class Condensed:
         both = schur_complement(subdomain.K, dofs)
         both[np.ix_(self._fixed, self._fixed)] += self._term
         self._stiffness = both.diagonal().copy()
-        invert_upper(both)
+        try:
+            invert_upper(both)
+        except np.linalg.LinAlgError as error:
+            raise np.linalg.LinAlgError(f"a held Schur complement: {error}") from error
         self._flexibility = both.diagonal().copy()
         # S held below the diagonal, its inverse above.
         np.fill_diagonal(both, 0.0)
@@ -63,7 +66,7 @@ class Condensed:
         """The symmetric matrix of one triangle of the array, and of a diagonal, times x."""
         A = self._both
         if x.size > FEW * self.n:
-            own = np.asfortranarray(diagonal[:, None] * x)
+            own = np.multiply(diagonal[:, None], x, order="F")
             out[:] = dsymm(1.0, A, x, beta=1.0, c=own, overwrite_c=1, lower=lower)
         else:
             for column, result in _columns(x, out):

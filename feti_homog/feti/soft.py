@@ -168,7 +168,7 @@ def soft_modes(held: Float, N: Float, threshold: float) -> Float:
     NR, RNR = N[:m, m:], N[m:, m:]
     # Less the kernel's part, N has eigenvectors N-orthogonal to the kernel, and S may be held.
     rest = N[:m, :m] - NR @ np.linalg.pinv(RNR, rcond=NULL, hermitian=True) @ NR.T
-    # A Cholesky factorization tells at a twentieth of the cost whether there are any.
+    # A Cholesky factorization tells at a tenth of the cost whether there are any.
     if not dpotrf(held - threshold * rest, lower=1)[1]:
         return np.zeros((m, 0))
     return np.asarray(eigh(rest, held, subset_by_value=(1.0 / threshold, np.inf), overwrite_a=True)[1])

@@ -23,7 +23,7 @@ def invert_upper(A: Float) -> None:
     """
     info = dpotrf(A, lower=0, clean=0, overwrite_a=1)[1]
     if info:
-        raise np.linalg.LinAlgError(f"a dense matrix is not positive definite (LAPACK info {info})")
+        raise np.linalg.LinAlgError(f"not positive definite (LAPACK info {info})")
     _invert_triangle(A)
     dlauum(A, lower=0, overwrite_c=1)
 
