@@ -45,7 +45,7 @@ OPTIONS = (
         "auto",
         "rigid-body motions only, or soft modes of the subdomains too",
     ),
-    Option("feti_coarse_threshold", "<real>", "0.22", "softer modes are deflated; fewer iterations if larger"),
+    Option("feti_coarse_threshold", "<real>", "0.24", "softer modes are deflated; fewer iterations if larger"),
     Option("feti_view", "", "", "print subdomains, coarse space and estimated condition numbers"),
     Option("feti_sub_ksp_type", "preonly|...", "preonly", "subdomain solves"),
     Option("feti_sub_pc_type", "cholesky|lu", "cholesky", "subdomain factorizations"),

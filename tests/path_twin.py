@@ -6,6 +6,7 @@ Tractions are nodal reactions by the arc length that each node stands for.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from qp_twin import QPTwin
@@ -41,9 +42,9 @@ class PathTwin:
         used = shares.max(axis=0) if self.criterion == "max" else np.sqrt((shares**2).sum(axis=0))
         return state, used * bonded
 
-    def proportional(self, strain, bonded):
-        """Events from zero to `strain`, snap-back included."""
-        events, bonded = [], bonded.copy()
+    def proportional(self, strain):
+        """Events of the wholly bonded cell from zero to `strain`, snap-back included."""
+        events, bonded = [], np.ones(len(self.twin.key), bool)
         while True:
             state, used = self.state(strain, bonded)
             load = used.max()
@@ -75,3 +76,11 @@ class PathTwin:
                         middle = (low + high) / 2
                         low, high = (low, middle) if at(middle)[1].max() > 1.0 + 2 * TIE else (middle, high)
                 s = high
+
+    def legs(self, strains, steps):
+        """(load factor, event) of a path from zero through all of `strains`; its whole length is 1."""
+        found = [self.proportional(strains[0])]
+        for before, after in pairwise(strains):
+            left = ~np.any([e.broke for events in found for e in events], axis=0)
+            found.append(self.leg(before, after, left, steps))
+        return [((k + e.load_factor) / len(strains), e) for k, events in enumerate(found) for e in events]

@@ -33,7 +33,7 @@ from feti_homog.feti.vectors import preconditioned
 Int = NDArray[np.int64]
 Float = NDArray[np.float64]
 
-THRESHOLD = 0.22
+THRESHOLD = 0.24
 # Active rows per coarse vector below which the vectors are taken to depend on each other.
 ROOM = 4
 # Largest T T z - T z, and G^T T z, of a usable coarse problem, relative to T z and G^T z.

@@ -73,14 +73,14 @@ class Condensed:
                 result[:] = dsymv(1.0, A, column, beta=1.0, y=diagonal * column, overwrite_y=1, lower=lower)
 
     def answer(self, X: Float) -> Float:
-        """S+ X for X (n,) or (n, k)."""
-        out = np.empty_like(X)
+        """S+ X, in Fortran order, for X (n,) or (n, k)."""
+        out = np.empty(X.shape, order="F")
         self.flexibility(X, out)
         return out
 
     def forces(self, X: Float) -> Float:
-        """S X for X (n,) or (n, k)."""
-        out = np.empty_like(X)
+        """S X, in Fortran order, for X (n,) or (n, k)."""
+        out = np.empty(X.shape, order="F")
         self.stiffness(X, out)
         return out
 

@@ -17,7 +17,7 @@ from feti_homog.feti.subdomain import both_directions
 Int = NDArray[np.int64]
 
 # Dofs that a trace space keeps at least.
-ENOUGH = 150
+ENOUGH = 100
 
 
 def trace(piece: Piece, lattice: Lattice, nodes: Int) -> csr_matrix:

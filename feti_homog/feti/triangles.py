@@ -11,6 +11,7 @@ Float = NDArray[np.float64]
 
 # Rows up to which LAPACK inverts a triangle, and of the blocks that are mirrored.
 SMALL, BLOCK = 48, 64
+LOWER = np.tri(BLOCK, dtype=bool)
 
 
 def invert_upper(A: Float) -> None:
@@ -46,6 +47,6 @@ def mirrored(A: Float) -> Float:
     for j in range(0, len(A), BLOCK):
         some = slice(j, j + BLOCK)
         whole[:j, some] = whole[some, :j].T
-        corner = np.tril(whole[some, some])
-        whole[some, some] = corner + np.tril(corner, -1).T
+        corner = whole[some, some]
+        whole[some, some] = np.where(LOWER[: len(corner), : len(corner)], corner, corner.T)
     return whole.T

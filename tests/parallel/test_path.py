@@ -14,6 +14,7 @@ from support import parallel_assert
 from feti_homog.interface.contact import BONDED, OPEN
 from feti_homog.interface.debonding import events, increments, unloaded
 from feti_homog.interface.law import Law
+from feti_homog.parallel import on_root
 
 pytestmark = pytest.mark.parallel
 
@@ -61,10 +62,10 @@ def is_certified(points):
 )
 def test_events_equal_the_twins(comm, cell, criterion, contact, strain):
     case = bonds.build(comm, matrix={"young": 1.0, "poisson": 0.35}, fibre={"young": 5.0, "poisson": 0.2}, **cell)
-    twin = comm.bcast(case.twin)
     strengths = (0.15, 0.3) if criterion == "max" else (0.25, 0.2)
-    path = PathTwin(twin, contact, *strengths, criterion)
-    expected = path.proportional(np.array(strain), np.ones(len(twin.key), bool))
+    expected = on_root(
+        comm, lambda: PathTwin(case.twin, contact, *strengths, criterion).proportional(np.array(strain))
+    )
     points = follow(case.cell, contact, Law(*strengths, criterion), [strain])
     assert len(points) == len(expected) > 3
     assert is_certified(points)
@@ -79,13 +80,8 @@ def test_events_equal_the_twins(comm, cell, criterion, contact, strain):
 @pytest.mark.parametrize("back", [[0.0, 0.0, 0.0], [-0.6, 0.8, -0.3]], ids=["unloading", "reversal"])
 def test_later_legs_equal_small_steps(comm, back):
     case = bonds.build(comm, matrix={"young": 1.0, "poisson": 0.35}, fibre={"young": 5.0, "poisson": 0.2}, **SQUARE)
-    twin, legs = comm.bcast(case.twin), np.array([[0.3, -0.4, 0.15], back, [0.9, -0.9, 0.7]])
-    path = PathTwin(twin, True, 0.15, 0.3, "max")
-    found = path.proportional(legs[0], np.ones(len(twin.key), bool))
-    expected = [(e.load_factor / 3, e) for e in found]
-    for leg in (1, 2):
-        left = ~np.any([e.broke for _, e in expected], axis=0)
-        expected += [((leg + e.load_factor) / 3, e) for e in path.leg(legs[leg - 1], legs[leg], left, 12)]
+    legs = np.array([[0.3, -0.4, 0.15], back, [0.9, -0.9, 0.7]])
+    expected = on_root(comm, lambda: PathTwin(case.twin, True, 0.15, 0.3, "max").legs(legs, 12))
     points = follow(case.cell, True, Law(0.15, 0.3, "max"), legs)
     assert is_certified(points)
     turns = [p for p in points if not p.broke and p.after.position > 0]

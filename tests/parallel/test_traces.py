@@ -14,6 +14,7 @@ from feti_homog.feti.traces import ENOUGH, trace
 pytestmark = pytest.mark.parallel
 
 REFINED = NARROW | {"refine": 2}
+ADAPTIVE = {"feti_coarse_space": "adaptive"}
 ALL = 10**9
 
 
@@ -58,7 +59,7 @@ def test_few_dofs_are_all_kept(comm, monkeypatch):
 def test_coarser_traces_find_as_good_modes(comm, monkeypatch, pieces):
     found = []
     for enough in (ALL, ENOUGH):
-        cell = tear(comm, enough, monkeypatch, decomposition={"subdomains": pieces})
+        cell = tear(comm, enough, monkeypatch, decomposition={"subdomains": pieces}, petsc=ADAPTIVE)
         solutions = together(cell)
         vectors = cell.solver.coarse.vectors
         found.append((vectors, solutions[0].iterations, [cell.solver.stress_integral(s) for s in solutions]))
