@@ -23,7 +23,7 @@ from feti_homog.errors import ConvergenceError
 from feti_homog.homogenization import Homogenization, Response
 from feti_homog.interface.law import Law
 from feti_homog.material import plane_stiffness
-from feti_homog.output import folder, plots, results, states, tables, xdmf
+from feti_homog.output import folder, results, states, tables, xdmf
 from feti_homog.output.checkpoint import Checkpoint, NoCheckpoint, finished
 from feti_homog.output.fields import FieldFile
 from feti_homog.output.summary import summary
@@ -224,6 +224,13 @@ def _write(study: Study, directory: Path, document: dict[str, Any], checkpoint: 
         checkpoint.clear()
     if output.pictures:
         with progress.stage("pictures") as words:
-            words.append(", ".join(p.name for p in on_root_only(comm, plots.plot, directory) or []))
+            words.append(", ".join(p.name for p in on_root_only(comm, _draw, directory) or []))
     timings = progress.timings()
     progress.say("\n" + summary(document | {"timings": timings}))
+
+
+def _draw(directory: Path) -> list[Path]:
+    """The pictures; only a rank that draws loads Matplotlib."""
+    from feti_homog.output import plots
+
+    return plots.plot(directory)

@@ -14,6 +14,7 @@ RUN_VARIABLES = {
     "OMPI_ALLOW_RUN_AS_ROOT": "1",
     "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
     "OMPI_MCA_btl_vader_single_copy_mechanism": "none",
+    "OMPI_MCA_mpi_yield_when_idle": "1",  # jobs share the cores
     "OMP_NUM_THREADS": "1",
     "H5PY_ALWAYS_USE_MPI": "1",
 }

@@ -78,6 +78,12 @@ def test_importing_starts_nothing():
     assert not {"petsc4py", "mpi4py", "gmsh", "h5py", "matplotlib"} & set(run.stdout.split())
 
 
+def test_only_a_rank_that_draws_loads_matplotlib():
+    program = "import sys, feti_homog.job, feti_homog.sweep.execute; print(*sys.modules)"
+    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert "matplotlib" not in run.stdout.split()
+
+
 def test_files_are_short():
     files = [path for folder in FOLDERS for path in (ROOT / folder).rglob("*.py")]
     lengths = {path: len(path.read_text(encoding="utf-8").splitlines()) for path in files}
