@@ -4,10 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from scaling_model import COARSE, COARSE_POWER, LOCAL, MESH, TOGETHER, Machine, Prediction, Rates, predict
+from scaling_model import (
+    COARSE,
+    COARSE_POWER,
+    LOCAL,
+    MESH,
+    SUMS_TOGETHER,
+    TOGETHER,
+    Machine,
+    Prediction,
+    Rates,
+    predict,
+)
 from scaling_report import COARSE_SUMS, GATHERS, SCALARS, SUMS, Row
 
-from feti_homog.feti.limits import LARGEST_REDUNDANT
+from feti_homog.feti.limits import LARGEST_REPLICATED
 
 RANKS = (1, 2, 16, 64, 1024)
 FAR = (64, 1024)
@@ -41,14 +52,14 @@ def assumptions(rates: Rates, machine: Machine) -> list[str]:
         f"to each; {1e3 * r.subdomains:.2f} of them in 1 000 dofs",
         f"  coarse      n = {1e3 * r.coarse:.2f} unknowns in 1 000 dofs, summed and factored by every rank for itself "
         f"in {r.factor:.2g} n^{COARSE_POWER} s,",
-        f"              solved once an iteration in {r.solve:.2g} n log2 n s: powers of sparse plane "
-        f"problems, assumed; factors measured, up to n = {r.largest_coarse};",
-        f"              from {LARGEST_REDUNDANT / r.vectors / 1e6:.0f} million dofs by all ranks together, "
+        f"              solved once an iteration in {r.solve:.2g} n log2 n s a load, which ranks deal out: powers of "
+        f"sparse plane problems, assumed; factors measured, up to n = {r.largest_coarse};",
+        f"              from {LARGEST_REPLICATED / r.vectors / 1e6:.0f} million dofs by all ranks together, "
         f"p^{TOGETHER} times faster, assumed",
         f"  messages    {1e6 * machine.latency:g} microseconds each and {machine.bandwidth / 1e9:g} GB/s, assumed; "
         f"{GATHERS + SUMS} exchanges an iteration, each of {r.neighbours} messages and {r.surface:.1f} values",
         f"              times the root of the rank's dofs (most that were counted); {COARSE_SUMS} sums over ranks of "
-        f"{r.loads} n values and {SCALARS} of single ones,",
+        f"{r.loads} n values ({SUMS_TOGETHER} where ranks solve together) and {SCALARS} of single ones,",
         f"              log2 p messages deep; once {r.coarse_bytes:.1f} bytes a dof of coarse matrices for every rank",
         f"  iterations  {r.iterations} at any size, the most of all runs",
         "  memory      not in the model: neither whether each rank can hold the coarse factor, nor rank 0 the mesh; "

@@ -1,7 +1,7 @@
 """A cost model of the solver on more ranks than there are here, with rates measured on few.
 
 Every term is one that the program has today: a mesh and a tearing on rank 0, work on subdomains that ranks share, a
-coarse problem that every rank factors and solves for itself, or all together if it is large, and messages.
+coarse problem that every rank factors to solve for some load cases, or all together if it is large, and messages.
 """
 
 from __future__ import annotations
@@ -12,11 +12,14 @@ from math import ceil, log2, sqrt
 
 from scaling_report import COARSE_SUMS, GATHERS, SCALARS, SUMS, VALUE_BYTES, Row
 
-from feti_homog.feti.limits import LARGEST_REDUNDANT
+from feti_homog.feti.limits import LARGEST_REPLICATED
 
 MESH, LOCAL, COARSE, MESSAGES = "mesh on rank 0", "subdomains", "coarse problem", "messages"
 # Powers: of the coarse unknowns, in their factorization; of the ranks, by which they are faster together.
 COARSE_POWER, TOGETHER = 1.5, 0.5
+# Sums of coarse vectors in an iteration where ranks solve together: three solves take two each, and a right-hand side,
+# the constraints' forces and the projection one.
+SUMS_TOGETHER = 9
 
 
 @dataclass(frozen=True)
@@ -34,7 +37,7 @@ class Rates:
     Attributes:
         mesh: seconds per coarse triangle.
         assemble, setup, apply: seconds per dof, `apply` of an iteration.
-        factor, solve: seconds per n^1.5 and n log2 n of the coarse unknowns n.
+        factor, solve: seconds per n^1.5 of the coarse unknowns n, and per n log2 n and load case.
         loads: load cases solved together.
         triangles, subdomains, vectors, coarse, coarse_bytes: per dof.
         largest_coarse: most coarse unknowns that were timed.
@@ -77,7 +80,7 @@ def measured(rows: Sequence[Row], cores: int) -> Rates:
             for row in alone
         ),
         factor=_rate((row.coarse_factor, row.coarse**COARSE_POWER) for row in timed),
-        solve=_rate((row.coarse_solve, row.coarse * log2(row.coarse)) for row in timed),
+        solve=_rate((row.coarse_solve, _turns(row.loads, row.ranks) * _once(row.coarse)) for row in timed),
         loads=rows[0].loads,
         triangles=_rate((row.triangles, row.dofs) for row in rows),
         subdomains=_rate((row.subdomains, row.dofs) for row in rows),
@@ -90,6 +93,16 @@ def measured(rows: Sequence[Row], cores: int) -> Rates:
         neighbours=max(max(row.neighbours) for row in rows),
         imbalance=most.fullest * most.ranks / most.dofs,
     )
+
+
+def _turns(loads: int, ranks: int) -> int:
+    """How many of the load cases the busiest rank solves the coarse problem for."""
+    return ceil(loads / ranks)
+
+
+def _once(coarse: float) -> float:
+    """Work of a coarse solve."""
+    return coarse * log2(coarse)
 
 
 def _rate(pairs: Iterable[tuple[float, float]]) -> float:
@@ -140,7 +153,9 @@ def predict(rates: Rates, machine: Machine, dofs: float, ranks: int) -> Predicti
     whole = ceil(subdomains / ranks) * ranks / subdomains
     own = dofs / ranks * max(rates.imbalance if ranks > 1 else 1.0, whole)
     coarse = max(rates.coarse * dofs, 2.0)
-    together = ranks**TOGETHER if rates.vectors * dofs > LARGEST_REDUNDANT else 1.0
+    large = rates.vectors * dofs > LARGEST_REPLICATED
+    together = ranks**TOGETHER if large else 1.0
+    turns = rates.loads if large else _turns(rates.loads, ranks)
     return Prediction(
         dofs=dofs,
         ranks=ranks,
@@ -149,17 +164,17 @@ def predict(rates: Rates, machine: Machine, dofs: float, ranks: int) -> Predicti
         setup=rates.setup * own,
         coarse_factor=rates.factor * coarse**COARSE_POWER / together,
         apply=rates.iterations * rates.apply * own,
-        coarse_solve=rates.iterations * rates.solve * coarse * log2(coarse) / together,
-        messages=_messages(rates, machine, dofs, ranks, coarse) if ranks > 1 else 0.0,
+        coarse_solve=rates.iterations * rates.solve * turns * _once(coarse) / together,
+        messages=_messages(rates, machine, dofs, ranks, SUMS_TOGETHER if large else COARSE_SUMS) if ranks > 1 else 0.0,
     )
 
 
-def _messages(rates: Rates, machine: Machine, dofs: float, ranks: int, coarse: float) -> float:
+def _messages(rates: Rates, machine: Machine, dofs: float, ranks: int, sums: int) -> float:
     """Seconds of all messages: those of the iterations, and the coarse matrix that every rank is told."""
     values = rates.surface * sqrt(dofs / ranks)
     exchange = machine.latency * rates.neighbours + VALUE_BYTES * values / machine.bandwidth
     tree = machine.latency * ceil(log2(ranks))
     # A sum of a long vector over ranks moves it twice.
-    coarse_sum = tree + 2 * VALUE_BYTES * coarse * rates.loads / machine.bandwidth
-    iteration = (GATHERS + SUMS) * exchange + COARSE_SUMS * coarse_sum + SCALARS * tree
+    coarse_sum = tree + 2 * VALUE_BYTES * rates.coarse * dofs * rates.loads / machine.bandwidth
+    iteration = (GATHERS + SUMS) * exchange + sums * coarse_sum + SCALARS * tree
     return rates.iterations * iteration + rates.coarse_bytes * dofs / machine.bandwidth

@@ -14,9 +14,9 @@ COLUMNS = (
 )  # fmt: skip
 VALUE_BYTES = 8
 # What one iteration does: exchanges of multipliers (a gather and a sum each for the operator and the preconditioner,
-# a gather for the coarse problem), sums over ranks of coarse vectors (its right-hand side, those of its refinement, the
+# a gather for the coarse problem), sums over ranks of coarse vectors (of its right-hand side and solution, and of the
 # projection), and of single numbers by the Krylov method.
-GATHERS, SUMS, COARSE_SUMS, SCALARS = 3, 2, 7, 3
+GATHERS, SUMS, COARSE_SUMS, SCALARS = 3, 2, 3, 3
 
 
 @dataclass(frozen=True)

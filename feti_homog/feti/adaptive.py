@@ -26,6 +26,7 @@ from feti_homog.feti.coarse import CoarseProblem
 from feti_homog.feti.constraints import Constraints
 from feti_homog.feti.neighbours import Neighbours
 from feti_homog.feti.preconditioner import Scaled
+from feti_homog.feti.replicated import Replicated, saddle_point
 from feti_homog.feti.saddle import SaddlePoint
 from feti_homog.feti.spectral import coarse_vectors, dual_blocks
 from feti_homog.feti.vectors import preconditioned
@@ -73,7 +74,7 @@ class AdaptiveCoarse(CoarseProblem):
         self._complete, self._usable, self._sufficient = False, True, False
         # The faintest entries of U are dropped for large bodies.
         self._exact = not comm.allreduce(any(boundary.large), MPI.LOR)
-        self.saddle: SaddlePoint | None = None
+        self.saddle: SaddlePoint | Replicated | None = None
         self._E: csr_matrix
         # (columns, S+ B^T U there) of each subdomain
         self._answers: list[tuple[Int, Float]]
@@ -181,7 +182,7 @@ class AdaptiveCoarse(CoarseProblem):
         heap.trim()
         self.destroy()
         try:
-            self.saddle = SaddlePoint(self.comm, E.tocsr(), K.tocsr(), free, "feti_coarse_")
+            self.saddle = saddle_point(self.comm, E.tocsr(), K.tocsr(), free, "feti_coarse_")
         except np.linalg.LinAlgError:
             return False
         return True
@@ -230,10 +231,13 @@ class AdaptiveCoarse(CoarseProblem):
         return energy
 
     def _own(self, local: csr_matrix) -> csr_matrix:
-        """The owned of the local rows."""
+        """The owned of the local rows, which follow each other; no copy."""
         first, last = self.constraints.owned
         at = np.searchsorted(self.constraints.rows, first)
-        return local[at : at + last - first]
+        ends = local.indptr[at : at + last - first + 1]
+        part = slice(ends[0], ends[-1])
+        entries = local.data[part], local.indices[part], ends - ends[0]
+        return csr_matrix(entries, shape=(last - first, local.shape[1]))
 
 
 def _compressed(matrix: csr_matrix, rows: Int) -> tuple[Int, Float]:

@@ -32,7 +32,7 @@ class DirectSolver:
     def _hold(self, ksp: PETSc.KSP) -> None:
         self._ksp = ksp
         self._x, self._b = ksp.getOperators()[0].createVecs()
-        weakref.finalize(self, _free, ksp, self._x, self._b)
+        self._release = weakref.finalize(self, _free, ksp, self._x, self._b)
 
     def solve(self, B: Float) -> Float:
         """A^-1 B for B (n,) or (n, k)."""
@@ -50,6 +50,11 @@ class DirectSolver:
         for matrix in matrices:
             matrix.destroy()
         return X
+
+
+    def destroy(self) -> None:
+        """Free the factor, which otherwise goes with the object."""
+        self._release()
 
 
 class IndefiniteSolver(DirectSolver):

@@ -10,9 +10,10 @@ from scipy.sparse import bmat, csr_matrix, diags, vstack
 
 from feti_homog.feti import together
 from feti_homog.feti.assembled import own_rows
+from feti_homog.feti.local import DirectSolver
 
 Float = NDArray[np.float64]
-Solver = together.Redundant | together.Distributed
+Solver = DirectSolver | together.Distributed
 
 # Of the constraints in the augmented matrix; each solve with it shrinks their error by about this factor.
 WEIGHT = 1e7
@@ -47,15 +48,15 @@ class SaddlePoint:
         K = own_rows(comm, (K @ diags(self._columns)).tocsr())
         length = np.sqrt(np.asarray(K.multiply(K).sum(axis=1)).ravel())
         length = np.where(length > 0, length, 1.0)
-        self._E = (diags(self._columns) @ E @ diags(self._columns)).tocsr()
         self._rows = 1.0 / np.concatenate(comm.allgather(length))
-        self._K = _Constraints(comm, (diags(1.0 / length) @ K).tocsr())
+        E = (diags(self._columns) @ E @ diags(self._columns)).tocsr()
+        self._system = _System(comm, E, (diags(1.0 / length) @ K).tocsr())
         self._solves = FEWEST_SOLVES
         self._inner: _Augmented | _Indefinite
-        augmented = (self._E + WEIGHT * (self._K.KT @ self._K.K)).tocsr()
+        augmented = self._system.augmented()
         self.entries = int(augmented.nnz)
         try:
-            self._inner = _Augmented(self._K, together.solver(comm, augmented, prefix, definite=True))
+            self._inner = _Augmented(self._system, together.solver(comm, augmented, prefix, definite=True))
             if self._refine():
                 return
             self.destroy()
@@ -63,14 +64,15 @@ class SaddlePoint:
             pass
         self._solves = INDEFINITE_SOLVES
         try:
-            self._inner = _Indefinite(together.solver(comm, self._K.beside(self._E, free), prefix, definite=False))
+            whole = together.solver(comm, self._system.beside(free), prefix, definite=False)
         except PETSc.Error as error:
             raise np.linalg.LinAlgError(f"a coarse matrix is singular: {error}") from error
+        self._inner = _Indefinite(self._system, whole)
 
     def solve(self, f: Float, g: Float) -> tuple[Float, Float]:
         """c and a for f (n,) and g (m,), or (n, k) and (m, k).  Collective."""
         columns, rows = (s if f.ndim == 1 else s[:, None] for s in (self._columns, self._rows))
-        c, a = self._solve(columns * f, rows * g)
+        c, a = self._inner.solve(columns * f, rows * g, self._solves)
         return columns * c, rows * a
 
     @property
@@ -81,18 +83,6 @@ class SaddlePoint:
     def destroy(self) -> None:
         """Free the factor.  Collective."""
         self._inner.solver.destroy()
-
-    def _solve(self, f: Float, g: Float) -> tuple[Float, Float]:
-        c, a = self._inner.solve(f, g)
-        for _ in range(self._solves - 1):
-            df, dg = self._left(f, g, c, a)
-            dc, da = self._inner.solve(df, dg)
-            c, a = c + dc, a + da
-        return c, a
-
-    def _left(self, f: Float, g: Float, c: Float, a: Float) -> tuple[Float, Float]:
-        """f - E c - K^T a and g - K c."""
-        return f - _sum(self.comm, self._E @ c + self._K.part(a)), g - self._K.applied(c)
 
     def _refine(self) -> bool:
         """Make as many solves as it takes; whether that was enough."""
@@ -105,62 +95,74 @@ class SaddlePoint:
     def _error(self) -> float:
         """Relative residual of some system."""
         c, a = (np.cos(np.arange(n) + 1.0) for n in (len(self._columns), len(self._rows)))
-        f, g = self._left(np.zeros_like(c), np.zeros_like(a), c, a)
-        left = self._left(f, g, *self._solve(f, g))
+        f, g = self._system.left(np.zeros_like(c), np.zeros_like(a), c, a)
+        left = self._system.left(f, g, *self._inner.solve(f, g, self._solves))
         return float(max(np.linalg.norm(r) / (np.linalg.norm(b) or 1.0) for r, b in zip(left, (f, g), strict=True)))
 
 
-class _Constraints:
-    """K (m, n), of which every rank has some rows."""
+class _System:
+    """E (n, n), the sum of every rank's part, and K (m, n), of which every rank has some rows."""
 
-    def __init__(self, comm: MPI.Intracomm, K: csr_matrix) -> None:
-        """`K` are this rank's rows."""
-        self.comm, self.K, self.KT = comm, K, K.T.tocsr()
-        counts = comm.allgather(K.shape[0])
-        first = sum(counts[: comm.rank])
-        self.own, self.total = slice(first, first + K.shape[0]), sum(counts)
+    def __init__(self, comm: MPI.Intracomm, E: csr_matrix, K: csr_matrix) -> None:
+        self.comm, self.E, self.K, self.KT = comm, E, K, K.T.tocsr()
+        self._counts = np.array(comm.allgather(K.shape[0]))
+        first = int(self._counts[: comm.rank].sum())
+        self.own, self.total = slice(first, first + K.shape[0]), int(self._counts.sum())
 
-    def applied(self, c: Float) -> Float:
-        """K c.  Collective."""
-        return np.concatenate(self.comm.allgather(self.K @ c))
+    def everywhere(self, own: Float) -> Float:
+        """(m,) or (m, k) of which every rank has the rows that it has of K.  Collective."""
+        whole = np.empty((self.total, *own.shape[1:]))
+        self.comm.Allgatherv(np.ascontiguousarray(own), (whole, self._counts * (whole.size // max(self.total, 1))))
+        return whole
 
-    def part(self, a: Float) -> Float:
-        """This rank's part of K^T a."""
-        return np.asarray(self.KT @ a[self.own])
+    def left(self, f: Float, g: Float, c: Float, a: Float) -> tuple[Float, Float]:
+        """f - E c - K^T a and g - K c.  Collective."""
+        return f - _sum(self.comm, self.E @ c + self.KT @ a[self.own]), g - self.everywhere(self.K @ c)
 
-    def reactions(self, a: Float) -> Float:
-        """K^T a.  Collective."""
-        return _sum(self.comm, self.part(a))
+    def augmented(self) -> csr_matrix:
+        """This rank's part of E + rho K^T K."""
+        return (self.E + WEIGHT * (self.KT @ self.K)).tocsr()
 
-    def beside(self, E: csr_matrix, free: csr_matrix) -> csr_matrix:
+    def beside(self, free: csr_matrix) -> csr_matrix:
         """This rank's part of [E K^T; K -free]."""
         empty = [csr_matrix((n, self.K.shape[1])) for n in (self.own.start, self.total - self.own.stop)]
         K = vstack([empty[0], self.K, empty[1]])
-        return bmat([[E, K.T], [K, -free if self.comm.rank == 0 else None]]).tocsr()
+        return bmat([[self.E, K.T], [K, -free if self.comm.rank == 0 else None]]).tocsr()
 
 
 class _Augmented:
-    """By E + rho K^T K, definite: a step of the augmented Lagrangian (Fortin & Glowinski, 1983).
+    """By E + rho K^T K, definite: steps of the augmented Lagrangian (Fortin & Glowinski, 1983).
 
     For columns that overlap widely K^T K has no entry that E has not, so this costs a quarter of an indefinite factor.
     """
 
-    def __init__(self, K: _Constraints, solver: Solver) -> None:
-        self._K, self.solver = K, solver
+    def __init__(self, system: _System, solver: Solver) -> None:
+        self._system, self.solver = system, solver
 
-    def solve(self, f: Float, g: Float) -> tuple[Float, Float]:
-        c = self.solver.solve(f + WEIGHT * self._K.reactions(g))
-        return c, WEIGHT * (self._K.applied(c) - g)
+    def solve(self, f: Float, g: Float, solves: int) -> tuple[Float, Float]:
+        """c and a after so many steps, each with one sum over ranks.  Collective."""
+        system, g = self._system, g[self._system.own]
+        c = self.solver.solve(f + WEIGHT * _sum(system.comm, system.KT @ g))
+        a = WEIGHT * (system.K @ c - g)
+        for _ in range(solves - 1):
+            missed = g - system.K @ c
+            dc = self.solver.solve(f - _sum(system.comm, system.E @ c + system.KT @ (a - WEIGHT * missed)))
+            c, a = c + dc, a + WEIGHT * (system.K @ dc - missed)
+        return c, system.everywhere(a)
 
 
 class _Indefinite:
     """By an LDL^T factor of the whole, for matrices that are too badly conditioned for the other."""
 
-    def __init__(self, solver: Solver) -> None:
-        self.solver = solver
+    def __init__(self, system: _System, solver: Solver) -> None:
+        self._system, self.solver = system, solver
 
-    def solve(self, f: Float, g: Float) -> tuple[Float, Float]:
-        x = self.solver.solve(np.concatenate([f, g]))
+    def solve(self, f: Float, g: Float, solves: int) -> tuple[Float, Float]:
+        """c and a after so many steps of iterative refinement.  Collective."""
+        x = np.zeros((len(f) + len(g), *f.shape[1:]))
+        for _ in range(solves):
+            left = self._system.left(f, g, x[: len(f)], x[len(f) :])
+            x = x + self.solver.solve(np.concatenate(left))
         return x[: len(f)], x[len(f) :]
 
 

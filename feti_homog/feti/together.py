@@ -7,15 +7,14 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
-from feti_homog.feti.assembled import distributed, total
-from feti_homog.feti.limits import LARGEST_REDUNDANT
+from feti_homog.feti.assembled import distributed
 from feti_homog.feti.local import DirectSolver, IndefiniteSolver, factored_by_mumps
 
 Float = NDArray[np.float64]
 
 
-class Redundant:
-    """Every rank holds the factor of the whole matrix."""
+class Distributed:
+    """The ranks factor the matrix together (MUMPS), and none ever has all of it."""
 
     def __init__(self, comm: MPI.Intracomm, part: csr_matrix, prefix: str, definite: bool) -> None:
         """Factor the sum of the parts (n, n); options under `prefix`.  Collective.
@@ -23,21 +22,6 @@ class Redundant:
         Raises:
             PETSc.Error: the matrix is singular, or not definite as it should be.
         """
-        self._solver = (DirectSolver if definite else IndefiniteSolver)(total(comm, part), prefix)
-
-    def solve(self, b: Float) -> Float:
-        """A^-1 b for b (n,) or (n, k), the same on every rank."""
-        return self._solver.solve(b)
-
-    def destroy(self) -> None:
-        """The factor goes with the object."""
-
-
-class Distributed:
-    """The ranks factor the matrix together (MUMPS), and none ever has all of it."""
-
-    def __init__(self, comm: MPI.Intracomm, part: csr_matrix, prefix: str, definite: bool) -> None:
-        """As `Redundant`."""
         self.comm = comm
         self._ksp = factored_by_mumps(distributed(comm, part), prefix, definite)
         self._x, self._b = self._ksp.getOperators()[0].createVecs()
@@ -61,7 +45,8 @@ class Distributed:
             thing.destroy()
 
 
-def solver(comm: MPI.Intracomm, part: csr_matrix, prefix: str, definite: bool) -> Redundant | Distributed:
-    """Redundant where the matrix is small or there is one rank."""
-    small = comm.size == 1 or part.shape[0] <= LARGEST_REDUNDANT
-    return (Redundant if small else Distributed)(comm, part, prefix, definite)
+def solver(comm: MPI.Intracomm, part: csr_matrix, prefix: str, definite: bool) -> DirectSolver | Distributed:
+    """Solves with the sum of the parts.  Collective."""
+    if comm.size > 1:
+        return Distributed(comm, part, prefix, definite)
+    return (DirectSolver if definite else IndefiniteSolver)(part, prefix)

@@ -1,0 +1,63 @@
+"""Saddle-point systems whose matrices are sums over ranks: solved by all ranks together, and each column by one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.sparse import csr_matrix
+
+from feti_homog.feti.replicated import Replicated
+from feti_homog.feti.saddle import SaddlePoint
+
+pytestmark = pytest.mark.parallel
+
+KINDS = [SaddlePoint, Replicated]
+N, M = 40, 7
+
+
+@pytest.fixture
+def system():
+    """E and K, the last row of which is the sum of the first two, and the motion that is free for it."""
+    rng = np.random.default_rng(1)
+    root = rng.standard_normal((N, N))
+    K = rng.standard_normal((M, N))
+    K[-1] = K[0] + K[1]
+    null = np.eye(M)[[0, 1, -1]].T @ [1.0, 1.0, -1.0] / np.sqrt(3)
+    return root @ root.T + np.eye(N), K, np.outer(null, null)
+
+
+def parts(comm, matrix):
+    """This rank's part of a matrix: no two ranks have the same, and their sum is the matrix."""
+    weights = np.arange(comm.size) + 1.0
+    return csr_matrix(matrix * weights[comm.rank] / weights.sum())
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("columns", [(), (1,), (2,), (3,), (5,)])
+def test_solution(comm, system, kind, columns):
+    E, K, free = system
+    rng = np.random.default_rng(2)
+    c, a = rng.standard_normal((N, *columns)), rng.standard_normal((M, *columns))
+    saddle = kind(comm, parts(comm, E), parts(comm, K), csr_matrix(free), "test_")
+    found, work = saddle.solve(E @ c + K.T @ a, K @ c)
+    assert found.shape == c.shape and work.shape == a.shape
+    np.testing.assert_allclose(found, c, atol=1e-10)
+    np.testing.assert_allclose(K.T @ work, K.T @ a, atol=1e-8)
+    for x in (found, work):
+        assert (comm.bcast(x) == x).all()
+    saddle.destroy()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_singular_systems_are_told_on_every_rank(comm, kind):
+    E, K, free = (csr_matrix(np.full(shape, value)) for shape, value in (((3, 3), 1.0), ((1, 3), 0.0), ((1, 1), 0.0)))
+    with pytest.raises(np.linalg.LinAlgError, match="singular"):
+        kind(comm, E, K, free, "test_")
+
+
+def test_a_replicated_system_is_benign_where_the_common_one_is(comm, system):
+    E, K, free = system
+    found = [kind(comm, parts(comm, E), parts(comm, K), csr_matrix(free), "test_") for kind in KINDS]
+    assert len({saddle.benign for saddle in found}) == 1
+    for saddle in found:
+        saddle.destroy()
