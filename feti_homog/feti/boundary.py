@@ -85,7 +85,8 @@ class Boundary:
         return self._each([o.flexibility for o in self.operators], x)
 
     def _each(self, applied: Sequence[Callable[[Float, Float], None]], x: Float) -> Float:
-        y = np.empty_like(x)
+        x = np.asfortranarray(x)
+        y = np.empty(x.shape, order="F")
         for apply, (first, last) in zip(applied, pairwise(self.offsets.tolist()), strict=True):
             apply(x[first:last], y[first:last])
         return y

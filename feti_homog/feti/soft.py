@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 from scipy.linalg.lapack import dpotrf
-from scipy.sparse import csr_matrix, hstack
+from scipy.sparse import csr_matrix
 
 from feti_homog.feti.condensed import Condensed
 from feti_homog.feti.factored import Factored
@@ -66,32 +66,27 @@ class Whole:
     """Examined as one.  `common` names the rows that it has in common with each subdomain, itself among them."""
 
     def __init__(self, block: DualBlock, operator: Condensed, common: Mapping[int, Int]) -> None:
-        self.block, self.operator, self.common = block, operator, common
+        self.block, self.common = block, common
+        subdomain, S = block.subdomain, operator.S
+        self._P = trace(subdomain.piece, subdomain.mesh.lattice, block.dofs[::2] // 2)
+        self._held = congruent(self._P, S) + operator.holding(self._P)
+        # (rows, rows) its share W^-1 B D^-1 S D^-1 B^T W^-1 of M^-1; this precision tells soft from stiff.
+        BW = block.BW.astype(np.float32)
+        self._share = BW @ (BW @ S.astype(np.float32)).T
 
-    @property
-    def preconditioner(self) -> Float:
-        """(rows, rows) its share W^-1 B D^-1 S D^-1 B^T W^-1 of M^-1."""
-        return np.asarray(self.block.BW @ (self.block.BW @ self.operator.S).T)
-
-    def shares(self) -> Iterator[tuple[int, Float]]:
+    def shares(self) -> Iterator[tuple[int, Single]]:
         """Its share of M^-1 on the rows in common with each other subdomain."""
-        M = self.preconditioner
         for s, rows in self.common.items():
             if s != self.block.subdomain.piece.index:
-                yield s, M[np.ix_(rows, rows)]
+                yield s, self._share[np.ix_(rows, rows)]
 
     def modes(self, shares: Sequence[tuple[int, Single]], threshold: float) -> Float:
         """(n, m) soft modes besides the kernel, for the shares of others in M^-1."""
-        subdomain = self.block.subdomain
-        P = trace(subdomain.piece, subdomain.mesh.lattice, self.block.dofs[::2] // 2)
-        jumps = self.block.B @ spanned(P, self.block.R)
-        S = self.operator.S
-        N = congruent((self.block.BW.T @ jumps).tocsr(), S)
-        dense = jumps.toarray()
+        M = self._share.copy()
         for s, share in shares:
-            add_congruent(N, dense[self.common[s]], share)
-        held = congruent(P, S) + self.operator.holding(P)
-        return np.asarray(P @ soft_modes(held, N, threshold))
+            M[np.ix_(self.common[s], self.common[s])] += share
+        N = jump_energy(self.block.B, self._P, self.block.R, M)
+        return np.asarray(self._P @ soft_modes(self._held, N, threshold))
 
 
 class Faces:
@@ -106,14 +101,14 @@ class Faces:
             if s != block.subdomain.piece.index
         }
 
-    def shares(self) -> Iterator[tuple[int, Float]]:
+    def shares(self) -> Iterator[tuple[int, Single]]:
         """No less than its share of M^-1 on the rows in common with each other subdomain."""
         for s, found in self._rings.items():
             share = np.zeros((len(self.common[s]),) * 2)
             for ring in found:
                 BW = self.block.BW[self.common[s]][:, ring.at]
                 share += BW @ (BW @ ring.clamped).T
-            yield s, share
+            yield s, share.astype(np.float32)
 
     def modes(self, shares: Sequence[tuple[int, Single]], threshold: float) -> Float:
         """(n, m) soft modes of the faces, for the shares of others in M^-1."""
@@ -121,7 +116,7 @@ class Faces:
         for s, share in shares:
             for ring in self._rings[s]:
                 B = self.block.B[self.common[s]][:, ring.at]
-                N = congruent(B @ spanned(ring.P, ring.R), share)
+                N = jump_energy(B, ring.P, ring.R, share)
                 soft = ring.P @ soft_modes(congruent(ring.P, ring.operator.held), N, FACE * threshold)
                 parts.append(np.zeros((len(self.block.dofs), soft.shape[1])))
                 parts[-1][ring.at] = soft
@@ -141,20 +136,16 @@ def examined(block: DualBlock, common: Mapping[int, Int]) -> Whole | Faces:
     return Whole(block, block.operator, common)
 
 
-def spanned(P: csr_matrix, R: Float) -> csr_matrix:
-    """(n, m + k) [P R] of the trace space and the kernel."""
-    return hstack([P, csr_matrix(R)]).tocsr()
-
-
 def congruent(T: csr_matrix | Float, A: Float | Single) -> Float:
     """T^T A T for symmetric A."""
     return np.asarray(T.T @ (T.T @ A).T)
 
 
-def add_congruent(N: Float, T: Float, A: Single) -> None:
-    """N <- N + T^T A T for symmetric A and T of which few columns are not zero."""
-    used = np.flatnonzero(T.any(axis=0))
-    N[np.ix_(used, used)] += congruent(T[:, used], A)
+def jump_energy(B: csr_matrix, P: csr_matrix, R: Float, M: Single) -> Float:
+    """(m + k, m + k) T^T M T of the jumps T = B [P R] of a trace space and a kernel, for symmetric M."""
+    TP, TR = (B @ P).astype(np.float32), (B @ R).astype(np.float32)
+    MR = M @ TR
+    return np.block([[congruent(TP, M), TP.T @ MR], [(TP.T @ MR).T, TR.T @ MR]]).astype(float)
 
 
 def soft_modes(held: Float, N: Float, threshold: float) -> Float:

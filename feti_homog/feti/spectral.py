@@ -46,13 +46,13 @@ def dual_blocks(
 def coarse_vectors(blocks: Sequence[DualBlock], neighbours: Neighbours, threshold: float) -> list[Float]:
     """For each subdomain of this rank: (n, k + m) its kernel and its m modes below the threshold.  Collective."""
     subdomains = [examined(*of) for of in zip(blocks, neighbours.common, strict=True)]
-    # Of the neighbours' shares in M^-1 the rows that both have; single precision is enough to tell soft from stiff.
+    # Of the neighbours' shares in M^-1 the rows that both have.
     others: list[list[tuple[int, Single]]] = [[] for _ in blocks]
 
     def shares() -> Iterator[tuple[int, int, Single]]:
         for i, subdomain in enumerate(subdomains):
             for s, share in subdomain.shares():
-                yield i, s, share.astype(np.float32)
+                yield i, s, share
 
     neighbours.exchange(shares(), lambda i, sender, share: others[i].append((sender, share)))
     vectors = []
