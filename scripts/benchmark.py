@@ -29,10 +29,7 @@ def main() -> int:
     arguments = parser.parse_args()
     if not arguments.case.is_file():
         parser.error(f"{arguments.case}: no such file")
-    rows: list[Row] = []
-    for spec in arguments.tools.split(","):
-        rows.append(best(spec, arguments))
-        print(f"{rows[-1].name:14}{rows[-1].total:9.1f} s  {rows[-1].status}", flush=True)
+    rows = list(best(arguments).values())
     compare(rows)
     print("", *table(rows), *notes(rows), sep="\n")
     arguments.out.mkdir(parents=True, exist_ok=True)
@@ -64,14 +61,22 @@ def _tools(text: str) -> str:
     return text
 
 
-def best(spec: str, arguments: argparse.Namespace) -> Row:
-    """The fastest run of a tool; the first that does not end well if there is one."""
-    tool, _, ranks = spec.partition("@")
-    alone = tool in PEERS and PEERS[tool].sequential
-    rows: list[Row] = []
-    while len(rows) < arguments.repeat and all(row.status == "done" for row in rows):
-        rows.append(run(tool, int(ranks or (1 if alone else arguments.ranks)), arguments))
-    return min(rows, key=lambda row: (row.status == "done", row.solver))
+def best(arguments: argparse.Namespace) -> dict[str, Row]:
+    """The fastest run of each tool, or one that did not end well, after which it gets no other.
+
+    The tools take turns, so that none has the quiet minutes of a machine to itself.
+    """
+    rows: dict[str, Row] = {}
+    for _ in range(arguments.repeat):
+        for spec in arguments.tools.split(","):
+            if spec in rows and rows[spec].status != "done":
+                continue
+            tool, _, ranks = spec.partition("@")
+            alone = tool in PEERS and PEERS[tool].sequential
+            row = run(tool, int(ranks or (1 if alone else arguments.ranks)), arguments)
+            print(f"{row.name:14}{row.total:9.1f} s  {row.status}", flush=True)
+            rows[spec] = min(rows.get(spec, row), row, key=lambda row: (row.status == "done", row.solver))
+    return rows
 
 
 def run(tool: str, ranks: int, arguments: argparse.Namespace) -> Row:
