@@ -24,7 +24,7 @@ TOOLS = "feti,cholmod,mumps@1,mumps,gamg,hypre,hypre_rigid,fetidp,bddc"
 
 
 def main() -> int:
-    """Run the tools one after the other; print and write what they took."""
+    """Run the tools in turns; print and write what they took."""
     parser = _parser()
     arguments = parser.parse_args()
     if not arguments.case.is_file():
@@ -54,7 +54,10 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _tools(text: str) -> str:
-    for spec in text.split(","):
+    specs = text.split(",")
+    if len(set(specs)) < len(specs):
+        raise argparse.ArgumentTypeError(f"{text}: expected each tool once")
+    for spec in specs:
         tool, _, ranks = spec.partition("@")
         if tool not in ("feti", *PEERS) or (ranks and not ranks.isdecimal()):
             raise argparse.ArgumentTypeError(f"{spec}: expected one of feti, {', '.join(PEERS)}, or one with @RANKS")

@@ -4,19 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from scaling_model import (
-    COARSE,
-    COARSE_POWER,
-    LOCAL,
-    MESH,
-    SUMS_TOGETHER,
-    TOGETHER,
-    Machine,
-    Prediction,
-    Rates,
-    predict,
-)
-from scaling_report import COARSE_SUMS, GATHERS, SCALARS, SUMS, Row
+from scaling_model import COARSE, COARSE_POWER, LOCAL, MESH, TOGETHER, Machine, Prediction, Rates, predict
+from scaling_report import COARSE_SUMS, GATHERS, SCALARS, SUMS, SUMS_TOGETHER, Row
 
 from feti_homog.feti.limits import LARGEST_REPLICATED
 

@@ -10,16 +10,13 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import ceil, log2, sqrt
 
-from scaling_report import COARSE_SUMS, GATHERS, SCALARS, SUMS, VALUE_BYTES, Row
+from scaling_report import COARSE_SUMS, GATHERS, SCALARS, SUMS, SUMS_TOGETHER, VALUE_BYTES, Row
 
 from feti_homog.feti.limits import LARGEST_REPLICATED
 
 MESH, LOCAL, COARSE, MESSAGES = "mesh on rank 0", "subdomains", "coarse problem", "messages"
 # Powers: of the coarse unknowns, in their factorization; of the ranks, by which they are faster together.
 COARSE_POWER, TOGETHER = 1.5, 0.5
-# Sums of coarse vectors in an iteration where ranks solve together: three solves take two each, and a right-hand side,
-# the constraints' forces and the projection one.
-SUMS_TOGETHER = 9
 
 
 @dataclass(frozen=True)
@@ -70,6 +67,7 @@ def measured(rows: Sequence[Row], cores: int) -> Rates:
     """Rates from the rows: local work from those on one rank, sizes and counts from all."""
     timed = [row for row in rows if row.ranks <= cores]
     alone = [row for row in rows if row.ranks == 1]
+    told = [row for row in rows if row.ranks > 1] or rows
     most = max(rows, key=lambda row: (row.ranks, row.dofs))
     return Rates(
         mesh=_rate((row.seconds["mesh"], row.triangles) for row in timed),
@@ -79,14 +77,14 @@ def measured(rows: Sequence[Row], cores: int) -> Rates:
             (row.seconds["solve"] - row.iterations * row.coarse_solve, row.iterations * row.dofs)
             for row in alone
         ),
-        factor=_rate((row.coarse_factor, row.coarse**COARSE_POWER) for row in timed),
-        solve=_rate((row.coarse_solve, _turns(row.loads, row.ranks) * _once(row.coarse)) for row in timed),
+        factor=_rate((row.coarse_factor, _factored(row.coarse, row.vectors, row.ranks)) for row in timed),
+        solve=_rate((row.coarse_solve, _solved(row.coarse, row.vectors, row.ranks, row.loads)) for row in timed),
         loads=rows[0].loads,
         triangles=_rate((row.triangles, row.dofs) for row in rows),
         subdomains=_rate((row.subdomains, row.dofs) for row in rows),
         vectors=_rate((row.vectors, row.dofs) for row in rows),
         coarse=_rate((row.coarse, row.dofs) for row in rows),
-        coarse_bytes=_rate((row.coarse_bytes, row.dofs) for row in rows),
+        coarse_bytes=_rate((row.coarse_bytes, row.dofs) for row in told),
         largest_coarse=max(row.coarse for row in timed),
         iterations=max(row.iterations for row in rows),
         surface=max(row.values / sqrt(row.dofs / row.ranks) for row in rows),
@@ -95,14 +93,14 @@ def measured(rows: Sequence[Row], cores: int) -> Rates:
     )
 
 
-def _turns(loads: int, ranks: int) -> int:
-    """How many of the load cases the busiest rank solves the coarse problem for."""
-    return ceil(loads / ranks)
+def _factored(coarse: float, vectors: float, ranks: int) -> float:
+    """Work of a coarse factorization on the busiest rank: all of it, or a share where ranks do it together."""
+    return coarse**COARSE_POWER / (ranks**TOGETHER if vectors > LARGEST_REPLICATED else 1.0)
 
 
-def _once(coarse: float) -> float:
-    """Work of a coarse solve."""
-    return coarse * log2(coarse)
+def _solved(coarse: float, vectors: float, ranks: int, loads: int) -> float:
+    """Work of the coarse solves on the busiest rank: for the loads that are dealt to it, or a share of all."""
+    return coarse * log2(coarse) * (loads / ranks**TOGETHER if vectors > LARGEST_REPLICATED else ceil(loads / ranks))
 
 
 def _rate(pairs: Iterable[tuple[float, float]]) -> float:
@@ -153,19 +151,18 @@ def predict(rates: Rates, machine: Machine, dofs: float, ranks: int) -> Predicti
     whole = ceil(subdomains / ranks) * ranks / subdomains
     own = dofs / ranks * max(rates.imbalance if ranks > 1 else 1.0, whole)
     coarse = max(rates.coarse * dofs, 2.0)
-    large = rates.vectors * dofs > LARGEST_REPLICATED
-    together = ranks**TOGETHER if large else 1.0
-    turns = rates.loads if large else _turns(rates.loads, ranks)
+    vectors = rates.vectors * dofs
+    sums = SUMS_TOGETHER if vectors > LARGEST_REPLICATED else COARSE_SUMS
     return Prediction(
         dofs=dofs,
         ranks=ranks,
         mesh=rates.mesh * rates.triangles * dofs,
         assemble=rates.assemble * own,
         setup=rates.setup * own,
-        coarse_factor=rates.factor * coarse**COARSE_POWER / together,
+        coarse_factor=rates.factor * _factored(coarse, vectors, ranks),
         apply=rates.iterations * rates.apply * own,
-        coarse_solve=rates.iterations * rates.solve * turns * _once(coarse) / together,
-        messages=_messages(rates, machine, dofs, ranks, SUMS_TOGETHER if large else COARSE_SUMS) if ranks > 1 else 0.0,
+        coarse_solve=rates.iterations * rates.solve * _solved(coarse, vectors, ranks, rates.loads),
+        messages=_messages(rates, machine, dofs, ranks, sums) if ranks > 1 else 0.0,
     )
 
 

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from feti_homog.feti.limits import LARGEST_REPLICATED
+
 STAGES = ("mesh", "assemble", "set-up", "solve")
 COLUMNS = (
     "fibres", "ranks", "dofs", "subdomains", "vectors", "kernel", "iterations", "converged", "memory", "sent",
@@ -17,6 +19,9 @@ VALUE_BYTES = 8
 # a gather for the coarse problem), sums over ranks of coarse vectors (of its right-hand side and solution, and of the
 # projection), and of single numbers by the Krylov method.
 GATHERS, SUMS, COARSE_SUMS, SCALARS = 3, 2, 3, 3
+# Where ranks solve the coarse problem together its three solves take two sums each; its right-hand side, the forces of
+# the constraints and the projection one.
+SUMS_TOGETHER = 9
 
 
 @dataclass(frozen=True)
@@ -84,7 +89,8 @@ class Row:
     @property
     def summed(self) -> int:
         """Bytes that every rank puts into the sums over ranks of an iteration."""
-        return VALUE_BYTES * (COARSE_SUMS * self.coarse * self.loads + SCALARS)
+        sums = SUMS_TOGETHER if self.vectors > LARGEST_REPLICATED else COARSE_SUMS
+        return VALUE_BYTES * (sums * self.coarse * self.loads + SCALARS)
 
     @property
     def miscounted(self) -> float:

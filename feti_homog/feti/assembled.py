@@ -135,9 +135,9 @@ class Blocks:
     def _flush(self) -> None:
         if self._held:
             rows, counts, columns, values = (np.concatenate(part) for part in zip(*self._held, strict=True))
+            self._held, self._entries = [], 0
             m, n = self._whole.shape
             # A product sums faster than a conversion from coordinates, which sorts.
             one_by_one = csr_matrix((values, columns, np.r_[0, np.cumsum(counts)]), shape=(len(rows), n))
             place = csr_matrix((np.ones(len(rows)), (rows, np.arange(len(rows)))), shape=(m, len(rows)))
             self._whole = self._whole + place @ one_by_one
-            self._held, self._entries = [], 0

@@ -51,7 +51,6 @@ class DirectSolver:
             matrix.destroy()
         return X
 
-
     def destroy(self) -> None:
         """Free the factor, which otherwise goes with the object."""
         self._release()

@@ -10,7 +10,6 @@ from scipy.sparse import csr_matrix
 from feti_homog.feti.assembled import total
 from feti_homog.feti.limits import LARGEST_REPLICATED
 from feti_homog.feti.saddle import SaddlePoint
-from feti_homog.parallel import agree
 
 Float = NDArray[np.float64]
 
@@ -21,14 +20,22 @@ class Replicated:
     Attributes:
         alone: that of this rank.
         benign: whether it is so on every rank.
-        entries: nonzero ones of this rank's parts of the matrices.
+        entries: nonzero ones of all ranks' parts of the matrices, which every rank is told.
     """
 
     def __init__(self, comm: MPI.Intracomm, E: csr_matrix, K: csr_matrix, free: csr_matrix, prefix: str) -> None:
         """As `SaddlePoint`."""
         self.comm = comm
-        self.entries = int(E.nnz + K.nnz)
-        self.alone = agree(comm, SaddlePoint, MPI.COMM_SELF, total(comm, E), total(comm, K), free, prefix)
+        self.entries: int = comm.allreduce(int(E.nnz + K.nnz))
+        whole = total(comm, E), total(comm, K)
+        error = None
+        try:
+            self.alone = SaddlePoint(MPI.COMM_SELF, *whole, free, prefix)
+        except np.linalg.LinAlgError as caught:
+            error = caught
+        # Rounding may differ from rank to rank where their processors do.
+        if comm.allreduce(error is not None, MPI.LOR):
+            raise error or np.linalg.LinAlgError("a coarse matrix is singular, as another rank found")
         self.benign: bool = comm.allreduce(self.alone.benign, MPI.LAND)
 
     def solve(self, f: Float, g: Float) -> tuple[Float, Float]:

@@ -43,7 +43,6 @@ class SaddlePoint:
         Raises:
             LinAlgError: the matrix is singular.
         """
-        self.comm = comm
         self._columns = 1.0 / np.sqrt(_sum(comm, E.diagonal()))
         K = own_rows(comm, (K @ diags(self._columns)).tocsr())
         length = np.sqrt(np.asarray(K.multiply(K).sum(axis=1)).ravel())

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from operator import itemgetter
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,8 +32,8 @@ Int = NDArray[np.int64]
 Float = NDArray[np.float64]
 Single = NDArray[np.float32]
 
-# Of a symmetric matrix, relative to its largest entry: eigenvalues that are none.
-NULL = 1e-10
+# Of a symmetric matrix in single precision, relative to its largest eigenvalue: eigenvalues that are none.
+NULL = 1e-6
 # The threshold of a face, over tau, for what other faces and the rest of the body add is not in its eigenproblem.
 FACE = 1.25
 
@@ -83,7 +84,8 @@ class Whole:
     def modes(self, shares: Sequence[tuple[int, Single]], threshold: float) -> Float:
         """(n, m) soft modes besides the kernel, for the shares of others in M^-1."""
         M = self._share.copy()
-        for s, share in shares:
+        # In an order that no distribution changes.
+        for s, share in sorted(shares, key=itemgetter(0)):
             M[np.ix_(self.common[s], self.common[s])] += share
         N = jump_energy(self.block.B, self._P, self.block.R, M)
         return np.asarray(self._P @ soft_modes(self._held, N, threshold))
@@ -142,7 +144,7 @@ def congruent(T: csr_matrix | Float, A: Float | Single) -> Float:
 
 
 def jump_energy(B: csr_matrix, P: csr_matrix, R: Float, M: Single) -> Float:
-    """(m + k, m + k) T^T M T of the jumps T = B [P R] of a trace space and a kernel, for symmetric M."""
+    """(m + k, m + k) T^T M T of the jumps T = B [P R] of a trace space and a kernel, for symmetric M and as precise."""
     TP, TR = (B @ P).astype(np.float32), (B @ R).astype(np.float32)
     MR = M @ TR
     return np.block([[congruent(TP, M), TP.T @ MR], [(TP.T @ MR).T, TR.T @ MR]]).astype(float)

@@ -55,9 +55,36 @@ def test_singular_systems_are_told_on_every_rank(comm, kind):
         kind(comm, E, K, free, "test_")
 
 
-def test_a_replicated_system_is_benign_where_the_common_one_is(comm, system):
+def test_a_fault_of_one_rank_is_told_on_every_rank(comm, system, monkeypatch):
     E, K, free = system
-    found = [kind(comm, parts(comm, E), parts(comm, K), csr_matrix(free), "test_") for kind in KINDS]
-    assert len({saddle.benign for saddle in found}) == 1
-    for saddle in found:
-        saddle.destroy()
+
+    def factored(own, *arguments):
+        if comm.rank == comm.size - 1:
+            raise np.linalg.LinAlgError("a coarse matrix is singular")
+        return SaddlePoint(own, *arguments)
+
+    monkeypatch.setattr("feti_homog.feti.replicated.SaddlePoint", factored)
+    with pytest.raises(np.linalg.LinAlgError, match="singular"):
+        Replicated(comm, parts(comm, E), parts(comm, K), csr_matrix(free), "test_")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(("accurate", "benign"), [(1e-11, True), (0.0, False)])
+def test_benign_where_few_solves_are_enough(comm, system, monkeypatch, kind, accurate, benign):
+    E, K, free = system
+    # One rank that wants more is enough.
+    monkeypatch.setattr("feti_homog.feti.saddle.ACCURATE", accurate if comm.rank == 0 or kind is SaddlePoint else 1e-11)
+    saddle = kind(comm, parts(comm, E), parts(comm, K), csr_matrix(free), "test_")
+    assert saddle.benign == benign
+    saddle.destroy()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_no_constraints(comm, system, kind):
+    E, _, _ = system
+    c = np.random.default_rng(3).standard_normal((N, 2))
+    saddle = kind(comm, parts(comm, E), csr_matrix((0, N)), csr_matrix((0, 0)), "test_")
+    found, work = saddle.solve(E @ c, np.zeros((0, 2)))
+    np.testing.assert_allclose(found, c, atol=1e-10)
+    assert work.shape == (0, 2)
+    saddle.destroy()
