@@ -158,8 +158,8 @@ class _Indefinite:
 
     def solve(self, f: Float, g: Float, solves: int) -> tuple[Float, Float]:
         """c and a after so many steps of iterative refinement.  Collective."""
-        x = np.zeros((len(f) + len(g), *f.shape[1:]))
-        for _ in range(solves):
+        x = self.solver.solve(np.concatenate([f, g]))
+        for _ in range(solves - 1):
             left = self._system.left(f, g, x[: len(f)], x[len(f) :])
             x = x + self.solver.solve(np.concatenate(left))
         return x[: len(f)], x[len(f) :]

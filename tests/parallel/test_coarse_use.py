@@ -14,8 +14,10 @@ from narrow_cells import BOUND, BREAKING, NARROW, STRAINS, of_all, together
 
 from feti_homog.errors import CaseError
 from feti_homog.feti.adaptive import THRESHOLD, AdaptiveCoarse
+from feti_homog.feti.local import DirectSolver
 from feti_homog.feti.replicated import Replicated
 from feti_homog.feti.saddle import SaddlePoint, _Augmented
+from feti_homog.feti.together import Distributed
 
 pytestmark = pytest.mark.parallel
 
@@ -113,12 +115,17 @@ def test_wrong_options_are_refused(comm, petsc, words):
 def test_a_distributed_coarse_problem_gives_the_same(comm, monkeypatch, contrast):
     case = NARROW | {"fibre": {"young": 3.0 * contrast, "poisson": 0.3}, "decomposition": {"subdomains": 50}}
     found = []
-    for largest, kind in ((10**6, SaddlePoint if comm.size == 1 else Replicated), (0, SaddlePoint)):
+    alone = comm.size == 1
+    for largest, kind, solver in (
+        (10**6, SaddlePoint if alone else Replicated, DirectSolver),
+        (0, SaddlePoint, DirectSolver if alone else Distributed),
+    ):
         monkeypatch.setattr("feti_homog.feti.replicated.LARGEST_REPLICATED", largest)
         cell = bonds.tear(comm, **case)
         saddle = cell.solver.coarse.saddle
         assert isinstance(saddle, kind)
         inner = saddle.alone if isinstance(saddle, Replicated) else saddle
+        assert isinstance(inner._inner.solver, solver)
         assert isinstance(inner._inner, _Augmented) == (contrast < 1e3)
         found.append(together(cell))
     for one, other in zip(*found, strict=True):
