@@ -43,8 +43,8 @@ def write(folder: Path, points: dict[str, Any]) -> list[Path]:
     import h5py
     from matplotlib.figure import Figure
 
-    from feti_homog.output.faces import WORDS, legend
-    from feti_homog.output.panels import Scene
+    from feti_homog.output.plots.deformed_panels import Scene
+    from feti_homog.output.plots.interface_marks import WORDS, legend
 
     figure = Figure(figsize=(8.4, 6.4), layout="constrained")
     grid, rows = figure.subplots(1, 2, sharex=True, sharey=True), []

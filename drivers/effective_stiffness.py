@@ -52,9 +52,9 @@ def stiffness(
     arguments: argparse.Namespace, comm: Intracomm, geometry: str, plane: str, fraction: float
 ) -> list[list[float]] | None:
     """L^ef of one cell on rank 0, None on the others; its results go to a folder of its own."""
-    from feti_homog.case import parse
-    from feti_homog.job import run
-    from feti_homog.output import results
+    from feti_homog.analysis.runner import run
+    from feti_homog.config.case import parse
+    from feti_homog.output.files import result_json
 
     name = f"{geometry}_{plane}_{round(100 * fraction)}"
     document: dict[str, Any] = {
@@ -70,7 +70,7 @@ def stiffness(
     run(parse(document, Path()), arguments.out / name, comm, quiet=True)
     if comm.rank:
         return None
-    L: list[list[float]] = results.read(arguments.out / name)["effective_stiffness"]
+    L: list[list[float]] = result_json.read(arguments.out / name)["effective_stiffness"]
     return L
 
 

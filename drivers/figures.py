@@ -35,10 +35,10 @@ def solved(
     options: argparse.Namespace, comm: Intracomm, name: str, geometry: str, material: Mapping[str, Any], **rest: Any
 ) -> dict[str, Any]:
     """result.json, on every rank, of the case `name`, in a folder of its own; `rest` are its other sections."""
-    from feti_homog.case import parse
-    from feti_homog.job import run
-    from feti_homog.output import results
-    from feti_homog.parallel import on_root
+    from feti_homog.analysis.runner import run
+    from feti_homog.common.mpi_errors import on_root
+    from feti_homog.config.case import parse
+    from feti_homog.output.files import result_json
 
     cell = {
         "geometry": geometry,
@@ -51,7 +51,7 @@ def solved(
     case = parse({"name": name, "cell": cell, "material": dict(material), "output": output, **rest}, Path())
     folder = options.out / name.replace(" ", "_")
     run(case, folder, comm, quiet=True)
-    return on_root(comm, results.read, folder)
+    return on_root(comm, result_json.read, folder)
 
 
 def tabulate(path: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> Path:
@@ -67,7 +67,7 @@ def finish(comm: Intracomm, write: Callable[..., list[Path]], *args: Any) -> int
     """Let rank 0 write its files and tell which; the exit code."""
     import matplotlib as mpl
 
-    from feti_homog.parallel import on_root_only
+    from feti_homog.common.mpi_errors import on_root_only
 
     with mpl.rc_context(STYLE):
         for path in on_root_only(comm, write, *args) or []:

@@ -1,6 +1,6 @@
 """Iterations of the dual problem over the refinement of the hexagonal cell, its bodies whole: they do not grow.
 
-    mpirun -n 2 .venv/bin/python drivers/iterations.py --refine 1 2 3 4 5
+mpirun -n 2 .venv/bin/python drivers/iterations.py --refine 1 2 3 4 5
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from feti_homog.cli import Parser, launch, parsed
 
 def main(words: Sequence[str], comm: Intracomm) -> int:
     """Print degrees of freedom, multipliers, iterations of the three unit strains, and seconds of the run."""
-    from feti_homog.case import parse
-    from feti_homog.job import run
-    from feti_homog.output import results
+    from feti_homog.analysis.runner import run
+    from feti_homog.config.case import parse
+    from feti_homog.output.files import result_json
 
     arguments = parsed(_parser(), words, comm)
     if comm.rank == 0:
@@ -42,7 +42,7 @@ def main(words: Sequence[str], comm: Intracomm) -> int:
         run(parse(document, Path()), arguments.out / f"refine_{refine}", comm, quiet=True)
         seconds = time.perf_counter() - start
         if comm.rank == 0:
-            solver = results.read(arguments.out / f"refine_{refine}")["solver"]
+            solver = result_json.read(arguments.out / f"refine_{refine}")["solver"]
             counts = ", ".join(map(str, solver["iterations"]))
             print(f"{refine:>6}{solver['dofs']:>10}{solver['multipliers']:>13}  {counts:<14}{seconds:8.1f}", flush=True)
     return 0

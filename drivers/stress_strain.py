@@ -59,7 +59,7 @@ def write(folder: Path, curves: dict[tuple[float, float], Any], cell: dict[str, 
     """stress_strain.csv and stress_strain.png."""
     from matplotlib.figure import Figure
 
-    from feti_homog.output.curves import strain_controlled
+    from feti_homog.output.plots.response_curves import strain_controlled
 
     print(HEADS)
     rows = []

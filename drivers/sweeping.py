@@ -34,7 +34,7 @@ def swept(
     given: argparse.Namespace, comm: Intracomm, document: dict[str, Any], report: Callable[[Any], list[str]]
 ) -> int:
     """Run the sweep, print the report of its table, and draw; the exit code."""
-    from feti_homog.parallel import on_root, on_root_only
+    from feti_homog.common.mpi_errors import on_root, on_root_only
     from feti_homog.sweep import collect, execute, plan
 
     sweep = on_root(comm, plan.expand, document, Path())

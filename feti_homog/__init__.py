@@ -5,8 +5,8 @@ From a program of one's own: `run(Case.load("case.toml"), comm)` is the result a
 
 __version__ = "0.1.0"
 
-from feti_homog.case import Case
+from feti_homog.api import run
+from feti_homog.config.case import Case
 from feti_homog.errors import CaseError, ConvergenceError, FetiHomogError, MeshError
-from feti_homog.start import run
 
 __all__ = ["Case", "CaseError", "ConvergenceError", "FetiHomogError", "MeshError", "__version__", "run"]

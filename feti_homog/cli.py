@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
 from feti_homog import __version__
+from feti_homog.common.petsc_option_table import help_text, split_argv
 from feti_homog.errors import EXIT_DONE, CaseError
-from feti_homog.options import help_text, split_argv
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
@@ -53,7 +53,7 @@ def launch(command: Callable[[Sequence[str], Intracomm], int], argv: Sequence[st
     from mpi4py import MPI
 
     petsc4py.init([sys.argv[0], *petsc], comm=MPI.COMM_WORLD)
-    from feti_homog.parallel import run_main
+    from feti_homog.common.mpi_errors import run_main
 
     return run_main(MPI.COMM_WORLD, lambda: command(ours, MPI.COMM_WORLD))
 
@@ -122,25 +122,25 @@ def _add_sweep(sweep: argparse.ArgumentParser) -> None:
 
 
 def _run(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    from feti_homog import case as cases
-    from feti_homog.job import run
-    from feti_homog.output import folder
-    from feti_homog.parallel import on_root
+    from feti_homog.analysis.runner import run
+    from feti_homog.common.mpi_errors import on_root
+    from feti_homog.config import case as cases
+    from feti_homog.output.files import output_folder
 
     case = on_root(comm, cases.load, arguments.case)
     if arguments.resume and case.path is None:
         raise CaseError(f'--resume: only for [analysis] type = "path"; this case has "{case.analysis.type}"')
-    on_root(comm, folder.usable, arguments.out)
+    on_root(comm, output_folder.usable, arguments.out)
     run(case, arguments.out, comm, arguments.quiet, arguments.resume)
 
 
 def _check(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    from feti_homog import case as cases
-    from feti_homog.case import SWEEP
-    from feti_homog.parallel import on_root, on_root_only
-    from feti_homog.petsc_options import case_options
+    from feti_homog.common.mpi_errors import on_root, on_root_only
+    from feti_homog.common.petsc_options import case_options
+    from feti_homog.config import case as cases
+    from feti_homog.config.case import SWEEP
+    from feti_homog.homogenization.unit_cell import describe
     from feti_homog.sweep import plan
-    from feti_homog.torn import describe
 
     document = on_root(comm, cases.read_document, arguments.case)
     if SWEEP in document:
@@ -156,16 +156,16 @@ def _check(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def _plot(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    from feti_homog.output import plots
-    from feti_homog.parallel import on_root_only
+    from feti_homog.common.mpi_errors import on_root_only
+    from feti_homog.output.plots import figures
 
-    for path in on_root_only(comm, plots.plot, arguments.directory) or []:
+    for path in on_root_only(comm, figures.plot, arguments.directory) or []:
         print(path)
 
 
 def _sweep(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    from feti_homog.output import folder
-    from feti_homog.parallel import on_root, on_root_only
+    from feti_homog.common.mpi_errors import on_root, on_root_only
+    from feti_homog.output.files import output_folder
     from feti_homog.sweep import execute, plan
 
     if arguments.out is None and not arguments.list:
@@ -178,7 +178,7 @@ def _sweep(arguments: argparse.Namespace, comm: Intracomm) -> None:
         for line in on_root_only(comm, execute.listed, sweep, arguments.out) or []:
             print(line)
         return
-    on_root(comm, folder.usable, arguments.out)
+    on_root(comm, output_folder.usable, arguments.out)
     if arguments.index is None:
         execute.run_all(sweep, arguments.out, comm, group, arguments.retry, arguments.quiet)
     else:
@@ -186,7 +186,7 @@ def _sweep(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def _collect(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    from feti_homog.parallel import on_root_only
+    from feti_homog.common.mpi_errors import on_root_only
     from feti_homog.sweep import collect
 
     for line in on_root_only(comm, collect.collect, arguments.directory, not arguments.no_pictures) or []:

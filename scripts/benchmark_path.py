@@ -21,14 +21,14 @@ from composite import MATERIAL  # noqa: E402
 from monolithic import factor_and_solve, glued  # noqa: E402
 from mpi4py import MPI  # noqa: E402
 
-from feti_homog import case as cases  # noqa: E402
-from feti_homog.homogenization import Homogenization  # noqa: E402
+from feti_homog.common.petsc_options import case_options  # noqa: E402
+from feti_homog.common.progress import Progress  # noqa: E402
+from feti_homog.config import case as cases  # noqa: E402
+from feti_homog.homogenization.averaging import Homogenization  # noqa: E402
+from feti_homog.homogenization.unit_cell import tear  # noqa: E402
 from feti_homog.interface.contact import BONDED  # noqa: E402
-from feti_homog.interface.debonding import events, unloaded  # noqa: E402
-from feti_homog.interface.law import Law  # noqa: E402
-from feti_homog.petsc_options import case_options  # noqa: E402
-from feti_homog.progress import Progress  # noqa: E402
-from feti_homog.torn import tear  # noqa: E402
+from feti_homog.interface.path_following import events, unloaded  # noqa: E402
+from feti_homog.interface.strength_criterion import Law  # noqa: E402
 
 STRAIN = [0.2, 0.0, 0.0]
 STRENGTH = 10.0

@@ -24,14 +24,15 @@ from mpi4py import MPI  # noqa: E402
 from peers import PEERS, Peer  # noqa: E402
 from petsc4py import PETSc  # noqa: E402
 
-from feti_homog import case as cases  # noqa: E402
-from feti_homog import heap, torn  # noqa: E402
-from feti_homog.analysis.study import Study  # noqa: E402
-from feti_homog.case import Case  # noqa: E402
-from feti_homog.homogenization import Homogenization  # noqa: E402
-from feti_homog.parallel import run_main  # noqa: E402
-from feti_homog.petsc_options import case_options  # noqa: E402
-from feti_homog.progress import Progress  # noqa: E402
+from feti_homog.analysis.context import Study  # noqa: E402
+from feti_homog.common import process_memory  # noqa: E402
+from feti_homog.common.mpi_errors import run_main  # noqa: E402
+from feti_homog.common.petsc_options import case_options  # noqa: E402
+from feti_homog.common.progress import Progress  # noqa: E402
+from feti_homog.config import case as cases  # noqa: E402
+from feti_homog.config.case import Case  # noqa: E402
+from feti_homog.homogenization import unit_cell  # noqa: E402
+from feti_homog.homogenization.averaging import Homogenization  # noqa: E402
 
 PREFIX = "peer_"
 MEGABYTE = 2**20
@@ -62,7 +63,7 @@ def feti(case: Case, progress: Progress, loads: int, rtol: float) -> dict[str, A
     """This program."""
     comm = progress.comm
     with case_options(case.petsc | {"feti_ksp_rtol": rtol}):
-        cell = torn.tear(case, comm, progress)
+        cell = unit_cell.tear(case, comm, progress)
         progress.seconds["set-up"] = progress.seconds.pop("factor")
         with progress.stage("set-up"):
             study = Study(Homogenization(cell, contact=False), cell.debonded, progress, lambda *_: None)
@@ -80,7 +81,7 @@ def feti(case: Case, progress: Progress, loads: int, rtol: float) -> dict[str, A
 def peer(tool: Peer, case: Case, progress: Progress, loads: int, rtol: float) -> dict[str, Any]:
     """One of the others."""
     comm = progress.comm
-    plan, _, lattice, subdomains = torn.assembled(case, comm, progress)
+    plan, _, lattice, subdomains = unit_cell.assembled(case, comm, progress)
     with progress.stage("glue"):
         cell = glue(comm, subdomains, lattice)
         A = _operator(tool, cell)
@@ -139,7 +140,7 @@ def _report(
 
 def peak() -> float:
     """Largest resident memory of this rank so far in megabytes."""
-    return heap.peak() / MEGABYTE
+    return process_memory.peak() / MEGABYTE
 
 
 if __name__ == "__main__":

@@ -13,8 +13,8 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from feti_homog.cell.refine import Lattice
-from feti_homog.feti.subdomain import Subdomain
+from feti_homog.cell.refinement import Lattice
+from feti_homog.feti.decomposition.subdomain import Subdomain
 
 Int = NDArray[np.int64]
 Float = NDArray[np.float64]

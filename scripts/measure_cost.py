@@ -1,4 +1,4 @@
-"""Measures the constants of feti_homog/cost.py on this machine, on one rank, and prints them.
+"""Measures the constants of feti_homog/homogenization/cost_model.py on this machine, on one rank, and prints them.
 
     .venv/bin/python scripts/measure_cost.py
 
@@ -20,8 +20,8 @@ import tomli_w
 from composite import STIFFNESS
 from scipy.optimize import least_squares
 
-from feti_homog import cost
-from feti_homog.output import results
+from feti_homog.homogenization import cost_model
+from feti_homog.output.files import result_json
 
 CELLS = (
     {"geometry": "hexagonal", "fibre_fraction": 0.4, "mesh_size": 0.05},
@@ -62,7 +62,7 @@ def document(cell: dict[str, Any], refine: int) -> dict[str, Any]:
         words = ["-m", "feti_homog", "run", path, "--out", folder, "--quiet"]
         start = time.perf_counter()
         subprocess.run([sys.executable, *map(str, words)], check=True)
-        return results.read(Path(folder)) | {"wall": time.perf_counter() - start}
+        return result_json.read(Path(folder)) | {"wall": time.perf_counter() - start}
 
 
 def cost_of(run: dict[str, Any]) -> tuple[int, int, int]:
@@ -81,4 +81,4 @@ def fitted(values: Any, *columns: Any) -> tuple[Any, Any]:
 
 if __name__ == "__main__":
     main()
-    print("now:", {name: value for name, value in vars(cost).items() if name.isupper()})
+    print("now:", {name: value for name, value in vars(cost_model).items() if name.isupper()})

@@ -9,8 +9,8 @@ from glued import Nodes
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix
 
-from feti_homog.feti.local import DirectSolver
-from feti_homog.torn import TornCell
+from feti_homog.feti.linalg.sparse_direct import DirectSolver
+from feti_homog.homogenization.unit_cell import TornCell
 
 
 def glued(cell: TornCell) -> tuple[csr_matrix, np.ndarray]:

@@ -22,11 +22,11 @@ import numpy as np  # noqa: E402
 from mpi4py import MPI  # noqa: E402
 from petsc4py import PETSc  # noqa: E402
 
-from feti_homog import case as cases  # noqa: E402
-from feti_homog.case import Case  # noqa: E402
-from feti_homog.petsc_options import case_options  # noqa: E402
-from feti_homog.progress import Progress  # noqa: E402
-from feti_homog.torn import tear  # noqa: E402
+from feti_homog.common.petsc_options import case_options  # noqa: E402
+from feti_homog.common.progress import Progress  # noqa: E402
+from feti_homog.config import case as cases  # noqa: E402
+from feti_homog.config.case import Case  # noqa: E402
+from feti_homog.homogenization.unit_cell import tear  # noqa: E402
 
 # Coarse elements along the side of a cell with one fibre.
 ELEMENTS = 5

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from scaling_model import COARSE, COARSE_POWER, LOCAL, MESH, TOGETHER, Machine, Prediction, Rates, predict
 from scaling_report import COARSE_SUMS, GATHERS, SCALARS, SUMS, SUMS_TOGETHER, Row
 
-from feti_homog.feti.limits import LARGEST_REPLICATED
+from feti_homog.feti.thresholds import LARGEST_REPLICATED
 
 RANKS = (1, 2, 16, 64, 1024)
 FAR = (64, 1024)

@@ -12,7 +12,7 @@ from math import ceil, log2, sqrt
 
 from scaling_report import COARSE_SUMS, GATHERS, SCALARS, SUMS, SUMS_TOGETHER, VALUE_BYTES, Row
 
-from feti_homog.feti.limits import LARGEST_REPLICATED
+from feti_homog.feti.thresholds import LARGEST_REPLICATED
 
 MESH, LOCAL, COARSE, MESSAGES = "mesh on rank 0", "subdomains", "coarse problem", "messages"
 # Powers: of the coarse unknowns, in their factorization; of the ranks, by which they are faster together.
@@ -74,8 +74,7 @@ def measured(rows: Sequence[Row], cores: int) -> Rates:
         assemble=_rate((row.seconds["assemble"], row.dofs) for row in alone),
         setup=_rate((row.seconds["set-up"] - row.coarse_factor, row.dofs) for row in alone),
         apply=_rate(
-            (row.seconds["solve"] - row.iterations * row.coarse_solve, row.iterations * row.dofs)
-            for row in alone
+            (row.seconds["solve"] - row.iterations * row.coarse_solve, row.iterations * row.dofs) for row in alone
         ),
         factor=_rate((row.coarse_factor, _factored(row.coarse, row.vectors, row.ranks)) for row in timed),
         solve=_rate((row.coarse_solve, _solved(row.coarse, row.vectors, row.ranks, row.loads)) for row in timed),

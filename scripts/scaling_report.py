@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from feti_homog.feti.limits import LARGEST_REPLICATED
+from feti_homog.feti.thresholds import LARGEST_REPLICATED
 
 STAGES = ("mesh", "assemble", "set-up", "solve")
 COLUMNS = (

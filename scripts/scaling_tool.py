@@ -23,14 +23,14 @@ from benchmark_tool import peak  # noqa: E402
 from mpi4py import MPI  # noqa: E402
 from petsc4py import PETSc  # noqa: E402
 
-from feti_homog import case as cases  # noqa: E402
-from feti_homog.case import Case  # noqa: E402
-from feti_homog.feti.adaptive import AdaptiveCoarse  # noqa: E402
-from feti_homog.feti.constraints import Constraints  # noqa: E402
-from feti_homog.parallel import run_main  # noqa: E402
-from feti_homog.petsc_options import case_options  # noqa: E402
-from feti_homog.progress import Progress  # noqa: E402
-from feti_homog.torn import TornCell, tear  # noqa: E402
+from feti_homog.common.mpi_errors import run_main  # noqa: E402
+from feti_homog.common.petsc_options import case_options  # noqa: E402
+from feti_homog.common.progress import Progress  # noqa: E402
+from feti_homog.config import case as cases  # noqa: E402
+from feti_homog.config.case import Case  # noqa: E402
+from feti_homog.feti.coarse.adaptive import AdaptiveCoarse  # noqa: E402
+from feti_homog.feti.decomposition.jump_operator import Constraints  # noqa: E402
+from feti_homog.homogenization.unit_cell import TornCell, tear  # noqa: E402
 
 LOADS = 3
 RTOL = 1e-8

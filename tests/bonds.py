@@ -7,14 +7,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from cells import make_case
 from petsc4py import PETSc
-from qp_twin import QPTwin, keys
+from reference.quadratic_programme import QPTwin, keys
 
-from feti_homog import sections, torn
 from feti_homog.cell.arrangement import arrange
+from feti_homog.common.petsc_options import case_options
+from feti_homog.common.progress import Progress
+from feti_homog.config import sections
+from feti_homog.homogenization import unit_cell
+from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface.contact import BONDED, OPEN, Interface
-from feti_homog.petsc_options import case_options
-from feti_homog.progress import Progress
-from feti_homog.torn import TornCell
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,7 @@ def tear(comm, arcs=(), **case):
     PETSc.garbage_cleanup(comm)
     case = replace(make_case(**case), interface=sections.Interface(debonded=tuple(arcs)))
     with case_options(case.petsc):
-        return torn.tear(case, comm, Progress(comm, quiet=True))
+        return unit_cell.tear(case, comm, Progress(comm, quiet=True))
 
 
 def printed(comm, capfd, **case):

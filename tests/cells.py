@@ -5,16 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import twin
 from petsc4py import PETSc
+from reference import monolithic
 
-from feti_homog import case as cases
 from feti_homog.analysis import stiffness
-from feti_homog.analysis.study import Study
-from feti_homog.homogenization import Homogenization
-from feti_homog.petsc_options import case_options
-from feti_homog.progress import Progress
-from feti_homog.torn import tear
+from feti_homog.analysis.context import Study
+from feti_homog.common.petsc_options import case_options
+from feti_homog.common.progress import Progress
+from feti_homog.config import case as cases
+from feti_homog.homogenization.averaging import Homogenization
+from feti_homog.homogenization.unit_cell import tear
 
 MATRIX, FIBRE = {"young": 88.0, "poisson": 0.299}, {"young": 200.0, "poisson": 0.222}
 
@@ -55,7 +55,7 @@ def twin_stiffness(cell):
     if cell.comm.rank == 0:
         own = [part for parts_of_rank in parts for part in parts_of_rank]
         first = np.cumsum([0] + [len(points) for points, _, _ in own])
-        result = twin.effective_stiffness(
+        result = monolithic.effective_stiffness(
             np.concatenate([points for points, _, _ in own]),
             np.concatenate([triangles + n for (_, triangles, _), n in zip(own, first, strict=False)]),
             np.concatenate([np.broadcast_to(L, (len(triangles), 3, 3)) for _, triangles, L in own]),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from support import mpirun
-from unit.faulty_cases import BASE
+from unit.config.faulty_cases import BASE
 
 CASE = BASE.replace("mesh_size = 0.05", "mesh_size = 0.15")
 

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 import support
 
-from feti_homog.parallel import others_come
+from feti_homog.common.mpi_errors import others_come
 
 RANK = int(os.environ.get("OMPI_COMM_WORLD_RANK", os.environ.get("PMI_RANK", "0")))
 PATIENCE = 5.0  # seconds that a failing rank waits for the others to end the same test

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import bonds
-import dense
 import numpy as np
 from cells import relative_error
 from mpi4py import MPI
+from reference import dense_feti
 from scipy.linalg import eigh
 
+from feti_homog.common.petsc_options import case_options
 from feti_homog.interface.contact import BONDED, CLOSED, OPEN
-from feti_homog.petsc_options import case_options
 
 # Sixteen fibres almost touch; the matrix is cut across the gaps.
 NARROW = {
@@ -35,10 +35,10 @@ class Narrow:
         self.cell = bonds.tear(MPI.COMM_WORLD, **NARROW, petsc={"feti_coarse_threshold": threshold})
         self.solver = self.cell.solver
         self.coarse = self.solver.coarse
-        self.twin = twin or dense.DualTwin(self.cell)
+        self.twin = twin or dense_feti.DualTwin(self.cell)
         self.M = self.twin.preconditioner(np.ones(self.twin.total, bool))
-        self.U = dense.gathered(self.cell, self.coarse.U.toarray())
-        self.T = dense.deflation(self.twin.F, self.U, self.twin.G)
+        self.U = dense_feti.gathered(self.cell, self.coarse.U.toarray())
+        self.T = dense_feti.deflation(self.twin.F, self.U, self.twin.G)
 
     def soft_modes(self):
         """For each subdomain: (n,) all theta of S p = theta N p, rising, and (n, n) the modes."""
@@ -92,8 +92,8 @@ def agree(cell, found, expected):
     for a, b in zip(found, expected, strict=True):
         assert a.reason > 0 and b.reason > 0
         assert relative_error(bonds.stress(cell, a), bonds.stress(cell, b)) < 1e-8
-        lam, other = (dense.gathered(cell, s.lam) for s in (a, b))
+        lam, other = (dense_feti.gathered(cell, s.lam) for s in (a, b))
         assert relative_error(lam, other) < 1e-6
-        jump, other = (dense.gathered(cell, s.jump) for s in (a, b))
-        opening = np.abs(dense.gathered(cell, cell.solver.d)).max()
+        jump, other = (dense_feti.gathered(cell, s.jump) for s in (a, b))
+        opening = np.abs(dense_feti.gathered(cell, cell.solver.d)).max()
         assert np.abs(jump - other).max() < 1e-6 * opening

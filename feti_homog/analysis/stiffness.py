@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from feti_homog.analysis.study import UNIT_CASES, Study
-from feti_homog.homogenization import asymmetry
+from feti_homog.analysis.context import UNIT_CASES, Study
+from feti_homog.homogenization.averaging import asymmetry
 
 
 def run(study: Study) -> dict[str, Any]:

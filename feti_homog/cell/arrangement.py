@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from feti_homog.errors import MeshError
 
 if TYPE_CHECKING:
-    from feti_homog.case import Cell
+    from feti_homog.config.case import Cell
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.intp]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from feti_homog.cell.arrangement import Arrangement
-from feti_homog.cell.sizing import circle_size, line_size
+from feti_homog.cell.size_field import circle_size, line_size
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.intp]

@@ -7,8 +7,8 @@ from collections import deque
 import numpy as np
 from numpy.typing import NDArray
 
-from feti_homog.cell.piece import Piece
-from feti_homog.cell.torus import components, edge_pairs
+from feti_homog.cell.periodic_topology import components, edge_pairs
+from feti_homog.cell.submesh import Piece
 
 Int = NDArray[np.int64]
 Float = NDArray[np.float64]

@@ -1,1 +1,4 @@
-"""Vectorised plane elasticity on linear and (isoparametric) quadratic triangles."""
+"""Plane elasticity on linear and (isoparametric) quadratic triangles, vectorized over elements.
+
+May use `cell`.  Main entry: `assembly.assemble`, the stiffness matrix and load columns of one subdomain.
+"""

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_matrix, csr_matrix
 
-from feti_homog.cell.refine import FineMesh
-from feti_homog.fem.element import gradients
-from feti_homog.fem.macro import Macro, integrals, products
+from feti_homog.cell.refinement import FineMesh
+from feti_homog.fem.macro_element import Macro, integrals, products
+from feti_homog.fem.shape_functions import gradients
 
 Int = NDArray[np.int64]
 Int32 = NDArray[np.int32]

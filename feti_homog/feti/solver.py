@@ -17,14 +17,14 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from feti_homog import heap
-from feti_homog.cell.refine import Lattice
-from feti_homog.feti import settings, view
-from feti_homog.feti.constraints import Constraints
-from feti_homog.feti.contexts import ActiveRows, Krylov
-from feti_homog.feti.operator import DualOperator
-from feti_homog.feti.shared import Shared
-from feti_homog.feti.subdomain import Subdomain
+from feti_homog.cell.refinement import Lattice
+from feti_homog.common import process_memory
+from feti_homog.feti import factory, view
+from feti_homog.feti.decomposition.jump_operator import Constraints
+from feti_homog.feti.decomposition.shared_entities import Shared
+from feti_homog.feti.decomposition.subdomain import Subdomain
+from feti_homog.feti.krylov import ActiveRows, Krylov
+from feti_homog.feti.operators.dual_operator import DualOperator
 
 Int = NDArray[np.int64]
 Float = NDArray[np.float64]
@@ -79,11 +79,11 @@ class FetiSolver:
         """Set up; `applications` is how many times the dual operator is expected to be applied."""
         self.comm, self.subdomains = comm, subdomains
         self.constraints = Constraints(comm, shared, subdomains, lattice)
-        self.boundary, self.preconditioner, self.coarse = settings.parts(
+        self.boundary, self.preconditioner, self.coarse = factory.parts(
             comm, self.constraints, subdomains, applications
         )
         self.operator = DualOperator(self.constraints, self.boundary)
-        heap.trim()
+        process_memory.trim()
         self.active = ActiveRows(self.rows)
         self._view = PETSc.Options("feti_").getBool("view", False)
         self._krylov: dict[int, Krylov] = {}

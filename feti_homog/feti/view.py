@@ -6,12 +6,12 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from feti_homog.feti.adaptive import AdaptiveCoarse
-from feti_homog.feti.boundary import Boundary
-from feti_homog.feti.coarse import CoarseProblem
-from feti_homog.feti.condensed import Condensed
-from feti_homog.feti.influence import Influence
-from feti_homog.feti.preconditioner import Preconditioner
+from feti_homog.feti.coarse.adaptive import AdaptiveCoarse
+from feti_homog.feti.coarse.natural import CoarseProblem
+from feti_homog.feti.operators.explicit import Condensed
+from feti_homog.feti.operators.interface_operators import Boundary
+from feti_homog.feti.preconditioners.influence import Influence
+from feti_homog.feti.preconditioners.scaled import Preconditioner
 
 
 def setup(comm: MPI.Intracomm, boundary: Boundary, preconditioner: Preconditioner, coarse: CoarseProblem) -> str:

@@ -1,1 +1,4 @@
-"""Imperfect bonding: which interface multipliers act."""
+"""Imperfect bonding: debonded arcs, contact, strengths, and the states along a path of load.
+
+May use `feti` and the floors below it.  Main entries: `contact` and `path_following`.
+"""

@@ -15,9 +15,9 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from feti_homog.feti.constraints import InterfaceNodes
+from feti_homog.feti.decomposition.jump_operator import InterfaceNodes
 from feti_homog.feti.solver import DualSolution, FetiSolver
-from feti_homog.interface.loose import Placement, place
+from feti_homog.interface.rigid_placement import Placement, place
 
 Float = NDArray[np.float64]
 Bool = NDArray[np.bool_]
@@ -178,13 +178,15 @@ class Interface:
         traction, gap = self.traction(solution), solution.jump[self.nodes.row]
         force = solution.lam[self.nodes.row]
         faces = (status != BONDED) & self.contact
-        worst = np.array([
-            np.where(faces, -gap, 0.0).max(initial=0.0),
-            np.where(faces & (status == CLOSED), traction[:, 0], 0.0).max(initial=0.0),
-            np.where(faces, np.abs(force * gap), 0.0).max(initial=0.0),
-            np.abs(traction).max(initial=0.0),
-            np.abs(force).max(initial=0.0),
-        ])
+        worst = np.array(
+            [
+                np.where(faces, -gap, 0.0).max(initial=0.0),
+                np.where(faces & (status == CLOSED), traction[:, 0], 0.0).max(initial=0.0),
+                np.where(faces, np.abs(force * gap), 0.0).max(initial=0.0),
+                np.abs(traction).max(initial=0.0),
+                np.abs(force).max(initial=0.0),
+            ]
+        )
         self.solver.comm.Allreduce(MPI.IN_PLACE, worst, MPI.MAX)
         penetration, tension, product, largest_traction, largest_force = (float(w) for w in worst)
         scale = self.imposed(solution.strain) or 1.0

@@ -1,4 +1,7 @@
-"""What a run leaves behind: result.json, result.h5 with result.xdmf, pictures and the printed summary."""
+"""What a run leaves behind: files, the printed summary, pictures.
+
+May use `homogenization` and the floors below it.  Main entries: its own floors, from above `plots`, `text`, `files`.
+"""
 
 from __future__ import annotations
 

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import qmc
 
-from feti_homog.case import SWEEP, TOP_LEVEL
-from feti_homog.schema import choice, integer, is_real, key, keys_of, named, read, shown, suggestion
-from feti_homog.sections import SECTIONS
+from feti_homog.config.case import SWEEP, TOP_LEVEL
+from feti_homog.config.schema import choice, integer, is_real, key, keys_of, named, read, shown, suggestion
+from feti_homog.config.sections import SECTIONS
 
 Path = tuple[str, ...]
 Assignment = dict[Path, Any]

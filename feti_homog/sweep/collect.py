@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from feti_homog.output import sweep_pictures, sweep_tables
-from feti_homog.output.collected import Collected, outputs
-from feti_homog.output.listing import sweep_failures
+from feti_homog.output.text.point_tables import sweep_failures
 from feti_homog.sweep import store
+from feti_homog.sweep.report import figures, tables
+from feti_homog.sweep.report.statistics import Collected, outputs
 from feti_homog.sweep.store import BAD, DAMAGED, DONE, Index, State
 
 
@@ -34,9 +34,9 @@ def collect(directory: Path, pictures: bool) -> list[str]:
     index = store.read_index(directory)
     states = [store.state(directory, entry) for entry in index.entries]
     table = _collected(index, states)
-    paths = sweep_tables.write(directory, table)
+    paths = tables.write(directory, table)
     if pictures:
-        paths += sweep_pictures.plot(directory, table)
+        paths += figures.plot(directory, table)
     counts = {status: list(table.status).count(status) for status in dict.fromkeys(table.status)}
     words = ", ".join(f"{count} {status}" for status, count in counts.items())
     rows = [

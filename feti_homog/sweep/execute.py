@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from feti_homog import job
-from feti_homog.case import Case
+from feti_homog.analysis.runner import run
+from feti_homog.common.mpi_errors import on_root, on_root_only, others_come
+from feti_homog.config.case import Case
 from feti_homog.errors import CaseError, ConvergenceError, FetiHomogError, MeshError
-from feti_homog.output.listing import sweep_failures, sweep_table
-from feti_homog.parallel import on_root, on_root_only, others_come
+from feti_homog.output.text.point_tables import sweep_failures, sweep_table
 from feti_homog.sweep import store
 from feti_homog.sweep.locks import Busy, Lock
 from feti_homog.sweep.plan import Entry, Sweep
@@ -79,7 +79,7 @@ class Runner:
     def _compute(self, entry: Entry, case: Case) -> str:
         """Run a case and keep its error if it is the case's own.  Collective; returns its status in words."""
         try:
-            job.run(case, self.directory / entry.folder, self.comm, quiet=True, resume=case.path is not None)
+            run(case, self.directory / entry.folder, self.comm, quiet=True, resume=case.path is not None)
             return DONE
         except (CaseError, MeshError, ConvergenceError) as error:
             if not others_come(self.comm, PATIENCE):

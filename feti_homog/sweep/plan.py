@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from feti_homog import case as cases
-from feti_homog.case import SWEEP, Case
+from feti_homog.config import case as cases
+from feti_homog.config.case import SWEEP, Case
+from feti_homog.config.schema import shown
 from feti_homog.errors import CaseError
-from feti_homog.output.units import unit
-from feti_homog.schema import shown
+from feti_homog.output.text.units import unit
 from feti_homog.sweep.axes import Assignment, Settings, assignments, dotted
 
 SHOWN = 4  # numbers of cases that a fault names

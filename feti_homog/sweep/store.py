@@ -1,9 +1,9 @@
 """The folder of a sweep: its list of cases, a folder for each, and how far each has come.
 
-    DIR/sweep.json, cases.csv     what the cases are
-    DIR/case-0001/case.toml       the case with its defaults, which `feti-homog run` runs too
-    DIR/case-0001/result.json     as of any run
-    DIR/case-0001/error.txt       why it failed, if it did
+DIR/sweep.json, cases.csv     what the cases are
+DIR/case-0001/case.toml       the case with its defaults, which `feti-homog run` runs too
+DIR/case-0001/result.json     as of any run
+DIR/case-0001/error.txt       why it failed, if it did
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from typing import Any
 import tomli_w
 
 from feti_homog import __version__
-from feti_homog.case import Case
+from feti_homog.config.case import Case
 from feti_homog.errors import CaseError, FetiHomogError
-from feti_homog.output import atomic, checkpoint, results
+from feti_homog.output.files import atomic, checkpoint, result_json
 from feti_homog.sweep.locks import Busy, Lock, is_held
 from feti_homog.sweep.plan import Entry, Sweep, identity_of
 
@@ -99,14 +99,14 @@ def state(directory: Path, entry: Entry, own: bool = False) -> State:
     """How far a case has come; with `own`, for the holder of its lock: never "running".  On one rank."""
     folder = directory / entry.folder
     try:
-        if (folder / results.NAME).exists():
-            document = results.read(folder)
+        if (folder / result_json.NAME).exists():
+            document = result_json.read(folder)
             identity = identity_of(document["digest"], document["case"]["petsc"])
             if identity != entry.identity:
-                return State(DAMAGED, f"{folder / results.NAME} is of another case")
+                return State(DAMAGED, f"{folder / result_json.NAME} is of another case")
             return State(document["status"], "; ".join(document["faults"]), document)
     except (FetiHomogError, KeyError, TypeError) as error:
-        return State(DAMAGED, f"{folder / results.NAME} is no readable result: {error}")
+        return State(DAMAGED, f"{folder / result_json.NAME} is no readable result: {error}")
     if not own and is_held(folder / LOCK):
         return State(RUNNING)
     if (folder / ERROR).exists():
@@ -134,8 +134,8 @@ def forget(directory: Path, entry: Entry, status: str) -> None:
     try:
         (folder / ERROR).unlink(missing_ok=True)
         shutil.rmtree(folder / checkpoint.FOLDER, ignore_errors=True)
-        if (folder / results.NAME).exists():
-            os.replace(folder / results.NAME, folder / f"{results.NAME}.{status.replace(' ', '_')}")
+        if (folder / result_json.NAME).exists():
+            os.replace(folder / result_json.NAME, folder / f"{result_json.NAME}.{status.replace(' ', '_')}")
     except OSError as error:
         raise FetiHomogError(f"cannot write {folder}: {error.strerror}") from error
 

@@ -8,8 +8,8 @@ import time
 import pytest
 from commands import case_file, command_line
 from support import mpirun
-from unit.faulty_cases import FAULTY_CASES
-from unit.faulty_meshes import FAULTY_MESHES
+from unit.cell.faulty_meshes import FAULTY_MESHES
+from unit.config.faulty_cases import FAULTY_CASES
 
 CASES = ("empty", "syntax", "unknown_key", "many")
 MESH_CASE = 'geometry = "mesh"\nfile = "faulty.msh"'

@@ -10,7 +10,7 @@ def narrow():
     """The narrow cell at the default threshold."""
     from narrow_cells import Narrow
 
-    from feti_homog.feti.adaptive import THRESHOLD
+    from feti_homog.feti.coarse.adaptive import THRESHOLD
 
     cell = Narrow(THRESHOLD)
     yield cell

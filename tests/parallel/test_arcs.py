@@ -9,14 +9,14 @@ import pytest
 from cells import FIBRE, MATRIX
 from petsc4py import PETSc
 from support import parallel_assert
-from unit.faulty_meshes import ALL_SIDES, RIGHT_SIDE, grid
+from unit.cell.faulty_meshes import ALL_SIDES, RIGHT_SIDE, grid
 
-from feti_homog import case as cases
 from feti_homog.cell.arrangement import arrange
-from feti_homog.cutting import coarse_mesh
+from feti_homog.common.progress import Progress
+from feti_homog.config import case as cases
 from feti_homog.errors import CaseError
-from feti_homog.progress import Progress
-from feti_homog.torn import tear
+from feti_homog.homogenization.domain_partition import coarse_mesh
+from feti_homog.homogenization.unit_cell import tear
 
 pytestmark = pytest.mark.parallel
 

@@ -8,18 +8,19 @@ import bonds
 import numpy as np
 import pytest
 from cells import make_case, relative_error, solve
-from dense import DualTwin, boundary_of, gathered, matrix, projector
 from mpi4py import MPI
+from reference.dense_feti import DualTwin, boundary_of, gathered, matrix, projector
 
-from feti_homog import cutting, sections, torn
-from feti_homog.cell.refine import Lattice
+from feti_homog.cell.refinement import Lattice
+from feti_homog.common.progress import Progress
+from feti_homog.config import sections
 from feti_homog.errors import CaseError
-from feti_homog.feti import boundary as boundaries
-from feti_homog.feti.adaptive import AdaptiveCoarse
-from feti_homog.feti.boundary import Boundary
-from feti_homog.feti.condensed import Condensed
-from feti_homog.feti.factored import Factored
-from feti_homog.progress import Progress
+from feti_homog.feti.coarse.adaptive import AdaptiveCoarse
+from feti_homog.feti.operators import interface_operators as boundaries
+from feti_homog.feti.operators.explicit import Condensed
+from feti_homog.feti.operators.implicit import Factored
+from feti_homog.feti.operators.interface_operators import Boundary
+from feti_homog.homogenization import domain_partition, unit_cell
 
 pytestmark = pytest.mark.parallel
 
@@ -139,13 +140,15 @@ def test_adaptive_space_is_refused_where_boundaries_are_too_large(comm, monkeypa
 def sizes(monkeypatch):
     """Pieces of 100 dofs, at most 50 of a cell; bodies are cut above 250 dofs, or 80 of the boundary."""
     for name, value in {"FASTEST": 100, "MOST": 50, "LARGE": 2.5, "WIDE": 80}.items():
-        monkeypatch.setattr(cutting, name, value)
+        monkeypatch.setattr(domain_partition, name, value)
 
 
 def wanted(load, edges, interface=None, n_ranks=1, refine=0):
     """Default pieces of bodies of so many triangles and outer edges."""
     case = replace(make_case(refine=refine), interface=interface)
-    return cutting.wanted_pieces(case, np.array(load), np.array(edges), Lattice.of(refine, 1), n_ranks).tolist()
+    return domain_partition.wanted_pieces(
+        case, np.array(load), np.array(edges), Lattice.of(refine, 1), n_ranks
+    ).tolist()
 
 
 def test_large_bodies_are_cut(sizes):
@@ -160,7 +163,7 @@ def test_pieces_of_very_large_bodies_are_larger(sizes):
 
 
 def test_bodies_that_can_be_dealt_evenly_are_whole_up_to_a_larger_size(sizes, monkeypatch):
-    monkeypatch.setattr(cutting, "MOST", 1000)
+    monkeypatch.setattr(domain_partition, "MOST", 1000)
     load, edges = [600] * 100 + [1300], [10] * 101
     assert wanted(load, edges) == [1] * 100 + [13]
     assert wanted(load, edges, n_ranks=16) == [6] * 100 + [13]
@@ -183,7 +186,7 @@ def test_there_are_pieces_for_all_ranks(sizes, interface):
 def torn_by_default(comm, interface):
     """A cell of two fibres and a matrix; the bodies of its pieces and the triangles of the largest piece."""
     case = replace(make_case(geometry="hexagonal", mesh_size=0.1), interface=interface)
-    cell = torn.tear(case, comm, Progress(comm, quiet=True))
+    cell = unit_cell.tear(case, comm, Progress(comm, quiet=True))
     own = comm.allgather([s.piece.body for s in cell.subdomains])
     largest = comm.allreduce(max((len(s.piece.triangles) for s in cell.subdomains), default=0), MPI.MAX)
     assert min(map(len, own)) > 0
@@ -205,11 +208,11 @@ def test_default_pieces_of_a_bonded_cell(comm, sizes):
 
 
 def test_default_pieces_of_a_debonding_cell(comm, sizes, monkeypatch):
-    monkeypatch.setattr(cutting, "WIDE", 1000)
+    monkeypatch.setattr(domain_partition, "WIDE", 1000)
     cell, bodies, largest = torn_by_default(comm, sections.Interface())
     assert len(bodies) == max(3, comm.size)
     assert isinstance(cell.solver.coarse, AdaptiveCoarse) == (comm.size > 3)
-    monkeypatch.setattr(cutting, "WIDE", 80)
+    monkeypatch.setattr(domain_partition, "WIDE", 80)
     cell, bodies, narrowed = torn_by_default(comm, sections.Interface())
     assert len(bodies) > 4
     assert narrowed < min(largest, 1.5 * 100)

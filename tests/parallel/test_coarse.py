@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import bonds
-import dense
 import numpy as np
 import pytest
 from cells import relative_error
 from mpi4py import MPI
 from narrow_cells import BOUND, BREAKING, NARROW, SINGLE, Narrow, agree, masks, of_all, together
+from reference import dense_feti
 
-from feti_homog.feti.adaptive import ROOM, THRESHOLD, AdaptiveCoarse
-from feti_homog.feti.assembled import total
-from feti_homog.feti.boundary import Boundary
-from feti_homog.feti.neighbours import Neighbours
-from feti_homog.feti.preconditioner import Dirichlet
-from feti_homog.feti.spectral import coarse_vectors, dual_blocks
+from feti_homog.feti.coarse.adaptive import ROOM, THRESHOLD, AdaptiveCoarse
+from feti_homog.feti.coarse.geneo import coarse_vectors, dual_blocks
+from feti_homog.feti.decomposition.neighbours import Neighbours
+from feti_homog.feti.linalg.distributed_matrix import total
+from feti_homog.feti.operators.interface_operators import Boundary
+from feti_homog.feti.preconditioners.scaled import Dirichlet
 from feti_homog.interface.contact import BONDED, OPEN
 
 pytestmark = pytest.mark.parallel
@@ -59,13 +59,12 @@ def test_soft_modes_solve_the_eigenproblem(comm, narrow):
 def test_coarse_vectors_are_preconditioned_jumps(comm, narrow):
     """U = M^-1 B V of the kernels and the modes, the same space from dense ones."""
     jumps = [
-        B @ modes[:, theta < THRESHOLD]
-        for B, (theta, modes) in zip(narrow.twin.B, narrow.soft_modes(), strict=True)
+        B @ modes[:, theta < THRESHOLD] for B, (theta, modes) in zip(narrow.twin.B, narrow.soft_modes(), strict=True)
     ]
     expected = narrow.M @ np.hstack(jumps)
     assert expected.shape == narrow.U.shape
-    assert dense.distance(narrow.U, expected) < SINGLE
-    assert dense.distance(expected, narrow.U) < SINGLE
+    assert dense_feti.distance(narrow.U, expected) < SINGLE
+    assert dense_feti.distance(expected, narrow.U) < SINGLE
 
 
 # The coarse problem.
@@ -73,14 +72,14 @@ def test_coarse_vectors_are_preconditioned_jumps(comm, narrow):
 
 def test_admissible_corrections_are_the_best(narrow):
     """T z is what no coarse vector can improve; dense, with another generalized inverse."""
-    T = dense.matrix(narrow.cell, narrow.coarse.admissible)
+    T = dense_feti.matrix(narrow.cell, narrow.coarse.admissible)
     assert relative_error(T, narrow.T) < 1e-9
     assert np.abs(T @ T - T).max() < 1e-9 * np.abs(T).max()
     assert np.abs(narrow.twin.G.T @ T).max() < 1e-9 * np.abs(T).max()
     V = narrow.U @ null_space(narrow.twin.G.T @ narrow.U)
     V /= np.linalg.norm(V, axis=0)
     assert V.shape[1] > 10
-    F = dense.matrix(narrow.cell, narrow.solver.operator.apply)
+    F = dense_feti.matrix(narrow.cell, narrow.solver.operator.apply)
     assert np.abs(V.T @ F @ T).max() < 1e-9 * np.abs(V.T @ F).max()
 
 
@@ -96,7 +95,7 @@ def test_many_columns_at_once(narrow):
 def test_projected_operator(narrow):
     """What is left of residual(F T z) after T M^-1 is that of T^T F T z."""
     coarse, F, M = narrow.coarse, narrow.solver.operator, narrow.solver.preconditioner
-    found = dense.matrix(
+    found = dense_feti.matrix(
         narrow.cell, lambda z: coarse.admissible(M.apply(coarse.residual(F.apply(coarse.admissible(z)))))
     )
     assert relative_error(found, narrow.T @ narrow.M @ narrow.T.T @ narrow.twin.F @ narrow.T) < 1e-9
@@ -112,17 +111,17 @@ def _improved(narrow, r):
 
 def test_residual_and_correction(narrow):
     """After a correction coarse vectors see rigid-body motions only; what is taken off is of rigid-body motions too."""
-    coarse, F = narrow.coarse, dense.matrix(narrow.cell, narrow.solver.operator.apply)
+    coarse, F = narrow.coarse, dense_feti.matrix(narrow.cell, narrow.solver.operator.apply)
     r = narrow.random(1)
-    c, left = (dense.gathered(narrow.cell, x) for x in _improved(narrow, r))
+    c, left = (dense_feti.gathered(narrow.cell, x) for x in _improved(narrow, r))
     lengths = np.linalg.norm(narrow.U, axis=0)
     seen, motions = (narrow.U.T @ x / lengths[:, None] for x in (left[:, None], narrow.twin.G))
     beside = seen - motions @ np.linalg.lstsq(motions, seen, rcond=None)[0]
     assert np.abs(beside).max() < 1e-9 * np.abs(narrow.U.T @ r / lengths).max()
     taken = r - F @ c - left
-    P = dense.projector(narrow.twin.G)
+    P = dense_feti.projector(narrow.twin.G)
     assert np.linalg.norm(P @ taken) < 1e-9 * np.linalg.norm(taken)
-    again = dense.gathered(narrow.cell, coarse.residual(narrow.own(left)))
+    again = dense_feti.gathered(narrow.cell, coarse.residual(narrow.own(left)))
     assert np.linalg.norm(again - left) < 1e-9 * np.linalg.norm(left)
 
 
@@ -132,7 +131,7 @@ def test_correction_has_the_least_energy(narrow):
     V = narrow.U @ null_space(narrow.twin.G.T @ narrow.U)
     V /= np.linalg.norm(V, axis=0)
     expected = V @ np.linalg.lstsq(V.T @ F @ V, V.T @ r, rcond=1e-13)[0]
-    found = dense.gathered(narrow.cell, _improved(narrow, r)[0])
+    found = dense_feti.gathered(narrow.cell, _improved(narrow, r)[0])
     assert relative_error(found, expected) < 1e-8
     assert np.abs(narrow.twin.G.T @ found).max() < 1e-9 * np.abs(found).max()
 
@@ -155,8 +154,8 @@ def null_space(A):
 
 
 def test_deflation_bounds_the_spectrum(narrow):
-    least, largest = dense.extreme_eigenvalues(narrow.T, narrow.twin.F, narrow.M)
-    natural = dense.extreme_eigenvalues(dense.projector(narrow.twin.G), narrow.twin.F, narrow.M)[1]
+    least, largest = dense_feti.extreme_eigenvalues(narrow.T, narrow.twin.F, narrow.M)
+    natural = dense_feti.extreme_eigenvalues(dense_feti.projector(narrow.twin.G), narrow.twin.F, narrow.M)[1]
     assert least > 1 - 1e-8
     assert largest < BOUND / THRESHOLD
     assert natural > 20 * largest
@@ -167,7 +166,7 @@ def test_threshold_trades_vectors_for_conditioning(narrow):
     for threshold in (0.03, THRESHOLD, 0.5):
         cell = narrow if threshold == THRESHOLD else Narrow(threshold, narrow.twin)
         assert cell.coarse.threshold == threshold
-        largest = dense.extreme_eigenvalues(cell.T, cell.twin.F, cell.M)[1]
+        largest = dense_feti.extreme_eigenvalues(cell.T, cell.twin.F, cell.M)[1]
         assert largest < BOUND / threshold
         found.append((cell.coarse.vectors, -largest))
     assert found == sorted(found)
@@ -195,26 +194,26 @@ def test_updated_coarse_matrix_equals_one_from_scratch(comm):
     fresh.solver.activate(steps[-1])
     scratch, _ = energies(fresh, fresh.solver.coarse)
     assert relative_error(found, scratch) < 1e-12
-    first, second = (dense.matrix(c, c.solver.coarse.admissible) for c in (cell, fresh))
+    first, second = (dense_feti.matrix(c, c.solver.coarse.admissible) for c in (cell, fresh))
     assert relative_error(first, second) < 1e-8
 
 
 def test_masked_corrections_are_the_best(comm):
     """T against a dense one of the active rows; the space is in use, not fallen back from."""
     cell = bonds.tear(comm, **BREAKING)
-    twin = dense.DualTwin(cell)
+    twin = dense_feti.DualTwin(cell)
     for active in masks(cell, range(2)):
         cell.solver.activate(active)
-        on = dense.gathered(cell, active) > 0
+        on = dense_feti.gathered(cell, active) > 0
         assert 0.05 < (~on).mean() < 0.5
-        U = dense.gathered(cell, cell.solver.coarse.U.toarray())[on]
+        U = dense_feti.gathered(cell, cell.solver.coarse.U.toarray())[on]
         assert on.sum() > ROOM * U.shape[1]
-        expected = dense.deflation(twin.F[np.ix_(on, on)], U, twin.G[on])
-        T = dense.matrix(cell, lambda z, a=active: cell.solver.coarse.admissible(a[:, None] * z))
+        expected = dense_feti.deflation(twin.F[np.ix_(on, on)], U, twin.G[on])
+        T = dense_feti.matrix(cell, lambda z, a=active: cell.solver.coarse.admissible(a[:, None] * z))
         assert (T[~on] == 0).all() and (T[:, ~on] == 0).all()
         assert relative_error(T[np.ix_(on, on)], expected) < 1e-7
         M = twin.preconditioner(on)
-        assert relative_error(dense.matrix(cell, cell.solver.preconditioner.apply), M) < 1e-11
+        assert relative_error(dense_feti.matrix(cell, cell.solver.preconditioner.apply), M) < 1e-11
 
 
 @pytest.mark.parametrize(

@@ -5,19 +5,19 @@ from __future__ import annotations
 import re
 
 import bonds
-import dense
 import numpy as np
 import pytest
 from cells import make_case, relative_error, solve, twin_stiffness
 from mpi4py import MPI
 from narrow_cells import BOUND, BREAKING, NARROW, STRAINS, of_all, together
+from reference import dense_feti
 
 from feti_homog.errors import CaseError
-from feti_homog.feti.adaptive import THRESHOLD, AdaptiveCoarse
-from feti_homog.feti.local import DirectSolver
-from feti_homog.feti.replicated import Replicated
-from feti_homog.feti.saddle import SaddlePoint, _Augmented
-from feti_homog.feti.together import Distributed
+from feti_homog.feti.coarse.adaptive import THRESHOLD, AdaptiveCoarse
+from feti_homog.feti.linalg.distributed_direct import Distributed
+from feti_homog.feti.linalg.replicated_saddle_point import Replicated
+from feti_homog.feti.linalg.saddle_point import SaddlePoint, _Augmented
+from feti_homog.feti.linalg.sparse_direct import DirectSolver
 
 pytestmark = pytest.mark.parallel
 
@@ -34,7 +34,7 @@ def test_together_as_one_by_one(narrow):
         (alone,) = together(narrow.cell, strain[None], start[:, None])
         assert alone.reason > 0 and found.reason > 0
         assert (found.strain == strain).all()
-        assert relative_error(*(dense.gathered(narrow.cell, s.lam) for s in (found, alone))) < 1e-7
+        assert relative_error(*(dense_feti.gathered(narrow.cell, s.lam) for s in (found, alone))) < 1e-7
         assert relative_error(*(solver.stress_integral(s) for s in (found, alone))) < 1e-9
         assert abs(found.iterations - alone.iterations) <= 4
 
@@ -43,7 +43,7 @@ def test_a_load_without_multipliers_among_others(narrow):
     zero, found = together(narrow.cell, np.array([[0.0, 0, 0], [1.0, 0, 0]]))
     assert (zero.lam == 0).all()
     (alone,) = together(narrow.cell, STRAINS[:1])
-    assert relative_error(*(dense.gathered(narrow.cell, s.lam) for s in (found, alone))) < 1e-7
+    assert relative_error(*(dense_feti.gathered(narrow.cell, s.lam) for s in (found, alone))) < 1e-7
 
 
 def test_ranks_do_not_matter(comm):
@@ -120,7 +120,7 @@ def test_a_distributed_coarse_problem_gives_the_same(comm, monkeypatch, contrast
         (10**6, SaddlePoint if alone else Replicated, DirectSolver),
         (0, SaddlePoint, DirectSolver if alone else Distributed),
     ):
-        monkeypatch.setattr("feti_homog.feti.replicated.LARGEST_REPLICATED", largest)
+        monkeypatch.setattr("feti_homog.feti.linalg.replicated_saddle_point.LARGEST_REPLICATED", largest)
         cell = bonds.tear(comm, **case)
         saddle = cell.solver.coarse.saddle
         assert isinstance(saddle, kind)
@@ -130,7 +130,7 @@ def test_a_distributed_coarse_problem_gives_the_same(comm, monkeypatch, contrast
         found.append(together(cell))
     for one, other in zip(*found, strict=True):
         assert one.reason > 0 and other.reason > 0 and abs(one.iterations - other.iterations) <= 1
-        assert relative_error(*(dense.gathered(cell, s.lam) for s in (one, other))) < 1e-7
+        assert relative_error(*(dense_feti.gathered(cell, s.lam) for s in (one, other))) < 1e-7
 
 
 @pytest.mark.parametrize("petsc", [{"feti_dual_operator": "implicit"}, {"feti_pc_type": "lumped"}])
@@ -150,7 +150,7 @@ def test_view(comm, narrow, capfd):
     assert number("soft modes below", text) == THRESHOLD
     assert f"soft modes below {THRESHOLD:g}: {narrow.coarse.vectors - narrow.coarse.dimension}," in text
     assert f"{cell.plan.subdomains} subdomains, {cell.plan.subdomains} with dense boundary operators" in text
-    least, largest = dense.extreme_eigenvalues(narrow.T, narrow.twin.F, narrow.M)
+    least, largest = dense_feti.extreme_eigenvalues(narrow.T, narrow.twin.F, narrow.M)
     assert 0.7 * largest / least < number("condition number about", text) < 1.01 * largest / least
 
 

@@ -8,9 +8,9 @@ import pytest
 from cells import relative_error
 from random_bonds import random_bonded, random_cell, random_strain
 
+from feti_homog.config.sections import Arc
 from feti_homog.interface import contact as contact_room
 from feti_homog.interface.contact import BONDED, CLOSED, MOST_SOLVES, OPEN
-from feti_homog.sections import Arc
 
 pytestmark = pytest.mark.parallel
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from cells import FIBRE, MATRIX, make_case, relative_error, solve, twin_stiffness
 from mpi4py import MPI
-from unit.faulty_meshes import grid
+from unit.cell.faulty_meshes import grid
 
 pytestmark = pytest.mark.parallel
 
@@ -188,9 +188,7 @@ def test_square_fibre(comm, shared_path, cell):
     if comm.rank == 0:
         grid().write(shared_path / "square_fibre.msh")
     comm.barrier()
-    torn, L, _ = solve(
-        make_case(geometry="mesh", file="square_fibre.msh", folder=shared_path, **cell), comm
-    )
+    torn, L, _ = solve(make_case(geometry="mesh", file="square_fibre.msh", folder=shared_path, **cell), comm)
     assert torn.areas()["fibre"] == pytest.approx(0.25)
     assert relative_error(L, twin_stiffness(torn)) < 1e-9
 

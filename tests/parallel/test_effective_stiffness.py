@@ -38,9 +38,7 @@ def test_preconditioner_changes_only_the_iterations(comm, preconditioner):
     assert relative_error(L, expected) < TIGHT
 
 
-@pytest.mark.parametrize(
-    "option", ["feti_sub_pc_factor_mat_solver_type", "feti_interior_pc_factor_mat_solver_type"]
-)
+@pytest.mark.parametrize("option", ["feti_sub_pc_factor_mat_solver_type", "feti_interior_pc_factor_mat_solver_type"])
 def test_mumps_in_the_place_of_cholmod(comm, option):
     _, L, _ = solve(make_case(petsc={option: "mumps"}), comm)
     _, expected, _ = solve(make_case(), comm)
@@ -141,9 +139,7 @@ def test_dual_operator_and_projector_laws(comm):
     torn, _, _ = solve(make_case(geometry="hexagonal", decomposition={"subdomains": 7}), comm)
     solver = torn.solver
     first, last = solver.constraints.owned
-    x, y = (
-        np.random.default_rng(seed).standard_normal(solver.constraints.total)[first:last] for seed in (1, 2)
-    )
+    x, y = (np.random.default_rng(seed).standard_normal(solver.constraints.total)[first:last] for seed in (1, 2))
 
     def dot(a, b):
         return comm.allreduce(a @ b)
@@ -164,8 +160,8 @@ def test_dual_operator_and_projector_laws(comm):
 
 
 def test_swapped_phases_lie_within_voigt_and_reuss(comm):
-    from feti_homog import bounds
-    from feti_homog.material import plane_stiffness
+    from feti_homog.config.materials import plane_stiffness
+    from feti_homog.mechanics import bounds
 
     for matrix, fibre in ((MATRIX, FIBRE), (FIBRE, MATRIX)):
         torn, L, _ = solve(make_case(geometry="square", matrix=matrix, fibre=fibre), comm)

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import bonds
-import dense
 import numpy as np
 import pytest
 from cells import make_case, relative_error, solve, twin_stiffness
 from mpi4py import MPI
 from narrow_cells import NARROW, agree, masks, of_all, together
+from reference import dense_feti
 
-from feti_homog.feti import boundary as boundaries
-from feti_homog.feti import rings as rings_module
-from feti_homog.feti.adaptive import AdaptiveCoarse
-from feti_homog.feti.neighbours import Neighbours
-from feti_homog.feti.rings import rings
-from feti_homog.feti.subdomain import both_directions
+from feti_homog.feti.coarse import face_neighbourhoods as rings_module
+from feti_homog.feti.coarse.adaptive import AdaptiveCoarse
+from feti_homog.feti.coarse.face_neighbourhoods import rings
+from feti_homog.feti.decomposition.neighbours import Neighbours
+from feti_homog.feti.decomposition.subdomain import both_directions
+from feti_homog.feti.operators import interface_operators as boundaries
 
 pytestmark = pytest.mark.parallel
 
@@ -37,7 +37,7 @@ def faces(request, comm):
     neighbours = Neighbours(comm, solver.constraints, cell.subdomains)
     for i, s in enumerate(cell.subdomains):
         B, dofs = solver.boundary.B[:, solver.boundary.spans[i]], solver.boundary.dofs[i]
-        S = dense.schur(s.K.toarray(), dofs)
+        S = dense_feti.schur(s.K.toarray(), dofs)
         for other, common in neighbours.common[i].items():
             if other != s.piece.index:
                 nodes = np.unique(B[neighbours.rows[i][common]].indices // 2)
@@ -77,7 +77,7 @@ def test_kernels_of_rings(comm, faces):
         for ring in rings(s, dofs, face):
             S = ring.operator.S
             assert np.abs(S @ ring.R).max(initial=0.0) < TIGHT * np.abs(S).max()
-            assert dense.kernel(S).shape[1] == ring.R.shape[1]
+            assert dense_feti.kernel(S).shape[1] == ring.R.shape[1]
             assert np.linalg.eigvalsh(ring.operator.held)[0] > 0
             kernels.add(ring.R.shape[1])
     assert 3 in set().union(*comm.allgather(kernels))
@@ -90,7 +90,7 @@ def test_a_ring_of_the_whole_body_is_as_stiff(faces, monkeypatch):
             continue
         (ring,) = rings(s, dofs, face)
         expected = np.zeros_like(S)
-        expected[np.ix_(face, face)] = dense.schur(S, face)
+        expected[np.ix_(face, face)] = dense_feti.schur(S, face)
         found = np.zeros_like(S)
         found[np.ix_(ring.at, ring.at)] = ring.operator.S
         assert relative_error(found, expected) < TIGHT

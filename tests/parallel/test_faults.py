@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 from support import parallel_assert
-from unit.faulty_bonding import FAULTY_BONDINGS
-from unit.faulty_cases import BASE, FAULTY_CASES
-from unit.faulty_meshes import FAULTY_MESHES
+from unit.cell.faulty_meshes import FAULTY_MESHES
+from unit.config.faulty_bonding import FAULTY_BONDINGS
+from unit.config.faulty_cases import BASE, FAULTY_CASES
 
 from feti_homog import cli
 

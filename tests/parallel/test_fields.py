@@ -12,7 +12,7 @@ import pytest
 from sample_output import Sample, part_of, sample, without_interface
 
 from feti_homog.errors import FetiHomogError
-from feti_homog.output.fields import FieldFile
+from feti_homog.output.files.field_file import FieldFile
 
 pytestmark = pytest.mark.parallel
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from feti_homog.common.mpi_errors import RemoteError, agree, on_root, on_root_only
 from feti_homog.errors import CaseError, MeshError
-from feti_homog.parallel import RemoteError, agree, on_root, on_root_only
 
 pytestmark = pytest.mark.parallel
 

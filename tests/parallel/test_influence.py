@@ -6,14 +6,14 @@ import bonds
 import numpy as np
 import pytest
 from cells import relative_error
-from dense import DualTwin, gathered, matrix
 from narrow_cells import BREAKING, NARROW, together
+from reference.dense_feti import DualTwin, gathered, matrix
 from scipy.linalg import null_space
 
 from feti_homog.errors import CaseError
-from feti_homog.feti.condensed import Condensed
-from feti_homog.feti.influence import Influence
-from feti_homog.feti.settings import MANY
+from feti_homog.feti.factory import MANY
+from feti_homog.feti.operators.explicit import Condensed
+from feti_homog.feti.preconditioners.influence import Influence
 from feti_homog.interface.contact import BONDED, CLOSED, OPEN
 
 pytestmark = pytest.mark.parallel
@@ -105,7 +105,7 @@ def test_narrow_gaps_and_contrasts(comm):
     ids=["path", "stiffness", "dirichlet", "adaptive", "implicit"],
 )
 def test_chosen_for_many_applications(comm, monkeypatch, applications, petsc, chosen):
-    monkeypatch.setattr("feti_homog.cost.applications", lambda case: applications)
+    monkeypatch.setattr("feti_homog.homogenization.cost_model.applications", lambda case: applications)
     solver = bonds.tear(comm, **BREAKING, petsc=petsc).solver
     assert isinstance(solver.preconditioner, Influence) == chosen
     if chosen:
@@ -113,8 +113,8 @@ def test_chosen_for_many_applications(comm, monkeypatch, applications, petsc, ch
 
 
 def test_not_chosen_where_the_bonded_cell_is_too_large(comm, monkeypatch):
-    monkeypatch.setattr("feti_homog.cost.applications", lambda case: MANY)
-    monkeypatch.setattr("feti_homog.feti.settings.LARGEST_BONDED", 10)
+    monkeypatch.setattr("feti_homog.homogenization.cost_model.applications", lambda case: MANY)
+    monkeypatch.setattr("feti_homog.feti.factory.LARGEST_BONDED", 10)
     assert not isinstance(bonds.tear(comm, **BREAKING).solver.preconditioner, Influence)
 
 

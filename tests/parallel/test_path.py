@@ -8,13 +8,13 @@ import bonds
 import numpy as np
 import pytest
 from cells import relative_error
-from path_twin import PathTwin
+from reference.load_path import PathTwin
 from support import parallel_assert
 
+from feti_homog.common.mpi_errors import on_root
 from feti_homog.interface.contact import BONDED, OPEN
-from feti_homog.interface.debonding import events, increments, unloaded
-from feti_homog.interface.law import Law
-from feti_homog.parallel import on_root
+from feti_homog.interface.path_following import events, increments, unloaded
+from feti_homog.interface.strength_criterion import Law
 
 pytestmark = pytest.mark.parallel
 
@@ -63,9 +63,7 @@ def is_certified(points):
 def test_events_equal_the_twins(comm, cell, criterion, contact, strain):
     case = bonds.build(comm, matrix={"young": 1.0, "poisson": 0.35}, fibre={"young": 5.0, "poisson": 0.2}, **cell)
     strengths = (0.15, 0.3) if criterion == "max" else (0.25, 0.2)
-    expected = on_root(
-        comm, lambda: PathTwin(case.twin, contact, *strengths, criterion).proportional(np.array(strain))
-    )
+    expected = on_root(comm, lambda: PathTwin(case.twin, contact, *strengths, criterion).proportional(np.array(strain)))
     points = follow(case.cell, contact, Law(*strengths, criterion), [strain])
     assert len(points) == len(expected) > 3
     assert is_certified(points)

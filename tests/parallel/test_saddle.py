@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_matrix
 
-from feti_homog.feti.replicated import Replicated
-from feti_homog.feti.saddle import SaddlePoint
+from feti_homog.feti.linalg.replicated_saddle_point import Replicated
+from feti_homog.feti.linalg.saddle_point import SaddlePoint
 
 pytestmark = pytest.mark.parallel
 
@@ -63,7 +63,7 @@ def test_a_fault_of_one_rank_is_told_on_every_rank(comm, system, monkeypatch):
             raise np.linalg.LinAlgError("a coarse matrix is singular")
         return SaddlePoint(own, *arguments)
 
-    monkeypatch.setattr("feti_homog.feti.replicated.SaddlePoint", factored)
+    monkeypatch.setattr("feti_homog.feti.linalg.replicated_saddle_point.SaddlePoint", factored)
     with pytest.raises(np.linalg.LinAlgError, match="singular"):
         Replicated(comm, parts(comm, E), parts(comm, K), csr_matrix(free), "test_")
 
@@ -73,7 +73,9 @@ def test_a_fault_of_one_rank_is_told_on_every_rank(comm, system, monkeypatch):
 def test_benign_where_few_solves_are_enough(comm, system, monkeypatch, kind, accurate, benign):
     E, K, free = system
     # One rank that wants more is enough.
-    monkeypatch.setattr("feti_homog.feti.saddle.ACCURATE", accurate if comm.rank == 0 or kind is SaddlePoint else 1e-11)
+    monkeypatch.setattr(
+        "feti_homog.feti.linalg.saddle_point.ACCURATE", accurate if comm.rank == 0 or kind is SaddlePoint else 1e-11
+    )
     saddle = kind(comm, parts(comm, E), parts(comm, K), csr_matrix(free), "test_")
     assert saddle.benign == benign
     saddle.destroy()

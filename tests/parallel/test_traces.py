@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from narrow_cells import NARROW, together
 
-from feti_homog.cell.refine import edge_node
-from feti_homog.feti import traces
-from feti_homog.feti.traces import ENOUGH, trace
+from feti_homog.cell.refinement import edge_node
+from feti_homog.feti.coarse import trace_spaces
+from feti_homog.feti.coarse.trace_spaces import ENOUGH, trace
 
 pytestmark = pytest.mark.parallel
 
@@ -19,7 +19,7 @@ ALL = 10**9
 
 
 def tear(comm, enough, monkeypatch, **cell):
-    monkeypatch.setattr(traces, "ENOUGH", enough)
+    monkeypatch.setattr(trace_spaces, "ENOUGH", enough)
     return bonds.tear(comm, **REFINED | cell)
 
 

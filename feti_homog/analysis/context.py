@@ -1,0 +1,98 @@
+"""What the analyses share: the cell, its interfaces, who is told of progress and where states go."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feti_homog.common.progress import Progress
+from feti_homog.homogenization.averaging import Homogenization, Response
+from feti_homog.interface.contact import OPEN, Status
+
+Float = NDArray[np.float64]
+
+UNIT_CASES = ("E11", "E22", "G12")
+
+# A check may exceed the solver's tolerance by what sums over the cell and jumps of stiffness make of it.
+CHECK_MARGIN = 1e3
+CONTACT_TOLERANCE = 1e-6
+
+
+@dataclass
+class Study:
+    """One run of an analysis.
+
+    Attributes:
+        homogenization: the cell and its interfaces.
+        debonded: opening angle (or None for the arcs' own) -> (k,) prescribed debonded nodes of this rank.
+        record: called with each response that is to be kept as a state, its load factor and its name.
+        iterations, reasons: of every dual solve so far.
+        checks: largest error of each law so far.
+        faults: what did not converge or hold, in words.
+    """
+
+    homogenization: Homogenization
+    debonded: Callable[[float | None], NDArray[np.bool_]]
+    progress: Progress
+    record: Callable[[Response, float, str], None]
+    iterations: list[int] = field(default_factory=list)
+    reasons: list[int] = field(default_factory=list)
+    checks: dict[str, float] = field(default_factory=dict)
+    faults: list[str] = field(default_factory=list)
+
+    def status(self, opening: float | None) -> Status:
+        """Interface states before any load: prescribed debonded nodes are open."""
+        return np.where(self.debonded(opening), OPEN, 0).astype(np.int8)
+
+    def nothing(self) -> Float:
+        """First multipliers when there are no better ones."""
+        return np.zeros(self.homogenization.cell.solver.rows)
+
+    def note(self, name: str, response: Response) -> None:
+        """Keep the numbers of a response, tell of it, and complain if it breaks a law."""
+        state = response.state
+        self.iterations.append(state.iterations)
+        self.reasons.append(state.solution.reason)
+        words = f"{state.iterations} iterations, relative jump {state.solution.residual:.1e}"
+        debonded = response.counts["open"] + response.counts["closed"]
+        if debonded:
+            words += f", {debonded} debonded ({response.counts['closed']} closed), {state.solves} solves"
+        if state.loose:
+            words += f", {state.loose} free motions"
+        self.progress.say(f"  {name}: {words}")
+        if state.solution.reason < 0:
+            self.faults.append(
+                f"{name}: no convergence after {state.iterations} iterations, relative jump "
+                f"{state.solution.residual:.1e} (KSPConvergedReason {state.solution.reason}); result marked"
+            )
+        self.check(name, response.checks)
+
+    def check(self, name: str, errors: Mapping[str, float]) -> None:
+        """Keep the largest errors; a fault for each above its tolerance."""
+        for law, error in errors.items():
+            self.checks[law] = max(error, self.checks.get(law, 0.0))
+            if error > (tolerance := self.tolerance(law)):
+                self.faults.append(f"{name}: check {law}: {error:.1e}, expected at most {tolerance:.1e}; result marked")
+
+    def tolerance(self, law: str) -> float:
+        """Largest error of a check that passes."""
+        contact = law.startswith("kkt_")
+        return CONTACT_TOLERANCE if contact else CHECK_MARGIN * self.homogenization.cell.solver.rtol
+
+    def unit_responses(
+        self, label: str, status: Status, starts: Sequence[Float], sign: float
+    ) -> tuple[Float, list[Response]]:
+        """Secant stiffness (3, 3) to plus or minus each unit strain (39), and the responses."""
+        responses = self.homogenization.respond(sign * np.eye(3), status, starts)
+        for name, response in zip(UNIT_CASES, responses, strict=True):
+            self.note(f"{label}{'-' if sign < 0 else ''}{name}", response)
+        return np.stack([sign * r.stress for r in responses], axis=1), responses
+
+    def point(self, responses: Sequence[Response]) -> dict[str, Any]:
+        """The numbers of a point of a list in result.json: states of its last response, all iterations."""
+        counts = responses[-1].counts if responses else {}
+        return counts | {"iterations": sum(r.state.iterations for r in responses)}

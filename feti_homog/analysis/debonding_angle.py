@@ -1,0 +1,43 @@
+"""`analysis.type = "angle"`: the response against the debonding angle, Fig. 3."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feti_homog.analysis.context import UNIT_CASES, Study
+from feti_homog.homogenization.averaging import Response, asymmetry
+
+Float = NDArray[np.float64]
+
+
+def run(study: Study, values: Sequence[float], strain: Float | None) -> dict[str, Any]:
+    """`angle`, a list of points: under `strain` the stress, else the stiffness from the three unit cases.
+
+    Each angle begins with the multipliers of the one before it.
+    """
+    unit = strain is None
+    starts = [study.nothing()] * (3 if unit else 1)
+    points = []
+    for value in study.progress.bar(values, "angles"):
+        status, label = study.status(value), f"{value:g} deg"
+        point: dict[str, Any] = {"angle": value}
+        responses: list[Response]
+        if unit:
+            L, responses = study.unit_responses(f"{label} ", status, starts, 1.0)
+            point["stiffness"] = L
+            debonded = responses[0].counts["open"] + responses[0].counts["closed"]
+            if not (study.homogenization.interface.contact and debonded):
+                study.check(label, {"symmetry": asymmetry(L)})
+        else:
+            responses = study.homogenization.respond(np.array([strain]), status, starts)
+            study.note(label, responses[0])
+            point |= {"strain": responses[0].strain, "stress": responses[0].stress}
+        for name, response in zip(UNIT_CASES if unit else ("",), responses, strict=True):
+            study.record(response, 1.0, f"{label} {name}".strip())
+        starts = [r.state.solution.lam for r in responses]
+        points.append(point | study.point(responses))
+    return {"angle": points}

@@ -1,0 +1,177 @@
+"""The coarse periodic mesh of a cell of round fibres: gmsh fills the outline with triangles."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from itertools import chain, pairwise
+from types import MappingProxyType, ModuleType
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feti_homog.cell.arrangement import arrange
+from feti_homog.cell.coarse_mesh import CoarseMesh, areas, flip_double_arcs, representatives
+from feti_homog.cell.outline import MATRIX, Curve, Outline, outline
+
+if TYPE_CHECKING:
+    from feti_homog.config.case import Cell
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.intp]
+
+NO_MARKS: Mapping[int, Sequence[float]] = MappingProxyType({})
+FRONTAL_DELAUNAY = 6
+# gmsh's element types.
+LINE, TRIANGLE = 1, 2
+
+# Curves of the outline are numbered from 1; a negative number is a curve run backwards.
+Signed = tuple[int, Curve]
+
+
+def generate(cell: Cell, marks: Mapping[int, Sequence[float]] = NO_MARKS) -> CoarseMesh:
+    """The periodic coarse mesh of a square, hexagonal or random cell, elements about mesh_size * width.
+
+    `marks` maps a fibre (its number in the arrangement) to angles in degrees, measured at its centre, where
+    the mesh gets nodes: tips of debonded arcs. A mark within MERGED of where the circle crosses the cell's
+    boundary, or of another mark, is moved there. Raises MeshError if the cell cannot be arranged.
+    """
+    arrangement = arrange(cell)
+    lines = outline(arrangement, cell.mesh_size * arrangement.width, marks)
+    points, triangles, circle = _fill(lines, cell.mesh_size * arrangement.width)
+    phase = (circle != MATRIX).astype(np.int32)
+    arcs = [curve for curve in lines.curves if curve.circle != MATRIX]
+    arc_edges = np.concatenate([np.stack([arc.nodes[:-1], arc.nodes[1:]], axis=1) for arc in arcs])
+    arc_edges = arc_edges.astype(np.int32)
+    arc_circle = np.repeat([arc.circle for arc in arcs], [len(arc.nodes) - 1 for arc in arcs])
+    return CoarseMesh(
+        width=arrangement.width,
+        height=arrangement.height,
+        points=points,
+        triangles=flip_double_arcs(triangles, phase, arc_edges, arc_circle, len(points)),
+        phase=phase,
+        phases=("matrix", "fibre"),
+        representative=representatives(points, arrangement.width, arrangement.height),
+        circles=lines.circles,
+        arc_edges=arc_edges,
+        arc_circle=arc_circle.astype(np.int32),
+        debonded_edges=np.zeros((0, 2), np.int32),
+    )
+
+
+@contextmanager
+def gmsh_session() -> Iterator[ModuleType]:
+    """gmsh, initialised, silent, with fixed options and an empty model; finalised at the end."""
+    import gmsh
+
+    gmsh.initialize(readConfigFiles=False, interruptible=False)
+    try:
+        for option, value in {
+            "General.Terminal": 0,
+            "General.NumThreads": 1,
+            "Mesh.Algorithm": FRONTAL_DELAUNAY,
+            "Mesh.RandomSeed": 1,
+            "Mesh.Renumber": 0,
+        }.items():
+            gmsh.option.setNumber(option, value)
+        gmsh.model.add("cell")
+        yield gmsh
+    finally:
+        gmsh.finalize()
+
+
+def _fill(lines: Outline, largest: float) -> tuple[Floats, Integers, Integers]:
+    """Nodes (n, 2), those of the outline first, triangles (m, 3) and the circle around each (or MATRIX)."""
+    with gmsh_session() as gmsh:
+        gmsh.option.setNumber("Mesh.MeshSizeMax", largest)
+        surfaces, circle = _add_surfaces(gmsh, lines)
+        gmsh.model.mesh.generate(2)
+        tags, coordinates, _ = gmsh.model.mesh.getNodes()
+        elements = [gmsh.model.mesh.getElementsByType(TRIANGLE, surface)[1] for surface in surfaces]
+    order = np.argsort(tags)
+    points = coordinates.reshape(-1, 3)[order, :2]
+    points[: len(lines.points)] = lines.points
+    triangles = np.searchsorted(tags[order], np.concatenate(elements)).astype(np.int32).reshape(-1, 3)
+    clockwise = areas(points, triangles) < 0
+    triangles[clockwise] = triangles[clockwise][:, ::-1]
+    return points, triangles, np.repeat(circle, [len(nodes) // 3 for nodes in elements])
+
+
+def _add_lines(gmsh: ModuleType, lines: Outline) -> list[list[int]]:
+    """Make each edge of the outline a line of one element, node n a point n + 1; the lines of each curve."""
+    geo = gmsh.model.geo
+    for tag, (x, y) in enumerate(lines.points.tolist(), 1):
+        geo.addPoint(x, y, 0.0, tag=tag)
+    made = []
+    for curve in lines.curves:
+        nodes = (curve.nodes + 1).tolist()
+        made.append([geo.addLine(start, stop) for start, stop in pairwise(nodes)])
+    for tag in chain.from_iterable(made):
+        geo.mesh.setTransfiniteCurve(tag, 2)
+    return made
+
+
+def _add_surfaces(gmsh: ModuleType, lines: Outline) -> tuple[list[int], list[int]]:
+    """Add the plane surfaces of fibres and matrix; their tags, and the circle around each or MATRIX."""
+    geo, made = gmsh.model.geo, _add_lines(gmsh, lines)
+
+    def add_loop(loop: list[Signed]) -> int:
+        tags = [made[tag - 1] if tag > 0 else [-line for line in reversed(made[-tag - 1])] for tag, _ in loop]
+        return geo.addCurveLoop(list(chain.from_iterable(tags)))
+
+    surfaces, circle = [], []
+    discs = [(tag, curve) for tag, curve in enumerate(lines.curves, 1) if curve.inside != MATRIX]
+    for loop in _loops(discs):
+        surfaces.append(geo.addPlaneSurface([add_loop(loop)]))
+        circle.append(loop[0][1].inside)
+    for loops in _with_holes(_loops(_matrix_lines(lines)), lines.points):
+        surfaces.append(geo.addPlaneSurface([add_loop(loop) for loop in loops]))
+        circle.append(MATRIX)
+    geo.synchronize()
+    return surfaces, circle
+
+
+def _matrix_lines(lines: Outline) -> list[Signed]:
+    """The lines that have matrix on their left: pieces of sides, and arcs backwards with a negative tag."""
+    result = []
+    for tag, curve in enumerate(lines.curves, 1):
+        if curve.circle != MATRIX:
+            result.append((-tag, Curve(curve.nodes[::-1], curve.circle, MATRIX)))
+        elif curve.inside == MATRIX:
+            result.append((tag, curve))
+    return result
+
+
+def _loops(lines: list[Signed]) -> list[list[Signed]]:
+    """Closed chains of lines that have one region on their left; each vertex of a region starts one line."""
+    after = {(curve.inside, int(curve.nodes[0])): (tag, curve) for tag, curve in lines}
+    loops = []
+    while after:
+        loop = [after.pop(next(iter(after)))]
+        while (key := (loop[0][1].inside, int(loop[-1][1].nodes[-1]))) in after:
+            loop.append(after.pop(key))
+        loops.append(loop)
+    return loops
+
+
+def _with_holes(loops: list[list[Signed]], points: Floats) -> list[list[list[Signed]]]:
+    """Groups of loops, each an outer one followed by the holes, which are whole circles, within it."""
+    holes = [loop for loop in loops if all(curve.circle != MATRIX for _, curve in loop)]
+    outer = [loop for loop in loops if any(curve.circle == MATRIX for _, curve in loop)]
+    groups = [[loop] for loop in outer]
+    if len(outer) == 1:
+        return [outer + holes]
+    polygons = [points[np.concatenate([curve.nodes[:-1] for _, curve in loop])] for loop in outer]
+    for hole in holes:
+        group = next(k for k, polygon in enumerate(polygons) if _holds(polygon, points[hole[0][1].nodes[0]]))
+        groups[group].append(hole)
+    return groups
+
+
+def _holds(polygon: Floats, point: Floats) -> bool:
+    """Whether a polygon (k, 2) contains a point, by counting the edges to its right."""
+    a, b = polygon - point, np.roll(polygon, -1, axis=0) - point
+    crossing = (a[:, 1] > 0) != (b[:, 1] > 0)
+    rise = np.where(crossing, b[:, 1] - a[:, 1], 1.0)
+    return bool(np.count_nonzero(crossing & (a[:, 0] - a[:, 1] * (b[:, 0] - a[:, 0]) / rise > 0)) % 2)

@@ -1,0 +1,243 @@
+"""The checks of a user's mesh: each function finds one kind of fault and names the first offenders."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from feti_homog.cell.coarse_mesh import areas, edge_keys, edges
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+# Nodes nearer than this, relative to the cell, are at the same place.
+SAME = 1e-7
+# A node nearer to an edge than this, relative to its length, hangs on it.
+HANGING = 1e-2
+# Area of a triangle relative to its longest edge squared that counts as zero.
+FLAT = 1e-9
+# The physical curve of the edges that are debonded from the start.
+DEBONDED = "debonded"
+PHASE = re.compile(r"matrix|fibre(:\S+)?")
+SIDES = {(0, 0): "left", (0, 1): "right", (1, 0): "lower", (1, 1): "upper"}
+
+
+@dataclass(frozen=True)
+class RawMesh:
+    """Triangles of a mesh file: nodes in use with their tags, elements with their tags and group.
+
+    node_tags (n,), points (n, 3), element_tags (m,), triangles (m, 3) node numbers, group (m,) index into
+    `groups`, the lists of physical surfaces that the elements' entities belong to, and debonded (d, 2), the node
+    tags of the lines in the physical curve DEBONDED.
+    """
+
+    node_tags: Integers
+    points: Floats
+    element_tags: Integers
+    triangles: NDArray[np.int32]
+    group: Integers
+    groups: tuple[tuple[str, ...], ...]
+    debonded: Integers
+
+    def node(self, number: int) -> str:
+        """A node in words."""
+        return f"node {self.node_tags[number]} {at(self.points[number])}"
+
+    def element(self, number: int) -> str:
+        """An element in words, with the position of its centre."""
+        centre = self.points[self.triangles[number]].mean(axis=0)
+        return f"element {self.element_tags[number]} at {at(centre)}"
+
+    def edge(self, pair: Iterable[int]) -> str:
+        """An edge in words."""
+        return "the edge between " + " and ".join(self.node(int(end)) for end in pair)
+
+
+def at(point: Floats) -> str:
+    """A position in words, (x, y)."""
+    return f"({point[0]:.9g}, {point[1]:.9g})"
+
+
+def first_of(names: Iterable[str], total: int, shown: int = 3) -> str:
+    """The first few names and how many more there are."""
+    listed = ", ".join(name for name, _ in zip(names, range(shown), strict=False))
+    return listed if total <= shown else f"{listed} and {total - shown} more"
+
+
+def unlabelled(mesh: RawMesh) -> list[str]:
+    """Elements that are in no physical surface, or in several."""
+    faults = []
+    none = np.flatnonzero(np.isin(mesh.group, [k for k, names in enumerate(mesh.groups) if not names]))
+    if len(none):
+        faults.append(f"{first_of(map(mesh.element, none), len(none))}: not in any physical surface")
+    for number, names in enumerate(mesh.groups):
+        if len(names) > 1:
+            element = mesh.element(int(np.argmax(mesh.group == number)))
+            faults.append(f"{element} is in {len(names)} physical surfaces: {', '.join(names)}")
+    return faults
+
+
+def unknown_phases(mesh: RawMesh) -> list[str]:
+    """Physical surfaces whose name is not a phase, and a missing matrix."""
+    names = [name for group in mesh.groups for name in group]
+    known = 'the names are "matrix", "fibre", "fibre:2", ...'
+    strange = [name for name in names if not PHASE.fullmatch(name)]
+    faults = [f'physical surface "{name}" is not a phase: {known}' for name in dict.fromkeys(strange)]
+    if "matrix" not in names:
+        faults.append('no physical surface is named "matrix"')
+    return faults
+
+
+def not_finite(mesh: RawMesh) -> list[str]:
+    """Nodes whose coordinates are not numbers."""
+    bad = np.flatnonzero(~np.isfinite(mesh.points).all(axis=1))
+    return [f"{first_of(map(mesh.node, bad), len(bad))}: coordinates are not finite"] if len(bad) else []
+
+
+def not_planar(mesh: RawMesh) -> list[str]:
+    """Nodes off the plane of the first one."""
+    height = mesh.points[:, 2]
+    bad = np.flatnonzero(np.abs(height - height[0]) > SAME * np.ptp(mesh.points[:, :2], axis=0).max())
+    if len(bad) == 0:
+        return []
+    where = f"{mesh.node(int(bad[0]))} has z = {height[bad[0]]:.9g}, {mesh.node(0)} has z = {height[0]:.9g}"
+    return [f"the mesh is not planar: {where}"]
+
+
+def flat_or_inverted(mesh: RawMesh) -> list[str]:
+    """Triangles of zero area, and those that run against the others."""
+    plane = mesh.points[:, :2]
+    area = areas(plane, mesh.triangles)
+    ends = plane[edges(mesh.triangles)]
+    longest = ((ends[:, 1] - ends[:, 0]) ** 2).sum(axis=1).reshape(-1, 3).max(axis=1)
+    flat = np.abs(area) <= FLAT * longest
+    sense = 1 if np.count_nonzero(area > 0) >= np.count_nonzero(area < 0) else -1
+    faults = []
+    for bad, what in ((flat, "zero area"), (~flat & (sense * area < 0), "inverted")):
+        found = np.flatnonzero(bad)
+        if len(found):
+            faults.append(f"{first_of(map(mesh.element, found), len(found))}: {what}")
+    return faults
+
+
+def duplicate_nodes(mesh: RawMesh) -> list[str]:
+    """Different nodes at the same place."""
+    plane = mesh.points[:, :2]
+    pairs = cKDTree(plane).query_pairs(SAME * np.ptp(plane, axis=0).max(), output_type="ndarray")
+    pairs = pairs[np.lexsort(pairs.T[::-1])]
+    names = (f"{mesh.node(a)} and {mesh.node(b)}" for a, b in pairs)
+    return [f"nodes at the same place: {first_of(names, len(pairs))}"] if len(pairs) else []
+
+
+def overlapping(mesh: RawMesh) -> list[str]:
+    """Edges of more than two triangles, or of two on the same side."""
+    pairs = edges(mesh.triangles)
+    _, first, where, number = np.unique(
+        edge_keys(pairs, len(mesh.points)), return_index=True, return_inverse=True, return_counts=True
+    )
+    forward = np.bincount(where, pairs[:, 0] < pairs[:, 1], len(first))
+    crowded = np.flatnonzero(number > 2)
+    folded = np.flatnonzero((number == 2) & (forward != 1))
+    faults = []
+    if len(crowded):
+        names = (f"{mesh.edge(pairs[first[k]])} ({number[k]})" for k in crowded)
+        faults.append(f"overlapping elements, more than two share an edge: {first_of(names, len(crowded))}")
+    if len(folded):
+        names = (mesh.edge(pairs[first[k]]) for k in folded)
+        faults.append(f"overlapping elements on the same side of an edge: {first_of(names, len(folded))}")
+    return faults
+
+
+def open_edges(mesh: RawMesh, plane: Floats, size: Floats) -> list[str]:
+    """Edges of one triangle only, not on the boundary of the cell: hanging nodes, holes, other shapes.
+
+    `plane` (n, 2) are positions with the lower left corner at the origin, nodes on sides exactly there.
+    """
+    pairs = edges(mesh.triangles)
+    _, first, number = np.unique(edge_keys(pairs, len(plane)), return_index=True, return_counts=True)
+    single = pairs[first[number == 1]]
+    ends = plane[single]
+    on_side = np.any(np.all(ends == 0, axis=1) | np.all(ends == size, axis=1), axis=1)
+    inner = single[~on_side]
+    if len(inner) == 0:
+        return []
+    hanging = _hanging(plane, inner)
+    if hanging:
+        names = (f"{mesh.node(node)} on {mesh.edge(pair)}" for node, pair in hanging)
+        return [f"hanging nodes: {first_of(names, len(hanging))}"]
+    found = first_of(map(mesh.edge, inner), len(inner), shown=2)
+    return [f"the mesh has a hole or its boundary is not a rectangle, elements on one side only of {found}"]
+
+
+def _hanging(plane: Floats, pairs: NDArray[np.int32]) -> list[tuple[int, tuple[int, int]]]:
+    """Nodes of the edges (k, 2) that lie within others, not at their ends, with these edges."""
+    found = []
+    nodes = np.unique(pairs)
+    tree = cKDTree(plane[nodes])
+    start, stop = plane[pairs[:, 0]], plane[pairs[:, 1]]
+    near = tree.query_ball_point((start + stop) / 2, np.linalg.norm(stop - start, axis=1) / 2)
+    for candidates, pair, a, b in zip(near, pairs, start, stop, strict=True):
+        others = np.setdiff1d(nodes[candidates], pair)
+        along, away = b - a, plane[others] - a
+        distance = np.abs(along[0] * away[:, 1] - along[1] * away[:, 0])
+        close = others[distance < HANGING * (along @ along)]
+        found += [(int(node), (int(pair[0]), int(pair[1]))) for node in close]
+    return found
+
+
+def missing_corners(plane: Floats, origin: Floats, size: Floats) -> list[str]:
+    """Corners of the bounding rectangle without a node."""
+    corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * size
+    missing = [corner for corner in corners if not np.all(plane == corner, axis=1).any()]
+    names = first_of((at(corner + origin) for corner in missing), len(missing), shown=4)
+    return [f"no node at the corner {names} of the cell"] if missing else []
+
+
+def uncovered(plane: Floats, triangles: NDArray[np.int32], size: Floats) -> list[str]:
+    """Triangles that do not add up to the rectangle."""
+    total, whole = areas(plane, triangles).sum(), size.prod()
+    if abs(abs(total) - whole) <= 1e-6 * whole:
+        return []
+    what = "overlap" if abs(total) > whole else "leave parts uncovered"
+    return [f"the elements {what}: their area is {abs(total):.9g}, that of the cell {whole:.9g}"]
+
+
+def loose_lines(mesh: RawMesh) -> list[str]:
+    """Debonded lines whose ends are not nodes of triangles."""
+    bad = mesh.debonded[~np.isin(mesh.debonded, mesh.node_tags).all(axis=1)]
+    names = (f"that between nodes {start} and {stop}" for start, stop in bad)
+    what = f'lines in the physical curve "{DEBONDED}" that are no edges of triangles'
+    return [f"{what}: {first_of(names, len(bad))}"] if len(bad) else []
+
+
+def cannot_debond(mesh: RawMesh, pairs: NDArray[np.int32], fit: NDArray[np.bool_]) -> list[str]:
+    """Debonded lines (d, 2) that are not edges between a fibre and the matrix; `fit` (d,) tells which are."""
+    bad = pairs[~fit]
+    what = f'lines in the physical curve "{DEBONDED}" that are not between a fibre and the matrix'
+    return [f"{what}: {first_of(map(mesh.edge, bad), len(bad))}"] if len(bad) else []
+
+
+def not_periodic(mesh: RawMesh, plane: Floats, size: Floats) -> list[str]:
+    """Nodes on a side without a partner at the same place of the opposite one."""
+    faults = []
+    for axis in (0, 1):
+        sides = [np.flatnonzero(plane[:, axis] == level) for level in (0.0, size[axis])]
+        for here in (0, 1):
+            other = np.sort(plane[sides[1 - here], 1 - axis])
+            own = plane[sides[here], 1 - axis]
+            after = np.clip(np.searchsorted(other, own), 1, len(other) - 1)
+            away = np.minimum(np.abs(other[after] - own), np.abs(other[after - 1] - own))
+            alone = sides[here][away > SAME * size.max()]
+            if len(alone):
+                shift = np.where(np.arange(3) == axis, (1 - 2 * here) * size[axis], 0.0)
+                names = (f"{mesh.node(k)}, expected at {at(mesh.points[k] + shift)}" for k in alone)
+                faults.append(
+                    f"not periodic, nodes of the {SIDES[axis, here]} side have no partner on the "
+                    f"{SIDES[axis, 1 - here]} side: {first_of(names, len(alone))}"
+                )
+    return faults

@@ -1,0 +1,155 @@
+"""The coarse cell as a torus: node classes, torus edges and constituents, on rank 0.
+
+Two plane nodes that differ by a period are one class, two boundary edges that differ by a period one
+torus edge.  A constituent is a connected component of equal phase on the torus, so a fibre that the
+cell's boundary cuts is one constituent.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from feti_homog.cell.coarse_mesh import CoarseMesh
+
+Int = NDArray[np.int64]
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Torus:
+    """Identities on the torus of a `CoarseMesh` with m triangles.
+
+    Attributes:
+        mesh: the plane mesh.
+        node_class: (n,) class of each plane node.
+        edges: (e, 2) plane edges, each from its lexicographically lower to its upper end.
+        triangle_edges: (m, 3) plane edge from vertex k to vertex k + 1 (mod 3).
+        torus_edge: (e,) torus edge of each plane edge.
+        constituent: (m,) constituent of each triangle; those of the matrix come first.
+    """
+
+    mesh: CoarseMesh
+    node_class: Int
+    edges: Int
+    triangle_edges: Int
+    torus_edge: Int
+    constituent: Int
+
+    @classmethod
+    def of(cls, mesh: CoarseMesh) -> Torus:
+        """Identify the periodic images of `mesh` and find its constituents."""
+        node_class = np.unique(mesh.representative, return_inverse=True)[1]
+        edges, triangle_edges = _plane_edges(mesh)
+        torus_edge = _identify_edges(mesh, edges)
+        left, right = edge_pairs(torus_edge[triangle_edges])
+        same = mesh.phase[left] == mesh.phase[right]
+        label = components(len(mesh.triangles), left[same], right[same])
+        torus = cls(mesh, node_class, edges, triangle_edges, torus_edge, label)
+        # Fibres on circles are numbered in the order of the circles, which is that of the arrangement.
+        circle = np.full(len(edges), len(mesh.circles))
+        circle[torus.arcs] = mesh.arc_circle
+        first = np.full(label.max() + 1, len(mesh.circles))
+        np.minimum.at(first, np.repeat(label, 3), circle[triangle_edges].ravel())
+        order = np.lexsort((np.arange(len(label)), first[label], mesh.phase))
+        return replace(torus, constituent=_renumber(label, order))
+
+    @cached_property
+    def triangle_torus_edges(self) -> Int:
+        """(m, 3) torus edge from vertex k to vertex k + 1 (mod 3)."""
+        return self.torus_edge[self.triangle_edges]
+
+    @cached_property
+    def edge_circles(self) -> Float:
+        """(e, 3) centre and radius of the circle that each plane edge lies on; radius 0 where it is straight."""
+        circles = np.zeros((len(self.edges), 3))
+        circles[self.arcs] = self.mesh.circles[self.mesh.arc_circle]
+        return circles
+
+    @cached_property
+    def edge_lengths(self) -> Float:
+        """Length of each torus edge, of its chord if it lies on a circle."""
+        ends = self.mesh.points[self.edges]
+        lengths = np.empty(self.torus_edge.max() + 1)
+        lengths[self.torus_edge] = np.hypot(*(ends[:, 1] - ends[:, 0]).T)
+        return lengths
+
+    @cached_property
+    def arcs(self) -> Int:
+        """(a,) plane edge of each of the mesh's `arc_edges`."""
+        return self.plane_edges(self.mesh.arc_edges)
+
+    def plane_edges(self, pairs: NDArray[np.int32]) -> Int:
+        """(k,) plane edge between each pair (k, 2) of plane nodes."""
+        n = len(self.mesh.points)
+        key = np.sort(self.edges, axis=1) @ [n, 1]
+        order = np.argsort(key)
+        return order[np.searchsorted(key[order], np.sort(pairs.astype(np.int64), axis=1) @ [n, 1])]
+
+    @cached_property
+    def constituent_phase(self) -> Int:
+        """(constituents,) phase of each constituent."""
+        first = np.unique(self.constituent, return_index=True)[1]
+        return self.mesh.phase[first].astype(np.int64)
+
+    def plane_parts(self) -> Int:
+        """(m,) constituents cut by the cell's boundary, as the paper's Fig. 2a does (`bodies = "plane"`)."""
+        left, right = edge_pairs(self.triangle_edges)
+        same = self.constituent[left] == self.constituent[right]
+        label = components(len(self.constituent), left[same], right[same])
+        return _renumber(label, np.argsort(self.constituent, kind="stable"))
+
+
+def edge_pairs(triangle_edges: Int) -> tuple[Int, Int]:
+    """The triangles on either side of each edge that two of them share: two arrays, in the edges' order."""
+    flat = triangle_edges.ravel()
+    order = np.argsort(flat, kind="stable")
+    twice = flat[order][1:] == flat[order][:-1]
+    return order[:-1][twice] // 3, order[1:][twice] // 3
+
+
+def shared_edges(triangle_edges: Int) -> Int:
+    """The edges that two triangles share, in the order of `edge_pairs`."""
+    flat = np.sort(triangle_edges, axis=None)
+    return flat[:-1][flat[1:] == flat[:-1]]
+
+
+def components(n: int, left: Int, right: Int) -> Int:
+    """Connected components of the graph on n vertices with edges (left, right): (n,) labels."""
+    graph = coo_matrix((np.ones(len(left), np.int8), (left, right)), shape=(n, n))
+    return connected_components(graph, directed=False)[1].astype(np.int64)
+
+
+def _renumber(label: Int, order: Int) -> Int:
+    """Number the labels by their first appearance in `order`."""
+    first = np.unique(label[order], return_index=True)[1]
+    rank = np.empty_like(first)
+    rank[np.argsort(first)] = np.arange(len(first))
+    return rank[label]
+
+
+def _plane_edges(mesh: CoarseMesh) -> tuple[Int, Int]:
+    triangles = mesh.triangles.astype(np.int64)
+    ends = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
+    n = len(mesh.points)
+    keys, which = np.unique(ends.min(axis=1) * n + ends.max(axis=1), return_inverse=True)
+    edges = np.stack([keys // n, keys % n], axis=1)
+    (xa, ya), (xb, yb) = mesh.points[edges[:, 0]].T, mesh.points[edges[:, 1]].T
+    backwards = (xa > xb) | ((xa == xb) & (ya > yb))
+    edges[backwards] = edges[backwards, ::-1]
+    return edges, which.reshape(-1, 3)
+
+
+def _identify_edges(mesh: CoarseMesh, edges: Int) -> Int:
+    """(e,) torus edge of each plane edge: the i-th edge of a side is the i-th of the opposite side."""
+    same = np.arange(len(edges))
+    for axis, period in ((0, mesh.width), (1, mesh.height)):
+        across, along = mesh.points[edges][:, :, axis], mesh.points[edges][:, :, 1 - axis].sum(axis=1)
+        low, high = (np.flatnonzero((across == side).all(axis=1)) for side in (0.0, period))
+        same[high[np.argsort(along[high])]] = low[np.argsort(along[low])]
+    return np.unique(same, return_inverse=True)[1]

@@ -1,0 +1,135 @@
+"""The coarse share of one subdomain: all that a rank needs to refine it by itself."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feti_homog.cell.periodic_topology import Torus
+
+Int = NDArray[np.int64]
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Piece:
+    """One subdomain of the coarse mesh: v plane vertices, e plane edges, t triangles.
+
+    A plane vertex belongs to a class, a plane edge to a torus edge; both are numbered locally, in
+    ascending order of their global numbers `class_keys` and `edge_keys`.
+
+    Attributes:
+        index: number of the subdomain.
+        body: constituent that it is a piece of.
+        phase: name of the material phase.
+        points: (v, 2) vertices, in plane position.
+        triangles: (t, 3) vertices, counter-clockwise.
+        triangle_edges: (t, 3) edge from vertex k to vertex k + 1 (mod 3).
+        backwards: (t, 3) true where the triangle runs along the edge against its direction.
+        edges: (e, 2) vertices from start to end.
+        circles: (e, 3) centre and radius of the circle that the edge lies on, radius 0 where straight.
+        vertex_class: (v,) class of each vertex.
+        edge_class: (e,) torus edge of each edge.
+        class_keys, edge_keys: global numbers of the classes and torus edges.
+        period: (2,) width and height of the cell.
+        pinned: class that is held against translation of the whole cell, Eq. (15), or -1.
+    """
+
+    index: int
+    body: int
+    phase: str
+    points: Float
+    triangles: Int
+    triangle_edges: Int
+    backwards: NDArray[np.bool_]
+    edges: Int
+    circles: Float
+    vertex_class: Int
+    edge_class: Int
+    class_keys: Int
+    edge_keys: Int
+    period: Float
+    pinned: int
+
+
+def cut(torus: Torus, subdomain: Int) -> Iterator[Piece]:
+    """Cut the coarse cell into its subdomains; `subdomain` (m,) numbers each triangle's, from 0 without gaps."""
+    pinned = pinned_class(torus)
+    order = np.argsort(subdomain, kind="stable")
+    for index, members in enumerate(np.split(order, np.cumsum(np.bincount(subdomain))[:-1])):
+        yield _piece(torus, index, members, pinned)
+
+
+def part(piece: Piece, members: Int) -> Piece:
+    """The coarse triangles `members` (m,) of a piece, as a piece of its own."""
+    vertices, triangles = np.unique(piece.triangles[members], return_inverse=True)
+    edges, triangle_edges = np.unique(piece.triangle_edges[members], return_inverse=True)
+    classes, vertex_class = np.unique(piece.vertex_class[vertices], return_inverse=True)
+    torus_edges, edge_class = np.unique(piece.edge_class[edges], return_inverse=True)
+    held = np.flatnonzero(classes == piece.pinned)
+    return replace(
+        piece,
+        points=piece.points[vertices],
+        triangles=triangles.reshape(-1, 3),
+        triangle_edges=triangle_edges.reshape(-1, 3),
+        backwards=piece.backwards[members],
+        edges=np.searchsorted(vertices, piece.edges[edges]),
+        circles=piece.circles[edges],
+        vertex_class=vertex_class,
+        edge_class=edge_class,
+        class_keys=piece.class_keys[classes],
+        edge_keys=piece.edge_keys[torus_edges],
+        pinned=int(held[0]) if len(held) else -1,
+    )
+
+
+def pinned_class(torus: Torus) -> int:
+    """The class held fixed, Eq. (15): that inside the matrix nearest to the cell's corner.
+
+    On an interface it would tie faces that must be able to part, in a fibre it would tie one that may come
+    loose; u* is the same up to a constant.
+    """
+    mesh = torus.mesh
+    body = np.repeat(torus.constituent, 3)
+    corner = torus.node_class[mesh.triangles].ravel()
+    n = torus.node_class.max() + 1
+    low, high = np.full(n, body.max()), np.zeros(n, np.int64)
+    np.minimum.at(low, corner, body)
+    np.maximum.at(high, corner, body)
+    away = mesh.points - np.round(mesh.points / [mesh.width, mesh.height]) * [mesh.width, mesh.height]
+    distance = np.full(n, np.inf)
+    np.minimum.at(distance, torus.node_class, np.hypot(*away.T))
+    in_matrix = torus.constituent_phase[high] == 0
+    # By preference inside the matrix, else inside any body.
+    return int(np.lexsort((distance, ~in_matrix, low != high))[0])
+
+
+def _piece(torus: Torus, index: int, members: Int, pinned: int) -> Piece:
+    mesh = torus.mesh
+    vertices, triangles = np.unique(mesh.triangles[members], return_inverse=True)
+    edges, triangle_edges = np.unique(torus.triangle_edges[members], return_inverse=True)
+    ends = np.searchsorted(vertices, torus.edges[edges])
+    triangles, triangle_edges = triangles.reshape(-1, 3), triangle_edges.reshape(-1, 3)
+    class_keys, vertex_class = np.unique(torus.node_class[vertices], return_inverse=True)
+    edge_keys, edge_class = np.unique(torus.torus_edge[edges], return_inverse=True)
+    held = np.flatnonzero(class_keys == pinned)
+    return Piece(
+        index=index,
+        body=int(torus.constituent[members[0]]),
+        phase=mesh.phases[mesh.phase[members[0]]],
+        points=mesh.points[vertices],
+        triangles=triangles,
+        triangle_edges=triangle_edges,
+        backwards=ends[triangle_edges, 0] != triangles,
+        edges=ends,
+        circles=torus.edge_circles[edges],
+        vertex_class=vertex_class,
+        edge_class=edge_class,
+        class_keys=class_keys,
+        edge_keys=edge_keys,
+        period=np.array([mesh.width, mesh.height]),
+        pinned=int(held[0]) if len(held) else -1,
+    )

@@ -1,0 +1,58 @@
+"""Stages of a run: told on rank 0, timed on every rank, and shown by PETSc's -log_view."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from typing import TypeVar
+
+from mpi4py import MPI
+from petsc4py import PETSc
+from tqdm import tqdm
+
+from feti_homog.common import process_memory
+
+T = TypeVar("T")
+
+
+class Progress:
+    """Prints a line a stage and a line a solve on rank 0, unless quiet, and keeps the stages' times."""
+
+    def __init__(self, comm: MPI.Intracomm, quiet: bool) -> None:
+        self.comm = comm
+        self.telling = comm.rank == 0 and not quiet
+        # mpirun gives rank 0 a terminal for its output even where it has none itself, but not for its errors.
+        self.on_terminal = self.telling and sys.stdout.isatty() and sys.stderr.isatty()
+        self.seconds: dict[str, float] = {}
+
+    def say(self, line: str) -> None:
+        """Print one line on rank 0, past the progress bar if there is one."""
+        if self.telling:
+            tqdm.write(line, file=sys.stdout)
+            sys.stdout.flush()
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[list[str]]:
+        """A PETSc log stage; the block may append words to the list, which are told with its time."""
+        words: list[str] = []
+        start = time.perf_counter()
+        with PETSc.Log.Stage(name):
+            yield words
+        took = time.perf_counter() - start
+        self.seconds[name] = self.seconds.get(name, 0.0) + took
+        self.say(f"{name:<9} {took:8.2f} s  {' '.join(words)}".rstrip())
+
+    def bar(self, items: Iterable[T], label: str) -> Iterator[T]:
+        """The items, with a progress bar if rank 0 writes to a terminal."""
+        return iter(tqdm(items, desc=label, leave=False, disable=not self.on_terminal))
+
+    def timings(self) -> dict[str, float]:
+        """Seconds of each stage, the maximum over ranks."""
+        return {name: self.comm.allreduce(took, MPI.MAX) for name, took in self.seconds.items()}
+
+    def memory(self) -> int:
+        """Peak resident memory of the case in bytes, the maximum over ranks."""
+        peak: int = self.comm.allreduce(process_memory.peak(), MPI.MAX)
+        return peak

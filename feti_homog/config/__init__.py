@@ -1,0 +1,4 @@
+"""The case file: its sections, keys and materials, checked before anything is computed.
+
+May use `common` and `errors`; starts neither MPI nor PETSc.  Main entry: `case.load` and `case.parse`.
+"""

@@ -1,0 +1,135 @@
+"""Linear elastic phases and their plane stiffness in Voigt order [11, 22, 12] with engineering shear."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feti_homog.config.schema import Kind, is_real, key, real, shown
+
+Matrix3 = tuple[tuple[float, float, float], ...]
+Array = NDArray[np.float64]
+
+POSITIVE = real(above=0.0)
+
+
+def _is_matrix(value: object) -> bool:
+    rows = value if isinstance(value, list | tuple) else []
+    triples = [row for row in rows if isinstance(row, list | tuple) and len(row) == 3]
+    return len(rows) == len(triples) == 3 and all(is_real(entry) for row in triples for entry in row)
+
+
+def _as_matrix(value: Any) -> Matrix3:
+    return tuple(tuple(float(entry) for entry in row) for row in value)  # type: ignore[misc]
+
+
+MATRIX = Kind("a symmetric 3x3 array of numbers in the order 11, 22, 12", _is_matrix, _as_matrix)
+
+
+@dataclass(frozen=True)
+class Isotropic:
+    """Young's modulus (stress) and Poisson's ratio."""
+
+    young: float = key(POSITIVE)
+    poisson: float = key(real(above=-1.0, most=0.5))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Orthotropic:
+    """Engineering constants along the material axes; axis 1 is turned by `angle` degrees from x1 towards x2.
+
+    nu_ij = -eps_j/eps_i under stress along i, so nu_ij/E_i = nu_ji/E_j. The constants out of the plane
+    (E3, nu13, nu23) are needed for plane strain only.
+    """
+
+    E1: float = key(POSITIVE)
+    E2: float = key(POSITIVE)
+    E3: float | None = key(POSITIVE, default=None)
+    nu12: float = key(real())
+    nu13: float | None = key(real(), default=None)
+    nu23: float | None = key(real(), default=None)
+    G12: float = key(POSITIVE)
+    angle: float = key(real(), default=0.0)
+
+
+@dataclass(frozen=True)
+class General:
+    """The plane stiffness itself, for whichever plane state the case asks for."""
+
+    stiffness: Matrix3 = key(MATRIX)
+
+
+Material = Isotropic | Orthotropic | General
+KINDS: dict[str, type[Isotropic] | type[Orthotropic] | type[General]] = {
+    "isotropic": Isotropic,
+    "orthotropic": Orthotropic,
+    "general": General,
+}
+
+
+def plane_stiffness(material: Material, plane: str) -> Array:
+    """C with [S11, S22, S12] = C [E11, E22, gamma12], (3, 3), symmetric positive definite, unit of stress.
+
+    `plane` is "strain" or "stress". Raises ValueError, with the keys at fault, if the constants are those of
+    no stable material.
+    """
+    if isinstance(material, Isotropic):
+        return _isotropic(material, plane)
+    if isinstance(material, Orthotropic):
+        return rotated(np.linalg.inv(_orthotropic_compliance(material, plane)), material.angle)
+    stiffness = np.array(material.stiffness)
+    if not np.allclose(stiffness, stiffness.T, rtol=0.0, atol=1e-9 * np.abs(stiffness).max()):
+        raise ValueError(f"stiffness = {shown(material.stiffness)}: expected a symmetric matrix")
+    if not is_positive_definite(stiffness):
+        raise ValueError(f"stiffness = {shown(material.stiffness)}: expected a positive definite matrix")
+    return (stiffness + stiffness.T) / 2.0
+
+
+def _isotropic(material: Isotropic, plane: str) -> Array:
+    if plane == "strain" and material.poisson >= 0.5:
+        raise ValueError(f"poisson = {material.poisson}: expected less than 0.5 in plane strain")
+    shear = material.young / (2.0 * (1.0 + material.poisson))
+    thickness = 1.0 - 2.0 * material.poisson if plane == "strain" else 1.0 - material.poisson
+    lame = 2.0 * shear * material.poisson / thickness  # plane stress: the reduced Lame constant
+    return np.array([[lame + 2 * shear, lame, 0.0], [lame, lame + 2 * shear, 0.0], [0.0, 0.0, shear]])
+
+
+def _orthotropic_compliance(material: Orthotropic, plane: str) -> Array:
+    """Compliance (3, 3) in the material axes; in plane strain S_ij - S_i3 S_j3 / S_33."""
+    E1, E2, G12, nu12 = material.E1, material.E2, material.G12, material.nu12
+    compliance = np.array([[1 / E1, -nu12 / E1, 0.0], [-nu12 / E1, 1 / E2, 0.0], [0.0, 0.0, 1 / G12]])
+    if not is_positive_definite(compliance):
+        raise ValueError(f"nu12 = {nu12}: expected nu12^2 < E1/E2 = {E1 / E2:.6g}; no material is stable otherwise")
+    if plane == "stress":
+        return compliance
+    E3, nu13, nu23 = material.E3, material.nu13, material.nu23
+    if E3 is None or nu13 is None or nu23 is None:
+        absent = [name for name in ("E3", "nu13", "nu23") if getattr(material, name) is None]
+        raise ValueError(f"{', '.join(absent)}: missing; plane strain needs them")
+    out = np.array([-nu13 / E1, -nu23 / E2, 0.0])
+    compliance -= E3 * np.outer(out, out)
+    if not is_positive_definite(compliance):
+        raise ValueError("E1, E2, E3, nu12, nu13, nu23: expected a positive definite compliance")
+    return compliance
+
+
+def rotated(stiffness: Array, angle: float) -> Array:
+    """Stiffness (3, 3) in axes x1, x2 of a material whose axis 1 is turned by `angle` degrees from x1.
+
+    C = T^T C' T, where T takes strains [E11, E22, gamma12] to the material axes.
+    """
+    c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+    strain_to_axes = np.array([[c * c, s * s, c * s], [s * s, c * c, -c * s], [-2 * c * s, 2 * c * s, c * c - s * s]])
+    return np.asarray(strain_to_axes.T @ stiffness @ strain_to_axes)
+
+
+def is_positive_definite(matrix: Array) -> bool:
+    """Whether a symmetric matrix, scaled to a unit diagonal, has no eigenvalue below 1e-12."""
+    diagonal = np.diag(matrix)
+    if diagonal.min() <= 0.0:
+        return False
+    scaled = matrix / np.sqrt(np.outer(diagonal, diagonal))
+    return bool(np.linalg.eigvalsh(scaled).min() > 1e-12)

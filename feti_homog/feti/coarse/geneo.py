@@ -1,0 +1,71 @@
+"""Local eigenproblems that find what slows the preconditioned dual operator down, of all subdomains.
+
+With the jumps of the soft modes deflated, the largest eigenvalue of P M^-1 F is about 1 / tau whatever the geometry
+and the materials (GenEO: Spillane & Rixen, IJNME 95, 2013).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+from scipy.sparse import csc_matrix, csr_matrix
+
+from feti_homog.feti.coarse.local_eigenproblems import DualBlock, examined
+from feti_homog.feti.decomposition.jump_operator import Constraints
+from feti_homog.feti.decomposition.neighbours import Neighbours
+from feti_homog.feti.linalg.distributed_matrix import summed
+from feti_homog.feti.operators.interface_operators import Boundary
+from feti_homog.feti.preconditioners.scaled import Scaled
+
+Int = NDArray[np.int64]
+Float = NDArray[np.float64]
+Single = NDArray[np.float32]
+
+
+def dual_blocks(
+    comm: MPI.Intracomm, constraints: Constraints, boundary: Boundary, scaling: Scaled, rows: Sequence[Int]
+) -> list[DualBlock]:
+    """The blocks of this rank's subdomains; `rows` are those of their nodes."""
+    owned = constraints.owned[1] - constraints.owned[0]
+    inverse = scaling.W_inverse.tocoo()
+    at = np.searchsorted(constraints.rows, constraints.owned[0])
+    shape = (len(constraints.rows), constraints.total)
+    wide = csr_matrix((inverse.data, (inverse.row + at, inverse.col + constraints.owned[0])), shape=shape)
+    W_inverse = summed(comm, wide, constraints.rows, constraints.foreign, owned)[:, constraints.rows]
+    B, BW = boundary.B.tocsc(), (W_inverse @ scaling.BD).tocsc()
+    blocks = []
+    for i, (subdomain, operator) in enumerate(zip(boundary.subdomains, boundary.operators, strict=True)):
+        own, scaled = (_columns(matrix, boundary.spans[i], rows[i]) for matrix in (B, BW))
+        blocks.append(DualBlock(subdomain, boundary.dofs[i], operator, own, scaled, boundary.large[i]))
+    return blocks
+
+
+def coarse_vectors(blocks: Sequence[DualBlock], neighbours: Neighbours, threshold: float) -> list[Float]:
+    """For each subdomain of this rank: (n, k + m) its kernel and its m modes below the threshold.  Collective."""
+    subdomains = [examined(*of) for of in zip(blocks, neighbours.common, strict=True)]
+    # Of the neighbours' shares in M^-1 the rows that both have.
+    others: list[list[tuple[int, Single]]] = [[] for _ in blocks]
+
+    def shares() -> Iterator[tuple[int, int, Single]]:
+        for i, subdomain in enumerate(subdomains):
+            for s, share in subdomain.shares():
+                yield i, s, share
+
+    neighbours.exchange(shares(), lambda i, sender, share: others[i].append((sender, share)))
+    vectors = []
+    for block, subdomain, received in zip(blocks, subdomains, others, strict=True):
+        vectors.append(np.hstack([block.R, subdomain.modes(received, threshold)]))
+        received.clear()
+    return vectors
+
+
+def _columns(matrix: csc_matrix, span: slice, rows: Int) -> csr_matrix:
+    """The columns `span` on the sorted `rows`, which hold all their entries."""
+    indptr = matrix.indptr[span.start : span.stop + 1]
+    part = slice(indptr[0], indptr[-1])
+    at = np.searchsorted(rows, matrix.indices[part])
+    shape = (len(rows), span.stop - span.start)
+    return csc_matrix((matrix.data[part], at, indptr - indptr[0]), shape=shape).tocsr()

@@ -1,0 +1,167 @@
+"""Soft modes of one subdomain, examined as one or face by face.
+
+For a subdomain s with Schur complement S_s and constraints B_s, the displacements p of its boundary with
+
+    S_s p = theta N_s p,  N_s = B_s^T M^-1 B_s,  theta < tau
+
+are soft in s but stiff in the eyes of the preconditioner.  On a large boundary that takes a dense eigenproblem beyond
+reach.  But where each node is shared with one other body only, the weights of M^-1 hardly change along the boundary,
+its own share is no more than S_s, and what makes p stiff is the neighbour's: so each face is examined by itself, with
+the ring around it for S_s.  The eigenproblems are projected to trace spaces.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from operator import itemgetter
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import eigh
+from scipy.linalg.lapack import dpotrf
+from scipy.sparse import csr_matrix
+
+from feti_homog.feti.coarse.face_neighbourhoods import rings
+from feti_homog.feti.coarse.trace_spaces import trace
+from feti_homog.feti.decomposition.subdomain import Subdomain, both_directions
+from feti_homog.feti.operators.explicit import Condensed
+from feti_homog.feti.operators.implicit import Factored
+
+Int = NDArray[np.int64]
+Float = NDArray[np.float64]
+Single = NDArray[np.float32]
+
+# Of a symmetric matrix in single precision, relative to its largest eigenvalue: eigenvalues that are none.
+NULL = 1e-6
+# The threshold of a face, over tau, for what other faces and the rest of the body add is not in its eigenproblem.
+FACE = 1.25
+
+
+@dataclass(frozen=True)
+class DualBlock:
+    """One subdomain on the rows of its nodes.
+
+    Attributes:
+        subdomain, dofs: what it is, and its (n,) boundary dofs.
+        operator: its boundary operators.
+        B: (rows, n) constraints.
+        BW: (rows, n) scaled constraints W^-1 B D^-1.
+        large: whether it is to be examined face by face.
+    """
+
+    subdomain: Subdomain
+    dofs: Int
+    operator: Condensed | Factored
+    B: csr_matrix
+    BW: csr_matrix
+    large: bool
+
+    @property
+    def R(self) -> Float:
+        """(n, k) kernel on the boundary."""
+        return self.subdomain.R[self.dofs]
+
+
+class Whole:
+    """Examined as one.  `common` names the rows that it has in common with each subdomain, itself among them."""
+
+    def __init__(self, block: DualBlock, operator: Condensed, common: Mapping[int, Int]) -> None:
+        self.block, self.common = block, common
+        subdomain, S = block.subdomain, operator.S
+        self._P = trace(subdomain.piece, subdomain.mesh.lattice, block.dofs[::2] // 2)
+        self._held = congruent(self._P, S) + operator.holding(self._P)
+        # (rows, rows) its share W^-1 B D^-1 S D^-1 B^T W^-1 of M^-1; this precision tells soft from stiff.
+        BW = block.BW.astype(np.float32)
+        self._share = BW @ (BW @ S.astype(np.float32)).T
+
+    def shares(self) -> Iterator[tuple[int, Single]]:
+        """Its share of M^-1 on the rows in common with each other subdomain."""
+        for s, rows in self.common.items():
+            if s != self.block.subdomain.piece.index:
+                yield s, self._share[np.ix_(rows, rows)]
+
+    def modes(self, shares: Sequence[tuple[int, Single]], threshold: float) -> Float:
+        """(n, m) soft modes besides the kernel, for the shares of others in M^-1."""
+        M = self._share.copy()
+        # In an order that no distribution changes.
+        for s, share in sorted(shares, key=itemgetter(0)):
+            M[np.ix_(self.common[s], self.common[s])] += share
+        N = jump_energy(self.block.B, self._P, self.block.R, M)
+        return np.asarray(self._P @ soft_modes(self._held, N, threshold))
+
+
+class Faces:
+    """Examined face by face; see `Whole`."""
+
+    def __init__(self, block: DualBlock, common: Mapping[int, Int]) -> None:
+        self.block, self.common = block, common
+        faces = {s: np.unique(block.B[rows].indices // 2) for s, rows in common.items()}
+        self._rings = {
+            s: rings(block.subdomain, block.dofs, both_directions(nodes))
+            for s, nodes in faces.items()
+            if s != block.subdomain.piece.index
+        }
+
+    def shares(self) -> Iterator[tuple[int, Single]]:
+        """No less than its share of M^-1 on the rows in common with each other subdomain."""
+        for s, found in self._rings.items():
+            share = np.zeros((len(self.common[s]),) * 2)
+            for ring in found:
+                BW = self.block.BW[self.common[s]][:, ring.at]
+                share += BW @ (BW @ ring.clamped).T
+            yield s, share.astype(np.float32)
+
+    def modes(self, shares: Sequence[tuple[int, Single]], threshold: float) -> Float:
+        """(n, m) soft modes of the faces, for the shares of others in M^-1."""
+        parts = [np.zeros((len(self.block.dofs), 0))]
+        for s, share in shares:
+            for ring in self._rings[s]:
+                B = self.block.B[self.common[s]][:, ring.at]
+                N = jump_energy(B, ring.P, ring.R, share)
+                soft = ring.P @ soft_modes(congruent(ring.P, ring.operator.held), N, FACE * threshold)
+                parts.append(np.zeros((len(self.block.dofs), soft.shape[1])))
+                parts[-1][ring.at] = soft
+        return np.hstack(parts)
+
+
+def examined(block: DualBlock, common: Mapping[int, Int]) -> Whole | Faces:
+    """How a subdomain of that size is examined.
+
+    Raises:
+        TypeError: as one, but without dense boundary operators.
+    """
+    if block.large:
+        return Faces(block, common)
+    if not isinstance(block.operator, Condensed):
+        raise TypeError("soft modes of small boundaries need dense operators")
+    return Whole(block, block.operator, common)
+
+
+def congruent(T: csr_matrix | Float, A: Float | Single) -> Float:
+    """T^T A T for symmetric A."""
+    return np.asarray(T.T @ (T.T @ A).T)
+
+
+def jump_energy(B: csr_matrix, P: csr_matrix, R: Float, M: Single) -> Float:
+    """(m + k, m + k) T^T M T of the jumps T = B [P R] of a trace space and a kernel, for symmetric M and as precise."""
+    TP, TR = (B @ P).astype(np.float32), (B @ R).astype(np.float32)
+    MR = M @ TR
+    return np.block([[congruent(TP, M), TP.T @ MR], [(TP.T @ MR).T, TR.T @ MR]]).astype(float)
+
+
+def soft_modes(held: Float, N: Float, threshold: float) -> Float:
+    """(m, j) eigenvectors q of P^T S P q = theta P^T N P q with theta < threshold, besides the kernel of S.
+
+    Args:
+        held: (m, m) P^T S P, the kernel of S held.
+        N: (m + k, m + k) that of [P R], with the kernel R (n, k) of S.
+    """
+    m = len(held)
+    NR, RNR = N[:m, m:], N[m:, m:]
+    # Less the kernel's part, N has eigenvectors N-orthogonal to the kernel, and S may be held.
+    rest = N[:m, :m] - NR @ np.linalg.pinv(RNR, rcond=NULL, hermitian=True) @ NR.T
+    # A Cholesky factorization tells at a tenth of the cost whether there are any.
+    if not dpotrf(held - threshold * rest, lower=1)[1]:
+        return np.zeros((m, 0))
+    return np.asarray(eigh(rest, held, subset_by_value=(1.0 / threshold, np.inf), overwrite_a=True)[1])

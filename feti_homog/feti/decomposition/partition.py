@@ -1,0 +1,131 @@
+"""Who gets what: constituents -> subdomains -> ranks, decided on rank 0 from the coarse mesh."""
+
+from __future__ import annotations
+
+import heapq
+from dataclasses import dataclass
+
+import numpy as np
+import pymetis
+from numpy.typing import NDArray
+from scipy.sparse import coo_matrix, csr_matrix
+
+from feti_homog.cell.periodic_topology import Torus, components, edge_pairs, shared_edges
+
+Int = NDArray[np.int64]
+
+# METIS takes whole numbers: of so many classes of length.
+LENGTHS = 100
+# How much more load the fullest rank may have if that keeps neighbours together.
+UNEVEN = 1.03
+
+
+@dataclass(frozen=True)
+class Decomposition:
+    """Subdomain of each coarse triangle, (m,), and rank of each subdomain, (s,)."""
+
+    subdomain: Int
+    rank: Int
+
+
+def decompose(torus: Torus, parts: Int, pieces: Int, n_ranks: int) -> Decomposition:
+    """Cut the bodies into pieces and deal them out.
+
+    Args:
+        parts: (m,) body of each triangle: `torus.constituent`, or `torus.plane_parts()`.
+        pieces: (b,) wanted pieces of each body; METIS cuts a body that has more than one, by short cuts: so
+            they rather cross narrow gaps than run along them, which converges better.
+        n_ranks: ranks to share the subdomains; some get none if there are more ranks than subdomains.
+
+    Every subdomain is connected through edges: pieces that METIS leaves in several parts are split.
+    """
+    left, right = edge_pairs(torus.triangle_torus_edges)
+    inside = parts[left] == parts[right]
+    length = torus.edge_lengths[shared_edges(torus.triangle_torus_edges)]
+    weight = np.ceil(LENGTHS * length / length.max()).astype(np.int64)
+    piece = _cut(parts, pieces, left[inside], right[inside], weight[inside])
+    key = parts * (piece.max() + 1) + piece
+    together = key[left] == key[right]
+    connected = components(len(parts), left[together], right[together])
+    # Numbered body by body, so that neighbours in number are neighbours in place.
+    order = np.lexsort((connected, piece, parts))
+    first = np.unique(connected[order], return_index=True)[1]
+    number = np.empty_like(first)
+    number[np.argsort(first)] = np.arange(len(first))
+    subdomain = number[connected]
+    load, apart = np.bincount(subdomain), ~together
+    return Decomposition(subdomain, _deal(load, subdomain[left[apart]], subdomain[right[apart]], n_ranks))
+
+
+def pieces_for_count(load: Int, wanted: int) -> Int:
+    """(b,) pieces of each body: `wanted` in all (never fewer than one a body), the largest pieces halved first."""
+    pieces = np.ones(len(load), np.int64)
+    heap = [(-float(size), body) for body, size in enumerate(load)]
+    heapq.heapify(heap)
+    for _ in range(wanted - len(load)):
+        body = heap[0][1]
+        if pieces[body] >= load[body]:
+            break
+        pieces[body] += 1
+        heapq.heapreplace(heap, (-load[body] / pieces[body], body))
+    return pieces
+
+
+def pieces_for_size(load: Int, dofs_per_load: float, max_dofs: int) -> Int:
+    """(b,) pieces of each body such that none has many more than `max_dofs` degrees of freedom."""
+    return np.minimum(np.ceil(load * dofs_per_load / max_dofs).astype(np.int64), load)
+
+
+def _cut(parts: Int, pieces: Int, left: Int, right: Int, weight: Int) -> Int:
+    """Piece of each triangle among those of its body; `weight` is the cost of parting neighbours (left, right)."""
+    members, own = np.argsort(parts, kind="stable"), np.argsort(parts[left], kind="stable")
+    load, edges = np.bincount(parts, minlength=len(pieces)), np.bincount(parts[left], minlength=len(pieces))
+    first, first_edge = np.cumsum(load) - load, np.cumsum(edges) - edges
+    number = np.empty(len(parts), np.int64)
+    number[members] = np.arange(len(parts)) - np.repeat(first, load)
+    piece = np.zeros(len(parts), np.int64)
+    for body in np.flatnonzero(pieces > 1):
+        those = own[first_edge[body] : first_edge[body] + edges[body]]
+        graph = _graph(load[body], number[left[those]], number[right[those]], weight[those])
+        piece[members[first[body] : first[body] + load[body]]] = _metis(graph, int(pieces[body]))
+    return piece
+
+
+def _graph(n: int, left: Int, right: Int, weight: Int) -> csr_matrix:
+    """(n, n) symmetric: sums of the weights of the pairs (left, right)."""
+    both = (np.r_[left, right], np.r_[right, left])
+    return coo_matrix((np.r_[weight, weight], both), shape=(n, n)).tocsr()
+
+
+def _metis(graph: csr_matrix, count: int, load: Int | None = None) -> Int:
+    """Part of each vertex; parts of about equal `load`, or number of vertices, with edges of small weight between."""
+    options = pymetis.Options(contig=int(load is None), seed=0)
+    _, part = pymetis.part_graph(
+        count,
+        pymetis.CSRAdjacency(graph.indptr, graph.indices),
+        eweights=graph.data,
+        vweights=load,
+        options=options,
+    )
+    return np.asarray(part, np.int64)
+
+
+def _deal(load: Int, left: Int, right: Int, n_ranks: int) -> Int:
+    """Rank of each subdomain: neighbours (left, right) on the same one as far as the loads stay even."""
+    even = _dealt_evenly(load, n_ranks)
+    if n_ranks == 1 or len(load) <= n_ranks:
+        return even
+    near = _metis(_graph(len(load), left, right, np.ones_like(left)), n_ranks, load)
+    most = [np.bincount(ranks, load, n_ranks).max() for ranks in (near, even)]
+    return near if most[0] <= UNEVEN * most[1] and len(np.unique(near)) == n_ranks else even
+
+
+def _dealt_evenly(load: Int, n_ranks: int) -> Int:
+    """Rank of each subdomain: the largest goes first, each to the least loaded rank."""
+    ranks = np.zeros(len(load), np.int64)
+    heap = [(0, rank) for rank in range(n_ranks)]
+    for subdomain in np.argsort(-load, kind="stable"):
+        total, rank = heap[0]
+        ranks[subdomain] = rank
+        heapq.heapreplace(heap, (total + int(load[subdomain]), rank))
+    return ranks

@@ -1,0 +1,157 @@
+"""One subdomain: its refined mesh, stiffness, load and kernel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix, diags
+
+from feti_homog.cell.refinement import FineMesh, Lattice, refine
+from feti_homog.cell.submesh import Piece
+from feti_homog.cell.unwrap import unwrap
+from feti_homog.errors import MeshError
+from feti_homog.fem.assembly import assemble
+
+Int = NDArray[np.int64]
+Float = NDArray[np.float64]
+
+KERNEL_TOLERANCE = 1e-10
+
+
+@dataclass(frozen=True)
+class Subdomain:
+    """A body or a piece of it, with c node classes and kernel dimension k.
+
+    Attributes:
+        piece: the coarse share.
+        mesh: the refined mesh.
+        L: (3, 3) stiffness of the material.
+        Q: (2c, 3) load of the unit strains: f = -Q E.
+        area: of the subdomain.
+        R: (2c, k) orthonormal kernel of K: two translations, and a rotation if the piece can turn,
+            less what the pinned class stops.
+        positions: (c, 2) unwrapped positions of the classes.
+    """
+
+    piece: Piece
+    mesh: FineMesh
+    L: Float
+    Q: Float
+    area: float
+    R: Float
+    positions: Float
+
+    @classmethod
+    def build(cls, piece: Piece, lattice: Lattice, L: Float) -> Subdomain:
+        """Refine and assemble, without communication.
+
+        Raises:
+            MeshError: an element is inverted, or the rigid-body modes are not in the kernel of K.
+        """
+        mesh = refine(piece, lattice)
+        _check_corners(piece, mesh)
+        body = assemble(mesh, L)
+        shift, closes = unwrap(piece)
+        positions = np.empty((mesh.n_classes, 2))
+        positions[mesh.node_class[mesh.nodes]] = mesh.points[mesh.nodes] + shift[:, None]
+        R = kernel(positions, closes, piece.pinned)
+        K = _pinned(body.K, piece.pinned)
+        _check_kernel(piece, K, R)
+        Q = body.Q
+        if piece.pinned >= 0:
+            Q[2 * piece.pinned : 2 * piece.pinned + 2] = 0.0
+        subdomain = cls(piece, mesh, L, Q, body.area, R, positions)
+        subdomain.__dict__["K"] = K
+        return subdomain
+
+    @cached_property
+    def K(self) -> csr_matrix:
+        """(2c, 2c) stiffness, the pinned class (15) eliminated by a unit row scaled like the others."""
+        return _pinned(assemble(self.mesh, self.L).K, self.piece.pinned)
+
+    def release(self) -> None:
+        """Free the memory of K, which is assembled again when it is wanted."""
+        self.__dict__.pop("K", None)
+
+    def fixing(self, candidates: Int) -> tuple[Int, Float]:
+        """Degrees of freedom and dense block rho Rf Rf^T that make K + block an SPD matrix.
+
+        Its inverse is a generalized inverse K+ of K.  Rf is the kernel restricted to at most three of the
+        `candidates` (nodes), far apart, and orthonormalised (Brzobohaty, Dostal, Kozubek, Kovar, Markopoulos,
+        IJNME 88, 2011).
+        """
+        if self.R.shape[1] == 0:
+            return np.zeros(0, np.int64), np.zeros((0, 0))
+        # On a straight line two are enough, and the third is one of them.
+        nodes = np.unique(self._far_apart(candidates))
+        dofs = both_directions(nodes)
+        Rf = np.linalg.qr(self.R[dofs])[0]
+        return dofs, self.K.diagonal()[dofs].mean() * Rf @ Rf.T
+
+    def regularised(self, candidates: Int) -> csr_matrix:
+        """K with the block of `fixing`."""
+        dofs, block = self.fixing(candidates)
+        rows, columns = np.meshgrid(dofs, dofs, indexing="ij")
+        return (self.K + csr_matrix((block.ravel(), (rows.ravel(), columns.ravel())), shape=self.K.shape)).tocsr()
+
+    def _far_apart(self, candidates: Int) -> Int:
+        """Three far-apart nodes for three modes, else the one farthest from the pinned class."""
+        x = self.positions[candidates]
+        origin = self.positions[self.piece.pinned] if self.piece.pinned >= 0 else x.mean(axis=0)
+        a = np.argmax(((x - origin) ** 2).sum(axis=1))
+        if self.R.shape[1] < 3:
+            return candidates[[a]]
+        b = np.argmax(((x - x[a]) ** 2).sum(axis=1))
+        (dx, dy), (ex, ey) = x[b] - x[a], (x - x[a]).T
+        return candidates[[a, b, np.argmax(np.abs(dx * ey - dy * ex))]]
+
+
+def both_directions(nodes: Int) -> Int:
+    """(2n,) degrees of freedom of the nodes (n,)."""
+    return np.asarray((2 * nodes[:, None] + np.arange(2)).ravel())
+
+
+def kernel(positions: Float, rotates: bool, pinned: int) -> Float:
+    """Orthonormal rigid-body modes (2c, k) of nodes at `positions` (c, 2); `pinned` is a node or -1."""
+    free = np.zeros((len(positions), 2, 0)) if pinned >= 0 else np.tile(np.eye(2), (len(positions), 1, 1))
+    if rotates:
+        centre = positions[pinned] if pinned >= 0 else positions.mean(axis=0)
+        x, y = (positions - centre).T
+        turn = np.stack([-y, x], axis=1)[..., None] / max(np.ptp(x), np.ptp(y))
+        free = np.concatenate([free, turn], axis=2)
+    return np.linalg.qr(free.reshape(2 * len(positions), -1))[0]
+
+
+def _pinned(K: csr_matrix, pinned: int) -> csr_matrix:
+    if pinned < 0:
+        return K
+    keep = np.ones(K.shape[0])
+    keep[2 * pinned : 2 * pinned + 2] = 0.0
+    mask = diags(keep)
+    return (mask @ K @ mask + diags((1 - keep) * K.diagonal().max())).tocsr()
+
+
+def _check_kernel(piece: Piece, K: csr_matrix, R: Float) -> None:
+    residual = abs(K @ R).max(initial=0.0) / abs(K.data).max()
+    if residual > KERNEL_TOLERANCE:
+        raise MeshError(
+            f"subdomain {piece.index} ({piece.phase}) near ({piece.points[0, 0]:.6g}, {piece.points[0, 1]:.6g}): "
+            f"|K R| / |K| = {residual:.1e}, expected at most {KERNEL_TOLERANCE:.0e}; its elements are degenerate"
+        )
+
+
+def _check_corners(piece: Piece, mesh: FineMesh) -> None:
+    """Refuse triangles that bending towards the circles has turned over."""
+    triangles = mesh.nodes[mesh.curved][:, mesh.lattice.triangles[:, :3]].reshape(-1, 3)
+    a, b, c = (mesh.points[triangles[:, k]] for k in range(3))
+    doubled = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
+    inverted = np.flatnonzero(doubled <= 0)
+    if len(inverted):
+        x, y = mesh.points[triangles[inverted[0]]].mean(axis=0)
+        raise MeshError(
+            f"[cell] refine, order: {len(inverted)} refined elements of {piece.phase} are inverted, the first "
+            f"near ({x:.6g}, {y:.6g}); expected a mesh fine enough for its curved interfaces"
+        )

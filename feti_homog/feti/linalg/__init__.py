@@ -1,0 +1,4 @@
+"""Linear algebra that the FETI method needs and no library has in one call; factorizations are PETSc's.
+
+May use `thresholds` and `common`.  Main entries: `sparse_direct.DirectSolver` and `saddle_point.SaddlePoint`.
+"""

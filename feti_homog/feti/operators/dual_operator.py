@@ -1,0 +1,30 @@
+"""The dual operator F = sum_s B K+ B^T, Eq. (36), on the owned rows of multiplier vectors."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feti_homog.feti.decomposition.jump_operator import Constraints
+from feti_homog.feti.operators.interface_operators import Boundary
+
+Float = NDArray[np.float64]
+
+
+class DualOperator:
+    """y = F x.  Symmetric positive definite, since B has full row rank and K+ is definite."""
+
+    def __init__(self, constraints: Constraints, boundary: Boundary) -> None:
+        self.constraints, self.boundary = constraints, boundary
+
+    def apply(self, x: Float) -> Float:
+        """sum_s B K+ B^T x for x (owned rows,) or (owned rows, k)."""
+        return self.jump(self.displacement(x))
+
+    def displacement(self, lam: Float) -> Float:
+        """K+ B^T lam on the boundary dofs: minus the torn cell's answer to multipliers in Eq. (34)."""
+        return self.boundary.flexibility(self.boundary.BT @ self.constraints.gather(lam))
+
+    def jump(self, u: Float) -> Float:
+        """B u, Eq. (33), for displacements u (boundary dofs,) or (boundary dofs, k)."""
+        return self.constraints.sum(self.boundary.B @ u)

@@ -1,0 +1,50 @@
+"""Matrices on the multipliers that couple only the rows of one fine node, such as B B^T."""
+
+from __future__ import annotations
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
+
+from feti_homog.feti.decomposition.jump_operator import Constraints
+from feti_homog.feti.linalg.distributed_matrix import assembled
+
+Int = NDArray[np.int64]
+Float = NDArray[np.float64]
+
+
+class NodeBlocks:
+    """The owned rows of the sum over ranks of `local` (local rows, local rows), as small dense blocks by size."""
+
+    def __init__(self, comm: MPI.Intracomm, constraints: Constraints, local: csr_matrix) -> None:
+        first, last = constraints.owned
+        matrix = assembled(comm, local, constraints.rows, constraints.rows, (last - first, last - first))
+        entries = matrix[:, first:last].tocoo()
+        starts, sizes = constraints.blocks
+        self.rows = last - first
+        self.blocks: list[tuple[Int, Float]] = []
+        block = np.repeat(np.arange(len(starts)), sizes)[entries.row]
+        for size in np.unique(sizes):
+            some = np.flatnonzero(sizes == size)
+            number = np.full(len(starts), -1)
+            number[some] = np.arange(len(some))
+            mine = number[block] >= 0
+            own = block[mine]
+            dense = np.zeros((len(some), size, size))
+            dense[number[own], entries.row[mine] - starts[own], entries.col[mine] - starts[own]] = entries.data[mine]
+            self.blocks.append((starts[some][:, None] + np.arange(size), dense))
+
+    def inverse(self, active: Float) -> csr_matrix:
+        """Inverse of the active rows and columns, 0 on the others."""
+        rows, columns, values = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)], [np.zeros(0)]
+        for at, dense in self.blocks:
+            mask = active[at]
+            both = mask[:, :, None] * mask[:, None, :]
+            unit = np.eye(at.shape[1]) * (1 - mask)[:, :, None]
+            rows.append(np.broadcast_to(at[:, :, None], dense.shape).ravel())
+            columns.append(np.broadcast_to(at[:, None, :], dense.shape).ravel())
+            inverse: Float = np.linalg.inv(both * dense + unit)
+            values.append((both * inverse).ravel())
+        shape = (self.rows, self.rows)
+        return csr_matrix((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=shape)

@@ -1,0 +1,64 @@
+"""The cell with all bonds intact, on the shared nodes: one displacement a node, u = Z y with B Z = 0."""
+
+from __future__ import annotations
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
+
+from feti_homog.feti.decomposition.jump_operator import Constraints
+from feti_homog.feti.linalg.distributed_matrix import Blocks, total
+from feti_homog.feti.linalg.sparse_direct import DirectSolver
+from feti_homog.feti.operators.explicit import Condensed
+from feti_homog.feti.operators.interface_operators import Boundary
+
+Int = NDArray[np.int64]
+Float = NDArray[np.float64]
+
+
+class BondedCell:
+    """Z^T S Z of all subdomains, factored once; every rank holds the factor.
+
+    Attributes:
+        size: dofs on the shared nodes of all ranks, two each.
+    """
+
+    def __init__(self, comm: MPI.Intracomm, constraints: Constraints, boundary: Boundary) -> None:
+        """Assemble and factor; all boundary operators must be dense.  Collective.
+
+        Options have the prefix `feti_bonded_` (default: cholesky by CHOLMOD).
+        """
+        self.comm = comm
+        self._shared = _originals(comm, constraints, boundary)
+        self.size = shared_dofs(comm, constraints)
+        stiffness = Blocks((self.size, self.size))
+        for operator, span in zip(boundary.operators, boundary.spans, strict=True):
+            if not isinstance(operator, Condensed):
+                raise TypeError("the bonded cell needs dense boundary operators")
+            stiffness.add(self._shared[span], self._shared[span], operator.S)
+        self._solver = DirectSolver(total(comm, stiffness.matrix()), "feti_bonded_")
+        entries = np.ones(len(self._shared)), (self._shared, np.arange(len(self._shared)))
+        self._ZT = csr_matrix(entries, shape=(self.size, len(self._shared)))
+
+    def relaxed(self, forces: Float) -> Float:
+        """-Z (Z^T S Z)^-1 Z^T f for boundary forces f (n,) or (n, k): the motion that takes them off shared nodes."""
+        right = -self._ZT @ forces
+        self.comm.Allreduce(MPI.IN_PLACE, right)
+        return self._solver.solve(right)[self._shared]
+
+
+def shared_dofs(comm: MPI.Intracomm, constraints: Constraints) -> int:
+    """The size of the bonded cell; collective."""
+    return int(comm.allreduce(2 * len(constraints.blocks[0])))
+
+
+def _originals(comm: MPI.Intracomm, constraints: Constraints, boundary: Boundary) -> Int:
+    """The global number of the shared dof that each boundary dof is a copy of."""
+    starts, sizes = constraints.blocks
+    order = np.argsort(starts)
+    first = comm.exscan(len(starts)) or 0
+    node = constraints.gather(np.repeat(first + np.arange(len(starts)), sizes[order]).astype(float))
+    # Each copy of a node takes part in some row of it, and its two dofs are neighbours.
+    row = boundary.BT.indices[boundary.BT.indptr[:-1]]
+    return np.asarray(2 * node[row].astype(np.int64) + np.arange(len(row)) % 2)

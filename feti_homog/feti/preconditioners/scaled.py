@@ -1,0 +1,96 @@
+"""Preconditioners of the dual problem: none, lumped, Dirichlet, scaled by stiffness.
+
+M^-1 = W^-1 B D^-1 S D^-1 B^T W^-1 on the active rows, with W = B D^-1 B^T and D the mean diagonal stiffness of
+each node.  W is block-diagonal by node.  S is the boundary block of K (lumped), or its Schur complement (Dirichlet).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix, diags
+
+from feti_homog.feti.decomposition.jump_operator import Constraints
+from feti_homog.feti.operators.interface_operators import Boundary
+from feti_homog.feti.operators.node_blocks import NodeBlocks
+
+Int = NDArray[np.int64]
+Float = NDArray[np.float64]
+
+
+class Preconditioner(Protocol):
+    """z = M^-1 r on the owned rows, for r (owned rows,) or (owned rows, k)."""
+
+    def activate(self, active: Float) -> None:
+        """Restrict to the rows where `active` is 1."""
+
+    def apply(self, r: Float) -> Float:
+        """M^-1 r; r and the result are 0 on inactive rows."""
+
+    def first(self, start: Float, closing: Float) -> Float:
+        """First multipliers of a solve: `start`, those of an earlier one, or `closing`, P M^-1 of the jump."""
+
+
+class Identity:
+    """z = r."""
+
+    def activate(self, active: Float) -> None:
+        """Nothing depends on the rows."""
+
+    def apply(self, r: Float) -> Float:
+        """r."""
+        return r.copy()
+
+    def first(self, start: Float, closing: Float) -> Float:
+        """What solved an earlier problem."""
+        return start
+
+
+class Scaled:
+    """M^-1 with the scaling of this module around a boundary stiffness.
+
+    Attributes:
+        BD: (local rows, boundary dofs) B D^-1.
+    """
+
+    def __init__(
+        self, comm: MPI.Intracomm, constraints: Constraints, boundary: Boundary, stiffness: Callable[[Float], Float]
+    ) -> None:
+        self.constraints, self.stiffness = constraints, stiffness
+        # Both directions of a node are on the boundary.
+        flexibility = diags(np.repeat(2.0 / boundary.diagonal.reshape(-1, 2).sum(axis=1), 2))
+        self.BD: csr_matrix = (boundary.B @ flexibility).tocsr()
+        self.DBT = self.BD.T.tocsr()
+        self.W = NodeBlocks(comm, constraints, self.BD @ boundary.B.T)
+        self.activate(np.ones(self.W.rows))
+
+    def activate(self, active: Float) -> None:
+        """Invert the active part of W."""
+        self.W_inverse = self.W.inverse(active)
+
+    def apply(self, r: Float) -> Float:
+        """W^-1 B D^-1 S D^-1 B^T W^-1 r."""
+        x = self.DBT @ self.constraints.gather(self.W_inverse @ r)
+        return np.asarray(self.W_inverse @ self.constraints.sum(self.BD @ self.stiffness(x)))
+
+    def first(self, start: Float, closing: Float) -> Float:
+        """What solved an earlier problem."""
+        return start
+
+
+class Dirichlet(Scaled):
+    """Around the Schur complements."""
+
+    def __init__(self, comm: MPI.Intracomm, constraints: Constraints, boundary: Boundary) -> None:
+        super().__init__(comm, constraints, boundary, boundary.stiffness)
+
+
+class Lumped(Scaled):
+    """Around the boundary blocks of K."""
+
+    def __init__(self, comm: MPI.Intracomm, constraints: Constraints, boundary: Boundary) -> None:
+        super().__init__(comm, constraints, boundary, boundary.Kbb.__matmul__)

@@ -1,0 +1,149 @@
+"""Macroscopic response of the torn cell, and the laws that every response must obey.
+
+Voigt order [11, 22, 12] with engineering shear; stresses in the unit of the moduli.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from feti_homog.errors import ConvergenceError
+from feti_homog.feti.decomposition.subdomain import Subdomain
+from feti_homog.feti.operators.node_blocks import NodeBlocks
+from feti_homog.homogenization.unit_cell import TornCell
+from feti_homog.interface.contact import BONDED, CLOSED, OPEN, Equilibrium, Interface, Status
+
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Response:
+    """The cell under one macroscopic strain.
+
+    Attributes:
+        strain: (3,) E.
+        stress: (3,) Sigma = <sigma>.
+        scale: the response is `scale` times `state`.
+        state: interface states, multipliers, jumps and amplitudes.
+        u: (boundary dofs,) fluctuating displacement u* on the boundaries of this rank's subdomains.
+        checks: relative errors of the laws: `strain` <eps> = E, Eq. (3), with the opening of debonded faces as
+            part of <eps>; `hill` <sigma:eps> = Sigma:E, Eq. (8); `jump`, the largest opening of a glued
+            node relative to the largest displacement; and the KKT certificate of contact.
+        counts: numbers of `bonded`, `open` and `closed` interface nodes.
+    """
+
+    strain: Float
+    stress: Float
+    scale: float
+    state: Equilibrium
+    u: Float
+    checks: dict[str, float]
+    counts: dict[str, int]
+
+
+class Homogenization:
+    """Averages over a torn cell with its interfaces."""
+
+    def __init__(self, cell: TornCell, contact: bool) -> None:
+        self.cell = cell
+        self.interface = Interface(cell.solver, contact, np.array([cell.plan.width, cell.plan.height]))
+
+    def respond(self, strains: Float, status: Status, starts: Sequence[Float]) -> list[Response]:
+        """Solve the unit-cell problem under every strain of (k, 3) and average.  Collective.
+
+        `status` says which nodes are debonded and guesses who is in contact; `starts` are first multipliers.
+
+        Raises:
+            ConvergenceError: a solve broke down and left no numbers.
+        """
+        if self.interface.is_linear(status):
+            return [self._finite(state) for state in self.interface.equilibria(strains, status, starts)]
+        pairs = zip(strains, starts, strict=True)
+        return [self._finite(self.interface.equilibrium(strain, status, start)) for strain, start in pairs]
+
+    def _finite(self, state: Equilibrium) -> Response:
+        """The response of the state that was just found, unless it is no state."""
+        if not np.isfinite(state.solution.residual):
+            raise ConvergenceError(
+                f"strain {state.solution.strain.tolist()}: the Krylov method broke down after {state.iterations} "
+                f"iterations (KSPConvergedReason {state.solution.reason})"
+            )
+        return self.response(state, 1.0)
+
+    def response(self, state: Equilibrium, scale: float) -> Response:
+        """`scale` times an equilibrium, averaged.  Collective."""
+        cell, solver = self.cell, self.cell.solver
+        strain, u = state.solution.strain, solver.boundary_displacement(state.solution)
+        stress, star, energy = self._averages(strain, u)
+        opening = cell.comm.allreduce(self._strain_of_jumps.T @ (state.solution.jump * (1 - solver.active.mask)))
+        largest = (self._largest(u) + self.interface.imposed(strain)) or 1.0
+        checks = {
+            "strain": float(np.abs(star - opening / cell.plan.area).max() / (np.abs(strain).max() or 1.0)),
+            "hill": float(abs(energy - stress @ strain) / (abs(energy) or 1.0)),
+            "jump": self._largest(solver.active.mask * state.solution.jump) / largest,
+        }
+        counts = self.counts(state.status)
+        return Response(scale * strain, scale * stress, scale, state, scale * u, checks | state.certificate, counts)
+
+    def counts(self, status: Status) -> dict[str, int]:
+        """Interface nodes in each state; collective."""
+        numbers = np.array([(status == kind).sum() for kind in (BONDED, OPEN, CLOSED)])
+        total = self.cell.comm.allreduce(numbers)
+        return dict(zip(("bonded", "open", "closed"), total.tolist(), strict=True))
+
+    @cached_property
+    def _strain_of_jumps(self) -> Float:
+        """(owned rows, 3) nu with int eps* = nu^T B u for every displacement u: nu = (B B^T)^-1 B int B_e."""
+        solver = self.cell.solver
+        B = solver.boundary.B
+        unit = [np.linalg.solve(s.L, Q.T).T for s, Q in self._loads()]
+        summed = solver.constraints.sum(B @ np.concatenate([np.zeros((0, 3)), *unit]))
+        gram = NodeBlocks(self.cell.comm, self.cell.solver.constraints, B @ B.T)
+        return np.asarray(gram.inverse(np.ones(gram.rows)) @ summed)
+
+    def _averages(self, E: Float, u: Float) -> tuple[Float, Float, float]:
+        """<sigma>, <eps*> over the bodies, and <sigma:eps>; collective."""
+        cell, total = self.cell, np.zeros(7)
+        for (s, Q), span in zip(self._loads(), cell.solver.boundary.spans, strict=True):
+            from_u = Q.T @ u[span]
+            total[:3] += s.area * s.L @ E + from_u
+            total[3:6] += np.linalg.solve(s.L, from_u)
+            total[6] += s.area * E @ s.L @ E + 2 * E @ from_u
+        total[6] += u @ cell.solver.boundary.stiffness(u)
+        cell.comm.Allreduce(MPI.IN_PLACE, total)
+        total /= cell.plan.area
+        return total[:3], total[3:6], float(total[6])
+
+    def _loads(self) -> list[tuple[Subdomain, Float]]:
+        """The subdomains and their Q on the boundary dofs; inside a uniform body it vanishes."""
+        solver = self.cell.solver
+        return [(s, solver.loads[span]) for s, span in zip(solver.subdomains, solver.boundary.spans, strict=True)]
+
+    def _largest(self, values: Float) -> float:
+        """max |values| over all ranks."""
+        return float(self.cell.comm.allreduce(np.abs(values).max(initial=0.0), MPI.MAX))
+
+
+def asymmetry(L: Float) -> float:
+    """max |L - L^T| / max |L|."""
+    return float(np.abs(L - L.T).max() / np.abs(L).max())
+
+
+def displacement(cell: TornCell, strain: Float, u: Float) -> Float:
+    """(nodes, 2) total displacement E y + u*, Eq. (14), at this rank's plane nodes."""
+    E = np.array([[strain[0], strain[2] / 2], [strain[2] / 2, strain[1]]])
+    points = np.concatenate([s.mesh.points for s in cell.subdomains] or [np.zeros((0, 2))])
+    return points @ E + fluctuation(cell, u)
+
+
+def fluctuation(cell: TornCell, u: Float) -> Float:
+    """(nodes, 2) u* at this rank's plane nodes."""
+    parts = zip(cell.subdomains, cell.offsets, strict=False)
+    own = [u[o : o + len(s.Q)].reshape(-1, 2)[s.mesh.node_class] for s, o in parts]
+    return np.concatenate(own or [np.zeros((0, 2))])

@@ -1,0 +1,81 @@
+"""Debonded arcs: where their tips are, and which nodes of the interface are within them.
+
+Directions are degrees about the centre of a fibre, from x1 towards x2.  The tips of an arc stay bonded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feti_homog.config.schema import shown
+from feti_homog.config.sections import Arc
+
+Int = NDArray[np.int64]
+Float = NDArray[np.float64]
+Bool = NDArray[np.bool_]
+
+# A node within so many degrees of a tip is the tip.
+SAME = 1e-6
+
+
+def tips(arcs: Sequence[Arc], values: Sequence[float], fibres: int) -> dict[int, list[float]]:
+    """Directions in [0, 360) of the tips of arcs on each of so many fibres, which are here numbered from 0.
+
+    An arc without an angle has every one of `values` in turn. Openings of 0 and 360 degrees have no tips.
+    """
+    marks: dict[int, set[float]] = {}
+    for arc in arcs:
+        halves = [opening / 2 for opening in (values if arc.angle is None else (arc.angle,)) if 0 < opening < 360]
+        ends = {round(arc.centre + side * half, 9) % 360.0 for half in halves for side in (-1, 1)}
+        for fibre in range(1, fibres + 1) if isinstance(arc.fibre, str) else arc.fibre:
+            marks.setdefault(fibre - 1, set()).update(ends)
+    return {fibre: sorted(marks[fibre]) for fibre in sorted(marks) if marks[fibre]}
+
+
+def angles(points: Float, fibre: Int, centres: Float, period: Float) -> Float:
+    """Directions (k,) in (-180, 180] of points (k, 2) from the nearest image of centres[fibre], (c, 2).
+
+    NaN where the fibre has no centre.
+    """
+    offset = points - centres[fibre]
+    offset -= np.round(offset / period) * period
+    return np.asarray(np.degrees(np.arctan2(offset[:, 1], offset[:, 0])))
+
+
+def debonded(
+    arcs: Sequence[Arc], opening: float | None, fibre: Int, angle: Float, tolerance: float | Float = SAME
+) -> Bool:
+    """Whether nodes are within an arc of their fibre: (k,) for the fibres' numbers from 1 and directions (k,).
+
+    `opening` is that of arcs without an angle; `tolerance`, one or (k,), how near a tip a node is the tip itself.
+    """
+    inside = np.zeros(len(fibre), bool)
+    for arc in arcs:
+        whole = opening if arc.angle is None else arc.angle
+        if whole is None:
+            raise ValueError("an arc without an angle needs an opening")
+        away = np.abs((angle - arc.centre + 180.0) % 360.0 - 180.0)
+        within = (away < whole / 2 - tolerance) | (whole >= 360.0)
+        inside |= within & (np.isin(fibre, arc.fibre) if isinstance(arc.fibre, tuple) else True)
+    return inside
+
+
+def faults(arcs: Sequence[Arc], centres: Float) -> list[str]:
+    """What is wrong with arcs on a cell whose fibres have these centres (fibres, 2), NaN where there is none."""
+    found = []
+    for place, arc in enumerate(arcs):
+        chosen = range(1, len(centres) + 1) if isinstance(arc.fibre, str) else arc.fibre
+        written = arc.fibre if isinstance(arc.fibre, str) or len(arc.fibre) > 1 else arc.fibre[0]
+        line = f"[interface] debonded[{place}].fibre = {shown(written)}: "
+        if max(chosen, default=0) > len(centres):
+            found.append(f"{line}expected at most {len(centres)}; the cell has {len(centres)} fibres, counted from 1")
+        winding = [number for number in chosen if number <= len(centres) and np.isnan(centres[number - 1, 0])]
+        if winding and arc.angle not in (0.0, 360.0):
+            found.append(
+                f"{line}fibre {winding[0]} has no centre, for it winds around the cell; expected angle = 360, or "
+                'a physical curve "debonded" in the mesh'
+            )
+    return found

@@ -1,0 +1,155 @@
+"""Checkpoints of a path: one small HDF5 file an event, written whole or not at all.
+
+Rank 0 writes what the ranks' parts add up to; it concerns the interfaces only.  The events' files are numbered
+without gaps; each carries the run that it belongs to and a checksum.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from feti_homog.common.mpi_errors import on_root, on_root_only
+from feti_homog.config.case import Case
+from feti_homog.errors import CaseError, FetiHomogError
+from feti_homog.output.files import result_json
+
+FOLDER = "checkpoint"
+
+Arrays = dict[str, NDArray[Any]]
+
+
+def finished(directory: Path, case: Case) -> bool:
+    """Whether `directory` has the finished result of this case and no checkpoint of a later run.  Call on one rank."""
+    if (directory / FOLDER).is_dir() or not (directory / result_json.NAME).is_file():
+        return False
+    document = result_json.read(directory)
+    return document.get("status") == "done" and document.get("digest") == case.digest()
+
+
+class Checkpoint:
+    """The events of one path in `directory`/checkpoint; every method is collective.
+
+    Attributes:
+        signature: text that an event must carry to belong to this run: case, subdomains and ranks.
+    """
+
+    def __init__(self, directory: Path, comm: MPI.Intracomm, signature: str) -> None:
+        self.folder, self.comm, self.signature = directory / FOLDER, comm, signature
+
+    def clear(self) -> int:
+        """Forget all events; returns how many there were."""
+        return on_root(self.comm, self._clear)
+
+    def read(self) -> list[Arrays]:
+        """The events so far, in their order: this rank's part of distributed arrays, all of the others.
+
+        Raises:
+            CaseError: an event is unreadable or of another run.
+        """
+        events = on_root_only(self.comm, self._read_all)
+        parts = None if events is None else [[_part(e, rank) for e in events] for rank in range(self.comm.size)]
+        own: list[Arrays] = self.comm.scatter(parts or [])
+        return own
+
+    def write(self, number: int, whole: Mapping[str, Any], distributed: Mapping[str, NDArray[Any]]) -> None:
+        """Add event `number`: numbers that all ranks share, and arrays of which each has a part.
+
+        Raises:
+            FetiHomogError: the file cannot be written.
+        """
+        gathered = {name: self.comm.gather(part) for name, part in distributed.items()}
+        on_root(self.comm, self._write, number, whole, gathered)
+
+    def _clear(self) -> int:
+        """Under its own name the folder is there as a whole or not at all."""
+        count, dropped = len(self._files()), self.folder.with_suffix(".dropped")
+        shutil.rmtree(dropped, ignore_errors=True)
+        if self.folder.is_dir():
+            os.replace(self.folder, dropped)
+            shutil.rmtree(dropped, ignore_errors=True)
+        return count
+
+    def _files(self) -> list[Path]:
+        return sorted(self.folder.glob("[0-9]*.h5")) if self.folder.is_dir() else []
+
+    def _read_all(self) -> list[Arrays]:
+        files = self._files()
+        missing = next((n for n, path in enumerate(files) if path.stem != f"{n:06d}"), None)
+        if missing is not None:
+            raise CaseError(f"--resume: event {missing:06d} is missing in {self.folder}")
+        return [self._read_event(path) for path in files]
+
+    def _read_event(self, path: Path) -> Arrays:
+        try:
+            with h5py.File(path, "r") as file:
+                signature, checksum = file.attrs["signature"], file.attrs["checksum"]
+                event = {name: table[()] for name, table in file.items()}
+        except Exception as error:  # of damaged files h5py says anything
+            raise CaseError(f"--resume: {path} is no readable event of a path: {error}") from error
+        if signature != self.signature:
+            raise CaseError(f"--resume: {path} is of another run: expected {self.signature}; found {signature}")
+        if checksum != _checksum(event):
+            raise CaseError(f"--resume: {path} is damaged: its checksum is wrong")
+        return event
+
+    def _write(self, number: int, whole: Mapping[str, Any], gathered: Mapping[str, list[NDArray[Any]]]) -> None:
+        path = self.folder / f"{number:06d}.h5"
+        part = path.with_suffix(".part")
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            with h5py.File(part, "w") as file:
+                event = {name: np.asarray(value) for name, value in whole.items()}
+                event |= {name: np.concatenate(parts) for name, parts in gathered.items()}
+                event |= {f"{name}_ends": np.cumsum([len(p) for p in parts]) for name, parts in gathered.items()}
+                for name, value in event.items():
+                    file[name] = value
+                file.attrs.update(signature=self.signature, checksum=_checksum(event))
+            os.replace(part, path)
+        except (OSError, RuntimeError) as error:
+            raise FetiHomogError(f"cannot write {path}: {error}") from error
+
+
+class NoCheckpoint(Checkpoint):
+    """Keeps nothing, for runs that leave no files."""
+
+    def __init__(self, comm: MPI.Intracomm) -> None:
+        super().__init__(Path(), comm, "")
+
+    def clear(self) -> int:
+        return 0
+
+    def read(self) -> list[Arrays]:
+        return []
+
+    def write(self, number: int, whole: Mapping[str, Any], distributed: Mapping[str, NDArray[Any]]) -> None:
+        """Nothing."""
+
+
+def _checksum(event: Arrays) -> str:
+    content = hashlib.sha256()
+    for name in sorted(event):
+        content.update(name.encode() + np.ascontiguousarray(event[name]).tobytes())
+    return content.hexdigest()
+
+
+def _part(event: Arrays, rank: int) -> Arrays:
+    """The event with a rank's share of the distributed arrays."""
+    part = {}
+    for name, table in event.items():
+        if name.endswith("_ends"):
+            continue
+        ends = event.get(f"{name}_ends")
+        if ends is not None:
+            table = table[ends[rank - 1] if rank else 0 : ends[rank]]
+        part[name] = table
+    return part

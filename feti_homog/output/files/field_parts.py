@@ -1,0 +1,82 @@
+"""The torn cell and its responses as the parts of result.h5 that this rank writes."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feti_homog import __version__
+from feti_homog.fem.assembly import element_strain
+from feti_homog.homogenization.averaging import Response, displacement, fluctuation
+from feti_homog.homogenization.unit_cell import TornCell
+from feti_homog.output.files.field_file import Header, InterfacePart, MeshPart, StatePart
+
+Float = NDArray[np.float64]
+
+
+def header(cell: TornCell) -> Header:
+    """What the file says of the whole cell."""
+    case, plan = cell.case, cell.plan
+    return Header(
+        title=case.name,
+        version=__version__,
+        width=plan.width,
+        height=plan.height,
+        order=case.cell.order,
+        refine=case.cell.refine,
+        phases=plan.phases,
+        length_unit=case.output.length_unit,
+        stress_unit=case.output.stress_unit,
+    )
+
+
+def mesh_part(cell: TornCell) -> MeshPart:
+    """The refined meshes of this rank's subdomains, one after the other."""
+    subdomains = cell.subdomains
+    nodes = np.cumsum([0, *(len(s.mesh.points) for s in subdomains)])
+    columns = 3 * cell.case.cell.order
+    sizes = [len(s.mesh.triangles) for s in subdomains]
+    triangles = [s.mesh.triangles + n for s, n in zip(subdomains, nodes, strict=False)]
+    phase = [cell.plan.phases.index(s.piece.phase) for s in subdomains]
+    return MeshPart(
+        points=np.concatenate([s.mesh.points for s in subdomains] or [np.zeros((0, 2))]),
+        triangles=np.concatenate(triangles or [np.zeros((0, columns), np.int64)]),
+        body=np.repeat([s.piece.body for s in subdomains], sizes).astype(np.int32),
+        subdomain=np.repeat([s.piece.index for s in subdomains], sizes).astype(np.int32),
+        phase=np.repeat(phase, sizes).astype(np.int32),
+    )
+
+
+def interface_part(cell: TornCell) -> InterfacePart:
+    """The interface nodes whose multipliers this rank owns."""
+    nodes = cell.solver.constraints.nodes
+    return InterfacePart(nodes.points, nodes.normal, nodes.length, nodes.fibre.astype(np.int32))
+
+
+def state_part(cell: TornCell, response: Response, load_factor: float, label: str) -> StatePart:
+    """The fields of a response; tractions and jumps are scaled like it."""
+    nodes, solution = cell.solver.constraints.nodes, response.state.solution
+    u = response.scale * cell.solver.displacement(solution)
+    pair = nodes.row[:, None] + np.arange(2)
+    return StatePart(
+        strain=response.strain,
+        stress_mean=response.stress,
+        load_factor=load_factor,
+        label=label,
+        displacement=displacement(cell, response.strain, u),
+        fluctuation=fluctuation(cell, u),
+        stress=_element_stress(cell, response.strain, u),
+        traction=response.scale * solution.lam[pair] / nodes.length[:, None],
+        jump=response.scale * solution.jump[pair],
+        status=response.state.status,
+    )
+
+
+def _element_stress(cell: TornCell, E: Float, u: Float) -> Float:
+    """(elements, 3) mean stresses."""
+    stresses = [np.zeros((0, 3))]
+    for s, offset in zip(cell.subdomains, cell.offsets, strict=False):
+        own = u[offset : offset + len(s.Q)].reshape(-1, 2)
+        strain, _ = element_strain(s.mesh.points, s.mesh.triangles, s.mesh.node_class, own)
+        stresses.append((strain + E) @ s.L)
+    return np.concatenate(stresses)

@@ -1,0 +1,111 @@
+"""What the pictures have in common: their style, the frame of a cell, triangles and lines, colour ranges, labels."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from matplotlib.patches import PathPatch
+from matplotlib.path import Path as Path2D
+
+from feti_homog.output.plots.decimation import Array, Drawing
+
+STRAINS = (r"E_{11}", r"E_{22}", r"\gamma_{12}")
+STRESSES = {"S11": r"\sigma_{11}", "S22": r"\sigma_{22}", "S12": r"\sigma_{12}"}
+SAME = 1e-6  # values that differ by less, relatively, are one
+SIDE = 4.8  # inches, the longer side of a drawn cell
+STYLE = {"font.size": 10, "axes.titlesize": 11, "axes.linewidth": 0.8, "savefig.dpi": 200}
+
+
+def save(figure: Figure, path: Path) -> Path:
+    FigureCanvasAgg(figure)
+    figure.savefig(path, bbox_inches="tight", pad_inches=0.08)
+    return path
+
+
+def figure_of(attributes: Any, panels: int) -> tuple[Figure, Sequence[Axes]]:
+    width, height = float(attributes["width"]), float(attributes["height"])
+    inches = SIDE / max(width, height)
+    figure = Figure(figsize=(panels * (width * inches + 0.7) + 0.1, height * inches + 1.2), layout="constrained")
+    return figure, figure.subplots(1, panels, squeeze=False)[0]
+
+
+def frame(axes: Axes, attributes: Any) -> None:
+    unit = unit_label(attributes["length_unit"]) or "(cell units)"
+    axes.set_aspect("equal")
+    axes.autoscale_view()
+    axes.margins(0.03)
+    axes.set_xlabel(f"$x_1$ {unit}")
+    axes.set_ylabel(f"$x_2$ {unit}")
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def paint(axes: Axes, drawn: Drawing, points: Array, colours: Array, edges: bool, **mapping: Any) -> Any:
+    """Fills the triangles with values, or with colours (q, 4); antialiasing would leave seams."""
+    fill = {"array": colours} if colours.ndim == 1 else {"facecolors": colours}
+    border = {"edgecolors": "0.55", "linewidths": 0.15} if edges else {"edgecolors": "none", "antialiased": False}
+    style: dict[str, Any] = fill | border | mapping
+    corners: Any = points[drawn.triangles]
+    shapes = PolyCollection(corners, **style)
+    axes.add_collection(shapes)
+    return shapes
+
+
+def lines(axes: Axes, segments: Array, colour: str, width: float, cap: Literal["butt", "round"] = "butt") -> None:
+    """Draws segments (e, 2, 2) as one path, in which they join without spots."""
+    path = Path2D(segments.reshape(-1, 2), [Path2D.MOVETO, Path2D.LINETO] * len(segments))
+    axes.add_patch(PathPatch(path, fill=False, edgecolor=colour, linewidth=width, capstyle=cap, snap=False))
+
+
+def colour_range(values: Array) -> tuple[Normalize, str, str]:
+    """Colour range, map and the ends at which values lie outside; zero is white if both signs matter."""
+    norm, extend = value_range(values)
+    least, most = float(norm.vmin or 0.0), float(norm.vmax or 0.0)
+    if min(-least, most) <= 0.05 * max(-least, most) or np.ptp(values) <= SAME * np.abs(values).max():
+        return norm, "viridis", extend
+    most = max(-least, most)
+    return Normalize(-most, most), "RdBu_r", _outside(values, -most, most)
+
+
+def value_range(values: Array) -> tuple[Normalize, str]:
+    """Colour range and the ends at which values lie outside; the extreme 0.5 % may, at either end."""
+    low, high = float(values.min()), float(values.max())
+    if high - low <= SAME * max(abs(low), abs(high), 1e-300):
+        middle = 0.5 * (low + high)
+        half = 0.5 * (abs(middle) or 1.0)
+        return Normalize(middle - half, middle + half), "neither"
+    least, most = (float(value) for value in np.percentile(values, (0.5, 99.5)))
+    slack = 0.05 * (most - least)
+    least, most = (low if least - low < slack else least), (high if high - most < slack else most)
+    return Normalize(least, most), _outside(values, least, most)
+
+
+def _outside(values: Array, least: float, most: float) -> str:
+    ends = (bool(values.min() < least), bool(values.max() > most))
+    return {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}[ends]
+
+
+def magnification(displacement: Array, points: Array) -> float:
+    """1, 2 or 5 times a power of ten, with which the largest displacement is about a tenth of the cell."""
+    largest = float(np.linalg.norm(displacement, axis=1).max())
+    if largest == 0.0:
+        return 1.0
+    wanted = 0.1 * float(np.ptp(points, axis=0).min()) / largest
+    power = 10.0 ** math.floor(math.log10(wanted))
+    return power * min((1, 2, 5, 10), key=lambda factor: abs(math.log(factor * power / wanted)))
+
+
+def load_label(strain: Array) -> str:
+    return ", ".join(f"${STRAINS[i]} = {{{strain[i]:.4g}}}$" for i in range(3) if strain[i] != 0.0) or "no strain"
+
+
+def unit_label(label: str) -> str:
+    return f"({label})" if label else ""

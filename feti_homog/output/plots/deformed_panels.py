@@ -1,0 +1,157 @@
+"""The deformed cell at several states of an angle or path, side by side and as an animation."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+from PIL import Image
+
+from feti_homog.output.plots.canvas import (
+    STRESSES,
+    lines,
+    load_label,
+    magnification,
+    paint,
+    save,
+    unit_label,
+    value_range,
+)
+from feti_homog.output.plots.decimation import Array, Drawing, drawing, on_nodes, on_triangles, outlines
+from feti_homog.output.plots.interface_marks import WORDS, Faces, legend
+from feti_homog.output.text import point_tables
+
+PANELS = 6
+FRAMES, FRAME_TIME = 24, 250  # of the animation; milliseconds
+FRAME_LIMIT = 8000  # triangles in a frame
+INCHES, BAR = 8.0, 0.55  # of all panels of a row, and of the colour bar in each
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What is the same in every panel."""
+
+    file: Any
+    drawn: Drawing
+    borders: Array
+    faces: Faces
+    component: str
+    scale: float
+
+    @classmethod
+    def of(cls, file: Any, numbers: Sequence[int], output: Mapping[str, Any], true: bool, limit: int) -> Scene:
+        """The stress that suits all these states; the `true` scale of displacements unless the case has another."""
+        drawn = drawing(file, limit)
+        borders = outlines(drawn, drawn.body)
+        strain = np.abs([file[f"state/{n}"].attrs["strain"] for n in numbers]).max(axis=0)
+        component = output.get("stress", "auto")
+        if component not in STRESSES:
+            component = list(STRESSES)[int(np.argmax(strain))]
+        displacements = (on_nodes(file[f"state/{n}/displacement"], drawn) for n in numbers)
+        automatic = 1.0 if true else min(magnification(d, drawn.points) for d in displacements)
+        scale = output.get("deformation_scale") or automatic
+        return cls(file, drawn, borders, Faces.of(file, drawn, borders), component, scale)
+
+    def moved(self, number: int) -> Array:
+        """(p, 2) places of the drawn nodes."""
+        places: Array = self.drawn.points + self.scale * on_nodes(self.file[f"state/{number}/displacement"], self.drawn)
+        return places
+
+    def draw(self, figure: Figure, axes: Axes, number: int, moved: Array) -> None:
+        """The cell of a state, drawn nodes at `moved`, in its own range of colours: stresses grow along a path."""
+        state = self.file[f"state/{number}"]
+        stress = on_triangles(state["stress"], list(STRESSES).index(self.component), self.drawn)
+        norm, extend = value_range(stress)
+        shapes = paint(axes, self.drawn, moved, stress, edges=False, norm=norm, cmap="viridis")
+        lines(axes, moved[self.borders], "black", 0.5)
+        self.faces.mark(axes, moved, state["status"][:], magnified=0.8)
+        axes.set_aspect("equal")
+        axes.set_axis_off()
+        attributes = state.attrs
+        axes.set_title(f"{attributes['label']}\n{load_label(attributes['strain'])}", fontsize=9)
+        bar = figure.colorbar(shapes, cax=axes.inset_axes((1.02, 0.1, 0.035, 0.8)), extend=extend)
+        bar.ax.tick_params(labelsize=7, pad=1, length=2)
+        bar.locator = MaxNLocator(5)
+
+    @property
+    def words(self) -> str:
+        """What is drawn."""
+        unit = unit_label(self.file.attrs["stress_unit"]) or "(unit of the moduli)"
+        scale = "true scale" if self.scale == 1 else f"displacement × {self.scale:g}"
+        return f"${STRESSES[self.component]}$ {unit}, {scale}"
+
+
+def plot(directory: Path, file: Any, document: Mapping[str, Any]) -> list[Path]:
+    """`angle_states.png`, or `path_states.png` and `path.gif`."""
+    output, count = document["case"]["output"], len(file.get("state", ()))
+    if not count:
+        return []
+    if "angle" in document:
+        # The first of the unit cases, if there are three an angle.
+        every = range(0, count, count // len(document["angle"]) or 1)
+        numbers = [every[round(k)] for k in np.linspace(0, len(every) - 1, min(PANELS, len(every)))]
+        true = document["case"]["angle"].get("strain") is not None
+        return [save(_side_by_side(file, numbers, output, true), directory / "angle_states.png")]
+    points = document["path"][:count]
+    paths = [
+        save(_side_by_side(file, point_tables.chosen(points, PANELS), output, True), directory / "path_states.png")
+    ]
+    return [*paths, _animation(file, point_tables.chosen(points, FRAMES), output, directory / "path.gif")]
+
+
+def _side_by_side(file: Any, numbers: Sequence[int], output: Mapping[str, Any], true: bool) -> Figure:
+    scene = Scene.of(file, numbers, output, true, limit=30_000)
+    places = [scene.moved(number) for number in numbers]
+    size = np.subtract(*_corners(places)[::-1])
+    rows = max(1, round(math.sqrt(0.7 * len(numbers) * size[0] / size[1])))
+    columns = -(-len(numbers) // rows)
+    panel = (INCHES - BAR * columns) / columns
+    figure = Figure(figsize=(INCHES, rows * (panel * size[1] / size[0] + 0.5) + 0.7), layout="constrained")
+    grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
+    for axes, number, moved in zip(grid, numbers, places, strict=False):
+        scene.draw(figure, axes, number, moved)
+    for axes in grid[len(numbers) :]:
+        axes.set_axis_off()
+    grid[0].autoscale_view()
+    figure.suptitle(f"{file.attrs['title']}: {scene.words}".lstrip(": "), fontsize=11)
+    found = {int(kind) for n in numbers for kind in np.unique(scene.faces.state(file[f"state/{n}/status"][:]))}
+    handles = legend([kind for kind in WORDS if kind in found])
+    if handles:
+        figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False)
+    return figure
+
+
+def _animation(file: Any, numbers: Sequence[int], output: Mapping[str, Any], path: Path) -> Path:
+    scene = Scene.of(file, numbers, output, True, limit=FRAME_LIMIT)
+    places = [scene.moved(number) for number in numbers]
+    low, high = _corners(places)
+    size = high - low
+    figure = Figure(figsize=(3.6 + BAR, 3.6 * size[1] / size[0] + 0.7), dpi=100, layout="constrained")
+    canvas = FigureCanvasAgg(figure)
+    frames = []
+    for number, moved in zip(numbers, places, strict=True):
+        figure.clear()
+        axes = figure.subplots()
+        scene.draw(figure, axes, number, moved)
+        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+        canvas.draw()
+        picture = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
+        frames.append(picture.quantize(128, dither=Image.Dither.NONE))
+    times = [FRAME_TIME] * (len(frames) - 1) + [6 * FRAME_TIME]
+    frames[0].save(path, save_all=True, append_images=frames[1:], duration=times, loop=0, optimize=True)
+    return path
+
+
+def _corners(places: Sequence[Array]) -> tuple[Array, Array]:
+    """Lower left and upper right corner of all states, with a margin."""
+    low, high = np.min([p.min(axis=0) for p in places], axis=0), np.max([p.max(axis=0) for p in places], axis=0)
+    margin = 0.02 * (high - low)
+    return low - margin, high + margin

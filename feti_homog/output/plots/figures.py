@@ -1,0 +1,175 @@
+"""The pictures of a result: the cell, the deformed cell of each load case, and those of an angle or path."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import h5py
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+
+from feti_homog.errors import FetiHomogError
+from feti_homog.output.files import field_file, result_json
+from feti_homog.output.plots import deformed_panels, response_curves, traction_plots
+from feti_homog.output.plots.canvas import (
+    STRESSES,
+    STYLE,
+    colour_range,
+    figure_of,
+    frame,
+    lines,
+    load_label,
+    magnification,
+    paint,
+    save,
+    unit_label,
+)
+from feti_homog.output.plots.decimation import Array, Drawing, drawing, on_nodes, on_triangles, outlines
+from feti_homog.output.plots.interface_marks import Faces
+
+CASES = ("E11", "E22", "G12")
+MESH_LINES = 6000  # triangles up to which their edges are drawn
+FEW_BODIES = 8  # up to which the deformed cell is drawn over all that it has left
+MATRIX = "#ece8df"
+FIBRES = ("Blues", "Oranges", "Greens", "Purples", "Reds", "Greys")  # one colour map for each phase
+
+
+def plot(directory: Path) -> list[Path]:
+    """Draws the pictures of `directory`/result.h5 and result.json beside them and returns their paths.
+
+    - cell.png: bodies and subdomains;
+    - of each load case case_E11.png, case_minus_E11.png, ... (unit strains) or state_K.png;
+    - of `angle` angle.png and angle_states.png, of `path` path.png, path_states.png and path.gif;
+    - interface.png, if some interface is debonded.
+
+    If there is a result.json, its case.output chooses the stress component (else that of the unit strain) and the
+    deformation scale. A case without fields has the curves alone. Call on one rank.
+
+    Raises:
+        FetiHomogError: result.h5 cannot be read, or a picture cannot be written.
+    """
+    directory = Path(directory)
+    document = result_json.read(directory) if (directory / result_json.NAME).exists() else {}
+    output: Mapping[str, Any] = document.get("case", {}).get("output", {})
+    with mpl.rc_context(STYLE):
+        try:
+            paths = _pictures(directory, document, output) if output.get("fields", True) else []
+            return paths + response_curves.plot(directory, document)
+        except OSError as error:
+            raise FetiHomogError(f"cannot draw {directory / field_file.NAME}: {error.strerror or error}") from error
+
+
+def _pictures(directory: Path, document: Mapping[str, Any], output: Mapping[str, Any]) -> list[Path]:
+    """The pictures of result.h5."""
+    with h5py.File(directory / field_file.NAME, "r") as file:
+        drawn = drawing(file)
+        borders = outlines(drawn, drawn.body)
+        faces = Faces.of(file, drawn, borders)
+        paths = [save(_cell(file.attrs, drawn, borders), directory / "cell.png")]
+        if "angle" in document or "path" in document:
+            paths += deformed_panels.plot(directory, file, document)
+        else:
+            for number in sorted(file.get("state", ()), key=int):
+                state = file[f"state/{number}"]
+                figure = _deformed(file, state, drawn, borders, faces, output)
+                paths.append(save(figure, directory / f"{_name(number, state.attrs['strain'])}.png"))
+        return paths + traction_plots.plot(directory, file, "path" in document)
+
+
+def _name(number: str, strain: Array) -> str:
+    unit = _unit_case(strain)
+    if unit is None:
+        return f"state_{number}"
+    return f"case_{'minus_' if strain[unit] < 0 else ''}{CASES[unit]}"
+
+
+def _unit_case(strain: Array) -> int | None:
+    """Which of E11, E22, gamma12 is 1 or -1 while the others are 0."""
+    cases = [i for i in range(3) if np.array_equal(np.abs(strain), np.eye(3)[i])]
+    return cases[0] if cases else None
+
+
+def _cell(attributes: Any, drawn: Drawing, borders: Array) -> Figure:
+    """The phases, each body in a shade of its own, beside the subdomains."""
+    figure, (left, right) = figure_of(attributes, panels=2)
+    edges = len(drawn.triangles) <= MESH_LINES
+    bodies, subdomains = drawn.body.max() + 1, drawn.subdomain.max() + 1
+    shades, legend = _shades(drawn, list(attributes["phases"]))
+    for axes, label, colours in ((left, drawn.body, shades), (right, drawn.subdomain, _distinct(subdomains))):
+        paint(axes, drawn, drawn.points, colours[label], edges)
+        lines(axes, drawn.points[borders], "black", 0.9)
+        frame(axes, attributes)
+    lines(right, drawn.points[outlines(drawn, drawn.subdomain)], "black", 0.5)
+    left.set_title(_count(bodies, "body", "bodies"))
+    right.set_title(_count(subdomains, "subdomain", "subdomains"))
+    right.set_ylabel("")
+    figure.suptitle(attributes["title"], fontsize=12)
+    left.legend(handles=legend, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=3, frameon=False)
+    return figure
+
+
+def _deformed(file: Any, state: Any, drawn: Drawing, borders: Array, faces: Faces, output: Mapping[str, Any]) -> Figure:
+    """The magnified deformed cell with a stress component in colour, and the outline it has left."""
+    attributes, strain = file.attrs, state.attrs["strain"]
+    figure, (axes,) = figure_of(attributes, panels=1)
+    displacement = on_nodes(state["displacement"], drawn)
+    scale = output.get("deformation_scale") or magnification(displacement, drawn.points)
+    component = output.get("stress", "auto")
+    if component not in STRESSES:
+        component = list(STRESSES)[_unit_case(strain) or 0]
+    stress = on_triangles(state["stress"], list(STRESSES).index(component), drawn)
+    norm, colours, extend = colour_range(stress)
+    moved = drawn.points + scale * displacement
+    picture = paint(axes, drawn, moved, stress, edges=False, norm=norm, cmap=colours)
+    lines(axes, _left(attributes, drawn, borders), "0.5", 0.7)
+    lines(axes, moved[borders], "black", 0.8)
+    handles = faces.mark(axes, moved, state["status"][:])
+    frame(axes, attributes)
+    bar = figure.colorbar(picture, cax=axes.inset_axes((1.03, 0.0, 0.04, 1.0)), extend=extend)
+    bar.set_label(f"${STRESSES[component]}$ " + (unit_label(attributes["stress_unit"]) or "(unit of the moduli)"))
+    axes.set_title(f"{attributes['title']}\n{load_label(strain)}, displacement × {scale:g}".lstrip())
+    if len(handles) > 1:
+        axes.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=3, frameon=False)
+    return figure
+
+
+def _left(attributes: Any, drawn: Drawing, borders: Array) -> Array:
+    """The undeformed outlines (e, 2, 2): of the bodies if they are few, else of the cell alone."""
+    if drawn.body.max() < FEW_BODIES:
+        outline: Array = drawn.points[borders]
+        return outline
+    corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * [attributes["width"], attributes["height"]]
+    return np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
+
+
+def _shades(drawn: Drawing, phases: list[str]) -> tuple[Array, list[Patch]]:
+    """A colour (bodies, 4) for each body, a shade of its phase's; and the legend of the phases."""
+    colours = np.zeros((drawn.body.max() + 1, 4))
+    legend = []
+    for index, phase in enumerate(phases):
+        bodies = np.unique(drawn.body[drawn.phase == index])
+        if not len(bodies):
+            continue
+        if index == 0:
+            shades = np.tile(mpl.colors.to_rgba(MATRIX), (len(bodies), 1))
+        else:
+            tones = 0.65 - 0.35 * (np.arange(len(bodies)) * 0.618 % 1.0)
+            shades = mpl.colormaps[FIBRES[(index - 1) % len(FIBRES)]](tones)
+        colours[bodies] = shades
+        legend.append(Patch(facecolor=shades[0], edgecolor="black", linewidth=0.6, label=phase))
+    return colours, legend
+
+
+def _distinct(count: int) -> Array:
+    """Colours (count, 4), of which those with near numbers differ most."""
+    colours: Array = mpl.colormaps["tab20"](np.arange(count) * 7 % 20)
+    colours[:, :3] = 0.3 + 0.7 * colours[:, :3]
+    return colours
+
+
+def _count(number: int, one: str, many: str) -> str:
+    return f"{number} {one if number == 1 else many}"

@@ -1,0 +1,67 @@
+"""The interface in a picture: which drawn edges are bonded, in contact or open."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from scipy.spatial import cKDTree
+
+from feti_homog.output.plots.canvas import lines
+from feti_homog.output.plots.decimation import Array, Drawing
+
+BONDED, CLOSED, OPEN = 0, 1, 2
+WORDS = {BONDED: "bonded", CLOSED: "in contact", OPEN: "open"}
+COLOURS = {BONDED: "black", CLOSED: "#ff7f0e", OPEN: "#d6006c"}
+WIDTHS = {BONDED: 0.8, CLOSED: 2.6, OPEN: 2.0}
+NEAR = 1e-6  # of the width of the cell
+
+
+@dataclass(frozen=True)
+class Faces:
+    """The drawn edges on fibre-matrix interfaces, those of either face, and the interface nodes at their ends."""
+
+    edges: Array  # (e, 2) drawn nodes
+    nodes: Array  # (e, 2) rows of /interface
+
+    @classmethod
+    def of(cls, file: Any, drawn: Drawing, borders: Array) -> Faces:
+        """Those among the outlines of the bodies; /interface has one node for all its periodic images."""
+        points, period = file["interface/points"][:], np.array([file.attrs["width"], file.attrs["height"]])
+        if not len(points):
+            return cls(borders[:0], borders[:0])
+        near = NEAR * float(period[0])
+        tree = cKDTree(_wrapped(points, period, near), boxsize=period * (1.0 + 1e-12))
+        ends = _wrapped(drawn.points[borders.ravel()], period, near)
+        distance, nearest = tree.query(ends, distance_upper_bound=2 * near)
+        there = np.isfinite(distance).reshape(-1, 2).all(axis=1)
+        return cls(borders[there], nearest.reshape(-1, 2)[there])
+
+    def state(self, status: Array) -> Array:
+        """(e,) states of the edges for those of the nodes: open if an end is, else in contact if one is."""
+        states: Array = status[self.nodes].max(axis=1, initial=BONDED)
+        return states
+
+    def mark(self, axes: Axes, points: Array, status: Array, magnified: float = 1.0) -> list[Line2D]:
+        """Draw the edges at the places (p, 2) of the drawn nodes; returns a legend of the states that there are."""
+        states = self.state(status)
+        found = [kind for kind in WORDS if (states == kind).any()]
+        for kind in found:
+            segments = points[self.edges[states == kind]]
+            lines(axes, segments, COLOURS[kind], magnified * WIDTHS[kind], "butt" if kind == BONDED else "round")
+        return legend(found)
+
+
+def legend(kinds: list[int]) -> list[Line2D]:
+    return [Line2D([], [], color=COLOURS[k], linewidth=WIDTHS[k], label=WORDS[k]) for k in kinds]
+
+
+def _wrapped(points: Array, period: Array, near: float) -> Array:
+    """The points' images in [0, period), those within `near` of the upper ends at 0."""
+    inside = np.mod(points, period)
+    inside[inside > period - near] = 0.0
+    wrapped: Array = inside
+    return wrapped

@@ -1,0 +1,188 @@
+"""The printed summary of result.json's document."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from math import floor, log10
+from textwrap import wrap
+from typing import Any
+
+from feti_homog.output.text.point_tables import angle_table, path_table
+
+WIDTH = 79
+LABEL = 12  # columns of the labels at the left
+NAME = 28  # columns of the names of table rows
+GLUE = "\N{NO-BREAK SPACE}"  # at which no line is broken
+STIFF = ("C11", "C22", "C33")
+LISTED = 12  # numbers of iterations that are told one by one
+TITLES = {"stiffness": "effective stiffness", "angle": "debonding angle", "path": "load path"}
+MODULI = ("E1", "E2", "G12", "bulk", "shear")  # in the unit of the stresses; the others are ratios
+
+Document = Mapping[str, Any]
+
+
+def summary(document: Document) -> str:
+    """The document in lines of at most 79 columns (but for long names), without a newline at the end.
+
+    Cell, solver, effective stiffness with moduli and bounds or else the points of `angle` or `path`, checks,
+    timings, memory, warnings and status.
+    Keys that it does not know are left out. Raises KeyError if one that DESIGN names is missing.
+    """
+    case = document["case"]
+    unit = case.get("output", {}).get("stress_unit", "")
+    stress = f" ({unit})" if unit else ""
+    what = TITLES[case["analysis"]["type"]]
+    title = f"{case.get('name', '')}: {what}, plane {case['analysis']['plane']}".lstrip(": ")
+    blocks = [
+        [title, "=" * min(len(title), WIDTH)],
+        [*_cell(document), *_solver(document["solver"])],
+        *_answer(document, stress),
+        _checks(document),
+        [
+            *_timings(document["timings"]),
+            *_field("Memory", [f"{_bytes(document['memory'])} per rank at most"]),
+        ],
+        [*_remarks("Warning", document.get("warnings", ())), *_remarks("Fault", document.get("faults", ()))],
+        _field("Status", [str(document["status"])]),
+    ]
+    return "\n\n".join("\n".join(block) for block in blocks if block).replace(GLUE, " ")
+
+
+def _answer(document: Document, stress: str) -> list[list[str]]:
+    """The blocks of what was asked for."""
+    if "angle" in document:
+        return [angle_table(document["angle"], stress)]
+    if "path" in document:
+        return [path_table(document["path"], stress)]
+    blocks = [_matrix(f"Effective stiffness{stress}", document["effective_stiffness"])]
+    if "effective_stiffness_compression" in document:
+        blocks.append(_matrix(f"Under minus E{stress}", document["effective_stiffness_compression"]))
+    if document["case"].get("interface"):  # moduli and bounds are of bonded, linear composites
+        return blocks
+    return [
+        *blocks,
+        _moduli(f"Engineering moduli{stress}", document["moduli"]),
+        _bounds(f"Bounds{stress}", document),
+    ]
+
+
+def _cell(document: Document) -> list[str]:
+    cell, case = document["cell"], document["case"]
+    unit = case.get("output", {}).get("length_unit", "")
+    size = f"{cell['width']:.6g} x {cell['height']:.6g} {unit}".rstrip()
+    shape, fractions = case["cell"], cell.get("fractions", {})
+    shares = ", ".join(f"{phase} {share:.6f}" for phase, share in fractions.items())
+    mesh = [_number(cell["elements"], "element"), _number(cell["nodes"], "node")]
+    mesh += [f"order {shape['order']}"] * ("order" in shape) + [f"refine {shape['refine']}"] * ("refine" in shape)
+    return [
+        *_field("Cell", [str(shape["geometry"]), size]),
+        *_field("Meshed", [f"fibre fraction {cell['fibre_fraction']:.6f}", *([f"({shares})"] if shares else [])]),
+        *_field("Mesh", mesh),
+    ]
+
+
+def _solver(solver: Document) -> list[str]:
+    parts = [_number(solver["ranks"], "rank"), _number(solver["subdomains"], "subdomain")]
+    dual = [_number(solver["multipliers"], "multiplier"), f"kernel {solver['kernel_dim']}"]
+    return [
+        *_field("Solver", [*parts, _number(solver["dofs"], "dof")]),
+        *_field("Dual", [*dual, f"coarse problem {solver['coarse_dim']}"]),
+        *_factorized(solver),
+        *_field("Iterations", _iterations(_listed(solver["iterations"]))),
+    ]
+
+
+def _factorized(solver: Document) -> list[str]:
+    if "factorizations" not in solver:
+        return []
+    coarse = _number(solver.get("coarse_factorizations", 0), "coarse one")
+    return _field("Factorized", [_number(solver["factorizations"], "subdomain"), coarse])
+
+
+def _iterations(counts: Sequence[int]) -> list[str]:
+    if len(counts) <= LISTED:
+        return [str(count) for count in counts]
+    return [f"{min(counts)} to {max(counts)} a state", f"{sum(counts)} for {len(counts)} states"]
+
+
+def _matrix(title: str, rows: Sequence[Sequence[float]]) -> list[str]:
+    # All entries to the digit that is the eighth of the largest.
+    largest = max(abs(entry) for row in rows for entry in row)
+    form = f".{7 - floor(log10(largest))}f" if 1e-4 < largest < 1e8 else ".7e"
+    lines = [f"{title:<{NAME}}" + "".join(f"{name:>16}" for name in ("E11", "E22", "gamma12"))]
+    for name, row in zip(("S11", "S22", "S12"), rows, strict=True):
+        lines.append(f"  {name:<{NAME - 2}}" + "".join(f"{_signless(entry, form):>16}" for entry in row))
+    return lines
+
+
+def _moduli(title: str, moduli: Document) -> list[str]:
+    stiff = [f"{name:<6}{moduli[name]:>13.7g}" for name in MODULI if name in moduli]
+    ratios = [f"{name:<11}{_signless(value, '.6f'):>13}" for name, value in moduli.items() if name not in MODULI]
+    count = max(len(stiff), len(ratios))
+    pairs = zip(stiff + [""] * (count - len(stiff)), ratios + [""] * (count - len(ratios)), strict=True)
+    return [title, *(f"  {left:<30}{right}".rstrip() for left, right in pairs)]
+
+
+def _bounds(title: str, document: Document) -> list[str]:
+    moduli, bounds, here = document["moduli"], document["bounds"], document["effective_stiffness"]
+    lines = [f"{title:<{NAME}}{'lower':>14}{'computed':>14}{'upper':>14}"]
+    for i, name in enumerate(STIFF):
+        lower, upper = bounds["reuss"][i][i], bounds["voigt"][i][i]
+        inside = lower - 1e-9 * abs(lower) <= here[i][i] <= upper + 1e-9 * abs(upper)
+        note = "" if inside else "  outside"
+        lines.append(_between(f"{name} Reuss, Voigt", lower, here[i][i], upper) + note)
+    # These hold for isotropic cells only, so a value outside is no fault.
+    for name, (lower, upper) in (bounds["hashin_shtrikman"] or {}).items():
+        lines.append(_between(f"{name} Hashin-Shtr.", lower, moduli[name], upper))
+    return lines
+
+
+def _between(label: str, lower: float, value: float, upper: float) -> str:
+    return f"  {label:<{NAME - 2}}{lower:>14.7g}{value:>14.7g}{upper:>14.7g}"
+
+
+def _checks(document: Document) -> list[str]:
+    tolerance = document.get("check_tolerance")
+    limit = "" if tolerance is None else f" (relative, at most {tolerance:.1e})"
+    lines = [f"Checks{limit}"]
+    contact = document.get("kkt_tolerance", tolerance)
+    if any(name.startswith("kkt_") for name in document["checks"]) and contact != tolerance:
+        lines[0] = lines[0].replace(")", f"; of contact {contact:.1e})")
+    for name, error in document["checks"].items():
+        tolerance = contact if name.startswith("kkt_") else document.get("check_tolerance")
+        verdict = "" if tolerance is None else "pass" if error <= tolerance else "FAIL"
+        lines.append(f"  {name:<{NAME - 2}}{error:>14.1e}    {verdict}".rstrip())
+    return lines
+
+
+def _timings(timings: Document) -> list[str]:
+    stages = [f"{stage}{GLUE}{seconds:.2f}{GLUE}s" for stage, seconds in timings.items()]
+    return _field("Time", stages)
+
+
+def _remarks(label: str, remarks: Iterable[str]) -> list[str]:
+    return [line for remark in remarks for line in _field(label, [str(remark)])]
+
+
+def _field(label: str, words: Sequence[str]) -> list[str]:
+    """A label and its words, separated by commas, in as many lines as it takes."""
+    text = ", ".join(words).replace(", (", " (")
+    return wrap(text, WIDTH, initial_indent=f"{label:<{LABEL}}", subsequent_indent=" " * LABEL, break_long_words=False)
+
+
+def _listed(value: Any) -> list[Any]:
+    return list(value) if isinstance(value, list | tuple) else [value]
+
+
+def _signless(value: float, form: str) -> str:
+    """The number, without the sign of a zero that it is rounded to."""
+    text = f"{value:{form}}"
+    return text.removeprefix("-") if float(text) == 0.0 else text
+
+
+def _number(count: int, name: str) -> str:
+    return f"{count:,} {name}{'' if count == 1 else 's'}".replace(",", " ")
+
+
+def _bytes(size: float) -> str:
+    return f"{size / 2**20:.0f} MiB" if size < 2**30 else f"{size / 2**30:.2f} GiB"

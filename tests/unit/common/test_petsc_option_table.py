@@ -1,0 +1,62 @@
+"""Splitting the command line and naming mistyped options."""
+
+from __future__ import annotations
+
+import pytest
+
+from feti_homog.common.petsc_option_table import OPTIONS, help_text, option_names, split_argv, unknown_options
+
+
+@pytest.mark.parametrize(
+    ("line", "ours", "petsc"),
+    [
+        ("run a.toml --out d", "run a.toml --out d", ""),
+        ("run a.toml --out d -feti_ksp_rtol 1e-8", "run a.toml --out d", "-feti_ksp_rtol 1e-8"),
+        ("run -feti_ksp_max_it 50 a.toml --out d", "run a.toml --out d", "-feti_ksp_max_it 50"),
+        ("run a.toml -feti_ksp_monitor --out d", "run a.toml --out d", "-feti_ksp_monitor"),
+        ("run a.toml -log_view -options_left", "run a.toml", "-log_view -options_left"),
+        ("run a.toml -shift -1.5e-3 --quiet", "run a.toml --quiet", "-shift -1.5e-3"),
+        ("run a.toml -shift -.5", "run a.toml", "-shift -.5"),
+        ("run a.toml -a x y", "run a.toml y", "-a x"),
+        ("-h", "-h", ""),
+        ("run -feti_ksp_view -h", "run -h", "-feti_ksp_view"),
+        ("-help", "", "-help"),
+        ("check --quiet -1", "check --quiet -1", ""),
+        ("", "", ""),
+    ],
+)
+def test_split(line, ours, petsc):
+    assert split_argv(line.split()) == (ours.split(), petsc.split())
+
+
+def test_names():
+    assert option_names(["-feti_ksp_rtol", "1e-8", "-shift", "-1", "-log_view"]) == [
+        "feti_ksp_rtol",
+        "shift",
+        "log_view",
+    ]
+
+
+def test_known_options():
+    assert unknown_options(option.name for option in OPTIONS) == []
+    assert unknown_options(["feti_ksp_gmres_restart", "feti_sub_mat_mumps_icntl_14", "log_view", "ksp_rtol"]) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("feti_kps_rtol", "-feti_kps_rtol: unknown option; did you mean -feti_ksp_rtol?"),
+        ("feti_pctype", "did you mean -feti_pc_type?"),
+        ("feti_ksp_", "unknown option"),
+        ("feti_zzz", "known prefixes: -feti_ksp_, -feti_pc_, "),
+    ],
+)
+def test_unknown_options(name, words):
+    (fault,) = unknown_options([name, "feti_ksp_rtol"])
+    assert words in fault
+
+
+def test_help_names_every_option():
+    lines = help_text().splitlines()
+    assert len(lines) == len(OPTIONS) + 1
+    assert all(f"-{option.name} " in text for option, text in zip(OPTIONS, lines[1:], strict=True))

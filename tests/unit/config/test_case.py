@@ -1,0 +1,197 @@
+"""Case files, right and faulty."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import pickle
+from pathlib import Path
+
+import pytest
+from unit.config.faulty_bonding import ANGLE, ARC, BARE_ARC, FAULTY_BONDINGS, PATH, debonded, of_type
+from unit.config.faulty_cases import BASE, FAULTY_CASES, FIBRE, MESH_CELL, RANDOM, changed, fibre
+
+from feti_homog.config.case import check_phases, load, parse
+from feti_homog.config.materials import General, Isotropic, Orthotropic
+from feti_homog.config.sections import Angle, Arc, Interface, LoadPath
+from feti_homog.errors import CaseError
+
+FAULTY = FAULTY_CASES | FAULTY_BONDINGS
+MESH = changed(MESH_CELL)
+
+
+def case_of(tmp_path: Path, content: str, name: str = "cell.toml"):
+    (tmp_path / "cell.msh").touch()
+    path = tmp_path / name
+    path.write_text(content, encoding="utf-8")
+    return load(path)
+
+
+def test_defaults(tmp_path):
+    case = case_of(tmp_path, BASE.replace("mesh_size = 0.05\n", ""))
+    assert case.name == "cell"
+    assert dataclasses.asdict(case.cell) == {
+        "geometry": "hexagonal", "fibre_fraction": 0.4, "mesh_size": 0.05, "refine": 0, "order": 1,
+        "bodies": "torus", "fibres": None, "min_gap": 0.05, "seed": 0, "radius_spread": 0.0, "file": None,
+    }  # fmt: skip
+    assert list(case.materials.items()) == [
+        ("matrix", Isotropic(88.0, 0.299)),
+        ("fibre", Isotropic(200.0, 0.222)),
+    ]
+    assert (case.analysis.type, case.analysis.plane) == ("stiffness", "strain")
+    assert (case.decomposition.subdomains, case.decomposition.max_dofs) == (None, None)
+    assert (case.output.fields, case.output.pictures, case.output.stress) == (True, True, "auto")
+    assert (case.interface, case.angle, case.path) == (None, None, None)
+    assert case.petsc == {}
+    assert case.warnings() == ()
+
+
+@pytest.mark.parametrize("name", FAULTY)
+def test_fault(tmp_path, name):
+    content, expected = FAULTY[name]
+    with pytest.raises(CaseError) as caught:
+        case_of(tmp_path, content)
+    faults = caught.value.faults
+    for words in expected:
+        assert any(words in fault for fault in faults), faults
+    assert all(len(fault.splitlines()) == 1 for fault in faults)
+    assert caught.value.exit_code == 2
+
+
+@pytest.mark.parametrize("name", [name for name, (_, expected) in FAULTY.items() if len(expected) == 1])
+def test_one_fault_is_one_line(tmp_path, name):
+    with pytest.raises(CaseError) as caught:
+        case_of(tmp_path, FAULTY[name][0])
+    # a mistyped key that is required is also missing; a mesh has none of the three keys of the hexagonal cell
+    related = {"young_mistyped": 2, "mesh_with_fraction": 3}
+    assert len(caught.value.faults) == related.get(name, 1), caught.value.faults
+
+
+def test_there_are_enough_faulty_cases():
+    assert len(FAULTY) == len(FAULTY_CASES) + len(FAULTY_BONDINGS) >= 100
+
+
+def test_file_not_there(tmp_path):
+    with pytest.raises(CaseError, match=r"none\.toml: cannot be read: No such file"):
+        load(tmp_path / "none.toml")
+
+
+def test_folder(tmp_path):
+    with pytest.raises(CaseError, match="cannot be read: Is a directory"):
+        load(tmp_path)
+
+
+def test_not_utf8(tmp_path):
+    path = tmp_path / "cell.toml"
+    path.write_bytes(BASE.encode() + "# Zelle für Stoß\n".encode("latin-1"))
+    with pytest.raises(CaseError, match=r"not UTF-8 text \(line 17\)"):
+        load(path)
+
+
+def test_byte_order_mark_is_allowed(tmp_path):
+    assert case_of(tmp_path, "\ufeff" + BASE) == case_of(tmp_path, BASE)
+
+
+def test_integers_are_numbers(tmp_path):
+    material = case_of(tmp_path, BASE.replace("88.0", "88")).materials["matrix"]
+    assert isinstance(material, Isotropic)
+    assert isinstance(material.young, float)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        BASE,
+        "name = 'Zelle'\n"
+        + BASE
+        + "[decomposition]\nmax_dofs = 5000\n[petsc]\nfeti_ksp_rtol = 1e-8\nlog_view = true\n",
+        changed(('geometry = "hexagonal"\n', RANDOM + "seed = 7\nradius_spread = 0.2\n")),
+        MESH + '[material."fibre:2"]\nstiffness = [[3, 1, 0], [1, 3, 0], [0, 0, 1]]\n',
+        fibre("E1 = 10.0\nE2 = 5.0\nE3 = 5.0\nnu12 = 0.3\nnu13 = 0.3\nnu23 = 0.2\nG12 = 2.0\nangle = 30\n"),
+        BASE + '[output]\nfields = false\nstress = "S12"\ndeformation_scale = 2\nlength_unit = "µm"\n',
+        BASE + f"[interface]\ndebonded = [{ARC}]\n",
+        BASE + "[interface]\ncontact = false\ndebonded = []\n",
+        MESH + "[interface]\n",
+        of_type("angle", ANGLE, BARE_ARC, "contact = false"),
+        of_type("angle", ANGLE, "strain = [0, 0, 0.2]", '[[interface.debonded]]\nfibre = "all"\ncentre = 90'),
+        of_type("path", PATH),
+        of_type("path", "[path]\nwaypoints = [[1, 0, 0], [0, 0, 0]]\nmax_events = 7"),
+        of_type("path", PATH, 'method = "increments"\nincrements = 50\nrelease = "worst"'),
+        debonded("{fibre = [1, 2], angle = 360}", "normal_strength = inf\ntangential_strength = 3"),
+        debonded(f'{ARC}, {{fibre = "all", angle = 0}}', 'normal_strength = 1\ncriterion = "quadratic"'),
+    ],
+)
+def test_resolved_makes_the_same_case_again(tmp_path, content):
+    case = case_of(tmp_path, content)
+    written = json.loads(json.dumps(case.resolved(), allow_nan=False))
+    assert written == case.resolved()
+    assert parse(written, Path("/nowhere")) == case
+    assert pickle.loads(pickle.dumps(case)) == case
+
+
+def test_interface(tmp_path):
+    case = case_of(tmp_path, debonded('{fibre = "all", centre = -30, angle = 60}, {fibre = 2, angle = 10.5}'))
+    arcs = (Arc(fibre="all", centre=-30.0, angle=60.0), Arc(fibre=(2,), centre=0.0, angle=10.5))
+    assert case.interface == Interface(debonded=arcs)
+    assert (case.interface.contact, case.interface.criterion) == (True, "max")
+    assert (case.interface.normal_strength, case.interface.tangential_strength) == (None, None)
+    strong = case_of(tmp_path, of_type("path", PATH, "[interface]", "normal_strength = inf", "tangential_strength = 2"))
+    assert (strong.interface.normal_strength, strong.interface.tangential_strength) == (None, 2.0)
+
+
+def test_angle(tmp_path):
+    case = case_of(tmp_path, of_type("angle", "[angle]", "values = [0, 30, 360.0]", BARE_ARC))
+    assert case.angle == Angle(values=(0.0, 30.0, 360.0), strain=None)
+    assert case.interface == Interface(debonded=(Arc(fibre=(1,), angle=None),))
+
+
+def test_path(tmp_path):
+    case = case_of(tmp_path, of_type("path", PATH))
+    assert case.path == LoadPath(strain=(0.2, 0.0, 0.0))
+    assert case.path.targets == ((0.2, 0.0, 0.0),)
+    assert (case.path.method, case.path.increments, case.path.max_events) == ("events", None, 100_000)
+    there_and_back = case_of(tmp_path, of_type("path", "[path]\nwaypoints = [[1, 0, 0], [0, 0, 0]]"))
+    assert there_and_back.path.targets == ((1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+
+def test_kinds_of_material(tmp_path):
+    assert case_of(tmp_path, fibre("stiffness = [[3, 1, 0], [1, 3, 0], [0, 0, 1]]\n")).materials["fibre"] == General(
+        ((3.0, 1.0, 0.0), (1.0, 3.0, 0.0), (0.0, 0.0, 1.0))
+    )
+    constants = "E1 = 10.0\nE2 = 5.0\nnu12 = 0.3\nG12 = 2.0\n"
+    assert case_of(tmp_path, fibre(constants, "stress")).materials["fibre"] == Orthotropic(
+        E1=10.0, E2=5.0, nu12=0.3, G12=2.0
+    )
+
+
+def test_mesh_file_is_beside_the_case(tmp_path):
+    (tmp_path / "cases").mkdir()
+    content = MESH.replace("cell.msh", "../cell.msh")
+    assert case_of(tmp_path, content, "cases/one.toml").cell.file == (tmp_path / "cell.msh").resolve()
+
+
+def test_check_phases(tmp_path):
+    case = case_of(tmp_path, MESH)
+    check_phases(case, ["matrix", "fibre"])
+    check_phases(case, ["matrix", "fibre:1", "fibre:2"])
+    assert case.material_of("fibre:2") == Isotropic(200.0, 0.222)
+    with pytest.raises(CaseError, match=r"^\[material.fibre\]: the mesh has no such phase; it has matrix$"):
+        check_phases(case, ["matrix"])
+    with pytest.raises(CaseError, match=r'^\[material."fibre:2"\]: missing section; the mesh has this phase$'):
+        check_phases(case_of(tmp_path, MESH.replace(FIBRE, "")), ["matrix", "fibre:2"])
+    own = case_of(tmp_path, MESH + '[material."fibre:2"]\nyoung = 1\npoisson = 0\n')
+    assert own.material_of("fibre:2") == Isotropic(1.0, 0.0)
+    with pytest.raises(CaseError, match="fibre:2"):
+        check_phases(own, ["matrix", "fibre"])
+
+
+def test_locking_is_warned_of(tmp_path):
+    locking = BASE.replace("0.299", "0.4999")
+    (warning,) = case_of(tmp_path, locking).warnings()
+    assert warning.startswith("[material.matrix] poisson = 0.4999") and "order = 2" in warning
+    assert case_of(tmp_path, locking.replace('"strain"', '"stress"')).warnings() == ()
+    assert case_of(tmp_path, locking.replace("mesh_size", "order = 2\nmesh_size")).warnings() == ()
+
+
+def test_incompressible_is_allowed_in_plane_stress(tmp_path):
+    case_of(tmp_path, changed(("0.299", "0.5"), ('"strain"', '"stress"')))

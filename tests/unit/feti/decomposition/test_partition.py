@@ -1,0 +1,88 @@
+"""Pieces and ranks: connected, balanced, and neighbours together."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from feti_homog.cell.gmsh_mesher import generate
+from feti_homog.cell.periodic_topology import Torus, components, edge_pairs, shared_edges
+from feti_homog.feti.decomposition.partition import decompose, pieces_for_count, pieces_for_size
+
+
+@pytest.fixture(scope="module")
+def torus():
+    cell = SimpleNamespace(
+        geometry="random", fibres=16, fibre_fraction=0.6, min_gap=0.06, seed=1, radius_spread=0.0, mesh_size=0.03
+    )
+    return Torus.of(generate(cell))
+
+
+def fine(torus, n_ranks, size=20):
+    """The decomposition into pieces of about `size` triangles."""
+    load = np.bincount(torus.constituent)
+    return decompose(torus, torus.constituent, pieces_for_size(load, 1, size), n_ranks)
+
+
+def test_pieces_are_connected_and_within_one_body(torus):
+    subdomain = fine(torus, 2).subdomain
+    left, right = edge_pairs(torus.triangle_torus_edges)
+    inside = subdomain[left] == subdomain[right]
+    parts = components(len(subdomain), left[inside], right[inside])
+    assert parts.max() == subdomain.max()
+    bodies = np.unique(np.stack([subdomain, torus.constituent]), axis=1)
+    assert bodies.shape[1] == subdomain.max() + 1
+
+
+def test_pieces_have_the_wanted_size(torus):
+    load = np.bincount(fine(torus, 2).subdomain)
+    assert load.max() <= 1.25 * 20
+    assert np.median(load) > 0.6 * 20
+
+
+@pytest.mark.parametrize("n_ranks", [2, 3, 4, 12])
+def test_ranks_are_balanced_and_their_subdomains_together(torus, n_ranks):
+    decomposition = fine(torus, n_ranks)
+    load = np.bincount(decomposition.rank[decomposition.subdomain], minlength=n_ranks)
+    assert load.max() < 1.05 * load.mean()
+    left, right = edge_pairs(torus.triangle_torus_edges)
+    a, b = decomposition.subdomain[left], decomposition.subdomain[right]
+    between = a != b
+    remote = decomposition.rank[a] != decomposition.rank[b]
+    # Dealt at random, a share of 1 - 1 / n_ranks of the neighbours would be on other ranks.
+    assert remote.sum() < 0.5 * (1 - 1 / n_ranks) * between.sum()
+
+
+def test_few_subdomains_are_dealt_by_size(torus):
+    whole = decompose(torus, torus.constituent, np.ones(17, np.int64), 2)
+    load = np.bincount(whole.subdomain)
+    largest = np.bincount(whole.rank, load).max()
+    assert largest <= 1.05 * max(load.max(), load.sum() / 2)
+
+
+def test_more_ranks_than_subdomains(torus):
+    whole = decompose(torus, torus.constituent, np.ones(17, np.int64), 40)
+    assert len(np.unique(whole.rank)) == 17
+
+
+def test_pieces_for_count_halves_the_largest():
+    assert pieces_for_count(np.array([100, 10, 10]), 5).tolist() == [3, 1, 1]
+    assert pieces_for_count(np.array([100, 10, 10]), 2).tolist() == [1, 1, 1]
+    assert pieces_for_count(np.array([2, 2]), 9).tolist() == [2, 2]
+
+
+def test_cuts_are_short(torus, monkeypatch):
+    """Shorter in all than where every edge counts alike."""
+    left, right = edge_pairs(torus.triangle_torus_edges)
+    length = torus.edge_lengths[shared_edges(torus.triangle_torus_edges)]
+    inside = torus.constituent[left] == torus.constituent[right]
+
+    def cut_length():
+        subdomain = fine(torus, 1).subdomain
+        return length[inside & (subdomain[left] != subdomain[right])].sum()
+
+    short = cut_length()
+    monkeypatch.setattr("feti_homog.feti.decomposition.partition.LENGTHS", 1)
+    assert short < 0.95 * cut_length()

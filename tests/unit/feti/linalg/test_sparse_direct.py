@@ -1,0 +1,108 @@
+"""Direct solvers of one rank, and what they leave behind."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from scipy.sparse import csr_matrix, diags, kronsum
+
+from feti_homog.common import process_memory
+from feti_homog.feti.linalg.distributed_matrix import Blocks, assembled
+from feti_homog.feti.linalg.saddle_point import SaddlePoint, _Augmented, _Indefinite
+from feti_homog.feti.linalg.sparse_direct import DirectSolver, IndefiniteSolver
+
+PAGE, MEGABYTE = 4096, 2**20
+
+
+def laplacian(n=60):
+    line = diags([-1, 2.1, -1], [-1, 0, 1], (n, n))
+    return kronsum(line, line).tocsr()
+
+
+def resident():
+    process_memory.trim()
+    return int(Path("/proc/self/statm").read_text().split()[1]) * PAGE
+
+
+@pytest.mark.parametrize("solver", [DirectSolver, IndefiniteSolver])
+@pytest.mark.parametrize("columns", [(), (1,), (3,), (40,)])
+def test_solves(solver, columns):
+    A = laplacian(12)
+    x = np.random.default_rng(0).standard_normal((A.shape[0], *columns))
+    np.testing.assert_allclose(solver(A, "test_").solve(A @ x), x, atol=1e-10)
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda A: DirectSolver(A, "test_").solve(np.ones((A.shape[0], 20))),
+        lambda A: IndefiniteSolver(A, "test_").solve(np.ones((A.shape[0], 20))),
+        lambda A: assembled(MPI.COMM_WORLD, A, np.arange(A.shape[0]), np.arange(A.shape[0]), A.shape),
+    ],
+    ids=["definite", "indefinite", "assembled"],
+)
+def test_nothing_is_left_of_a_factor(make):
+    """A path makes one at every event."""
+    A = laplacian()
+    for _ in range(5):
+        make(A)
+    before = resident()
+    for _ in range(100):
+        make(A)
+    # A hundred matrices alone would be 20 MB.
+    assert resident() - before < 8 * MEGABYTE
+
+
+def test_a_factor_can_be_freed_before_its_owner():
+    before, kept = resident(), []
+    for _ in range(60):
+        kept.append(DirectSolver(laplacian(), "test_"))
+        kept[-1].destroy()
+        kept[-1].destroy()
+    assert resident() - before < 8 * MEGABYTE
+
+
+@pytest.mark.parametrize(("accurate", "inner"), [(1e-11, _Augmented), (0.0, _Indefinite)])
+@pytest.mark.parametrize("spread", [1.0, 1e7])
+def test_saddle_points(monkeypatch, spread, accurate, inner):
+    """Both factors solve [E K^T; K 0], also where rows of K depend on each other and a motion is free."""
+    monkeypatch.setattr("feti_homog.feti.linalg.saddle_point.ACCURATE", accurate)
+    rng = np.random.default_rng(1)
+    n, m = 30, 6
+    basis = np.linalg.qr(rng.standard_normal((n, n)))[0]
+    E = basis @ np.diag(np.geomspace(1.0, spread, n)) @ basis.T
+    K = rng.standard_normal((m, n))
+    K[-1] = K[0] + K[1]
+    null = np.array([1.0, 1, 0, 0, 0, -1]) / np.sqrt(3)
+    c, a = rng.standard_normal((n, 2)), rng.standard_normal((m, 2))
+    saddle = SaddlePoint(MPI.COMM_WORLD, *(csr_matrix(x) for x in (E, K, np.outer(null, null))), "test_")
+    found, work = saddle.solve(E @ c + K.T @ a, K @ c)
+    np.testing.assert_allclose(found, c, atol=1e-6)
+    np.testing.assert_allclose(K.T @ work, K.T @ a, rtol=1e-6, atol=1e-6 * spread)
+    alone, _ = saddle.solve((E @ c + K.T @ a)[:, 0], (K @ c)[:, 0])
+    np.testing.assert_allclose(alone, found[:, 0], atol=1e-6)
+    assert isinstance(saddle._inner, inner)
+
+
+def test_blocks_sum_whatever_is_held(monkeypatch):
+    rng = np.random.default_rng(2)
+    for held in (1, 50, 10**6):
+        monkeypatch.setattr("feti_homog.feti.linalg.distributed_matrix.HELD", held)
+        blocks, expected = Blocks((20, 15)), np.zeros((20, 15))
+        for _ in range(30):
+            rows, columns = rng.choice(20, 4, replace=False), rng.choice(15, 3, replace=False)
+            values = rng.standard_normal((4, 3))
+            blocks.add(rows, columns, values)
+            expected[np.ix_(rows, columns)] += values
+        np.testing.assert_allclose(blocks.matrix().toarray(), expected, atol=1e-12)
+
+
+def test_small_entries_of_blocks_are_left_out():
+    blocks = Blocks((4, 3))
+    values = np.array([[1.0, -2.0], [0.1, -5.0]])
+    blocks.add_larger(np.array([2, 0]), np.array([1, 2]), values, np.array([0.5, 2.0]))
+    np.testing.assert_array_equal(blocks.matrix().toarray(), [[0, 0, -5.0], [0, 0, 0], [0, 1.0, 0], [0, 0, 0]])
+    assert blocks.matrix().nnz == 2

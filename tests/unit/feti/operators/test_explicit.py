@@ -1,0 +1,130 @@
+"""Boundary operators of one subdomain against dense Schur complements by NumPy."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import bonds
+import numpy as np
+import pytest
+from mpi4py import MPI
+from reference.dense_feti import boundary_of, kernel, schur
+from scipy.sparse import csr_matrix, diags, identity
+
+from feti_homog.feti.operators.explicit import Condensed, schur_complement
+from feti_homog.feti.operators.implicit import Factored
+
+TIGHT = 1e-10
+
+
+@pytest.fixture(
+    scope="module",
+    params=[{}, {"subdomains": 6}, {"subdomains": 6, "order": 2}, {"bodies": "plane"}],
+    ids=["whole", "cut", "quadratic", "plane"],
+)
+def parts(request):
+    """(subdomain, boundary dofs, K, S) of pinned and of free subdomains, with and without a rotation."""
+    case = dict(request.param)
+    pieces = {"subdomains": case.pop("subdomains")} if "subdomains" in case else {}
+    cell = bonds.tear(MPI.COMM_SELF, geometry="hexagonal", mesh_size=0.2, decomposition=pieces, **case)
+    found = []
+    for s, first in zip(cell.subdomains, cell.offsets, strict=False):
+        K = s.K.toarray()
+        dofs = boundary_of(cell.solver.constraints.B[:, first : first + len(K)].toarray())
+        found.append((s, dofs, K, schur(K, dofs)))
+    yield found
+    cell.solver.destroy()
+
+
+def applied(function, x):
+    out = np.full_like(x, np.nan)
+    function(x, out)
+    return out
+
+
+def test_several_kernels_are_met(parts):
+    assert len({s.R.shape[1] for s, *_ in parts}) > 1
+    for s, _, _, S in parts:
+        assert kernel(S).shape[1] == s.R.shape[1]
+
+
+@pytest.mark.parametrize("kind", [Condensed, Factored])
+def test_stiffness_is_the_schur_complement(parts, kind):
+    for s, dofs, _, S in parts:
+        found = applied(kind(s, dofs).stiffness, np.eye(len(dofs)))
+        assert np.abs(found - S).max() < TIGHT * np.abs(S).max()
+
+
+@pytest.mark.parametrize("kind", [Condensed, Factored])
+def test_flexibility_is_a_generalized_inverse(parts, kind):
+    for s, dofs, _, S in parts:
+        flexibility = applied(kind(s, dofs).flexibility, np.eye(len(dofs)))
+        assert np.abs(S @ flexibility @ S - S).max() < TIGHT * np.abs(S).max()
+        assert np.abs(flexibility - flexibility.T).max() < TIGHT * np.abs(flexibility).max()
+        # Definite, so that F is.
+        assert np.linalg.eigvalsh(flexibility)[0] > 0
+
+
+def test_factored_gives_the_numbers_of_condensed(parts):
+    for s, dofs, _, _ in parts:
+        dense, sparse = Condensed(s, dofs), Factored(s, dofs)
+        x = np.random.default_rng(1).standard_normal((len(dofs), 4))
+        for first, second in ((dense.stiffness, sparse.stiffness), (dense.flexibility, sparse.flexibility)):
+            expected = applied(first, x)
+            assert np.abs(applied(second, x) - expected).max() < TIGHT * np.abs(expected).max()
+
+
+@pytest.mark.parametrize("kind", [Condensed, Factored])
+def test_one_vector_is_a_column_of_many(parts, kind):
+    for s, dofs, _, _ in parts:
+        operator = kind(s, dofs)
+        x = np.random.default_rng(2).standard_normal((len(dofs), 3))
+        for function in (operator.stiffness, operator.flexibility):
+            before = x.copy()
+            together = applied(function, x)
+            assert (x == before).all()
+            for k in range(3):
+                alone = applied(function, x[:, k].copy())
+                assert np.abs(alone - together[:, k]).max() < TIGHT * np.abs(together).max()
+
+
+def test_answer_is_the_flexibility_of_many_columns(parts):
+    for s, dofs, _, _ in parts:
+        operator = Condensed(s, dofs)
+        X = np.random.default_rng(3).standard_normal((len(dofs), 7))
+        before, expected = X.copy(), applied(operator.flexibility, X)
+        for order in "CF":
+            given = np.array(X, order=order)
+            assert np.abs(operator.answer(given) - expected).max() < TIGHT * np.abs(expected).max()
+            assert (given == before).all()
+
+
+def test_dense_matrices(parts):
+    for s, dofs, _, S in parts:
+        operator = Condensed(s, dofs)
+        assert np.abs(operator.S - S).max() < TIGHT * np.abs(S).max()
+        held = operator.held
+        assert np.linalg.eigvalsh(held)[0] > 0
+        holding = operator.holding(identity(len(dofs)).tocsr())
+        assert np.abs(holding - (held - operator.S)).max() < TIGHT * np.abs(S).max()
+        inverse = applied(operator.flexibility, np.eye(len(dofs)))
+        assert np.abs(held @ inverse - np.eye(len(dofs))).max() < 1e-8
+
+
+def test_schur_complement_without_an_interior():
+    A = csr_matrix(np.diag([2.0, 3.0]) + 1.0)
+    assert (schur_complement(A, np.arange(2)) == A.toarray()).all()
+
+
+def test_schur_complement_of_any_definite_matrix():
+    n, dofs = 30, np.array([1, 4, 5, 17, 29])
+    A = csr_matrix(diags([np.arange(n) + 4.0, np.full(n - 1, -1.5), np.full(n - 1, -1.5)], [0, 1, -1]))
+    expected = np.linalg.inv(np.linalg.inv(A.toarray())[np.ix_(dofs, dofs)])
+    assert np.abs(schur_complement(A, dofs) - expected).max() < 1e-12
+
+
+def test_indefinite_subdomain_is_refused():
+    K = csr_matrix(np.diag([1.0, 1.0, -1.0, 1.0]))
+    subdomain = SimpleNamespace(fixing=lambda nodes: (np.zeros(0, np.int64), np.zeros((0, 0))), K=K)
+    with pytest.raises(np.linalg.LinAlgError, match="not positive definite"):
+        Condensed(subdomain, np.arange(4))

@@ -1,0 +1,83 @@
+"""Checkpoints: what is read is what was written, or is refused."""
+
+from __future__ import annotations
+
+import random
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from feti_homog.errors import CaseError
+from feti_homog.output.files.checkpoint import Checkpoint
+
+EVENTS = 4
+
+
+def written(folder: Path, signature: str = "this run") -> Checkpoint:
+    checkpoint = Checkpoint(folder, MPI.COMM_SELF, signature)
+    for number in range(EVENTS):
+        checkpoint.write(number, {"path": [0.1 * number, 1.0]}, {"lam": np.arange(5.0) * number, "jump": np.zeros(0)})
+    return checkpoint
+
+
+def same(events) -> bool:
+    return all(
+        event["path"].tolist() == [0.1 * number, 1.0]
+        and event["lam"].tolist() == (np.arange(5.0) * number).tolist()
+        and event["jump"].shape == (0,)
+        for number, event in enumerate(events)
+    )
+
+
+def test_what_was_written_is_read(tmp_path):
+    checkpoint = written(tmp_path)
+    events = checkpoint.read()
+    assert len(events) == EVENTS and same(events)
+    assert checkpoint.clear() == EVENTS and checkpoint.read() == [] and checkpoint.clear() == 0
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_another_run(tmp_path):
+    written(tmp_path)
+    with pytest.raises(CaseError, match=r"--resume: .*000000\.h5 is of another run: expected that; found this run"):
+        Checkpoint(tmp_path, MPI.COMM_SELF, "that").read()
+
+
+def test_a_missing_event(tmp_path):
+    checkpoint = written(tmp_path)
+    (tmp_path / "checkpoint" / "000001.h5").unlink()
+    with pytest.raises(CaseError, match="--resume: event 000001 is missing"):
+        checkpoint.read()
+
+
+def test_an_unfinished_event_does_not_count(tmp_path):
+    checkpoint = written(tmp_path)
+    (tmp_path / "checkpoint" / "000004.part").write_bytes(b"half")
+    assert len(checkpoint.read()) == EVENTS
+
+
+@pytest.mark.parametrize("content", [b"", b"nothing", None])
+def test_an_unreadable_event(tmp_path, content):
+    checkpoint = written(tmp_path)
+    path = tmp_path / "checkpoint" / "000002.h5"
+    path.write_bytes(path.read_bytes()[:-200] if content is None else content)
+    with pytest.raises(CaseError, match=r"--resume: .*000002\.h5"):
+        checkpoint.read()
+
+
+def test_a_damaged_event_is_refused_or_harmless(tmp_path):
+    checkpoint, chance = written(tmp_path), random.Random(0)
+    path = tmp_path / "checkpoint" / "000003.h5"
+    content = path.read_bytes()
+    refused = 0
+    for _ in range(200):
+        damaged = bytearray(content)
+        damaged[chance.randrange(len(content))] ^= 1 << chance.randrange(8)
+        path.write_bytes(damaged)
+        try:
+            assert same(checkpoint.read())
+        except CaseError:
+            refused += 1
+    assert refused > 10

@@ -1,0 +1,162 @@
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+import pytest
+
+from feti_homog.output.text.summary import summary
+
+DOCUMENT: dict[str, Any] = {
+    "version": "0",
+    "case": {
+        "name": "pair",
+        "cell": {"geometry": "hexagonal", "order": 2, "refine": 1},
+        "analysis": {"type": "stiffness", "plane": "strain"},
+        "output": {"length_unit": "mm", "stress_unit": "GPa"},
+    },
+    "cell": {
+        "width": 1.0, "height": 1.7320508, "area": 1.7320508, "fibre_fraction": 0.4,
+        "elements": 12345, "nodes": 6300,
+        "fractions": {"matrix": 0.6, "fibre": 0.4},
+    },
+    "solver": {
+        "ranks": 1, "subdomains": 3, "dofs": 12600, "multipliers": 400, "kernel_dim": 8,
+        "coarse_dim": 8, "iterations": [12, 12, 11], "converged_reason": [2, 2, 2],
+    },
+    "effective_stiffness": [[149.69, 56.97, 1e-13], [56.97, 149.69, 0.0], [-1e-13, 0.0, 46.36]],
+    "moduli": {"E1": 128.0, "E2": 128.0, "nu12": 0.38, "nu21": 0.38, "G12": 46.36, "eta1": 1e-16,
+               "bulk": 103.33, "shear": 46.36},
+    "bounds": {
+        "voigt": [[160.0, 60.0, 0.0], [60.0, 160.0, 0.0], [0.0, 0.0, 53.0]],
+        "reuss": [[140.0, 50.0, 0.0], [50.0, 140.0, 0.0], [0.0, 0.0, 44.0]],
+        "hashin_shtrikman": {"bulk": [103.3, 104.8], "shear": [46.2, 47.6]},
+    },
+    "checks": {"strain": 1e-15, "hill": 2e-12, "jump": 3e-6},
+    "check_tolerance": 1e-7,
+    "timings": {"mesh": 0.5, "solve": 1.23, "assemble": 0.25, "factor": 0.31, "output": 0.4, "cut": 0.01},
+    "memory": 200 * 2**20,
+    "warnings": ["the matrix is nearly incompressible in plane strain: P1 elements lock, so take order = 2"],
+    "status": "done",
+}  # fmt: skip
+
+
+def changed(**top: Any) -> dict[str, Any]:
+    return copy.deepcopy(DOCUMENT) | top
+
+
+def line(text: str, start: str) -> str:
+    return next(line for line in text.splitlines() if line.strip().startswith(start))
+
+
+def test_it_is_aligned_and_narrow() -> None:
+    lines = summary(DOCUMENT).splitlines()
+    assert max(map(len, lines)) < 80
+    assert all(text == text.rstrip() for text in lines)
+    matrix = [lines[i] for i in range(len(lines)) if lines[i].startswith(("Effective", "  S11", "  S22", "  S12"))]
+    assert len(matrix) == 4 and len({len(text) for text in matrix}) == 1
+
+
+def test_it_says_what_was_computed() -> None:
+    text = summary(DOCUMENT)
+    assert line(text, "S22").split() == ["S22", "56.97000", "149.69000", "0.00000"]
+    assert line(text, "S11").split()[-1] == "0.00000"
+    assert line(text, "Solver") == "Solver      1 rank, 3 subdomains, 12 600 dofs"
+    assert line(text, "Iterations").endswith("12, 12, 11")
+    assert "fibre fraction 0.400000 (matrix 0.600000, fibre 0.400000)" in text
+    assert line(text, "E1").split() == ["E1", "128", "nu12", "0.380000"]
+    assert line(text, "bulk H").split()[-3:] == ["103.3", "103.33", "104.8"]
+    assert line(text, "Memory").endswith("200 MiB per rank at most")
+    assert "Effective stiffness (GPa)" in text and "1.73205 mm" in text
+    assert line(text, "Status").split() == ["Status", "done"]
+
+
+@pytest.mark.parametrize(("entry", "text"), [(2.0e11, "2.0000000e+11"), (0.5, "0.50000000"), (12345.678, "12345.678")])
+def test_stiffnesses_of_any_size(entry: float, text: str) -> None:
+    stiffness = [[entry, 0.0, 0.0], [0.0, entry, 0.0], [0.0, 0.0, entry]]
+    lines = summary(changed(effective_stiffness=stiffness)).splitlines()
+    assert next(words for words in lines if words.startswith("  S11")).split()[1].startswith(text)
+    assert max(map(len, lines)) < 80
+
+
+def test_checks_pass_and_fail() -> None:
+    text = summary(DOCUMENT)
+    assert line(text, "hill").split() == ["hill", "2.0e-12", "pass"]
+    assert line(text, "jump").split() == ["jump", "3.0e-06", "FAIL"]
+    document = changed()
+    del document["check_tolerance"]
+    assert line(summary(document), "jump").split() == ["jump", "3.0e-06"]
+
+
+def test_a_value_out_of_its_bounds_is_marked() -> None:
+    assert "outside" not in summary(DOCUMENT)
+    stiffness = [[170.0, 0.0, 0.0], [0.0, 150.0, 0.0], [0.0, 0.0, 45.0]]
+    assert line(summary(changed(effective_stiffness=stiffness)), "C11").endswith("170           160  outside")
+
+
+def test_warnings_and_faults() -> None:
+    text = summary(changed(faults=["check jump: 3e-06"], status="not converged"))
+    assert "Warning     the matrix" in text and "Fault       check jump: 3e-06" in text
+    assert "Warning" not in summary(changed(warnings=[]))
+
+
+def test_no_units_no_hashin_shtrikman_and_unknown_keys() -> None:
+    document = changed(something_else={"a": 1})
+    document["case"]["output"] = {}
+    document["bounds"]["hashin_shtrikman"] = None
+    text = summary(document)
+    assert "GPa" not in text and "Hashin" not in text and "()" not in text
+
+
+@pytest.mark.parametrize("key", ["cell", "solver", "effective_stiffness", "checks", "timings", "memory", "status"])
+def test_what_must_be_there(key: str) -> None:
+    document = changed()
+    del document[key]
+    with pytest.raises(KeyError, match=key):
+        summary(document)
+
+
+def counted(bonded: int, **values: Any) -> dict[str, Any]:
+    return values | {"bonded": bonded, "open": 9, "closed": 1, "iterations": 7}
+
+
+def test_an_angle() -> None:
+    stiffness = [[9.0, 2, 0], [2, 8, 0], [0, 0, 3]]
+    document = changed(angle=[counted(20 - k, angle=90.0 * k, stiffness=stiffness) for k in (0, 4)])
+    del document["effective_stiffness"], document["moduli"], document["bounds"]
+    document["case"]["analysis"]["type"] = "angle"
+    text = summary(document)
+    assert text.startswith("pair: debonding angle, plane strain") and max(map(len, text.splitlines())) < 80
+    assert line(text, "angle ").split() == ["angle", "C11", "C22", "C12", "C33", "bonded", "open", "closed"]
+    assert line(text, "360 ").split() == ["360", "9", "8", "2", "3", "16", "9", "1"]
+
+
+def test_a_path() -> None:
+    points = [
+        counted(100 - k, load_factor=0.01 * k, strain=[0, -2e-3 * k, 1e-5], stress=[1e-15, -3.5 * k, -2.0], broke=1,
+                dissipated=0.5 * k)
+        for k in range(101)
+    ]  # fmt: skip
+    document = changed(path=points, kkt_tolerance=1e-6)
+    del document["effective_stiffness"], document["moduli"], document["bounds"]
+    document["case"]["analysis"]["type"] = "path"
+    document["checks"] |= {"kkt_tension": 9e-7, "kkt_penetration": 2e-6}
+    document["solver"] |= {"iterations": [*range(5, 30)], "factorizations": 3, "coarse_factorizations": 30}
+    text = summary(document)
+    assert max(map(len, text.splitlines())) < 80
+    assert "101 points, 15 shown; 101 bonds broke, 50 dissipated per area" in text
+    rows = [words.split() for words in text.splitlines() if words[:5].strip().isdigit()]
+    assert len(rows) == 15
+    assert rows[0] == ["0", "0.000000", "0", "0", "0", "-2", "100", "9", "1"]
+    assert rows[-1] == ["100", "1.000000", "-0.2", "0", "-350", "-2", "0", "9", "1"]
+    assert line(text, "Iterations").endswith("5 to 29 a state, 425 for 25 states")
+    assert line(text, "Factorized").split(maxsplit=1)[1] == "3 subdomains, 30 coarse ones"
+    assert line(text, "kkt_tension").endswith("pass") and line(text, "kkt_penetration").endswith("FAIL")
+    assert "at most 1.0e-07; of contact 1.0e-06" in text
+
+
+def test_bounds_of_bonded_cells_only() -> None:
+    document = changed(effective_stiffness_compression=[[150.0, 57, 0], [57, 150, 0], [0, 0, 46]])
+    document["case"]["interface"] = {"contact": True, "debonded": [{"fibre": "all", "centre": 0.0, "angle": 60.0}]}
+    text = summary(document)
+    assert "Under minus E (GPa)" in text and "Bounds" not in text and "moduli" not in text

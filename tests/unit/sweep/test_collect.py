@@ -1,0 +1,154 @@
+"""Statistics over realisations, and the tables and pictures of a sweep."""
+
+from __future__ import annotations
+
+import csv
+import math
+
+import h5py
+import numpy as np
+import pytest
+from matplotlib.image import imread
+from scipy import stats
+
+import feti_homog.output  # noqa: F401 (chooses the build of h5py)
+from feti_homog.output.text.units import unit, with_unit
+from feti_homog.sweep.report import figures, tables
+from feti_homog.sweep.report.statistics import Collected, Statistics, outputs
+
+MATERIAL = {"matrix": {"young": 88.0, "poisson": 0.299}, "fibre": {"young": 200.0, "poisson": 0.222}}
+
+
+def test_statistics_are_scipys():
+    samples = np.random.default_rng(0).normal(5.0, 2.0, (7, 3))
+    found = Statistics.of(samples)
+    for k, column in enumerate(samples.T):
+        low, high = stats.t.interval(0.95, len(column) - 1, loc=column.mean(), scale=stats.sem(column))
+        assert (found.mean[k], found.std[k]) == pytest.approx((column.mean(), column.std(ddof=1)))
+        assert found.mean[k] + np.array([-1, 1]) * found.ci95[k] == pytest.approx([low, high])
+
+
+def test_statistics_of_few():
+    found = Statistics.of(np.array([[1.0, 2.0, np.nan], [np.nan, 4.0, np.nan]]))
+    assert found.count.tolist() == [1, 2, 0]
+    assert found.mean[:2].tolist() == [1.0, 3.0] and math.isnan(found.mean[2])
+    assert np.isnan(found.std[[0, 2]]).all() and found.std[1] == pytest.approx(2**0.5)
+    assert found.ci95[1] == pytest.approx(12.706, rel=1e-4)
+
+
+def document(fraction, fibres, shift):
+    """What a run leaves, with a stiffness a little above that of Reuss."""
+    C = np.array([[120.0 + 80 * fraction, 50.0, 0.0], [50.0, 120.0 + 80 * fraction, 0.0], [0.0, 0.0, 35.0]]) + shift
+    cell = {"geometry": "random", "fibre_fraction": fraction, "fibres": fibres}
+    return {
+        "case": {"cell": cell, "material": MATERIAL, "analysis": {"type": "stiffness", "plane": "strain"}},
+        "cell": {"fibre_fraction": fraction, "elements": 10, "nodes": 9},
+        "solver": {"ranks": 1, "subdomains": 2, "dofs": 18, "multipliers": 4, "iterations": [3, 4, 5]},
+        "effective_stiffness": C, "moduli": {"bulk": 85.0 + 60 * fraction + shift, "shear": 35.0 + shift},
+        "checks": {"hill": 1e-12}, "timings": {"solve": 0.1}, "memory": 1000,
+    }  # fmt: skip
+
+
+def path_document(fibres, shift):
+    points = [
+        {"load_factor": f, "strain": [0.2 * f, 0, 0], "stress": [s + shift, s / 3, 0.0], "broke": 1,
+         "dissipated": 0.1 * f, "bonded": 9, "open": 1, "closed": 0}
+        for f, s in ((0.1, 4.0), (0.08, 2.0), (0.5, 5.0), (1.0, 8.0))
+    ]  # fmt: skip
+    base = document(0.4, fibres, 0.0)
+    case = base["case"] | {"path": {"method": "events", "strain": [0.2, 0, 0]}}
+    del base["effective_stiffness"], base["moduli"]
+    return base | {"case": case, "path": points}
+
+
+def collected(inputs, documents, point, realisation):
+    found = [outputs(d) if d else {} for d in documents]
+    names = dict.fromkeys(name for row in found for name in row)
+    return Collected(
+        name="test", stress_unit="GPa", folder=[f"case-{k + 1:04d}" for k in range(len(documents))],
+        point=point, realisation=realisation, status=["done" if d else "waiting" for d in documents],
+        reason=[""] * len(documents), inputs=inputs, documents=documents,
+        outputs={name: np.array([row.get(name, np.nan) for row in found]) for name in names},
+    )  # fmt: skip
+
+
+def fractions():
+    """Two fractions with three realisations each, of which one still waits."""
+    documents = [document(c, 8, shift) for shift in (0.0, 0.5, 1.0) for c in (0.2, 0.4)]
+    documents[-1] = None
+    inputs = {"cell.fibre_fraction": [0.2, 0.4] * 3, "cell.seed": [0, 0, 1, 1, 2, 2]}
+    return collected(inputs, documents, [1, 2] * 3, [1, 1, 2, 2, 3, 3])
+
+
+def test_tables(tmp_path):
+    table = fractions()
+    assert [path.name for path in tables.write(tmp_path, table)] == ["sweep.csv", "sweep.h5"]
+    with (tmp_path / "sweep.csv").open() as stream:
+        rows = list(csv.DictReader(stream))
+    assert [row["row"] for row in rows] == ["case"] * 6 + ["count", "mean", "std", "ci95"] * 2
+    assert rows[5]["status"] == "waiting" and rows[5]["bulk (GPa)"] == "" and rows[5]["cell.fibre_fraction"] == "0.4"
+    assert [float(row["bulk (GPa)"]) for row in rows if row["row"] == "mean"] == pytest.approx([97.5, 109.25])
+    assert [row["bulk (GPa)"] for row in rows if row["row"] == "count"] == ["3.0", "2.0"]
+    with h5py.File(tmp_path / "sweep.h5") as file:
+        assert file["statistics/mean/C11"][()].tolist() == pytest.approx([136.5, 152.25])
+        halves = [stats.t.ppf(0.975, 2) * 0.5 / 3**0.5, stats.t.ppf(0.975, 1) * 0.25]
+        assert file["statistics/ci95/C11"][()] == pytest.approx(halves)
+        assert file["cases/status"].asstr()[5] == "waiting" and np.isnan(file["outputs/C11"][5])
+        assert file["points/cell.fibre_fraction"][()].tolist() == [0.2, 0.4]
+        assert file["outputs/seconds_solve"].attrs["unit"] == "s"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["sweep.csv", "sweep.h5"]
+
+
+def test_curves(tmp_path):
+    documents = [path_document(fibres, shift) for shift in (0.0, 1.0) for fibres in (2, 4)]
+    table = collected({"cell.fibres": [2, 4, 2, 4], "cell.seed": [0, 0, 1, 1]}, documents, [1, 2, 1, 2], [1, 1, 2, 2])
+    tables.write(tmp_path, table)
+    assert table.outputs["onset_S11"].tolist() == [4.0, 4.0, 5.0, 5.0]
+    assert table.outputs["peak_S11"].tolist() == [8.0, 8.0, 9.0, 9.0]
+    with h5py.File(tmp_path / "sweep.h5") as file:
+        group = file["curves/point-1"]
+        strain, mean = group["strain"][()], group["S11_mean"][()]
+        assert strain[[0, -1]].tolist() == [0.0, 0.2] and group["S11"].shape == (2, len(strain))
+        assert mean[[0, -1]] == pytest.approx([0.0, 8.5])
+        # The bonded branch: from zero to the mean of the first breaks.
+        assert np.interp(0.01, strain, mean) == pytest.approx(2.25)
+        half = stats.t.ppf(0.975, 1) * 0.5**0.5 / 2**0.5
+        assert group["S11_ci95"][-1] == pytest.approx(half)
+    assert_drawn(tmp_path, table, ["cell_size.png", "curves.png"])
+
+
+def test_pictures(tmp_path):
+    assert_drawn(tmp_path, fractions(), ["moduli.png"])
+    documents = [document(0.4, fibres, shift / fibres) for shift in (-1.0, 0.0, 1.0) for fibres in (4, 8, 16)]
+    inputs = {"cell.fibres": [4, 8, 16] * 3, "cell.mesh_size": [0.3, 0.2, 0.1] * 3, "cell.seed": [0] * 9}
+    table = collected(inputs, documents, [1, 2, 3] * 3, [1] * 3 + [2] * 3 + [3] * 3)
+    assert_drawn(tmp_path, table, ["cell_size.png"])
+    assert not figures.plot(tmp_path, collected({"cell.order": [1]}, [document(0.4, 8, 0)], [1], [1]))
+    waiting = collected({"cell.fibre_fraction": [0.1, 0.2]}, [None] * 2, [1, 2], [1] * 2)
+    assert not figures.plot(tmp_path, waiting)
+
+
+def assert_drawn(folder, table, names):
+    paths = figures.plot(folder, table)
+    assert [path.name for path in paths] == names
+    for path in paths:
+        picture = imread(path)
+        assert min(picture.shape[:2]) > 500 and picture[..., :3].std() > 0.03
+
+
+def test_what_varies_along_is_no_other_series():
+    from feti_homog.sweep.report.style import series
+
+    documents = [document(0.4, fibres, 0.0) for fibres in (4, 8, 4, 8)]
+    inputs = {"cell.fibres": [4, 8, 4, 8], "cell.mesh_size": [0.3, 0.2, 0.3, 0.2], "material.fibre.young": [1, 1, 2, 2]}
+    found = series(collected(inputs, documents, [1, 2, 3, 4], [1] * 4), "cell.fibres")
+    assert [(one.label, one.points, one.x.tolist()) for one in found] == [
+        ("young 1", [1, 2], [4.0, 8.0]), ("young 2", [3, 4], [4.0, 8.0]),
+    ]  # fmt: skip
+
+
+def test_units():
+    assert unit("material.fibre.young", "GPa") == "GPa" == unit("C11_compression", "GPa") == unit("onset_S11", "GPa")
+    assert with_unit("angle_60_C11", "MPa") == "angle_60_C11 (MPa)" and with_unit("bulk", "") == "bulk"
+    assert unit("seconds_solve", "GPa") == "s" and unit("material.fibre.angle", "GPa") == "degrees"
+    assert not unit("cell.fibre_fraction", "GPa") and not unit("nu12", "GPa") and not unit("check_hill", "GPa")
