@@ -15,9 +15,8 @@ from petsc4py import PETSc
 
 from feti_homog.cell.refinement import Lattice
 from feti_homog.feti.decomposition.subdomain import Subdomain
+from feti_homog.typing import Float, Int
 
-Int = NDArray[np.int64]
-Float = NDArray[np.float64]
 ADD = PETSc.InsertMode.ADD_VALUES
 
 

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from feti_homog.common.progress import Progress
 from feti_homog.homogenization.averaging import Homogenization, Response
 from feti_homog.interface.contact import OPEN, Status
-
-Float = NDArray[np.float64]
+from feti_homog.typing import Float
 
 UNIT_CASES = ("E11", "E22", "G12")
 

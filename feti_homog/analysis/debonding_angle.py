@@ -6,12 +6,10 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feti_homog.analysis.context import UNIT_CASES, Study
 from feti_homog.homogenization.averaging import Response, asymmetry
-
-Float = NDArray[np.float64]
+from feti_homog.typing import Float
 
 
 def run(study: Study, values: Sequence[float], strain: Float | None) -> dict[str, Any]:

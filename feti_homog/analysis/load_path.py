@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
 from feti_homog.analysis.context import Study
 from feti_homog.config.sections import LoadPath
@@ -18,8 +17,7 @@ from feti_homog.interface.contact import BONDED, Equilibrium
 from feti_homog.interface.path_following import Point, Stand, events, increments, unloaded
 from feti_homog.interface.strength_criterion import Law
 from feti_homog.output.files.checkpoint import Arrays, Checkpoint
-
-Float = NDArray[np.float64]
+from feti_homog.typing import Float
 
 KKT_LAWS = ("kkt_complementarity", "kkt_penetration", "kkt_tension")
 

@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from feti_homog import __version__
@@ -34,8 +33,7 @@ from feti_homog.output.files import csv_tables, field_parts, output_folder, resu
 from feti_homog.output.files.checkpoint import Checkpoint, NoCheckpoint, finished
 from feti_homog.output.files.field_file import FieldFile
 from feti_homog.output.text.summary import summary
-
-Float = NDArray[np.float64]
+from feti_homog.typing import Float
 
 
 def run(case: Case, directory: Path, comm: MPI.Intracomm, quiet: bool, resume: bool = False) -> None:

@@ -9,16 +9,14 @@ from math import fsum, pi, sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from feti_homog.errors import MeshError
+from feti_homog.typing import Float, Int
 
 if TYPE_CHECKING:
     from feti_homog.config.case import Cell
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.intp]
 
 # Quenched random packings jam near this area fraction.
 JAMMED = 0.84
@@ -33,8 +31,8 @@ class Arrangement:
 
     width: float
     height: float
-    centres: Floats
-    radii: Floats
+    centres: Float
+    radii: Float
 
 
 def arrange(cell: Cell) -> Arrangement:
@@ -56,7 +54,7 @@ def hexagonal_arrangement(cell: Cell) -> Arrangement:
     return _lattice(cell, sqrt(3), np.array([[0.0, 0.0], [0.5, sqrt(3) / 2]]), pi / (2 * sqrt(3)))
 
 
-def _lattice(cell: Cell, height: float, centres: Floats, limit: float) -> Arrangement:
+def _lattice(cell: Cell, height: float, centres: Float, limit: float) -> Arrangement:
     fraction = cell.fibre_fraction
     assert fraction is not None
     if fraction >= limit:
@@ -101,7 +99,7 @@ def random_arrangement(cell: Cell) -> Arrangement:
     )
 
 
-def neighbours(centres: Floats, size: Floats, reach: float) -> tuple[Integers, Integers, Floats]:
+def neighbours(centres: Float, size: Float, reach: float) -> tuple[Int, Int, Float]:
     """All pairs i <= j nearer than `reach`, and the vectors (k, 2) from i to that image of j.
 
     Images of one disc are pairs i = j; each pair of images comes once or, where i = j, from both ends.
@@ -123,7 +121,7 @@ def neighbours(centres: Floats, size: Floats, reach: float) -> tuple[Integers, I
     return who[first], who[second], place[second] - place[first]
 
 
-def _relax(centres: Floats, radii: Floats) -> tuple[Floats, float]:
+def _relax(centres: Float, radii: Float) -> tuple[Float, float]:
     """Centres (N, 2) moved until discs on the unit torus do not overlap, and the clearance reached.
 
     The clearance is the smallest ratio of distance to sum of radii; at least 1 is success. Heavy-ball descent
@@ -143,7 +141,7 @@ def _relax(centres: Floats, radii: Floats) -> tuple[Floats, float]:
     return centres, clearance
 
 
-def _sum_at(rows: Integers, vectors: Floats, count: int) -> Floats:
+def _sum_at(rows: Int, vectors: Float, count: int) -> Float:
     """Sums (count, 2) of the vectors (k, 2) of each row, added one after the other."""
     return np.stack([np.bincount(rows, vectors[:, axis], count) for axis in (0, 1)], axis=1)
 

@@ -11,9 +11,7 @@ from scipy.sparse.csgraph import connected_components, depth_first_order
 
 from feti_homog.cell.coarse_mesh import CoarseMesh, double_arcs, edge_keys, edges, flip_double_arcs
 from feti_homog.cell.interface_edges import interface_edges
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.intp]
+from feti_homog.typing import Float, Int
 
 # Largest distance of a node from its circle, relative to the radius.
 ROUND = 1e-6
@@ -25,8 +23,8 @@ FEWEST = 8
 class _Loop:
     """A closed interface: its node classes (k,) in order, and where they lie, unwrapped, (k, 2)."""
 
-    classes: Integers
-    places: Floats
+    classes: Int
+    places: Float
 
 
 def with_circles(mesh: CoarseMesh) -> CoarseMesh:
@@ -60,7 +58,7 @@ def with_circles(mesh: CoarseMesh) -> CoarseMesh:
     return _without_double_arcs(_with_arcs(mesh, circles, arc_edges))
 
 
-def _loops(mesh: CoarseMesh, pairs: NDArray[np.int32], size: Floats) -> list[_Loop]:
+def _loops(mesh: CoarseMesh, pairs: NDArray[np.int32], size: Float) -> list[_Loop]:
     """The interfaces that are simple closed curves and contractible on the torus."""
     if len(pairs) == 0:
         return []
@@ -85,7 +83,7 @@ def _loops(mesh: CoarseMesh, pairs: NDArray[np.int32], size: Floats) -> list[_Lo
     return loops
 
 
-def _fit(places: Floats) -> Floats | None:
+def _fit(places: Float) -> Float | None:
     """Centre and radius (3,) of the circle through a closed chain of places (k, 2); None if not round."""
     middle = places.mean(axis=0)
     offset = places - middle
@@ -102,7 +100,7 @@ def _fit(places: Floats) -> Floats | None:
     return np.array([*(middle + scale * np.array([x, y])), scale * radius])
 
 
-def _moved(points: Floats, places: Floats, circle: Floats, size: Floats) -> Floats | None:
+def _moved(points: Float, places: Float, circle: Float, size: Float) -> Float | None:
     """Points (k, 2) of the plane moved onto the circle, along the side they are on; None if impossible."""
     centres = circle[:2] - np.round((places - points) / size) * size
     spokes = points - centres
@@ -122,14 +120,14 @@ def _moved(points: Floats, places: Floats, circle: Floats, size: Floats) -> Floa
     return moved
 
 
-def _on_sides(ends: Floats, size: Floats) -> NDArray[np.bool_]:
+def _on_sides(ends: Float, size: Float) -> NDArray[np.bool_]:
     """Whether edges with ends (k, 2, 2) lie on a side of the cell."""
     return np.any(np.all(ends == 0, axis=1) | np.all(ends == size, axis=1), axis=1)
 
 
 def _images(
-    mesh: CoarseMesh, loop: _Loop, circle: Floats, own: NDArray[np.int32], size: Floats
-) -> list[tuple[Floats, NDArray[np.int32]]]:
+    mesh: CoarseMesh, loop: _Loop, circle: Float, own: NDArray[np.int32], size: Float
+) -> list[tuple[Float, NDArray[np.int32]]]:
     """The images of a circle in the plane, each with its edges (a, 2) among the loop's own."""
     order = np.argsort(loop.classes)
     place = order[np.searchsorted(loop.classes[order], mesh.representative[own[:, 0]])]
@@ -140,12 +138,12 @@ def _images(
     return [(np.append(centre, circle[2]), own[which == k]) for k, centre in enumerate(centres)]
 
 
-def _copied(mesh: CoarseMesh, points: Floats, size: Floats) -> Floats:
+def _copied(mesh: CoarseMesh, points: Float, size: Float) -> Float:
     """Points (n, 2) whose periodic copies follow their representatives; those on high sides stay there."""
     return np.where(mesh.points == size, size, points[mesh.representative])
 
 
-def _with_arcs(mesh: CoarseMesh, circles: list[Floats], arc_edges: list[NDArray[np.int32]]) -> CoarseMesh:
+def _with_arcs(mesh: CoarseMesh, circles: list[Float], arc_edges: list[NDArray[np.int32]]) -> CoarseMesh:
     """The mesh with these circles (3,) and their edges (a, 2)."""
     counts = np.array([len(own) for own in arc_edges], dtype=np.intp)
     return replace(

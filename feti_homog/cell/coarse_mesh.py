@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int32]
+from feti_homog.typing import Float, Int32
 
 
 @dataclass(frozen=True)
@@ -28,36 +27,36 @@ class CoarseMesh:
 
     width: float
     height: float
-    points: Floats
-    triangles: Ints
-    phase: Ints
+    points: Float
+    triangles: Int32
+    phase: Int32
     phases: tuple[str, ...]
-    representative: Ints
-    circles: Floats
-    arc_edges: Ints
-    arc_circle: Ints
-    debonded_edges: Ints
+    representative: Int32
+    circles: Float
+    arc_edges: Int32
+    arc_circle: Int32
+    debonded_edges: Int32
 
 
-def areas(points: Floats, triangles: Ints) -> Floats:
+def areas(points: Float, triangles: Int32) -> Float:
     """Signed areas (m,) of triangles, positive counter-clockwise."""
     a, b, c = (points[triangles[:, i]] for i in range(3))
     u, v = b - a, c - a
     return 0.5 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
 
 
-def edges(triangles: Ints) -> Ints:
+def edges(triangles: Int32) -> Int32:
     """Directed edges (3m, 2): edge i of triangle t, opposite to its corner i, is row 3 t + i."""
     return triangles[:, [1, 2, 2, 0, 0, 1]].reshape(-1, 2)
 
 
-def edge_keys(pairs: Ints, nodes: int) -> NDArray[np.int64]:
+def edge_keys(pairs: Int32, nodes: int) -> NDArray[np.int64]:
     """One integer for each undirected edge (k, 2) of a mesh with that many nodes."""
     ordered = np.sort(pairs, axis=1).astype(np.int64)
     return ordered[:, 0] * nodes + ordered[:, 1]
 
 
-def representatives(points: Floats, width: float, height: float) -> Ints:
+def representatives(points: Float, width: float, height: float) -> Int32:
     """Class representative (n,) of each node, for a mesh whose opposite sides match exactly.
 
     A node at x = width has the class of its partner at x = 0, one at y = height that of its partner at y = 0,
@@ -72,7 +71,7 @@ def representatives(points: Floats, width: float, height: float) -> Ints:
     return result[result]
 
 
-def flip_double_arcs(triangles: Ints, phase: Ints, arc_edges: Ints, arc_circle: Ints, nodes: int) -> Ints:
+def flip_double_arcs(triangles: Int32, phase: Int32, arc_edges: Int32, arc_circle: Int32, nodes: int) -> Int32:
     """Triangles (m, 3) after edge flips, such that as few as possible have two edges on the same circle.
 
     Such a triangle would have an angle of 180 degrees once its edges follow the circle. Its third edge, a
@@ -102,7 +101,7 @@ def flip_double_arcs(triangles: Ints, phase: Ints, arc_edges: Ints, arc_circle: 
     return triangles
 
 
-def double_arcs(triangles: Ints, arc_edges: Ints, arc_circle: Ints, nodes: int) -> tuple[Ints, Ints]:
+def double_arcs(triangles: Int32, arc_edges: Int32, arc_circle: Int32, nodes: int) -> tuple[Int32, Int32]:
     """Triangles with two edges on the same circle, and the corner that these two edges share."""
     if len(arc_edges) == 0:
         return np.zeros(0, np.int32), np.zeros(0, np.int32)

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feti_homog.cell.coarse_mesh import areas
 from feti_homog.cell.periodic_topology import Torus
 from feti_homog.cell.submesh import Piece, cut
 from feti_homog.cell.unwrap import unwrap
-
-Float = NDArray[np.float64]
+from feti_homog.typing import Float
 
 # Relative to the radius: circles nearer than this are images of one.
 SAME = 1e-9

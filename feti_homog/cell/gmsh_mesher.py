@@ -9,17 +9,15 @@ from types import MappingProxyType, ModuleType
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feti_homog.cell.arrangement import arrange
 from feti_homog.cell.coarse_mesh import CoarseMesh, areas, flip_double_arcs, representatives
 from feti_homog.cell.outline import MATRIX, Curve, Outline, outline
+from feti_homog.typing import Float, Index
 
 if TYPE_CHECKING:
     from feti_homog.config.case import Cell
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.intp]
 
 NO_MARKS: Mapping[int, Sequence[float]] = MappingProxyType({})
 FRONTAL_DELAUNAY = 6
@@ -81,7 +79,7 @@ def gmsh_session() -> Iterator[ModuleType]:
         gmsh.finalize()
 
 
-def _fill(lines: Outline, largest: float) -> tuple[Floats, Integers, Integers]:
+def _fill(lines: Outline, largest: float) -> tuple[Float, Index, Index]:
     """Nodes (n, 2), those of the outline first, triangles (m, 3) and the circle around each (or MATRIX)."""
     with gmsh_session() as gmsh:
         gmsh.option.setNumber("Mesh.MeshSizeMax", largest)
@@ -155,7 +153,7 @@ def _loops(lines: list[Signed]) -> list[list[Signed]]:
     return loops
 
 
-def _with_holes(loops: list[list[Signed]], points: Floats) -> list[list[list[Signed]]]:
+def _with_holes(loops: list[list[Signed]], points: Float) -> list[list[list[Signed]]]:
     """Groups of loops, each an outer one followed by the holes, which are whole circles, within it."""
     holes = [loop for loop in loops if all(curve.circle != MATRIX for _, curve in loop)]
     outer = [loop for loop in loops if any(curve.circle == MATRIX for _, curve in loop)]
@@ -169,7 +167,7 @@ def _with_holes(loops: list[list[Signed]], points: Floats) -> list[list[list[Sig
     return groups
 
 
-def _holds(polygon: Floats, point: Floats) -> bool:
+def _holds(polygon: Float, point: Float) -> bool:
     """Whether a polygon (k, 2) contains a point, by counting the edges to its right."""
     a, b = polygon - point, np.roll(polygon, -1, axis=0) - point
     crossing = (a[:, 1] > 0) != (b[:, 1] > 0)

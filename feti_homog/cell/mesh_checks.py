@@ -11,9 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from feti_homog.cell.coarse_mesh import areas, edge_keys, edges
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from feti_homog.typing import Float, Int
 
 # Nodes nearer than this, relative to the cell, are at the same place.
 SAME = 1e-7
@@ -36,13 +34,13 @@ class RawMesh:
     tags of the lines in the physical curve DEBONDED.
     """
 
-    node_tags: Integers
-    points: Floats
-    element_tags: Integers
+    node_tags: Int
+    points: Float
+    element_tags: Int
     triangles: NDArray[np.int32]
-    group: Integers
+    group: Int
     groups: tuple[tuple[str, ...], ...]
-    debonded: Integers
+    debonded: Int
 
     def node(self, number: int) -> str:
         """A node in words."""
@@ -58,7 +56,7 @@ class RawMesh:
         return "the edge between " + " and ".join(self.node(int(end)) for end in pair)
 
 
-def at(point: Floats) -> str:
+def at(point: Float) -> str:
     """A position in words, (x, y)."""
     return f"({point[0]:.9g}, {point[1]:.9g})"
 
@@ -153,7 +151,7 @@ def overlapping(mesh: RawMesh) -> list[str]:
     return faults
 
 
-def open_edges(mesh: RawMesh, plane: Floats, size: Floats) -> list[str]:
+def open_edges(mesh: RawMesh, plane: Float, size: Float) -> list[str]:
     """Edges of one triangle only, not on the boundary of the cell: hanging nodes, holes, other shapes.
 
     `plane` (n, 2) are positions with the lower left corner at the origin, nodes on sides exactly there.
@@ -174,7 +172,7 @@ def open_edges(mesh: RawMesh, plane: Floats, size: Floats) -> list[str]:
     return [f"the mesh has a hole or its boundary is not a rectangle, elements on one side only of {found}"]
 
 
-def _hanging(plane: Floats, pairs: NDArray[np.int32]) -> list[tuple[int, tuple[int, int]]]:
+def _hanging(plane: Float, pairs: NDArray[np.int32]) -> list[tuple[int, tuple[int, int]]]:
     """Nodes of the edges (k, 2) that lie within others, not at their ends, with these edges."""
     found = []
     nodes = np.unique(pairs)
@@ -190,7 +188,7 @@ def _hanging(plane: Floats, pairs: NDArray[np.int32]) -> list[tuple[int, tuple[i
     return found
 
 
-def missing_corners(plane: Floats, origin: Floats, size: Floats) -> list[str]:
+def missing_corners(plane: Float, origin: Float, size: Float) -> list[str]:
     """Corners of the bounding rectangle without a node."""
     corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * size
     missing = [corner for corner in corners if not np.all(plane == corner, axis=1).any()]
@@ -198,7 +196,7 @@ def missing_corners(plane: Floats, origin: Floats, size: Floats) -> list[str]:
     return [f"no node at the corner {names} of the cell"] if missing else []
 
 
-def uncovered(plane: Floats, triangles: NDArray[np.int32], size: Floats) -> list[str]:
+def uncovered(plane: Float, triangles: NDArray[np.int32], size: Float) -> list[str]:
     """Triangles that do not add up to the rectangle."""
     total, whole = areas(plane, triangles).sum(), size.prod()
     if abs(abs(total) - whole) <= 1e-6 * whole:
@@ -222,7 +220,7 @@ def cannot_debond(mesh: RawMesh, pairs: NDArray[np.int32], fit: NDArray[np.bool_
     return [f"{what}: {first_of(map(mesh.edge, bad), len(bad))}"] if len(bad) else []
 
 
-def not_periodic(mesh: RawMesh, plane: Floats, size: Floats) -> list[str]:
+def not_periodic(mesh: RawMesh, plane: Float, size: Float) -> list[str]:
     """Nodes on a side without a partner at the same place of the opposite one."""
     faults = []
     for axis in (0, 1):

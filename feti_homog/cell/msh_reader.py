@@ -15,8 +15,7 @@ from feti_homog.cell.gmsh_mesher import LINE, TRIANGLE, gmsh_session
 from feti_homog.cell.interface_edges import can_debond
 from feti_homog.cell.mesh_checks import RawMesh
 from feti_homog.errors import MeshError
-
-Floats = NDArray[np.float64]
+from feti_homog.typing import Float
 
 # How a mesh file of gmsh begins; other text would be run as a script.
 HEADERS = ("$MeshFormat", "$Comments", "$PhysicalNames", "$NOD")
@@ -132,7 +131,7 @@ def _debonded_lines(gmsh: ModuleType) -> NDArray[np.int64]:
     return np.concatenate(lines).reshape(-1, 2)
 
 
-def _on_rectangle(plane: Floats) -> tuple[Floats, Floats, Floats]:
+def _on_rectangle(plane: Float) -> tuple[Float, Float, Float]:
     """Origin and size (2,) of the bounding rectangle, and positions (n, 2) in it, exactly on its sides."""
     origin = plane.min(axis=0)
     size = plane.max(axis=0) - origin
@@ -142,7 +141,7 @@ def _on_rectangle(plane: Floats) -> tuple[Floats, Floats, Floats]:
     return origin, size, np.where(np.abs(moved - size) < near, size, moved)
 
 
-def _matched(plane: Floats, size: Floats) -> Floats:
+def _matched(plane: Float, size: Float) -> Float:
     """Positions whose partners on opposite sides have the same coordinate along them."""
     plane = plane.copy()
     for axis in (0, 1):
@@ -152,7 +151,7 @@ def _matched(plane: Floats, size: Floats) -> Floats:
     return plane
 
 
-def _coarse_mesh(raw: RawMesh, plane: Floats, size: Floats) -> CoarseMesh:
+def _coarse_mesh(raw: RawMesh, plane: Float, size: Float) -> CoarseMesh:
     """A checked mesh, counter-clockwise, without circles."""
     names = [group[0] for group in raw.groups]
     phases = ("matrix", *sorted(set(names) - {"matrix"}))

@@ -7,14 +7,11 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from feti_homog.cell.arrangement import Arrangement
 from feti_homog.cell.size_field import circle_size, line_size
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.intp]
+from feti_homog.typing import Float, Int
 
 MATRIX = -1
 # Relative distance below which two positions are one.
@@ -27,7 +24,7 @@ QUARTER = TURN / 4
 ARC_SAMPLES = 65
 SIDE_SAMPLES = 513
 
-Spacing = Callable[[Floats], Floats]
+Spacing = Callable[[Float], Float]
 
 
 @dataclass(frozen=True)
@@ -39,7 +36,7 @@ class Curve:
     inside       what is on its left: the disc of that circle, or MATRIX
     """
 
-    nodes: Integers
+    nodes: Int
     circle: int
     inside: int
 
@@ -48,12 +45,12 @@ class Curve:
 class Outline:
     """Nodes (n, 2) on all lines, exactly in place, curves through them, and circles (k, 3) in the plane."""
 
-    points: Floats
+    points: Float
     curves: tuple[Curve, ...]
-    circles: Floats
+    circles: Float
 
 
-def images(arrangement: Arrangement) -> tuple[Floats, Integers]:
+def images(arrangement: Arrangement) -> tuple[Float, Int]:
     """Circles (k, 3) of the periodic images that reach into the cell, fibre by fibre, and their fibres (k,)."""
     size = np.array([arrangement.width, arrangement.height])
     circles, fibre = [], []
@@ -95,13 +92,13 @@ def outline(arrangement: Arrangement, largest: float, marks: Mapping[int, Sequen
 class _Numbering:
     """Gives numbers to the nodes: first the vertices (v, 2), found by position, then those between."""
 
-    def __init__(self, vertices: Floats) -> None:
+    def __init__(self, vertices: Float) -> None:
         self.vertices = vertices
         self._tree = cKDTree(vertices)
-        self._between: list[Floats] = []
+        self._between: list[Float] = []
         self._count = len(vertices)
 
-    def along(self, points: Floats) -> Integers:
+    def along(self, points: Float) -> Int:
         """Numbers (k,) of the nodes at `points` (k, 2) on one curve, whose ends are vertices."""
         _, ends = self._tree.query(points[[0, -1]])
         between = np.arange(self._count, self._count + len(points) - 2)
@@ -109,12 +106,12 @@ class _Numbering:
         self._between.append(points[1:-1])
         return np.concatenate([ends[:1], between, ends[1:]])
 
-    def points(self) -> Floats:
+    def points(self) -> Float:
         """Positions (n, 2) of all nodes by number."""
         return np.concatenate([self.vertices, *self._between])
 
 
-def _crossings(circles: Floats, axis: int, size: Floats) -> Floats:
+def _crossings(circles: Float, axis: int, size: Float) -> Float:
     """Sorted coordinates along `axis` of the vertices on the side at 0: corners and crossings of circles."""
     depth, centre, radius = circles[:, 1 - axis], circles[:, axis], circles[:, 2]
     half = np.sqrt(np.maximum(radius**2 - depth**2, 0.0))
@@ -122,21 +119,19 @@ def _crossings(circles: Floats, axis: int, size: Floats) -> Floats:
     return np.concatenate([[0.0], np.sort(crossing[(crossing > 0) & (crossing < size[axis])]), [size[axis]]])
 
 
-def _on_side(places: Floats, axis: int, level: float) -> Floats:
+def _on_side(places: Float, axis: int, level: float) -> Float:
     """Points (k, 2) on the side along `axis` at the given level of the other coordinate."""
     points = np.full((len(places), 2), level)
     points[:, axis] = places
     return points
 
 
-def _on_circle(circles: Floats, angles: Floats) -> Floats:
+def _on_circle(circles: Float, angles: Float) -> Float:
     """Points (..., 2) on circles (..., 3) at angles in radians."""
     return circles[..., :2] + circles[..., 2:] * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
 
 
-def _vertex_angles(
-    circles: Floats, fibre: Integers, border: Floats, marks: Mapping[int, Sequence[float]]
-) -> list[Floats]:
+def _vertex_angles(circles: Float, fibre: Int, border: Float, marks: Mapping[int, Sequence[float]]) -> list[Float]:
     """Sorted angles in [0, 2 pi) of the vertices of each circle: crossings of the sides, and the marks."""
     angles = []
     near = cKDTree(border).query_ball_point(circles[:, :2], circles[:, 2] * (1 + SAME))
@@ -151,7 +146,7 @@ def _vertex_angles(
     return angles
 
 
-def _arcs(circles: Floats, angles: list[Floats], size: Floats) -> tuple[Integers, Floats, Floats]:
+def _arcs(circles: Float, angles: list[Float], size: Float) -> tuple[Int, Float, Float]:
     """Circle, start and stop angle (a,) of the arcs within the cell, each at most a quarter turn."""
     circle, start, stop = [], [], []
     for number, own in enumerate(angles):
@@ -168,7 +163,7 @@ def _arcs(circles: Floats, angles: list[Floats], size: Floats) -> tuple[Integers
 
 
 def _side_curves(
-    axis: int, places: Floats, circles: Floats, size: Floats, spacing: Spacing, numbering: _Numbering
+    axis: int, places: Float, circles: Float, size: Float, spacing: Spacing, numbering: _Numbering
 ) -> list[Curve]:
     """The pieces of the two sides along `axis`, with the same nodes on both."""
     share = np.linspace(0, 1, SIDE_SAMPLES)
@@ -189,17 +184,17 @@ def _side_curves(
     return curves
 
 
-def _disc_at(points: Floats, circles: Floats) -> Integers:
+def _disc_at(points: Float, circles: Float) -> Int:
     """The circle (k,) whose disc holds each point, or MATRIX."""
     holds = np.linalg.norm(points[:, None] - circles[:, :2], axis=2) < circles[:, 2]
     return np.where(holds.any(axis=1), holds.argmax(axis=1), MATRIX)
 
 
 def _arc_curves(
-    circles: Floats,
-    circle: Integers,
-    start: Floats,
-    stop: Floats,
+    circles: Float,
+    circle: Int,
+    start: Float,
+    stop: Float,
     spacing: Spacing,
     largest: float,
     numbering: _Numbering,
@@ -218,7 +213,7 @@ def _arc_curves(
     return curves
 
 
-def _stations(share: Floats, sizes: Floats, lengths: Floats, least: Integers) -> list[Floats]:
+def _stations(share: Float, sizes: Float, lengths: Float, least: Int) -> list[Float]:
     """For each curve the positions in [0, 1] of its nodes, equidistant in the measure ds / h.
 
     The sizes h (c, s) are given at the positions `share` (s,), the lengths (c,) in the same unit.

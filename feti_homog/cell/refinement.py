@@ -13,10 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feti_homog.cell.submesh import Piece
-
-Int = NDArray[np.int64]
-Int32 = NDArray[np.int32]
-Float = NDArray[np.float64]
+from feti_homog.typing import Float, Int, Int32
 
 
 @dataclass(frozen=True, eq=False)

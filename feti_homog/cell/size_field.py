@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from feti_homog.cell.arrangement import Arrangement, neighbours
-
-Floats = NDArray[np.float64]
+from feti_homog.typing import Float
 
 # Edges around a fibre, at least.
 AROUND = 16
@@ -23,10 +22,10 @@ WEDGE = 3
 GROWTH = 0.4
 
 # Places (k, 2), edge lengths (k,) and growths (k,).
-Source = tuple[Floats, Floats, Floats]
+Source = tuple[Float, Float, Float]
 
 
-def line_size(arrangement: Arrangement, largest: float, vertices: Floats) -> Callable[[Floats], Floats]:
+def line_size(arrangement: Arrangement, largest: float, vertices: Float) -> Callable[[Float], Float]:
     """The function h(x) = min(largest, min_k (h_k + g_k |x - x_k|)) of positions (n, 2) on the torus.
 
     The sources (x_k, h_k) are the two faces of each narrow passage between two fibres, or between a fibre and
@@ -47,7 +46,7 @@ def line_size(arrangement: Arrangement, largest: float, vertices: Floats) -> Cal
     tree = cKDTree(places, boxsize=size)
     count = min(16, len(places))
 
-    def at(points: Floats) -> Floats:
+    def at(points: Float) -> Float:
         # Beyond the bound the tree gives the source behind the last, which is infinite.
         distance, nearest = tree.query(_wrap(points, size), k=count, distance_upper_bound=largest / GROWTH)
         graded = (lengths[nearest] + growths[nearest] * distance).reshape(len(points), -1)
@@ -56,17 +55,17 @@ def line_size(arrangement: Arrangement, largest: float, vertices: Floats) -> Cal
     return at
 
 
-def circle_size(radii: Floats, largest: float) -> Floats:
+def circle_size(radii: Float, largest: float) -> Float:
     """Largest edge length (k,) on circles, such that each has at least AROUND edges."""
     return np.minimum(largest, 2 * np.pi * radii / AROUND)
 
 
-def _wrap(points: Floats, size: Floats) -> Floats:
+def _wrap(points: Float, size: Float) -> Float:
     wrapped = points % size
     return np.where(wrapped >= size, 0.0, wrapped)
 
 
-def _between_fibres(arrangement: Arrangement, size: Floats, caps: Floats, largest: float) -> Source:
+def _between_fibres(arrangement: Arrangement, size: Float, caps: Float, largest: float) -> Source:
     """Facing points of near fibres; the edges at either suit the gap and those of the other fibre."""
     centres, radii = arrangement.centres, arrangement.radii
     first, second, vector = neighbours(centres, size, 2 * radii.max() + largest)
@@ -84,12 +83,12 @@ def _between_fibres(arrangement: Arrangement, size: Floats, caps: Floats, larges
     return np.concatenate(places), np.concatenate(lengths), np.concatenate(growths)
 
 
-def _growth(width: Floats, curvature: Floats) -> Floats:
+def _growth(width: Float, curvature: Float) -> Float:
     """Growth with which edges stay below twice the width w + c s^2 / 2 of a passage of curvature c."""
     return np.minimum(GROWTH, np.sqrt((4 - 2 * PASSAGE) * 2 * width * curvature))
 
 
-def _at_sides(arrangement: Arrangement, size: Floats, caps: Floats, largest: float) -> Source:
+def _at_sides(arrangement: Arrangement, size: Float, caps: Float, largest: float) -> Source:
     """Where a circle comes near a side or hardly crosses it: extreme point, foot on the side, crossings."""
     centres, radii = arrangement.centres % size, arrangement.radii
     sources: list[Source] = []
@@ -116,13 +115,13 @@ def _at_sides(arrangement: Arrangement, size: Floats, caps: Floats, largest: flo
     return places, lengths, growths
 
 
-def _where(chosen: NDArray[np.bool_], *source: Floats) -> Source:
+def _where(chosen: NDArray[np.bool_], *source: Float) -> Source:
     """The chosen rows of places, lengths and growths."""
     places, lengths, growths = (part[chosen] for part in source)
     return places, lengths, growths
 
 
-def _at_corners(arrangement: Arrangement, size: Floats, caps: Floats) -> Source:
+def _at_corners(arrangement: Arrangement, size: Float, caps: Float) -> Source:
     """Where a circle passes near the corner: the corner and the nearest point of the circle."""
     offset = (arrangement.centres + size / 2) % size - size / 2
     distance = np.linalg.norm(offset, axis=1)
@@ -133,7 +132,7 @@ def _at_corners(arrangement: Arrangement, size: Floats, caps: Floats) -> Source:
     return places, np.tile(length[near], 2), np.full(len(places), GROWTH)
 
 
-def _at_vertices(vertices: Floats, size: Floats, largest: float) -> Source:
+def _at_vertices(vertices: Float, size: Float, largest: float) -> Source:
     """Vertices, once on the torus, with the distance to the nearest other one."""
     places = _wrap(vertices, size)
     tree = cKDTree(places, boxsize=size)

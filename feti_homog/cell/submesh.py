@@ -9,9 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feti_homog.cell.periodic_topology import Torus
-
-Int = NDArray[np.int64]
-Float = NDArray[np.float64]
+from feti_homog.typing import Float, Int
 
 
 @dataclass(frozen=True)

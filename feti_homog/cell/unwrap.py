@@ -5,13 +5,10 @@ from __future__ import annotations
 from collections import deque
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feti_homog.cell.periodic_topology import components, edge_pairs
 from feti_homog.cell.submesh import Piece
-
-Int = NDArray[np.int64]
-Float = NDArray[np.float64]
+from feti_homog.typing import Float, Int
 
 
 def unwrap(piece: Piece) -> tuple[Float, bool]:

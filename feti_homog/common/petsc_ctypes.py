@@ -9,10 +9,10 @@ import ctypes
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 from petsc4py import PETSc
 
-Float = NDArray[np.float64]
+from feti_homog.typing import Float
+
 Pointer = ctypes.c_void_p
 
 

@@ -6,12 +6,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feti_homog.config.schema import Kind, is_real, key, real, shown
+from feti_homog.typing import Float
 
 Matrix3 = tuple[tuple[float, float, float], ...]
-Array = NDArray[np.float64]
 
 POSITIVE = real(above=0.0)
 
@@ -70,7 +69,7 @@ KINDS: dict[str, type[Isotropic] | type[Orthotropic] | type[General]] = {
 }
 
 
-def plane_stiffness(material: Material, plane: str) -> Array:
+def plane_stiffness(material: Material, plane: str) -> Float:
     """C with [S11, S22, S12] = C [E11, E22, gamma12], (3, 3), symmetric positive definite, unit of stress.
 
     `plane` is "strain" or "stress". Raises ValueError, with the keys at fault, if the constants are those of
@@ -88,7 +87,7 @@ def plane_stiffness(material: Material, plane: str) -> Array:
     return (stiffness + stiffness.T) / 2.0
 
 
-def _isotropic(material: Isotropic, plane: str) -> Array:
+def _isotropic(material: Isotropic, plane: str) -> Float:
     if plane == "strain" and material.poisson >= 0.5:
         raise ValueError(f"poisson = {material.poisson}: expected less than 0.5 in plane strain")
     shear = material.young / (2.0 * (1.0 + material.poisson))
@@ -97,7 +96,7 @@ def _isotropic(material: Isotropic, plane: str) -> Array:
     return np.array([[lame + 2 * shear, lame, 0.0], [lame, lame + 2 * shear, 0.0], [0.0, 0.0, shear]])
 
 
-def _orthotropic_compliance(material: Orthotropic, plane: str) -> Array:
+def _orthotropic_compliance(material: Orthotropic, plane: str) -> Float:
     """Compliance (3, 3) in the material axes; in plane strain S_ij - S_i3 S_j3 / S_33."""
     E1, E2, G12, nu12 = material.E1, material.E2, material.G12, material.nu12
     compliance = np.array([[1 / E1, -nu12 / E1, 0.0], [-nu12 / E1, 1 / E2, 0.0], [0.0, 0.0, 1 / G12]])
@@ -116,7 +115,7 @@ def _orthotropic_compliance(material: Orthotropic, plane: str) -> Array:
     return compliance
 
 
-def rotated(stiffness: Array, angle: float) -> Array:
+def rotated(stiffness: Float, angle: float) -> Float:
     """Stiffness (3, 3) in axes x1, x2 of a material whose axis 1 is turned by `angle` degrees from x1.
 
     C = T^T C' T, where T takes strains [E11, E22, gamma12] to the material axes.
@@ -126,7 +125,7 @@ def rotated(stiffness: Array, angle: float) -> Array:
     return np.asarray(strain_to_axes.T @ stiffness @ strain_to_axes)
 
 
-def is_positive_definite(matrix: Array) -> bool:
+def is_positive_definite(matrix: Float) -> bool:
     """Whether a symmetric matrix, scaled to a unit diagonal, has no eigenvalue below 1e-12."""
     diagonal = np.diag(matrix)
     if diagonal.min() <= 0.0:

@@ -10,16 +10,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_matrix, csr_matrix
 
 from feti_homog.cell.refinement import FineMesh
 from feti_homog.fem.macro_element import Macro, integrals, products
 from feti_homog.fem.shape_functions import gradients
-
-Int = NDArray[np.int64]
-Int32 = NDArray[np.int32]
-Float = NDArray[np.float64]
+from feti_homog.typing import Float, Int, Int32
 
 _VOIGT = np.array([[0, 2], [2, 1]])
 _CHUNK = 1 << 16

@@ -6,13 +6,10 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feti_homog.cell.refinement import Lattice
 from feti_homog.fem.shape_functions import gradients
-
-Int = NDArray[np.int64]
-Float = NDArray[np.float64]
+from feti_homog.typing import Float, Int
 
 
 @dataclass(frozen=True)

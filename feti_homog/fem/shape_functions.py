@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
+from feti_homog.typing import Float
 
 # Linear: exact for constants.  Quadratic: degree 4 with 6 points (Dunavant 1985), so that stiffness and
 # area are exact on straight elements and of full order on curved ones.

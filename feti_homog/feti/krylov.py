@@ -6,14 +6,12 @@ A vector holds k multiplier vectors, the k values of a row side by side, so that
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from feti_homog.feti.coarse.natural import CoarseProblem
 from feti_homog.feti.operators.dual_operator import DualOperator
 from feti_homog.feti.preconditioners.scaled import Preconditioner
-
-Float = NDArray[np.float64]
+from feti_homog.typing import Float
 
 RTOL = 1e-8
 # Methods that apply the preconditioner to the residual itself, so that the jump can be read off there; with the

@@ -14,7 +14,6 @@ from functools import cached_property
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from feti_homog.cell.refinement import Lattice
@@ -25,9 +24,7 @@ from feti_homog.feti.decomposition.shared_entities import Shared
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.krylov import ActiveRows, Krylov
 from feti_homog.feti.operators.dual_operator import DualOperator
-
-Int = NDArray[np.int64]
-Float = NDArray[np.float64]
+from feti_homog.typing import Float
 
 # What a coarse space that is accurate to too few digits can end in, and how often to go on from there with it.
 BROKEN = (

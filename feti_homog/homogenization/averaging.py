@@ -11,15 +11,13 @@ from functools import cached_property
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
 from feti_homog.errors import ConvergenceError
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.operators.node_blocks import NodeBlocks
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface.contact import BONDED, CLOSED, OPEN, Equilibrium, Interface, Status
-
-Float = NDArray[np.float64]
+from feti_homog.typing import Float
 
 
 @dataclass(frozen=True)

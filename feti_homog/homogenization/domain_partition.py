@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feti_homog.cell.coarse_mesh import CoarseMesh
 from feti_homog.cell.fibre_centres import fibre_centres
@@ -18,9 +17,7 @@ from feti_homog.errors import CaseError
 from feti_homog.feti.decomposition.partition import decompose, pieces_for_count, pieces_for_size
 from feti_homog.feti.decomposition.shared_entities import Shared, share
 from feti_homog.interface import debonded_arcs
-
-Int = NDArray[np.int64]
-Float = NDArray[np.float64]
+from feti_homog.typing import Float, Int
 
 # Degrees of freedom of a piece that make set-up and solve fastest, unless there would be more than so many pieces: the
 # coarse problem grows faster than they do; a piece gets `NARROW` of its boundary to other bodies at most.  A body is

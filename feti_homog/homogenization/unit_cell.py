@@ -7,7 +7,6 @@ from functools import cached_property
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
 from feti_homog.cell.outline import MERGED
 from feti_homog.cell.refinement import Lattice
@@ -22,10 +21,7 @@ from feti_homog.feti.solver import FetiSolver
 from feti_homog.homogenization import cost_model
 from feti_homog.homogenization.domain_partition import Plan, coarse_mesh, deal
 from feti_homog.interface import debonded_arcs
-
-Int = NDArray[np.int64]
-Float = NDArray[np.float64]
-Bool = NDArray[np.bool_]
+from feti_homog.typing import Bool, Float, Int
 
 
 @dataclass(frozen=True)

@@ -18,9 +18,8 @@ from numpy.typing import NDArray
 from feti_homog.feti.decomposition.jump_operator import InterfaceNodes
 from feti_homog.feti.solver import DualSolution, FetiSolver
 from feti_homog.interface.rigid_placement import Placement, place
+from feti_homog.typing import Bool, Float
 
-Float = NDArray[np.float64]
-Bool = NDArray[np.bool_]
 Status = NDArray[np.int8]
 
 BONDED, CLOSED, OPEN = 0, 1, 2

@@ -8,14 +8,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feti_homog.config.schema import shown
 from feti_homog.config.sections import Arc
-
-Int = NDArray[np.int64]
-Float = NDArray[np.float64]
-Bool = NDArray[np.bool_]
+from feti_homog.typing import Bool, Float, Int
 
 # A node within so many degrees of a tip is the tip.
 SAME = 1e-6

@@ -13,14 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
 from feti_homog.feti.solver import DualSolution
 from feti_homog.interface.contact import BONDED, CLOSED, NOISE, OPEN, Equilibrium, Interface, Status
 from feti_homog.interface.strength_criterion import Law
-
-Float = NDArray[np.float64]
-Bool = NDArray[np.bool_]
+from feti_homog.typing import Bool, Float
 
 # Bonds whose utilisation differs by no more than this break together, as those of a symmetric cell must.
 TIE = 1e-6

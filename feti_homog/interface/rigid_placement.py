@@ -13,9 +13,7 @@ from scipy.sparse import csr_matrix
 from feti_homog.feti.coarse.natural import CoarseProblem
 from feti_homog.feti.decomposition.jump_operator import InterfaceNodes
 from feti_homog.feti.solver import DualSolution
-
-Float = NDArray[np.float64]
-Bool = NDArray[np.bool_]
+from feti_homog.typing import Bool, Float
 
 # Motions whose gaps are smaller than this, relative to their slips, do not open (a round fibre turns).
 SLIDING = 1e-9

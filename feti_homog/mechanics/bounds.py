@@ -9,9 +9,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from feti_homog.typing import Float
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ def isotropic_part(stiffness: ArrayLike) -> tuple[float, float]:
     return float(bulk), float(shear)
 
 
-def isotropic_stiffness(bulk: float, shear: float) -> Array:
+def isotropic_stiffness(bulk: float, shear: float) -> Float:
     """C11 = C22 = k + mu, C12 = k - mu, C33 = mu."""
     plus, minus = bulk + shear, bulk - shear
     return np.array([[plus, minus, 0.0], [minus, plus, 0.0], [0.0, 0.0, shear]])
@@ -82,12 +82,12 @@ def anisotropy(stiffness: ArrayLike) -> float:
     return float(np.linalg.norm(mandel * rest) / np.linalg.norm(mandel * c))
 
 
-def voigt(fractions: ArrayLike, stiffnesses: ArrayLike) -> Array:
+def voigt(fractions: ArrayLike, stiffnesses: ArrayLike) -> Float:
     """Upper bound sum c_i C_i, (3, 3), of fractions (n,) and stiffnesses (n, 3, 3)."""
     return np.einsum("i,ijk->jk", np.asarray(fractions, float), np.asarray(stiffnesses, float))
 
 
-def reuss(fractions: ArrayLike, stiffnesses: ArrayLike) -> Array:
+def reuss(fractions: ArrayLike, stiffnesses: ArrayLike) -> Float:
     """Lower bound (sum c_i C_i^-1)^-1, (3, 3), of fractions (n,) and stiffnesses (n, 3, 3)."""
     return np.asarray(np.linalg.inv(voigt(fractions, np.linalg.inv(np.asarray(stiffnesses, dtype=float)))))
 

@@ -16,7 +16,6 @@ from collections.abc import Callable
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 from scipy.sparse import csr_matrix, diags, hstack
 
 from feti_homog.common import process_memory
@@ -30,9 +29,7 @@ from feti_homog.feti.linalg.replicated_saddle_point import Replicated, saddle_po
 from feti_homog.feti.linalg.saddle_point import SaddlePoint
 from feti_homog.feti.operators.interface_operators import Boundary
 from feti_homog.feti.preconditioners.scaled import Scaled
-
-Int = NDArray[np.int64]
-Float = NDArray[np.float64]
+from feti_homog.typing import Float, Int
 
 THRESHOLD = 0.24
 # Active rows per coarse vector below which the vectors are taken to depend on each other.

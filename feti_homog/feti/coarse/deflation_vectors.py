@@ -6,16 +6,14 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
 from feti_homog.feti.coarse.local_eigenproblems import DualBlock
 from feti_homog.feti.decomposition.jump_operator import Constraints
 from feti_homog.feti.decomposition.neighbours import Neighbours
 from feti_homog.feti.linalg.distributed_matrix import Blocks, summed
+from feti_homog.typing import Float, Int
 
-Int = NDArray[np.int64]
-Float = NDArray[np.float64]
 # Rows of the receiver, numbers of coarse vectors, and their jumps there (rows, vectors).
 Jumps = tuple[Int, Int, Float]
 

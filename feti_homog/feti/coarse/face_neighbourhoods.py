@@ -13,7 +13,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
 from feti_homog.cell.periodic_topology import components, edge_pairs
@@ -21,10 +20,7 @@ from feti_homog.cell.submesh import part
 from feti_homog.feti.coarse.trace_spaces import trace
 from feti_homog.feti.decomposition.subdomain import Subdomain, both_directions
 from feti_homog.feti.operators.explicit import Condensed, schur_complement
-
-Int = NDArray[np.int64]
-Float = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from feti_homog.typing import Bool, Float, Int
 
 # Coarse triangles from the face to the far side of its ring.
 LAYERS = 2
@@ -72,7 +68,7 @@ def rings(body: Subdomain, dofs: Int, face: Int) -> list[Ring]:
     return found
 
 
-def _ring(body: Subdomain, dofs: Int, members: Int, on_face: Mask, others: Mask) -> Ring | None:
+def _ring(body: Subdomain, dofs: Int, members: Int, on_face: Bool, others: Bool) -> Ring | None:
     """That of the coarse triangles `members`, if it has enough of the face."""
     outside = np.zeros_like(on_face)
     outside[body.mesh.node_class[np.delete(body.mesh.nodes, members, axis=0)]] = True
@@ -89,7 +85,7 @@ def _ring(body: Subdomain, dofs: Int, members: Int, on_face: Mask, others: Mask)
     return Ring(at, Condensed(ring, own), ring.R[own], P, clamped)
 
 
-def _near(body: Subdomain, on_face: Mask) -> Int:
+def _near(body: Subdomain, on_face: Bool) -> Int:
     """Coarse triangles within LAYERS of the marked nodes."""
     classes = body.mesh.node_class[body.mesh.nodes]
     near = on_face[classes].any(axis=1)

@@ -10,7 +10,6 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 from scipy.sparse import csc_matrix, csr_matrix
 
 from feti_homog.feti.coarse.local_eigenproblems import DualBlock, examined
@@ -19,10 +18,7 @@ from feti_homog.feti.decomposition.neighbours import Neighbours
 from feti_homog.feti.linalg.distributed_matrix import summed
 from feti_homog.feti.operators.interface_operators import Boundary
 from feti_homog.feti.preconditioners.scaled import Scaled
-
-Int = NDArray[np.int64]
-Float = NDArray[np.float64]
-Single = NDArray[np.float32]
+from feti_homog.typing import Float, Float32, Int
 
 
 def dual_blocks(
@@ -47,9 +43,9 @@ def coarse_vectors(blocks: Sequence[DualBlock], neighbours: Neighbours, threshol
     """For each subdomain of this rank: (n, k + m) its kernel and its m modes below the threshold.  Collective."""
     subdomains = [examined(*of) for of in zip(blocks, neighbours.common, strict=True)]
     # Of the neighbours' shares in M^-1 the rows that both have.
-    others: list[list[tuple[int, Single]]] = [[] for _ in blocks]
+    others: list[list[tuple[int, Float32]]] = [[] for _ in blocks]
 
-    def shares() -> Iterator[tuple[int, int, Single]]:
+    def shares() -> Iterator[tuple[int, int, Float32]]:
         for i, subdomain in enumerate(subdomains):
             for s, share in subdomain.shares():
                 yield i, s, share

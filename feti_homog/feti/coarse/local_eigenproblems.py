@@ -17,7 +17,6 @@ from dataclasses import dataclass
 from operator import itemgetter
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import eigh
 from scipy.linalg.lapack import dpotrf
 from scipy.sparse import csr_matrix
@@ -27,10 +26,7 @@ from feti_homog.feti.coarse.trace_spaces import trace
 from feti_homog.feti.decomposition.subdomain import Subdomain, both_directions
 from feti_homog.feti.operators.explicit import Condensed
 from feti_homog.feti.operators.implicit import Factored
-
-Int = NDArray[np.int64]
-Float = NDArray[np.float64]
-Single = NDArray[np.float32]
+from feti_homog.typing import Float, Float32, Int
 
 # Of a symmetric matrix in single precision, relative to its largest eigenvalue: eigenvalues that are none.
 NULL = 1e-6
@@ -75,13 +71,13 @@ class Whole:
         BW = block.BW.astype(np.float32)
         self._share = BW @ (BW @ S.astype(np.float32)).T
 
-    def shares(self) -> Iterator[tuple[int, Single]]:
+    def shares(self) -> Iterator[tuple[int, Float32]]:
         """Its share of M^-1 on the rows in common with each other subdomain."""
         for s, rows in self.common.items():
             if s != self.block.subdomain.piece.index:
                 yield s, self._share[np.ix_(rows, rows)]
 
-    def modes(self, shares: Sequence[tuple[int, Single]], threshold: float) -> Float:
+    def modes(self, shares: Sequence[tuple[int, Float32]], threshold: float) -> Float:
         """(n, m) soft modes besides the kernel, for the shares of others in M^-1."""
         M = self._share.copy()
         # In an order that no distribution changes.
@@ -103,7 +99,7 @@ class Faces:
             if s != block.subdomain.piece.index
         }
 
-    def shares(self) -> Iterator[tuple[int, Single]]:
+    def shares(self) -> Iterator[tuple[int, Float32]]:
         """No less than its share of M^-1 on the rows in common with each other subdomain."""
         for s, found in self._rings.items():
             share = np.zeros((len(self.common[s]),) * 2)
@@ -112,7 +108,7 @@ class Faces:
                 share += BW @ (BW @ ring.clamped).T
             yield s, share.astype(np.float32)
 
-    def modes(self, shares: Sequence[tuple[int, Single]], threshold: float) -> Float:
+    def modes(self, shares: Sequence[tuple[int, Float32]], threshold: float) -> Float:
         """(n, m) soft modes of the faces, for the shares of others in M^-1."""
         parts = [np.zeros((len(self.block.dofs), 0))]
         for s, share in shares:
@@ -138,12 +134,12 @@ def examined(block: DualBlock, common: Mapping[int, Int]) -> Whole | Faces:
     return Whole(block, block.operator, common)
 
 
-def congruent(T: csr_matrix | Float, A: Float | Single) -> Float:
+def congruent(T: csr_matrix | Float, A: Float | Float32) -> Float:
     """T^T A T for symmetric A."""
     return np.asarray(T.T @ (T.T @ A).T)
 
 
-def jump_energy(B: csr_matrix, P: csr_matrix, R: Float, M: Single) -> Float:
+def jump_energy(B: csr_matrix, P: csr_matrix, R: Float, M: Float32) -> Float:
     """(m + k, m + k) T^T M T of the jumps T = B [P R] of a trace space and a kernel, for symmetric M and as precise."""
     TP, TR = (B @ P).astype(np.float32), (B @ R).astype(np.float32)
     MR = M @ TR

@@ -6,7 +6,6 @@ from collections.abc import Callable
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 from scipy.sparse import block_diag, csr_matrix, diags, hstack
 
 from feti_homog.cell.periodic_topology import components
@@ -14,9 +13,7 @@ from feti_homog.feti.decomposition.jump_operator import Constraints
 from feti_homog.feti.linalg.distributed_matrix import assembled, total
 from feti_homog.feti.linalg.sparse_direct import DirectSolver
 from feti_homog.feti.operators.interface_operators import Boundary
-
-Int = NDArray[np.int64]
-Float = NDArray[np.float64]
+from feti_homog.typing import Float, Int
 
 FREE = 1e-10
 

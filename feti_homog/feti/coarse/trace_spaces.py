@@ -13,8 +13,7 @@ from scipy.sparse import csr_matrix
 from feti_homog.cell.refinement import Lattice
 from feti_homog.cell.submesh import Piece
 from feti_homog.feti.decomposition.subdomain import both_directions
-
-Int = NDArray[np.int64]
+from feti_homog.typing import Int
 
 # Dofs that a trace space keeps at least.
 ENOUGH = 100

@@ -20,9 +20,7 @@ from scipy.sparse import coo_matrix, csr_matrix
 from feti_homog.cell.refinement import Lattice, edge_node
 from feti_homog.feti.decomposition.shared_entities import Shared
 from feti_homog.feti.decomposition.subdomain import Subdomain
-
-Int = NDArray[np.int64]
-Float = NDArray[np.float64]
+from feti_homog.typing import Float, Int
 
 
 @dataclass(frozen=True)

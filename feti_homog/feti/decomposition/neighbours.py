@@ -7,12 +7,10 @@ from typing import TypeVar
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
 from feti_homog.feti.decomposition.jump_operator import Constraints
 from feti_homog.feti.decomposition.subdomain import Subdomain
-
-Int = NDArray[np.int64]
+from feti_homog.typing import Int
 
 Message = TypeVar("Message")
 

@@ -7,12 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import pymetis
-from numpy.typing import NDArray
 from scipy.sparse import coo_matrix, csr_matrix
 
 from feti_homog.cell.periodic_topology import Torus, components, edge_pairs, shared_edges
-
-Int = NDArray[np.int64]
+from feti_homog.typing import Int
 
 # METIS takes whole numbers: of so many classes of length.
 LENGTHS = 100

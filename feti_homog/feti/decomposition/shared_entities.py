@@ -14,9 +14,7 @@ from numpy.typing import NDArray
 
 from feti_homog.cell.periodic_topology import Torus, edge_pairs, shared_edges
 from feti_homog.cell.submesh import Piece
-
-Int = NDArray[np.int64]
-Float = NDArray[np.float64]
+from feti_homog.typing import Float, Int
 
 
 @dataclass(frozen=True)

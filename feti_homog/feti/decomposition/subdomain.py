@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_matrix, diags
 
 from feti_homog.cell.refinement import FineMesh, Lattice, refine
@@ -14,9 +13,7 @@ from feti_homog.cell.submesh import Piece
 from feti_homog.cell.unwrap import unwrap
 from feti_homog.errors import MeshError
 from feti_homog.fem.assembly import assemble
-
-Int = NDArray[np.int64]
-Float = NDArray[np.float64]
+from feti_homog.typing import Float, Int
 
 KERNEL_TOLERANCE = 1e-10
 

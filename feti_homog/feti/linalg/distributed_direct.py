@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
 from feti_homog.feti.linalg.distributed_matrix import distributed
 from feti_homog.feti.linalg.sparse_direct import DirectSolver, IndefiniteSolver, factored_by_mumps
-
-Float = NDArray[np.float64]
+from feti_homog.typing import Float
 
 
 class Distributed:

@@ -8,9 +8,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix, diags
 
-Int = NDArray[np.int64]
-Int32 = NDArray[np.int32]
-Float = NDArray[np.float64]
+from feti_homog.typing import Float, Int, Int32
 
 # Entries of dense blocks that are held before they are summed up, at least.
 HELD = 4_000_000

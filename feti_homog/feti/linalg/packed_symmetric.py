@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg.blas import dtrmm
 from scipy.linalg.lapack import dlauum, dpotrf, dtrtri
 
-Float = NDArray[np.float64]
+from feti_homog.typing import Float
 
 # Rows up to which LAPACK inverts a triangle, and of the blocks that are mirrored.
 SMALL, BLOCK = 48, 64

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
 from feti_homog.feti.linalg.distributed_matrix import total
 from feti_homog.feti.linalg.saddle_point import SaddlePoint
 from feti_homog.feti.thresholds import LARGEST_REPLICATED
-
-Float = NDArray[np.float64]
+from feti_homog.typing import Float
 
 
 class Replicated:

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy.sparse import bmat, csr_matrix, diags, vstack
 
 from feti_homog.feti.linalg import distributed_direct
 from feti_homog.feti.linalg.distributed_matrix import own_rows
 from feti_homog.feti.linalg.sparse_direct import DirectSolver
+from feti_homog.typing import Float
 
-Float = NDArray[np.float64]
 Solver = DirectSolver | distributed_direct.Distributed
 
 # Of the constraints in the augmented matrix; each solve with it shrinks their error by about this factor.

@@ -5,11 +5,10 @@ from __future__ import annotations
 import weakref
 
 import numpy as np
-from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix
 
-Float = NDArray[np.float64]
+from feti_homog.typing import Float
 
 # Per cent of MUMPS' estimate of workspace that it may need more for pivoting.
 PIVOTING_ROOM = 200

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
 from feti_homog.feti.decomposition.jump_operator import Constraints
 from feti_homog.feti.operators.interface_operators import Boundary
-
-Float = NDArray[np.float64]
+from feti_homog.typing import Float
 
 
 class DualOperator:

@@ -8,7 +8,6 @@ of a macroscopic strain vanishes inside a uniform body.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy.linalg.blas import dsymm, dsymv
 from scipy.sparse import csr_matrix
@@ -16,9 +15,7 @@ from scipy.sparse import csr_matrix
 from feti_homog.common import petsc_ctypes
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.linalg.packed_symmetric import invert_upper, mirrored
-
-Int = NDArray[np.int64]
-Float = NDArray[np.float64]
+from feti_homog.typing import Float, Int
 
 # Columns up to which products one after the other are faster than all at once.
 FEW = 6

@@ -6,13 +6,10 @@ from collections.abc import Callable
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.linalg.sparse_direct import DirectSolver
-
-Int = NDArray[np.int64]
-Float = NDArray[np.float64]
+from feti_homog.typing import Float, Int
 
 # Columns that are solved for at once, so that memory stays bounded.
 CHUNK = 64

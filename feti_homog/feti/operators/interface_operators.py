@@ -7,7 +7,6 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy.sparse import block_diag, csr_matrix
 
@@ -16,9 +15,7 @@ from feti_homog.feti.decomposition.shared_entities import Shared
 from feti_homog.feti.decomposition.subdomain import Subdomain, both_directions
 from feti_homog.feti.operators.explicit import Condensed
 from feti_homog.feti.operators.implicit import Factored, Interior
-
-Int = NDArray[np.int64]
-Float = NDArray[np.float64]
+from feti_homog.typing import Float, Int
 
 KINDS = ("auto", "implicit", "explicit")
 # Boundary dofs of a subdomain up to which dense matrices (8 n^2 bytes) are ever chosen by themselves.

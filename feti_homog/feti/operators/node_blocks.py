@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
 from feti_homog.feti.decomposition.jump_operator import Constraints
 from feti_homog.feti.linalg.distributed_matrix import assembled
-
-Int = NDArray[np.int64]
-Float = NDArray[np.float64]
+from feti_homog.typing import Float, Int
 
 
 class NodeBlocks:

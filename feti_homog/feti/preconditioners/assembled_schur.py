@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
 from feti_homog.feti.decomposition.jump_operator import Constraints
@@ -12,9 +11,7 @@ from feti_homog.feti.linalg.distributed_matrix import Blocks, total
 from feti_homog.feti.linalg.sparse_direct import DirectSolver
 from feti_homog.feti.operators.explicit import Condensed
 from feti_homog.feti.operators.interface_operators import Boundary
-
-Int = NDArray[np.int64]
-Float = NDArray[np.float64]
+from feti_homog.typing import Float, Int
 
 
 class BondedCell:

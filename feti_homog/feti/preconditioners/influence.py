@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 from scipy.linalg.lapack import dpstrf
 
@@ -23,9 +22,7 @@ from feti_homog.feti.decomposition.jump_operator import Constraints
 from feti_homog.feti.operators.interface_operators import Boundary
 from feti_homog.feti.preconditioners.assembled_schur import BondedCell
 from feti_homog.feti.preconditioners.scaled import Scaled
-
-Int = NDArray[np.int64]
-Float = NDArray[np.float64]
+from feti_homog.typing import Float, Int
 
 # Columns of H that are found at once.
 CHUNK = 32

@@ -11,15 +11,12 @@ from typing import Protocol
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 from scipy.sparse import csr_matrix, diags
 
 from feti_homog.feti.decomposition.jump_operator import Constraints
 from feti_homog.feti.operators.interface_operators import Boundary
 from feti_homog.feti.operators.node_blocks import NodeBlocks
-
-Int = NDArray[np.int64]
-Float = NDArray[np.float64]
+from feti_homog.typing import Float
 
 
 class Preconditioner(Protocol):

@@ -16,12 +16,11 @@ from numpy.typing import NDArray
 
 from feti_homog.common.mpi_errors import agree, on_root
 from feti_homog.errors import FetiHomogError
+from feti_homog.typing import AnyInt, Float
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Comm
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.integer[Any]]
 
 NAME = "result.h5"
 INTEGERS = {name: np.int32 for name in ("body", "subdomain", "phase", "fibre")}
@@ -51,37 +50,37 @@ class MeshPart:
     Each group of 4**refine consecutive triangles fills one coarse triangle.
     """
 
-    points: Floats  # (n, 2)
-    triangles: Integers  # (m, 3), or (m, 6): vertices, then mid-edge nodes 01, 12, 20; this rank's numbers
-    body: Integers  # (m,)
-    subdomain: Integers  # (m,)
-    phase: Integers  # (m,) index into Header.phases
+    points: Float  # (n, 2)
+    triangles: AnyInt  # (m, 3), or (m, 6): vertices, then mid-edge nodes 01, 12, 20; this rank's numbers
+    body: AnyInt  # (m,)
+    subdomain: AnyInt  # (m,)
+    phase: AnyInt  # (m,) index into Header.phases
 
 
 @dataclass(frozen=True)
 class InterfacePart:
     """The k fibre-matrix interface nodes whose multipliers this rank owns; k may be 0."""
 
-    points: Floats  # (k, 2)
-    normal: Floats  # (k, 2) from fibre to matrix
-    length: Floats  # (k,) tributary
-    fibre: Integers  # (k,)
+    points: Float  # (k, 2)
+    normal: Float  # (k, 2) from fibre to matrix
+    length: Float  # (k,) tributary
+    fibre: AnyInt  # (k,)
 
 
 @dataclass(frozen=True)
 class StatePart:
     """One load case or state of the cell and this rank's part of its fields."""
 
-    strain: Floats  # (3,) E11, E22, gamma12 of the cell
-    stress_mean: Floats  # (3,) S11, S22, S12 of the cell
+    strain: Float  # (3,) E11, E22, gamma12 of the cell
+    stress_mean: Float  # (3,) S11, S22, S12 of the cell
     load_factor: float
     label: str  # what the state is, in words: "60 deg E11", "event 12"
-    displacement: Floats  # (n, 2)
-    fluctuation: Floats  # (n, 2)
-    stress: Floats  # (m, 3) element means of S11, S22, S12
-    traction: Floats  # (k, 2) normal, tangential
-    jump: Floats  # (k, 2) normal, tangential
-    status: Integers  # (k,) 0 bonded, 1 closed, 2 open
+    displacement: Float  # (n, 2)
+    fluctuation: Float  # (n, 2)
+    stress: Float  # (m, 3) element means of S11, S22, S12
+    traction: Float  # (k, 2) normal, tangential
+    jump: Float  # (k, 2) normal, tangential
+    status: AnyInt  # (k,) 0 bonded, 1 closed, 2 open
 
 
 @dataclass(frozen=True)

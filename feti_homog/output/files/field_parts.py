@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feti_homog import __version__
 from feti_homog.fem.assembly import element_strain
 from feti_homog.homogenization.averaging import Response, displacement, fluctuation
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.output.files.field_file import Header, InterfacePart, MeshPart, StatePart
-
-Float = NDArray[np.float64]
+from feti_homog.typing import Float
 
 
 def header(cell: TornCell) -> Header:

@@ -16,7 +16,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Path2D
 
-from feti_homog.output.plots.decimation import Array, Drawing
+from feti_homog.output.plots.decimation import Drawing
+from feti_homog.typing import Array
 
 STRAINS = (r"E_{11}", r"E_{22}", r"\gamma_{12}")
 STRESSES = {"S11": r"\sigma_{11}", "S22": r"\sigma_{22}", "S12": r"\sigma_{12}"}

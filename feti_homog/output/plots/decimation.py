@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-Array = NDArray[Any]
+from feti_homog.typing import Array
 
 LIMIT = 100_000  # triangles in a picture
 BLOCK = 1 << 18  # rows of a table read at once

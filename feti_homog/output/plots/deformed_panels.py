@@ -25,9 +25,10 @@ from feti_homog.output.plots.canvas import (
     unit_label,
     value_range,
 )
-from feti_homog.output.plots.decimation import Array, Drawing, drawing, on_nodes, on_triangles, outlines
+from feti_homog.output.plots.decimation import Drawing, drawing, on_nodes, on_triangles, outlines
 from feti_homog.output.plots.interface_marks import WORDS, Faces, legend
 from feti_homog.output.text import point_tables
+from feti_homog.typing import Array
 
 PANELS = 6
 FRAMES, FRAME_TIME = 24, 250  # of the animation; milliseconds

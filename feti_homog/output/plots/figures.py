@@ -28,8 +28,9 @@ from feti_homog.output.plots.canvas import (
     save,
     unit_label,
 )
-from feti_homog.output.plots.decimation import Array, Drawing, drawing, on_nodes, on_triangles, outlines
+from feti_homog.output.plots.decimation import Drawing, drawing, on_nodes, on_triangles, outlines
 from feti_homog.output.plots.interface_marks import Faces
+from feti_homog.typing import Array
 
 CASES = ("E11", "E22", "G12")
 MESH_LINES = 6000  # triangles up to which their edges are drawn

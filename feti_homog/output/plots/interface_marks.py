@@ -11,7 +11,8 @@ from matplotlib.lines import Line2D
 from scipy.spatial import cKDTree
 
 from feti_homog.output.plots.canvas import lines
-from feti_homog.output.plots.decimation import Array, Drawing
+from feti_homog.output.plots.decimation import Drawing
+from feti_homog.typing import Array
 
 BONDED, CLOSED, OPEN = 0, 1, 2
 WORDS = {BONDED: "bonded", CLOSED: "in contact", OPEN: "open"}

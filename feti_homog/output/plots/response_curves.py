@@ -13,9 +13,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
 from feti_homog.output.plots.canvas import STRAINS, save, unit_label
-from feti_homog.output.plots.decimation import Array
 from feti_homog.output.plots.interface_marks import BONDED, CLOSED, COLOURS, OPEN, WORDS
 from feti_homog.output.text import point_tables
+from feti_homog.typing import Array
 
 MACROSCOPIC = (r"\Sigma_{11}", r"\Sigma_{22}", r"\Sigma_{12}")
 INK = ("#1f4e9c", "#c44e00", "#2a7f3f", "#7a3e9d")

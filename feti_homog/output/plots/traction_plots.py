@@ -12,8 +12,8 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MultipleLocator
 
 from feti_homog.output.plots.canvas import load_label, save, unit_label
-from feti_homog.output.plots.decimation import Array
 from feti_homog.output.plots.interface_marks import BONDED, CLOSED, COLOURS, OPEN, WORDS
+from feti_homog.typing import Array
 
 MOST_FIBRES = 4
 INK = ("#1f4e9c", "#2a7f3f")

@@ -14,8 +14,9 @@ from feti_homog.config.materials import plane_stiffness
 from feti_homog.mechanics import bounds
 from feti_homog.output.plots.canvas import STYLE, save
 from feti_homog.sweep.report import bundles, cell_size
-from feti_homog.sweep.report.statistics import Collected, Float
+from feti_homog.sweep.report.statistics import Collected
 from feti_homog.sweep.report.style import Series, finish, legend, series, varies, with_scatter
+from feti_homog.typing import Float
 
 FRACTION, FIBRES = "cell.fibre_fraction", "cell.fibres"
 PANELS = ("C11", "C33", "bulk", "shear")

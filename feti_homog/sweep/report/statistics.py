@@ -8,14 +8,13 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from feti_homog.output.files.csv_tables import STIFFNESS, STRESS
 from feti_homog.output.plots import response_curves
 from feti_homog.output.text import point_tables
+from feti_homog.typing import Float
 
-Float = NDArray[np.float64]
 Document = Mapping[str, Any]
 
 CONFIDENCE = 0.95

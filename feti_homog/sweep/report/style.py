@@ -10,7 +10,8 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from feti_homog.output.plots.canvas import unit_label
-from feti_homog.sweep.report.statistics import Collected, Float
+from feti_homog.sweep.report.statistics import Collected
+from feti_homog.typing import Float
 
 INK = ("#1f4e9c", "#c44e00", "#2a7f3f", "#7a3e9d", "#8c6d1f", "#c2185b")
 MARKS = ("o", "s", "^", "D", "v", "P")

@@ -1,0 +1,18 @@
+"""Aliases of NumPy's array types: the shape stands in each docstring, the type of the entries here."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Float = NDArray[np.float64]
+Float32 = NDArray[np.float32]
+Int = NDArray[np.int64]
+Int32 = NDArray[np.int32]
+Int8 = NDArray[np.int8]
+Index = NDArray[np.intp]  # as NumPy itself numbers
+Bool = NDArray[np.bool_]
+AnyInt = NDArray[np.integer[Any]]
+Array = NDArray[Any]
