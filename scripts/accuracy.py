@@ -28,7 +28,7 @@ from mpi4py import MPI  # noqa: E402
 from petsc4py import PETSc  # noqa: E402
 
 from feti_homog.analysis import stiffness  # noqa: E402
-from feti_homog.analysis.context import Study  # noqa: E402
+from feti_homog.analysis.context import AnalysisContext  # noqa: E402
 from feti_homog.common.petsc_options import case_options  # noqa: E402
 from feti_homog.common.progress import Progress  # noqa: E402
 from feti_homog.config import case as cases  # noqa: E402
@@ -116,8 +116,8 @@ def measure(geometry: str, order: int, mesh_size: float, refine: int) -> tuple[i
     with case_options(case.petsc):
         start = time.perf_counter()
         cell = tear(case, comm, progress)
-        study = Study(Homogenization(cell, contact=False), cell.debonded, progress, lambda *_: None)
-        L = np.asarray(stiffness.run(study)["effective_stiffness"])
+        context = AnalysisContext(Homogenization(cell, contact=False), cell.debonded, progress, lambda *_: None)
+        L = np.asarray(stiffness.run(context)["effective_stiffness"])
         feti = time.perf_counter() - start
     mesh = progress.seconds["mesh"] + progress.seconds["assemble"]
     direct, peer, dofs = direct_solve(cell)

@@ -28,7 +28,7 @@ from feti_homog.homogenization.averaging import Homogenization  # noqa: E402
 from feti_homog.homogenization.unit_cell import tear  # noqa: E402
 from feti_homog.interface.contact import BONDED  # noqa: E402
 from feti_homog.interface.path_following import events, unloaded  # noqa: E402
-from feti_homog.interface.strength_criterion import Law  # noqa: E402
+from feti_homog.interface.strength_criterion import StrengthCriterion  # noqa: E402
 
 STRAIN = [0.2, 0.0, 0.0]
 STRENGTH = 10.0
@@ -90,7 +90,9 @@ def run_events(homogenization: Homogenization, count: int) -> tuple[list[float],
     """Seconds, Krylov iterations and dual problems of each event."""
     interface = homogenization.interface
     bonded = np.full(len(interface.nodes.row), BONDED, np.int8)
-    found = events(interface, Law(STRENGTH, STRENGTH, "max"), np.array([STRAIN]), unloaded(interface, bonded))
+    found = events(
+        interface, StrengthCriterion(STRENGTH, STRENGTH, "max"), np.array([STRAIN]), unloaded(interface, bonded)
+    )
     seconds, iterations, solves = [], [], []
     start = time.perf_counter()
     for point in islice(found, count):

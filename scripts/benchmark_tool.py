@@ -24,7 +24,7 @@ from mpi4py import MPI  # noqa: E402
 from peers import PEERS, Peer  # noqa: E402
 from petsc4py import PETSc  # noqa: E402
 
-from feti_homog.analysis.context import Study  # noqa: E402
+from feti_homog.analysis.context import AnalysisContext  # noqa: E402
 from feti_homog.common import process_memory  # noqa: E402
 from feti_homog.common.mpi_errors import run_main  # noqa: E402
 from feti_homog.common.petsc_options import case_options  # noqa: E402
@@ -66,16 +66,16 @@ def feti(case: Case, progress: Progress, loads: int, rtol: float) -> dict[str, A
         cell = unit_cell.tear(case, comm, progress)
         progress.seconds["set-up"] = progress.seconds.pop("factor")
         with progress.stage("set-up"):
-            study = Study(Homogenization(cell, contact=False), cell.debonded, progress, lambda *_: None)
+            context = AnalysisContext(Homogenization(cell, contact=False), cell.debonded, progress, lambda *_: None)
         with progress.stage("solve"):
-            starts = [study.nothing()] * loads
-            responses = study.homogenization.respond(np.eye(3)[:loads], study.status(None), starts)
+            starts = [context.nothing()] * loads
+            responses = context.homogenization.respond(np.eye(3)[:loads], context.status(None), starts)
             for response in responses:
-                study.note("", response)
+                context.note("", response)
     dofs = cell.total(sum(len(s.Q) for s in cell.subdomains))
     cell.solver.destroy()
     columns = [response.stress for response in responses]
-    return _report(dofs, cell.plan.subdomains, columns, study.iterations, study.reasons)
+    return _report(dofs, cell.plan.subdomains, columns, context.iterations, context.reasons)
 
 
 def peer(tool: Peer, case: Case, progress: Progress, loads: int, rtol: float) -> dict[str, Any]:

@@ -63,16 +63,16 @@ class Nodes:
 def _keys(comm: MPI.Intracomm, subdomains: list[Subdomain], lattice: Lattice) -> tuple[list[Int], int]:
     """A key for each class of each subdomain, the same wherever the node is, and from which on keys are not shared."""
     inner = lattice.intervals - 1
-    inside = [s.mesh.n_classes - len(s.piece.class_keys) - len(s.piece.edge_keys) * inner for s in subdomains]
-    vertices = comm.allreduce(max(int(s.piece.class_keys.max()) + 1 for s in subdomains), MPI.MAX)
-    edges = comm.allreduce(max(int(s.piece.edge_keys.max()) + 1 for s in subdomains), MPI.MAX)
+    inside = [s.mesh.n_classes - len(s.submesh.class_keys) - len(s.submesh.edge_keys) * inner for s in subdomains]
+    vertices = comm.allreduce(max(int(s.submesh.class_keys.max()) + 1 for s in subdomains), MPI.MAX)
+    edges = comm.allreduce(max(int(s.submesh.edge_keys.max()) + 1 for s in subdomains), MPI.MAX)
     several = vertices + edges * inner
     ends = several + comm.scan(sum(inside)) - sum(inside) + np.cumsum(inside)
     keys = [
         np.concatenate(
             [
-                s.piece.class_keys,
-                (vertices + s.piece.edge_keys[:, None] * inner + np.arange(inner)).ravel(),
+                s.submesh.class_keys,
+                (vertices + s.submesh.edge_keys[:, None] * inner + np.arange(inner)).ravel(),
                 np.arange(end - count, end),
             ]
         )

@@ -28,8 +28,8 @@ from feti_homog.common.petsc_options import case_options  # noqa: E402
 from feti_homog.common.progress import Progress  # noqa: E402
 from feti_homog.config import case as cases  # noqa: E402
 from feti_homog.config.case import Case  # noqa: E402
-from feti_homog.feti.coarse.adaptive import AdaptiveCoarse  # noqa: E402
-from feti_homog.feti.decomposition.jump_operator import Constraints  # noqa: E402
+from feti_homog.feti.coarse.adaptive import AdaptiveCoarseSpace  # noqa: E402
+from feti_homog.feti.decomposition.jump_operator import JumpOperator  # noqa: E402
 from feti_homog.homogenization.unit_cell import TornCell, tear  # noqa: E402
 
 LOADS = 3
@@ -87,7 +87,7 @@ def measure(case: Case, progress: Progress) -> dict[str, Any]:
     with progress.stage("solve"):
         solutions = solver.solve_together(np.eye(LOADS), np.zeros((solver.rows, LOADS)))
     memory = sum(comm.allgather(peak()))
-    if not isinstance(solver.coarse, AdaptiveCoarse):
+    if not isinstance(solver.coarse, AdaptiveCoarseSpace):
         raise TypeError("the study is of the adaptive coarse space")
     own = comm.allgather(len(solver.Q))
     report = {
@@ -116,7 +116,7 @@ def _messages(cell: TornCell) -> dict[str, Any]:
     gather; in a sum they change places.  `logged` are the bytes, both ways, that PETSc counted in the solves.
     """
     comm = cell.comm
-    counts = LOADS * np.array(comm.allgather(_foreign(cell.solver.constraints, comm)))
+    counts = LOADS * np.array(comm.allgather(_foreign(cell.solver.jump_operator, comm)))
     log = PETSc.Log.Event("VecScatterBegin").getPerfInfo(PETSc.Log.Stage("solve").id)
     return {
         "told": counts.sum(axis=0).tolist(),
@@ -127,15 +127,15 @@ def _messages(cell: TornCell) -> dict[str, Any]:
     }
 
 
-def _foreign(constraints: Constraints, comm: MPI.Intracomm) -> np.ndarray:
+def _foreign(jump_operator: JumpOperator, comm: MPI.Intracomm) -> np.ndarray:
     """(ranks,) local rows that each of the other ranks owns."""
-    ends = np.array(comm.allgather(constraints.owned[1]))
-    counts = np.bincount(np.searchsorted(ends, constraints.rows, side="right"), minlength=comm.size)
+    ends = np.array(comm.allgather(jump_operator.owned[1]))
+    counts = np.bincount(np.searchsorted(ends, jump_operator.rows, side="right"), minlength=comm.size)
     counts[comm.rank] = 0
     return counts
 
 
-def _coarse(coarse: AdaptiveCoarse, comm: MPI.Intracomm) -> dict[str, float]:
+def _coarse(coarse: AdaptiveCoarseSpace, comm: MPI.Intracomm) -> dict[str, float]:
     """Seconds to sum and factor the coarse matrices and to solve with them once, and bytes that every rank is told."""
     right = np.ones((coarse.vectors, LOADS)), np.ones((coarse.dimension, LOADS))
     solve = min(_seconds(lambda: coarse.saddle.solve(*right)) for _ in range(TIMED))

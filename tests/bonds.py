@@ -48,7 +48,7 @@ class Bonds:
 
     @property
     def here(self):
-        return len(self.cell.solver.constraints.nodes.row)
+        return len(self.cell.solver.jump_operator.nodes.row)
 
     def start(self):
         return np.zeros(self.cell.solver.rows)
@@ -57,7 +57,7 @@ class Bonds:
 def tear(comm, arcs=(), **case):
     """The torn cell of the case that `make_case` makes, the tips of arcs at its nodes.  Collective."""
     PETSc.garbage_cleanup(comm)
-    case = replace(make_case(**case), interface=sections.Interface(debonded=tuple(arcs)))
+    case = replace(make_case(**case), interface=sections.InterfaceSection(debonded=tuple(arcs)))
     with case_options(case.petsc):
         return unit_cell.tear(case, comm, Progress(comm, quiet=True))
 
@@ -79,8 +79,10 @@ def build(comm, **case):
     """The cell of `tear` and its twin.  Collective."""
     cell = tear(comm, **case)
     size = np.array([cell.plan.width, cell.plan.height])
-    parts = [(s.mesh.points, s.mesh.triangles, s.piece.body, s.piece.phase == "matrix", s.L) for s in cell.subdomains]
-    parts, points = comm.gather(parts), comm.gather(cell.solver.constraints.nodes.points)
+    parts = [
+        (s.mesh.points, s.mesh.triangles, s.submesh.body, s.submesh.phase == "matrix", s.L) for s in cell.subdomains
+    ]
+    parts, points = comm.gather(parts), comm.gather(cell.solver.jump_operator.nodes.points)
     if parts is None:
         return Bonds(cell, None, np.zeros(0, int))
     fibres = arrange(cell.case.cell)

@@ -9,7 +9,7 @@ from petsc4py import PETSc
 from reference import monolithic
 
 from feti_homog.analysis import stiffness
-from feti_homog.analysis.context import Study
+from feti_homog.analysis.context import AnalysisContext
 from feti_homog.common.petsc_options import case_options
 from feti_homog.common.progress import Progress
 from feti_homog.config import case as cases
@@ -39,13 +39,13 @@ def solve(case, comm):
     with case_options(case.petsc):
         cell = tear(case, comm, progress)
         responses = []
-        study = Study(
+        context = AnalysisContext(
             Homogenization(cell, contact=False),
-            lambda opening: np.zeros(len(cell.solver.constraints.nodes.row), bool),
+            lambda opening: np.zeros(len(cell.solver.jump_operator.nodes.row), bool),
             progress,
             lambda response, *_: responses.append(response),
         )
-        return cell, stiffness.run(study)["effective_stiffness"], responses
+        return cell, stiffness.run(context)["effective_stiffness"], responses
 
 
 def twin_stiffness(cell):

@@ -47,7 +47,7 @@ class Narrow:
 
     def own(self, whole):
         """This rank's rows."""
-        first, last = self.solver.constraints.owned
+        first, last = self.solver.jump_operator.owned
         return whole[first:last]
 
     def random(self, seed, columns=()):
@@ -64,13 +64,13 @@ def together(cell, strains=STRAINS, starts=None):
 
 def of_all(comm, coarse, cell):
     """Soft modes of all subdomains in the order of their numbers."""
-    own = zip((s.piece.index for s in cell.subdomains), coarse.counts, strict=True)
+    own = zip((s.submesh.index for s in cell.subdomains), coarse.counts, strict=True)
     return [count for _, count in sorted(pair for part in comm.allgather(list(own)) for pair in part)]
 
 
 def statuses(cell, seed):
     """Statuses of this rank's nodes: an arc of each fibre open, some more nodes open or closed, at random."""
-    rng, nodes = np.random.default_rng(seed), cell.solver.constraints.nodes
+    rng, nodes = np.random.default_rng(seed), cell.solver.jump_operator.nodes
     points = np.concatenate(cell.comm.allgather(nodes.points))
     place = np.empty(len(points), int)
     place[np.lexsort(np.round(points, 8).T)] = np.arange(len(points))

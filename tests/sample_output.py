@@ -26,17 +26,17 @@ def sample(cells: int = 8, refine: int = 0, order: int = 1) -> Sample:
     Body 0, the matrix, is torn in two (left, right of x = 1/2); body 1 is the fibre. 4 divides `cells`.
     """
     corners, phase = _coarse(cells)
-    piece = np.where(phase == 1, 2, (corners.mean(axis=1)[:, 0] > 0.5).astype(int))
-    corners, piece = corners[np.argsort(piece, kind="stable")], np.sort(piece)
+    submesh = np.where(phase == 1, 2, (corners.mean(axis=1)[:, 0] > 0.5).astype(int))
+    corners, submesh = corners[np.argsort(submesh, kind="stable")], np.sort(submesh)
     for _ in range(refine):
         corners = _split(corners)
-    piece = np.repeat(piece, 4**refine)
+    submesh = np.repeat(submesh, 4**refine)
     if order == 2:
         mids = 0.5 * (corners + np.roll(corners, -1, axis=1))
         corners = np.concatenate([corners, mids], axis=1)
-    points, triangles = _merge(corners, piece)
-    phase = (piece == 2).astype(int)
-    mesh = MeshPart(points, triangles, body=phase, subdomain=piece, phase=phase)
+    points, triangles = _merge(corners, submesh)
+    phase = (submesh == 2).astype(int)
+    mesh = MeshPart(points, triangles, body=phase, subdomain=submesh, phase=phase)
     header = Header("sample", "0", 1.0, 1.0, order, refine, ("matrix", "fibre"), "mm", "GPa")
     return Sample(header, mesh, _interface(), tuple(_state(mesh, gradient) for gradient in GRADIENTS))
 
@@ -44,7 +44,7 @@ def sample(cells: int = 8, refine: int = 0, order: int = 1) -> Sample:
 def part_of(whole: Sample, rank: int, size: int) -> Sample:
     """The share of a rank: subdomains are dealt out in order; ranks past the third have nothing."""
     mesh, last = whole.mesh, 2
-    mine = [piece for piece in range(last + 1) if min(piece, size - 1) == rank]
+    mine = [submesh for submesh in range(last + 1) if min(submesh, size - 1) == rank]
     rows = np.isin(mesh.subdomain, mine)
     nodes, triangles = np.unique(mesh.triangles[rows], return_inverse=True)
     labels = {name: getattr(mesh, name)[rows] for name in ("body", "subdomain", "phase")}
@@ -79,9 +79,9 @@ def _split(corners: np.ndarray) -> np.ndarray:
     return np.stack([np.stack(child, axis=1) for child in children], axis=1).reshape(-1, 3, 2)
 
 
-def _merge(corners: np.ndarray, piece: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _merge(corners: np.ndarray, submesh: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Nodes numbered piece by piece, shared within a piece only."""
-    keys = np.concatenate([np.repeat(piece, corners.shape[1])[:, None], corners.reshape(-1, 2)], axis=1)
+    keys = np.concatenate([np.repeat(submesh, corners.shape[1])[:, None], corners.reshape(-1, 2)], axis=1)
     nodes, triangles = np.unique(keys.round(12), axis=0, return_inverse=True)
     return np.ascontiguousarray(nodes[:, 1:]), triangles.reshape(corners.shape[:2])
 

@@ -22,7 +22,7 @@ CONTACT_TOLERANCE = 1e-6
 
 
 @dataclass
-class Study:
+class AnalysisContext:
     """One run of an analysis.
 
     Attributes:

@@ -7,35 +7,35 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.analysis.context import UNIT_CASES, Study
+from feti_homog.analysis.context import UNIT_CASES, AnalysisContext
 from feti_homog.homogenization.averaging import Response, asymmetry
 from feti_homog.typing import Float
 
 
-def run(study: Study, values: Sequence[float], strain: Float | None) -> dict[str, Any]:
+def run(context: AnalysisContext, values: Sequence[float], strain: Float | None) -> dict[str, Any]:
     """`angle`, a list of points: under `strain` the stress, else the stiffness from the three unit cases.
 
     Each angle begins with the multipliers of the one before it.
     """
     unit = strain is None
-    starts = [study.nothing()] * (3 if unit else 1)
+    starts = [context.nothing()] * (3 if unit else 1)
     points = []
-    for value in study.progress.bar(values, "angles"):
-        status, label = study.status(value), f"{value:g} deg"
+    for value in context.progress.bar(values, "angles"):
+        status, label = context.status(value), f"{value:g} deg"
         point: dict[str, Any] = {"angle": value}
         responses: list[Response]
         if unit:
-            L, responses = study.unit_responses(f"{label} ", status, starts, 1.0)
+            L, responses = context.unit_responses(f"{label} ", status, starts, 1.0)
             point["stiffness"] = L
             debonded = responses[0].counts["open"] + responses[0].counts["closed"]
-            if not (study.homogenization.interface.contact and debonded):
-                study.check(label, {"symmetry": asymmetry(L)})
+            if not (context.homogenization.interface.contact and debonded):
+                context.check(label, {"symmetry": asymmetry(L)})
         else:
-            responses = study.homogenization.respond(np.array([strain]), status, starts)
-            study.note(label, responses[0])
+            responses = context.homogenization.respond(np.array([strain]), status, starts)
+            context.note(label, responses[0])
             point |= {"strain": responses[0].strain, "stress": responses[0].stress}
         for name, response in zip(UNIT_CASES if unit else ("",), responses, strict=True):
-            study.record(response, 1.0, f"{label} {name}".strip())
+            context.record(response, 1.0, f"{label} {name}".strip())
         starts = [r.state.solution.lam for r in responses]
-        points.append(point | study.point(responses))
+        points.append(point | context.point(responses))
     return {"angle": points}

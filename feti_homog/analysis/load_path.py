@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from feti_homog.analysis.context import Study
+from feti_homog.analysis.context import AnalysisContext
 from feti_homog.config.sections import LoadPath
 from feti_homog.feti.solver import DualSolution
 from feti_homog.homogenization.averaging import Response
 from feti_homog.interface.contact import BONDED, Equilibrium
-from feti_homog.interface.path_following import Point, Stand, events, increments, unloaded
-from feti_homog.interface.strength_criterion import Law
+from feti_homog.interface.path_following import PathState, Point, events, increments, unloaded
+from feti_homog.interface.strength_criterion import StrengthCriterion
 from feti_homog.output.files.checkpoint import Arrays, Checkpoint
 from feti_homog.typing import Float
 
@@ -30,8 +30,8 @@ class _Dissipation:
     one direction, the stress after it comes from the next point; else, from a solve.
     """
 
-    study: Study
-    left: Stand
+    context: AnalysisContext
+    left: PathState
     total: float = 0.0
     pending: tuple[float, Float] | None = None
 
@@ -52,9 +52,9 @@ class _Dissipation:
         self.pending = (point.scale, response.stress / point.scale) if point.broke and point.scale < 1.0 else None
         return total
 
-    def _stress(self, stand: Stand, point: Point, stress: Float) -> Float:
+    def _stress(self, stand: PathState, point: Point, stress: Float) -> Float:
         """Sigma under the point's strain with what is debonded at `stand`; `stress` is that of the point itself."""
-        homogenization = self.study.homogenization
+        homogenization = self.context.homogenization
         solver = homogenization.interface.solver
         same = np.array_equal(stand.status == BONDED, point.state.status == BONDED)
         if solver.comm.allreduce(same, MPI.LAND):
@@ -63,15 +63,17 @@ class _Dissipation:
         return solver.stress_integral(state.solution) / homogenization.cell.plan.area
 
 
-def run(study: Study, path: LoadPath, law: Law, checkpoint: Checkpoint, resume: bool) -> dict[str, Any]:
+def run(
+    context: AnalysisContext, path: LoadPath, law: StrengthCriterion, checkpoint: Checkpoint, resume: bool
+) -> dict[str, Any]:
     """`path`, a list of points, one an event (or increment); each is checkpointed before the next is sought."""
-    interface = study.homogenization.interface
-    known = _known(study, checkpoint, resume)
-    begin = unloaded(interface, study.status(None))
-    dissipation, points = _Dissipation(study, begin), []
-    for number, point in enumerate(_points(study, path, law, begin, [point for point, _ in known])):
+    interface = context.homogenization.interface
+    known = _known(context, checkpoint, resume)
+    begin = unloaded(interface, context.status(None))
+    dissipation, points = _Dissipation(context, begin), []
+    for number, point in enumerate(_points(context, path, law, begin, [point for point, _ in known])):
         interface.solver.activate(interface.active(point.state.status))
-        response = study.homogenization.response(point.state, point.scale)
+        response = context.homogenization.response(point.state, point.scale)
         label, source = f"{'event' if path.method == 'events' else 'increment'} {number}", ""
         if number < len(known):
             dissipated, source = dissipation.recall(known[number][1], point, response), ", from the checkpoint"
@@ -79,8 +81,8 @@ def run(study: Study, path: LoadPath, law: Law, checkpoint: Checkpoint, resume: 
             dissipated = dissipation.at(point, response)
             if point.state.solution.reason > 0:
                 checkpoint.write(number, *_stored(point, dissipated))
-        study.note(f"{label} at {point.load_factor:.6f}{source}", response)
-        study.record(response, point.load_factor, label)
+        context.note(f"{label} at {point.load_factor:.6f}{source}", response)
+        context.record(response, point.load_factor, label)
         points.append(
             {
                 "load_factor": point.load_factor,
@@ -90,18 +92,18 @@ def run(study: Study, path: LoadPath, law: Law, checkpoint: Checkpoint, resume: 
                 "loose": point.state.loose,
                 "dissipated": dissipated,
             }
-            | study.point([response])
+            | context.point([response])
         )
         if point.state.solution.reason < 0:
             # What broke next was decided on a state that does not hold.
             break
         if number + 1 == path.max_events and point.load_factor < 1.0:
-            study.faults.append(f"[path] max_events = {number + 1}: the path was not finished; result marked")
+            context.faults.append(f"[path] max_events = {number + 1}: the path was not finished; result marked")
             break
     return {"path": points, "resumed": len(known)}
 
 
-def _known(study: Study, checkpoint: Checkpoint, resume: bool) -> list[tuple[Point, float]]:
+def _known(context: AnalysisContext, checkpoint: Checkpoint, resume: bool) -> list[tuple[Point, float]]:
     """The points of the checkpoint and what was dissipated up to each, if they are wanted; else it is cleared.
 
     Raises:
@@ -109,21 +111,23 @@ def _known(study: Study, checkpoint: Checkpoint, resume: bool) -> list[tuple[Poi
     """
     if resume:
         known = [_restored(arrays) for arrays in checkpoint.read()]
-        study.progress.say(
+        context.progress.say(
             f"  {len(known)} events are taken from the checkpoint"
             if known
             else "  there is no checkpoint: the path begins at its beginning"
         )
         return known
     if dropped := checkpoint.clear():
-        study.progress.say(f"  {dropped} events of an earlier run are dropped; --resume would have gone on from them")
+        context.progress.say(f"  {dropped} events of an earlier run are dropped; --resume would have gone on from them")
     return []
 
 
-def _points(study: Study, path: LoadPath, law: Law, begin: Stand, known: Sequence[Point]) -> Iterator[Point]:
+def _points(
+    context: AnalysisContext, path: LoadPath, law: StrengthCriterion, begin: PathState, known: Sequence[Point]
+) -> Iterator[Point]:
     """The points of the checkpoint, then those still to be found."""
     yield from known
-    interface, waypoints = study.homogenization.interface, np.array(path.targets)
+    interface, waypoints = context.homogenization.interface, np.array(path.targets)
     begin = known[-1].after if known else begin
     if path.method == "events":
         yield from events(interface, law, waypoints, begin)
@@ -161,5 +165,5 @@ def _restored(event: Arrays) -> tuple[Point, float]:
     )
     certificate = dict(zip(KKT_LAWS, event["certificate"].tolist(), strict=True))
     state = Equilibrium(event["status"], solution, iterations, solves, loose, certificate)
-    after = Stand(int(leg), position, event["status_after"], event["lam_after"])
+    after = PathState(int(leg), position, event["status_after"], event["lam_after"])
     return Point(load_factor, scale, state, broke, after), dissipated

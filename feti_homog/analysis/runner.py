@@ -16,7 +16,7 @@ from petsc4py import PETSc
 
 from feti_homog import __version__
 from feti_homog.analysis import debonding_angle, load_path, stiffness
-from feti_homog.analysis.context import CONTACT_TOLERANCE, Study
+from feti_homog.analysis.context import CONTACT_TOLERANCE, AnalysisContext
 from feti_homog.analysis.result import Result
 from feti_homog.common import process_memory
 from feti_homog.common.mpi_errors import on_root, on_root_only
@@ -27,7 +27,7 @@ from feti_homog.config.materials import plane_stiffness
 from feti_homog.errors import ConvergenceError
 from feti_homog.homogenization.averaging import Homogenization, Response
 from feti_homog.homogenization.unit_cell import TornCell, tear
-from feti_homog.interface.strength_criterion import Law
+from feti_homog.interface.strength_criterion import StrengthCriterion
 from feti_homog.mechanics import bounds
 from feti_homog.output.files import csv_tables, field_parts, output_folder, result_json, xdmf
 from feti_homog.output.files.checkpoint import Checkpoint, NoCheckpoint, finished
@@ -64,11 +64,11 @@ def compute(case: Case, comm: MPI.Intracomm) -> Result:
     """
     progress = Progress(comm, quiet=True)
     with _torn(case, comm, progress) as cell:
-        study = _study(cell, progress, None)
-        document = _document(study, _analyse(study, NoCheckpoint(comm), resume=False))
-        document |= {"timings": study.progress.timings(), "memory": study.progress.memory()}
-    if study.faults:
-        raise ConvergenceError(*study.faults)
+        context = _study(cell, progress, None)
+        document = _document(context, _analyse(context, NoCheckpoint(comm), resume=False))
+        document |= {"timings": context.progress.timings(), "memory": context.progress.memory()}
+    if context.faults:
+        raise ConvergenceError(*context.faults)
     return Result.of(document)
 
 
@@ -98,48 +98,48 @@ def _run(cell: TornCell, directory: Path, progress: Progress, resume: bool) -> l
                 directory, comm, field_parts.header(cell), field_parts.mesh_part(cell), field_parts.interface_part(cell)
             )
     with file or nullcontext():
-        study = _study(cell, progress, file)
+        context = _study(cell, progress, file)
         checkpoint = _checkpoint(cell, directory)
-        analysis = _analyse(study, checkpoint, resume)
-    _write(study, directory, _document(study, analysis), checkpoint)
-    return study.faults
+        analysis = _analyse(context, checkpoint, resume)
+    _write(context, directory, _document(context, analysis), checkpoint)
+    return context.faults
 
 
-def _study(cell: TornCell, progress: Progress, file: FieldFile | None) -> Study:
+def _study(cell: TornCell, progress: Progress, file: FieldFile | None) -> AnalysisContext:
     """The analysis of a cell, whose states go to the file if there is one."""
     contact = cell.case.interface is not None and cell.case.interface.contact
-    return Study(Homogenization(cell, contact), cell.debonded, progress, _recorder(cell, file))
+    return AnalysisContext(Homogenization(cell, contact), cell.debonded, progress, _recorder(cell, file))
 
 
-def _analyse(study: Study, checkpoint: Checkpoint, resume: bool) -> dict[str, Any]:
+def _analyse(context: AnalysisContext, checkpoint: Checkpoint, resume: bool) -> dict[str, Any]:
     """The numbers of the analysis asked for, as they stand in result.json."""
-    with study.progress.stage("solve") as words:
-        analysis = _analysis(study, checkpoint, resume)
-        words.append(f"{len(study.iterations)} states, {sum(study.iterations)} iterations")
+    with context.progress.stage("solve") as words:
+        analysis = _analysis(context, checkpoint, resume)
+        words.append(f"{len(context.iterations)} states, {sum(context.iterations)} iterations")
     return analysis
 
 
-def _analysis(study: Study, checkpoint: Checkpoint, resume: bool) -> dict[str, Any]:
-    case = study.homogenization.cell.case
+def _analysis(context: AnalysisContext, checkpoint: Checkpoint, resume: bool) -> dict[str, Any]:
+    case = context.homogenization.cell.case
     if case.path is not None:
-        return load_path.run(study, case.path, _law(case), checkpoint, resume)
+        return load_path.run(context, case.path, _law(case), checkpoint, resume)
     if case.angle is not None:
         strain = None if case.angle.strain is None else np.array(case.angle.strain)
-        return debonding_angle.run(study, case.angle.values, strain)
-    return stiffness.run(study)
+        return debonding_angle.run(context, case.angle.values, strain)
+    return stiffness.run(context)
 
 
 def _checkpoint(cell: TornCell, directory: Path) -> Checkpoint:
-    plan, multipliers = cell.plan, cell.solver.constraints.total
+    plan, multipliers = cell.plan, cell.solver.jump_operator.total
     parts = f"{plan.subdomains} subdomains on {cell.comm.size} ranks, {multipliers} multipliers"
     return Checkpoint(directory, cell.comm, f"case {on_root(cell.comm, cell.case.digest)}, {parts}")
 
 
-def _law(case: Case) -> Law:
+def _law(case: Case) -> StrengthCriterion:
     bond = case.interface
     if bond is None:
-        return Law(math.inf, math.inf, "max")
-    return Law(bond.normal_strength or math.inf, bond.tangential_strength or math.inf, bond.criterion)
+        return StrengthCriterion(math.inf, math.inf, "max")
+    return StrengthCriterion(bond.normal_strength or math.inf, bond.tangential_strength or math.inf, bond.criterion)
 
 
 def _recorder(cell: TornCell, file: FieldFile | None) -> Callable[[Response, float, str], None]:
@@ -153,9 +153,9 @@ def _recorder(cell: TornCell, file: FieldFile | None) -> Callable[[Response, flo
     return record
 
 
-def _document(study: Study, analysis: dict[str, Any]) -> dict[str, Any]:
+def _document(context: AnalysisContext, analysis: dict[str, Any]) -> dict[str, Any]:
     """result.json but for times and memory; collective."""
-    cell = study.homogenization.cell
+    cell = context.homogenization.cell
     plan, solver, areas = cell.plan, cell.solver, cell.areas()
     fractions = {phase: area / sum(areas.values()) for phase, area in areas.items()}
     document = {
@@ -176,23 +176,23 @@ def _document(study: Study, analysis: dict[str, Any]) -> dict[str, Any]:
             "bodies": plan.bodies,
             "subdomains": plan.subdomains,
             "dofs": cell.total(len(solver.Q)),
-            "multipliers": solver.constraints.total,
-            "interface_nodes": cell.total(len(solver.constraints.nodes.row)),
+            "multipliers": solver.jump_operator.total,
+            "interface_nodes": cell.total(len(solver.jump_operator.nodes.row)),
             "kernel_dim": solver.coarse.dimension,
             "coarse_dim": solver.coarse.vectors,
             "factorizations": cell.total(len(solver.boundary.operators)),
             "coarse_factorizations": solver.coarse.factorizations,
             "rtol": solver.rtol,
             "solves": solver.solves,
-            "iterations": study.iterations,
-            "converged_reason": study.reasons,
+            "iterations": context.iterations,
+            "converged_reason": context.reasons,
         },
-        "checks": study.checks,
-        "check_tolerance": study.tolerance("jump"),
+        "checks": context.checks,
+        "check_tolerance": context.tolerance("jump"),
         "kkt_tolerance": CONTACT_TOLERANCE,
         "warnings": list(cell.case.warnings()),
-        "faults": study.faults,
-        "status": "not converged" if study.faults else "done",
+        "faults": context.faults,
+        "status": "not converged" if context.faults else "done",
     }
     if "effective_stiffness" in analysis and cell.case.interface is None:
         document |= _beside(cell, analysis["effective_stiffness"], fractions)
@@ -214,15 +214,15 @@ def _beside(cell: TornCell, L: Float, fractions: dict[str, float]) -> dict[str, 
     }
 
 
-def _write(study: Study, directory: Path, document: dict[str, Any], checkpoint: Checkpoint) -> None:
-    cell, progress = study.homogenization.cell, study.progress
+def _write(context: AnalysisContext, directory: Path, document: dict[str, Any], checkpoint: Checkpoint) -> None:
+    cell, progress = context.homogenization.cell, context.progress
     comm, output = cell.comm, cell.case.output
     if output.fields:
         on_root_only(comm, xdmf.write, directory)
     document["timings"], document["memory"] = progress.timings(), progress.memory()
     on_root_only(comm, result_json.write, directory, document)
     on_root_only(comm, csv_tables.write, directory, document)
-    if cell.case.path is not None and not study.faults:
+    if cell.case.path is not None and not context.faults:
         checkpoint.clear()
     if output.pictures:
         with progress.stage("pictures") as words:

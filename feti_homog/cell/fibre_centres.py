@@ -6,7 +6,7 @@ import numpy as np
 
 from feti_homog.cell.coarse_mesh import areas
 from feti_homog.cell.periodic_topology import Torus
-from feti_homog.cell.submesh import Piece, cut
+from feti_homog.cell.submesh import Submesh, cut
 from feti_homog.cell.unwrap import unwrap
 from feti_homog.typing import Float
 
@@ -20,27 +20,27 @@ def fibre_centres(torus: Torus) -> Float:
     NaN for the matrix, and for a fibre that winds around the torus, which has no centre.
     """
     centres = np.full((len(torus.constituent_phase), 2), np.nan)
-    for piece in cut(torus, torus.constituent):
-        if torus.constituent_phase[piece.body] > 0:
-            centres[piece.body] = _centre(piece)
+    for submesh in cut(torus, torus.constituent):
+        if torus.constituent_phase[submesh.body] > 0:
+            centres[submesh.body] = _centre(submesh)
     return centres
 
 
-def _centre(piece: Piece) -> Float:
-    around = _boundary_circles(piece)
+def _centre(submesh: Submesh) -> Float:
+    around = _boundary_circles(submesh)
     radius = around[0, 2] if len(around) else 0.0
     offset = around[:, :2] - around[:1, :2]
-    offset -= np.round(offset / piece.period) * piece.period
+    offset -= np.round(offset / submesh.period) * submesh.period
     if radius > 0 and np.all(np.abs(around[:, 2] - radius) < SAME * radius) and np.all(np.abs(offset) < SAME * radius):
         return np.asarray(around[0, :2])
-    shift, closes = unwrap(piece)
+    shift, closes = unwrap(submesh)
     if not closes:
         return np.full(2, np.nan)
-    middles = piece.points[piece.triangles].mean(axis=1) + shift
-    return np.asarray(np.average(middles, axis=0, weights=areas(piece.points, piece.triangles.astype(np.int32))))
+    middles = submesh.points[submesh.triangles].mean(axis=1) + shift
+    return np.asarray(np.average(middles, axis=0, weights=areas(submesh.points, submesh.triangles.astype(np.int32))))
 
 
-def _boundary_circles(piece: Piece) -> Float:
+def _boundary_circles(submesh: Submesh) -> Float:
     """(b, 3) circles of the edges that the piece has on one side only, radius 0 where they are straight."""
-    sides = np.bincount(piece.edge_class[piece.triangle_edges].ravel(), minlength=len(piece.edge_keys))
-    return piece.circles[sides[piece.edge_class] == 1]
+    sides = np.bincount(submesh.edge_class[submesh.triangle_edges].ravel(), minlength=len(submesh.edge_keys))
+    return submesh.circles[sides[submesh.edge_class] == 1]

@@ -175,12 +175,12 @@ def _side_curves(
         inside = _disc_at(_on_side(begin + span / 2, axis, level), circles)
         # A chord has two edges or more: a triangle with two arc edges beside it could not be flipped.
         least = np.where(inside == MATRIX, 1, 2)
-        for piece, stations in enumerate(_stations(share, sizes, span, least)):
-            along = begin[piece] + span[piece] * stations
-            along[[0, -1]] = places[piece : piece + 2]
+        for submesh, stations in enumerate(_stations(share, sizes, span, least)):
+            along = begin[submesh] + span[submesh] * stations
+            along[[0, -1]] = places[submesh : submesh + 2]
             nodes = numbering.along(_on_side(along, axis, level))
             # Counter-clockwise around the cell: along the coordinate at the bottom and at the right.
-            curves.append(Curve(nodes if low == (axis == 0) else nodes[::-1], MATRIX, int(inside[piece])))
+            curves.append(Curve(nodes if low == (axis == 0) else nodes[::-1], MATRIX, int(inside[submesh])))
     return curves
 
 

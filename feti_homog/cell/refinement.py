@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from feti_homog.cell.submesh import Piece
+from feti_homog.cell.submesh import Submesh
 from feti_homog.typing import Float, Int, Int32
 
 
@@ -91,18 +91,18 @@ class FineMesh:
         return self.nodes[:, elements].reshape(-1, elements.shape[1])
 
 
-def refine(piece: Piece, lattice: Lattice) -> FineMesh:
+def refine(submesh: Submesh, lattice: Lattice) -> FineMesh:
     """Refine the subdomain; new nodes on circles lie on them."""
-    edges, back, inner = piece.triangle_edges, piece.backwards, lattice.intervals - 1
-    plane = lattice.number(piece.triangles, edges, back, len(piece.points), len(piece.edges)).astype(np.int32)
-    n_classes, n_edges = len(piece.class_keys), len(piece.edge_keys)
-    torus = lattice.number(piece.vertex_class[piece.triangles], piece.edge_class[edges], back, n_classes, n_edges)
-    n = len(piece.points) + len(piece.edges) * inner + len(plane) * (len(lattice.nodes) - 3 - 3 * inner)
+    edges, back, inner = submesh.triangle_edges, submesh.backwards, lattice.intervals - 1
+    plane = lattice.number(submesh.triangles, edges, back, len(submesh.points), len(submesh.edges)).astype(np.int32)
+    n_classes, n_edges = len(submesh.class_keys), len(submesh.edge_keys)
+    torus = lattice.number(submesh.vertex_class[submesh.triangles], submesh.edge_class[edges], back, n_classes, n_edges)
+    n = len(submesh.points) + len(submesh.edges) * inner + len(plane) * (len(lattice.nodes) - 3 - 3 * inner)
     points, node_class = np.empty((n, 2)), np.empty(n, np.int32)
-    points[plane] = _positions(piece, lattice)
+    points[plane] = _positions(submesh, lattice)
     node_class[plane] = torus
-    c = n_classes + n_edges * inner + n - len(piece.points) - len(piece.edges) * inner
-    curved = (piece.circles[edges, 2] > 0).any(axis=1)
+    c = n_classes + n_edges * inner + n - len(submesh.points) - len(submesh.edges) * inner
+    curved = (submesh.circles[edges, 2] > 0).any(axis=1)
     return FineMesh(points, plane, curved, node_class, c, lattice)
 
 
@@ -119,7 +119,7 @@ def _split(triangle: Int) -> Int:
     return np.stack([np.stack(child, axis=1) for child in children], axis=1).reshape(-1, 3, 3)
 
 
-def _positions(piece: Piece, lattice: Lattice) -> Float:
+def _positions(submesh: Submesh, lattice: Lattice) -> Float:
     """(t, q, 2) lattice nodes of each coarse triangle, bent towards its curved edges.
 
     x = sum_k b_k x_k + sum_edges (1 - b_o)^2 delta(s): delta is the arc's distance from its chord at
@@ -127,24 +127,24 @@ def _positions(piece: Piece, lattice: Lattice) -> Float:
     elements are midpoints except on the arcs, so only elements at a circle are curved.
     """
     b = lattice.nodes / lattice.intervals
-    x = b @ piece.points[piece.triangles]
+    x = b @ submesh.points[submesh.triangles]
     for k in range(3):
-        edge = piece.triangle_edges[:, k]
-        curved = np.flatnonzero(piece.circles[edge, 2] > 0)
-        a, c = piece.points[piece.triangles[curved, k]], piece.points[piece.triangles[curved, (k + 1) % 3]]
+        edge = submesh.triangle_edges[:, k]
+        curved = np.flatnonzero(submesh.circles[edge, 2] > 0)
+        a, c = submesh.points[submesh.triangles[curved, k]], submesh.points[submesh.triangles[curved, (k + 1) % 3]]
         span = 1 - b[:, (k + 2) % 3]
         s = np.divide(b[:, (k + 1) % 3], span, out=np.zeros_like(span), where=span > 0)
-        x[curved] += span[:, None] ** 2 * (_arc(a, c, piece.circles[edge[curved]], s) - _chord(a, c, s))
+        x[curved] += span[:, None] ** 2 * (_arc(a, c, submesh.circles[edge[curved]], s) - _chord(a, c, s))
     if lattice.triangles.shape[1] == 6:
-        _straighten(x, piece, lattice)
+        _straighten(x, submesh, lattice)
     return x
 
 
-def _straighten(x: Float, piece: Piece, lattice: Lattice) -> None:
+def _straighten(x: Float, submesh: Submesh, lattice: Lattice) -> None:
     """Put mid-edge nodes midway between their vertices, save those on arcs."""
     corners = lattice.triangles[:, :3]
     middle = (x[:, corners] + x[:, np.roll(corners, -1, axis=1)]) / 2
-    curved = piece.circles[piece.triangle_edges, 2] > 0
+    curved = submesh.circles[submesh.triangle_edges, 2] > 0
     on_edge = lattice.nodes[lattice.triangles[:, 3:]][..., [2, 0, 1]] == 0
     on_arc = (curved[:, None, None, :] & on_edge).any(axis=3)
     x[:, lattice.triangles[:, 3:]] = np.where(on_arc[..., None], x[:, lattice.triangles[:, 3:]], middle)

@@ -13,7 +13,7 @@ from feti_homog.typing import Float, Int
 
 
 @dataclass(frozen=True)
-class Piece:
+class Submesh:
     """One subdomain of the coarse mesh: v plane vertices, e plane edges, t triangles.
 
     A plane vertex belongs to a class, a plane edge to a torus edge; both are numbered locally, in
@@ -53,7 +53,7 @@ class Piece:
     pinned: int
 
 
-def cut(torus: Torus, subdomain: Int) -> Iterator[Piece]:
+def cut(torus: Torus, subdomain: Int) -> Iterator[Submesh]:
     """Cut the coarse cell into its subdomains; `subdomain` (m,) numbers each triangle's, from 0 without gaps."""
     pinned = pinned_class(torus)
     order = np.argsort(subdomain, kind="stable")
@@ -61,25 +61,25 @@ def cut(torus: Torus, subdomain: Int) -> Iterator[Piece]:
         yield _piece(torus, index, members, pinned)
 
 
-def part(piece: Piece, members: Int) -> Piece:
+def part(submesh: Submesh, members: Int) -> Submesh:
     """The coarse triangles `members` (m,) of a piece, as a piece of its own."""
-    vertices, triangles = np.unique(piece.triangles[members], return_inverse=True)
-    edges, triangle_edges = np.unique(piece.triangle_edges[members], return_inverse=True)
-    classes, vertex_class = np.unique(piece.vertex_class[vertices], return_inverse=True)
-    torus_edges, edge_class = np.unique(piece.edge_class[edges], return_inverse=True)
-    held = np.flatnonzero(classes == piece.pinned)
+    vertices, triangles = np.unique(submesh.triangles[members], return_inverse=True)
+    edges, triangle_edges = np.unique(submesh.triangle_edges[members], return_inverse=True)
+    classes, vertex_class = np.unique(submesh.vertex_class[vertices], return_inverse=True)
+    torus_edges, edge_class = np.unique(submesh.edge_class[edges], return_inverse=True)
+    held = np.flatnonzero(classes == submesh.pinned)
     return replace(
-        piece,
-        points=piece.points[vertices],
+        submesh,
+        points=submesh.points[vertices],
         triangles=triangles.reshape(-1, 3),
         triangle_edges=triangle_edges.reshape(-1, 3),
-        backwards=piece.backwards[members],
-        edges=np.searchsorted(vertices, piece.edges[edges]),
-        circles=piece.circles[edges],
+        backwards=submesh.backwards[members],
+        edges=np.searchsorted(vertices, submesh.edges[edges]),
+        circles=submesh.circles[edges],
         vertex_class=vertex_class,
         edge_class=edge_class,
-        class_keys=piece.class_keys[classes],
-        edge_keys=piece.edge_keys[torus_edges],
+        class_keys=submesh.class_keys[classes],
+        edge_keys=submesh.edge_keys[torus_edges],
         pinned=int(held[0]) if len(held) else -1,
     )
 
@@ -105,7 +105,7 @@ def pinned_class(torus: Torus) -> int:
     return int(np.lexsort((distance, ~in_matrix, low != high))[0])
 
 
-def _piece(torus: Torus, index: int, members: Int, pinned: int) -> Piece:
+def _piece(torus: Torus, index: int, members: Int, pinned: int) -> Submesh:
     mesh = torus.mesh
     vertices, triangles = np.unique(mesh.triangles[members], return_inverse=True)
     edges, triangle_edges = np.unique(torus.triangle_edges[members], return_inverse=True)
@@ -114,7 +114,7 @@ def _piece(torus: Torus, index: int, members: Int, pinned: int) -> Piece:
     class_keys, vertex_class = np.unique(torus.node_class[vertices], return_inverse=True)
     edge_keys, edge_class = np.unique(torus.torus_edge[edges], return_inverse=True)
     held = np.flatnonzero(class_keys == pinned)
-    return Piece(
+    return Submesh(
         index=index,
         body=int(torus.constituent[members[0]]),
         phase=mesh.phases[mesh.phase[members[0]]],

@@ -7,11 +7,11 @@ from collections import deque
 import numpy as np
 
 from feti_homog.cell.periodic_topology import components, edge_pairs
-from feti_homog.cell.submesh import Piece
+from feti_homog.cell.submesh import Submesh
 from feti_homog.typing import Float, Int
 
 
-def unwrap(piece: Piece) -> tuple[Float, bool]:
+def unwrap(submesh: Submesh) -> tuple[Float, bool]:
     """Shift of each coarse triangle to its unwrapped position, and whether the walk closes.
 
     The walk closes when every class has one unwrapped position; then (and only then) the subdomain can
@@ -20,27 +20,27 @@ def unwrap(piece: Piece) -> tuple[Float, bool]:
     Returns:
         (t, 2) shifts, whole periods; true if the subdomain is contractible.
     """
-    if len(piece.class_keys) == len(piece.points):
+    if len(submesh.class_keys) == len(submesh.points):
         # No two vertices are images of each other: the plane positions are unwrapped.
-        return np.zeros((len(piece.triangles), 2)), True
-    part = components(len(piece.triangles), *edge_pairs(piece.triangle_edges))
-    shift = _part_shifts(piece, part)[part]
-    corners = piece.points[piece.triangles] + shift[:, None]
-    classes = piece.vertex_class[piece.triangles].ravel()
-    position = np.empty((len(piece.class_keys), 2))
+        return np.zeros((len(submesh.triangles), 2)), True
+    part = components(len(submesh.triangles), *edge_pairs(submesh.triangle_edges))
+    shift = _part_shifts(submesh, part)[part]
+    corners = submesh.points[submesh.triangles] + shift[:, None]
+    classes = submesh.vertex_class[submesh.triangles].ravel()
+    position = np.empty((len(submesh.class_keys), 2))
     position[classes] = corners.reshape(-1, 2)
-    closes = np.allclose(position[classes], corners.reshape(-1, 2), atol=1e-6 * piece.period.min())
+    closes = np.allclose(position[classes], corners.reshape(-1, 2), atol=1e-6 * submesh.period.min())
     return shift, closes
 
 
-def _part_shifts(piece: Piece, part: Int) -> Float:
+def _part_shifts(submesh: Submesh, part: Int) -> Float:
     """Shift of each plane-connected part, along a spanning tree of their contacts across the cell's boundary."""
-    part_of_edge = np.empty(len(piece.edges), np.int64)
-    part_of_edge[piece.triangle_edges] = part[:, None]
-    order = np.argsort(piece.edge_class, kind="stable")
-    twice = np.flatnonzero(np.diff(piece.edge_class[order]) == 0)
+    part_of_edge = np.empty(len(submesh.edges), np.int64)
+    part_of_edge[submesh.triangle_edges] = part[:, None]
+    order = np.argsort(submesh.edge_class, kind="stable")
+    twice = np.flatnonzero(np.diff(submesh.edge_class[order]) == 0)
     a, b = order[twice], order[twice + 1]
-    step = piece.points[piece.edges[a, 0]] - piece.points[piece.edges[b, 0]]
+    step = submesh.points[submesh.edges[a, 0]] - submesh.points[submesh.edges[b, 0]]
     links, first = np.unique(np.stack([part_of_edge[a], part_of_edge[b]], axis=1), axis=0, return_index=True)
     neighbours: dict[int, list[tuple[int, Float]]] = {k: [] for k in range(part.max() + 1)}
     for (p, q), k in zip(links.tolist(), first, strict=True):
@@ -53,6 +53,6 @@ def _part_shifts(piece: Piece, part: Int) -> Float:
         p = queue.popleft()
         for q, jump in neighbours[p]:
             if np.isnan(shifts[q, 0]):
-                shifts[q] = np.round((shifts[p] + jump) / piece.period) * piece.period
+                shifts[q] = np.round((shifts[p] + jump) / submesh.period) * submesh.period
                 queue.append(q)
     return shifts

@@ -25,7 +25,7 @@ from feti_homog.config.sections import (
     Arc,
     Cell,
     Decomposition,
-    Interface,
+    InterfaceSection,
     LoadPath,
     Output,
 )
@@ -64,7 +64,7 @@ class Case:
     cell: Cell
     materials: dict[str, Material]
     analysis: Analysis
-    interface: Interface | None
+    interface: InterfaceSection | None
     angle: Angle | None
     path: LoadPath | None
     decomposition: Decomposition

@@ -8,7 +8,7 @@ from itertools import pairwise
 from typing import Any
 
 from feti_homog.config.schema import NOWHERE, accepted, read, shown
-from feti_homog.config.sections import ARCS, CIRCULAR, Angle, Arc, Interface, LoadPath
+from feti_homog.config.sections import ARCS, CIRCULAR, Angle, Arc, InterfaceSection, LoadPath
 
 TYPE = "[analysis] type"
 
@@ -38,7 +38,7 @@ def read_bonding(
 
 def _read_interface(
     table: Any, geometry: str | None, analysis: str | None, faults: list[str], owners: Mapping[str, str]
-) -> Interface | None:
+) -> InterfaceSection | None:
     debonded = table.get("debonded", []) if isinstance(table, dict) else []
     if analysis == "angle" and debonded == []:
         faults.append(f'[interface] debonded: missing; {TYPE} = "angle" needs {ARCS.expected}')
@@ -47,7 +47,7 @@ def _read_interface(
     # An empty list says that it is meant; of a user's mesh a curve may be debonded.
     if analysis == "stiffness" and geometry in CIRCULAR and isinstance(table, dict) and "debonded" not in table:
         faults.append(f"[interface] debonded: missing; expected {ARCS.expected}, or []: nothing else can open")
-    interface = read(Interface, table, "interface", faults, TYPE, analysis, owners)
+    interface = read(InterfaceSection, table, "interface", faults, TYPE, analysis, owners)
     arcs = [
         read(Arc, arc, "interface", faults, TYPE, analysis, owners, f"debonded[{k}].")
         for k, arc in enumerate(debonded if ARCS.accepts(debonded) else [])

@@ -96,7 +96,7 @@ class Arc:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Interface:
+class InterfaceSection:
     """Bonding of fibres and matrix: what is debonded from the start, and the tractions that debond more.
 
     With `contact` debonded faces do not overlap. A strength of None is unlimited. `criterion`: a node breaks
@@ -168,7 +168,7 @@ class Output:
 SECTIONS: dict[str, type[Any]] = {
     "cell": Cell,
     "analysis": Analysis,
-    "interface": Interface,
+    "interface": InterfaceSection,
     "angle": Angle,
     "path": LoadPath,
     "decomposition": Decomposition,

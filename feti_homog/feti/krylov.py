@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from petsc4py import PETSc
 
-from feti_homog.feti.coarse.natural import CoarseProblem
+from feti_homog.feti.coarse.natural import NaturalCoarseSpace
 from feti_homog.feti.operators.dual_operator import DualOperator
 from feti_homog.feti.preconditioners.scaled import Preconditioner
 from feti_homog.typing import Float
@@ -35,7 +35,7 @@ class ActiveRows:
 class ProjectedOperator:
     """y = T^T F x on the active rows; x is in the range of T (P, if the coarse problem is the natural one)."""
 
-    def __init__(self, operator: DualOperator, coarse: CoarseProblem, active: ActiveRows, columns: int) -> None:
+    def __init__(self, operator: DualOperator, coarse: NaturalCoarseSpace, active: ActiveRows, columns: int) -> None:
         self.operator, self.coarse, self.active = operator, coarse, active
         self.shape = (-1, columns)
         self.event = PETSc.Log.Event("FETIDual")
@@ -50,7 +50,7 @@ class ProjectedOperator:
 class ProjectedPreconditioner:
     """z = T M^-1 r; keeps r, which tells the interface jump B u of the iterate."""
 
-    def __init__(self, preconditioner: Preconditioner, coarse: CoarseProblem, columns: int) -> None:
+    def __init__(self, preconditioner: Preconditioner, coarse: NaturalCoarseSpace, columns: int) -> None:
         self.preconditioner, self.coarse = preconditioner, coarse
         self.shape = (-1, columns)
         self.event = PETSc.Log.Event("FETIPrecond")
@@ -117,7 +117,7 @@ class Krylov:
         vector: PETSc.Vec,
         operator: DualOperator,
         preconditioner: Preconditioner,
-        coarse: CoarseProblem,
+        coarse: NaturalCoarseSpace,
         active: ActiveRows,
         columns: int,
     ) -> None:

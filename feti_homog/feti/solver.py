@@ -19,8 +19,8 @@ from petsc4py import PETSc
 from feti_homog.cell.refinement import Lattice
 from feti_homog.common import process_memory
 from feti_homog.feti import factory, view
-from feti_homog.feti.decomposition.jump_operator import Constraints
-from feti_homog.feti.decomposition.shared_entities import Shared
+from feti_homog.feti.decomposition.jump_operator import JumpOperator
+from feti_homog.feti.decomposition.shared_entities import SharedEntities
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.krylov import ActiveRows, Krylov
 from feti_homog.feti.operators.dual_operator import DualOperator
@@ -68,18 +68,18 @@ class FetiSolver:
     def __init__(
         self,
         comm: MPI.Intracomm,
-        shared: Shared,
+        shared: SharedEntities,
         subdomains: Sequence[Subdomain],
         lattice: Lattice,
         applications: int,
     ) -> None:
         """Set up; `applications` is how many times the dual operator is expected to be applied."""
         self.comm, self.subdomains = comm, subdomains
-        self.constraints = Constraints(comm, shared, subdomains, lattice)
+        self.jump_operator = JumpOperator(comm, shared, subdomains, lattice)
         self.boundary, self.preconditioner, self.coarse = factory.parts(
-            comm, self.constraints, subdomains, applications
+            comm, self.jump_operator, subdomains, applications
         )
-        self.operator = DualOperator(self.constraints, self.boundary)
+        self.operator = DualOperator(self.jump_operator, self.boundary)
         process_memory.trim()
         self.active = ActiveRows(self.rows)
         self._view = PETSc.Options("feti_").getBool("view", False)
@@ -94,7 +94,7 @@ class FetiSolver:
     @property
     def rows(self) -> int:
         """Number of multipliers that this rank owns."""
-        return self.constraints.owned[1] - self.constraints.owned[0]
+        return self.jump_operator.owned[1] - self.jump_operator.owned[0]
 
     @property
     def ksp(self) -> PETSc.KSP:
@@ -245,7 +245,7 @@ class FetiSolver:
 
     def _solver_for(self, columns: int) -> Krylov:
         if columns not in self._krylov:
-            vector, parts = self.constraints.vector, (self.operator, self.preconditioner, self.coarse, self.active)
+            vector, parts = self.jump_operator.vector, (self.operator, self.preconditioner, self.coarse, self.active)
             self._krylov[columns] = Krylov(vector, *parts, columns)
             if self._view:
                 self._krylov[columns].ksp.setComputeSingularValues(True)

@@ -6,18 +6,20 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from feti_homog.feti.coarse.adaptive import AdaptiveCoarse
-from feti_homog.feti.coarse.natural import CoarseProblem
-from feti_homog.feti.operators.explicit import Condensed
-from feti_homog.feti.operators.interface_operators import Boundary
+from feti_homog.feti.coarse.adaptive import AdaptiveCoarseSpace
+from feti_homog.feti.coarse.natural import NaturalCoarseSpace
+from feti_homog.feti.operators.explicit import ExplicitInterfaceOperator
+from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.preconditioners.influence import Influence
 from feti_homog.feti.preconditioners.scaled import Preconditioner
 
 
-def setup(comm: MPI.Intracomm, boundary: Boundary, preconditioner: Preconditioner, coarse: CoarseProblem) -> str:
+def setup(
+    comm: MPI.Intracomm, boundary: InterfaceOperators, preconditioner: Preconditioner, coarse: NaturalCoarseSpace
+) -> str:
     """Subdomains, their operators, the preconditioner and the coarse space; collective."""
     sizes = np.array([n for part in comm.allgather([len(d) for d in boundary.dofs]) for n in part])
-    dense = comm.allreduce(sum(isinstance(o, Condensed) for o in boundary.operators))
+    dense = comm.allreduce(sum(isinstance(o, ExplicitInterfaceOperator) for o in boundary.operators))
     lines = [
         f"FETI: {len(sizes)} subdomains, {dense} with dense boundary operators",
         f"  boundary dofs of a subdomain: {sizes.min()} to {sizes.max()}, mean {sizes.mean():.0f}",
@@ -25,7 +27,7 @@ def setup(comm: MPI.Intracomm, boundary: Boundary, preconditioner: Preconditione
     ]
     if isinstance(preconditioner, Influence):
         lines.append(f"  influence columns by the bonded cell, {preconditioner.bonded.size} dofs on its shared nodes")
-    if isinstance(coarse, AdaptiveCoarse):
+    if isinstance(coarse, AdaptiveCoarseSpace):
         counts = np.array([n for part in comm.allgather(coarse.counts) for n in part])
         lines.append(
             f"  soft modes below {coarse.threshold:g}: {counts.sum()}, at most {counts.max()} of a subdomain, "

@@ -101,8 +101,8 @@ class Homogenization:
         solver = self.cell.solver
         B = solver.boundary.B
         unit = [np.linalg.solve(s.L, Q.T).T for s, Q in self._loads()]
-        summed = solver.constraints.sum(B @ np.concatenate([np.zeros((0, 3)), *unit]))
-        gram = NodeBlocks(self.cell.comm, self.cell.solver.constraints, B @ B.T)
+        summed = solver.jump_operator.sum(B @ np.concatenate([np.zeros((0, 3)), *unit]))
+        gram = NodeBlocks(self.cell.comm, self.cell.solver.jump_operator, B @ B.T)
         return np.asarray(gram.inverse(np.ones(gram.rows)) @ summed)
 
     def _averages(self, E: Float, u: Float) -> tuple[Float, Float, float]:

@@ -10,12 +10,12 @@ from feti_homog.cell.coarse_mesh import CoarseMesh
 from feti_homog.cell.fibre_centres import fibre_centres
 from feti_homog.cell.periodic_topology import Torus, edge_pairs
 from feti_homog.cell.refinement import Lattice
-from feti_homog.cell.submesh import Piece, cut
+from feti_homog.cell.submesh import Submesh, cut
 from feti_homog.config import case as cases
 from feti_homog.config.case import Case
 from feti_homog.errors import CaseError
 from feti_homog.feti.decomposition.partition import decompose, pieces_for_count, pieces_for_size
-from feti_homog.feti.decomposition.shared_entities import Shared, share
+from feti_homog.feti.decomposition.shared_entities import SharedEntities, share
 from feti_homog.interface import debonded_arcs
 from feti_homog.typing import Float, Int
 
@@ -72,7 +72,9 @@ def coarse_mesh(case: Case) -> CoarseMesh:
     return mesh
 
 
-def deal(case: Case, mesh: CoarseMesh, lattice: Lattice, n_ranks: int) -> list[tuple[Plan, list[Piece], Shared]]:
+def deal(
+    case: Case, mesh: CoarseMesh, lattice: Lattice, n_ranks: int
+) -> list[tuple[Plan, list[Submesh], SharedEntities]]:
     """For each rank: the plan, its pieces and the table of what they share with others."""
     torus = Torus.of(mesh)
     first_fibre = int(np.count_nonzero(torus.constituent_phase == 0))
@@ -87,9 +89,9 @@ def deal(case: Case, mesh: CoarseMesh, lattice: Lattice, n_ranks: int) -> list[t
     tables = share(torus, pieces, decomposition.rank, lattice.intervals - 1, n_ranks)
     bodies = int(parts.max()) + 1
     plan = Plan(mesh.width, mesh.height, mesh.phases, bodies, len(pieces), len(mesh.triangles), first_fibre, centres)
-    own: list[list[Piece]] = [[] for _ in range(n_ranks)]
-    for piece, rank in zip(pieces, decomposition.rank, strict=True):
-        own[rank].append(piece)
+    own: list[list[Submesh]] = [[] for _ in range(n_ranks)]
+    for submesh, rank in zip(pieces, decomposition.rank, strict=True):
+        own[rank].append(submesh)
     return list(zip([plan] * n_ranks, own, tables, strict=True))
 
 

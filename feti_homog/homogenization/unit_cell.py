@@ -10,12 +10,12 @@ from mpi4py import MPI
 
 from feti_homog.cell.outline import MERGED
 from feti_homog.cell.refinement import Lattice
-from feti_homog.cell.submesh import Piece
+from feti_homog.cell.submesh import Submesh
 from feti_homog.common.mpi_errors import agree, on_root_only
 from feti_homog.common.progress import Progress
 from feti_homog.config.case import Case
 from feti_homog.config.materials import plane_stiffness
-from feti_homog.feti.decomposition.shared_entities import Shared
+from feti_homog.feti.decomposition.shared_entities import SharedEntities
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.solver import FetiSolver
 from feti_homog.homogenization import cost_model
@@ -43,7 +43,7 @@ class TornCell:
     @cached_property
     def directions(self) -> Float:
         """(k,) directions in degrees of this rank's interface nodes about the centres of their fibres."""
-        nodes = self.solver.constraints.nodes
+        nodes = self.solver.jump_operator.nodes
         return debonded_arcs.angles(nodes.points, nodes.fibre, self.plan.centres, self.plan.period)
 
     def debonded(self, opening: float | None) -> Bool:
@@ -51,7 +51,7 @@ class TornCell:
 
         Arcs without an angle have that `opening`; None if there are none.
         """
-        nodes = self.solver.constraints.nodes
+        nodes = self.solver.jump_operator.nodes
         # The mesher moves a tip to a vertex that is as near as this.
         moved = nodes.vertex & (self.case.cell.file is None)
         near = np.where(moved, np.degrees(MERGED), debonded_arcs.SAME)
@@ -63,7 +63,7 @@ class TornCell:
         """Meshed area of each phase; collective."""
         local = dict.fromkeys(self.plan.phases, 0.0)
         for s in self.subdomains:
-            local[s.piece.phase] += s.area
+            local[s.submesh.phase] += s.area
         return {phase: self.comm.allreduce(area) for phase, area in local.items()}
 
     def total(self, number: int) -> int:
@@ -80,11 +80,13 @@ def tear(case: Case, comm: MPI.Intracomm, progress: Progress) -> TornCell:
     plan, shared, lattice, subdomains = assembled(case, comm, progress)
     with progress.stage("factor") as words:
         solver = FetiSolver(comm, shared, subdomains, lattice, cost_model.applications(case))
-        words.append(f"{solver.constraints.total} multipliers, coarse dimension {solver.coarse.vectors}")
+        words.append(f"{solver.jump_operator.total} multipliers, coarse dimension {solver.coarse.vectors}")
     return TornCell(comm, case, plan, lattice, subdomains, solver)
 
 
-def assembled(case: Case, comm: MPI.Intracomm, progress: Progress) -> tuple[Plan, Shared, Lattice, list[Subdomain]]:
+def assembled(
+    case: Case, comm: MPI.Intracomm, progress: Progress
+) -> tuple[Plan, SharedEntities, Lattice, list[Subdomain]]:
     """Mesh the cell on rank 0, deal out its pieces, and refine and assemble them where they are.  Collective.
 
     Returns the plan, what this rank's pieces share with others, the lattice of the refinement, and the subdomains.
@@ -106,7 +108,7 @@ def assembled(case: Case, comm: MPI.Intracomm, progress: Progress) -> tuple[Plan
     return plan, shared, lattice, subdomains
 
 
-def _assemble(case: Case, pieces: list[Piece], lattice: Lattice) -> list[Subdomain]:
+def _assemble(case: Case, pieces: list[Submesh], lattice: Lattice) -> list[Subdomain]:
     plane = case.analysis.plane
     return [Subdomain.build(p, lattice, plane_stiffness(case.material_of(p.phase), plane)) for p in pieces]
 

@@ -94,7 +94,7 @@ class Interface:
     nodes: InterfaceNodes = field(init=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "nodes", self.solver.constraints.nodes)
+        object.__setattr__(self, "nodes", self.solver.jump_operator.nodes)
 
     def active(self, status: Status) -> Float:
         """(owned rows,) 1 for the multipliers that act: both of a bonded node, the normal one of a closed node."""

@@ -16,7 +16,7 @@ from mpi4py import MPI
 
 from feti_homog.feti.solver import DualSolution
 from feti_homog.interface.contact import BONDED, CLOSED, NOISE, OPEN, Equilibrium, Interface, Status
-from feti_homog.interface.strength_criterion import Law
+from feti_homog.interface.strength_criterion import StrengthCriterion
 from feti_homog.typing import Bool, Float
 
 # Bonds whose utilisation differs by no more than this break together, as those of a symmetric cell must.
@@ -29,7 +29,7 @@ BISECTIONS = 60
 
 
 @dataclass(frozen=True)
-class Stand:
+class PathState:
     """Where a path stands, enough to go on from: `position` 0..1 on `leg` (or the number of the increment)."""
 
     leg: int
@@ -54,15 +54,15 @@ class Point:
     scale: float
     state: Equilibrium
     broke: int
-    after: Stand
+    after: PathState
 
 
-def unloaded(interface: Interface, status: Status) -> Stand:
+def unloaded(interface: Interface, status: Status) -> PathState:
     """The beginning of a path with the debonded nodes of `status`."""
-    return Stand(0, 0.0, status, np.zeros(interface.solver.rows))
+    return PathState(0, 0.0, status, np.zeros(interface.solver.rows))
 
 
-def events(interface: Interface, law: Law, waypoints: Float, begin: Stand) -> Iterator[Point]:
+def events(interface: Interface, law: StrengthCriterion, waypoints: Float, begin: PathState) -> Iterator[Point]:
     """Every break along zero -> waypoints[0] -> ... (n, 3), and the end of each leg.  Collective.
 
     On later legs also the changes of contact, with `broke` = 0: between points the response is straight.
@@ -79,7 +79,7 @@ def events(interface: Interface, law: Law, waypoints: Float, begin: Stand) -> It
 
 
 def increments(
-    interface: Interface, law: Law, waypoints: Float, steps: int, worst_only: bool, begin: Stand
+    interface: Interface, law: StrengthCriterion, waypoints: Float, steps: int, worst_only: bool, begin: PathState
 ) -> Iterator[Point]:
     """The paper's loop: at each of `steps` equal load steps, release overloaded bonds until none is left.
 
@@ -100,25 +100,27 @@ def increments(
             which = worst if worst_only else _utilisation(interface, law, state.status, state.solution) > 1.0
             broke += interface.solver.comm.allreduce(int(which.sum()))
             status = interface.debond(status, which, lam)
-        yield Point(step / steps, 1.0, state, broke, Stand(step, 0.0, status, lam))
+        yield Point(step / steps, 1.0, state, broke, PathState(step, 0.0, status, lam))
 
 
-def _first_leg(interface: Interface, law: Law, strain: Float, legs: int, begin: Stand) -> Iterator[Point]:
+def _first_leg(
+    interface: Interface, law: StrengthCriterion, strain: Float, legs: int, begin: PathState
+) -> Iterator[Point]:
     status, lam = begin.status, begin.lam
     while True:
         state = interface.equilibrium(strain, status, lam)
         lam = state.solution.lam
         load, worst = _worst(interface, law, state)
         if load <= 1.0:
-            yield Point(1.0 / legs, 1.0, state, 0, Stand(1, 0.0, state.status, lam))
+            yield Point(1.0 / legs, 1.0, state, 0, PathState(1, 0.0, state.status, lam))
             return
         broke = interface.solver.comm.allreduce(int(worst.sum()))
         status = interface.debond(state.status, worst, lam)
-        yield Point(1.0 / load / legs, 1.0 / load, state, broke, Stand(0, 0.0, status, lam))
+        yield Point(1.0 / load / legs, 1.0 / load, state, broke, PathState(0, 0.0, status, lam))
 
 
 def _later_leg(
-    interface: Interface, law: Law, ends: tuple[Float, Float], leg: int, legs: int, begin: Stand
+    interface: Interface, law: StrengthCriterion, ends: tuple[Float, Float], leg: int, legs: int, begin: PathState
 ) -> Iterator[Point]:
     status, lam, s = begin.status, begin.lam, begin.position
     safe, due, told = s, False, s
@@ -134,15 +136,15 @@ def _later_leg(
         if load > 1.0 + TIE or (due and load > 1.0 - TIE):
             broke = interface.solver.comm.allreduce(int(worst.sum()))
             status = interface.debond(status, worst, lam)
-            yield Point((leg + s) / legs, 1.0, state, broke, Stand(leg, s, status, lam))
+            yield Point((leg + s) / legs, 1.0, state, broke, PathState(leg, s, status, lam))
             safe, due, told = s, False, s
             continue
         if s == 1.0:
-            yield Point((leg + 1) / legs, 1.0, state, 0, Stand(leg + 1, 0.0, status, lam))
+            yield Point((leg + 1) / legs, 1.0, state, 0, PathState(leg + 1, 0.0, status, lam))
             return
         if changed and s > told:
             told = s
-            yield Point((leg + s) / legs, 1.0, state, 0, Stand(leg, s, status, lam))
+            yield Point((leg + s) / legs, 1.0, state, 0, PathState(leg, s, status, lam))
         ahead = interface.linear(ends[1], status, lam)
         breaks, changes = _first_break(interface, law, state, ahead), _first_change(interface, state, ahead)
         least = 0.0 if breaks <= changes and not due else LOOSE_STEP if state.loose else STEP
@@ -158,12 +160,12 @@ def _between(before: Float, after: Float, share: float) -> Float:
     return np.where(np.abs(strain).max() > ROUNDING * np.abs([before, after]).max(), strain, 0.0)
 
 
-def _utilisation(interface: Interface, law: Law, status: Status, solution: DualSolution) -> Float:
+def _utilisation(interface: Interface, law: StrengthCriterion, status: Status, solution: DualSolution) -> Float:
     """(k,) share of strength that bonded nodes use, 0 on debonded ones."""
     return law.utilisation(interface.traction(solution)) * (status == BONDED)
 
 
-def _worst(interface: Interface, law: Law, state: Equilibrium) -> tuple[float, Bool]:
+def _worst(interface: Interface, law: StrengthCriterion, state: Equilibrium) -> tuple[float, Bool]:
     """The largest utilisation of all bonds, and which of this rank's have it; rank 0 decides."""
     comm = interface.solver.comm
     used = _utilisation(interface, law, state.status, state.solution)
@@ -171,7 +173,7 @@ def _worst(interface: Interface, law: Law, state: Equilibrium) -> tuple[float, B
     return float(load), (used >= load * (1.0 - TIE)) & (used > 0.0)
 
 
-def _first_break(interface: Interface, law: Law, state: Equilibrium, ahead: DualSolution) -> float:
+def _first_break(interface: Interface, law: StrengthCriterion, state: Equilibrium, ahead: DualSolution) -> float:
     """Share of the way to `ahead` at which the first bond reaches its strength, or inf.
 
     Utilisation is convex along a straight way, so below 1 here and above 1 there it passes 1 once: bisection.

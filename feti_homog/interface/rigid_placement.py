@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linprog
 from scipy.sparse import csr_matrix
 
-from feti_homog.feti.coarse.natural import CoarseProblem
+from feti_homog.feti.coarse.natural import NaturalCoarseSpace
 from feti_homog.feti.decomposition.jump_operator import InterfaceNodes
 from feti_homog.feti.solver import DualSolution
 from feti_homog.typing import Bool, Float
@@ -31,14 +31,14 @@ class Placement:
         """Nothing moves, nothing is squeezed."""
         return cls(np.zeros(0), np.zeros(nodes, bool))
 
-    def jump(self, coarse: CoarseProblem) -> Float:
+    def jump(self, coarse: NaturalCoarseSpace) -> Float:
         """(owned rows,) G alpha."""
         return np.asarray(coarse.G @ self.alpha)
 
 
 def place(
     comm: MPI.Intracomm,
-    coarse: CoarseProblem,
+    coarse: NaturalCoarseSpace,
     nodes: InterfaceNodes,
     is_open: Bool,
     solution: DualSolution,

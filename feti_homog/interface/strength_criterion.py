@@ -10,7 +10,7 @@ from feti_homog.typing import Float
 
 
 @dataclass(frozen=True)
-class Law:
+class StrengthCriterion:
     """Limits of the traction on a bonded face, force per area; compression never breaks a bond.
 
     Attributes:

@@ -41,7 +41,7 @@ def torn(case, comm):
     """The torn cell; number, direction and state of all interface nodes by the opening, on every rank."""
     PETSc.garbage_cleanup(comm)
     cell = tear(case, comm, Progress(comm, quiet=True))
-    number = cell.solver.constraints.nodes.fibre - cell.plan.first_fibre + 1
+    number = cell.solver.jump_operator.nodes.fibre - cell.plan.first_fibre + 1
 
     def nodes(opening=None):
         parts = comm.allgather((number, cell.directions, cell.debonded(opening)))

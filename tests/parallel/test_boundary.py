@@ -15,11 +15,11 @@ from feti_homog.cell.refinement import Lattice
 from feti_homog.common.progress import Progress
 from feti_homog.config import sections
 from feti_homog.errors import CaseError
-from feti_homog.feti.coarse.adaptive import AdaptiveCoarse
+from feti_homog.feti.coarse.adaptive import AdaptiveCoarseSpace
 from feti_homog.feti.operators import interface_operators as boundaries
-from feti_homog.feti.operators.explicit import Condensed
-from feti_homog.feti.operators.implicit import Factored
-from feti_homog.feti.operators.interface_operators import Boundary
+from feti_homog.feti.operators.explicit import ExplicitInterfaceOperator
+from feti_homog.feti.operators.implicit import ImplicitInterfaceOperator
+from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.homogenization import domain_partition, unit_cell
 
 pytestmark = pytest.mark.parallel
@@ -56,7 +56,7 @@ def test_extension_is_harmonic(comm, case):
 @CELLS
 def test_boundary_is_where_the_constraints_act(comm, case):
     cell = bonds.tear(comm, **case)
-    B = cell.solver.constraints.B.toarray()
+    B = cell.solver.jump_operator.B.toarray()
     for s, dofs, first in zip(cell.subdomains, cell.solver.boundary.dofs, cell.offsets, strict=False):
         assert (dofs == boundary_of(B[:, first : first + len(s.Q)])).all()
     assert (cell.solver.boundary.B.toarray() == B[:, cell.solver.boundary.local]).all()
@@ -86,7 +86,7 @@ def test_torn_cell_equals_the_dense_one(comm, case, kind):
     own_jump, own_stiffness = np.zeros((twin.total, 3)), np.zeros((3, 3))
     for s, first in zip(cell.subdomains, cell.offsets, strict=False):
         u = np.linalg.pinv(s.K.toarray(), rcond=1e-10, hermitian=True) @ -s.Q
-        own_jump[solver.constraints.rows] += solver.constraints.B[:, first : first + len(u)] @ u
+        own_jump[solver.jump_operator.rows] += solver.jump_operator.B[:, first : first + len(u)] @ u
         own_stiffness += s.area * s.L + s.Q.T @ u
     jump = P @ comm.allreduce(own_jump)
     assert relative_error(P @ gathered(cell, solver.d), jump) < 1e-10
@@ -98,7 +98,7 @@ def test_torn_cell_equals_the_dense_one(comm, case, kind):
 @CELLS
 def test_preconditioner_equals_the_dense_one(comm, case):
     cell = bonds.tear(comm, **case)
-    active = np.ones(cell.solver.constraints.total, bool)
+    active = np.ones(cell.solver.jump_operator.total, bool)
     expected = DualTwin(cell).preconditioner(active)
     assert relative_error(matrix(cell, cell.solver.preconditioner.apply), expected) < 1e-11
 
@@ -106,7 +106,7 @@ def test_preconditioner_equals_the_dense_one(comm, case):
 def test_implicit_and_explicit_operators_give_the_same(comm):
     case = RANDOM | {"decomposition": {"subdomains": 12}}
     found = []
-    for kind, operators in (("implicit", Factored), ("explicit", Condensed)):
+    for kind, operators in (("implicit", ImplicitInterfaceOperator), ("explicit", ExplicitInterfaceOperator)):
         cell, L, _ = solve(make_case(**case, petsc={"feti_dual_operator": kind}), comm)
         assert all(isinstance(o, operators) for o in cell.solver.boundary.operators)
         found.append((L, matrix(cell, cell.solver.operator.apply)))
@@ -118,20 +118,20 @@ def test_dense_operators_where_they_pay(comm, monkeypatch):
     cell = bonds.tear(comm, geometry="hexagonal", petsc={"feti_coarse_space": "natural"})
 
     def kinds(applications, soft):
-        boundary = Boundary(cell.solver.constraints, cell.subdomains, "auto", applications, soft)
+        boundary = InterfaceOperators(cell.solver.jump_operator, cell.subdomains, "auto", applications, soft)
         return set().union(*comm.allgather({type(o) for o in boundary.operators}))
 
-    assert kinds(0, False) == {Factored}
-    assert kinds(10**6, False) == {Condensed}
-    assert kinds(0, True) == {Condensed}
+    assert kinds(0, False) == {ImplicitInterfaceOperator}
+    assert kinds(10**6, False) == {ExplicitInterfaceOperator}
+    assert kinds(0, True) == {ExplicitInterfaceOperator}
     monkeypatch.setattr(boundaries, "LARGEST_DENSE", 10)
-    assert kinds(10**6, True) == {Factored}
+    assert kinds(10**6, True) == {ImplicitInterfaceOperator}
 
 
 def test_adaptive_space_is_refused_where_boundaries_are_too_large(comm, monkeypatch):
     case = {"geometry": "hexagonal", "decomposition": {"subdomains": 8}}
     monkeypatch.setattr(boundaries, "LARGEST_DENSE", 10)
-    assert not isinstance(bonds.tear(comm, **case).solver.coarse, AdaptiveCoarse)
+    assert not isinstance(bonds.tear(comm, **case).solver.coarse, AdaptiveCoarseSpace)
     with pytest.raises(CaseError, match="-feti_coarse_space adaptive: needs"):
         bonds.tear(comm, **case, petsc={"feti_coarse_space": "adaptive"})
 
@@ -171,12 +171,12 @@ def test_bodies_that_can_be_dealt_evenly_are_whole_up_to_a_larger_size(sizes, mo
 
 
 def test_bodies_that_debond_are_whole_unless_their_boundary_is_wide(sizes):
-    bonds_break = sections.Interface()
+    bonds_break = sections.InterfaceSection()
     assert wanted([260, 3000, 260], [10, 39, 41], bonds_break) == [1, 1, 3]
     assert wanted([70, 70], [19, 21], bonds_break, refine=1) == [1, 3]
 
 
-@pytest.mark.parametrize("interface", [None, sections.Interface()])
+@pytest.mark.parametrize("interface", [None, sections.InterfaceSection()])
 def test_there_are_pieces_for_all_ranks(sizes, interface):
     assert wanted([200, 40], [10, 10], interface, n_ranks=2) == [1, 1]
     assert wanted([200, 40], [10, 10], interface, n_ranks=5) == [4, 1]
@@ -187,8 +187,8 @@ def torn_by_default(comm, interface):
     """A cell of two fibres and a matrix; the bodies of its pieces and the triangles of the largest piece."""
     case = replace(make_case(geometry="hexagonal", mesh_size=0.1), interface=interface)
     cell = unit_cell.tear(case, comm, Progress(comm, quiet=True))
-    own = comm.allgather([s.piece.body for s in cell.subdomains])
-    largest = comm.allreduce(max((len(s.piece.triangles) for s in cell.subdomains), default=0), MPI.MAX)
+    own = comm.allgather([s.submesh.body for s in cell.subdomains])
+    largest = comm.allreduce(max((len(s.submesh.triangles) for s in cell.subdomains), default=0), MPI.MAX)
     assert min(map(len, own)) > 0
     return cell, sorted(body for bodies in own for body in bodies), largest
 
@@ -204,15 +204,15 @@ def test_default_pieces_of_a_bonded_cell(comm, sizes):
     cell, bodies, largest = torn_by_default(comm, None)
     assert len(bodies) > 4
     assert largest < 1.5 * 100
-    assert isinstance(cell.solver.coarse, AdaptiveCoarse)
+    assert isinstance(cell.solver.coarse, AdaptiveCoarseSpace)
 
 
 def test_default_pieces_of_a_debonding_cell(comm, sizes, monkeypatch):
     monkeypatch.setattr(domain_partition, "WIDE", 1000)
-    cell, bodies, largest = torn_by_default(comm, sections.Interface())
+    cell, bodies, largest = torn_by_default(comm, sections.InterfaceSection())
     assert len(bodies) == max(3, comm.size)
-    assert isinstance(cell.solver.coarse, AdaptiveCoarse) == (comm.size > 3)
+    assert isinstance(cell.solver.coarse, AdaptiveCoarseSpace) == (comm.size > 3)
     monkeypatch.setattr(domain_partition, "WIDE", 80)
-    cell, bodies, narrowed = torn_by_default(comm, sections.Interface())
+    cell, bodies, narrowed = torn_by_default(comm, sections.InterfaceSection())
     assert len(bodies) > 4
     assert narrowed < min(largest, 1.5 * 100)

@@ -10,11 +10,11 @@ from mpi4py import MPI
 from narrow_cells import BOUND, BREAKING, NARROW, SINGLE, Narrow, agree, masks, of_all, together
 from reference import dense_feti
 
-from feti_homog.feti.coarse.adaptive import ROOM, THRESHOLD, AdaptiveCoarse
+from feti_homog.feti.coarse.adaptive import ROOM, THRESHOLD, AdaptiveCoarseSpace
 from feti_homog.feti.coarse.geneo import coarse_vectors, dual_blocks
 from feti_homog.feti.decomposition.neighbours import Neighbours
 from feti_homog.feti.linalg.distributed_matrix import total
-from feti_homog.feti.operators.interface_operators import Boundary
+from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.preconditioners.scaled import Dirichlet
 from feti_homog.interface.contact import BONDED, OPEN
 
@@ -37,14 +37,14 @@ def test_soft_modes_are_counted_as_dense_eigenvalues(comm, narrow):
 
 def test_soft_modes_solve_the_eigenproblem(comm, narrow):
     """S p = theta N p for the modes made N-orthogonal to the kernel; N from all ranks' data."""
-    constraints, subdomains = narrow.solver.constraints, narrow.cell.subdomains
-    boundary = Boundary(constraints, subdomains, "explicit", 1, True)
-    neighbours = Neighbours(comm, constraints, subdomains)
-    scaled = Dirichlet(comm, constraints, boundary)
-    blocks = dual_blocks(comm, constraints, boundary, scaled, neighbours.rows)
+    jump_operator, subdomains = narrow.solver.jump_operator, narrow.cell.subdomains
+    boundary = InterfaceOperators(jump_operator, subdomains, "explicit", 1, True)
+    neighbours = Neighbours(comm, jump_operator, subdomains)
+    scaled = Dirichlet(comm, jump_operator, boundary)
+    blocks = dual_blocks(comm, jump_operator, boundary, scaled, neighbours.rows)
     found = coarse_vectors(blocks, neighbours, THRESHOLD)
     for s, V, count in zip(subdomains, found, narrow.coarse.counts, strict=True):
-        B, S = narrow.twin.B[s.piece.index], narrow.twin.S[s.piece.index]
+        B, S = narrow.twin.B[s.submesh.index], narrow.twin.S[s.submesh.index]
         N, k = B.T @ narrow.M @ B, s.R.shape[1]
         R, p = V[:, :k], V[:, k:]
         assert p.shape == (len(S), count)
@@ -227,8 +227,8 @@ def test_inactive_rows_give_the_natural_spaces_solution(comm, case, share):
     adaptive, natural = (
         bonds.tear(comm, **case, petsc={"feti_coarse_space": space}) for space in ("adaptive", "natural")
     )
-    assert isinstance(adaptive.solver.coarse, AdaptiveCoarse)
-    assert not isinstance(natural.solver.coarse, AdaptiveCoarse)
+    assert isinstance(adaptive.solver.coarse, AdaptiveCoarseSpace)
+    assert not isinstance(natural.solver.coarse, AdaptiveCoarseSpace)
     first = together(adaptive)
     steps = masks(adaptive, range(3))
     for active in [*steps, np.ones(len(steps[0]))]:
@@ -247,7 +247,7 @@ def test_loose_fibres(comm, case, which):
     results = []
     for space in ("adaptive", "natural"):
         cell = bonds.tear(comm, **case, petsc={"feti_coarse_space": space})
-        fibre = cell.solver.constraints.nodes.fibre
+        fibre = cell.solver.jump_operator.nodes.fibre
         lowest = comm.allreduce(fibre.min(initial=1000), MPI.MIN)
         status = np.where((fibre == lowest) | (which == "all"), OPEN, BONDED).astype(np.int8)
         cell.solver.activate(bonds.interface(cell, False).active(status))

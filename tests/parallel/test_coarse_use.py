@@ -13,7 +13,7 @@ from narrow_cells import BOUND, BREAKING, NARROW, STRAINS, of_all, together
 from reference import dense_feti
 
 from feti_homog.errors import CaseError
-from feti_homog.feti.coarse.adaptive import THRESHOLD, AdaptiveCoarse
+from feti_homog.feti.coarse.adaptive import THRESHOLD, AdaptiveCoarseSpace
 from feti_homog.feti.linalg.distributed_direct import Distributed
 from feti_homog.feti.linalg.replicated_saddle_point import Replicated
 from feti_homog.feti.linalg.saddle_point import SaddlePoint, _Augmented
@@ -69,7 +69,7 @@ def test_contrasts_converge_fast(comm, contrast, pieces):
         "petsc": {"feti_ksp_rtol": 1e-8}, "decomposition": {"subdomains": pieces},
     }  # fmt: skip
     torn, L, responses = solve(make_case(**case), comm)
-    assert isinstance(torn.solver.coarse, AdaptiveCoarse)
+    assert isinstance(torn.solver.coarse, AdaptiveCoarseSpace)
     assert all(r.state.solution.reason > 0 for r in responses)
     assert max(r.state.iterations for r in responses) <= 30
     # The tolerance is on the three load cases together.
@@ -91,7 +91,7 @@ def test_contrasts_converge_fast(comm, contrast, pieces):
 )
 def test_choice_of_the_coarse_space(comm, case, space, adaptive):
     coarse = bonds.tear(comm, **case, petsc={"feti_coarse_space": space}).solver.coarse
-    assert isinstance(coarse, AdaptiveCoarse) == adaptive
+    assert isinstance(coarse, AdaptiveCoarseSpace) == adaptive
 
 
 @pytest.mark.parametrize(
@@ -136,7 +136,7 @@ def test_a_distributed_coarse_problem_gives_the_same(comm, monkeypatch, contrast
 @pytest.mark.parametrize("petsc", [{"feti_dual_operator": "implicit"}, {"feti_pc_type": "lumped"}])
 def test_natural_space_where_the_adaptive_one_cannot_be(comm, petsc):
     cell = bonds.tear(comm, **BREAKING, petsc=petsc)
-    assert not isinstance(cell.solver.coarse, AdaptiveCoarse)
+    assert not isinstance(cell.solver.coarse, AdaptiveCoarseSpace)
 
 
 def number(pattern, text):

@@ -22,7 +22,7 @@ STRAINS = np.eye(3)
 
 def directions(cell):
     """Degrees of this rank's interface nodes about their fibre's centre."""
-    normal = cell.solver.constraints.nodes.normal
+    normal = cell.solver.jump_operator.nodes.normal
     return np.degrees(np.arctan2(normal[:, 1], normal[:, 0]))
 
 
@@ -136,9 +136,9 @@ def test_masked_rows_equal_constraints_built_without_them(comm, order):
     status = np.where(np.abs(directions(cell) - 30) < 50, OPEN, BONDED).astype(np.int8)
     active = np.concatenate(comm.allgather(interface.active(status))) > 0
     solver = cell.solver
-    first, last = solver.constraints.owned
+    first, last = solver.jump_operator.owned
     F = []
-    for row in range(solver.constraints.total):
+    for row in range(solver.jump_operator.total):
         unit = (np.arange(first, last) == row).astype(float)
         F.append(np.concatenate(comm.allgather(solver.operator.apply(unit))))
     G, d = (np.concatenate(comm.allgather(x)) for x in (solver.coarse.G.toarray(), solver.d))
@@ -159,7 +159,7 @@ def test_masked_rows_equal_constraints_built_without_them(comm, order):
 def test_loose_fibres_are_counted(comm, bodies, subdomains):
     pieces = {"subdomains": subdomains}
     cell = bonds.tear(comm, geometry="hexagonal", mesh_size=0.2, bodies=bodies, decomposition=pieces)
-    fibre = cell.solver.constraints.nodes.fibre
+    fibre = cell.solver.jump_operator.nodes.fibre
     both = np.full(len(fibre), OPEN, np.int8)
     lowest = comm.allreduce(fibre.min(initial=1000), min)
     one = np.where(fibre == lowest, OPEN, BONDED).astype(np.int8)

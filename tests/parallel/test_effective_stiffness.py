@@ -138,8 +138,8 @@ def test_rounding_in_the_coarse_space_costs_few_iterations(comm):
 def test_dual_operator_and_projector_laws(comm):
     torn, _, _ = solve(make_case(geometry="hexagonal", decomposition={"subdomains": 7}), comm)
     solver = torn.solver
-    first, last = solver.constraints.owned
-    x, y = (np.random.default_rng(seed).standard_normal(solver.constraints.total)[first:last] for seed in (1, 2))
+    first, last = solver.jump_operator.owned
+    x, y = (np.random.default_rng(seed).standard_normal(solver.jump_operator.total)[first:last] for seed in (1, 2))
 
     def dot(a, b):
         return comm.allreduce(a @ b)

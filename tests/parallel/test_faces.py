@@ -11,7 +11,7 @@ from narrow_cells import NARROW, agree, masks, of_all, together
 from reference import dense_feti
 
 from feti_homog.feti.coarse import face_neighbourhoods as rings_module
-from feti_homog.feti.coarse.adaptive import AdaptiveCoarse
+from feti_homog.feti.coarse.adaptive import AdaptiveCoarseSpace
 from feti_homog.feti.coarse.face_neighbourhoods import rings
 from feti_homog.feti.decomposition.neighbours import Neighbours
 from feti_homog.feti.decomposition.subdomain import both_directions
@@ -34,12 +34,12 @@ def faces(request, comm):
     """(subdomain, boundary dofs, S, face) of all pairs of neighbours."""
     cell = bonds.tear(comm, **request.param, petsc={"feti_coarse_space": "natural"})
     solver, found = cell.solver, []
-    neighbours = Neighbours(comm, solver.constraints, cell.subdomains)
+    neighbours = Neighbours(comm, solver.jump_operator, cell.subdomains)
     for i, s in enumerate(cell.subdomains):
         B, dofs = solver.boundary.B[:, solver.boundary.spans[i]], solver.boundary.dofs[i]
         S = dense_feti.schur(s.K.toarray(), dofs)
         for other, common in neighbours.common[i].items():
-            if other != s.piece.index:
+            if other != s.submesh.index:
                 nodes = np.unique(B[neighbours.rows[i][common]].indices // 2)
                 found.append((s, dofs, S, both_directions(nodes)))
     return found
@@ -107,7 +107,7 @@ def test_contrasts_converge_fast(comm, contrast):
         "petsc": {"feti_ksp_rtol": 1e-8, "feti_coarse_space": "adaptive"},
     }  # fmt: skip
     torn, L, responses = solve(make_case(**case), comm)
-    assert isinstance(torn.solver.coarse, AdaptiveCoarse)
+    assert isinstance(torn.solver.coarse, AdaptiveCoarseSpace)
     assert comm.allreduce(any(torn.solver.boundary.large), MPI.LOR)
     assert all(r.state.solution.reason > 0 for r in responses)
     assert max(r.state.iterations for r in responses) <= 25
@@ -146,7 +146,7 @@ def test_inactive_rows_give_the_natural_spaces_solution(comm):
     adaptive, natural = (
         bonds.tear(comm, **WHOLE, refine=1, petsc={"feti_coarse_space": space}) for space in ("adaptive", "natural")
     )
-    assert isinstance(adaptive.solver.coarse, AdaptiveCoarse)
+    assert isinstance(adaptive.solver.coarse, AdaptiveCoarseSpace)
     for active in masks(adaptive, range(2)):
         for cell in (adaptive, natural):
             cell.solver.activate(active)

@@ -12,7 +12,7 @@ from scipy.linalg import null_space
 
 from feti_homog.errors import CaseError
 from feti_homog.feti.factory import MANY
-from feti_homog.feti.operators.explicit import Condensed
+from feti_homog.feti.operators.explicit import ExplicitInterfaceOperator
 from feti_homog.feti.preconditioners.influence import Influence
 from feti_homog.interface.contact import BONDED, CLOSED, OPEN
 
@@ -47,7 +47,7 @@ def activate(cell, status):
 
 def states(cell):
     """Statuses that open, close, bond again and loosen a whole fibre."""
-    nodes = cell.solver.constraints.nodes
+    nodes = cell.solver.jump_operator.nodes
     angle = np.degrees(np.arctan2(nodes.normal[:, 1], nodes.normal[:, 0]))
     bonded = np.full(len(nodes.row), BONDED, np.int8)
     arc = np.where(np.abs(angle) < 40, OPEN, bonded)
@@ -109,7 +109,7 @@ def test_chosen_for_many_applications(comm, monkeypatch, applications, petsc, ch
     solver = bonds.tear(comm, **BREAKING, petsc=petsc).solver
     assert isinstance(solver.preconditioner, Influence) == chosen
     if chosen:
-        assert all(isinstance(o, Condensed) for o in solver.boundary.operators)
+        assert all(isinstance(o, ExplicitInterfaceOperator) for o in solver.boundary.operators)
 
 
 def test_not_chosen_where_the_bonded_cell_is_too_large(comm, monkeypatch):
@@ -125,6 +125,6 @@ def test_needs_dense_operators(comm):
 
 def test_is_told_by_view(comm, capfd):
     cell, text = bonds.printed(comm, capfd, **BREAKING, petsc=INFLUENCE | {"feti_view": True})
-    size = 2 * comm.allreduce(len(cell.solver.constraints.blocks[0]))
+    size = 2 * comm.allreduce(len(cell.solver.jump_operator.blocks[0]))
     assert f"influence columns by the bonded cell, {size} dofs on its shared nodes" in text
     assert "1 load case, 0 iterations" in text

@@ -14,7 +14,7 @@ from support import parallel_assert
 from feti_homog.common.mpi_errors import on_root
 from feti_homog.interface.contact import BONDED, OPEN
 from feti_homog.interface.path_following import events, increments, unloaded
-from feti_homog.interface.strength_criterion import Law
+from feti_homog.interface.strength_criterion import StrengthCriterion
 
 pytestmark = pytest.mark.parallel
 
@@ -32,7 +32,7 @@ TENSION, MIXED, SHEAR = [1.0, 0.1, 0.2], [0.6, -0.8, 0.3], [0.2, -0.1, 1.0]
 
 
 def bonded_status(cell):
-    return np.full(len(cell.solver.constraints.nodes.row), BONDED, np.int8)
+    return np.full(len(cell.solver.jump_operator.nodes.row), BONDED, np.int8)
 
 
 def follow(cell, contact, law, waypoints, begin=None):
@@ -64,7 +64,7 @@ def test_events_equal_the_twins(comm, cell, criterion, contact, strain):
     case = bonds.build(comm, matrix={"young": 1.0, "poisson": 0.35}, fibre={"young": 5.0, "poisson": 0.2}, **cell)
     strengths = (0.15, 0.3) if criterion == "max" else (0.25, 0.2)
     expected = on_root(comm, lambda: PathTwin(case.twin, contact, *strengths, criterion).proportional(np.array(strain)))
-    points = follow(case.cell, contact, Law(*strengths, criterion), [strain])
+    points = follow(case.cell, contact, StrengthCriterion(*strengths, criterion), [strain])
     assert len(points) == len(expected) > 3
     assert is_certified(points)
     np.testing.assert_array_equal(broken(case, points), np.cumsum([e.broke for e in expected], axis=0) > 0)
@@ -80,7 +80,7 @@ def test_later_legs_equal_small_steps(comm, back):
     case = bonds.build(comm, matrix={"young": 1.0, "poisson": 0.35}, fibre={"young": 5.0, "poisson": 0.2}, **SQUARE)
     legs = np.array([[0.3, -0.4, 0.15], back, [0.9, -0.9, 0.7]])
     expected = on_root(comm, lambda: PathTwin(case.twin, True, 0.15, 0.3, "max").legs(legs, 12))
-    points = follow(case.cell, True, Law(0.15, 0.3, "max"), legs)
+    points = follow(case.cell, True, StrengthCriterion(0.15, 0.3, "max"), legs)
     assert is_certified(points)
     turns = [p for p in points if not p.broke and p.after.position > 0]
     assert turns
@@ -99,7 +99,9 @@ def test_later_legs_equal_small_steps(comm, back):
 def test_onset_in_the_square_cell(comm):
     cell = bonds.tear(comm, geometry="square", order=2, mesh_size=0.08, refine=1)
     interface = bonds.interface(cell, True)
-    first = next(events(interface, Law(0.1, 0.1, "max"), np.eye(3)[:1], unloaded(interface, bonded_status(cell))))
+    first = next(
+        events(interface, StrengthCriterion(0.1, 0.1, "max"), np.eye(3)[:1], unloaded(interface, bonded_status(cell)))
+    )
     stress = first.scale * bonds.stress(cell, first.state.solution)
     assert np.abs(np.r_[first.load_factor, stress[:2]] / [5.57799e-4, 0.0843146, 0.0309787] - 1).max() < 1e-3
     normal, shear = interface.traction(first.state.solution).T
@@ -113,7 +115,7 @@ def test_onset_in_the_square_cell(comm):
 @pytest.mark.parametrize("contact", [True, False])
 def test_debonding_grows_and_dissipates(comm, contact):
     case = bonds.build(comm, **THREE)
-    points = follow(case.cell, contact, Law(20.0, 30.0, "quadratic"), [SHEAR])
+    points = follow(case.cell, contact, StrengthCriterion(20.0, 30.0, "quadratic"), [SHEAR])
     after = broken(case, points)
     assert (after[1:] >= after[:-1]).all()
     for before, now in pairwise(points):
@@ -124,7 +126,7 @@ def test_debonding_grows_and_dissipates(comm, contact):
 def test_increments_meet_events_and_the_curve_between_them_converges_with_first_order(comm):
     """Releasing the worst bonds one after the other, an increment ends where events end that break no later."""
     cell = bonds.tear(comm, **SQUARE)
-    law, strain = Law(0.05, 0.05, "max"), np.array([[1e-3, 0.0, 0.0]])
+    law, strain = StrengthCriterion(0.05, 0.05, "max"), np.array([[1e-3, 0.0, 0.0]])
     exact = curve(cell, follow(cell, True, law, strain))[:, :2]
     interface, loads, errors = bonds.interface(cell, True), np.linspace(0, 1, 20001), []
     begin = unloaded(interface, bonded_status(cell))
@@ -139,7 +141,7 @@ def test_increments_meet_events_and_the_curve_between_them_converges_with_first_
 
 def test_onset_by_increments_is_late_by_less_than_one(comm):
     cell = bonds.tear(comm, **SQUARE)
-    law, strain = Law(0.05, 0.05, "max"), np.array([[1e-3, 0.0, 0.0]])
+    law, strain = StrengthCriterion(0.05, 0.05, "max"), np.array([[1e-3, 0.0, 0.0]])
     interface, exact = bonds.interface(cell, True), follow(cell, True, law, strain)[0].load_factor
     for steps in (10, 40):
         points = list(increments(interface, law, strain, steps, False, unloaded(interface, bonded_status(cell))))
@@ -156,7 +158,7 @@ def rising(exact, loads):
 
 def test_goes_on_from_any_point(comm):
     case = bonds.build(comm, **SQUARE)
-    law, waypoints = Law(20.0, 30.0, "max"), [[0.7, -0.8, 0.5], [0.0, 0.0, 0.0], [-1.0, 1.0, 1.5]]
+    law, waypoints = StrengthCriterion(20.0, 30.0, "max"), [[0.7, -0.8, 0.5], [0.0, 0.0, 0.0], [-1.0, 1.0, 1.5]]
     points = follow(case.cell, True, law, waypoints)
     whole, sets = curve(case.cell, points), broken(case, points)
     for k in range(0, len(points) - 1, max(1, len(points) // 6)):
@@ -167,7 +169,7 @@ def test_goes_on_from_any_point(comm):
 
 
 def test_bodies_and_pieces_change_nothing(comm):
-    law, curves = Law(20.0, 30.0, "max"), []
+    law, curves = StrengthCriterion(20.0, 30.0, "max"), []
     for variant in ({}, {"bodies": "plane"}, {"decomposition": {"subdomains": 9}}):
         cell = bonds.tear(comm, geometry="hexagonal", mesh_size=0.25, **variant)
         curves.append(curve(cell, follow(cell, True, law, [MIXED])))
@@ -177,11 +179,13 @@ def test_bodies_and_pieces_change_nothing(comm):
 
 def test_infinite_strengths_never_break(comm):
     cell = bonds.tear(comm, **SQUARE)
-    points = follow(cell, True, Law(np.inf, np.inf, "quadratic"), [TENSION, SHEAR])
+    points = follow(cell, True, StrengthCriterion(np.inf, np.inf, "quadratic"), [TENSION, SHEAR])
     assert [(p.load_factor, p.broke) for p in points] == [(0.5, 0), (1.0, 0)]
     status = np.full(len(bonded_status(cell)), OPEN, np.int8)
     interface = bonds.interface(cell, True)
-    points = list(events(interface, Law(1.0, 1.0, "max"), np.array([SHEAR, MIXED]), unloaded(interface, status)))
+    points = list(
+        events(interface, StrengthCriterion(1.0, 1.0, "max"), np.array([SHEAR, MIXED]), unloaded(interface, status))
+    )
     points = [p for p in points if p.after.position == 0]
     assert [(p.load_factor, p.broke) for p in points] == [(0.5, 0), (1.0, 0)]
     assert is_certified(points)
@@ -192,7 +196,7 @@ def test_twenty_fibres_to_the_end(comm):
         pytest.skip("one test, two cores")
     many = {"geometry": "random", "fibres": 20, "fibre_fraction": 0.4, "min_gap": 0.1, "seed": 2, "mesh_size": 0.08}
     cell = bonds.tear(comm, **many, **INFLUENCE)
-    points = follow(cell, True, Law(30.0, 15.0, "max"), [[1.0, -0.3, 0.4]])
+    points = follow(cell, True, StrengthCriterion(30.0, 15.0, "max"), [[1.0, -0.3, 0.4]])
     assert is_certified(points)
     assert points[-1].load_factor == 1.0
     left = comm.allreduce(int((points[-1].state.status == BONDED).sum()))

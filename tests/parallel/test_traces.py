@@ -29,16 +29,16 @@ def test_piecewise_linear_along_the_coarse_edges(comm, monkeypatch, enough, orde
     cell = tear(comm, enough, monkeypatch, order=order, refine=3 - order)
     for s, dofs in zip(cell.subdomains, cell.solver.boundary.dofs, strict=True):
         nodes, M = dofs[::2] // 2, s.mesh.lattice.intervals
-        P = trace(s.piece, s.mesh.lattice, nodes)
+        P = trace(s.submesh, s.mesh.lattice, nodes)
         assert P.shape[0] == len(dofs)
         assert P.shape[1] >= min(enough, len(dofs))
         u = np.full((s.mesh.n_classes, 2), np.nan)
-        u[nodes] = (P @ np.random.default_rng(s.piece.index).standard_normal(P.shape[1])).reshape(-1, 2)
-        u[s.piece.pinned] = 0.0 if s.piece.pinned >= 0 else u[s.piece.pinned]
-        kept = np.arange(s.mesh.n_classes) < len(s.piece.class_keys)
+        u[nodes] = (P @ np.random.default_rng(s.submesh.index).standard_normal(P.shape[1])).reshape(-1, 2)
+        u[s.submesh.pinned] = 0.0 if s.submesh.pinned >= 0 else u[s.submesh.pinned]
+        kept = np.arange(s.mesh.n_classes) < len(s.submesh.class_keys)
         kept[nodes] |= P.max(axis=1).toarray()[::2, 0] == 1.0
-        for (a, b), edge in zip(s.piece.vertex_class[s.piece.edges], s.piece.edge_class, strict=True):
-            between = edge_node(len(s.piece.class_keys), edge, np.arange(1, M), s.mesh.lattice)
+        for (a, b), edge in zip(s.submesh.vertex_class[s.submesh.edges], s.submesh.edge_class, strict=True):
+            between = edge_node(len(s.submesh.class_keys), edge, np.arange(1, M), s.mesh.lattice)
             line = np.concatenate([[a], between, [b]])
             if not np.isnan(u[line]).any():
                 at = np.flatnonzero(kept[line])
@@ -50,7 +50,7 @@ def test_piecewise_linear_along_the_coarse_edges(comm, monkeypatch, enough, orde
 def test_few_dofs_are_all_kept(comm, monkeypatch):
     cell = tear(comm, ALL, monkeypatch)
     for s, dofs in zip(cell.subdomains, cell.solver.boundary.dofs, strict=True):
-        P = trace(s.piece, s.mesh.lattice, dofs[::2] // 2)
+        P = trace(s.submesh, s.mesh.lattice, dofs[::2] // 2)
         assert P.shape == (len(dofs),) * 2
         assert np.array_equal(P.toarray(), np.eye(len(dofs)))
 

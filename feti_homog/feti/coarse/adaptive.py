@@ -21,14 +21,14 @@ from scipy.sparse import csr_matrix, diags, hstack
 from feti_homog.common import process_memory
 from feti_homog.feti.coarse.deflation_vectors import preconditioned
 from feti_homog.feti.coarse.geneo import coarse_vectors, dual_blocks
-from feti_homog.feti.coarse.natural import CoarseProblem
-from feti_homog.feti.decomposition.jump_operator import Constraints
+from feti_homog.feti.coarse.natural import NaturalCoarseSpace
+from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.neighbours import Neighbours
 from feti_homog.feti.linalg.distributed_matrix import Blocks, summed
 from feti_homog.feti.linalg.replicated_saddle_point import Replicated, saddle_point
 from feti_homog.feti.linalg.saddle_point import SaddlePoint
-from feti_homog.feti.operators.interface_operators import Boundary
-from feti_homog.feti.preconditioners.scaled import Scaled
+from feti_homog.feti.operators.interface_operators import InterfaceOperators
+from feti_homog.feti.preconditioners.scaled import StiffnessScaled
 from feti_homog.typing import Float, Int
 
 THRESHOLD = 0.24
@@ -38,7 +38,7 @@ ROOM = 4
 LEAK = 1e-6
 
 
-class AdaptiveCoarse(CoarseProblem):
+class AdaptiveCoarseSpace(NaturalCoarseSpace):
     """The coarse space of this module.  Every rank holds its rows of U and a factor of the coarse matrix.
 
     Attributes:
@@ -49,22 +49,22 @@ class AdaptiveCoarse(CoarseProblem):
     def __init__(
         self,
         comm: MPI.Intracomm,
-        constraints: Constraints,
-        boundary: Boundary,
-        scaling: Scaled,
+        jump_operator: JumpOperator,
+        boundary: InterfaceOperators,
+        scaling: StiffnessScaled,
         threshold: float,
     ) -> None:
         """Find the soft modes and factor.  All boundary operators must be dense but of large bodies.  Collective."""
-        super().__init__(comm, constraints, boundary)
+        super().__init__(comm, jump_operator, boundary)
         self.threshold = threshold
-        self.constraints = constraints
-        neighbours = Neighbours(comm, constraints, boundary.subdomains)
+        self.jump_operator = jump_operator
+        neighbours = Neighbours(comm, jump_operator, boundary.subdomains)
         self._rows, self._boundary = neighbours.rows, boundary
-        self._blocks = dual_blocks(comm, constraints, boundary, scaling, self._rows)
+        self._blocks = dual_blocks(comm, jump_operator, boundary, scaling, self._rows)
         V = coarse_vectors(self._blocks, neighbours, threshold)
         process_memory.trim()
         self.counts = [v.shape[1] - b.R.shape[1] for v, b in zip(V, self._blocks, strict=True)]
-        self._mask = np.ones(len(constraints.rows))
+        self._mask = np.ones(len(jump_operator.rows))
         own = (boundary.B @ self.R).tocsr()
         shape = (own.shape[0], self.dimension)
         self._motions = csr_matrix((own.data, own.indices + self.own.start, own.indptr), shape=shape)
@@ -75,7 +75,7 @@ class AdaptiveCoarse(CoarseProblem):
         self._E: csr_matrix
         # (columns, S+ B^T U there) of each subdomain
         self._answers: list[tuple[Int, Float]]
-        U = preconditioned(comm, constraints, self._blocks, neighbours, V)
+        U = preconditioned(comm, jump_operator, self._blocks, neighbours, V)
         process_memory.trim()
         self._span(U)
         self._active = np.ones(self.U.shape[0])
@@ -95,10 +95,10 @@ class AdaptiveCoarse(CoarseProblem):
         """Factorize for the owned rows of which `active` is 1; U is restricted to them."""
         super().activate(active)
         if not self._complete:
-            G = summed(self.comm, self._motions, self.constraints.rows, self.constraints.foreign, len(active))
+            G = summed(self.comm, self._motions, self.jump_operator.rows, self.jump_operator.foreign, len(active))
             self._complete = True
             self._span(hstack([self._U, G]).tocsr())
-        mask = self.constraints.gather(active).copy()
+        mask = self.jump_operator.gather(active).copy()
         changed = mask != self._mask
         touched = [i for i, rows in enumerate(self._rows) if changed[rows].any()]
         change = Blocks(self._E.shape)
@@ -221,7 +221,7 @@ class AdaptiveCoarse(CoarseProblem):
 
     def _energy(self, z: Float) -> Float:
         """This rank's share of U^T F z, (vectors,) or (vectors, k)."""
-        x = self._boundary.BT @ self.constraints.gather(z)
+        x = self._boundary.BT @ self.jump_operator.gather(z)
         energy = np.zeros((self.vectors, *z.shape[1:]))
         for (columns, answer), span in zip(self._answers, self._boundary.spans, strict=True):
             energy[columns] += answer.T @ x[span]
@@ -229,8 +229,8 @@ class AdaptiveCoarse(CoarseProblem):
 
     def _own(self, local: csr_matrix) -> csr_matrix:
         """The owned of the local rows, which follow each other; no copy."""
-        first, last = self.constraints.owned
-        at = np.searchsorted(self.constraints.rows, first)
+        first, last = self.jump_operator.owned
+        at = np.searchsorted(self.jump_operator.rows, first)
         ends = local.indptr[at : at + last - first + 1]
         part = slice(ends[0], ends[-1])
         entries = local.data[part], local.indices[part], ends - ends[0]

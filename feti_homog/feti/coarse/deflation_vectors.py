@@ -8,8 +8,8 @@ import numpy as np
 from mpi4py import MPI
 from scipy.sparse import csr_matrix
 
-from feti_homog.feti.coarse.local_eigenproblems import DualBlock
-from feti_homog.feti.decomposition.jump_operator import Constraints
+from feti_homog.feti.coarse.local_eigenproblems import SubdomainBlocks
+from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.neighbours import Neighbours
 from feti_homog.feti.linalg.distributed_matrix import Blocks, summed
 from feti_homog.typing import Float, Int
@@ -24,8 +24,8 @@ CHUNK, FAINT = 128, 1e-5
 
 def preconditioned(
     comm: MPI.Intracomm,
-    constraints: Constraints,
-    blocks: Sequence[DualBlock],
+    jump_operator: JumpOperator,
+    blocks: Sequence[SubdomainBlocks],
     neighbours: Neighbours,
     V: Sequence[Float],
 ) -> csr_matrix:
@@ -45,7 +45,7 @@ def preconditioned(
 
     received: list[list[Jumps]] = [[] for _ in blocks]
     neighbours.exchange(jumps(), lambda i, sender, of: received[i].append((neighbours.common[i][sender], *of)))
-    U = Blocks((len(constraints.rows), int(every.sum())))
+    U = Blocks((len(jump_operator.rows), int(every.sum())))
     for i, (block, rows) in enumerate(zip(blocks, neighbours.rows, strict=True)):
         for some in _groups(received[i]):
             columns = np.concatenate([c for _, c, _ in some])
@@ -58,8 +58,8 @@ def preconditioned(
                 U.add_larger(rows, columns, vectors, FAINT * np.abs(vectors).max(axis=0))
             else:
                 U.add(rows, columns, vectors)
-    owned = constraints.owned[1] - constraints.owned[0]
-    return summed(comm, U.matrix(), constraints.rows, constraints.foreign, owned)
+    owned = jump_operator.owned[1] - jump_operator.owned[0]
+    return summed(comm, U.matrix(), jump_operator.rows, jump_operator.foreign, owned)
 
 
 def _groups(messages: Sequence[Jumps]) -> Iterator[list[Jumps]]:

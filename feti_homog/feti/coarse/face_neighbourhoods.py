@@ -19,7 +19,7 @@ from feti_homog.cell.periodic_topology import components, edge_pairs
 from feti_homog.cell.submesh import part
 from feti_homog.feti.coarse.trace_spaces import trace
 from feti_homog.feti.decomposition.subdomain import Subdomain, both_directions
-from feti_homog.feti.operators.explicit import Condensed, schur_complement
+from feti_homog.feti.operators.explicit import ExplicitInterfaceOperator, schur_complement
 from feti_homog.typing import Bool, Float, Int
 
 # Coarse triangles from the face to the far side of its ring.
@@ -41,7 +41,7 @@ class Ring:
     """
 
     at: Int
-    operator: Condensed
+    operator: ExplicitInterfaceOperator
     R: Float
     P: csr_matrix
     clamped: Float
@@ -59,7 +59,7 @@ def rings(body: Subdomain, dofs: Int, face: Int) -> list[Ring]:
     others = np.zeros_like(on_face)
     others[dofs // 2] = ~on_face[dofs // 2]
     near = _near(body, on_face)
-    edges = body.piece.edge_class[body.piece.triangle_edges[near]]
+    edges = body.submesh.edge_class[body.submesh.triangle_edges[near]]
     label = components(len(near), *edge_pairs(edges))
     found = []
     for k in range(label.max() + 1):
@@ -72,7 +72,7 @@ def _ring(body: Subdomain, dofs: Int, members: Int, on_face: Bool, others: Bool)
     """That of the coarse triangles `members`, if it has enough of the face."""
     outside = np.zeros_like(on_face)
     outside[body.mesh.node_class[np.delete(body.mesh.nodes, members, axis=0)]] = True
-    ring = Subdomain.build(part(body.piece, members), body.mesh.lattice, body.L)
+    ring = Subdomain.build(part(body.submesh, members), body.mesh.lattice, body.L)
     of_body = np.empty(ring.mesh.n_classes, np.int64)
     of_body[ring.mesh.node_class[ring.mesh.nodes]] = body.mesh.node_class[body.mesh.nodes[members]]
     nodes = np.flatnonzero(on_face[of_body])
@@ -81,8 +81,8 @@ def _ring(body: Subdomain, dofs: Int, members: Int, on_face: Bool, others: Bool)
     own, at = both_directions(nodes), np.searchsorted(dofs, both_directions(of_body[nodes]))
     free = both_directions(np.flatnonzero(on_face[of_body] | ~(outside | others)[of_body]))
     clamped = schur_complement(ring.K[free][:, free].tocsr(), np.searchsorted(free, own))
-    P = trace(ring.piece, ring.mesh.lattice, nodes)
-    return Ring(at, Condensed(ring, own), ring.R[own], P, clamped)
+    P = trace(ring.submesh, ring.mesh.lattice, nodes)
+    return Ring(at, ExplicitInterfaceOperator(ring, own), ring.R[own], P, clamped)
 
 
 def _near(body: Subdomain, on_face: Bool) -> Int:

@@ -12,34 +12,38 @@ import numpy as np
 from mpi4py import MPI
 from scipy.sparse import csc_matrix, csr_matrix
 
-from feti_homog.feti.coarse.local_eigenproblems import DualBlock, examined
-from feti_homog.feti.decomposition.jump_operator import Constraints
+from feti_homog.feti.coarse.local_eigenproblems import SubdomainBlocks, examined
+from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.neighbours import Neighbours
 from feti_homog.feti.linalg.distributed_matrix import summed
-from feti_homog.feti.operators.interface_operators import Boundary
-from feti_homog.feti.preconditioners.scaled import Scaled
+from feti_homog.feti.operators.interface_operators import InterfaceOperators
+from feti_homog.feti.preconditioners.scaled import StiffnessScaled
 from feti_homog.typing import Float, Float32, Int
 
 
 def dual_blocks(
-    comm: MPI.Intracomm, constraints: Constraints, boundary: Boundary, scaling: Scaled, rows: Sequence[Int]
-) -> list[DualBlock]:
+    comm: MPI.Intracomm,
+    jump_operator: JumpOperator,
+    boundary: InterfaceOperators,
+    scaling: StiffnessScaled,
+    rows: Sequence[Int],
+) -> list[SubdomainBlocks]:
     """The blocks of this rank's subdomains; `rows` are those of their nodes."""
-    owned = constraints.owned[1] - constraints.owned[0]
+    owned = jump_operator.owned[1] - jump_operator.owned[0]
     inverse = scaling.W_inverse.tocoo()
-    at = np.searchsorted(constraints.rows, constraints.owned[0])
-    shape = (len(constraints.rows), constraints.total)
-    wide = csr_matrix((inverse.data, (inverse.row + at, inverse.col + constraints.owned[0])), shape=shape)
-    W_inverse = summed(comm, wide, constraints.rows, constraints.foreign, owned)[:, constraints.rows]
+    at = np.searchsorted(jump_operator.rows, jump_operator.owned[0])
+    shape = (len(jump_operator.rows), jump_operator.total)
+    wide = csr_matrix((inverse.data, (inverse.row + at, inverse.col + jump_operator.owned[0])), shape=shape)
+    W_inverse = summed(comm, wide, jump_operator.rows, jump_operator.foreign, owned)[:, jump_operator.rows]
     B, BW = boundary.B.tocsc(), (W_inverse @ scaling.BD).tocsc()
     blocks = []
     for i, (subdomain, operator) in enumerate(zip(boundary.subdomains, boundary.operators, strict=True)):
         own, scaled = (_columns(matrix, boundary.spans[i], rows[i]) for matrix in (B, BW))
-        blocks.append(DualBlock(subdomain, boundary.dofs[i], operator, own, scaled, boundary.large[i]))
+        blocks.append(SubdomainBlocks(subdomain, boundary.dofs[i], operator, own, scaled, boundary.large[i]))
     return blocks
 
 
-def coarse_vectors(blocks: Sequence[DualBlock], neighbours: Neighbours, threshold: float) -> list[Float]:
+def coarse_vectors(blocks: Sequence[SubdomainBlocks], neighbours: Neighbours, threshold: float) -> list[Float]:
     """For each subdomain of this rank: (n, k + m) its kernel and its m modes below the threshold.  Collective."""
     subdomains = [examined(*of) for of in zip(blocks, neighbours.common, strict=True)]
     # Of the neighbours' shares in M^-1 the rows that both have.

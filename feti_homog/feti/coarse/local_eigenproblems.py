@@ -24,8 +24,8 @@ from scipy.sparse import csr_matrix
 from feti_homog.feti.coarse.face_neighbourhoods import rings
 from feti_homog.feti.coarse.trace_spaces import trace
 from feti_homog.feti.decomposition.subdomain import Subdomain, both_directions
-from feti_homog.feti.operators.explicit import Condensed
-from feti_homog.feti.operators.implicit import Factored
+from feti_homog.feti.operators.explicit import ExplicitInterfaceOperator
+from feti_homog.feti.operators.implicit import ImplicitInterfaceOperator
 from feti_homog.typing import Float, Float32, Int
 
 # Of a symmetric matrix in single precision, relative to its largest eigenvalue: eigenvalues that are none.
@@ -35,7 +35,7 @@ FACE = 1.25
 
 
 @dataclass(frozen=True)
-class DualBlock:
+class SubdomainBlocks:
     """One subdomain on the rows of its nodes.
 
     Attributes:
@@ -48,7 +48,7 @@ class DualBlock:
 
     subdomain: Subdomain
     dofs: Int
-    operator: Condensed | Factored
+    operator: ExplicitInterfaceOperator | ImplicitInterfaceOperator
     B: csr_matrix
     BW: csr_matrix
     large: bool
@@ -59,13 +59,13 @@ class DualBlock:
         return self.subdomain.R[self.dofs]
 
 
-class Whole:
+class SubdomainEigenproblem:
     """Examined as one.  `common` names the rows that it has in common with each subdomain, itself among them."""
 
-    def __init__(self, block: DualBlock, operator: Condensed, common: Mapping[int, Int]) -> None:
+    def __init__(self, block: SubdomainBlocks, operator: ExplicitInterfaceOperator, common: Mapping[int, Int]) -> None:
         self.block, self.common = block, common
         subdomain, S = block.subdomain, operator.S
-        self._P = trace(subdomain.piece, subdomain.mesh.lattice, block.dofs[::2] // 2)
+        self._P = trace(subdomain.submesh, subdomain.mesh.lattice, block.dofs[::2] // 2)
         self._held = congruent(self._P, S) + operator.holding(self._P)
         # (rows, rows) its share W^-1 B D^-1 S D^-1 B^T W^-1 of M^-1; this precision tells soft from stiff.
         BW = block.BW.astype(np.float32)
@@ -74,7 +74,7 @@ class Whole:
     def shares(self) -> Iterator[tuple[int, Float32]]:
         """Its share of M^-1 on the rows in common with each other subdomain."""
         for s, rows in self.common.items():
-            if s != self.block.subdomain.piece.index:
+            if s != self.block.subdomain.submesh.index:
                 yield s, self._share[np.ix_(rows, rows)]
 
     def modes(self, shares: Sequence[tuple[int, Float32]], threshold: float) -> Float:
@@ -87,16 +87,16 @@ class Whole:
         return np.asarray(self._P @ soft_modes(self._held, N, threshold))
 
 
-class Faces:
-    """Examined face by face; see `Whole`."""
+class FaceEigenproblems:
+    """Examined face by face; see `SubdomainEigenproblem`."""
 
-    def __init__(self, block: DualBlock, common: Mapping[int, Int]) -> None:
+    def __init__(self, block: SubdomainBlocks, common: Mapping[int, Int]) -> None:
         self.block, self.common = block, common
         faces = {s: np.unique(block.B[rows].indices // 2) for s, rows in common.items()}
         self._rings = {
             s: rings(block.subdomain, block.dofs, both_directions(nodes))
             for s, nodes in faces.items()
-            if s != block.subdomain.piece.index
+            if s != block.subdomain.submesh.index
         }
 
     def shares(self) -> Iterator[tuple[int, Float32]]:
@@ -121,17 +121,17 @@ class Faces:
         return np.hstack(parts)
 
 
-def examined(block: DualBlock, common: Mapping[int, Int]) -> Whole | Faces:
+def examined(block: SubdomainBlocks, common: Mapping[int, Int]) -> SubdomainEigenproblem | FaceEigenproblems:
     """How a subdomain of that size is examined.
 
     Raises:
         TypeError: as one, but without dense boundary operators.
     """
     if block.large:
-        return Faces(block, common)
-    if not isinstance(block.operator, Condensed):
+        return FaceEigenproblems(block, common)
+    if not isinstance(block.operator, ExplicitInterfaceOperator):
         raise TypeError("soft modes of small boundaries need dense operators")
-    return Whole(block, block.operator, common)
+    return SubdomainEigenproblem(block, block.operator, common)
 
 
 def congruent(T: csr_matrix | Float, A: Float | Float32) -> Float:

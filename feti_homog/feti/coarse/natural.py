@@ -9,23 +9,23 @@ from mpi4py import MPI
 from scipy.sparse import block_diag, csr_matrix, diags, hstack
 
 from feti_homog.cell.periodic_topology import components
-from feti_homog.feti.decomposition.jump_operator import Constraints
+from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.linalg.distributed_matrix import assembled, total
 from feti_homog.feti.linalg.sparse_direct import DirectSolver
-from feti_homog.feti.operators.interface_operators import Boundary
+from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.typing import Float, Int
 
 FREE = 1e-10
 
 
-class CoarseProblem:
+class NaturalCoarseSpace:
     """Solvability of all subdomains, Eq. (37), on the active multipliers: G^T lam = 0.
 
     The load of a macroscopic strain does no work on rigid-body motions, so e = R^T f vanishes.  G has a row a
     multiplier and a column a kernel mode; every rank holds its own rows and a factor of G^T G.
     """
 
-    def __init__(self, comm: MPI.Intracomm, constraints: Constraints, boundary: Boundary) -> None:
+    def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, boundary: InterfaceOperators) -> None:
         subdomains = boundary.subdomains
         kernels = [s.R[dofs] for s, dofs in zip(subdomains, boundary.dofs, strict=True)]
         modes = sum(R.shape[1] for R in kernels)
@@ -34,17 +34,17 @@ class CoarseProblem:
         self.own = slice(first, first + modes)
         self.dimension: int = comm.allreduce(modes)
         self.R = csr_matrix(block_diag(kernels)) if kernels else csr_matrix((0, 0))
-        body = np.repeat([s.piece.body for s in subdomains], [R.shape[1] for R in kernels])
+        body = np.repeat([s.submesh.body for s in subdomains], [R.shape[1] for R in kernels])
         self.body = np.concatenate(comm.allgather(body)).astype(np.int64)
-        pinned = [s.piece.body for s in subdomains if s.piece.pinned >= 0]
+        pinned = [s.submesh.body for s in subdomains if s.submesh.pinned >= 0]
         self.held = comm.allreduce(max(pinned, default=-1), MPI.MAX)
-        owned = constraints.owned[1] - constraints.owned[0]
+        owned = jump_operator.owned[1] - jump_operator.owned[0]
         columns = np.arange(first, first + modes)
-        self.G = assembled(comm, boundary.B @ self.R, constraints.rows, columns, (owned, modes))
+        self.G = assembled(comm, boundary.B @ self.R, jump_operator.rows, columns, (owned, modes))
         self.factorizations = 0
         squares = np.asarray(self.G.power(2).sum(axis=0)).ravel()
         self.scale = float(comm.allreduce(squares).max(initial=0.0))
-        CoarseProblem.activate(self, np.ones(owned))
+        NaturalCoarseSpace.activate(self, np.ones(owned))
 
     def activate(self, active: Float) -> None:
         """Factorize for the owned rows of which `active` is 1; the others, 0, carry no multiplier.

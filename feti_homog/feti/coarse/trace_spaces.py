@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
 from feti_homog.cell.refinement import Lattice
-from feti_homog.cell.submesh import Piece
+from feti_homog.cell.submesh import Submesh
 from feti_homog.feti.decomposition.subdomain import both_directions
 from feti_homog.typing import Int
 
@@ -19,9 +19,9 @@ from feti_homog.typing import Int
 ENOUGH = 100
 
 
-def trace(piece: Piece, lattice: Lattice, nodes: Int) -> csr_matrix:
+def trace(submesh: Submesh, lattice: Lattice, nodes: Int) -> csr_matrix:
     """(2n, 2m) P for n boundary nodes, sorted classes of the refined piece; ends of edges not among them are held."""
-    vertices, inner = len(piece.class_keys), lattice.intervals - 1
+    vertices, inner = len(submesh.class_keys), lattice.intervals - 1
     on_edge = nodes >= vertices
     edge, position = np.divmod(nodes - vertices, max(inner, 1))
     position += 1
@@ -34,12 +34,12 @@ def trace(piece: Piece, lattice: Lattice, nodes: Int) -> csr_matrix:
         k *= 2
     keep = kept(k)
     m = int(keep.sum())
-    number = np.full(vertices + len(piece.edge_keys) * inner, -1)
+    number = np.full(vertices + len(submesh.edge_keys) * inner, -1)
     number[nodes[keep]] = np.arange(m)
     between = np.flatnonzero(~keep)
     edge, lower = edge[between], position[between] // k * k
-    ends = np.empty((len(piece.edge_keys), 2), np.int64)
-    ends[piece.edge_class] = piece.vertex_class[piece.edges]
+    ends = np.empty((len(submesh.edge_keys), 2), np.int64)
+    ends[submesh.edge_class] = submesh.vertex_class[submesh.edges]
     first = vertices + edge * inner - 1
     left = np.where(lower == 0, ends[edge, 0], first + lower)
     right = np.where(lower + k == lattice.intervals, ends[edge, 1], first + lower + k)

@@ -18,7 +18,7 @@ from petsc4py import PETSc
 from scipy.sparse import coo_matrix, csr_matrix
 
 from feti_homog.cell.refinement import Lattice, edge_node
-from feti_homog.feti.decomposition.shared_entities import Shared
+from feti_homog.feti.decomposition.shared_entities import SharedEntities
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.typing import Float, Int
 
@@ -46,7 +46,7 @@ class InterfaceNodes:
     precracked: NDArray[np.bool_]
 
 
-class Constraints:
+class JumpOperator:
     """B of this rank's subdomains and the layout of the multipliers.
 
     Attributes:
@@ -61,7 +61,9 @@ class Constraints:
         vector: a multiplier vector to duplicate.
     """
 
-    def __init__(self, comm: MPI.Intracomm, shared: Shared, subdomains: Sequence[Subdomain], lattice: Lattice) -> None:
+    def __init__(
+        self, comm: MPI.Intracomm, shared: SharedEntities, subdomains: Sequence[Subdomain], lattice: Lattice
+    ) -> None:
         layout = _Layout(shared, subdomains, lattice)
         self.shared, self._first, self._count = shared, layout.first, layout.count
         elsewhere = np.bincount(np.repeat(np.arange(len(shared.key)), shared.copies), layout.base < 0, len(shared.key))
@@ -128,7 +130,7 @@ class _Exchange:
 class _Layout:
     """Rows and columns of one rank, entity by entity."""
 
-    def __init__(self, shared: Shared, subdomains: Sequence[Subdomain], lattice: Lattice) -> None:
+    def __init__(self, shared: SharedEntities, subdomains: Sequence[Subdomain], lattice: Lattice) -> None:
         self.shared, self.subdomains, self.lattice = shared, subdomains, lattice
         copies = shared.copies
         self.count = shared.nodes * 2 * (copies - 1)
@@ -144,13 +146,13 @@ class _Layout:
         base = np.full(len(shared.sharer), -1)
         entity = np.repeat(np.arange(len(shared.key)), shared.copies)
         for subdomain, offset in zip(self.subdomains, self.dofs // 2, strict=False):
-            piece = subdomain.piece
-            mine = np.flatnonzero(shared.sharer == piece.index)
+            submesh = subdomain.submesh
+            mine = np.flatnonzero(shared.sharer == submesh.index)
             key, is_edge = shared.key[entity[mine]], shared.is_edge[entity[mine]]
             edge = edge_node(
-                len(piece.class_keys), np.searchsorted(piece.edge_keys, key), np.ones_like(key), self.lattice
+                len(submesh.class_keys), np.searchsorted(submesh.edge_keys, key), np.ones_like(key), self.lattice
             )
-            base[mine] = offset + np.where(is_edge, edge, np.searchsorted(piece.class_keys, key))
+            base[mine] = offset + np.where(is_edge, edge, np.searchsorted(submesh.class_keys, key))
         return base
 
     def matrix(self) -> csr_matrix:

@@ -8,7 +8,7 @@ from typing import TypeVar
 import numpy as np
 from mpi4py import MPI
 
-from feti_homog.feti.decomposition.jump_operator import Constraints
+from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.typing import Int
 
@@ -25,12 +25,12 @@ class Neighbours:
             same order on both sides.
     """
 
-    def __init__(self, comm: MPI.Intracomm, constraints: Constraints, subdomains: Sequence[Subdomain]) -> None:
+    def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, subdomains: Sequence[Subdomain]) -> None:
         self.comm = comm
-        self.index = [s.piece.index for s in subdomains]
+        self.index = [s.submesh.index for s in subdomains]
         self.local = {s: i for i, s in enumerate(self.index)}
         self.rank = {s: r for r, own in enumerate(comm.allgather(self.index)) for s in own}
-        first, second, entity = _pairs(constraints.shared.pointer, constraints.shared.sharer, self.index)
+        first, second, entity = _pairs(jump_operator.shared.pointer, jump_operator.shared.sharer, self.index)
         order = np.lexsort((entity, second, first))
         first, second, entity = first[order], second[order], entity[order]
         new = np.ones(len(first), bool)
@@ -38,7 +38,7 @@ class Neighbours:
         starts = np.flatnonzero(new)
         self.rows: list[Int] = [np.zeros(0, np.int64) for _ in self.index]
         groups = [
-            (self.local[int(first[a])], int(second[a]), constraints.rows_of(some))
+            (self.local[int(first[a])], int(second[a]), jump_operator.rows_of(some))
             for a, some in zip(starts, np.split(entity, starts)[1:], strict=True)
         ]
         for i, s, rows in groups:

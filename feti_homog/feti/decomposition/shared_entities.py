@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feti_homog.cell.periodic_topology import Torus, edge_pairs, shared_edges
-from feti_homog.cell.submesh import Piece
+from feti_homog.cell.submesh import Submesh
 from feti_homog.typing import Float, Int
 
 
 @dataclass(frozen=True)
-class Shared:
+class SharedEntities:
     """The n entities that one rank's subdomains take part in, in the order of their rows.
 
     Attributes:
@@ -56,7 +56,7 @@ class Shared:
         return np.diff(self.pointer)
 
 
-def share(torus: Torus, pieces: Sequence[Piece], rank: Int, inner: int, n_ranks: int) -> list[Shared]:
+def share(torus: Torus, pieces: Sequence[Submesh], rank: Int, inner: int, n_ranks: int) -> list[SharedEntities]:
     """The tables of all ranks; `rank` (s,) is each subdomain's, `inner` the fine nodes inside a coarse edge."""
     held = [p.class_keys if p.pinned < 0 else np.delete(p.class_keys, p.pinned) for p in pieces]
     kinds = [_sharers(held, pieces)]
@@ -82,7 +82,7 @@ def share(torus: Torus, pieces: Sequence[Piece], rank: Int, inner: int, n_ranks:
         here[np.repeat(np.arange(len(key)), copies)[rank[sharer] == r]] = True
         entries = _ranges(pointer[:-1][here], copies[here])
         tables.append(
-            Shared(
+            SharedEntities(
                 key[here], is_edge[here], nodes[here], ends[:-1][here], np.r_[0, np.cumsum(copies[here])],
                 sharer[entries], body[entries], fibre[here], normal[here], length[here],
                 precracked[here], (int(limits[r]), int(limits[r + 1])), int(ends[-1]),
@@ -91,7 +91,7 @@ def share(torus: Torus, pieces: Sequence[Piece], rank: Int, inner: int, n_ranks:
     return tables
 
 
-def _sharers(keys: Sequence[Int], pieces: Sequence[Piece]) -> tuple[Int, Int, Int]:
+def _sharers(keys: Sequence[Int], pieces: Sequence[Submesh]) -> tuple[Int, Int, Int]:
     """Keys that several pieces hold, how many do, and which: sorted by key, then body, then subdomain."""
     sizes = [len(k) for k in keys]
     key, piece = np.concatenate(keys), np.repeat(np.arange(len(keys)), sizes)

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.sparse import csr_matrix, diags
 
 from feti_homog.cell.refinement import FineMesh, Lattice, refine
-from feti_homog.cell.submesh import Piece
+from feti_homog.cell.submesh import Submesh
 from feti_homog.cell.unwrap import unwrap
 from feti_homog.errors import MeshError
 from feti_homog.fem.assembly import assemble
@@ -23,7 +23,7 @@ class Subdomain:
     """A body or a piece of it, with c node classes and kernel dimension k.
 
     Attributes:
-        piece: the coarse share.
+        submesh: the coarse share.
         mesh: the refined mesh.
         L: (3, 3) stiffness of the material.
         Q: (2c, 3) load of the unit strains: f = -Q E.
@@ -33,7 +33,7 @@ class Subdomain:
         positions: (c, 2) unwrapped positions of the classes.
     """
 
-    piece: Piece
+    submesh: Submesh
     mesh: FineMesh
     L: Float
     Q: Float
@@ -42,32 +42,32 @@ class Subdomain:
     positions: Float
 
     @classmethod
-    def build(cls, piece: Piece, lattice: Lattice, L: Float) -> Subdomain:
+    def build(cls, submesh: Submesh, lattice: Lattice, L: Float) -> Subdomain:
         """Refine and assemble, without communication.
 
         Raises:
             MeshError: an element is inverted, or the rigid-body modes are not in the kernel of K.
         """
-        mesh = refine(piece, lattice)
-        _check_corners(piece, mesh)
+        mesh = refine(submesh, lattice)
+        _check_corners(submesh, mesh)
         body = assemble(mesh, L)
-        shift, closes = unwrap(piece)
+        shift, closes = unwrap(submesh)
         positions = np.empty((mesh.n_classes, 2))
         positions[mesh.node_class[mesh.nodes]] = mesh.points[mesh.nodes] + shift[:, None]
-        R = kernel(positions, closes, piece.pinned)
-        K = _pinned(body.K, piece.pinned)
-        _check_kernel(piece, K, R)
+        R = kernel(positions, closes, submesh.pinned)
+        K = _pinned(body.K, submesh.pinned)
+        _check_kernel(submesh, K, R)
         Q = body.Q
-        if piece.pinned >= 0:
-            Q[2 * piece.pinned : 2 * piece.pinned + 2] = 0.0
-        subdomain = cls(piece, mesh, L, Q, body.area, R, positions)
+        if submesh.pinned >= 0:
+            Q[2 * submesh.pinned : 2 * submesh.pinned + 2] = 0.0
+        subdomain = cls(submesh, mesh, L, Q, body.area, R, positions)
         subdomain.__dict__["K"] = K
         return subdomain
 
     @cached_property
     def K(self) -> csr_matrix:
         """(2c, 2c) stiffness, the pinned class (15) eliminated by a unit row scaled like the others."""
-        return _pinned(assemble(self.mesh, self.L).K, self.piece.pinned)
+        return _pinned(assemble(self.mesh, self.L).K, self.submesh.pinned)
 
     def release(self) -> None:
         """Free the memory of K, which is assembled again when it is wanted."""
@@ -97,7 +97,7 @@ class Subdomain:
     def _far_apart(self, candidates: Int) -> Int:
         """Three far-apart nodes for three modes, else the one farthest from the pinned class."""
         x = self.positions[candidates]
-        origin = self.positions[self.piece.pinned] if self.piece.pinned >= 0 else x.mean(axis=0)
+        origin = self.positions[self.submesh.pinned] if self.submesh.pinned >= 0 else x.mean(axis=0)
         a = np.argmax(((x - origin) ** 2).sum(axis=1))
         if self.R.shape[1] < 3:
             return candidates[[a]]
@@ -131,16 +131,17 @@ def _pinned(K: csr_matrix, pinned: int) -> csr_matrix:
     return (mask @ K @ mask + diags((1 - keep) * K.diagonal().max())).tocsr()
 
 
-def _check_kernel(piece: Piece, K: csr_matrix, R: Float) -> None:
+def _check_kernel(submesh: Submesh, K: csr_matrix, R: Float) -> None:
     residual = abs(K @ R).max(initial=0.0) / abs(K.data).max()
     if residual > KERNEL_TOLERANCE:
         raise MeshError(
-            f"subdomain {piece.index} ({piece.phase}) near ({piece.points[0, 0]:.6g}, {piece.points[0, 1]:.6g}): "
+            f"subdomain {submesh.index} ({submesh.phase}) near "
+            f"({submesh.points[0, 0]:.6g}, {submesh.points[0, 1]:.6g}): "
             f"|K R| / |K| = {residual:.1e}, expected at most {KERNEL_TOLERANCE:.0e}; its elements are degenerate"
         )
 
 
-def _check_corners(piece: Piece, mesh: FineMesh) -> None:
+def _check_corners(submesh: Submesh, mesh: FineMesh) -> None:
     """Refuse triangles that bending towards the circles has turned over."""
     triangles = mesh.nodes[mesh.curved][:, mesh.lattice.triangles[:, :3]].reshape(-1, 3)
     a, b, c = (mesh.points[triangles[:, k]] for k in range(3))
@@ -149,6 +150,6 @@ def _check_corners(piece: Piece, mesh: FineMesh) -> None:
     if len(inverted):
         x, y = mesh.points[triangles[inverted[0]]].mean(axis=0)
         raise MeshError(
-            f"[cell] refine, order: {len(inverted)} refined elements of {piece.phase} are inverted, the first "
+            f"[cell] refine, order: {len(inverted)} refined elements of {submesh.phase} are inverted, the first "
             f"near ({x:.6g}, {y:.6g}); expected a mesh fine enough for its curved interfaces"
         )

@@ -21,7 +21,7 @@ from feti_homog.typing import Float, Int
 FEW = 6
 
 
-class Condensed:
+class ExplicitInterfaceOperator:
     """S and S+ of one subdomain on its n boundary dofs.
 
     With the fixing nodes on the boundary, the inverse of S + rho Rf Rf^T is the boundary part of K+.

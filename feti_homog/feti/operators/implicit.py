@@ -15,7 +15,7 @@ from feti_homog.typing import Float, Int
 CHUNK = 64
 
 
-class Factored:
+class ImplicitInterfaceOperator:
     """S and the boundary part of K+ of one subdomain, on its n boundary dofs."""
 
     def __init__(self, subdomain: Subdomain, dofs: Int) -> None:

@@ -10,11 +10,11 @@ import numpy as np
 from petsc4py import PETSc
 from scipy.sparse import block_diag, csr_matrix
 
-from feti_homog.feti.decomposition.jump_operator import Constraints
-from feti_homog.feti.decomposition.shared_entities import Shared
+from feti_homog.feti.decomposition.jump_operator import JumpOperator
+from feti_homog.feti.decomposition.shared_entities import SharedEntities
 from feti_homog.feti.decomposition.subdomain import Subdomain, both_directions
-from feti_homog.feti.operators.explicit import Condensed
-from feti_homog.feti.operators.implicit import Factored, Interior
+from feti_homog.feti.operators.explicit import ExplicitInterfaceOperator
+from feti_homog.feti.operators.implicit import ImplicitInterfaceOperator, Interior
 from feti_homog.typing import Float, Int
 
 KINDS = ("auto", "implicit", "explicit")
@@ -27,7 +27,7 @@ LARGEST_WHOLE = 2000
 INVERSE, SOLVES = 5e-10, 3.5e-7
 
 
-class Boundary:
+class InterfaceOperators:
     """The boundary dofs of this rank's subdomains, one subdomain after the other, n in all.
 
     Attributes:
@@ -40,7 +40,7 @@ class Boundary:
     """
 
     def __init__(
-        self, constraints: Constraints, subdomains: Sequence[Subdomain], kind: str, applications: int, soft: bool
+        self, jump_operator: JumpOperator, subdomains: Sequence[Subdomain], kind: str, applications: int, soft: bool
     ) -> None:
         """Factor every subdomain, once.
 
@@ -50,22 +50,26 @@ class Boundary:
             soft: whether soft modes will be looked for, which takes dense matrices but of large bodies.
         """
         self.subdomains = subdomains
-        self.dofs = _touched(constraints.B, subdomains)
+        self.dofs = _touched(jump_operator.B, subdomains)
         self.offsets = np.cumsum([0, *(len(d) for d in self.dofs)])
         first = np.cumsum([0, *(s.K.shape[0] for s in subdomains)])
         self.local = np.concatenate([o + d for o, d in zip(first, self.dofs, strict=False)] or [np.zeros(0, np.int64)])
-        self.B = constraints.B[:, self.local].tocsr()
+        self.B = jump_operator.B[:, self.local].tocsr()
         self.BT = self.B.T.tocsr()
         diagonals = [s.K.diagonal()[d] for s, d in zip(subdomains, self.dofs, strict=True)]
         self.diagonal = np.concatenate([np.zeros(0), *diagonals])
-        whole = _whole(constraints.shared, [s.piece.index for s in subdomains])
+        whole = _whole(jump_operator.shared, [s.submesh.index for s in subdomains])
         self.large = [w and len(d) > LARGEST_WHOLE for w, d in zip(whole, self.dofs, strict=True)]
-        self.operators: list[Condensed | Factored] = []
+        self.operators: list[ExplicitInterfaceOperator | ImplicitInterfaceOperator] = []
         for subdomain, dofs, large in zip(subdomains, self.dofs, self.large, strict=True):
             pays = INVERSE * len(dofs) ** 3 <= SOLVES * subdomain.K.shape[0] * applications
             pays = pays or (soft and not large)
             dense = kind == "explicit" or (kind == "auto" and pays and _fits(len(dofs)))
-            self.operators.append(Condensed(subdomain, dofs) if dense and len(dofs) else Factored(subdomain, dofs))
+            self.operators.append(
+                ExplicitInterfaceOperator(subdomain, dofs)
+                if dense and len(dofs)
+                else ImplicitInterfaceOperator(subdomain, dofs)
+            )
             subdomain.release()
 
     @property
@@ -98,7 +102,9 @@ class Boundary:
     def _interiors(self) -> list[Interior]:
         interiors = []
         for subdomain, dofs, operator in zip(self.subdomains, self.dofs, self.operators, strict=True):
-            interiors.append(operator.interior if isinstance(operator, Factored) else Interior(subdomain, dofs))
+            interiors.append(
+                operator.interior if isinstance(operator, ImplicitInterfaceOperator) else Interior(subdomain, dofs)
+            )
             subdomain.release()
         return interiors
 
@@ -124,7 +130,7 @@ def _touched(B: csr_matrix, subdomains: Sequence[Subdomain]) -> list[Int]:
     return [both_directions(np.flatnonzero(n)) for n in nodes]
 
 
-def _whole(shared: Shared, subdomains: Sequence[int]) -> list[bool]:
+def _whole(shared: SharedEntities, subdomains: Sequence[int]) -> list[bool]:
     """Whether all that each of the subdomains shares, it shares with one other body."""
     entity = np.repeat(np.arange(len(shared.key)), shared.copies)
     first, last = shared.pointer[:-1], shared.pointer[1:] - 1

@@ -6,7 +6,7 @@ import numpy as np
 from mpi4py import MPI
 from scipy.sparse import csr_matrix
 
-from feti_homog.feti.decomposition.jump_operator import Constraints
+from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.linalg.distributed_matrix import assembled
 from feti_homog.typing import Float, Int
 
@@ -14,11 +14,11 @@ from feti_homog.typing import Float, Int
 class NodeBlocks:
     """The owned rows of the sum over ranks of `local` (local rows, local rows), as small dense blocks by size."""
 
-    def __init__(self, comm: MPI.Intracomm, constraints: Constraints, local: csr_matrix) -> None:
-        first, last = constraints.owned
-        matrix = assembled(comm, local, constraints.rows, constraints.rows, (last - first, last - first))
+    def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, local: csr_matrix) -> None:
+        first, last = jump_operator.owned
+        matrix = assembled(comm, local, jump_operator.rows, jump_operator.rows, (last - first, last - first))
         entries = matrix[:, first:last].tocoo()
-        starts, sizes = constraints.blocks
+        starts, sizes = jump_operator.blocks
         self.rows = last - first
         self.blocks: list[tuple[Int, Float]] = []
         block = np.repeat(np.arange(len(starts)), sizes)[entries.row]

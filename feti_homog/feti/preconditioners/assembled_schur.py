@@ -6,32 +6,32 @@ import numpy as np
 from mpi4py import MPI
 from scipy.sparse import csr_matrix
 
-from feti_homog.feti.decomposition.jump_operator import Constraints
+from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.linalg.distributed_matrix import Blocks, total
 from feti_homog.feti.linalg.sparse_direct import DirectSolver
-from feti_homog.feti.operators.explicit import Condensed
-from feti_homog.feti.operators.interface_operators import Boundary
+from feti_homog.feti.operators.explicit import ExplicitInterfaceOperator
+from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.typing import Float, Int
 
 
-class BondedCell:
+class AssembledSchur:
     """Z^T S Z of all subdomains, factored once; every rank holds the factor.
 
     Attributes:
         size: dofs on the shared nodes of all ranks, two each.
     """
 
-    def __init__(self, comm: MPI.Intracomm, constraints: Constraints, boundary: Boundary) -> None:
+    def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, boundary: InterfaceOperators) -> None:
         """Assemble and factor; all boundary operators must be dense.  Collective.
 
         Options have the prefix `feti_bonded_` (default: cholesky by CHOLMOD).
         """
         self.comm = comm
-        self._shared = _originals(comm, constraints, boundary)
-        self.size = shared_dofs(comm, constraints)
+        self._shared = _originals(comm, jump_operator, boundary)
+        self.size = shared_dofs(comm, jump_operator)
         stiffness = Blocks((self.size, self.size))
         for operator, span in zip(boundary.operators, boundary.spans, strict=True):
-            if not isinstance(operator, Condensed):
+            if not isinstance(operator, ExplicitInterfaceOperator):
                 raise TypeError("the bonded cell needs dense boundary operators")
             stiffness.add(self._shared[span], self._shared[span], operator.S)
         self._solver = DirectSolver(total(comm, stiffness.matrix()), "feti_bonded_")
@@ -45,17 +45,17 @@ class BondedCell:
         return self._solver.solve(right)[self._shared]
 
 
-def shared_dofs(comm: MPI.Intracomm, constraints: Constraints) -> int:
+def shared_dofs(comm: MPI.Intracomm, jump_operator: JumpOperator) -> int:
     """The size of the bonded cell; collective."""
-    return int(comm.allreduce(2 * len(constraints.blocks[0])))
+    return int(comm.allreduce(2 * len(jump_operator.blocks[0])))
 
 
-def _originals(comm: MPI.Intracomm, constraints: Constraints, boundary: Boundary) -> Int:
+def _originals(comm: MPI.Intracomm, jump_operator: JumpOperator, boundary: InterfaceOperators) -> Int:
     """The global number of the shared dof that each boundary dof is a copy of."""
-    starts, sizes = constraints.blocks
+    starts, sizes = jump_operator.blocks
     order = np.argsort(starts)
     first = comm.exscan(len(starts)) or 0
-    node = constraints.gather(np.repeat(first + np.arange(len(starts)), sizes[order]).astype(float))
+    node = jump_operator.gather(np.repeat(first + np.arange(len(starts)), sizes[order]).astype(float))
     # Each copy of a node takes part in some row of it, and its two dofs are neighbours.
     row = boundary.BT.indices[boundary.BT.indptr[:-1]]
     return np.asarray(2 * node[row].astype(np.int64) + np.arange(len(row)) % 2)

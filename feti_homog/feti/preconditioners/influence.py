@@ -18,10 +18,10 @@ from mpi4py import MPI
 from scipy.linalg import solve_triangular
 from scipy.linalg.lapack import dpstrf
 
-from feti_homog.feti.decomposition.jump_operator import Constraints
-from feti_homog.feti.operators.interface_operators import Boundary
-from feti_homog.feti.preconditioners.assembled_schur import BondedCell
-from feti_homog.feti.preconditioners.scaled import Scaled
+from feti_homog.feti.decomposition.jump_operator import JumpOperator
+from feti_homog.feti.operators.interface_operators import InterfaceOperators
+from feti_homog.feti.preconditioners.assembled_schur import AssembledSchur
+from feti_homog.feti.preconditioners.scaled import StiffnessScaled
 from feti_homog.typing import Float, Int
 
 # Columns of H that are found at once.
@@ -33,12 +33,12 @@ SINGULAR = 1e-10
 class Influence:
     """z = H_D r on the active rows.  A Krylov method has nothing left to do but to confirm."""
 
-    def __init__(self, comm: MPI.Intracomm, constraints: Constraints, boundary: Boundary) -> None:
+    def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, boundary: InterfaceOperators) -> None:
         """Factor the bonded cell; all boundary operators must be dense.  Collective."""
-        self.comm, self.start = comm, constraints.owned[0]
-        self.boundary, self.bonded = boundary, BondedCell(comm, constraints, boundary)
-        self.scaled = Scaled(comm, constraints, boundary, self._forces)
-        rows = constraints.owned[1] - self.start
+        self.comm, self.start = comm, jump_operator.owned[0]
+        self.boundary, self.bonded = boundary, AssembledSchur(comm, jump_operator, boundary)
+        self.scaled = StiffnessScaled(comm, jump_operator, boundary, self._forces)
+        rows = jump_operator.owned[1] - self.start
         # Rows that have ever been inactive, as they came, and H there, (known, known); its columns, with room for more.
         # `_inactive` tells which of them are so now, `_kept` which of those the factor is of.
         self._known: Int = np.zeros(0, np.int64)

@@ -13,8 +13,8 @@ import numpy as np
 from mpi4py import MPI
 from scipy.sparse import csr_matrix, diags
 
-from feti_homog.feti.decomposition.jump_operator import Constraints
-from feti_homog.feti.operators.interface_operators import Boundary
+from feti_homog.feti.decomposition.jump_operator import JumpOperator
+from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.operators.node_blocks import NodeBlocks
 from feti_homog.typing import Float
 
@@ -47,7 +47,7 @@ class Identity:
         return start
 
 
-class Scaled:
+class StiffnessScaled:
     """M^-1 with the scaling of this module around a boundary stiffness.
 
     Attributes:
@@ -55,14 +55,18 @@ class Scaled:
     """
 
     def __init__(
-        self, comm: MPI.Intracomm, constraints: Constraints, boundary: Boundary, stiffness: Callable[[Float], Float]
+        self,
+        comm: MPI.Intracomm,
+        jump_operator: JumpOperator,
+        boundary: InterfaceOperators,
+        stiffness: Callable[[Float], Float],
     ) -> None:
-        self.constraints, self.stiffness = constraints, stiffness
+        self.jump_operator, self.stiffness = jump_operator, stiffness
         # Both directions of a node are on the boundary.
         flexibility = diags(np.repeat(2.0 / boundary.diagonal.reshape(-1, 2).sum(axis=1), 2))
         self.BD: csr_matrix = (boundary.B @ flexibility).tocsr()
         self.DBT = self.BD.T.tocsr()
-        self.W = NodeBlocks(comm, constraints, self.BD @ boundary.B.T)
+        self.W = NodeBlocks(comm, jump_operator, self.BD @ boundary.B.T)
         self.activate(np.ones(self.W.rows))
 
     def activate(self, active: Float) -> None:
@@ -71,23 +75,23 @@ class Scaled:
 
     def apply(self, r: Float) -> Float:
         """W^-1 B D^-1 S D^-1 B^T W^-1 r."""
-        x = self.DBT @ self.constraints.gather(self.W_inverse @ r)
-        return np.asarray(self.W_inverse @ self.constraints.sum(self.BD @ self.stiffness(x)))
+        x = self.DBT @ self.jump_operator.gather(self.W_inverse @ r)
+        return np.asarray(self.W_inverse @ self.jump_operator.sum(self.BD @ self.stiffness(x)))
 
     def first(self, start: Float, closing: Float) -> Float:
         """What solved an earlier problem."""
         return start
 
 
-class Dirichlet(Scaled):
+class Dirichlet(StiffnessScaled):
     """Around the Schur complements."""
 
-    def __init__(self, comm: MPI.Intracomm, constraints: Constraints, boundary: Boundary) -> None:
-        super().__init__(comm, constraints, boundary, boundary.stiffness)
+    def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, boundary: InterfaceOperators) -> None:
+        super().__init__(comm, jump_operator, boundary, boundary.stiffness)
 
 
-class Lumped(Scaled):
+class Lumped(StiffnessScaled):
     """Around the boundary blocks of K."""
 
-    def __init__(self, comm: MPI.Intracomm, constraints: Constraints, boundary: Boundary) -> None:
-        super().__init__(comm, constraints, boundary, boundary.Kbb.__matmul__)
+    def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, boundary: InterfaceOperators) -> None:
+        super().__init__(comm, jump_operator, boundary, boundary.Kbb.__matmul__)

@@ -35,25 +35,25 @@ def mesh_part(cell: TornCell) -> MeshPart:
     columns = 3 * cell.case.cell.order
     sizes = [len(s.mesh.triangles) for s in subdomains]
     triangles = [s.mesh.triangles + n for s, n in zip(subdomains, nodes, strict=False)]
-    phase = [cell.plan.phases.index(s.piece.phase) for s in subdomains]
+    phase = [cell.plan.phases.index(s.submesh.phase) for s in subdomains]
     return MeshPart(
         points=np.concatenate([s.mesh.points for s in subdomains] or [np.zeros((0, 2))]),
         triangles=np.concatenate(triangles or [np.zeros((0, columns), np.int64)]),
-        body=np.repeat([s.piece.body for s in subdomains], sizes).astype(np.int32),
-        subdomain=np.repeat([s.piece.index for s in subdomains], sizes).astype(np.int32),
+        body=np.repeat([s.submesh.body for s in subdomains], sizes).astype(np.int32),
+        subdomain=np.repeat([s.submesh.index for s in subdomains], sizes).astype(np.int32),
         phase=np.repeat(phase, sizes).astype(np.int32),
     )
 
 
 def interface_part(cell: TornCell) -> InterfacePart:
     """The interface nodes whose multipliers this rank owns."""
-    nodes = cell.solver.constraints.nodes
+    nodes = cell.solver.jump_operator.nodes
     return InterfacePart(nodes.points, nodes.normal, nodes.length, nodes.fibre.astype(np.int32))
 
 
 def state_part(cell: TornCell, response: Response, load_factor: float, label: str) -> StatePart:
     """The fields of a response; tractions and jumps are scaled like it."""
-    nodes, solution = cell.solver.constraints.nodes, response.state.solution
+    nodes, solution = cell.solver.jump_operator.nodes, response.state.solution
     u = response.scale * cell.solver.displacement(solution)
     pair = nodes.row[:, None] + np.arange(2)
     return StatePart(

@@ -13,7 +13,7 @@ from unit.config.faulty_cases import BASE, FAULTY_CASES, FIBRE, MESH_CELL, RANDO
 
 from feti_homog.config.case import check_phases, load, parse
 from feti_homog.config.materials import General, Isotropic, Orthotropic
-from feti_homog.config.sections import Angle, Arc, Interface, LoadPath
+from feti_homog.config.sections import Angle, Arc, InterfaceSection, LoadPath
 from feti_homog.errors import CaseError
 
 FAULTY = FAULTY_CASES | FAULTY_BONDINGS
@@ -132,7 +132,7 @@ def test_resolved_makes_the_same_case_again(tmp_path, content):
 def test_interface(tmp_path):
     case = case_of(tmp_path, debonded('{fibre = "all", centre = -30, angle = 60}, {fibre = 2, angle = 10.5}'))
     arcs = (Arc(fibre="all", centre=-30.0, angle=60.0), Arc(fibre=(2,), centre=0.0, angle=10.5))
-    assert case.interface == Interface(debonded=arcs)
+    assert case.interface == InterfaceSection(debonded=arcs)
     assert (case.interface.contact, case.interface.criterion) == (True, "max")
     assert (case.interface.normal_strength, case.interface.tangential_strength) == (None, None)
     strong = case_of(tmp_path, of_type("path", PATH, "[interface]", "normal_strength = inf", "tangential_strength = 2"))
@@ -142,7 +142,7 @@ def test_interface(tmp_path):
 def test_angle(tmp_path):
     case = case_of(tmp_path, of_type("angle", "[angle]", "values = [0, 30, 360.0]", BARE_ARC))
     assert case.angle == Angle(values=(0.0, 30.0, 360.0), strain=None)
-    assert case.interface == Interface(debonded=(Arc(fibre=(1,), angle=None),))
+    assert case.interface == InterfaceSection(debonded=(Arc(fibre=(1,), angle=None),))
 
 
 def test_path(tmp_path):
