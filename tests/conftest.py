@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import support
+from support import jobs
 
 from feti_homog.common.mpi_errors import others_come
 
@@ -41,7 +41,7 @@ def shared_path(comm: Any, tmp_path: Path) -> Path:
 
 @pytest.fixture
 def mpirun() -> Callable[..., Any]:
-    return support.mpirun
+    return jobs.mpirun
 
 
 @pytest.hookimpl(trylast=True)

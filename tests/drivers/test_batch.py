@@ -10,8 +10,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from support import ROOT, environment
-from sweeps import CASE, FAILING, FAILING_POINTS, rows, sweep_file
+from support.jobs import ROOT, environment
+from support.sweep_files import CASE, FAILING, FAILING_POINTS, rows, sweep_file
 
 SCRIPTS = sorted([*(ROOT / "scripts/slurm").iterdir(), *(ROOT / "scripts/pbs").iterdir()])
 TWO = "cell.fibre_fraction = [0.2, 0.3]\n"

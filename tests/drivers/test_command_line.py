@@ -9,8 +9,8 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
-from commands import case_file, command_line
 from matplotlib.image import imread
+from support.command_line import case_file, command_line
 
 import feti_homog.output  # noqa: F401 (chooses the build of h5py)
 

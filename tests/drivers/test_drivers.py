@@ -6,7 +6,7 @@ import re
 
 import pytest
 from matplotlib.image import imread
-from support import ROOT, mpirun
+from support.jobs import ROOT, mpirun
 
 
 def test_effective_stiffness(tmp_path):

@@ -6,8 +6,8 @@ import json
 import time
 
 import pytest
-from commands import case_file, command_line
-from support import mpirun
+from support.command_line import case_file, command_line
+from support.jobs import mpirun
 from unit.cell.faulty_meshes import FAULTY_MESHES
 from unit.config.faulty_cases import FAULTY_CASES
 

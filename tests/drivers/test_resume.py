@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from commands import command_line
-from processes import kill_when, started
+from support.background_jobs import kill_when, started
+from support.command_line import command_line
 
 CASE = """\
 [cell]
@@ -179,7 +179,7 @@ def test_unreadable_checkpoints(tmp_path, interrupted, damage):
 
 
 def test_only_paths_resume(tmp_path):
-    from commands import case_file as stiffness_case
+    from support.command_line import case_file as stiffness_case
 
     job = command_line(1, "run", stiffness_case(tmp_path), "--out", tmp_path / "out", "--resume")
     assert job.returncode == 2 and '--resume: only for [analysis] type = "path"' in job.stderr

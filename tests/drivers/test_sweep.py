@@ -14,11 +14,11 @@ from functools import partial
 from pathlib import Path
 
 import pytest
-from commands import command_line
 from matplotlib.image import imread
-from processes import kill_when, started, wait_until
-from support import ROOT, RUN_VARIABLES, mpirun
-from sweeps import CASE, FAILING, FAILING_POINTS, RANDOM, rows, sweep_file
+from support.background_jobs import kill_when, started, wait_until
+from support.command_line import command_line
+from support.jobs import ROOT, RUN_VARIABLES, mpirun
+from support.sweep_files import CASE, FAILING, FAILING_POINTS, RANDOM, rows, sweep_file
 
 import feti_homog.output  # noqa: F401 (chooses the build of h5py)
 

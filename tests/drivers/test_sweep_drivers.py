@@ -7,8 +7,8 @@ import re
 import numpy as np
 import pytest
 from matplotlib.image import imread
-from support import ROOT, mpirun
-from sweeps import rows
+from support.jobs import ROOT, mpirun
+from support.sweep_files import rows
 
 
 def driven(name, folder, *options):

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cells import FIBRE, MATRIX
 from petsc4py import PETSc
-from support import parallel_assert
+from support.cases import FIBRE, MATRIX
+from support.ranks import parallel_assert
 from unit.cell.faulty_meshes import ALL_SIDES, RIGHT_SIDE, grid
 
 from feti_homog.cell.arrangement import arrange

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import bonds
 import numpy as np
 import pytest
-from cells import make_case, relative_error, solve
 from mpi4py import MPI
 from reference.dense_feti import DualTwin, boundary_of, gathered, matrix, projector
+from support import torn_cells as bonds
+from support.cases import make_case, relative_error, solve
 
 from feti_homog.cell.refinement import Lattice
 from feti_homog.common.progress import Progress

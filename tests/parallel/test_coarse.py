@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import bonds
 import numpy as np
 import pytest
-from cells import relative_error
 from mpi4py import MPI
-from narrow_cells import BOUND, BREAKING, NARROW, SINGLE, Narrow, agree, masks, of_all, together
 from reference import dense_feti
+from support import torn_cells as bonds
+from support.cases import relative_error
+from support.coarse_space_cells import BOUND, BREAKING, NARROW, SINGLE, Narrow, agree, masks, of_all, together
 
 from feti_homog.feti.coarse.adaptive import ROOM, THRESHOLD, AdaptiveCoarseSpace
 from feti_homog.feti.coarse.geneo import coarse_vectors, dual_blocks

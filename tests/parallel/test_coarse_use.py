@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import re
 
-import bonds
 import numpy as np
 import pytest
-from cells import make_case, relative_error, solve, twin_stiffness
 from mpi4py import MPI
-from narrow_cells import BOUND, BREAKING, NARROW, STRAINS, of_all, together
 from reference import dense_feti
+from support import torn_cells as bonds
+from support.cases import make_case, relative_error, solve, twin_stiffness
+from support.coarse_space_cells import BOUND, BREAKING, NARROW, STRAINS, of_all, together
 
 from feti_homog.errors import CaseError
 from feti_homog.feti.coarse.adaptive import THRESHOLD, AdaptiveCoarseSpace

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import bonds
 import numpy as np
 import pytest
-from cells import relative_error
-from random_bonds import random_bonded, random_cell, random_strain
+from support import torn_cells as bonds
+from support.cases import relative_error
+from support.random_cells import random_bonded, random_cell, random_strain
 
 from feti_homog.config.sections import Arc
 from feti_homog.interface import contact as contact_room

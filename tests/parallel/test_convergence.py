@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cells import FIBRE, MATRIX, make_case, relative_error, solve, twin_stiffness
 from mpi4py import MPI
+from support.cases import FIBRE, MATRIX, make_case, relative_error, solve, twin_stiffness
 from unit.cell.faulty_meshes import grid
 
 pytestmark = pytest.mark.parallel

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from cells import FIBRE, MATRIX, make_case, relative_error, solve, twin_stiffness
+from support.cases import FIBRE, MATRIX, make_case, relative_error, solve, twin_stiffness
 
 pytestmark = pytest.mark.parallel
 

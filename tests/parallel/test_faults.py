@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from support import parallel_assert
+from support.ranks import parallel_assert
 from unit.cell.faulty_meshes import FAULTY_MESHES
 from unit.config.faulty_bonding import FAULTY_BONDINGS
 from unit.config.faulty_cases import BASE, FAULTY_CASES

@@ -9,7 +9,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-from sample_output import Sample, part_of, sample, without_interface
+from support.sample_output import Sample, part_of, sample, without_interface
 
 from feti_homog.errors import FetiHomogError
 from feti_homog.output.files.field_file import FieldFile

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import bonds
 import numpy as np
 import pytest
-from cells import relative_error
-from narrow_cells import BREAKING, NARROW, together
 from reference.dense_feti import DualTwin, gathered, matrix
 from scipy.linalg import null_space
+from support import torn_cells as bonds
+from support.cases import relative_error
+from support.coarse_space_cells import BREAKING, NARROW, together
 
 from feti_homog.errors import CaseError
 from feti_homog.feti.factory import MANY

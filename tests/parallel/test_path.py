@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from itertools import pairwise
 
-import bonds
 import numpy as np
 import pytest
-from cells import relative_error
 from reference.load_path import PathTwin
-from support import parallel_assert
+from support import torn_cells as bonds
+from support.cases import relative_error
+from support.ranks import parallel_assert
 
 from feti_homog.common.mpi_errors import on_root
 from feti_homog.interface.contact import BONDED, OPEN

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from cells import MATRIX, make_case
 from mpi4py import MPI
-from support import mpirun, parallel_assert
+from support.cases import MATRIX, make_case
+from support.jobs import mpirun
+from support.ranks import parallel_assert
 
 from feti_homog import Case, CaseError, ConvergenceError, run
 

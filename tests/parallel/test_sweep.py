@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mpi4py import MPI
-from support import parallel_assert
-from sweeps import CASE, RANDOM
+from support.ranks import parallel_assert
+from support.sweep_files import CASE, RANDOM
 
 from feti_homog import run
 from feti_homog.common.mpi_errors import on_root

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import bonds
 import numpy as np
 import pytest
-from narrow_cells import NARROW, together
+from support import torn_cells as bonds
+from support.coarse_space_cells import NARROW, together
 
 from feti_homog.cell.refinement import edge_node
 from feti_homog.feti.coarse import trace_spaces

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+
 from reference.quadratic_programme import QPTwin
 
 TIE = 1e-6

@@ -11,9 +11,10 @@ from dataclasses import dataclass
 
 import clarabel
 import numpy as np
-from reference import monolithic
 from scipy.sparse import bmat, coo_matrix, csc_matrix, csr_matrix, triu
 from scipy.sparse.linalg import splu
+
+from reference import monolithic
 
 EXACT = 1e-9  # relative, of the KKT conditions of an answer
 

@@ -6,7 +6,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from circular import cell
+from support.circular_cells import cell
 
 from feti_homog.cell.arrangement import Arrangement, arrange, clear_shift, neighbours
 from feti_homog.errors import MeshError

@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from circular import cell
+from support.circular_cells import cell
 
 from feti_homog.cell.arrangement import arrange
 from feti_homog.cell.coarse_mesh import areas, flip_double_arcs

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from sweeps import CASE, RANDOM
+from support.sweep_files import CASE, RANDOM
 
 from feti_homog.errors import CaseError
 from feti_homog.sweep import plan

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
-import bonds
 import numpy as np
 import pytest
 from mpi4py import MPI
 from reference.dense_feti import boundary_of, kernel, schur
 from scipy.sparse import csr_matrix, diags, identity
+from support import torn_cells as bonds
 
 from feti_homog.feti.operators.explicit import ExplicitInterfaceOperator, schur_complement
 from feti_homog.feti.operators.implicit import ImplicitInterfaceOperator

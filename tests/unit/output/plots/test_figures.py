@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 from PIL import Image
-from sample_output import Sample, sample, without_interface
+from support.sample_output import Sample, sample, without_interface
 
 from feti_homog.errors import FetiHomogError
 from feti_homog.output.files import xdmf

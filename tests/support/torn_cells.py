@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from cells import make_case
 from petsc4py import PETSc
 from reference.quadratic_programme import QPTwin, keys
 
@@ -16,6 +15,7 @@ from feti_homog.config import sections
 from feti_homog.homogenization import unit_cell
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface.contact import BONDED, OPEN, Interface
+from support.cases import make_case
 
 
 @dataclass(frozen=True)

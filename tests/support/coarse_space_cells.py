@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import bonds
 import numpy as np
-from cells import relative_error
 from mpi4py import MPI
 from reference import dense_feti
 from scipy.linalg import eigh
 
 from feti_homog.common.petsc_options import case_options
 from feti_homog.interface.contact import BONDED, CLOSED, OPEN
+from support import torn_cells as bonds
+from support.cases import relative_error
 
 # Sixteen fibres almost touch; the matrix is cut across the gaps.
 NARROW = {
