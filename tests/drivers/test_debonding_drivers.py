@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.image import imread
+from reference import references
 from support.jobs import mpirun
 
-# Fully debonded without contact: a cell with holes.  Fourier solutions, plane strain: C11, C12, C33.
-BONDED, VOID = (149.690255, 56.975975, 46.357140), (36.123857, 14.523762, 10.800047)
+BONDED, VOID = references.BONDED["hexagonal", "strain"].value, references.VOID["hexagonal"].value
 
 
 def driven(name: str, folder: Path, *options: str) -> list[dict[str, str]]:

@@ -7,6 +7,7 @@ import re
 import numpy as np
 import pytest
 from matplotlib.image import imread
+from reference.references import BONDED
 from support.jobs import ROOT, mpirun
 from support.sweep_files import rows
 
@@ -25,8 +26,8 @@ def test_fibre_fraction_sweep(tmp_path):
         for m in re.finditer(r"^(square|hexagonal|random) +([\d.]+) (.*)$", output, re.MULTILINE)
     }
     assert len(found) == 6 and all(len(v) == (6 if key[0] == "random" else 4) for key, v in found.items())
-    assert found["hexagonal", 0.4][:3] == pytest.approx([149.690255, 56.975975, 46.357140], rel=1e-3)
-    assert found["square", 0.4][:3] == pytest.approx([151.155859, 55.537426, 45.078553], rel=1e-3)
+    assert found["hexagonal", 0.4][:3] == pytest.approx(BONDED["hexagonal", "strain"].value, rel=1e-3)
+    assert found["square", 0.4][:3] == pytest.approx(BONDED["square", "strain"].value, rel=1e-3)
     assert found["hexagonal", 0.2][3] < 1e-3 < 1e-2 < found["square", 0.2][3]
     assert all(output.count(str(tmp_path / name)) == 1 for name in ("sweep.csv", "moduli.png"))
     assert imread(tmp_path / "moduli.png")[..., :3].std() > 0.05
