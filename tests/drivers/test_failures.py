@@ -20,7 +20,7 @@ import os, signal, sys
 from feti_homog import cli
 
 def launch():
-    from feti_homog.feti.operator import DualOperator
+    from feti_homog.feti.operators.dual_operator import DualOperator
     from mpi4py import MPI
     comm, apply, count = MPI.COMM_WORLD, DualOperator.apply, 0
 
