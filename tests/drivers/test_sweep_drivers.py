@@ -18,7 +18,7 @@ def driven(name, folder, *options):
     return job.stdout
 
 
-def test_fibre_fraction_sweep(tmp_path):
+def test_fibre_fraction_sweep_reaches_the_references(tmp_path):
     options = ("--fractions", "0.2", "0.4", "--fibres", "6", "--realisations", "3", "--mesh-size", "0.25")
     output = driven("fibre_fraction_sweep", tmp_path, *options)
     found = {
@@ -34,7 +34,7 @@ def test_fibre_fraction_sweep(tmp_path):
     assert driven("fibre_fraction_sweep", tmp_path, *options) == output
 
 
-def test_representative_cell(tmp_path):
+def test_representative_cell_prints_what_scatters(tmp_path):
     output = driven("representative_cell", tmp_path, "--fibres", "2", "8", "--realisations", "4", "--tolerance", "0.5")
     lines = re.findall(r"^ +\d+ +\d+\..*$", output, re.MULTILINE)
     table = np.array([[float(x) for x in line.split()] for line in lines])

@@ -92,7 +92,7 @@ def test_tips_are_nodes_and_stay_bonded(comm, cell, mesh, bodies):
     check(comm, case, nodes, cell, {fibre: [(0.0, 60.0)] for fibre in range(1, fibres + 1)})
 
 
-def test_several_arcs_on_chosen_fibres(comm):
+def test_several_arcs_debond_the_chosen_fibres_only(comm):
     arcs = [
         {"fibre": [1, 4], "angle": 40.0, "centre": 200.0},
         {"fibre": 4, "angle": 30.0},
@@ -129,7 +129,7 @@ def test_a_tip_beside_a_crossing_is_the_crossing(comm):
 
 @pytest.mark.parametrize("bodies", ["torus", "plane"])
 @pytest.mark.parametrize(("order", "refine"), [(1, 0), (2, 0), (2, 1)])
-def test_debonded_curve_of_a_mesh(comm, shared_path, order, refine, bodies):
+def test_the_debonded_curve_of_a_mesh_is_debonded(comm, shared_path, order, refine, bodies):
     cell = {"geometry": "mesh", "file": "grid.msh", "order": order, "refine": refine, "bodies": bodies}
     for lines, vertices in ((RIGHT_SIDE, 1), (ALL_SIDES, 8)):
         if comm.rank == 0:
@@ -144,7 +144,7 @@ def test_debonded_curve_of_a_mesh(comm, shared_path, order, refine, bodies):
         comm.barrier()
 
 
-def test_curve_and_arcs_go_together(comm, shared_path):
+def test_a_debonded_curve_and_arcs_add_up(comm, shared_path):
     if comm.rank == 0:
         grid().with_curve(RIGHT_SIDE).write(shared_path / "grid.msh")
     comm.barrier()
@@ -167,7 +167,7 @@ def test_without_an_interface_section_all_is_bonded(comm, shared_path):
     comm.barrier()
 
 
-def test_arcs_of_fibres_that_are_not_there(comm):
+def test_arcs_of_fibres_that_are_not_there_are_refused(comm):
     arcs = [{"fibre": [1, 7], "angle": 60.0}, {"fibre": 6, "angle": 60.0}, {"fibre": 5, "angle": 60.0}]
     with pytest.raises(CaseError) as caught:
         tear(case_of(RANDOM, arcs), comm, Progress(comm, quiet=True))
@@ -177,7 +177,7 @@ def test_arcs_of_fibres_that_are_not_there(comm):
     assert second == f"[interface] debonded[1].fibre = 6: {expected}"
 
 
-def test_arcs_of_a_fibre_without_centre(comm, shared_path):
+def test_arcs_of_a_fibre_without_centre_are_refused(comm, shared_path):
     if comm.rank == 0:
         grid(lambda x, y: abs(y - 0.5) < 0.25).write(shared_path / "grid.msh")
     comm.barrier()

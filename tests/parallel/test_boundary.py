@@ -114,7 +114,7 @@ def test_implicit_and_explicit_operators_give_the_same(comm):
         assert relative_error(first, second) < 1e-9
 
 
-def test_dense_operators_where_they_pay(comm, monkeypatch):
+def test_operators_are_explicit_where_they_pay(comm, monkeypatch):
     cell = bonds.tear(comm, geometry="hexagonal", petsc={"feti_coarse_space": "natural"})
 
     def kinds(applications, soft):
@@ -177,7 +177,7 @@ def test_bodies_that_debond_are_whole_unless_their_boundary_is_wide(sizes):
 
 
 @pytest.mark.parametrize("interface", [None, sections.InterfaceSection()])
-def test_there_are_pieces_for_all_ranks(sizes, interface):
+def test_every_rank_has_a_piece(sizes, interface):
     assert wanted([200, 40], [10, 10], interface, n_ranks=2) == [1, 1]
     assert wanted([200, 40], [10, 10], interface, n_ranks=5) == [4, 1]
     assert wanted([260, 70], [10, 41], n_ranks=3) == [3, 1]
@@ -200,14 +200,14 @@ def test_default_pieces_give_every_rank_one(comm, case):
     assert cell.plan.subdomains == max(cell.plan.bodies, comm.size)
 
 
-def test_default_pieces_of_a_bonded_cell(comm, sizes):
+def test_default_pieces_of_a_bonded_cell_are_small(comm, sizes):
     cell, bodies, largest = torn_by_default(comm, None)
     assert len(bodies) > 4
     assert largest < 1.5 * 100
     assert isinstance(cell.solver.coarse, AdaptiveCoarseSpace)
 
 
-def test_default_pieces_of_a_debonding_cell(comm, sizes, monkeypatch):
+def test_default_pieces_of_a_debonding_cell_are_bodies_unless_wide(comm, sizes, monkeypatch):
     monkeypatch.setattr(domain_partition, "WIDE", 1000)
     cell, bodies, largest = torn_by_default(comm, sections.InterfaceSection())
     assert len(bodies) == max(3, comm.size)

@@ -70,7 +70,7 @@ def test_coarse_vectors_are_preconditioned_jumps(comm, narrow):
 # The coarse problem.
 
 
-def test_admissible_corrections_are_the_best(narrow):
+def test_deflation_leaves_what_no_coarse_vector_can_improve(narrow):
     """T z is what no coarse vector can improve; dense, with another generalized inverse."""
     T = dense_feti.matrix(narrow.cell, narrow.coarse.admissible)
     assert relative_error(T, narrow.T) < 1e-9
@@ -83,7 +83,7 @@ def test_admissible_corrections_are_the_best(narrow):
     assert np.abs(V.T @ F @ T).max() < 1e-9 * np.abs(V.T @ F).max()
 
 
-def test_many_columns_at_once(narrow):
+def test_many_columns_are_deflated_as_each_alone(narrow):
     x = narrow.own(narrow.random(0, (3,)))
     for function in (narrow.coarse.admissible, narrow.coarse.residual):
         columns = function(x)
@@ -92,7 +92,7 @@ def test_many_columns_at_once(narrow):
             assert np.abs(alone - columns[:, k]).max(initial=0.0) < 1e-10 * np.abs(columns).max(initial=1.0)
 
 
-def test_projected_operator(narrow):
+def test_the_iteration_applies_the_projected_operator(narrow):
     """What is left of residual(F T z) after T M^-1 is that of T^T F T z."""
     coarse, F, M = narrow.coarse, narrow.solver.operator, narrow.solver.preconditioner
     found = dense_feti.matrix(
@@ -109,7 +109,7 @@ def _improved(narrow, r):
     return lam[:, 0], residual[:, 0]
 
 
-def test_residual_and_correction(narrow):
+def test_after_a_correction_coarse_vectors_see_rigid_motions_only(narrow):
     """After a correction coarse vectors see rigid-body motions only; what is taken off is of rigid-body motions too."""
     coarse, F = narrow.coarse, dense_feti.matrix(narrow.cell, narrow.solver.operator.apply)
     r = narrow.random(1)
@@ -125,7 +125,7 @@ def test_residual_and_correction(narrow):
     assert np.linalg.norm(again - left) < 1e-9 * np.linalg.norm(left)
 
 
-def test_correction_has_the_least_energy(narrow):
+def test_the_initial_correction_has_the_least_energy(narrow):
     """z^T F z / 2 - z^T r is least of all z = U c with G^T z = 0."""
     F, r = narrow.twin.F, narrow.random(2)
     V = narrow.U @ null_space(narrow.twin.G.T @ narrow.U)
@@ -198,7 +198,7 @@ def test_updated_coarse_matrix_equals_one_from_scratch(comm):
     assert relative_error(first, second) < 1e-8
 
 
-def test_masked_corrections_are_the_best(comm):
+def test_deflation_on_active_rows_leaves_what_no_coarse_vector_can_improve(comm):
     """T against a dense one of the active rows; the space is in use, not fallen back from."""
     cell = bonds.tear(comm, **BREAKING)
     twin = dense_feti.DualTwin(cell)
@@ -222,7 +222,7 @@ def test_masked_corrections_are_the_best(comm):
     [(BREAKING, 0.9), (NARROW, 1.1), (NARROW | {"refine": 1}, 0.4)],
     ids=["breaking", "narrow", "refined"],
 )
-def test_inactive_rows_give_the_natural_spaces_solution(comm, case, share):
+def test_with_inactive_rows_the_solution_is_that_of_the_natural_space(comm, case, share):
     """In that share of the iterations."""
     adaptive, natural = (
         bonds.tear(comm, **case, petsc={"feti_coarse_space": space}) for space in ("adaptive", "natural")
@@ -242,7 +242,7 @@ def test_inactive_rows_give_the_natural_spaces_solution(comm, case, share):
 
 @pytest.mark.parametrize("which", ["one", "all"])
 @pytest.mark.parametrize("case", [BREAKING, NARROW], ids=["breaking", "narrow"])
-def test_loose_fibres(comm, case, which):
+def test_fibres_that_float_keep_the_natural_spaces_solution(comm, case, which):
     """Without contact, fibres whose interface is wholly open; with few rows left the space may give up."""
     results = []
     for space in ("adaptive", "natural"):

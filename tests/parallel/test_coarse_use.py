@@ -25,7 +25,7 @@ pytestmark = pytest.mark.parallel
 # Solutions.
 
 
-def test_together_as_one_by_one(narrow):
+def test_loads_solved_together_give_the_solutions_of_each_alone(narrow):
     solver = narrow.solver
     strains = np.array([[1.0, 0, 0], [0.2, -3.0, 1e-3], [0, 0, 1e-4]])
     starts = narrow.own(narrow.random(4, (3,))) * [0.0, 1e-2, 0.0]
@@ -39,14 +39,14 @@ def test_together_as_one_by_one(narrow):
         assert abs(found.iterations - alone.iterations) <= 4
 
 
-def test_a_load_without_multipliers_among_others(narrow):
+def test_a_load_without_multipliers_leaves_the_others_alone(narrow):
     zero, found = together(narrow.cell, np.array([[0.0, 0, 0], [1.0, 0, 0]]))
     assert (zero.lam == 0).all()
     (alone,) = together(narrow.cell, STRAINS[:1])
     assert relative_error(*(dense_feti.gathered(narrow.cell, s.lam) for s in (found, alone))) < 1e-7
 
 
-def test_ranks_do_not_matter(comm):
+def test_soft_modes_and_stress_do_not_depend_on_the_ranks(comm):
     """The same cell on this and on one rank."""
     found = []
     for some in (comm, MPI.COMM_SELF):
@@ -63,7 +63,7 @@ def test_ranks_do_not_matter(comm):
 
 @pytest.mark.parametrize("pieces", [24, 50], ids=["matrix cut", "all cut"])
 @pytest.mark.parametrize("contrast", [1e-3, 1.0, 1e6])
-def test_contrasts_converge_fast(comm, contrast, pieces):
+def test_iterations_stay_few_at_any_contrast(comm, contrast, pieces):
     case = NARROW | {
         "matrix": {"young": 1.0, "poisson": 0.3}, "fibre": {"young": contrast, "poisson": 0.3},
         "petsc": {"feti_ksp_rtol": 1e-8}, "decomposition": {"subdomains": pieces},
@@ -89,7 +89,7 @@ def test_contrasts_converge_fast(comm, contrast, pieces):
         ({"geometry": "hexagonal", "decomposition": {"subdomains": 1}}, "auto", False),
     ],
 )
-def test_choice_of_the_coarse_space(comm, case, space, adaptive):
+def test_the_coarse_space_is_the_one_asked_for_or_that_pays(comm, case, space, adaptive):
     coarse = bonds.tear(comm, **case, petsc={"feti_coarse_space": space}).solver.coarse
     assert isinstance(coarse, AdaptiveCoarseSpace) == adaptive
 
@@ -104,7 +104,7 @@ def test_choice_of_the_coarse_space(comm, case, space, adaptive):
         ({"feti_coarse_space": "adaptive", "feti_pc_type": "lumped"}, "-feti_coarse_space adaptive: needs"),
     ],
 )
-def test_wrong_options_are_refused(comm, petsc, words):
+def test_wrong_options_of_the_coarse_space_are_refused(comm, petsc, words):
     with pytest.raises(CaseError) as caught:
         bonds.tear(comm, **BREAKING, petsc=petsc)
     (fault,) = caught.value.faults
@@ -134,7 +134,7 @@ def test_a_distributed_coarse_problem_gives_the_same(comm, monkeypatch, contrast
 
 
 @pytest.mark.parametrize("petsc", [{"feti_dual_operator": "implicit"}, {"feti_pc_type": "lumped"}])
-def test_natural_space_where_the_adaptive_one_cannot_be(comm, petsc):
+def test_the_natural_space_is_taken_where_the_adaptive_one_cannot_be(comm, petsc):
     cell = bonds.tear(comm, **BREAKING, petsc=petsc)
     assert not isinstance(cell.solver.coarse, AdaptiveCoarseSpace)
 
@@ -143,7 +143,7 @@ def number(pattern, text):
     return float(re.search(pattern + r" ([\d.e+]+)", text)[1])
 
 
-def test_view(comm, narrow, capfd):
+def test_view_shows_the_adaptive_space_and_the_condition_number(comm, narrow, capfd):
     cell, text = bonds.printed(comm, capfd, **NARROW, petsc={"feti_view": True})
     assert number("coarse dimension", text) == narrow.coarse.vectors
     assert number("kernels:", text) == narrow.coarse.dimension
@@ -154,7 +154,7 @@ def test_view(comm, narrow, capfd):
     assert 0.7 * largest / least < number("condition number about", text) < 1.01 * largest / least
 
 
-def test_view_of_the_natural_space(comm, narrow, capfd):
+def test_view_shows_the_natural_space_without_soft_modes(comm, narrow, capfd):
     _, text = bonds.printed(comm, capfd, **NARROW, petsc={"feti_view": True, "feti_coarse_space": "natural"})
     assert number("coarse dimension", text) == narrow.coarse.dimension
     assert "soft modes" not in text

@@ -111,7 +111,7 @@ def test_debonded_fibres_without_contact_are_voids(comm, geometry):
     assert np.abs([L[0, 0] / expected[0], L[0, 1] / expected[1], L[2, 2] / expected[2]] - np.ones(3)).max() < 1e-4
 
 
-def test_arc_of_120_degrees_has_the_published_stiffness(comm):
+def test_an_arc_of_120_degrees_has_the_reference_stiffness(comm):
     """The tips are singular, so the error falls with the element size: extrapolated from two meshes."""
     results = []
     for refine in (1, 2):
@@ -154,7 +154,7 @@ def test_masked_rows_equal_constraints_built_without_them(comm, order):
 
 @pytest.mark.parametrize("bodies", ["torus", "plane"])
 @pytest.mark.parametrize("subdomains", [1, 12])
-def test_loose_fibres_are_counted(comm, bodies, subdomains):
+def test_free_motions_of_debonded_fibres_are_counted(comm, bodies, subdomains):
     pieces = {"subdomains": subdomains}
     cell = bonds.tear(comm, geometry="hexagonal", mesh_size=0.2, bodies=bodies, decomposition=pieces)
     fibre = cell.solver.jump_operator.nodes.fibre

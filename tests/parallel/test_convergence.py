@@ -43,7 +43,7 @@ def test_every_entry_reaches_the_reference(geometry, plane, order):
 
 @pytest.mark.parametrize("order", LADDERS)
 @CELLS
-def test_rate_of_convergence(geometry, plane, order):
+def test_errors_fall_with_twice_the_order_of_the_elements(geometry, plane, order):
     """|L^ef(h) - L^ef| = O(h^2p) for elements of order p."""
     expected = cubic(*BONDED[geometry, plane].value)
     errors = [relative_error(L, expected) for L in ladder(geometry, plane, order)[-3:]]
@@ -59,7 +59,7 @@ def test_hexagonal_cell_is_transversely_isotropic(order):
 
 
 @pytest.mark.parametrize("young", [200.0, 1e-4], ids=["stiff", "nearly void"])
-def test_dilute_slopes(comm, young):
+def test_dilute_slopes_are_the_closed_form(comm, young):
     fibre = {"young": young, "poisson": 0.222}
     expected = dilute_slopes(MATRIX, fibre)
     slopes = []
@@ -107,7 +107,7 @@ def test_laminate_is_exact(comm, shared_path, phases, across, order):
 
 @pytest.mark.parametrize("fraction", [0.1, 0.4, 0.75])
 @pytest.mark.parametrize("geometry", ["square", "hexagonal"])
-def test_within_hashin_shtrikman(comm, geometry, fraction):
+def test_moduli_lie_within_hashin_shtrikman(comm, geometry, fraction):
     """The upper bounds are the lower ones with phases swapped."""
     torn, L, _ = solve(make_case(geometry=geometry, fibre_fraction=fraction, order=2, refine=1), comm)
     c = torn.areas()["fibre"] / torn.plan.area
@@ -119,7 +119,7 @@ def test_within_hashin_shtrikman(comm, geometry, fraction):
 
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("geometry", ["square", "hexagonal"])
-def test_users_mesh_gives_the_same(comm, geometry, order):
+def test_stiffness_of_a_users_mesh_reaches_the_reference(comm, geometry, order):
     case = make_case(geometry="mesh", file=f"{geometry}.msh", folder=MESHES, order=order, refine=2 // order)
     _, L, _ = solve(case, comm)
     assert entry_errors(L, cubic(*BONDED[geometry, "strain"].value)).max() < {1: 3e-4, 2: 1e-5}[order]
@@ -133,7 +133,7 @@ def test_bodies_cut_by_the_cell_change_nothing(comm, geometry, cell):
 
 
 @pytest.mark.parametrize("cell", [{"refine": 2}, {"order": 2}])
-def test_square_fibre(comm, shared_path, cell):
+def test_stiffness_with_a_square_fibre_is_the_monolithic_one(comm, shared_path, cell):
     if comm.rank == 0:
         grid().write(shared_path / "square_fibre.msh")
     comm.barrier()
@@ -144,7 +144,7 @@ def test_square_fibre(comm, shared_path, cell):
 
 @pytest.mark.parametrize("refine", range(3))
 @pytest.mark.parametrize("order", [1, 2])
-def test_iterations_do_not_grow(comm, order, refine):
+def test_iterations_do_not_grow_with_refinement(comm, order, refine):
     """Hexagonal cell, bodies on the torus, from 5 000 to 80 000 degrees of freedom."""
     case = make_case(mesh_size=0.062, order=order, refine=refine + 2 - order, decomposition={"subdomains": 1})
     torn, _, responses = solve(case, comm)

@@ -24,7 +24,7 @@ TIGHT = 1e-9
     ],
     ids=["square", "hexagonal", "quadratic", "random"],
 )
-def test_equals_the_monolithic_twin(comm, cell, pieces, bodies):
+def test_torn_cell_has_the_monolithic_stiffness(comm, cell, pieces, bodies):
     torn, L, responses = solve(make_case(bodies=bodies, decomposition=pieces, **cell), comm)
     assert relative_error(L, twin_stiffness(torn)) < TIGHT
     assert all(r.state.solution.reason > 0 for r in responses)
@@ -40,7 +40,7 @@ def test_preconditioner_changes_only_the_iterations(comm, preconditioner):
 
 
 @pytest.mark.parametrize("option", ["feti_sub_pc_factor_mat_solver_type", "feti_interior_pc_factor_mat_solver_type"])
-def test_mumps_in_the_place_of_cholmod(comm, option):
+def test_mumps_gives_the_stiffness_of_cholmod(comm, option):
     _, L, _ = solve(make_case(petsc={option: "mumps"}), comm)
     _, expected, _ = solve(make_case(), comm)
     assert relative_error(L, expected) < TIGHT
@@ -81,7 +81,7 @@ def test_equal_shear_moduli_obey_hill(comm, cell):
 
 
 @pytest.mark.parametrize("contrast", [1e-4, 1e-2, 1e3, 1e6])
-def test_contrast_converges(comm, contrast):
+def test_stiffness_is_monolithic_at_any_contrast(comm, contrast):
     fibre = {"young": contrast, "poisson": 0.3}
     case = make_case(matrix={"young": 1.0, "poisson": 0.3}, fibre=fibre, decomposition={"subdomains": 6})
     torn, L, responses = solve(case, comm)
@@ -89,7 +89,7 @@ def test_contrast_converges(comm, contrast):
     assert relative_error(L, twin_stiffness(torn)) < 1e-7
 
 
-def test_nearly_incompressible_matrix(comm):
+def test_quadratic_elements_do_not_lock(comm):
     """Quadratic elements do not lock: halving the elements changes L^ef little, unlike with linear ones."""
     matrix = {"young": 88.0, "poisson": 0.4999}
     L = {}
@@ -112,7 +112,7 @@ def test_rounding_in_the_coarse_space_costs_few_iterations(comm):
     assert relative_error(L, twin_stiffness(torn)) < 1e-7
 
 
-def test_dual_operator_and_projector_laws(comm):
+def test_dual_operator_is_symmetric_and_positive_and_the_projector_idempotent(comm):
     torn, _, _ = solve(make_case(geometry="hexagonal", decomposition={"subdomains": 7}), comm)
     solver = torn.solver
     first, last = solver.jump_operator.owned

@@ -71,7 +71,7 @@ def test_the_energy_of_a_body_lies_between_those_of_rings(comm, faces):
     assert examined > 0.9 * whole
 
 
-def test_kernels_of_rings(comm, faces):
+def test_kernels_of_rings_are_the_null_spaces_of_their_stiffness(comm, faces):
     kernels = set()
     for s, dofs, _, face in faces:
         for ring in rings(s, dofs, face):
@@ -101,7 +101,7 @@ def test_a_ring_of_the_whole_body_is_as_stiff(faces, monkeypatch):
 
 @pytest.mark.usefixtures("large")
 @pytest.mark.parametrize("contrast", [1e-3, 2.0, 1e6])
-def test_contrasts_converge_fast(comm, contrast):
+def test_iterations_stay_few_at_any_contrast(comm, contrast):
     case = WHOLE | {
         "matrix": {"young": 1.0, "poisson": 0.3}, "fibre": {"young": contrast, "poisson": 0.3},
         "petsc": {"feti_ksp_rtol": 1e-8, "feti_coarse_space": "adaptive"},
@@ -129,7 +129,7 @@ def test_a_whole_matrix_converges_as_with_one_eigenproblem(comm, monkeypatch):
 
 
 @pytest.mark.usefixtures("large")
-def test_ranks_do_not_matter(comm):
+def test_soft_modes_and_stress_do_not_depend_on_the_ranks(comm):
     found = []
     for some in (comm, MPI.COMM_SELF):
         cell = bonds.tear(some, **WHOLE, petsc={"feti_coarse_space": "adaptive"})
@@ -142,7 +142,7 @@ def test_ranks_do_not_matter(comm):
 
 
 @pytest.mark.usefixtures("large")
-def test_inactive_rows_give_the_natural_spaces_solution(comm):
+def test_with_inactive_rows_the_solution_is_that_of_the_natural_space(comm):
     adaptive, natural = (
         bonds.tear(comm, **WHOLE, refine=1, petsc={"feti_coarse_space": space}) for space in ("adaptive", "natural")
     )

@@ -58,7 +58,7 @@ def states(cell):
 
 
 @CELLS
-def test_is_the_inverse_for_any_active_rows(comm, case):
+def test_influence_columns_give_the_inverse_for_any_active_rows(comm, case):
     cell = bonds.tear(comm, **case, petsc=INFLUENCE)
     twin, influence = DualTwin(cell), cell.solver.preconditioner
     assert isinstance(influence, Influence)
@@ -73,7 +73,7 @@ def test_is_the_inverse_for_any_active_rows(comm, case):
 
 
 @CELLS
-def test_leaves_nothing_to_iterate(comm, case):
+def test_influence_columns_leave_nothing_to_iterate(comm, case):
     cell = bonds.tear(comm, **case, petsc=INFLUENCE)
     other = bonds.tear(comm, **case, petsc={"feti_pc_type": "dirichlet"})
     for status in states(cell):
@@ -86,7 +86,7 @@ def test_leaves_nothing_to_iterate(comm, case):
             assert relative_error(*lam) < 1e-5
 
 
-def test_narrow_gaps_and_contrasts(comm):
+def test_influence_columns_stay_exact_at_narrow_gaps_and_contrasts(comm):
     for contrast in (1e-6, 1e6):
         cell = bonds.tear(comm, **NARROW, fibre={"young": 3.0 * contrast, "poisson": 0.3}, petsc=INFLUENCE)
         solutions = together(cell)
@@ -104,7 +104,7 @@ def test_narrow_gaps_and_contrasts(comm):
     ],
     ids=["path", "stiffness", "dirichlet", "adaptive", "implicit"],
 )
-def test_chosen_for_many_applications(comm, monkeypatch, applications, petsc, chosen):
+def test_influence_columns_are_chosen_for_many_applications(comm, monkeypatch, applications, petsc, chosen):
     monkeypatch.setattr("feti_homog.homogenization.cost_model.applications", lambda case: applications)
     solver = bonds.tear(comm, **BREAKING, petsc=petsc).solver
     assert isinstance(solver.preconditioner, Influence) == chosen
@@ -112,18 +112,18 @@ def test_chosen_for_many_applications(comm, monkeypatch, applications, petsc, ch
         assert all(isinstance(o, ExplicitInterfaceOperator) for o in solver.boundary.operators)
 
 
-def test_not_chosen_where_the_bonded_cell_is_too_large(comm, monkeypatch):
+def test_influence_columns_are_not_chosen_where_the_bonded_cell_is_too_large(comm, monkeypatch):
     monkeypatch.setattr("feti_homog.homogenization.cost_model.applications", lambda case: MANY)
     monkeypatch.setattr("feti_homog.feti.factory.LARGEST_BONDED", 10)
     assert not isinstance(bonds.tear(comm, **BREAKING).solver.preconditioner, Influence)
 
 
-def test_needs_dense_operators(comm):
+def test_influence_columns_need_explicit_operators(comm):
     with pytest.raises(CaseError, match="-feti_pc_type influence: needs -feti_dual_operator explicit"):
         bonds.tear(comm, **BREAKING, petsc=INFLUENCE | {"feti_dual_operator": "implicit"})
 
 
-def test_is_told_by_view(comm, capfd):
+def test_view_shows_the_influence_columns(comm, capfd):
     cell, text = bonds.printed(comm, capfd, **BREAKING, petsc=INFLUENCE | {"feti_view": True})
     size = 2 * comm.allreduce(len(cell.solver.jump_operator.blocks[0]))
     assert f"influence columns by the bonded cell, {size} dofs on its shared nodes" in text

@@ -61,7 +61,7 @@ def is_certified(points):
     ("criterion", "contact", "strain"),
     [("max", True, MIXED), ("quadratic", True, SHEAR), ("max", False, TENSION), ("quadratic", False, MIXED)],
 )
-def test_events_equal_the_twins(comm, cell, criterion, contact, strain):
+def test_events_are_those_of_the_quadratic_programme(comm, cell, criterion, contact, strain):
     case = bonds.build(comm, matrix={"young": 1.0, "poisson": 0.35}, fibre={"young": 5.0, "poisson": 0.2}, **cell)
     strengths = (0.15, 0.3) if criterion == "max" else (0.25, 0.2)
     expected = on_root(comm, lambda: PathTwin(case.twin, contact, *strengths, criterion).proportional(np.array(strain)))
@@ -77,7 +77,7 @@ def test_events_equal_the_twins(comm, cell, criterion, contact, strain):
 
 
 @pytest.mark.parametrize("back", [[0.0, 0.0, 0.0], [-0.6, 0.8, -0.3]], ids=["unloading", "reversal"])
-def test_later_legs_equal_small_steps(comm, back):
+def test_events_of_later_legs_are_those_of_small_steps_and_bisection(comm, back):
     case = bonds.build(comm, matrix={"young": 1.0, "poisson": 0.35}, fibre={"young": 5.0, "poisson": 0.2}, **SQUARE)
     legs = np.array([[0.3, -0.4, 0.15], back, [0.9, -0.9, 0.7]])
     expected = on_root(comm, lambda: PathTwin(case.twin, True, 0.15, 0.3, "max").legs(legs, 12))
@@ -97,7 +97,7 @@ def test_later_legs_equal_small_steps(comm, back):
         assert (bonds.stress(case.cell, unloaded_at[0].state.solution) == 0).all()
 
 
-def test_onset_in_the_square_cell(comm):
+def test_debonding_begins_at_the_load_of_the_series_solution(comm):
     cell = bonds.tear(comm, geometry="square", order=2, mesh_size=0.08, refine=1)
     interface = bonds.interface(cell, True)
     first = next(
@@ -115,7 +115,7 @@ def test_onset_in_the_square_cell(comm):
 
 
 @pytest.mark.parametrize("contact", [True, False])
-def test_debonding_grows_and_dissipates(comm, contact):
+def test_bonds_never_heal_and_every_break_dissipates(comm, contact):
     case = bonds.build(comm, **THREE)
     points = follow(case.cell, contact, StrengthCriterion(20.0, 30.0, "quadratic"), [SHEAR])
     after = broken(case, points)
@@ -141,7 +141,7 @@ def test_increments_meet_events_and_the_curve_between_them_converges_with_first_
     assert constants.max() < 2.1 * constants.min()
 
 
-def test_onset_by_increments_is_late_by_less_than_one(comm):
+def test_onset_by_increments_is_late_by_less_than_one_increment(comm):
     cell = bonds.tear(comm, **SQUARE)
     law, strain = StrengthCriterion(0.05, 0.05, "max"), np.array([[1e-3, 0.0, 0.0]])
     interface, exact = bonds.interface(cell, True), follow(cell, True, law, strain)[0].load_factor
@@ -158,7 +158,7 @@ def rising(exact, loads):
     return loads * (exact[:, 1] / exact[:, 0])[first]
 
 
-def test_goes_on_from_any_point(comm):
+def test_a_path_goes_on_from_any_of_its_points_with_the_same_events(comm):
     case = bonds.build(comm, **SQUARE)
     law, waypoints = StrengthCriterion(20.0, 30.0, "max"), [[0.7, -0.8, 0.5], [0.0, 0.0, 0.0], [-1.0, 1.0, 1.5]]
     points = follow(case.cell, True, law, waypoints)
@@ -170,7 +170,7 @@ def test_goes_on_from_any_point(comm):
     assert follow(case.cell, True, law, waypoints, points[-1].after) == []
 
 
-def test_bodies_and_pieces_change_nothing(comm):
+def test_events_do_not_depend_on_bodies_and_pieces(comm):
     law, curves = StrengthCriterion(20.0, 30.0, "max"), []
     for variant in ({}, {"bodies": "plane"}, {"decomposition": {"subdomains": 9}}):
         cell = bonds.tear(comm, geometry="hexagonal", mesh_size=0.25, **variant)
@@ -193,7 +193,7 @@ def test_infinite_strengths_never_break(comm):
     assert is_certified(points)
 
 
-def test_twenty_fibres_to_the_end(comm):
+def test_twenty_fibres_debond_to_the_end_certified_and_dissipating(comm):
     if comm.size > 2:
         pytest.skip("one test, two cores")
     many = {"geometry": "random", "fibres": 20, "fibre_fraction": 0.4, "min_gap": 0.1, "seed": 2, "mesh_size": 0.08}

@@ -19,7 +19,7 @@ def with_fraction(fraction, **rest):
     return make_case(fibre_fraction=fraction, mesh_size=0.25, **rest)
 
 
-def test_result(comm, shared_path, monkeypatch):
+def test_run_gives_the_same_arrays_on_every_rank_and_writes_no_file(comm, shared_path, monkeypatch):
     """The same arrays on every rank, and no file."""
     monkeypatch.chdir(shared_path)
     result = run(with_fraction(0.4, order=2), comm)
@@ -34,7 +34,7 @@ def test_result(comm, shared_path, monkeypatch):
     parallel_assert(comm, not list(shared_path.iterdir()))
 
 
-def test_path_and_angle(comm):
+def test_points_of_path_and_angle_have_their_shapes(comm):
     document = with_fraction(0.4, geometry="square").resolved()
     document |= {"interface": {"normal_strength": 5.0}, "path": {"strain": [0.2, 0.0, 0.0]}}
     points = run(Case.parse(document | {"analysis": {"type": "path", "plane": "stress"}}), comm).points
@@ -47,7 +47,7 @@ def test_path_and_angle(comm):
     assert result.points["stiffness"][1, 0, 0] < result.points["stiffness"][0, 0, 0]
 
 
-def test_several_cases_at_once(comm):
+def test_halves_of_the_ranks_run_cases_of_their_own(comm):
     """Each half of the ranks runs cases of its own; every rank alone finds the same."""
     colour = comm.rank % 2
     group = comm.Split(colour)
@@ -59,7 +59,7 @@ def test_several_cases_at_once(comm):
     group.Free()
 
 
-def test_a_function_to_minimise(comm):
+def test_many_runs_one_after_the_other_leave_nothing_behind(comm):
     """Many runs one after the other, as an optimiser does, leave nothing behind that fails the next."""
     found = [
         run(make_case(matrix=MATRIX | {"young": young}, mesh_size=0.3), comm).effective_stiffness[2, 2]
@@ -68,7 +68,7 @@ def test_a_function_to_minimise(comm):
     assert (np.diff(found) > 0).all()
 
 
-def test_errors(comm):
+def test_faults_and_failures_are_raised_and_the_next_run_works(comm):
     with pytest.raises(CaseError, match="fibre_fraction"):
         Case.parse({"cell": {"geometry": "square", "fibre_fraction": 0.9}})
     with pytest.raises(ConvergenceError, match="no convergence after 2 iterations"):
@@ -88,7 +88,7 @@ if comm.rank == 0:
 """
 
 
-def test_a_program_whose_other_ranks_run_nothing(comm, shared_path):
+def test_a_run_on_one_rank_does_not_wait_for_the_others(comm, shared_path):
     """PETSc, started by the first run, does not wait for them; here in a program of its own."""
     if comm.rank == 0:
         import tomli_w

@@ -34,7 +34,7 @@ def parts(comm, matrix):
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("columns", [(), (1,), (2,), (3,), (5,)])
-def test_solution(comm, system, kind, columns):
+def test_solve_returns_the_unknowns_that_made_the_right_hand_side_on_every_rank(comm, system, kind, columns):
     E, K, free = system
     rng = np.random.default_rng(2)
     c, a = rng.standard_normal((N, *columns)), rng.standard_normal((M, *columns))
@@ -82,7 +82,7 @@ def test_benign_where_few_solves_are_enough(comm, system, monkeypatch, kind, acc
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_no_constraints(comm, system, kind):
+def test_without_constraints_only_the_definite_block_is_solved(comm, system, kind):
     E, _, _ = system
     c = np.random.default_rng(3).standard_normal((N, 2))
     saddle = kind(comm, parts(comm, E), csr_matrix((0, N)), csr_matrix((0, 0)), "test_")

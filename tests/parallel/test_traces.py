@@ -25,7 +25,7 @@ def tear(comm, enough, monkeypatch, **cell):
 
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("enough", [0, 60, 150, ALL])
-def test_piecewise_linear_along_the_coarse_edges(comm, monkeypatch, enough, order):
+def test_traces_are_piecewise_linear_along_the_coarse_edges(comm, monkeypatch, enough, order):
     cell = tear(comm, enough, monkeypatch, order=order, refine=3 - order)
     for s, dofs in zip(cell.subdomains, cell.solver.boundary.dofs, strict=True):
         nodes, M = dofs[::2] // 2, s.mesh.lattice.intervals
@@ -47,7 +47,7 @@ def test_piecewise_linear_along_the_coarse_edges(comm, monkeypatch, enough, orde
                     assert np.allclose(values, np.interp(np.arange(M + 1), at, values[at]), atol=1e-13)
 
 
-def test_few_dofs_are_all_kept(comm, monkeypatch):
+def test_traces_of_few_dofs_keep_them_all(comm, monkeypatch):
     cell = tear(comm, ALL, monkeypatch)
     for s, dofs in zip(cell.subdomains, cell.solver.boundary.dofs, strict=True):
         P = trace(s.submesh, s.mesh.lattice, dofs[::2] // 2)

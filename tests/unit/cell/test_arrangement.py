@@ -81,7 +81,7 @@ def test_impossible_arrangement_names_the_keys(share, fibres, gap):
 
 @pytest.mark.parametrize(("geometry", "count", "height"), [("square", 1, 1.0), ("hexagonal", 2, np.sqrt(3))])
 @pytest.mark.parametrize("share", [0.001, 0.4, 0.78])
-def test_lattices(geometry, count, height, share):
+def test_lattices_have_the_fraction_that_is_asked_for(geometry, count, height, share):
     result = arrange(cell(geometry, share))
     assert (result.width, result.height, len(result.radii)) == (1.0, height, count)
     assert fraction(result) == pytest.approx(share, abs=1e-14)

@@ -27,7 +27,7 @@ def run(mpirun, ranks, body):
 
 
 @pytest.mark.parametrize("ranks", [1, 2])
-def test_done(mpirun, ranks):
+def test_a_job_without_faults_ends_with_zero(mpirun, ranks):
     assert run(mpirun, ranks, "pass").returncode == 0
 
 

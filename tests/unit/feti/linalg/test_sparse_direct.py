@@ -29,7 +29,7 @@ def resident():
 
 @pytest.mark.parametrize("solver", [DirectSolver, IndefiniteSolver])
 @pytest.mark.parametrize("columns", [(), (1,), (3,), (40,)])
-def test_solves(solver, columns):
+def test_solvers_return_the_unknowns_that_made_the_right_hand_side(solver, columns):
     A = laplacian(12)
     x = np.random.default_rng(0).standard_normal((A.shape[0], *columns))
     np.testing.assert_allclose(solver(A, "test_").solve(A @ x), x, atol=1e-10)
@@ -67,7 +67,7 @@ def test_a_factor_can_be_freed_before_its_owner():
 
 @pytest.mark.parametrize(("accurate", "inner"), [(1e-11, _Augmented), (0.0, _Indefinite)])
 @pytest.mark.parametrize("spread", [1.0, 1e7])
-def test_saddle_points(monkeypatch, spread, accurate, inner):
+def test_both_factors_solve_saddle_points(monkeypatch, spread, accurate, inner):
     """Both factors solve [E K^T; K 0], also where rows of K depend on each other and a motion is free."""
     monkeypatch.setattr("feti_homog.feti.linalg.saddle_point.ACCURATE", accurate)
     rng = np.random.default_rng(1)
@@ -87,7 +87,7 @@ def test_saddle_points(monkeypatch, spread, accurate, inner):
     assert isinstance(saddle._inner, inner)
 
 
-def test_blocks_sum_whatever_is_held(monkeypatch):
+def test_sum_of_blocks_does_not_depend_on_the_buffer(monkeypatch):
     rng = np.random.default_rng(2)
     for held in (1, 50, 10**6):
         monkeypatch.setattr("feti_homog.feti.linalg.distributed_matrix.HELD", held)

@@ -65,7 +65,7 @@ def test_flexibility_is_a_generalized_inverse(parts, kind):
         assert np.linalg.eigvalsh(flexibility)[0] > 0
 
 
-def test_factored_gives_the_numbers_of_condensed(parts):
+def test_implicit_operators_give_the_numbers_of_explicit_ones(parts):
     for s, dofs, _, _ in parts:
         dense, sparse = ExplicitInterfaceOperator(s, dofs), ImplicitInterfaceOperator(s, dofs)
         x = np.random.default_rng(1).standard_normal((len(dofs), 4))
@@ -88,7 +88,7 @@ def test_one_vector_is_a_column_of_many(parts, kind):
                 assert np.abs(alone - together[:, k]).max() < TIGHT * np.abs(together).max()
 
 
-def test_answer_is_the_flexibility_of_many_columns(parts):
+def test_flexibility_of_many_columns_is_that_of_each(parts):
     for s, dofs, _, _ in parts:
         operator = ExplicitInterfaceOperator(s, dofs)
         X = np.random.default_rng(3).standard_normal((len(dofs), 7))
@@ -99,7 +99,7 @@ def test_answer_is_the_flexibility_of_many_columns(parts):
             assert (given == before).all()
 
 
-def test_dense_matrices(parts):
+def test_dense_matrices_are_those_that_are_applied(parts):
     for s, dofs, _, S in parts:
         operator = ExplicitInterfaceOperator(s, dofs)
         assert np.abs(operator.S - S).max() < TIGHT * np.abs(S).max()
@@ -111,12 +111,12 @@ def test_dense_matrices(parts):
         assert np.abs(held @ inverse - np.eye(len(dofs))).max() < 1e-8
 
 
-def test_schur_complement_without_an_interior():
+def test_schur_complement_without_an_interior_is_the_matrix():
     A = csr_matrix(np.diag([2.0, 3.0]) + 1.0)
     assert (schur_complement(A, np.arange(2)) == A.toarray()).all()
 
 
-def test_schur_complement_of_any_definite_matrix():
+def test_schur_complement_of_any_definite_matrix_is_the_dense_one():
     n, dofs = 30, np.array([1, 4, 5, 17, 29])
     A = csr_matrix(diags([np.arange(n) + 4.0, np.full(n - 1, -1.5), np.full(n - 1, -1.5)], [0, 1, -1]))
     expected = np.linalg.inv(np.linalg.inv(A.toarray())[np.ix_(dofs, dofs)])
