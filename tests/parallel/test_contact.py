@@ -82,6 +82,7 @@ def test_sign_of_shear_flips_only_the_shear_stress(comm):
     assert relative_error(plus, minus * [1, 1, -1]) < 1e-3
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("seed", range(3))
 def test_energy_of_free_contact_and_bonded_faces_rises(comm, seed):
     rng = np.random.default_rng(seed)
@@ -95,6 +96,7 @@ def test_energy_of_free_contact_and_bonded_faces_rises(comm, seed):
         assert free * (1 - 1e-9) < contact < bonded * (1 - 1e-6)
 
 
+@pytest.mark.quick
 def test_debonded_fibre_with_contact_is_a_void_under_tension(comm):
     cell = bonds.tear(comm, geometry="square", order=2, mesh_size=0.2)
     status = np.full(len(directions(cell)), OPEN, np.int8)

@@ -12,6 +12,7 @@ pytestmark = pytest.mark.parallel
 TIGHT = 1e-9
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("bodies", ["torus", "plane"])
 @pytest.mark.parametrize("pieces", [{}, {"subdomains": 9}, {"max_dofs": 150}])
 @pytest.mark.parametrize(

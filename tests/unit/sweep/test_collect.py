@@ -99,6 +99,7 @@ def test_tables_hold_cases_and_statistics_of_points(tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["sweep.csv", "sweep.h5"]
 
 
+@pytest.mark.slow
 def test_mean_curves_keep_the_bonded_branch(tmp_path):
     documents = [path_document(fibres, shift) for shift in (0.0, 1.0) for fibres in (2, 4)]
     table = collected({"cell.fibres": [2, 4, 2, 4], "cell.seed": [0, 0, 1, 1]}, documents, [1, 2, 1, 2], [1, 1, 2, 2])
@@ -117,6 +118,7 @@ def test_mean_curves_keep_the_bonded_branch(tmp_path):
     assert_drawn(tmp_path, table, ["cell_size.png", "curves.png"])
 
 
+@pytest.mark.slow
 def test_moduli_are_drawn(tmp_path):
     assert_drawn(tmp_path, fractions(), ["moduli.png"])
     documents = [document(0.4, fibres, shift / fibres) for shift in (-1.0, 0.0, 1.0) for fibres in (4, 8, 16)]

@@ -35,6 +35,7 @@ def test_solvers_return_the_unknowns_that_made_the_right_hand_side(solver, colum
     np.testing.assert_allclose(solver(A, "test_").solve(A @ x), x, atol=1e-10)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "make",
     [

@@ -67,6 +67,7 @@ def test_an_unreadable_event_is_refused(tmp_path, content):
         checkpoint.read()
 
 
+@pytest.mark.slow
 def test_a_damaged_event_is_refused_or_harmless(tmp_path):
     checkpoint, chance = written(tmp_path), random.Random(0)
     path = tmp_path / "checkpoint" / "000003.h5"

@@ -85,6 +85,7 @@ def test_outlines_leave_out_the_cuts_within_a_body(tmp_path: Path) -> None:
     assert length == pytest.approx(4 + 2 * 4 * 0.5 + 2 * 0.5)  # and both sides of the cut
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("order", "refine"), [(1, 1), (2, 0)])
 def test_all_pictures_are_made(tmp_path: Path, order: int, refine: int) -> None:
     write(tmp_path, sample(4, refine, order))
@@ -115,6 +116,7 @@ LISTS = [
 ]  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("document", "names"), LISTS, ids=["path", "angle, strain", "angle, stiffness"])
 def test_pictures_of_paths_and_angles_are_made(tmp_path: Path, document: dict[str, Any], names: list[str]) -> None:
     write(tmp_path, sample(4, refine=1))
@@ -148,6 +150,7 @@ def test_faces_are_as_their_worst_node(tmp_path: Path) -> None:
     assert [expected[y, round(16 * x)] for x, y in middle] == states.tolist()
 
 
+@pytest.mark.slow
 def test_the_case_chooses_component_and_scale(tmp_path: Path) -> None:
     write(tmp_path, sample(4))
     before = [path.read_bytes() for path in figures.plot(tmp_path)]
