@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from mpi4py import MPI
-from reference.dense_feti import DualTwin, boundary_of, gathered, matrix, projector
-from support import torn_cells as bonds
+from reference.dense_feti import DenseDual, boundary_of, gathered, matrix, projector
+from support import torn_cells
 from support.cases import make_case, relative_error, solve
 
 from feti_homog.cell.refinement import Lattice
@@ -40,7 +40,7 @@ CELLS = pytest.mark.parametrize(
 @CELLS
 def test_extension_is_harmonic(comm, case):
     """K u = 0 but on the boundary, where it is S x."""
-    cell = bonds.tear(comm, **case)
+    cell = torn_cells.tear(comm, **case)
     boundary = cell.solver.boundary
     x = np.random.default_rng(comm.rank).standard_normal(boundary.offsets[-1])
     u, forces = boundary.extend(x), boundary.stiffness(x)
@@ -55,7 +55,7 @@ def test_extension_is_harmonic(comm, case):
 
 @CELLS
 def test_boundary_is_where_the_constraints_act(comm, case):
-    cell = bonds.tear(comm, **case)
+    cell = torn_cells.tear(comm, **case)
     B = cell.solver.jump_operator.B.toarray()
     for s, dofs, first in zip(cell.subdomains, cell.solver.boundary.dofs, cell.offsets, strict=False):
         assert (dofs == boundary_of(B[:, first : first + len(s.Q)])).all()
@@ -66,7 +66,7 @@ def test_boundary_is_where_the_constraints_act(comm, case):
 
 @CELLS
 def test_load_vanishes_inside_the_bodies(comm, case):
-    cell = bonds.tear(comm, **case)
+    cell = torn_cells.tear(comm, **case)
     inside = cell.solver.Q.copy()
     inside[cell.solver.boundary.local] = 0
     largest = comm.allreduce(np.abs(cell.solver.Q).max(initial=0.0), MPI.MAX)
@@ -78,12 +78,12 @@ def test_load_vanishes_inside_the_bodies(comm, case):
 @pytest.mark.parametrize("kind", ["implicit", "explicit"])
 def test_torn_cell_equals_the_dense_one(comm, case, kind):
     """P d, P^T F P and the torn cell's stiffness do not depend on the generalized inverse."""
-    cell = bonds.tear(comm, **case, petsc={"feti_dual_operator": kind})
-    twin, solver = DualTwin(cell), cell.solver
-    P = projector(twin.G)
+    cell = torn_cells.tear(comm, **case, petsc={"feti_dual_operator": kind})
+    dense, solver = DenseDual(cell), cell.solver
+    P = projector(dense.G)
     F = matrix(cell, solver.operator.apply)
-    assert relative_error(P @ F @ P, P @ twin.F @ P) < 1e-10
-    own_jump, own_stiffness = np.zeros((twin.total, 3)), np.zeros((3, 3))
+    assert relative_error(P @ F @ P, P @ dense.F @ P) < 1e-10
+    own_jump, own_stiffness = np.zeros((dense.total, 3)), np.zeros((3, 3))
     for s, first in zip(cell.subdomains, cell.offsets, strict=False):
         u = np.linalg.pinv(s.K.toarray(), rcond=1e-10, hermitian=True) @ -s.Q
         own_jump[solver.jump_operator.rows] += solver.jump_operator.B[:, first : first + len(u)] @ u
@@ -97,9 +97,9 @@ def test_torn_cell_equals_the_dense_one(comm, case, kind):
 
 @CELLS
 def test_preconditioner_equals_the_dense_one(comm, case):
-    cell = bonds.tear(comm, **case)
+    cell = torn_cells.tear(comm, **case)
     active = np.ones(cell.solver.jump_operator.total, bool)
-    expected = DualTwin(cell).preconditioner(active)
+    expected = DenseDual(cell).preconditioner(active)
     assert relative_error(matrix(cell, cell.solver.preconditioner.apply), expected) < 1e-11
 
 
@@ -115,7 +115,7 @@ def test_implicit_and_explicit_operators_give_the_same(comm):
 
 
 def test_operators_are_explicit_where_they_pay(comm, monkeypatch):
-    cell = bonds.tear(comm, geometry="hexagonal", petsc={"feti_coarse_space": "natural"})
+    cell = torn_cells.tear(comm, geometry="hexagonal", petsc={"feti_coarse_space": "natural"})
 
     def kinds(applications, soft):
         boundary = InterfaceOperators(cell.solver.jump_operator, cell.subdomains, "auto", applications, soft)
@@ -131,9 +131,9 @@ def test_operators_are_explicit_where_they_pay(comm, monkeypatch):
 def test_adaptive_space_is_refused_where_boundaries_are_too_large(comm, monkeypatch):
     case = {"geometry": "hexagonal", "decomposition": {"subdomains": 8}}
     monkeypatch.setattr(boundaries, "LARGEST_DENSE", 10)
-    assert not isinstance(bonds.tear(comm, **case).solver.coarse, AdaptiveCoarseSpace)
+    assert not isinstance(torn_cells.tear(comm, **case).solver.coarse, AdaptiveCoarseSpace)
     with pytest.raises(CaseError, match="-feti_coarse_space adaptive: needs"):
-        bonds.tear(comm, **case, petsc={"feti_coarse_space": "adaptive"})
+        torn_cells.tear(comm, **case, petsc={"feti_coarse_space": "adaptive"})
 
 
 @pytest.fixture
@@ -195,7 +195,7 @@ def torn_by_default(comm, interface):
 
 @pytest.mark.parametrize("case", [{"geometry": "square"}, RANDOM, RANDOM | {"bodies": "plane", "mesh_size": 0.25}])
 def test_default_pieces_give_every_rank_one(comm, case):
-    cell = bonds.tear(comm, **case)
+    cell = torn_cells.tear(comm, **case)
     assert min(comm.allgather(len(cell.subdomains))) > 0
     assert cell.plan.subdomains == max(cell.plan.bodies, comm.size)
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 from reference import dense_feti
-from support import torn_cells as bonds
-from support.cases import make_case, relative_error, solve, twin_stiffness
+from support import torn_cells
+from support.cases import make_case, monolithic_stiffness, relative_error, solve
 from support.coarse_space_cells import BOUND, BREAKING, NARROW, STRAINS, of_all, together
 
 from feti_homog.errors import CaseError
@@ -50,10 +50,10 @@ def test_soft_modes_and_stress_do_not_depend_on_the_ranks(comm):
     """The same cell on this and on one rank."""
     found = []
     for some in (comm, MPI.COMM_SELF):
-        cell = bonds.tear(some, **NARROW)
+        cell = torn_cells.tear(some, **NARROW)
         solution = cell.solver.solve(np.array([1.0, -0.5, 0.3]), np.zeros(cell.solver.rows))
         soft = of_all(some, cell.solver.coarse, cell)
-        found.append((cell.solver.coarse.vectors, soft, solution.iterations, bonds.stress(cell, solution)))
+        found.append((cell.solver.coarse.vectors, soft, solution.iterations, torn_cells.stress(cell, solution)))
     (vectors, soft, iterations, stress), (of_one, soft_of_one, iterations_of_one, stress_of_one) = found
     assert vectors == of_one
     assert soft == soft_of_one
@@ -74,7 +74,7 @@ def test_iterations_stay_few_at_any_contrast(comm, contrast, pieces):
     assert max(r.state.iterations for r in responses) <= 30
     # The tolerance is on the three load cases together.
     assert max(r.state.solution.residual for r in responses) <= np.sqrt(3) * 1e-8
-    assert relative_error(L, twin_stiffness(torn)) < 1e-7
+    assert relative_error(L, monolithic_stiffness(torn)) < 1e-7
 
 
 # Options.
@@ -90,7 +90,7 @@ def test_iterations_stay_few_at_any_contrast(comm, contrast, pieces):
     ],
 )
 def test_the_coarse_space_is_the_one_asked_for_or_that_pays(comm, case, space, adaptive):
-    coarse = bonds.tear(comm, **case, petsc={"feti_coarse_space": space}).solver.coarse
+    coarse = torn_cells.tear(comm, **case, petsc={"feti_coarse_space": space}).solver.coarse
     assert isinstance(coarse, AdaptiveCoarseSpace) == adaptive
 
 
@@ -106,7 +106,7 @@ def test_the_coarse_space_is_the_one_asked_for_or_that_pays(comm, case, space, a
 )
 def test_wrong_options_of_the_coarse_space_are_refused(comm, petsc, words):
     with pytest.raises(CaseError) as caught:
-        bonds.tear(comm, **BREAKING, petsc=petsc)
+        torn_cells.tear(comm, **BREAKING, petsc=petsc)
     (fault,) = caught.value.faults
     assert fault.startswith(words)
 
@@ -121,7 +121,7 @@ def test_a_distributed_coarse_problem_gives_the_same(comm, monkeypatch, contrast
         (0, SaddlePoint, DirectSolver if alone else Distributed),
     ):
         monkeypatch.setattr("feti_homog.feti.linalg.replicated_saddle_point.LARGEST_REPLICATED", largest)
-        cell = bonds.tear(comm, **case)
+        cell = torn_cells.tear(comm, **case)
         saddle = cell.solver.coarse.saddle
         assert isinstance(saddle, kind)
         inner = saddle.alone if isinstance(saddle, Replicated) else saddle
@@ -135,7 +135,7 @@ def test_a_distributed_coarse_problem_gives_the_same(comm, monkeypatch, contrast
 
 @pytest.mark.parametrize("petsc", [{"feti_dual_operator": "implicit"}, {"feti_pc_type": "lumped"}])
 def test_the_natural_space_is_taken_where_the_adaptive_one_cannot_be(comm, petsc):
-    cell = bonds.tear(comm, **BREAKING, petsc=petsc)
+    cell = torn_cells.tear(comm, **BREAKING, petsc=petsc)
     assert not isinstance(cell.solver.coarse, AdaptiveCoarseSpace)
 
 
@@ -144,22 +144,22 @@ def number(pattern, text):
 
 
 def test_view_shows_the_adaptive_space_and_the_condition_number(comm, narrow, capfd):
-    cell, text = bonds.printed(comm, capfd, **NARROW, petsc={"feti_view": True})
+    cell, text = torn_cells.printed(comm, capfd, **NARROW, petsc={"feti_view": True})
     assert number("coarse dimension", text) == narrow.coarse.vectors
     assert number("kernels:", text) == narrow.coarse.dimension
     assert number("soft modes below", text) == THRESHOLD
     assert f"soft modes below {THRESHOLD:g}: {narrow.coarse.vectors - narrow.coarse.dimension}," in text
     assert f"{cell.plan.subdomains} subdomains, {cell.plan.subdomains} with dense boundary operators" in text
-    least, largest = dense_feti.extreme_eigenvalues(narrow.T, narrow.twin.F, narrow.M)
+    least, largest = dense_feti.extreme_eigenvalues(narrow.T, narrow.dense.F, narrow.M)
     assert 0.7 * largest / least < number("condition number about", text) < 1.01 * largest / least
 
 
 def test_view_shows_the_natural_space_without_soft_modes(comm, narrow, capfd):
-    _, text = bonds.printed(comm, capfd, **NARROW, petsc={"feti_view": True, "feti_coarse_space": "natural"})
+    _, text = torn_cells.printed(comm, capfd, **NARROW, petsc={"feti_view": True, "feti_coarse_space": "natural"})
     assert number("coarse dimension", text) == narrow.coarse.dimension
     assert "soft modes" not in text
     assert number("condition number about", text) > 10 * BOUND / THRESHOLD
 
 
 def test_nothing_is_printed_unasked(comm, capfd):
-    assert bonds.printed(comm, capfd, **BREAKING)[1] == ""
+    assert torn_cells.printed(comm, capfd, **BREAKING)[1] == ""

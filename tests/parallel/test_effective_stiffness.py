@@ -1,11 +1,11 @@
-"""L^ef of the torn cell against a monolithic twin, closed forms and laws, at any number of ranks."""
+"""L^ef of the torn cell against a monolithic solve, closed forms and laws, at any number of ranks."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 from reference.closed_forms import hill_bulk, homogeneous
-from support.cases import FIBRE, MATRIX, make_case, relative_error, solve, twin_stiffness
+from support.cases import FIBRE, MATRIX, make_case, monolithic_stiffness, relative_error, solve
 
 pytestmark = pytest.mark.parallel
 
@@ -27,7 +27,7 @@ TIGHT = 1e-9
 )
 def test_torn_cell_has_the_monolithic_stiffness(comm, cell, pieces, bodies):
     torn, L, responses = solve(make_case(bodies=bodies, decomposition=pieces, **cell), comm)
-    assert relative_error(L, twin_stiffness(torn)) < TIGHT
+    assert relative_error(L, monolithic_stiffness(torn)) < TIGHT
     assert all(r.state.solution.reason > 0 for r in responses)
     assert max(max(r.checks.values()) for r in responses) < 1e-8
 
@@ -87,7 +87,7 @@ def test_stiffness_is_monolithic_at_any_contrast(comm, contrast):
     case = make_case(matrix={"young": 1.0, "poisson": 0.3}, fibre=fibre, decomposition={"subdomains": 6})
     torn, L, responses = solve(case, comm)
     assert all(r.state.solution.reason > 0 for r in responses)
-    assert relative_error(L, twin_stiffness(torn)) < 1e-7
+    assert relative_error(L, monolithic_stiffness(torn)) < 1e-7
 
 
 def test_quadratic_elements_do_not_lock(comm):
@@ -110,7 +110,7 @@ def test_rounding_in_the_coarse_space_costs_few_iterations(comm):
     torn, L, responses = solve(make_case(matrix=matrix, decomposition={"subdomains": 4}, **cell), comm)
     assert all(r.state.solution.reason > 0 for r in responses)
     assert max(r.state.solution.iterations for r in responses) < 40
-    assert relative_error(L, twin_stiffness(torn)) < 1e-7
+    assert relative_error(L, monolithic_stiffness(torn)) < 1e-7
 
 
 def test_dual_operator_is_symmetric_and_positive_and_the_projector_idempotent(comm):

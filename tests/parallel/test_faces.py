@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 from reference import dense_feti
-from support import torn_cells as bonds
-from support.cases import make_case, relative_error, solve, twin_stiffness
+from support import torn_cells
+from support.cases import make_case, monolithic_stiffness, relative_error, solve
 from support.coarse_space_cells import NARROW, agree, masks, of_all, together
 
 from feti_homog.feti.coarse import face_neighbourhoods as rings_module
@@ -32,7 +32,7 @@ TIGHT = 1e-9
 @pytest.fixture(params=CASES.values(), ids=CASES.keys())
 def faces(request, comm):
     """(subdomain, boundary dofs, S, face) of all pairs of neighbours."""
-    cell = bonds.tear(comm, **request.param, petsc={"feti_coarse_space": "natural"})
+    cell = torn_cells.tear(comm, **request.param, petsc={"feti_coarse_space": "natural"})
     solver, found = cell.solver, []
     neighbours = Neighbours(comm, solver.jump_operator, cell.subdomains)
     for i, s in enumerate(cell.subdomains):
@@ -111,7 +111,7 @@ def test_iterations_stay_few_at_any_contrast(comm, contrast):
     assert comm.allreduce(any(torn.solver.boundary.large), MPI.LOR)
     assert all(r.state.solution.reason > 0 for r in responses)
     assert max(r.state.iterations for r in responses) <= 25
-    assert relative_error(L, twin_stiffness(torn)) < 1e-7
+    assert relative_error(L, monolithic_stiffness(torn)) < 1e-7
 
 
 def test_a_whole_matrix_converges_as_with_one_eigenproblem(comm, monkeypatch):
@@ -120,7 +120,7 @@ def test_a_whole_matrix_converges_as_with_one_eigenproblem(comm, monkeypatch):
     iterations, vectors = [], []
     for whole, space in ((300, "adaptive"), (4000, "adaptive"), (4000, "natural")):
         monkeypatch.setattr(boundaries, "LARGEST_WHOLE", whole)
-        cell = bonds.tear(comm, **case, petsc={"feti_coarse_space": space, "feti_ksp_rtol": 1e-8})
+        cell = torn_cells.tear(comm, **case, petsc={"feti_coarse_space": space, "feti_ksp_rtol": 1e-8})
         iterations.append(together(cell)[0].iterations)
         vectors.append(cell.solver.coarse.vectors)
     assert iterations[0] <= iterations[1] + 5
@@ -132,9 +132,9 @@ def test_a_whole_matrix_converges_as_with_one_eigenproblem(comm, monkeypatch):
 def test_soft_modes_and_stress_do_not_depend_on_the_ranks(comm):
     found = []
     for some in (comm, MPI.COMM_SELF):
-        cell = bonds.tear(some, **WHOLE, petsc={"feti_coarse_space": "adaptive"})
+        cell = torn_cells.tear(some, **WHOLE, petsc={"feti_coarse_space": "adaptive"})
         solution = cell.solver.solve(np.array([1.0, -0.5, 0.3]), np.zeros(cell.solver.rows))
-        found.append((of_all(some, cell.solver.coarse, cell), solution.iterations, bonds.stress(cell, solution)))
+        found.append((of_all(some, cell.solver.coarse, cell), solution.iterations, torn_cells.stress(cell, solution)))
     (soft_modes, iterations, stress), (of_one, iterations_of_one, stress_of_one) = found
     assert soft_modes == of_one
     assert abs(iterations - iterations_of_one) <= 1
@@ -144,7 +144,8 @@ def test_soft_modes_and_stress_do_not_depend_on_the_ranks(comm):
 @pytest.mark.usefixtures("large")
 def test_with_inactive_rows_the_solution_is_that_of_the_natural_space(comm):
     adaptive, natural = (
-        bonds.tear(comm, **WHOLE, refine=1, petsc={"feti_coarse_space": space}) for space in ("adaptive", "natural")
+        torn_cells.tear(comm, **WHOLE, refine=1, petsc={"feti_coarse_space": space})
+        for space in ("adaptive", "natural")
     )
     assert isinstance(adaptive.solver.coarse, AdaptiveCoarseSpace)
     for active in masks(adaptive, range(2)):

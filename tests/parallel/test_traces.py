@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from support import torn_cells as bonds
+from support import torn_cells
 from support.coarse_space_cells import NARROW, together
 
 from feti_homog.cell.refinement import edge_node
@@ -20,7 +20,7 @@ ALL = 10**9
 
 def tear(comm, enough, monkeypatch, **cell):
     monkeypatch.setattr(trace_spaces, "ENOUGH", enough)
-    return bonds.tear(comm, **REFINED | cell)
+    return torn_cells.tear(comm, **REFINED | cell)
 
 
 @pytest.mark.parametrize("order", [1, 2])

@@ -1,4 +1,4 @@
-"""A dense twin of the dual problem: Schur complements, preconditioner and deflation by NumPy alone, on every rank.
+"""The dual problem with dense matrices: Schur complements, preconditioner, deflation by NumPy alone, on every rank.
 
 It takes K and B of each subdomain from the program, nothing else.
 """
@@ -40,7 +40,7 @@ def matrix(cell, function):
     return gathered(cell, function(np.eye(cell.solver.jump_operator.total)[first:last]))
 
 
-class DualTwin:
+class DenseDual:
     """The subdomains of all ranks in the order of their numbers, on their boundaries.
 
     Attributes:

@@ -48,8 +48,8 @@ def solve(case, comm):
         return cell, stiffness.run(context)["effective_stiffness"], responses
 
 
-def twin_stiffness(cell):
-    """L^ef of the same refined mesh by the twin, on every rank."""
+def monolithic_stiffness(cell):
+    """L^ef of the same refined mesh by one monolithic solve, on every rank."""
     parts = cell.comm.gather([(s.mesh.points, s.mesh.triangles, s.L) for s in cell.subdomains])
     result = None
     if cell.comm.rank == 0:

@@ -1,4 +1,4 @@
-"""Torn cells with interfaces for the tests, and the same cells for the twins."""
+"""Torn cells with interfaces, and the same cells for the quadratic programme that they are checked by."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from petsc4py import PETSc
-from reference.quadratic_programme import QPTwin, keys
+from reference.quadratic_programme import QuadraticProgramme, torus_keys
 
 from feti_homog.cell.arrangement import arrange
 from feti_homog.common.petsc_options import case_options
@@ -19,25 +19,25 @@ from support.cases import make_case
 
 
 @dataclass(frozen=True)
-class Bonds:
-    """A torn cell, its twin (None but on rank 0) and, there, the twin's number of each node in the ranks' order."""
+class ReferencedCell:
+    """A torn cell and, on rank 0, its quadratic programme and that one's number of each interface node."""
 
     cell: TornCell
-    twin: QPTwin | None
+    reference: QuadraticProgramme | None
     order: np.ndarray
 
     def interface(self, contact):
         return interface(self.cell, contact)
 
     def status(self, bonded):
-        """The status on this rank, debonded nodes open, of the twin's `bonded` (k,) on rank 0.  Collective."""
+        """The status on this rank, debonded nodes open, of the reference's `bonded` (k,) on rank 0.  Collective."""
         comm = self.cell.comm
         bonded = comm.bcast(bonded[self.order] if comm.rank == 0 else None)
         first = comm.exscan(self.here) or 0
         return np.where(bonded[first : first + self.here], BONDED, OPEN).astype(np.int8)
 
-    def of_twin(self, values):
-        """Values of the interface nodes in the twin's order, on every rank.  Collective."""
+    def in_reference_order(self, values):
+        """Values of the interface nodes in the reference's order, on every rank.  Collective."""
         parts = self.cell.comm.gather(values)
         if parts is not None:
             values = np.concatenate(parts)
@@ -76,7 +76,7 @@ def interface(cell, contact):
 
 
 def build(comm, **case):
-    """The cell of `tear` and its twin.  Collective."""
+    """The cell of `tear` and its quadratic programme.  Collective."""
     cell = tear(comm, **case)
     size = np.array([cell.plan.width, cell.plan.height])
     parts = [
@@ -84,13 +84,13 @@ def build(comm, **case):
     ]
     parts, points = comm.gather(parts), comm.gather(cell.solver.jump_operator.nodes.points)
     if parts is None:
-        return Bonds(cell, None, np.zeros(0, int))
+        return ReferencedCell(cell, None, np.zeros(0, int))
     fibres = arrange(cell.case.cell)
-    twin = QPTwin([part for own in parts for part in own], fibres.centres, fibres.radii, size)
-    key = keys(np.concatenate(points), size)
-    order = np.searchsorted(twin.key, key)
-    assert (np.sort(key) == twin.key).all()
-    return Bonds(cell, twin, order)
+    reference = QuadraticProgramme([part for own in parts for part in own], fibres.centres, fibres.radii, size)
+    key = torus_keys(np.concatenate(points), size)
+    order = np.searchsorted(reference.key, key)
+    assert (np.sort(key) == reference.key).all()
+    return ReferencedCell(cell, reference, order)
 
 
 def energy(cell, solution):

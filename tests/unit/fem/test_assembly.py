@@ -1,4 +1,4 @@
-"""Refinement and assembly of one subdomain against element loops of the twin."""
+"""Refinement and assembly of one subdomain against element loops of the monolithic solve."""
 
 from __future__ import annotations
 

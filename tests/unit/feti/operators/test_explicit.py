@@ -9,7 +9,7 @@ import pytest
 from mpi4py import MPI
 from reference.dense_feti import boundary_of, kernel, schur
 from scipy.sparse import csr_matrix, diags, identity
-from support import torn_cells as bonds
+from support import torn_cells
 
 from feti_homog.feti.operators.explicit import ExplicitInterfaceOperator, schur_complement
 from feti_homog.feti.operators.implicit import ImplicitInterfaceOperator
@@ -26,7 +26,7 @@ def parts(request):
     """(subdomain, boundary dofs, K, S) of pinned and of free subdomains, with and without a rotation."""
     case = dict(request.param)
     pieces = {"subdomains": case.pop("subdomains")} if "subdomains" in case else {}
-    cell = bonds.tear(MPI.COMM_SELF, geometry="hexagonal", mesh_size=0.2, decomposition=pieces, **case)
+    cell = torn_cells.tear(MPI.COMM_SELF, geometry="hexagonal", mesh_size=0.2, decomposition=pieces, **case)
     found = []
     for s, first in zip(cell.subdomains, cell.offsets, strict=False):
         K = s.K.toarray()
