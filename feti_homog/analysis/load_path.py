@@ -60,7 +60,7 @@ class _Dissipation:
         if solver.comm.allreduce(same, MPI.LAND):
             return stress
         state = homogenization.interface.equilibrium(point.state.solution.strain, stand.status, stand.lam)
-        return solver.stress_integral(state.solution) / homogenization.cell.plan.area
+        return solver.stress_integral(state.solution) / homogenization.cell.summary.area
 
 
 def run(
