@@ -138,11 +138,12 @@ def _check(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.common.mpi_errors import on_root, on_root_only
     from feti_homog.common.petsc_options import case_options
     from feti_homog.config import case as cases
-    from feti_homog.config.case import SWEEP
+    from feti_homog.config.document import read_document
+    from feti_homog.config.sweep_section import SWEEP
     from feti_homog.homogenization.unit_cell import describe
     from feti_homog.sweep import plan
 
-    document = on_root(comm, cases.read_document, arguments.case)
+    document = on_root(comm, read_document, arguments.case)
     if SWEEP in document:
         sweep = on_root(comm, plan.load, arguments.case)
         case, points = sweep.cases[0], len({entry.point for entry in sweep.entries})
@@ -175,7 +176,7 @@ def _sweep(arguments: argparse.Namespace, comm: Intracomm) -> None:
         raise CaseError(f"--ranks-per-case {group}: expected a divisor of the {comm.size} ranks")
     sweep = on_root(comm, plan.load, arguments.case)
     if arguments.list:
-        for line in on_root_only(comm, execute.listed, sweep, arguments.out) or []:
+        for line in on_root_only(comm, execute.list_cases, sweep, arguments.out) or []:
             print(line)
         return
     on_root(comm, output_folder.usable, arguments.out)
