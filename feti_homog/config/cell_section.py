@@ -62,7 +62,7 @@ class Cell:
     )
     seed: int = key(
         integer(least=0),
-        "Of the random arrangement; the same seed gives the same cell on any machine and any number of ranks.",
+        "Seed of the random arrangement; the same seed gives the same cell on any machine and any number of ranks.",
         default=0,
         only=RANDOM,
     )
@@ -75,6 +75,6 @@ class Cell:
     file: Path | None = key(
         MESH_FILE,
         "The mesh, relative to the case file: triangles of three nodes that fill a rectangle, in physical surfaces "
-        '"matrix", "fibre", "fibre:2", ...; the nodes on opposite sides match.',
+        '"matrix", "fibre", "fibre:2", ...; the nodes on opposite sides match. Fibres may have any shape.',
         only=MESH,
     )

@@ -10,21 +10,29 @@ from typing import Any
 from feti_homog.config.cell_section import CIRCULAR, GEOMETRY
 from feti_homog.config.schema import Selected, TableReader
 from feti_homog.config.section_values import ARCS
-from feti_homog.config.sections import ANALYSIS_TYPE, Angle, Arc, InterfaceSection, LoadPath, Strain
+from feti_homog.config.sections import (
+    ANALYSIS_TYPE,
+    SECTIONS_OF_AN_ANALYSIS,
+    Angle,
+    Arc,
+    InterfaceSection,
+    LoadPath,
+    Strain,
+)
 from feti_homog.config.wording import toml_value
 
-TYPE = "[analysis] type"
 ZERO: Strain = (0.0, 0.0, 0.0)
 
 
 def misplaced_sections(document: Mapping[str, Any], analysis: str | None) -> list[str]:
     """Faults of [angle] and [path] that are missing or belong to another type of analysis (None: faulty)."""
     faults = []
-    for section in ("angle", "path"):
-        if section not in document and section == analysis:
-            faults.append(f'[{section}]: missing section; {TYPE} = "{section}" needs it')
-        elif section in document and analysis not in (section, None):
-            faults.append(f'[{section}]: belongs to {TYPE} = "{section}", not {toml_value(analysis)}')
+    for section, condition in SECTIONS_OF_AN_ANALYSIS.items():
+        words = condition.in_words(section)
+        if section not in document and analysis in condition.values:
+            faults.append(f"[{section}]: missing section; {words} needs it")
+        elif section in document and analysis not in (*condition.values, None):
+            faults.append(f"[{section}]: belongs to {words}, not {toml_value(analysis)}")
     return faults
 
 
@@ -44,7 +52,7 @@ def _missing_arcs(table: Any, selected: Selected) -> list[str]:
     """The fault that nothing can debond."""
     analysis, debonded = selected[ANALYSIS_TYPE], table.get("debonded") if isinstance(table, dict) else None
     if analysis == "angle" and debonded in (None, []):
-        return [f'[interface] debonded: missing; {TYPE} = "angle" needs {ARCS.expected}']
+        return [f'[interface] debonded: missing; [analysis] type = "angle" needs {ARCS.expected}']
     # An empty list says that it is meant; of a user's mesh a curve may be debonded.
     is_bare = isinstance(table, dict) and "debonded" not in table
     if analysis == "stiffness" and selected[GEOMETRY] in CIRCULAR and is_bare:

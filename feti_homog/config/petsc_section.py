@@ -17,6 +17,9 @@ WITHOUT_PREFIX = (
 """PETSc's own options that a case may set."""
 
 
+OPTION_EXPECTED = "a text, a number, true or false"
+
+
 def read_petsc(table: object, faults: list[str]) -> dict[str, Scalar]:
     """PETSc's options by name; whether PETSc knows one of prefix feti_ only the run can tell."""
     if not isinstance(table, dict):
@@ -36,5 +39,5 @@ def _option_fault(name: str, value: object) -> str:
     if not re.fullmatch(PREFIXED, name) and name not in WITHOUT_PREFIX:
         return f"expected the prefix feti_, or one of {', '.join(WITHOUT_PREFIX)}"
     if not (isinstance(value, bool) or is_number(value) or text.accepts(value)):
-        return "expected a text, a number, true or false"
+        return f"expected {OPTION_EXPECTED}"
     return ""

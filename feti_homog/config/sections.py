@@ -15,7 +15,7 @@ Strain = tuple[float, ...]
 ANALYSIS_TYPE = Selector("analysis", "type")
 METHOD = Selector("path", "method")
 
-PATH_ANALYSIS = ANALYSIS_TYPE.among("path")
+ANGLE_ANALYSIS, PATH_ANALYSIS = ANALYSIS_TYPE.among("angle"), ANALYSIS_TYPE.among("path")
 BY_EVENTS, BY_INCREMENTS = METHOD.among("events"), METHOD.among("increments")
 
 
@@ -43,7 +43,7 @@ class Arc:
 
     fibre: str | tuple[int, ...] = key(
         FIBRES,
-        "Of which fibres, in the order of the arrangement; of the hexagonal cell 1 is at the corners, 2 in the middle.",
+        "Which fibres, in the order of the arrangement; of the hexagonal cell 1 is at the corners, 2 in the middle.",
     )
     centre: float = key(
         real(least=-360.0, most=360.0),
@@ -62,9 +62,10 @@ class Arc:
 
 @dataclass(frozen=True, kw_only=True)
 class InterfaceSection:
-    """Bonding of fibres and matrix: what is debonded from the start, and the tractions that debond more.
+    """Bonding of fibres and matrix: what is debonded from the start, and the tractions that debond more. Without this
+    section bonding is perfect.
 
-    Without this section bonding is perfect. A strength of None is unlimited.
+    A strength of None is unlimited.
     """
 
     contact: bool = key(
@@ -203,3 +204,6 @@ SECTIONS: dict[str, type[Any]] = {
     "decomposition": Decomposition,
     "output": Output,
 }
+
+SECTIONS_OF_AN_ANALYSIS = {"angle": ANGLE_ANALYSIS, "path": PATH_ANALYSIS}
+"""Sections that must be given for one type of analysis, and belong to no other."""

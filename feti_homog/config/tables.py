@@ -15,16 +15,24 @@ TOP_LEVEL = (*SECTIONS, "material", "petsc", "name")
 
 @dataclass(frozen=True)
 class Table:
-    """A table: the section in which it stands, its place there in words, and the dataclass that lists its keys."""
+    """A table.
+
+    Attributes:
+        section: the section in which it stands.
+        place: its place in the file, in words.
+        contents: the dataclass that lists its keys.
+        form: which of several forms of the table this is, empty if there is one.
+    """
 
     section: str
     place: str
     contents: type[Any]
+    form: str = ""
 
 
 TABLES = (
     *(Table(section, f"[{section}]", contents) for section, contents in SECTIONS.items()),
-    *(Table("material", "[material.PHASE]", contents) for contents in MATERIAL_FORMS.values()),
+    *(Table("material", "[material.PHASE]", contents, form) for form, contents in MATERIAL_FORMS.items()),
     Table("interface", "an arc of [interface] debonded", Arc),
 )
 

@@ -60,7 +60,7 @@ class Limits:
 
     def in_words(self) -> str:
         limits = {"above": self.above, "at least": self.least, "below": self.below, "at most": self.most}
-        return " and ".join(f"{word} {limit:.6g}" for word, limit in limits.items() if math.isfinite(limit))
+        return " and ".join(f"{word} {_short(limit)}" for word, limit in limits.items() if math.isfinite(limit))
 
     def json_schema(self) -> dict[str, float]:
         limits = {
@@ -68,6 +68,10 @@ class Limits:
             "exclusiveMaximum": self.below, "maximum": min(self.most, LARGEST),
         }  # fmt: skip
         return {word: limit for word, limit in limits.items() if math.isfinite(limit)}
+
+
+def _short(limit: float) -> str:
+    return str(limit) if isinstance(limit, int) else f"{limit:.6g}"
 
 
 def real(**limits: float) -> ValueType:
