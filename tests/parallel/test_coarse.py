@@ -13,7 +13,7 @@ from support.coarse_space_cells import BOUND, BREAKING, NARROW, SINGLE, Narrow, 
 from feti_homog.feti.coarse.adaptive import ROOM, THRESHOLD, AdaptiveCoarseSpace
 from feti_homog.feti.coarse.geneo import coarse_vectors, dual_blocks
 from feti_homog.feti.decomposition.neighbours import Neighbours
-from feti_homog.feti.linalg.distributed_matrix import total
+from feti_homog.feti.linalg.collectives import allreduce_sparse
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.preconditioners.scaled import Dirichlet
 from feti_homog.interface.contact import BONDED, OPEN
@@ -181,7 +181,7 @@ def energies(cell, coarse):
     active = cell.solver.active.mask[:, None]
     U = active * coarse.U.toarray()
     expected = cell.comm.allreduce(U.T @ cell.solver.operator.apply(U))
-    return total(cell.comm, coarse._E).toarray(), expected
+    return allreduce_sparse(cell.comm, coarse._E).toarray(), expected
 
 
 def test_updated_coarse_matrix_equals_one_from_scratch(comm):

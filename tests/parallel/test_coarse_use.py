@@ -14,10 +14,11 @@ from support.coarse_space_cells import BOUND, BREAKING, NARROW, STRAINS, of_all,
 
 from feti_homog.errors import CaseError
 from feti_homog.feti.coarse.adaptive import THRESHOLD, AdaptiveCoarseSpace
-from feti_homog.feti.linalg.distributed_direct import Distributed
-from feti_homog.feti.linalg.replicated_saddle_point import Replicated
+from feti_homog.feti.linalg.distributed_direct import DistributedDirectSolver
+from feti_homog.feti.linalg.replicated_saddle_point import ReplicatedSaddlePoint
 from feti_homog.feti.linalg.saddle_point import SaddlePoint, _Augmented
 from feti_homog.feti.linalg.sparse_direct import DirectSolver
+from feti_homog.feti.thresholds import Thresholds
 
 pytestmark = pytest.mark.parallel
 
@@ -112,19 +113,18 @@ def test_wrong_options_of_the_coarse_space_are_refused(comm, petsc, words):
 
 
 @pytest.mark.parametrize("contrast", [23.0, 1e6], ids=["augmented", "indefinite"])
-def test_a_distributed_coarse_problem_gives_the_same(comm, monkeypatch, contrast):
+def test_a_distributed_coarse_problem_gives_the_same(comm, contrast):
     case = NARROW | {"fibre": {"young": 3.0 * contrast, "poisson": 0.3}, "decomposition": {"subdomains": 50}}
     found = []
     alone = comm.size == 1
     for largest, kind, solver in (
-        (10**6, SaddlePoint if alone else Replicated, DirectSolver),
-        (0, SaddlePoint, DirectSolver if alone else Distributed),
+        (10**6, SaddlePoint if alone else ReplicatedSaddlePoint, DirectSolver),
+        (0, SaddlePoint, DirectSolver if alone else DistributedDirectSolver),
     ):
-        monkeypatch.setattr("feti_homog.feti.linalg.replicated_saddle_point.LARGEST_REPLICATED", largest)
-        cell = torn_cells.tear(comm, **case)
+        cell = torn_cells.tear(comm, **case, thresholds=Thresholds(replicated_vectors=largest))
         saddle = cell.solver.coarse.saddle
         assert isinstance(saddle, kind)
-        inner = saddle.alone if isinstance(saddle, Replicated) else saddle
+        inner = saddle.local if isinstance(saddle, ReplicatedSaddlePoint) else saddle
         assert isinstance(inner._inner.solver, solver)
         assert isinstance(inner._inner, _Augmented) == (contrast < 1e3)
         found.append(together(cell))
@@ -149,7 +149,7 @@ def test_view_shows_the_adaptive_space_and_the_condition_number(comm, narrow, ca
     assert number("kernels:", text) == narrow.coarse.dimension
     assert number("soft modes below", text) == THRESHOLD
     assert f"soft modes below {THRESHOLD:g}: {narrow.coarse.vectors - narrow.coarse.dimension}," in text
-    assert f"{cell.plan.subdomains} subdomains, {cell.plan.subdomains} with dense boundary operators" in text
+    assert f"{cell.summary.subdomains} subdomains, {cell.summary.subdomains} with dense boundary operators" in text
     least, largest = dense_feti.extreme_eigenvalues(narrow.T, narrow.dense.F, narrow.M)
     assert 0.7 * largest / least < number("condition number about", text) < 1.01 * largest / least
 

@@ -66,7 +66,7 @@ def test_dilute_slopes_are_the_closed_form(comm, young):
     for c in (0.01, 0.005):
         case = make_case(geometry="square", fibre=fibre, fibre_fraction=c, mesh_size=0.1, order=2, refine=1)
         torn, L, _ = solve(case, comm)
-        fraction = torn.areas()["fibre"] / torn.plan.area
+        fraction = torn.areas()["fibre"] / torn.summary.area
         bulk, shear = (L[0, 0] + L[0, 1]) / 2, ((L[0, 0] - L[0, 1]) / 2 + L[2, 2]) / 2
         slopes.append((np.array([bulk, shear]) - bulk_and_shear(MATRIX)) / fraction)
     extrapolated = 2 * slopes[1] - slopes[0]
@@ -110,7 +110,7 @@ def test_laminate_is_exact(comm, shared_path, phases, across, order):
 def test_moduli_lie_within_hashin_shtrikman(comm, geometry, fraction):
     """The upper bounds are the lower ones with phases swapped."""
     torn, L, _ = solve(make_case(geometry=geometry, fibre_fraction=fraction, order=2, refine=1), comm)
-    c = torn.areas()["fibre"] / torn.plan.area
+    c = torn.areas()["fibre"] / torn.summary.area
     lower, upper = hashin_shtrikman(MATRIX, FIBRE, c), hashin_shtrikman(FIBRE, MATRIX, 1 - c)
     assert lower[0] < (L[0, 0] + L[0, 1]) / 2 < upper[0]
     if geometry == "hexagonal":
@@ -148,6 +148,6 @@ def test_iterations_do_not_grow_with_refinement(comm, order, refine):
     """Hexagonal cell, bodies on the torus, from 5 000 to 80 000 degrees of freedom."""
     case = make_case(mesh_size=0.062, order=order, refine=refine + 2 - order, decomposition={"subdomains": 1})
     torn, _, responses = solve(case, comm)
-    assert torn.plan.subdomains == 3
-    assert torn.total(len(torn.solver.Q)) == pytest.approx(5_000 * 4**refine, rel=0.2)
+    assert torn.summary.subdomains == 3
+    assert torn.sum_over_ranks(len(torn.solver.Q)) == pytest.approx(5_000 * 4**refine, rel=0.2)
     assert max(r.state.iterations for r in responses) <= 14

@@ -15,7 +15,7 @@ from feti_homog.feti.coarse.adaptive import AdaptiveCoarseSpace
 from feti_homog.feti.coarse.face_neighbourhoods import rings
 from feti_homog.feti.decomposition.neighbours import Neighbours
 from feti_homog.feti.decomposition.subdomain import both_directions
-from feti_homog.feti.operators import interface_operators as boundaries
+from feti_homog.feti.thresholds import Thresholds
 
 pytestmark = pytest.mark.parallel
 
@@ -27,6 +27,8 @@ CASES = {
     "plane, quadratic": {"geometry": "hexagonal", "mesh_size": 0.2, "order": 2, "bodies": "plane"},
 }
 TIGHT = 1e-9
+# Nearly all whole bodies are examined face by face.
+FACEWISE = Thresholds(whole_boundary_dofs=30)
 
 
 @pytest.fixture(params=CASES.values(), ids=CASES.keys())
@@ -36,19 +38,13 @@ def faces(request, comm):
     solver, found = cell.solver, []
     neighbours = Neighbours(comm, solver.jump_operator, cell.subdomains)
     for i, s in enumerate(cell.subdomains):
-        B, dofs = solver.boundary.B[:, solver.boundary.spans[i]], solver.boundary.dofs[i]
-        S = dense_feti.schur(s.K.toarray(), dofs)
+        B, dofs = solver.boundary.B[:, solver.boundary.slices[i]], solver.boundary.dofs[i]
+        S = dense_feti.schur(s.assemble_stiffness().toarray(), dofs)
         for other, common in neighbours.common[i].items():
             if other != s.submesh.index:
                 nodes = np.unique(B[neighbours.rows[i][common]].indices // 2)
                 found.append((s, dofs, S, both_directions(nodes)))
     return found
-
-
-@pytest.fixture
-def large(monkeypatch):
-    """Call nearly all boundaries large."""
-    monkeypatch.setattr(boundaries, "LARGEST_WHOLE", 30)
 
 
 # Rings.
@@ -78,7 +74,7 @@ def test_kernels_of_rings_are_the_null_spaces_of_their_stiffness(comm, faces):
             S = ring.operator.S
             assert np.abs(S @ ring.R).max(initial=0.0) < TIGHT * np.abs(S).max()
             assert dense_feti.kernel(S).shape[1] == ring.R.shape[1]
-            assert np.linalg.eigvalsh(ring.operator.held)[0] > 0
+            assert np.linalg.eigvalsh(ring.operator.regularised_schur)[0] > 0
             kernels.add(ring.R.shape[1])
     assert 3 in set().union(*comm.allgather(kernels))
 
@@ -99,28 +95,29 @@ def test_a_ring_of_the_whole_body_is_as_stiff(faces, monkeypatch):
 # Solutions.
 
 
-@pytest.mark.usefixtures("large")
 @pytest.mark.parametrize("contrast", [1e-3, 2.0, 1e6])
 def test_iterations_stay_few_at_any_contrast(comm, contrast):
     case = WHOLE | {
         "matrix": {"young": 1.0, "poisson": 0.3}, "fibre": {"young": contrast, "poisson": 0.3},
         "petsc": {"feti_ksp_rtol": 1e-8, "feti_coarse_space": "adaptive"},
     }  # fmt: skip
-    torn, L, responses = solve(make_case(**case), comm)
+    torn, L, responses = solve(make_case(**case), comm, FACEWISE)
     assert isinstance(torn.solver.coarse, AdaptiveCoarseSpace)
-    assert comm.allreduce(any(torn.solver.boundary.large), MPI.LOR)
+    assert comm.allreduce(any(torn.solver.boundary.facewise), MPI.LOR)
     assert all(r.state.solution.reason > 0 for r in responses)
     assert max(r.state.iterations for r in responses) <= 25
     assert relative_error(L, monolithic_stiffness(torn)) < 1e-7
 
 
-def test_a_whole_matrix_converges_as_with_one_eigenproblem(comm, monkeypatch):
+def test_a_whole_matrix_converges_as_with_one_eigenproblem(comm):
     """By faces, in one, and with rigid-body motions alone; a few more modes come by faces."""
     case = WHOLE | {"refine": 1, "min_gap": 0.01, "fibre_fraction": 0.65}
     iterations, vectors = [], []
     for whole, space in ((300, "adaptive"), (4000, "adaptive"), (4000, "natural")):
-        monkeypatch.setattr(boundaries, "LARGEST_WHOLE", whole)
-        cell = torn_cells.tear(comm, **case, petsc={"feti_coarse_space": space, "feti_ksp_rtol": 1e-8})
+        thresholds = Thresholds(whole_boundary_dofs=whole)
+        cell = torn_cells.tear(
+            comm, **case, thresholds=thresholds, petsc={"feti_coarse_space": space, "feti_ksp_rtol": 1e-8}
+        )
         iterations.append(together(cell)[0].iterations)
         vectors.append(cell.solver.coarse.vectors)
     assert iterations[0] <= iterations[1] + 5
@@ -128,11 +125,10 @@ def test_a_whole_matrix_converges_as_with_one_eigenproblem(comm, monkeypatch):
     assert vectors[2] < vectors[1] < vectors[0] < 2 * vectors[1]
 
 
-@pytest.mark.usefixtures("large")
 def test_soft_modes_and_stress_do_not_depend_on_the_ranks(comm):
     found = []
     for some in (comm, MPI.COMM_SELF):
-        cell = torn_cells.tear(some, **WHOLE, petsc={"feti_coarse_space": "adaptive"})
+        cell = torn_cells.tear(some, **WHOLE, thresholds=FACEWISE, petsc={"feti_coarse_space": "adaptive"})
         solution = cell.solver.solve(np.array([1.0, -0.5, 0.3]), np.zeros(cell.solver.rows))
         found.append((of_all(some, cell.solver.coarse, cell), solution.iterations, torn_cells.stress(cell, solution)))
     (soft_modes, iterations, stress), (of_one, iterations_of_one, stress_of_one) = found
@@ -141,10 +137,9 @@ def test_soft_modes_and_stress_do_not_depend_on_the_ranks(comm):
     assert relative_error(stress, stress_of_one) < 1e-9
 
 
-@pytest.mark.usefixtures("large")
 def test_with_inactive_rows_the_solution_is_that_of_the_natural_space(comm):
     adaptive, natural = (
-        torn_cells.tear(comm, **WHOLE, refine=1, petsc={"feti_coarse_space": space})
+        torn_cells.tear(comm, **WHOLE, refine=1, thresholds=FACEWISE, petsc={"feti_coarse_space": space})
         for space in ("adaptive", "natural")
     )
     assert isinstance(adaptive.solver.coarse, AdaptiveCoarseSpace)

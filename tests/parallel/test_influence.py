@@ -125,6 +125,6 @@ def test_influence_columns_need_explicit_operators(comm):
 
 def test_view_shows_the_influence_columns(comm, capfd):
     cell, text = torn_cells.printed(comm, capfd, **BREAKING, petsc=INFLUENCE | {"feti_view": True})
-    size = 2 * comm.allreduce(len(cell.solver.jump_operator.blocks[0]))
+    size = 2 * comm.allreduce(len(cell.solver.jump_operator.node_rows[0]))
     assert f"influence columns by the bonded cell, {size} dofs on its shared nodes" in text
     assert "1 load case, 0 iterations" in text

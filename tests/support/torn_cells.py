@@ -12,6 +12,7 @@ from feti_homog.cell.arrangement import arrange
 from feti_homog.common.petsc_options import case_options
 from feti_homog.common.progress import Progress
 from feti_homog.config import sections
+from feti_homog.feti.thresholds import DEFAULTS
 from feti_homog.homogenization import unit_cell
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface.contact import BONDED, OPEN, Interface
@@ -54,12 +55,12 @@ class ReferencedCell:
         return np.zeros(self.cell.solver.rows)
 
 
-def tear(comm, arcs=(), **case):
+def tear(comm, arcs=(), thresholds=DEFAULTS, **case):
     """The torn cell of the case that `make_case` makes, the tips of arcs at its nodes.  Collective."""
     PETSc.garbage_cleanup(comm)
     case = replace(make_case(**case), interface=sections.InterfaceSection(debonded=tuple(arcs)))
     with case_options(case.petsc):
-        return unit_cell.tear(case, comm, Progress(comm, quiet=True))
+        return unit_cell.tear(case, comm, Progress(comm, quiet=True), thresholds=thresholds)
 
 
 def printed(comm, capfd, **case):
@@ -72,13 +73,13 @@ def printed(comm, capfd, **case):
 
 def interface(cell, contact):
     """Its interfaces."""
-    return Interface(cell.solver, contact, np.array([cell.plan.width, cell.plan.height]))
+    return Interface(cell.solver, contact, np.array([cell.summary.width, cell.summary.height]))
 
 
 def build(comm, **case):
     """The cell of `tear` and its quadratic programme.  Collective."""
     cell = tear(comm, **case)
-    size = np.array([cell.plan.width, cell.plan.height])
+    size = np.array([cell.summary.width, cell.summary.height])
     parts = [
         (s.mesh.points, s.mesh.triangles, s.submesh.body, s.submesh.phase == "matrix", s.L) for s in cell.subdomains
     ]
@@ -99,10 +100,10 @@ def energy(cell, solution):
     total = 0.0
     for s, offset in zip(cell.subdomains, cell.offsets, strict=False):
         own = u[offset : offset + len(s.Q)]
-        total += s.area * E @ s.L @ E / 2 + E @ s.Q.T @ own + own @ (s.K @ own) / 2
+        total += s.area * E @ s.L @ E / 2 + E @ s.Q.T @ own + own @ (s.assemble_stiffness() @ own) / 2
     return cell.comm.allreduce(total)
 
 
 def stress(cell, solution):
     """Sigma from the multipliers.  Collective."""
-    return cell.solver.stress_integral(solution) / cell.plan.area
+    return cell.solver.stress_integral(solution) / cell.summary.area

@@ -10,7 +10,7 @@ from reference import monolithic
 
 from feti_homog.cell.gmsh_mesher import generate
 from feti_homog.cell.periodic_topology import Torus
-from feti_homog.cell.refinement import Lattice, refine
+from feti_homog.cell.refinement import ReferenceLattice, refine
 from feti_homog.cell.submesh import cut
 from feti_homog.cell.unwrap import unwrap
 from feti_homog.fem.assembly import assemble, element_strain
@@ -27,7 +27,7 @@ def torus():
 
 @pytest.fixture(params=LATTICES, ids=lambda p: f"refine{p[0]}-order{p[1]}")
 def lattice(request):
-    return Lattice.of(*request.param)
+    return ReferenceLattice.of(*request.param)
 
 
 @pytest.fixture(params=range(3), ids=["matrix", "fibre", "cut-fibre"])
