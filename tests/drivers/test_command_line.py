@@ -42,7 +42,7 @@ def contents(path):
 
     tables = {}
     with h5py.File(path, "r") as file:
-        file.visititems(lambda name, item: tables.update({name: item[()]} if hasattr(item, "shape") else {}))
+        file.visititems(lambda name, item: tables.update({name: item[()]} if isinstance(item, h5py.Dataset) else {}))
     return tables
 
 

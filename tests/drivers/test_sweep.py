@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import json
-import os
-import shutil
 import signal
 import subprocess
 import sys
-import tempfile
 import tomllib
 from functools import partial
 from pathlib import Path
@@ -17,44 +14,13 @@ import pytest
 from matplotlib.image import imread
 from support.background_jobs import kill_when, started, wait_until
 from support.command_line import command_line
-from support.jobs import ROOT, RUN_VARIABLES, mpirun
+from support.jobs import ROOT
 from support.sweep_files import CASE, FAILING, FAILING_POINTS, RANDOM, rows, sweep_file
+from support.sweep_runs import TWO, collected, contents, results, swept
 
 import feti_homog.output  # noqa: F401 (chooses the build of h5py)
 
-TWO = "cell.fibre_fraction = [0.2, 0.3]\n"
 FORTY = "cell.fibre_fraction = {from = 0.1, to = 0.4, count = 20}\nmaterial.fibre.young = [150.0, 200.0]\n"
-
-LIMITED = """
-import resource, sys
-from mpi4py import MPI
-from feti_homog import cli
-resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, {limit}))
-sys.exit(cli.main(sys.argv[1:]))
-"""
-
-
-def results(out: Path) -> dict[str, int]:
-    """When each result was written."""
-    return {str(path.relative_to(out)): path.stat().st_mtime_ns for path in out.glob("case-*/result.json")}
-
-
-def contents(out: Path) -> dict[Path, bytes]:
-    """Of all files but the locks."""
-    return {path: path.read_bytes() for path in out.rglob("*") if path.is_file() and "lock" not in path.name}
-
-
-def swept(out: Path, path: Path, *words: str, ranks: int = 1, code: int = 0):
-    job = command_line(ranks, "sweep", path, "--out", out, *words)
-    assert job.returncode == code, job.stdout + job.stderr
-    assert "Traceback" not in job.stderr
-    return job
-
-
-def collected(out: Path):
-    job = command_line(0, "collect", out)
-    assert job.returncode == 0, job.stderr
-    return job
 
 
 @pytest.mark.parametrize(("ranks", "words"), [(0, []), (1, []), (2, []), (4, ["--ranks-per-case", "2"])])
@@ -240,81 +206,6 @@ def test_jobs_of_an_array_share_the_folder_but_no_case(tmp_path):
     held.send_signal(signal.SIGKILL)
     held.wait()
     swept(out, path, "--index", "1")
-
-
-@pytest.mark.parametrize("damage", ["truncated", "garbage", "foreign"])
-def test_a_corrupt_result_is_computed_again(tmp_path, damage):
-    out, path = tmp_path / "out", sweep_file(tmp_path, TWO)
-    swept(out, path)
-    result = out / "case-0002/result.json"
-    content = {
-        "truncated": result.read_bytes()[:500], "garbage": os.urandom(500),
-        "foreign": (out / "case-0001/result.json").read_bytes(),
-    }[damage]  # fmt: skip
-    result.write_bytes(content)
-    job = collected(out)
-    assert "1 done, 1 damaged" in job.stdout and "case-0002/result.json is" in job.stdout
-    assert [row["status"] for row in rows(out)][:2] == ["done", "damaged"]
-    job = swept(out, path)
-    assert "case-0002: " in job.stdout and "set aside, the case is computed again" in job.stdout
-    assert (out / "case-0002/result.json.damaged").read_bytes() == content
-    assert "2 done" in collected(out).stdout
-
-
-def test_a_damaged_list_of_cases_is_told(tmp_path):
-    out, path = tmp_path / "out", sweep_file(tmp_path, TWO)
-    swept(out, path)
-    (out / "sweep.json").write_text('{"cases": [')
-    for words in (["sweep", path, "--out", out], ["collect", out]):
-        job = command_line(1, *words)
-        assert job.returncode == 2 and "sweep.json is damaged" in job.stderr and "Traceback" not in job.stderr
-    assert len(results(out)) == 2
-
-
-@pytest.mark.parametrize("limit", [1500, 200])
-def test_a_full_disk_is_told_and_the_sweep_goes_on_later(tmp_path, limit):
-    """No file may be longer than the limit: below 1500 bytes no result can be written, below 200 not even the list."""
-    out, path, script = tmp_path / "out", sweep_file(tmp_path, TWO), tmp_path / "limited.py"
-    script.write_text(LIMITED.format(limit=limit))
-    job = mpirun(0, script, "sweep", path, "--out", out, timeout=60)
-    assert job.returncode == 1 and "Traceback" not in job.stderr, job.stderr
-    assert "cannot write" in job.stderr and "File too large" in job.stderr
-    assert not results(out) and not list(out.rglob("*.part"))
-    swept(out, path)
-    assert len(results(out)) == 2
-
-
-def test_a_full_disk_while_collecting_leaves_the_old_table(tmp_path):
-    out, script = tmp_path / "out", tmp_path / "limited.py"
-    swept(out, sweep_file(tmp_path, TWO))
-    collected(out)
-    before = (out / "sweep.csv").read_bytes()
-    script.write_text(LIMITED.format(limit=300))
-    job = mpirun(0, script, "collect", out, timeout=60)
-    assert job.returncode == 1 and "cannot write" in job.stderr and "Traceback" not in job.stderr
-    assert (out / "sweep.csv").read_bytes() == before
-
-
-def test_an_unwritable_folder_is_told(tmp_path):
-    """As a user who may not write: root may everywhere."""
-    folder = Path(tempfile.mkdtemp())
-    try:
-        folder.chmod(0o755)
-        path, program = sweep_file(folder, TWO), ["-m", "feti_homog", "sweep"]
-        user = {"user": 65534, "group": 65534} if os.geteuid() == 0 else {}
-        if not user:
-            folder.chmod(0o555)
-        words = [sys.executable, *program, path, "--out", folder / "out"]
-        environment = {"PATH": os.environ["PATH"], "HOME": "/nonexistent", "MPLCONFIGDIR": "/tmp"} | RUN_VARIABLES
-        job = subprocess.run(
-            list(map(str, words)), cwd=ROOT, env=environment, text=True, capture_output=True, timeout=60, **user
-        )
-        assert job.returncode == 2, job.stderr
-        assert f"--out {folder / 'out'}: expected a folder that can be written to" in job.stderr
-        assert not (folder / "out").exists()
-    finally:
-        folder.chmod(0o755)
-        shutil.rmtree(folder)
 
 
 def test_collect_needs_the_folder_of_a_sweep(tmp_path):

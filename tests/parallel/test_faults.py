@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import pytest
+from support.base_case import BASE
 from support.ranks import parallel_assert
 from unit.cell.faulty_meshes import FAULTY_MESHES
 from unit.config.faulty_bonding import FAULTY_BONDINGS
-from unit.config.faulty_cases import BASE, FAULTY_CASES
+from unit.config.faulty_cases import FAULTY_CASES
 
 from feti_homog import cli
 

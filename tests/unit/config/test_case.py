@@ -8,8 +8,9 @@ import pickle
 from pathlib import Path
 
 import pytest
+from support.base_case import BASE, FIBRE, changed, fibre
 from unit.config.faulty_bonding import BARE_ARC, FAULTY_BONDINGS, PATH, debonded, of_type
-from unit.config.faulty_cases import BASE, FAULTY_CASES, FIBRE, changed, fibre
+from unit.config.faulty_cases import FAULTY_CASES
 from unit.config.valid_cases import MESH, VALID_CASES
 
 from feti_homog.config.case import check_phases, load, parse

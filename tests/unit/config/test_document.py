@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 import tomli_w
 from hypothesis import given, settings
+from support.base_case import BASE
 from unit.config.documents import documents, with_numpy_values
 from unit.config.faulty_bonding import ANGLE, BARE_ARC, PATH, of_type
-from unit.config.faulty_cases import BASE
 from unit.config.valid_cases import MESH
 
 from feti_homog import Case

@@ -9,9 +9,10 @@ import pytest
 from hypothesis import given, settings
 from jsonschema import Draft202012Validator
 from support import ROOT
+from support.base_case import BASE
 from unit.config.documents import documents
 from unit.config.faulty_bonding import FAULTY_BONDINGS
-from unit.config.faulty_cases import BASE, FAULTY_CASES
+from unit.config.faulty_cases import FAULTY_CASES
 from unit.config.valid_cases import VALID_CASES, VALID_SWEEPS
 
 from feti_homog.config.json_schema import json_schema

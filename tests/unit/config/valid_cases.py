@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from support.base_case import BASE, MESH_CELL, RANDOM, changed, fibre
 from unit.config.faulty_bonding import ANGLE, ARC, BARE_ARC, PATH, debonded, of_type
-from unit.config.faulty_cases import BASE, MESH_CELL, RANDOM, changed, fibre
 
 MESH = changed(MESH_CELL)
 
