@@ -27,7 +27,7 @@ def blocks_and_masks(draw):
 
 def node_blocks(matrix, sizes, rows):
     """Blocks of a matrix whose contribution from this rank has its rows in another order."""
-    layout = SimpleNamespace(owned=(0, len(matrix)), rows=rows, blocks=(np.cumsum(sizes) - sizes, sizes))
+    layout = SimpleNamespace(owned=(0, len(matrix)), rows=rows, node_rows=(np.cumsum(sizes) - sizes, sizes))
     return NodeBlocks(MPI.COMM_SELF, layout, csr_matrix(matrix[np.ix_(rows, rows)]))
 
 
