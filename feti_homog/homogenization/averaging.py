@@ -137,7 +137,7 @@ def displacement(cell: TornCell, strain: Float, u: Float) -> Float:
     """(nodes, 2) total displacement E y + u*, Eq. (14), at this rank's plane nodes."""
     E = np.array([[strain[0], strain[2] / 2], [strain[2] / 2, strain[1]]])
     points = np.concatenate([s.mesh.points for s in cell.subdomains] or [np.zeros((0, 2))])
-    return points @ E + fluctuation(cell, u)
+    return np.asarray(points @ E + fluctuation(cell, u))
 
 
 def fluctuation(cell: TornCell, u: Float) -> Float:

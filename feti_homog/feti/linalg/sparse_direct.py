@@ -133,4 +133,5 @@ def _destroy(ksp: PETSc.KSP, *vectors: PETSc.Vec) -> None:
 
 
 def _sequential(matrix: csr_matrix) -> PETSc.Mat:
+    """The matrix as PETSc's, on this rank alone."""
     return PETSc.Mat().createAIJ(matrix.shape, csr=(matrix.indptr, matrix.indices, matrix.data), comm=PETSc.COMM_SELF)
