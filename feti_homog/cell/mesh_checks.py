@@ -217,7 +217,7 @@ def stray_lines(mesh: RawMesh) -> list[str]:
 
 
 def cannot_debond(mesh: RawMesh, pairs: Int32, fit: Bool) -> list[str]:
-    """Debonded lines (d, 2) that are not edges between a fibre and the matrix; `fit` (d,) tells which are."""
+    """Debonded lines (d, 2) that are not edges between a fibre and the matrix; `fit` (d,) says which are."""
     bad = pairs[~fit]
     what = f'lines in the physical curve "{DEBONDED}" that are not between a fibre and the matrix'
     return [f"{what}: {first_of(map(mesh.edge, bad), len(bad))}"] if len(bad) else []

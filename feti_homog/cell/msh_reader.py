@@ -61,7 +61,7 @@ def _refuse(path: Path, *faults: list[str]) -> None:
 
 
 def _load(path: Path) -> RawMesh:
-    """The triangles of a file, with nothing known about them but their kind."""
+    """The triangles of a file; only their kind has been checked."""
     try:
         with path.open("rb") as file:
             start = file.read(4096).lstrip().decode("latin-1")

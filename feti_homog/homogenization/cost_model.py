@@ -22,7 +22,7 @@ MESH_SECONDS = 3.9e-5
 SETUP_SECONDS, SUBDOMAIN_SECONDS = 9.5e-6, 5.2e-3
 # Seconds for each degree of freedom in one application of operator and preconditioner.
 APPLY_SECONDS = 8.8e-8
-# Bytes of a rank with nothing on it, and for each degree of freedom.
+# Bytes of a rank without degrees of freedom, and for each of these.
 BASE_BYTES, DOF_BYTES = 2.1e8, 6.7e2
 # Degrees of freedom of a rank; with fewer, its waiting for others takes more than it saves.
 DOFS_OF_A_RANK = 50_000

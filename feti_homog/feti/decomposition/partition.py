@@ -36,7 +36,7 @@ def decompose(
         pieces: (b,) wanted pieces of each body; METIS cuts a body that has more than one, by short cuts: so
             they rather cross narrow gaps than run along them, which converges better.
         n_ranks: ranks to share the subdomains; some get none if there are more ranks than subdomains.
-        length_classes: how finely METIS tells lengths of edges apart; with 1 all count alike.
+        length_classes: number of lengths of edges that METIS distinguishes; with 1 all count alike.
 
     Every subdomain is connected through edges: pieces that METIS leaves in several parts are split.
     """
