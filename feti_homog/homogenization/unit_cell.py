@@ -83,8 +83,8 @@ def tear(
     case: Case,
     comm: MPI.Intracomm,
     progress: Progress,
-    policy: PartitionPolicy = DEFAULT_POLICY,
     thresholds: Thresholds = DEFAULTS,
+    policy: PartitionPolicy = DEFAULT_POLICY,
 ) -> TornCell:
     """The torn cell of a case, its subdomains factored.  Collective.
 
