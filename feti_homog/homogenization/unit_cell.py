@@ -83,8 +83,8 @@ def tear(
     case: Case,
     comm: MPI.Intracomm,
     progress: Progress,
-    policy: PartitionPolicy = DEFAULT_POLICY,
     thresholds: Thresholds = DEFAULTS,
+    policy: PartitionPolicy = DEFAULT_POLICY,
 ) -> TornCell:
     """The torn cell of a case, its subdomains factored.  Collective.
 
@@ -124,6 +124,7 @@ def assemble_subdomains(
 
 
 def _assemble(case: Case, submeshes: list[Submesh], lattice: ReferenceLattice) -> list[Subdomain]:
+    """The subdomains of this rank, refined and assembled."""
     plane = case.analysis.plane
     return [Subdomain.build(s, lattice, plane_stiffness(case.material_of(s.phase), plane)) for s in submeshes]
 
@@ -150,7 +151,7 @@ def describe(case: Case, n_ranks: int) -> str:
             f"rank {rank:<5} {count} subdomains, about {2 * n} degrees of freedom"
             for rank, (count, n) in enumerate(zip(own, nodes, strict=True))
         ),
-        *cost_model.words(taken, n_ranks),
+        *cost_model.estimate_lines(taken, n_ranks),
         *(f"warning    {warning}" for warning in case.warnings()),
         "the case is valid",
     ]

@@ -15,7 +15,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from feti_homog.feti.decomposition.jump_operator import InterfaceNodes
+from feti_homog.feti.decomposition.constraint_layout import InterfaceNodes
 from feti_homog.feti.solver import DualSolution, FetiSolver
 from feti_homog.interface.rigid_placement import Placement, place
 from feti_homog.typing import Bool, Float

@@ -11,7 +11,7 @@ from scipy.optimize import linprog
 from scipy.sparse import csr_matrix
 
 from feti_homog.feti.coarse.natural import NaturalCoarseSpace
-from feti_homog.feti.decomposition.jump_operator import InterfaceNodes
+from feti_homog.feti.decomposition.constraint_layout import InterfaceNodes
 from feti_homog.feti.solver import DualSolution
 from feti_homog.typing import Bool, Float
 

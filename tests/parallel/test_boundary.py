@@ -184,7 +184,7 @@ def test_every_rank_has_a_piece(interface):
 def torn_by_default(comm, interface, policy=SMALL_PIECES):
     """A cell of two fibres and a matrix; the bodies of its pieces and the triangles of the largest piece."""
     case = replace(make_case(geometry="hexagonal", mesh_size=0.1), interface=interface)
-    cell = unit_cell.tear(case, comm, Progress(comm, quiet=True), policy)
+    cell = unit_cell.tear(case, comm, Progress(comm, quiet=True), policy=policy)
     own = comm.allgather([s.submesh.body for s in cell.subdomains])
     largest = comm.allreduce(max((len(s.submesh.triangles) for s in cell.subdomains), default=0), MPI.MAX)
     assert min(map(len, own)) > 0

@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_matrix
 
+from feti_homog.common.petsc_ctypes import option_was_used
+from feti_homog.common.petsc_options import case_options
+from feti_homog.errors import CaseError
 from feti_homog.feti.linalg.replicated_saddle_point import ReplicatedSaddlePoint
 from feti_homog.feti.linalg.saddle_point import SaddlePoint
 
@@ -83,3 +86,44 @@ def test_without_constraints_only_the_definite_block_is_solved(comm, system, kin
     np.testing.assert_allclose(found, c, atol=1e-10)
     assert work.shape == (0, 2)
     saddle.destroy()
+
+
+LIBRARY = "test_pc_factor_mat_solver_type"
+
+
+@pytest.mark.parametrize(
+    ("kind", "library"), [*((kind, "mumps") for kind in KINDS), (ReplicatedSaddlePoint, "cholmod")]
+)
+def test_the_library_of_the_factor_is_an_option(comm, system, kind, library):
+    E, K, free = system
+    with case_options({LIBRARY: library}):
+        saddle = kind(comm, parts(comm, E), parts(comm, K), csr_matrix(free), "test_", 1e-11)
+        assert option_was_used(LIBRARY)
+    inner = saddle.local if kind is ReplicatedSaddlePoint else saddle
+    assert inner._inner.solver._ksp.getPC().getFactorSolverType() == library
+    c = np.arange(N) + 1.0
+    np.testing.assert_allclose(saddle.solve(E @ c, K @ c)[0], c, rtol=1e-9)
+    saddle.destroy()
+
+
+def test_cholmod_factors_no_distributed_matrix(comm, system):
+    E, K, free = system
+    arguments = comm, parts(comm, E), parts(comm, K), csr_matrix(free), "test_", 1e-11
+    with case_options({LIBRARY: "cholmod"}):
+        if comm.size == 1:
+            SaddlePoint(*arguments).destroy()
+            return
+        with pytest.raises(CaseError) as caught:
+            SaddlePoint(*arguments)
+    assert caught.value.faults == (
+        f"-{LIBRARY} cholmod: it has no cholesky factorization of a matrix on {comm.size} ranks; mumps has",
+    )
+
+
+def test_a_library_that_petsc_does_not_have_is_refused(comm, system):
+    E, K, free = system
+    with (
+        case_options({LIBRARY: "cholmud"}),
+        pytest.raises(CaseError, match="cholmud: it has no cholesky factorization"),
+    ):
+        SaddlePoint(comm, parts(comm, E), parts(comm, K), csr_matrix(free), "test_")

@@ -38,7 +38,7 @@ def solve(case, comm, thresholds=DEFAULTS):
     PETSc.garbage_cleanup(comm)
     progress = Progress(comm, quiet=True)
     with case_options(case.petsc):
-        cell = tear(case, comm, progress, thresholds=thresholds)
+        cell = tear(case, comm, progress, thresholds)
         responses = []
         context = AnalysisContext(
             Homogenization(cell, contact=False),

@@ -60,7 +60,7 @@ def tear(comm, arcs=(), thresholds=DEFAULTS, **case):
     PETSc.garbage_cleanup(comm)
     case = replace(make_case(**case), interface=sections.InterfaceSection(debonded=tuple(arcs)))
     with case_options(case.petsc):
-        return unit_cell.tear(case, comm, Progress(comm, quiet=True), thresholds=thresholds)
+        return unit_cell.tear(case, comm, Progress(comm, quiet=True), thresholds)
 
 
 def printed(comm, capfd, **case):

@@ -14,8 +14,7 @@ from feti_homog.errors import MeshError
 from feti_homog.fem.assembly import assemble
 from feti_homog.typing import Float, Int
 
-# Largest |K R| relative to |K|.  Rounding leaves 1e-14 to 1e-12 on elements of usable shape; a rigid-body mode that is
-# wrong, or an element without area, gives 1e-2 and more.
+# Largest |K R| relative to |K|.  Rounding leaves about 1e-16; a rotation that is wrong by 1 % gives 1e-7 and more.
 KERNEL_TOLERANCE = 1e-10
 
 

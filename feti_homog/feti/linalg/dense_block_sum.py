@@ -39,12 +39,14 @@ class DenseBlockSum:
         return self._sum
 
     def _add(self, rows: Int, counts: Int, columns: Int32, values: Float) -> None:
+        """Buffer rows with `counts` entries each, whose columns and values come row by row."""
         self._buffer.append((rows, counts, columns, values))
         self._buffered_entries += len(values)
         if self._buffered_entries > max(self._max_buffered_entries, self._sum.nnz):
             self._flush()
 
     def _flush(self) -> None:
+        """Add the buffer to the sum."""
         if not self._buffer:
             return
         rows, counts, columns, values = (np.concatenate(part) for part in zip(*self._buffer, strict=True))

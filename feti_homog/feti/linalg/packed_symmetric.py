@@ -9,8 +9,6 @@ from scipy.linalg.lapack import dlauum, dpotrf, dtrtri
 from feti_homog.feti.thresholds import MIRRORED_BLOCK_ROWS, TRIANGLE_INVERSE_ROWS
 from feti_homog.typing import Float
 
-LOWER = np.tri(MIRRORED_BLOCK_ROWS, dtype=bool)
-
 
 def invert_upper(A: Float) -> None:
     """Let the upper triangle and the diagonal of the SPD matrix A (n, n), in Fortran order, become those of A^-1.
@@ -39,12 +37,12 @@ def _invert_triangle(U: Float) -> None:
     corner[:] = dtrmm(1.0, last, dtrmm(-1.0, first, corner), side=1, overwrite_b=1)
 
 
-def full_from_lower(A: Float) -> Float:
+def full_from_lower(A: Float, block: int = MIRRORED_BLOCK_ROWS) -> Float:
     """The symmetric matrix, in C order, whose lower triangle is that of A (n, n); by blocks that fit the cache."""
-    whole = A.copy(order="F")
-    for j in range(0, len(A), MIRRORED_BLOCK_ROWS):
-        some = slice(j, j + MIRRORED_BLOCK_ROWS)
+    whole, lower = A.copy(order="F"), np.tri(block, dtype=bool)
+    for j in range(0, len(A), block):
+        some = slice(j, j + block)
         whole[:j, some] = whole[some, :j].T
         corner = whole[some, some]
-        whole[some, some] = np.where(LOWER[: len(corner), : len(corner)], corner, corner.T)
+        whole[some, some] = np.where(lower[: len(corner), : len(corner)], corner, corner.T)
     return np.asarray(whole.T)

@@ -89,7 +89,7 @@ def factor_by_cholmod(matrix: csr_matrix, prefix: str) -> PETSc.KSP:
 def factor_by_mumps(A: PETSc.Mat, prefix: str, definite: bool) -> PETSc.KSP:
     """A KSP with the factorization of a symmetric matrix on any communicator; options under `prefix`, MUMPS by default.
 
-    The matrix should have rows and columns of similar size: MUMPS is told not to scale it, for its own scaling loses
+    The matrix should have rows and columns of similar size: MUMPS does not scale it here, for its own scaling loses
     all digits of coarse problems with contrasts of 1e6.
     """
     A.setOption(PETSc.Mat.Option.SPD if definite else PETSc.Mat.Option.SYMMETRIC, True)
@@ -133,4 +133,5 @@ def _destroy(ksp: PETSc.KSP, *vectors: PETSc.Vec) -> None:
 
 
 def _sequential(matrix: csr_matrix) -> PETSc.Mat:
+    """The matrix as PETSc's, on this rank alone."""
     return PETSc.Mat().createAIJ(matrix.shape, csr=(matrix.indptr, matrix.indices, matrix.data), comm=PETSc.COMM_SELF)

@@ -94,7 +94,7 @@ def schur_complement(matrix: csr_matrix, dofs: Int) -> Float:
     Options have the prefix `feti_schur_`.
     """
     if len(dofs) == matrix.shape[0]:
-        return matrix.toarray(order="F")
+        return np.asarray(matrix.toarray(order="F"))
     csr = matrix.indptr, matrix.indices, matrix.data
     A = PETSc.Mat().createAIJWithArrays(matrix.shape, csr, comm=PETSc.COMM_SELF)
     A.setOption(PETSc.Mat.Option.SPD, True)

@@ -38,6 +38,7 @@ class ImplicitInterfaceOperator:
         return _by_columns(self._solve, x, out)
 
     def _solve(self, x: Float) -> Float:
+        """The boundary part of K+ x for few columns."""
         load = np.zeros((self._subdomain.n_dofs, *x.shape[1:]), order="F")
         load[self.dofs] = x
         return self._solver.solve(load)[self.dofs]

@@ -79,6 +79,7 @@ class InterfaceOperators:
         return self._each([o.apply_flexibility for o in self.operators], x)
 
     def _each(self, applied: Sequence[Callable[[Float, Float], Float]], x: Float) -> Float:
+        """The operators of the subdomains, each applied to its part of x (n,) or (n, k)."""
         x = np.asfortranarray(x)
         y = np.empty(x.shape, order="F")
         for apply, (first, last) in zip(applied, pairwise(self.offsets.tolist()), strict=True):
@@ -93,6 +94,7 @@ class InterfaceOperators:
 
     @cached_property
     def _interiors(self) -> list[Interior]:
+        """The interior of each subdomain, factored."""
         return [
             operator.interior
             if isinstance(operator, ImplicitInterfaceOperator)
