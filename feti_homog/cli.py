@@ -94,6 +94,8 @@ def _parser() -> Parser:
     plot = actions.add_parser("plot", help="make the pictures of a results folder again")
     plot.add_argument("directory", type=Path, metavar="DIR")
     plot.set_defaults(action=_plot)
+    options = actions.add_parser("options", help="print PETSc's options that the solver takes")
+    options.set_defaults(action=_print_options)
     _add_sweep(actions.add_parser("sweep", help="run the cases of a file with [sweep]", description=SWEEP_HELP))
     collect = actions.add_parser(
         "collect",
@@ -174,6 +176,11 @@ def _plot(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
     for path in on_root_only(comm, figures.plot, arguments.directory) or []:
         print(path)
+
+
+def _print_options(arguments: argparse.Namespace, comm: Intracomm) -> None:
+    if comm.rank == 0:
+        print(help_text())
 
 
 def _sweep(arguments: argparse.Namespace, comm: Intracomm) -> None:

@@ -8,7 +8,7 @@ import tomllib
 import pytest
 from hypothesis import given, settings
 from jsonschema import Draft202012Validator
-from support import ROOT
+from support.jobs import ROOT
 from unit.config.documents import documents
 from unit.config.faulty_bonding import FAULTY_BONDINGS
 from unit.config.faulty_cases import BASE, FAULTY_CASES
