@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 
-from commands import command_line
+from support.command_line import command_line
 
 from feti_homog.config.json_schema import json_schema
 
