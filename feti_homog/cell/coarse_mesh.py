@@ -14,15 +14,16 @@ from feti_homog.typing import Float, Int32
 class CoarseMesh:
     """Conforming periodic mesh of straight triangles on the cell [0, width] x [0, height]; on rank 0 only.
 
-    points (n, 2)        nodes in the plane
-    triangles (m, 3)     counter-clockwise; none has two edges on the same circle
-    phase (m,)           index into `phases`, whose first name is "matrix"
-    representative (n,)  node that stands for the class of a node on the torus: x = width -> x = 0, y = height
-                         -> y = 0; idempotent
-    circles (k, 3)       centre and radius in the plane; periodic images are listed separately
-    arc_edges (a, 2)     edges of the mesh whose ends lie on a circle, to rounding
-    arc_circle (a,)      the circle of each of them
-    debonded_edges (d, 2)  edges between a fibre and the matrix that are debonded from the start
+    Attributes:
+        points: (n, 2) nodes in the plane.
+        triangles: (m, 3) counter-clockwise; none has two edges on the same circle.
+        phase: (m,) index into `phases`, whose first name is "matrix".
+        representative: (n,) node that stands for the class of a node on the torus: x = width -> x = 0, y = height
+            -> y = 0; idempotent.
+        circles: (k, 3) centre and radius in the plane; periodic images are listed separately.
+        arc_edges: (a, 2) edges of the mesh whose ends lie on a circle, to rounding.
+        arc_circle: (a,) the circle of each of them.
+        debonded_edges: (d, 2) edges between a fibre and the matrix that are debonded from the start.
     """
 
     width: float

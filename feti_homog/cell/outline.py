@@ -31,9 +31,10 @@ Spacing = Callable[[Float], Float]
 class Curve:
     """A piece of a side or a circle from vertex to vertex, counter-clockwise around the cell or the disc.
 
-    nodes (k,)   numbers of its nodes, from end to end
-    circle       the circle it lies on; MATRIX for a piece of a side
-    inside       what is on its left: the disc of that circle, or MATRIX
+    Attributes:
+        nodes: (k,) numbers of its nodes, from end to end.
+        circle: the circle it lies on; MATRIX for a piece of a side.
+        inside: what is on its left: the disc of that circle, or MATRIX.
     """
 
     nodes: Int
