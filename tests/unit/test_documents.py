@@ -1,4 +1,4 @@
-"""What the documents name exists: links, pictures, files, modules, commands, keys; and their recipe for a mesh works."""
+"""What the documents name exists: links, files, modules, commands, case files; and their recipe for a mesh works."""
 
 from __future__ import annotations
 
