@@ -65,12 +65,12 @@ def parsed(parser: argparse.ArgumentParser, words: Sequence[str], comm: Intracom
 
 
 def _command(words: Sequence[str], comm: Intracomm) -> int:
-    arguments = parsed(_parser(), words or ["--help"], comm)
+    arguments = parsed(command_parser(), words or ["--help"], comm)
     arguments.action(arguments, comm)
     return EXIT_DONE
 
 
-def _parser() -> Parser:
+def command_parser() -> Parser:
     parser = Parser(
         prog="feti-homog",
         description="Effective stiffness of fibre composites by FETI, on any number of MPI ranks.",
