@@ -1,4 +1,5 @@
-"""The command line: `feti-homog run CASE.toml --out DIR`, `check CASE.toml`, `plot DIR`, `sweep`, `collect`.
+"""The command line: `feti-homog run CASE.toml --out DIR`, `check CASE.toml`, `plot DIR`, `sweep`, `collect`,
+`keys`, `schema`.
 
 Options with a double dash are ours, with a single dash PETSc's.
 """
@@ -8,9 +9,11 @@ from __future__ import annotations
 import argparse
 import contextlib
 import io
+import json
 import os
 import sys
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
@@ -103,7 +106,16 @@ def command_parser() -> Parser:
     collect.add_argument("directory", type=Path, metavar="DIR", help="--out of the sweep")
     collect.add_argument("--no-pictures", action="store_true", help="make the tables alone")
     collect.set_defaults(action=_collect)
+    _add_reference(actions)
     return parser
+
+
+def _add_reference(actions: argparse._SubParsersAction[Parser]) -> None:
+    keys = actions.add_parser("keys", help="print what the keys of a case file mean")
+    keys.add_argument("section", nargs="?", metavar="SECTION", help="cell, material, ...; by default all of them")
+    keys.set_defaults(action=_keys)
+    schema = actions.add_parser("schema", help="print the JSON Schema of a case file, for editors")
+    schema.set_defaults(action=_schema)
 
 
 def _add_sweep(sweep: argparse.ArgumentParser) -> None:
@@ -140,11 +152,12 @@ def _check(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.common.mpi_errors import on_root, on_root_only
     from feti_homog.common.petsc_options import case_options
     from feti_homog.config import case as cases
-    from feti_homog.config.case import SWEEP
+    from feti_homog.config.document import read_document
+    from feti_homog.config.sweep_section import SWEEP
     from feti_homog.homogenization.unit_cell import describe
     from feti_homog.sweep import plan
 
-    document = on_root(comm, cases.read_document, arguments.case)
+    document = on_root(comm, read_document, arguments.case)
     if SWEEP in document:
         sweep = on_root(comm, plan.load, arguments.case)
         case, points = sweep.cases[0], len({entry.point for entry in sweep.entries})
@@ -182,7 +195,7 @@ def _sweep(arguments: argparse.Namespace, comm: Intracomm) -> None:
         raise CaseError(f"--ranks-per-case {group}: expected a divisor of the {comm.size} ranks")
     sweep = on_root(comm, plan.load, arguments.case)
     if arguments.list:
-        for line in on_root_only(comm, execute.listed, sweep, arguments.out) or []:
+        for line in on_root_only(comm, execute.list_cases, sweep, arguments.out) or []:
             print(line)
         return
     on_root(comm, output_folder.usable, arguments.out)
@@ -198,3 +211,20 @@ def _collect(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
     for line in on_root_only(comm, collect.collect, arguments.directory, not arguments.no_pictures) or []:
         print(line)
+
+
+def _keys(arguments: argparse.Namespace, comm: Intracomm) -> None:
+    from feti_homog.common.mpi_errors import on_root_only
+    from feti_homog.config import reference
+
+    section = arguments.section
+    tables = on_root_only(comm, reference.tables if section is None else partial(reference.tables_of, section))
+    if tables is not None:
+        print(reference.as_text(tables))
+
+
+def _schema(arguments: argparse.Namespace, comm: Intracomm) -> None:
+    from feti_homog.config.json_schema import json_schema
+
+    if comm.rank == 0:
+        print(json.dumps(json_schema(), indent=2))

@@ -15,7 +15,7 @@ from feti_homog.errors import MeshError
 from feti_homog.typing import Float, Int
 
 if TYPE_CHECKING:
-    from feti_homog.config.case import Cell
+    from feti_homog.config.cell_section import Cell
 
 
 # Quenched random packings jam near this area fraction.

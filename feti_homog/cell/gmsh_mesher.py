@@ -16,7 +16,7 @@ from feti_homog.cell.outline import MATRIX, Curve, Outline, outline
 from feti_homog.typing import Float, Index
 
 if TYPE_CHECKING:
-    from feti_homog.config.case import Cell
+    from feti_homog.config.cell_section import Cell
 
 
 NO_MARKS: Mapping[int, Sequence[float]] = MappingProxyType({})

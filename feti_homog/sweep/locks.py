@@ -15,40 +15,40 @@ from types import TracebackType
 
 from feti_homog.errors import FetiHomogError
 
-PATIENCE = 0.2  # seconds that a lock is tried for: one who only looks whether it is held, holds it for a moment
+LOCK_TIMEOUT_S = 0.2  # who only looks whether a lock is held holds it for a moment
 
 
-class Busy(Exception):
+class LockHeld(Exception):
     """Somebody else holds the lock; the text says who."""
 
 
 class Lock:
     """A lock on the file `path`, which stays behind; `shared` ones exclude the others only.
 
-    It is tried for during `patience` seconds.  As a context manager it is held while the block lasts.
+    It is tried for during `timeout` seconds.  As a context manager it is held while the block lasts.
     """
 
-    def __init__(self, path: Path, shared: bool = False, patience: float = PATIENCE) -> None:
-        self.path, self.shared, self.patience = path, shared, patience
+    def __init__(self, path: Path, shared: bool = False, timeout: float = LOCK_TIMEOUT_S) -> None:
+        self.path, self.shared, self.timeout = path, shared, timeout
         self._file = -1
 
     def acquire(self) -> None:
         """Take the lock.
 
         Raises:
-            Busy: somebody else has it.
+            LockHeld: somebody else has it.
             FetiHomogError: the file cannot be written or locked.
         """
         try:
             self._file = os.open(self.path, os.O_RDWR | os.O_CREAT, 0o666)
-            self._try_until(time.monotonic() + self.patience)
+            self._try_until(time.monotonic() + self.timeout)
             if not self.shared:
                 os.truncate(self._file, 0)
                 os.pwrite(self._file, f"{socket.gethostname()}, process {os.getpid()}".encode(), 0)
         except OSError as error:
             self.release()
             raise FetiHomogError(f"cannot lock {self.path}: {error.strerror}") from error
-        except Busy:
+        except LockHeld:
             self.release()
             raise
 
@@ -76,11 +76,14 @@ class Lock:
                 if error.errno not in (errno.EAGAIN, errno.EACCES):
                     raise
                 if time.monotonic() > deadline:
-                    raise Busy(os.pread(self._file, 200, 0).decode(errors="replace") or "another process") from error
+                    raise LockHeld(self._holder()) from error
             time.sleep(0.01)
 
+    def _holder(self) -> str:
+        return os.pread(self._file, 200, 0).decode(errors="replace") or "another process"
 
-def is_held(path: Path) -> bool:
+
+def is_locked(path: Path) -> bool:
     """Whether somebody holds the lock exclusively just now."""
     try:
         file = os.open(path, os.O_RDWR)

@@ -7,29 +7,30 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
-from feti_homog.sweep.report.statistics import Collected
-from feti_homog.sweep.report.style import INK, MARKS, Series, finish, legend, series, with_scatter
+from feti_homog.sweep.report.series import Series, series_over
+from feti_homog.sweep.report.style import COLOURS, MARKERS, label_axes, legend, plot_series
+from feti_homog.sweep.report.sweep_table import SweepTable
 
-ASIDE, MARGIN = 0.94, 1.3  # factors on a logarithmic axis
+X_FACTOR, MARGIN = 0.94, 1.3  # factors on a logarithmic axis
 CHOICES = (("C11", "bulk", "shear"), ("onset_S11", "peak_S11"))
 
 
-def names(table: Collected) -> tuple[str, ...]:
+def names(table: SweepTable) -> tuple[str, ...]:
     """The outputs that are drawn: moduli, or the strength of paths."""
     return next((chosen for chosen in CHOICES if all(name in table.outputs for name in chosen)), ())
 
 
-def figure(table: Collected, key: str) -> Figure:
+def figure(table: SweepTable, key: str) -> Figure:
     """Above the realisations and the means, below the scatter of the realisations and of the mean."""
-    drawn, found = names(table), series(table, key)
+    drawn, found = names(table), series_over(table, key)[: len(COLOURS)]
     whole = Figure(figsize=(0.4 + 3.9 * len(drawn), 6.6), layout="constrained")
     panels = whole.subplots(2, len(drawn), sharex=True, squeeze=False)
     for name, upper, lower in zip(drawn, *panels, strict=True):
         for style, one in enumerate(found):
-            with_scatter(upper, table, one, name, style, aside=ASIDE)
+            plot_series(upper, table, one, name, style, x_factor=X_FACTOR)
             _scatter(lower, table, one, name, style)
-        finish(upper, name, table, "")
-        finish(lower, name, table, "number of fibres")
+        label_axes(upper, name, table, "")
+        label_axes(lower, name, table, "number of fibres")
         lower.set_ylabel("scatter / mean (%)")
         lower.set_ylim(bottom=0.0)
     _logarithmic(panels[0, 0], sorted({int(x) for one in found for x in one.x}))
@@ -38,7 +39,7 @@ def figure(table: Collected, key: str) -> Figure:
     return whole
 
 
-def _scatter(axes: Axes, table: Collected, one: Series, name: str, style: int) -> None:
+def _scatter(axes: Axes, table: SweepTable, one: Series, name: str, style: int) -> None:
     """Standard deviation of one cell and half-width of the mean's interval, relative to the mean."""
     statistics = table.statistics[name]
     numbers = [table.points.index(point) for point in one.points]
@@ -47,7 +48,7 @@ def _scatter(axes: Axes, table: Collected, one: Series, name: str, style: int) -
     kinds = ((statistics.std, "-", "standard deviation of a cell"), (statistics.ci95, ":", "95 % interval of the mean"))
     for values, line, what in kinds:
         axes.plot(
-            one.x, 100 * values[numbers] / mean, line, color=INK[style], marker=MARKS[style], markersize=4,
+            one.x, 100 * values[numbers] / mean, line, color=COLOURS[style], marker=MARKERS[style], markersize=4,
             linewidth=1.2, label=f"{what}{words}",
         )  # fmt: skip
 

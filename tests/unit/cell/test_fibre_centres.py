@@ -13,7 +13,7 @@ from feti_homog.cell.fibre_centres import fibre_centres
 from feti_homog.cell.gmsh_mesher import generate
 from feti_homog.cell.msh_reader import read
 from feti_homog.cell.periodic_topology import Torus
-from feti_homog.config.case import Cell
+from feti_homog.config.cell_section import Cell
 from feti_homog.errors import MeshError
 
 

@@ -8,8 +8,9 @@ import pickle
 from pathlib import Path
 
 import pytest
-from unit.config.faulty_bonding import ANGLE, ARC, BARE_ARC, FAULTY_BONDINGS, PATH, debonded, of_type
-from unit.config.faulty_cases import BASE, FAULTY_CASES, FIBRE, MESH_CELL, RANDOM, changed, fibre
+from unit.config.faulty_bonding import BARE_ARC, FAULTY_BONDINGS, PATH, debonded, of_type
+from unit.config.faulty_cases import BASE, FAULTY_CASES, FIBRE, changed, fibre
+from unit.config.valid_cases import MESH, VALID_CASES
 
 from feti_homog.config.case import check_phases, load, parse
 from feti_homog.config.materials import General, Isotropic, Orthotropic
@@ -17,7 +18,6 @@ from feti_homog.config.sections import Angle, Arc, InterfaceSection, LoadPath
 from feti_homog.errors import CaseError
 
 FAULTY = FAULTY_CASES | FAULTY_BONDINGS
-MESH = changed(MESH_CELL)
 
 
 def case_of(tmp_path: Path, content: str, name: str = "cell.toml"):
@@ -98,31 +98,9 @@ def test_integers_are_numbers(tmp_path):
     assert isinstance(material.young, float)
 
 
-@pytest.mark.parametrize(
-    "content",
-    [
-        BASE,
-        "name = 'Zelle'\n"
-        + BASE
-        + "[decomposition]\nmax_dofs = 5000\n[petsc]\nfeti_ksp_rtol = 1e-8\nlog_view = true\n",
-        changed(('geometry = "hexagonal"\n', RANDOM + "seed = 7\nradius_spread = 0.2\n")),
-        MESH + '[material."fibre:2"]\nstiffness = [[3, 1, 0], [1, 3, 0], [0, 0, 1]]\n',
-        fibre("E1 = 10.0\nE2 = 5.0\nE3 = 5.0\nnu12 = 0.3\nnu13 = 0.3\nnu23 = 0.2\nG12 = 2.0\nangle = 30\n"),
-        BASE + '[output]\nfields = false\nstress = "S12"\ndeformation_scale = 2\nlength_unit = "µm"\n',
-        BASE + f"[interface]\ndebonded = [{ARC}]\n",
-        BASE + "[interface]\ncontact = false\ndebonded = []\n",
-        MESH + "[interface]\n",
-        of_type("angle", ANGLE, BARE_ARC, "contact = false"),
-        of_type("angle", ANGLE, "strain = [0, 0, 0.2]", '[[interface.debonded]]\nfibre = "all"\ncentre = 90'),
-        of_type("path", PATH),
-        of_type("path", "[path]\nwaypoints = [[1, 0, 0], [0, 0, 0]]\nmax_events = 7"),
-        of_type("path", PATH, 'method = "increments"\nincrements = 50\nrelease = "worst"'),
-        debonded("{fibre = [1, 2], angle = 360}", "normal_strength = inf\ntangential_strength = 3"),
-        debonded(f'{ARC}, {{fibre = "all", angle = 0}}', 'normal_strength = 1\ncriterion = "quadratic"'),
-    ],
-)
-def test_resolved_makes_the_same_case_again(tmp_path, content):
-    case = case_of(tmp_path, content)
+@pytest.mark.parametrize("name", VALID_CASES)
+def test_resolved_makes_the_same_case_again(tmp_path, name):
+    case = case_of(tmp_path, VALID_CASES[name])
     written = json.loads(json.dumps(case.resolved(), allow_nan=False))
     assert written == case.resolved()
     assert parse(written, Path("/nowhere")) == case

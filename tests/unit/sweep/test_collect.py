@@ -14,7 +14,10 @@ from scipy import stats
 import feti_homog.output  # noqa: F401 (chooses the build of h5py)
 from feti_homog.output.text.units import unit, with_unit
 from feti_homog.sweep.report import figures, tables
-from feti_homog.sweep.report.statistics import Collected, Statistics, outputs
+from feti_homog.sweep.report.outputs import outputs
+from feti_homog.sweep.report.series import series_over
+from feti_homog.sweep.report.statistics import Statistics
+from feti_homog.sweep.report.sweep_table import SweepTable
 
 MATERIAL = {"matrix": {"young": 88.0, "poisson": 0.299}, "fibre": {"young": 200.0, "poisson": 0.222}}
 
@@ -64,7 +67,7 @@ def path_document(fibres, shift):
 def collected(inputs, documents, point, realisation):
     found = [outputs(d) if d else {} for d in documents]
     names = dict.fromkeys(name for row in found for name in row)
-    return Collected(
+    return SweepTable(
         name="test", stress_unit="GPa", folder=[f"case-{k + 1:04d}" for k in range(len(documents))],
         point=point, realisation=realisation, status=["done" if d else "waiting" for d in documents],
         reason=[""] * len(documents), inputs=inputs, documents=documents,
@@ -137,11 +140,9 @@ def assert_drawn(folder, table, names):
 
 
 def test_what_varies_along_is_no_other_series():
-    from feti_homog.sweep.report.style import series
-
     documents = [document(0.4, fibres, 0.0) for fibres in (4, 8, 4, 8)]
     inputs = {"cell.fibres": [4, 8, 4, 8], "cell.mesh_size": [0.3, 0.2, 0.3, 0.2], "material.fibre.young": [1, 1, 2, 2]}
-    found = series(collected(inputs, documents, [1, 2, 3, 4], [1] * 4), "cell.fibres")
+    found = series_over(collected(inputs, documents, [1, 2, 3, 4], [1] * 4), "cell.fibres")
     assert [(one.label, one.points, one.x.tolist()) for one in found] == [
         ("young 1", [1, 2], [4.0, 8.0]), ("young 2", [3, 4], [4.0, 8.0]),
     ]  # fmt: skip

@@ -10,7 +10,7 @@ import pytest
 
 from feti_homog.errors import FetiHomogError
 from feti_homog.output.files import atomic
-from feti_homog.sweep.locks import Busy, Lock, is_held
+from feti_homog.sweep.locks import Lock, LockHeld, is_locked
 
 HOLDER = """
 import sys, time
@@ -37,26 +37,26 @@ def test_locks_between_processes(tmp_path, theirs, ours, free):
     path = tmp_path / "lock"
     process = holder(path, theirs)
     try:
-        lock = Lock(path, ours, patience=0.05)
+        lock = Lock(path, ours, timeout=0.05)
         if free:
             lock.acquire()
             lock.release()
         else:
-            with pytest.raises(Busy, match="another process" if theirs else f"process {process.pid}"):
+            with pytest.raises(LockHeld, match="another process" if theirs else f"process {process.pid}"):
                 lock.acquire()
-        assert is_held(path) != theirs
+        assert is_locked(path) != theirs
     finally:
         process.kill()
         process.wait()
     with Lock(path):
-        assert is_held(path)
-    assert not is_held(path)
+        assert is_locked(path)
+    assert not is_locked(path)
 
 
 def test_a_lock_that_cannot_be_made(tmp_path):
     with pytest.raises(FetiHomogError, match="cannot lock"):
         Lock(tmp_path / "none" / "lock").acquire()
-    assert not is_held(tmp_path / "none" / "lock")
+    assert not is_locked(tmp_path / "none" / "lock")
 
 
 def test_a_file_is_replaced_whole_or_not_at_all(tmp_path):
