@@ -46,6 +46,7 @@ default_role = "py:obj"
 suppress_warnings = ["autoapi.python_import_resolution"]
 
 highlight_language = "none"
+smartquotes = False
 
 html_theme = "furo"
 html_title = f"{project} {release}"
