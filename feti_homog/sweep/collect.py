@@ -46,8 +46,8 @@ def collect(directory: Path, pictures: bool) -> list[str]:
         for entry, state in zip(index.entries, states, strict=True)
         if state.status.is_failure or state.status is Status.DAMAGED
     ]
-    told = sweep_failures(failures) if failures else []
-    return [f"{len(table.status)} cases: {counts}", *told, *map(str, paths)]
+    failure_lines = sweep_failures(failures) if failures else []
+    return [f"{len(table.status)} cases: {counts}", *failure_lines, *map(str, paths)]
 
 
 def _index_and_states(directory: Path) -> tuple[SweepIndex, list[CaseState]]:

@@ -35,7 +35,7 @@ def run_all(sweep: Sweep, directory: Path, comm: Intracomm, ranks_per_case: int,
 
     Raises:
         CaseError: the folder cannot be used: it holds another sweep, or another process runs this one.
-        ConvergenceError: cases failed; they are told of.
+        ConvergenceError: cases failed; they are printed.
         FetiHomogError: a result could not be written; the finished ones are kept.
     """
     with _sweep_lock(directory, comm, sweep, shared=False):

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import copy
 import hashlib
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,11 +12,12 @@ from typing import Any
 from feti_homog.config import case as cases
 from feti_homog.config.case import Case
 from feti_homog.config.document import read_document, to_document
-from feti_homog.config.sweep_section import SWEEP, SweepSection
-from feti_homog.config.wording import dotted_key, toml_value
+from feti_homog.config.sweep_section import SWEEP
+from feti_homog.config.wording import toml_value
 from feti_homog.errors import CaseError
 from feti_homog.output.text.units import unit
-from feti_homog.sweep.points import Assignment, read_points
+from feti_homog.sweep.case_documents import CaseDocument, case_documents
+from feti_homog.sweep.points import read_points
 
 MAX_NAMED_CASES = 4  # in one fault
 
@@ -63,16 +63,6 @@ class Sweep:
         return self.cases[0].output.stress_unit
 
 
-@dataclass(frozen=True)
-class _Numbered:
-    """The document of a case that is not checked yet, and which case it is."""
-
-    point: int
-    realisation: int
-    inputs: dict[str, Any]
-    document: dict[str, Any]
-
-
 def load(path: str | Path) -> Sweep:
     """The sweep in a file.  Raises CaseError with all faults of the table [sweep], or else of all its cases."""
     document = read_document(path)
@@ -93,22 +83,19 @@ def expand(values: Mapping[str, Any], folder: Path) -> Sweep:
         raise CaseError(f"{SWEEP} = {toml_value(table)}: expected a section [{SWEEP}]")
     faults: list[str] = []
     points, settings = read_points(table, faults)
-    documents = [_document(document, point, faults) for point in points]
-    if settings.realisations is not None:
-        faults += _realisation_faults(documents, points)
-    faults += _repeated(points[0]) if points else []
+    unchecked = case_documents(document, points, settings.realisations, faults)
     if faults:
         raise CaseError(*dict.fromkeys(faults))
-    return _checked(str(document.get("name", "case")), list(_numbered(points, documents, settings)), folder)
+    return _checked(str(document.get("name", "case")), unchecked, folder)
 
 
-def _checked(name: str, numbered: Sequence[_Numbered], folder: Path) -> Sweep:
+def _checked(name: str, unchecked: Sequence[CaseDocument], folder: Path) -> Sweep:
     """The sweep of its documents.  Raises CaseError with the faults of all cases, each with the cases that have it."""
     found, numbers_by_fault = [], dict[str, list[int]]()
-    for number, one in enumerate(numbered, start=1):
+    for number, each in enumerate(unchecked, start=1):
         try:
-            case = cases.parse(one.document | {"name": f"{name}-{number:04d}"}, folder)
-            found.append((SweepCase(number, one.point, one.realisation, one.inputs, _identity(case)), case))
+            case = cases.parse(each.document | {"name": f"{name}-{number:04d}"}, folder)
+            found.append((SweepCase(number, each.point, each.realisation, each.inputs, _identity(case)), case))
         except CaseError as error:
             for fault in error.faults:
                 numbers_by_fault.setdefault(fault, []).append(number)
@@ -125,73 +112,6 @@ def identity_of(digest: str, petsc: Mapping[str, Any]) -> str:
 
 def _identity(case: Case) -> str:
     return identity_of(case.digest(), case.petsc)
-
-
-def _document(base: Mapping[str, Any], point: Assignment, faults: list[str]) -> dict[str, Any]:
-    """The base with the values of a point; a table is merged into the section that it is a value of."""
-    document = copy.deepcopy(dict(base))
-    for path, value in point.items():
-        table = document
-        for name in path[:-1]:
-            table = table.setdefault(name, {})
-            if not isinstance(table, dict):
-                faults.append(f"[{SWEEP}] {dotted_key(path)}: {toml_value(name)} is no section")
-                return document
-        last = path[-1]
-        if isinstance(value, dict) and isinstance(table.get(last, {}), dict):
-            table[last] = table.get(last, {}) | value
-        else:
-            table[last] = value
-    return document
-
-
-def _realisation_faults(documents: list[dict[str, Any]], points: list[Assignment]) -> list[str]:
-    line = f"[{SWEEP}] realisations: "
-    faults = []
-    if not any(map(_is_random, documents)):
-        faults.append(f'{line}only cells with geometry = "random" have several')
-    if any("cell.seed" in _inputs(point) for point in points):
-        faults.append(f"{line}excludes cell.seed, the first of which is that of [cell]")
-    return faults
-
-
-def _repeated(point: Assignment) -> list[str]:
-    """Faults of keys that vary by themselves and within a table too."""
-    given = [key for path, value in point.items() for key in _inputs({path: value})]
-    return [f"[{SWEEP}] {key}: given twice" for key in dict.fromkeys(given) if given.count(key) > 1]
-
-
-def _is_random(document: Mapping[str, Any]) -> bool:
-    cell = document.get("cell")
-    return isinstance(cell, dict) and cell.get("geometry") == "random"
-
-
-def _inputs(point: Assignment) -> dict[str, Any]:
-    """The values of a point by dotted key, tables taken apart."""
-    inputs: dict[str, Any] = {}
-    for path, value in point.items():
-        parts = {(*path, name): part for name, part in value.items()} if isinstance(value, dict) else {path: value}
-        inputs |= {dotted_key(key): part for key, part in parts.items()}
-    return inputs
-
-
-def _numbered(points: list[Assignment], documents: list[dict[str, Any]], settings: SweepSection) -> Iterator[_Numbered]:
-    """The cases in their order: only points with a random cell have more than one realisation."""
-    for realisation in range(1, (settings.realisations or 1) + 1):
-        for point, (assignment, document) in enumerate(zip(points, documents, strict=True), start=1):
-            inputs = _inputs(assignment)
-            if settings.realisations is not None and _is_random(document):
-                seed = _seed(document, realisation)
-                cell = document["cell"] | {"seed": seed}
-                yield _Numbered(point, realisation, inputs | {"cell.seed": seed}, document | {"cell": cell})
-            elif realisation == 1:
-                yield _Numbered(point, realisation, inputs, document)
-
-
-def _seed(document: Mapping[str, Any], realisation: int) -> Any:
-    """The seed of a realisation: that of [cell] and those after it; a faulty one stays as it is."""
-    first = document["cell"].get("seed", 0)
-    return first + realisation - 1 if isinstance(first, int) else first
 
 
 def _case_names(numbers: list[int]) -> str:

@@ -35,7 +35,7 @@ def read_points(table: Mapping[str, Any], faults: list[str]) -> tuple[list[Assig
         found.append(f"[{SWEEP}]: nothing varies; expected keys with {AXIS_EXPECTED}, or realisations")
     found += _count_faults(axes, settings)
     faults += found
-    return ([] if found else expand(axes, settings)), settings
+    return ([] if found else combine(axes, settings)), settings
 
 
 def _axis_faults(axes: Sequence[Axis], settings: SweepSection) -> list[str]:
@@ -66,7 +66,7 @@ def _lengths(axes: Sequence[Axis], settings: SweepSection) -> list[tuple[str, in
     return [*lengths, (" and ".join(sampled), settings.samples)] if sampled and settings.samples else lengths
 
 
-def expand(axes: Sequence[Axis], settings: SweepSection) -> list[Assignment]:
+def combine(axes: Sequence[Axis], settings: SweepSection) -> list[Assignment]:
     """The points of axes without fault.
 
     Of a grid the last key in the file runs fastest; sampled keys are one axis of points, the last.

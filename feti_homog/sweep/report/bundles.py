@@ -21,17 +21,17 @@ def figure(table: SweepTable) -> Figure:
     document = next(d for d in table.finished if d.get("path"))
     along = point_tables.leading(document["path"])
     across = 1 if along == 0 else 0
-    whole = Figure(figsize=(9.6, 4.6), layout="constrained")
-    panels = whole.subplots(1, 2, sharex=True)
+    picture = Figure(figsize=(9.6, 4.6), layout="constrained")
+    panels = picture.subplots(1, 2, sharex=True)
     for axes, component in zip(panels, (along, across), strict=True):
         for style, point in enumerate(points):
             _bundle(axes, table, point, component, COLOURS[style])
         axes.xaxis.set_major_locator(MaxNLocator(5))
         axes.axhline(0.0, color="0.6", linewidth=0.6, zorder=0)
         label_axes(axes, f"$\\Sigma_{{{COMPONENTS[component]}}}$", table, f"${STRAINS[along]}$")
-    whole.suptitle(f"{table.name}: realisations, means and their 95 % confidence intervals", fontsize=12)
-    legend(whole, list(panels))
-    return whole
+    picture.suptitle(f"{table.name}: realisations, means and their 95 % confidence intervals", fontsize=12)
+    legend(picture, list(panels))
+    return picture
 
 
 def _bundle(axes: Axes, table: SweepTable, point: int, component: int, colour: str) -> None:

@@ -36,27 +36,27 @@ class PanelBounds:
 def figure(table: SweepTable) -> Figure:
     """Moduli above; below, where there are bounds, how far they are above that of Reuss, which tells them apart."""
     bounds, series = _bounds(table), series_over(table, FRACTION)[: len(COLOURS)]
-    whole = Figure(figsize=(14.4, 6.6 if bounds else 3.8), layout="constrained")
-    panels = whole.subplots(2 if bounds else 1, len(PANELS), sharex=True, squeeze=False)
+    picture = Figure(figsize=(14.4, 6.6 if bounds else 3.8), layout="constrained")
+    panels = picture.subplots(2 if bounds else 1, len(PANELS), sharex=True, squeeze=False)
     for k, name in enumerate(PANELS):
         if bounds is not None:
             _draw_bounds(panels[0, k], bounds.fractions, bounds.rows[name])
-        for style, one in enumerate(series):
-            plot_series(panels[0, k], table, one, name, style)
+        for style, each in enumerate(series):
+            plot_series(panels[0, k], table, each, name, style)
         label_axes(panels[0, k], name, table, "" if bounds else "fibre fraction")
         if bounds is not None:
             _draw_above_reuss(panels[1, k], table, series, bounds, name)
     planes = sorted({document["case"]["analysis"]["plane"] for document in table.finished})
-    whole.suptitle(f"{table.name}: plane {' and '.join(planes)}", fontsize=12)
-    legend(whole, list(panels.flat)[::-1])
-    return whole
+    picture.suptitle(f"{table.name}: plane {' and '.join(planes)}", fontsize=12)
+    legend(picture, list(panels.flat)[::-1])
+    return picture
 
 
 def _draw_above_reuss(axes: Axes, table: SweepTable, series: list[Series], bounds: PanelBounds, name: str) -> None:
     c, rows = bounds.fractions, bounds.rows[name]
     _draw_bounds(axes, c, 100.0 * (rows / rows[0] - 1.0))
-    for style, one in enumerate(series):
-        plot_series(axes, table, one, name, style, baseline=lambda x: np.interp(x, c, rows[0]), x_factor=X_FACTOR)
+    for style, each in enumerate(series):
+        plot_series(axes, table, each, name, style, baseline=lambda x: np.interp(x, c, rows[0]), x_factor=X_FACTOR)
     label_axes(axes, name, table, "fibre fraction")
     axes.set_ylabel("above Reuss (%)")
 

@@ -168,3 +168,16 @@ def test_a_file_without_the_table(tmp_path):
 def test_all_sampled_points_differ():
     found = values("samples = 20\ncell.fibre_fraction = {from = 0.1, to = 0.6}")
     assert all(a != b for a, b in pairwise(sorted(found)))
+
+
+def test_values_may_be_numpys():
+    base = tomllib.loads(CASE)
+    sweep = plan.expand(base | {"sweep": {"cell.fibre_fraction": np.linspace(0.1, 0.3, 3)}}, Path())
+    same = plan.expand(base | {"sweep": {"cell": {"fibre_fraction": np.linspace(0.1, 0.3, 3).tolist()}}}, Path())
+    assert sweep == same and len(sweep.cases) == 3
+    assert all(type(entry.inputs["cell.fibre_fraction"]) is float for entry in sweep.entries)
+
+
+def test_a_base_that_is_no_section():
+    with pytest.raises(CaseError, match=r"cell\.order: \"cell\" is no section"):
+        plan.expand({"cell": 3, "sweep": {"cell.order": [1]}}, Path())
