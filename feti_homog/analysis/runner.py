@@ -130,7 +130,7 @@ def _analysis(context: AnalysisContext, checkpoint: Checkpoint, resume: bool) ->
 
 
 def _checkpoint(cell: TornCell, directory: Path) -> Checkpoint:
-    plan, multipliers = cell.plan, cell.solver.jump_operator.total
+    plan, multipliers = cell.summary, cell.solver.jump_operator.global_rows
     parts = f"{plan.subdomains} subdomains on {cell.comm.size} ranks, {multipliers} multipliers"
     return Checkpoint(directory, cell.comm, f"case {on_root(cell.comm, cell.case.digest)}, {parts}")
 
@@ -156,7 +156,7 @@ def _recorder(cell: TornCell, file: FieldFile | None) -> Callable[[Response, flo
 def _document(context: AnalysisContext, analysis: dict[str, Any]) -> dict[str, Any]:
     """result.json but for times and memory; collective."""
     cell = context.homogenization.cell
-    plan, solver, areas = cell.plan, cell.solver, cell.areas()
+    plan, solver, areas = cell.summary, cell.solver, cell.areas()
     fractions = {phase: area / sum(areas.values()) for phase, area in areas.items()}
     document = {
         "version": __version__,
@@ -168,19 +168,19 @@ def _document(context: AnalysisContext, analysis: dict[str, Any]) -> dict[str, A
             "area": plan.area,
             "fibre_fraction": sum(f for phase, f in fractions.items() if phase != "matrix"),
             "fractions": fractions,
-            "elements": cell.total(sum(len(s.mesh.triangles) for s in cell.subdomains)),
-            "nodes": cell.total(sum(len(s.mesh.points) for s in cell.subdomains)),
+            "elements": cell.sum_over_ranks(sum(len(s.mesh.triangles) for s in cell.subdomains)),
+            "nodes": cell.sum_over_ranks(sum(len(s.mesh.points) for s in cell.subdomains)),
         },
         "solver": {
             "ranks": cell.comm.size,
             "bodies": plan.bodies,
             "subdomains": plan.subdomains,
-            "dofs": cell.total(len(solver.Q)),
-            "multipliers": solver.jump_operator.total,
-            "interface_nodes": cell.total(len(solver.jump_operator.nodes.row)),
+            "dofs": cell.sum_over_ranks(len(solver.Q)),
+            "multipliers": solver.jump_operator.global_rows,
+            "interface_nodes": cell.sum_over_ranks(len(solver.jump_operator.nodes.row)),
             "kernel_dim": solver.coarse.dimension,
             "coarse_dim": solver.coarse.vectors,
-            "factorizations": cell.total(len(solver.boundary.operators)),
+            "factorizations": cell.sum_over_ranks(len(solver.boundary.operators)),
             "coarse_factorizations": solver.coarse.factorizations,
             "rtol": solver.rtol,
             "solves": solver.solves,

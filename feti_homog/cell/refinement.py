@@ -17,7 +17,7 @@ from feti_homog.typing import Float, Int, Int32
 
 
 @dataclass(frozen=True, eq=False)
-class Lattice:
+class ReferenceLattice:
     """The reference triangle with corners (0,0), (M,0), (0,M), cut into 4**refine triangles.
 
     Two are the same only if they are one object, so that what follows from one can be kept.
@@ -33,7 +33,7 @@ class Lattice:
     triangles: Int
 
     @classmethod
-    def of(cls, refine: int, order: int) -> Lattice:
+    def of(cls, refine: int, order: int) -> ReferenceLattice:
         """The lattice of `refine` halvings for elements of the given order (1 or 2)."""
         m = order * 2**refine
         corners = np.array([[[m, 0, 0], [0, m, 0], [0, 0, m]]])
@@ -82,7 +82,7 @@ class FineMesh:
     curved: NDArray[np.bool_]
     node_class: Int32
     n_classes: int
-    lattice: Lattice
+    lattice: ReferenceLattice
 
     @property
     def triangles(self) -> Int32:
@@ -91,7 +91,7 @@ class FineMesh:
         return self.nodes[:, elements].reshape(-1, elements.shape[1])
 
 
-def refine(submesh: Submesh, lattice: Lattice) -> FineMesh:
+def refine(submesh: Submesh, lattice: ReferenceLattice) -> FineMesh:
     """Refine the subdomain; new nodes on circles lie on them."""
     edges, back, inner = submesh.triangle_edges, submesh.backwards, lattice.intervals - 1
     plane = lattice.number(submesh.triangles, edges, back, len(submesh.points), len(submesh.edges)).astype(np.int32)
@@ -106,7 +106,7 @@ def refine(submesh: Submesh, lattice: Lattice) -> FineMesh:
     return FineMesh(points, plane, curved, node_class, c, lattice)
 
 
-def edge_node(n_classes: int, edge: Int, position: Int, lattice: Lattice) -> Int:
+def edge_node(n_classes: int, edge: Int, position: Int, lattice: ReferenceLattice) -> Int:
     """Class of the lattice node at `position` (1..M-1) of local torus edge `edge`."""
     return n_classes + edge * (lattice.intervals - 1) + position - 1
 
@@ -119,7 +119,7 @@ def _split(triangle: Int) -> Int:
     return np.stack([np.stack(child, axis=1) for child in children], axis=1).reshape(-1, 3, 3)
 
 
-def _positions(submesh: Submesh, lattice: Lattice) -> Float:
+def _positions(submesh: Submesh, lattice: ReferenceLattice) -> Float:
     """(t, q, 2) lattice nodes of each coarse triangle, bent towards its curved edges.
 
     x = sum_k b_k x_k + sum_edges (1 - b_o)^2 delta(s): delta is the arc's distance from its chord at
@@ -140,7 +140,7 @@ def _positions(submesh: Submesh, lattice: Lattice) -> Float:
     return x
 
 
-def _straighten(x: Float, submesh: Submesh, lattice: Lattice) -> None:
+def _straighten(x: Float, submesh: Submesh, lattice: ReferenceLattice) -> None:
     """Put mid-edge nodes midway between their vertices, save those on arcs."""
     corners = lattice.triangles[:, :3]
     middle = (x[:, corners] + x[:, np.roll(corners, -1, axis=1)]) / 2

@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from feti_homog.cell.refinement import Lattice
+from feti_homog.cell.refinement import ReferenceLattice
 from feti_homog.fem.shape_functions import gradients
 from feti_homog.typing import Float, Int
 
@@ -57,7 +57,7 @@ class Macro:
 
     @classmethod
     @lru_cache(maxsize=4)
-    def of(cls, lattice: Lattice) -> Macro:
+    def of(cls, lattice: ReferenceLattice) -> Macro:
         """The element of a lattice."""
         elements, q = lattice.triangles, len(lattice.nodes)
         pair = elements[:, :, None] * q + elements[:, None, :]

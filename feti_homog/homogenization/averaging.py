@@ -50,7 +50,7 @@ class Homogenization:
 
     def __init__(self, cell: TornCell, contact: bool) -> None:
         self.cell = cell
-        self.interface = Interface(cell.solver, contact, np.array([cell.plan.width, cell.plan.height]))
+        self.interface = Interface(cell.solver, contact, np.array([cell.summary.width, cell.summary.height]))
 
     def respond(self, strains: Float, status: Status, starts: Sequence[Float]) -> list[Response]:
         """Solve the unit-cell problem under every strain of (k, 3) and average.  Collective.
@@ -82,7 +82,7 @@ class Homogenization:
         opening = cell.comm.allreduce(self._strain_of_jumps.T @ (state.solution.jump * (1 - solver.active.mask)))
         largest = (self._largest(u) + self.interface.imposed(strain)) or 1.0
         checks = {
-            "strain": float(np.abs(star - opening / cell.plan.area).max() / (np.abs(strain).max() or 1.0)),
+            "strain": float(np.abs(star - opening / cell.summary.area).max() / (np.abs(strain).max() or 1.0)),
             "hill": float(abs(energy - stress @ strain) / (abs(energy) or 1.0)),
             "jump": self._largest(solver.active.mask * state.solution.jump) / largest,
         }
@@ -108,20 +108,20 @@ class Homogenization:
     def _averages(self, E: Float, u: Float) -> tuple[Float, Float, float]:
         """<sigma>, <eps*> over the bodies, and <sigma:eps>; collective."""
         cell, total = self.cell, np.zeros(7)
-        for (s, Q), span in zip(self._loads(), cell.solver.boundary.spans, strict=True):
+        for (s, Q), span in zip(self._loads(), cell.solver.boundary.slices, strict=True):
             from_u = Q.T @ u[span]
             total[:3] += s.area * s.L @ E + from_u
             total[3:6] += np.linalg.solve(s.L, from_u)
             total[6] += s.area * E @ s.L @ E + 2 * E @ from_u
-        total[6] += u @ cell.solver.boundary.stiffness(u)
+        total[6] += u @ cell.solver.boundary.apply_schur(u)
         cell.comm.Allreduce(MPI.IN_PLACE, total)
-        total /= cell.plan.area
+        total /= cell.summary.area
         return total[:3], total[3:6], float(total[6])
 
     def _loads(self) -> list[tuple[Subdomain, Float]]:
         """The subdomains and their Q on the boundary dofs; inside a uniform body it vanishes."""
         solver = self.cell.solver
-        return [(s, solver.loads[span]) for s, span in zip(solver.subdomains, solver.boundary.spans, strict=True)]
+        return [(s, solver.loads[span]) for s, span in zip(solver.subdomains, solver.boundary.slices, strict=True)]
 
     def _largest(self, values: Float) -> float:
         """max |values| over all ranks."""

@@ -1,9 +1,9 @@
 """The gluing constraints B of one rank, and their place in the distributed vector of multipliers.
 
-Of the k copies of a fine node, those within one body are glued in x and y by orthonormal contrasts and can
-never part; a fibre and the matrix are glued by one pair (n, t) between the means of their copies, which can.
-So B has full row rank, n.(u_matrix - u_fibre) is the gap, and a multiplier is the nodal force that the
-faces exert on each other: tension is positive.
+Of the k copies of a fine node, those within one body are glued in x and y by orthonormal contrasts and can never
+part.  A fibre and the matrix are glued by one pair of rows (n, t) between the means of their copies; this bond can
+break.  So B has full row rank, n.(u_matrix - u_fibre) is the gap, and a multiplier is the nodal force that the faces
+exert on each other: tension is positive.
 """
 
 from __future__ import annotations
@@ -13,14 +13,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy.sparse import coo_matrix, csr_matrix
 
-from feti_homog.cell.refinement import Lattice, edge_node
+from feti_homog.cell.refinement import ReferenceLattice, edge_node
 from feti_homog.feti.decomposition.shared_entities import SharedEntities
 from feti_homog.feti.decomposition.subdomain import Subdomain
-from feti_homog.typing import Float, Int
+from feti_homog.typing import Bool, Float, Int
 
 
 @dataclass(frozen=True)
@@ -42,8 +41,8 @@ class InterfaceNodes:
     normal: Float
     length: Float
     fibre: Int
-    vertex: NDArray[np.bool_]
-    precracked: NDArray[np.bool_]
+    vertex: Bool
+    precracked: Bool
 
 
 class JumpOperator:
@@ -52,28 +51,28 @@ class JumpOperator:
     Attributes:
         B: (local rows, local dofs) signed, rotated entries; a local row is one that a local dof takes part in.
         rows: global number of each local row.
-        blocks: first owned row and number of rows of each fine node that this rank owns.
+        node_rows: first owned row and number of rows of each fine node that this rank owns.
         nodes: the interface nodes that this rank owns.
         owned: first global row of this rank and the one after its last.
-        total: number of rows on all ranks.
+        global_rows: number of rows on all ranks.
         shared: the vertices and edges that the rows belong to.
-        foreign: whether other ranks have each local row too.
+        is_shared_row: whether other ranks have each local row too.
         vector: a multiplier vector to duplicate.
     """
 
     def __init__(
-        self, comm: MPI.Intracomm, shared: SharedEntities, subdomains: Sequence[Subdomain], lattice: Lattice
+        self, comm: MPI.Intracomm, shared: SharedEntities, subdomains: Sequence[Subdomain], lattice: ReferenceLattice
     ) -> None:
         layout = _Layout(shared, subdomains, lattice)
         self.shared, self._first, self._count = shared, layout.first, layout.count
         elsewhere = np.bincount(np.repeat(np.arange(len(shared.key)), shared.copies), layout.base < 0, len(shared.key))
-        self.foreign = np.repeat(elsewhere > 0, layout.count)
+        self.is_shared_row = np.repeat(elsewhere > 0, layout.count)
         self.owned = shared.owned
-        self.total = shared.total
+        self.global_rows = shared.global_rows
         self.rows, self.B = layout.rows, layout.matrix()
-        self.blocks = layout.blocks(shared.owned)
+        self.node_rows = layout.node_rows(shared.owned)
         self.nodes = layout.interface_nodes(shared.owned)
-        self.vector = PETSc.Vec().createMPI((shared.owned[1] - shared.owned[0], shared.total), comm=comm)
+        self.vector = PETSc.Vec().createMPI((shared.owned[1] - shared.owned[0], shared.global_rows), comm=comm)
         self._exchanges: dict[int, _Exchange] = {}
 
     def rows_of(self, entities: Int) -> Int:
@@ -115,7 +114,8 @@ class _Exchange:
             return owned
         self._owned.getArray()[:] = owned.ravel()
         self._scatter.scatter(self._owned, self._local)
-        return self._local.getArray(readonly=True).reshape(-1, *owned.shape[1:]).copy()
+        local: Float = self._local.getArray(readonly=True).reshape(-1, *owned.shape[1:])
+        return local.copy()
 
     def sum(self, local: Float) -> Float:
         """The owned rows of the sum over ranks of x (local rows,) or (local rows, k)."""
@@ -124,13 +124,14 @@ class _Exchange:
         self._owned.zeroEntries()
         self._local.getArray()[:] = local.ravel()
         self._scatter.scatter(self._local, self._owned, addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
-        return self._owned.getArray(readonly=True).reshape(-1, *local.shape[1:]).copy()
+        owned: Float = self._owned.getArray(readonly=True).reshape(-1, *local.shape[1:])
+        return owned.copy()
 
 
 class _Layout:
     """Rows and columns of one rank, entity by entity."""
 
-    def __init__(self, shared: SharedEntities, subdomains: Sequence[Subdomain], lattice: Lattice) -> None:
+    def __init__(self, shared: SharedEntities, subdomains: Sequence[Subdomain], lattice: ReferenceLattice) -> None:
         self.shared, self.subdomains, self.lattice = shared, subdomains, lattice
         copies = shared.copies
         self.count = shared.nodes * 2 * (copies - 1)
@@ -156,13 +157,14 @@ class _Layout:
         return base
 
     def matrix(self) -> csr_matrix:
+        """B (local rows, local dofs)."""
         entries = [self._entries(*group) for group in self._signatures()]
         rows, columns, values = (np.concatenate([e[i] for e in entries] or [np.zeros(0)]) for i in range(3))
         shape = (len(self.rows), self.dofs[-1])
         return coo_matrix((values, (rows.astype(np.int64), columns.astype(np.int64))), shape=shape).tocsr()
 
     def _signatures(self) -> list[tuple[Int, Int, bool]]:
-        """Entities grouped by the sizes of the bodies' shares and whether they can break."""
+        """Entities grouped by how many copies each body has and whether they can break."""
         shared = self.shared
         groups: list[tuple[Int, Int, bool]] = []
         for k in np.unique(shared.copies):
@@ -176,6 +178,7 @@ class _Layout:
         return groups
 
     def _entries(self, entities: Int, sizes: Int, breakable: bool) -> tuple[Int, Int, Float]:
+        """Rows, columns and values of B on some entities whose bodies have `sizes` copies each."""
         shared = self.shared
         contrasts = _contrasts(sizes)
         k = len(contrasts) + 1
@@ -206,7 +209,8 @@ class _Layout:
         cos, sin = np.cos(angle), np.sin(angle)
         return np.stack([cos * a[:, 0] - sin * a[:, 1], sin * a[:, 0] + cos * a[:, 1]], axis=1)
 
-    def blocks(self, owned: tuple[int, int]) -> tuple[Int, Int]:
+    def node_rows(self, owned: tuple[int, int]) -> tuple[Int, Int]:
+        """First owned row and number of rows of each fine node whose rows are owned."""
         shared = self.shared
         mine = np.flatnonzero((shared.first_row >= owned[0]) & (shared.first_row < owned[1]))
         size = 2 * (shared.copies[mine] - 1)
@@ -214,6 +218,7 @@ class _Layout:
         return shared.first_row[mine][entity] - owned[0] + p * size[entity], size[entity]
 
     def interface_nodes(self, owned: tuple[int, int]) -> InterfaceNodes:
+        """The breakable nodes whose rows are owned."""
         shared, m = self.shared, self.lattice.intervals
         mine = (shared.first_row >= owned[0]) & (shared.first_row < owned[1])
         entity, p = _expand(np.flatnonzero(mine & (shared.fibre >= 0)), shared.nodes[mine & (shared.fibre >= 0)])

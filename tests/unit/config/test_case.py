@@ -27,7 +27,7 @@ def case_of(tmp_path: Path, content: str, name: str = "cell.toml"):
     return load(path)
 
 
-def test_defaults(tmp_path):
+def test_keys_that_are_left_out_have_their_defaults(tmp_path):
     case = case_of(tmp_path, BASE.replace("mesh_size = 0.05\n", ""))
     assert case.name == "cell"
     assert dataclasses.asdict(case.cell) == {
@@ -47,7 +47,7 @@ def test_defaults(tmp_path):
 
 
 @pytest.mark.parametrize("name", FAULTY)
-def test_fault(tmp_path, name):
+def test_faults_are_told_by_section_and_key(tmp_path, name):
     content, expected = FAULTY[name]
     with pytest.raises(CaseError) as caught:
         case_of(tmp_path, content)
@@ -71,17 +71,17 @@ def test_there_are_enough_faulty_cases():
     assert len(FAULTY) == len(FAULTY_CASES) + len(FAULTY_BONDINGS) >= 100
 
 
-def test_file_not_there(tmp_path):
+def test_a_missing_file_is_told(tmp_path):
     with pytest.raises(CaseError, match=r"none\.toml: cannot be read: No such file"):
         load(tmp_path / "none.toml")
 
 
-def test_folder(tmp_path):
+def test_a_folder_in_the_place_of_a_file_is_told(tmp_path):
     with pytest.raises(CaseError, match="cannot be read: Is a directory"):
         load(tmp_path)
 
 
-def test_not_utf8(tmp_path):
+def test_a_file_that_is_not_utf8_is_told(tmp_path):
     path = tmp_path / "cell.toml"
     path.write_bytes(BASE.encode() + "# Zelle für Stoß\n".encode("latin-1"))
     with pytest.raises(CaseError, match=r"not UTF-8 text \(line 17\)"):
@@ -107,7 +107,7 @@ def test_resolved_makes_the_same_case_again(tmp_path, name):
     assert pickle.loads(pickle.dumps(case)) == case
 
 
-def test_interface(tmp_path):
+def test_arcs_and_strengths_are_read(tmp_path):
     case = case_of(tmp_path, debonded('{fibre = "all", centre = -30, angle = 60}, {fibre = 2, angle = 10.5}'))
     arcs = (Arc(fibre="all", centre=-30.0, angle=60.0), Arc(fibre=(2,), centre=0.0, angle=10.5))
     assert case.interface == InterfaceSection(debonded=arcs)
@@ -117,13 +117,13 @@ def test_interface(tmp_path):
     assert (strong.interface.normal_strength, strong.interface.tangential_strength) == (None, 2.0)
 
 
-def test_angle(tmp_path):
+def test_openings_are_read(tmp_path):
     case = case_of(tmp_path, of_type("angle", "[angle]", "values = [0, 30, 360.0]", BARE_ARC))
     assert case.angle == Angle(values=(0.0, 30.0, 360.0), strain=None)
     assert case.interface == InterfaceSection(debonded=(Arc(fibre=(1,), angle=None),))
 
 
-def test_path(tmp_path):
+def test_targets_of_a_path_are_read(tmp_path):
     case = case_of(tmp_path, of_type("path", PATH))
     assert case.path == LoadPath(strain=(0.2, 0.0, 0.0))
     assert case.path.targets == ((0.2, 0.0, 0.0),)
@@ -132,7 +132,7 @@ def test_path(tmp_path):
     assert there_and_back.path.targets == ((1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
-def test_kinds_of_material(tmp_path):
+def test_the_keys_of_a_material_choose_its_kind(tmp_path):
     assert case_of(tmp_path, fibre("stiffness = [[3, 1, 0], [1, 3, 0], [0, 0, 1]]\n")).materials["fibre"] == General(
         ((3.0, 1.0, 0.0), (1.0, 3.0, 0.0), (0.0, 0.0, 1.0))
     )
@@ -148,7 +148,7 @@ def test_mesh_file_is_beside_the_case(tmp_path):
     assert case_of(tmp_path, content, "cases/one.toml").cell.file == (tmp_path / "cell.msh").resolve()
 
 
-def test_check_phases(tmp_path):
+def test_phases_of_mesh_and_case_must_match(tmp_path):
     case = case_of(tmp_path, MESH)
     check_phases(case, ["matrix", "fibre"])
     check_phases(case, ["matrix", "fibre:1", "fibre:2"])

@@ -31,7 +31,7 @@ def test_statistics_are_scipys():
         assert found.mean[k] + np.array([-1, 1]) * found.ci95[k] == pytest.approx([low, high])
 
 
-def test_statistics_of_few():
+def test_statistics_of_too_few_values_are_nan():
     found = Statistics.of(np.array([[1.0, 2.0, np.nan], [np.nan, 4.0, np.nan]]))
     assert found.count.tolist() == [1, 2, 0]
     assert found.mean[:2].tolist() == [1.0, 3.0] and math.isnan(found.mean[2])
@@ -83,7 +83,7 @@ def fractions():
     return collected(inputs, documents, [1, 2] * 3, [1, 1, 2, 2, 3, 3])
 
 
-def test_tables(tmp_path):
+def test_tables_hold_cases_and_statistics_of_points(tmp_path):
     table = fractions()
     assert [path.name for path in tables.write(tmp_path, table)] == ["sweep.csv", "sweep.h5"]
     with (tmp_path / "sweep.csv").open() as stream:
@@ -102,7 +102,8 @@ def test_tables(tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["sweep.csv", "sweep.h5"]
 
 
-def test_curves(tmp_path):
+@pytest.mark.slow
+def test_mean_curves_keep_the_bonded_branch(tmp_path):
     documents = [path_document(fibres, shift) for shift in (0.0, 1.0) for fibres in (2, 4)]
     table = collected({"cell.fibres": [2, 4, 2, 4], "cell.seed": [0, 0, 1, 1]}, documents, [1, 2, 1, 2], [1, 1, 2, 2])
     tables.write(tmp_path, table)
@@ -120,7 +121,8 @@ def test_curves(tmp_path):
     assert_drawn(tmp_path, table, ["cell_size.png", "curves.png"])
 
 
-def test_pictures(tmp_path):
+@pytest.mark.slow
+def test_moduli_are_drawn(tmp_path):
     assert_drawn(tmp_path, fractions(), ["moduli.png"])
     documents = [document(0.4, fibres, shift / fibres) for shift in (-1.0, 0.0, 1.0) for fibres in (4, 8, 16)]
     inputs = {"cell.fibres": [4, 8, 16] * 3, "cell.mesh_size": [0.3, 0.2, 0.1] * 3, "cell.seed": [0] * 9}
@@ -148,7 +150,7 @@ def test_what_varies_along_is_no_other_series():
     ]  # fmt: skip
 
 
-def test_units():
+def test_outputs_have_their_units():
     assert unit("material.fibre.young", "GPa") == "GPa" == unit("C11_compression", "GPa") == unit("onset_S11", "GPa")
     assert with_unit("angle_60_C11", "MPa") == "angle_60_C11 (MPa)" and with_unit("bulk", "") == "bulk"
     assert unit("seconds_solve", "GPa") == "s" and unit("material.fibre.angle", "GPa") == "degrees"

@@ -62,7 +62,7 @@ def test_few_subdomains_are_dealt_by_size(torus):
     assert largest <= 1.05 * max(load.max(), load.sum() / 2)
 
 
-def test_more_ranks_than_subdomains(torus):
+def test_ranks_beyond_the_subdomains_have_nothing(torus):
     whole = decompose(torus, torus.constituent, np.ones(17, np.int64), 40)
     assert len(np.unique(whole.rank)) == 17
 
