@@ -1,5 +1,5 @@
 """The command line: `feti-homog run CASE.toml --out DIR`, `check CASE.toml`, `plot DIR`, `sweep`, `collect`,
-`keys`, `schema`.
+`keys`, `schema`, `options`.
 
 Options with a double dash are ours, with a single dash PETSc's.
 """
@@ -11,6 +11,7 @@ import contextlib
 import io
 import json
 import os
+import signal
 import sys
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -68,12 +69,12 @@ def parsed(parser: argparse.ArgumentParser, words: Sequence[str], comm: Intracom
 
 
 def _command(words: Sequence[str], comm: Intracomm) -> int:
-    arguments = parsed(_parser(), words or ["--help"], comm)
+    arguments = parsed(command_parser(), words or ["--help"], comm)
     arguments.action(arguments, comm)
     return EXIT_DONE
 
 
-def _parser() -> Parser:
+def command_parser() -> Parser:
     parser = Parser(
         prog="feti-homog",
         description="Effective stiffness of fibre composites by FETI, on any number of MPI ranks.",
@@ -94,8 +95,6 @@ def _parser() -> Parser:
     plot = actions.add_parser("plot", help="make the pictures of a results folder again")
     plot.add_argument("directory", type=Path, metavar="DIR")
     plot.set_defaults(action=_plot)
-    options = actions.add_parser("options", help="print PETSc's options that the solver takes")
-    options.set_defaults(action=_print_options)
     _add_sweep(actions.add_parser("sweep", help="run the cases of a file with [sweep]", description=SWEEP_HELP))
     collect = actions.add_parser(
         "collect",
@@ -116,6 +115,8 @@ def _add_reference(actions: argparse._SubParsersAction[Parser]) -> None:
     keys.set_defaults(action=_keys)
     schema = actions.add_parser("schema", help="print the JSON Schema of a case file, for editors")
     schema.set_defaults(action=_schema)
+    options = actions.add_parser("options", help="print PETSc's options that the solver takes")
+    options.set_defaults(action=_options)
 
 
 def _add_sweep(sweep: argparse.ArgumentParser) -> None:
@@ -178,11 +179,6 @@ def _plot(arguments: argparse.Namespace, comm: Intracomm) -> None:
         print(path)
 
 
-def _print_options(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    if comm.rank == 0:
-        print(help_text())
-
-
 def _sweep(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.common.mpi_errors import on_root, on_root_only
     from feti_homog.output.files import output_folder
@@ -219,12 +215,21 @@ def _keys(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
     section = arguments.section
     tables = on_root_only(comm, reference.tables if section is None else partial(reference.tables_of, section))
-    if tables is not None:
-        print(reference.as_text(tables))
+    _print_reference(comm, reference.as_text(tables or []))
 
 
 def _schema(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.config.json_schema import json_schema
 
+    _print_reference(comm, json.dumps(json_schema(), indent=2))
+
+
+def _options(arguments: argparse.Namespace, comm: Intracomm) -> None:
+    _print_reference(comm, help_text())
+
+
+def _print_reference(comm: Intracomm, text: str) -> None:
+    """Print a text on rank 0; if its reader leaves early, as `head` does, the program ends without a word."""
     if comm.rank == 0:
-        print(json.dumps(json_schema(), indent=2))
+        signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # PETSc's handler would tell of an error
+        print(text, flush=True)

@@ -1,6 +1,7 @@
 """Settings of Sphinx for `scripts/manual`, which lays the sources out in build/manual_source."""
 
 import sys
+from importlib.metadata import distribution
 from pathlib import Path
 
 HERE = Path(__file__).parent
@@ -17,11 +18,12 @@ release = __version__
 
 extensions = [
     "myst_parser",
+    "sphinx.ext.mathjax",
     "sphinx.ext.napoleon",
     "sphinx.ext.viewcode",
     "autoapi.extension",
     "docstrings",
-    "mathml",
+    "formulas",
     "repository_links",
 ]
 
@@ -44,10 +46,15 @@ default_role = "py:obj"
 suppress_warnings = ["autoapi.python_import_resolution"]
 
 highlight_language = "none"
+smartquotes = False
 
 html_theme = "furo"
 html_title = f"{project} {release}"
-html_math_renderer = "mathml"
+# MathJax in one file, with its fonts.
+MATHJAX = distribution("sphinx-mathjax-offline").locate_file("sphinx-mathjax-offline/static/mathjax/tex-svg-full.js")
+html_static_path = [str(HERE / "static"), str(MATHJAX)]
+mathjax_path = MATHJAX.name
+html_css_files = ["manual.css"]
 html_copy_source = False
 html_show_copyright = False
 
