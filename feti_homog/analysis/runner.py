@@ -49,7 +49,8 @@ def run(case: Case, directory: Path, comm: MPI.Intracomm, quiet: bool, resume: b
     if resume and on_root(comm, finished, directory, case):
         progress.say(f"{directory} holds the finished result of this case: nothing to do")
         return
-    with _torn(case, comm, progress) as cell:
+    on_root(comm, output_folder.usable, directory)
+    with _torn(case, comm, progress) as cell, output_folder.held(directory, comm):
         faults = _run(cell, directory, progress, resume)
     if faults:
         raise ConvergenceError(*faults)
@@ -89,7 +90,6 @@ def _torn(case: Case, comm: MPI.Intracomm, progress: Progress) -> Iterator[TornC
 def _run(cell: TornCell, directory: Path, progress: Progress, resume: bool) -> list[str]:
     """Analyse and write; returns what did not hold."""
     case, comm = cell.case, cell.comm
-    on_root(comm, output_folder.make, directory)
     file = None
     if case.output.fields:
         with progress.stage("output") as words:

@@ -11,12 +11,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from feti_homog.analysis.runner import run
+from feti_homog.common.file_locks import Busy, Lock
 from feti_homog.common.mpi_errors import on_root, on_root_only, others_come
 from feti_homog.config.case import Case
 from feti_homog.errors import CaseError, ConvergenceError, FetiHomogError, MeshError
 from feti_homog.output.text.point_tables import sweep_failures, sweep_table
 from feti_homog.sweep import store
-from feti_homog.sweep.locks import Busy, Lock
 from feti_homog.sweep.plan import Entry, Sweep
 from feti_homog.sweep.store import BAD, DAMAGED, DONE, LOCK, WAITING
 

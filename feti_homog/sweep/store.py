@@ -11,7 +11,6 @@ from __future__ import annotations
 import csv
 import io
 import json
-import os
 import shutil
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -21,10 +20,10 @@ from typing import Any
 import tomli_w
 
 from feti_homog import __version__
+from feti_homog.common.file_locks import Busy, Lock, is_held
 from feti_homog.config.case import Case
 from feti_homog.errors import CaseError, FetiHomogError
 from feti_homog.output.files import atomic, checkpoint, result_json
-from feti_homog.sweep.locks import Busy, Lock, is_held
 from feti_homog.sweep.plan import Entry, Sweep, identity_of
 
 INDEX, TABLE, ERROR, CASE, LOCK = "sweep.json", "cases.csv", "error.txt", "case.toml", "lock"
@@ -135,7 +134,7 @@ def forget(directory: Path, entry: Entry, status: str) -> None:
         (folder / ERROR).unlink(missing_ok=True)
         shutil.rmtree(folder / checkpoint.FOLDER, ignore_errors=True)
         if (folder / result_json.NAME).exists():
-            os.replace(folder / result_json.NAME, folder / f"{result_json.NAME}.{status.replace(' ', '_')}")
+            atomic.rename(folder / result_json.NAME, folder / f"{result_json.NAME}.{status.replace(' ', '_')}")
     except OSError as error:
         raise FetiHomogError(f"cannot write {folder}: {error.strerror}") from error
 

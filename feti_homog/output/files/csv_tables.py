@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.errors import FetiHomogError
+from feti_homog.output.files import atomic
 
 STRAIN, STRESS = ("E11", "E22", "G12"), ("S11", "S22", "S12")
 STIFFNESS = tuple(f"C{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3))
@@ -41,10 +41,10 @@ def _row(point: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _write(path: Path, rows: list[dict[str, Any]]) -> None:
-    try:
-        with path.open("w", newline="", encoding="utf-8") as stream:
+    def write_rows(part: Path) -> None:
+        with part.open("w", newline="", encoding="utf-8") as stream:
             writer = csv.DictWriter(stream, list(rows[0]) if rows else [])
             writer.writeheader()
             writer.writerows(rows)
-    except OSError as error:
-        raise FetiHomogError(f"cannot write {path}: {error.strerror or error}") from error
+
+    atomic.replace(path, write_rows)

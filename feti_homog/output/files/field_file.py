@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from feti_homog.common.mpi_errors import agree, on_root
 from feti_homog.errors import FetiHomogError
+from feti_homog.output.files import atomic
 from feti_homog.typing import AnyInt, Float
 
 if TYPE_CHECKING:
@@ -107,7 +108,7 @@ class FieldFile:
     - /vector/interface/normal, /vector/state/K/displacement, fluctuation: with a third component 0, as
       virtual datasets, which take no space
 
-    Until `close` the file is called result.h5.part. As a context manager it closes when the block ends well;
+    Until `close` the file is called `part`. As a context manager it closes when the block ends well;
     after an exception it leaves the unfinished file. Empty parts still need their columns: shape (0, 2).
 
     Raises:
@@ -117,13 +118,13 @@ class FieldFile:
     def __init__(self, directory: Path, comm: Comm, header: Header, mesh: MeshPart, interface: InterfacePart) -> None:
         self._comm = comm
         self._path = Path(directory) / NAME
-        self._part = self._path.with_name(f"{NAME}.part")
+        self.part: Path = on_root(comm, atomic.part_of, self._path)
         self._nodes = _Rows.of(comm, len(mesh.points))
         self._elements = _Rows.of(comm, len(mesh.triangles))
         self._interface = _Rows.of(comm, len(interface.points))
-        on_root(comm, _told, self._path, _probe, self._part, comm.size)
-        self._file = agree(comm, _told, self._path, _create, self._part, comm)
-        self._together(_set_attributes, self._file, asdict(header) | {"created_by": "feti_homog"})
+        on_root(comm, _with_write_errors, self._path, _probe, self.part, comm.size)
+        self._file = agree(comm, _with_write_errors, self._path, _create, self.part, comm)
+        self._collectively(_set_attributes, self._file, asdict(header) | {"created_by": "feti_homog"})
         elements = {"triangles": mesh.triangles + np.int64(self._nodes.start), "body": mesh.body}
         elements |= {"subdomain": mesh.subdomain, "phase": mesh.phase}
         self._write("mesh", self._nodes, {"points": mesh.points})
@@ -140,15 +141,15 @@ class FieldFile:
         self._write(name, self._interface, interface)
         means = {"strain": state.strain, "stress": state.stress_mean, "load_factor": state.load_factor}
         means |= {"label": state.label}
-        self._together(_set_attributes, self._file[name], means)
+        self._collectively(_set_attributes, self._file[name], means)
         self._view(f"{name}/displacement", self._nodes)
         self._view(f"{name}/fluctuation", self._nodes)
-        self._together(self._file.flush)
+        self._collectively(self._file.flush)
 
     def close(self) -> Path:
         """Completes the file, gives it its final name, and returns its path."""
-        self._together(self._file.close)
-        on_root(self._comm, _told, self._path, os.replace, self._part, self._path)
+        self._collectively(self._file.close)
+        on_root(self._comm, _with_write_errors, self._path, atomic.commit, self.part, self._path)
         return self._path
 
     def __enter__(self) -> FieldFile:
@@ -164,21 +165,21 @@ class FieldFile:
         """Makes the tables of a group, each rank giving its rows."""
         arrays = agree(self._comm, _arrays, group, rows.count, tables)
         row = sum(array.dtype.itemsize * int(np.prod(array.shape[1:])) for array in arrays.values())
-        self._together(_reserve, self._comm.rank, self._part, row * rows.total)
+        self._collectively(_reserve, self._comm.rank, self.part, row * rows.total)
         for name, array in arrays.items():
-            self._together(_write_rows, self._file, f"{group}/{name}", rows, array)
+            self._collectively(_write_rows, self._file, f"{group}/{name}", rows, array)
 
     def _view(self, name: str, rows: _Rows) -> None:
         """The table `name` (rows, 2) as /vector/`name` (rows, 3)."""
         if rows.total:
             layout = h5py.VirtualLayout((rows.total, 3), dtype=np.float64)
             layout[:, :2] = h5py.VirtualSource(".", name, shape=(rows.total, 2), dtype=np.float64)
-            self._together(self._file.create_virtual_dataset, f"vector/{name}", layout, 0.0)
+            self._collectively(self._file.create_virtual_dataset, f"vector/{name}", layout, 0.0)
 
-    def _together(self, function: Callable[..., object], *args: Any) -> None:
+    def _collectively(self, function: Callable[..., object], *args: Any) -> None:
         """function(*args) on all ranks; if any cannot write, the file is removed and all raise."""
         try:
-            agree(self._comm, _told, self._path, function, *args)
+            agree(self._comm, _with_write_errors, self._path, function, *args)
         except FetiHomogError:
             self._remove()
             raise
@@ -187,29 +188,25 @@ class FieldFile:
         """Closes and removes the file. On a full disk HDF5 can close it only after it was cut to nothing."""
         if self._comm.rank == 0:
             with contextlib.suppress(OSError):
-                os.truncate(self._part, 0)
+                os.truncate(self.part, 0)
         self._comm.barrier()
         with contextlib.suppress(OSError, RuntimeError):
             self._file.close()
         if self._comm.rank == 0:
             with contextlib.suppress(OSError):
-                self._part.unlink()
+                self.part.unlink()
 
 
-def _told(path: Path, function: Callable[..., Any], *args: Any) -> Any:
-    """function(*args), with the failures of the file system and of HDF5 in words."""
-    try:
+def _with_write_errors(path: Path, function: Callable[..., Any], *args: Any) -> Any:
+    """function(*args), its failures in words about `path`."""
+    with atomic.write_errors(path):
         return function(*args)
-    except OSError as error:
-        raise FetiHomogError(f"cannot write {path}: {error.strerror or error}") from error
-    except RuntimeError as error:
-        raise FetiHomogError(f"cannot write {path}: {error}") from error
 
 
 def _probe(part: Path, ranks: int) -> None:
     """Finds out in plain terms whether the file can be made, before MPI-IO tries."""
     if ranks > 1 and not h5py.get_config().mpi:
-        raise FetiHomogError(f"h5py is built without MPI: {ranks} ranks cannot write {part.stem}")
+        raise FetiHomogError(f"h5py is built without MPI: {ranks} ranks cannot write {NAME}")
     part.parent.mkdir(parents=True, exist_ok=True)
     part.open("wb").close()
 

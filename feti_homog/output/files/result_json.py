@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.errors import FetiHomogError
+from feti_homog.output.files import atomic
 
 NAME = "result.json"
 
@@ -31,20 +32,14 @@ def write(directory: Path, document: Mapping[str, Any]) -> Path:
     plain = _plain(document, "", faults)
     if faults:
         raise FetiHomogError(*faults)
-    path = Path(directory) / NAME
-    part = path.with_name(f"{NAME}.part")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+
+    def write_text(part: Path) -> None:
+        part.parent.mkdir(parents=True, exist_ok=True)
         with part.open("w", encoding="utf-8") as stream:
             json.dump(plain, stream, indent=1, ensure_ascii=False, allow_nan=False)
             stream.write("\n")
-            stream.flush()
-            os.fsync(stream.fileno())
-        os.replace(part, path)
-    except OSError as error:
-        _remove(part)
-        raise FetiHomogError(f"cannot write {path}: {error.strerror or error}") from error
-    return path
+
+    return atomic.replace(Path(directory) / NAME, write_text)
 
 
 def read(directory: Path) -> dict[str, Any]:
@@ -74,11 +69,3 @@ def _plain(value: Any, place: str, faults: list[str]) -> Any:
     if value is None or isinstance(value, bool | int | float | str):
         return value
     raise TypeError(f"{NAME}: {place} is a {type(value).__name__}, which JSON cannot hold")
-
-
-def _remove(path: Path) -> None:
-    """Removes what may be left of a file, if it can be removed."""
-    try:
-        path.unlink(missing_ok=True)
-    except OSError:
-        return
