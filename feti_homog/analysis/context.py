@@ -14,7 +14,7 @@ from feti_homog.homogenization.averaging import Homogenization, Response
 from feti_homog.interface.contact import OPEN, Status
 from feti_homog.typing import Float
 
-UNIT_CASES = ("E11", "E22", "G12")
+UNIT_CASES = ("E11", "E22", "gamma12")
 
 # A check may exceed the solver's tolerance by what sums over the cell and jumps of stiffness make of it.
 CHECK_MARGIN = 1e3
@@ -47,11 +47,11 @@ class AnalysisContext:
         """Interface states before any load: prescribed debonded nodes are open."""
         return np.where(self.debonded(opening), OPEN, 0).astype(np.int8)
 
-    def nothing(self) -> Float:
+    def zero_multipliers(self) -> Float:
         """First multipliers when there are no better ones."""
         return np.zeros(self.homogenization.cell.solver.rows)
 
-    def note(self, name: str, response: Response) -> None:
+    def record_checks(self, name: str, response: Response) -> None:
         """Keep the numbers of a response, tell of it, and complain if it breaks a law."""
         state = response.state
         self.iterations.append(state.iterations)
@@ -60,8 +60,8 @@ class AnalysisContext:
         debonded = response.counts["open"] + response.counts["closed"]
         if debonded:
             words += f", {debonded} debonded ({response.counts['closed']} closed), {state.solves} solves"
-        if state.loose:
-            words += f", {state.loose} free motions"
+        if state.free_motions:
+            words += f", {state.free_motions} free motions"
         self.progress.say(f"  {name}: {words}")
         if state.solution.reason < 0:
             self.faults.append(
@@ -88,7 +88,7 @@ class AnalysisContext:
         """Secant stiffness (3, 3) to plus or minus each unit strain (39), and the responses."""
         responses = self.homogenization.respond(sign * np.eye(3), status, starts)
         for name, response in zip(UNIT_CASES, responses, strict=True):
-            self.note(f"{label}{'-' if sign < 0 else ''}{name}", response)
+            self.record_checks(f"{label}{'-' if sign < 0 else ''}{name}", response)
         return np.stack([sign * r.stress for r in responses], axis=1), responses
 
     def point(self, responses: Sequence[Response]) -> dict[str, Any]:

@@ -81,7 +81,7 @@ def run(
             dissipated = dissipation.at(point, response)
             if point.state.solution.reason > 0:
                 checkpoint.write(number, *_stored(point, dissipated))
-        context.note(f"{label} at {point.load_factor:.6f}{source}", response)
+        context.record_checks(f"{label} at {point.load_factor:.6f}{source}", response)
         context.record(response, point.load_factor, label)
         points.append(
             {
@@ -89,7 +89,7 @@ def run(
                 "strain": response.strain,
                 "stress": response.stress,
                 "broke": point.broke,
-                "loose": point.state.loose,
+                "free_motions": point.state.free_motions,
                 "dissipated": dissipated,
             }
             | context.point([response])
@@ -140,7 +140,14 @@ def _stored(point: Point, dissipated: float) -> tuple[dict[str, Any], Arrays]:
     state, solution, after = point.state, point.state.solution, point.after
     whole: dict[str, Any] = {
         "path": [point.load_factor, point.scale, float(after.leg), after.position, dissipated],
-        "numbers": [point.broke, state.iterations, state.solves, state.loose, solution.iterations, solution.reason],
+        "numbers": [
+            point.broke,
+            state.iterations,
+            state.solves,
+            state.free_motions,
+            solution.iterations,
+            solution.reason,
+        ],
         "strain": solution.strain,
         "alpha": solution.alpha,
         "residual": solution.residual,
@@ -159,11 +166,11 @@ def _stored(point: Point, dissipated: float) -> tuple[dict[str, Any], Arrays]:
 def _restored(event: Arrays) -> tuple[Point, float]:
     """What `_stored` took apart."""
     load_factor, scale, leg, position, dissipated = event["path"].tolist()
-    broke, iterations, solves, loose, last, reason = event["numbers"].tolist()
+    broke, iterations, solves, free_motions, last, reason = event["numbers"].tolist()
     solution = DualSolution(
         event["strain"], event["lam"], event["jump"], event["alpha"], last, reason, float(event["residual"])
     )
     certificate = dict(zip(KKT_LAWS, event["certificate"].tolist(), strict=True))
-    state = Equilibrium(event["status"], solution, iterations, solves, loose, certificate)
+    state = Equilibrium(event["status"], solution, iterations, solves, free_motions, certificate)
     after = PathState(int(leg), position, event["status_after"], event["lam_after"])
     return Point(load_factor, scale, state, broke, after), dissipated

@@ -54,7 +54,7 @@ class TornCell:
         nodes = self.solver.jump_operator.nodes
         # The mesher moves a tip to a vertex that is as near as this.
         moved = nodes.vertex & (self.case.cell.file is None)
-        near = np.where(moved, np.degrees(MERGED), debonded_arcs.SAME)
+        near = np.where(moved, np.degrees(MERGED), debonded_arcs.TIP_TOLERANCE_DEGREES)
         number = nodes.fibre - self.plan.first_fibre + 1
         cracks = nodes.precracked & (self.case.interface is not None)
         return cracks | debonded_arcs.debonded(self.case.arcs, opening, number, self.directions, near)

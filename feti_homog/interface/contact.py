@@ -40,7 +40,7 @@ class Equilibrium:
         status: (k,) BONDED, CLOSED or OPEN of the interface nodes that this rank owns.
         solution: of the last dual problem; its multipliers and jumps are those of the state.
         iterations, solves: Krylov iterations and dual problems that it took.
-        loose: rigid motions that no interface force resists.
+        free_motions: rigid motions that no interface force resists.
         certificate: errors of the KKT conditions: `kkt_penetration` relative to the largest imposed displacement,
             `kkt_tension` on a closed node relative to the largest traction, `kkt_complementarity`, the
             largest product of force and gap relative to the product of both scales.
@@ -50,7 +50,7 @@ class Equilibrium:
     solution: DualSolution
     iterations: int
     solves: int
-    loose: int
+    free_motions: int
     certificate: dict[str, float]
 
 

@@ -13,8 +13,8 @@ from feti_homog.config.schema import shown
 from feti_homog.config.sections import Arc
 from feti_homog.typing import Bool, Float, Int
 
-# A node within so many degrees of a tip is the tip.
-SAME = 1e-6
+# A node this near to a tip, in degrees, is the tip: coordinates in files and of circles are rounded.
+TIP_TOLERANCE_DEGREES = 1e-6
 
 
 def tips(arcs: Sequence[Arc], values: Sequence[float], fibres: int) -> dict[int, list[float]]:
@@ -42,7 +42,11 @@ def angles(points: Float, fibre: Int, centres: Float, period: Float) -> Float:
 
 
 def debonded(
-    arcs: Sequence[Arc], opening: float | None, fibre: Int, angle: Float, tolerance: float | Float = SAME
+    arcs: Sequence[Arc],
+    opening: float | None,
+    fibre: Int,
+    angle: Float,
+    tolerance: float | Float = TIP_TOLERANCE_DEGREES,
 ) -> Bool:
     """Whether nodes are within an arc of their fibre: (k,) for the fibres' numbers from 1 and directions (k,).
 

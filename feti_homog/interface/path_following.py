@@ -147,7 +147,7 @@ def _later_leg(
             yield Point((leg + s) / legs, 1.0, state, 0, PathState(leg, s, status, lam))
         ahead = interface.linear(ends[1], status, lam)
         breaks, changes = _first_break(interface, law, state, ahead), _first_change(interface, state, ahead)
-        least = 0.0 if breaks <= changes and not due else LOOSE_STEP if state.loose else STEP
+        least = 0.0 if breaks <= changes and not due else LOOSE_STEP if state.free_motions else STEP
         safe, due = s, breaks <= changes and breaks < 1.0 and not due
         s = min(1.0, s + max(min(breaks, changes) * (1.0 - s), least))
         way = (s - safe) / (1.0 - safe)

@@ -56,7 +56,7 @@ def test_run(tmp_path, ranks):
     job = command_line(ranks, "run", case_file(tmp_path, ""), "--out", out)
     assert job.returncode == 0, job.stderr
     assert {path.name for path in out.iterdir()} == FILES
-    for words in (*STAGES, "E11: ", "G12: ", "Effective stiffness", "Hashin-Shtr.", "Status      done"):
+    for words in (*STAGES, "E11: ", "gamma12: ", "Effective stiffness", "Hashin-Shtr.", "Status      done"):
         assert words in job.stdout
     assert_document(json.loads((out / "result.json").read_text()), max(ranks, 1))
     assert_fields(out)
