@@ -80,9 +80,10 @@ def plain(value: Any) -> Any:
 
     A field whose default is None is left out while it is None.
     """
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        absent = {f.name for f in dataclasses.fields(value) if f.default is None and getattr(value, f.name) is None}
-        return {name: plain(getattr(value, name)) for name in descriptions(value) if name not in absent}
+    if dataclasses.is_dataclass(value):
+        defaults = {f.name: f.default for f in dataclasses.fields(value)}
+        items = {name: getattr(value, name) for name in descriptions(value)}
+        return {name: plain(item) for name, item in items.items() if item is not None or defaults[name] is not None}
     if isinstance(value, Mapping):
         return {name: plain(item) for name, item in value.items()}
     if isinstance(value, list | tuple):

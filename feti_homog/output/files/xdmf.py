@@ -9,6 +9,7 @@ from xml.etree import ElementTree as ET
 import h5py
 import numpy as np
 
+from feti_homog.mechanics.voigt import STRESSES
 from feti_homog.output.files import atomic, field_file
 
 NAME = "result.xdmf"
@@ -52,7 +53,7 @@ def _cell(file: h5py.File, state: str) -> ET.Element:
         _attribute(grid, name, "Vector", "Node", _table(file[f"vector/state/{state}/{name}"]))
     for name in ("body", "subdomain", "phase"):
         _attribute(grid, name, "Scalar", "Cell", _table(file[f"mesh/{name}"]))
-    for column, name in enumerate(("S11", "S22", "S12")):
+    for column, name in enumerate(STRESSES):
         _attribute(grid, name, "Scalar", "Cell", _column(file[f"state/{state}/stress"], column))
     return grid
 

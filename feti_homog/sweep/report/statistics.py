@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from scipy.stats import t as student
 
-from feti_homog.output.files.csv_tables import STIFFNESS, STRESS
-from feti_homog.output.plots import response_curves
+from feti_homog.mechanics import response
+from feti_homog.mechanics.voigt import STIFFNESSES, STRESSES
 from feti_homog.output.text import point_tables
 from feti_homog.typing import Float
 
@@ -97,7 +97,7 @@ class Collected:
         Both are empty if the cases are no straight paths.
         """
         documents = [document for document in (self.documents[row] for row in self.rows(point)) if document is not None]
-        paths = [path for path in map(response_curves.straight, documents) if path is not None]
+        paths = [path for path in map(response.rising_strain, documents) if path is not None]
         if not paths:
             return np.zeros(0), np.zeros((0, 0, 3))
         strain = np.linspace(0.0, min(path[-1, 3] for path in paths), GRID)
@@ -120,7 +120,7 @@ def outputs(document: Document) -> dict[str, float]:
     found |= {"iterations": sum(solver["iterations"])}
     for name, suffix in (("effective_stiffness", ""), ("effective_stiffness_compression", "_compression")):
         entries = np.ravel(document.get(name, [])).tolist()
-        found |= {f"{entry}{suffix}": value for entry, value in zip(STIFFNESS, entries, strict=False)}
+        found |= {f"{entry}{suffix}": value for entry, value in zip(STIFFNESSES, entries, strict=False)}
     found |= _anisotropy(document.get("effective_stiffness"))
     found |= document.get("moduli", {}) | _bounds(document.get("bounds", {}))
     found |= _angles(document.get("angle", ())) | _path(document.get("path", ()))
@@ -150,7 +150,7 @@ def _bounds(bounds: Document) -> dict[str, float]:
 def _angles(points: Sequence[Document]) -> dict[str, float]:
     found: dict[str, float] = {}
     for point in points:
-        names, key = (STIFFNESS, "stiffness") if "stiffness" in point else (STRESS, "stress")
+        names, key = (STIFFNESSES, "stiffness") if "stiffness" in point else (STRESSES, "stress")
         values = np.ravel(point[key]).tolist()
         found |= {f"angle_{point['angle']:g}_{name}": v for name, v in zip(names, values, strict=True)}
     return found
@@ -164,5 +164,5 @@ def _path(points: Sequence[Document]) -> dict[str, float]:
     peak = stress[np.abs(stress).argmax(axis=0), range(3)]
     found = {"onset_load_factor": points[0]["load_factor"], "dissipated": points[-1]["dissipated"]}
     for place, values in (("onset", stress[0]), ("peak", peak), ("end", stress[-1])):
-        found |= {f"{place}_{name}": value for name, value in zip(STRESS, values.tolist(), strict=True)}
+        found |= {f"{place}_{name}": value for name, value in zip(STRESSES, values.tolist(), strict=True)}
     return found | {f"end_{state}": points[-1][state] for state in point_tables.STATES}
