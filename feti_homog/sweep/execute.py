@@ -8,12 +8,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from feti_homog.common.file_locks import Lock, LockHeld
 from feti_homog.common.mpi_errors import on_root, on_root_only, others_come
 from feti_homog.errors import CaseError, ConvergenceError, FetiHomogError
 from feti_homog.output.text.point_tables import sweep_failures, sweep_table
 from feti_homog.sweep import store
 from feti_homog.sweep.case_runner import PEER_TIMEOUT_S, CaseRunner, Outcome
-from feti_homog.sweep.locks import Lock, LockHeld
 from feti_homog.sweep.plan import Sweep
 from feti_homog.sweep.store import LOCK_FILE, CaseState, Status
 

@@ -11,7 +11,6 @@ from __future__ import annotations
 import csv
 import io
 import json
-import os
 import shutil
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -22,10 +21,10 @@ from typing import Any
 import tomli_w
 
 from feti_homog import __version__
+from feti_homog.common.file_locks import Lock, LockHeld, is_locked
 from feti_homog.config.case import Case
 from feti_homog.errors import CaseError, FetiHomogError
 from feti_homog.output.files import atomic, checkpoint, result_json
-from feti_homog.sweep.locks import Lock, LockHeld, is_locked
 from feti_homog.sweep.plan import Sweep, SweepCase, identity_of
 
 INDEX_FILE, TABLE_FILE, ERROR_FILE, CASE_FILE, LOCK_FILE = (
@@ -163,7 +162,7 @@ def reset(directory: Path, entry: SweepCase, status: Status) -> None:
         (folder / ERROR_FILE).unlink(missing_ok=True)
         shutil.rmtree(folder / checkpoint.FOLDER, ignore_errors=True)
         if (folder / result_json.NAME).exists():
-            os.replace(folder / result_json.NAME, folder / f"{result_json.NAME}.{status.replace(' ', '_')}")
+            atomic.rename(folder / result_json.NAME, folder / f"{result_json.NAME}.{status.replace(' ', '_')}")
     except OSError as error:
         raise FetiHomogError(f"cannot write {folder}: {error.strerror}") from error
 

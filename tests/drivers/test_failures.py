@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 import time
 
 import pytest
@@ -100,6 +102,35 @@ def test_a_file_in_the_place_of_the_folder_is_left_alone(tmp_path, ranks):
         job = command_line(ranks, "run", case_file(tmp_path), "--out", folder)
         assert job.returncode == 2 and job.stderr.count("is a file") == 1
     assert out.read_text() == "mine"
+
+
+HOLDER = """
+import sys, time
+from pathlib import Path
+from feti_homog.common.file_locks import TemporaryLock
+TemporaryLock(Path(sys.argv[1])).acquire()
+print("held", flush=True)
+time.sleep(60)
+"""
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_folder_that_another_run_writes_to(tmp_path, ranks):
+    out = tmp_path / "results"
+    out.mkdir()
+    other = subprocess.Popen([sys.executable, "-c", HOLDER, out / "result.lock"], stdout=subprocess.PIPE)
+    try:
+        assert other.stdout.readline() == b"held\n"
+        job = command_line(ranks, "run", case_file(tmp_path), "--out", out)
+        assert job.returncode == 2 and job.stderr.count("error: ") == 1, job.stderr
+        assert f"--out {out}: another run writes its results there: " in job.stderr
+        assert f"process {other.pid}" in job.stderr
+        assert [path.name for path in out.iterdir()] == ["result.lock"]
+    finally:
+        other.kill()
+        other.wait()
+    assert command_line(ranks, "run", case_file(tmp_path), "--out", out).returncode == 0
+    assert not (out / "result.lock").exists()
 
 
 @pytest.mark.parametrize("ranks", [1, 2])

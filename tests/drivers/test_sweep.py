@@ -194,7 +194,7 @@ def test_jobs_of_an_array_share_the_folder_but_no_case(tmp_path):
     jobs = [started(0, "sweep", path, "--out", out, "--index", str(k)) for k in (1, 2)]
     assert [job.wait(60) for job in jobs] == [0, 0] and len(results(out)) == 2
     held = subprocess.Popen(
-        [sys.executable, "-c", f"from feti_homog.sweep.locks import Lock; from pathlib import Path; import time\n"
+        [sys.executable, "-c", f"from feti_homog.common.file_locks import Lock; from pathlib import Path; import time\n"
          f"Lock(Path({str(out / 'case-0001/lock')!r})).acquire(); print('held', flush=True); time.sleep(60)"],
         stdout=subprocess.PIPE,
     )  # fmt: skip

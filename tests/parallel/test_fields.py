@@ -74,11 +74,11 @@ def test_states_are_on_disk_before_the_file_has_its_name(comm: Any, shared_path:
         assert not (shared_path / "result.h5").exists()
         comm.barrier()
         if comm.rank == 0:
-            with h5py.File(shared_path / "result.h5.part", "r") as reader:
+            with h5py.File(file.part, "r") as reader:
                 assert sorted(reader["state"]) == [str(i) for i in range(k + 1)]
         comm.barrier()
     file.close()
-    assert (shared_path / "result.h5").exists() and not (shared_path / "result.h5.part").exists()
+    assert (shared_path / "result.h5").exists() and not file.part.exists()
     comm.barrier()
 
 

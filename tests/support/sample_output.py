@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.output.files.field_file import Header, InterfacePart, MeshPart, StatePart
+from feti_homog.output.files.field_layout import Header, InterfacePart, MeshPart, StatePart
 
 GRADIENTS = tuple(np.array([[a, b], [b, c]]) for a, b, c in ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.5, 0.0)))
 

@@ -8,7 +8,7 @@ from feti_homog import __version__
 from feti_homog.fem.assembly import element_strain
 from feti_homog.homogenization.averaging import Response, displacement, fluctuation
 from feti_homog.homogenization.unit_cell import TornCell
-from feti_homog.output.files.field_file import Header, InterfacePart, MeshPart, StatePart
+from feti_homog.output.files.field_layout import Header, InterfacePart, MeshPart, StatePart
 from feti_homog.typing import Float
 
 

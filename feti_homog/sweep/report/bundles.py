@@ -6,8 +6,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from feti_homog.mechanics import response
 from feti_homog.output.plots.canvas import STRAINS
-from feti_homog.output.text import point_tables
 from feti_homog.sweep.report.statistics import Statistics
 from feti_homog.sweep.report.style import COLOURS, label_axes, legend
 from feti_homog.sweep.report.sweep_table import SweepTable
@@ -19,7 +19,7 @@ def figure(table: SweepTable) -> Figure:
     """Two panels: the stress along the strain, and the largest of the others."""
     points = [point for point in table.points if len(table.curves(point)[0])][: len(COLOURS)]
     document = next(d for d in table.finished if d.get("path"))
-    along = point_tables.leading(document["path"])
+    along = response.leading_component(document["path"])
     across = 1 if along == 0 else 0
     picture = Figure(figsize=(9.6, 4.6), layout="constrained")
     panels = picture.subplots(1, 2, sharex=True)

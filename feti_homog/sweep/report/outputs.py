@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.output.files.csv_tables import STIFFNESS, STRESS
+from feti_homog.mechanics.voigt import STIFFNESSES, STRESSES
 from feti_homog.output.text import point_tables
 
 Document = Mapping[str, Any]
@@ -21,7 +21,7 @@ def outputs(document: Document) -> dict[str, float]:
     found |= {"iterations": sum(solver["iterations"])}
     for name, suffix in (("effective_stiffness", ""), ("effective_stiffness_compression", "_compression")):
         entries = np.ravel(document.get(name, [])).tolist()
-        found |= {f"{entry}{suffix}": value for entry, value in zip(STIFFNESS, entries, strict=False)}
+        found |= {f"{entry}{suffix}": value for entry, value in zip(STIFFNESSES, entries, strict=False)}
     found |= _anisotropy(document.get("effective_stiffness"))
     found |= document.get("moduli", {}) | _bounds(document.get("bounds", {}))
     found |= _angles(document.get("angle", ())) | _path(document.get("path", ()))
@@ -51,7 +51,7 @@ def _bounds(bounds: Document) -> dict[str, float]:
 def _angles(points: Sequence[Document]) -> dict[str, float]:
     found: dict[str, float] = {}
     for point in points:
-        names, key = (STIFFNESS, "stiffness") if "stiffness" in point else (STRESS, "stress")
+        names, key = (STIFFNESSES, "stiffness") if "stiffness" in point else (STRESSES, "stress")
         values = np.ravel(point[key]).tolist()
         found |= {f"angle_{point['angle']:g}_{name}": v for name, v in zip(names, values, strict=True)}
     return found
@@ -65,5 +65,5 @@ def _path(points: Sequence[Document]) -> dict[str, float]:
     peak = stress[np.abs(stress).argmax(axis=0), range(3)]
     found = {"onset_load_factor": points[0]["load_factor"], "dissipated": points[-1]["dissipated"]}
     for place, values in (("onset", stress[0]), ("peak", peak), ("end", stress[-1])):
-        found |= {f"{place}_{name}": value for name, value in zip(STRESS, values.tolist(), strict=True)}
+        found |= {f"{place}_{name}": value for name, value in zip(STRESSES, values.tolist(), strict=True)}
     return found | {f"end_{state}": points[-1][state] for state in point_tables.STATES}

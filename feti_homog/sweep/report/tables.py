@@ -13,8 +13,8 @@ from typing import Any
 import h5py
 import numpy as np
 
+from feti_homog.mechanics.voigt import STRESSES
 from feti_homog.output.files import atomic
-from feti_homog.output.files.csv_tables import STRESS
 from feti_homog.output.text.units import unit, with_unit
 from feti_homog.sweep.report.statistics import Statistics
 from feti_homog.sweep.report.sweep_table import SweepTable
@@ -102,7 +102,7 @@ def _put_curves(file: Any, table: SweepTable, point: int) -> None:
         return
     group = f"curves/point-{point}"
     _put(file, f"{group}/strain", strain, "")
-    for k, name in enumerate(STRESS):
+    for k, name in enumerate(STRESSES):
         statistics = Statistics.of(stress[:, :, k])
         _put(file, f"{group}/{name}", stress[:, :, k], table.stress_unit)
         for part in PARTS[1:]:

@@ -8,14 +8,14 @@ from pathlib import Path
 
 import pytest
 
+from feti_homog.common.file_locks import Lock, LockHeld, is_locked
 from feti_homog.errors import FetiHomogError
 from feti_homog.output.files import atomic
-from feti_homog.sweep.locks import Lock, LockHeld, is_locked
 
 HOLDER = """
 import sys, time
 from pathlib import Path
-from feti_homog.sweep.locks import Lock
+from feti_homog.common.file_locks import Lock
 Lock(Path(sys.argv[1]), shared={shared}).acquire()
 print("held", flush=True)
 time.sleep(60)

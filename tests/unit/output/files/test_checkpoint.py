@@ -5,12 +5,14 @@ from __future__ import annotations
 import random
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from mpi4py import MPI
 
 from feti_homog.errors import CaseError
-from feti_homog.output.files.checkpoint import Checkpoint
+from feti_homog.output.files import atomic
+from feti_homog.output.files.checkpoint import FORMAT, Checkpoint
 
 EVENTS = 4
 
@@ -54,8 +56,20 @@ def test_a_checkpoint_without_one_of_its_events_is_refused(tmp_path):
 
 def test_an_unfinished_event_does_not_count(tmp_path):
     checkpoint = written(tmp_path)
-    (tmp_path / "checkpoint" / "000004.part").write_bytes(b"half")
+    atomic.part_of(tmp_path / "checkpoint" / "000004.h5").write_bytes(b"half")
     assert len(checkpoint.read()) == EVENTS
+
+
+@pytest.mark.parametrize("version", [None, FORMAT + 1])
+def test_an_event_of_another_format(tmp_path, version):
+    checkpoint = written(tmp_path)
+    with h5py.File(tmp_path / "checkpoint" / "000001.h5", "r+") as file:
+        del file.attrs["format"]
+        if version is not None:
+            file.attrs["format"] = version
+    found = rf"000001\.h5 has the checkpoints' format {version or 0}, this program reads format {FORMAT};"
+    with pytest.raises(CaseError, match=found):
+        checkpoint.read()
 
 
 @pytest.mark.parametrize("content", [b"", b"nothing", None])

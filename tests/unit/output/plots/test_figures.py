@@ -12,9 +12,10 @@ from matplotlib.image import imread
 from PIL import Image
 from support.sample_output import Sample, sample, without_interface
 
-from feti_homog.errors import FetiHomogError
+from feti_homog.errors import CaseError, FetiHomogError
 from feti_homog.output.files import xdmf
 from feti_homog.output.files.field_file import FieldFile
+from feti_homog.output.files.result_json import SCHEMA
 from feti_homog.output.plots import canvas, decimation, figures
 from feti_homog.output.plots.interface_marks import Faces
 
@@ -90,7 +91,7 @@ def test_outlines_leave_out_the_cuts_within_a_body(tmp_path: Path) -> None:
 def test_all_pictures_are_made(tmp_path: Path, order: int, refine: int) -> None:
     write(tmp_path, sample(4, refine, order))
     paths = figures.plot(tmp_path)
-    cases = ["case_E11.png", "case_E22.png", "case_G12.png"]
+    cases = ["case_E11.png", "case_E22.png", "case_gamma12.png"]
     assert [path.name for path in paths] == ["cell.png", *cases, "interface.png"]
     for path in paths:
         picture = imread(path)
@@ -103,7 +104,7 @@ def listed(kind: str, **points: Any) -> dict[str, Any]:
     section = {"strain": [0.0, 0.0, 1.0]} | ({"method": "events"} if kind == "path" else {"values": [0, 90, 180]})
     case = {"name": "a", "analysis": {"type": kind, "plane": "strain"}, "interface": {"contact": True}, kind: section}
     rows = [counts | {key: values[k] for key, values in points.items()} for k in range(3)]
-    return {"case": case | {"output": {"stress_unit": "GPa"}}, kind: rows}
+    return {"schema": SCHEMA, "case": case | {"output": {"stress_unit": "GPa"}}, kind: rows}
 
 
 LISTS = [
@@ -155,7 +156,7 @@ def test_the_case_chooses_component_and_scale(tmp_path: Path) -> None:
     write(tmp_path, sample(4))
     before = [path.read_bytes() for path in figures.plot(tmp_path)]
     output = {"stress": "S22", "deformation_scale": 0.3}
-    (tmp_path / "result.json").write_text(json.dumps({"case": {"output": output}}))
+    (tmp_path / "result.json").write_text(json.dumps({"schema": SCHEMA, "case": {"output": output}}))
     after = [path.read_bytes() for path in figures.plot(tmp_path)]
     assert before[0] == after[0] and all(a != b for a, b in zip(before[1:4], after[1:4], strict=True))
 
@@ -188,6 +189,15 @@ def test_a_missing_or_broken_result_is_told(tmp_path: Path) -> None:
         figures.plot(tmp_path)
     (tmp_path / "result.h5").write_text("nothing")
     with pytest.raises(FetiHomogError, match=r"^cannot draw .*result\.h5: "):
+        figures.plot(tmp_path)
+
+
+@pytest.mark.parametrize("schema", [{}, {"schema": SCHEMA + 1}])
+def test_a_result_of_another_schema(tmp_path: Path, schema: dict[str, int]) -> None:
+    write(tmp_path, sample(4))
+    (tmp_path / "result.json").write_text(json.dumps({"case": {}} | schema))
+    found = rf"result\.json: its schema is {schema.get('schema', 'none')}, this program reads schema {SCHEMA}"
+    with pytest.raises(CaseError, match=found):
         figures.plot(tmp_path)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from feti_homog.output.plots.response_curves import strain_controlled
+from feti_homog.mechanics.response import first_drop, first_leg, rising_strain, strain_controlled
 from feti_homog.output.text.point_tables import chosen
 
 
@@ -23,6 +23,29 @@ def test_snap_back_becomes_a_drop() -> None:
     found = strain_controlled(points, 0)[:, [3, 0]]
     expected = [[0, 0], [0.05, 0.5], [0.05, 0.2], [0.08, 0.32], [0.08, 0.16], [0.1, 0.2]]
     np.testing.assert_allclose(found, expected, atol=1e-15)
+
+
+def document(method: str, waypoints: int, points: list[dict[str, Any]]) -> dict[str, Any]:
+    path = {"method": method} | ({"waypoints": [[1.0, 0, 0]] * waypoints} if waypoints > 1 else {})
+    return {"case": {"path": path}, "path": points}
+
+
+def test_the_first_drop_ends_on_the_next_branch_that_holds() -> None:
+    points = [point(0.5, 10.0), point(0.3, 8.0), point(0.4, 6.0), point(0.8, 4.0), point(1.0, 2.0, 0)]
+    stress, number = first_drop(points)
+    assert number == 3 and stress.tolist() == pytest.approx([0.05 * 4.0, 0.0, 0.0])
+
+
+def test_first_legs() -> None:
+    points = [point(load, 1.0) for load in (0.2, 0.5, 0.6, 1.0)]
+    assert [first_leg(document("events", n, points)) for n in (1, 2, 3)] == [4, 2, 1]
+    assert first_leg(document("increments", 2, points)) == 4
+
+
+def test_rising_strain_of_increments_is_the_points_from_zero() -> None:
+    found = rising_strain(document("increments", 1, [point(0.5, 4.0), point(1.0, 2.0)]))
+    np.testing.assert_allclose(found[:, [3, 0]], [[0, 0], [0.05, 0.2], [0.1, 0.2]])
+    assert rising_strain(document("events", 2, [point(1.0, 2.0)])) is None
 
 
 def test_no_break_is_a_straight_line() -> None:
