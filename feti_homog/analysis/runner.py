@@ -99,6 +99,8 @@ def _run(cell: TornCell, directory: Path, progress: Progress, resume: bool) -> l
             )
     with file or nullcontext():
         context = _study(cell, progress, file)
+        for warning in context.warnings():
+            progress.say(f"warning: {warning}")
         checkpoint = _checkpoint(cell, directory)
         analysis = _analyse(context, checkpoint, resume)
     _write(context, directory, _document(context, analysis), checkpoint)
@@ -190,7 +192,7 @@ def _document(context: AnalysisContext, analysis: dict[str, Any]) -> dict[str, A
         "checks": context.checks,
         "check_tolerance": context.tolerance("jump"),
         "kkt_tolerance": CONTACT_TOLERANCE,
-        "warnings": list(cell.case.warnings()),
+        "warnings": [*cell.case.warnings(), *context.warnings()],
         "faults": context.faults,
         "status": "not converged" if context.faults else "done",
     }

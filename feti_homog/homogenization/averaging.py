@@ -31,8 +31,10 @@ class Response:
         state: interface states, multipliers, jumps and amplitudes.
         u: (boundary dofs,) fluctuating displacement u* on the boundaries of this rank's subdomains.
         checks: relative errors of the laws: `strain` <eps> = E, Eq. (3), with the opening of debonded faces as
-            part of <eps>; `hill` <sigma:eps> = Sigma:E, Eq. (8); `jump`, the largest opening of a glued
-            node relative to the largest displacement; and the KKT certificate of contact.
+            part of <eps>; `hill` <sigma:eps> = Sigma:E, Eq. (8), relative to <sigma:eps> or, if that is less, to
+            what a bonded cell stores at least, E:<L^-1>^-1:E (Reuss), for a debonded one may store nothing;
+            `jump`, the largest opening of a glued node relative to the largest displacement, which does not
+            vanish where forces do; and the KKT certificate of contact.
         counts: numbers of `bonded`, `open` and `closed` interface nodes.
     """
 
@@ -80,10 +82,11 @@ class Homogenization:
         strain, u = state.solution.strain, solver.boundary_displacement(state.solution)
         stress, star, energy = self._averages(strain, u)
         opening = cell.comm.allreduce(self._strain_of_jumps.T @ (state.solution.jump * (1 - solver.active.mask)))
+        least = float(strain @ self.interface.least_bonded_stiffness @ strain)
         largest = (self._largest(u) + self.interface.imposed(strain)) or 1.0
         checks = {
             "strain": float(np.abs(star - opening / cell.plan.area).max() / (np.abs(strain).max() or 1.0)),
-            "hill": float(abs(energy - stress @ strain) / (abs(energy) or 1.0)),
+            "hill": float(abs(energy - stress @ strain) / (max(abs(energy), least) or 1.0)),
             "jump": self._largest(solver.active.mask * state.solution.jump) / largest,
         }
         counts = self.counts(state.status)
@@ -137,7 +140,7 @@ def displacement(cell: TornCell, strain: Float, u: Float) -> Float:
     """(nodes, 2) total displacement E y + u*, Eq. (14), at this rank's plane nodes."""
     E = np.array([[strain[0], strain[2] / 2], [strain[2] / 2, strain[1]]])
     points = np.concatenate([s.mesh.points for s in cell.subdomains] or [np.zeros((0, 2))])
-    return points @ E + fluctuation(cell, u)
+    return np.asarray(points @ E + fluctuation(cell, u))
 
 
 def fluctuation(cell: TornCell, u: Float) -> Float:
