@@ -56,6 +56,16 @@ TRIANGLE_INVERSE_ROWS = 48
 # Rows of the blocks in which a triangle is mirrored, so that they fit the cache.
 MIRRORED_BLOCK_ROWS = 64
 
+# decomposition
+
+# METIS takes whole numbers as weights of edges: lengths are rounded up to so many classes.  Cuts are 5 % shorter and
+# more than with one class (`tests/unit/feti/decomposition/test_partition.py`).
+LENGTH_CLASSES = 100
+# Load of the fullest rank, relative to that of the most even assignment, that is accepted to keep neighbours together.
+MAX_IMBALANCE = 1.03
+# Largest |K R| relative to |K|.  Rounding leaves about 1e-16; a rotation that is wrong by 1 % gives 1e-7 and more.
+KERNEL_TOLERANCE = 1e-10
+
 # operators
 
 # Seconds, up to a common factor, for the choice: of a dense inverse per n^3 of n boundary dofs, and of one application
