@@ -123,12 +123,12 @@ def measure(cell: Cell, space: str, comm: MPI.Intracomm) -> Row:
     with case_options(case.petsc):
         torn = tear(case, comm, Progress(comm, quiet=True))
         solver = torn.solver
-        solutions = solver.solve_together(np.eye(3), np.zeros((solver.rows, 3)))
-    boundary = comm.allreduce(max((len(d) for d in solver.boundary.dofs), default=0), MPI.MAX)
+        solutions = solver.solve_many(np.eye(3), np.zeros((solver.rows, 3)))
+    boundary = comm.allreduce(max((len(d) for d in solver.interface_operators.dofs), default=0), MPI.MAX)
     dofs = torn.total(len(solver.Q))
     iterations = solutions[0].iterations if solutions[0].reason > 0 else 9999
     seconds = time.perf_counter() - start
-    vectors = solver.coarse.vectors / torn.plan.subdomains
+    vectors = solver.coarse.coarse_dimension / torn.plan.subdomains
     solver.destroy()
     PETSc.garbage_cleanup(comm)
     return Row(**asdict(cell), dofs=dofs, subdomains=torn.plan.subdomains, boundary=boundary, vectors=vectors,

@@ -85,7 +85,7 @@ def measure(case: Case, progress: Progress) -> dict[str, Any]:
     solver = cell.solver
     progress.seconds["set-up"] = progress.seconds.pop("factor")
     with progress.stage("solve"):
-        solutions = solver.solve_together(np.eye(LOADS), np.zeros((solver.rows, LOADS)))
+        solutions = solver.solve_many(np.eye(LOADS), np.zeros((solver.rows, LOADS)))
     memory = sum(comm.allgather(peak()))
     if not isinstance(solver.coarse, AdaptiveCoarseSpace):
         raise TypeError("the study is of the adaptive coarse space")
@@ -96,8 +96,8 @@ def measure(case: Case, progress: Progress) -> dict[str, Any]:
         "fullest": max(own),
         "triangles": cell.plan.coarse_triangles,
         "subdomains": cell.plan.subdomains,
-        "vectors": solver.coarse.vectors,
-        "kernel": solver.coarse.dimension,
+        "vectors": solver.coarse.coarse_dimension,
+        "kernel": solver.natural.kernel_dimension,
         "iterations": solutions[0].iterations,
         "converged": solutions[0].reason > 0,
         "seconds": progress.timings(),
@@ -137,7 +137,7 @@ def _foreign(jump_operator: JumpOperator, comm: MPI.Intracomm) -> np.ndarray:
 
 def _coarse(coarse: AdaptiveCoarseSpace, comm: MPI.Intracomm) -> dict[str, float]:
     """Seconds to sum and factor the coarse matrices and to solve with them once, and bytes that every rank is told."""
-    right = np.ones((coarse.vectors, LOADS)), np.ones((coarse.dimension, LOADS))
+    right = np.ones((coarse.coarse_dimension, LOADS)), np.ones((coarse.natural.kernel_dimension, LOADS))
     solve = min(_seconds(lambda: coarse.saddle.solve(*right)) for _ in range(TIMED))
     return {
         "coarse_factor": comm.allreduce(_seconds(coarse.factor), MPI.MAX),

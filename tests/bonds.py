@@ -13,6 +13,7 @@ from feti_homog.cell.arrangement import arrange
 from feti_homog.common.petsc_options import case_options
 from feti_homog.common.progress import Progress
 from feti_homog.config import sections
+from feti_homog.feti.thresholds import DEFAULTS
 from feti_homog.homogenization import unit_cell
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface.contact import BONDED, OPEN, Interface
@@ -54,12 +55,12 @@ class Bonds:
         return np.zeros(self.cell.solver.rows)
 
 
-def tear(comm, arcs=(), **case):
+def tear(comm, arcs=(), thresholds=DEFAULTS, **case):
     """The torn cell of the case that `make_case` makes, the tips of arcs at its nodes.  Collective."""
     PETSc.garbage_cleanup(comm)
     case = replace(make_case(**case), interface=sections.InterfaceSection(debonded=tuple(arcs)))
     with case_options(case.petsc):
-        return unit_cell.tear(case, comm, Progress(comm, quiet=True))
+        return unit_cell.tear(case, comm, Progress(comm, quiet=True), thresholds)
 
 
 def printed(comm, capfd, **case):

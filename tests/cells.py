@@ -13,6 +13,7 @@ from feti_homog.analysis.context import AnalysisContext
 from feti_homog.common.petsc_options import case_options
 from feti_homog.common.progress import Progress
 from feti_homog.config import case as cases
+from feti_homog.feti.thresholds import DEFAULTS
 from feti_homog.homogenization.averaging import Homogenization
 from feti_homog.homogenization.unit_cell import tear
 
@@ -32,12 +33,12 @@ def make_case(*, matrix=MATRIX, fibre=FIBRE, plane="strain", petsc=None, decompo
     return cases.parse(document, Path(folder))
 
 
-def solve(case, comm):
+def solve(case, comm, thresholds=DEFAULTS):
     """The torn cell, L^ef and the responses."""
     PETSc.garbage_cleanup(comm)
     progress = Progress(comm, quiet=True)
     with case_options(case.petsc):
-        cell = tear(case, comm, progress)
+        cell = tear(case, comm, progress, thresholds)
         responses = []
         context = AnalysisContext(
             Homogenization(cell, contact=False),

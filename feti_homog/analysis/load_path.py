@@ -11,7 +11,7 @@ from mpi4py import MPI
 
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.config.sections import LoadPath
-from feti_homog.feti.solver import DualSolution
+from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.homogenization.averaging import Response
 from feti_homog.interface.contact import BONDED, Equilibrium
 from feti_homog.interface.path_following import PathState, Point, events, increments, unloaded

@@ -18,6 +18,7 @@ from feti_homog.config.materials import plane_stiffness
 from feti_homog.feti.decomposition.shared_entities import SharedEntities
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.solver import FetiSolver
+from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 from feti_homog.homogenization import cost_model
 from feti_homog.homogenization.domain_partition import Plan, coarse_mesh, deal
 from feti_homog.interface import debonded_arcs
@@ -71,7 +72,7 @@ class TornCell:
         return int(self.comm.allreduce(number))
 
 
-def tear(case: Case, comm: MPI.Intracomm, progress: Progress) -> TornCell:
+def tear(case: Case, comm: MPI.Intracomm, progress: Progress, thresholds: Thresholds = DEFAULTS) -> TornCell:
     """The torn cell of a case, its subdomains factored.  Collective.
 
     Raises:
@@ -79,8 +80,8 @@ def tear(case: Case, comm: MPI.Intracomm, progress: Progress) -> TornCell:
     """
     plan, shared, lattice, subdomains = assembled(case, comm, progress)
     with progress.stage("factor") as words:
-        solver = FetiSolver(comm, shared, subdomains, lattice, cost_model.applications(case))
-        words.append(f"{solver.jump_operator.total} multipliers, coarse dimension {solver.coarse.vectors}")
+        solver = FetiSolver(comm, shared, subdomains, lattice, cost_model.applications(case), thresholds)
+        words.append(f"{solver.jump_operator.total} multipliers, coarse dimension {solver.coarse.coarse_dimension}")
     return TornCell(comm, case, plan, lattice, subdomains, solver)
 
 

@@ -16,7 +16,8 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from feti_homog.feti.decomposition.jump_operator import InterfaceNodes
-from feti_homog.feti.solver import DualSolution, FetiSolver
+from feti_homog.feti.dual_solution import DualSolution
+from feti_homog.feti.solver import FetiSolver
 from feti_homog.interface.rigid_placement import Placement, place
 from feti_homog.typing import Bool, Float
 
@@ -130,8 +131,8 @@ class Interface:
     def equilibria(self, strains: Float, status: Status, starts: Sequence[Float]) -> list[Equilibrium]:
         """Solve a linear problem for every strain of (k, 3) together.  Collective."""
         self.solver.activate(self.active(status))
-        free = self.solver.coarse.free.shape[1]
-        solutions = self.solver.solve_together(strains, np.stack(starts, axis=1))
+        free = self.solver.natural.unconstrained_modes.shape[1]
+        solutions = self.solver.solve_many(strains, np.stack(starts, axis=1))
         return [Equilibrium(status, s, s.iterations, 1, free, self._certificate(status, s)) for s in solutions]
 
     def equilibrium(self, strain: Float, status: Status, start: Float) -> Equilibrium:
@@ -142,10 +143,10 @@ class Interface:
             solution = self.linear(strain, status, start)
             iterations, solves = iterations + solution.iterations, solves + 1
             loose = Placement.none(len(status))
-            if self.contact and self.solver.coarse.free.shape[1]:
-                loose = place(comm, self.solver.coarse, self.nodes, status == OPEN, solution, self._tolerance(strain))
+            if self.contact and self.solver.natural.unconstrained_modes.shape[1]:
+                loose = place(comm, self.solver.natural, self.nodes, status == OPEN, solution, self._tolerance(strain))
                 solution = replace(
-                    solution, alpha=solution.alpha + loose.alpha, jump=solution.jump + loose.jump(self.solver.coarse)
+                    solution, alpha=solution.alpha + loose.alpha, jump=solution.jump + loose.jump(self.solver.natural)
                 )
             wrong = self._wrong(status, solution) | loose.squeezed if self.contact else np.zeros(len(status), bool)
             count = comm.allreduce(int(wrong.sum()))
@@ -154,7 +155,7 @@ class Interface:
             flip = pivots.choose(wrong, count)
             status = np.where(flip, CLOSED + OPEN - status, status).astype(np.int8)
             start = solution.lam
-        free = self.solver.coarse.free.shape[1]
+        free = self.solver.natural.unconstrained_modes.shape[1]
         return Equilibrium(status, solution, iterations, solves, free, self._certificate(status, solution))
 
     def _tolerance(self, strain: Float) -> float:

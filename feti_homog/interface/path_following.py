@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 
-from feti_homog.feti.solver import DualSolution
+from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.interface.contact import BONDED, CLOSED, NOISE, OPEN, Equilibrium, Interface, Status
 from feti_homog.interface.strength_criterion import StrengthCriterion
 from feti_homog.typing import Bool, Float

@@ -12,7 +12,7 @@ from scipy.sparse import csr_matrix
 
 from feti_homog.feti.coarse.natural import NaturalCoarseSpace
 from feti_homog.feti.decomposition.jump_operator import InterfaceNodes
-from feti_homog.feti.solver import DualSolution
+from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.typing import Bool, Float
 
 # Motions whose gaps are smaller than this, relative to their slips, do not open (a round fibre turns).
@@ -49,13 +49,13 @@ def place(
     A fibre that overlaps is put where its smallest gap is largest: a linear programme in its rigid motions.  If even
     that overlaps, the programme's dual solution is a system of contact forces in balance, and its nodes close.
     """
-    free = csr_matrix(coarse.free)
+    free = csr_matrix(coarse.unconstrained_modes)
     opening, slip = (np.asarray((coarse.G[nodes.row + i] @ free).todense()) for i in range(2))
     parts = comm.gather((solution.jump[nodes.row], opening, slip, nodes.fibre, is_open))
     answer = _place_all(parts, noise) if parts is not None else None
     amplitudes, squeezed = comm.bcast(answer)
     first = comm.exscan(len(nodes.row)) or 0
-    return Placement(coarse.free @ amplitudes, squeezed[first : first + len(nodes.row)])
+    return Placement(coarse.unconstrained_modes @ amplitudes, squeezed[first : first + len(nodes.row)])
 
 
 def _place_all(parts: list[tuple[Float, Float, Float, NDArray[np.int64], Bool]], noise: float) -> tuple[Float, Bool]:

@@ -9,17 +9,20 @@ import numpy as np
 import pytest
 from cells import make_case, relative_error, solve, twin_stiffness
 from mpi4py import MPI
-from narrow_cells import BOUND, BREAKING, NARROW, STRAINS, of_all, together
+from narrow_cells import BOUND, BREAKING, NARROW, STRAINS, of_all, solve_many
 from reference import dense_feti
 
 from feti_homog.errors import CaseError
-from feti_homog.feti.coarse.adaptive import THRESHOLD, AdaptiveCoarseSpace
+from feti_homog.feti.coarse.adaptive import AdaptiveCoarseSpace
 from feti_homog.feti.linalg.distributed_direct import Distributed
 from feti_homog.feti.linalg.replicated_saddle_point import Replicated
 from feti_homog.feti.linalg.saddle_point import SaddlePoint, _Augmented
 from feti_homog.feti.linalg.sparse_direct import DirectSolver
+from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 
 pytestmark = pytest.mark.parallel
+
+THRESHOLD = DEFAULTS.soft_mode
 
 
 # Solutions.
@@ -29,9 +32,9 @@ def test_together_as_one_by_one(narrow):
     solver = narrow.solver
     strains = np.array([[1.0, 0, 0], [0.2, -3.0, 1e-3], [0, 0, 1e-4]])
     starts = narrow.own(narrow.random(4, (3,))) * [0.0, 1e-2, 0.0]
-    solutions = together(narrow.cell, strains, starts)
+    solutions = solve_many(narrow.cell, strains, starts)
     for strain, start, found in zip(strains, starts.T, solutions, strict=True):
-        (alone,) = together(narrow.cell, strain[None], start[:, None])
+        (alone,) = solve_many(narrow.cell, strain[None], start[:, None])
         assert alone.reason > 0 and found.reason > 0
         assert (found.strain == strain).all()
         assert relative_error(*(dense_feti.gathered(narrow.cell, s.lam) for s in (found, alone))) < 1e-7
@@ -40,9 +43,9 @@ def test_together_as_one_by_one(narrow):
 
 
 def test_a_load_without_multipliers_among_others(narrow):
-    zero, found = together(narrow.cell, np.array([[0.0, 0, 0], [1.0, 0, 0]]))
+    zero, found = solve_many(narrow.cell, np.array([[0.0, 0, 0], [1.0, 0, 0]]))
     assert (zero.lam == 0).all()
-    (alone,) = together(narrow.cell, STRAINS[:1])
+    (alone,) = solve_many(narrow.cell, STRAINS[:1])
     assert relative_error(*(dense_feti.gathered(narrow.cell, s.lam) for s in (found, alone))) < 1e-7
 
 
@@ -53,7 +56,7 @@ def test_ranks_do_not_matter(comm):
         cell = bonds.tear(some, **NARROW)
         solution = cell.solver.solve(np.array([1.0, -0.5, 0.3]), np.zeros(cell.solver.rows))
         soft = of_all(some, cell.solver.coarse, cell)
-        found.append((cell.solver.coarse.vectors, soft, solution.iterations, bonds.stress(cell, solution)))
+        found.append((cell.solver.coarse.coarse_dimension, soft, solution.iterations, bonds.stress(cell, solution)))
     (vectors, soft, iterations, stress), (of_one, soft_of_one, iterations_of_one, stress_of_one) = found
     assert vectors == of_one
     assert soft == soft_of_one
@@ -112,7 +115,7 @@ def test_wrong_options_are_refused(comm, petsc, words):
 
 
 @pytest.mark.parametrize("contrast", [23.0, 1e6], ids=["augmented", "indefinite"])
-def test_a_distributed_coarse_problem_gives_the_same(comm, monkeypatch, contrast):
+def test_a_distributed_coarse_problem_gives_the_same(comm, contrast):
     case = NARROW | {"fibre": {"young": 3.0 * contrast, "poisson": 0.3}, "decomposition": {"subdomains": 50}}
     found = []
     alone = comm.size == 1
@@ -120,14 +123,13 @@ def test_a_distributed_coarse_problem_gives_the_same(comm, monkeypatch, contrast
         (10**6, SaddlePoint if alone else Replicated, DirectSolver),
         (0, SaddlePoint, DirectSolver if alone else Distributed),
     ):
-        monkeypatch.setattr("feti_homog.feti.linalg.replicated_saddle_point.LARGEST_REPLICATED", largest)
-        cell = bonds.tear(comm, **case)
+        cell = bonds.tear(comm, thresholds=Thresholds(replicated_vectors=largest), **case)
         saddle = cell.solver.coarse.saddle
         assert isinstance(saddle, kind)
         inner = saddle.alone if isinstance(saddle, Replicated) else saddle
         assert isinstance(inner._inner.solver, solver)
         assert isinstance(inner._inner, _Augmented) == (contrast < 1e3)
-        found.append(together(cell))
+        found.append(solve_many(cell))
     for one, other in zip(*found, strict=True):
         assert one.reason > 0 and other.reason > 0 and abs(one.iterations - other.iterations) <= 1
         assert relative_error(*(dense_feti.gathered(cell, s.lam) for s in (one, other))) < 1e-7
@@ -145,10 +147,11 @@ def number(pattern, text):
 
 def test_view(comm, narrow, capfd):
     cell, text = bonds.printed(comm, capfd, **NARROW, petsc={"feti_view": True})
-    assert number("coarse dimension", text) == narrow.coarse.vectors
-    assert number("kernels:", text) == narrow.coarse.dimension
+    assert number("coarse dimension", text) == narrow.coarse.coarse_dimension
+    assert number("kernels:", text) == narrow.coarse.natural.kernel_dimension
     assert number("soft modes below", text) == THRESHOLD
-    assert f"soft modes below {THRESHOLD:g}: {narrow.coarse.vectors - narrow.coarse.dimension}," in text
+    soft = narrow.coarse.coarse_dimension - narrow.coarse.natural.kernel_dimension
+    assert f"soft modes below {THRESHOLD:g}: {soft}," in text
     assert f"{cell.plan.subdomains} subdomains, {cell.plan.subdomains} with dense boundary operators" in text
     least, largest = dense_feti.extreme_eigenvalues(narrow.T, narrow.twin.F, narrow.M)
     assert 0.7 * largest / least < number("condition number about", text) < 1.01 * largest / least
@@ -156,7 +159,7 @@ def test_view(comm, narrow, capfd):
 
 def test_view_of_the_natural_space(comm, narrow, capfd):
     _, text = bonds.printed(comm, capfd, **NARROW, petsc={"feti_view": True, "feti_coarse_space": "natural"})
-    assert number("coarse dimension", text) == narrow.coarse.dimension
+    assert number("coarse dimension", text) == narrow.coarse.natural.kernel_dimension
     assert "soft modes" not in text
     assert number("condition number about", text) > 10 * BOUND / THRESHOLD
 

@@ -8,7 +8,7 @@ from scipy.sparse import csr_matrix
 
 from feti_homog.feti.linalg.distributed_matrix import total
 from feti_homog.feti.linalg.saddle_point import SaddlePoint
-from feti_homog.feti.thresholds import LARGEST_REPLICATED
+from feti_homog.feti.thresholds import DEFAULTS
 from feti_homog.typing import Float
 
 
@@ -55,8 +55,13 @@ class Replicated:
 
 
 def saddle_point(
-    comm: MPI.Intracomm, E: csr_matrix, K: csr_matrix, free: csr_matrix, prefix: str
+    comm: MPI.Intracomm,
+    E: csr_matrix,
+    K: csr_matrix,
+    free: csr_matrix,
+    prefix: str,
+    largest_replicated: int = DEFAULTS.replicated_vectors,
 ) -> SaddlePoint | Replicated:
-    """The coarse problem of these parts, replicated where it is small.  Collective; see `SaddlePoint`."""
-    replicated = comm.size > 1 and E.shape[0] <= LARGEST_REPLICATED
+    """The coarse problem of these parts, replicated up to so many rows of E.  Collective; see `SaddlePoint`."""
+    replicated = comm.size > 1 and E.shape[0] <= largest_replicated
     return (Replicated if replicated else SaddlePoint)(comm, E, K, free, prefix)

@@ -15,13 +15,11 @@ from feti_homog.feti.decomposition.shared_entities import SharedEntities
 from feti_homog.feti.decomposition.subdomain import Subdomain, both_directions
 from feti_homog.feti.operators.explicit import ExplicitInterfaceOperator
 from feti_homog.feti.operators.implicit import ImplicitInterfaceOperator, Interior
+from feti_homog.feti.thresholds import DEFAULTS
 from feti_homog.typing import Float, Int
 
-KINDS = ("auto", "implicit", "explicit")
 # Boundary dofs of a subdomain up to which dense matrices (8 n^2 bytes) are ever chosen by themselves.
 LARGEST_DENSE = 6000
-# Boundary dofs above which a whole body's soft modes come from a dense eigenproblem for each face, not from one.
-LARGEST_WHOLE = 2000
 # Seconds, up to a common factor, for the choice: of a dense inverse per n^3, and of one application of the dual
 # operator and the preconditioner by triangular solves per dof (both measured with `scripts/benchmark_path`).
 INVERSE, SOLVES = 5e-10, 3.5e-7
@@ -40,14 +38,21 @@ class InterfaceOperators:
     """
 
     def __init__(
-        self, jump_operator: JumpOperator, subdomains: Sequence[Subdomain], kind: str, applications: int, soft: bool
+        self,
+        jump_operator: JumpOperator,
+        subdomains: Sequence[Subdomain],
+        kind: str,
+        applications: int,
+        soft: bool,
+        largest_whole: int = DEFAULTS.whole_boundary_dofs,
     ) -> None:
         """Factor every subdomain, once.
 
         Args:
-            kind: of KINDS; auto is dense where that pays.
+            kind: auto, implicit or explicit; auto is dense where that pays.
             applications: how many times the operators are expected to be applied.
             soft: whether soft modes will be looked for, which takes dense matrices but of large bodies.
+            largest_whole: boundary dofs above which a whole body is large.
         """
         self.subdomains = subdomains
         self.dofs = _touched(jump_operator.B, subdomains)
@@ -59,7 +64,7 @@ class InterfaceOperators:
         diagonals = [s.K.diagonal()[d] for s, d in zip(subdomains, self.dofs, strict=True)]
         self.diagonal = np.concatenate([np.zeros(0), *diagonals])
         whole = _whole(jump_operator.shared, [s.submesh.index for s in subdomains])
-        self.large = [w and len(d) > LARGEST_WHOLE for w, d in zip(whole, self.dofs, strict=True)]
+        self.large = [w and len(d) > largest_whole for w, d in zip(whole, self.dofs, strict=True)]
         self.operators: list[ExplicitInterfaceOperator | ImplicitInterfaceOperator] = []
         for subdomain, dofs, large in zip(subdomains, self.dofs, self.large, strict=True):
             pays = INVERSE * len(dofs) ** 3 <= SOLVES * subdomain.K.shape[0] * applications
