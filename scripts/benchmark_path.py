@@ -11,6 +11,7 @@ import sys
 import time
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import petsc4py
@@ -71,7 +72,7 @@ def main() -> None:
     cell.solver.destroy()
 
 
-def document(arguments: argparse.Namespace) -> dict:
+def document(arguments: argparse.Namespace) -> dict[str, Any]:
     """The case: bonded at first, strengths low enough that many nodes break."""
     geometry = {"geometry": "hexagonal", "fibre_fraction": 0.4}
     if arguments.fibres:

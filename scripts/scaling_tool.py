@@ -31,6 +31,7 @@ from feti_homog.config.case import Case  # noqa: E402
 from feti_homog.feti.coarse.adaptive import AdaptiveCoarseSpace  # noqa: E402
 from feti_homog.feti.decomposition.jump_operator import JumpOperator  # noqa: E402
 from feti_homog.homogenization.unit_cell import TornCell, tear  # noqa: E402
+from feti_homog.typing import Int  # noqa: E402
 
 LOADS = 3
 RTOL = 1e-8
@@ -127,7 +128,7 @@ def _messages(cell: TornCell) -> dict[str, Any]:
     }
 
 
-def _foreign(jump_operator: JumpOperator, comm: MPI.Intracomm) -> np.ndarray:
+def _foreign(jump_operator: JumpOperator, comm: MPI.Intracomm) -> Int:
     """(ranks,) local rows that each of the other ranks owns."""
     ends = np.array(comm.allgather(jump_operator.owned[1]))
     counts = np.bincount(np.searchsorted(ends, jump_operator.rows, side="right"), minlength=comm.size)

@@ -45,15 +45,19 @@ def refuse_unused() -> None:
     Raises:
         CaseError: an option with our prefix is no option of any solver, or a solver cannot be made with it.
     """
-    given = [name for name in sorted(PETSc.Options().getAll()) if name.startswith("feti_")]
-    open_names = [name for name in given if name not in READ_WHEN_SOLVING and not is_in_table(name)]
-    unused = [name for name in open_names if not petsc_ctypes.option_was_used(name)]
+    unused = _unused_names()
     for prefix in DIRECT_PREFIXES:
         if any(name.startswith(prefix) for name in unused):
             _let_solver_read(prefix)
-    unused = [name for name in unused if not petsc_ctypes.option_was_used(name)]
-    if unused:
-        raise CaseError(*(f"-{name}: no solver has such an option; {suggestion(name)}" for name in unused))
+    faults = [f"-{name}: no solver has such an option; {suggestion(name)}" for name in _unused_names()]
+    if faults:
+        raise CaseError(*faults)
+
+
+def _unused_names() -> list[str]:
+    """The options with our prefix, but for those of the table, that no solver has read or will read."""
+    given = [name for name in sorted(PETSc.Options().getAll().keys() - READ_WHEN_SOLVING) if name.startswith("feti_")]
+    return [name for name in given if not is_in_table(name) and not petsc_ctypes.option_was_used(name)]
 
 
 def _let_solver_read(prefix: str) -> None:

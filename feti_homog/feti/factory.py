@@ -48,7 +48,7 @@ def build(
         CaseError: an option has no such value, or two exclude each other.
     """
     database = PETSc.Options("feti_")
-    options = SolverOptions.read(database.getString, database.getReal)
+    options = SolverOptions.read(database.getString, database.getReal, thresholds)
     soft = options.want_soft_modes(_are_cut(comm, subdomains))
     operators = InterfaceOperators(
         jump_operator, subdomains, options.operator, applications, soft, thresholds.whole_boundary_dofs

@@ -30,7 +30,12 @@ class SolverOptions:
     threshold: float = DEFAULTS.soft_mode
 
     @classmethod
-    def read(cls, text: Callable[[str, str], str], number: Callable[[str, float], float]) -> SolverOptions:
+    def read(
+        cls,
+        text: Callable[[str, str], str],
+        number: Callable[[str, float], float],
+        thresholds: Thresholds = DEFAULTS,
+    ) -> SolverOptions:
         """The options that text(name, default) and number(name, default) find, names without `feti_`.
 
         Raises:
@@ -48,7 +53,7 @@ class SolverOptions:
             preconditioner,
             choice("dual_operator", OPERATORS, "explicit" if preconditioner == "influence" else "auto"),
             choice("coarse_space", COARSE_SPACES, "auto"),
-            number("coarse_threshold", DEFAULTS.soft_mode),
+            number("coarse_threshold", thresholds.soft_mode),
         )
 
     def want_soft_modes(self, bodies_are_cut: bool) -> bool:
