@@ -3,7 +3,9 @@
     mpirun -n 2 .venv/bin/python scripts/measure_thresholds.py min_trace_dofs 40 100 250
 
 Each line is a random cell of narrow gaps, its matrix whole or in pieces, with stiff or soft fibres, and one value: the
-coarse vectors per subdomain, iterations to 1e-8 of three load cases, and seconds of set-up and solve.
+coarse vectors per subdomain, iterations to 1e-8 of three load cases, and seconds of meshing, set-up and solve.  For the
+figures in `thresholds.py`, with --contrasts 2: `soft_mode` --fibres 16 --refine 1 --pieces 1; `min_trace_dofs` the same
+with --refine 2; the others --fibres 36 --refine 1 --pieces 0.
 """
 
 from __future__ import annotations
@@ -52,9 +54,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("values", type=float, nargs="+")
     parser.add_argument("--fibres", type=int, default=64)
     parser.add_argument("--fraction", type=float, default=0.65)
-    parser.add_argument("--gap", type=float, default=0.02, help="in fibre diameters")
+    parser.add_argument("--gap", type=float, default=0.01, help="in fibre diameters")
     parser.add_argument("--pieces", type=int, nargs="+", default=[0, 1, 4], help="of the matrix per fibre, 0: whole")
-    parser.add_argument("--contrasts", type=float, nargs="+", default=[1e-3, 1e3])
+    parser.add_argument("--contrasts", type=float, nargs="+", default=[2.0, 1e3])
     parser.add_argument("--refine", type=int, default=2)
     return parser
 

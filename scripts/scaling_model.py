@@ -113,7 +113,7 @@ def _counts(rows: Sequence[Row], cores: int) -> dict[str, Any]:
 def _factored(coarse: float, vectors: float, ranks: int) -> float:
     """Work of a coarse factorization on the busiest rank: all of it, or a share where ranks do it together."""
     share: float = ranks**TOGETHER if vectors > DEFAULTS.replicated_vectors else 1.0
-    return coarse**COARSE_POWER / share
+    return float(coarse**COARSE_POWER) / share
 
 
 def _solved(coarse: float, vectors: float, ranks: int, loads: int) -> float:
