@@ -14,10 +14,14 @@ from feti_homog.homogenization.averaging import Homogenization, Response
 from feti_homog.interface.contact import OPEN, Status
 from feti_homog.typing import Float
 
-UNIT_CASES = ("E11", "E22", "G12")
+UNIT_CASES = ("E11", "E22", "gamma12")
 
-# A check may exceed the solver's tolerance by what sums over the cell and jumps of stiffness make of it.
-CHECK_MARGIN = 1e3
+# Largest relative error of a check that passes, in relative tolerances of the Krylov method: sums over the cell and
+# jumps of stiffness make so much of the solver's error.
+CHECK_ERROR_PER_RTOL = 1e3
+# And whatever the tolerance: what is wrong by more than this is no result.
+MAX_CHECK_ERROR = 1e-4
+# Largest error of the KKT conditions that passes, relative to the scales of `contact_certificate.kkt_errors`.
 CONTACT_TOLERANCE = 1e-6
 
 
@@ -47,26 +51,27 @@ class AnalysisContext:
         """Interface states before any load: prescribed debonded nodes are open."""
         return np.where(self.debonded(opening), OPEN, 0).astype(np.int8)
 
-    def nothing(self) -> Float:
+    def zero_multipliers(self) -> Float:
         """First multipliers when there are no better ones."""
         return np.zeros(self.homogenization.cell.solver.rows)
 
-    def note(self, name: str, response: Response) -> None:
+    def record_checks(self, name: str, response: Response) -> None:
         """Keep the numbers of a response, tell of it, and complain if it breaks a law."""
         state = response.state
         self.iterations.append(state.iterations)
         self.reasons.append(state.solution.reason)
-        words = f"{state.iterations} iterations, relative jump {state.solution.residual:.1e}"
+        jump = f"relative jump {response.checks['jump']:.1e}"
+        words = f"{state.iterations} iterations, {jump}"
         debonded = response.counts["open"] + response.counts["closed"]
         if debonded:
             words += f", {debonded} debonded ({response.counts['closed']} closed), {state.solves} solves"
-        if state.loose:
-            words += f", {state.loose} free motions"
+        if state.free_motions:
+            words += f", {state.free_motions} free motions"
         self.progress.say(f"  {name}: {words}")
         if state.solution.reason < 0:
             self.faults.append(
-                f"{name}: no convergence after {state.iterations} iterations, relative jump "
-                f"{state.solution.residual:.1e} (KSPConvergedReason {state.solution.reason}); result marked"
+                f"{name}: no convergence after {state.iterations} iterations, {jump} "
+                f"(KSPConvergedReason {state.solution.reason}); result marked"
             )
         self.check(name, response.checks)
 
@@ -79,8 +84,19 @@ class AnalysisContext:
 
     def tolerance(self, law: str) -> float:
         """Largest error of a check that passes."""
-        contact = law.startswith("kkt_")
-        return CONTACT_TOLERANCE if contact else CHECK_MARGIN * self.homogenization.cell.solver.rtol
+        if law.startswith("kkt_"):
+            return CONTACT_TOLERANCE
+        return min(CHECK_ERROR_PER_RTOL * self.homogenization.cell.solver.rtol, MAX_CHECK_ERROR)
+
+    def warnings(self) -> list[str]:
+        """What a user may have meant otherwise, in words."""
+        rtol = self.homogenization.cell.solver.rtol
+        if CHECK_ERROR_PER_RTOL * rtol <= MAX_CHECK_ERROR:
+            return []
+        return [
+            f"-feti_ksp_rtol {rtol:g} asks for less than the checks do: the result is marked unless their errors are "
+            f"at most {MAX_CHECK_ERROR:g}"
+        ]
 
     def unit_responses(
         self, label: str, status: Status, starts: Sequence[Float], sign: float
@@ -88,7 +104,7 @@ class AnalysisContext:
         """Secant stiffness (3, 3) to plus or minus each unit strain (39), and the responses."""
         responses = self.homogenization.respond(sign * np.eye(3), status, starts)
         for name, response in zip(UNIT_CASES, responses, strict=True):
-            self.note(f"{label}{'-' if sign < 0 else ''}{name}", response)
+            self.record_checks(f"{label}{'-' if sign < 0 else ''}{name}", response)
         return np.stack([sign * r.stress for r in responses], axis=1), responses
 
     def point(self, responses: Sequence[Response]) -> dict[str, Any]:

@@ -18,7 +18,7 @@ def run(context: AnalysisContext, values: Sequence[float], strain: Float | None)
     Each angle begins with the multipliers of the one before it.
     """
     unit = strain is None
-    starts = [context.nothing()] * (3 if unit else 1)
+    starts = [context.zero_multipliers()] * (3 if unit else 1)
     points = []
     for value in context.progress.bar(values, "angles"):
         status, label = context.status(value), f"{value:g} deg"
@@ -32,7 +32,7 @@ def run(context: AnalysisContext, values: Sequence[float], strain: Float | None)
                 context.check(label, {"symmetry": asymmetry(L)})
         else:
             responses = context.homogenization.respond(np.array([strain]), status, starts)
-            context.note(label, responses[0])
+            context.record_checks(label, responses[0])
             point |= {"strain": responses[0].strain, "stress": responses[0].stress}
         for name, response in zip(UNIT_CASES if unit else ("",), responses, strict=True):
             context.record(response, 1.0, f"{label} {name}".strip())

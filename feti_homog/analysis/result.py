@@ -1,56 +1,96 @@
-"""What a case comes to, as arrays: the answer to a program that asks for it in Python."""
+"""What a case comes to: the answer to a program that asks for it in Python, and the content of result.json."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from feti_homog.analysis.result_fields import Fields
+from feti_homog.analysis.result_html import tables
+from feti_homog.analysis.result_records import AnglePoint, CellInfo, Checks, PathPoint, SolverInfo, StiffnessBounds
+from feti_homog.common.records import BYTES, SECONDS, STRESS, Key, described, keys, plain, restored
+from feti_homog.mechanics.bounds import Moduli
+from feti_homog.output.files.result_json import SCHEMA
+from feti_homog.output.text.summary import short_summary
 from feti_homog.typing import Float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Result:
-    """The result of a case, the same on every rank; stresses in the unit of the moduli, order [11, 22, 12].
+    """The result of a case, the same on every rank but for `fields`.
+
+    Printed, it is a short summary; in a notebook, tables.  `schema_keys` lists all that is written.
 
     Attributes:
-        effective_stiffness: (3, 3) L^ef, its columns the stresses under the unit strains; None for
-            analyses other than "stiffness".
+        effective_stiffness: (3, 3) L^ef, its columns the stresses under the unit strains; of analysis "stiffness".
         effective_stiffness_compression: (3, 3) the same under minus the unit strains, where debonded faces touch
-            without tension; else None.
-        moduli: engineering moduli by name (`E1`, `G12`, `bulk`, `shear`, ...); empty for debonded cells.
-        bounds: `voigt` and `reuss`, (3, 3), and `hashin_shtrikman`, bounds of `bulk` and `shear` or None; as `moduli`.
-        points: by name, arrays over the n points of an "angle" or a "path": `angle` or `load_factor` (n,),
-            `strain` and `stress` (n, 3), `stiffness` (n, 3, 3), `bonded`, `open`, `closed`, ... (n,); else empty.
-        checks: largest relative error of each law.
-        document: all of result.json.
+            without tension.
+        moduli, bounds: of perfectly bonded cells, else None.
+        angle, path: the points of these analyses, else None; `points` has them as arrays.
+        fields: mesh, interface and states on this rank if they were asked for, else None; not written to result.json.
     """
 
-    effective_stiffness: Float | None
-    effective_stiffness_compression: Float | None
-    moduli: Mapping[str, float]
-    bounds: Mapping[str, Any]
-    points: Mapping[str, NDArray[Any]]
-    checks: Mapping[str, float]
-    document: Mapping[str, Any]
+    schema: int = described("version of this layout", default=SCHEMA)
+    version: str = described("version of the program")
+    case: Mapping[str, Any] = described("the case with its defaults, as in a case file", entries={"KEY": "as there"})
+    digest: str = described("short name of what the case computes, whatever its name, output and PETSc options")
+    cell: CellInfo = described("the meshed cell")
+    solver: SolverInfo = described("how the dual problem was solved")
+    checks: Checks = described("largest relative error of each law over all states")
+    check_tolerance: float = described("largest error of a check that passes")
+    kkt_tolerance: float = described("the same of the checks of contact")
+    warnings: tuple[str, ...] = described("what is allowed but probably not wanted")
+    faults: tuple[str, ...] = described("what did not converge or hold")
+    status: str = described("`done`, or `not converged` if there are faults")
+    moduli: Moduli | None = described("engineering moduli of a perfectly bonded cell", default=None)
+    bounds: StiffnessBounds | None = described("bounds of a perfectly bonded cell", default=None)
+    effective_stiffness: Float | None = described(
+        "L^ef: columns are the stresses under the unit strains", STRESS, "(3, 3)", default=None
+    )
+    effective_stiffness_compression: Float | None = described(
+        "the same under minus the unit strains, with contact", STRESS, "(3, 3)", default=None
+    )
+    angle: tuple[AnglePoint, ...] | None = described("points of analysis `angle`, as in angle.csv", default=None)
+    path: tuple[PathPoint, ...] | None = described("points of analysis `path`, as in path.csv", default=None)
+    resumed: int | None = described("points of a path that were taken from a checkpoint", default=None)
+    timings: Mapping[str, float] = described(
+        "wall time of each stage, the largest over ranks", SECONDS, entries={"STAGE": "of mesh, assemble, factor, ..."}
+    )
+    memory: int = described("peak resident memory, the largest over ranks", BYTES)
+    fields: Fields | None = field(default=None, repr=False, compare=False)
 
     @classmethod
     def of(cls, document: Mapping[str, Any]) -> Result:
-        """The result of a document as result.json has it."""
-        points = document.get("angle") or document.get("path") or [{}]
-        return cls(
-            effective_stiffness=_matrix(document.get("effective_stiffness")),
-            effective_stiffness_compression=_matrix(document.get("effective_stiffness_compression")),
-            moduli=document.get("moduli", {}),
-            bounds=document.get("bounds", {}),
-            points={name: np.array([point[name] for point in points]) for name in points[0]},
-            checks=document["checks"],
-            document=document,
-        )
+        """The result of what result.json holds.  Raises KeyError if a key is missing."""
+        return restored(cls, document)
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """What result.json holds, in its order; arrays are NumPy's."""
+        document: dict[str, Any] = plain(self)
+        return document
+
+    @property
+    def points(self) -> dict[str, NDArray[Any]]:
+        """Arrays over the n points of an angle or a path by name, empty for other analyses.
+
+        `angle` or `load_factor` (n,), `strain` and `stress` (n, 3), `stiffness` (n, 3, 3), `bonded`, `open`,
+        `closed`, ... (n,).
+        """
+        documents = [plain(point) for point in (*(self.angle or ()), *(self.path or ()))]
+        return {name: np.array([point[name] for point in documents]) for name in (documents[0] if documents else ())}
+
+    def __str__(self) -> str:
+        return short_summary(self.document)
+
+    def _repr_html_(self) -> str:
+        return tables(self.document)
 
 
-def _matrix(value: Any) -> Float | None:
-    return None if value is None else np.asarray(value, dtype=float)
+def schema_keys() -> Iterator[Key]:
+    """The keys of result.json with type, unit and meaning: its reference table."""
+    return keys(Result)

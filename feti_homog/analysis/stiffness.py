@@ -12,14 +12,14 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     """`effective_stiffness`, whose columns are the stresses under the unit strains; with contact between debonded
     faces also `effective_stiffness_compression`, its columns -Sigma(-E)."""
     status = context.status(None)
-    nothing = [context.nothing()] * 3
+    starts = [context.zero_multipliers()] * 3
     one_sided = context.homogenization.interface.contact and context.homogenization.counts(status)["open"] > 0
-    L, responses = context.unit_responses("", status, nothing, 1.0)
+    L, responses = context.unit_responses("", status, starts, 1.0)
     for name, response in zip(UNIT_CASES, responses, strict=True):
         context.record(response, 1.0, name)
     document: dict[str, Any] = {"effective_stiffness": L}
     if one_sided:
-        minus, responses = context.unit_responses("", status, nothing, -1.0)
+        minus, responses = context.unit_responses("", status, starts, -1.0)
         for name, response in zip(UNIT_CASES, responses, strict=True):
             context.record(response, -1.0, f"-{name}")
         document["effective_stiffness_compression"] = minus

@@ -50,9 +50,7 @@ def build(
     database = PETSc.Options("feti_")
     options = SolverOptions.read(database.getString, database.getReal, thresholds)
     soft = options.want_soft_modes(_are_cut(comm, subdomains))
-    operators = InterfaceOperators(
-        jump_operator, subdomains, options.operator, applications, soft, thresholds.whole_boundary_dofs
-    )
+    operators = InterfaceOperators(jump_operator, subdomains, options.operator, applications, soft, thresholds)
     plan = choose(_sizes(comm, jump_operator, operators, applications), options, thresholds)
     preconditioner = _preconditioner(plan.preconditioner, comm, jump_operator, operators)
     natural = NaturalCoarseSpace(comm, jump_operator, operators)
@@ -73,7 +71,7 @@ def _sizes(
         applications=applications,
         bodies_are_cut=_are_cut(comm, operators.subdomains),
         all_dense=comm.allreduce(all(dense), MPI.LAND),
-        all_searchable=comm.allreduce(all(np.logical_or(dense, operators.large)), MPI.LAND),
+        all_searchable=comm.allreduce(all(np.logical_or(dense, operators.facewise)), MPI.LAND),
         shared_dofs=shared_dofs(comm, jump_operator),
         precracked_nodes=comm.allreduce(int(jump_operator.nodes.precracked.sum())),
     )

@@ -15,7 +15,7 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from feti_homog.cell.refinement import Lattice
+from feti_homog.cell.refinement import ReferenceLattice
 from feti_homog.common import process_memory
 from feti_homog.common.distributed_arrays import allreduce_sum
 from feti_homog.feti import factory, view
@@ -57,7 +57,7 @@ class FetiSolver:
         comm: MPI.Intracomm,
         shared: SharedEntities,
         subdomains: Sequence[Subdomain],
-        lattice: Lattice,
+        lattice: ReferenceLattice,
         applications: int,
         thresholds: Thresholds = DEFAULTS,
     ) -> None:
@@ -107,13 +107,13 @@ class FetiSolver:
     @cached_property
     def loads(self) -> Float:
         """(boundary dofs, 3) Q there; inside the uniform bodies it vanishes."""
-        loads: Float = self.Q[self.interface_operators.local]
+        loads: Float = self.Q[self.interface_operators.local_dofs]
         return loads
 
     @cached_property
     def _torn_displacement(self) -> Float:
         """(boundary dofs, 3) K+ (-Q), of the torn cell under the unit strains."""
-        return self.interface_operators.flexibility(-self.loads)
+        return self.interface_operators.apply_flexibility(-self.loads)
 
     @cached_property
     def d(self) -> Float:

@@ -18,10 +18,11 @@ class Thresholds:
     "Measured" is what `scripts/measure_thresholds.py NAME VALUE...` says of the values in brackets.
 
     Attributes:
+        dense_boundary_dofs: boundary degrees of freedom of a subdomain up to which `-feti_dual_operator auto` ever
+            makes dense matrices, of 8 n^2 bytes.
         soft_mode: tau, no unit; displacements p with S p = theta N p, theta < tau, are deflated.  The default of
             `-feti_coarse_threshold`; the condition number is about 1 / tau.  Measured [0.1, 0.24, 0.5]: 29, 19, 14
-            iterations, 4.4, 5.6, 7.4 vectors a subdomain; 0.24 is the smallest with at most 25 iterations on the whole
-            list of `scripts/robustness`.
+            iterations, 4.4, 5.6, 7.4 vectors a subdomain; at 0.2 some packings of `scripts/robustness` took 26.
         face_factor: tau of a face's own eigenproblem over tau, no unit: the energy that other faces and the rest of
             the body add is not in it.  Measured [0.8, 1, 1.25, 1.6]: 24, 22, 20, 18 iterations, 7.2, 8.0, 8.9, 9.9
             vectors; one eigenproblem of the whole boundary takes 21 with 5.8.
@@ -44,6 +45,7 @@ class Thresholds:
             two columns for each of them.
     """
 
+    dense_boundary_dofs: int = 6000
     soft_mode: float = 0.24
     face_factor: float = 1.25
     face_layers: int = 2
@@ -58,6 +60,40 @@ class Thresholds:
 
 
 DEFAULTS = Thresholds()
+
+# linalg
+
+# Relative residual that a coarse solve must reach: the projector takes away nearly all of what it is applied to where
+# materials differ much, so what is left has few digits.
+COARSE_ACCURACY = 1e-14
+# Weight rho of the constraints in the augmented matrix E + rho K^T K, with a unit diagonal of E and unit rows of K.
+# Each solve shrinks the error of the constraints by about rho, and the factor loses about log10(rho) digits.
+AUGMENTATION_WEIGHT = 1e7
+# Solves with the augmented factor: the fewest, and the most that are tried to reach COARSE_ACCURACY.
+MIN_COARSE_SOLVES, MAX_COARSE_SOLVES = 3, 4
+# Solves with the indefinite factor, one of them iterative refinement.
+INDEFINITE_COARSE_SOLVES = 2
+# Per cent more workspace than MUMPS estimates, which the pivoting of an indefinite matrix may use up.
+MUMPS_EXTRA_WORKSPACE_PERCENT = 200
+# Entries of dense blocks that wait to be added to a sparse sum, at least: 16 bytes each.
+MAX_BUFFERED_ENTRIES = 4_000_000
+# Right-hand sides up to which the library is faster with one after the other than with all at once.
+# `scripts/measure_kernels.py` measures these and the two below.
+CHOLMOD_COLUMNS_ONE_BY_ONE, MUMPS_COLUMNS_ONE_BY_ONE = 2, 1
+# Rows up to which LAPACK's dtrtri inverts a triangle faster than halving it.
+TRIANGLE_INVERSE_ROWS = 48
+# Rows of the blocks in which a triangle is mirrored, so that they fit the cache.
+MIRRORED_BLOCK_ROWS = 64
+
+# operators
+
+# Seconds, up to a common factor, for the choice: of a dense inverse per n^3 of n boundary dofs, and of one application
+# of the dual operator and the preconditioner by triangular solves per dof; measured with `scripts/benchmark_path`.
+DENSE_INVERSE_SECONDS, APPLY_SECONDS = 5e-10, 3.5e-7
+# Columns up to which dense products one after the other are faster than all at once (`scripts/measure_kernels.py`).
+DENSE_COLUMNS_ONE_BY_ONE = 6
+# Columns for which sparse factors are solved at once: bounds the memory of their right-hand sides, 8 bytes a dof each.
+SPARSE_COLUMNS_AT_ONCE = 64
 
 # solver, krylov
 

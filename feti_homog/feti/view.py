@@ -33,7 +33,7 @@ def describe_setup(comm: MPI.Intracomm, parts: SolverParts) -> str:
             f"  soft modes below {coarse.threshold:g}: {counts.sum()}, at most {counts.max()} of a subdomain, "
             f"mean {counts.mean():.2f}"
         )
-        facewise = comm.allreduce(sum(operators.large))
+        facewise = comm.allreduce(sum(operators.facewise))
         lines += [f"  {facewise} examined face by face"] if facewise else []
     lines.append(
         f"  coarse dimension {coarse.coarse_dimension}, {coarse.coarse_dimension / len(sizes):.2f} a subdomain"

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from feti_homog.common.records import STRESS, described
 from feti_homog.typing import Float
 
 
@@ -22,24 +23,24 @@ class Moduli:
     `bulk` and `shear` are those of the nearest isotropic stiffness, `anisotropy` the relative distance to it.
     """
 
-    E1: float
-    E2: float
-    nu12: float
-    nu21: float
-    G12: float
-    eta1: float
-    eta2: float
-    bulk: float
-    shear: float
-    anisotropy: float
+    E1: float = described("Young's modulus along x1", STRESS)
+    E2: float = described("Young's modulus along x2", STRESS)
+    nu12: float = described("contraction along x2 under stress along x1")
+    nu21: float = described("contraction along x1 under stress along x2")
+    G12: float = described("shear modulus in the axes of the cell", STRESS)
+    eta1: float = described("shear strain gamma12 over the strain along x1 under stress along x1")
+    eta2: float = described("shear strain gamma12 over the strain along x2 under stress along x2")
+    bulk: float = described("plane bulk modulus of the nearest isotropic stiffness", STRESS)
+    shear: float = described("shear modulus of the nearest isotropic stiffness", STRESS)
+    anisotropy: float = described("relative distance to the nearest isotropic stiffness")
 
 
 @dataclass(frozen=True)
 class Bounds:
     """Lower and upper bound of the plane bulk modulus and of the shear modulus."""
 
-    bulk: tuple[float, float]
-    shear: tuple[float, float]
+    bulk: tuple[float, float] = described("lower and upper bound of the plane bulk modulus", STRESS, "(2,)")
+    shear: tuple[float, float] = described("lower and upper bound of the shear modulus", STRESS, "(2,)")
 
 
 def engineering_moduli(stiffness: ArrayLike) -> Moduli:
@@ -84,7 +85,7 @@ def anisotropy(stiffness: ArrayLike) -> float:
 
 def voigt(fractions: ArrayLike, stiffnesses: ArrayLike) -> Float:
     """Upper bound sum c_i C_i, (3, 3), of fractions (n,) and stiffnesses (n, 3, 3)."""
-    return np.einsum("i,ijk->jk", np.asarray(fractions, float), np.asarray(stiffnesses, float))
+    return np.asarray(np.einsum("i,ijk->jk", np.asarray(fractions, float), np.asarray(stiffnesses, float)))
 
 
 def reuss(fractions: ArrayLike, stiffnesses: ArrayLike) -> Float:

@@ -6,7 +6,7 @@ import json
 
 import numpy as np
 import pytest
-from commands import case_file, command_line
+from support.command_line import case_file, command_line
 
 from feti_homog.common.petsc_option_table import OPTIONS
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import bonds
 import numpy as np
 import pytest
-from narrow_cells import NARROW, solve_many
+from support import torn_cells
+from support.coarse_space_cells import NARROW, solve_many
 
 from feti_homog.cell.refinement import edge_node
 from feti_homog.feti.coarse.trace_spaces import trace_space
@@ -20,12 +20,12 @@ ALL = 10**9
 
 def tear(comm, enough, **cell):
     """With trace spaces of at least so many dofs."""
-    return bonds.tear(comm, thresholds=Thresholds(min_trace_dofs=enough), **REFINED | cell)
+    return torn_cells.tear(comm, thresholds=Thresholds(min_trace_dofs=enough), **REFINED | cell)
 
 
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("enough", [0, 60, 150, ALL])
-def test_piecewise_linear_along_the_coarse_edges(comm, enough, order):
+def test_traces_are_piecewise_linear_along_the_coarse_edges(comm, enough, order):
     cell = tear(comm, enough, order=order, refine=3 - order)
     for s, dofs in zip(cell.subdomains, cell.solver.interface_operators.dofs, strict=True):
         nodes, M = dofs[::2] // 2, s.mesh.lattice.intervals
@@ -47,7 +47,7 @@ def test_piecewise_linear_along_the_coarse_edges(comm, enough, order):
                     assert np.allclose(values, np.interp(np.arange(M + 1), at, values[at]), atol=1e-13)
 
 
-def test_few_dofs_are_all_kept(comm):
+def test_traces_of_few_dofs_keep_them_all(comm):
     cell = tear(comm, ALL)
     for s, dofs in zip(cell.subdomains, cell.solver.interface_operators.dofs, strict=True):
         P = trace_space(s.submesh, s.mesh.lattice, dofs[::2] // 2, ALL)

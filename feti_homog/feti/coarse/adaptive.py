@@ -27,8 +27,8 @@ from feti_homog.feti.coarse.geneo import kernels_and_soft_modes, subdomain_block
 from feti_homog.feti.coarse.natural import NaturalCoarseSpace
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.neighbours import Neighbours
-from feti_homog.feti.linalg.distributed_matrix import summed
-from feti_homog.feti.linalg.replicated_saddle_point import Replicated, saddle_point
+from feti_homog.feti.linalg.distributed_matrix import add_shared_rows
+from feti_homog.feti.linalg.replicated_saddle_point import ReplicatedSaddlePoint, coarse_saddle_point
 from feti_homog.feti.linalg.saddle_point import SaddlePoint
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.preconditioners.scaled import StiffnessScaled
@@ -88,10 +88,10 @@ class AdaptiveCoarseSpace:
         process_memory.trim()
         self.counts = [v.shape[1] - b.R.shape[1] for v, b in zip(V, blocks, strict=True)]
         # The smallest entries of U are dropped for large bodies.
-        self._is_exact = not comm.allreduce(any(operators.large), MPI.LOR)
+        self._is_exact = not comm.allreduce(any(operators.facewise), MPI.LOR)
         self._includes_G = False
         self._G_local = _local_motions(operators, natural)
-        self._saddle: SaddlePoint | Replicated | None = None
+        self._saddle: SaddlePoint | ReplicatedSaddlePoint | None = None
         self.state = Deflation.OFF
         U = deflation_vectors(comm, jump_operator, blocks, neighbours, V, thresholds.drop_tolerance)
         process_memory.trim()
@@ -110,7 +110,7 @@ class AdaptiveCoarseSpace:
         return self.state is not Deflation.OFF
 
     @property
-    def saddle(self) -> SaddlePoint | Replicated:
+    def saddle(self) -> SaddlePoint | ReplicatedSaddlePoint:
         """The factored coarse problem.
 
         Raises:
@@ -125,7 +125,7 @@ class AdaptiveCoarseSpace:
         self.natural.activate(active)
         if not self._includes_G:
             jump_operator = self.jump_operator
-            G = summed(self.comm, self._G_local, jump_operator.rows, jump_operator.foreign, len(active))
+            G = add_shared_rows(self.comm, self._G_local, jump_operator.rows, jump_operator.is_shared_row, len(active))
             self._includes_G = True
             self.operator.set_vectors(hstack([self.operator.U_local, G]).tocsr())
         self.operator.activate(active)
@@ -141,7 +141,7 @@ class AdaptiveCoarseSpace:
         self.state = Deflation.OBLIQUE
         if not self._deflation_is_projector():
             self.destroy()
-        elif self._is_exact and self.saddle.benign and not self._includes_G:
+        elif self._is_exact and self.saddle.well_conditioned and not self._includes_G:
             self.state = Deflation.ORTHOGONAL
 
     def disable_deflation(self) -> bool:
@@ -211,7 +211,7 @@ class AdaptiveCoarseSpace:
         process_memory.trim()
         largest = self._thresholds.replicated_vectors
         try:
-            self._saddle = saddle_point(self.comm, E.tocsr(), K.tocsr(), unconstrained, "feti_coarse_", largest)
+            self._saddle = coarse_saddle_point(self.comm, E.tocsr(), K.tocsr(), unconstrained, "feti_coarse_", largest)
         except np.linalg.LinAlgError:
             return False
         return True

@@ -15,7 +15,7 @@ from scipy.sparse import csr_matrix
 
 from feti_homog.feti.coarse.local_eigenproblems import SubdomainBlocks
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
-from feti_homog.feti.linalg.distributed_matrix import Blocks
+from feti_homog.feti.linalg.dense_block_sum import DenseBlockSum
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.typing import Float, Int
 
@@ -54,11 +54,11 @@ class CoarseOperator:
     def set_vectors(self, U_local: csr_matrix) -> None:
         """Let the columns of U (local rows, vectors) be the coarse vectors."""
         self.U_local, self.U = U_local, self._owned_rows(U_local)
-        E = Blocks((self.vectors, self.vectors))
+        E = DenseBlockSum((self.vectors, self.vectors))
         self._flexed = []
         for i, block in enumerate(self._blocks):
             columns, X = self._loads(i)
-            Y = block.operator.answer(X)
+            Y = block.operator.apply_flexibility(X)
             self._flexed.append((columns, Y))
             E.add(columns, columns, X.T @ Y)
         self.E = E.matrix()
@@ -68,14 +68,14 @@ class CoarseOperator:
         mask = self._jump_operator.gather(active).copy()
         changed = mask != self._mask
         touched = [i for i, rows in enumerate(self._rows) if changed[rows].any()]
-        change = Blocks(self.E.shape)
+        change = DenseBlockSum(self.E.shape)
         for i in touched:
             columns, X = self._loads(i)
             change.add(columns, columns, -X.T @ self._flexed[i][1])
         self._mask = mask
         for i in touched:
             columns, X = self._loads(i)
-            self._flexed[i] = columns, self._blocks[i].operator.answer(X)
+            self._flexed[i] = columns, self._blocks[i].operator.apply_flexibility(X)
             change.add(columns, columns, X.T @ self._flexed[i][1])
         self.E = self.E + change.matrix()
 
@@ -83,7 +83,7 @@ class CoarseOperator:
         """This rank's part of U^T F z, (vectors,) or (vectors, k), for z (owned rows,) or (owned rows, k)."""
         x = self._operators.BT @ self._jump_operator.gather(z)
         energy = np.zeros((self.vectors, *z.shape[1:]))
-        for (columns, Y), span in zip(self._flexed, self._operators.spans, strict=True):
+        for (columns, Y), span in zip(self._flexed, self._operators.slices, strict=True):
             energy[columns] += Y.T @ x[span]
         return energy
 

@@ -12,7 +12,8 @@ from scipy.sparse import csr_matrix
 from feti_homog.feti.coarse.local_eigenproblems import SubdomainBlocks
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.neighbours import Neighbours
-from feti_homog.feti.linalg.distributed_matrix import Blocks, summed
+from feti_homog.feti.linalg.dense_block_sum import DenseBlockSum
+from feti_homog.feti.linalg.distributed_matrix import add_shared_rows
 from feti_homog.feti.thresholds import DEFAULTS, VECTOR_CHUNK
 from feti_homog.typing import Float, Int
 
@@ -42,7 +43,7 @@ def deflation_vectors(
     entries below `drop_tolerance`, relative to the largest of their vector, are dropped.
     """
     received, vectors = _exchange_jumps(comm, blocks, neighbours, V)
-    U = Blocks((len(jump_operator.rows), vectors))
+    U = DenseBlockSum((len(jump_operator.rows), vectors))
     for block, rows, messages in zip(blocks, neighbours.rows, received, strict=True):
         for group in _groups(messages):
             columns = np.concatenate([jumps.columns for jumps in group])
@@ -50,13 +51,13 @@ def deflation_vectors(
             for jumps in group:
                 jump[jumps.rows, at : at + len(jumps.columns)] = jumps.values
                 at += len(jumps.columns)
-            part = block.BW @ block.operator.forces(block.BW.T @ jump)
+            part = block.BW @ block.operator.apply_schur(block.BW.T @ jump)
             if block.facewise:
-                U.add_larger(rows, columns, part, drop_tolerance * np.abs(part).max(axis=0))
+                U.add_entries_above(rows, columns, part, drop_tolerance * np.abs(part).max(axis=0))
             else:
                 U.add(rows, columns, part)
     owned = jump_operator.owned[1] - jump_operator.owned[0]
-    return summed(comm, U.matrix(), jump_operator.rows, jump_operator.foreign, owned)
+    return add_shared_rows(comm, U.matrix(), jump_operator.rows, jump_operator.is_shared_row, owned)
 
 
 def _exchange_jumps(

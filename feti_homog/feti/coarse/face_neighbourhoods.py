@@ -81,9 +81,10 @@ def _neighbourhood(
         return None
     face, at = both_directions(nodes), np.searchsorted(dofs, both_directions(of_body[nodes]))
     movable = both_directions(np.flatnonzero(on_face[of_body] | ~(outside | on_others)[of_body]))
-    S_fixed = schur_complement(own.K[movable][:, movable].tocsr(), np.searchsorted(movable, face))
+    K = own.take_stiffness()
+    S_fixed = schur_complement(K[movable][:, movable].tocsr(), np.searchsorted(movable, face))
     P = trace_space(own.submesh, own.mesh.lattice, nodes, min_trace_dofs)
-    return FaceNeighbourhood(at, ExplicitInterfaceOperator(own, face), own.R[face], P, S_fixed)
+    return FaceNeighbourhood(at, ExplicitInterfaceOperator(own, K, face), own.R[face], P, S_fixed)
 
 
 def _near(body: Subdomain, on_face: Bool, layers: int) -> Int:

@@ -15,7 +15,7 @@ from scipy.sparse import csc_matrix, csr_matrix
 from feti_homog.feti.coarse.local_eigenproblems import SubdomainBlocks, eigenproblem
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.neighbours import Neighbours
-from feti_homog.feti.linalg.distributed_matrix import summed
+from feti_homog.feti.linalg.distributed_matrix import add_shared_rows
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.preconditioners.scaled import StiffnessScaled
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
@@ -33,14 +33,16 @@ def subdomain_blocks(
     owned = jump_operator.owned[1] - jump_operator.owned[0]
     inverse = scaling.W_inverse.tocoo()
     at = np.searchsorted(jump_operator.rows, jump_operator.owned[0])
-    shape = (len(jump_operator.rows), jump_operator.total)
+    shape = (len(jump_operator.rows), jump_operator.global_rows)
     wide = csr_matrix((inverse.data, (inverse.row + at, inverse.col + jump_operator.owned[0])), shape=shape)
-    W_inverse = summed(comm, wide, jump_operator.rows, jump_operator.foreign, owned)[:, jump_operator.rows]
+    W_inverse = add_shared_rows(comm, wide, jump_operator.rows, jump_operator.is_shared_row, owned)[
+        :, jump_operator.rows
+    ]
     B, BW = operators.B.tocsc(), (W_inverse @ scaling.BD).tocsc()
     blocks = []
     for i, (subdomain, operator) in enumerate(zip(operators.subdomains, operators.operators, strict=True)):
-        own, scaled = (_columns(matrix, operators.spans[i], rows[i]) for matrix in (B, BW))
-        blocks.append(SubdomainBlocks(subdomain, operators.dofs[i], operator, own, scaled, operators.large[i]))
+        own, scaled = (_columns(matrix, operators.slices[i], rows[i]) for matrix in (B, BW))
+        blocks.append(SubdomainBlocks(subdomain, operators.dofs[i], operator, own, scaled, operators.facewise[i]))
     return blocks
 
 

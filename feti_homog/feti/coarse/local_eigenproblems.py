@@ -69,7 +69,7 @@ class SubdomainEigenproblem:
         self.block, self.common = block, common
         subdomain, S = block.subdomain, operator.S
         self._P = trace_space(subdomain.submesh, subdomain.mesh.lattice, block.dofs[::2] // 2, min_trace_dofs)
-        self._regular_S = congruent(self._P, S) + operator.holding(self._P)
+        self._regular_S = congruent(self._P, S) + operator.regularisation(self._P)
         # (rows, rows) its share W^-1 B D^-1 S D^-1 B^T W^-1 of M^-1; this precision tells soft from stiff.
         BW = block.BW.astype(np.float32)
         self._share = BW @ (BW @ S.astype(np.float32)).T
@@ -118,7 +118,9 @@ class FaceEigenproblems:
             for near in self._neighbourhoods[s]:
                 B = self.block.B[self.common[s]][:, near.at]
                 N = jump_energy(B, near.P, near.R, share)
-                soft = near.P @ soft_modes(congruent(near.P, near.operator.held), N, self._factor * threshold)
+                soft = near.P @ soft_modes(
+                    congruent(near.P, near.operator.regularised_schur), N, self._factor * threshold
+                )
                 modes.append(np.zeros((len(self.block.dofs), soft.shape[1])))
                 modes[-1][near.at] = soft
         return np.hstack(modes)

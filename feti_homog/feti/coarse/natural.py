@@ -11,7 +11,8 @@ from scipy.sparse import block_diag, csr_matrix, diags, hstack
 from feti_homog.cell.periodic_topology import components
 from feti_homog.common.distributed_arrays import allreduce_sum
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
-from feti_homog.feti.linalg.distributed_matrix import assembled, total
+from feti_homog.feti.linalg.collectives import allreduce_sparse
+from feti_homog.feti.linalg.distributed_matrix import assemble_owned_rows
 from feti_homog.feti.linalg.sparse_direct import DirectSolver
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.thresholds import UNCONSTRAINED_EIGENVALUE
@@ -52,7 +53,7 @@ class NaturalCoarseSpace:
         self.pinned_body: int = comm.allreduce(max(pinned, default=-1), MPI.MAX)
         owned = jump_operator.owned[1] - jump_operator.owned[0]
         columns = np.arange(first, first + modes)
-        self.G = assembled(comm, operators.B @ self.R, jump_operator.rows, columns, (owned, modes))
+        self.G = assemble_owned_rows(comm, operators.B @ self.R, jump_operator.rows, columns, (owned, modes))
         self.factorizations = 0
         squares = np.asarray(self.G.power(2).sum(axis=0)).ravel()
         self._largest_diagonal = float(comm.allreduce(squares).max(initial=0.0))
@@ -65,15 +66,18 @@ class NaturalCoarseSpace:
         """
         self.G_active = (diags(active) @ self.G).tocsr()
         self.GT_active = self.G_active.T.tocsr()
-        gram = total(self.comm, (self.GT_active @ self.G_active).tocsr())
-        self.unconstrained_modes = _null_space(
-            gram, self.body, self.pinned_body, UNCONSTRAINED_EIGENVALUE * self._largest_diagonal
-        )
+        gram, self.unconstrained_modes = self._null_space((self.GT_active @ self.G_active).tocsr())
         if self.kernel_dimension:
             Z = self.unconstrained_modes
             regular = gram + self._largest_diagonal * csr_matrix(Z @ Z.T)
             self._solver = DirectSolver(regular.tocsr(), "feti_natural_")
             self.factorizations += 1
+
+    def _null_space(self, part: csr_matrix) -> tuple[csr_matrix, Float]:
+        """G^T G of active rows, of which this rank has a part, and its null space (m, z).  Collective."""
+        gram = allreduce_sparse(self.comm, part)
+        tolerance = UNCONSTRAINED_EIGENVALUE * self._largest_diagonal
+        return gram, _null_space(gram, self.body, self.pinned_body, tolerance)
 
     @property
     def coarse_dimension(self) -> int:
@@ -95,6 +99,11 @@ class NaturalCoarseSpace:
             return x.copy()
         projected: Float = x - self.G_active @ self.amplitudes(x)
         return projected
+
+    def free_motions(self, active: Float) -> int:
+        """How many rigid motions the owned rows of which `active` is 1 would leave free.  Collective."""
+        G = (diags(active) @ self.G).tocsr()
+        return int(self._null_space((G.T @ G).tocsr())[1].shape[1])
 
     def rigid_body_motion(self, amplitudes: Float) -> Float:
         """R alpha on the boundary dofs, for alpha (m,) or (m, k)."""

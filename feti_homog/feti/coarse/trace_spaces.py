@@ -10,14 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
-from feti_homog.cell.refinement import Lattice
+from feti_homog.cell.refinement import ReferenceLattice
 from feti_homog.cell.submesh import Submesh
 from feti_homog.feti.decomposition.subdomain import both_directions
 from feti_homog.feti.thresholds import DEFAULTS
 from feti_homog.typing import Int
 
 
-def trace_space(submesh: Submesh, lattice: Lattice, nodes: Int, min_dofs: int = DEFAULTS.min_trace_dofs) -> csr_matrix:
+def trace_space(
+    submesh: Submesh, lattice: ReferenceLattice, nodes: Int, min_dofs: int = DEFAULTS.min_trace_dofs
+) -> csr_matrix:
     """(2n, 2m) P for n boundary nodes, sorted classes of the refined piece, with at least `min_dofs` columns if 2n is.
 
     Displacements vanish at ends of edges that are not among the nodes.

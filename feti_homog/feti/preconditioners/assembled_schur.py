@@ -7,7 +7,8 @@ from mpi4py import MPI
 from scipy.sparse import csr_matrix
 
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
-from feti_homog.feti.linalg.distributed_matrix import Blocks, total
+from feti_homog.feti.linalg.collectives import allreduce_sparse
+from feti_homog.feti.linalg.dense_block_sum import DenseBlockSum
 from feti_homog.feti.linalg.sparse_direct import DirectSolver
 from feti_homog.feti.operators.explicit import ExplicitInterfaceOperator
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
@@ -30,12 +31,12 @@ class AssembledSchur:
         self.comm = comm
         self._shared_dof = _shared_dof_of(comm, jump_operator, operators)
         self.size = shared_dofs(comm, jump_operator)
-        stiffness = Blocks((self.size, self.size))
-        for operator, span in zip(operators.operators, operators.spans, strict=True):
+        stiffness = DenseBlockSum((self.size, self.size))
+        for operator, span in zip(operators.operators, operators.slices, strict=True):
             if not isinstance(operator, ExplicitInterfaceOperator):
                 raise TypeError("the assembled Schur complement needs dense boundary operators")
             stiffness.add(self._shared_dof[span], self._shared_dof[span], operator.S)
-        self._solver = DirectSolver(total(comm, stiffness.matrix()), "feti_bonded_")
+        self._solver = DirectSolver(allreduce_sparse(comm, stiffness.matrix()), "feti_bonded_")
         n = len(self._shared_dof)
         self._ZT = csr_matrix((np.ones(n), (self._shared_dof, np.arange(n))), shape=(self.size, n))
 
@@ -49,12 +50,12 @@ class AssembledSchur:
 
 def shared_dofs(comm: MPI.Intracomm, jump_operator: JumpOperator) -> int:
     """Dofs on the shared nodes of all ranks; collective."""
-    return int(comm.allreduce(2 * len(jump_operator.blocks[0])))
+    return int(comm.allreduce(2 * len(jump_operator.node_rows[0])))
 
 
 def _shared_dof_of(comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators) -> Int:
     """(n,) the global number of the shared dof that each boundary dof is a copy of.  Collective."""
-    starts, sizes = jump_operator.blocks
+    starts, sizes = jump_operator.node_rows
     order = np.argsort(starts)
     first = comm.exscan(len(starts)) or 0
     node = jump_operator.gather(np.repeat(first + np.arange(len(starts)), sizes[order]).astype(float))

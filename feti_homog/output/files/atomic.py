@@ -1,14 +1,20 @@
-"""Files that are there whole or not at all, whoever reads and whenever the writer ends."""
+"""Files that are there whole or not at all, whoever reads and whenever the writer ends.
+
+What is written is on the disk, with its name, before the writer goes on: file and folder are synchronised.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import os
+import re
 import socket
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from feti_homog.errors import FetiHomogError
+
+UNFINISHED = re.compile(r".+\.\d+\.part")
 
 
 def replace(path: Path, write: Callable[[Path], object]) -> Path:
@@ -17,20 +23,63 @@ def replace(path: Path, write: Callable[[Path], object]) -> Path:
     Raises:
         FetiHomogError: the file cannot be written; what was at `path` is untouched.
     """
-    part = path.with_name(f"{path.name}.{socket.gethostname()}.{os.getpid()}.part")
-    try:
-        write(part)
-        with part.open("rb") as stream:
-            os.fsync(stream.fileno())
-        os.replace(part, path)
-    except (OSError, RuntimeError) as error:  # the latter from HDF5
-        with contextlib.suppress(OSError):
-            part.unlink(missing_ok=True)
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else error
-        raise FetiHomogError(f"cannot write {path}: {reason}") from error
+    part = part_of(path)
+    with write_errors(path):
+        try:
+            write(part)
+            commit(part, path)
+        except (OSError, RuntimeError):
+            with contextlib.suppress(OSError):
+                part.unlink(missing_ok=True)
+            raise
     return path
 
 
 def replace_text(path: Path, text: str) -> Path:
     """The same with a text.  Raises FetiHomogError as `replace` does."""
     return replace(path, lambda part: part.write_text(text, encoding="utf-8"))
+
+
+def part_of(path: Path) -> Path:
+    """The name, beside `path`, of a file that is being written: no other process writes one of that name."""
+    return path.with_name(f"{path.name}.{socket.gethostname()}.{os.getpid()}.part")
+
+
+def commit(part: Path, path: Path) -> None:
+    """Give the finished file `part` the name `path`, in one step that lasts.  Raises OSError."""
+    _synchronise(part)
+    rename(part, path)
+
+
+def rename(old: Path, new: Path) -> None:
+    """Rename a file or folder within its folder, in one step that lasts.  Raises OSError."""
+    os.replace(old, new)
+    with contextlib.suppress(OSError):  # not every file system synchronises folders
+        _synchronise(new.parent)
+
+
+def remove_unfinished(folder: Path) -> None:
+    """Remove what writers that were killed have left in a folder; for whoever alone may write there."""
+    for path in folder.glob("*.part"):
+        if UNFINISHED.fullmatch(path.name):
+            with contextlib.suppress(OSError):
+                path.unlink()
+
+
+@contextlib.contextmanager
+def write_errors(path: Path) -> Iterator[None]:
+    """In the block, failures of the file system and of HDF5 (RuntimeError) become a FetiHomogError about `path`."""
+    try:
+        yield
+    except (OSError, RuntimeError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else error
+        raise FetiHomogError(f"cannot write {path}: {reason}") from error
+
+
+def _synchronise(path: Path) -> None:
+    """Wait until a file, or the names in a folder, are on the disk."""
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

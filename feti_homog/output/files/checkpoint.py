@@ -1,13 +1,12 @@
 """Checkpoints of a path: one small HDF5 file an event, written whole or not at all.
 
 Rank 0 writes what the ranks' parts add up to; it concerns the interfaces only.  The events' files are numbered
-without gaps; each carries the run that it belongs to and a checksum.
+without gaps; each carries the format, the run that it belongs to and a checksum.
 """
 
 from __future__ import annotations
 
 import hashlib
-import os
 import shutil
 from collections.abc import Mapping
 from pathlib import Path
@@ -20,10 +19,11 @@ from numpy.typing import NDArray
 
 from feti_homog.common.mpi_errors import on_root, on_root_only
 from feti_homog.config.case import Case
-from feti_homog.errors import CaseError, FetiHomogError
-from feti_homog.output.files import result_json
+from feti_homog.errors import CaseError
+from feti_homog.output.files import atomic, result_json
 
 FOLDER = "checkpoint"
+FORMAT = 1  # of an event's file: to be raised when what an event holds changes
 
 Arrays = dict[str, NDArray[Any]]
 
@@ -75,7 +75,7 @@ class Checkpoint:
         count, dropped = len(self._files()), self.folder.with_suffix(".dropped")
         shutil.rmtree(dropped, ignore_errors=True)
         if self.folder.is_dir():
-            os.replace(self.folder, dropped)
+            atomic.rename(self.folder, dropped)
             shutil.rmtree(dropped, ignore_errors=True)
         return count
 
@@ -92,10 +92,16 @@ class Checkpoint:
     def _read_event(self, path: Path) -> Arrays:
         try:
             with h5py.File(path, "r") as file:
-                signature, checksum = file.attrs["signature"], file.attrs["checksum"]
+                version = int(file.attrs.get("format", 0))
+                signature, checksum = str(file.attrs.get("signature", "")), str(file.attrs.get("checksum", ""))
                 event = {name: table[()] for name, table in file.items()}
         except Exception as error:  # of damaged files h5py says anything
             raise CaseError(f"--resume: {path} is no readable event of a path: {error}") from error
+        if version != FORMAT:
+            raise CaseError(
+                f"--resume: {path} has the checkpoints' format {version}, this program reads format {FORMAT}; "
+                "go on with the program that wrote it, or start again without --resume"
+            )
         if signature != self.signature:
             raise CaseError(f"--resume: {path} is of another run: expected {self.signature}; found {signature}")
         if checksum != _checksum(event):
@@ -103,20 +109,18 @@ class Checkpoint:
         return event
 
     def _write(self, number: int, whole: Mapping[str, Any], gathered: Mapping[str, list[NDArray[Any]]]) -> None:
-        path = self.folder / f"{number:06d}.h5"
-        part = path.with_suffix(".part")
-        try:
-            self.folder.mkdir(parents=True, exist_ok=True)
+        event = {name: np.asarray(value) for name, value in whole.items()}
+        event |= {name: np.concatenate(parts) for name, parts in gathered.items()}
+        event |= {f"{name}_ends": np.cumsum([len(p) for p in parts]) for name, parts in gathered.items()}
+
+        def write_event(part: Path) -> None:
+            part.parent.mkdir(parents=True, exist_ok=True)
             with h5py.File(part, "w") as file:
-                event = {name: np.asarray(value) for name, value in whole.items()}
-                event |= {name: np.concatenate(parts) for name, parts in gathered.items()}
-                event |= {f"{name}_ends": np.cumsum([len(p) for p in parts]) for name, parts in gathered.items()}
                 for name, value in event.items():
                     file[name] = value
-                file.attrs.update(signature=self.signature, checksum=_checksum(event))
-            os.replace(part, path)
-        except (OSError, RuntimeError) as error:
-            raise FetiHomogError(f"cannot write {path}: {error}") from error
+                file.attrs.update(format=FORMAT, signature=self.signature, checksum=_checksum(event))
+
+        atomic.replace(self.folder / f"{number:06d}.h5", write_event)
 
 
 class NoCheckpoint(Checkpoint):

@@ -3,48 +3,57 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Mapping
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from feti_homog.errors import FetiHomogError
-
-STRAIN, STRESS = ("E11", "E22", "G12"), ("S11", "S22", "S12")
-STIFFNESS = tuple(f"C{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3))
-COLUMNS = {"strain": STRAIN, "stress": STRESS, "stiffness": STIFFNESS}
+from feti_homog.common.records import descriptions, plain
+from feti_homog.output.files import atomic
 
 
-def write(directory: Path, document: Mapping[str, Any]) -> list[Path]:
-    """Write a table for each list of points in the document.  Call on one rank.
+@dataclass(frozen=True)
+class Column:
+    """A column of a table."""
+
+    name: str
+    unit: str
+    meaning: str
+
+
+def columns(kind: type) -> Iterator[Column]:
+    """The columns that a record of this class fills: the reference table of its file."""
+    for name, description in descriptions(kind).items():
+        for component in description.components or (name,):
+            words = f"{component}, {description.meaning}" if description.components else description.meaning
+            yield Column(component, description.unit, words)
+
+
+def write(path: Path, points: Sequence[Any]) -> Path:
+    """Write records of one class, each in a row: numbers under their names, arrays under those of their components.
+
+    What the first record leaves out has no column.  Call on one rank.
 
     Raises:
-        FetiHomogError: a table cannot be written.
+        FetiHomogError: the table cannot be written.
     """
-    paths = []
-    for name in ("angle", "path"):
-        if name in document:
-            paths.append(Path(directory) / f"{name}.csv")
-            _write(paths[-1], [_row(point) for point in document[name]])
-    return paths
+    rows = [_row(point) for point in points]
 
-
-def _row(point: Mapping[str, Any]) -> dict[str, Any]:
-    row: dict[str, Any] = {}
-    for key, value in point.items():
-        if key in COLUMNS:
-            row |= dict(zip(COLUMNS[key], np.ravel(value).tolist(), strict=True))
-        else:
-            row[key] = value
-    return row
-
-
-def _write(path: Path, rows: list[dict[str, Any]]) -> None:
-    try:
-        with path.open("w", newline="", encoding="utf-8") as stream:
+    def write_rows(part: Path) -> None:
+        with part.open("w", newline="", encoding="utf-8") as stream:
             writer = csv.DictWriter(stream, list(rows[0]) if rows else [])
             writer.writeheader()
             writer.writerows(rows)
-    except OSError as error:
-        raise FetiHomogError(f"cannot write {path}: {error.strerror or error}") from error
+
+    return atomic.replace(path, write_rows)
+
+
+def _row(point: Any) -> dict[str, Any]:
+    row: dict[str, Any] = {}
+    described = descriptions(point)
+    for name, value in plain(point).items():
+        components = described[name].components or (name,)
+        row |= dict(zip(components, np.ravel(value).tolist(), strict=True))
+    return row

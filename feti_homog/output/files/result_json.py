@@ -5,15 +5,17 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from feti_homog.errors import FetiHomogError
+from feti_homog.errors import CaseError, FetiHomogError
+from feti_homog.output.files import atomic
 
 NAME = "result.json"
+SCHEMA = 1  # version of the layout: to be raised when a key is renamed, removed or changes its meaning
 
 
 def write(directory: Path, document: Mapping[str, Any]) -> Path:
@@ -27,28 +29,27 @@ def write(directory: Path, document: Mapping[str, Any]) -> Path:
             file cannot be written.
         TypeError: a value has no form in JSON.
     """
-    faults: list[str] = []
-    plain = _plain(document, "", faults)
+    content = _json_value(document, "")
+    faults = [f"{NAME}: {place} is {value}, not a finite number" for place, value in _not_finite(content, "")]
     if faults:
         raise FetiHomogError(*faults)
-    path = Path(directory) / NAME
-    part = path.with_name(f"{NAME}.part")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+
+    def write_text(part: Path) -> None:
+        part.parent.mkdir(parents=True, exist_ok=True)
         with part.open("w", encoding="utf-8") as stream:
-            json.dump(plain, stream, indent=1, ensure_ascii=False, allow_nan=False)
+            json.dump(content, stream, indent=1, ensure_ascii=False, allow_nan=False)
             stream.write("\n")
-            stream.flush()
-            os.fsync(stream.fileno())
-        os.replace(part, path)
-    except OSError as error:
-        _remove(part)
-        raise FetiHomogError(f"cannot write {path}: {error.strerror or error}") from error
-    return path
+
+    return atomic.replace(Path(directory) / NAME, write_text)
 
 
 def read(directory: Path) -> dict[str, Any]:
-    """The document of `directory`/result.json. Raises FetiHomogError if it is missing or not JSON."""
+    """The document of `directory`/result.json.
+
+    Raises:
+        FetiHomogError: it is missing or not JSON.
+        CaseError: its layout is of another version than this program's.
+    """
     path = Path(directory) / NAME
     try:
         document: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
@@ -56,19 +57,20 @@ def read(directory: Path) -> dict[str, Any]:
         raise FetiHomogError(f"cannot read {path}: {error.strerror or error}") from error
     except ValueError as error:
         raise FetiHomogError(f"cannot read {path}: {error}") from error
+    found = document.get("schema", "none")
+    if found != SCHEMA:
+        raise CaseError(f"{path}: its schema is {found}, this program reads schema {SCHEMA}; run the case again")
     return document
 
 
-def _plain(value: Any, place: str, faults: list[str]) -> Any:
-    """The value in JSON's own types; appends to `faults` the place of each number that is not finite."""
+def _json_value(value: Any, place: str) -> Any:
+    """The value in JSON's own types.  Raises TypeError with the place of one that has none."""
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
     if isinstance(value, Mapping):
-        return {key: _plain(item, f"{place}.{key}" if place else key, faults) for key, item in value.items()}
+        return {key: _json_value(item, _inside(place, key)) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(item, f"{place}[{i}]", faults) for i, item in enumerate(value)]
-    if isinstance(value, float) and not math.isfinite(value):
-        faults.append(f"{NAME}: {place} is {value}, not a finite number")
+        return [_json_value(item, f"{place}[{i}]") for i, item in enumerate(value)]
     if isinstance(value, os.PathLike):
         return os.fspath(value)
     if value is None or isinstance(value, bool | int | float | str):
@@ -76,9 +78,17 @@ def _plain(value: Any, place: str, faults: list[str]) -> Any:
     raise TypeError(f"{NAME}: {place} is a {type(value).__name__}, which JSON cannot hold")
 
 
-def _remove(path: Path) -> None:
-    """Removes what may be left of a file, if it can be removed."""
-    try:
-        path.unlink(missing_ok=True)
-    except OSError:
-        return
+def _not_finite(value: Any, place: str) -> Iterator[tuple[str, float]]:
+    """The numbers that are not finite, and their places."""
+    if isinstance(value, dict):
+        for key, item in value.items():
+            yield from _not_finite(item, _inside(place, key))
+    elif isinstance(value, list):
+        for i, item in enumerate(value):
+            yield from _not_finite(item, f"{place}[{i}]")
+    elif isinstance(value, float) and not math.isfinite(value):
+        yield place, value
+
+
+def _inside(place: str, key: str) -> str:
+    return f"{place}.{key}" if place else key

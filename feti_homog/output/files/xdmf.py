@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
@@ -10,8 +9,8 @@ from xml.etree import ElementTree as ET
 import h5py
 import numpy as np
 
-from feti_homog.errors import FetiHomogError
-from feti_homog.output.files import field_file
+from feti_homog.mechanics.voigt import STRESSES
+from feti_homog.output.files import atomic, field_file
 
 NAME = "result.xdmf"
 NUMBERS = {"f": "Float", "i": "Int"}
@@ -27,21 +26,15 @@ def write(directory: Path) -> Path:
         FetiHomogError: result.h5 cannot be read or the file cannot be written.
     """
     path = Path(directory) / NAME
-    part = path.with_name(f"{NAME}.part")
     root = ET.Element("Xdmf", Version="3.0")
     domain = ET.SubElement(root, "Domain")
-    try:
-        with h5py.File(path.with_name(field_file.NAME), "r") as file:
-            states = sorted(file.get("state", ()), key=int)
-            _collection(domain, "cell", [_cell(file, state) for state in states])
-            if len(file["interface/points"]):
-                _collection(domain, "interface", [_interface(file, state) for state in states])
-        ET.indent(root)
-        ET.ElementTree(root).write(part, encoding="utf-8", xml_declaration=True)
-        os.replace(part, path)
-    except OSError as error:
-        raise FetiHomogError(f"cannot write {path}: {error.strerror or error}") from error
-    return path
+    with atomic.write_errors(path), h5py.File(path.with_name(field_file.NAME), "r") as file:
+        states = sorted(file.get("state", ()), key=int)
+        _collection(domain, "cell", [_cell(file, state) for state in states])
+        if len(file["interface/points"]):
+            _collection(domain, "interface", [_interface(file, state) for state in states])
+    ET.indent(root)
+    return atomic.replace(path, lambda part: ET.ElementTree(root).write(part, encoding="utf-8", xml_declaration=True))
 
 
 def _collection(domain: ET.Element, name: str, grids: list[ET.Element]) -> None:
@@ -60,7 +53,7 @@ def _cell(file: h5py.File, state: str) -> ET.Element:
         _attribute(grid, name, "Vector", "Node", _table(file[f"vector/state/{state}/{name}"]))
     for name in ("body", "subdomain", "phase"):
         _attribute(grid, name, "Scalar", "Cell", _table(file[f"mesh/{name}"]))
-    for column, name in enumerate(("S11", "S22", "S12")):
+    for column, name in enumerate(STRESSES):
         _attribute(grid, name, "Scalar", "Cell", _column(file[f"state/{state}/stress"], column))
     return grid
 

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from feti_homog.errors import FetiHomogError
+from feti_homog.mechanics.voigt import STRAINS
 from feti_homog.output.files import field_file, result_json
 from feti_homog.output.plots import deformed_panels, response_curves, traction_plots
 from feti_homog.output.plots.canvas import (
@@ -32,7 +33,6 @@ from feti_homog.output.plots.decimation import Drawing, drawing, on_nodes, on_tr
 from feti_homog.output.plots.interface_marks import Faces
 from feti_homog.typing import Array
 
-CASES = ("E11", "E22", "G12")
 MESH_LINES = 6000  # triangles up to which their edges are drawn
 FEW_BODIES = 8  # up to which the deformed cell is drawn over all that it has left
 MATRIX = "#ece8df"
@@ -85,7 +85,7 @@ def _name(number: str, strain: Array) -> str:
     unit = _unit_case(strain)
     if unit is None:
         return f"state_{number}"
-    return f"case_{'minus_' if strain[unit] < 0 else ''}{CASES[unit]}"
+    return f"case_{'minus_' if strain[unit] < 0 else ''}{STRAINS[unit]}"
 
 
 def _unit_case(strain: Array) -> int | None:

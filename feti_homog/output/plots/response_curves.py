@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -12,19 +11,22 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
+from feti_homog.mechanics import response
 from feti_homog.output.plots.canvas import STRAINS, save, unit_label
 from feti_homog.output.plots.interface_marks import BONDED, CLOSED, COLOURS, OPEN, WORDS
 from feti_homog.output.text import point_tables
 from feti_homog.typing import Array
 
+Document = Mapping[str, Any]
+
 MACROSCOPIC = (r"\Sigma_{11}", r"\Sigma_{22}", r"\Sigma_{12}")
 INK = ("#1f4e9c", "#c44e00", "#2a7f3f", "#7a3e9d")
 MARKS = ("o", "s", "^", "D")
-FEW = 60  # points up to which they are marked
+MARKED_POINTS = 60  # points of a path up to which each has a mark
 STATES = {BONDED: "bonded", OPEN: "open", CLOSED: "closed"}
 
 
-def plot(directory: Path, document: Mapping[str, Any]) -> list[Path]:
+def plot(directory: Path, document: Document) -> list[Path]:
     """angle.png or path.png beside result.json, if the document has such points."""
     if document.get("angle"):
         return [save(_angle(document), directory / "angle.png")]
@@ -33,19 +35,17 @@ def plot(directory: Path, document: Mapping[str, Any]) -> list[Path]:
     return []
 
 
-def _angle(document: Mapping[str, Any]) -> Figure:
+def _angle(document: Document) -> Figure:
+    """Stiffnesses or stresses against the debonding angle."""
     points, case = document["angle"], document["case"]
+    stiff = "stiffness" in points[0]
     figure = Figure(figsize=(5.6, 4.2), layout="constrained")
     axes = figure.subplots()
     angles = [point["angle"] for point in points]
-    stiff = "stiffness" in points[0]
-    names = [f"L_{{{i + 1}{j + 1}}}" for i, j in point_tables.ENTRIES.values()] if stiff else MACROSCOPIC
-    entries = tuple(zip(*point_tables.ENTRIES.values(), strict=True))
-    values = np.array([np.array(p["stiffness"])[entries] if stiff else p["stress"] for p in points])
-    for name, column, ink, mark in zip(names, values.T, INK, MARKS, strict=False):
+    for (name, column), ink, mark in zip(_angle_columns(points, stiff), INK, MARKS, strict=False):
         axes.plot(angles, column, color=ink, marker=mark, markersize=4, linewidth=1.5, label=f"${name}$")
     axes.set_xlabel("debonding angle (degrees)")
-    axes.set_ylabel("effective stiffness " * stiff + "macroscopic stress " * (not stiff) + _stress_unit(case))
+    axes.set_ylabel(f"{'effective stiffness' if stiff else 'macroscopic stress'} {_stress_unit(case)}")
     axes.xaxis.set_major_locator(MultipleLocator(60 if angles[-1] > 180 else 30))
     contact = "contact" if case["interface"]["contact"] else "no contact"
     load = "" if stiff else f", $E = [{', '.join(f'{e:g}' for e in points[0]['strain'])}]$"
@@ -56,89 +56,65 @@ def _angle(document: Mapping[str, Any]) -> Figure:
     return figure
 
 
-def _path(document: Mapping[str, Any]) -> Figure:
+def _angle_columns(points: Sequence[Mapping[str, Any]], stiff: bool) -> list[tuple[str, Array]]:
+    """Each curve's name and its values (points,)."""
+    if not stiff:
+        return list(zip(MACROSCOPIC, np.array([point["stress"] for point in points]).T, strict=True))
+    stiffness = np.array([point["stiffness"] for point in points])
+    return [(f"L_{{{i + 1}{j + 1}}}", stiffness[:, i, j]) for i, j in point_tables.ENTRIES.values()]
+
+
+def _path(document: Document) -> Figure:
     """Stresses against the leading strain, over the numbers of bonded, open and closed nodes."""
     points, case = document["path"], document["case"]
-    which = point_tables.leading(points)
-    strain = np.array([point["strain"] for point in points])[:, which]
-    stress = np.array([point["stress"] for point in points])
+    component, first = response.leading_component(points), response.first_leg(document)
+    strain = np.array([point["strain"] for point in points])[:, component]
+    style: dict[str, Any] = {"marker": "o", "markersize": 2.5} if len(points) <= MARKED_POINTS else {}
     figure = Figure(figsize=(5.8, 5.6), layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1))
-    few = len(points) <= FEW
-    style: dict[str, Any] = {"marker": "o", "markersize": 2.5} if few else {}
-    held = strain_controlled(points, which) if _has_envelope(case) else None
-    legs = len(case["path"].get("waypoints", [0]))
-    first = len(points) if case["path"]["method"] == "increments" else _first_leg(points, legs)
-    for i, (name, ink) in enumerate(zip(MACROSCOPIC, INK, strict=False)):
-        width = 0.8 if held is not None else 1.4
-        upper.plot(
-            np.append(0.0, strain[:first]), np.append(0.0, stress[:first, i]), color=ink, linewidth=width, alpha=0.8,
-            label=None if held is not None else f"${name}$", **style,
-        )  # fmt: skip
-        if first < len(points):
-            upper.plot(strain[first - 1 :], stress[first - 1 :, i], color=ink, linewidth=0.8, marker="o", ms=2)
-        if held is not None:
-            upper.plot(held[:, 3], held[:, i], color=ink, linewidth=2.0, label=f"${name}$")
-    if held is not None:
-        upper.plot([], [], color="0.3", linewidth=0.8, **style, label="all equilibria")
-        upper.plot([], [], color="0.3", linewidth=2.0, label="rising strain")
-    if first < len(points):
-        upper.plot([], [], color="0.3", linewidth=0.8, marker="o", ms=2, label="later legs")
+    _stress_curves(upper, document, strain, component, first, style)
     upper.set_ylabel(f"macroscopic stress {_stress_unit(case)}")
     upper.set_title(f"{case.get('name', '')}: plane {case['analysis']['plane']}, {_strengths(case)}".lstrip(": "))
-    for kind, key in STATES.items():
-        ink = "0.2" if kind == BONDED else COLOURS[kind]
-        number = [point[key] for point in points]
-        lower.plot(strain[:first], number[:first], color=ink, linewidth=1.4, label=WORDS[kind], **style)
-        if first < len(points):
-            lower.plot(strain[first - 1 :], number[first - 1 :], ":", color=ink, linewidth=0.8, marker="o", ms=2.5)
-    lower.set_ylabel("interface nodes")
-    lower.set_xlabel(f"macroscopic strain ${STRAINS[which]}$")
+    _count_curves(lower, points, strain, first, style)
+    lower.set_xlabel(f"macroscopic strain ${STRAINS[component]}$")
     for axes in (upper, lower):
         _finish(axes)
     return figure
 
 
-def straight(document: Mapping[str, Any]) -> Array | None:
-    """(v, 4) S11, S22, S12 and the leading strain's size along a path with one waypoint, the strain only rising.
-
-    None of any other result.
-    """
-    points, case = document.get("path"), document["case"]
-    if not points or len(case["path"].get("waypoints", [0])) != 1:
-        return None
-    which = point_tables.leading(points)
-    if case["path"]["method"] == "events":
-        held = strain_controlled(points, which)
-    else:
-        held = np.array([[0.0] * 4, *([*point["stress"], point["strain"][which]] for point in points)])
-    return held * [1.0, 1.0, 1.0, np.sign(held[-1, 3])]
-
-
-def strain_controlled(points: Sequence[Mapping[str, Any]], which: int) -> Array:
-    """(v, 4) S11, S22, S12 and the strain `which` along a straight path when the strain only rises.
-
-    At a load where bonds break, all break whose load is lower once the first are gone: the stress falls at
-    constant strain to the next branch that holds, and each branch is a ray through zero.
-    """
-    load = np.array([point["load_factor"] for point in points])
-    values = np.array([[*point["stress"], point["strain"][which]] for point in points])
-    records = np.flatnonzero(load >= np.maximum.accumulate(load))
-    vertices = [np.zeros(4), values[records[0]]]
-    for before, after in pairwise(records):
-        vertices += [values[after] * load[before] / load[after], values[after]]
-    return np.array(vertices)
+def _stress_curves(
+    axes: Axes, document: Document, strain: Array, component: int, first: int, style: Mapping[str, Any]
+) -> None:
+    """The first leg with its snap-back, thick what a rising strain follows, and the later legs."""
+    points = document["path"]
+    stress = np.array([point["stress"] for point in points])
+    rising = response.strain_controlled(points, component) if response.is_proportional(document) else None
+    for i, (name, ink) in enumerate(zip(MACROSCOPIC, INK, strict=False)):
+        thin: dict[str, Any] = {"label": f"${name}$", "linewidth": 1.4} if rising is None else {"linewidth": 0.8}
+        from_zero = np.append(0.0, strain[:first]), np.append(0.0, stress[:first, i])
+        axes.plot(*from_zero, color=ink, alpha=0.8, **thin, **style)
+        if first < len(points):
+            axes.plot(strain[first - 1 :], stress[first - 1 :, i], color=ink, linewidth=0.8, marker="o", ms=2)
+        if rising is not None:
+            axes.plot(rising[:, 3], rising[:, i], color=ink, linewidth=2.0, label=f"${name}$")
+    if rising is not None:
+        axes.plot([], [], color="0.3", linewidth=0.8, **style, label="all equilibria")
+        axes.plot([], [], color="0.3", linewidth=2.0, label="rising strain")
+    if first < len(points):
+        axes.plot([], [], color="0.3", linewidth=0.8, marker="o", ms=2, label="later legs")
 
 
-def _first_leg(points: Sequence[Mapping[str, Any]], legs: int) -> int:
-    """How many points are on the first leg."""
-    return next((n for n, point in enumerate(points) if point["load_factor"] > (1.0 + 1e-9) / legs), len(points))
-
-
-def _has_envelope(case: Mapping[str, Any]) -> bool:
-    """Whether every point is on a ray of its own: events, and one way-point."""
-    path = case["path"]
-    return path["method"] == "events" and len(path.get("waypoints", [0])) == 1
+def _count_curves(
+    axes: Axes, points: Sequence[Mapping[str, Any]], strain: Array, first: int, style: Mapping[str, Any]
+) -> None:
+    """Numbers of bonded, open and closed nodes; dotted on later legs."""
+    for kind, key in STATES.items():
+        ink = "0.2" if kind == BONDED else COLOURS[kind]
+        number = [point[key] for point in points]
+        axes.plot(strain[:first], number[:first], color=ink, linewidth=1.4, label=WORDS[kind], **style)
+        if first < len(points):
+            axes.plot(strain[first - 1 :], number[first - 1 :], ":", color=ink, linewidth=0.8, marker="o", ms=2.5)
+    axes.set_ylabel("interface nodes")
 
 
 def _strengths(case: Mapping[str, Any]) -> str:

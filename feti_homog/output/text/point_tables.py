@@ -5,18 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from feti_homog.mechanics.response import leading_component
+from feti_homog.mechanics.voigt import STRAINS, STRESSES
+
 ROWS = 15  # of a path's table
 ENTRIES = {"C11": (0, 0), "C22": (1, 1), "C12": (0, 1), "C33": (2, 2)}
-STRAINS, STRESSES = ("E11", "E22", "gamma12"), ("S11", "S22", "S12")
 STATES = ("bonded", "open", "closed")
 
 Point = Mapping[str, Any]
-
-
-def leading(points: Sequence[Point]) -> int:
-    """The component of strain that is the largest on a path."""
-    largest = [max(abs(point["strain"][i]) for point in points) for i in range(3)]
-    return largest.index(max(largest))
 
 
 def chosen(points: Sequence[Point], rows: int) -> list[int]:
@@ -46,19 +42,27 @@ def angle_table(points: Sequence[Point], stress: str) -> list[str]:
 
 def path_table(points: Sequence[Point], stress: str) -> list[str]:
     """Totals of the path, and rows of some of its points."""
-    which = leading(points)
+    component = leading_component(points)
     numbers = chosen(points, ROWS)
-    broke, last = sum(point["broke"] for point in points), points[-1]
+    broke = sum(point["broke"] for point in points)
     some = "" if len(numbers) == len(points) else f", {len(numbers)} shown"
     lines = [
-        f"Path{stress}: {len(points)} points{some}; {broke} bonds broke, {last['dissipated']:.6g} dissipated per area",
-        f"{'point':>5}{'load':>9}{STRAINS[which]:>11}" + "".join(f"{name:>11}" for name in STRESSES) + _heads(),
+        f"Path{stress}: {len(points)} points{some}; {broke} bonds broke",
+        f"Dissipated per area{stress}: {_dissipated(points[-1])}",
+        f"{'point':>5}{'load':>9}{STRAINS[component]:>11}" + "".join(f"{name:>11}" for name in STRESSES) + _heads(),
     ]
     for number in numbers:
         point = points[number]
-        values = "".join(_number(value, 11) for value in (point["strain"][which], *point["stress"]))
+        values = "".join(_number(value, 11) for value in (point["strain"][component], *point["stress"]))
         lines.append(f"{number:>5}{point['load_factor']:>9.6f}{values}{_counts(point)}")
     return lines
+
+
+def _dissipated(last: Point) -> str:
+    """What breaks have lost at the end of a path, also if the strain only rose."""
+    words = f"{last['dissipated']:.6g} along all equilibria"
+    rising = last.get("dissipated_strain_controlled")
+    return words if rising is None else f"{words}, {rising:.6g} if the strain only rises"
 
 
 def sweep_table(rows: Sequence[tuple[str, str, str]]) -> list[str]:

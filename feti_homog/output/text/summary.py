@@ -7,6 +7,7 @@ from math import floor, log10
 from textwrap import wrap
 from typing import Any
 
+from feti_homog.mechanics.voigt import STRAINS, STRESSES
 from feti_homog.output.text.point_tables import angle_table, path_table
 
 WIDTH = 79
@@ -28,15 +29,10 @@ def summary(document: Document) -> str:
     timings, memory, warnings and status.
     Keys that it does not know are left out. Raises KeyError if one that DESIGN names is missing.
     """
-    case = document["case"]
-    unit = case.get("output", {}).get("stress_unit", "")
-    stress = f" ({unit})" if unit else ""
-    what = TITLES[case["analysis"]["type"]]
-    title = f"{case.get('name', '')}: {what}, plane {case['analysis']['plane']}".lstrip(": ")
     blocks = [
-        [title, "=" * min(len(title), WIDTH)],
+        _heading(document),
         [*_cell(document), *_solver(document["solver"])],
-        *_answer(document, stress),
+        *_answer(document),
         _checks(document),
         [
             *_timings(document["timings"]),
@@ -45,11 +41,36 @@ def summary(document: Document) -> str:
         [*_remarks("Warning", document.get("warnings", ())), *_remarks("Fault", document.get("faults", ()))],
         _field("Status", [str(document["status"])]),
     ]
+    return _joined(blocks)
+
+
+def short_summary(document: Document) -> str:
+    """What was asked for, the largest error of all checks, and the status."""
+    law, error = max(document["checks"].items(), key=lambda check: check[1])
+    checks = _field("Checks", [f"largest relative error {error:.1e} ({law})"])
+    return _joined([_heading(document), *_answer(document), [*checks, *_field("Status", [str(document["status"])])]])
+
+
+def title_of(document: Document) -> str:
+    """Name, analysis and plane state of the case."""
+    case = document["case"]
+    what = TITLES[case["analysis"]["type"]]
+    return f"{case.get('name', '')}: {what}, plane {case['analysis']['plane']}".lstrip(": ")
+
+
+def _heading(document: Document) -> list[str]:
+    title = title_of(document)
+    return [title, "=" * min(len(title), WIDTH)]
+
+
+def _joined(blocks: Iterable[Sequence[str]]) -> str:
     return "\n\n".join("\n".join(block) for block in blocks if block).replace(GLUE, " ")
 
 
-def _answer(document: Document, stress: str) -> list[list[str]]:
+def _answer(document: Document) -> list[list[str]]:
     """The blocks of what was asked for."""
+    unit = document["case"].get("output", {}).get("stress_unit", "")
+    stress = f" ({unit})" if unit else ""
     if "angle" in document:
         return [angle_table(document["angle"], stress)]
     if "path" in document:
@@ -109,8 +130,8 @@ def _matrix(title: str, rows: Sequence[Sequence[float]]) -> list[str]:
     # All entries to the digit that is the eighth of the largest.
     largest = max(abs(entry) for row in rows for entry in row)
     form = f".{7 - floor(log10(largest))}f" if 1e-4 < largest < 1e8 else ".7e"
-    lines = [f"{title:<{NAME}}" + "".join(f"{name:>16}" for name in ("E11", "E22", "gamma12"))]
-    for name, row in zip(("S11", "S22", "S12"), rows, strict=True):
+    lines = [f"{title:<{NAME}}" + "".join(f"{name:>16}" for name in STRAINS)]
+    for name, row in zip(STRESSES, rows, strict=True):
         lines.append(f"  {name:<{NAME - 2}}" + "".join(f"{_signless(entry, form):>16}" for entry in row))
     return lines
 

@@ -12,9 +12,11 @@ import pytest
 from feti_homog.errors import FetiHomogError
 from feti_homog.output.files import result_json
 
+SCHEMA = {"schema": result_json.SCHEMA}
+
 
 def test_numpy_tuples_and_paths_become_json(tmp_path: Path) -> None:
-    document = {
+    document = SCHEMA | {
         "matrix": np.array([[1.5, 2.0], [3.0, 4.0]]),
         "count": np.int64(7),
         "flag": np.bool_(True),
@@ -25,7 +27,7 @@ def test_numpy_tuples_and_paths_become_json(tmp_path: Path) -> None:
     path = result_json.write(tmp_path, document)
     assert path == tmp_path / "result.json"
     text = path.read_text(encoding="utf-8")
-    assert json.loads(text) == {
+    assert json.loads(text) == SCHEMA | {
         "matrix": [[1.5, 2.0], [3.0, 4.0]],
         "count": 7,
         "flag": True,
@@ -38,7 +40,7 @@ def test_numpy_tuples_and_paths_become_json(tmp_path: Path) -> None:
 
 def test_floats_keep_all_their_digits(tmp_path: Path) -> None:
     values = np.random.default_rng(0).normal(size=100) * 10.0 ** np.arange(-50, 50)
-    result_json.write(tmp_path, {"values": values})
+    result_json.write(tmp_path, SCHEMA | {"values": values})
     assert result_json.read(tmp_path)["values"] == values.tolist()
 
 
@@ -61,12 +63,12 @@ def test_what_json_cannot_hold_is_a_defect(tmp_path: Path, value: Any) -> None:
 
 
 def test_a_fault_leaves_the_old_file(tmp_path: Path) -> None:
-    result_json.write(tmp_path, {"a": 1})
+    result_json.write(tmp_path, SCHEMA | {"a": 1})
     with pytest.raises(FetiHomogError):
         result_json.write(tmp_path, {"a": np.nan})
-    assert result_json.read(tmp_path) == {"a": 1}
-    result_json.write(tmp_path, {"a": 2})
-    assert result_json.read(tmp_path) == {"a": 2}
+    assert result_json.read(tmp_path) == SCHEMA | {"a": 1}
+    result_json.write(tmp_path, SCHEMA | {"a": 2})
+    assert result_json.read(tmp_path) == SCHEMA | {"a": 2}
     assert [path.name for path in tmp_path.iterdir()] == ["result.json"]
 
 
@@ -75,21 +77,21 @@ def test_a_folder_that_is_missing_is_made(tmp_path: Path) -> None:
     assert (tmp_path / "new" / "folder" / "result.json").exists()
 
 
-def test_a_folder_that_cannot_be_made(tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_made_is_told(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(FetiHomogError, match=r"^cannot write .*file/folder/result\.json: Not a directory$"):
         result_json.write(tmp_path / "file" / "folder", {})
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
-def test_a_folder_that_cannot_be_written_to(tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_written_to_is_told(tmp_path: Path) -> None:
     tmp_path.chmod(0o500)
     with pytest.raises(FetiHomogError, match=r"^cannot write .*result\.json: Permission denied$"):
         result_json.write(tmp_path, {})
 
 
-def test_a_full_disk(tmp_path: Path) -> None:
-    result_json.write(tmp_path, {"a": 1})
+def test_a_full_disk_leaves_the_old_file(tmp_path: Path) -> None:
+    result_json.write(tmp_path, SCHEMA | {"a": 1})
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (1000, limits[1]))
     try:
@@ -97,11 +99,11 @@ def test_a_full_disk(tmp_path: Path) -> None:
             result_json.write(tmp_path, {"a": list(range(10_000))})
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
-    assert result_json.read(tmp_path) == {"a": 1}
+    assert result_json.read(tmp_path) == SCHEMA | {"a": 1}
     assert [path.name for path in tmp_path.iterdir()] == ["result.json"]
 
 
-def test_reading_what_is_missing_or_broken(tmp_path: Path) -> None:
+def test_a_missing_or_broken_file_is_told(tmp_path: Path) -> None:
     with pytest.raises(FetiHomogError, match=r"^cannot read .*result\.json: No such file"):
         result_json.read(tmp_path)
     (tmp_path / "result.json").write_text('{"a": 1')

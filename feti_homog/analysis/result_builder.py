@@ -1,0 +1,99 @@
+"""From a finished analysis to its `Result`: counts over all ranks, moduli and bounds, timings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from feti_homog import __version__
+from feti_homog.analysis.context import CONTACT_TOLERANCE, AnalysisContext
+from feti_homog.analysis.result import Result
+from feti_homog.analysis.result_fields import Fields
+from feti_homog.analysis.result_records import AnglePoint, CellInfo, Checks, PathPoint, SolverInfo, StiffnessBounds
+from feti_homog.common.mpi_errors import on_root
+from feti_homog.config.materials import plane_stiffness
+from feti_homog.homogenization.unit_cell import TornCell
+from feti_homog.mechanics import bounds
+from feti_homog.mechanics.bounds import Moduli
+from feti_homog.typing import Float
+
+
+def result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Fields | None) -> Result:
+    """The numbers of an analysis with all that belongs to them; collective."""
+    cell, progress = context.homogenization.cell, context.progress
+    areas = cell.areas()
+    fractions = {phase: area / sum(areas.values()) for phase, area in areas.items()}
+    points: dict[str, Any] = {
+        name: tuple(kind(**point) for point in analysis[name])
+        for name, kind in (("angle", AnglePoint), ("path", PathPoint))
+        if name in analysis
+    }
+    if "effective_stiffness" in analysis and cell.case.interface is None:
+        points |= _moduli_and_bounds(cell, analysis["effective_stiffness"], fractions)
+    return Result(
+        version=__version__,
+        case=cell.case.resolved(),
+        digest=on_root(cell.comm, cell.case.digest),
+        cell=_cell_info(cell, fractions),
+        solver=_solver_info(context),
+        checks=Checks(**context.checks),
+        check_tolerance=context.tolerance("jump"),
+        kkt_tolerance=CONTACT_TOLERANCE,
+        warnings=(*cell.case.warnings(), *context.warnings()),
+        faults=tuple(context.faults),
+        status="not converged" if context.faults else "done",
+        timings=progress.timings(),
+        memory=progress.memory(),
+        fields=fields,
+        **{**analysis, **points},
+    )
+
+
+def _cell_info(cell: TornCell, fractions: dict[str, float]) -> CellInfo:
+    """Collective."""
+    return CellInfo(
+        width=cell.summary.width,
+        height=cell.summary.height,
+        area=cell.summary.area,
+        fibre_fraction=sum(f for phase, f in fractions.items() if phase != "matrix"),
+        fractions=fractions,
+        elements=cell.sum_over_ranks(sum(len(s.mesh.triangles) for s in cell.subdomains)),
+        nodes=cell.sum_over_ranks(sum(len(s.mesh.points) for s in cell.subdomains)),
+    )
+
+
+def _solver_info(context: AnalysisContext) -> SolverInfo:
+    """Collective."""
+    cell = context.homogenization.cell
+    plan, solver = cell.summary, cell.solver
+    return SolverInfo(
+        ranks=cell.comm.size,
+        bodies=plan.bodies,
+        subdomains=plan.subdomains,
+        dofs=cell.sum_over_ranks(len(solver.Q)),
+        multipliers=solver.jump_operator.global_rows,
+        interface_nodes=cell.sum_over_ranks(len(solver.jump_operator.nodes.row)),
+        kernel_dim=solver.natural.kernel_dimension,
+        coarse_dim=solver.coarse.coarse_dimension,
+        factorizations=cell.sum_over_ranks(len(solver.interface_operators.operators)),
+        coarse_factorizations=solver.natural.factorizations,
+        rtol=solver.rtol,
+        solves=solver.solves,
+        iterations=tuple(context.iterations),
+        converged_reason=tuple(context.reasons),
+    )
+
+
+def _moduli_and_bounds(cell: TornCell, L: Float, fractions: dict[str, float]) -> dict[str, Moduli | StiffnessBounds]:
+    """The moduli of L^ef and the bounds of the phases."""
+    case, shares = cell.case, list(fractions.values())
+    phases = [plane_stiffness(case.material_of(phase), case.analysis.plane) for phase in fractions]
+    isotropic = all(bounds.is_isotropic(stiffness) for stiffness in phases)
+    return {
+        "moduli": bounds.engineering_moduli(L),
+        "bounds": StiffnessBounds(
+            voigt=bounds.voigt(shares, phases),
+            reuss=bounds.reuss(shares, phases),
+            hashin_shtrikman=bounds.hashin_shtrikman(shares, phases) if isotropic else None,
+        ),
+    }

@@ -1,0 +1,55 @@
+"""A result as tables of HTML, for notebooks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from html import escape
+from typing import Any
+
+from feti_homog.mechanics.voigt import STRAINS, STRESSES
+from feti_homog.output.text.summary import title_of
+from feti_homog.output.text.units import with_unit
+
+Document = Mapping[str, Any]
+
+LONGEST = 20  # rows of a table of points
+
+
+def tables(document: Document) -> str:
+    """L^ef, moduli, or the points of an angle or path; then checks and status."""
+    unit = document["case"].get("output", {}).get("stress_unit", "")
+    label = f" ({unit})" if unit else ""
+    blocks = [f"<h4>{escape(title_of(document))}</h4>"]
+    for key, words in (("effective_stiffness", "L<sup>ef</sup>"), ("effective_stiffness_compression", "under minus E")):
+        if key in document:
+            rows = ([name, *map(_number, row)] for name, row in zip(STRESSES, document[key], strict=True))
+            blocks.append(_table(f"{words}{escape(label)}", ["", *STRAINS], rows))
+    if "moduli" in document:
+        moduli = document["moduli"].items()
+        blocks.append(_table("moduli", None, ([with_unit(name, unit), _number(value)] for name, value in moduli)))
+    for key in ("angle", "path"):
+        if key in document:
+            blocks.append(_points(key, document[key]))
+    checks = document["checks"].items()
+    blocks.append(_table("largest relative errors", None, ([law, f"{error:.1e}"] for law, error in checks)))
+    return "\n".join([*blocks, f"<p>{escape(document['status'])}</p>"])
+
+
+def _points(key: str, points: Sequence[Document]) -> str:
+    """The numbers, not the arrays, of the first points."""
+    names = [name for name, value in points[0].items() if isinstance(value, int | float)]
+    rows = ([_number(point[name]) for name in names] for point in points[:LONGEST])
+    more = f", the first {LONGEST} of {len(points)} points" if len(points) > LONGEST else ""
+    return _table(f"{key}{more}", names, rows)
+
+
+def _table(caption: str, head: Sequence[str] | None, rows: Iterable[Sequence[str]]) -> str:
+    lines = [f"<table><caption>{caption}</caption>"]
+    if head is not None:
+        lines.append("<tr>" + "".join(f"<th>{escape(name)}</th>" for name in head) + "</tr>")
+    lines += ["<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows]
+    return "\n".join([*lines, "</table>"])
+
+
+def _number(value: float) -> str:
+    return f"{value:.7g}" if isinstance(value, int) or abs(value) > 1e-12 else "0"

@@ -1,0 +1,109 @@
+"""The records that result.json consists of; `result.Result` has them all.
+
+Strains are [E11, E22, gamma12], stresses [S11, S22, S12], in the unit of the moduli, per unit of depth.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from feti_homog.common.records import DEGREES, LENGTH, STRESS, described, plain
+from feti_homog.mechanics.bounds import Bounds
+from feti_homog.mechanics.voigt import STIFFNESSES, STRAINS, STRESSES
+from feti_homog.typing import Float
+
+
+@dataclass(frozen=True)
+class CellInfo:
+    """The meshed cell."""
+
+    width: float = described("width of the cell", LENGTH)
+    height: float = described("height of the cell", LENGTH)
+    area: float = described("area of the cell", f"{LENGTH} squared")
+    fibre_fraction: float = described("share of all fibres in the meshed area")
+    fractions: Mapping[str, float] = described(
+        "share of each phase in the meshed area", entries={"PHASE": "that of one phase"}
+    )
+    elements: int = described("triangles of the refined mesh")
+    nodes: int = described("nodes of the refined mesh, those on cuts once for each subdomain")
+
+
+@dataclass(frozen=True)
+class SolverInfo:
+    """How the dual problem was solved."""
+
+    ranks: int = described("MPI ranks")
+    bodies: int = described("bodies, the matrix and the fibres")
+    subdomains: int = described("subdomains that the bodies are cut into")
+    dofs: int = described("degrees of freedom of all subdomains")
+    multipliers: int = described("Lagrange multipliers of the dual problem")
+    interface_nodes: int = described("nodes of the fibre-matrix interfaces, periodic images once")
+    kernel_dim: int = described("rigid-body motions of all subdomains")
+    coarse_dim: int = described("vectors of the coarse space, rigid-body motions included")
+    factorizations: int = described("subdomains that were factored, each once")
+    coarse_factorizations: int = described("factorizations of the coarse problem")
+    rtol: float = described("relative tolerance of the dual problem")
+    solves: int = described("dual problems solved")
+    iterations: tuple[int, ...] = described("Krylov iterations of each state")
+    converged_reason: tuple[int, ...] = described("PETSc's KSPConvergedReason of each state, negative if it failed")
+
+
+@dataclass(frozen=True)
+class Checks:
+    """The largest relative error of each law over all states."""
+
+    strain: float = described("mean strain, with the opening of debonded faces, equals E")
+    hill: float = described("Hill's lemma: mean of stress times strain equals Sigma E")
+    jump: float = described("no jump where faces are glued, relative to the largest displacement")
+    kkt_complementarity: float | None = described("contact: traction times gap vanishes", default=None)
+    kkt_penetration: float | None = described("contact: no gap is negative", default=None)
+    kkt_tension: float | None = described("contact: no closed node is pulled", default=None)
+    symmetry: float | None = described("L^ef is symmetric; of bonded or frictionless free faces only", default=None)
+
+    def by_law(self) -> dict[str, float]:
+        """The errors of the laws that were checked, by name."""
+        errors: dict[str, float] = plain(self)
+        return errors
+
+
+@dataclass(frozen=True)
+class StiffnessBounds:
+    """What the phases bound L^ef by, whatever their arrangement."""
+
+    voigt: Float = described("upper bound of the stiffness: uniform strain", STRESS, "(3, 3)")
+    reuss: Float = described("lower bound of the stiffness: uniform stress", STRESS, "(3, 3)")
+    hashin_shtrikman: Bounds | None = described("bounds of isotropic composites; null if a phase is not isotropic")
+
+
+@dataclass(frozen=True, kw_only=True)
+class AnglePoint:
+    """The response at one debonding angle."""
+
+    angle: float = described("opening of the arcs without an angle of their own", DEGREES)
+    stiffness: Float | None = described("L^ef, if no strain is given", STRESS, "(3, 3)", STIFFNESSES, default=None)
+    strain: Float | None = described("macroscopic strain that is given", "", "(3,)", STRAINS, default=None)
+    stress: Float | None = described("macroscopic stress under it", STRESS, "(3,)", STRESSES, default=None)
+    bonded: int = described("bonded interface nodes")
+    open: int = described("debonded interface nodes without contact")
+    closed: int = described("debonded interface nodes in contact")
+    iterations: int = described("Krylov iterations")
+
+
+@dataclass(frozen=True, kw_only=True)
+class PathPoint:
+    """A point of a path: a break, a change of contact, the end of a leg, or of an increment."""
+
+    load_factor: float = described("position on the whole path, 0 to 1, every leg taking the same share")
+    strain: Float = described("macroscopic strain", "", "(3,)", STRAINS)
+    stress: Float = described("macroscopic stress, before bonds break here", STRESS, "(3,)", STRESSES)
+    broke: int = described("bonds that break here")
+    free_motions: int = described("rigid motions of fibres that no interface force resists")
+    dissipated: float = described("energy lost to breaks so far per area of the cell, along all equilibria", STRESS)
+    dissipated_strain_controlled: float | None = described(
+        "the same if the strain only rises on the first leg", STRESS, default=None
+    )
+    bonded: int = described("bonded interface nodes")
+    open: int = described("debonded interface nodes without contact")
+    closed: int = described("debonded interface nodes in contact")
+    iterations: int = described("Krylov iterations")

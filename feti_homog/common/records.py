@@ -1,0 +1,159 @@
+"""Records: dataclasses whose fields say what they hold, in which unit, and under which names they are written.
+
+The writers of files take names and types from these descriptions, and so do the reference tables of the manual.
+Fields without a description are not written.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import types
+import typing
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import numpy as np
+
+T = TypeVar("T")
+
+DESCRIPTION = "description"
+STRESS, LENGTH, SECONDS, BYTES, DEGREES = "unit of the moduli", "unit of the cell", "s", "bytes", "degrees"
+WORDS = {float: "number", int: "integer", str: "text", bool: "true or false"}
+
+
+@dataclass(frozen=True)
+class Description:
+    """What a field holds.
+
+    Attributes:
+        meaning: in words.
+        unit: empty for pure numbers, counts and texts.
+        shape: of an array, as "(3, 3)" or "(n, 2)".
+        components: the names of the columns that an array fills in a table.
+        entries: the keys of a mapping and their meanings; a single key in capitals stands for any.
+        dtype: of an array in an HDF5 file.
+        name: under which an HDF5 file has it, if not that of the field.
+    """
+
+    meaning: str
+    unit: str = ""
+    shape: str = ""
+    components: tuple[str, ...] = ()
+    entries: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    dtype: str = "float64"
+    name: str = ""
+
+
+@dataclass(frozen=True)
+class Key:
+    """A key of a document, `path` being its place: `cell.width`, `path[].strain`, `timings.STAGE`."""
+
+    path: str
+    type: str
+    unit: str
+    meaning: str
+
+
+def described(
+    meaning: str,
+    unit: str = "",
+    shape: str = "",
+    components: tuple[str, ...] = (),
+    entries: Mapping[str, str] | None = None,
+    dtype: str = "float64",
+    name: str = "",
+    **options: Any,
+) -> Any:
+    """A dataclass field with a description; `options` are those of `dataclasses.field`."""
+    description = Description(meaning, unit, shape, components, entries or {}, dtype, name)
+    return dataclasses.field(metadata={DESCRIPTION: description}, **options)
+
+
+def descriptions(record: type | Any) -> dict[str, Description]:
+    """The described fields of a record, or of its class, by name."""
+    return {f.name: f.metadata[DESCRIPTION] for f in dataclasses.fields(record) if DESCRIPTION in f.metadata}
+
+
+def plain(value: Any) -> Any:
+    """The value with records as mappings of their described fields.
+
+    A field whose default is None is left out while it is None.
+    """
+    if dataclasses.is_dataclass(value):
+        defaults = {f.name: f.default for f in dataclasses.fields(value)}
+        items = {name: getattr(value, name) for name in descriptions(value)}
+        return {name: plain(item) for name, item in items.items() if item is not None or defaults[name] is not None}
+    if isinstance(value, Mapping):
+        return {name: plain(item) for name, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    return value
+
+
+def restored(kind: type[T], document: Mapping[str, Any]) -> T:
+    """The record of a class from what `plain` made of it; keys that it does not know are left out.
+
+    Raises:
+        KeyError: a key is missing.
+    """
+    hints, values = typing.get_type_hints(kind), {}
+    for field in dataclasses.fields(kind):  # type: ignore[arg-type]
+        if DESCRIPTION not in field.metadata or (field.name not in document and field.default is None):
+            continue
+        values[field.name] = _restored_value(hints[field.name], document[field.name])
+    return kind(**values)
+
+
+def keys(kind: type, above: str = "") -> Iterator[Key]:
+    """The keys of a record's document, those of the records in it too."""
+    hints = typing.get_type_hints(kind)
+    for name, description in descriptions(kind).items():
+        path, hint = f"{above}{name}", _without_none(hints[name])
+        yield Key(path, _type_words(hint, description), description.unit, description.meaning)
+        for key, meaning in description.entries.items():
+            item = typing.get_args(hint)[1]
+            yield Key(f"{path}.{key}", WORDS.get(item, "any"), description.unit, meaning)
+        if dataclasses.is_dataclass(hint):
+            yield from keys(typing.cast(type, hint), f"{path}.")
+        elif (item := _record_of_tuple(hint)) is not None:
+            yield from keys(item, f"{path}[].")
+
+
+def _restored_value(hint: Any, value: Any) -> Any:
+    hint = _without_none(hint)
+    if value is None:
+        return None
+    if dataclasses.is_dataclass(hint):
+        return restored(typing.cast(type, hint), value)
+    if (record := _record_of_tuple(hint)) is not None:
+        return tuple(restored(record, item) for item in value)
+    if typing.get_origin(hint) is np.ndarray:
+        return np.asarray(value, dtype=float)
+    return tuple(value) if typing.get_origin(hint) is tuple else value
+
+
+def _without_none(hint: Any) -> Any:
+    """X of `X | None`."""
+    if typing.get_origin(hint) not in (types.UnionType, typing.Union):
+        return hint
+    (kind,) = (part for part in typing.get_args(hint) if part is not type(None))
+    return kind
+
+
+def _record_of_tuple(hint: Any) -> type | None:
+    """The record's class of `tuple[Record, ...]`."""
+    item = typing.get_args(hint)[0] if typing.get_origin(hint) is tuple else None
+    return item if dataclasses.is_dataclass(item) and isinstance(item, type) else None
+
+
+def _type_words(hint: Any, description: Description) -> str:
+    if description.shape:
+        return f"numbers {description.shape}"
+    if dataclasses.is_dataclass(hint) or typing.get_origin(hint) not in (None, tuple):
+        return "table"
+    if _record_of_tuple(hint) is not None:
+        return "list of tables"
+    if typing.get_origin(hint) is tuple:
+        return f"list of {WORDS[typing.get_args(hint)[0]]}s"
+    return WORDS.get(hint, "any")

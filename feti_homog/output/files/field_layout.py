@@ -1,0 +1,124 @@
+"""What result.h5 holds: the parts that each rank hands over, and where the file has them.
+
+Lengths are in the unit of the cell, stresses in that of the moduli.  n nodes, m elements and k interface nodes are all
+of the file's, of which each rank has a part; nodes are torn, so that each subdomain has its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from feti_homog.common.records import LENGTH, STRESS, Description, described, descriptions
+from feti_homog.mechanics.voigt import STRAINS, STRESSES
+from feti_homog.typing import AnyInt, Float
+
+PROGRAM = "feti_homog"
+PLANE_VECTORS = ("normal", "displacement", "fluctuation")  # which /vector has with a third component
+
+
+@dataclass(frozen=True)
+class Header:
+    """The file's attributes."""
+
+    title: str = described("name of the case")
+    version: str = described("version of the program")
+    width: float = described("width of the cell", LENGTH)
+    height: float = described("height of the cell", LENGTH)
+    order: int = described("order of the elements: 1, or 2 with curved sides at interfaces")
+    refine: int = described("times that every triangle of the coarse mesh was cut in four")
+    phases: tuple[str, ...] = described("names of the phases")
+    length_unit: str = described("label of the unit of lengths, may be empty", default="")
+    stress_unit: str = described("label of the unit of stresses, may be empty", default="")
+
+
+@dataclass(frozen=True)
+class MeshPart:
+    """This rank's n nodes and m triangles, one subdomain after the other; nodes are torn between subdomains.
+
+    Each group of 4**refine consecutive triangles fills one coarse triangle.
+    """
+
+    points: Float = described("positions of the nodes", LENGTH, "(n, 2)")
+    triangles: AnyInt = described(
+        "nodes of the elements, from 0: vertices, then of order 2 the mid-side nodes 01, 12, 20",
+        shape="(m, 3 or 6)", dtype="int64",
+    )  # fmt: skip
+    body: AnyInt = described("body of each element, from 0, the matrix", shape="(m,)", dtype="int32")
+    subdomain: AnyInt = described("subdomain of each element, from 0", shape="(m,)", dtype="int32")
+    phase: AnyInt = described("phase of each element, a place in `phases`", shape="(m,)", dtype="int32")
+
+
+@dataclass(frozen=True)
+class InterfacePart:
+    """The k fibre-matrix interface nodes whose multipliers this rank owns; k may be 0."""
+
+    points: Float = described("positions of the interface nodes", LENGTH, "(k, 2)")
+    normal: Float = described("unit normals, from fibre to matrix", shape="(k, 2)")
+    length: Float = described("tributary length: that of the interface which a node stands for", LENGTH, "(k,)")
+    fibre: AnyInt = described("body of the fibre", shape="(k,)", dtype="int32")
+
+
+@dataclass(frozen=True)
+class StatePart:
+    """One load case or state of the cell and this rank's part of its fields."""
+
+    strain: Float = described(f"macroscopic strain {', '.join(STRAINS)}", shape="(3,)")
+    stress_mean: Float = described(f"macroscopic stress {', '.join(STRESSES)}", STRESS, "(3,)", name="stress")
+    load_factor: float = described("position on the path, 0 to 1; 1 of other analyses")
+    label: str = described("the state in words, as `E11`, `60 deg E11`, `event 12`")
+    displacement: Float = described("displacement, that of the macroscopic strain included", LENGTH, "(n, 2)")
+    fluctuation: Float = described("displacement less that of the macroscopic strain, periodic", LENGTH, "(n, 2)")
+    stress: Float = described(f"means over the elements, {', '.join(STRESSES)}", STRESS, "(m, 3)")
+    traction: Float = described("normal and tangential traction on the matrix, tension positive", STRESS, "(k, 2)")
+    jump: Float = described("gap and slip: displacement of the matrix minus that of the fibre", LENGTH, "(k, 2)")
+    status: AnyInt = described("0 bonded, 1 closed (debonded, in contact), 2 open", shape="(k,)", dtype="int8")
+
+
+@dataclass(frozen=True)
+class Item:
+    """A dataset or an attribute of result.h5; K in `path` is the number of a state, from 0."""
+
+    path: str
+    kind: str
+    shape: str
+    dtype: str
+    unit: str
+    meaning: str
+
+
+def items() -> Iterator[Item]:
+    """All that result.h5 holds, with unit and meaning: the reference table of the file."""
+    yield from _items_of(Header, "")
+    yield Item("/", "attribute created_by", "", "text", "", f"`{PROGRAM}`")
+    for group, part in (("mesh", MeshPart), ("interface", InterfacePart), ("state/K", StatePart)):
+        yield from _items_of(part, group)
+
+
+def tables(part: Any) -> dict[str, Description]:
+    """The fields of a part that are datasets, those with a row for each node, element or interface node."""
+    return {name: d for name, d in descriptions(part).items() if rows_of(d)}
+
+
+def attributes(part: Any) -> dict[str, Any]:
+    """The other fields, by the names of the attributes, with their values."""
+    return {d.name or name: getattr(part, name) for name, d in descriptions(part).items() if not rows_of(d)}
+
+
+def rows_of(description: Description) -> str:
+    """What a dataset has rows of: `n` nodes, `m` elements, `k` interface nodes; empty for attributes."""
+    first = description.shape[1:2]
+    return first if first in ("n", "m", "k") else ""
+
+
+def _items_of(part: type, group: str) -> Iterator[Item]:
+    for name, d in descriptions(part).items():
+        if rows_of(d):
+            yield Item(f"/{group}/{name}", "dataset", d.shape, d.dtype, d.unit, d.meaning)
+            if name in PLANE_VECTORS:
+                words = f"/{group}/{name} with a third component 0, as viewers want it; takes no space"
+                yield Item(f"/vector/{group}/{name}", "dataset", f"({rows_of(d)}, 3)", d.dtype, d.unit, words)
+        else:
+            kind = "float64" if d.unit or d.shape or name == "load_factor" else "integer or text"
+            yield Item(f"/{group}", f"attribute {d.name or name}", d.shape, kind, d.unit, d.meaning)

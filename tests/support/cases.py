@@ -1,0 +1,71 @@
+"""Cases for the tests, and the program's stages run on them without files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from petsc4py import PETSc
+from reference import monolithic
+
+from feti_homog.analysis import stiffness
+from feti_homog.analysis.context import AnalysisContext
+from feti_homog.common.petsc_options import case_options
+from feti_homog.common.progress import Progress
+from feti_homog.config import case as cases
+from feti_homog.feti.thresholds import DEFAULTS
+from feti_homog.homogenization.averaging import Homogenization
+from feti_homog.homogenization.unit_cell import tear
+
+MATRIX, FIBRE = {"young": 88.0, "poisson": 0.299}, {"young": 200.0, "poisson": 0.222}
+
+
+def make_case(*, matrix=MATRIX, fibre=FIBRE, plane="strain", petsc=None, decomposition=None, folder=".", **cell):
+    """A case of the given cell, tight enough (1e-10) for comparisons."""
+    circular = {} if cell.get("geometry") == "mesh" else {"fibre_fraction": 0.4, "mesh_size": 0.15}
+    document = {
+        "cell": {"geometry": "hexagonal"} | circular | cell,
+        "material": {"matrix": matrix, "fibre": fibre},
+        "analysis": {"type": "stiffness", "plane": plane},
+        "petsc": {"feti_ksp_rtol": 1e-10} | (petsc or {}),
+        "decomposition": decomposition or {},
+    }
+    return cases.parse(document, Path(folder))
+
+
+def solve(case, comm, thresholds=DEFAULTS):
+    """The torn cell, L^ef and the responses."""
+    PETSc.garbage_cleanup(comm)
+    progress = Progress(comm, quiet=True)
+    with case_options(case.petsc):
+        cell = tear(case, comm, progress, thresholds)
+        responses = []
+        context = AnalysisContext(
+            Homogenization(cell, contact=False),
+            lambda opening: np.zeros(len(cell.solver.jump_operator.nodes.row), bool),
+            progress,
+            lambda response, *_: responses.append(response),
+        )
+        return cell, stiffness.run(context)["effective_stiffness"], responses
+
+
+def monolithic_stiffness(cell):
+    """L^ef of the same refined mesh by one monolithic solve, on every rank."""
+    parts = cell.comm.gather([(s.mesh.points, s.mesh.triangles, s.L) for s in cell.subdomains])
+    result = None
+    if cell.comm.rank == 0:
+        own = [part for parts_of_rank in parts for part in parts_of_rank]
+        first = np.cumsum([0] + [len(points) for points, _, _ in own])
+        result = monolithic.effective_stiffness(
+            np.concatenate([points for points, _, _ in own]),
+            np.concatenate([triangles + n for (_, triangles, _), n in zip(own, first, strict=False)]),
+            np.concatenate([np.broadcast_to(L, (len(triangles), 3, 3)) for _, triangles, L in own]),
+            cell.summary.width,
+            cell.summary.height,
+        )
+    return cell.comm.bcast(result)
+
+
+def relative_error(L, expected):
+    """Largest difference of entries, relative to the largest entry."""
+    return np.abs(L - expected).max() / np.abs(expected).max()

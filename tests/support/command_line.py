@@ -1,0 +1,22 @@
+"""Runs of the command line for the tests of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from support.base_case import BASE
+from support.jobs import mpirun
+
+CASE = BASE.replace("mesh_size = 0.05", "mesh_size = 0.15")
+
+
+def case_file(folder: Path, end: str = "[output]\npictures = false\n") -> Path:
+    """A small case that ends with these lines; by default it draws nothing, which takes longest."""
+    path = folder / "small.toml"
+    path.write_text(CASE + end)
+    return path
+
+
+def command_line(ranks: int, *words: str | Path, timeout: float = 60.0):
+    """`python -m feti_homog words...` on so many ranks; none: without mpirun."""
+    return mpirun(ranks, "-m", "feti_homog", *words, timeout=timeout)

@@ -1,0 +1,46 @@
+"""Programs that tests start: Python programs under mpirun, or without it."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).parents[2]
+LAUNCHER_VARIABLES = ("OMPI_", "PMIX_", "ORTE_", "PMI_")
+RUN_VARIABLES = {
+    "OMPI_ALLOW_RUN_AS_ROOT": "1",
+    "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+    "OMPI_MCA_btl_vader_single_copy_mechanism": "none",
+    "OMPI_MCA_mpi_yield_when_idle": "1",  # jobs share the cores
+    "OMP_NUM_THREADS": "1",
+    "H5PY_ALWAYS_USE_MPI": "1",
+}
+
+
+def environment() -> dict[str, str]:
+    """Of a job of its own: without what the launcher of these tests has set."""
+    return {k: v for k, v in os.environ.items() if not k.startswith(LAUNCHER_VARIABLES)} | RUN_VARIABLES
+
+
+def launched(ranks: int, *args: str | Path, cwd: Path = ROOT, **options: Any) -> subprocess.Popen[Any]:
+    """`python args...` on so many ranks, started; ranks = 0 starts it without mpirun.  Options are those of Popen."""
+    launcher = ["mpirun", "--oversubscribe", "-n", str(ranks)] if ranks else []
+    return subprocess.Popen([*launcher, sys.executable, *map(str, args)], cwd=cwd, env=environment(), **options)
+
+
+def mpirun(ranks: int, *args: str | Path, timeout: float = 120.0, cwd: Path = ROOT) -> subprocess.CompletedProcess[str]:
+    """As `launched`, to its end, with its output as text.
+
+    Raises subprocess.TimeoutExpired if it takes longer than `timeout` seconds; nothing is left running.
+    """
+    process = launched(ranks, *args, cwd=cwd, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    try:
+        output, errors = process.communicate(timeout=timeout)
+    except subprocess.TimeoutExpired:
+        process.terminate()  # mpirun ends its ranks
+        process.communicate()
+        raise
+    return subprocess.CompletedProcess(process.args, process.returncode, output, errors)

@@ -1,0 +1,113 @@
+"""A structured mesh of the unit square with a square fibre, and fields on it, as ranks hand them over."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from feti_homog.output.files.field_layout import Header, InterfacePart, MeshPart, StatePart
+
+GRADIENTS = tuple(np.array([[a, b], [b, c]]) for a, b, c in ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.5, 0.0)))
+
+
+@dataclass(frozen=True)
+class Sample:
+    header: Header
+    mesh: MeshPart
+    interface: InterfacePart
+    states: tuple[StatePart, ...]
+
+
+def sample(cells: int = 8, refine: int = 0, order: int = 1) -> Sample:
+    """The unit square on `cells` x `cells` coarse squares of two triangles; the fibre is the middle quarter.
+
+    Body 0, the matrix, is torn in two (left, right of x = 1/2); body 1 is the fibre. 4 divides `cells`.
+    """
+    corners, phase = _coarse(cells)
+    submesh = np.where(phase == 1, 2, (corners.mean(axis=1)[:, 0] > 0.5).astype(int))
+    corners, submesh = corners[np.argsort(submesh, kind="stable")], np.sort(submesh)
+    for _ in range(refine):
+        corners = _split(corners)
+    submesh = np.repeat(submesh, 4**refine)
+    if order == 2:
+        mids = 0.5 * (corners + np.roll(corners, -1, axis=1))
+        corners = np.concatenate([corners, mids], axis=1)
+    points, triangles = _merge(corners, submesh)
+    phase = (submesh == 2).astype(int)
+    mesh = MeshPart(points, triangles, body=phase, subdomain=submesh, phase=phase)
+    header = Header("sample", "0", 1.0, 1.0, order, refine, ("matrix", "fibre"), "mm", "GPa")
+    return Sample(header, mesh, _interface(), tuple(_state(mesh, gradient) for gradient in GRADIENTS))
+
+
+def part_of(whole: Sample, rank: int, size: int) -> Sample:
+    """The share of a rank: subdomains are dealt out in order; ranks past the third have nothing."""
+    mesh, last = whole.mesh, 2
+    mine = [submesh for submesh in range(last + 1) if min(submesh, size - 1) == rank]
+    rows = np.isin(mesh.subdomain, mine)
+    nodes, triangles = np.unique(mesh.triangles[rows], return_inverse=True)
+    labels = {name: getattr(mesh, name)[rows] for name in ("body", "subdomain", "phase")}
+    part = MeshPart(mesh.points[nodes], triangles.reshape(-1, mesh.triangles.shape[1]), **labels)
+    owned = slice(None) if last in mine else slice(0)
+    interface = InterfacePart(**{name: table[owned] for name, table in vars(whole.interface).items()})
+    states = tuple(_cut(state, nodes, rows, owned) for state in whole.states)
+    return Sample(whole.header, part, interface, states)
+
+
+def without_interface(whole: Sample) -> Sample:
+    """The same with no interface nodes."""
+    none = InterfacePart(**{name: table[:0] for name, table in vars(whole.interface).items()})
+    states = (_cut(state, slice(None), slice(None), slice(0)) for state in whole.states)
+    return replace(whole, interface=none, states=tuple(states))
+
+
+def _coarse(cells: int) -> tuple[np.ndarray, np.ndarray]:
+    i, j = (index.ravel() for index in np.meshgrid(np.arange(cells), np.arange(cells)))
+    lower, upper = np.array([[0, 0], [1, 0], [1, 1]]), np.array([[0, 0], [1, 1], [0, 1]])
+    base = np.stack([i, j], axis=1)[:, None, :]
+    corners = np.concatenate([base + lower, base + upper]) / cells
+    inside = (np.abs(corners.mean(axis=1) - 0.5) < 0.25).all(axis=1)
+    return corners, inside.astype(int)
+
+
+def _split(corners: np.ndarray) -> np.ndarray:
+    """Each triangle in four, consecutive: at its corners 0, 1, 2, then the middle one."""
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
+    children = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
+    return np.stack([np.stack(child, axis=1) for child in children], axis=1).reshape(-1, 3, 2)
+
+
+def _merge(corners: np.ndarray, submesh: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes numbered piece by piece, shared within a piece only."""
+    keys = np.concatenate([np.repeat(submesh, corners.shape[1])[:, None], corners.reshape(-1, 2)], axis=1)
+    nodes, triangles = np.unique(keys.round(12), axis=0, return_inverse=True)
+    return np.ascontiguousarray(nodes[:, 1:]), triangles.reshape(corners.shape[:2])
+
+
+def _interface() -> InterfacePart:
+    s = np.linspace(0.25, 0.75, 5)
+    sides = [np.stack([s, 0 * s + 0.25], 1), np.stack([s, 0 * s + 0.75], 1)]
+    normals = [np.tile([0.0, -1.0], (5, 1)), np.tile([0.0, 1.0], (5, 1))]
+    length, fibre = np.full(10, 0.125), np.zeros(10, int)
+    return InterfacePart(np.concatenate(sides), np.concatenate(normals), length, fibre)
+
+
+def _state(mesh: MeshPart, gradient: np.ndarray) -> StatePart:
+    """u = gradient x plus a bubble; the stress of an element is linear in its centre's position."""
+    x = mesh.points
+    bubble = 0.05 * np.sin(2 * np.pi * x)[:, ::-1]
+    centre = x[mesh.triangles[:, :3]].mean(axis=1)
+    strain = np.array([gradient[0, 0], gradient[1, 1], 2 * gradient[0, 1]])
+    stress = np.stack([1.0 + centre[:, 0], 2.0 + centre[:, 1], centre[:, 0] - centre[:, 1]], axis=1)
+    k = np.arange(10.0)
+    traction, jump, status = np.stack([k, -k], 1), np.stack([0.1 * k, 0.2 * k], 1), np.arange(10) % 3
+    displacement = x @ gradient.T + bubble
+    return StatePart(strain, strain * 3, 1.0, "a state", displacement, bubble, stress, traction, jump, status)
+
+
+def _cut(state: StatePart, nodes: Any, rows: Any, owned: Any) -> StatePart:
+    on_nodes = {name: getattr(state, name)[nodes] for name in ("displacement", "fluctuation")}
+    on_interface = {name: getattr(state, name)[owned] for name in ("traction", "jump", "status")}
+    return replace(state, **on_nodes, **on_interface, stress=state.stress[rows])

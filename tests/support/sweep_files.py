@@ -1,0 +1,31 @@
+"""Small sweeps for the tests."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+from support.base_case import BASE
+
+QUIET = '[output]\nfields = false\npictures = false\nstress_unit = "GPa"\n'
+CASE = BASE.replace("mesh_size = 0.05", "mesh_size = 0.3") + QUIET
+RANDOM_CELL = 'geometry = "random"\nfibres = 3\nfibre_fraction = 0.4\nmesh_size = 0.3'
+RANDOM = CASE.replace('geometry = "hexagonal"\nfibre_fraction = 0.4\nmesh_size = 0.3', RANDOM_CELL)
+
+# Of the second point no arrangement can be made.
+FAILING = RANDOM.replace("fibres = 3", "fibres = 12\nmin_gap = 0.1")
+FAILING_POINTS = "cell.fibre_fraction = [0.2, 0.745, 0.25]\n"
+
+
+def sweep_file(folder: Path, table: str, case: str = CASE, name: str = "sweep") -> Path:
+    """A case file with these lines under [sweep]."""
+    path = folder / f"{name}.toml"
+    path.write_text(f"{case}[sweep]\n{table}" if table else case)
+    return path
+
+
+def rows(folder: Path, measured: bool = False) -> list[dict[str, str]]:
+    """sweep.csv, without times and memory unless they are asked for."""
+    with (folder / "sweep.csv").open(encoding="utf-8") as stream:
+        found = list(csv.DictReader(stream))
+    return [{k: v for k, v in row.items() if measured or not k.startswith(("seconds", "memory"))} for row in found]
