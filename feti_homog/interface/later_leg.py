@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from mpi4py import MPI
 
-from feti_homog.feti.solver import DualSolution
+from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.interface.contact import Equilibrium, Interface
 from feti_homog.interface.leg_prediction import first_break, first_change
 from feti_homog.interface.path_points import UTILISATION_TIE, PathState, Point, energy_released, most_utilised, total
