@@ -85,7 +85,7 @@ def anisotropy(stiffness: ArrayLike) -> float:
 
 def voigt(fractions: ArrayLike, stiffnesses: ArrayLike) -> Float:
     """Upper bound sum c_i C_i, (3, 3), of fractions (n,) and stiffnesses (n, 3, 3)."""
-    return np.einsum("i,ijk->jk", np.asarray(fractions, float), np.asarray(stiffnesses, float))
+    return np.asarray(np.einsum("i,ijk->jk", np.asarray(fractions, float), np.asarray(stiffnesses, float)))
 
 
 def reuss(fractions: ArrayLike, stiffnesses: ArrayLike) -> Float:

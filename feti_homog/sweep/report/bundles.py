@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from feti_homog.mechanics import response
-from feti_homog.output.plots.canvas import STRAINS
+from feti_homog.output.plots.plot_helpers import STRAIN_SYMBOLS
 from feti_homog.sweep.report.statistics import Collected, Statistics
 from feti_homog.sweep.report.style import INK, finish, legend
 
@@ -27,7 +27,7 @@ def figure(table: Collected) -> Figure:
             _bundle(axes, table, point, component, INK[style])
         axes.xaxis.set_major_locator(MaxNLocator(5))
         axes.axhline(0.0, color="0.6", linewidth=0.6, zorder=0)
-        finish(axes, f"$\\Sigma_{{{COMPONENTS[component]}}}$", table, f"${STRAINS[along]}$")
+        finish(axes, f"$\\Sigma_{{{COMPONENTS[component]}}}$", table, f"${STRAIN_SYMBOLS[along]}$")
     whole.suptitle(f"{table.name}: realisations, means and their 95 % confidence intervals", fontsize=12)
     legend(whole, list(panels))
     return whole

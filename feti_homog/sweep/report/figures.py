@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from feti_homog.config.case import parse
 from feti_homog.config.materials import plane_stiffness
 from feti_homog.mechanics import bounds
-from feti_homog.output.plots.canvas import STYLE, save
+from feti_homog.output.plots.plot_helpers import STYLE, save
 from feti_homog.sweep.report import bundles, cell_size
 from feti_homog.sweep.report.statistics import Collected
 from feti_homog.sweep.report.style import Series, finish, legend, series, varies, with_scatter

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from feti_homog.output.plots.canvas import unit_label
+from feti_homog.output.plots.plot_helpers import unit_label
 from feti_homog.sweep.report.statistics import Collected
 from feti_homog.typing import Float
 

@@ -12,7 +12,6 @@ import pytest
 from feti_homog.errors import FetiHomogError
 from feti_homog.output.files import result_json
 
-
 SCHEMA = {"schema": result_json.SCHEMA}
 
 
