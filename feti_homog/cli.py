@@ -1,4 +1,5 @@
-"""The command line: `feti-homog run CASE.toml --out DIR`, `check CASE.toml`, `plot DIR`, `sweep`, `collect`.
+"""The command line: `feti-homog run CASE.toml --out DIR`, `check CASE.toml`, `plot DIR`, `sweep`, `collect`,
+`keys`, `schema`, `options`.
 
 Options with a double dash are ours, with a single dash PETSc's.
 """
@@ -6,7 +7,10 @@ Options with a double dash are ours, with a single dash PETSc's.
 from __future__ import annotations
 
 import argparse
+import json
+import signal
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
@@ -39,12 +43,12 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _command(words: Sequence[str], comm: Intracomm) -> int:
-    arguments = parsed(_parser(), words or ["--help"], comm)
+    arguments = parsed(command_parser(), words or ["--help"], comm)
     arguments.action(arguments, comm)
     return EXIT_DONE
 
 
-def _parser() -> Parser:
+def command_parser() -> Parser:
     parser = Parser(
         prog="feti-homog",
         description="Effective stiffness of fibre composites by FETI, on any number of MPI ranks.",
@@ -75,7 +79,18 @@ def _parser() -> Parser:
     collect.add_argument("directory", type=Path, metavar="DIR", help="--out of the sweep")
     collect.add_argument("--no-pictures", action="store_true", help="make the tables alone")
     collect.set_defaults(action=_collect)
+    _add_reference(actions)
     return parser
+
+
+def _add_reference(actions: argparse._SubParsersAction[Parser]) -> None:
+    keys = actions.add_parser("keys", help="print what the keys of a case file mean")
+    keys.add_argument("section", nargs="?", metavar="SECTION", help="cell, material, ...; by default all of them")
+    keys.set_defaults(action=_keys)
+    schema = actions.add_parser("schema", help="print the JSON Schema of a case file, for editors")
+    schema.set_defaults(action=_schema)
+    options = actions.add_parser("options", help="print PETSc's options that the solver takes")
+    options.set_defaults(action=_options)
 
 
 def _add_sweep(sweep: argparse.ArgumentParser) -> None:
@@ -112,11 +127,12 @@ def _check(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.common.mpi_errors import on_root, on_root_only
     from feti_homog.common.petsc_options import case_options
     from feti_homog.config import case as cases
-    from feti_homog.config.case import SWEEP
+    from feti_homog.config.document import read_document
+    from feti_homog.config.sweep_section import SWEEP
     from feti_homog.homogenization.unit_cell import describe
     from feti_homog.sweep import plan
 
-    document = on_root(comm, cases.read_document, arguments.case)
+    document = on_root(comm, read_document, arguments.case)
     if SWEEP in document:
         sweep = on_root(comm, plan.load, arguments.case)
         case, points = sweep.cases[0], len({entry.point for entry in sweep.entries})
@@ -149,7 +165,7 @@ def _sweep(arguments: argparse.Namespace, comm: Intracomm) -> None:
         raise CaseError(f"--ranks-per-case {group}: expected a divisor of the {comm.size} ranks")
     sweep = on_root(comm, plan.load, arguments.case)
     if arguments.list:
-        for line in on_root_only(comm, execute.listed, sweep, arguments.out) or []:
+        for line in on_root_only(comm, execute.list_cases, sweep, arguments.out) or []:
             print(line)
         return
     on_root(comm, output_folder.usable, arguments.out)
@@ -165,3 +181,29 @@ def _collect(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
     for line in on_root_only(comm, collect.collect, arguments.directory, not arguments.no_pictures) or []:
         print(line)
+
+
+def _keys(arguments: argparse.Namespace, comm: Intracomm) -> None:
+    from feti_homog.common.mpi_errors import on_root_only
+    from feti_homog.config import reference
+
+    section = arguments.section
+    tables = on_root_only(comm, reference.tables if section is None else partial(reference.tables_of, section))
+    _print_reference(comm, reference.as_text(tables or []))
+
+
+def _schema(arguments: argparse.Namespace, comm: Intracomm) -> None:
+    from feti_homog.config.json_schema import json_schema
+
+    _print_reference(comm, json.dumps(json_schema(), indent=2))
+
+
+def _options(arguments: argparse.Namespace, comm: Intracomm) -> None:
+    _print_reference(comm, help_text())
+
+
+def _print_reference(comm: Intracomm, text: str) -> None:
+    """Print a text on rank 0; if its reader leaves early, as `head` does, the program ends without a word."""
+    if comm.rank == 0:
+        signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # PETSc's handler would tell of an error
+        print(text, flush=True)

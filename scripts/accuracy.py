@@ -136,7 +136,7 @@ def direct_solve(cell: TornCell) -> tuple[float, np.ndarray, int]:
     K, Q = glued(cell)
     solver = DirectSolver(K, "mono_")
     stress = sum(s.area * s.L for s in cell.subdomains)
-    L = (stress - Q.T @ solver.solve(Q)) / cell.plan.area
+    L = (stress - Q.T @ solver.solve(Q)) / cell.summary.area
     return time.perf_counter() - start, L, K.shape[0]
 
 

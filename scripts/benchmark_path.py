@@ -27,7 +27,8 @@ from feti_homog.config import case as cases  # noqa: E402
 from feti_homog.homogenization.averaging import Homogenization  # noqa: E402
 from feti_homog.homogenization.unit_cell import tear  # noqa: E402
 from feti_homog.interface.contact import BONDED  # noqa: E402
-from feti_homog.interface.path_following import events, unloaded  # noqa: E402
+from feti_homog.interface.path_following import events  # noqa: E402
+from feti_homog.interface.path_points import unloaded  # noqa: E402
 from feti_homog.interface.strength_criterion import StrengthCriterion  # noqa: E402
 
 STRAIN = [0.2, 0.0, 0.0]
@@ -59,7 +60,7 @@ def main() -> None:
     peer = factor + solve
     mean = float(np.mean(seconds))
     print(f"degrees of freedom          {len(cell.solver.Q)} torn, {K.shape[0]} glued")
-    print(f"torn stiffness C11          {stiffness[0, 0] / cell.plan.area:.6g}")
+    print(f"torn stiffness C11          {stiffness[0, 0] / cell.summary.area:.6g}")
     print(f"set-up                      {setup:8.2f} s, {setup / peer:6.2f} of the peer")
     print(f"monolithic factor and solve {peer:8.2f} s  (factor {factor:.2f}, solve {solve:.3f})")
     print(f"an event, mean of {len(seconds):4d}      {mean:8.3f} s, 1/{peer / mean:.1f} of the peer")

@@ -72,16 +72,16 @@ def feti(case: Case, progress: Progress, loads: int, rtol: float) -> dict[str, A
             responses = context.homogenization.respond(np.eye(3)[:loads], context.status(None), starts)
             for response in responses:
                 context.record_checks("", response)
-    dofs = cell.total(sum(len(s.Q) for s in cell.subdomains))
+    dofs = cell.sum_over_ranks(sum(len(s.Q) for s in cell.subdomains))
     cell.solver.destroy()
     columns = [response.stress for response in responses]
-    return _report(dofs, cell.plan.subdomains, columns, context.iterations, context.reasons)
+    return _report(dofs, cell.summary.subdomains, columns, context.iterations, context.reasons)
 
 
 def peer(tool: Peer, case: Case, progress: Progress, loads: int, rtol: float) -> dict[str, Any]:
     """One of the others."""
     comm = progress.comm
-    plan, _, lattice, subdomains = unit_cell.assembled(case, comm, progress)
+    plan, _, lattice, subdomains = unit_cell.assemble_subdomains(case, comm, progress)
     with progress.stage("glue"):
         cell = glue(comm, subdomains, lattice)
         A = _operator(tool, cell)

@@ -13,7 +13,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from feti_homog.cell.refinement import Lattice
+from feti_homog.cell.refinement import ReferenceLattice
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.typing import Float, Int
 
@@ -35,7 +35,7 @@ class Nodes:
     owned: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, comm: MPI.Intracomm, subdomains: list[Subdomain], lattice: Lattice) -> Nodes:
+    def of(cls, comm: MPI.Intracomm, subdomains: list[Subdomain], lattice: ReferenceLattice) -> Nodes:
         """Number the nodes; one that several ranks hold is owned by the lowest of them.  Collective."""
         keys, several = _keys(comm, subdomains, lattice)
         sizes = np.cumsum([len(k) for k in keys])[:-1]
@@ -60,7 +60,7 @@ class Nodes:
         return cls(np.split(place[which], sizes), number, owned)
 
 
-def _keys(comm: MPI.Intracomm, subdomains: list[Subdomain], lattice: Lattice) -> tuple[list[Int], int]:
+def _keys(comm: MPI.Intracomm, subdomains: list[Subdomain], lattice: ReferenceLattice) -> tuple[list[Int], int]:
     """A key for each class of each subdomain, the same wherever the node is, and from which on keys are not shared."""
     inner = lattice.intervals - 1
     inside = [s.mesh.n_classes - len(s.submesh.class_keys) - len(s.submesh.edge_keys) * inner for s in subdomains]
@@ -114,22 +114,24 @@ class Glued:
         return np.array([q.dot(u) for q in self.Q])
 
 
-def glue(comm: MPI.Intracomm, subdomains: list[Subdomain], lattice: Lattice) -> Glued:
+def glue(comm: MPI.Intracomm, subdomains: list[Subdomain], lattice: ReferenceLattice) -> Glued:
     """Glue the subdomains, which are taken from the list one by one to save memory.  Collective."""
     nodes = Nodes.of(comm, subdomains, lattice)
     n = len(nodes.number)
     entries, Q, x = np.zeros(2 * n, np.int32), np.zeros((2 * n, 3)), np.zeros((n, 2))
     stiffness = np.asarray(comm.allreduce(sum(s.area * s.L for s in subdomains)))
-    for s, local in zip(subdomains, nodes.local, strict=True):
+    matrices = [s.take_stiffness() for s in subdomains]
+    for s, matrix, local in zip(subdomains, matrices, nodes.local, strict=True):
         own = _dofs(local)
-        entries[own] += np.diff(s.K.indptr)
+        entries[own] += np.diff(matrix.indptr)
         Q[own] += s.Q
         x[local[s.mesh.node_class]] = s.mesh.points
     K = PETSc.Mat().createAIJ((2 * n, 2 * n), nnz=entries, comm=PETSc.COMM_SELF)
     K.setBlockSize(2)
     while subdomains:
-        s, own = subdomains.pop(), _dofs(nodes.local.pop())
-        K.setValuesIJV(s.K.indptr, own[s.K.indices], s.K.data, ADD, own)
+        subdomains.pop()
+        matrix, own = matrices.pop(), _dofs(nodes.local.pop())
+        K.setValuesIJV(matrix.indptr, own[matrix.indices], matrix.data, ADD, own)
     K.assemble()
     lgmap = PETSc.LGMap().create(nodes.number.astype(np.int32), 2, comm)
     size = (2 * int(nodes.owned.sum()), None)

@@ -22,7 +22,7 @@ def glued(cell: TornCell) -> tuple[csr_matrix, np.ndarray]:
     for s in cell.subdomains:
         own = dofs[first : first + len(s.Q)]
         gather = csr_matrix((np.ones(len(own)), (own, np.arange(len(own)))), shape=(n, len(own)))
-        K, Q, first = K + gather @ s.K @ gather.T, Q + gather @ s.Q, first + len(own)
+        K, Q, first = K + gather @ s.assemble_stiffness() @ gather.T, Q + gather @ s.Q, first + len(own)
     return K.tocsr(), Q
 
 

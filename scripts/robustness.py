@@ -125,13 +125,13 @@ def measure(cell: Cell, space: str, comm: MPI.Intracomm) -> Row:
         solver = torn.solver
         solutions = solver.solve_together(np.eye(3), np.zeros((solver.rows, 3)))
     boundary = comm.allreduce(max((len(d) for d in solver.boundary.dofs), default=0), MPI.MAX)
-    dofs = torn.total(len(solver.Q))
+    dofs = torn.sum_over_ranks(len(solver.Q))
     iterations = solutions[0].iterations if solutions[0].reason > 0 else 9999
     seconds = time.perf_counter() - start
-    vectors = solver.coarse.vectors / torn.plan.subdomains
+    vectors = solver.coarse.vectors / torn.summary.subdomains
     solver.destroy()
     PETSc.garbage_cleanup(comm)
-    return Row(**asdict(cell), dofs=dofs, subdomains=torn.plan.subdomains, boundary=boundary, vectors=vectors,
+    return Row(**asdict(cell), dofs=dofs, subdomains=torn.summary.subdomains, boundary=boundary, vectors=vectors,
                iterations=iterations, seconds=seconds)  # fmt: skip
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from scaling_model import COARSE, COARSE_POWER, LOCAL, MESH, TOGETHER, Machine, Prediction, Rates, predict
 from scaling_report import COARSE_SUMS, GATHERS, SCALARS, SUMS, SUMS_TOGETHER, Row
 
-from feti_homog.feti.thresholds import LARGEST_REPLICATED
+from feti_homog.feti.thresholds import DEFAULTS
 
 RANKS = (1, 2, 16, 64, 1024)
 FAR = (64, 1024)
@@ -43,7 +43,7 @@ def assumptions(rates: Rates, machine: Machine) -> list[str]:
         f"in {r.factor:.2g} n^{COARSE_POWER} s,",
         f"              solved once an iteration in {r.solve:.2g} n log2 n s a load, which ranks deal out: powers of "
         f"sparse plane problems, assumed; factors measured, up to n = {r.largest_coarse};",
-        f"              from {LARGEST_REPLICATED / r.vectors / 1e6:.0f} million dofs by all ranks together, "
+        f"              from {DEFAULTS.replicated_vectors / r.vectors / 1e6:.0f} million dofs by all ranks together, "
         f"p^{TOGETHER} times faster, assumed",
         f"  messages    {1e6 * machine.latency:g} microseconds each and {machine.bandwidth / 1e9:g} GB/s, assumed; "
         f"{GATHERS + SUMS} exchanges an iteration, each of {r.neighbours} messages and {r.surface:.1f} values",

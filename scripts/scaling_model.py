@@ -12,7 +12,7 @@ from math import ceil, log2, sqrt
 
 from scaling_report import COARSE_SUMS, GATHERS, SCALARS, SUMS, SUMS_TOGETHER, VALUE_BYTES, Row
 
-from feti_homog.feti.thresholds import LARGEST_REPLICATED
+from feti_homog.feti.thresholds import DEFAULTS
 
 MESH, LOCAL, COARSE, MESSAGES = "mesh on rank 0", "subdomains", "coarse problem", "messages"
 # Powers: of the coarse unknowns, in their factorization; of the ranks, by which they are faster together.
@@ -94,12 +94,16 @@ def measured(rows: Sequence[Row], cores: int) -> Rates:
 
 def _factored(coarse: float, vectors: float, ranks: int) -> float:
     """Work of a coarse factorization on the busiest rank: all of it, or a share where ranks do it together."""
-    return coarse**COARSE_POWER / (ranks**TOGETHER if vectors > LARGEST_REPLICATED else 1.0)
+    return coarse**COARSE_POWER / (ranks**TOGETHER if vectors > DEFAULTS.replicated_vectors else 1.0)
 
 
 def _solved(coarse: float, vectors: float, ranks: int, loads: int) -> float:
     """Work of the coarse solves on the busiest rank: for the loads that are dealt to it, or a share of all."""
-    return coarse * log2(coarse) * (loads / ranks**TOGETHER if vectors > LARGEST_REPLICATED else ceil(loads / ranks))
+    return (
+        coarse
+        * log2(coarse)
+        * (loads / ranks**TOGETHER if vectors > DEFAULTS.replicated_vectors else ceil(loads / ranks))
+    )
 
 
 def _rate(pairs: Iterable[tuple[float, float]]) -> float:
@@ -151,7 +155,7 @@ def predict(rates: Rates, machine: Machine, dofs: float, ranks: int) -> Predicti
     own = dofs / ranks * max(rates.imbalance if ranks > 1 else 1.0, whole)
     coarse = max(rates.coarse * dofs, 2.0)
     vectors = rates.vectors * dofs
-    sums = SUMS_TOGETHER if vectors > LARGEST_REPLICATED else COARSE_SUMS
+    sums = SUMS_TOGETHER if vectors > DEFAULTS.replicated_vectors else COARSE_SUMS
     return Prediction(
         dofs=dofs,
         ranks=ranks,

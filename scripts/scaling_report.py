@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from feti_homog.feti.thresholds import LARGEST_REPLICATED
+from feti_homog.feti.thresholds import DEFAULTS
 
 STAGES = ("mesh", "assemble", "set-up", "solve")
 COLUMNS = (
@@ -89,7 +89,7 @@ class Row:
     @property
     def summed(self) -> int:
         """Bytes that every rank puts into the sums over ranks of an iteration."""
-        sums = SUMS_TOGETHER if self.vectors > LARGEST_REPLICATED else COARSE_SUMS
+        sums = SUMS_TOGETHER if self.vectors > DEFAULTS.replicated_vectors else COARSE_SUMS
         return VALUE_BYTES * (sums * self.coarse * self.loads + SCALARS)
 
     @property

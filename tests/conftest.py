@@ -10,9 +10,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import support
+from hypothesis import settings
+from support import jobs
 
 from feti_homog.common.mpi_errors import others_come
+
+# The same examples in every run and on every rank; `--hypothesis-profile=search` looks for new ones.
+settings.register_profile("suite", derandomize=True, deadline=None, max_examples=60, database=None)
+settings.register_profile("search", deadline=None, max_examples=2000, database=None)
+settings.load_profile("suite")
 
 RANK = int(os.environ.get("OMPI_COMM_WORLD_RANK", os.environ.get("PMI_RANK", "0")))
 PATIENCE = 5.0  # seconds that a failing rank waits for the others to end the same test
@@ -41,7 +47,7 @@ def shared_path(comm: Any, tmp_path: Path) -> Path:
 
 @pytest.fixture
 def mpirun() -> Callable[..., Any]:
-    return support.mpirun
+    return jobs.mpirun
 
 
 @pytest.hookimpl(trylast=True)

@@ -39,7 +39,7 @@ def result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Fields
         checks=Checks(**context.checks),
         check_tolerance=context.tolerance("jump"),
         kkt_tolerance=CONTACT_TOLERANCE,
-        warnings=tuple(cell.case.warnings()),
+        warnings=(*cell.case.warnings(), *context.warnings()),
         faults=tuple(context.faults),
         status="not converged" if context.faults else "done",
         timings=progress.timings(),
@@ -52,30 +52,30 @@ def result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Fields
 def _cell_info(cell: TornCell, fractions: dict[str, float]) -> CellInfo:
     """Collective."""
     return CellInfo(
-        width=cell.plan.width,
-        height=cell.plan.height,
-        area=cell.plan.area,
+        width=cell.summary.width,
+        height=cell.summary.height,
+        area=cell.summary.area,
         fibre_fraction=sum(f for phase, f in fractions.items() if phase != "matrix"),
         fractions=fractions,
-        elements=cell.total(sum(len(s.mesh.triangles) for s in cell.subdomains)),
-        nodes=cell.total(sum(len(s.mesh.points) for s in cell.subdomains)),
+        elements=cell.sum_over_ranks(sum(len(s.mesh.triangles) for s in cell.subdomains)),
+        nodes=cell.sum_over_ranks(sum(len(s.mesh.points) for s in cell.subdomains)),
     )
 
 
 def _solver_info(context: AnalysisContext) -> SolverInfo:
     """Collective."""
     cell = context.homogenization.cell
-    plan, solver = cell.plan, cell.solver
+    plan, solver = cell.summary, cell.solver
     return SolverInfo(
         ranks=cell.comm.size,
         bodies=plan.bodies,
         subdomains=plan.subdomains,
-        dofs=cell.total(len(solver.Q)),
-        multipliers=solver.jump_operator.total,
-        interface_nodes=cell.total(len(solver.jump_operator.nodes.row)),
+        dofs=cell.sum_over_ranks(len(solver.Q)),
+        multipliers=solver.jump_operator.global_rows,
+        interface_nodes=cell.sum_over_ranks(len(solver.jump_operator.nodes.row)),
         kernel_dim=solver.coarse.dimension,
         coarse_dim=solver.coarse.vectors,
-        factorizations=cell.total(len(solver.boundary.operators)),
+        factorizations=cell.sum_over_ranks(len(solver.boundary.operators)),
         coarse_factorizations=solver.coarse.factorizations,
         rtol=solver.rtol,
         solves=solver.solves,

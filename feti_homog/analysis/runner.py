@@ -125,6 +125,8 @@ def _run_and_write(cell: TornCell, directory: Path, progress: Progress, resume: 
     with file or nullcontext():
         states = _States(cell, file, keep_fields)
         context = _context(cell, progress, states)
+        for warning in context.warnings():
+            progress.say(f"warning: {warning}")
         checkpoint = _checkpoint(cell, directory)
         analysis = _analyse(context, checkpoint, resume)
     if file is not None:
@@ -177,7 +179,7 @@ def _analysis(context: AnalysisContext, checkpoint: Checkpoint, resume: bool) ->
 
 
 def _checkpoint(cell: TornCell, directory: Path) -> Checkpoint:
-    plan, multipliers = cell.plan, cell.solver.jump_operator.total
+    plan, multipliers = cell.summary, cell.solver.jump_operator.global_rows
     parts = f"{plan.subdomains} subdomains on {cell.comm.size} ranks, {multipliers} multipliers"
     return Checkpoint(directory, cell.comm, f"case {on_root(cell.comm, cell.case.digest)}, {parts}")
 

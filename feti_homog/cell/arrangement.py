@@ -15,14 +15,15 @@ from feti_homog.errors import MeshError
 from feti_homog.typing import Float, Int
 
 if TYPE_CHECKING:
-    from feti_homog.config.case import Cell
+    from feti_homog.config.cell_section import Cell
 
 
 # Quenched random packings jam near this area fraction.
 JAMMED = 0.84
 # Relative excess of the radii that push over those that must not overlap: the descent ends in finite time.
-SLACK = 1e-3
-STEPS = 2000
+RADIUS_EXCESS = 1e-3
+# Steps of the descent after which an arrangement counts as jammed; found ones take less than 200.
+MAX_STEPS = 2000
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,10 @@ def arrange(cell: Cell) -> Arrangement:
     """The arrangement that a case asks for, whose area fraction is `cell.fibre_fraction` to rounding.
 
     square: one disc in the middle of a 1 x 1 cell. hexagonal: 1 x sqrt(3), a disc in the middle and one at
-    the corner. random: `cell.fibres` discs in a 1 x 1 cell, see `random_arrangement`. Raises MeshError.
+    the corner. random: `cell.fibres` discs in a 1 x 1 cell, see `random_arrangement`.
+
+    Raises:
+        MeshError: discs of that fraction touch, or no arrangement is found.
     """
     return ARRANGEMENTS[cell.geometry](cell)
 
@@ -55,6 +59,7 @@ def hexagonal_arrangement(cell: Cell) -> Arrangement:
 
 
 def _lattice(cell: Cell, height: float, centres: Float, limit: float) -> Arrangement:
+    """Equal discs at the centres (N, 2) of a 1 x height cell, which touch at the fraction `limit`."""
     fraction = cell.fibre_fraction
     assert fraction is not None
     if fraction >= limit:
@@ -66,14 +71,17 @@ def _lattice(cell: Cell, height: float, centres: Float, limit: float) -> Arrange
     return Arrangement(1.0, height, centres, np.full(len(centres), radius))
 
 
-def random_arrangement(cell: Cell) -> Arrangement:
+def random_arrangement(cell: Cell, max_steps: int = MAX_STEPS, max_attempts: int | None = None) -> Arrangement:
     """Discs at random in the unit square, periodic, the same for the same case on every machine.
 
     Radii are uniform in mean * (1 - s, 1 + s), s = `radius_spread`, and scaled to the fraction. Any two
     discs, images included, are at least `min_gap` mean diameters apart. Random centres are moved down the
     gradient of the overlap energy 1/2 sum max(0, R_i + R_j - |x_i - x_j|)^2 of the discs grown by half the
-    gap until it is zero; when that jams, it starts again a few times. Last, all is shifted (`clear_shift`).
-    Raises MeshError when no arrangement is found.
+    gap until it is zero; when that has not come after `max_steps`, it starts again from other centres, up to
+    `max_attempts` times (default: 10 for few fibres, 3 for many). Last, all is shifted (`clear_shift`).
+
+    Raises:
+        MeshError: no arrangement is found.
     """
     count, gap, fraction = cell.fibres, cell.min_gap, cell.fibre_fraction
     assert count is not None and fraction is not None
@@ -87,9 +95,9 @@ def random_arrangement(cell: Cell) -> Arrangement:
             f"{ask}: random arrangements with this gap exist up to a fibre fraction of at most about "
             f"{JAMMED / (1 + gap) ** 2:.2f}; lower one of them"
         )
-    attempts, best = max(3, min(10, 100 // count)), 0.0
+    attempts, best = max_attempts or max(3, min(10, 100 // count)), 0.0
     for _ in range(attempts):
-        centres, clearance = _relax(generator.random((count, 2)), grown)
+        centres, clearance = _relax(generator.random((count, 2)), grown, max_steps)
         if clearance >= 1:
             return clear_shift(Arrangement(1.0, 1.0, centres, radii))
         best = max(best, clearance)
@@ -121,14 +129,14 @@ def neighbours(centres: Float, size: Float, reach: float) -> tuple[Int, Int, Flo
     return who[first], who[second], place[second] - place[first]
 
 
-def _relax(centres: Float, radii: Float) -> tuple[Float, float]:
+def _relax(centres: Float, radii: Float, max_steps: int) -> tuple[Float, float]:
     """Centres (N, 2) moved until discs on the unit torus do not overlap, and the clearance reached.
 
     The clearance is the smallest ratio of distance to sum of radii; at least 1 is success. Heavy-ball descent
     x += 0.25 f + 0.9 dx: no reductions over the discs, so that every machine gets the same numbers.
     """
-    target, step, clearance = radii * (1 + SLACK), np.zeros_like(centres), 0.0
-    for _ in range(STEPS):
+    target, step, clearance = radii * (1 + RADIUS_EXCESS), np.zeros_like(centres), 0.0
+    for _ in range(max_steps):
         first, second, vector = neighbours(centres, np.ones(2), 2 * target.max())
         distance = np.sqrt(vector[:, 0] * vector[:, 0] + vector[:, 1] * vector[:, 1])
         clearance = float(np.min(distance / (radii[first] + radii[second]), initial=2.0))

@@ -5,18 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components, depth_first_order
 
 from feti_homog.cell.coarse_mesh import CoarseMesh, double_arcs, edge_keys, edges, flip_double_arcs
 from feti_homog.cell.interface_edges import interface_edges
-from feti_homog.typing import Float, Int
+from feti_homog.typing import Bool, Float, Int, Int32
 
-# Largest distance of a node from its circle, relative to the radius.
-ROUND = 1e-6
+# Largest distance of a node from its circle, relative to the radius: files may round coordinates to seven digits.
+ROUNDNESS_TOLERANCE = 1e-6
 # A circle has at least so many edges, none longer than the radius: other regular polygons are meant as such.
-FEWEST = 8
+MIN_CIRCLE_EDGES = 8
 
 
 @dataclass(frozen=True)
@@ -30,12 +29,12 @@ class _Loop:
 def with_circles(mesh: CoarseMesh) -> CoarseMesh:
     """The mesh with the round interfaces as circles, their nodes moved onto them exactly.
 
-    A closed interface between two phases is a circle if all its nodes are within ROUND radii of one, there
-    are at least FEWEST edges, none on a side of the cell or longer than the radius, and no corner of the cell
-    is on it. Others stay polygons.
+    A closed interface between two phases is a circle if all its nodes are within ROUNDNESS_TOLERANCE radii of one,
+    there are at least MIN_CIRCLE_EDGES edges, none on a side of the cell or longer than the radius, and no corner of
+    the cell is on it. Others stay polygons.
     """
     pairs = interface_edges(mesh)
-    size = np.array([mesh.width, mesh.height])
+    size = mesh.period
     loops = _loops(mesh, pairs, size)
     loop_of = np.full(len(mesh.points), -1)
     for number, loop in enumerate(loops):
@@ -58,7 +57,7 @@ def with_circles(mesh: CoarseMesh) -> CoarseMesh:
     return _without_double_arcs(_with_arcs(mesh, circles, arc_edges))
 
 
-def _loops(mesh: CoarseMesh, pairs: NDArray[np.int32], size: Float) -> list[_Loop]:
+def _loops(mesh: CoarseMesh, pairs: Int32, size: Float) -> list[_Loop]:
     """The interfaces that are simple closed curves and contractible on the torus."""
     if len(pairs) == 0:
         return []
@@ -73,7 +72,7 @@ def _loops(mesh: CoarseMesh, pairs: NDArray[np.int32], size: Float) -> list[_Loo
     branching = np.bincount(part, np.bincount(ends.ravel()) != 2) > 0
     _, first, number = np.unique(part, return_index=True, return_counts=True)
     loops = []
-    for start in first[~branching & (number >= FEWEST)].tolist():
+    for start in first[~branching & (number >= MIN_CIRCLE_EDGES)].tolist():
         order, _ = depth_first_order(graph, start, directed=False)
         hops = np.stack([np.asarray(step[order, np.roll(order, -1)]).ravel() for step in steps], axis=1)
         if np.all(np.abs(hops.sum(axis=0)) < size / 2):
@@ -95,7 +94,7 @@ def _fit(places: Float) -> Float | None:
     spokes = scaled - (x, y)
     away = np.abs(np.linalg.norm(spokes, axis=1) - radius).max()
     chord = np.linalg.norm(np.roll(scaled, -1, axis=0) - scaled, axis=1).max()
-    if away > ROUND * radius or chord > radius:
+    if away > ROUNDNESS_TOLERANCE * radius or chord > radius:
         return None
     return np.array([*(middle + scale * np.array([x, y])), scale * radius])
 
@@ -104,7 +103,7 @@ def _moved(points: Float, places: Float, circle: Float, size: Float) -> Float | 
     """Points (k, 2) of the plane moved onto the circle, along the side they are on; None if impossible."""
     centres = circle[:2] - np.round((places - points) / size) * size
     spokes = points - centres
-    moved = centres + circle[2] * spokes / np.linalg.norm(spokes, axis=1)[:, None]
+    moved: Float = centres + circle[2] * spokes / np.linalg.norm(spokes, axis=1)[:, None]
     on_side = (points == 0) | (points == size)
     if on_side.all(axis=1).any():
         return None
@@ -120,14 +119,12 @@ def _moved(points: Float, places: Float, circle: Float, size: Float) -> Float | 
     return moved
 
 
-def _on_sides(ends: Float, size: Float) -> NDArray[np.bool_]:
+def _on_sides(ends: Float, size: Float) -> Bool:
     """Whether edges with ends (k, 2, 2) lie on a side of the cell."""
-    return np.any(np.all(ends == 0, axis=1) | np.all(ends == size, axis=1), axis=1)
+    return np.asarray(np.any(np.all(ends == 0, axis=1) | np.all(ends == size, axis=1), axis=1))
 
 
-def _images(
-    mesh: CoarseMesh, loop: _Loop, circle: Float, own: NDArray[np.int32], size: Float
-) -> list[tuple[Float, NDArray[np.int32]]]:
+def _images(mesh: CoarseMesh, loop: _Loop, circle: Float, own: Int32, size: Float) -> list[tuple[Float, Int32]]:
     """The images of a circle in the plane, each with its edges (a, 2) among the loop's own."""
     order = np.argsort(loop.classes)
     place = order[np.searchsorted(loop.classes[order], mesh.representative[own[:, 0]])]
@@ -143,7 +140,7 @@ def _copied(mesh: CoarseMesh, points: Float, size: Float) -> Float:
     return np.where(mesh.points == size, size, points[mesh.representative])
 
 
-def _with_arcs(mesh: CoarseMesh, circles: list[Float], arc_edges: list[NDArray[np.int32]]) -> CoarseMesh:
+def _with_arcs(mesh: CoarseMesh, circles: list[Float], arc_edges: list[Int32]) -> CoarseMesh:
     """The mesh with these circles (3,) and their edges (a, 2)."""
     counts = np.array([len(own) for own in arc_edges], dtype=np.intp)
     return replace(

@@ -5,24 +5,26 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from feti_homog.typing import Float, Int32
+from feti_homog.cell.periodic_sides import paired_sides
+from feti_homog.typing import Float, Int, Int32
 
 
 @dataclass(frozen=True)
 class CoarseMesh:
     """Conforming periodic mesh of straight triangles on the cell [0, width] x [0, height]; on rank 0 only.
 
-    points (n, 2)        nodes in the plane
-    triangles (m, 3)     counter-clockwise; none has two edges on the same circle
-    phase (m,)           index into `phases`, whose first name is "matrix"
-    representative (n,)  node that stands for the class of a node on the torus: x = width -> x = 0, y = height
-                         -> y = 0; idempotent
-    circles (k, 3)       centre and radius in the plane; periodic images are listed separately
-    arc_edges (a, 2)     edges of the mesh whose ends lie on a circle, to rounding
-    arc_circle (a,)      the circle of each of them
-    debonded_edges (d, 2)  edges between a fibre and the matrix that are debonded from the start
+    Attributes:
+        width, height: periods of the cell.
+        points: (n, 2) nodes in the plane.
+        triangles: (m, 3) counter-clockwise; none has two edges on the same circle.
+        phase: (m,) index into `phases`, whose first name is "matrix".
+        representative: (n,) node that stands for the class of a node on the torus: x = width -> x = 0,
+            y = height -> y = 0; idempotent.
+        circles: (k, 3) centre and radius in the plane; periodic images are listed separately.
+        arc_edges: (a, 2) edges of the mesh whose ends lie on a circle, to rounding.
+        arc_circle: (a,) the circle of each of them.
+        debonded_edges: (d, 2) edges between a fibre and the matrix that are debonded from the start.
     """
 
     width: float
@@ -37,12 +39,17 @@ class CoarseMesh:
     arc_circle: Int32
     debonded_edges: Int32
 
+    @property
+    def period(self) -> Float:
+        """(2,) width and height."""
+        return np.array([self.width, self.height])
+
 
 def areas(points: Float, triangles: Int32) -> Float:
     """Signed areas (m,) of triangles, positive counter-clockwise."""
     a, b, c = (points[triangles[:, i]] for i in range(3))
     u, v = b - a, c - a
-    return 0.5 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
+    return np.asarray(0.5 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]))
 
 
 def edges(triangles: Int32) -> Int32:
@@ -50,7 +57,7 @@ def edges(triangles: Int32) -> Int32:
     return triangles[:, [1, 2, 2, 0, 0, 1]].reshape(-1, 2)
 
 
-def edge_keys(pairs: Int32, nodes: int) -> NDArray[np.int64]:
+def edge_keys(pairs: Int32, nodes: int) -> Int:
     """One integer for each undirected edge (k, 2) of a mesh with that many nodes."""
     ordered = np.sort(pairs, axis=1).astype(np.int64)
     return ordered[:, 0] * nodes + ordered[:, 1]
@@ -63,11 +70,8 @@ def representatives(points: Float, width: float, height: float) -> Int32:
     and the four corners that of the origin.
     """
     result = np.arange(len(points), dtype=np.int32)
-    for axis, period in ((0, width), (1, height)):
-        low = np.flatnonzero(points[:, axis] == 0.0)
-        high = np.flatnonzero(points[:, axis] == period)
-        along = points[:, 1 - axis]
-        result[high[np.argsort(along[high])]] = low[np.argsort(along[low])]
+    for _, low, high in paired_sides(points, np.array([width, height])):
+        result[high] = low
     return result[result]
 
 

@@ -11,7 +11,7 @@ from feti_homog.cell.unwrap import unwrap
 from feti_homog.typing import Float
 
 # Relative to the radius: circles nearer than this are images of one.
-SAME = 1e-9
+SAME_CIRCLE = 1e-9
 
 
 def fibre_centres(torus: Torus) -> Float:
@@ -27,11 +27,13 @@ def fibre_centres(torus: Torus) -> Float:
 
 
 def _centre(submesh: Submesh) -> Float:
+    """(2,) that of one fibre."""
     around = _boundary_circles(submesh)
     radius = around[0, 2] if len(around) else 0.0
     offset = around[:, :2] - around[:1, :2]
     offset -= np.round(offset / submesh.period) * submesh.period
-    if radius > 0 and np.all(np.abs(around[:, 2] - radius) < SAME * radius) and np.all(np.abs(offset) < SAME * radius):
+    away = np.abs(np.column_stack([offset, around[:, 2] - radius]))
+    if radius > 0 and np.all(away < SAME_CIRCLE * radius):
         return np.asarray(around[0, :2])
     shift, closes = unwrap(submesh)
     if not closes:
@@ -43,4 +45,4 @@ def _centre(submesh: Submesh) -> Float:
 def _boundary_circles(submesh: Submesh) -> Float:
     """(b, 3) circles of the edges that the piece has on one side only, radius 0 where they are straight."""
     sides = np.bincount(submesh.edge_class[submesh.triangle_edges].ravel(), minlength=len(submesh.edge_keys))
-    return submesh.circles[sides[submesh.edge_class] == 1]
+    return np.asarray(submesh.circles[sides[submesh.edge_class] == 1])

@@ -16,7 +16,7 @@ from feti_homog.cell.outline import MATRIX, Curve, Outline, outline
 from feti_homog.typing import Float, Index
 
 if TYPE_CHECKING:
-    from feti_homog.config.case import Cell
+    from feti_homog.config.cell_section import Cell
 
 
 NO_MARKS: Mapping[int, Sequence[float]] = MappingProxyType({})
@@ -33,7 +33,10 @@ def generate(cell: Cell, marks: Mapping[int, Sequence[float]] = NO_MARKS) -> Coa
 
     `marks` maps a fibre (its number in the arrangement) to angles in degrees, measured at its centre, where
     the mesh gets nodes: tips of debonded arcs. A mark within MERGED of where the circle crosses the cell's
-    boundary, or of another mark, is moved there. Raises MeshError if the cell cannot be arranged.
+    boundary, or of another mark, is moved there.
+
+    Raises:
+        MeshError: the fibres cannot be arranged.
     """
     arrangement = arrange(cell)
     lines = outline(arrangement, cell.mesh_size * arrangement.width, marks)
@@ -116,7 +119,7 @@ def _add_surfaces(gmsh: ModuleType, lines: Outline) -> tuple[list[int], list[int
 
     def add_loop(loop: list[Signed]) -> int:
         tags = [made[tag - 1] if tag > 0 else [-line for line in reversed(made[-tag - 1])] for tag, _ in loop]
-        return geo.addCurveLoop(list(chain.from_iterable(tags)))
+        return int(geo.addCurveLoop(list(chain.from_iterable(tags))))
 
     surfaces, circle = [], []
     discs = [(tag, curve) for tag, curve in enumerate(lines.curves, 1) if curve.inside != MATRIX]
@@ -155,19 +158,29 @@ def _loops(lines: list[Signed]) -> list[list[Signed]]:
 
 def _with_holes(loops: list[list[Signed]], points: Float) -> list[list[list[Signed]]]:
     """Groups of loops, each an outer one followed by the holes, which are whole circles, within it."""
-    holes = [loop for loop in loops if all(curve.circle != MATRIX for _, curve in loop)]
-    outer = [loop for loop in loops if any(curve.circle == MATRIX for _, curve in loop)]
-    groups = [[loop] for loop in outer]
+    holes = [loop for loop in loops if _is_hole(loop)]
+    outer = [loop for loop in loops if not _is_hole(loop)]
     if len(outer) == 1:
         return [outer + holes]
-    polygons = [points[np.concatenate([curve.nodes[:-1] for _, curve in loop])] for loop in outer]
+    groups = [[loop] for loop in outer]
+    polygons = [_polygon(loop, points) for loop in outer]
     for hole in holes:
-        group = next(k for k, polygon in enumerate(polygons) if _holds(polygon, points[hole[0][1].nodes[0]]))
-        groups[group].append(hole)
+        place = points[hole[0][1].nodes[0]]
+        groups[next(k for k, polygon in enumerate(polygons) if _contains(polygon, place))].append(hole)
     return groups
 
 
-def _holds(polygon: Float, point: Float) -> bool:
+def _is_hole(loop: list[Signed]) -> bool:
+    """Whether no piece of a side is in the loop."""
+    return all(curve.circle != MATRIX for _, curve in loop)
+
+
+def _polygon(loop: list[Signed], points: Float) -> Float:
+    """(k, 2) nodes of the loop in order."""
+    return np.asarray(points[np.concatenate([curve.nodes[:-1] for _, curve in loop])])
+
+
+def _contains(polygon: Float, point: Float) -> bool:
     """Whether a polygon (k, 2) contains a point, by counting the edges to its right."""
     a, b = polygon - point, np.roll(polygon, -1, axis=0) - point
     crossing = (a[:, 1] > 0) != (b[:, 1] > 0)

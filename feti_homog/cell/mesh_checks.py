@@ -7,18 +7,17 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from feti_homog.cell.coarse_mesh import areas, edge_keys, edges
-from feti_homog.typing import Float, Int
+from feti_homog.typing import Bool, Float, Int, Int32
 
-# Nodes nearer than this, relative to the cell, are at the same place.
-SAME = 1e-7
-# A node nearer to an edge than this, relative to its length, hangs on it.
-HANGING = 1e-2
-# Area of a triangle relative to its longest edge squared that counts as zero.
-FLAT = 1e-9
+# Nodes nearer than this, relative to the cell, are at the same place: files may round coordinates.
+SAME_PLACE = 1e-7
+# A node nearer to an edge than this, relative to its length, hangs on it; an element that flat would be of no use.
+HANGING_DISTANCE = 1e-2
+# Area of a triangle, relative to its longest edge squared, up to which it is zero but for rounding of coordinates.
+FLAT_AREA = 1e-9
 # The physical curve of the edges that are debonded from the start.
 DEBONDED = "debonded"
 PHASE = re.compile(r"matrix|fibre(:\S+)?")
@@ -29,15 +28,19 @@ SIDES = {(0, 0): "left", (0, 1): "right", (1, 0): "lower", (1, 1): "upper"}
 class RawMesh:
     """Triangles of a mesh file: nodes in use with their tags, elements with their tags and group.
 
-    node_tags (n,), points (n, 3), element_tags (m,), triangles (m, 3) node numbers, group (m,) index into
-    `groups`, the lists of physical surfaces that the elements' entities belong to, and debonded (d, 2), the node
-    tags of the lines in the physical curve DEBONDED.
+    Attributes:
+        node_tags: (n,) the file's numbers of the nodes.
+        points: (n, 3) their positions.
+        element_tags: (m,) the file's numbers of the elements.
+        triangles: (m, 3) nodes, numbered from 0.
+        group: (m,) index into `groups`, the lists of physical surfaces that the elements' entities belong to.
+        debonded: (d, 2) node tags of the lines in the physical curve DEBONDED.
     """
 
     node_tags: Int
     points: Float
     element_tags: Int
-    triangles: NDArray[np.int32]
+    triangles: Int32
     group: Int
     groups: tuple[tuple[str, ...], ...]
     debonded: Int
@@ -100,7 +103,7 @@ def not_finite(mesh: RawMesh) -> list[str]:
 def not_planar(mesh: RawMesh) -> list[str]:
     """Nodes off the plane of the first one."""
     height = mesh.points[:, 2]
-    bad = np.flatnonzero(np.abs(height - height[0]) > SAME * np.ptp(mesh.points[:, :2], axis=0).max())
+    bad = np.flatnonzero(np.abs(height - height[0]) > SAME_PLACE * np.ptp(mesh.points[:, :2], axis=0).max())
     if len(bad) == 0:
         return []
     where = f"{mesh.node(int(bad[0]))} has z = {height[bad[0]]:.9g}, {mesh.node(0)} has z = {height[0]:.9g}"
@@ -113,7 +116,7 @@ def flat_or_inverted(mesh: RawMesh) -> list[str]:
     area = areas(plane, mesh.triangles)
     ends = plane[edges(mesh.triangles)]
     longest = ((ends[:, 1] - ends[:, 0]) ** 2).sum(axis=1).reshape(-1, 3).max(axis=1)
-    flat = np.abs(area) <= FLAT * longest
+    flat = np.abs(area) <= FLAT_AREA * longest
     sense = 1 if np.count_nonzero(area > 0) >= np.count_nonzero(area < 0) else -1
     faults = []
     for bad, what in ((flat, "zero area"), (~flat & (sense * area < 0), "inverted")):
@@ -126,7 +129,7 @@ def flat_or_inverted(mesh: RawMesh) -> list[str]:
 def duplicate_nodes(mesh: RawMesh) -> list[str]:
     """Different nodes at the same place."""
     plane = mesh.points[:, :2]
-    pairs = cKDTree(plane).query_pairs(SAME * np.ptp(plane, axis=0).max(), output_type="ndarray")
+    pairs = cKDTree(plane).query_pairs(SAME_PLACE * np.ptp(plane, axis=0).max(), output_type="ndarray")
     pairs = pairs[np.lexsort(pairs.T[::-1])]
     names = (f"{mesh.node(a)} and {mesh.node(b)}" for a, b in pairs)
     return [f"nodes at the same place: {first_of(names, len(pairs))}"] if len(pairs) else []
@@ -172,7 +175,7 @@ def open_edges(mesh: RawMesh, plane: Float, size: Float) -> list[str]:
     return [f"the mesh has a hole or its boundary is not a rectangle, elements on one side only of {found}"]
 
 
-def _hanging(plane: Float, pairs: NDArray[np.int32]) -> list[tuple[int, tuple[int, int]]]:
+def _hanging(plane: Float, pairs: Int32) -> list[tuple[int, tuple[int, int]]]:
     """Nodes of the edges (k, 2) that lie within others, not at their ends, with these edges."""
     found = []
     nodes = np.unique(pairs)
@@ -183,7 +186,7 @@ def _hanging(plane: Float, pairs: NDArray[np.int32]) -> list[tuple[int, tuple[in
         others = np.setdiff1d(nodes[candidates], pair)
         along, away = b - a, plane[others] - a
         distance = np.abs(along[0] * away[:, 1] - along[1] * away[:, 0])
-        close = others[distance < HANGING * (along @ along)]
+        close = others[distance < HANGING_DISTANCE * (along @ along)]
         found += [(int(node), (int(pair[0]), int(pair[1]))) for node in close]
     return found
 
@@ -196,7 +199,7 @@ def missing_corners(plane: Float, origin: Float, size: Float) -> list[str]:
     return [f"no node at the corner {names} of the cell"] if missing else []
 
 
-def uncovered(plane: Float, triangles: NDArray[np.int32], size: Float) -> list[str]:
+def uncovered(plane: Float, triangles: Int32, size: Float) -> list[str]:
     """Triangles that do not add up to the rectangle."""
     total, whole = areas(plane, triangles).sum(), size.prod()
     if abs(abs(total) - whole) <= 1e-6 * whole:
@@ -205,7 +208,7 @@ def uncovered(plane: Float, triangles: NDArray[np.int32], size: Float) -> list[s
     return [f"the elements {what}: their area is {abs(total):.9g}, that of the cell {whole:.9g}"]
 
 
-def loose_lines(mesh: RawMesh) -> list[str]:
+def stray_lines(mesh: RawMesh) -> list[str]:
     """Debonded lines whose ends are not nodes of triangles."""
     bad = mesh.debonded[~np.isin(mesh.debonded, mesh.node_tags).all(axis=1)]
     names = (f"that between nodes {start} and {stop}" for start, stop in bad)
@@ -213,8 +216,8 @@ def loose_lines(mesh: RawMesh) -> list[str]:
     return [f"{what}: {first_of(names, len(bad))}"] if len(bad) else []
 
 
-def cannot_debond(mesh: RawMesh, pairs: NDArray[np.int32], fit: NDArray[np.bool_]) -> list[str]:
-    """Debonded lines (d, 2) that are not edges between a fibre and the matrix; `fit` (d,) tells which are."""
+def cannot_debond(mesh: RawMesh, pairs: Int32, fit: Bool) -> list[str]:
+    """Debonded lines (d, 2) that are not edges between a fibre and the matrix; `fit` (d,) says which are."""
     bad = pairs[~fit]
     what = f'lines in the physical curve "{DEBONDED}" that are not between a fibre and the matrix'
     return [f"{what}: {first_of(map(mesh.edge, bad), len(bad))}"] if len(bad) else []
@@ -230,7 +233,7 @@ def not_periodic(mesh: RawMesh, plane: Float, size: Float) -> list[str]:
             own = plane[sides[here], 1 - axis]
             after = np.clip(np.searchsorted(other, own), 1, len(other) - 1)
             away = np.minimum(np.abs(other[after] - own), np.abs(other[after - 1] - own))
-            alone = sides[here][away > SAME * size.max()]
+            alone = sides[here][away > SAME_PLACE * size.max()]
             if len(alone):
                 shift = np.where(np.arange(3) == axis, (1 - 2 * here) * size[axis], 0.0)
                 names = (f"{mesh.node(k)}, expected at {at(mesh.points[k] + shift)}" for k in alone)

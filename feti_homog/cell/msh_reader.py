@@ -6,7 +6,6 @@ from pathlib import Path
 from types import ModuleType
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feti_homog.cell import mesh_checks
 from feti_homog.cell.circle_detection import with_circles
@@ -14,8 +13,9 @@ from feti_homog.cell.coarse_mesh import CoarseMesh, areas, representatives
 from feti_homog.cell.gmsh_mesher import LINE, TRIANGLE, gmsh_session
 from feti_homog.cell.interface_edges import can_debond
 from feti_homog.cell.mesh_checks import RawMesh
+from feti_homog.cell.periodic_sides import paired_sides
 from feti_homog.errors import MeshError
-from feti_homog.typing import Float
+from feti_homog.typing import Float, Int
 
 # How a mesh file of gmsh begins; other text would be run as a script.
 HEADERS = ("$MeshFormat", "$Comments", "$PhysicalNames", "$NOD")
@@ -33,11 +33,14 @@ def read(path: Path) -> CoarseMesh:
 
     It consists of 3-node triangles in physical surfaces "matrix", "fibre", "fibre:2", ..., fills a rectangle,
     and has matching nodes on opposite sides. Lines in the physical curve "debonded" are edges between a fibre
-    and the matrix that are debonded. Round interfaces become circles (`with_circles`). Raises MeshError with
-    all faults of the first stage that has any: file, labels, shapes, connections, sides, debonded lines.
+    and the matrix that are debonded. Round interfaces become circles (`with_circles`).
+
+    Raises:
+        MeshError: with all faults of the first stage that has any: file, labels, shapes, connections, sides, debonded
+            lines.
     """
     raw = _load(path)
-    _refuse(path, mesh_checks.unlabelled(raw), mesh_checks.unknown_phases(raw), mesh_checks.loose_lines(raw))
+    _refuse(path, mesh_checks.unlabelled(raw), mesh_checks.unknown_phases(raw), mesh_checks.stray_lines(raw))
     _refuse(path, mesh_checks.not_finite(raw))
     _refuse(path, mesh_checks.not_planar(raw), mesh_checks.flat_or_inverted(raw), mesh_checks.duplicate_nodes(raw))
     origin, size, plane = _on_rectangle(raw.points[:, :2])
@@ -58,7 +61,7 @@ def _refuse(path: Path, *faults: list[str]) -> None:
 
 
 def _load(path: Path) -> RawMesh:
-    """The triangles of a file, with nothing known about them but their kind."""
+    """The triangles of a file; only their kind has been checked."""
     try:
         with path.open("rb") as file:
             start = file.read(4096).lstrip().decode("latin-1")
@@ -121,7 +124,7 @@ def _raw_mesh(gmsh: ModuleType) -> RawMesh:
     )
 
 
-def _debonded_lines(gmsh: ModuleType) -> NDArray[np.int64]:
+def _debonded_lines(gmsh: ModuleType) -> Int:
     """Node tags (d, 2) of the lines in the physical curve "debonded"."""
     lines = [np.zeros(0, np.int64)]
     for _, entity in gmsh.model.getEntities(1):
@@ -136,7 +139,7 @@ def _on_rectangle(plane: Float) -> tuple[Float, Float, Float]:
     origin = plane.min(axis=0)
     size = plane.max(axis=0) - origin
     moved = plane - origin
-    near = mesh_checks.SAME * size.max()
+    near = mesh_checks.SAME_PLACE * size.max()
     moved[np.abs(moved) < near] = 0.0
     return origin, size, np.where(np.abs(moved - size) < near, size, moved)
 
@@ -144,10 +147,8 @@ def _on_rectangle(plane: Float) -> tuple[Float, Float, Float]:
 def _matched(plane: Float, size: Float) -> Float:
     """Positions whose partners on opposite sides have the same coordinate along them."""
     plane = plane.copy()
-    for axis in (0, 1):
-        low, high = (np.flatnonzero(plane[:, axis] == level) for level in (0.0, size[axis]))
-        along = plane[:, 1 - axis]
-        along[high[np.argsort(along[high])]] = along[low[np.argsort(along[low])]]
+    for axis, low, high in paired_sides(plane, size):
+        plane[high, 1 - axis] = plane[low, 1 - axis]
     return plane
 
 

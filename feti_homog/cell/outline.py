@@ -15,7 +15,7 @@ from feti_homog.typing import Float, Int
 
 MATRIX = -1
 # Relative distance below which two positions are one.
-SAME = 1e-9
+SAME_PLACE = 1e-9
 # A mark nearer than this many radians to another vertex of its circle is that vertex.
 MERGED = np.radians(0.05)
 TURN = 2 * np.pi
@@ -31,9 +31,10 @@ Spacing = Callable[[Float], Float]
 class Curve:
     """A piece of a side or a circle from vertex to vertex, counter-clockwise around the cell or the disc.
 
-    nodes (k,)   numbers of its nodes, from end to end
-    circle       the circle it lies on; MATRIX for a piece of a side
-    inside       what is on its left: the disc of that circle, or MATRIX
+    Attributes:
+        nodes: (k,) numbers of its nodes, from end to end.
+        circle: the circle it lies on; MATRIX for a piece of a side.
+        inside: what is on its left: the disc of that circle, or MATRIX.
     """
 
     nodes: Int
@@ -78,7 +79,7 @@ def outline(arrangement: Arrangement, largest: float, marks: Mapping[int, Sequen
     border = np.concatenate([_on_side(places[axis], axis, level) for axis, level in sides])
     circle, start, stop = _arcs(circles, _vertex_angles(circles, fibre, border, marks), size)
     ends = _on_circle(circles[circle], start)
-    away = cKDTree(border).query(ends)[0] > SAME * size.max()
+    away = cKDTree(border).query(ends)[0] > SAME_PLACE * size.max()
     numbering = _Numbering(np.concatenate([np.unique(border, axis=0), ends[away]]))
     spacing = line_size(arrangement, largest, numbering.vertices)
 
@@ -128,16 +129,16 @@ def _on_side(places: Float, axis: int, level: float) -> Float:
 
 def _on_circle(circles: Float, angles: Float) -> Float:
     """Points (..., 2) on circles (..., 3) at angles in radians."""
-    return circles[..., :2] + circles[..., 2:] * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    return np.asarray(circles[..., :2] + circles[..., 2:] * np.stack([np.cos(angles), np.sin(angles)], axis=-1))
 
 
 def _vertex_angles(circles: Float, fibre: Int, border: Float, marks: Mapping[int, Sequence[float]]) -> list[Float]:
     """Sorted angles in [0, 2 pi) of the vertices of each circle: crossings of the sides, and the marks."""
     angles = []
-    near = cKDTree(border).query_ball_point(circles[:, :2], circles[:, 2] * (1 + SAME))
+    near = cKDTree(border).query_ball_point(circles[:, :2], circles[:, 2] * (1 + SAME_PLACE))
     for circle, owner, candidates in zip(circles, fibre.tolist(), near, strict=True):
         offset = border[candidates] - circle[:2]
-        offset = offset[np.linalg.norm(offset, axis=1) > circle[2] * (1 - SAME)]
+        offset = offset[np.linalg.norm(offset, axis=1) > circle[2] * (1 - SAME_PLACE)]
         own = (np.arctan2(offset[:, 1], offset[:, 0]) % TURN).tolist()
         for mark in np.radians(marks.get(owner, ())) % TURN:
             if all(abs((mark - angle + np.pi) % TURN - np.pi) > MERGED for angle in own):
@@ -151,7 +152,7 @@ def _arcs(circles: Float, angles: list[Float], size: Float) -> tuple[Int, Float,
     circle, start, stop = [], [], []
     for number, own in enumerate(angles):
         for begin, span in zip(own, np.diff(own, append=own[0] + TURN), strict=True):
-            parts = max(1, int(np.ceil(span / QUARTER - SAME)))
+            parts = max(1, int(np.ceil(span / QUARTER - SAME_PLACE)))
             stations = begin + span * np.arange(parts + 1) / parts
             circle.append(np.full(parts, number))
             start.append(stations[:-1])
@@ -175,12 +176,12 @@ def _side_curves(
         inside = _disc_at(_on_side(begin + span / 2, axis, level), circles)
         # A chord has two edges or more: a triangle with two arc edges beside it could not be flipped.
         least = np.where(inside == MATRIX, 1, 2)
-        for submesh, stations in enumerate(_stations(share, sizes, span, least)):
-            along = begin[submesh] + span[submesh] * stations
-            along[[0, -1]] = places[submesh : submesh + 2]
+        for number, stations in enumerate(_stations(share, sizes, span, least)):
+            along = begin[number] + span[number] * stations
+            along[[0, -1]] = places[number : number + 2]
             nodes = numbering.along(_on_side(along, axis, level))
             # Counter-clockwise around the cell: along the coordinate at the bottom and at the right.
-            curves.append(Curve(nodes if low == (axis == 0) else nodes[::-1], MATRIX, int(inside[submesh])))
+            curves.append(Curve(nodes if low == (axis == 0) else nodes[::-1], MATRIX, int(inside[number])))
     return curves
 
 

@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from feti_homog.cell.coarse_mesh import CoarseMesh
-from feti_homog.typing import Float, Int
+from feti_homog.cell.periodic_sides import paired_sides
+from feti_homog.typing import Float, Int, Int32
 
 
 @dataclass(frozen=True)
@@ -82,18 +82,19 @@ class Torus:
         """(a,) plane edge of each of the mesh's `arc_edges`."""
         return self.plane_edges(self.mesh.arc_edges)
 
-    def plane_edges(self, pairs: NDArray[np.int32]) -> Int:
+    def plane_edges(self, pairs: Int32) -> Int:
         """(k,) plane edge between each pair (k, 2) of plane nodes."""
         n = len(self.mesh.points)
         key = np.sort(self.edges, axis=1) @ [n, 1]
         order = np.argsort(key)
-        return order[np.searchsorted(key[order], np.sort(pairs.astype(np.int64), axis=1) @ [n, 1])]
+        found = np.searchsorted(key[order], np.sort(pairs.astype(np.int64), axis=1) @ [n, 1])
+        return np.asarray(order[found])
 
     @cached_property
     def constituent_phase(self) -> Int:
         """(constituents,) phase of each constituent."""
         first = np.unique(self.constituent, return_index=True)[1]
-        return self.mesh.phase[first].astype(np.int64)
+        return np.asarray(self.mesh.phase[first], np.int64)
 
     def plane_parts(self) -> Int:
         """(m,) constituents cut by the cell's boundary, as the paper's Fig. 2a does (`bodies = "plane"`)."""
@@ -114,13 +115,13 @@ def edge_pairs(triangle_edges: Int) -> tuple[Int, Int]:
 def shared_edges(triangle_edges: Int) -> Int:
     """The edges that two triangles share, in the order of `edge_pairs`."""
     flat = np.sort(triangle_edges, axis=None)
-    return flat[:-1][flat[1:] == flat[:-1]]
+    return np.asarray(flat[:-1][flat[1:] == flat[:-1]])
 
 
 def components(n: int, left: Int, right: Int) -> Int:
     """Connected components of the graph on n vertices with edges (left, right): (n,) labels."""
     graph = coo_matrix((np.ones(len(left), np.int8), (left, right)), shape=(n, n))
-    return connected_components(graph, directed=False)[1].astype(np.int64)
+    return np.asarray(connected_components(graph, directed=False)[1], np.int64)
 
 
 def _renumber(label: Int, order: Int) -> Int:
@@ -128,10 +129,11 @@ def _renumber(label: Int, order: Int) -> Int:
     first = np.unique(label[order], return_index=True)[1]
     rank = np.empty_like(first)
     rank[np.argsort(first)] = np.arange(len(first))
-    return rank[label]
+    return np.asarray(rank[label])
 
 
 def _plane_edges(mesh: CoarseMesh) -> tuple[Int, Int]:
+    """Edges (e, 2) and those of each triangle (m, 3), as in `Torus`."""
     triangles = mesh.triangles.astype(np.int64)
     ends = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
     n = len(mesh.points)
@@ -144,10 +146,8 @@ def _plane_edges(mesh: CoarseMesh) -> tuple[Int, Int]:
 
 
 def _identify_edges(mesh: CoarseMesh, edges: Int) -> Int:
-    """(e,) torus edge of each plane edge: the i-th edge of a side is the i-th of the opposite side."""
+    """(e,) torus edge of each plane edge (e, 2)."""
     same = np.arange(len(edges))
-    for axis, period in ((0, mesh.width), (1, mesh.height)):
-        across, along = mesh.points[edges][:, :, axis], mesh.points[edges][:, :, 1 - axis].sum(axis=1)
-        low, high = (np.flatnonzero((across == side).all(axis=1)) for side in (0.0, period))
-        same[high[np.argsort(along[high])]] = low[np.argsort(along[low])]
-    return np.unique(same, return_inverse=True)[1]
+    for _, low, high in paired_sides(mesh.points[edges].mean(axis=1), mesh.period):
+        same[high] = low
+    return np.asarray(np.unique(same, return_inverse=True)[1])

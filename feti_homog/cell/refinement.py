@@ -10,17 +10,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feti_homog.cell.submesh import Submesh
-from feti_homog.typing import Float, Int, Int32
+from feti_homog.typing import Bool, Float, Int, Int32
 
 
 @dataclass(frozen=True, eq=False)
-class Lattice:
+class ReferenceLattice:
     """The reference triangle with corners (0,0), (M,0), (0,M), cut into 4**refine triangles.
 
-    Two are the same only if they are one object, so that what follows from one can be kept.
+    Compared by identity, so that a cache may be keyed with it.
 
     Attributes:
         intervals: M.
@@ -33,7 +32,7 @@ class Lattice:
     triangles: Int
 
     @classmethod
-    def of(cls, refine: int, order: int) -> Lattice:
+    def of(cls, refine: int, order: int) -> ReferenceLattice:
         """The lattice of `refine` halvings for elements of the given order (1 or 2)."""
         m = order * 2**refine
         corners = np.array([[[m, 0, 0], [0, m, 0], [0, 0, m]]])
@@ -52,7 +51,7 @@ class Lattice:
         number[nodes[:, 1], nodes[:, 2]] = np.arange(len(nodes))
         return cls(m, nodes, number[corners[..., 1], corners[..., 2]])
 
-    def number(self, vertices: Int, edges: Int, backwards: NDArray[np.bool_], n_vertices: int, n_edges: int) -> Int:
+    def number(self, vertices: Int, edges: Int, backwards: Bool, n_vertices: int, n_edges: int) -> Int:
         """(t, q) node numbers: vertices first, then M - 1 nodes an edge along its direction, then interiors."""
         inner = self.intervals - 1
         p = np.arange(inner)
@@ -79,10 +78,10 @@ class FineMesh:
 
     points: Float
     nodes: Int32
-    curved: NDArray[np.bool_]
+    curved: Bool
     node_class: Int32
     n_classes: int
-    lattice: Lattice
+    lattice: ReferenceLattice
 
     @property
     def triangles(self) -> Int32:
@@ -91,7 +90,7 @@ class FineMesh:
         return self.nodes[:, elements].reshape(-1, elements.shape[1])
 
 
-def refine(submesh: Submesh, lattice: Lattice) -> FineMesh:
+def refine(submesh: Submesh, lattice: ReferenceLattice) -> FineMesh:
     """Refine the subdomain; new nodes on circles lie on them."""
     edges, back, inner = submesh.triangle_edges, submesh.backwards, lattice.intervals - 1
     plane = lattice.number(submesh.triangles, edges, back, len(submesh.points), len(submesh.edges)).astype(np.int32)
@@ -106,7 +105,7 @@ def refine(submesh: Submesh, lattice: Lattice) -> FineMesh:
     return FineMesh(points, plane, curved, node_class, c, lattice)
 
 
-def edge_node(n_classes: int, edge: Int, position: Int, lattice: Lattice) -> Int:
+def edge_node(n_classes: int, edge: Int, position: Int, lattice: ReferenceLattice) -> Int:
     """Class of the lattice node at `position` (1..M-1) of local torus edge `edge`."""
     return n_classes + edge * (lattice.intervals - 1) + position - 1
 
@@ -116,10 +115,10 @@ def _split(triangle: Int) -> Int:
     a, b, c = triangle[:, 0], triangle[:, 1], triangle[:, 2]
     ab, bc, ca = (a + b) // 2, (b + c) // 2, (c + a) // 2
     children = [[a, ab, ca], [ab, b, bc], [ca, bc, c], [bc, ca, ab]]
-    return np.stack([np.stack(child, axis=1) for child in children], axis=1).reshape(-1, 3, 3)
+    return np.asarray(np.stack([np.stack(child, axis=1) for child in children], axis=1).reshape(-1, 3, 3))
 
 
-def _positions(submesh: Submesh, lattice: Lattice) -> Float:
+def _positions(submesh: Submesh, lattice: ReferenceLattice) -> Float:
     """(t, q, 2) lattice nodes of each coarse triangle, bent towards its curved edges.
 
     x = sum_k b_k x_k + sum_edges (1 - b_o)^2 delta(s): delta is the arc's distance from its chord at
@@ -140,7 +139,7 @@ def _positions(submesh: Submesh, lattice: Lattice) -> Float:
     return x
 
 
-def _straighten(x: Float, submesh: Submesh, lattice: Lattice) -> None:
+def _straighten(x: Float, submesh: Submesh, lattice: ReferenceLattice) -> None:
     """Put mid-edge nodes midway between their vertices, save those on arcs."""
     corners = lattice.triangles[:, :3]
     middle = (x[:, corners] + x[:, np.roll(corners, -1, axis=1)]) / 2
@@ -151,6 +150,7 @@ def _straighten(x: Float, submesh: Submesh, lattice: Lattice) -> None:
 
 
 def _chord(a: Float, b: Float, s: Float) -> Float:
+    """(t, q, 2) points that cut the chords from a to b (t, 2) in the ratio s (q,)."""
     return a[:, None] + s[None, :, None] * (b - a)[:, None]
 
 
@@ -161,4 +161,4 @@ def _arc(a: Float, b: Float, circle: Float, s: Float) -> Float:
     sine = from_a[..., 0] * from_b[..., 1] - from_a[..., 1] * from_b[..., 0]
     angle = np.arctan2(np.abs(sine), (from_a * from_b).sum(axis=2))
     weight_a, weight_b = np.sin((1 - s) * angle), np.sin(s * angle)
-    return centre + (weight_a[..., None] * from_a + weight_b[..., None] * from_b) / np.sin(angle)[..., None]
+    return np.asarray(centre + (weight_a[..., None] * from_a + weight_b[..., None] * from_b) / np.sin(angle)[..., None])

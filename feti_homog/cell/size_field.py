@@ -6,20 +6,19 @@ from collections.abc import Callable
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from feti_homog.cell.arrangement import Arrangement, neighbours
-from feti_homog.typing import Float
+from feti_homog.typing import Bool, Float
 
 # Edges around a fibre, at least.
-AROUND = 16
+MIN_EDGES_AROUND = 16
 # Edge length in a narrow passage, relative to its width.
-PASSAGE = 1.5
+PASSAGE_EDGE = 1.5
 # Angle between a circle and a side that it crosses, relative to the turn of the circle along an edge there.
 WEDGE = 3
 # Growth of the edge length per distance, at most.
-GROWTH = 0.4
+MAX_GROWTH = 0.4
 
 # Places (k, 2), edge lengths (k,) and growths (k,).
 Source = tuple[Float, Float, Float]
@@ -41,26 +40,27 @@ def line_size(arrangement: Arrangement, largest: float, vertices: Float) -> Call
         _at_vertices(vertices, size, largest),
     ]
     places, lengths, growths = (np.concatenate(parts) for parts in zip(*sources, strict=True))
-    lengths, growths = np.append(lengths, np.inf), np.append(growths, GROWTH)
+    lengths, growths = np.append(lengths, np.inf), np.append(growths, MAX_GROWTH)
     places = _wrap(places, size)
     tree = cKDTree(places, boxsize=size)
     count = min(16, len(places))
 
     def at(points: Float) -> Float:
         # Beyond the bound the tree gives the source behind the last, which is infinite.
-        distance, nearest = tree.query(_wrap(points, size), k=count, distance_upper_bound=largest / GROWTH)
+        distance, nearest = tree.query(_wrap(points, size), k=count, distance_upper_bound=largest / MAX_GROWTH)
         graded = (lengths[nearest] + growths[nearest] * distance).reshape(len(points), -1)
-        return np.minimum(largest, graded.min(axis=1))
+        return np.asarray(np.minimum(largest, graded.min(axis=1)))
 
     return at
 
 
 def circle_size(radii: Float, largest: float) -> Float:
-    """Largest edge length (k,) on circles, such that each has at least AROUND edges."""
-    return np.minimum(largest, 2 * np.pi * radii / AROUND)
+    """Largest edge length (k,) on circles, such that each has at least MIN_EDGES_AROUND edges."""
+    return np.minimum(largest, 2 * np.pi * radii / MIN_EDGES_AROUND)
 
 
 def _wrap(points: Float, size: Float) -> Float:
+    """Positions (n, 2) on the torus, in [0, size)."""
     wrapped = points % size
     return np.where(wrapped >= size, 0.0, wrapped)
 
@@ -75,7 +75,7 @@ def _between_fibres(arrangement: Arrangement, size: Float, caps: Float, largest:
     growth = _growth(gap, 1 / radii[first] + 1 / radii[second])
     places, lengths, growths = [], [], []
     for here, there, sign in ((first, second, 1.0), (second, first, -1.0)):
-        length = np.minimum(PASSAGE * gap, caps[there] + GROWTH * gap)
+        length = np.minimum(PASSAGE_EDGE * gap, caps[there] + MAX_GROWTH * gap)
         near = length < caps[here]
         places.append((centres[here] + sign * radii[here, None] * normal)[near])
         lengths.append(length[near])
@@ -85,7 +85,7 @@ def _between_fibres(arrangement: Arrangement, size: Float, caps: Float, largest:
 
 def _growth(width: Float, curvature: Float) -> Float:
     """Growth with which edges stay below twice the width w + c s^2 / 2 of a passage of curvature c."""
-    return np.minimum(GROWTH, np.sqrt((4 - 2 * PASSAGE) * 2 * width * curvature))
+    return np.asarray(np.minimum(MAX_GROWTH, np.sqrt((4 - 2 * PASSAGE_EDGE) * 2 * width * curvature)))
 
 
 def _at_sides(arrangement: Arrangement, size: Float, caps: Float, largest: float) -> Source:
@@ -99,7 +99,7 @@ def _at_sides(arrangement: Arrangement, size: Float, caps: Float, largest: float
         foot[:, axis] += sign * distance
         width = np.abs(distance - radii)
         growth = _growth(width, 1 / radii)
-        length = np.minimum(PASSAGE * width, caps + GROWTH * width)
+        length = np.minimum(PASSAGE_EDGE * width, caps + MAX_GROWTH * width)
         sources += [
             _where(length < caps, extreme, length, growth),
             _where(length < largest, foot, length, growth),
@@ -110,12 +110,12 @@ def _at_sides(arrangement: Arrangement, size: Float, caps: Float, largest: float
             crossing = foot.copy()
             crossing[:, 1 - axis] += turn * radii * np.sin(angle)
             sharp = (length < caps) & (angle > 0)
-            sources.append(_where(sharp, crossing, length, np.full(len(radii), GROWTH)))
+            sources.append(_where(sharp, crossing, length, np.full(len(radii), MAX_GROWTH)))
     places, lengths, growths = (np.concatenate(parts) for parts in zip(*sources, strict=True))
     return places, lengths, growths
 
 
-def _where(chosen: NDArray[np.bool_], *source: Float) -> Source:
+def _where(chosen: Bool, *source: Float) -> Source:
     """The chosen rows of places, lengths and growths."""
     places, lengths, growths = (part[chosen] for part in source)
     return places, lengths, growths
@@ -125,11 +125,11 @@ def _at_corners(arrangement: Arrangement, size: Float, caps: Float) -> Source:
     """Where a circle passes near the corner: the corner and the nearest point of the circle."""
     offset = (arrangement.centres + size / 2) % size - size / 2
     distance = np.linalg.norm(offset, axis=1)
-    length = PASSAGE * np.abs(distance - arrangement.radii)
+    length = PASSAGE_EDGE * np.abs(distance - arrangement.radii)
     near = length < caps
     facing = offset[near] * (1 - arrangement.radii[near] / distance[near])[:, None]
     places = np.concatenate([facing, np.zeros_like(facing)])
-    return places, np.tile(length[near], 2), np.full(len(places), GROWTH)
+    return places, np.tile(length[near], 2), np.full(len(places), MAX_GROWTH)
 
 
 def _at_vertices(vertices: Float, size: Float, largest: float) -> Source:
@@ -139,6 +139,6 @@ def _at_vertices(vertices: Float, size: Float, largest: float) -> Source:
     same = tree.query_pairs(1e-9 * size.max(), output_type="ndarray")
     places = np.delete(places, same[:, 1], axis=0)
     if len(places) == 1:
-        return places, np.array([largest]), np.array([GROWTH])
+        return places, np.array([largest]), np.array([MAX_GROWTH])
     distance, _ = cKDTree(places, boxsize=size).query(places, k=2)
-    return places, distance[:, 1], np.full(len(places), GROWTH)
+    return places, distance[:, 1], np.full(len(places), MAX_GROWTH)

@@ -6,10 +6,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feti_homog.cell.periodic_topology import Torus
-from feti_homog.typing import Float, Int
+from feti_homog.typing import Bool, Float, Int
 
 
 @dataclass(frozen=True)
@@ -33,7 +32,7 @@ class Submesh:
         edge_class: (e,) torus edge of each edge.
         class_keys, edge_keys: global numbers of the classes and torus edges.
         period: (2,) width and height of the cell.
-        pinned: class that is held against translation of the whole cell, Eq. (15), or -1.
+        pinned: local class that is pinned against translation of the whole cell, Eq. (15), or -1.
     """
 
     index: int
@@ -42,7 +41,7 @@ class Submesh:
     points: Float
     triangles: Int
     triangle_edges: Int
-    backwards: NDArray[np.bool_]
+    backwards: Bool
     edges: Int
     circles: Float
     vertex_class: Int
@@ -58,16 +57,16 @@ def cut(torus: Torus, subdomain: Int) -> Iterator[Submesh]:
     pinned = pinned_class(torus)
     order = np.argsort(subdomain, kind="stable")
     for index, members in enumerate(np.split(order, np.cumsum(np.bincount(subdomain))[:-1])):
-        yield _piece(torus, index, members, pinned)
+        yield _submesh(torus, index, members, pinned)
 
 
 def part(submesh: Submesh, members: Int) -> Submesh:
-    """The coarse triangles `members` (m,) of a piece, as a piece of its own."""
+    """The coarse triangles `members` (m,) of a submesh, as a submesh of its own."""
     vertices, triangles = np.unique(submesh.triangles[members], return_inverse=True)
     edges, triangle_edges = np.unique(submesh.triangle_edges[members], return_inverse=True)
     classes, vertex_class = np.unique(submesh.vertex_class[vertices], return_inverse=True)
     torus_edges, edge_class = np.unique(submesh.edge_class[edges], return_inverse=True)
-    held = np.flatnonzero(classes == submesh.pinned)
+    pinned_here = np.flatnonzero(classes == submesh.pinned)
     return replace(
         submesh,
         points=submesh.points[vertices],
@@ -80,15 +79,15 @@ def part(submesh: Submesh, members: Int) -> Submesh:
         edge_class=edge_class,
         class_keys=submesh.class_keys[classes],
         edge_keys=submesh.edge_keys[torus_edges],
-        pinned=int(held[0]) if len(held) else -1,
+        pinned=int(pinned_here[0]) if len(pinned_here) else -1,
     )
 
 
 def pinned_class(torus: Torus) -> int:
-    """The class held fixed, Eq. (15): that inside the matrix nearest to the cell's corner.
+    """The class that is pinned, Eq. (15): the one inside the matrix nearest to the cell's corner.
 
-    On an interface it would tie faces that must be able to part, in a fibre it would tie one that may come
-    loose; u* is the same up to a constant.
+    A pinned class on an interface would hold faces together that must be able to part, and one in a fibre would keep
+    that from moving when all of its bonds are broken.  u* is the same up to a constant.
     """
     mesh = torus.mesh
     body = np.repeat(torus.constituent, 3)
@@ -105,7 +104,8 @@ def pinned_class(torus: Torus) -> int:
     return int(np.lexsort((distance, ~in_matrix, low != high))[0])
 
 
-def _piece(torus: Torus, index: int, members: Int, pinned: int) -> Submesh:
+def _submesh(torus: Torus, index: int, members: Int, pinned: int) -> Submesh:
+    """The triangles `members` (t,) of the cell as submesh number `index`; `pinned` is the pinned class."""
     mesh = torus.mesh
     vertices, triangles = np.unique(mesh.triangles[members], return_inverse=True)
     edges, triangle_edges = np.unique(torus.triangle_edges[members], return_inverse=True)
@@ -113,7 +113,7 @@ def _piece(torus: Torus, index: int, members: Int, pinned: int) -> Submesh:
     triangles, triangle_edges = triangles.reshape(-1, 3), triangle_edges.reshape(-1, 3)
     class_keys, vertex_class = np.unique(torus.node_class[vertices], return_inverse=True)
     edge_keys, edge_class = np.unique(torus.torus_edge[edges], return_inverse=True)
-    held = np.flatnonzero(class_keys == pinned)
+    pinned_here = np.flatnonzero(class_keys == pinned)
     return Submesh(
         index=index,
         body=int(torus.constituent[members[0]]),
@@ -129,5 +129,5 @@ def _piece(torus: Torus, index: int, members: Int, pinned: int) -> Submesh:
         class_keys=class_keys,
         edge_keys=edge_keys,
         period=np.array([mesh.width, mesh.height]),
-        pinned=int(held[0]) if len(held) else -1,
+        pinned=int(pinned_here[0]) if len(pinned_here) else -1,
     )

@@ -20,37 +20,37 @@ from feti_homog.errors import FetiHomogError
 LOCK_TIMEOUT_S = 0.2
 
 
-class Busy(Exception):
+class LockHeld(Exception):
     """Somebody else holds the lock; the text says who."""
 
 
 class Lock:
     """A lock on the file `path`, which stays behind; `shared` ones exclude the others only.
 
-    It is tried for during `patience` seconds.  As a context manager it is held while the block lasts.
+    It is tried for during `timeout` seconds.  As a context manager it is held while the block lasts.
     """
 
-    def __init__(self, path: Path, shared: bool = False, patience: float = LOCK_TIMEOUT_S) -> None:
-        self.path, self.shared, self.patience = path, shared, patience
+    def __init__(self, path: Path, shared: bool = False, timeout: float = LOCK_TIMEOUT_S) -> None:
+        self.path, self.shared, self.timeout = path, shared, timeout
         self._file = -1
 
     def acquire(self) -> None:
         """Take the lock.
 
         Raises:
-            Busy: somebody else has it.
+            LockHeld: somebody else has it.
             FetiHomogError: the file cannot be written or locked.
         """
         try:
             self._file = os.open(self.path, os.O_RDWR | os.O_CREAT, 0o666)
-            self._try_until(time.monotonic() + self.patience)
+            self._try_until(time.monotonic() + self.timeout)
             if not self.shared:
                 os.truncate(self._file, 0)
                 os.pwrite(self._file, this_process().encode(), 0)
         except OSError as error:
             self._close()
             raise FetiHomogError(f"cannot lock {self.path}: {error.strerror}") from error
-        except Busy:
+        except LockHeld:
             self._close()
             raise
 
@@ -76,7 +76,7 @@ class Lock:
                 if error.errno not in (errno.EAGAIN, errno.EACCES):
                     raise
                 if time.monotonic() > deadline:
-                    raise Busy(_written(self._file)) from error
+                    raise LockHeld(_written(self._file)) from error
             time.sleep(0.01)
 
     def _close(self) -> None:
@@ -88,8 +88,8 @@ class Lock:
 class TemporaryLock(Lock):
     """An exclusive lock whose file is removed when the lock is given back."""
 
-    def __init__(self, path: Path, patience: float = LOCK_TIMEOUT_S) -> None:
-        super().__init__(path, shared=False, patience=patience)
+    def __init__(self, path: Path, timeout: float = LOCK_TIMEOUT_S) -> None:
+        super().__init__(path, shared=False, timeout=timeout)
 
     def acquire(self) -> None:
         """Take the lock.  Raises as `Lock.acquire`."""
@@ -127,7 +127,8 @@ def holder(path: Path) -> str | None:
         os.close(file)
 
 
-def is_held(path: Path) -> bool:
+
+def is_locked(path: Path) -> bool:
     """Whether somebody holds the lock exclusively just now."""
     return holder(path) is not None
 

@@ -1,4 +1,4 @@
-"""Calls on rank 0 and on all ranks whose exceptions every rank hears of, so that none waits for ever."""
+"""Calls on rank 0 and on all ranks whose exceptions are raised on every rank, so that none waits for ever."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ if TYPE_CHECKING:
     from mpi4py.MPI import Comm
 
 T = TypeVar("T")
-PATIENCE = 5.0  # seconds that a rank with an error waits for the others to come with theirs
+# Seconds that a rank with an error waits for the others to come with theirs, before it ends the job.
+ARRIVAL_TIMEOUT_S = 5.0
 
 
 class RemoteError(RuntimeError):
@@ -27,8 +28,9 @@ def on_root(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs: Any
     Collective; the other ranks' arguments do not matter. The result must be picklable; `function` must
     not communicate.
     """
-    result, error = _attempt(function, *args, **kwargs) if comm.rank == 0 else (None, None)
-    result, message = comm.bcast((result, _portable(comm, error)), root=0)
+    own, error = _attempt(function, *args, **kwargs) if comm.rank == 0 else (None, None)
+    result: T
+    result, message = comm.bcast((own, _portable(comm, error)), root=0)
     if message is not None:
         raise error or message
     return result
@@ -61,13 +63,13 @@ def agree(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs: Any) 
 def run_main(comm: Comm, main: Callable[[], int]) -> int:
     """The exit code of main(), run by every rank.
 
-    A FetiHomogError that every rank raises is told once, by rank 0, and gives its exit code. One that the
-    others do not come with in time, and any other exception, is told by its rank and aborts the job.
+    A FetiHomogError that every rank raises is printed once, by rank 0, and gives its exit code. One that the
+    others do not raise in time, and any other exception, is printed by its rank and aborts the job.
     """
     try:
         return main()
     except FetiHomogError as error:
-        all_came = others_come(comm, PATIENCE)
+        all_came = others_come(comm, ARRIVAL_TIMEOUT_S)
         if comm.rank == 0 or not all_came:
             print(*(f"error: {fault}" for fault in error.faults), sep="\n", file=sys.stderr, flush=True)
         if not all_came:
@@ -85,10 +87,10 @@ def abort(comm: Comm, exit_code: int) -> NoReturn:
     raise SystemExit(exit_code)
 
 
-def others_come(comm: Comm, patience: float) -> bool:
-    """Whether every rank calls this within so many seconds of this one."""
+def others_come(comm: Comm, timeout: float) -> bool:
+    """Whether every rank calls this within `timeout` seconds of this one."""
     barrier = comm.Ibarrier()
-    deadline = time.monotonic() + patience
+    deadline = time.monotonic() + timeout
     while not (all_came := barrier.Test()) and time.monotonic() < deadline:
         time.sleep(0.001)
     return all_came

@@ -7,7 +7,8 @@ import resource
 from contextlib import suppress
 from pathlib import Path
 
-CLEAR_REFS, PEAK = Path("/proc/self/clear_refs"), "5"  # see proc(5)
+# Writing 5 to this file resets the peak of resident memory; see proc(5).
+CLEAR_REFS, RESET_PEAK = Path("/proc/self/clear_refs"), "5"
 
 
 def trim() -> None:
@@ -20,8 +21,8 @@ def peak() -> int:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 
 
-def forget_peak() -> None:
+def forget_peak(clear_refs: Path = CLEAR_REFS) -> None:
     """Trim, and let the peak begin anew; where the system refuses that, it stays that of the whole process."""
     trim()
     with suppress(OSError):
-        CLEAR_REFS.write_text(PEAK)
+        clear_refs.write_text(RESET_PEAK)

@@ -1,4 +1,4 @@
-"""Stages of a run: told on rank 0, timed on every rank, and shown by PETSc's -log_view."""
+"""Stages of a run: printed on rank 0, timed on every rank, and shown by PETSc's -log_view."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ class Progress:
 
     def __init__(self, comm: MPI.Intracomm, quiet: bool) -> None:
         self.comm = comm
-        self.telling = comm.rank == 0 and not quiet
-        # mpirun gives rank 0 a terminal for its output even where it has none itself, but not for its errors.
-        self.on_terminal = self.telling and sys.stdout.isatty() and sys.stderr.isatty()
+        self.prints = comm.rank == 0 and not quiet
+        # mpirun gives rank 0 a terminal for its output even if mpirun has none itself, but none for its errors.
+        self.on_terminal = self.prints and sys.stdout.isatty() and sys.stderr.isatty()
         self.seconds: dict[str, float] = {}
 
     def say(self, line: str) -> None:
         """Print one line on rank 0, past the progress bar if there is one."""
-        if self.telling:
+        if self.prints:
             tqdm.write(line, file=sys.stdout)
             sys.stdout.flush()
 
     @contextmanager
     def stage(self, name: str) -> Iterator[list[str]]:
-        """A PETSc log stage; the block may append words to the list, which are told with its time."""
+        """A PETSc log stage; the block may append words to the list, which are printed with its time."""
         words: list[str] = []
         start = time.perf_counter()
         with PETSc.Log.Stage(name):

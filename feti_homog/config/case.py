@@ -1,4 +1,4 @@
-"""The case file: TOML to frozen dataclasses, with every fault reported at once."""
+"""A case: the checked contents of its file as frozen dataclasses, with every fault reported at once."""
 
 from __future__ import annotations
 
@@ -6,58 +6,48 @@ import dataclasses
 import hashlib
 import json
 import os
-import re
-import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from feti_homog.config.interface_sections import read_bonding
-from feti_homog.config.materials import KINDS, Isotropic, Material, plane_stiffness
-from feti_homog.config.schema import accepted, is_real, keys_of, named, read, shown, suggestion, text, written
+from feti_homog.config.cell_section import GEOMETRY, TOUCHING, Cell
+from feti_homog.config.document import read_document, to_document
+from feti_homog.config.interface_sections import misplaced_sections, read_angle, read_interface, read_path
+from feti_homog.config.material_sections import phase_faults, provider, read_materials
+from feti_homog.config.materials import Isotropic, Material
+from feti_homog.config.petsc_section import Scalar, read_petsc
+from feti_homog.config.schema import Selected, TableReader, selected_value, to_table
 from feti_homog.config.sections import (
-    CIRCULAR,
+    ANALYSIS_TYPE,
+    METHOD,
     SECTIONS,
-    TOUCHING,
     Analysis,
     Angle,
     Arc,
-    Cell,
     Decomposition,
     InterfaceSection,
     LoadPath,
     Output,
 )
+from feti_homog.config.sweep_section import SWEEP
+from feti_homog.config.tables import KEY_OWNERS, REQUIRED, TOP_LEVEL
+from feti_homog.config.values import text
+from feti_homog.config.wording import suggestion, toml_key, toml_value
 from feti_homog.errors import CaseError
 
-Scalar = str | int | float | bool
-
-PHASE = re.compile(r"matrix|fibre(:\w+)?")
-PETSC_WIDE = (
-    "log_view", "log_view_memory", "log_trace", "options_left", "options_view", "malloc_debug", "malloc_view",
-    "malloc_dump", "memory_view", "on_error_abort", "fp_trap", "info",
-)  # fmt: skip
 LOCKING_POISSON = 0.49
-
-REQUIRED = ("cell", "material", "analysis")
-SWEEP = "sweep"
-TOP_LEVEL = (*SECTIONS, "material", "petsc", "name")
-HOMES: list[tuple[str, type[Any]]] = [
-    *((f"[{section}]", cls) for section, cls in SECTIONS.items()),
-    *(("[material.PHASE]", cls) for cls in KINDS.values()),
-    ("an arc of [interface] debonded", Arc),
-]
-OWNERS = {
-    name: " or ".join(home for home, cls in HOMES if name in keys_of(cls)) for _, cls in HOMES for name in keys_of(cls)
-}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Case:
-    """A checked case; `materials` by phase, in the file's order; `petsc` options without dash.
+    """A checked case.
 
-    Without `interface` the bonding is perfect; `angle` and `path` are there if the analysis is of that type.
+    Attributes:
+        materials: by phase, in the file's order.
+        interface: None if the bonding is perfect.
+        angle, path: there if the analysis is of that type.
+        petsc: options without dash.
     """
 
     name: str
@@ -78,7 +68,7 @@ class Case:
 
     @classmethod
     def parse(cls, document: Mapping[str, Any], folder: str | Path = ".") -> Case:
-        """The case of a document of TOML's values; see `parse`."""
+        """The case of nested dictionaries as in the file, with Python's or NumPy's values; see `parse`."""
         return parse(document, Path(folder))
 
     @property
@@ -88,31 +78,30 @@ class Case:
 
     def material_of(self, phase: str) -> Material:
         """The material of a phase; "fibre:2" without its own has that of "fibre". Raises KeyError."""
-        return self.materials[_provider(phase, self.materials)]
+        return self.materials[provider(phase, self.materials)]
 
     def warnings(self) -> tuple[str, ...]:
         """What is allowed but probably not wanted, one line each."""
-        locking = self.analysis.plane == "strain" and self.cell.order == 1
+        may_lock = self.analysis.plane == "strain" and self.cell.order == 1
         return tuple(
-            f"[material.{named(phase)}] poisson = {material.poisson}: linear triangles lock "
+            f"[material.{toml_key(phase)}] poisson = {material.poisson}: linear triangles lock "
             f"above {LOCKING_POISSON} in plane strain; use order = 2 in [cell]"
             for phase, material in self.materials.items()
-            if locking and isinstance(material, Isotropic) and material.poisson > LOCKING_POISSON
+            if may_lock and isinstance(material, Isotropic) and material.poisson > LOCKING_POISSON
         )
 
     def resolved(self) -> dict[str, Any]:
-        """The case with its defaults as a plain document, of which `parse` makes the same case again."""
-        document: dict[str, Any] = {"name": self.name}
-        document["cell"] = written(self.cell, self.cell.geometry)
-        document["material"] = {phase: written(material) for phase, material in self.materials.items()}
-        document["analysis"] = written(self.analysis)
-        if self.interface is not None:
-            document["interface"] = written(self.interface, self.analysis.type)
-        if self.angle is not None:
-            document["angle"] = written(self.angle)
-        if self.path is not None:
-            document["path"] = written(self.path, self.path.method)
-        document |= {"decomposition": written(self.decomposition), "output": written(self.output)}
+        """The case with its defaults as a plain document, of which `parse` makes an equal case."""
+        selected: Selected = {
+            GEOMETRY: self.cell.geometry,
+            ANALYSIS_TYPE: self.analysis.type,
+            METHOD: None if self.path is None else self.path.method,
+        }
+        document: dict[str, Any] = {"name": self.name, "cell": to_table(self.cell, selected)}
+        document["material"] = {phase: to_table(material, selected) for phase, material in self.materials.items()}
+        sections = {section: getattr(self, section) for section in SECTIONS if section != "cell"}
+        given = {section: contents for section, contents in sections.items() if contents is not None}
+        document |= {section: to_table(contents, selected) for section, contents in given.items()}
         return document | {"petsc": dict(self.petsc)}
 
     def digest(self) -> str:
@@ -129,71 +118,74 @@ def load(path: str | Path) -> Case:
     return parse(read_document(path), Path(path).parent)
 
 
-def read_document(path: str | Path) -> dict[str, Any]:
-    """The TOML document in a file, named after the file. Raises CaseError if it is none."""
-    path = Path(path)
-    try:
-        content = path.read_bytes().decode("utf-8-sig")
-        document = tomllib.loads(content)
-    except UnicodeDecodeError as error:
-        line = error.object.count(b"\n", 0, error.start) + 1
-        raise CaseError(f"{path}: not UTF-8 text (line {line})") from None
-    except (ValueError, RecursionError) as error:  # of too long a number and too deep an array too
-        place = f"line {content.count(chr(10)) + 1}, the end"
-        raise CaseError(f"{path}: not TOML: {str(error).replace('end of document', place)}") from None
-    except OSError as error:
-        raise CaseError(f"{path}: cannot be read: {error.strerror}") from None
-    return {"name": path.stem} | document
+def parse(values: Mapping[str, Any], folder: Path) -> Case:
+    """The case of nested dictionaries; its files are relative to `folder`.
 
+    NumPy's scalars and arrays, tuples and paths are as good as TOML's values.
 
-def parse(document: Mapping[str, Any], folder: Path) -> Case:
-    """The case of a TOML document; its files are relative to `folder`. Raises CaseError with all faults."""
-    faults = _top_level_faults(document)
-    geometry = accepted(Cell, document.get("cell"), "geometry")
-    plane = accepted(Analysis, document.get("analysis"), "plane")
-    analysis = accepted(Analysis, document.get("analysis"), "type")
-    cell = _read_section(document, "cell", faults, "geometry", geometry)
-    decomposition = _read_section(document, "decomposition", faults)
+    Raises:
+        CaseError: with all faults.
+        TypeError: `values` is no mapping.
+    """
+    document = to_document(values)
+    reader = TableReader(_selected(document), KEY_OWNERS, _top_level_faults(document))
+    analysis, faults = reader.selected[ANALYSIS_TYPE], reader.faults
+    cell = _read_section(document, "cell", reader)
+    decomposition = _read_section(document, "decomposition", reader)
     if decomposition and decomposition.subdomains and decomposition.max_dofs:
         faults.append("[decomposition] subdomains, max_dofs: exclude each other; give one")
-    parts = {
+    sections = {
         "cell": cell and _checked_cell(cell, folder, faults),
-        "materials": _read_materials(document.get("material"), geometry, plane, faults),
-        "analysis": _read_section(document, "analysis", faults),
-        **read_bonding(document, geometry, analysis, faults, OWNERS),
+        "materials": read_materials(document.get("material"), _selected_plane(document), reader),
+        "analysis": _read_section(document, "analysis", reader),
         "decomposition": decomposition,
-        "output": _read_section(document, "output", faults),
-        "petsc": _read_petsc(document.get("petsc", {}), faults),
+    }
+    faults += misplaced_sections(document, analysis)
+    sections |= {
+        "interface": read_interface(document.get("interface"), reader),
+        "angle": read_angle(document.get("angle"), reader),
+        "path": read_path(document.get("path"), reader),
+        "output": _read_section(document, "output", reader),
+        "petsc": read_petsc(document.get("petsc", {}), faults),
     }
     if faults:
         raise CaseError(*faults)
-    return Case(name=document.get("name", "case"), **parts)
+    return Case(name=document.get("name", "case"), **sections)
+
+
+def _selected(document: Mapping[str, Any]) -> Selected:
+    """The values that decide which keys belong to the case."""
+    selectors = (GEOMETRY, ANALYSIS_TYPE, METHOD)
+    return {s: selected_value(SECTIONS[s.section], document.get(s.section), s.key) for s in selectors}
+
+
+def _selected_plane(document: Mapping[str, Any]) -> str | None:
+    plane: str | None = selected_value(Analysis, document.get("analysis"), "plane")
+    return plane
 
 
 def _top_level_faults(document: Mapping[str, Any]) -> list[str]:
     """Faults of the names of sections and of the keys before the first section."""
     faults = [f"[{section}]: missing section" for section in REQUIRED if section not in document]
     for name, value in document.items():
-        hint = suggestion(name, TOP_LEVEL, OWNERS)
+        hint = suggestion(name, TOP_LEVEL, KEY_OWNERS)
         if name == SWEEP:
             faults.append("[sweep]: this file describes many cases; `feti-homog sweep` runs them")
         elif name not in TOP_LEVEL and isinstance(value, dict):
-            faults.append(f"[{named(name)}]: unknown section; {hint}")
+            faults.append(f"[{toml_key(name)}]: unknown section; {hint}")
         elif name not in TOP_LEVEL:
-            faults.append(f"{named(name)}: unknown key; {hint}")
+            faults.append(f"{toml_key(name)}: unknown key; {hint}")
     name = document.get("name", "case")
     if not text.accepts(name):
-        faults.append(f"name = {shown(name)}: expected {text.expected}")
+        faults.append(f"name = {toml_value(name)}: expected {text.expected}")
     return faults
 
 
-def _read_section(
-    document: Mapping[str, Any], section: str, faults: list[str], variant: str = "", chosen: str | None = None
-) -> Any:
+def _read_section(document: Mapping[str, Any], section: str, reader: TableReader) -> Any:
     """The dataclass of a section, or None if that is faulty or was already found to be missing."""
     if section in REQUIRED and section not in document:
         return None
-    return read(SECTIONS[section], document.get(section, {}), section, faults, variant, chosen, OWNERS)
+    return reader.read(SECTIONS[section], document.get(section, {}), section)
 
 
 def _checked_cell(cell: Cell, folder: Path, faults: list[str]) -> Cell:
@@ -205,86 +197,18 @@ def _checked_cell(cell: Cell, folder: Path, faults: list[str]) -> Cell:
             reason = "no circles min_gap apart are denser" if crowding > 1 else "there the fibres touch"
             faults.append(
                 f"[cell] fibre_fraction = {cell.fibre_fraction}: expected less than {limit:.4g} for "
-                f"geometry = {shown(cell.geometry)}: {reason}"
+                f"geometry = {toml_value(cell.geometry)}: {reason}"
             )
     if cell.file is None:
         return cell
     file = (folder / cell.file).resolve()
     if not os.path.isfile(file):  # false, not an error, for a name too long
-        faults.append(f"[cell] file = {shown(str(cell.file))}: no such file (expected at {file})")
+        faults.append(f"[cell] file = {toml_value(str(cell.file))}: no such file (expected at {file})")
     return dataclasses.replace(cell, file=file)
-
-
-def _read_materials(table: object, geometry: str | None, plane: str | None, faults: list[str]) -> dict[str, Material]:
-    """The materials by phase; what depends on a geometry or plane state that is faulty is not checked."""
-    if table is None:
-        return {}
-    if not isinstance(table, dict):
-        faults.append(f"material = {shown(table)}: expected sections [material.matrix], [material.fibre]")
-        return {}
-    materials = {}
-    for phase, constants in table.items():
-        section = f"material.{named(phase)}"
-        if not PHASE.fullmatch(phase):
-            hint = suggestion(phase, ("matrix", "fibre", "fibre:2"), OWNERS)
-            faults.append(f"[{section}]: unknown phase; {hint}")
-        elif ":" in phase and geometry in CIRCULAR:
-            faults.append(f'[{section}]: belongs to geometry = "mesh", not {shown(geometry)}')
-        else:
-            materials[phase] = _read_material(constants, section, plane, faults)
-    needed = ("matrix", "fibre") if geometry in CIRCULAR else ("matrix",)
-    faults += [f"[material.{phase}]: missing section" for phase in needed if phase not in table]
-    return materials
-
-
-def _read_material(table: object, section: str, plane: str | None, faults: list[str]) -> Any:
-    """The material of a section, of the kind that its keys tell; None if it is faulty."""
-    given = table if isinstance(table, dict) else {}
-    kinds = {kind: [name for name in keys_of(cls) if name in given] for kind, cls in KINDS.items()}
-    used = [kind for kind, names in kinds.items() if names] or ["isotropic"]
-    if len(used) > 1:
-        groups = " and ".join(f"{', '.join(kinds[kind])} ({kind})" for kind in used)
-        faults.append(f"[{section}] {groups}: exclude each other; a material is of one kind")
-        return None
-    material = read(KINDS[used[0]], table, section, faults, owners=OWNERS)
-    if material is not None and plane is not None:
-        try:
-            plane_stiffness(material, plane)
-        except ValueError as error:
-            faults.append(f"[{section}] {error}")
-    return material
-
-
-def _read_petsc(table: object, faults: list[str]) -> dict[str, Scalar]:
-    """PETSc's options by name; whether PETSc knows one of prefix feti_ only the run can tell."""
-    if not isinstance(table, dict):
-        faults.append(f"petsc = {shown(table)}: expected a section [petsc]")
-        return {}
-    for name, value in table.items():
-        line = f"[petsc] {named(name)} = {shown(value)}: "
-        if name.startswith("-"):
-            faults.append(f"{line}expected the option's name without its dash")
-        elif not re.fullmatch(r"feti_\w+", name) and name not in PETSC_WIDE:
-            faults.append(f"{line}expected the prefix feti_, or one of {', '.join(PETSC_WIDE)}")
-        elif not (isinstance(value, bool) or is_real(value) or text.accepts(value)):
-            faults.append(f"{line}expected a text, a number, true or false")
-    return dict(table)
-
-
-def _provider(phase: str, materials: Mapping[str, Material]) -> str:
-    """The phase whose material a phase has: its own, or that of "fibre" for "fibre:2"."""
-    return phase if phase in materials else phase.partition(":")[0]
 
 
 def check_phases(case: Case, phases: Iterable[str]) -> None:
     """Raises CaseError if a phase of the mesh has no material, or a material no phase."""
-    phases = list(phases)
-    providers = [_provider(phase, case.materials) for phase in phases]
-    lacking = [phase for phase in phases if _provider(phase, case.materials) not in case.materials]
-    unused = [phase for phase in case.materials if phase not in providers]
-    faults = [f"[material.{named(phase)}]: missing section; the mesh has this phase" for phase in lacking] + [
-        f"[material.{named(phase)}]: the mesh has no such phase; it has {', '.join(map(named, phases))}"
-        for phase in unused
-    ]
+    faults = phase_faults(case.materials, phases)
     if faults:
         raise CaseError(*faults)

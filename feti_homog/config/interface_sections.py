@@ -1,4 +1,4 @@
-"""The sections of imperfect bonding, [interface], [angle] and [path], and what must hold between their keys."""
+"""Reading the sections of imperfect bonding, [interface], [angle] and [path], and what must hold between their keys."""
 
 from __future__ import annotations
 
@@ -7,79 +7,98 @@ from collections.abc import Mapping
 from itertools import pairwise
 from typing import Any
 
-from feti_homog.config.schema import NOWHERE, accepted, read, shown
-from feti_homog.config.sections import ARCS, CIRCULAR, Angle, Arc, InterfaceSection, LoadPath
+from feti_homog.config.cell_section import CIRCULAR, GEOMETRY
+from feti_homog.config.schema import Selected, TableReader
+from feti_homog.config.section_values import ARCS
+from feti_homog.config.sections import (
+    ANALYSIS_TYPE,
+    SECTIONS_OF_AN_ANALYSIS,
+    Angle,
+    Arc,
+    InterfaceSection,
+    LoadPath,
+    Strain,
+)
+from feti_homog.config.wording import toml_value
 
-TYPE = "[analysis] type"
-
-
-def read_bonding(
-    document: Mapping[str, Any],
-    geometry: str | None,
-    analysis: str | None,
-    faults: list[str],
-    owners: Mapping[str, str] = NOWHERE,
-) -> dict[str, Any]:
-    """The dataclasses of "interface", "angle" and "path", None where a section is absent or faulty.
-
-    `geometry` and the type of `analysis` are None if they are faulty: then what depends on them is not checked.
-    """
-    for section in ("angle", "path"):
-        if section not in document and section == analysis:
-            faults.append(f'[{section}]: missing section; {TYPE} = "{section}" needs it')
-        elif section in document and analysis not in (section, None):
-            faults.append(f'[{section}]: belongs to {TYPE} = "{section}", not {shown(analysis)}')
-    return {
-        "interface": _read_interface(document.get("interface"), geometry, analysis, faults, owners),
-        "angle": _read_angle(document.get("angle"), faults, owners),
-        "path": _read_path(document.get("path"), faults, owners),
-    }
+ZERO: Strain = (0.0, 0.0, 0.0)
 
 
-def _read_interface(
-    table: Any, geometry: str | None, analysis: str | None, faults: list[str], owners: Mapping[str, str]
-) -> InterfaceSection | None:
-    debonded = table.get("debonded", []) if isinstance(table, dict) else []
-    if analysis == "angle" and debonded == []:
-        faults.append(f'[interface] debonded: missing; {TYPE} = "angle" needs {ARCS.expected}')
+def misplaced_sections(document: Mapping[str, Any], analysis: str | None) -> list[str]:
+    """Faults of [angle] and [path] that are missing or belong to another type of analysis (None: faulty)."""
+    faults = []
+    for section, condition in SECTIONS_OF_AN_ANALYSIS.items():
+        words = condition.in_words(section)
+        if section not in document and analysis in condition.values:
+            faults.append(f"[{section}]: missing section; {words} needs it")
+        elif section in document and analysis not in (*condition.values, None):
+            faults.append(f"[{section}]: belongs to {words}, not {toml_value(analysis)}")
+    return faults
+
+
+def read_interface(table: Any, reader: TableReader) -> InterfaceSection | None:
+    """The section [interface] with its arcs; None if it is absent or faulty."""
+    reader.faults += _missing_arcs(table, reader.selected)
     if table is None:
         return None
-    # An empty list says that it is meant; of a user's mesh a curve may be debonded.
-    if analysis == "stiffness" and geometry in CIRCULAR and isinstance(table, dict) and "debonded" not in table:
-        faults.append(f"[interface] debonded: missing; expected {ARCS.expected}, or []: nothing else can open")
-    interface = read(InterfaceSection, table, "interface", faults, TYPE, analysis, owners)
-    arcs = [
-        read(Arc, arc, "interface", faults, TYPE, analysis, owners, f"debonded[{k}].")
-        for k, arc in enumerate(debonded if ARCS.accepts(debonded) else [])
-    ]
+    interface = reader.read(InterfaceSection, table, "interface")
+    debonded = table.get("debonded", []) if isinstance(table, dict) else []
+    given = debonded if ARCS.accepts(debonded) else []
+    arcs = [reader.read(Arc, arc, "interface", f"debonded[{k}].") for k, arc in enumerate(given)]
     return interface and dataclasses.replace(interface, debonded=tuple(arc for arc in arcs if arc is not None))
 
 
-def _read_angle(table: Any, faults: list[str], owners: Mapping[str, str]) -> Angle | None:
+def _missing_arcs(table: Any, selected: Selected) -> list[str]:
+    """The fault that nothing can debond."""
+    analysis, debonded = selected[ANALYSIS_TYPE], table.get("debonded") if isinstance(table, dict) else None
+    if analysis == "angle" and debonded in (None, []):
+        return [f'[interface] debonded: missing; [analysis] type = "angle" needs {ARCS.expected}']
+    # An empty list says that it is meant; of a user's mesh a curve may be debonded.
+    is_bare = isinstance(table, dict) and "debonded" not in table
+    if analysis == "stiffness" and selected[GEOMETRY] in CIRCULAR and is_bare:
+        return [f"[interface] debonded: missing; expected {ARCS.expected}, or []: nothing else can open"]
+    return []
+
+
+def read_angle(table: Any, reader: TableReader) -> Angle | None:
+    """The section [angle]; None if it is absent or faulty."""
     if table is None:
         return None
-    angle = read(Angle, table, "angle", faults, owners=owners)
+    angle = reader.read(Angle, table, "angle")
     if angle is not None and angle.strain is not None and not any(angle.strain):
-        faults.append("[angle] strain: expected a strain other than zero")
+        reader.faults.append("[angle] strain: expected a strain other than zero")
     return angle
 
 
-def _read_path(table: Any, faults: list[str], owners: Mapping[str, str]) -> LoadPath | None:
+def read_path(table: Any, reader: TableReader) -> LoadPath | None:
+    """The section [path]; None if it is absent or faulty."""
     if table is None:
         return None
-    path = read(LoadPath, table, "path", faults, "method", accepted(LoadPath, table, "method"), owners)
-    if path is None:
-        return None
+    path = reader.read(LoadPath, table, "path")
+    if path is not None:
+        reader.faults += _path_faults(path)
+    return path
+
+
+def _path_faults(path: LoadPath) -> list[str]:
+    faults = []
     if (path.strain is None) == (path.waypoints is None):
         state = "missing; give one" if path.strain is None else "exclude each other; give one"
         faults.append(f"[path] strain, waypoints: {state}")
     elif path.strain is not None and not any(path.strain):
         faults.append("[path] strain: expected a strain other than zero, where the path begins")
     elif path.waypoints is not None:
-        for k, (before, after) in enumerate(pairwise([(0.0, 0.0, 0.0), *path.waypoints])):
-            if before == after:
-                place = f"waypoints[{k - 1}]" if k else "zero, where the path begins"
-                faults.append(f"[path] waypoints[{k}] = {shown(list(after))}: expected a strain other than {place}")
+        faults += _repeated_waypoints(path.waypoints)
     if path.increments is not None and path.increments < len(path.targets):
         faults.append(f"[path] increments = {path.increments}: expected at least one for each waypoint")
-    return path
+    return faults
+
+
+def _repeated_waypoints(waypoints: tuple[Strain, ...]) -> list[str]:
+    """Faults of waypoints at which the path already is."""
+    repeated = [k for k, (before, after) in enumerate(pairwise([ZERO, *waypoints])) if before == after]
+    return [
+        f"[path] waypoints[{k}] = {toml_value(list(waypoints[k]))}: expected a strain other than "
+        + (f"waypoints[{k - 1}]" if k else "zero, where the path begins")
+        for k in repeated
+    ]

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from feti_homog.config.schema import Kind, is_real, key, real, shown
+from feti_homog.config.schema import key
+from feti_homog.config.values import ValueType, is_number, real
+from feti_homog.config.wording import toml_value
 from feti_homog.typing import Float
 
 Matrix3 = tuple[tuple[float, float, float], ...]
@@ -15,54 +18,66 @@ Matrix3 = tuple[tuple[float, float, float], ...]
 POSITIVE = real(above=0.0)
 
 
+def _is_triple(row: object) -> bool:
+    return isinstance(row, list | tuple) and len(row) == 3 and all(map(is_number, row))
+
+
 def _is_matrix(value: object) -> bool:
-    rows = value if isinstance(value, list | tuple) else []
-    triples = [row for row in rows if isinstance(row, list | tuple) and len(row) == 3]
-    return len(rows) == len(triples) == 3 and all(is_real(entry) for row in triples for entry in row)
+    return isinstance(value, list | tuple) and len(value) == 3 and all(map(_is_triple, value))
 
 
-def _as_matrix(value: Any) -> Matrix3:
+def _to_matrix(value: Any) -> Matrix3:
     return tuple(tuple(float(entry) for entry in row) for row in value)  # type: ignore[misc]
 
 
-MATRIX = Kind("a symmetric 3x3 array of numbers in the order 11, 22, 12", _is_matrix, _as_matrix)
+def _three(items: Mapping[str, Any]) -> dict[str, Any]:
+    return {"type": "array", "items": items, "minItems": 3, "maxItems": 3}
+
+
+MATRIX = ValueType(
+    "a symmetric 3x3 array of numbers in the order 11, 22, 12",
+    _is_matrix,
+    _to_matrix,
+    _three(_three(real().json_schema)),
+)
 
 
 @dataclass(frozen=True)
 class Isotropic:
-    """Young's modulus (stress) and Poisson's ratio."""
+    """Young's modulus and Poisson's ratio."""
 
-    young: float = key(POSITIVE)
-    poisson: float = key(real(above=-1.0, most=0.5))
+    young: float = key(POSITIVE, "Young's modulus.", unit="stress")
+    poisson: float = key(real(above=-1.0, most=0.5), "Poisson's ratio; in plane strain below 0.5.")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Orthotropic:
-    """Engineering constants along the material axes; axis 1 is turned by `angle` degrees from x1 towards x2.
+    """Engineering constants along the material axes; nu_ij = -eps_j/eps_i under stress along i.
 
-    nu_ij = -eps_j/eps_i under stress along i, so nu_ij/E_i = nu_ji/E_j. The constants out of the plane
-    (E3, nu13, nu23) are needed for plane strain only.
+    So nu_ij/E_i = nu_ji/E_j. The constants out of the plane (E3, nu13, nu23) are needed for plane strain only.
     """
 
-    E1: float = key(POSITIVE)
-    E2: float = key(POSITIVE)
-    E3: float | None = key(POSITIVE, default=None)
-    nu12: float = key(real())
-    nu13: float | None = key(real(), default=None)
-    nu23: float | None = key(real(), default=None)
-    G12: float = key(POSITIVE)
-    angle: float = key(real(), default=0.0)
+    E1: float = key(POSITIVE, "Young's modulus along axis 1.", unit="stress")
+    E2: float = key(POSITIVE, "Young's modulus along axis 2.", unit="stress")
+    E3: float | None = key(
+        POSITIVE, "Young's modulus out of the plane; plane strain needs it.", unit="stress", default=None
+    )
+    nu12: float = key(real(), "Poisson's ratio in the plane; nu12^2 < E1/E2.")
+    nu13: float | None = key(real(), "Poisson's ratio out of the plane; plane strain needs it.", default=None)
+    nu23: float | None = key(real(), "Poisson's ratio out of the plane; plane strain needs it.", default=None)
+    G12: float = key(POSITIVE, "Shear modulus in the plane.", unit="stress")
+    angle: float = key(real(), "Direction of axis 1, from x1 towards x2.", unit="degrees", default=0.0)
 
 
 @dataclass(frozen=True)
 class General:
     """The plane stiffness itself, for whichever plane state the case asks for."""
 
-    stiffness: Matrix3 = key(MATRIX)
+    stiffness: Matrix3 = key(MATRIX, "The plane stiffness, symmetric and positive definite.", unit="stress")
 
 
 Material = Isotropic | Orthotropic | General
-KINDS: dict[str, type[Isotropic] | type[Orthotropic] | type[General]] = {
+MATERIAL_FORMS: dict[str, type[Isotropic] | type[Orthotropic] | type[General]] = {
     "isotropic": Isotropic,
     "orthotropic": Orthotropic,
     "general": General,
@@ -81,10 +96,10 @@ def plane_stiffness(material: Material, plane: str) -> Float:
         return rotated(np.linalg.inv(_orthotropic_compliance(material, plane)), material.angle)
     stiffness = np.array(material.stiffness)
     if not np.allclose(stiffness, stiffness.T, rtol=0.0, atol=1e-9 * np.abs(stiffness).max()):
-        raise ValueError(f"stiffness = {shown(material.stiffness)}: expected a symmetric matrix")
+        raise ValueError(f"stiffness = {toml_value(material.stiffness)}: expected a symmetric matrix")
     if not is_positive_definite(stiffness):
-        raise ValueError(f"stiffness = {shown(material.stiffness)}: expected a positive definite matrix")
-    return (stiffness + stiffness.T) / 2.0
+        raise ValueError(f"stiffness = {toml_value(material.stiffness)}: expected a positive definite matrix")
+    return np.asarray((stiffness + stiffness.T) / 2.0)
 
 
 def _isotropic(material: Isotropic, plane: str) -> Float:

@@ -1,189 +1,181 @@
-"""Reading a table of a case file into a frozen dataclass whose fields say what they accept."""
+"""Reading a table of a case file into a frozen dataclass whose fields say what they accept and what they mean."""
 
 from __future__ import annotations
 
 import dataclasses
-import difflib
-import json
-import math
-import re
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, TypeVar
 
+from feti_homog.config.values import ValueType
+from feti_homog.config.wording import suggestion, toml_key, toml_value
+
 T = TypeVar("T")
-MAGNITUDES = (1e-100, 1e100)  # of numbers other than 0: no product of a few over- or underflows
 
 
 @dataclass(frozen=True)
-class Kind:
-    """What a value must be, in words and as a test, and how it is then stored."""
+class Selector:
+    """The key of a section whose value decides which other keys belong to the case."""
 
-    expected: str
-    accepts: Callable[[Any], bool]
-    store: Callable[[Any], Any]
+    section: str
+    key: str
+
+    def among(self, *values: str) -> Condition:
+        """The condition that the key has one of these values."""
+        return Condition(self, values)
+
+    def in_words(self, section: str) -> str:
+        """The key as a fault in a section names it."""
+        return self.key if section == self.section else f"[{self.section}] {self.key}"
+
+
+@dataclass(frozen=True)
+class Condition:
+    """That a selector has one of some values."""
+
+    selector: Selector
+    values: tuple[str, ...]
+
+    def in_words(self, section: str) -> str:
+        """The condition as it is read in a section."""
+        return f"{self.selector.in_words(section)} = {' or '.join(map(toml_value, self.values))}"
+
+
+Selected = Mapping[Selector, str | None]
+"""The value of each selector, None if that is faulty: then what depends on it is not checked."""
 
 
 @dataclass(frozen=True)
 class Key:
-    """A key of a table: the variants it belongs to (all, if empty) and whether it must be there."""
+    """A key of a table.
 
-    kind: Kind
-    only: tuple[str, ...]
+    Attributes:
+        type: what its value must be.
+        meaning: a sentence or two for the reference.
+        unit: of the value, empty if it has none.
+        default: in words; empty if there is none.
+        only: when it belongs to the table; always, if None.
+        required: whether it must be there where it belongs.
+    """
+
+    type: ValueType
+    meaning: str
+    unit: str
+    default: str
+    only: Condition | None
     required: bool
 
+    def belongs(self, selected: Selected) -> bool:
+        """Whether the key belongs to the table; not, if that depends on a faulty selector."""
+        return self.only is None or selected.get(self.only.selector) in self.only.values
 
-def key(kind: Kind, *, default: Any = dataclasses.MISSING, only: tuple[str, ...] = ()) -> Any:
-    """A dataclass field read from the key of its name; required where it belongs if it has no default."""
+
+def key(
+    type_: ValueType,
+    meaning: str,
+    *,
+    unit: str = "",
+    default: Any = dataclasses.MISSING,
+    default_words: str = "",
+    only: Condition | None = None,
+) -> Any:
+    """A dataclass field read from the key of its name; required where it belongs if it has no default.
+
+    `default_words` tells what a default of None stands for.
+    """
     required = default is dataclasses.MISSING
-    metadata = {"key": Key(kind, only, required)}
-    if required and not only:
+    words = default_words or ("" if required or default is None else _default_in_words(default))
+    metadata = {"key": Key(type_, meaning, unit, words, only, required)}
+    if required and only is None:
         return dataclasses.field(metadata=metadata)
     return dataclasses.field(default=None if required else default, metadata=metadata)
 
 
-def keys_of(cls: type[Any]) -> dict[str, Key]:
-    return {field.name: field.metadata["key"] for field in dataclasses.fields(cls)}
+def _default_in_words(default: Any) -> str:
+    return toml_value(list(default) if isinstance(default, tuple) else default)
 
 
-# Kinds of values
+def keys_of(table_class: type[Any]) -> dict[str, Key]:
+    """The keys of a table by name."""
+    return {each.name: each.metadata["key"] for each in dataclasses.fields(table_class)}
 
 
-def is_real(value: object) -> bool:
-    """Whether the value is a finite number of sensible magnitude (true and false are none)."""
-    least, most = MAGNITUDES
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return False
-    return value == 0 or least <= abs(value) <= most
+def defaults_of(table_class: type[Any]) -> dict[str, Any]:
+    """The defaults of a table, as TOML has them, of the keys that have one."""
+    found = {each.name: each.default for each in dataclasses.fields(table_class)}
+    return {name: _to_toml(value, {}) for name, value in found.items() if value not in (None, dataclasses.MISSING)}
 
 
-def _numeric(noun: str, is_number: Callable[[Any], bool], store: Callable[[Any], Any]) -> Callable[..., Kind]:
-    def kind(
-        *, above: float = -math.inf, least: float = -math.inf, below: float = math.inf, most: float = math.inf
-    ) -> Kind:
-        limits = {"above": above, "at least": least, "below": below, "at most": most}
-        words = [f"{word} {limit:.6g}" for word, limit in limits.items() if math.isfinite(limit)]
-        return Kind(
-            f"{noun} {' and '.join(words)}".strip(),
-            lambda value: is_number(value) and above < value < below and least <= value <= most,
-            store,
-        )
-
-    return kind
-
-
-real = _numeric("a number", is_real, float)
-integer = _numeric("an integer", lambda value: is_real(value) and isinstance(value, int), int)
-boolean = Kind("true or false", lambda value: isinstance(value, bool), bool)
-text = Kind("a text in one line", lambda value: isinstance(value, str) and value.isprintable(), str)
-
-
-def are_reals(value: object, count: int | None = None) -> bool:
-    """Whether the value is a list of numbers, so many if a count is given."""
-    return isinstance(value, list) and count in (None, len(value)) and all(map(is_real, value))
-
-
-def as_reals(value: Iterable[Any]) -> tuple[float, ...]:
-    return tuple(map(float, value))
-
-
-def choice(*options: str) -> Kind:
-    return Kind("one of " + ", ".join(map(shown, options)), lambda value: value in options, str)
-
-
-def accepted(cls: type[Any], table: object, name: str) -> Any:
+def selected_value(table_class: type[Any], table: object, name: str) -> Any:
     """The value of a key if it is right, its default if it is not there, None if it is faulty."""
-    default = getattr(cls, name, None)
-    value = table.get(name, default) if isinstance(table, dict) else default
-    return value if keys_of(cls)[name].kind.accepts(value) else None
+    default = getattr(table_class, name, None)
+    value = table.get(name, default) if isinstance(table, Mapping) else default
+    return value if keys_of(table_class)[name].type.accepts(value) else None
 
 
-# Words of the faults
+@dataclass
+class TableReader:
+    """Reads tables and gathers what is wrong with them.
 
-NOWHERE: Mapping[str, str] = MappingProxyType({})
-
-
-def shown(value: object) -> str:
-    """The value nearly as TOML writes it, in one short line."""
-    if isinstance(value, float):
-        return repr(value)
-    written = json.dumps(value, default=str, ensure_ascii=not str(value).isprintable())
-    return written if len(written) <= 60 else written[:57] + "..."
-
-
-def named(name: str) -> str:
-    """A key as TOML writes it: quoted if it is not bare."""
-    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else shown(name)
-
-
-def suggestion(name: str, known: Iterable[str], owners: Mapping[str, str] = NOWHERE) -> str:
-    """The end of a fault on an unknown name: where it belongs, the nearest known name, or all of them."""
-    known = list(known)
-    nearest = difflib.get_close_matches(name, known, n=1)
-    if name in owners:
-        return f"it belongs to {owners[name]}"
-    if nearest:
-        return f"did you mean {named(nearest[0])}?"
-    return "known here: " + ", ".join(map(named, known))
-
-
-def _fault(name: str, entry: Key, table: Mapping[str, Any], variant: str, chosen: str | None) -> str:
-    """What is wrong with one known key, empty if nothing; `chosen` is the variant, None if that is faulty."""
-    belongs = not entry.only or chosen in entry.only
-    if name not in table:
-        return f": missing; expected {entry.kind.expected}" if entry.required and belongs else ""
-    written = f" = {shown(table[name])}: "
-    if not belongs and chosen is not None:
-        homes = " or ".join(map(shown, entry.only))
-        return f"{written}belongs to {variant} = {homes}, not {shown(chosen)}"
-    return "" if entry.kind.accepts(table[name]) else f"{written}expected {entry.kind.expected}"
-
-
-def read(
-    cls: type[T],
-    table: object,
-    section: str,
-    faults: list[str],
-    variant: str = "",
-    chosen: str | None = None,
-    owners: Mapping[str, str] = NOWHERE,
-    prefix: str = "",
-) -> T | None:
-    """The table as an instance of `cls`; None, and one line per fault added to `faults`, if it is faulty.
-
-    `variant` names the key whose value `chosen` (None if that is faulty) decides which others belong; `owners`
-    says where keys belong that belong elsewhere; `prefix` stands before the keys of a table within a section.
+    Attributes:
+        selected: the values that decide which keys belong to the case.
+        owners: where keys belong that are unknown in a table.
+        faults: one line each.
     """
-    if not isinstance(table, dict):
-        faults.append(f"{section} = {shown(table)}: expected a section [{section}]")
-        return None
-    keys = keys_of(cls)
-    found = {
-        name: f" = {shown(value)}: unknown key; {suggestion(name, keys, owners)}"
-        for name, value in table.items()
-        if name not in keys
-    }
-    found |= {name: _fault(name, entry, table, variant, chosen) for name, entry in keys.items()}
-    lines = [f"[{section}] {prefix}{named(name)}{words}" for name, words in found.items() if words]
-    faults += lines
-    return None if lines else cls(**{name: keys[name].kind.store(value) for name, value in table.items()})
+
+    selected: Selected = field(default_factory=dict)
+    owners: Mapping[str, str] = field(default_factory=dict)
+    faults: list[str] = field(default_factory=list)
+
+    def read(self, table_class: type[T], table: object, section: str, prefix: str = "") -> T | None:
+        """The table as an instance of `table_class`; None, and a line for each fault, if it is faulty.
+
+        `prefix` stands before the keys of a table within a section.
+        """
+        if not isinstance(table, dict):
+            self.faults.append(f"{section} = {toml_value(table)}: expected a section [{section}]")
+            return None
+        keys = keys_of(table_class)
+        unknown = {
+            name: f" = {toml_value(value)}: unknown key; {suggestion(name, keys, self.owners)}"
+            for name, value in table.items()
+            if name not in keys
+        }
+        known = {name: self._fault(name, entry, table, section) for name, entry in keys.items()}
+        lines = [f"[{section}] {prefix}{toml_key(name)}{words}" for name, words in (unknown | known).items() if words]
+        self.faults += lines
+        return None if lines else table_class(**{name: keys[name].type.store(value) for name, value in table.items()})
+
+    def _fault(self, name: str, entry: Key, table: Mapping[str, Any], section: str) -> str:
+        """What is wrong with one known key, empty if nothing."""
+        if name not in table:
+            missing = entry.required and entry.belongs(self.selected)
+            return f": missing; expected {entry.type.expected}" if missing else ""
+        line = f" = {toml_value(table[name])}: "
+        if entry.only is not None and not entry.belongs(self.selected):
+            found = self.selected.get(entry.only.selector)
+            if found is not None:
+                return f"{line}belongs to {entry.only.in_words(section)}, not {toml_value(found)}"
+        return "" if entry.type.accepts(table[name]) else f"{line}expected {entry.type.expected}"
 
 
-def written(instance: Any, chosen: str = "") -> dict[str, Any]:
-    """The table, of TOML's values, that `read` makes the instance of; without the keys of other variants."""
+def to_table(instance: Any, selected: Selected) -> dict[str, Any]:
+    """The table, of TOML's values, that `TableReader.read` makes the instance of.
+
+    It has neither the keys that do not belong to the case nor those without a value.
+    """
     return {
-        name: _plain(getattr(instance, name), chosen)
+        name: _to_toml(getattr(instance, name), selected)
         for name, entry in keys_of(type(instance)).items()
-        if getattr(instance, name) is not None and (not entry.only or chosen in entry.only)
+        if getattr(instance, name) is not None and entry.belongs(selected)
     }
 
 
-def _plain(value: Any, chosen: str) -> Any:
+def _to_toml(value: Any, selected: Selected) -> Any:
     """The value as TOML has it."""
     if isinstance(value, tuple):
-        return [_plain(entry, chosen) for entry in value]
+        return [_to_toml(entry, selected) for entry in value]
     if isinstance(value, Path):
         return str(value)
-    return written(value, chosen) if dataclasses.is_dataclass(value) else value
+    return to_table(value, selected) if dataclasses.is_dataclass(value) else value

@@ -1,138 +1,152 @@
-"""The sections of a case file: which keys they have and what each accepts."""
+"""The sections of a case file: which keys they have, what each accepts, and what it means."""
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
-from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
-from feti_homog.config.schema import Kind, are_reals, as_reals, boolean, choice, integer, is_real, key, real, text
+from feti_homog.config.cell_section import Cell
+from feti_homog.config.schema import Selector, key
+from feti_homog.config.section_values import ARCS, FIBRES, OPENINGS, STRAIN, STRENGTH, WAYPOINTS
+from feti_homog.config.values import boolean, choice, integer, real, text
 
 Strain = tuple[float, ...]
 
-MESH_FILE = Kind("the name of a .msh file", lambda v: text.accepts(v) and v.endswith(".msh"), Path)
-CIRCULAR = ("square", "hexagonal", "random")
-TOUCHING = {"square": math.pi / 4, "hexagonal": math.pi / math.sqrt(12), "random": math.pi / math.sqrt(12)}
-"""Fibre fraction at which the fibres touch; of a random cell, that of the densest packing of circles."""
+ANALYSIS_TYPE = Selector("analysis", "type")
+METHOD = Selector("path", "method")
 
-FIBRE = integer(least=1)
-
-
-def _are_fibres(value: Any) -> bool:
-    return value == "all" or (isinstance(value, list) and value != [] and all(map(FIBRE.accepts, value)))
-
-
-def _are_openings(value: Any) -> bool:
-    rising = are_reals(value) and all(a < b for a, b in pairwise(value))
-    return rising and value != [] and value[0] >= 0 and value[-1] <= 360
-
-
-FIBRES = Kind(
-    'the number of a fibre, counted from 1, a list of numbers, or "all"',
-    lambda v: FIBRE.accepts(v) or _are_fibres(v),
-    lambda v: v if v == "all" else tuple(v if isinstance(v, list) else [v]),
-)
-ARCS = Kind(
-    "a list of arcs {fibre, centre, angle}",
-    lambda v: isinstance(v, list) and all(isinstance(arc, dict) for arc in v),
-    tuple,
-)
-STRENGTH = Kind(
-    "a traction above 0, or inf",
-    lambda v: (is_real(v) and v > 0) or (isinstance(v, float) and v == math.inf),
-    lambda v: None if v == math.inf else float(v),
-)
-OPENINGS = Kind("a rising list of numbers from 0 to 360", _are_openings, as_reals)
-STRAIN = Kind("a list of three numbers [E11, E22, gamma12]", lambda v: are_reals(v, 3), as_reals)
-WAYPOINTS = Kind(
-    "a list of strains [E11, E22, gamma12]",
-    lambda v: isinstance(v, list) and v != [] and all(are_reals(strain, 3) for strain in v),
-    lambda v: tuple(map(as_reals, v)),
-)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Cell:
-    """Geometry of the periodic cell and its mesh.
-
-    `mesh_size` is in widths of the cell, `min_gap` in diameters of a fibre; a radius differs from the mean by
-    at most `radius_spread` of that. Of the keys of another geometry nothing is meant.
-    """
-
-    geometry: str = key(choice(*CIRCULAR, "mesh"))
-    fibre_fraction: float | None = key(real(above=0.0, below=1.0), only=CIRCULAR)
-    mesh_size: float = key(real(least=1e-4, most=0.5), default=0.05, only=CIRCULAR)
-    refine: int = key(integer(least=0, most=8), default=0)
-    order: int = key(integer(least=1, most=2), default=1)
-    bodies: str = key(choice("torus", "plane"), default="torus")
-    fibres: int | None = key(integer(least=1, most=100_000), only=("random",))
-    min_gap: float = key(real(least=0.0, most=1.0), default=0.05, only=("random",))
-    seed: int = key(integer(least=0), default=0, only=("random",))
-    radius_spread: float = key(real(least=0.0, most=0.5), default=0.0, only=("random",))
-    file: Path | None = key(MESH_FILE, only=("mesh",))
+ANGLE_ANALYSIS, PATH_ANALYSIS = ANALYSIS_TYPE.among("angle"), ANALYSIS_TYPE.among("path")
+BY_EVENTS, BY_INCREMENTS = METHOD.among("events"), METHOD.among("increments")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Analysis:
     """What is computed, and in which plane state."""
 
-    type: str = key(choice("stiffness", "angle", "path"))
-    plane: str = key(choice("strain", "stress"))
+    type: str = key(
+        choice("stiffness", "angle", "path"),
+        '"stiffness": the effective stiffness; "angle": the response against the debonding angle, see [angle]; '
+        '"path": debonding by the load, see [path].',
+    )
+    plane: str = key(
+        choice("strain", "stress"),
+        'Plane state: "strain" is that of long fibres along x3, "stress" that of a thin sheet.',
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
 class Arc:
-    """Debonded part of the interface of a fibre, of `angle` degrees in all around the direction `centre`.
+    """An arc of a fibre's interface that is debonded from the start, any number of them. Its tips stay bonded.
 
-    Directions are measured at the fibre's centre from x1 towards x2. `fibre` is "all" or numbers from 1, in the
-    order of the arrangement. For type = "angle" the opening is None: [angle] values takes its place.
+    In type = "angle" the opening is None: [angle] values takes its place.
     """
 
-    fibre: str | tuple[int, ...] = key(FIBRES)
-    centre: float = key(real(least=-360.0, most=360.0), default=0.0)
-    angle: float | None = key(real(least=0.0, most=360.0), only=("stiffness", "path"))
+    fibre: str | tuple[int, ...] = key(
+        FIBRES,
+        "Which fibres, in the order of the arrangement; of the hexagonal cell 1 is at the corners, 2 in the middle.",
+    )
+    centre: float = key(
+        real(least=-360.0, most=360.0),
+        "Direction of the middle of the arc, seen from the centre of the fibre, from x1 towards x2.",
+        unit="degrees",
+        default=0.0,
+    )
+    angle: float | None = key(
+        real(least=0.0, most=360.0),
+        "Whole opening of the arc, measured at the centre of the fibre. 0 is perfect bonding; at 360 nothing holds the "
+        "fibre, and its rigid motions are left out.",
+        unit="degrees",
+        only=ANALYSIS_TYPE.among("stiffness", "path"),
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
 class InterfaceSection:
-    """Bonding of fibres and matrix: what is debonded from the start, and the tractions that debond more.
+    """Bonding of fibres and matrix: what is debonded from the start, and the tractions that debond more. Without this
+    section bonding is perfect.
 
-    With `contact` debonded faces do not overlap. A strength of None is unlimited. `criterion`: a node breaks
-    when the larger ("max") or the root of the sum of squares ("quadratic") of traction / strength reaches 1.
+    A strength of None is unlimited.
     """
 
-    contact: bool = key(boolean, default=True)
-    debonded: tuple[Arc, ...] = key(ARCS, default=())
-    normal_strength: float | None = key(STRENGTH, default=None, only=("path",))
-    tangential_strength: float | None = key(STRENGTH, default=None, only=("path",))
-    criterion: str = key(choice("max", "quadratic"), default="max", only=("path",))
+    contact: bool = key(
+        boolean,
+        "true: debonded faces do not overlap, they touch without friction. false: they overlap freely.",
+        default=True,
+    )
+    debonded: tuple[Arc, ...] = key(
+        ARCS,
+        'What is debonded from the start; needed in type = "angle", and in type = "stiffness" unless the cell is a '
+        'mesh (there lines in a physical curve "debonded" are debonded too).',
+        default=(),
+    )
+    normal_strength: float | None = key(
+        STRENGTH,
+        "R^n: the normal traction at which a bond breaks. A force per area: it does not depend on the mesh.",
+        unit="stress",
+        default=None,
+        default_words="inf",
+        only=PATH_ANALYSIS,
+    )
+    tangential_strength: float | None = key(
+        STRENGTH,
+        "R^t: the tangential traction at which a bond breaks.",
+        unit="stress",
+        default=None,
+        default_words="inf",
+        only=PATH_ANALYSIS,
+    )
+    criterion: str = key(
+        choice("max", "quadratic"),
+        'A bond breaks when this reaches 1: "max": the larger of t_n / R^n and |t_t| / R^t; "quadratic": the root of '
+        "the sum of their squares. Compression never breaks a bond.",
+        default="max",
+        only=PATH_ANALYSIS,
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
 class Angle:
-    """Openings of the arcs in degrees, one after the other; without a strain, under the three unit strains."""
+    """Openings of the arcs, one after the other."""
 
-    values: tuple[float, ...] = key(OPENINGS)
-    strain: Strain | None = key(STRAIN, default=None)
+    values: tuple[float, ...] = key(OPENINGS, "Openings of all arcs of [interface] debonded.", unit="degrees")
+    strain: Strain | None = key(
+        STRAIN,
+        "Macroscopic strain, other than zero; by default the three unit strains, which give the effective stiffness.",
+        default=None,
+        default_words="unit strains",
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
 class LoadPath:
-    """Macroscopic strains [E11, E22, gamma12] that are gone through, straight from 0 to each waypoint.
+    """Macroscopic strains that are gone through, straight from zero to each waypoint. Give strain or waypoints."""
 
-    `strain` is a single waypoint. method = "events" finds each load factor at which a node breaks;
-    "increments" goes through the whole path in so many load steps and in each releases all nodes over their
-    strength, or the worst one, until none is over.
-    """
-
-    strain: Strain | None = key(STRAIN, default=None)
-    waypoints: tuple[Strain, ...] | None = key(WAYPOINTS, default=None)
-    method: str = key(choice("events", "increments"), default="events")
-    increments: int | None = key(integer(least=1, most=1_000_000), only=("increments",))
-    release: str = key(choice("all", "worst"), default="all", only=("increments",))
-    max_events: int = key(integer(least=1), default=100_000, only=("events",))
+    strain: Strain | None = key(STRAIN, "The strain at the end, other than zero: a single waypoint.", default=None)
+    waypoints: tuple[Strain, ...] | None = key(
+        WAYPOINTS, "Strains that are gone through one after the other; each differs from the one before.", default=None
+    )
+    method: str = key(
+        choice("events", "increments"),
+        '"events": every break at its exact load; "increments": equal load steps.',
+        default="events",
+    )
+    increments: int | None = key(
+        integer(least=1, most=1_000_000),
+        "Number of load steps of the whole path, at least one for each waypoint.",
+        only=BY_INCREMENTS,
+    )
+    release: str = key(
+        choice("all", "worst"),
+        'In a step "all" bonds over their strength break at once, or the "worst" first, until none is over.',
+        default="all",
+        only=BY_INCREMENTS,
+    )
+    max_events: int = key(
+        integer(least=1),
+        "Stop after so many events, with exit code 3; --resume with a higher number goes on.",
+        default=100_000,
+        only=BY_EVENTS,
+    )
 
     @property
     def targets(self) -> tuple[Strain, ...]:
@@ -144,25 +158,41 @@ class LoadPath:
 
 @dataclass(frozen=True, kw_only=True)
 class Decomposition:
-    """Into how many subdomains the bodies are cut, or the most unknowns of one; neither: by the ranks."""
+    """Into how many subdomains the bodies are cut. Give one of the two keys, or neither."""
 
-    subdomains: int | None = key(integer(least=1, most=1_000_000), default=None)
-    max_dofs: int | None = key(integer(least=100), default=None)
+    subdomains: int | None = key(
+        integer(least=1, most=1_000_000),
+        "Number of subdomains, at least that of the bodies; large bodies are cut to the fastest size.",
+        default=None,
+        default_words="automatic",
+    )
+    max_dofs: int | None = key(
+        integer(least=100),
+        "Bodies are cut such that no subdomain has many more unknowns than this.",
+        default=None,
+        default_words="automatic",
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
 class Output:
-    """What is written. The units are labels only; a deformation scale of None is chosen automatically.
+    """What is written and drawn."""
 
-    The stress component drawn is by default ("auto") that of the unit strain.
-    """
-
-    fields: bool = key(boolean, default=True)
-    pictures: bool = key(boolean, default=True)
-    stress: str = key(choice("auto", "S11", "S22", "S12"), default="auto")
-    deformation_scale: float | None = key(real(least=0.0), default=None)
-    length_unit: str = key(text, default="")
-    stress_unit: str = key(text, default="")
+    fields: bool = key(boolean, "Write result.h5 and result.xdmf.", default=True)
+    pictures: bool = key(boolean, "Draw the PNG files; without fields, the curves alone.", default=True)
+    stress: str = key(
+        choice("auto", "S11", "S22", "S12"),
+        'The component drawn; "auto": that of the unit strain.',
+        default="auto",
+    )
+    deformation_scale: float | None = key(
+        real(least=0.0),
+        "Factor of the displacements drawn; by default 1 under a given strain, and less under unit strains.",
+        default=None,
+        default_words="automatic",
+    )
+    length_unit: str = key(text, "A label, such as mm; nothing is converted.", default="")
+    stress_unit: str = key(text, "A label, such as GPa; nothing is converted.", default="")
 
 
 SECTIONS: dict[str, type[Any]] = {
@@ -174,3 +204,6 @@ SECTIONS: dict[str, type[Any]] = {
     "decomposition": Decomposition,
     "output": Output,
 }
+
+SECTIONS_OF_AN_ANALYSIS = {"angle": ANGLE_ANALYSIS, "path": PATH_ANALYSIS}
+"""Sections that must be given for one type of analysis, and belong to no other."""

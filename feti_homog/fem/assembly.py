@@ -13,12 +13,14 @@ import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 
 from feti_homog.cell.refinement import FineMesh
-from feti_homog.fem.macro_element import Macro, integrals, products
+from feti_homog.fem.macro_element import MacroElement, integrals, products
 from feti_homog.fem.shape_functions import gradients
 from feti_homog.typing import Float, Int, Int32
 
-_VOIGT = np.array([[0, 2], [2, 1]])
-_CHUNK = 1 << 16
+# Voigt number of the strain or stress component (i, k).
+VOIGT = np.array([[0, 2], [2, 1]])
+# Elements that are integrated at once: bounds the memory of their gradients, about 100 MB of quadratic ones.
+ELEMENTS_AT_ONCE = 1 << 16
 
 
 @dataclass(frozen=True)
@@ -39,7 +41,7 @@ class Assembly:
 
 def assemble(mesh: FineMesh, L: Float) -> Assembly:
     """Assemble the subdomain `mesh` of material `L` (3, 3)."""
-    macro, tensor = Macro.of(mesh.lattice), _tensor(L)
+    macro, tensor = MacroElement.of(mesh.lattice), _tensor(L)
     couples, loads = np.empty((len(mesh.nodes), len(macro.rows), 4)), np.empty((*mesh.nodes.shape, 2))
     area = 0.0
     for part in _parts(mesh):
@@ -49,14 +51,14 @@ def assemble(mesh: FineMesh, L: Float) -> Assembly:
     classes, n = mesh.node_class[mesh.nodes], mesh.n_classes
     load = np.stack([np.bincount(classes.ravel(), loads[..., k].ravel(), n) for k in range(2)], axis=1)
     # sum_k int dN/dx_k L[(i,k), :]
-    Q = np.einsum("ck,ikv->civ", load, L[_VOIGT]).reshape(-1, 3)
+    Q = np.einsum("ck,ikv->civ", load, L[VOIGT]).reshape(-1, 3)
     return Assembly(_sparse(couples, classes[:, macro.rows], classes[:, macro.columns], n), Q, area)
 
 
 def element_gradients(points: Float, triangles: Int32) -> Iterator[tuple[slice, Float, Float]]:
     """Gradients (e, q, a, 2) and weights (e, q) by chunks of elements, so that memory stays bounded."""
-    for first in range(0, len(triangles), _CHUNK):
-        part = slice(first, min(first + _CHUNK, len(triangles)))
+    for first in range(0, len(triangles), ELEMENTS_AT_ONCE):
+        part = slice(first, min(first + ELEMENTS_AT_ONCE, len(triangles)))
         yield part, *gradients(points[triangles[part]])
 
 
@@ -73,13 +75,13 @@ def element_strain(points: Float, triangles: Int32, node_class: Int32, u: Float)
 
 def _parts(mesh: FineMesh) -> Iterator[Int]:
     """Coarse triangles, affine and curved ones apart, in groups that keep memory bounded."""
-    most = max(1, _CHUNK // len(mesh.lattice.triangles))
+    most = max(1, ELEMENTS_AT_ONCE // len(mesh.lattice.triangles))
     for kind in (~mesh.curved, mesh.curved):
         members = np.flatnonzero(kind)
         yield from (members[first : first + most] for first in range(0, len(members), most))
 
 
-def _affine(macro: Macro, mesh: FineMesh, part: Int, tensor: Float) -> tuple[Float, Float, float]:
+def _affine(macro: MacroElement, mesh: FineMesh, part: Int, tensor: Float) -> tuple[Float, Float, float]:
     """Couples (t, p, 4), loads (t, q, 2) and area of affine coarse triangles: pulled back to the unit triangle."""
     g, w = gradients(mesh.points[mesh.nodes[part, :3]])
     # The last two of the three linear functions are the reference coordinates: inverse_rk = dr_r / dx_k.
@@ -88,7 +90,7 @@ def _affine(macro: Macro, mesh: FineMesh, part: Int, tensor: Float) -> tuple[Flo
     return macro.products @ (determinant * pulled), macro.integrals @ (determinant * inverse), float(w.sum())
 
 
-def _curved(macro: Macro, mesh: FineMesh, part: Int, tensor: Float) -> tuple[Float, Float, float]:
+def _curved(macro: MacroElement, mesh: FineMesh, part: Int, tensor: Float) -> tuple[Float, Float, float]:
     """The same of coarse triangles with curved edges, by integration over each of their elements."""
     elements = mesh.lattice.triangles
     g, w = gradients(mesh.points[mesh.nodes[part][:, elements].reshape(-1, elements.shape[1])])
@@ -97,7 +99,7 @@ def _curved(macro: Macro, mesh: FineMesh, part: Int, tensor: Float) -> tuple[Flo
 
 def _tensor(L: Float) -> Float:
     """(4, 4) that turns int dN_a/dx_k dN_b/dx_l into K_(a i)(b j), with (k, l) and (i, j) flat."""
-    tensor: Float = L[_VOIGT[:, :, None, None], _VOIGT[None, None]].transpose(1, 3, 0, 2).reshape(4, 4)
+    tensor: Float = L[VOIGT[:, :, None, None], VOIGT[None, None]].transpose(1, 3, 0, 2).reshape(4, 4)
     return tensor
 
 

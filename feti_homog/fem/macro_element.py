@@ -7,13 +7,13 @@ from functools import lru_cache
 
 import numpy as np
 
-from feti_homog.cell.refinement import Lattice
+from feti_homog.cell.refinement import ReferenceLattice
 from feti_homog.fem.shape_functions import gradients
 from feti_homog.typing import Float, Int
 
 
 @dataclass(frozen=True)
-class Fold:
+class GroupedSum:
     """Sums of the element matrices' entries of one coarse triangle that belong together.
 
     Attributes:
@@ -25,7 +25,7 @@ class Fold:
     first: Int
 
     @classmethod
-    def of(cls, target: Int) -> Fold:
+    def of(cls, target: Int) -> GroupedSum:
         """One sum for each value of `target`, which says where an entry belongs, in ascending order."""
         entries = np.argsort(target, axis=None, kind="stable")
         return cls(entries, np.unique(target.ravel()[entries], return_index=True)[1])
@@ -37,7 +37,7 @@ class Fold:
 
 
 @dataclass(frozen=True)
-class Macro:
+class MacroElement:
     """The lattice with q nodes as an element whose nodes couple in p ordered pairs, those that share an element.
 
     Attributes:
@@ -50,18 +50,18 @@ class Macro:
 
     rows: Int
     columns: Int
-    couples: Fold
-    nodes: Fold
+    couples: GroupedSum
+    nodes: GroupedSum
     products: Float
     integrals: Float
 
     @classmethod
     @lru_cache(maxsize=4)
-    def of(cls, lattice: Lattice) -> Macro:
+    def of(cls, lattice: ReferenceLattice) -> MacroElement:
         """The element of a lattice."""
         elements, q = lattice.triangles, len(lattice.nodes)
         pair = elements[:, :, None] * q + elements[:, None, :]
-        couples, nodes, each = Fold.of(pair), Fold.of(elements), np.unique(pair)
+        couples, nodes, each = GroupedSum.of(pair), GroupedSum.of(elements), np.unique(pair)
         g, w = gradients(lattice.nodes[elements][..., 1:] / lattice.intervals)
         return cls(each // q, each % q, couples, nodes, couples(products(g, w))[0], nodes(integrals(g, w))[0])
 
@@ -71,7 +71,7 @@ def products(g: Float, w: Float) -> Float:
     e, q, a, _ = g.shape
     flat = g.reshape(e, q, 2 * a)
     outer = np.matmul((flat * w[..., None]).transpose(0, 2, 1), flat)
-    return outer.reshape(e, a, 2, a, 2).transpose(0, 1, 3, 2, 4).reshape(e, a, a, 4)
+    return np.asarray(outer.reshape(e, a, 2, a, 2).transpose(0, 1, 3, 2, 4).reshape(e, a, a, 4))
 
 
 def integrals(g: Float, w: Float) -> Float:

@@ -13,12 +13,13 @@ from feti_homog.feti.coarse.adaptive import THRESHOLD, AdaptiveCoarseSpace
 from feti_homog.feti.coarse.natural import NaturalCoarseSpace
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.subdomain import Subdomain
-from feti_homog.feti.operators import interface_operators as boundaries
+from feti_homog.feti.operators.choice import KINDS
 from feti_homog.feti.operators.explicit import ExplicitInterfaceOperator
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.preconditioners.assembled_schur import shared_dofs
 from feti_homog.feti.preconditioners.influence import Influence
 from feti_homog.feti.preconditioners.scaled import Dirichlet, Identity, Lumped, Preconditioner
+from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 
 COARSE_SPACES = ("auto", "natural", "adaptive")
 PRECONDITIONERS = ("auto", "none", "lumped", "dirichlet", "influence")
@@ -28,7 +29,11 @@ MANY, LARGEST_BONDED, MOST_PRECRACKED = 1000, 40_000, 500
 
 
 def parts(
-    comm: MPI.Intracomm, jump_operator: JumpOperator, subdomains: Sequence[Subdomain], applications: int
+    comm: MPI.Intracomm,
+    jump_operator: JumpOperator,
+    subdomains: Sequence[Subdomain],
+    applications: int,
+    thresholds: Thresholds = DEFAULTS,
 ) -> tuple[InterfaceOperators, Preconditioner, NaturalCoarseSpace]:
     """What the options `feti_dual_operator`, `feti_pc_type` and `feti_coarse_*` name.  Collective.
 
@@ -36,14 +41,14 @@ def parts(
         CaseError: an option has no such value, or two exclude each other.
     """
     pc = _choice("pc_type", PRECONDITIONERS, "auto")
-    operator = _choice("dual_operator", boundaries.KINDS, "explicit" if pc == "influence" else "auto")
+    operator = _choice("dual_operator", KINDS, "explicit" if pc == "influence" else "auto")
     space = _choice("coarse_space", COARSE_SPACES, "auto")
     threshold = PETSc.Options("feti_").getReal("coarse_threshold", THRESHOLD)
     soft = space == "adaptive" or (space == "auto" and _cut(comm, subdomains))
-    boundary = InterfaceOperators(jump_operator, subdomains, operator, applications, soft)
+    boundary = InterfaceOperators(jump_operator, subdomains, operator, applications, soft, thresholds)
     condensed = [isinstance(o, ExplicitInterfaceOperator) for o in boundary.operators]
     dense = comm.allreduce(all(condensed), MPI.LAND)
-    examinable = comm.allreduce(all(np.logical_or(condensed, boundary.large)), MPI.LAND)
+    examinable = comm.allreduce(all(np.logical_or(condensed, boundary.facewise)), MPI.LAND)
     if pc == "influence" and not dense:
         raise CaseError("-feti_pc_type influence: needs -feti_dual_operator explicit")
     if pc == "auto":
@@ -53,7 +58,9 @@ def parts(
         raise CaseError("-feti_coarse_space adaptive: needs -feti_pc_type dirichlet, -feti_dual_operator not implicit")
     preconditioner = _preconditioner(pc, comm, jump_operator, boundary)
     if soft and examinable and isinstance(preconditioner, Dirichlet):
-        return boundary, preconditioner, AdaptiveCoarseSpace(comm, jump_operator, boundary, preconditioner, threshold)
+        replicated = thresholds.replicated_vectors
+        coarse = AdaptiveCoarseSpace(comm, jump_operator, boundary, preconditioner, threshold, replicated)
+        return boundary, preconditioner, coarse
     return boundary, preconditioner, NaturalCoarseSpace(comm, jump_operator, boundary)
 
 

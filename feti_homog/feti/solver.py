@@ -16,7 +16,7 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from feti_homog.cell.refinement import Lattice
+from feti_homog.cell.refinement import ReferenceLattice
 from feti_homog.common import process_memory
 from feti_homog.feti import factory, view
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
@@ -24,6 +24,7 @@ from feti_homog.feti.decomposition.shared_entities import SharedEntities
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.krylov import ActiveRows, Krylov
 from feti_homog.feti.operators.dual_operator import DualOperator
+from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 from feti_homog.typing import Float
 
 # What a coarse space that is accurate to too few digits can end in, and how often to go on from there with it.
@@ -70,14 +71,15 @@ class FetiSolver:
         comm: MPI.Intracomm,
         shared: SharedEntities,
         subdomains: Sequence[Subdomain],
-        lattice: Lattice,
+        lattice: ReferenceLattice,
         applications: int,
+        thresholds: Thresholds = DEFAULTS,
     ) -> None:
         """Set up; `applications` is how many times the dual operator is expected to be applied."""
         self.comm, self.subdomains = comm, subdomains
         self.jump_operator = JumpOperator(comm, shared, subdomains, lattice)
         self.boundary, self.preconditioner, self.coarse = factory.parts(
-            comm, self.jump_operator, subdomains, applications
+            comm, self.jump_operator, subdomains, applications, thresholds
         )
         self.operator = DualOperator(self.jump_operator, self.boundary)
         process_memory.trim()
@@ -114,12 +116,12 @@ class FetiSolver:
     @cached_property
     def loads(self) -> Float:
         """(boundary dofs, 3) Q there; inside the uniform bodies it vanishes."""
-        return self.Q[self.boundary.local]
+        return self.Q[self.boundary.local_dofs]
 
     @cached_property
     def _torn(self) -> Float:
         """(boundary dofs, 3) K+ (-Q), the torn cell under the unit strains."""
-        return self.boundary.flexibility(-self.loads)
+        return self.boundary.apply_flexibility(-self.loads)
 
     @cached_property
     def d(self) -> Float:

@@ -33,7 +33,7 @@ def setup(
             f"  soft modes below {coarse.threshold:g}: {counts.sum()}, at most {counts.max()} of a subdomain, "
             f"mean {counts.mean():.2f}"
         )
-        large = comm.allreduce(sum(boundary.large))
+        large = comm.allreduce(sum(boundary.facewise))
         lines += [f"  {large} examined face by face"] if large else []
     lines.append(f"  coarse dimension {coarse.vectors}, {coarse.vectors / len(sizes):.2f} a subdomain")
     return "\n".join(lines)

@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 from mpi4py import MPI
 
+from feti_homog.common.distributed_arrays import allreduce_sum
 from feti_homog.errors import ConvergenceError
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.operators.node_blocks import NodeBlocks
@@ -31,8 +32,10 @@ class Response:
         state: interface states, multipliers, jumps and amplitudes.
         u: (boundary dofs,) fluctuating displacement u* on the boundaries of this rank's subdomains.
         checks: relative errors of the laws: `strain` <eps> = E, Eq. (3), with the opening of debonded faces as
-            part of <eps>; `hill` <sigma:eps> = Sigma:E, Eq. (8); `jump`, the largest opening of a glued
-            node relative to the largest displacement; and the KKT certificate of contact.
+            part of <eps>; `hill` <sigma:eps> = Sigma:E, Eq. (8), relative to <sigma:eps> or, if that is less, to
+            what a bonded cell stores at least, E:<L^-1>^-1:E (Reuss), for a debonded one may store nothing;
+            `jump`, the largest opening of a glued node relative to the largest displacement, which does not
+            vanish where forces do; and the KKT certificate of contact.
         counts: numbers of `bonded`, `open` and `closed` interface nodes.
     """
 
@@ -50,7 +53,7 @@ class Homogenization:
 
     def __init__(self, cell: TornCell, contact: bool) -> None:
         self.cell = cell
-        self.interface = Interface(cell.solver, contact, np.array([cell.plan.width, cell.plan.height]))
+        self.interface = Interface(cell.solver, contact, np.array([cell.summary.width, cell.summary.height]))
 
     def respond(self, strains: Float, status: Status, starts: Sequence[Float]) -> list[Response]:
         """Solve the unit-cell problem under every strain of (k, 3) and average.  Collective.
@@ -61,12 +64,16 @@ class Homogenization:
             ConvergenceError: a solve broke down and left no numbers.
         """
         if self.interface.is_linear(status):
-            return [self._finite(state) for state in self.interface.equilibria(strains, status, starts)]
+            return [self._finite_response(state) for state in self.interface.equilibria(strains, status, starts)]
         pairs = zip(strains, starts, strict=True)
-        return [self._finite(self.interface.equilibrium(strain, status, start)) for strain, start in pairs]
+        return [self._finite_response(self.interface.equilibrium(strain, status, start)) for strain, start in pairs]
 
-    def _finite(self, state: Equilibrium) -> Response:
-        """The response of the state that was just found, unless it is no state."""
+    def _finite_response(self, state: Equilibrium) -> Response:
+        """The response of a state.
+
+        Raises:
+            ConvergenceError: its numbers are not finite.
+        """
         if not np.isfinite(state.solution.residual):
             raise ConvergenceError(
                 f"strain {state.solution.strain.tolist()}: the Krylov method broke down after {state.iterations} "
@@ -75,15 +82,16 @@ class Homogenization:
         return self.response(state, 1.0)
 
     def response(self, state: Equilibrium, scale: float) -> Response:
-        """`scale` times an equilibrium, averaged.  Collective."""
+        """The averages of `scale` times an equilibrium.  Collective."""
         cell, solver = self.cell, self.cell.solver
         strain, u = state.solution.strain, solver.boundary_displacement(state.solution)
         stress, star, energy = self._averages(strain, u)
         opening = cell.comm.allreduce(self._strain_of_jumps.T @ (state.solution.jump * (1 - solver.active.mask)))
+        least = float(strain @ self.interface.least_bonded_stiffness @ strain)
         largest = (self._largest(u) + self.interface.imposed(strain)) or 1.0
         checks = {
-            "strain": float(np.abs(star - opening / cell.plan.area).max() / (np.abs(strain).max() or 1.0)),
-            "hill": float(abs(energy - stress @ strain) / (abs(energy) or 1.0)),
+            "strain": float(np.abs(star - opening / cell.summary.area).max() / (np.abs(strain).max() or 1.0)),
+            "hill": float(abs(energy - stress @ strain) / (max(abs(energy), least) or 1.0)),
             "jump": self._largest(solver.active.mask * state.solution.jump) / largest,
         }
         counts = self.counts(state.status)
@@ -92,8 +100,8 @@ class Homogenization:
     def counts(self, status: Status) -> dict[str, int]:
         """Interface nodes in each state; collective."""
         numbers = np.array([(status == kind).sum() for kind in (BONDED, OPEN, CLOSED)])
-        total = self.cell.comm.allreduce(numbers)
-        return dict(zip(("bonded", "open", "closed"), total.tolist(), strict=True))
+        sums = self.cell.comm.allreduce(numbers)
+        return dict(zip(("bonded", "open", "closed"), sums.tolist(), strict=True))
 
     @cached_property
     def _strain_of_jumps(self) -> Float:
@@ -101,27 +109,26 @@ class Homogenization:
         solver = self.cell.solver
         B = solver.boundary.B
         unit = [np.linalg.solve(s.L, Q.T).T for s, Q in self._loads()]
-        summed = solver.jump_operator.sum(B @ np.concatenate([np.zeros((0, 3)), *unit]))
+        integrals = solver.jump_operator.sum(B @ np.concatenate([np.zeros((0, 3)), *unit]))
         gram = NodeBlocks(self.cell.comm, self.cell.solver.jump_operator, B @ B.T)
-        return np.asarray(gram.inverse(np.ones(gram.rows)) @ summed)
+        return np.asarray(gram.inverse(np.ones(gram.rows)) @ integrals)
 
     def _averages(self, E: Float, u: Float) -> tuple[Float, Float, float]:
         """<sigma>, <eps*> over the bodies, and <sigma:eps>; collective."""
-        cell, total = self.cell, np.zeros(7)
-        for (s, Q), span in zip(self._loads(), cell.solver.boundary.spans, strict=True):
+        cell, sums = self.cell, np.zeros(7)
+        for (s, Q), span in zip(self._loads(), cell.solver.boundary.slices, strict=True):
             from_u = Q.T @ u[span]
-            total[:3] += s.area * s.L @ E + from_u
-            total[3:6] += np.linalg.solve(s.L, from_u)
-            total[6] += s.area * E @ s.L @ E + 2 * E @ from_u
-        total[6] += u @ cell.solver.boundary.stiffness(u)
-        cell.comm.Allreduce(MPI.IN_PLACE, total)
-        total /= cell.plan.area
-        return total[:3], total[3:6], float(total[6])
+            sums[:3] += s.area * s.L @ E + from_u
+            sums[3:6] += np.linalg.solve(s.L, from_u)
+            sums[6] += s.area * E @ s.L @ E + 2 * E @ from_u
+        sums[6] += u @ cell.solver.boundary.apply_schur(u)
+        sums = allreduce_sum(cell.comm, sums) / cell.summary.area
+        return sums[:3], sums[3:6], float(sums[6])
 
     def _loads(self) -> list[tuple[Subdomain, Float]]:
         """The subdomains and their Q on the boundary dofs; inside a uniform body it vanishes."""
         solver = self.cell.solver
-        return [(s, solver.loads[span]) for s, span in zip(solver.subdomains, solver.boundary.spans, strict=True)]
+        return [(s, solver.loads[span]) for s, span in zip(solver.subdomains, solver.boundary.slices, strict=True)]
 
     def _largest(self, values: Float) -> float:
         """max |values| over all ranks."""
@@ -137,7 +144,7 @@ def displacement(cell: TornCell, strain: Float, u: Float) -> Float:
     """(nodes, 2) total displacement E y + u*, Eq. (14), at this rank's plane nodes."""
     E = np.array([[strain[0], strain[2] / 2], [strain[2] / 2, strain[1]]])
     points = np.concatenate([s.mesh.points for s in cell.subdomains] or [np.zeros((0, 2))])
-    return points @ E + fluctuation(cell, u)
+    return np.asarray(points @ E + fluctuation(cell, u))
 
 
 def fluctuation(cell: TornCell, u: Float) -> Float:

@@ -14,14 +14,18 @@ from math import ceil
 
 from feti_homog.config.case import Case
 
-START_SECONDS = 1.2  # Python, MPI, PETSc and gmsh
-MESH_SECONDS = 3.9e-5  # a coarse triangle, on rank 0
-SETUP_SECONDS = 9.5e-6  # a degree of freedom: assembling and factoring
-SUBDOMAIN_SECONDS = 5.2e-3  # a subdomain
-APPLY_SECONDS = 8.8e-8  # a degree of freedom in one application of operator and preconditioner
-BASE_BYTES = 2.1e8  # of a rank with nothing on it
-DOF_BYTES = 6.7e2
-DOFS_OF_A_RANK = 50_000  # fewer on a rank, and its waiting for others takes more than it saves
+# Seconds to start Python, MPI, PETSc and gmsh.
+START_SECONDS = 1.2
+# Seconds for each coarse triangle, on rank 0.
+MESH_SECONDS = 3.9e-5
+# Seconds for each degree of freedom to assemble and factor, and for each subdomain besides.
+SETUP_SECONDS, SUBDOMAIN_SECONDS = 9.5e-6, 5.2e-3
+# Seconds for each degree of freedom in one application of operator and preconditioner.
+APPLY_SECONDS = 8.8e-8
+# Bytes of a rank without degrees of freedom, and for each of these.
+BASE_BYTES, DOF_BYTES = 2.1e8, 6.7e2
+# Degrees of freedom of a rank; with fewer, its waiting for others takes more than it saves.
+DOFS_OF_A_RANK = 50_000
 # Typical numbers, by which a case is estimated and its operators are chosen.
 ITERATIONS_OF_A_SOLVE, SOLVES_OF_A_CONTACT, SOLVES_OF_A_PATH = 20, 3, 100
 
@@ -49,9 +53,9 @@ def applications(case: Case) -> int:
 def estimate(
     dofs: Sequence[int], subdomains: Sequence[int], coarse_triangles: int, bodies: int, applications: int
 ) -> Estimate:
-    """Of a case with `dofs` and `subdomains` on each rank, which applies its dual operator so many times.
+    """What a case takes with `dofs` and `subdomains` on each rank, which applies its dual operator so many times.
 
-    More ranks than bodies would cut bodies, which costs iterations.
+    As many ranks are suggested as there are bodies at most, for more would cut bodies, which costs iterations.
     """
     own = zip(dofs, subdomains, strict=True)
     slowest = max(n * (SETUP_SECONDS + applications * APPLY_SECONDS) + k * SUBDOMAIN_SECONDS for n, k in own)
@@ -62,7 +66,7 @@ def estimate(
     )
 
 
-def words(found: Estimate, n_ranks: int) -> list[str]:
+def estimate_lines(found: Estimate, n_ranks: int) -> list[str]:
     """An estimate for `n_ranks` ranks in two lines, each with a label of eleven columns."""
     size = found.memory / 2**20
     memory = f"{size:.0f} MiB" if size < 1000 else f"{size / 1024:.1f} GiB"
@@ -74,6 +78,7 @@ def words(found: Estimate, n_ranks: int) -> list[str]:
 
 
 def _rounded(seconds: float) -> str:
+    """A time in words, to two digits."""
     if seconds < 120:
         return f"{seconds:.2g} s"
     return f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.1f} h"

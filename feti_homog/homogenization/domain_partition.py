@@ -1,4 +1,4 @@
-"""The cut cell, on rank 0: from a case to its coarse mesh, and to the pieces of it that each rank gets."""
+"""The cut cell, on rank 0: from a case to its coarse mesh, and to the submeshes that each rank gets."""
 
 from __future__ import annotations
 
@@ -9,31 +9,62 @@ import numpy as np
 from feti_homog.cell.coarse_mesh import CoarseMesh
 from feti_homog.cell.fibre_centres import fibre_centres
 from feti_homog.cell.periodic_topology import Torus, edge_pairs
-from feti_homog.cell.refinement import Lattice
+from feti_homog.cell.refinement import ReferenceLattice
 from feti_homog.cell.submesh import Submesh, cut
 from feti_homog.config import case as cases
 from feti_homog.config.case import Case
 from feti_homog.errors import CaseError
 from feti_homog.feti.decomposition.partition import decompose, pieces_for_count, pieces_for_size
-from feti_homog.feti.decomposition.shared_entities import SharedEntities, share
+from feti_homog.feti.decomposition.shared_entities import SharedEntities, share_entities
 from feti_homog.interface import debonded_arcs
 from feti_homog.typing import Float, Int
 
-# Degrees of freedom of a piece that make set-up and solve fastest, unless there would be more than so many pieces: the
-# coarse problem grows faster than they do; a piece gets `NARROW` of its boundary to other bodies at most.  A body is
-# cut that is larger than a piece by a factor, or, where bonds break, whose boundary is too long for dense matrices.
-FASTEST, MOST, NARROW, LARGE, WIDE = 3000, 4000, 500, 2.5, 2500
-# Bodies of short boundary stay whole up to a larger factor, if they are no more than a fraction of a rank's load.
-LARGEST, FRACTION = 12.0, 1 / 16
 FIBRES_OF = {"square": 1, "hexagonal": 2}
 
 
 @dataclass(frozen=True)
-class Plan:
-    """What rank 0 tells every rank of the whole cell.
+class PartitionPolicy:
+    """Into how many pieces bodies are cut by default; sizes in degrees of freedom after refinement.
 
-    Fibre number 1 of the case file is the constituent `first_fibre`; `centres` (constituents, 2) are NaN where
-    there is none.
+    Attributes:
+        piece_dofs: of a piece; with smaller pieces the coarse problem takes longer, with larger ones the factors and
+            the dense matrices do.
+        max_pieces: of the whole cell, above which pieces are made larger than `piece_dofs`: the coarse problem grows
+            faster than they do.
+        piece_boundary_dofs: of a piece on the boundary to other bodies, at most; for pieces of narrow bodies.
+        cut_factor: a bonded body is cut if it is larger than a piece by this factor, or its boundary to other bodies is
+            than that of a piece.
+        even_cut_factor, even_share: instead of `cut_factor`, this one for bodies that are no more than this share of
+            the load of a rank, for they can be distributed evenly as they are.
+        breakable_boundary_dofs: where bonds may break, a body is cut only if its boundary has more: the cell is solved
+            so often then that whole bodies pay as long as dense matrices of their boundaries are small.
+
+    `scripts/benchmark scripts/cases/benchmark_1m.toml --tools feti` times the bonded ones, and `scripts/benchmark_path`
+    the last.
+    """
+
+    piece_dofs: int = 3000
+    max_pieces: int = 4000
+    piece_boundary_dofs: int = 500
+    cut_factor: float = 2.5
+    even_cut_factor: float = 12.0
+    even_share: float = 1 / 16
+    breakable_boundary_dofs: int = 2500
+
+
+DEFAULT_POLICY = PartitionPolicy()
+
+
+@dataclass(frozen=True)
+class CellSummary:
+    """What every rank knows of the whole cell.
+
+    Attributes:
+        width, height: periods.
+        phases: names of the material phases, the matrix first.
+        bodies, subdomains, coarse_triangles: numbers of them.
+        first_fibre: the constituent that is fibre number 1 of the case file.
+        centres: (constituents, 2) centre of each fibre, NaN where there is none.
     """
 
     width: float
@@ -56,9 +87,23 @@ class Plan:
         return self.width * self.height
 
 
+@dataclass(frozen=True)
+class RankShare:
+    """What one rank gets of the cut cell: its submeshes, and the entities that they share with others."""
+
+    summary: CellSummary
+    submeshes: list[Submesh]
+    shared: SharedEntities
+
+
 def coarse_mesh(case: Case) -> CoarseMesh:
-    """The coarse mesh that the case describes, its phases checked against the materials."""
-    # gmsh is loaded where it is used: only rank 0 has use for it.
+    """The coarse mesh that the case describes, its phases checked against the materials.
+
+    Raises:
+        CaseError: a phase has no material, or a material no phase.
+        MeshError: the cell cannot be meshed, or its mesh file is faulty.
+    """
+    # gmsh is imported on rank 0 alone, which is where this runs.
     if case.cell.file is not None:
         from feti_homog.cell.msh_reader import read
 
@@ -72,10 +117,14 @@ def coarse_mesh(case: Case) -> CoarseMesh:
     return mesh
 
 
-def deal(
-    case: Case, mesh: CoarseMesh, lattice: Lattice, n_ranks: int
-) -> list[tuple[Plan, list[Submesh], SharedEntities]]:
-    """For each rank: the plan, its pieces and the table of what they share with others."""
+def distribute(
+    case: Case, mesh: CoarseMesh, lattice: ReferenceLattice, n_ranks: int, policy: PartitionPolicy = DEFAULT_POLICY
+) -> list[RankShare]:
+    """Cut the cell into subdomains and share them among the ranks; one share for each rank.
+
+    Raises:
+        CaseError: an arc of the case lies on a fibre that cannot have it.
+    """
     torus = Torus.of(mesh)
     first_fibre = int(np.count_nonzero(torus.constituent_phase == 0))
     centres = fibre_centres(torus)
@@ -83,41 +132,58 @@ def deal(
     if faults:
         raise CaseError(*faults)
     parts = torus.constituent if case.cell.bodies == "torus" else torus.plane_parts()
-    wanted = wanted_pieces(case, np.bincount(parts), _outer_edges(torus, parts), lattice, n_ranks)
+    wanted = wanted_pieces(case, np.bincount(parts), _outer_edges(torus, parts), lattice, n_ranks, policy)
     decomposition = decompose(torus, parts, wanted, n_ranks)
-    pieces = list(cut(torus, decomposition.subdomain))
-    tables = share(torus, pieces, decomposition.rank, lattice.intervals - 1, n_ranks)
-    bodies = int(parts.max()) + 1
-    plan = Plan(mesh.width, mesh.height, mesh.phases, bodies, len(pieces), len(mesh.triangles), first_fibre, centres)
+    submeshes = list(cut(torus, decomposition.subdomain))
+    shared = share_entities(torus, submeshes, decomposition.rank, lattice.intervals - 1, n_ranks)
+    summary = CellSummary(
+        width=mesh.width,
+        height=mesh.height,
+        phases=mesh.phases,
+        bodies=int(parts.max()) + 1,
+        subdomains=len(submeshes),
+        coarse_triangles=len(mesh.triangles),
+        first_fibre=first_fibre,
+        centres=centres,
+    )
     own: list[list[Submesh]] = [[] for _ in range(n_ranks)]
-    for submesh, rank in zip(pieces, decomposition.rank, strict=True):
+    for submesh, rank in zip(submeshes, decomposition.rank, strict=True):
         own[rank].append(submesh)
-    return list(zip([plan] * n_ranks, own, tables, strict=True))
+    return [RankShare(summary, *share) for share in zip(own, shared, strict=True)]
 
 
-def wanted_pieces(case: Case, load: Int, edges: Int, lattice: Lattice, n_ranks: int) -> Int:
-    """Wanted pieces of each body of `load` coarse triangles and `edges` coarse edges to others.
+def wanted_pieces(
+    case: Case,
+    load: Int,
+    edges: Int,
+    lattice: ReferenceLattice,
+    n_ranks: int,
+    policy: PartitionPolicy = DEFAULT_POLICY,
+) -> Int:
+    """(b,) wanted pieces of each body: what the case says, else what the policy says; at least one for each rank.
 
-    As the case says; else large bodies are cut to the size that is fastest, and every rank gets a piece.
+    Args:
+        load: (b,) coarse triangles of each body.
+        edges: (b,) coarse edges that each body shares with others.
     """
-    wanted = case.decomposition
-    # A triangle of the lattice brings about M^2 / 2 nodes.
+    # A coarse triangle brings about M^2 / 2 nodes.
     dofs_of_triangle = lattice.intervals**2
-    if wanted.max_dofs is not None:
-        return pieces_for_size(load, dofs_of_triangle, wanted.max_dofs)
-    if wanted.subdomains is not None:
-        return pieces_for_count(load, wanted.subdomains)
-    # A debonding cell is solved so often that whole bodies pay, as long as their dense matrices are small.
-    size = max(FASTEST, int(load.sum()) * dofs_of_triangle // MOST)
+    if case.decomposition.max_dofs is not None:
+        return pieces_for_size(load, dofs_of_triangle, case.decomposition.max_dofs)
+    if case.decomposition.subdomains is not None:
+        return pieces_for_count(load, case.decomposition.subdomains)
+    all_dofs = int(load.sum()) * dofs_of_triangle
+    piece_dofs = max(policy.piece_dofs, all_dofs // policy.max_pieces)
     boundary = edges * 2 * lattice.intervals
-    share = int(load.sum()) * dofs_of_triangle / n_ranks
-    whole = max(LARGE * size, min(LARGEST * size, FRACTION * share))
-    large = (load * dofs_of_triangle > whole) | (boundary > LARGE * NARROW)
-    if case.interface is not None:
-        large = boundary > WIDE
-    by_size = pieces_for_size(load, dofs_of_triangle, size)
-    by_boundary = np.minimum(-(-boundary // NARROW), load)
-    pieces = np.where(large, np.maximum(by_size, by_boundary), 1)
+    if case.interface is None:
+        evenly_shared = min(policy.even_cut_factor * piece_dofs, policy.even_share * all_dofs / n_ranks)
+        largest = max(policy.cut_factor * piece_dofs, evenly_shared)
+        to_cut = (load * dofs_of_triangle > largest) | (boundary > policy.cut_factor * policy.piece_boundary_dofs)
+    else:
+        to_cut = boundary > policy.breakable_boundary_dofs
+    by_size = pieces_for_size(load, dofs_of_triangle, piece_dofs)
+    by_boundary = np.minimum(-(-boundary // policy.piece_boundary_dofs), load)
+    pieces = np.where(to_cut, np.maximum(by_size, by_boundary), 1)
     return pieces if pieces.sum() >= n_ranks else pieces_for_count(load, n_ranks)
 
 

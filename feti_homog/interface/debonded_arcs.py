@@ -9,8 +9,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from feti_homog.config.schema import shown
 from feti_homog.config.sections import Arc
+from feti_homog.config.wording import toml_value
 from feti_homog.typing import Bool, Float, Int
 
 # A node this near to a tip, in degrees, is the tip: coordinates in files and of circles are rounded.
@@ -69,7 +69,7 @@ def faults(arcs: Sequence[Arc], centres: Float) -> list[str]:
     for place, arc in enumerate(arcs):
         chosen = range(1, len(centres) + 1) if isinstance(arc.fibre, str) else arc.fibre
         written = arc.fibre if isinstance(arc.fibre, str) or len(arc.fibre) > 1 else arc.fibre[0]
-        line = f"[interface] debonded[{place}].fibre = {shown(written)}: "
+        line = f"[interface] debonded[{place}].fibre = {toml_value(written)}: "
         if max(chosen, default=0) > len(centres):
             found.append(f"{line}expected at most {len(centres)}; the cell has {len(centres)} fibres, counted from 1")
         winding = [number for number in chosen if number <= len(centres) and np.isnan(centres[number - 1, 0])]

@@ -2,58 +2,62 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from feti_homog.output.text.point_tables import sweep_failures
 from feti_homog.sweep import store
+from feti_homog.sweep.plan import SweepCase
 from feti_homog.sweep.report import figures, tables
-from feti_homog.sweep.report.statistics import Collected, outputs
-from feti_homog.sweep.store import BAD, DAMAGED, DONE, Index, State
+from feti_homog.sweep.report.outputs import outputs
+from feti_homog.sweep.report.sweep_table import SweepTable
+from feti_homog.sweep.store import CaseState, Status, SweepIndex
+from feti_homog.typing import Float
 
 
-def read(directory: Path) -> Collected:
+def read(directory: Path) -> SweepTable:
     """The table of a sweep's folder, of all its cases, finished or not.  On one rank.
 
     Raises:
         CaseError: it is no folder of a sweep, or its list of cases is damaged.
     """
-    index = store.read_index(directory)
-    return _collected(index, [store.state(directory, entry) for entry in index.entries])
+    return _table(*_index_and_states(directory))
 
 
 def collect(directory: Path, pictures: bool) -> list[str]:
-    """Write sweep.csv, sweep.h5 and the pictures to the folder; returns what to tell of it.  On one rank.
+    """Write sweep.csv, sweep.h5 and the pictures to the folder; returns the lines to print.  On one rank.
 
     Raises:
         CaseError: as `read`.
         FetiHomogError: a file cannot be written.
     """
-    index = store.read_index(directory)
-    states = [store.state(directory, entry) for entry in index.entries]
-    table = _collected(index, states)
+    index, states = _index_and_states(directory)
+    table = _table(index, states)
     paths = tables.write(directory, table)
     if pictures:
         paths += figures.plot(directory, table)
-    counts = {status: list(table.status).count(status) for status in dict.fromkeys(table.status)}
-    words = ", ".join(f"{count} {status}" for status, count in counts.items())
-    rows = [
-        (entry.folder, entry.words(index.stress_unit), state.reason)
+    counts = ", ".join(f"{count} {status}" for status, count in Counter(table.status).items())
+    failures = [
+        (entry.folder, entry.in_words(index.stress_unit), state.reason)
         for entry, state in zip(index.entries, states, strict=True)
-        if state.status in (*BAD, DAMAGED)
+        if state.status.is_failure or state.status is Status.DAMAGED
     ]
-    failures = sweep_failures(rows) if rows else []
-    return [f"{len(table.status)} cases: {words}", *failures, *map(str, paths)]
+    failure_lines = sweep_failures(failures) if failures else []
+    return [f"{len(table.status)} cases: {counts}", *failure_lines, *map(str, paths)]
 
 
-def _collected(index: Index, states: Sequence[State]) -> Collected:
-    documents = [state.document if state.status == DONE else None for state in states]
-    found = [{} if document is None else outputs(document) for document in documents]
-    columns = dict.fromkeys(name for row in found for name in row)
-    keys = dict.fromkeys(name for entry in index.entries for name in entry.inputs)
-    return Collected(
+def _index_and_states(directory: Path) -> tuple[SweepIndex, list[CaseState]]:
+    index = store.read_index(directory)
+    return index, [store.case_state(directory, entry) for entry in index.entries]
+
+
+def _table(index: SweepIndex, states: Sequence[CaseState]) -> SweepTable:
+    documents = [state.document if state.status is Status.DONE else None for state in states]
+    return SweepTable(
         name=index.name,
         stress_unit=index.stress_unit,
         folder=[entry.folder for entry in index.entries],
@@ -61,7 +65,19 @@ def _collected(index: Index, states: Sequence[State]) -> Collected:
         realisation=[entry.realisation for entry in index.entries],
         status=[state.status for state in states],
         reason=[state.reason for state in states],
-        inputs={name: [entry.inputs.get(name) for entry in index.entries] for name in keys},
-        outputs={name: np.array([row.get(name, np.nan) for row in found]) for name in columns},
+        inputs=_inputs(index.entries),
+        outputs=_columns([{} if document is None else outputs(document) for document in documents]),
         documents=documents,
     )
+
+
+def _inputs(entries: Sequence[SweepCase]) -> dict[str, list[Any]]:
+    """Of each key that varies its values in all cases, None where a case has none."""
+    names = dict.fromkeys(name for entry in entries for name in entry.inputs)
+    return {name: [entry.inputs.get(name) for entry in entries] for name in names}
+
+
+def _columns(rows: Sequence[Mapping[str, float]]) -> dict[str, Float]:
+    """Of each name its values in all rows, NaN where a row has none."""
+    names = dict.fromkeys(name for row in rows for name in row)
+    return {name: np.array([row.get(name, np.nan) for row in rows]) for name in names}

@@ -3,100 +3,29 @@
 from __future__ import annotations
 
 import sys
-import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from feti_homog.analysis.runner import run
-from feti_homog.common.file_locks import Busy, Lock
+from feti_homog.common.file_locks import Lock, LockHeld
 from feti_homog.common.mpi_errors import on_root, on_root_only, others_come
-from feti_homog.config.case import Case
-from feti_homog.errors import CaseError, ConvergenceError, FetiHomogError, MeshError
+from feti_homog.errors import CaseError, ConvergenceError, FetiHomogError
 from feti_homog.output.text.point_tables import sweep_failures, sweep_table
 from feti_homog.sweep import store
-from feti_homog.sweep.plan import Entry, Sweep
-from feti_homog.sweep.store import BAD, DAMAGED, DONE, LOCK, WAITING
+from feti_homog.sweep.case_runner import PEER_TIMEOUT_S, CaseRunner, Outcome
+from feti_homog.sweep.plan import Sweep
+from feti_homog.sweep.store import LOCK_FILE, CaseState, Status
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
 
-PATIENCE = 5.0  # seconds that a rank whose case failed waits for the others to say so too
-BUSY, COMPUTED = "busy", "computed"
 
-
-@dataclass(frozen=True)
-class Runner:
-    """Runs cases of one sweep on the ranks of `comm`; `retry` takes up failed ones, `quiet` tells of none."""
-
-    comm: Intracomm
-    directory: Path
-    retry: bool
-    quiet: bool
-
-    def run(self, entry: Entry, case: Case, total: int) -> tuple[str, str]:
-        """Run a case unless it is finished, failed before, or is somebody else's.  Collective.
-
-        Returns what was done (or found), and who has it if that is somebody else.  Raises FetiHomogError if the
-        folder cannot be written.
-        """
-        lock = Lock(self.directory / entry.folder / LOCK)
-        try:
-            found, words = on_root(self.comm, self._claim, lock, entry, case)
-            if found != COMPUTED:
-                return found, words
-            start = time.perf_counter()
-            status = self._compute(entry, case)
-            took = time.perf_counter() - start
-            self._say(f"{entry.folder} of {total}: {status}, {took:.2f} s; {entry.words(case.output.stress_unit)}")
-            return COMPUTED, ""
-        finally:
-            lock.release()
-
-    def _claim(self, lock: Lock, entry: Entry, case: Case) -> tuple[str, str]:
-        """Take the case's lock if it is to be run."""
-        folder = self.directory / entry.folder
-        try:
-            folder.mkdir(exist_ok=True)
-            lock.acquire()
-        except Busy as busy:
-            return BUSY, str(busy)
-        except OSError as error:
-            raise FetiHomogError(f"cannot make {folder}: {error.strerror}") from error
-        state = store.state(self.directory, entry, own=True)
-        if state.status == DONE or (state.status in BAD and not self.retry):
-            lock.release()
-            return state.status, state.reason
-        if state.status == DAMAGED:
-            self._say(f"{entry.folder}: {state.reason}; set aside, the case is computed again")
-        if state.status != WAITING:
-            store.forget(self.directory, entry, state.status)
-        store.begin(self.directory, entry, case)
-        return COMPUTED, ""
-
-    def _compute(self, entry: Entry, case: Case) -> str:
-        """Run a case and keep its error if it is the case's own.  Collective; returns its status in words."""
-        try:
-            run(case, self.directory / entry.folder, self.comm, quiet=True, resume=case.path is not None)
-            return DONE
-        except (CaseError, MeshError, ConvergenceError) as error:
-            if not others_come(self.comm, PATIENCE):
-                raise
-            on_root_only(self.comm, store.fail, self.directory, entry, error)
-            return f"failed ({error.faults[0]})"
-
-    def _say(self, line: str) -> None:
-        if self.comm.rank == 0 and not self.quiet:
-            print(line, flush=True)
-
-
-def listed(sweep: Sweep, directory: Path | None) -> list[str]:
+def list_cases(sweep: Sweep, directory: Path | None) -> list[str]:
     """The cases in a table, with their status if a folder is given.  On one rank."""
-    states = ["" if directory is None else store.state(directory, entry).status for entry in sweep.entries]
-    words = [entry.words(sweep.stress_unit) for entry in sweep.entries]
-    return sweep_table(list(zip([entry.folder for entry in sweep.entries], states, words, strict=True)))
+    statuses = ["" if directory is None else store.case_state(directory, entry).status for entry in sweep.entries]
+    inputs = [entry.in_words(sweep.stress_unit) for entry in sweep.entries]
+    return sweep_table(list(zip([entry.folder for entry in sweep.entries], statuses, inputs, strict=True)))
 
 
 def run_all(sweep: Sweep, directory: Path, comm: Intracomm, ranks_per_case: int, retry: bool, quiet: bool) -> None:
@@ -106,29 +35,24 @@ def run_all(sweep: Sweep, directory: Path, comm: Intracomm, ranks_per_case: int,
 
     Raises:
         CaseError: the folder cannot be used: it holds another sweep, or another process runs this one.
-        ConvergenceError: cases failed; they are told of.
+        ConvergenceError: cases failed; they are printed.
         FetiHomogError: a result could not be written; the finished ones are kept.
     """
     with _sweep_lock(directory, comm, sweep, shared=False):
         group = comm if ranks_per_case == comm.size else _group(comm, ranks_per_case)
         if retry:
-            on_root_only(comm, _forget_failures, directory, sweep)
-        runner = Runner(group, directory, False, quiet)
-        fault = _run_free(runner, sweep)
-        faults = [fault for fault in comm.allgather(fault) if fault is not None]
-        if faults:
-            kept = "finished cases are kept; the same command goes on with the others"
-            raise FetiHomogError(*dict.fromkeys(line for fault in faults for line in fault.faults), kept)
-    states = on_root(comm, lambda: [store.state(directory, entry) for entry in sweep.entries])
-    statuses = [state.status for state in states]
-    bad = [(entry, state.reason) for entry, state in zip(sweep.entries, states, strict=True) if state.status in BAD]
+            on_root_only(comm, _reset_failures, directory, sweep)
+        fault = _run_free_cases(CaseRunner(group, directory, False, quiet), sweep)
+        _raise_together(comm, fault)
+    states = on_root(comm, lambda: [store.case_state(directory, entry) for entry in sweep.entries])
     if comm.rank == 0 and not quiet:
-        print(f"{statuses.count(DONE)} of {len(states)} cases done in {directory}", flush=True)
-    if bad:
-        unit = sweep.stress_unit
+        done = sum(state.status is Status.DONE for state in states)
+        print(f"{done} of {len(states)} cases done in {directory}", flush=True)
+    failures = _failures(sweep, states)
+    if failures:
         if comm.rank == 0:
-            print(*sweep_failures([(e.folder, e.words(unit), reason) for e, reason in bad]), sep="\n", flush=True)
-        raise ConvergenceError(f"{len(bad)} of {len(states)} cases failed; --retry computes them again")
+            print(*sweep_failures(failures), sep="\n", flush=True)
+        raise ConvergenceError(f"{len(failures)} of {len(states)} cases failed; --retry computes them again")
 
 
 def run_one(sweep: Sweep, number: int, directory: Path, comm: Intracomm, retry: bool, quiet: bool) -> None:
@@ -143,33 +67,33 @@ def run_one(sweep: Sweep, number: int, directory: Path, comm: Intracomm, retry: 
         raise CaseError(f"--index {number}: expected the number of a case, 1 to {len(sweep.entries)}")
     entry, case = sweep.entries[number - 1], sweep.cases[number - 1]
     with _sweep_lock(directory, comm, sweep, shared=True):
-        found, words = Runner(comm, directory, retry, quiet).run(entry, case, len(sweep.entries))
-    if found == BUSY:
-        raise CaseError(f"--index {number}: {entry.folder} is being computed by {words}")
-    if found == DONE and comm.rank == 0 and not quiet:
+        outcome, holder = CaseRunner(comm, directory, retry, quiet).run(entry, case, len(sweep.entries))
+    if outcome is Outcome.HELD_ELSEWHERE:
+        raise CaseError(f"--index {number}: {entry.folder} is being computed by {holder}")
+    if outcome is Outcome.FINISHED_BEFORE and comm.rank == 0 and not quiet:
         print(f"{entry.folder} is finished: nothing to do", flush=True)
-    state = on_root(comm, store.state, directory, entry)
-    if state.status in BAD:
-        hint = "" if found == COMPUTED else "; it failed before, --retry computes it again"
-        raise ConvergenceError(f"{entry.folder} ({entry.words(sweep.stress_unit)}): {state.reason}{hint}")
+    state = on_root(comm, store.case_state, directory, entry)
+    if state.status.is_failure:
+        hint = "; it failed before, --retry computes it again" if outcome is Outcome.FAILED_BEFORE else ""
+        raise ConvergenceError(f"{entry.folder} ({entry.in_words(sweep.stress_unit)}): {state.reason}{hint}")
 
 
 def _group(comm: Intracomm, ranks: int) -> Any:
-    """This rank's group of so many neighbours."""
+    """This rank's group of so many neighbours.  Collective."""
     return comm.Split(comm.rank // ranks)
 
 
-def _run_free(runner: Runner, sweep: Sweep) -> FetiHomogError | None:
-    """Run whatever case is free until none is; returns what made the group stop before."""
-    took = True
+def _run_free_cases(runner: CaseRunner, sweep: Sweep) -> FetiHomogError | None:
+    """Run whatever case is free until none is; returns what made the group stop before.  Collective in the group."""
+    some_computed = True
     try:
-        while took:
-            took = False
+        while some_computed:
+            some_computed = False
             for entry, case in zip(sweep.entries, sweep.cases, strict=True):
-                found, _ = runner.run(entry, case, len(sweep.entries))
-                took = took or found == COMPUTED
+                outcome, _ = runner.run(entry, case, len(sweep.entries))
+                some_computed = some_computed or outcome is Outcome.COMPUTED
     except FetiHomogError as error:
-        if not others_come(runner.comm, PATIENCE):
+        if not others_come(runner.comm, PEER_TIMEOUT_S):
             raise
         if runner.comm.rank == 0:
             print(*error.faults, sep="\n", file=sys.stderr, flush=True)
@@ -177,28 +101,45 @@ def _run_free(runner: Runner, sweep: Sweep) -> FetiHomogError | None:
     return None
 
 
-def _forget_failures(directory: Path, sweep: Sweep) -> None:
+def _raise_together(comm: Intracomm, fault: FetiHomogError | None) -> None:
+    """Raises on all ranks the faults that made any group stop.  Collective."""
+    faults = [fault for fault in comm.allgather(fault) if fault is not None]
+    if faults:
+        kept = "finished cases are kept; the same command goes on with the others"
+        raise FetiHomogError(*dict.fromkeys(line for fault in faults for line in fault.faults), kept)
+
+
+def _failures(sweep: Sweep, states: Sequence[CaseState]) -> list[tuple[str, str, str]]:
+    """Folder, inputs and reason of each case that failed."""
+    return [
+        (entry.folder, entry.in_words(sweep.stress_unit), state.reason)
+        for entry, state in zip(sweep.entries, states, strict=True)
+        if state.status.is_failure
+    ]
+
+
+def _reset_failures(directory: Path, sweep: Sweep) -> None:
     for entry in sweep.entries:
-        state = store.state(directory, entry)
-        if state.status in BAD:
-            store.forget(directory, entry, state.status)
+        status = store.case_state(directory, entry).status
+        if status.is_failure:
+            store.reset(directory, entry, status)
 
 
 @contextmanager
 def _sweep_lock(directory: Path, comm: Intracomm, sweep: Sweep, shared: bool) -> Iterator[None]:
-    """The folder made and held: by one sweep, or by any number of single cases."""
-    lock = Lock(directory / LOCK, shared)
-    on_root(comm, _hold, lock, directory, sweep)
+    """The folder made and held: by one sweep, or by any number of single cases.  Collective."""
+    lock = Lock(directory / LOCK_FILE, shared)
+    on_root(comm, _prepare_and_lock, lock, directory, sweep)
     try:
         yield
     finally:
         lock.release()
 
 
-def _hold(lock: Lock, directory: Path, sweep: Sweep) -> None:
-    store.prepare(directory, sweep)
+def _prepare_and_lock(lock: Lock, directory: Path, sweep: Sweep) -> None:
+    store.prepare_folder(directory, sweep)
     try:
         lock.acquire()
-    except Busy as busy:
-        who = str(busy) if lock.shared else f"{busy} (or single cases of it)"
-        raise CaseError(f"--out {directory}: this sweep is being run by {who}") from busy
+    except LockHeld as holder:
+        who = str(holder) if lock.shared else f"{holder} (or single cases of it)"
+        raise CaseError(f"--out {directory}: this sweep is being run by {who}") from holder

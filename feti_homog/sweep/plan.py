@@ -2,27 +2,29 @@
 
 from __future__ import annotations
 
-import copy
 import hashlib
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from feti_homog.config import case as cases
-from feti_homog.config.case import SWEEP, Case
-from feti_homog.config.schema import shown
+from feti_homog.config.case import Case
+from feti_homog.config.document import read_document, to_document
+from feti_homog.config.sweep_section import SWEEP
+from feti_homog.config.wording import toml_value
 from feti_homog.errors import CaseError
 from feti_homog.output.text.units import unit
-from feti_homog.sweep.axes import Assignment, Settings, assignments, dotted
+from feti_homog.sweep.case_documents import CaseDocument, case_documents
+from feti_homog.sweep.points import read_points
 
-SHOWN = 4  # numbers of cases that a fault names
+MAX_NAMED_CASES = 4  # in one fault
 
 
 @dataclass(frozen=True)
-class Entry:
-    """One case of a sweep.
+class SweepCase:
+    """Which case of a sweep one is.
 
     Attributes:
         number: of the case, from 1.
@@ -42,9 +44,9 @@ class Entry:
     def folder(self) -> str:
         return f"case-{self.number:04d}"
 
-    def words(self, stress_unit: str) -> str:
+    def in_words(self, stress_unit: str) -> str:
         """The inputs in one line, with their units."""
-        values = [(f"{name} = {shown(value)}", unit(name, stress_unit)) for name, value in self.inputs.items()]
+        values = [(f"{name} = {toml_value(value)}", unit(name, stress_unit)) for name, value in self.inputs.items()]
         return ", ".join(f"{text} {own}".rstrip() for text, own in values)
 
 
@@ -53,7 +55,7 @@ class Sweep:
     """The cases of a sweep file; `cases[k]` is that of `entries[k]`."""
 
     name: str
-    entries: tuple[Entry, ...]
+    entries: tuple[SweepCase, ...]
     cases: tuple[Case, ...]
 
     @property
@@ -63,39 +65,42 @@ class Sweep:
 
 def load(path: str | Path) -> Sweep:
     """The sweep in a file.  Raises CaseError with all faults of the table [sweep], or else of all its cases."""
-    document = cases.read_document(path)
+    document = read_document(path)
     if SWEEP not in document:
         raise CaseError(f"{path}: [{SWEEP}]: missing section; `feti-homog run` runs a single case")
     return expand(document, Path(path).parent)
 
 
-def expand(document: Mapping[str, Any], folder: Path) -> Sweep:
-    """The sweep of a TOML document; its files are relative to `folder`.
+def expand(values: Mapping[str, Any], folder: Path) -> Sweep:
+    """The sweep of nested dictionaries with a table "sweep"; its files are relative to `folder`.
 
     All points come once before any comes in its next realisation, so that more realisations add cases at the end.
     Raises CaseError as `load` does.
     """
-    table, base = document[SWEEP], {name: value for name, value in document.items() if name != SWEEP}
+    document = to_document(values)
+    table = document.pop(SWEEP)
     if not isinstance(table, dict):
-        raise CaseError(f"{SWEEP} = {shown(table)}: expected a section [{SWEEP}]")
+        raise CaseError(f"{SWEEP} = {toml_value(table)}: expected a section [{SWEEP}]")
     faults: list[str] = []
-    points, settings = assignments(table, faults)
-    documents = [_document(base, point, faults) for point in points]
-    if settings.realisations is not None:
-        faults += _realisation_faults(documents, points)
-    faults += _repeated(points[0]) if points else []
+    points, settings = read_points(table, faults)
+    unchecked = case_documents(document, points, settings.realisations, faults)
     if faults:
         raise CaseError(*dict.fromkeys(faults))
-    name, found, wrong = str(base.get("name", "case")), [], dict[str, list[int]]()
-    for number, (entry, whole) in enumerate(_numbered(points, documents, settings), start=1):
+    return _checked(str(document.get("name", "case")), unchecked, folder)
+
+
+def _checked(name: str, unchecked: Sequence[CaseDocument], folder: Path) -> Sweep:
+    """The sweep of its documents.  Raises CaseError with the faults of all cases, each with the cases that have it."""
+    found, numbers_by_fault = [], dict[str, list[int]]()
+    for number, each in enumerate(unchecked, start=1):
         try:
-            case = cases.parse(whole | {"name": f"{name}-{number:04d}"}, folder)
-            found.append((Entry(number, *entry, _identity(case)), case))
+            case = cases.parse(each.document | {"name": f"{name}-{number:04d}"}, folder)
+            found.append((SweepCase(number, each.point, each.realisation, each.inputs, _identity(case)), case))
         except CaseError as error:
             for fault in error.faults:
-                wrong.setdefault(fault, []).append(number)
-    if wrong:
-        raise CaseError(*(f"{_numbers(numbers)}: {fault}" for fault, numbers in wrong.items()))
+                numbers_by_fault.setdefault(fault, []).append(number)
+    if numbers_by_fault:
+        raise CaseError(*(f"{_case_names(numbers)}: {fault}" for fault, numbers in numbers_by_fault.items()))
     entries, checked = zip(*found, strict=True)
     return Sweep(name, entries, checked)
 
@@ -109,71 +114,8 @@ def _identity(case: Case) -> str:
     return identity_of(case.digest(), case.petsc)
 
 
-def _document(base: Mapping[str, Any], point: Assignment, faults: list[str]) -> dict[str, Any]:
-    """The base with the values of a point; a table is merged into the section that it is a value of."""
-    document = copy.deepcopy(dict(base))
-    for path, value in point.items():
-        table = document
-        for name in path[:-1]:
-            table = table.setdefault(name, {})
-            if not isinstance(table, dict):
-                faults.append(f"[{SWEEP}] {dotted(path)}: {shown(name)} is no section")
-                return document
-        last = path[-1]
-        if isinstance(value, dict) and isinstance(table.get(last, {}), dict):
-            table[last] = table.get(last, {}) | value
-        else:
-            table[last] = value
-    return document
-
-
-def _realisation_faults(documents: list[dict[str, Any]], points: list[Assignment]) -> list[str]:
-    line = f"[{SWEEP}] realisations: "
-    faults = []
-    if not any(map(_is_random, documents)):
-        faults.append(f'{line}only cells with geometry = "random" have several')
-    if any("cell.seed" in _inputs(point) for point in points):
-        faults.append(f"{line}excludes cell.seed, the first of which is that of [cell]")
-    return faults
-
-
-def _repeated(point: Assignment) -> list[str]:
-    """Faults of keys that vary by themselves and within a table too."""
-    given = [key for path, value in point.items() for key in _inputs({path: value})]
-    return [f"[{SWEEP}] {key}: given twice" for key in dict.fromkeys(given) if given.count(key) > 1]
-
-
-def _is_random(document: Mapping[str, Any]) -> bool:
-    cell = document.get("cell")
-    return isinstance(cell, dict) and cell.get("geometry") == "random"
-
-
-def _inputs(point: Assignment) -> dict[str, Any]:
-    """The values of a point by dotted key, tables taken apart."""
-    inputs: dict[str, Any] = {}
-    for path, value in point.items():
-        parts = {(*path, name): part for name, part in value.items()} if isinstance(value, dict) else {path: value}
-        inputs |= {dotted(key): part for key, part in parts.items()}
-    return inputs
-
-
-def _numbered(
-    points: list[Assignment], documents: list[dict[str, Any]], settings: Settings
-) -> Iterator[tuple[tuple[int, int, dict[str, Any]], dict[str, Any]]]:
-    """Point, realisation and inputs of each case, and its document."""
-    for realisation in range(1, (settings.realisations or 1) + 1):
-        for point, (assignment, document) in enumerate(zip(points, documents, strict=True), start=1):
-            inputs, whole = _inputs(assignment), document
-            if settings.realisations is not None and _is_random(document):
-                first = document["cell"].get("seed", 0)
-                inputs["cell.seed"] = first + realisation - 1 if isinstance(first, int) else first
-                whole = document | {"cell": document["cell"] | {"seed": inputs["cell.seed"]}}
-            elif realisation > 1:
-                continue
-            yield (point, realisation, inputs), whole
-
-
-def _numbers(numbers: list[int]) -> str:
+def _case_names(numbers: list[int]) -> str:
     """Which cases, in words."""
-    few = ", ".join(f"case-{number:04d}" for number in numbers[:SHOWN])
-    return few if len(numbers) <= SHOWN else f"{few} and {len(numbers) - SHOWN} more"
+    names = ", ".join(f"case-{number:04d}" for number in numbers[:MAX_NAMED_CASES])
+    rest = len(numbers) - MAX_NAMED_CASES
+    return names if rest <= 0 else f"{names} and {rest} more"

@@ -14,44 +14,64 @@ import json
 import shutil
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
 import tomli_w
 
 from feti_homog import __version__
-from feti_homog.common.file_locks import Busy, Lock, is_held
+from feti_homog.common.file_locks import Lock, LockHeld, is_locked
 from feti_homog.config.case import Case
 from feti_homog.errors import CaseError, FetiHomogError
 from feti_homog.output.files import atomic, checkpoint, result_json
-from feti_homog.sweep.plan import Entry, Sweep, identity_of
+from feti_homog.sweep.plan import Sweep, SweepCase, identity_of
 
-INDEX, TABLE, ERROR, CASE, LOCK = "sweep.json", "cases.csv", "error.txt", "case.toml", "lock"
-DONE, UNCONVERGED, FAILED, DAMAGED, RUNNING, WAITING = (
-    "done", "not converged", "failed", "damaged", "running", "waiting",
+INDEX_FILE, TABLE_FILE, ERROR_FILE, CASE_FILE, LOCK_FILE = (
+    "sweep.json", "cases.csv", "error.txt", "case.toml", "lock",
 )  # fmt: skip
-BAD = (UNCONVERGED, FAILED)
+INDEX_LOCK_FILE, INDEX_LOCK_TIMEOUT_S = "index.lock", 30.0
+
+
+class Status(StrEnum):
+    """How far a case has come.
+
+    UNCONVERGED has a result that its checks refuse, FAILED an error instead; DAMAGED has a result that cannot be
+    read or is of another case; WAITING has neither.
+    """
+
+    DONE = "done"
+    UNCONVERGED = "not converged"
+    FAILED = "failed"
+    DAMAGED = "damaged"
+    RUNNING = "running"
+    WAITING = "waiting"
+
+    @property
+    def is_failure(self) -> bool:
+        """Whether the case was computed in vain; --retry computes it again."""
+        return self in (Status.UNCONVERGED, Status.FAILED)
 
 
 @dataclass(frozen=True)
-class State:
+class CaseState:
     """How far a case has come, why it did not come further, and its result.json if that is there."""
 
-    status: str
+    status: Status
     reason: str = ""
     document: dict[str, Any] | None = None
 
 
 @dataclass(frozen=True)
-class Index:
+class SweepIndex:
     """What sweep.json says."""
 
     name: str
     stress_unit: str
-    entries: tuple[Entry, ...]
+    entries: tuple[SweepCase, ...]
 
 
-def prepare(directory: Path, sweep: Sweep) -> None:
+def prepare_folder(directory: Path, sweep: Sweep) -> None:
     """Make the folder of a sweep, or find that it is already that, perhaps with fewer cases.  On one rank.
 
     Raises:
@@ -62,68 +82,76 @@ def prepare(directory: Path, sweep: Sweep) -> None:
         directory.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise CaseError(f"--out {directory}: cannot be made: {error.strerror}") from error
-    if _known(directory) == sweep.entries:
+    if _existing_entries(directory) == sweep.entries:
         return
     try:
-        with Lock(directory / "index.lock", patience=30.0):
-            known = _known(directory)
+        with Lock(directory / INDEX_LOCK_FILE, timeout=INDEX_LOCK_TIMEOUT_S):
+            known = _existing_entries(directory)
             _refuse_another(directory, known, sweep.entries)
             if known != sweep.entries:
-                atomic.replace_text(directory / TABLE, _table(sweep.entries))
+                atomic.replace_text(directory / TABLE_FILE, _table(sweep.entries))
                 document = {"version": __version__, "name": sweep.name, "stress_unit": sweep.stress_unit}
                 entries = [asdict(entry) for entry in sweep.entries]
-                atomic.replace_text(directory / INDEX, json.dumps(document | {"cases": entries}, indent=1) + "\n")
-    except Busy as busy:
-        raise CaseError(f"--out {directory}: {busy} has been writing its list of cases for long") from busy
+                atomic.replace_text(directory / INDEX_FILE, json.dumps(document | {"cases": entries}, indent=1) + "\n")
+    except LockHeld as error:
+        raise CaseError(f"--out {directory}: {error} has been writing its list of cases for long") from error
 
 
-def _known(directory: Path) -> tuple[Entry, ...]:
-    return read_index(directory).entries if (directory / INDEX).exists() else ()
+def _existing_entries(directory: Path) -> tuple[SweepCase, ...]:
+    return read_index(directory).entries if (directory / INDEX_FILE).exists() else ()
 
 
-def read_index(directory: Path) -> Index:
+def read_index(directory: Path) -> SweepIndex:
     """The cases of a sweep's folder.  Raises CaseError if it is none."""
-    path = directory / INDEX
+    path = directory / INDEX_FILE
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
-        entries = tuple(Entry(**entry) for entry in document["cases"])
-        return Index(document["name"], document["stress_unit"], entries)
+        entries = tuple(SweepCase(**entry) for entry in document["cases"])
+        return SweepIndex(document["name"], document["stress_unit"], entries)
     except OSError as error:
         raise CaseError(f"{path}: cannot be read: {error.strerror}; expected the folder of a sweep") from error
     except (ValueError, KeyError, TypeError) as error:
         raise CaseError(f"{path} is damaged: {error}; move it away and start the sweep again") from error
 
 
-def state(directory: Path, entry: Entry, own: bool = False) -> State:
-    """How far a case has come; with `own`, for the holder of its lock: never "running".  On one rank."""
+def case_state(directory: Path, entry: SweepCase) -> CaseState:
+    """How far a case has come; RUNNING while another process holds its lock.  On one rank."""
+    state = stored_state(directory, entry)
+    is_open = state.status in (Status.WAITING, Status.FAILED)
+    return CaseState(Status.RUNNING) if is_open and is_locked(directory / entry.folder / LOCK_FILE) else state
+
+
+def stored_state(directory: Path, entry: SweepCase) -> CaseState:
+    """How far a case has come by its files alone, as the holder of its lock needs it.  On one rank."""
     folder = directory / entry.folder
     try:
         if (folder / result_json.NAME).exists():
-            document = result_json.read(folder)
-            identity = identity_of(document["digest"], document["case"]["petsc"])
-            if identity != entry.identity:
-                return State(DAMAGED, f"{folder / result_json.NAME} is of another case")
-            return State(document["status"], "; ".join(document["faults"]), document)
-    except (FetiHomogError, KeyError, TypeError) as error:
-        return State(DAMAGED, f"{folder / result_json.NAME} is no readable result: {error}")
-    if not own and is_held(folder / LOCK):
-        return State(RUNNING)
-    if (folder / ERROR).exists():
-        return State(FAILED, "; ".join((folder / ERROR).read_text(encoding="utf-8").splitlines()))
-    return State(WAITING)
+            return _result_state(folder, entry)
+    except (FetiHomogError, KeyError, TypeError, ValueError) as error:
+        return CaseState(Status.DAMAGED, f"{folder / result_json.NAME} is no readable result: {error}")
+    if (folder / ERROR_FILE).exists():
+        return CaseState(Status.FAILED, "; ".join((folder / ERROR_FILE).read_text(encoding="utf-8").splitlines()))
+    return CaseState(Status.WAITING)
 
 
-def begin(directory: Path, entry: Entry, case: Case) -> None:
+def _result_state(folder: Path, entry: SweepCase) -> CaseState:
+    document = result_json.read(folder)
+    if identity_of(document["digest"], document["case"]["petsc"]) != entry.identity:
+        return CaseState(Status.DAMAGED, f"{folder / result_json.NAME} is of another case")
+    return CaseState(Status(document["status"]), "; ".join(document["faults"]), document)
+
+
+def write_case_file(directory: Path, entry: SweepCase, case: Case) -> None:
     """Write the file of a case that is to be computed.  On one rank.
 
     Raises:
         FetiHomogError: the folder cannot be written.
     """
     document = {name: table for name, table in case.resolved().items() if table != {}}
-    atomic.replace_text(directory / entry.folder / CASE, tomli_w.dumps(document))
+    atomic.replace_text(directory / entry.folder / CASE_FILE, tomli_w.dumps(document))
 
 
-def forget(directory: Path, entry: Entry, status: str) -> None:
+def reset(directory: Path, entry: SweepCase, status: Status) -> None:
     """Make a case that failed or is damaged one that waits; an unusable result.json is set aside.  On one rank.
 
     Raises:
@@ -131,7 +159,7 @@ def forget(directory: Path, entry: Entry, status: str) -> None:
     """
     folder = directory / entry.folder
     try:
-        (folder / ERROR).unlink(missing_ok=True)
+        (folder / ERROR_FILE).unlink(missing_ok=True)
         shutil.rmtree(folder / checkpoint.FOLDER, ignore_errors=True)
         if (folder / result_json.NAME).exists():
             atomic.rename(folder / result_json.NAME, folder / f"{result_json.NAME}.{status.replace(' ', '_')}")
@@ -139,17 +167,17 @@ def forget(directory: Path, entry: Entry, status: str) -> None:
         raise FetiHomogError(f"cannot write {folder}: {error.strerror}") from error
 
 
-def fail(directory: Path, entry: Entry, error: FetiHomogError) -> None:
+def write_error(directory: Path, entry: SweepCase, error: FetiHomogError) -> None:
     """Keep why a case failed.  On one rank.  Raises FetiHomogError if it cannot be written."""
     lines = [f"{type(error).__name__}: {fault}" for fault in error.faults]
-    atomic.replace_text(directory / entry.folder / ERROR, "\n".join(lines) + "\n")
+    atomic.replace_text(directory / entry.folder / ERROR_FILE, "\n".join(lines) + "\n")
 
 
-def _refuse_another(directory: Path, known: Sequence[Entry], wanted: Sequence[Entry]) -> None:
+def _refuse_another(directory: Path, known: Sequence[SweepCase], wanted: Sequence[SweepCase]) -> None:
     """Raises CaseError unless the known cases are the first of those wanted."""
     for old, new in zip(known, wanted, strict=False):
         if old != new:
-            words = f"its {old.folder} ({old.words('')}) differs from that of this file ({new.words('')})"
+            words = f"its {old.folder} ({old.in_words('')}) differs from that of this file ({new.in_words('')})"
             raise CaseError(f"--out {directory} holds another sweep: {words}; choose another folder")
     if len(known) > len(wanted):
         raise CaseError(
@@ -158,7 +186,7 @@ def _refuse_another(directory: Path, known: Sequence[Entry], wanted: Sequence[En
         )
 
 
-def _table(entries: Sequence[Entry]) -> str:
+def _table(entries: Sequence[SweepCase]) -> str:
     names = list(dict.fromkeys(name for entry in entries for name in entry.inputs))
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")

@@ -10,8 +10,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from support import ROOT, environment
-from sweeps import CASE, FAILING, FAILING_POINTS, rows, sweep_file
+from support.jobs import ROOT, environment
+from support.sweep_files import CASE, FAILING, FAILING_POINTS, rows, sweep_file
 
 SCRIPTS = sorted([*(ROOT / "scripts/slurm").iterdir(), *(ROOT / "scripts/pbs").iterdir()])
 TWO = "cell.fibre_fraction = [0.2, 0.3]\n"
@@ -86,7 +86,7 @@ def submitted(scheduler, script, *words, code=0):
 
 
 @pytest.mark.parametrize("path", SCRIPTS, ids=lambda path: f"{path.parent.name}/{path.name}")
-def test_text(path):
+def test_batch_scripts_are_sound_bash(path):
     subprocess.run(["bash", "-n", path], check=True)
     shellcheck = Path(sys.executable).with_name("shellcheck")
     found = str(shellcheck) if shellcheck.exists() else shutil.which("shellcheck")
@@ -97,7 +97,7 @@ def test_text(path):
 
 
 @pytest.mark.parametrize("kind", ["slurm", "pbs"])
-def test_options_stand_at_the_top(kind):
+def test_options_of_the_scheduler_stand_at_the_top(kind):
     for path in (path for path in SCRIPTS if path.parent.name == kind and path.name != "submit_sweep"):
         lines = path.read_text().splitlines()
         options = [k for k, line in enumerate(lines) if re.match(r"#(SBATCH|PBS) -", line)]
@@ -105,7 +105,7 @@ def test_options_stand_at_the_top(kind):
 
 
 @pytest.mark.parametrize(("kind", "submit", "launcher"), [("slurm", "sbatch", "srun"), ("pbs", "qsub", "mpirun")])
-def test_a_sweep_as_an_array(tmp_path, scheduler, kind, submit, launcher):
+def test_a_sweep_is_an_array_of_its_cases(tmp_path, scheduler, kind, submit, launcher):
     out = tmp_path / "out"
     path = sweep_file(tmp_path, FAILING_POINTS, FAILING)
     job, notes = submitted(scheduler, ROOT / f"scripts/{kind}/submit_sweep", path, out)
@@ -126,7 +126,7 @@ def test_a_faulty_sweep_is_not_submitted(tmp_path, scheduler, kind):
     assert "case-0002: [cell] fibre_fraction" in job.stderr and not notes
 
 
-def test_a_single_case(tmp_path, scheduler):
+def test_a_single_case_is_run_with_its_options(tmp_path, scheduler):
     path, words = sweep_file(tmp_path, "", CASE), ["--resume-not"]
     _, notes = submitted(scheduler, ROOT / "scripts/slurm/case", path, tmp_path / "slurm", "-feti_ksp_rtol", "1e-6")
     assert notes[-1].startswith("srun") and notes[-1].endswith("-feti_ksp_rtol 1e-6")

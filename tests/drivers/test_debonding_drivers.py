@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.image import imread
-from support import mpirun
+from reference import references
+from support.jobs import mpirun
 
-# Fully debonded without contact: a cell with holes.  Fourier solutions, plane strain: C11, C12, C33.
-BONDED, VOID = (149.690255, 56.975975, 46.357140), (36.123857, 14.523762, 10.800047)
+BONDED, VOID = references.BONDED["hexagonal", "strain"].value, references.VOID["hexagonal"].value
 
 
 def driven(name: str, folder: Path, *options: str) -> list[dict[str, str]]:
@@ -30,7 +30,7 @@ def column(rows: list[dict[str, str]], name: str) -> np.ndarray:
     return np.array([float(row[name]) for row in rows])
 
 
-def test_debonding_angle(tmp_path):
+def test_stiffness_falls_with_the_angle_from_bonded_to_void(tmp_path):
     rows = driven("debonding_angle", tmp_path)
     assert column(rows, "angle").tolist() == [0.0, 90.0, 180.0, 270.0, 360.0]
     for entry in ("L11", "L22", "L33"):
@@ -47,7 +47,7 @@ def test_debonding_angle(tmp_path):
     assert (column(rows, "S11 with contact")[2:] < -0.1).all() and (column(rows, "S22 with contact")[2:] < -0.1).all()
 
 
-def test_deformed_cell(tmp_path):
+def test_contact_prevents_overlap_and_stiffens(tmp_path):
     free, contact = driven("deformed_cell", tmp_path)
     assert float(contact["S12"]) > float(free["S12"]) > 0.0
     assert int(free["closed"]) == 0 < int(contact["closed"])
@@ -55,7 +55,7 @@ def test_deformed_cell(tmp_path):
     assert float(contact["largest overlap"]) < 1e-7 < 1e-3 < float(free["largest overlap"])
 
 
-def test_stress_strain(tmp_path):
+def test_onset_is_proportional_to_strength_and_no_point_is_above_the_bonded_line(tmp_path):
     rows = driven("stress_strain", tmp_path)
     strengths = sorted({(row["Rn"], row["Rt"]) for row in rows})
     assert len(strengths) == 2
@@ -74,7 +74,7 @@ def test_stress_strain(tmp_path):
     assert onset[high] / onset[low] == pytest.approx(high / low, rel=1e-6)
 
 
-def test_pictures_of_every_case(tmp_path):
+def test_every_case_of_a_driver_has_its_pictures(tmp_path):
     driven("stress_strain", tmp_path, "--fields")
     folder = tmp_path / "Rn_5_Rt_5"
     for name in ("path", "path_states", "interface", "cell"):

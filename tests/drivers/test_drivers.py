@@ -6,10 +6,10 @@ import re
 
 import pytest
 from matplotlib.image import imread
-from support import ROOT, mpirun
+from support.jobs import ROOT, mpirun
 
 
-def test_effective_stiffness(tmp_path):
+def test_effective_stiffness_prints_errors_below_2e_5(tmp_path):
     job = mpirun(2, ROOT / "drivers/effective_stiffness.py", "--out", tmp_path, "--fractions", "0.2", "0.4")
     assert job.returncode == 0, job.stderr
     rows = re.findall(r"^(square|hexagonal) +(strain|stress) (.*)$", job.stdout, re.MULTILINE)
@@ -21,7 +21,7 @@ def test_effective_stiffness(tmp_path):
 
 
 @pytest.mark.parametrize("ranks", [1, 4])
-def test_iterations(tmp_path, ranks):
+def test_iterations_prints_a_row_for_every_refinement(tmp_path, ranks):
     words = ["--out", tmp_path, "--refine", "0", "1", "--mesh-size", "0.1"]
     job = mpirun(ranks, ROOT / "drivers/iterations.py", *words)
     assert job.returncode == 0, job.stderr
@@ -31,7 +31,7 @@ def test_iterations(tmp_path, ranks):
 
 
 @pytest.mark.parametrize("driver", ["effective_stiffness", "iterations"])
-def test_help_and_faults(tmp_path, driver):
+def test_help_ends_with_0_and_faults_with_2(tmp_path, driver):
     job = mpirun(2, ROOT / f"drivers/{driver}.py", "--help")
     assert job.returncode == 0 and job.stdout.count("usage:") == 1
     job = mpirun(2, ROOT / f"drivers/{driver}.py", "--out", tmp_path / "new", "--mesh-size", "7")

@@ -8,8 +8,8 @@ import sys
 import time
 
 import pytest
-from commands import case_file, command_line
-from support import mpirun
+from support.command_line import case_file, command_line
+from support.jobs import mpirun
 from unit.cell.faulty_meshes import FAULTY_MESHES
 from unit.config.faulty_cases import FAULTY_CASES
 
@@ -54,7 +54,7 @@ def assert_refused(job, expected, out):
 
 @pytest.mark.parametrize("ranks", [1, 2])
 @pytest.mark.parametrize("name", CASES)
-def test_faulty_case(tmp_path, name, ranks):
+def test_faulty_cases_end_with_2_and_write_nothing(tmp_path, name, ranks):
     content, expected = FAULTY_CASES[name]
     (tmp_path / "cell.toml").write_text(content)
     job = command_line(ranks, "run", tmp_path / "cell.toml", "--out", tmp_path / "results")
@@ -63,7 +63,7 @@ def test_faulty_case(tmp_path, name, ranks):
 
 @pytest.mark.parametrize("ranks", [1, 2])
 @pytest.mark.parametrize("name", ["hanging", "not periodic, right", "inverted", "no matrix"])
-def test_faulty_mesh(tmp_path, name, ranks):
+def test_faulty_meshes_end_with_2_and_write_nothing(tmp_path, name, ranks):
     write, message = FAULTY_MESHES[name]
     write(tmp_path / "faulty.msh")
     path = case_file(tmp_path)
@@ -83,19 +83,19 @@ def test_faulty_mesh(tmp_path, name, ranks):
     ],
 )
 @pytest.mark.parametrize("ranks", [1, 2])
-def test_mistyped_option(tmp_path, ranks, option, message):
+def test_mistyped_options_end_with_2(tmp_path, ranks, option, message):
     job = command_line(ranks, "run", case_file(tmp_path), "--out", tmp_path / "results", "--quiet", *option)
     assert_refused(job, [message], tmp_path / "results")
 
 
-def test_mistyped_option_of_the_case(tmp_path):
+def test_mistyped_options_of_the_case_end_with_2(tmp_path):
     path = case_file(tmp_path, "[petsc]\nfeti_ksp_rtoll = 1e-3\n")
     job = command_line(2, "run", path, "--out", tmp_path / "results", "--quiet")
     assert_refused(job, ["feti_ksp_rtoll"], tmp_path / "results")
 
 
 @pytest.mark.parametrize("ranks", [1, 2])
-def test_folder_that_is_a_file(tmp_path, ranks):
+def test_a_file_in_the_place_of_the_folder_is_left_alone(tmp_path, ranks):
     out = tmp_path / "results"
     out.write_text("mine")
     for folder in (out, out / "deeper"):
@@ -134,7 +134,7 @@ def test_a_folder_that_another_run_writes_to(tmp_path, ranks):
 
 
 @pytest.mark.parametrize("ranks", [1, 2])
-def test_not_converging(tmp_path, ranks):
+def test_no_convergence_ends_with_3_and_keeps_what_was_computed(tmp_path, ranks):
     out = tmp_path / "results"
     job = command_line(ranks, "run", case_file(tmp_path), "--out", out, "-feti_ksp_max_it", "2")
     assert job.returncode == 3
@@ -147,14 +147,14 @@ def test_not_converging(tmp_path, ranks):
 
 @pytest.mark.parametrize("ranks", [1, 2, 4])
 @pytest.mark.parametrize("application", [1, 3], ids=["outside PETSc", "inside PETSc's callback"])
-def test_rank_that_raises(tmp_path, ranks, application):
+def test_a_rank_that_raises_ends_the_job_with_its_traceback(tmp_path, ranks, application):
     job = sabotaged(tmp_path, ranks, application, "raise ArithmeticError('lost my way')")
     assert job.returncode not in (0, 2, 3)
     assert "Traceback" in job.stderr and "ArithmeticError: lost my way" in job.stderr
     assert f"rank {ranks - 1} of {ranks}:" in job.stderr
 
 
-def test_rank_that_is_killed(tmp_path):
+def test_a_rank_that_is_killed_ends_the_job(tmp_path):
     assert sabotaged(tmp_path, 2, 3, "os.kill(os.getpid(), signal.SIGKILL)").returncode != 0
 
 

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from commands import command_line
-from processes import kill_when, started
+from support.background_jobs import kill_when, started
+from support.command_line import command_line
 
 CASE = """\
 [cell]
@@ -97,7 +97,7 @@ def interrupted(tmp_path_factory):
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_killed_again_and_again(tmp_path, reference, seed):
+def test_a_path_killed_again_and_again_ends_as_one_left_in_peace(tmp_path, reference, seed):
     chance, case, out = random.Random(seed), case_file(tmp_path), tmp_path / "out"
     expected, last = document(reference), 0
     for _ in range(3):
@@ -117,7 +117,7 @@ def test_killed_again_and_again(tmp_path, reference, seed):
 
 
 @pytest.mark.parametrize("path", [INCREMENTS, LATER_LEGS], ids=["increments", "later legs"])
-def test_other_paths(tmp_path, path):
+def test_paths_of_every_kind_resume(tmp_path, path):
     case = case_file(tmp_path, strain=path)
     assert command_line(2, "run", case, "--out", tmp_path / "whole").returncode == 0
     kept = killed(case, tmp_path / "out", 8, 0.0)
@@ -134,7 +134,7 @@ def test_a_finished_run_is_left_alone(tmp_path, reference):
     assert before == {path.name: path.stat().st_mtime_ns for path in reference.iterdir()}
 
 
-def test_no_checkpoint_and_no_resume(tmp_path, interrupted):
+def test_without_checkpoint_or_resume_a_run_begins_anew(tmp_path, interrupted):
     job = command_line(2, "run", case_file(tmp_path), "--out", tmp_path / "new", "--resume")
     assert job.returncode == 0 and "there is no checkpoint" in job.stdout
     shutil.copytree(interrupted, tmp_path / "old")
@@ -151,7 +151,7 @@ def test_no_checkpoint_and_no_resume(tmp_path, interrupted):
         (2, {r"\[output\]": "[decomposition]\nsubdomains = 4\n\n[output]"}, "is of another run"),
     ],
 )
-def test_foreign_checkpoints(tmp_path, interrupted, ranks, changes, message):
+def test_checkpoints_of_another_case_are_refused(tmp_path, interrupted, ranks, changes, message):
     shutil.copytree(interrupted, tmp_path / "out")
     text = CASE
     for old, new in changes.items():
@@ -166,7 +166,7 @@ def test_foreign_checkpoints(tmp_path, interrupted, ranks, changes, message):
 
 
 @pytest.mark.parametrize("damage", ["truncated", "garbage", "missing"])
-def test_unreadable_checkpoints(tmp_path, interrupted, damage):
+def test_unreadable_checkpoints_are_refused(tmp_path, interrupted, damage):
     shutil.copytree(interrupted, tmp_path / "out")
     path = tmp_path / "out" / "checkpoint" / "000002.h5"
     if damage == "missing":
@@ -179,7 +179,7 @@ def test_unreadable_checkpoints(tmp_path, interrupted, damage):
 
 
 def test_only_paths_resume(tmp_path):
-    from commands import case_file as stiffness_case
+    from support.command_line import case_file as stiffness_case
 
     job = command_line(1, "run", stiffness_case(tmp_path), "--out", tmp_path / "out", "--resume")
     assert job.returncode == 2 and '--resume: only for [analysis] type = "path"' in job.stderr

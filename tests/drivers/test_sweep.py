@@ -3,62 +3,28 @@
 from __future__ import annotations
 
 import json
-import os
-import shutil
 import signal
 import subprocess
 import sys
-import tempfile
 import tomllib
 from functools import partial
 from pathlib import Path
 
 import pytest
-from commands import command_line
 from matplotlib.image import imread
-from processes import kill_when, started, wait_until
-from support import ROOT, RUN_VARIABLES, mpirun
-from sweeps import CASE, FAILING, FAILING_POINTS, RANDOM, rows, sweep_file
+from support.background_jobs import kill_when, started, wait_until
+from support.command_line import command_line
+from support.jobs import ROOT
+from support.sweep_files import CASE, FAILING, FAILING_POINTS, RANDOM, rows, sweep_file
+from support.sweep_runs import TWO, collected, contents, results, swept
 
 import feti_homog.output  # noqa: F401 (chooses the build of h5py)
 
-TWO = "cell.fibre_fraction = [0.2, 0.3]\n"
 FORTY = "cell.fibre_fraction = {from = 0.1, to = 0.4, count = 20}\nmaterial.fibre.young = [150.0, 200.0]\n"
-
-LIMITED = """
-import resource, sys
-from mpi4py import MPI
-from feti_homog import cli
-resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, {limit}))
-sys.exit(cli.main(sys.argv[1:]))
-"""
-
-
-def results(out: Path) -> dict[str, int]:
-    """When each result was written."""
-    return {str(path.relative_to(out)): path.stat().st_mtime_ns for path in out.glob("case-*/result.json")}
-
-
-def contents(out: Path) -> dict[Path, bytes]:
-    """Of all files but the locks."""
-    return {path: path.read_bytes() for path in out.rglob("*") if path.is_file() and "lock" not in path.name}
-
-
-def swept(out: Path, path: Path, *words: str, ranks: int = 1, code: int = 0):
-    job = command_line(ranks, "sweep", path, "--out", out, *words)
-    assert job.returncode == code, job.stdout + job.stderr
-    assert "Traceback" not in job.stderr
-    return job
-
-
-def collected(out: Path):
-    job = command_line(0, "collect", out)
-    assert job.returncode == 0, job.stderr
-    return job
 
 
 @pytest.mark.parametrize(("ranks", "words"), [(0, []), (1, []), (2, []), (4, ["--ranks-per-case", "2"])])
-def test_sweep(tmp_path, ranks, words):
+def test_a_sweep_writes_every_case_at_any_number_of_ranks(tmp_path, ranks, words):
     out = tmp_path / "new" / "sweep"
     job = swept(out, sweep_file(tmp_path, TWO), *words, ranks=ranks)
     assert "2 of 2 cases done" in job.stdout and job.stdout.count("cell.fibre_fraction = 0.3") == 1
@@ -84,7 +50,7 @@ def test_the_case_files_run_by_themselves(tmp_path):
     assert found[0]["effective_stiffness"] == found[1]["effective_stiffness"]
 
 
-def test_list(tmp_path):
+def test_list_tells_cases_and_their_state(tmp_path):
     path, out = sweep_file(tmp_path, TWO + "material.matrix.young = [80.0]\n"), tmp_path / "out"
     job = command_line(2, "sweep", path, "--list")
     assert job.stdout.splitlines() == [
@@ -106,13 +72,13 @@ def test_list(tmp_path):
         (["--list", "--index", "1"], "not allowed with argument"),
     ],
 )
-def test_faulty_commands(tmp_path, words, message):
+def test_faulty_commands_end_with_2_and_write_nothing(tmp_path, words, message):
     job = command_line(2, "sweep", sweep_file(tmp_path, TWO), *words)
     assert job.returncode == 2 and job.stderr.count(message) == 1
     assert not Path(ROOT / "results/none").exists()
 
 
-def test_faults_of_all_points_before_anything_runs(tmp_path):
+def test_faults_of_all_points_are_told_before_anything_runs(tmp_path):
     path = sweep_file(tmp_path, "cell.fibre_fraction = [0.2, 0.95, 0.99]\n")
     for words in (["sweep", path, "--out", tmp_path / "out"], ["check", path]):
         job = command_line(2, *words)
@@ -128,7 +94,7 @@ def test_a_sweep_is_not_run_as_a_case_nor_a_case_as_a_sweep(tmp_path):
     assert job.returncode == 2 and "`feti-homog run` runs a single case" in job.stderr
 
 
-def test_check_of_a_sweep(tmp_path):
+def test_check_tells_cases_points_and_ranks(tmp_path):
     job = command_line(2, "check", sweep_file(tmp_path, "realisations = 3\n" + TWO, RANDOM))
     assert job.returncode == 0 and "6 cases, 2 points" in job.stdout and "would suit it" in job.stdout
 
@@ -152,7 +118,7 @@ def test_failed_cases_are_kept_and_told(tmp_path, ranks):
     assert [row["status"] for row in rows(out)][:3] == ["done", "failed", "done"]
 
 
-def test_not_converged_and_retried(tmp_path):
+def test_cases_without_convergence_are_computed_again_by_retry_only(tmp_path):
     out, path = tmp_path / "out", sweep_file(tmp_path, TWO)
     job = swept(out, path, "-feti_ksp_max_it", "2", code=3)
     assert job.stdout.count("no convergence after 2 iterations") >= 2
@@ -165,7 +131,7 @@ def test_not_converged_and_retried(tmp_path):
     assert (out / "case-0001/result.json.not_converged").exists() and not (out / "case-0001/error.txt").exists()
 
 
-def test_killed_in_the_middle(tmp_path):
+def test_a_killed_sweep_goes_on_to_the_same_table(tmp_path):
     """kill -9 twice: no finished case is computed again, and the table is that of a sweep left in peace."""
     path, whole, out = sweep_file(tmp_path, FORTY), tmp_path / "whole", tmp_path / "out"
     swept(whole, path)
@@ -185,7 +151,7 @@ def test_killed_in_the_middle(tmp_path):
     assert rows(out) == rows(whole) and len(rows(out)) == 40 * 5
 
 
-def test_two_sweeps_in_one_folder(tmp_path):
+def test_a_second_sweep_in_the_folder_is_refused_while_the_first_runs(tmp_path):
     """The second is refused while the first runs, even for one case; the first is not disturbed."""
     path, out = sweep_file(tmp_path, FORTY), tmp_path / "out"
     first = started(0, "sweep", path, "--out", out)
@@ -201,7 +167,7 @@ def test_two_sweeps_in_one_folder(tmp_path):
     assert first.wait(60) == 0 and len(results(out)) == 40
 
 
-def test_another_sweep_in_the_folder(tmp_path):
+def test_the_folder_of_another_sweep_is_refused(tmp_path):
     out = tmp_path / "out"
     swept(out, sweep_file(tmp_path, TWO))
     before = contents(out)
@@ -212,7 +178,7 @@ def test_another_sweep_in_the_folder(tmp_path):
     assert before == contents(out)
 
 
-def test_more_realisations_go_on(tmp_path):
+def test_more_realisations_keep_those_that_are_there(tmp_path):
     out = tmp_path / "out"
     swept(out, sweep_file(tmp_path, "realisations = 2\n" + TWO, RANDOM))
     before = results(out)
@@ -222,7 +188,7 @@ def test_more_realisations_go_on(tmp_path):
     assert "it has 6 cases, this file 4" in job.stderr
 
 
-def test_indices_at_the_same_time(tmp_path):
+def test_jobs_of_an_array_share_the_folder_but_no_case(tmp_path):
     """Different cases of an array share the folder; the same one twice does not."""
     path, out = sweep_file(tmp_path, TWO, CASE + "[petsc]\nfeti_ksp_rtol = 1e-9\n"), tmp_path / "out"
     jobs = [started(0, "sweep", path, "--out", out, "--index", str(k)) for k in (1, 2)]
@@ -242,87 +208,12 @@ def test_indices_at_the_same_time(tmp_path):
     swept(out, path, "--index", "1")
 
 
-@pytest.mark.parametrize("damage", ["truncated", "garbage", "foreign"])
-def test_a_corrupt_result(tmp_path, damage):
-    out, path = tmp_path / "out", sweep_file(tmp_path, TWO)
-    swept(out, path)
-    result = out / "case-0002/result.json"
-    content = {
-        "truncated": result.read_bytes()[:500], "garbage": os.urandom(500),
-        "foreign": (out / "case-0001/result.json").read_bytes(),
-    }[damage]  # fmt: skip
-    result.write_bytes(content)
-    job = collected(out)
-    assert "1 done, 1 damaged" in job.stdout and "case-0002/result.json is" in job.stdout
-    assert [row["status"] for row in rows(out)][:2] == ["done", "damaged"]
-    job = swept(out, path)
-    assert "case-0002: " in job.stdout and "set aside, the case is computed again" in job.stdout
-    assert (out / "case-0002/result.json.damaged").read_bytes() == content
-    assert "2 done" in collected(out).stdout
-
-
-def test_a_damaged_list_of_cases(tmp_path):
-    out, path = tmp_path / "out", sweep_file(tmp_path, TWO)
-    swept(out, path)
-    (out / "sweep.json").write_text('{"cases": [')
-    for words in (["sweep", path, "--out", out], ["collect", out]):
-        job = command_line(1, *words)
-        assert job.returncode == 2 and "sweep.json is damaged" in job.stderr and "Traceback" not in job.stderr
-    assert len(results(out)) == 2
-
-
-@pytest.mark.parametrize("limit", [1500, 200])
-def test_a_full_disk(tmp_path, limit):
-    """No file may be longer than the limit: below 1500 bytes no result can be written, below 200 not even the list."""
-    out, path, script = tmp_path / "out", sweep_file(tmp_path, TWO), tmp_path / "limited.py"
-    script.write_text(LIMITED.format(limit=limit))
-    job = mpirun(0, script, "sweep", path, "--out", out, timeout=60)
-    assert job.returncode == 1 and "Traceback" not in job.stderr, job.stderr
-    assert "cannot write" in job.stderr and "File too large" in job.stderr
-    assert not results(out) and not list(out.rglob("*.part"))
-    swept(out, path)
-    assert len(results(out)) == 2
-
-
-def test_a_full_disk_while_collecting(tmp_path):
-    out, script = tmp_path / "out", tmp_path / "limited.py"
-    swept(out, sweep_file(tmp_path, TWO))
-    collected(out)
-    before = (out / "sweep.csv").read_bytes()
-    script.write_text(LIMITED.format(limit=300))
-    job = mpirun(0, script, "collect", out, timeout=60)
-    assert job.returncode == 1 and "cannot write" in job.stderr and "Traceback" not in job.stderr
-    assert (out / "sweep.csv").read_bytes() == before
-
-
-def test_an_unwritable_folder(tmp_path):
-    """As a user who may not write: root may everywhere."""
-    folder = Path(tempfile.mkdtemp())
-    try:
-        folder.chmod(0o755)
-        path, program = sweep_file(folder, TWO), ["-m", "feti_homog", "sweep"]
-        user = {"user": 65534, "group": 65534} if os.geteuid() == 0 else {}
-        if not user:
-            folder.chmod(0o555)
-        words = [sys.executable, *program, path, "--out", folder / "out"]
-        environment = {"PATH": os.environ["PATH"], "HOME": "/nonexistent", "MPLCONFIGDIR": "/tmp"} | RUN_VARIABLES
-        job = subprocess.run(
-            list(map(str, words)), cwd=ROOT, env=environment, text=True, capture_output=True, timeout=60, **user
-        )
-        assert job.returncode == 2, job.stderr
-        assert f"--out {folder / 'out'}: expected a folder that can be written to" in job.stderr
-        assert not (folder / "out").exists()
-    finally:
-        folder.chmod(0o755)
-        shutil.rmtree(folder)
-
-
-def test_collect_of_nothing(tmp_path):
+def test_collect_needs_the_folder_of_a_sweep(tmp_path):
     job = command_line(1, "collect", tmp_path)
     assert job.returncode == 2 and "expected the folder of a sweep" in job.stderr
 
 
-def test_collect(tmp_path):
+def test_collect_writes_tables_and_pictures(tmp_path):
     import h5py
 
     out = tmp_path / "out"

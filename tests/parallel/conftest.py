@@ -8,7 +8,7 @@ import pytest
 @pytest.fixture(scope="module")
 def narrow():
     """The narrow cell at the default threshold."""
-    from narrow_cells import Narrow
+    from support.coarse_space_cells import Narrow
 
     from feti_homog.feti.coarse.adaptive import THRESHOLD
 

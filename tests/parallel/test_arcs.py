@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cells import FIBRE, MATRIX
 from petsc4py import PETSc
-from support import parallel_assert
+from support.cases import FIBRE, MATRIX
+from support.ranks import parallel_assert
 from unit.cell.faulty_meshes import ALL_SIDES, RIGHT_SIDE, grid
 
 from feti_homog.cell.arrangement import arrange
@@ -41,7 +41,7 @@ def torn(case, comm):
     """The torn cell; number, direction and state of all interface nodes by the opening, on every rank."""
     PETSc.garbage_cleanup(comm)
     cell = tear(case, comm, Progress(comm, quiet=True))
-    number = cell.solver.jump_operator.nodes.fibre - cell.plan.first_fibre + 1
+    number = cell.solver.jump_operator.nodes.fibre - cell.summary.first_fibre + 1
 
     def nodes(opening=None):
         parts = comm.allgather((number, cell.directions, cell.debonded(opening)))
@@ -70,7 +70,7 @@ def check(comm, case, nodes, cell, arcs, opening=None):
     """Tips are bonded nodes, and a chain of e edges of M intervals has e M - 1 debonded nodes."""
     number, direction, state = nodes(opening)
     edges = comm.bcast(edges_inside(case, arcs) if comm.rank == 0 else None)
-    for fibre in range(1, len(cell.plan.centres) - cell.plan.first_fibre + 1):
+    for fibre in range(1, len(cell.summary.centres) - cell.summary.first_fibre + 1):
         own = number == fibre
         for centre, angle in arcs.get(fibre, []):
             for tip in (centre - angle / 2, centre + angle / 2):
@@ -88,11 +88,11 @@ def check(comm, case, nodes, cell, arcs, opening=None):
 def test_tips_are_nodes_and_stay_bonded(comm, cell, mesh, bodies):
     case = case_of(cell | mesh | {"bodies": bodies}, [ARC])
     cell, nodes = torn(case, comm)
-    fibres = len(cell.plan.centres) - cell.plan.first_fibre
+    fibres = len(cell.summary.centres) - cell.summary.first_fibre
     check(comm, case, nodes, cell, {fibre: [(0.0, 60.0)] for fibre in range(1, fibres + 1)})
 
 
-def test_several_arcs_on_chosen_fibres(comm):
+def test_several_arcs_debond_the_chosen_fibres_only(comm):
     arcs = [
         {"fibre": [1, 4], "angle": 40.0, "centre": 200.0},
         {"fibre": 4, "angle": 30.0},
@@ -129,7 +129,7 @@ def test_a_tip_beside_a_crossing_is_the_crossing(comm):
 
 @pytest.mark.parametrize("bodies", ["torus", "plane"])
 @pytest.mark.parametrize(("order", "refine"), [(1, 0), (2, 0), (2, 1)])
-def test_debonded_curve_of_a_mesh(comm, shared_path, order, refine, bodies):
+def test_the_debonded_curve_of_a_mesh_is_debonded(comm, shared_path, order, refine, bodies):
     cell = {"geometry": "mesh", "file": "grid.msh", "order": order, "refine": refine, "bodies": bodies}
     for lines, vertices in ((RIGHT_SIDE, 1), (ALL_SIDES, 8)):
         if comm.rank == 0:
@@ -144,7 +144,7 @@ def test_debonded_curve_of_a_mesh(comm, shared_path, order, refine, bodies):
         comm.barrier()
 
 
-def test_curve_and_arcs_go_together(comm, shared_path):
+def test_a_debonded_curve_and_arcs_add_up(comm, shared_path):
     if comm.rank == 0:
         grid().with_curve(RIGHT_SIDE).write(shared_path / "grid.msh")
     comm.barrier()
@@ -167,7 +167,7 @@ def test_without_an_interface_section_all_is_bonded(comm, shared_path):
     comm.barrier()
 
 
-def test_arcs_of_fibres_that_are_not_there(comm):
+def test_arcs_of_fibres_that_are_not_there_are_refused(comm):
     arcs = [{"fibre": [1, 7], "angle": 60.0}, {"fibre": 6, "angle": 60.0}, {"fibre": 5, "angle": 60.0}]
     with pytest.raises(CaseError) as caught:
         tear(case_of(RANDOM, arcs), comm, Progress(comm, quiet=True))
@@ -177,7 +177,7 @@ def test_arcs_of_fibres_that_are_not_there(comm):
     assert second == f"[interface] debonded[1].fibre = 6: {expected}"
 
 
-def test_arcs_of_a_fibre_without_centre(comm, shared_path):
+def test_arcs_of_a_fibre_without_centre_are_refused(comm, shared_path):
     if comm.rank == 0:
         grid(lambda x, y: abs(y - 0.5) < 0.25).write(shared_path / "grid.msh")
     comm.barrier()

@@ -4,26 +4,28 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import bonds
 import numpy as np
 import pytest
-from cells import make_case, relative_error, solve
 from mpi4py import MPI
-from reference.dense_feti import DualTwin, boundary_of, gathered, matrix, projector
+from reference.dense_feti import DenseDual, boundary_of, gathered, matrix, projector
+from support import torn_cells
+from support.cases import make_case, relative_error, solve
 
-from feti_homog.cell.refinement import Lattice
+from feti_homog.cell.refinement import ReferenceLattice
 from feti_homog.common.progress import Progress
 from feti_homog.config import sections
 from feti_homog.errors import CaseError
 from feti_homog.feti.coarse.adaptive import AdaptiveCoarseSpace
-from feti_homog.feti.operators import interface_operators as boundaries
 from feti_homog.feti.operators.explicit import ExplicitInterfaceOperator
 from feti_homog.feti.operators.implicit import ImplicitInterfaceOperator
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
-from feti_homog.homogenization import domain_partition, unit_cell
+from feti_homog.feti.thresholds import DEFAULTS, Thresholds
+from feti_homog.homogenization import unit_cell
+from feti_homog.homogenization.domain_partition import PartitionPolicy, wanted_pieces
 
 pytestmark = pytest.mark.parallel
 
+SMALL_DENSE = Thresholds(dense_boundary_dofs=10)
 RANDOM = {"geometry": "random", "fibres": 5, "fibre_fraction": 0.45, "min_gap": 0.1, "seed": 3}
 CELLS = pytest.mark.parametrize(
     "case",
@@ -40,14 +42,15 @@ CELLS = pytest.mark.parametrize(
 @CELLS
 def test_extension_is_harmonic(comm, case):
     """K u = 0 but on the boundary, where it is S x."""
-    cell = bonds.tear(comm, **case)
+    cell = torn_cells.tear(comm, **case)
     boundary = cell.solver.boundary
     x = np.random.default_rng(comm.rank).standard_normal(boundary.offsets[-1])
-    u, forces = boundary.extend(x), boundary.stiffness(x)
-    for s, dofs, first, span in zip(cell.subdomains, boundary.dofs, cell.offsets, boundary.spans, strict=False):
+    u, forces = boundary.extend(x), boundary.apply_schur(x)
+    for s, dofs, first, span in zip(cell.subdomains, boundary.dofs, cell.offsets, boundary.slices, strict=False):
         own = u[first : first + len(s.Q)]
         assert (own[dofs] == x[span]).all()
-        residual, scale = s.K @ own, np.abs(s.K @ np.abs(own)).max()
+        K = s.assemble_stiffness()
+        residual, scale = K @ own, np.abs(K @ np.abs(own)).max()
         assert np.abs(residual[dofs] - forces[span]).max() < 1e-11 * scale
         residual[dofs] = 0
         assert np.abs(residual).max() < 1e-11 * scale
@@ -55,20 +58,20 @@ def test_extension_is_harmonic(comm, case):
 
 @CELLS
 def test_boundary_is_where_the_constraints_act(comm, case):
-    cell = bonds.tear(comm, **case)
+    cell = torn_cells.tear(comm, **case)
     B = cell.solver.jump_operator.B.toarray()
     for s, dofs, first in zip(cell.subdomains, cell.solver.boundary.dofs, cell.offsets, strict=False):
         assert (dofs == boundary_of(B[:, first : first + len(s.Q)])).all()
-    assert (cell.solver.boundary.B.toarray() == B[:, cell.solver.boundary.local]).all()
+    assert (cell.solver.boundary.B.toarray() == B[:, cell.solver.boundary.local_dofs]).all()
     # Something is inside, else the tests here would hold of anything.
-    assert comm.allreduce(B.shape[1] - len(cell.solver.boundary.local)) > 0
+    assert comm.allreduce(B.shape[1] - len(cell.solver.boundary.local_dofs)) > 0
 
 
 @CELLS
 def test_load_vanishes_inside_the_bodies(comm, case):
-    cell = bonds.tear(comm, **case)
+    cell = torn_cells.tear(comm, **case)
     inside = cell.solver.Q.copy()
-    inside[cell.solver.boundary.local] = 0
+    inside[cell.solver.boundary.local_dofs] = 0
     largest = comm.allreduce(np.abs(cell.solver.Q).max(initial=0.0), MPI.MAX)
     assert largest > 0
     assert np.abs(inside).max(initial=0.0) < 1e-13 * largest
@@ -78,14 +81,14 @@ def test_load_vanishes_inside_the_bodies(comm, case):
 @pytest.mark.parametrize("kind", ["implicit", "explicit"])
 def test_torn_cell_equals_the_dense_one(comm, case, kind):
     """P d, P^T F P and the torn cell's stiffness do not depend on the generalized inverse."""
-    cell = bonds.tear(comm, **case, petsc={"feti_dual_operator": kind})
-    twin, solver = DualTwin(cell), cell.solver
-    P = projector(twin.G)
+    cell = torn_cells.tear(comm, **case, petsc={"feti_dual_operator": kind})
+    dense, solver = DenseDual(cell), cell.solver
+    P = projector(dense.G)
     F = matrix(cell, solver.operator.apply)
-    assert relative_error(P @ F @ P, P @ twin.F @ P) < 1e-10
-    own_jump, own_stiffness = np.zeros((twin.total, 3)), np.zeros((3, 3))
+    assert relative_error(P @ F @ P, P @ dense.F @ P) < 1e-10
+    own_jump, own_stiffness = np.zeros((dense.total, 3)), np.zeros((3, 3))
     for s, first in zip(cell.subdomains, cell.offsets, strict=False):
-        u = np.linalg.pinv(s.K.toarray(), rcond=1e-10, hermitian=True) @ -s.Q
+        u = np.linalg.pinv(s.assemble_stiffness().toarray(), rcond=1e-10, hermitian=True) @ -s.Q
         own_jump[solver.jump_operator.rows] += solver.jump_operator.B[:, first : first + len(u)] @ u
         own_stiffness += s.area * s.L + s.Q.T @ u
     jump = P @ comm.allreduce(own_jump)
@@ -97,9 +100,9 @@ def test_torn_cell_equals_the_dense_one(comm, case, kind):
 
 @CELLS
 def test_preconditioner_equals_the_dense_one(comm, case):
-    cell = bonds.tear(comm, **case)
-    active = np.ones(cell.solver.jump_operator.total, bool)
-    expected = DualTwin(cell).preconditioner(active)
+    cell = torn_cells.tear(comm, **case)
+    active = np.ones(cell.solver.jump_operator.global_rows, bool)
+    expected = DenseDual(cell).preconditioner(active)
     assert relative_error(matrix(cell, cell.solver.preconditioner.apply), expected) < 1e-11
 
 
@@ -114,79 +117,74 @@ def test_implicit_and_explicit_operators_give_the_same(comm):
         assert relative_error(first, second) < 1e-9
 
 
-def test_dense_operators_where_they_pay(comm, monkeypatch):
-    cell = bonds.tear(comm, geometry="hexagonal", petsc={"feti_coarse_space": "natural"})
+def test_operators_are_explicit_where_they_pay(comm):
+    cell = torn_cells.tear(comm, geometry="hexagonal", petsc={"feti_coarse_space": "natural"})
 
-    def kinds(applications, soft):
-        boundary = InterfaceOperators(cell.solver.jump_operator, cell.subdomains, "auto", applications, soft)
+    def kinds(applications, soft, thresholds=DEFAULTS):
+        boundary = InterfaceOperators(
+            cell.solver.jump_operator, cell.subdomains, "auto", applications, soft, thresholds
+        )
         return set().union(*comm.allgather({type(o) for o in boundary.operators}))
 
     assert kinds(0, False) == {ImplicitInterfaceOperator}
     assert kinds(10**6, False) == {ExplicitInterfaceOperator}
     assert kinds(0, True) == {ExplicitInterfaceOperator}
-    monkeypatch.setattr(boundaries, "LARGEST_DENSE", 10)
-    assert kinds(10**6, True) == {ImplicitInterfaceOperator}
+    assert kinds(10**6, True, SMALL_DENSE) == {ImplicitInterfaceOperator}
 
 
-def test_adaptive_space_is_refused_where_boundaries_are_too_large(comm, monkeypatch):
+def test_adaptive_space_is_refused_where_boundaries_are_too_large(comm):
     case = {"geometry": "hexagonal", "decomposition": {"subdomains": 8}}
-    monkeypatch.setattr(boundaries, "LARGEST_DENSE", 10)
-    assert not isinstance(bonds.tear(comm, **case).solver.coarse, AdaptiveCoarseSpace)
+    assert not isinstance(torn_cells.tear(comm, **case, thresholds=SMALL_DENSE).solver.coarse, AdaptiveCoarseSpace)
     with pytest.raises(CaseError, match="-feti_coarse_space adaptive: needs"):
-        bonds.tear(comm, **case, petsc={"feti_coarse_space": "adaptive"})
+        torn_cells.tear(comm, **case, petsc={"feti_coarse_space": "adaptive"}, thresholds=SMALL_DENSE)
 
 
-@pytest.fixture
-def sizes(monkeypatch):
-    """Pieces of 100 dofs, at most 50 of a cell; bodies are cut above 250 dofs, or 80 of the boundary."""
-    for name, value in {"FASTEST": 100, "MOST": 50, "LARGE": 2.5, "WIDE": 80}.items():
-        monkeypatch.setattr(domain_partition, name, value)
+# Pieces of 100 dofs, at most 50 of a cell; bodies are cut above 250 dofs, or 80 of the boundary where bonds break.
+SMALL_PIECES = PartitionPolicy(piece_dofs=100, max_pieces=50, breakable_boundary_dofs=80)
 
 
-def wanted(load, edges, interface=None, n_ranks=1, refine=0):
+def wanted(load, edges, interface=None, n_ranks=1, refine=0, policy=SMALL_PIECES):
     """Default pieces of bodies of so many triangles and outer edges."""
-    case = replace(make_case(refine=refine), interface=interface)
-    return domain_partition.wanted_pieces(
-        case, np.array(load), np.array(edges), Lattice.of(refine, 1), n_ranks
-    ).tolist()
+    case, lattice = replace(make_case(refine=refine), interface=interface), ReferenceLattice.of(refine, 1)
+    return wanted_pieces(case, np.array(load), np.array(edges), lattice, n_ranks, policy).tolist()
 
 
-def test_large_bodies_are_cut(sizes):
+def test_large_bodies_are_cut():
     assert wanted([240, 260, 30, 1000], [90, 10, 10, 10]) == [1, 3, 1, 10]
     # Four elements a triangle.
     assert wanted([60, 65], [10, 10], refine=1) == [1, 3]
 
 
-def test_pieces_of_very_large_bodies_are_larger(sizes):
+def test_pieces_of_very_large_bodies_are_larger():
     assert wanted([5000], [10]) == [50]
     assert wanted([20_000, 30], [10, 10]) == [50, 1]
 
 
-def test_bodies_that_can_be_dealt_evenly_are_whole_up_to_a_larger_size(sizes, monkeypatch):
-    monkeypatch.setattr(domain_partition, "MOST", 1000)
+def test_bodies_that_can_be_shared_evenly_are_whole_up_to_a_larger_size():
+    policy = replace(SMALL_PIECES, max_pieces=1000)
     load, edges = [600] * 100 + [1300], [10] * 101
-    assert wanted(load, edges) == [1] * 100 + [13]
-    assert wanted(load, edges, n_ranks=16) == [6] * 100 + [13]
-    assert wanted([600] * 2, [400, 800]) == [6, 6]
+    assert wanted(load, edges, policy=policy) == [1] * 100 + [13]
+    assert wanted(load, edges, n_ranks=16, policy=policy) == [6] * 100 + [13]
+    assert wanted([600] * 2, [400, 800], policy=policy) == [6, 6]
 
 
-def test_bodies_that_debond_are_whole_unless_their_boundary_is_wide(sizes):
+def test_bodies_that_debond_are_whole_unless_their_boundary_is_wide():
     bonds_break = sections.InterfaceSection()
     assert wanted([260, 3000, 260], [10, 39, 41], bonds_break) == [1, 1, 3]
     assert wanted([70, 70], [19, 21], bonds_break, refine=1) == [1, 3]
 
 
 @pytest.mark.parametrize("interface", [None, sections.InterfaceSection()])
-def test_there_are_pieces_for_all_ranks(sizes, interface):
+def test_every_rank_has_a_piece(interface):
     assert wanted([200, 40], [10, 10], interface, n_ranks=2) == [1, 1]
     assert wanted([200, 40], [10, 10], interface, n_ranks=5) == [4, 1]
     assert wanted([260, 70], [10, 41], n_ranks=3) == [3, 1]
 
 
-def torn_by_default(comm, interface):
+def torn_by_default(comm, interface, policy=SMALL_PIECES):
     """A cell of two fibres and a matrix; the bodies of its pieces and the triangles of the largest piece."""
     case = replace(make_case(geometry="hexagonal", mesh_size=0.1), interface=interface)
-    cell = unit_cell.tear(case, comm, Progress(comm, quiet=True))
+    cell = unit_cell.tear(case, comm, Progress(comm, quiet=True), policy=policy)
     own = comm.allgather([s.submesh.body for s in cell.subdomains])
     largest = comm.allreduce(max((len(s.submesh.triangles) for s in cell.subdomains), default=0), MPI.MAX)
     assert min(map(len, own)) > 0
@@ -195,24 +193,23 @@ def torn_by_default(comm, interface):
 
 @pytest.mark.parametrize("case", [{"geometry": "square"}, RANDOM, RANDOM | {"bodies": "plane", "mesh_size": 0.25}])
 def test_default_pieces_give_every_rank_one(comm, case):
-    cell = bonds.tear(comm, **case)
+    cell = torn_cells.tear(comm, **case)
     assert min(comm.allgather(len(cell.subdomains))) > 0
-    assert cell.plan.subdomains == max(cell.plan.bodies, comm.size)
+    assert cell.summary.subdomains == max(cell.summary.bodies, comm.size)
 
 
-def test_default_pieces_of_a_bonded_cell(comm, sizes):
+def test_default_pieces_of_a_bonded_cell_are_small(comm):
     cell, bodies, largest = torn_by_default(comm, None)
     assert len(bodies) > 4
     assert largest < 1.5 * 100
     assert isinstance(cell.solver.coarse, AdaptiveCoarseSpace)
 
 
-def test_default_pieces_of_a_debonding_cell(comm, sizes, monkeypatch):
-    monkeypatch.setattr(domain_partition, "WIDE", 1000)
-    cell, bodies, largest = torn_by_default(comm, sections.InterfaceSection())
+def test_default_pieces_of_a_debonding_cell_are_bodies_unless_wide(comm):
+    whole = replace(SMALL_PIECES, breakable_boundary_dofs=1000)
+    cell, bodies, largest = torn_by_default(comm, sections.InterfaceSection(), whole)
     assert len(bodies) == max(3, comm.size)
     assert isinstance(cell.solver.coarse, AdaptiveCoarseSpace) == (comm.size > 3)
-    monkeypatch.setattr(domain_partition, "WIDE", 80)
     cell, bodies, narrowed = torn_by_default(comm, sections.InterfaceSection())
     assert len(bodies) > 4
     assert narrowed < min(largest, 1.5 * 100)

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import bonds
 import numpy as np
 import pytest
-from cells import relative_error
 from mpi4py import MPI
-from narrow_cells import BOUND, BREAKING, NARROW, SINGLE, Narrow, agree, masks, of_all, together
 from reference import dense_feti
+from support import torn_cells
+from support.cases import relative_error
+from support.coarse_space_cells import BOUND, BREAKING, NARROW, SINGLE, Narrow, agree, masks, of_all, together
 
 from feti_homog.feti.coarse.adaptive import ROOM, THRESHOLD, AdaptiveCoarseSpace
 from feti_homog.feti.coarse.geneo import coarse_vectors, dual_blocks
 from feti_homog.feti.decomposition.neighbours import Neighbours
-from feti_homog.feti.linalg.distributed_matrix import total
+from feti_homog.feti.linalg.collectives import allreduce_sparse
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.preconditioners.scaled import Dirichlet
 from feti_homog.interface.contact import BONDED, OPEN
@@ -27,12 +27,12 @@ pytestmark = pytest.mark.parallel
 def test_soft_modes_are_counted_as_dense_eigenvalues(comm, narrow):
     expected = [
         int((theta < THRESHOLD).sum()) - R.shape[1]
-        for (theta, _), R in zip(narrow.soft_modes(), narrow.twin.kernels, strict=True)
+        for (theta, _), R in zip(narrow.soft_modes(), narrow.dense.kernels, strict=True)
     ]
     assert of_all(comm, narrow.coarse, narrow.cell) == expected
     assert max(expected) > 2
     assert min(expected) == 0
-    assert narrow.coarse.vectors == sum(expected) + narrow.twin.G.shape[1]
+    assert narrow.coarse.vectors == sum(expected) + narrow.dense.G.shape[1]
 
 
 def test_soft_modes_solve_the_eigenproblem(comm, narrow):
@@ -44,7 +44,7 @@ def test_soft_modes_solve_the_eigenproblem(comm, narrow):
     blocks = dual_blocks(comm, jump_operator, boundary, scaled, neighbours.rows)
     found = coarse_vectors(blocks, neighbours, THRESHOLD)
     for s, V, count in zip(subdomains, found, narrow.coarse.counts, strict=True):
-        B, S = narrow.twin.B[s.submesh.index], narrow.twin.S[s.submesh.index]
+        B, S = narrow.dense.B[s.submesh.index], narrow.dense.S[s.submesh.index]
         N, k = B.T @ narrow.M @ B, s.R.shape[1]
         R, p = V[:, :k], V[:, k:]
         assert p.shape == (len(S), count)
@@ -59,7 +59,7 @@ def test_soft_modes_solve_the_eigenproblem(comm, narrow):
 def test_coarse_vectors_are_preconditioned_jumps(comm, narrow):
     """U = M^-1 B V of the kernels and the modes, the same space from dense ones."""
     jumps = [
-        B @ modes[:, theta < THRESHOLD] for B, (theta, modes) in zip(narrow.twin.B, narrow.soft_modes(), strict=True)
+        B @ modes[:, theta < THRESHOLD] for B, (theta, modes) in zip(narrow.dense.B, narrow.soft_modes(), strict=True)
     ]
     expected = narrow.M @ np.hstack(jumps)
     assert expected.shape == narrow.U.shape
@@ -70,20 +70,20 @@ def test_coarse_vectors_are_preconditioned_jumps(comm, narrow):
 # The coarse problem.
 
 
-def test_admissible_corrections_are_the_best(narrow):
+def test_deflation_leaves_what_no_coarse_vector_can_improve(narrow):
     """T z is what no coarse vector can improve; dense, with another generalized inverse."""
     T = dense_feti.matrix(narrow.cell, narrow.coarse.admissible)
     assert relative_error(T, narrow.T) < 1e-9
     assert np.abs(T @ T - T).max() < 1e-9 * np.abs(T).max()
-    assert np.abs(narrow.twin.G.T @ T).max() < 1e-9 * np.abs(T).max()
-    V = narrow.U @ null_space(narrow.twin.G.T @ narrow.U)
+    assert np.abs(narrow.dense.G.T @ T).max() < 1e-9 * np.abs(T).max()
+    V = narrow.U @ null_space(narrow.dense.G.T @ narrow.U)
     V /= np.linalg.norm(V, axis=0)
     assert V.shape[1] > 10
     F = dense_feti.matrix(narrow.cell, narrow.solver.operator.apply)
     assert np.abs(V.T @ F @ T).max() < 1e-9 * np.abs(V.T @ F).max()
 
 
-def test_many_columns_at_once(narrow):
+def test_many_columns_are_deflated_as_each_alone(narrow):
     x = narrow.own(narrow.random(0, (3,)))
     for function in (narrow.coarse.admissible, narrow.coarse.residual):
         columns = function(x)
@@ -92,13 +92,13 @@ def test_many_columns_at_once(narrow):
             assert np.abs(alone - columns[:, k]).max(initial=0.0) < 1e-10 * np.abs(columns).max(initial=1.0)
 
 
-def test_projected_operator(narrow):
+def test_the_iteration_applies_the_projected_operator(narrow):
     """What is left of residual(F T z) after T M^-1 is that of T^T F T z."""
     coarse, F, M = narrow.coarse, narrow.solver.operator, narrow.solver.preconditioner
     found = dense_feti.matrix(
         narrow.cell, lambda z: coarse.admissible(M.apply(coarse.residual(F.apply(coarse.admissible(z)))))
     )
-    assert relative_error(found, narrow.T @ narrow.M @ narrow.T.T @ narrow.twin.F @ narrow.T) < 1e-9
+    assert relative_error(found, narrow.T @ narrow.M @ narrow.T.T @ narrow.dense.F @ narrow.T) < 1e-9
 
 
 def _improved(narrow, r):
@@ -109,31 +109,31 @@ def _improved(narrow, r):
     return lam[:, 0], residual[:, 0]
 
 
-def test_residual_and_correction(narrow):
+def test_after_a_correction_coarse_vectors_see_rigid_motions_only(narrow):
     """After a correction coarse vectors see rigid-body motions only; what is taken off is of rigid-body motions too."""
     coarse, F = narrow.coarse, dense_feti.matrix(narrow.cell, narrow.solver.operator.apply)
     r = narrow.random(1)
     c, left = (dense_feti.gathered(narrow.cell, x) for x in _improved(narrow, r))
     lengths = np.linalg.norm(narrow.U, axis=0)
-    seen, motions = (narrow.U.T @ x / lengths[:, None] for x in (left[:, None], narrow.twin.G))
+    seen, motions = (narrow.U.T @ x / lengths[:, None] for x in (left[:, None], narrow.dense.G))
     beside = seen - motions @ np.linalg.lstsq(motions, seen, rcond=None)[0]
     assert np.abs(beside).max() < 1e-9 * np.abs(narrow.U.T @ r / lengths).max()
     taken = r - F @ c - left
-    P = dense_feti.projector(narrow.twin.G)
+    P = dense_feti.projector(narrow.dense.G)
     assert np.linalg.norm(P @ taken) < 1e-9 * np.linalg.norm(taken)
     again = dense_feti.gathered(narrow.cell, coarse.residual(narrow.own(left)))
     assert np.linalg.norm(again - left) < 1e-9 * np.linalg.norm(left)
 
 
-def test_correction_has_the_least_energy(narrow):
+def test_the_initial_correction_has_the_least_energy(narrow):
     """z^T F z / 2 - z^T r is least of all z = U c with G^T z = 0."""
-    F, r = narrow.twin.F, narrow.random(2)
-    V = narrow.U @ null_space(narrow.twin.G.T @ narrow.U)
+    F, r = narrow.dense.F, narrow.random(2)
+    V = narrow.U @ null_space(narrow.dense.G.T @ narrow.U)
     V /= np.linalg.norm(V, axis=0)
     expected = V @ np.linalg.lstsq(V.T @ F @ V, V.T @ r, rcond=1e-13)[0]
     found = dense_feti.gathered(narrow.cell, _improved(narrow, r)[0])
     assert relative_error(found, expected) < 1e-8
-    assert np.abs(narrow.twin.G.T @ found).max() < 1e-9 * np.abs(found).max()
+    assert np.abs(narrow.dense.G.T @ found).max() < 1e-9 * np.abs(found).max()
 
     def energy(z):
         return z @ F @ z / 2 - z @ r
@@ -154,8 +154,8 @@ def null_space(A):
 
 
 def test_deflation_bounds_the_spectrum(narrow):
-    least, largest = dense_feti.extreme_eigenvalues(narrow.T, narrow.twin.F, narrow.M)
-    natural = dense_feti.extreme_eigenvalues(dense_feti.projector(narrow.twin.G), narrow.twin.F, narrow.M)[1]
+    least, largest = dense_feti.extreme_eigenvalues(narrow.T, narrow.dense.F, narrow.M)
+    natural = dense_feti.extreme_eigenvalues(dense_feti.projector(narrow.dense.G), narrow.dense.F, narrow.M)[1]
     assert least > 1 - 1e-8
     assert largest < BOUND / THRESHOLD
     assert natural > 20 * largest
@@ -164,9 +164,9 @@ def test_deflation_bounds_the_spectrum(narrow):
 def test_threshold_trades_vectors_for_conditioning(narrow):
     found = []
     for threshold in (0.03, THRESHOLD, 0.5):
-        cell = narrow if threshold == THRESHOLD else Narrow(threshold, narrow.twin)
+        cell = narrow if threshold == THRESHOLD else Narrow(threshold, narrow.dense)
         assert cell.coarse.threshold == threshold
-        largest = dense_feti.extreme_eigenvalues(cell.T, cell.twin.F, cell.M)[1]
+        largest = dense_feti.extreme_eigenvalues(cell.T, cell.dense.F, cell.M)[1]
         assert largest < BOUND / threshold
         found.append((cell.coarse.vectors, -largest))
     assert found == sorted(found)
@@ -181,11 +181,11 @@ def energies(cell, coarse):
     active = cell.solver.active.mask[:, None]
     U = active * coarse.U.toarray()
     expected = cell.comm.allreduce(U.T @ cell.solver.operator.apply(U))
-    return total(cell.comm, coarse._E).toarray(), expected
+    return allreduce_sparse(cell.comm, coarse._E).toarray(), expected
 
 
 def test_updated_coarse_matrix_equals_one_from_scratch(comm):
-    cell, fresh = bonds.tear(comm, **BREAKING), bonds.tear(comm, **BREAKING)
+    cell, fresh = torn_cells.tear(comm, **BREAKING), torn_cells.tear(comm, **BREAKING)
     steps = masks(cell, range(3))
     for active in steps:
         cell.solver.activate(active)
@@ -198,21 +198,21 @@ def test_updated_coarse_matrix_equals_one_from_scratch(comm):
     assert relative_error(first, second) < 1e-8
 
 
-def test_masked_corrections_are_the_best(comm):
+def test_deflation_on_active_rows_leaves_what_no_coarse_vector_can_improve(comm):
     """T against a dense one of the active rows; the space is in use, not fallen back from."""
-    cell = bonds.tear(comm, **BREAKING)
-    twin = dense_feti.DualTwin(cell)
+    cell = torn_cells.tear(comm, **BREAKING)
+    dense = dense_feti.DenseDual(cell)
     for active in masks(cell, range(2)):
         cell.solver.activate(active)
         on = dense_feti.gathered(cell, active) > 0
         assert 0.05 < (~on).mean() < 0.5
         U = dense_feti.gathered(cell, cell.solver.coarse.U.toarray())[on]
         assert on.sum() > ROOM * U.shape[1]
-        expected = dense_feti.deflation(twin.F[np.ix_(on, on)], U, twin.G[on])
+        expected = dense_feti.deflation(dense.F[np.ix_(on, on)], U, dense.G[on])
         T = dense_feti.matrix(cell, lambda z, a=active: cell.solver.coarse.admissible(a[:, None] * z))
         assert (T[~on] == 0).all() and (T[:, ~on] == 0).all()
         assert relative_error(T[np.ix_(on, on)], expected) < 1e-7
-        M = twin.preconditioner(on)
+        M = dense.preconditioner(on)
         assert relative_error(dense_feti.matrix(cell, cell.solver.preconditioner.apply), M) < 1e-11
 
 
@@ -222,10 +222,10 @@ def test_masked_corrections_are_the_best(comm):
     [(BREAKING, 0.9), (NARROW, 1.1), (NARROW | {"refine": 1}, 0.4)],
     ids=["breaking", "narrow", "refined"],
 )
-def test_inactive_rows_give_the_natural_spaces_solution(comm, case, share):
+def test_with_inactive_rows_the_solution_is_that_of_the_natural_space(comm, case, share):
     """In that share of the iterations."""
     adaptive, natural = (
-        bonds.tear(comm, **case, petsc={"feti_coarse_space": space}) for space in ("adaptive", "natural")
+        torn_cells.tear(comm, **case, petsc={"feti_coarse_space": space}) for space in ("adaptive", "natural")
     )
     assert isinstance(adaptive.solver.coarse, AdaptiveCoarseSpace)
     assert not isinstance(natural.solver.coarse, AdaptiveCoarseSpace)
@@ -242,18 +242,18 @@ def test_inactive_rows_give_the_natural_spaces_solution(comm, case, share):
 
 @pytest.mark.parametrize("which", ["one", "all"])
 @pytest.mark.parametrize("case", [BREAKING, NARROW], ids=["breaking", "narrow"])
-def test_loose_fibres(comm, case, which):
+def test_fibres_that_float_keep_the_natural_spaces_solution(comm, case, which):
     """Without contact, fibres whose interface is wholly open; with few rows left the space may give up."""
     results = []
     for space in ("adaptive", "natural"):
-        cell = bonds.tear(comm, **case, petsc={"feti_coarse_space": space})
+        cell = torn_cells.tear(comm, **case, petsc={"feti_coarse_space": space})
         fibre = cell.solver.jump_operator.nodes.fibre
         lowest = comm.allreduce(fibre.min(initial=1000), MPI.MIN)
         status = np.where((fibre == lowest) | (which == "all"), OPEN, BONDED).astype(np.int8)
-        cell.solver.activate(bonds.interface(cell, False).active(status))
+        cell.solver.activate(torn_cells.interface(cell, False).active(status))
         fibres = len(set().union(*comm.allgather(set(fibre)))) if which == "all" else 1
         assert cell.solver.coarse.free.shape[1] == 3 * fibres
         results.append(together(cell))
     for found, expected in zip(*results, strict=True):
         assert found.reason > 0
-        assert relative_error(*(bonds.stress(cell, solution) for solution in (found, expected))) < 1e-8
+        assert relative_error(*(torn_cells.stress(cell, solution) for solution in (found, expected))) < 1e-8

@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import re
 
-import bonds
 import numpy as np
 import pytest
-from cells import make_case, relative_error, solve, twin_stiffness
 from mpi4py import MPI
-from narrow_cells import BOUND, BREAKING, NARROW, STRAINS, of_all, together
 from reference import dense_feti
+from support import torn_cells
+from support.cases import make_case, monolithic_stiffness, relative_error, solve
+from support.coarse_space_cells import BOUND, BREAKING, NARROW, STRAINS, of_all, together
 
 from feti_homog.errors import CaseError
 from feti_homog.feti.coarse.adaptive import THRESHOLD, AdaptiveCoarseSpace
-from feti_homog.feti.linalg.distributed_direct import Distributed
-from feti_homog.feti.linalg.replicated_saddle_point import Replicated
+from feti_homog.feti.linalg.distributed_direct import DistributedDirectSolver
+from feti_homog.feti.linalg.replicated_saddle_point import ReplicatedSaddlePoint
 from feti_homog.feti.linalg.saddle_point import SaddlePoint, _Augmented
 from feti_homog.feti.linalg.sparse_direct import DirectSolver
+from feti_homog.feti.thresholds import Thresholds
 
 pytestmark = pytest.mark.parallel
 
@@ -25,7 +26,7 @@ pytestmark = pytest.mark.parallel
 # Solutions.
 
 
-def test_together_as_one_by_one(narrow):
+def test_loads_solved_together_give_the_solutions_of_each_alone(narrow):
     solver = narrow.solver
     strains = np.array([[1.0, 0, 0], [0.2, -3.0, 1e-3], [0, 0, 1e-4]])
     starts = narrow.own(narrow.random(4, (3,))) * [0.0, 1e-2, 0.0]
@@ -39,21 +40,21 @@ def test_together_as_one_by_one(narrow):
         assert abs(found.iterations - alone.iterations) <= 4
 
 
-def test_a_load_without_multipliers_among_others(narrow):
+def test_a_load_without_multipliers_leaves_the_others_alone(narrow):
     zero, found = together(narrow.cell, np.array([[0.0, 0, 0], [1.0, 0, 0]]))
     assert (zero.lam == 0).all()
     (alone,) = together(narrow.cell, STRAINS[:1])
     assert relative_error(*(dense_feti.gathered(narrow.cell, s.lam) for s in (found, alone))) < 1e-7
 
 
-def test_ranks_do_not_matter(comm):
+def test_soft_modes_and_stress_do_not_depend_on_the_ranks(comm):
     """The same cell on this and on one rank."""
     found = []
     for some in (comm, MPI.COMM_SELF):
-        cell = bonds.tear(some, **NARROW)
+        cell = torn_cells.tear(some, **NARROW)
         solution = cell.solver.solve(np.array([1.0, -0.5, 0.3]), np.zeros(cell.solver.rows))
         soft = of_all(some, cell.solver.coarse, cell)
-        found.append((cell.solver.coarse.vectors, soft, solution.iterations, bonds.stress(cell, solution)))
+        found.append((cell.solver.coarse.vectors, soft, solution.iterations, torn_cells.stress(cell, solution)))
     (vectors, soft, iterations, stress), (of_one, soft_of_one, iterations_of_one, stress_of_one) = found
     assert vectors == of_one
     assert soft == soft_of_one
@@ -63,7 +64,7 @@ def test_ranks_do_not_matter(comm):
 
 @pytest.mark.parametrize("pieces", [24, 50], ids=["matrix cut", "all cut"])
 @pytest.mark.parametrize("contrast", [1e-3, 1.0, 1e6])
-def test_contrasts_converge_fast(comm, contrast, pieces):
+def test_iterations_stay_few_at_any_contrast(comm, contrast, pieces):
     case = NARROW | {
         "matrix": {"young": 1.0, "poisson": 0.3}, "fibre": {"young": contrast, "poisson": 0.3},
         "petsc": {"feti_ksp_rtol": 1e-8}, "decomposition": {"subdomains": pieces},
@@ -74,7 +75,7 @@ def test_contrasts_converge_fast(comm, contrast, pieces):
     assert max(r.state.iterations for r in responses) <= 30
     # The tolerance is on the three load cases together.
     assert max(r.state.solution.residual for r in responses) <= np.sqrt(3) * 1e-8
-    assert relative_error(L, twin_stiffness(torn)) < 1e-7
+    assert relative_error(L, monolithic_stiffness(torn)) < 1e-7
 
 
 # Options.
@@ -89,8 +90,8 @@ def test_contrasts_converge_fast(comm, contrast, pieces):
         ({"geometry": "hexagonal", "decomposition": {"subdomains": 1}}, "auto", False),
     ],
 )
-def test_choice_of_the_coarse_space(comm, case, space, adaptive):
-    coarse = bonds.tear(comm, **case, petsc={"feti_coarse_space": space}).solver.coarse
+def test_the_coarse_space_is_the_one_asked_for_or_that_pays(comm, case, space, adaptive):
+    coarse = torn_cells.tear(comm, **case, petsc={"feti_coarse_space": space}).solver.coarse
     assert isinstance(coarse, AdaptiveCoarseSpace) == adaptive
 
 
@@ -104,27 +105,26 @@ def test_choice_of_the_coarse_space(comm, case, space, adaptive):
         ({"feti_coarse_space": "adaptive", "feti_pc_type": "lumped"}, "-feti_coarse_space adaptive: needs"),
     ],
 )
-def test_wrong_options_are_refused(comm, petsc, words):
+def test_wrong_options_of_the_coarse_space_are_refused(comm, petsc, words):
     with pytest.raises(CaseError) as caught:
-        bonds.tear(comm, **BREAKING, petsc=petsc)
+        torn_cells.tear(comm, **BREAKING, petsc=petsc)
     (fault,) = caught.value.faults
     assert fault.startswith(words)
 
 
 @pytest.mark.parametrize("contrast", [23.0, 1e6], ids=["augmented", "indefinite"])
-def test_a_distributed_coarse_problem_gives_the_same(comm, monkeypatch, contrast):
+def test_a_distributed_coarse_problem_gives_the_same(comm, contrast):
     case = NARROW | {"fibre": {"young": 3.0 * contrast, "poisson": 0.3}, "decomposition": {"subdomains": 50}}
     found = []
     alone = comm.size == 1
     for largest, kind, solver in (
-        (10**6, SaddlePoint if alone else Replicated, DirectSolver),
-        (0, SaddlePoint, DirectSolver if alone else Distributed),
+        (10**6, SaddlePoint if alone else ReplicatedSaddlePoint, DirectSolver),
+        (0, SaddlePoint, DirectSolver if alone else DistributedDirectSolver),
     ):
-        monkeypatch.setattr("feti_homog.feti.linalg.replicated_saddle_point.LARGEST_REPLICATED", largest)
-        cell = bonds.tear(comm, **case)
+        cell = torn_cells.tear(comm, **case, thresholds=Thresholds(replicated_vectors=largest))
         saddle = cell.solver.coarse.saddle
         assert isinstance(saddle, kind)
-        inner = saddle.alone if isinstance(saddle, Replicated) else saddle
+        inner = saddle.local if isinstance(saddle, ReplicatedSaddlePoint) else saddle
         assert isinstance(inner._inner.solver, solver)
         assert isinstance(inner._inner, _Augmented) == (contrast < 1e3)
         found.append(together(cell))
@@ -134,8 +134,8 @@ def test_a_distributed_coarse_problem_gives_the_same(comm, monkeypatch, contrast
 
 
 @pytest.mark.parametrize("petsc", [{"feti_dual_operator": "implicit"}, {"feti_pc_type": "lumped"}])
-def test_natural_space_where_the_adaptive_one_cannot_be(comm, petsc):
-    cell = bonds.tear(comm, **BREAKING, petsc=petsc)
+def test_the_natural_space_is_taken_where_the_adaptive_one_cannot_be(comm, petsc):
+    cell = torn_cells.tear(comm, **BREAKING, petsc=petsc)
     assert not isinstance(cell.solver.coarse, AdaptiveCoarseSpace)
 
 
@@ -143,23 +143,23 @@ def number(pattern, text):
     return float(re.search(pattern + r" ([\d.e+]+)", text)[1])
 
 
-def test_view(comm, narrow, capfd):
-    cell, text = bonds.printed(comm, capfd, **NARROW, petsc={"feti_view": True})
+def test_view_shows_the_adaptive_space_and_the_condition_number(comm, narrow, capfd):
+    cell, text = torn_cells.printed(comm, capfd, **NARROW, petsc={"feti_view": True})
     assert number("coarse dimension", text) == narrow.coarse.vectors
     assert number("kernels:", text) == narrow.coarse.dimension
     assert number("soft modes below", text) == THRESHOLD
     assert f"soft modes below {THRESHOLD:g}: {narrow.coarse.vectors - narrow.coarse.dimension}," in text
-    assert f"{cell.plan.subdomains} subdomains, {cell.plan.subdomains} with dense boundary operators" in text
-    least, largest = dense_feti.extreme_eigenvalues(narrow.T, narrow.twin.F, narrow.M)
+    assert f"{cell.summary.subdomains} subdomains, {cell.summary.subdomains} with dense boundary operators" in text
+    least, largest = dense_feti.extreme_eigenvalues(narrow.T, narrow.dense.F, narrow.M)
     assert 0.7 * largest / least < number("condition number about", text) < 1.01 * largest / least
 
 
-def test_view_of_the_natural_space(comm, narrow, capfd):
-    _, text = bonds.printed(comm, capfd, **NARROW, petsc={"feti_view": True, "feti_coarse_space": "natural"})
+def test_view_shows_the_natural_space_without_soft_modes(comm, narrow, capfd):
+    _, text = torn_cells.printed(comm, capfd, **NARROW, petsc={"feti_view": True, "feti_coarse_space": "natural"})
     assert number("coarse dimension", text) == narrow.coarse.dimension
     assert "soft modes" not in text
     assert number("condition number about", text) > 10 * BOUND / THRESHOLD
 
 
 def test_nothing_is_printed_unasked(comm, capfd):
-    assert bonds.printed(comm, capfd, **BREAKING)[1] == ""
+    assert torn_cells.printed(comm, capfd, **BREAKING)[1] == ""

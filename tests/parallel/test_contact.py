@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-import bonds
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from cells import relative_error
-from random_bonds import random_bonded, random_cell, random_strain
+from reference.references import ARC_OF_120_DEGREES, VOID
+from support import torn_cells
+from support.cases import relative_error
+from support.random_cells import random_bonded, random_cell, random_strain
 
 from feti_homog.config.sections import Arc
-from feti_homog.interface import contact as contact_room
-from feti_homog.interface.contact import BONDED, CLOSED, MOST_SOLVES, OPEN
+from feti_homog.interface.contact import BONDED, CLOSED, OPEN
 
 pytestmark = pytest.mark.parallel
 
 EQUAL = 1e-7
 CERTIFIED = 1e-9
 CASES_OF_A_CELL = 5
+MOST_SOLVES = 50
 STRAINS = np.eye(3)
 
 
@@ -28,8 +31,8 @@ def directions(cell):
 
 def response(cell, contact, strain, status):
     """Sigma and the equilibrium from the multipliers zero."""
-    state = bonds.interface(cell, contact).equilibrium(np.array(strain, float), status, np.zeros(cell.solver.rows))
-    return bonds.stress(cell, state.solution), state
+    state = torn_cells.interface(cell, contact).equilibrium(np.array(strain, float), status, np.zeros(cell.solver.rows))
+    return torn_cells.stress(cell, state.solution), state
 
 
 def stiffness(cell, status):
@@ -42,20 +45,20 @@ def test_random_cells_equal_the_quadratic_programme(comm, number):
     # Other cells on other numbers of ranks: 240 cases at 1, 2 and 4.
     rng = np.random.default_rng([comm.size, number])
     pc = ("dirichlet", "influence")[number % 2]
-    case = bonds.build(comm, **random_cell(rng), petsc={"feti_pc_type": pc})
+    case = torn_cells.build(comm, **random_cell(rng), petsc={"feti_pc_type": pc})
     for _ in range(CASES_OF_A_CELL):
-        bonded, strain = random_bonded(rng, case.twin) if case.twin else None, None
+        bonded, strain = random_bonded(rng, case.reference) if case.reference else None, None
         bonded, strain = comm.bcast((bonded, random_strain(rng)))
         contact = bool(comm.bcast(rng.random() < 0.85))
         stress, state = response(case.cell, contact, strain, case.status(bonded))
-        energy = bonds.energy(case.cell, state.solution)
+        energy = torn_cells.energy(case.cell, state.solution)
         assert state.solution.reason > 0
-        assert state.solves < MOST_SOLVES // 10
+        assert state.solves < MOST_SOLVES
         assert max(state.certificate.values()) < CERTIFIED
-        expected = comm.bcast(case.twin and case.twin.solve(strain, bonded, contact))
+        expected = comm.bcast(case.reference and case.reference.solve(strain, bonded, contact))
         assert abs(energy - expected.energy) < EQUAL * expected.energy
         assert relative_error(stress, expected.stress) < EQUAL
-        status = case.of_twin(state.status)
+        status = case.in_reference_order(state.status)
         assert ((status == BONDED) == bonded).all()
         if contact:
             tight = expected.force[:, 0] < -1e-6 * np.abs(expected.stress).max()
@@ -64,7 +67,7 @@ def test_random_cells_equal_the_quadratic_programme(comm, number):
 
 def test_sigma_is_homogeneous_of_degree_one(comm):
     rng = np.random.default_rng(5)
-    cell = bonds.tear(comm, geometry="hexagonal", order=2, mesh_size=0.25)
+    cell = torn_cells.tear(comm, geometry="hexagonal", order=2, mesh_size=0.25)
     status = np.where(np.abs(directions(cell) - 20) < 70, OPEN, BONDED).astype(np.int8)
     for strain in rng.normal(size=(3, 3)):
         stress, _ = response(cell, True, strain, status)
@@ -74,71 +77,70 @@ def test_sigma_is_homogeneous_of_degree_one(comm):
 
 
 def test_sign_of_shear_flips_only_the_shear_stress(comm):
-    cell = bonds.tear(comm, [Arc(fibre="all", angle=120.0)], geometry="square", mesh_size=0.07, order=2)
+    cell = torn_cells.tear(comm, [Arc(fibre="all", angle=120.0)], geometry="square", mesh_size=0.07, order=2)
     status = np.where(np.abs(directions(cell)) < 60 - 1e-6, OPEN, BONDED).astype(np.int8)
     plus, minus = (response(cell, True, [-0.5, 0.2, sign * 0.7], status)[0] for sign in (1, -1))
     # The mesh is not symmetric.
     assert relative_error(plus, minus * [1, 1, -1]) < 1e-3
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("seed", range(3))
 def test_energy_of_free_contact_and_bonded_faces_rises(comm, seed):
     rng = np.random.default_rng(seed)
-    cell = bonds.tear(comm, geometry="random", fibres=4, min_gap=0.1, seed=seed, mesh_size=0.2)
+    cell = torn_cells.tear(comm, geometry="random", fibres=4, min_gap=0.1, seed=seed, mesh_size=0.2)
     status = np.where(np.cos(np.radians(3 * directions(cell))) < 0.3, OPEN, BONDED).astype(np.int8)
     for strain in rng.normal(size=(4, 3)):
         free, contact, bonded = (
-            bonds.energy(cell, response(cell, touch, strain, states)[1].solution)
+            torn_cells.energy(cell, response(cell, touch, strain, states)[1].solution)
             for touch, states in ((False, status), (True, status), (True, np.full_like(status, BONDED)))
         )
         assert free * (1 - 1e-9) < contact < bonded * (1 - 1e-6)
 
 
+@pytest.mark.quick
 def test_debonded_fibre_with_contact_is_a_void_under_tension(comm):
-    cell = bonds.tear(comm, geometry="square", order=2, mesh_size=0.2)
+    cell = torn_cells.tear(comm, geometry="square", order=2, mesh_size=0.2)
     status = np.full(len(directions(cell)), OPEN, np.int8)
     stress, state = response(cell, True, [1, 0, 0], status)
     assert relative_error(stress, stiffness(cell, status)[:, 0]) < 1e-9
     assert comm.allreduce(int((state.status != OPEN).sum())) == 0
 
 
-@pytest.mark.parametrize(
-    ("geometry", "expected"),
-    [("square", (40.268438, 9.710096, 6.303568)), ("hexagonal", (36.123857, 14.523762, 10.800047))],
-)
-def test_debonded_fibres_without_contact_are_voids(comm, geometry, expected):
-    cell = bonds.tear(comm, geometry=geometry, order=2, mesh_size=0.07, refine=1)
+@pytest.mark.parametrize("geometry", VOID)
+def test_debonded_fibres_without_contact_are_voids(comm, geometry):
+    expected = VOID[geometry].value
+    cell = torn_cells.tear(comm, geometry=geometry, order=2, mesh_size=0.07, refine=1)
     L = stiffness(cell, np.full(len(directions(cell)), OPEN, np.int8))
     assert np.abs([L[0, 0] / expected[0], L[0, 1] / expected[1], L[2, 2] / expected[2]] - np.ones(3)).max() < 1e-4
 
 
-def test_arc_of_120_degrees_has_the_published_stiffness(comm):
+def test_an_arc_of_120_degrees_has_the_reference_stiffness(comm):
     """The tips are singular, so the error falls with the element size: extrapolated from two meshes."""
     results = []
     for refine in (1, 2):
         arc = [Arc(fibre="all", angle=120.0)]
-        cell = bonds.tear(comm, arc, geometry="square", order=2, mesh_size=0.1, refine=refine)
+        cell = torn_cells.tear(comm, arc, geometry="square", order=2, mesh_size=0.1, refine=refine)
         status = np.where(np.abs(directions(cell)) < 60 - 1e-6, OPEN, BONDED).astype(np.int8)
         L, pressed = stiffness(cell, status), response(cell, True, [-1, 0, 0], status)[0]
         results.append(np.array([L[0, 0], L[1, 1], L[0, 1], L[2, 2], pressed[0], pressed[1]]))
-    expected = [72.549, 128.352, 29.259, 28.884, -146.256, -60.185]
-    assert np.abs((2 * results[1] - results[0]) / expected - 1).max() < 1e-3
+    assert np.abs((2 * results[1] - results[0]) / ARC_OF_120_DEGREES.value - 1).max() < 1e-3
 
 
 @pytest.mark.parametrize("order", [1, 2])
 def test_masked_rows_equal_constraints_built_without_them(comm, order):
     """The paper's first way against its second: the saddle-point problem of B without the debonded rows, dense."""
     pieces, tight = {"subdomains": 6}, {"feti_ksp_rtol": 1e-13}
-    cell = bonds.tear(
+    cell = torn_cells.tear(
         comm, geometry="hexagonal", order=order, mesh_size=0.25 * order, decomposition=pieces, petsc=tight
     )
-    interface = bonds.interface(cell, False)
+    interface = torn_cells.interface(cell, False)
     status = np.where(np.abs(directions(cell) - 30) < 50, OPEN, BONDED).astype(np.int8)
     active = np.concatenate(comm.allgather(interface.active(status))) > 0
     solver = cell.solver
     first, last = solver.jump_operator.owned
     F = []
-    for row in range(solver.jump_operator.total):
+    for row in range(solver.jump_operator.global_rows):
         unit = (np.arange(first, last) == row).astype(float)
         F.append(np.concatenate(comm.allgather(solver.operator.apply(unit))))
     G, d = (np.concatenate(comm.allgather(x)) for x in (solver.coarse.G.toarray(), solver.d))
@@ -150,15 +152,15 @@ def test_masked_rows_equal_constraints_built_without_them(comm, order):
         lam = np.concatenate(comm.allgather(state.solution.lam))
         assert relative_error(lam[active], x[: len(F)]) < 1e-10
         assert (lam[~active] == 0).all()
-        expected = (solver.torn_stiffness @ strain + d.T @ x[: len(F)]) / cell.plan.area
+        expected = (solver.torn_stiffness @ strain + d.T @ x[: len(F)]) / cell.summary.area
         assert relative_error(stress, expected) < 1e-10
 
 
 @pytest.mark.parametrize("bodies", ["torus", "plane"])
 @pytest.mark.parametrize("subdomains", [1, 12])
-def test_free_motions_are_counted(comm, bodies, subdomains):
+def test_free_motions_of_debonded_fibres_are_counted(comm, bodies, subdomains):
     pieces = {"subdomains": subdomains}
-    cell = bonds.tear(comm, geometry="hexagonal", mesh_size=0.2, bodies=bodies, decomposition=pieces)
+    cell = torn_cells.tear(comm, geometry="hexagonal", mesh_size=0.2, bodies=bodies, decomposition=pieces)
     fibre = cell.solver.jump_operator.nodes.fibre
     both = np.full(len(fibre), OPEN, np.int8)
     lowest = comm.allreduce(fibre.min(initial=1000), min)
@@ -173,22 +175,22 @@ def test_free_motions_are_counted(comm, bodies, subdomains):
 
 
 def test_no_strain_is_no_stress(comm):
-    cell = bonds.tear(comm, geometry="square", mesh_size=0.2)
+    cell = torn_cells.tear(comm, geometry="square", mesh_size=0.2)
     stress, state = response(cell, True, [0, 0, 0], np.full(len(directions(cell)), OPEN, np.int8))
     assert (stress == 0).all()
     assert max(state.certificate.values()) == 0
 
 
 @pytest.mark.parametrize("half", [60, 170])
-def test_single_pivots_find_the_same_state(comm, monkeypatch, half):
+def test_single_pivots_find_the_same_state(comm, half):
     """Murty's rule alone, one node at a time, ends where the block pivots do."""
-    cell = bonds.tear(comm, geometry="square", mesh_size=0.25)
+    cell = torn_cells.tear(comm, geometry="square", mesh_size=0.25)
     status = np.where(np.abs(directions(cell)) < half, OPEN, BONDED).astype(np.int8)
     strain = [0.3, -0.6, 0.5]
     expected, block = response(cell, True, strain, status)
-    pivots = contact_room._Pivots
-    monkeypatch.setattr(contact_room, "_Pivots", lambda comm: pivots(comm, fewest=0, patience=0))
-    stress, single = response(cell, True, strain, status)
-    assert 1 < single.solves < MOST_SOLVES
+    interface = replace(torn_cells.interface(cell, True), block_pivots=0)
+    single = interface.equilibrium(np.array(strain), status, np.zeros(cell.solver.rows))
+    stress = torn_cells.stress(cell, single.solution)
+    assert 1 < single.solves < 10 * MOST_SOLVES
     assert comm.allreduce(int((single.status != block.status).sum())) == 0
     assert relative_error(stress, expected) < 1e-9

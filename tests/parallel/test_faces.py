@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-import bonds
 import numpy as np
 import pytest
-from cells import make_case, relative_error, solve, twin_stiffness
 from mpi4py import MPI
-from narrow_cells import NARROW, agree, masks, of_all, together
 from reference import dense_feti
+from support import torn_cells
+from support.cases import make_case, monolithic_stiffness, relative_error, solve
+from support.coarse_space_cells import NARROW, agree, masks, of_all, together
 
 from feti_homog.feti.coarse import face_neighbourhoods as rings_module
 from feti_homog.feti.coarse.adaptive import AdaptiveCoarseSpace
 from feti_homog.feti.coarse.face_neighbourhoods import rings
 from feti_homog.feti.decomposition.neighbours import Neighbours
 from feti_homog.feti.decomposition.subdomain import both_directions
-from feti_homog.feti.operators import interface_operators as boundaries
+from feti_homog.feti.thresholds import Thresholds
 
 pytestmark = pytest.mark.parallel
 
@@ -27,28 +27,24 @@ CASES = {
     "plane, quadratic": {"geometry": "hexagonal", "mesh_size": 0.2, "order": 2, "bodies": "plane"},
 }
 TIGHT = 1e-9
+# Nearly all whole bodies are examined face by face.
+FACEWISE = Thresholds(whole_boundary_dofs=30)
 
 
 @pytest.fixture(params=CASES.values(), ids=CASES.keys())
 def faces(request, comm):
     """(subdomain, boundary dofs, S, face) of all pairs of neighbours."""
-    cell = bonds.tear(comm, **request.param, petsc={"feti_coarse_space": "natural"})
+    cell = torn_cells.tear(comm, **request.param, petsc={"feti_coarse_space": "natural"})
     solver, found = cell.solver, []
     neighbours = Neighbours(comm, solver.jump_operator, cell.subdomains)
     for i, s in enumerate(cell.subdomains):
-        B, dofs = solver.boundary.B[:, solver.boundary.spans[i]], solver.boundary.dofs[i]
-        S = dense_feti.schur(s.K.toarray(), dofs)
+        B, dofs = solver.boundary.B[:, solver.boundary.slices[i]], solver.boundary.dofs[i]
+        S = dense_feti.schur(s.assemble_stiffness().toarray(), dofs)
         for other, common in neighbours.common[i].items():
             if other != s.submesh.index:
                 nodes = np.unique(B[neighbours.rows[i][common]].indices // 2)
                 found.append((s, dofs, S, both_directions(nodes)))
     return found
-
-
-@pytest.fixture
-def large(monkeypatch):
-    """Call nearly all boundaries large."""
-    monkeypatch.setattr(boundaries, "LARGEST_WHOLE", 30)
 
 
 # Rings.
@@ -71,14 +67,14 @@ def test_the_energy_of_a_body_lies_between_those_of_rings(comm, faces):
     assert examined > 0.9 * whole
 
 
-def test_kernels_of_rings(comm, faces):
+def test_kernels_of_rings_are_the_null_spaces_of_their_stiffness(comm, faces):
     kernels = set()
     for s, dofs, _, face in faces:
         for ring in rings(s, dofs, face):
             S = ring.operator.S
             assert np.abs(S @ ring.R).max(initial=0.0) < TIGHT * np.abs(S).max()
             assert dense_feti.kernel(S).shape[1] == ring.R.shape[1]
-            assert np.linalg.eigvalsh(ring.operator.held)[0] > 0
+            assert np.linalg.eigvalsh(ring.operator.regularised_schur)[0] > 0
             kernels.add(ring.R.shape[1])
     assert 3 in set().union(*comm.allgather(kernels))
 
@@ -99,28 +95,29 @@ def test_a_ring_of_the_whole_body_is_as_stiff(faces, monkeypatch):
 # Solutions.
 
 
-@pytest.mark.usefixtures("large")
 @pytest.mark.parametrize("contrast", [1e-3, 2.0, 1e6])
-def test_contrasts_converge_fast(comm, contrast):
+def test_iterations_stay_few_at_any_contrast(comm, contrast):
     case = WHOLE | {
         "matrix": {"young": 1.0, "poisson": 0.3}, "fibre": {"young": contrast, "poisson": 0.3},
         "petsc": {"feti_ksp_rtol": 1e-8, "feti_coarse_space": "adaptive"},
     }  # fmt: skip
-    torn, L, responses = solve(make_case(**case), comm)
+    torn, L, responses = solve(make_case(**case), comm, FACEWISE)
     assert isinstance(torn.solver.coarse, AdaptiveCoarseSpace)
-    assert comm.allreduce(any(torn.solver.boundary.large), MPI.LOR)
+    assert comm.allreduce(any(torn.solver.boundary.facewise), MPI.LOR)
     assert all(r.state.solution.reason > 0 for r in responses)
     assert max(r.state.iterations for r in responses) <= 25
-    assert relative_error(L, twin_stiffness(torn)) < 1e-7
+    assert relative_error(L, monolithic_stiffness(torn)) < 1e-7
 
 
-def test_a_whole_matrix_converges_as_with_one_eigenproblem(comm, monkeypatch):
+def test_a_whole_matrix_converges_as_with_one_eigenproblem(comm):
     """By faces, in one, and with rigid-body motions alone; a few more modes come by faces."""
     case = WHOLE | {"refine": 1, "min_gap": 0.01, "fibre_fraction": 0.65}
     iterations, vectors = [], []
     for whole, space in ((300, "adaptive"), (4000, "adaptive"), (4000, "natural")):
-        monkeypatch.setattr(boundaries, "LARGEST_WHOLE", whole)
-        cell = bonds.tear(comm, **case, petsc={"feti_coarse_space": space, "feti_ksp_rtol": 1e-8})
+        thresholds = Thresholds(whole_boundary_dofs=whole)
+        cell = torn_cells.tear(
+            comm, **case, thresholds=thresholds, petsc={"feti_coarse_space": space, "feti_ksp_rtol": 1e-8}
+        )
         iterations.append(together(cell)[0].iterations)
         vectors.append(cell.solver.coarse.vectors)
     assert iterations[0] <= iterations[1] + 5
@@ -128,23 +125,22 @@ def test_a_whole_matrix_converges_as_with_one_eigenproblem(comm, monkeypatch):
     assert vectors[2] < vectors[1] < vectors[0] < 2 * vectors[1]
 
 
-@pytest.mark.usefixtures("large")
-def test_ranks_do_not_matter(comm):
+def test_soft_modes_and_stress_do_not_depend_on_the_ranks(comm):
     found = []
     for some in (comm, MPI.COMM_SELF):
-        cell = bonds.tear(some, **WHOLE, petsc={"feti_coarse_space": "adaptive"})
+        cell = torn_cells.tear(some, **WHOLE, thresholds=FACEWISE, petsc={"feti_coarse_space": "adaptive"})
         solution = cell.solver.solve(np.array([1.0, -0.5, 0.3]), np.zeros(cell.solver.rows))
-        found.append((of_all(some, cell.solver.coarse, cell), solution.iterations, bonds.stress(cell, solution)))
+        found.append((of_all(some, cell.solver.coarse, cell), solution.iterations, torn_cells.stress(cell, solution)))
     (soft_modes, iterations, stress), (of_one, iterations_of_one, stress_of_one) = found
     assert soft_modes == of_one
     assert abs(iterations - iterations_of_one) <= 1
     assert relative_error(stress, stress_of_one) < 1e-9
 
 
-@pytest.mark.usefixtures("large")
-def test_inactive_rows_give_the_natural_spaces_solution(comm):
+def test_with_inactive_rows_the_solution_is_that_of_the_natural_space(comm):
     adaptive, natural = (
-        bonds.tear(comm, **WHOLE, refine=1, petsc={"feti_coarse_space": space}) for space in ("adaptive", "natural")
+        torn_cells.tear(comm, **WHOLE, refine=1, thresholds=FACEWISE, petsc={"feti_coarse_space": space})
+        for space in ("adaptive", "natural")
     )
     assert isinstance(adaptive.solver.coarse, AdaptiveCoarseSpace)
     for active in masks(adaptive, range(2)):

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import pytest
-from support import parallel_assert
+from support.base_case import BASE
+from support.ranks import parallel_assert
 from unit.cell.faulty_meshes import FAULTY_MESHES
 from unit.config.faulty_bonding import FAULTY_BONDINGS
-from unit.config.faulty_cases import BASE, FAULTY_CASES
+from unit.config.faulty_cases import FAULTY_CASES
 
 from feti_homog import cli
 
@@ -22,7 +23,7 @@ BY_CASE = {"missing file": "no such file"}
 
 @pytest.mark.parametrize("command", ["run", "check"])
 @pytest.mark.parametrize("name", FAULTY)
-def test_faulty_case(comm, shared_path, capsys, command, name):
+def test_faulty_cases_are_refused_on_every_rank_and_told_once(comm, shared_path, capsys, command, name):
     content, expected = FAULTY[name]
     if comm.rank == 0:
         (shared_path / "cell.toml").write_text(content, encoding="utf-8")
@@ -31,7 +32,7 @@ def test_faulty_case(comm, shared_path, capsys, command, name):
 
 @pytest.mark.parametrize("command", ["run", "check"])
 @pytest.mark.parametrize("name", FAULTY_MESHES)
-def test_faulty_mesh(comm, shared_path, capsys, command, name):
+def test_faulty_meshes_are_refused_on_every_rank_and_told_once(comm, shared_path, capsys, command, name):
     write, message = FAULTY_MESHES[name]
     if comm.rank == 0:
         (shared_path / "cell.toml").write_text(MESH_CASE)
@@ -46,7 +47,7 @@ def test_faulty_mesh(comm, shared_path, capsys, command, name):
         (f"{RANDOM}fibre_fraction = 0.745\nmin_gap = 0.1", "lower one of them"),
     ],
 )
-def test_cell_that_cannot_be_made(comm, shared_path, capsys, cell, message):
+def test_cells_that_cannot_be_made_are_refused(comm, shared_path, capsys, cell, message):
     own = [line.split(" = ")[0] for line in cell.splitlines()]
     lines = [line for line in CELL.splitlines() if line.split(" = ")[0] not in own]
     if comm.rank == 0:
@@ -69,7 +70,7 @@ def test_there_are_enough_faults():
         (["check", "."], "cannot be read: Is a directory"),
     ],
 )
-def test_faulty_command(comm, capsys, words, message):
+def test_faulty_commands_are_refused_on_every_rank_and_told_once(comm, capsys, words, message):
     assert cli.main(words) == 2
     told_once(comm, capsys, [message])
 

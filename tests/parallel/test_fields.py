@@ -9,7 +9,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-from sample_output import Sample, part_of, sample, without_interface
+from support.sample_output import Sample, part_of, sample, without_interface
 
 from feti_homog.errors import FetiHomogError
 from feti_homog.output.files.field_file import FieldFile
@@ -26,7 +26,7 @@ def write(directory: Path, comm: Any, whole: Sample, states: int = 3) -> Path:
 
 
 @pytest.mark.parametrize(("order", "refine"), [(1, 0), (1, 2), (2, 0)])
-def test_content_is_that_of_the_whole(comm: Any, shared_path: Path, order: int, refine: int) -> None:
+def test_the_ranks_parts_make_the_whole_file(comm: Any, shared_path: Path, order: int, refine: int) -> None:
     whole = sample(4, refine, order)
     with h5py.File(write(shared_path, comm, whole), "r") as file:
         # The pieces are numbered in order, so the ranks' shares put together are the whole.
@@ -47,7 +47,7 @@ def test_content_is_that_of_the_whole(comm: Any, shared_path: Path, order: int, 
     comm.barrier()
 
 
-def test_attributes_and_types(comm: Any, shared_path: Path) -> None:
+def test_fields_have_their_attributes_and_types(comm: Any, shared_path: Path) -> None:
     with h5py.File(write(shared_path, comm, sample(4)), "r") as file:
         assert list(file.attrs["phases"]) == ["matrix", "fibre"]
         assert (file.attrs["length_unit"], file.attrs["stress_unit"]) == ("mm", "GPa")
@@ -60,13 +60,13 @@ def test_attributes_and_types(comm: Any, shared_path: Path) -> None:
     comm.barrier()
 
 
-def test_no_interface_nodes(comm: Any, shared_path: Path) -> None:
+def test_tables_without_interface_nodes_are_empty(comm: Any, shared_path: Path) -> None:
     with h5py.File(write(shared_path, comm, without_interface(sample(4))), "r") as file:
         assert file["interface/points"].shape == (0, 2) and file["state/2/status"].shape == (0,)
     comm.barrier()
 
 
-def test_states_are_on_disk_as_they_come(comm: Any, shared_path: Path) -> None:
+def test_states_are_on_disk_before_the_file_has_its_name(comm: Any, shared_path: Path) -> None:
     part = part_of(sample(4), comm.rank, comm.size)
     file = FieldFile(shared_path, comm, part.header, part.mesh, part.interface)
     for k, state in enumerate(part.states):
@@ -93,14 +93,14 @@ def test_an_exception_leaves_the_old_file(comm: Any, shared_path: Path) -> None:
     comm.barrier()
 
 
-def test_a_folder_that_cannot_be_made(comm: Any, shared_path: Path) -> None:
+def test_a_folder_that_cannot_be_made_is_told_on_every_rank(comm: Any, shared_path: Path) -> None:
     if comm.rank == 0:
         (shared_path / "file").write_text("")
     with pytest.raises(FetiHomogError, match=r"^cannot write .*result\.h5: .*[Nn]ot a directory$"):
         write(shared_path / "file" / "folder", comm, sample(4))
 
 
-def test_a_full_disk(comm: Any, shared_path: Path) -> None:
+def test_a_full_disk_is_told_on_every_rank_and_leaves_no_file(comm: Any, shared_path: Path) -> None:
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, limits[1]))
     try:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import bonds
 import numpy as np
 import pytest
-from cells import relative_error
-from narrow_cells import BREAKING, NARROW, together
-from reference.dense_feti import DualTwin, gathered, matrix
+from reference.dense_feti import DenseDual, gathered, matrix
 from scipy.linalg import null_space
+from support import torn_cells
+from support.cases import relative_error
+from support.coarse_space_cells import BREAKING, NARROW, together
 
 from feti_homog.errors import CaseError
 from feti_homog.feti.factory import MANY
@@ -31,16 +31,16 @@ CELLS = pytest.mark.parametrize(
 )
 
 
-def inverse(twin, active):
+def inverse(dense, active):
     """(total, total) N (N^T F N)^-1 N^T for a basis N of the forces on the active rows that are in equilibrium."""
-    N = np.eye(twin.total)[:, active]
-    N = N @ null_space(twin.G.T @ N)
-    return N @ np.linalg.solve(N.T @ twin.F @ N, N.T)
+    N = np.eye(dense.total)[:, active]
+    N = N @ null_space(dense.G.T @ N)
+    return N @ np.linalg.solve(N.T @ dense.F @ N, N.T)
 
 
 def activate(cell, status):
     """The active rows, on all ranks, of a status; the solver is set to them."""
-    active = bonds.interface(cell, True).active(status)
+    active = torn_cells.interface(cell, True).active(status)
     cell.solver.activate(active)
     return gathered(cell, active) > 0
 
@@ -58,24 +58,24 @@ def states(cell):
 
 
 @CELLS
-def test_is_the_inverse_for_any_active_rows(comm, case):
-    cell = bonds.tear(comm, **case, petsc=INFLUENCE)
-    twin, influence = DualTwin(cell), cell.solver.preconditioner
+def test_influence_columns_give_the_inverse_for_any_active_rows(comm, case):
+    cell = torn_cells.tear(comm, **case, petsc=INFLUENCE)
+    dense, influence = DenseDual(cell), cell.solver.preconditioner
     assert isinstance(influence, Influence)
     for status in states(cell):
         active = activate(cell, status)
-        expected = inverse(twin, active)
+        expected = inverse(dense, active)
         found = matrix(cell, influence.apply)
         assert relative_error(found, expected) < 1e-8
         assert np.abs(found[~active]).max(initial=0.0) == 0.0
         alone = gathered(cell, influence.apply(np.ones(cell.solver.rows)))
-        assert relative_error(alone, expected @ np.ones(twin.total)) < 1e-8
+        assert relative_error(alone, expected @ np.ones(dense.total)) < 1e-8
 
 
 @CELLS
-def test_leaves_nothing_to_iterate(comm, case):
-    cell = bonds.tear(comm, **case, petsc=INFLUENCE)
-    other = bonds.tear(comm, **case, petsc={"feti_pc_type": "dirichlet"})
+def test_influence_columns_leave_nothing_to_iterate(comm, case):
+    cell = torn_cells.tear(comm, **case, petsc=INFLUENCE)
+    other = torn_cells.tear(comm, **case, petsc={"feti_pc_type": "dirichlet"})
     for status in states(cell):
         activate(cell, status)
         activate(other, status)
@@ -86,9 +86,9 @@ def test_leaves_nothing_to_iterate(comm, case):
             assert relative_error(*lam) < 1e-5
 
 
-def test_narrow_gaps_and_contrasts(comm):
+def test_influence_columns_stay_exact_at_narrow_gaps_and_contrasts(comm):
     for contrast in (1e-6, 1e6):
-        cell = bonds.tear(comm, **NARROW, fibre={"young": 3.0 * contrast, "poisson": 0.3}, petsc=INFLUENCE)
+        cell = torn_cells.tear(comm, **NARROW, fibre={"young": 3.0 * contrast, "poisson": 0.3}, petsc=INFLUENCE)
         solutions = together(cell)
         assert all(s.reason > 0 and s.iterations <= 3 and s.residual < 1e-7 for s in solutions)
 
@@ -104,27 +104,27 @@ def test_narrow_gaps_and_contrasts(comm):
     ],
     ids=["path", "stiffness", "dirichlet", "adaptive", "implicit"],
 )
-def test_chosen_for_many_applications(comm, monkeypatch, applications, petsc, chosen):
+def test_influence_columns_are_chosen_for_many_applications(comm, monkeypatch, applications, petsc, chosen):
     monkeypatch.setattr("feti_homog.homogenization.cost_model.applications", lambda case: applications)
-    solver = bonds.tear(comm, **BREAKING, petsc=petsc).solver
+    solver = torn_cells.tear(comm, **BREAKING, petsc=petsc).solver
     assert isinstance(solver.preconditioner, Influence) == chosen
     if chosen:
         assert all(isinstance(o, ExplicitInterfaceOperator) for o in solver.boundary.operators)
 
 
-def test_not_chosen_where_the_bonded_cell_is_too_large(comm, monkeypatch):
+def test_influence_columns_are_not_chosen_where_the_bonded_cell_is_too_large(comm, monkeypatch):
     monkeypatch.setattr("feti_homog.homogenization.cost_model.applications", lambda case: MANY)
     monkeypatch.setattr("feti_homog.feti.factory.LARGEST_BONDED", 10)
-    assert not isinstance(bonds.tear(comm, **BREAKING).solver.preconditioner, Influence)
+    assert not isinstance(torn_cells.tear(comm, **BREAKING).solver.preconditioner, Influence)
 
 
-def test_needs_dense_operators(comm):
+def test_influence_columns_need_explicit_operators(comm):
     with pytest.raises(CaseError, match="-feti_pc_type influence: needs -feti_dual_operator explicit"):
-        bonds.tear(comm, **BREAKING, petsc=INFLUENCE | {"feti_dual_operator": "implicit"})
+        torn_cells.tear(comm, **BREAKING, petsc=INFLUENCE | {"feti_dual_operator": "implicit"})
 
 
-def test_is_told_by_view(comm, capfd):
-    cell, text = bonds.printed(comm, capfd, **BREAKING, petsc=INFLUENCE | {"feti_view": True})
-    size = 2 * comm.allreduce(len(cell.solver.jump_operator.blocks[0]))
+def test_view_shows_the_influence_columns(comm, capfd):
+    cell, text = torn_cells.printed(comm, capfd, **BREAKING, petsc=INFLUENCE | {"feti_view": True})
+    size = 2 * comm.allreduce(len(cell.solver.jump_operator.node_rows[0]))
     assert f"influence columns by the bonded cell, {size} dofs on its shared nodes" in text
     assert "1 load case, 0 iterations" in text

@@ -1,19 +1,21 @@
-"""Load-induced debonding against a slow twin, published numbers and laws, at any number of ranks."""
+"""Load-induced debonding against brute force, reference numbers and laws, at any number of ranks."""
 
 from __future__ import annotations
 
 from itertools import pairwise
 
-import bonds
 import numpy as np
 import pytest
-from cells import relative_error
-from reference.load_path import PathTwin
-from support import parallel_assert
+from reference.load_path import SlowLoadPath
+from reference.references import LARGEST_TRACTIONS, ONSET
+from support import torn_cells
+from support.cases import relative_error
+from support.ranks import parallel_assert
 
 from feti_homog.common.mpi_errors import on_root
 from feti_homog.interface.contact import BONDED, OPEN
-from feti_homog.interface.path_following import events, increments, unloaded
+from feti_homog.interface.path_following import events, increments
+from feti_homog.interface.path_points import unloaded
 from feti_homog.interface.strength_criterion import StrengthCriterion
 
 pytestmark = pytest.mark.parallel
@@ -37,18 +39,18 @@ def bonded_status(cell):
 
 def follow(cell, contact, law, waypoints, begin=None):
     """All points of an events path from the wholly bonded cell."""
-    interface = bonds.interface(cell, contact)
+    interface = torn_cells.interface(cell, contact)
     return list(events(interface, law, np.array(waypoints), begin or unloaded(interface, bonded_status(cell))))
 
 
 def curve(cell, points):
     """(points, 4) load factor and Sigma."""
-    return np.array([[p.load_factor, *(p.scale * bonds.stress(cell, p.state.solution))] for p in points])
+    return np.array([[p.load_factor, *(p.scale * torn_cells.stress(cell, p.state.solution))] for p in points])
 
 
 def broken(case, points):
-    """For each point, which of the twin's nodes are broken after it."""
-    return np.array([case.of_twin(p.after.status) != BONDED for p in points])
+    """For each point, which of the reference's nodes are broken after it."""
+    return np.array([case.in_reference_order(p.after.status) != BONDED for p in points])
 
 
 def is_certified(points):
@@ -60,10 +62,12 @@ def is_certified(points):
     ("criterion", "contact", "strain"),
     [("max", True, MIXED), ("quadratic", True, SHEAR), ("max", False, TENSION), ("quadratic", False, MIXED)],
 )
-def test_events_equal_the_twins(comm, cell, criterion, contact, strain):
-    case = bonds.build(comm, matrix={"young": 1.0, "poisson": 0.35}, fibre={"young": 5.0, "poisson": 0.2}, **cell)
+def test_events_are_those_of_the_quadratic_programme(comm, cell, criterion, contact, strain):
+    case = torn_cells.build(comm, matrix={"young": 1.0, "poisson": 0.35}, fibre={"young": 5.0, "poisson": 0.2}, **cell)
     strengths = (0.15, 0.3) if criterion == "max" else (0.25, 0.2)
-    expected = on_root(comm, lambda: PathTwin(case.twin, contact, *strengths, criterion).proportional(np.array(strain)))
+    expected = on_root(
+        comm, lambda: SlowLoadPath(case.reference, contact, *strengths, criterion).proportional(np.array(strain))
+    )
     points = follow(case.cell, contact, StrengthCriterion(*strengths, criterion), [strain])
     assert len(points) == len(expected) > 3
     assert is_certified(points)
@@ -76,10 +80,12 @@ def test_events_equal_the_twins(comm, cell, criterion, contact, strain):
 
 
 @pytest.mark.parametrize("back", [[0.0, 0.0, 0.0], [-0.6, 0.8, -0.3]], ids=["unloading", "reversal"])
-def test_later_legs_equal_small_steps(comm, back):
-    case = bonds.build(comm, matrix={"young": 1.0, "poisson": 0.35}, fibre={"young": 5.0, "poisson": 0.2}, **SQUARE)
+def test_events_of_later_legs_are_those_of_small_steps_and_bisection(comm, back):
+    case = torn_cells.build(
+        comm, matrix={"young": 1.0, "poisson": 0.35}, fibre={"young": 5.0, "poisson": 0.2}, **SQUARE
+    )
     legs = np.array([[0.3, -0.4, 0.15], back, [0.9, -0.9, 0.7]])
-    expected = on_root(comm, lambda: PathTwin(case.twin, True, 0.15, 0.3, "max").legs(legs, 12))
+    expected = on_root(comm, lambda: SlowLoadPath(case.reference, True, 0.15, 0.3, "max").legs(legs, 12))
     points = follow(case.cell, True, StrengthCriterion(0.15, 0.3, "max"), legs)
     assert is_certified(points)
     turns = [p for p in points if not p.broke and p.after.position > 0]
@@ -93,42 +99,43 @@ def test_later_legs_equal_small_steps(comm, back):
     if not np.any(back):
         unloaded_at = [p for p in points if p.load_factor == 2 / 3 and p.broke == 0]
         assert len(unloaded_at) == 1
-        assert (bonds.stress(case.cell, unloaded_at[0].state.solution) == 0).all()
+        assert (torn_cells.stress(case.cell, unloaded_at[0].state.solution) == 0).all()
 
 
-def test_onset_in_the_square_cell(comm):
-    cell = bonds.tear(comm, geometry="square", order=2, mesh_size=0.08, refine=1)
-    interface = bonds.interface(cell, True)
+def test_debonding_begins_at_the_load_of_the_series_solution(comm):
+    cell = torn_cells.tear(comm, geometry="square", order=2, mesh_size=0.08, refine=1)
+    interface = torn_cells.interface(cell, True)
     first = next(
         events(interface, StrengthCriterion(0.1, 0.1, "max"), np.eye(3)[:1], unloaded(interface, bonded_status(cell)))
     )
-    stress = first.scale * bonds.stress(cell, first.state.solution)
-    assert np.abs(np.r_[first.load_factor, stress[:2]] / [5.57799e-4, 0.0843146, 0.0309787] - 1).max() < 1e-3
+    stress = first.scale * torn_cells.stress(cell, first.state.solution)
+    assert np.abs(np.r_[first.load_factor, stress[:2]] / ONSET.value - 1).max() < 1e-3
     normal, shear = interface.traction(first.state.solution).T
-    assert abs(comm.allreduce(normal.max(initial=0), max) / 179.276113 - 1) < 1e-3
-    assert abs(comm.allreduce(np.abs(shear).max(initial=0), max) / 55.058455 - 1) < 1e-3
+    largest_normal, largest_shear = LARGEST_TRACTIONS.value
+    assert abs(comm.allreduce(normal.max(initial=0), max) / largest_normal - 1) < 1e-3
+    assert abs(comm.allreduce(np.abs(shear).max(initial=0), max) / largest_shear - 1) < 1e-3
     away = np.degrees(np.arctan2(*interface.nodes.normal.T[::-1]))
     largest = normal == comm.allreduce(normal.max(initial=0), max)
     parallel_assert(comm, bool((np.minimum(np.abs(away), 180 - np.abs(away))[largest] < 5).all()))
 
 
 @pytest.mark.parametrize("contact", [True, False])
-def test_debonding_grows_and_dissipates(comm, contact):
-    case = bonds.build(comm, **THREE)
+def test_bonds_never_heal_and_every_break_dissipates(comm, contact):
+    case = torn_cells.build(comm, **THREE)
     points = follow(case.cell, contact, StrengthCriterion(20.0, 30.0, "quadratic"), [SHEAR])
     after = broken(case, points)
     assert (after[1:] >= after[:-1]).all()
     for before, now in pairwise(points):
-        drop = bonds.stress(case.cell, before.state.solution) - bonds.stress(case.cell, now.state.solution)
+        drop = torn_cells.stress(case.cell, before.state.solution) - torn_cells.stress(case.cell, now.state.solution)
         assert drop @ SHEAR > -1e-9 * np.abs(drop).max()
 
 
 def test_increments_meet_events_and_the_curve_between_them_converges_with_first_order(comm):
     """Releasing the worst bonds one after the other, an increment ends where events end that break no later."""
-    cell = bonds.tear(comm, **SQUARE)
+    cell = torn_cells.tear(comm, **SQUARE)
     law, strain = StrengthCriterion(0.05, 0.05, "max"), np.array([[1e-3, 0.0, 0.0]])
     exact = curve(cell, follow(cell, True, law, strain))[:, :2]
-    interface, loads, errors = bonds.interface(cell, True), np.linspace(0, 1, 20001), []
+    interface, loads, errors = torn_cells.interface(cell, True), np.linspace(0, 1, 20001), []
     begin = unloaded(interface, bonded_status(cell))
     for steps in (10, 40, 160):
         found = curve(cell, list(increments(interface, law, strain, steps, True, begin)))[:, :2]
@@ -139,10 +146,10 @@ def test_increments_meet_events_and_the_curve_between_them_converges_with_first_
     assert constants.max() < 2.1 * constants.min()
 
 
-def test_onset_by_increments_is_late_by_less_than_one(comm):
-    cell = bonds.tear(comm, **SQUARE)
+def test_onset_by_increments_is_late_by_less_than_one_increment(comm):
+    cell = torn_cells.tear(comm, **SQUARE)
     law, strain = StrengthCriterion(0.05, 0.05, "max"), np.array([[1e-3, 0.0, 0.0]])
-    interface, exact = bonds.interface(cell, True), follow(cell, True, law, strain)[0].load_factor
+    interface, exact = torn_cells.interface(cell, True), follow(cell, True, law, strain)[0].load_factor
     for steps in (10, 40):
         points = list(increments(interface, law, strain, steps, False, unloaded(interface, bonded_status(cell))))
         onset = next(p.load_factor for p in points if p.broke)
@@ -156,8 +163,9 @@ def rising(exact, loads):
     return loads * (exact[:, 1] / exact[:, 0])[first]
 
 
-def test_goes_on_from_any_point(comm):
-    case = bonds.build(comm, **SQUARE)
+@pytest.mark.quick
+def test_a_path_goes_on_from_any_of_its_points_with_the_same_events(comm):
+    case = torn_cells.build(comm, **SQUARE)
     law, waypoints = StrengthCriterion(20.0, 30.0, "max"), [[0.7, -0.8, 0.5], [0.0, 0.0, 0.0], [-1.0, 1.0, 1.5]]
     points = follow(case.cell, True, law, waypoints)
     whole, sets = curve(case.cell, points), broken(case, points)
@@ -168,21 +176,21 @@ def test_goes_on_from_any_point(comm):
     assert follow(case.cell, True, law, waypoints, points[-1].after) == []
 
 
-def test_bodies_and_pieces_change_nothing(comm):
+def test_events_do_not_depend_on_bodies_and_pieces(comm):
     law, curves = StrengthCriterion(20.0, 30.0, "max"), []
     for variant in ({}, {"bodies": "plane"}, {"decomposition": {"subdomains": 9}}):
-        cell = bonds.tear(comm, geometry="hexagonal", mesh_size=0.25, **variant)
+        cell = torn_cells.tear(comm, geometry="hexagonal", mesh_size=0.25, **variant)
         curves.append(curve(cell, follow(cell, True, law, [MIXED])))
     for other in curves[1:]:
         assert relative_error(other, curves[0]) < 1e-7
 
 
 def test_infinite_strengths_never_break(comm):
-    cell = bonds.tear(comm, **SQUARE)
+    cell = torn_cells.tear(comm, **SQUARE)
     points = follow(cell, True, StrengthCriterion(np.inf, np.inf, "quadratic"), [TENSION, SHEAR])
     assert [(p.load_factor, p.broke) for p in points] == [(0.5, 0), (1.0, 0)]
     status = np.full(len(bonded_status(cell)), OPEN, np.int8)
-    interface = bonds.interface(cell, True)
+    interface = torn_cells.interface(cell, True)
     points = list(
         events(interface, StrengthCriterion(1.0, 1.0, "max"), np.array([SHEAR, MIXED]), unloaded(interface, status))
     )
@@ -191,11 +199,11 @@ def test_infinite_strengths_never_break(comm):
     assert is_certified(points)
 
 
-def test_twenty_fibres_to_the_end(comm):
+def test_twenty_fibres_debond_to_the_end_certified_and_dissipating(comm):
     if comm.size > 2:
         pytest.skip("one test, two cores")
     many = {"geometry": "random", "fibres": 20, "fibre_fraction": 0.4, "min_gap": 0.1, "seed": 2, "mesh_size": 0.08}
-    cell = bonds.tear(comm, **many, **INFLUENCE)
+    cell = torn_cells.tear(comm, **many, **INFLUENCE)
     points = follow(cell, True, StrengthCriterion(30.0, 15.0, "max"), [[1.0, -0.3, 0.4]])
     assert is_certified(points)
     assert points[-1].load_factor == 1.0
@@ -203,5 +211,5 @@ def test_twenty_fibres_to_the_end(comm):
     assert left < comm.allreduce(len(bonded_status(cell)))
     for before, now in pairwise(points):
         parallel_assert(comm, bool(((before.after.status != BONDED) <= (now.after.status != BONDED)).all()))
-        drop = bonds.stress(cell, before.state.solution) - bonds.stress(cell, now.state.solution)
+        drop = torn_cells.stress(cell, before.state.solution) - torn_cells.stress(cell, now.state.solution)
         assert drop @ [1.0, -0.3, 0.4] > -1e-9 * np.abs(drop).max()

@@ -6,12 +6,15 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_matrix
 
-from feti_homog.feti.linalg.replicated_saddle_point import Replicated
+from feti_homog.common.petsc_ctypes import option_was_used
+from feti_homog.common.petsc_options import case_options
+from feti_homog.errors import CaseError
+from feti_homog.feti.linalg.replicated_saddle_point import ReplicatedSaddlePoint
 from feti_homog.feti.linalg.saddle_point import SaddlePoint
 
 pytestmark = pytest.mark.parallel
 
-KINDS = [SaddlePoint, Replicated]
+KINDS = [SaddlePoint, ReplicatedSaddlePoint]
 N, M = 40, 7
 
 
@@ -34,7 +37,7 @@ def parts(comm, matrix):
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("columns", [(), (1,), (2,), (3,), (5,)])
-def test_solution(comm, system, kind, columns):
+def test_solve_returns_the_unknowns_that_made_the_right_hand_side_on_every_rank(comm, system, kind, columns):
     E, K, free = system
     rng = np.random.default_rng(2)
     c, a = rng.standard_normal((N, *columns)), rng.standard_normal((M, *columns))
@@ -55,34 +58,27 @@ def test_singular_systems_are_told_on_every_rank(comm, kind):
         kind(comm, E, K, free, "test_")
 
 
-def test_a_fault_of_one_rank_is_told_on_every_rank(comm, system, monkeypatch):
-    E, K, free = system
-
-    def factored(own, *arguments):
-        if comm.rank == comm.size - 1:
-            raise np.linalg.LinAlgError("a coarse matrix is singular")
-        return SaddlePoint(own, *arguments)
-
-    monkeypatch.setattr("feti_homog.feti.linalg.replicated_saddle_point.SaddlePoint", factored)
+def test_a_fault_of_one_rank_is_told_on_every_rank(comm):
+    """An indefinite factor, since no accuracy is enough; its matrix is singular on the last rank alone."""
+    null_projector = csr_matrix([[0.0 if comm.rank == comm.size - 1 else 1.0]])
+    E, K = parts(comm, np.eye(3)), csr_matrix((1, 3))
     with pytest.raises(np.linalg.LinAlgError, match="singular"):
-        Replicated(comm, parts(comm, E), parts(comm, K), csr_matrix(free), "test_")
+        ReplicatedSaddlePoint(comm, E, K, null_projector, "test_", accuracy=-1.0)
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize(("accurate", "benign"), [(1e-11, True), (0.0, False)])
-def test_benign_where_few_solves_are_enough(comm, system, monkeypatch, kind, accurate, benign):
+@pytest.mark.parametrize(("accuracy", "expected"), [(1e-11, True), (0.0, False)])
+def test_well_conditioned_where_few_solves_are_enough(comm, system, kind, accuracy, expected):
     E, K, free = system
     # One rank that wants more is enough.
-    monkeypatch.setattr(
-        "feti_homog.feti.linalg.saddle_point.ACCURATE", accurate if comm.rank == 0 or kind is SaddlePoint else 1e-11
-    )
-    saddle = kind(comm, parts(comm, E), parts(comm, K), csr_matrix(free), "test_")
-    assert saddle.benign == benign
+    own = accuracy if comm.rank == 0 or kind is SaddlePoint else 1e-11
+    saddle = kind(comm, parts(comm, E), parts(comm, K), csr_matrix(free), "test_", own)
+    assert saddle.well_conditioned == expected
     saddle.destroy()
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_no_constraints(comm, system, kind):
+def test_without_constraints_only_the_definite_block_is_solved(comm, system, kind):
     E, _, _ = system
     c = np.random.default_rng(3).standard_normal((N, 2))
     saddle = kind(comm, parts(comm, E), csr_matrix((0, N)), csr_matrix((0, 0)), "test_")
@@ -90,3 +86,44 @@ def test_no_constraints(comm, system, kind):
     np.testing.assert_allclose(found, c, atol=1e-10)
     assert work.shape == (0, 2)
     saddle.destroy()
+
+
+LIBRARY = "test_pc_factor_mat_solver_type"
+
+
+@pytest.mark.parametrize(
+    ("kind", "library"), [*((kind, "mumps") for kind in KINDS), (ReplicatedSaddlePoint, "cholmod")]
+)
+def test_the_library_of_the_factor_is_an_option(comm, system, kind, library):
+    E, K, free = system
+    with case_options({LIBRARY: library}):
+        saddle = kind(comm, parts(comm, E), parts(comm, K), csr_matrix(free), "test_", 1e-11)
+        assert option_was_used(LIBRARY)
+    inner = saddle.local if kind is ReplicatedSaddlePoint else saddle
+    assert inner._inner.solver._ksp.getPC().getFactorSolverType() == library
+    c = np.arange(N) + 1.0
+    np.testing.assert_allclose(saddle.solve(E @ c, K @ c)[0], c, rtol=1e-9)
+    saddle.destroy()
+
+
+def test_cholmod_factors_no_distributed_matrix(comm, system):
+    E, K, free = system
+    arguments = comm, parts(comm, E), parts(comm, K), csr_matrix(free), "test_", 1e-11
+    with case_options({LIBRARY: "cholmod"}):
+        if comm.size == 1:
+            SaddlePoint(*arguments).destroy()
+            return
+        with pytest.raises(CaseError) as caught:
+            SaddlePoint(*arguments)
+    assert caught.value.faults == (
+        f"-{LIBRARY} cholmod: it has no cholesky factorization of a matrix on {comm.size} ranks; mumps has",
+    )
+
+
+def test_a_library_that_petsc_does_not_have_is_refused(comm, system):
+    E, K, free = system
+    with (
+        case_options({LIBRARY: "cholmud"}),
+        pytest.raises(CaseError, match="cholmud: it has no cholesky factorization"),
+    ):
+        SaddlePoint(comm, parts(comm, E), parts(comm, K), csr_matrix(free), "test_")

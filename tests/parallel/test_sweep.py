@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mpi4py import MPI
-from support import parallel_assert
-from sweeps import CASE, RANDOM
+from reference.references import BONDED
+from support.ranks import parallel_assert
+from support.sweep_files import CASE, RANDOM
 
 from feti_homog import run
 from feti_homog.common.mpi_errors import on_root
@@ -19,8 +20,6 @@ from feti_homog.sweep import collect, execute, plan, store
 pytestmark = pytest.mark.parallel
 
 FRACTIONS = "'cell.fibre_fraction' = {from = 0.1, to = 0.6, step = 0.1}\n"
-# Fourier solution, hexagonal cell of 40 %, plane strain.
-REFERENCE = {"C11": 149.690255, "C12": 56.975975, "C33": 46.357140}
 
 
 def swept(comm, folder, table, case=CASE, ranks_per_case=None):
@@ -30,12 +29,12 @@ def swept(comm, folder, table, case=CASE, ranks_per_case=None):
     return on_root(comm, collect.read, folder / "out")
 
 
-def test_hexagonal_cells_against_reference_and_bounds(comm, shared_path):
+def test_hexagonal_cells_reach_the_reference_within_the_bounds(comm, shared_path):
     case = CASE.replace("mesh_size = 0.3", "mesh_size = 0.15\norder = 2")
     table = swept(comm, shared_path, FRACTIONS, case)
     found = table.outputs
     fractions = np.array(table.inputs["cell.fibre_fraction"])
-    for name, value in REFERENCE.items():
+    for name, value in zip(("C11", "C12", "C33"), BONDED["hexagonal", "strain"].value, strict=True):
         assert found[name][fractions == 0.4] == pytest.approx(value, rel=3e-4)
     for modulus in ("bulk", "shear"):
         below, above = (found[f"{modulus}_{side}"] for side in ("lower", "upper"))
@@ -58,7 +57,7 @@ def test_the_same_seeds_give_the_same_numbers(comm, shared_path):
     assert np.abs(found[0] - found[1]).max() > 0.1
 
 
-def test_groups_of_ranks(comm, shared_path):
+def test_groups_of_ranks_compute_every_case_once(comm, shared_path):
     """As many cases at once as there are ranks: each is computed once, by one rank."""
     table = swept(comm, shared_path, FRACTIONS, ranks_per_case=1)
     assert set(table.status) == {"done"} and set(table.outputs["ranks"]) == {1.0}
@@ -68,7 +67,7 @@ def test_groups_of_ranks(comm, shared_path):
     parallel_assert(comm, times == {p: p.stat().st_mtime_ns for p in shared_path.glob("out/case-*/result.json")})
 
 
-def test_mean_of_random_cells(comm, shared_path):
+def test_mean_of_random_cells_is_isotropic_and_within_the_bounds(comm, shared_path):
     """Between the bounds, and isotropic within its confidence interval: a small one of README's 30 realisations."""
     case = RANDOM.replace("fibres = 3", "fibres = 8").replace("mesh_size = 0.3", "mesh_size = 0.2")
     table = swept(comm, shared_path, "realisations = 12\n", case, ranks_per_case=1)
@@ -81,7 +80,7 @@ def test_mean_of_random_cells(comm, shared_path):
     assert s["C11"].count.tolist() == [12.0] and s["C11"].std[0] > 0
 
 
-def test_failures_end_as_one(comm, shared_path):
+def test_failed_cases_end_the_sweep_as_one_error(comm, shared_path):
     case = CASE + "[petsc]\nfeti_ksp_max_it = 2\n"
     with pytest.raises(ConvergenceError, match="2 of 2 cases failed"):
         swept(comm, shared_path, "cell.fibre_fraction = [0.2, 0.3]\n", case, ranks_per_case=1)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import bonds
 import numpy as np
 import pytest
-from narrow_cells import NARROW, together
+from support import torn_cells
+from support.coarse_space_cells import NARROW, together
 
 from feti_homog.cell.refinement import edge_node
 from feti_homog.feti.coarse import trace_spaces
@@ -20,12 +20,12 @@ ALL = 10**9
 
 def tear(comm, enough, monkeypatch, **cell):
     monkeypatch.setattr(trace_spaces, "ENOUGH", enough)
-    return bonds.tear(comm, **REFINED | cell)
+    return torn_cells.tear(comm, **REFINED | cell)
 
 
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("enough", [0, 60, 150, ALL])
-def test_piecewise_linear_along_the_coarse_edges(comm, monkeypatch, enough, order):
+def test_traces_are_piecewise_linear_along_the_coarse_edges(comm, monkeypatch, enough, order):
     cell = tear(comm, enough, monkeypatch, order=order, refine=3 - order)
     for s, dofs in zip(cell.subdomains, cell.solver.boundary.dofs, strict=True):
         nodes, M = dofs[::2] // 2, s.mesh.lattice.intervals
@@ -47,7 +47,7 @@ def test_piecewise_linear_along_the_coarse_edges(comm, monkeypatch, enough, orde
                     assert np.allclose(values, np.interp(np.arange(M + 1), at, values[at]), atol=1e-13)
 
 
-def test_few_dofs_are_all_kept(comm, monkeypatch):
+def test_traces_of_few_dofs_keep_them_all(comm, monkeypatch):
     cell = tear(comm, ALL, monkeypatch)
     for s, dofs in zip(cell.subdomains, cell.solver.boundary.dofs, strict=True):
         P = trace(s.submesh, s.mesh.lattice, dofs[::2] // 2)

@@ -1,4 +1,4 @@
-"""A dense twin of the dual problem: Schur complements, preconditioner and deflation by NumPy alone, on every rank.
+"""The dual problem with dense matrices: Schur complements, preconditioner, deflation by NumPy alone, on every rank.
 
 It takes K and B of each subdomain from the program, nothing else.
 """
@@ -37,10 +37,10 @@ def gathered(cell, own):
 def matrix(cell, function):
     """(total, total) of a linear function of the owned rows (rows, k).  Collective."""
     first, last = cell.solver.jump_operator.owned
-    return gathered(cell, function(np.eye(cell.solver.jump_operator.total)[first:last]))
+    return gathered(cell, function(np.eye(cell.solver.jump_operator.global_rows)[first:last]))
 
 
-class DualTwin:
+class DenseDual:
     """The subdomains of all ranks in the order of their numbers, on their boundaries.
 
     Attributes:
@@ -54,14 +54,14 @@ class DualTwin:
         jump_operator = cell.solver.jump_operator
         own = []
         for s, first in zip(cell.subdomains, cell.offsets, strict=False):
-            K, B = s.K.toarray(), np.zeros((jump_operator.total, len(s.Q)))
+            K, B = s.assemble_stiffness().toarray(), np.zeros((jump_operator.global_rows, len(s.Q)))
             B[jump_operator.rows] = jump_operator.B[:, first : first + len(s.Q)].toarray()
             at = boundary_of(B)
             diagonal = np.diag(K)[at].reshape(-1, 2)
             own.append((s.submesh.index, schur(K, at), B[:, at], np.repeat(diagonal.mean(axis=1), 2)))
         parts = sorted((part for parts in cell.comm.allgather(own) for part in parts), key=lambda part: part[0])
         self.S, self.B, self.D = ([part[i] for part in parts] for i in (1, 2, 3))
-        self.total = jump_operator.total
+        self.total = jump_operator.global_rows
         self.kernels = [kernel(S) for S in self.S]
         self.G = np.hstack([B @ R for B, R in zip(self.B, self.kernels, strict=True)])
         inverse = [np.linalg.pinv(S, rcond=KERNEL, hermitian=True) for S in self.S]

@@ -1,4 +1,4 @@
-"""A slow independent twin of load paths: every state anew by `qp_twin`, bonded nodes being one, debonded ones two.
+"""Load paths by brute force: every state anew by `quadratic_programme`, bonded nodes being one, debonded ones two.
 
 Tractions are nodal reactions by the arc length that each node stands for.
 """
@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from reference.quadratic_programme import QPTwin
+
+from reference.quadratic_programme import QuadraticProgramme
 
 TIE = 1e-6
 LEAST = 1e-9  # bisection ends
@@ -25,10 +26,10 @@ class Event:
 
 
 @dataclass(frozen=True)
-class PathTwin:
-    """The law: strengths `normal` and `tangential`, `criterion` "max" or "quadratic"."""
+class SlowLoadPath:
+    """A cell whose bonds have the strengths `normal` and `tangential`, by the `criterion` "max" or "quadratic"."""
 
-    twin: QPTwin
+    programme: QuadraticProgramme
     contact: bool
     normal: float
     tangential: float
@@ -36,15 +37,15 @@ class PathTwin:
 
     def state(self, strain, bonded):
         """The state, and the share of strength that each node uses."""
-        state = self.twin.solve(strain, bonded, self.contact)
-        tn, tt = (state.force / self.twin.lengths()[:, None]).T
+        state = self.programme.solve(strain, bonded, self.contact)
+        tn, tt = (state.force / self.programme.lengths()[:, None]).T
         shares = np.array([np.maximum(tn, 0.0) / self.normal, np.abs(tt) / self.tangential])
         used = shares.max(axis=0) if self.criterion == "max" else np.sqrt((shares**2).sum(axis=0))
         return state, used * bonded
 
     def proportional(self, strain):
         """Events of the wholly bonded cell from zero to `strain`, snap-back included."""
-        events, bonded = [], np.ones(len(self.twin.key), bool)
+        events, bonded = [], np.ones(len(self.programme.key), bool)
         while True:
             state, used = self.state(strain, bonded)
             load = used.max()

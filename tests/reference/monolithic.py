@@ -1,4 +1,4 @@
-"""A slow independent twin: one monolithic, periodic direct solve of the same refined mesh, with SciPy alone.
+"""The bonded cell without tearing: one monolithic, periodic direct solve of the same refined mesh, with SciPy alone.
 
 It shares the mesh with the program, nothing else: dense element loops, its own quadrature, its own periodic
 elimination.
@@ -14,7 +14,6 @@ from scipy.sparse.linalg import splu
 def effective_stiffness(points, triangles, stiffness, width, height):
     """L^ef (3, 3) of elements `triangles` (m, 3 or 6) on `points`, with `stiffness` (m, 3, 3) of each."""
     node, n = periodic_numbers(points, width, height)
-    K = np.zeros((0,))
     rows, columns, values, loads = [], [], [], np.zeros((2 * n, 3))
     mean = np.zeros((3, 3))
     for corners, L in zip(triangles, stiffness, strict=True):
@@ -35,7 +34,7 @@ def periodic_numbers(points, width, height):
     """Number of the class of each node, by rounded position modulo the periods; and how many there are."""
     period = np.array([width, height])
     reduced = np.round(points / period * 1e8).astype(np.int64) % 10**8
-    # Torn copies have the same position, so the twin glues them too.
+    # Torn copies have the same position, so they become one node here.
     classes, number = np.unique(reduced, axis=0, return_inverse=True)
     return number.ravel(), len(classes)
 

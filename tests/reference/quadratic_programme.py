@@ -1,4 +1,4 @@
-"""A slow independent twin with debonding and contact: the displacements of all bodies by quadratic programming.
+"""Debonding and contact in displacements: the bodies of the torn cell by quadratic programming, slow and simple.
 
 It shares the refined meshes with the program, nothing else.  Bonded nodes are one, debonded ones are two and,
 with contact, obey n.(u_matrix - u_fibre) >= 0: clarabel minimises the energy, and a direct solve of the KKT
@@ -11,9 +11,10 @@ from dataclasses import dataclass
 
 import clarabel
 import numpy as np
-from reference import monolithic
 from scipy.sparse import bmat, coo_matrix, csc_matrix, csr_matrix, triu
 from scipy.sparse.linalg import splu
+
+from reference import monolithic
 
 EXACT = 1e-9  # relative, of the KKT conditions of an answer
 
@@ -31,13 +32,13 @@ class State:
     closed: np.ndarray
 
 
-def keys(points, size):
+def torus_keys(points, size):
     """One integer for each position on the torus."""
     reduced = np.round(points / size * 1e8).astype(np.int64) % 10**8
     return reduced[:, 0] * 10**8 + reduced[:, 1]
 
 
-class QPTwin:
+class QuadraticProgramme:
     """The cell of round fibres made of meshed parts (points, triangles, body, is matrix, L).
 
     `centres` and `radii` are those of the fibres; interface nodes are sorted by `key`.
@@ -45,7 +46,7 @@ class QPTwin:
 
     def __init__(self, parts, centres, radii, size):
         self.size = np.array(size)
-        labels = [np.stack([np.full(len(p), body), keys(p, size)], axis=1) for p, _, body, _, _ in parts]
+        labels = [np.stack([np.full(len(p), body), torus_keys(p, size)], axis=1) for p, _, body, _, _ in parts]
         classes, number = np.unique(np.concatenate(labels), axis=0, return_inverse=True)
         first = np.cumsum([0] + [len(label) for label in labels])
         self.n = len(classes)
@@ -104,7 +105,7 @@ class QPTwin:
         free = np.flatnonzero(~bonded) if contact else np.zeros(0, int)
         K, f = (T.T @ self.K @ T).tocsc() / self.scale, -T.T @ (self.Q @ strain) / self.scale
         C = (self._gaps(free) @ T).tocsr()
-        v, pressure = _minimise(K, f, C, lambda active: self._loose(T, bonded, C[active]), reach)
+        v, pressure = _minimise(K, f, C, lambda active: self._free_motions(T, bonded, C[active]), reach)
         u = T @ v
         residual = self.K @ u + self.Q @ strain
         energy = strain @ self.mean @ strain / 2 + strain @ self.Q.T @ u + u @ (self.K @ u) / 2
@@ -127,7 +128,7 @@ class QPTwin:
         columns = (2 * np.searchsorted(kept, number[node])[:, None] + [0, 1]).ravel()
         return csr_matrix((np.ones(len(rows)), (rows, columns)), shape=(2 * self.n, 2 * len(kept)))
 
-    def _loose(self, T, bonded, C):
+    def _free_motions(self, T, bonded, C):
         """(free dofs, z) rigid motions of the fibres that no bonded node nor a row of C resists."""
         motions = []
         for f in range(self.rigid.shape[2]):
@@ -156,10 +157,10 @@ def _nearest(points, centres, radii, size):
     return fibre, arm[np.arange(len(arm)), fibre]
 
 
-def _minimise(K, f, C, loose, reach):
+def _minimise(K, f, C, free_motions, reach):
     """min v.K.v / 2 - f.v, C v >= 0: v and the forces of the constraints; gaps up to EXACT * reach are zero.
 
-    `loose` gives the null vectors of K on the active constraints.
+    `free_motions` gives the null vectors of K on the active constraints.
     """
     active, v, unit = np.zeros(C.shape[0], bool), np.zeros(len(f)), np.abs(f).max() or 1.0
     if C.shape[0]:
@@ -172,7 +173,7 @@ def _minimise(K, f, C, loose, reach):
         v, s, z = unit * np.array(found.x), np.array(found.s), np.array(found.z)
         active = z * reach > s * unit
     for _ in range(50):
-        v, own = _bordered(K, f, C[active], loose(active), v)
+        v, own = _bordered(K, f, C[active], free_motions(active), v)
         force = np.zeros(C.shape[0])
         force[active] = own
         pulled = force < -EXACT * max(np.abs(force).max(initial=0.0), EXACT * unit)
@@ -180,15 +181,15 @@ def _minimise(K, f, C, loose, reach):
         if not (pulled | overlap).any():
             return v, force
         active = (active & ~pulled) | overlap
-    raise AssertionError("the twin finds no state of contact")
+    raise AssertionError("no state of contact is found")
 
 
-def _bordered(K, f, C, loose, v):
-    """K v - C^T force = f, C v = 0 by a direct solve that leaves the amplitudes of loose motions as they are in v."""
+def _bordered(K, f, C, motions, v):
+    """K v - C^T force = f, C v = 0 by a direct solve that leaves the amplitudes of free motions as they are in v."""
     n, m = len(f), C.shape[0]
-    matrix = bmat([[K, -C.T, csr_matrix(loose)], [-C, csr_matrix((m, m)), None], [csr_matrix(loose.T), None, None]])
+    matrix = bmat([[K, -C.T, csr_matrix(motions)], [-C, csr_matrix((m, m)), None], [csr_matrix(motions.T), None, None]])
     factor = splu(matrix.tocsc())
-    b = np.r_[f, np.zeros(m), loose.T @ v]
+    b = np.r_[f, np.zeros(m), motions.T @ v]
     x = factor.solve(b)
     x += factor.solve(b - matrix @ x)
     return x[:n], x[n : n + m]

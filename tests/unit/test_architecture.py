@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -106,6 +107,23 @@ def test_files_are_short():
     files = [path for folder in FOLDERS for path in (ROOT / folder).rglob("*.py")]
     lengths = {path: len(path.read_text(encoding="utf-8").splitlines()) for path in files}
     assert not {str(path): n for path, n in lengths.items() if n > LONGEST}
+
+
+def is_known(name: str) -> bool:
+    """Whether a dotted name begins with a module of the package and goes on with a word that it has."""
+    place, words = PACKAGE, name.split(".")[1:]
+    while words and ((place / words[0]).is_dir() or (place / f"{words[0]}.py").is_file()):
+        place = place / words[0] if (place / words[0]).is_dir() else place / f"{words[0]}.py"
+        words = words[1:]
+    text = (place / "__init__.py" if place.is_dir() else place).read_text(encoding="utf-8")
+    return not words or re.search(rf"\b{words[0]}\b", text) is not None
+
+
+def test_modules_that_texts_name_are_there():
+    """Also in strings, where no import fails: programs that tests write, functions that they replace."""
+    files = [path for folder in FOLDERS for path in (ROOT / folder).rglob("*.py")]
+    named = {(path.name, name) for path in files for name in re.findall(r"\bfeti_homog(?:\.\w+)+", path.read_text())}
+    assert not {(path, name) for path, name in named if not is_known(name)}
 
 
 @pytest.mark.parametrize("script", ["benchmark", "benchmark_sweep", "measure_cost", "scaling"])

@@ -24,11 +24,13 @@ from feti_homog.feti.coarse.geneo import coarse_vectors, dual_blocks
 from feti_homog.feti.coarse.natural import NaturalCoarseSpace
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.neighbours import Neighbours
-from feti_homog.feti.linalg.distributed_matrix import Blocks, summed
-from feti_homog.feti.linalg.replicated_saddle_point import Replicated, saddle_point
+from feti_homog.feti.linalg.dense_block_sum import DenseBlockSum
+from feti_homog.feti.linalg.distributed_matrix import add_shared_rows
+from feti_homog.feti.linalg.replicated_saddle_point import ReplicatedSaddlePoint, coarse_saddle_point
 from feti_homog.feti.linalg.saddle_point import SaddlePoint
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.preconditioners.scaled import StiffnessScaled
+from feti_homog.feti.thresholds import DEFAULTS
 from feti_homog.typing import Float, Int
 
 THRESHOLD = 0.24
@@ -53,10 +55,11 @@ class AdaptiveCoarseSpace(NaturalCoarseSpace):
         boundary: InterfaceOperators,
         scaling: StiffnessScaled,
         threshold: float,
+        replicated_vectors: int = DEFAULTS.replicated_vectors,
     ) -> None:
         """Find the soft modes and factor.  All boundary operators must be dense but of large bodies.  Collective."""
         super().__init__(comm, jump_operator, boundary)
-        self.threshold = threshold
+        self.threshold, self._replicated_vectors = threshold, replicated_vectors
         self.jump_operator = jump_operator
         neighbours = Neighbours(comm, jump_operator, boundary.subdomains)
         self._rows, self._boundary = neighbours.rows, boundary
@@ -70,8 +73,8 @@ class AdaptiveCoarseSpace(NaturalCoarseSpace):
         self._motions = csr_matrix((own.data, own.indices + self.own.start, own.indptr), shape=shape)
         self._complete, self._usable, self._sufficient = False, True, False
         # The faintest entries of U are dropped for large bodies.
-        self._exact = not comm.allreduce(any(boundary.large), MPI.LOR)
-        self.saddle: SaddlePoint | Replicated | None = None
+        self._exact = not comm.allreduce(any(boundary.facewise), MPI.LOR)
+        self.saddle: SaddlePoint | ReplicatedSaddlePoint | None = None
         self._E: csr_matrix
         # (columns, S+ B^T U there) of each subdomain
         self._answers: list[tuple[Int, Float]]
@@ -95,20 +98,21 @@ class AdaptiveCoarseSpace(NaturalCoarseSpace):
         """Factorize for the owned rows of which `active` is 1; U is restricted to them."""
         super().activate(active)
         if not self._complete:
-            G = summed(self.comm, self._motions, self.jump_operator.rows, self.jump_operator.foreign, len(active))
+            rows, is_shared_row = self.jump_operator.rows, self.jump_operator.is_shared_row
+            G = add_shared_rows(self.comm, self._motions, rows, is_shared_row, len(active))
             self._complete = True
             self._span(hstack([self._U, G]).tocsr())
         mask = self.jump_operator.gather(active).copy()
         changed = mask != self._mask
         touched = [i for i, rows in enumerate(self._rows) if changed[rows].any()]
-        change = Blocks(self._E.shape)
+        change = DenseBlockSum(self._E.shape)
         for i in touched:
             columns, loads = self._loads(i)
             change.add(columns, columns, -loads.T @ self._answers[i][1])
         self._mask = mask
         for i in touched:
             columns, loads = self._loads(i)
-            self._answers[i] = columns, self._blocks[i].operator.answer(loads)
+            self._answers[i] = columns, self._blocks[i].operator.apply_flexibility(loads)
             change.add(columns, columns, loads.T @ self._answers[i][1])
         self._E = self._E + change.matrix()
         self._active = active
@@ -160,7 +164,7 @@ class AdaptiveCoarseSpace(NaturalCoarseSpace):
         rows = int(self.everywhere(np.array([self._active.sum()]))[0])
         self._usable = rows >= ROOM * self.vectors and self._factored() and self._projects()
         # Of a badly conditioned coarse problem T would not take away enough.
-        self._sufficient = self._exact and self.saddle is not None and self.saddle.benign
+        self._sufficient = self._exact and self.saddle is not None and self.saddle.well_conditioned
 
     def _factored(self) -> bool:
         seen = self.everywhere(abs(self.U.T) @ self._active) > 0.0
@@ -179,7 +183,9 @@ class AdaptiveCoarseSpace(NaturalCoarseSpace):
         process_memory.trim()
         self.destroy()
         try:
-            self.saddle = saddle_point(self.comm, E.tocsr(), K.tocsr(), free, "feti_coarse_")
+            self.saddle = coarse_saddle_point(
+                self.comm, E.tocsr(), K.tocsr(), free, "feti_coarse_", self._replicated_vectors
+            )
         except np.linalg.LinAlgError:
             return False
         return True
@@ -205,11 +211,11 @@ class AdaptiveCoarseSpace(NaturalCoarseSpace):
     def _span(self, U: csr_matrix) -> None:
         """Let the columns of U (local rows, vectors) be the coarse vectors.  Collective."""
         self._U, self.U = U, self._own(U)
-        E = Blocks((self.vectors, self.vectors))
+        E = DenseBlockSum((self.vectors, self.vectors))
         self._answers = []
         for i, block in enumerate(self._blocks):
             columns, loads = self._loads(i)
-            self._answers.append((columns, block.operator.answer(loads)))
+            self._answers.append((columns, block.operator.apply_flexibility(loads)))
             E.add(columns, columns, loads.T @ self._answers[i][1])
         self._E = E.matrix()
 
@@ -223,7 +229,7 @@ class AdaptiveCoarseSpace(NaturalCoarseSpace):
         """This rank's share of U^T F z, (vectors,) or (vectors, k)."""
         x = self._boundary.BT @ self.jump_operator.gather(z)
         energy = np.zeros((self.vectors, *z.shape[1:]))
-        for (columns, answer), span in zip(self._answers, self._boundary.spans, strict=True):
+        for (columns, answer), span in zip(self._answers, self._boundary.slices, strict=True):
             energy[columns] += answer.T @ x[span]
         return energy
 

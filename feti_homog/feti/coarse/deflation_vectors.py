@@ -11,7 +11,8 @@ from scipy.sparse import csr_matrix
 from feti_homog.feti.coarse.local_eigenproblems import SubdomainBlocks
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.neighbours import Neighbours
-from feti_homog.feti.linalg.distributed_matrix import Blocks, summed
+from feti_homog.feti.linalg.dense_block_sum import DenseBlockSum
+from feti_homog.feti.linalg.distributed_matrix import add_shared_rows
 from feti_homog.typing import Float, Int
 
 # Rows of the receiver, numbers of coarse vectors, and their jumps there (rows, vectors).
@@ -45,7 +46,7 @@ def preconditioned(
 
     received: list[list[Jumps]] = [[] for _ in blocks]
     neighbours.exchange(jumps(), lambda i, sender, of: received[i].append((neighbours.common[i][sender], *of)))
-    U = Blocks((len(jump_operator.rows), int(every.sum())))
+    U = DenseBlockSum((len(jump_operator.rows), int(every.sum())))
     for i, (block, rows) in enumerate(zip(blocks, neighbours.rows, strict=True)):
         for some in _groups(received[i]):
             columns = np.concatenate([c for _, c, _ in some])
@@ -53,13 +54,13 @@ def preconditioned(
             for where, _, Z in some:
                 jump[where, at : at + Z.shape[1]] = Z
                 at += Z.shape[1]
-            vectors = block.BW @ block.operator.forces(block.BW.T @ jump)
-            if block.large:
-                U.add_larger(rows, columns, vectors, FAINT * np.abs(vectors).max(axis=0))
+            vectors = block.BW @ block.operator.apply_schur(block.BW.T @ jump)
+            if block.facewise:
+                U.add_entries_above(rows, columns, vectors, FAINT * np.abs(vectors).max(axis=0))
             else:
                 U.add(rows, columns, vectors)
     owned = jump_operator.owned[1] - jump_operator.owned[0]
-    return summed(comm, U.matrix(), jump_operator.rows, jump_operator.foreign, owned)
+    return add_shared_rows(comm, U.matrix(), jump_operator.rows, jump_operator.is_shared_row, owned)
 
 
 def _groups(messages: Sequence[Jumps]) -> Iterator[list[Jumps]]:

@@ -80,9 +80,10 @@ def _ring(body: Subdomain, dofs: Int, members: Int, on_face: Bool, others: Bool)
         return None
     own, at = both_directions(nodes), np.searchsorted(dofs, both_directions(of_body[nodes]))
     free = both_directions(np.flatnonzero(on_face[of_body] | ~(outside | others)[of_body]))
-    clamped = schur_complement(ring.K[free][:, free].tocsr(), np.searchsorted(free, own))
+    K = ring.take_stiffness()
+    clamped = schur_complement(K[free][:, free].tocsr(), np.searchsorted(free, own))
     P = trace(ring.submesh, ring.mesh.lattice, nodes)
-    return Ring(at, ExplicitInterfaceOperator(ring, own), ring.R[own], P, clamped)
+    return Ring(at, ExplicitInterfaceOperator(ring, K, own), ring.R[own], P, clamped)
 
 
 def _near(body: Subdomain, on_face: Bool) -> Int:

@@ -15,7 +15,7 @@ from scipy.sparse import csc_matrix, csr_matrix
 from feti_homog.feti.coarse.local_eigenproblems import SubdomainBlocks, examined
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.neighbours import Neighbours
-from feti_homog.feti.linalg.distributed_matrix import summed
+from feti_homog.feti.linalg.distributed_matrix import add_shared_rows
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.preconditioners.scaled import StiffnessScaled
 from feti_homog.typing import Float, Float32, Int
@@ -32,14 +32,15 @@ def dual_blocks(
     owned = jump_operator.owned[1] - jump_operator.owned[0]
     inverse = scaling.W_inverse.tocoo()
     at = np.searchsorted(jump_operator.rows, jump_operator.owned[0])
-    shape = (len(jump_operator.rows), jump_operator.total)
+    shape = (len(jump_operator.rows), jump_operator.global_rows)
     wide = csr_matrix((inverse.data, (inverse.row + at, inverse.col + jump_operator.owned[0])), shape=shape)
-    W_inverse = summed(comm, wide, jump_operator.rows, jump_operator.foreign, owned)[:, jump_operator.rows]
+    rows_of_rank, is_shared_row = jump_operator.rows, jump_operator.is_shared_row
+    W_inverse = add_shared_rows(comm, wide, rows_of_rank, is_shared_row, owned)[:, rows_of_rank]
     B, BW = boundary.B.tocsc(), (W_inverse @ scaling.BD).tocsc()
     blocks = []
     for i, (subdomain, operator) in enumerate(zip(boundary.subdomains, boundary.operators, strict=True)):
-        own, scaled = (_columns(matrix, boundary.spans[i], rows[i]) for matrix in (B, BW))
-        blocks.append(SubdomainBlocks(subdomain, boundary.dofs[i], operator, own, scaled, boundary.large[i]))
+        own, scaled = (_columns(matrix, boundary.slices[i], rows[i]) for matrix in (B, BW))
+        blocks.append(SubdomainBlocks(subdomain, boundary.dofs[i], operator, own, scaled, boundary.facewise[i]))
     return blocks
 
 

@@ -43,7 +43,7 @@ class SubdomainBlocks:
         operator: its boundary operators.
         B: (rows, n) constraints.
         BW: (rows, n) scaled constraints W^-1 B D^-1.
-        large: whether it is to be examined face by face.
+        facewise: whether it is to be examined face by face.
     """
 
     subdomain: Subdomain
@@ -51,7 +51,7 @@ class SubdomainBlocks:
     operator: ExplicitInterfaceOperator | ImplicitInterfaceOperator
     B: csr_matrix
     BW: csr_matrix
-    large: bool
+    facewise: bool
 
     @property
     def R(self) -> Float:
@@ -66,7 +66,7 @@ class SubdomainEigenproblem:
         self.block, self.common = block, common
         subdomain, S = block.subdomain, operator.S
         self._P = trace(subdomain.submesh, subdomain.mesh.lattice, block.dofs[::2] // 2)
-        self._held = congruent(self._P, S) + operator.holding(self._P)
+        self._held = congruent(self._P, S) + operator.regularisation(self._P)
         # (rows, rows) its share W^-1 B D^-1 S D^-1 B^T W^-1 of M^-1; this precision tells soft from stiff.
         BW = block.BW.astype(np.float32)
         self._share = BW @ (BW @ S.astype(np.float32)).T
@@ -115,7 +115,7 @@ class FaceEigenproblems:
             for ring in self._rings[s]:
                 B = self.block.B[self.common[s]][:, ring.at]
                 N = jump_energy(B, ring.P, ring.R, share)
-                soft = ring.P @ soft_modes(congruent(ring.P, ring.operator.held), N, FACE * threshold)
+                soft = ring.P @ soft_modes(congruent(ring.P, ring.operator.regularised_schur), N, FACE * threshold)
                 parts.append(np.zeros((len(self.block.dofs), soft.shape[1])))
                 parts[-1][ring.at] = soft
         return np.hstack(parts)
@@ -127,7 +127,7 @@ def examined(block: SubdomainBlocks, common: Mapping[int, Int]) -> SubdomainEige
     Raises:
         TypeError: as one, but without dense boundary operators.
     """
-    if block.large:
+    if block.facewise:
         return FaceEigenproblems(block, common)
     if not isinstance(block.operator, ExplicitInterfaceOperator):
         raise TypeError("soft modes of small boundaries need dense operators")

@@ -10,7 +10,8 @@ from scipy.sparse import block_diag, csr_matrix, diags, hstack
 
 from feti_homog.cell.periodic_topology import components
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
-from feti_homog.feti.linalg.distributed_matrix import assembled, total
+from feti_homog.feti.linalg.collectives import allreduce_sparse
+from feti_homog.feti.linalg.distributed_matrix import assemble_owned_rows
 from feti_homog.feti.linalg.sparse_direct import DirectSolver
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.typing import Float, Int
@@ -40,7 +41,7 @@ class NaturalCoarseSpace:
         self.held = comm.allreduce(max(pinned, default=-1), MPI.MAX)
         owned = jump_operator.owned[1] - jump_operator.owned[0]
         columns = np.arange(first, first + modes)
-        self.G = assembled(comm, boundary.B @ self.R, jump_operator.rows, columns, (owned, modes))
+        self.G = assemble_owned_rows(comm, boundary.B @ self.R, jump_operator.rows, columns, (owned, modes))
         self.factorizations = 0
         squares = np.asarray(self.G.power(2).sum(axis=0)).ravel()
         self.scale = float(comm.allreduce(squares).max(initial=0.0))
@@ -53,7 +54,7 @@ class NaturalCoarseSpace:
         """
         self.Ga = (diags(active) @ self.G).tocsr()
         self.GaT = self.Ga.T.tocsr()
-        gram = total(self.comm, (self.GaT @ self.Ga).tocsr())
+        gram = allreduce_sparse(self.comm, (self.GaT @ self.Ga).tocsr())
         self.free = _null_vectors(gram, self.body, self.held, FREE * self.scale)
         if self.dimension:
             held = gram + self.scale * csr_matrix(self.free @ self.free.T)
@@ -69,6 +70,12 @@ class NaturalCoarseSpace:
     def deflates(self) -> bool:
         """Whether more than rigid-body motions is taken out of the Krylov method."""
         return False
+
+    def free_motions(self, active: Float) -> int:
+        """How many rigid motions the owned rows of which `active` is 1 would leave free; collective."""
+        Ga = (diags(active) @ self.G).tocsr()
+        gram = allreduce_sparse(self.comm, (Ga.T @ Ga).tocsr())
+        return int(_null_vectors(gram, self.body, self.held, FREE * self.scale).shape[1])
 
     def amplitudes(self, x: Float) -> Float:
         """(G^T G)^-1 G^T x on every rank, for the owned rows x (rows,) or (rows, k)."""

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
-from feti_homog.cell.refinement import Lattice
+from feti_homog.cell.refinement import ReferenceLattice
 from feti_homog.cell.submesh import Submesh
 from feti_homog.feti.decomposition.subdomain import both_directions
 from feti_homog.typing import Int
@@ -19,7 +19,7 @@ from feti_homog.typing import Int
 ENOUGH = 100
 
 
-def trace(submesh: Submesh, lattice: Lattice, nodes: Int) -> csr_matrix:
+def trace(submesh: Submesh, lattice: ReferenceLattice, nodes: Int) -> csr_matrix:
     """(2n, 2m) P for n boundary nodes, sorted classes of the refined piece; ends of edges not among them are held."""
     vertices, inner = len(submesh.class_keys), lattice.intervals - 1
     on_edge = nodes >= vertices

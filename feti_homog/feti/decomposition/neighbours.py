@@ -1,8 +1,8 @@
-"""Which subdomains meet in which constraints, and what they tell each other."""
+"""Which subdomains meet in which constraints, and messages between them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import TypeVar
 
 import numpy as np
@@ -20,39 +20,38 @@ class Neighbours:
 
     Attributes:
         index: global number of each of this rank's subdomains.
+        local: position in `index` of each of them, by its global number.
+        rank: rank of every subdomain of the cell, by its global number.
         rows: rows[i] local rows, ascending, of the nodes of subdomain i of this rank.
         common: common[i][s] positions in rows[i] of the rows of the nodes that it shares with subdomain s, in the
             same order on both sides.
     """
 
     def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, subdomains: Sequence[Subdomain]) -> None:
+        """Collective."""
         self.comm = comm
         self.index = [s.submesh.index for s in subdomains]
         self.local = {s: i for i, s in enumerate(self.index)}
         self.rank = {s: r for r, own in enumerate(comm.allgather(self.index)) for s in own}
-        first, second, entity = _pairs(jump_operator.shared.pointer, jump_operator.shared.sharer, self.index)
-        order = np.lexsort((entity, second, first))
-        first, second, entity = first[order], second[order], entity[order]
-        new = np.ones(len(first), bool)
-        new[1:] = (np.diff(first) != 0) | (np.diff(second) != 0)
-        starts = np.flatnonzero(new)
-        self.rows: list[Int] = [np.zeros(0, np.int64) for _ in self.index]
-        groups = [
-            (self.local[int(first[a])], int(second[a]), jump_operator.rows_of(some))
-            for a, some in zip(starts, np.split(entity, starts)[1:], strict=True)
+        shared_rows: list[dict[int, Int]] = [{} for _ in self.index]
+        for t, s, entities in _pairs(jump_operator.shared.pointer, jump_operator.shared.sharer, self.index):
+            shared_rows[self.local[t]][s] = jump_operator.rows_of(entities)
+        none = np.zeros(0, np.int64)
+        self.rows = [of.get(t, none) for t, of in zip(self.index, shared_rows, strict=True)]
+        self.common = [
+            {s: np.searchsorted(own, rows) for s, rows in of.items()}
+            for own, of in zip(self.rows, shared_rows, strict=True)
         ]
-        for i, s, rows in groups:
-            if s == self.index[i]:
-                self.rows[i] = rows
-        self.common: list[dict[int, Int]] = [{} for _ in self.index]
-        for i, s, rows in groups:
-            self.common[i][s] = np.searchsorted(self.rows[i], rows)
 
     def exchange(
         self, messages: Iterable[tuple[int, int, Message]], deliver: Callable[[int, int, Message], None]
     ) -> None:
-        """For each (from local subdomain i, to subdomain s, message) call deliver(local s, i's number, message) on the
-        rank of s; messages within a rank are delivered as they come.  Collective."""
+        """Deliver messages between subdomains; those within a rank are delivered as they come.  Collective.
+
+        Args:
+            messages: (i, s, message) from this rank's subdomain i to the subdomain of global number s.
+            deliver: called on the rank of s with the position of s there, the global number of i, and the message.
+        """
         outgoing: list[list[tuple[int, int, Message]]] = [[] for _ in range(self.comm.size)]
         for i, s, message in messages:
             if s in self.local:
@@ -65,8 +64,8 @@ class Neighbours:
                     deliver(self.local[to], sender, message)
 
 
-def _pairs(pointer: Int, sharer: Int, own: Sequence[int]) -> tuple[Int, Int, Int]:
-    """Pairs (t, s) of sharers of the same entity, t one of `own`, and the entity."""
+def _pairs(pointer: Int, sharer: Int, own: Sequence[int]) -> Iterator[tuple[int, int, Int]]:
+    """Pairs (t, s) of subdomains that share entities, t one of `own`: t, s and these; all in ascending order."""
     copies = np.diff(pointer)
     parts = []
     for k in np.unique(copies):
@@ -82,6 +81,11 @@ def _pairs(pointer: Int, sharer: Int, own: Sequence[int]) -> tuple[Int, Int, Int
                 ]
             )
         )
-    first, second, entity = np.concatenate(parts or [np.zeros((3, 0), np.int64)], axis=1)
-    mine = np.isin(first, own)
-    return first[mine], second[mine], entity[mine]
+    pairs = np.concatenate(parts or [np.zeros((3, 0), np.int64)], axis=1)
+    pairs = pairs[:, np.isin(pairs[0], own)]
+    first, second, entity = pairs[:, np.lexsort(pairs[::-1])]
+    new = np.ones(len(first), bool)
+    new[1:] = (np.diff(first) != 0) | (np.diff(second) != 0)
+    starts = np.flatnonzero(new)
+    for a, entities in zip(starts.tolist(), np.split(entity, starts)[1:], strict=True):
+        yield int(first[a]), int(second[a]), entities

@@ -1,4 +1,4 @@
-"""Who gets what: constituents -> subdomains -> ranks, decided on rank 0 from the coarse mesh."""
+"""Bodies cut into subdomains, and subdomains assigned to ranks; decided on rank 0 from the coarse mesh."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from scipy.sparse import coo_matrix, csr_matrix
 from feti_homog.cell.periodic_topology import Torus, components, edge_pairs, shared_edges
 from feti_homog.typing import Int
 
-# METIS takes whole numbers: of so many classes of length.
-LENGTHS = 100
-# How much more load the fullest rank may have if that keeps neighbours together.
-UNEVEN = 1.03
+# METIS takes whole numbers as weights of edges: lengths are rounded up to so many classes.
+LENGTH_CLASSES = 100
+# Load of the fullest rank, relative to that of the most even assignment, that is accepted to keep neighbours together.
+MAX_IMBALANCE = 1.03
 
 
 @dataclass(frozen=True)
@@ -26,21 +26,24 @@ class Decomposition:
     rank: Int
 
 
-def decompose(torus: Torus, parts: Int, pieces: Int, n_ranks: int) -> Decomposition:
-    """Cut the bodies into pieces and deal them out.
+def decompose(
+    torus: Torus, parts: Int, pieces: Int, n_ranks: int, length_classes: int = LENGTH_CLASSES
+) -> Decomposition:
+    """Cut the bodies into pieces and assign these to ranks.
 
     Args:
         parts: (m,) body of each triangle: `torus.constituent`, or `torus.plane_parts()`.
         pieces: (b,) wanted pieces of each body; METIS cuts a body that has more than one, by short cuts: so
             they rather cross narrow gaps than run along them, which converges better.
         n_ranks: ranks to share the subdomains; some get none if there are more ranks than subdomains.
+        length_classes: number of lengths of edges that METIS distinguishes; with 1 all count alike.
 
     Every subdomain is connected through edges: pieces that METIS leaves in several parts are split.
     """
     left, right = edge_pairs(torus.triangle_torus_edges)
     inside = parts[left] == parts[right]
     length = torus.edge_lengths[shared_edges(torus.triangle_torus_edges)]
-    weight = np.ceil(LENGTHS * length / length.max()).astype(np.int64)
+    weight = np.ceil(length_classes * length / length.max()).astype(np.int64)
     piece = _cut(parts, pieces, left[inside], right[inside], weight[inside])
     key = parts * (piece.max() + 1) + piece
     together = key[left] == key[right]
@@ -52,7 +55,7 @@ def decompose(torus: Torus, parts: Int, pieces: Int, n_ranks: int) -> Decomposit
     number[np.argsort(first)] = np.arange(len(first))
     subdomain = number[connected]
     load, apart = np.bincount(subdomain), ~together
-    return Decomposition(subdomain, _deal(load, subdomain[left[apart]], subdomain[right[apart]], n_ranks))
+    return Decomposition(subdomain, _assign_ranks(load, subdomain[left[apart]], subdomain[right[apart]], n_ranks))
 
 
 def pieces_for_count(load: Int, wanted: int) -> Int:
@@ -75,7 +78,7 @@ def pieces_for_size(load: Int, dofs_per_load: float, max_dofs: int) -> Int:
 
 
 def _cut(parts: Int, pieces: Int, left: Int, right: Int, weight: Int) -> Int:
-    """Piece of each triangle among those of its body; `weight` is the cost of parting neighbours (left, right)."""
+    """(m,) number of each triangle's piece in its body; `weight` is the cost of parting neighbours (left, right)."""
     members, own = np.argsort(parts, kind="stable"), np.argsort(parts[left], kind="stable")
     load, edges = np.bincount(parts, minlength=len(pieces)), np.bincount(parts[left], minlength=len(pieces))
     first, first_edge = np.cumsum(load) - load, np.cumsum(edges) - edges
@@ -108,17 +111,17 @@ def _metis(graph: csr_matrix, count: int, load: Int | None = None) -> Int:
     return np.asarray(part, np.int64)
 
 
-def _deal(load: Int, left: Int, right: Int, n_ranks: int) -> Int:
+def _assign_ranks(load: Int, left: Int, right: Int, n_ranks: int) -> Int:
     """Rank of each subdomain: neighbours (left, right) on the same one as far as the loads stay even."""
-    even = _dealt_evenly(load, n_ranks)
+    even = _balanced(load, n_ranks)
     if n_ranks == 1 or len(load) <= n_ranks:
         return even
     near = _metis(_graph(len(load), left, right, np.ones_like(left)), n_ranks, load)
     most = [np.bincount(ranks, load, n_ranks).max() for ranks in (near, even)]
-    return near if most[0] <= UNEVEN * most[1] and len(np.unique(near)) == n_ranks else even
+    return near if most[0] <= MAX_IMBALANCE * most[1] and len(np.unique(near)) == n_ranks else even
 
 
-def _dealt_evenly(load: Int, n_ranks: int) -> Int:
+def _balanced(load: Int, n_ranks: int) -> Int:
     """Rank of each subdomain: the largest goes first, each to the least loaded rank."""
     ranks = np.zeros(len(load), np.int64)
     heap = [(0, rank) for rank in range(n_ranks)]

@@ -2,25 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.sparse import csr_matrix, diags
 
-from feti_homog.cell.refinement import FineMesh, Lattice, refine
+from feti_homog.cell.refinement import FineMesh, ReferenceLattice, refine
 from feti_homog.cell.submesh import Submesh
 from feti_homog.cell.unwrap import unwrap
 from feti_homog.errors import MeshError
 from feti_homog.fem.assembly import assemble
 from feti_homog.typing import Float, Int
 
+# Largest |K R| relative to |K|.  Rounding leaves about 1e-16; a rotation that is wrong by 1 % gives 1e-7 and more.
 KERNEL_TOLERANCE = 1e-10
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class Subdomain:
     """A body or a piece of it, with c node classes and kernel dimension k.
+
+    All but K stays as it is made.  K is by far the largest: the one that `build` makes stays until the first call of
+    `take_stiffness`, whose caller then owns it.  Later calls assemble it anew.
 
     Attributes:
         submesh: the coarse share.
@@ -40,9 +43,10 @@ class Subdomain:
     area: float
     R: Float
     positions: Float
+    _built_stiffness: csr_matrix | None = field(repr=False)
 
     @classmethod
-    def build(cls, submesh: Submesh, lattice: Lattice, L: Float) -> Subdomain:
+    def build(cls, submesh: Submesh, lattice: ReferenceLattice, L: Float) -> Subdomain:
         """Refine and assemble, without communication.
 
         Raises:
@@ -60,25 +64,28 @@ class Subdomain:
         Q = body.Q
         if submesh.pinned >= 0:
             Q[2 * submesh.pinned : 2 * submesh.pinned + 2] = 0.0
-        subdomain = cls(submesh, mesh, L, Q, body.area, R, positions)
-        subdomain.__dict__["K"] = K
-        return subdomain
+        return cls(submesh, mesh, L, Q, body.area, R, positions, K)
 
-    @cached_property
-    def K(self) -> csr_matrix:
-        """(2c, 2c) stiffness, the pinned class (15) eliminated by a unit row scaled like the others."""
+    @property
+    def n_dofs(self) -> int:
+        """2c."""
+        return len(self.Q)
+
+    def take_stiffness(self) -> csr_matrix:
+        """(2c, 2c) K, which belongs to the caller: that of `build` the first time, then one assembled anew."""
+        K, self._built_stiffness = self._built_stiffness, None
+        return self.assemble_stiffness() if K is None else K
+
+    def assemble_stiffness(self) -> csr_matrix:
+        """(2c, 2c) K, Eq. (28), the pinned class (15) eliminated by a unit row scaled like the others."""
         return _pinned(assemble(self.mesh, self.L).K, self.submesh.pinned)
 
-    def release(self) -> None:
-        """Free the memory of K, which is assembled again when it is wanted."""
-        self.__dict__.pop("K", None)
-
-    def fixing(self, candidates: Int) -> tuple[Int, Float]:
+    def fixing(self, K: csr_matrix, candidates: Int) -> tuple[Int, Float]:
         """Degrees of freedom and dense block rho Rf Rf^T that make K + block an SPD matrix.
 
         Its inverse is a generalized inverse K+ of K.  Rf is the kernel restricted to at most three of the
         `candidates` (nodes), far apart, and orthonormalised (Brzobohaty, Dostal, Kozubek, Kovar, Markopoulos,
-        IJNME 88, 2011).
+        IJNME 88, 2011); rho is the mean diagonal entry of K there.
         """
         if self.R.shape[1] == 0:
             return np.zeros(0, np.int64), np.zeros((0, 0))
@@ -86,13 +93,13 @@ class Subdomain:
         nodes = np.unique(self._far_apart(candidates))
         dofs = both_directions(nodes)
         Rf = np.linalg.qr(self.R[dofs])[0]
-        return dofs, self.K.diagonal()[dofs].mean() * Rf @ Rf.T
+        return dofs, K.diagonal()[dofs].mean() * Rf @ Rf.T
 
-    def regularised(self, candidates: Int) -> csr_matrix:
+    def regularised(self, K: csr_matrix, candidates: Int) -> csr_matrix:
         """K with the block of `fixing`."""
-        dofs, block = self.fixing(candidates)
+        dofs, block = self.fixing(K, candidates)
         rows, columns = np.meshgrid(dofs, dofs, indexing="ij")
-        return (self.K + csr_matrix((block.ravel(), (rows.ravel(), columns.ravel())), shape=self.K.shape)).tocsr()
+        return (K + csr_matrix((block.ravel(), (rows.ravel(), columns.ravel())), shape=K.shape)).tocsr()
 
     def _far_apart(self, candidates: Int) -> Int:
         """Three far-apart nodes for three modes, else the one farthest from the pinned class."""
@@ -123,6 +130,7 @@ def kernel(positions: Float, rotates: bool, pinned: int) -> Float:
 
 
 def _pinned(K: csr_matrix, pinned: int) -> csr_matrix:
+    """K with the rows and columns of the node `pinned` those of a multiple of the identity; K itself for -1."""
     if pinned < 0:
         return K
     keep = np.ones(K.shape[0])
@@ -132,6 +140,7 @@ def _pinned(K: csr_matrix, pinned: int) -> csr_matrix:
 
 
 def _check_kernel(submesh: Submesh, K: csr_matrix, R: Float) -> None:
+    """Refuse a subdomain whose rigid-body modes R (2c, k) are not in the kernel of K (2c, 2c)."""
     residual = abs(K @ R).max(initial=0.0) / abs(K.data).max()
     if residual > KERNEL_TOLERANCE:
         raise MeshError(

@@ -6,11 +6,8 @@ import numpy as np
 from scipy.linalg.blas import dtrmm
 from scipy.linalg.lapack import dlauum, dpotrf, dtrtri
 
+from feti_homog.feti.thresholds import MIRRORED_BLOCK_ROWS, TRIANGLE_INVERSE_ROWS
 from feti_homog.typing import Float
-
-# Rows up to which LAPACK inverts a triangle, and of the blocks that are mirrored.
-SMALL, BLOCK = 48, 64
-LOWER = np.tri(BLOCK, dtype=bool)
 
 
 def invert_upper(A: Float) -> None:
@@ -31,7 +28,7 @@ def invert_upper(A: Float) -> None:
 def _invert_triangle(U: Float) -> None:
     """U <- U^-1 for the upper triangle of U, by halves: OpenBLAS inverts large ones column by column."""
     n = len(U)
-    if n <= SMALL:
+    if n <= TRIANGLE_INVERSE_ROWS:
         U[:] = dtrtri(U, lower=0)[0]
         return
     first, corner, last = U[: n // 2, : n // 2], U[: n // 2, n // 2 :], U[n // 2 :, n // 2 :]
@@ -40,12 +37,12 @@ def _invert_triangle(U: Float) -> None:
     corner[:] = dtrmm(1.0, last, dtrmm(-1.0, first, corner), side=1, overwrite_b=1)
 
 
-def mirrored(A: Float) -> Float:
+def full_from_lower(A: Float, block: int = MIRRORED_BLOCK_ROWS) -> Float:
     """The symmetric matrix, in C order, whose lower triangle is that of A (n, n); by blocks that fit the cache."""
-    whole = A.copy(order="F")
-    for j in range(0, len(A), BLOCK):
-        some = slice(j, j + BLOCK)
+    whole, lower = A.copy(order="F"), np.tri(block, dtype=bool)
+    for j in range(0, len(A), block):
+        some = slice(j, j + block)
         whole[:j, some] = whole[some, :j].T
         corner = whole[some, some]
-        whole[some, some] = np.where(LOWER[: len(corner), : len(corner)], corner, corner.T)
-    return whole.T
+        whole[some, some] = np.where(lower[: len(corner), : len(corner)], corner, corner.T)
+    return np.asarray(whole.T)

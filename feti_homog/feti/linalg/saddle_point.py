@@ -7,21 +7,21 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.sparse import bmat, csr_matrix, diags, vstack
 
-from feti_homog.feti.linalg import distributed_direct
-from feti_homog.feti.linalg.distributed_matrix import own_rows
+from feti_homog.common.distributed_arrays import allreduce_sum
+from feti_homog.feti.linalg.collectives import allgather_rows
+from feti_homog.feti.linalg.distributed_direct import DistributedDirectSolver, direct_solver
+from feti_homog.feti.linalg.distributed_matrix import reduce_scatter_rows
 from feti_homog.feti.linalg.sparse_direct import DirectSolver
+from feti_homog.feti.thresholds import (
+    AUGMENTATION_WEIGHT,
+    COARSE_ACCURACY,
+    INDEFINITE_COARSE_SOLVES,
+    MAX_COARSE_SOLVES,
+    MIN_COARSE_SOLVES,
+)
 from feti_homog.typing import Float
 
-Solver = DirectSolver | distributed_direct.Distributed
-
-# Of the constraints in the augmented matrix; each solve with it shrinks their error by about this factor.
-WEIGHT = 1e7
-# Relative residual that a coarse solve must reach, for T takes away nearly all of what it is applied to where materials
-# differ much; and the fewest and most solves that are made to reach it.
-ACCURATE = 1e-14
-FEWEST_SOLVES, MOST_SOLVES = 3, 4
-# Of the indefinite factor.
-INDEFINITE_SOLVES = 2
+Solver = DirectSolver | DistributedDirectSolver
 
 
 class SaddlePoint:
@@ -34,38 +34,52 @@ class SaddlePoint:
         entries: nonzero ones of this rank's part of the augmented matrix.
     """
 
-    def __init__(self, comm: MPI.Intracomm, E: csr_matrix, K: csr_matrix, free: csr_matrix, prefix: str) -> None:
-        """Factor the sums over ranks of E and K.  `free` (m, m) is a projector to all a with K^T a = 0.  Collective.
+    def __init__(
+        self,
+        comm: MPI.Intracomm,
+        E: csr_matrix,
+        K: csr_matrix,
+        null_projector: csr_matrix,
+        prefix: str,
+        accuracy: float = COARSE_ACCURACY,
+    ) -> None:
+        """Factor the sums over ranks of E and K.  Collective.
 
-        Options under `prefix`.
+        Args:
+            E, K: this rank's parts, of one shape on all ranks.
+            null_projector: (m, m) orthogonal projector to all a with K^T a = 0.
+            prefix: of the options of the definite factor; those of the indefinite one have `indefinite_` behind it.
+            accuracy: relative residual that a solve must reach.
 
         Raises:
             LinAlgError: the matrix is singular.
+            CaseError: the library that the options name cannot factor the matrix on that many ranks.
         """
-        self._columns = 1.0 / np.sqrt(_sum(comm, E.diagonal()))
-        K = own_rows(comm, (K @ diags(self._columns)).tocsr())
+        self._columns = 1.0 / np.sqrt(allreduce_sum(comm, E.diagonal()))
+        K = reduce_scatter_rows(comm, (K @ diags(self._columns)).tocsr())
         length = np.sqrt(np.asarray(K.multiply(K).sum(axis=1)).ravel())
         length = np.where(length > 0, length, 1.0)
         self._rows = 1.0 / np.concatenate(comm.allgather(length))
         E = (diags(self._columns) @ E @ diags(self._columns)).tocsr()
         self._system = _System(comm, E, (diags(1.0 / length) @ K).tocsr())
-        self._solves = FEWEST_SOLVES
+        self._solves = MIN_COARSE_SOLVES
         self._inner: _Augmented | _Indefinite
         augmented = self._system.augmented()
         self.entries = int(augmented.nnz)
         try:
-            self._inner = _Augmented(self._system, distributed_direct.solver(comm, augmented, prefix, definite=True))
-            if self._refine():
+            self._inner = _Augmented(self._system, direct_solver(comm, augmented, prefix, definite=True))
+            if self._reaches(accuracy):
                 return
             self.destroy()
         except PETSc.Error:
             pass
-        self._solves = INDEFINITE_SOLVES
+        self._solves = INDEFINITE_COARSE_SOLVES
         try:
-            whole = distributed_direct.solver(comm, self._system.beside(free), prefix, definite=False)
+            bordered = self._system.bordered(null_projector)
+            indefinite = direct_solver(comm, bordered, f"{prefix}indefinite_", definite=False)
         except PETSc.Error as error:
             raise np.linalg.LinAlgError(f"a coarse matrix is singular: {error}") from error
-        self._inner = _Indefinite(self._system, whole)
+        self._inner = _Indefinite(self._system, indefinite)
 
     def solve(self, f: Float, g: Float) -> tuple[Float, Float]:
         """c and a for f (n,) and g (m,), or (n, k) and (m, k).  Collective."""
@@ -74,58 +88,56 @@ class SaddlePoint:
         return columns * c, rows * a
 
     @property
-    def benign(self) -> bool:
-        """Whether the augmented matrix was good enough, and no solve more than the fewest was wanted."""
-        return isinstance(self._inner, _Augmented) and self._solves == FEWEST_SOLVES
+    def well_conditioned(self) -> bool:
+        """Whether the fewest solves with the augmented matrix were accurate enough."""
+        return isinstance(self._inner, _Augmented) and self._solves == MIN_COARSE_SOLVES
 
     def destroy(self) -> None:
         """Free the factor.  Collective."""
         self._inner.solver.destroy()
 
-    def _refine(self) -> bool:
-        """Make as many solves as it takes; whether that was enough."""
-        while self._error() > ACCURATE:
+    def _reaches(self, accuracy: float) -> bool:
+        """Make as many solves as that accuracy takes; whether they were enough."""
+        while self._error() > accuracy:
             self._solves += 1
-            if self._solves > MOST_SOLVES:
+            if self._solves > MAX_COARSE_SOLVES:
                 return False
         return True
 
     def _error(self) -> float:
-        """Relative residual of some system."""
+        """Relative residual after solving for the right-hand sides of some known c and a."""
         c, a = (np.cos(np.arange(n) + 1.0) for n in (len(self._columns), len(self._rows)))
-        f, g = self._system.left(np.zeros_like(c), np.zeros_like(a), c, a)
-        left = self._system.left(f, g, *self._inner.solve(f, g, self._solves))
-        return float(max(np.linalg.norm(r) / (np.linalg.norm(b) or 1.0) for r, b in zip(left, (f, g), strict=True)))
+        f, g = self._system.residuals(np.zeros_like(c), np.zeros_like(a), c, a)
+        rests = self._system.residuals(f, g, *self._inner.solve(f, g, self._solves))
+        return float(max(np.linalg.norm(r) / (np.linalg.norm(b) or 1.0) for r, b in zip(rests, (f, g), strict=True)))
 
 
 class _System:
-    """E (n, n), the sum of every rank's part, and K (m, n), of which every rank has some rows."""
+    """The scaled matrices: E (n, n), the sum of every rank's part, and K (m, n), of which every rank has some rows."""
 
     def __init__(self, comm: MPI.Intracomm, E: csr_matrix, K: csr_matrix) -> None:
         self.comm, self.E, self.K, self.KT = comm, E, K, K.T.tocsr()
         self._counts = np.array(comm.allgather(K.shape[0]))
         first = int(self._counts[: comm.rank].sum())
-        self.own, self.total = slice(first, first + K.shape[0]), int(self._counts.sum())
+        self.own, self._m = slice(first, first + K.shape[0]), int(self._counts.sum())
 
-    def everywhere(self, own: Float) -> Float:
-        """(m,) or (m, k) of which every rank has the rows that it has of K.  Collective."""
-        whole = np.empty((self.total, *own.shape[1:]))
-        self.comm.Allgatherv(np.ascontiguousarray(own), (whole, self._counts * (whole.size // max(self.total, 1))))
-        return whole
+    def allgather(self, own: Float) -> Float:
+        """(m,) or (m, k), of which each rank brings the rows that it has of K.  Collective."""
+        return allgather_rows(self.comm, own, self._counts)
 
-    def left(self, f: Float, g: Float, c: Float, a: Float) -> tuple[Float, Float]:
+    def residuals(self, f: Float, g: Float, c: Float, a: Float) -> tuple[Float, Float]:
         """f - E c - K^T a and g - K c.  Collective."""
-        return f - _sum(self.comm, self.E @ c + self.KT @ a[self.own]), g - self.everywhere(self.K @ c)
+        return f - allreduce_sum(self.comm, self.E @ c + self.KT @ a[self.own]), g - self.allgather(self.K @ c)
 
     def augmented(self) -> csr_matrix:
         """This rank's part of E + rho K^T K."""
-        return (self.E + WEIGHT * (self.KT @ self.K)).tocsr()
+        return (self.E + AUGMENTATION_WEIGHT * (self.KT @ self.K)).tocsr()
 
-    def beside(self, free: csr_matrix) -> csr_matrix:
-        """This rank's part of [E K^T; K -free]."""
-        empty = [csr_matrix((n, self.K.shape[1])) for n in (self.own.start, self.total - self.own.stop)]
-        K = vstack([empty[0], self.K, empty[1]])
-        return bmat([[self.E, K.T], [K, -free if self.comm.rank == 0 else None]]).tocsr()
+    def bordered(self, null_projector: csr_matrix) -> csr_matrix:
+        """This rank's part of [E K^T; K -N] for the projector N to all a with K^T a = 0."""
+        before, after = (csr_matrix((n, self.K.shape[1])) for n in (self.own.start, self._m - self.own.stop))
+        K = vstack([before, self.K, after])
+        return bmat([[self.E, K.T], [K, -null_projector if self.comm.rank == 0 else None]]).tocsr()
 
 
 class _Augmented:
@@ -140,17 +152,18 @@ class _Augmented:
     def solve(self, f: Float, g: Float, solves: int) -> tuple[Float, Float]:
         """c and a after so many steps, each with one sum over ranks.  Collective."""
         system, g = self._system, g[self._system.own]
-        c = self.solver.solve(f + WEIGHT * _sum(system.comm, system.KT @ g))
-        a = WEIGHT * (system.K @ c - g)
+        c = self.solver.solve(f + AUGMENTATION_WEIGHT * allreduce_sum(system.comm, system.KT @ g))
+        a = AUGMENTATION_WEIGHT * (system.K @ c - g)
         for _ in range(solves - 1):
             missed = g - system.K @ c
-            dc = self.solver.solve(f - _sum(system.comm, system.E @ c + system.KT @ (a - WEIGHT * missed)))
-            c, a = c + dc, a + WEIGHT * (system.K @ dc - missed)
-        return c, system.everywhere(a)
+            used = allreduce_sum(system.comm, system.E @ c + system.KT @ (a - AUGMENTATION_WEIGHT * missed))
+            dc = self.solver.solve(f - used)
+            c, a = c + dc, a + AUGMENTATION_WEIGHT * (system.K @ dc - missed)
+        return c, system.allgather(a)
 
 
 class _Indefinite:
-    """By an LDL^T factor of the whole, for matrices that are too badly conditioned for the other."""
+    """By an L D L^T factor of the whole, for matrices that are too badly conditioned for the augmented one."""
 
     def __init__(self, system: _System, solver: Solver) -> None:
         self._system, self.solver = system, solver
@@ -159,13 +172,6 @@ class _Indefinite:
         """c and a after so many steps of iterative refinement.  Collective."""
         x = self.solver.solve(np.concatenate([f, g]))
         for _ in range(solves - 1):
-            left = self._system.left(f, g, x[: len(f)], x[len(f) :])
-            x = x + self.solver.solve(np.concatenate(left))
+            residuals = self._system.residuals(f, g, x[: len(f)], x[len(f) :])
+            x = x + self.solver.solve(np.concatenate(residuals))
         return x[: len(f)], x[len(f) :]
-
-
-def _sum(comm: MPI.Intracomm, part: Float) -> Float:
-    """Of the parts of all ranks.  Collective."""
-    whole = np.empty_like(part)
-    comm.Allreduce(part, whole)
-    return whole

@@ -8,34 +8,41 @@ import numpy as np
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix
 
+from feti_homog.errors import CaseError
+from feti_homog.feti.thresholds import (
+    CHOLMOD_COLUMNS_ONE_BY_ONE,
+    MUMPS_COLUMNS_ONE_BY_ONE,
+    MUMPS_EXTRA_WORKSPACE_PERCENT,
+)
 from feti_homog.typing import Float
 
-# Per cent of MUMPS' estimate of workspace that it may need more for pivoting.
-PIVOTING_ROOM = 200
+# PETSc's error code for a factorization that the chosen library does not have (PETSC_ERR_MISSING_FACTOR).
+MISSING_FACTOR = 92
 
 
 class DirectSolver:
-    """X = A^-1 B for one symmetric definite matrix A and any number of right-hand sides."""
+    """X = A^-1 B for one symmetric definite matrix A (n, n) and any number of right-hand sides."""
 
-    # Right-hand sides up to which the library is faster with one at a time.
-    few = 2
+    max_columns_one_by_one = CHOLMOD_COLUMNS_ONE_BY_ONE
 
     def __init__(self, matrix: csr_matrix, prefix: str) -> None:
         """Factorize.  Options under `prefix` (default: cholesky by CHOLMOD).
 
         Raises:
             PETSc.Error: the matrix is not positive definite.
+            CaseError: the library that the options name has no such factorization.
         """
-        self._hold(factorized(matrix, prefix))
+        self._use(factor_by_cholmod(matrix, prefix))
 
-    def _hold(self, ksp: PETSc.KSP) -> None:
+    def _use(self, ksp: PETSc.KSP) -> None:
+        """Solve with this factorization from now on."""
         self._ksp = ksp
         self._x, self._b = ksp.getOperators()[0].createVecs()
-        self._release = weakref.finalize(self, _free, ksp, self._x, self._b)
+        self._destroy = weakref.finalize(self, _destroy, ksp, self._x, self._b)
 
     def solve(self, B: Float) -> Float:
         """A^-1 B for B (n,) or (n, k)."""
-        if B.size <= self.few * len(B):
+        if B.size <= self.max_columns_one_by_one * len(B):
             X = np.empty_like(B)
             for x, b in zip(X.reshape(len(B), -1).T, B.reshape(len(B), -1).T, strict=True):
                 self._b.setArray(b)
@@ -51,63 +58,80 @@ class DirectSolver:
         return X
 
     def destroy(self) -> None:
-        """Free the factor, which otherwise goes with the object."""
-        self._release()
+        """Free the factor now; otherwise it is freed with this object."""
+        self._destroy()
 
 
 class IndefiniteSolver(DirectSolver):
-    """The same for an indefinite matrix whose rows and columns are scaled."""
+    """The same for an indefinite matrix, by L D L^T; its rows and columns should be scaled to similar size."""
 
-    few = 1
+    max_columns_one_by_one = MUMPS_COLUMNS_ONE_BY_ONE
 
     def __init__(self, matrix: csr_matrix, prefix: str) -> None:
-        """Factorize by MUMPS, L D L^T.
+        """Factorize.  Options under `prefix` (default: cholesky, which then is L D L^T, by MUMPS).
 
         Raises:
             PETSc.Error: the matrix is singular.
+            CaseError: the library that the options name has no such factorization.
         """
-        self._hold(factored_by_mumps(_sequential(matrix), prefix, definite=False))
+        self._use(factor_by_mumps(_sequential(matrix), prefix, definite=False))
 
 
-def factorized(matrix: csr_matrix, prefix: str) -> PETSc.KSP:
-    """A KSP with the factorization of a symmetric definite matrix; options under `prefix`."""
+def factor_by_cholmod(matrix: csr_matrix, prefix: str) -> PETSc.KSP:
+    """A KSP with the factorization of a symmetric definite matrix; options under `prefix`, CHOLMOD by default."""
     A = _sequential(matrix)
     A.setOption(PETSc.Mat.Option.SPD, True)
-    ksp = _unfactored(A, prefix)
-    ksp.getPC().setFactorSolverType(PETSc.Mat.SolverType.CHOLMOD)
-    ksp.setFromOptions()
+    ksp = _direct_ksp(A, prefix, PETSc.Mat.SolverType.CHOLMOD)
     ksp.setUp()
     return ksp
 
 
-def factored_by_mumps(A: PETSc.Mat, prefix: str, definite: bool) -> PETSc.KSP:
-    """A KSP with MUMPS' factorization of a symmetric matrix whose rows and columns are scaled; on any communicator."""
+def factor_by_mumps(A: PETSc.Mat, prefix: str, definite: bool) -> PETSc.KSP:
+    """A KSP with the factorization of a symmetric matrix on any communicator; options under `prefix`, MUMPS by default.
+
+    The matrix should have rows and columns of similar size: MUMPS does not scale it here, for its own scaling loses
+    all digits of coarse problems with contrasts of 1e6.
+    """
     A.setOption(PETSc.Mat.Option.SPD if definite else PETSc.Mat.Option.SYMMETRIC, True)
-    ksp = _unfactored(A, prefix)
-    ksp.getPC().setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
-    ksp.getPC().setFactorSetUpSolverType()
-    # Its own scaling loses all digits of coarse problems with contrasts of 1e6.
-    ksp.getPC().getFactorMatrix().setMumpsIcntl(8, 0)
-    ksp.getPC().getFactorMatrix().setMumpsIcntl(14, PIVOTING_ROOM)
+    ksp = _direct_ksp(A, prefix, PETSc.Mat.SolverType.MUMPS)
+    pc = ksp.getPC()
+    if pc.getFactorSolverType() == PETSc.Mat.SolverType.MUMPS:
+        pc.getFactorMatrix().setMumpsIcntl(8, 0)
+        pc.getFactorMatrix().setMumpsIcntl(14, MUMPS_EXTRA_WORKSPACE_PERCENT)
     ksp.setUp()
     return ksp
 
 
-def _free(ksp: PETSc.KSP, *vectors: PETSc.Vec) -> None:
-    """Free a factor at once; PETSc would keep what Python drops until it is told to clean up."""
-    for thing in (ksp.getOperators()[0], ksp, *vectors):
-        thing.destroy()
-
-
-def _sequential(matrix: csr_matrix) -> PETSc.Mat:
-    return PETSc.Mat().createAIJ(matrix.shape, csr=(matrix.indptr, matrix.indices, matrix.data), comm=PETSc.COMM_SELF)
-
-
-def _unfactored(A: PETSc.Mat, prefix: str) -> PETSc.KSP:
+def _direct_ksp(A: PETSc.Mat, prefix: str, library: str) -> PETSc.KSP:
+    """A KSP that applies a Cholesky factorization by `library` once; options under `prefix` may change both."""
     ksp = PETSc.KSP().create(A.comm)
     ksp.setOptionsPrefix(prefix)
     ksp.setOperators(A)
     ksp.setType(PETSc.KSP.Type.PREONLY)
     ksp.setErrorIfNotConverged(True)
-    ksp.getPC().setType(PETSc.PC.Type.CHOLESKY)
+    pc = ksp.getPC()
+    pc.setType(PETSc.PC.Type.CHOLESKY)
+    pc.setFactorSolverType(library)
+    ksp.setFromOptions()
+    try:
+        pc.setFactorSetUpSolverType()
+    except PETSc.Error as error:
+        if error.ierr != MISSING_FACTOR:
+            raise
+        where = f"on {A.comm.size} ranks" if A.comm.size > 1 else "on one rank"
+        raise CaseError(
+            f"-{prefix}pc_factor_mat_solver_type {pc.getFactorSolverType()}: it has no {pc.getType()} factorization "
+            f"of a matrix {where}; mumps has"
+        ) from error
     return ksp
+
+
+def _destroy(ksp: PETSc.KSP, *vectors: PETSc.Vec) -> None:
+    """Free a factor at once: objects that Python merely drops stay until PETSc's garbage collection."""
+    for petsc_object in (ksp.getOperators()[0], ksp, *vectors):
+        petsc_object.destroy()
+
+
+def _sequential(matrix: csr_matrix) -> PETSc.Mat:
+    """The matrix as PETSc's, on this rank alone."""
+    return PETSc.Mat().createAIJ(matrix.shape, csr=(matrix.indptr, matrix.indices, matrix.data), comm=PETSc.COMM_SELF)

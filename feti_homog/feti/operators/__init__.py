@@ -1,4 +1,5 @@
 """Operators on the boundaries of subdomains, S and S+, explicit or implicit, and the dual operator F made of them.
 
-May use `decomposition` and `linalg`.  Main entries: `interface_operators` and `dual_operator`.
+May use `decomposition` and `linalg`.  Main entries: `choice.choose`, `interface_operators.InterfaceOperators` and
+`dual_operator.DualOperator`.
 """

@@ -19,7 +19,7 @@ class DualOperator:
 
     def displacement(self, lam: Float) -> Float:
         """K+ B^T lam on the boundary dofs: minus the torn cell's answer to multipliers in Eq. (34)."""
-        return self.boundary.flexibility(self.boundary.BT @ self.jump_operator.gather(lam))
+        return self.boundary.apply_flexibility(self.boundary.BT @ self.jump_operator.gather(lam))
 
     def jump(self, u: Float) -> Float:
         """B u, Eq. (33), for displacements u (boundary dofs,) or (boundary dofs, k)."""

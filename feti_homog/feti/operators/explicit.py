@@ -1,6 +1,6 @@
 """Dense boundary operators of a subdomain: its Schur complement S and the flexibility S+.
 
-Both are symmetric and share one square array: a product reads n^2 / 2 numbers once.  S comes from one partial
+Both are symmetric and share one square array, so that a product reads n^2 / 2 numbers.  S comes from one partial
 factorization (MUMPS) whose factors are not kept: all that the dual problem needs lives on the boundary, since the load
 of a macroscopic strain vanishes inside a uniform body.
 """
@@ -14,11 +14,9 @@ from scipy.sparse import csr_matrix
 
 from feti_homog.common import petsc_ctypes
 from feti_homog.feti.decomposition.subdomain import Subdomain
-from feti_homog.feti.linalg.packed_symmetric import invert_upper, mirrored
+from feti_homog.feti.linalg.packed_symmetric import full_from_lower, invert_upper
+from feti_homog.feti.thresholds import DENSE_COLUMNS_ONE_BY_ONE
 from feti_homog.typing import Float, Int
-
-# Columns up to which products one after the other are faster than all at once.
-FEW = 6
 
 
 class ExplicitInterfaceOperator:
@@ -27,73 +25,64 @@ class ExplicitInterfaceOperator:
     With the fixing nodes on the boundary, the inverse of S + rho Rf Rf^T is the boundary part of K+.
     """
 
-    def __init__(self, subdomain: Subdomain, dofs: Int) -> None:
-        """Factor; `dofs` (n,) are sorted local numbers.
+    def __init__(self, subdomain: Subdomain, K: csr_matrix, dofs: Int) -> None:
+        """Condense K (2c, 2c) to `dofs` (n,), which are sorted local numbers.  Options under `feti_schur_`.
 
         Raises:
-            LinAlgError: the Schur complement is not positive definite.
+            LinAlgError: the Schur complement is not positive definite on the complement of the kernel.
         """
-        fixed, self._term = subdomain.fixing(np.unique(dofs // 2))
+        fixed, self._term = subdomain.fixing(K, np.unique(dofs // 2))
         self._fixed = np.searchsorted(dofs, fixed)
         self.n = len(dofs)
-        both = schur_complement(subdomain.K, dofs)
-        self._stiffness = both.diagonal().copy()
-        # S stays below the diagonal, its inverse when held comes above.
+        both = schur_complement(K, dofs)
+        self._schur_diagonal = both.diagonal().copy()
+        # S stays below the diagonal; the inverse of the regularised S comes above it.
         both[np.ix_(self._fixed, self._fixed)] += np.triu(self._term)
         try:
             invert_upper(both)
         except np.linalg.LinAlgError as error:
-            raise np.linalg.LinAlgError(f"a held Schur complement: {error}") from error
-        self._flexibility = both.diagonal().copy()
+            raise np.linalg.LinAlgError(f"the regularised Schur complement of a subdomain: {error}") from error
+        self._flexibility_diagonal = both.diagonal().copy()
         np.fill_diagonal(both, 0.0)
         self._both = both
 
-    def stiffness(self, x: Float, out: Float) -> None:
-        """S x for x (n,) or (n, k)."""
-        self._product(x, out, self._stiffness, lower=1)
+    def apply_schur(self, x: Float, out: Float | None = None) -> Float:
+        """S x for x (n,) or (n, k), into `out` if it is given; else in Fortran order."""
+        return self._product(x, out, self._schur_diagonal, lower=1)
 
-    def flexibility(self, x: Float, out: Float) -> None:
-        """S+ x for x (n,) or (n, k)."""
-        self._product(x, out, self._flexibility, lower=0)
+    def apply_flexibility(self, x: Float, out: Float | None = None) -> Float:
+        """S+ x for x (n,) or (n, k), into `out` if it is given; else in Fortran order."""
+        return self._product(x, out, self._flexibility_diagonal, lower=0)
 
-    def _product(self, x: Float, out: Float, diagonal: Float, lower: int) -> None:
+    def _product(self, x: Float, out: Float | None, diagonal: Float, lower: int) -> Float:
         """The symmetric matrix of one triangle of the array, and of a diagonal, times x; fastest in Fortran order."""
         A = self._both
-        if x.size > FEW * self.n:
+        if out is None:
+            out = np.empty(x.shape, order="F")
+        if x.size > DENSE_COLUMNS_ONE_BY_ONE * self.n:
             own = np.multiply(diagonal[:, None], x, order="F")
             out[:] = dsymm(1.0, A, x, beta=1.0, c=own, overwrite_c=1, lower=lower)
         else:
             for column, result in zip(x.reshape(self.n, -1).T, out.reshape(self.n, -1).T, strict=True):
                 np.multiply(diagonal, column, out=result)
                 result[:] = dsymv(1.0, A, column, beta=1.0, y=result, overwrite_y=1, lower=lower)
-
-    def answer(self, X: Float) -> Float:
-        """S+ X, in Fortran order, for X (n,) or (n, k)."""
-        out = np.empty(X.shape, order="F")
-        self.flexibility(X, out)
-        return out
-
-    def forces(self, X: Float) -> Float:
-        """S X, in Fortran order, for X (n,) or (n, k)."""
-        out = np.empty(X.shape, order="F")
-        self.stiffness(X, out)
         return out
 
     @property
     def S(self) -> Float:
         """(n, n) S."""
-        S = mirrored(self._both)
-        np.fill_diagonal(S, self._stiffness)
+        S = full_from_lower(self._both)
+        np.fill_diagonal(S, self._schur_diagonal)
         return S
 
     @property
-    def held(self) -> Float:
-        """(n, n) S + rho Rf Rf^T, positive definite."""
-        held = self.S
-        held[np.ix_(self._fixed, self._fixed)] += self._term
-        return held
+    def regularised_schur(self) -> Float:
+        """(n, n) S + rho Rf Rf^T, positive definite; see `Subdomain.fixing`."""
+        S = self.S
+        S[np.ix_(self._fixed, self._fixed)] += self._term
+        return S
 
-    def holding(self, P: csr_matrix) -> Float:
+    def regularisation(self, P: csr_matrix) -> Float:
         """(m, m) P^T rho Rf Rf^T P for P (n, m)."""
         at_fixed = P[self._fixed].toarray()
         return np.asarray(at_fixed.T @ self._term @ at_fixed)
@@ -105,7 +94,7 @@ def schur_complement(matrix: csr_matrix, dofs: Int) -> Float:
     Options have the prefix `feti_schur_`.
     """
     if len(dofs) == matrix.shape[0]:
-        return matrix.toarray(order="F")
+        return np.asarray(matrix.toarray(order="F"))
     csr = matrix.indptr, matrix.indices, matrix.data
     A = PETSc.Mat().createAIJWithArrays(matrix.shape, csr, comm=PETSc.COMM_SELF)
     A.setOption(PETSc.Mat.Option.SPD, True)

@@ -1,4 +1,4 @@
-"""Boundary operators of a subdomain by sparse factorizations: for boundaries too large for dense matrices."""
+"""Boundary operators of a subdomain by sparse factorizations, for boundaries too large for dense matrices."""
 
 from __future__ import annotations
 
@@ -6,66 +6,58 @@ from collections.abc import Callable
 from functools import cached_property
 
 import numpy as np
+from scipy.sparse import csr_matrix
 
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.linalg.sparse_direct import DirectSolver
+from feti_homog.feti.thresholds import SPARSE_COLUMNS_AT_ONCE
 from feti_homog.typing import Float, Int
-
-# Columns that are solved for at once, so that memory stays bounded.
-CHUNK = 64
 
 
 class ImplicitInterfaceOperator:
     """S and the boundary part of K+ of one subdomain, on its n boundary dofs."""
 
-    def __init__(self, subdomain: Subdomain, dofs: Int) -> None:
+    def __init__(self, subdomain: Subdomain, K: csr_matrix, dofs: Int) -> None:
         """Factor K + rho Rf Rf^T; `dofs` (n,) are sorted local numbers.  Options under `feti_sub_`."""
         self.n, self.dofs, self._subdomain = len(dofs), dofs, subdomain
         # A single subdomain has no boundary: any of its nodes can be fixed.
         nodes = np.unique(dofs // 2) if len(dofs) else np.arange(subdomain.mesh.n_classes)
-        self._size = subdomain.K.shape[0]
-        self._solver = DirectSolver(subdomain.regularised(nodes), "feti_sub_")
+        self._solver = DirectSolver(subdomain.regularised(K, nodes), "feti_sub_")
 
     @cached_property
     def interior(self) -> Interior:
-        """The interior, factored when first asked for."""
-        interior = Interior(self._subdomain, self.dofs)
-        self._subdomain.release()
-        return interior
+        """The interior, factored when first asked for; for that K is assembled again."""
+        return Interior(self._subdomain.take_stiffness(), self.dofs)
 
-    def stiffness(self, x: Float, out: Float) -> None:
-        """S x = K_bb x - K_bi K_ii^-1 K_ib x for x (n,) or (n, k)."""
-        out[:] = self.forces(x)
+    def apply_schur(self, x: Float, out: Float | None = None) -> Float:
+        """S x = K_bb x - K_bi K_ii^-1 K_ib x for x (n,) or (n, k), into `out` if it is given."""
+        return _by_columns(self.interior.reactions, x, out)
 
-    def flexibility(self, x: Float, out: Float) -> None:
-        """The boundary part of K+ x for x (n,) or (n, k)."""
-        out[:] = self.answer(x)
+    def apply_flexibility(self, x: Float, out: Float | None = None) -> Float:
+        """The boundary part of K+ x for x (n,) or (n, k), into `out` if it is given."""
+        return _by_columns(self._solve, x, out)
 
-    def answer(self, X: Float) -> Float:
-        """The boundary part of K+ X for X (n,) or (n, k)."""
-
-        def solve(part: Float) -> Float:
-            load = np.zeros((self._size, *part.shape[1:]), order="F")
-            load[self.dofs] = part
-            return self._solver.solve(load)[self.dofs]
-
-        return _by_chunks(solve, X)
-
-    def forces(self, X: Float) -> Float:
-        """S X for X (n,) or (n, k)."""
-        return _by_chunks(self.interior.reactions, X)
+    def _solve(self, x: Float) -> Float:
+        """The boundary part of K+ x for few columns."""
+        load = np.zeros((self._subdomain.n_dofs, *x.shape[1:]), order="F")
+        load[self.dofs] = x
+        return self._solver.solve(load)[self.dofs]
 
 
 class Interior:
-    """The dofs of one subdomain that no constraint acts on."""
+    """The dofs of one subdomain that no constraint acts on.
 
-    def __init__(self, subdomain: Subdomain, dofs: Int) -> None:
+    Attributes:
+        dofs: their local numbers, sorted.
+    """
+
+    def __init__(self, K: csr_matrix, dofs: Int) -> None:
         """Split K and factor K_ii; `dofs` (n,) are the boundary's.  Options under `feti_interior_`."""
-        inside = np.ones(subdomain.K.shape[0], bool)
+        inside = np.ones(K.shape[0], bool)
         inside[dofs] = False
         self.dofs = np.flatnonzero(inside)
-        rows = subdomain.K[self.dofs]
-        self._Kib, self._Kbb = rows[:, dofs], subdomain.K[dofs][:, dofs]
+        rows = K[self.dofs]
+        self._Kib, self._Kbb = rows[:, dofs], K[dofs][:, dofs]
         if len(self.dofs):
             self._solver = DirectSolver(rows[:, self.dofs].tocsr(), "feti_interior_")
 
@@ -74,16 +66,18 @@ class Interior:
         return self._solver.solve(-self._Kib @ x) if len(self.dofs) else np.zeros((0, *x.shape[1:]))
 
     def reactions(self, x: Float) -> Float:
-        """S x, the forces that hold boundary displacements x (n,) or (n, k)."""
+        """S x, the forces that go with boundary displacements x (n,) or (n, k)."""
         return np.asarray(self._Kbb @ x + self._Kib.T @ self.extend(x))
 
 
-def _by_chunks(apply: Callable[[Float], Float], X: Float) -> Float:
-    """`apply` to some columns at a time."""
-    if X.size <= CHUNK * len(X):
-        return apply(X)
-    Y = np.empty_like(X)
-    for first in range(0, X.shape[1], CHUNK):
-        some = slice(first, first + CHUNK)
-        Y[:, some] = apply(X[:, some])
-    return Y
+def _by_columns(apply: Callable[[Float], Float], x: Float, out: Float | None) -> Float:
+    """`apply` to at most SPARSE_COLUMNS_AT_ONCE columns of x (n, k) at a time, or to x (n,)."""
+    if out is None:
+        out = np.empty_like(x)
+    if x.size <= SPARSE_COLUMNS_AT_ONCE * len(x):
+        out[:] = apply(x)
+        return out
+    for first in range(0, x.shape[1], SPARSE_COLUMNS_AT_ONCE):
+        some = slice(first, first + SPARSE_COLUMNS_AT_ONCE)
+        out[:, some] = apply(x[:, some])
+    return out

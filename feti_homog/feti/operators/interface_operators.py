@@ -13,79 +13,73 @@ from scipy.sparse import block_diag, csr_matrix
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.shared_entities import SharedEntities
 from feti_homog.feti.decomposition.subdomain import Subdomain, both_directions
+from feti_homog.feti.operators.choice import SubdomainSize, choose
 from feti_homog.feti.operators.explicit import ExplicitInterfaceOperator
 from feti_homog.feti.operators.implicit import ImplicitInterfaceOperator, Interior
+from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 from feti_homog.typing import Float, Int
 
-KINDS = ("auto", "implicit", "explicit")
-# Boundary dofs of a subdomain up to which dense matrices (8 n^2 bytes) are ever chosen by themselves.
-LARGEST_DENSE = 6000
-# Boundary dofs above which a whole body's soft modes come from a dense eigenproblem for each face, not from one.
-LARGEST_WHOLE = 2000
-# Seconds, up to a common factor, for the choice: of a dense inverse per n^3, and of one application of the dual
-# operator and the preconditioner by triangular solves per dof (both measured with `scripts/benchmark_path`).
-INVERSE, SOLVES = 5e-10, 3.5e-7
+InterfaceOperator = ExplicitInterfaceOperator | ImplicitInterfaceOperator
 
 
 class InterfaceOperators:
     """The boundary dofs of this rank's subdomains, one subdomain after the other, n in all.
 
     Attributes:
-        dofs: local numbers, sorted, of each subdomain's.
-        offsets: where each subdomain begins among the n.
+        dofs: for each subdomain, (n_s,) local numbers of its boundary dofs, sorted.
+        offsets: (subdomains + 1,) where each subdomain begins among the n.
+        local_dofs: (n,) their numbers among all dofs of this rank.
         operators: dense or factored, of each subdomain.
-        large: whether each is a whole body, and its boundary too large for one dense eigenproblem.
-        B: (local rows, n) the constraints on them.
+        facewise: whether the soft modes of each are to be looked for face by face.
+        B: (local rows, n) the constraints on them, and `BT` its transpose.
         diagonal: (n,) of K.
     """
 
     def __init__(
-        self, jump_operator: JumpOperator, subdomains: Sequence[Subdomain], kind: str, applications: int, soft: bool
+        self,
+        jump_operator: JumpOperator,
+        subdomains: Sequence[Subdomain],
+        kind: str,
+        applications: int,
+        soft_modes: bool,
+        thresholds: Thresholds = DEFAULTS,
     ) -> None:
-        """Factor every subdomain, once.
-
-        Args:
-            kind: of KINDS; auto is dense where that pays.
-            applications: how many times the operators are expected to be applied.
-            soft: whether soft modes will be looked for, which takes dense matrices but of large bodies.
-        """
+        """Factor every subdomain, once, as `choose` says; takes the stiffness of each.  Arguments as of `choose`."""
         self.subdomains = subdomains
-        self.dofs = _touched(jump_operator.B, subdomains)
+        self.dofs = _constrained_dofs(jump_operator.B, subdomains)
         self.offsets = np.cumsum([0, *(len(d) for d in self.dofs)])
-        first = np.cumsum([0, *(s.K.shape[0] for s in subdomains)])
-        self.local = np.concatenate([o + d for o, d in zip(first, self.dofs, strict=False)] or [np.zeros(0, np.int64)])
-        self.B = jump_operator.B[:, self.local].tocsr()
+        first = np.cumsum([0, *(s.n_dofs for s in subdomains)])
+        numbers = [o + d for o, d in zip(first, self.dofs, strict=False)]
+        self.local_dofs = np.concatenate([np.zeros(0, np.int64), *numbers])
+        self.B = jump_operator.B[:, self.local_dofs].tocsr()
         self.BT = self.B.T.tocsr()
-        diagonals = [s.K.diagonal()[d] for s, d in zip(subdomains, self.dofs, strict=True)]
-        self.diagonal = np.concatenate([np.zeros(0), *diagonals])
-        whole = _whole(jump_operator.shared, [s.submesh.index for s in subdomains])
-        self.large = [w and len(d) > LARGEST_WHOLE for w, d in zip(whole, self.dofs, strict=True)]
-        self.operators: list[ExplicitInterfaceOperator | ImplicitInterfaceOperator] = []
-        for subdomain, dofs, large in zip(subdomains, self.dofs, self.large, strict=True):
-            pays = INVERSE * len(dofs) ** 3 <= SOLVES * subdomain.K.shape[0] * applications
-            pays = pays or (soft and not large)
-            dense = kind == "explicit" or (kind == "auto" and pays and _fits(len(dofs)))
-            self.operators.append(
-                ExplicitInterfaceOperator(subdomain, dofs)
-                if dense and len(dofs)
-                else ImplicitInterfaceOperator(subdomain, dofs)
-            )
-            subdomain.release()
+        sizes = _sizes(jump_operator.shared, subdomains, self.dofs)
+        can_condense = bool(PETSc.Sys.hasExternalPackage("mumps"))
+        chosen = choose(sizes, kind, applications, soft_modes, can_condense, thresholds)
+        self.facewise = [choice.facewise for choice in chosen]
+        self.operators: list[InterfaceOperator] = []
+        diagonals = [np.zeros(0)]
+        for subdomain, dofs, choice in zip(subdomains, self.dofs, chosen, strict=True):
+            operator, diagonal = _factor(subdomain, dofs, choice.explicit)
+            self.operators.append(operator)
+            diagonals.append(diagonal)
+        self.diagonal = np.concatenate(diagonals)
 
     @property
-    def spans(self) -> list[slice]:
+    def slices(self) -> list[slice]:
         """The dofs of each subdomain among the n."""
         return [slice(a, b) for a, b in pairwise(self.offsets.tolist())]
 
-    def stiffness(self, x: Float) -> Float:
+    def apply_schur(self, x: Float) -> Float:
         """S x for x (n,) or (n, k)."""
-        return self._each([o.stiffness for o in self.operators], x)
+        return self._each([o.apply_schur for o in self.operators], x)
 
-    def flexibility(self, x: Float) -> Float:
+    def apply_flexibility(self, x: Float) -> Float:
         """The boundary part of K+ x for x (n,) or (n, k)."""
-        return self._each([o.flexibility for o in self.operators], x)
+        return self._each([o.apply_flexibility for o in self.operators], x)
 
-    def _each(self, applied: Sequence[Callable[[Float, Float], None]], x: Float) -> Float:
+    def _each(self, applied: Sequence[Callable[[Float, Float], Float]], x: Float) -> Float:
+        """The operators of the subdomains, each applied to its part of x (n,) or (n, k)."""
         x = np.asfortranarray(x)
         y = np.empty(x.shape, order="F")
         for apply, (first, last) in zip(applied, pairwise(self.offsets.tolist()), strict=True):
@@ -95,18 +89,18 @@ class InterfaceOperators:
     @cached_property
     def Kbb(self) -> csr_matrix:
         """(n, n) boundary block of K."""
-        blocks = [s.K[d][:, d] for s, d in zip(self.subdomains, self.dofs, strict=True)]
+        blocks = [s.take_stiffness()[d][:, d] for s, d in zip(self.subdomains, self.dofs, strict=True)]
         return csr_matrix(block_diag(blocks or [csr_matrix((0, 0))]))
 
     @cached_property
     def _interiors(self) -> list[Interior]:
-        interiors = []
-        for subdomain, dofs, operator in zip(self.subdomains, self.dofs, self.operators, strict=True):
-            interiors.append(
-                operator.interior if isinstance(operator, ImplicitInterfaceOperator) else Interior(subdomain, dofs)
-            )
-            subdomain.release()
-        return interiors
+        """The interior of each subdomain, factored."""
+        return [
+            operator.interior
+            if isinstance(operator, ImplicitInterfaceOperator)
+            else Interior(subdomain.take_stiffness(), dofs)
+            for subdomain, dofs, operator in zip(self.subdomains, self.dofs, self.operators, strict=True)
+        ]
 
     def extend(self, x: Float) -> Float:
         """(local dofs,) displacements that have the values x (n,) on the boundaries, with interiors in equilibrium.
@@ -114,31 +108,35 @@ class InterfaceOperators:
         The first call factors the interiors.
         """
         parts = [np.zeros(0)]
-        for subdomain, dofs, interior, span in zip(
-            self.subdomains, self.dofs, self._interiors, self.spans, strict=True
-        ):
-            u = np.empty(len(subdomain.Q))
-            u[dofs], u[interior.dofs] = x[span], interior.extend(x[span])
+        each = zip(self.subdomains, self.dofs, self._interiors, self.slices, strict=True)
+        for subdomain, dofs, interior, own in each:
+            u = np.empty(subdomain.n_dofs)
+            u[dofs], u[interior.dofs] = x[own], interior.extend(x[own])
             parts.append(u)
         return np.concatenate(parts)
 
 
-def _touched(B: csr_matrix, subdomains: Sequence[Subdomain]) -> list[Int]:
+def _factor(subdomain: Subdomain, dofs: Int, explicit: bool) -> tuple[InterfaceOperator, Float]:
+    """The boundary operator of a subdomain and the diagonal of K on its boundary `dofs`; K is freed at the end."""
+    K = subdomain.take_stiffness()
+    operator = (ExplicitInterfaceOperator if explicit else ImplicitInterfaceOperator)(subdomain, K, dofs)
+    return operator, K.diagonal()[dofs]
+
+
+def _constrained_dofs(B: csr_matrix, subdomains: Sequence[Subdomain]) -> list[Int]:
     """Local numbers of the dofs of each subdomain that constraints act on, both directions of a node."""
-    touched = B.getnnz(axis=0).reshape(-1, 2).any(axis=1)
-    nodes = np.split(touched, np.cumsum([s.mesh.n_classes for s in subdomains]))[:-1]
+    constrained = B.getnnz(axis=0).reshape(-1, 2).any(axis=1)
+    nodes = np.split(constrained, np.cumsum([s.mesh.n_classes for s in subdomains]))[:-1]
     return [both_directions(np.flatnonzero(n)) for n in nodes]
 
 
-def _whole(shared: SharedEntities, subdomains: Sequence[int]) -> list[bool]:
-    """Whether all that each of the subdomains shares, it shares with one other body."""
+def _sizes(shared: SharedEntities, subdomains: Sequence[Subdomain], dofs: Sequence[Int]) -> list[SubdomainSize]:
+    """What the choice of the operators depends on, of each subdomain."""
     entity = np.repeat(np.arange(len(shared.key)), shared.copies)
     first, last = shared.pointer[:-1], shared.pointer[1:] - 1
-    pairs = (shared.copies == 2) & (shared.body[first] != shared.body[last])
-    broken = set(shared.sharer[~pairs[entity]].tolist())
-    return [s not in broken for s in subdomains]
-
-
-def _fits(boundary: int) -> bool:
-    """Whether dense matrices of that many boundary dofs can be made."""
-    return boundary <= LARGEST_DENSE and bool(PETSc.Sys.hasExternalPackage("mumps"))
+    between_two_bodies = (shared.copies == 2) & (shared.body[first] != shared.body[last])
+    cut = set(shared.sharer[~between_two_bodies[entity]].tolist())
+    return [
+        SubdomainSize(s.n_dofs, len(d), is_whole_body=s.submesh.index not in cut)
+        for s, d in zip(subdomains, dofs, strict=True)
+    ]

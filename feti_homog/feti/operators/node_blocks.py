@@ -7,18 +7,24 @@ from mpi4py import MPI
 from scipy.sparse import csr_matrix
 
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
-from feti_homog.feti.linalg.distributed_matrix import assembled
+from feti_homog.feti.linalg.distributed_matrix import assemble_owned_rows
 from feti_homog.typing import Float, Int
 
 
 class NodeBlocks:
-    """The owned rows of the sum over ranks of `local` (local rows, local rows), as small dense blocks by size."""
+    """A matrix on the multipliers whose entries couple only rows of one fine node, as small dense blocks.
+
+    Attributes:
+        rows: number of rows that this rank owns.
+        blocks: for each size k of blocks, the rows (b, k) of the b blocks among the owned ones, and they (b, k, k).
+    """
 
     def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, local: csr_matrix) -> None:
+        """The owned rows of the sum over ranks of `local` (local rows, local rows).  Collective."""
         first, last = jump_operator.owned
-        matrix = assembled(comm, local, jump_operator.rows, jump_operator.rows, (last - first, last - first))
+        matrix = assemble_owned_rows(comm, local, jump_operator.rows, jump_operator.rows, (last - first, last - first))
         entries = matrix[:, first:last].tocoo()
-        starts, sizes = jump_operator.blocks
+        starts, sizes = jump_operator.node_rows
         self.rows = last - first
         self.blocks: list[tuple[Int, Float]] = []
         block = np.repeat(np.arange(len(starts)), sizes)[entries.row]
@@ -33,7 +39,7 @@ class NodeBlocks:
             self.blocks.append((starts[some][:, None] + np.arange(size), dense))
 
     def inverse(self, active: Float) -> csr_matrix:
-        """Inverse of the active rows and columns, 0 on the others."""
+        """(owned rows, owned rows) inverse of the part where `active` (owned rows,) is 1; 0 elsewhere."""
         rows, columns, values = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)], [np.zeros(0)]
         for at, dense in self.blocks:
             mask = active[at]

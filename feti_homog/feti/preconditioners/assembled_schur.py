@@ -7,7 +7,8 @@ from mpi4py import MPI
 from scipy.sparse import csr_matrix
 
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
-from feti_homog.feti.linalg.distributed_matrix import Blocks, total
+from feti_homog.feti.linalg.collectives import allreduce_sparse
+from feti_homog.feti.linalg.dense_block_sum import DenseBlockSum
 from feti_homog.feti.linalg.sparse_direct import DirectSolver
 from feti_homog.feti.operators.explicit import ExplicitInterfaceOperator
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
@@ -29,12 +30,12 @@ class AssembledSchur:
         self.comm = comm
         self._shared = _originals(comm, jump_operator, boundary)
         self.size = shared_dofs(comm, jump_operator)
-        stiffness = Blocks((self.size, self.size))
-        for operator, span in zip(boundary.operators, boundary.spans, strict=True):
+        stiffness = DenseBlockSum((self.size, self.size))
+        for operator, span in zip(boundary.operators, boundary.slices, strict=True):
             if not isinstance(operator, ExplicitInterfaceOperator):
                 raise TypeError("the bonded cell needs dense boundary operators")
             stiffness.add(self._shared[span], self._shared[span], operator.S)
-        self._solver = DirectSolver(total(comm, stiffness.matrix()), "feti_bonded_")
+        self._solver = DirectSolver(allreduce_sparse(comm, stiffness.matrix()), "feti_bonded_")
         entries = np.ones(len(self._shared)), (self._shared, np.arange(len(self._shared)))
         self._ZT = csr_matrix(entries, shape=(self.size, len(self._shared)))
 
@@ -47,12 +48,12 @@ class AssembledSchur:
 
 def shared_dofs(comm: MPI.Intracomm, jump_operator: JumpOperator) -> int:
     """The size of the bonded cell; collective."""
-    return int(comm.allreduce(2 * len(jump_operator.blocks[0])))
+    return int(comm.allreduce(2 * len(jump_operator.node_rows[0])))
 
 
 def _originals(comm: MPI.Intracomm, jump_operator: JumpOperator, boundary: InterfaceOperators) -> Int:
     """The global number of the shared dof that each boundary dof is a copy of."""
-    starts, sizes = jump_operator.blocks
+    starts, sizes = jump_operator.node_rows
     order = np.argsort(starts)
     first = comm.exscan(len(starts)) or 0
     node = jump_operator.gather(np.repeat(first + np.arange(len(starts)), sizes[order]).astype(float))

@@ -83,8 +83,8 @@ class Influence:
 
     def _forces(self, x: Float) -> Float:
         """S x - S Z (Z^T S Z)^-1 Z^T S x."""
-        forces = self.boundary.stiffness(x)
-        return forces + self.boundary.stiffness(self.bonded.relaxed(forces))
+        forces = self.boundary.apply_schur(x)
+        return forces + self.boundary.apply_schur(self.bonded.relaxed(forces))
 
     def _learn(self, rows: Int) -> None:
         """Find the columns of H for these rows.  Collective."""

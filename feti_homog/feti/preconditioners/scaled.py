@@ -87,7 +87,7 @@ class Dirichlet(StiffnessScaled):
     """Around the Schur complements."""
 
     def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, boundary: InterfaceOperators) -> None:
-        super().__init__(comm, jump_operator, boundary, boundary.stiffness)
+        super().__init__(comm, jump_operator, boundary, boundary.apply_schur)
 
 
 class Lumped(StiffnessScaled):

@@ -14,7 +14,7 @@ from feti_homog.typing import Float
 
 def header(cell: TornCell) -> Header:
     """What the file says of the whole cell."""
-    case, plan = cell.case, cell.plan
+    case, plan = cell.case, cell.summary
     return Header(
         title=case.name,
         version=__version__,
@@ -35,7 +35,7 @@ def mesh_part(cell: TornCell) -> MeshPart:
     columns = 3 * cell.case.cell.order
     sizes = [len(s.mesh.triangles) for s in subdomains]
     triangles = [s.mesh.triangles + n for s, n in zip(subdomains, nodes, strict=False)]
-    phase = [cell.plan.phases.index(s.submesh.phase) for s in subdomains]
+    phase = [cell.summary.phases.index(s.submesh.phase) for s in subdomains]
     return MeshPart(
         points=np.concatenate([s.mesh.points for s in subdomains] or [np.zeros((0, 2))]),
         triangles=np.concatenate(triangles or [np.zeros((0, columns), np.int64)]),

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from feti_homog.common.file_locks import Busy, TemporaryLock, holder
+from feti_homog.common.file_locks import LockHeld, TemporaryLock, holder
 from feti_homog.common.mpi_errors import on_root
 from feti_homog.errors import CaseError
 from feti_homog.output.files import atomic
@@ -60,8 +60,8 @@ def _hold(lock: TemporaryLock, directory: Path) -> None:
         raise CaseError(f"--out {directory}: cannot be made: {error.strerror}") from error
     try:
         lock.acquire()
-    except Busy as busy:
-        raise _busy(directory, str(busy)) from busy
+    except LockHeld as held:
+        raise _busy(directory, str(held)) from held
     atomic.remove_unfinished(directory)
 
 

@@ -7,47 +7,48 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
-from feti_homog.sweep.report.statistics import Collected
-from feti_homog.sweep.report.style import INK, MARKS, Series, finish, legend, series, with_scatter
+from feti_homog.sweep.report.series import Series, series_over
+from feti_homog.sweep.report.style import COLOURS, MARKERS, label_axes, legend, plot_series
+from feti_homog.sweep.report.sweep_table import SweepTable
 
-ASIDE, MARGIN = 0.94, 1.3  # factors on a logarithmic axis
+X_FACTOR, MARGIN = 0.94, 1.3  # factors on a logarithmic axis
 CHOICES = (("C11", "bulk", "shear"), ("onset_S11", "peak_S11"))
 
 
-def names(table: Collected) -> tuple[str, ...]:
+def names(table: SweepTable) -> tuple[str, ...]:
     """The outputs that are drawn: moduli, or the strength of paths."""
     return next((chosen for chosen in CHOICES if all(name in table.outputs for name in chosen)), ())
 
 
-def figure(table: Collected, key: str) -> Figure:
+def figure(table: SweepTable, key: str) -> Figure:
     """Above the realisations and the means, below the scatter of the realisations and of the mean."""
-    drawn, found = names(table), series(table, key)
-    whole = Figure(figsize=(0.4 + 3.9 * len(drawn), 6.6), layout="constrained")
-    panels = whole.subplots(2, len(drawn), sharex=True, squeeze=False)
+    drawn, found = names(table), series_over(table, key)[: len(COLOURS)]
+    picture = Figure(figsize=(0.4 + 3.9 * len(drawn), 6.6), layout="constrained")
+    panels = picture.subplots(2, len(drawn), sharex=True, squeeze=False)
     for name, upper, lower in zip(drawn, *panels, strict=True):
-        for style, one in enumerate(found):
-            with_scatter(upper, table, one, name, style, aside=ASIDE)
-            _scatter(lower, table, one, name, style)
-        finish(upper, name, table, "")
-        finish(lower, name, table, "number of fibres")
+        for style, series in enumerate(found):
+            plot_series(upper, table, series, name, style, x_factor=X_FACTOR)
+            _scatter(lower, table, series, name, style)
+        label_axes(upper, name, table, "")
+        label_axes(lower, name, table, "number of fibres")
         lower.set_ylabel("scatter / mean (%)")
         lower.set_ylim(bottom=0.0)
-    _logarithmic(panels[0, 0], sorted({int(x) for one in found for x in one.x}))
-    whole.suptitle(f"{table.name}: realisations and means with 95 % confidence intervals", fontsize=12)
-    legend(whole, list(panels.flat))
-    return whole
+    _logarithmic(panels[0, 0], sorted({int(x) for series in found for x in series.x}))
+    picture.suptitle(f"{table.name}: realisations and means with 95 % confidence intervals", fontsize=12)
+    legend(picture, list(panels.flat))
+    return picture
 
 
-def _scatter(axes: Axes, table: Collected, one: Series, name: str, style: int) -> None:
+def _scatter(axes: Axes, table: SweepTable, series: Series, name: str, style: int) -> None:
     """Standard deviation of one cell and half-width of the mean's interval, relative to the mean."""
     statistics = table.statistics[name]
-    numbers = [table.points.index(point) for point in one.points]
+    numbers = [table.points.index(point) for point in series.points]
     mean = np.abs(statistics.mean[numbers])
-    words = f", {one.label}" if one.label else ""
+    words = f", {series.label}" if series.label else ""
     kinds = ((statistics.std, "-", "standard deviation of a cell"), (statistics.ci95, ":", "95 % interval of the mean"))
     for values, line, what in kinds:
         axes.plot(
-            one.x, 100 * values[numbers] / mean, line, color=INK[style], marker=MARKS[style], markersize=4,
+            series.x, 100 * values[numbers] / mean, line, color=COLOURS[style], marker=MARKERS[style], markersize=4,
             linewidth=1.2, label=f"{what}{words}",
         )  # fmt: skip
 

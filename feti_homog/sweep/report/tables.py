@@ -16,19 +16,20 @@ import numpy as np
 from feti_homog.mechanics.voigt import STRESSES
 from feti_homog.output.files import atomic
 from feti_homog.output.text.units import unit, with_unit
-from feti_homog.sweep.report.statistics import Collected, Statistics
+from feti_homog.sweep.report.statistics import Statistics
+from feti_homog.sweep.report.sweep_table import SweepTable
 
 PARTS = ("count", "mean", "std", "ci95")
 CASE = ("folder", "point", "realisation", "status", "reason")
 
 
-def write(directory: Path, table: Collected) -> list[Path]:
+def write(directory: Path, table: SweepTable) -> list[Path]:
     """Write both, each in one step; returns their paths.  On one rank.  Raises FetiHomogError if it cannot."""
-    writers: tuple[tuple[str, Callable[[Collected, Path], None]], ...] = (("sweep.csv", _csv), ("sweep.h5", _hdf5))
+    writers: tuple[tuple[str, Callable[[SweepTable, Path], None]], ...] = (("sweep.csv", _csv), ("sweep.h5", _hdf5))
     return [atomic.replace(directory / name, partial(writer, table)) for name, writer in writers]
 
 
-def _csv(table: Collected, path: Path) -> None:
+def _csv(table: SweepTable, path: Path) -> None:
     """A row for each case; then, for each point, the count, mean, std and ci95 of its realisations.
 
     The column `row` says which; names have their units in brackets.
@@ -41,14 +42,14 @@ def _csv(table: Collected, path: Path) -> None:
         writer.writerows(_statistics_rows(table))
 
 
-def _case_rows(table: Collected) -> Iterator[list[Any]]:
+def _case_rows(table: SweepTable) -> Iterator[list[Any]]:
     for row, _ in enumerate(table.folder):
         inputs = [_cell(values[row]) for values in table.inputs.values()]
         outputs = [_cell(values[row]) for values in table.outputs.values()]
         yield ["case", *(getattr(table, name)[row] for name in CASE), *inputs, *outputs]
 
 
-def _statistics_rows(table: Collected) -> Iterator[list[Any]]:
+def _statistics_rows(table: SweepTable) -> Iterator[list[Any]]:
     for number, point in enumerate(table.points):
         first = table.rows(point)[0]
         inputs = ["" if key == "cell.seed" else _cell(values[first]) for key, values in table.inputs.items()]
@@ -64,7 +65,7 @@ def _cell(value: Any) -> Any:
     return json.dumps(value) if isinstance(value, list | dict) else value
 
 
-def _hdf5(table: Collected, path: Path) -> None:
+def _hdf5(table: SweepTable, path: Path) -> None:
     """/cases, /inputs, /outputs: a row a case; /statistics/mean, ...: a row a point, as /points/number and inputs.
 
     /curves/point-K of straight paths: strain (g,), S11, S22, S12 (realisations, g) and of each mean, std, ci95 (g,).
@@ -73,13 +74,7 @@ def _hdf5(table: Collected, path: Path) -> None:
         file.attrs.update(name=table.name, stress_unit=table.stress_unit)
         for name in CASE:
             _put(file, f"cases/{name}", list(getattr(table, name)), "")
-        first = [table.rows(point)[0] for point in table.points]
-        _put(file, "points/number", table.points, "")
-        for name, values in table.inputs.items():
-            own = unit(name, table.stress_unit)
-            _put(file, f"inputs/{name}", list(values), own)
-            if name != "cell.seed":
-                _put(file, f"points/{name}", [values[row] for row in first], own)
+        _put_inputs(file, table)
         for name, column in table.outputs.items():
             _put(file, f"outputs/{name}", column, unit(name, table.stress_unit))
         for name, statistics in table.statistics.items():
@@ -87,11 +82,22 @@ def _hdf5(table: Collected, path: Path) -> None:
                 own = "" if part == "count" else unit(name, table.stress_unit)
                 _put(file, f"statistics/{part}/{name}", getattr(statistics, part), own)
         for point in table.points:
-            _put_bundle(file, table, point)
+            _put_curves(file, table, point)
 
 
-def _put_bundle(file: Any, table: Collected, point: int) -> None:
-    strain, stress = table.bundle(point)
+def _put_inputs(file: Any, table: SweepTable) -> None:
+    """The inputs of all cases and, but for the seed, of all points."""
+    first = [table.rows(point)[0] for point in table.points]
+    _put(file, "points/number", table.points, "")
+    for name, values in table.inputs.items():
+        own = unit(name, table.stress_unit)
+        _put(file, f"inputs/{name}", list(values), own)
+        if name != "cell.seed":
+            _put(file, f"points/{name}", [values[row] for row in first], own)
+
+
+def _put_curves(file: Any, table: SweepTable, point: int) -> None:
+    strain, stress = table.curves(point)
     if not len(strain):
         return
     group = f"curves/point-{point}"

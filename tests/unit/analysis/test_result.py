@@ -23,7 +23,14 @@ COUNTS = {"bonded": 5, "open": 3, "closed": 1, "iterations": 7}
 def path_point(load: float) -> PathPoint:
     strain = np.array([load, 0.0, 0.0])
     return PathPoint(
-        load_factor=load, strain=strain, stress=STIFFNESS @ strain, broke=1, free_motions=0, dissipated=0.5, **COUNTS
+        load_factor=load,
+        strain=strain,
+        stress=STIFFNESS @ strain,
+        broke=1,
+        free_motions=0,
+        dissipated=0.5,
+        dissipated_strain_controlled=0.6,
+        **COUNTS,
     )
 
 

@@ -13,7 +13,7 @@ from feti_homog.cell.fibre_centres import fibre_centres
 from feti_homog.cell.gmsh_mesher import generate
 from feti_homog.cell.msh_reader import read
 from feti_homog.cell.periodic_topology import Torus
-from feti_homog.config.case import Cell
+from feti_homog.config.cell_section import Cell
 from feti_homog.errors import MeshError
 
 
@@ -56,7 +56,7 @@ def test_centre_of_a_polygon_is_that_of_its_area(tmp_path):
     assert centres[1] == pytest.approx([0.5, 0.5])
 
 
-def test_centre_of_a_fibre_around_the_corner(tmp_path):
+def test_a_fibre_around_the_corner_has_its_centre_at_the_corner(tmp_path):
     """An L of three quarters: areas at (1/4, 1/4), (3/4, 1/4), (1/4, 3/4) of a square about the corner."""
     inside = lambda x, y: (x > 0.75 or x < 0.25) and (y > 0.75 or y < 0.25) and not (x < 0.25 and y < 0.25)  # noqa: E731
     grid(inside).write(tmp_path / "good.msh")
@@ -125,7 +125,7 @@ def _layers():
     ],
     ids=["bonds elsewhere", "no edge", "loose node", "two fibres"],
 )
-def test_lines_that_cannot_debond(mesh, message, tmp_path):
+def test_lines_that_cannot_debond_are_refused(mesh, message, tmp_path):
     mesh.write(tmp_path / "faulty.msh")
     with pytest.raises(MeshError) as caught:
         read(tmp_path / "faulty.msh")

@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from circular import cell
+from support.circular_cells import cell
 
 from feti_homog.cell.arrangement import arrange
 from feti_homog.cell.coarse_mesh import areas, flip_double_arcs
@@ -117,7 +117,7 @@ def test_no_triangle_has_two_edges_on_one_circle(name):
 
 
 @named
-def test_angles_and_edges_around_a_fibre(name):
+def test_angles_are_wide_and_edges_around_a_fibre_enough(name):
     mesh = mesh_of(name)
     angles = least_angle(mesh.points, mesh.triangles)
     assert angles.min() > 13 and np.mean(angles) > 43
@@ -152,7 +152,7 @@ def test_a_triangle_with_two_arc_edges_is_flipped():
     assert np.array_equal(flip_double_arcs(triangles, zeros, arcs, np.arange(8, dtype=np.int32), 9), triangles)
 
 
-def test_size_is_followed():
+def test_the_number_of_triangles_follows_the_size():
     counts = [len(generate(cell("square", size=size)).triangles) for size in (0.04, 0.02)]
     assert 3.5 < counts[1] / counts[0] < 4.5
     expected = 4 / np.sqrt(3) / 0.02**2
@@ -181,6 +181,7 @@ def test_marks_that_nearly_meet_are_one_node():
     assert least_angle(mesh.points, mesh.triangles).min() > 13
 
 
-def test_a_thousand_fibres():
+@pytest.mark.slow
+def test_a_thousand_fibres_are_meshed_without_needles():
     mesh = generate(cell(fibres=1000, fraction=0.6, gap=0.03))
     assert least_angle(mesh.points, mesh.triangles).min() > 10

@@ -127,7 +127,7 @@ def test_an_ellipse_is_no_circle(tmp_path):
 
 
 @pytest.mark.parametrize(("name", "height", "circles"), [("square", 1.0, 1), ("hexagonal", np.sqrt(3), 5)])
-def test_meshes_of_the_repository(name, height, circles):
+def test_meshes_of_the_repository_have_their_circles_and_fraction(name, height, circles):
     mesh = read(MESHES / f"{name}.msh")
     assert (mesh.width, mesh.height) == pytest.approx((1.0, height)) and len(mesh.circles) == circles
     _assert_periodic(mesh)

@@ -7,7 +7,7 @@ import threading
 
 import pytest
 
-from feti_homog.common.file_locks import Busy, TemporaryLock, holder, this_process
+from feti_homog.common.file_locks import LockHeld, TemporaryLock, holder, this_process
 
 
 def test_the_file_is_there_only_while_the_lock_is_held(tmp_path):
@@ -15,8 +15,8 @@ def test_the_file_is_there_only_while_the_lock_is_held(tmp_path):
     assert holder(path) is None
     with TemporaryLock(path):
         assert holder(path) == path.read_text() == this_process()
-        with pytest.raises(Busy, match=f"process {os.getpid()}"):
-            TemporaryLock(path, patience=0.02).acquire()
+        with pytest.raises(LockHeld, match=f"process {os.getpid()}"):
+            TemporaryLock(path, timeout=0.02).acquire()
         assert path.exists(), "who is refused must not remove the file of the holder"
     assert holder(path) is None and not path.exists()
 
@@ -36,7 +36,7 @@ def test_one_at_a_time(tmp_path):
     def work() -> None:
         nonlocal inside, most
         for _ in range(20):
-            with TemporaryLock(tmp_path / "lock", patience=60.0):
+            with TemporaryLock(tmp_path / "lock", timeout=60.0):
                 with mutex:
                     inside += 1
                     most = max(most, inside)

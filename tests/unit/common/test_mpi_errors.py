@@ -27,10 +27,11 @@ def run(mpirun, ranks, body):
 
 
 @pytest.mark.parametrize("ranks", [1, 2])
-def test_done(mpirun, ranks):
+def test_a_job_without_faults_ends_with_zero(mpirun, ranks):
     assert run(mpirun, ranks, "pass").returncode == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ranks", [1, 2, 4])
 def test_faults_of_all_ranks_are_told_once(mpirun, ranks):
     job = run(mpirun, ranks, "raise CaseError('[cell] one', '[cell] two')")
@@ -39,6 +40,7 @@ def test_faults_of_all_ranks_are_told_once(mpirun, ranks):
     assert "Traceback" not in job.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("body", "words", "code"),
     [

@@ -25,11 +25,11 @@ from feti_homog.common.petsc_option_table import OPTIONS, help_text, option_name
         ("", "", ""),
     ],
 )
-def test_split(line, ours, petsc):
+def test_words_with_one_dash_are_petscs_and_the_others_ours(line, ours, petsc):
     assert split_argv(line.split()) == (ours.split(), petsc.split())
 
 
-def test_names():
+def test_numbers_with_a_sign_are_no_options():
     assert option_names(["-feti_ksp_rtol", "1e-8", "-shift", "-1", "-log_view"]) == [
         "feti_ksp_rtol",
         "shift",
@@ -37,7 +37,7 @@ def test_names():
     ]
 
 
-def test_known_options():
+def test_every_option_of_the_table_is_known():
     assert unknown_options(option.name for option in OPTIONS) == []
     assert unknown_options(["feti_ksp_gmres_restart", "feti_sub_mat_mumps_icntl_14", "log_view", "ksp_rtol"]) == []
 
@@ -51,7 +51,7 @@ def test_known_options():
         ("feti_zzz", "known prefixes: -feti_ksp_, -feti_pc_, "),
     ],
 )
-def test_unknown_options(name, words):
+def test_misspelt_options_are_told_with_the_nearest(name, words):
     (fault,) = unknown_options([name, "feti_ksp_rtol"])
     assert words in fault
 

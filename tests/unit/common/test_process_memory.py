@@ -24,8 +24,7 @@ def test_a_peak_is_forgotten():
     assert process_memory.peak() < before + 0.5 * LARGE
 
 
-def test_a_peak_that_cannot_be_forgotten_stays(monkeypatch, tmp_path):
-    monkeypatch.setattr(process_memory, "CLEAR_REFS", tmp_path / "none" / "clear_refs")
+def test_a_peak_that_cannot_be_forgotten_stays(tmp_path):
     before = process_memory.peak()
-    process_memory.forget_peak()
+    process_memory.forget_peak(tmp_path / "none" / "clear_refs")
     assert process_memory.peak() >= before

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from unit.config.faulty_cases import BASE, changed, ended
+from support.base_case import BASE, changed, ended
 
 
 def of_type(name: str, *sections: str) -> str:

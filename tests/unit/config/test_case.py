@@ -8,8 +8,10 @@ import pickle
 from pathlib import Path
 
 import pytest
-from unit.config.faulty_bonding import ANGLE, ARC, BARE_ARC, FAULTY_BONDINGS, PATH, debonded, of_type
-from unit.config.faulty_cases import BASE, FAULTY_CASES, FIBRE, MESH_CELL, RANDOM, changed, fibre
+from support.base_case import BASE, FIBRE, changed, fibre
+from unit.config.faulty_bonding import BARE_ARC, FAULTY_BONDINGS, PATH, debonded, of_type
+from unit.config.faulty_cases import FAULTY_CASES
+from unit.config.valid_cases import MESH, VALID_CASES
 
 from feti_homog.config.case import check_phases, load, parse
 from feti_homog.config.materials import General, Isotropic, Orthotropic
@@ -17,7 +19,6 @@ from feti_homog.config.sections import Angle, Arc, InterfaceSection, LoadPath
 from feti_homog.errors import CaseError
 
 FAULTY = FAULTY_CASES | FAULTY_BONDINGS
-MESH = changed(MESH_CELL)
 
 
 def case_of(tmp_path: Path, content: str, name: str = "cell.toml"):
@@ -27,7 +28,7 @@ def case_of(tmp_path: Path, content: str, name: str = "cell.toml"):
     return load(path)
 
 
-def test_defaults(tmp_path):
+def test_keys_that_are_left_out_have_their_defaults(tmp_path):
     case = case_of(tmp_path, BASE.replace("mesh_size = 0.05\n", ""))
     assert case.name == "cell"
     assert dataclasses.asdict(case.cell) == {
@@ -47,7 +48,7 @@ def test_defaults(tmp_path):
 
 
 @pytest.mark.parametrize("name", FAULTY)
-def test_fault(tmp_path, name):
+def test_faults_are_told_by_section_and_key(tmp_path, name):
     content, expected = FAULTY[name]
     with pytest.raises(CaseError) as caught:
         case_of(tmp_path, content)
@@ -71,17 +72,17 @@ def test_there_are_enough_faulty_cases():
     assert len(FAULTY) == len(FAULTY_CASES) + len(FAULTY_BONDINGS) >= 100
 
 
-def test_file_not_there(tmp_path):
+def test_a_missing_file_is_told(tmp_path):
     with pytest.raises(CaseError, match=r"none\.toml: cannot be read: No such file"):
         load(tmp_path / "none.toml")
 
 
-def test_folder(tmp_path):
+def test_a_folder_in_the_place_of_a_file_is_told(tmp_path):
     with pytest.raises(CaseError, match="cannot be read: Is a directory"):
         load(tmp_path)
 
 
-def test_not_utf8(tmp_path):
+def test_a_file_that_is_not_utf8_is_told(tmp_path):
     path = tmp_path / "cell.toml"
     path.write_bytes(BASE.encode() + "# Zelle für Stoß\n".encode("latin-1"))
     with pytest.raises(CaseError, match=r"not UTF-8 text \(line 17\)"):
@@ -98,38 +99,16 @@ def test_integers_are_numbers(tmp_path):
     assert isinstance(material.young, float)
 
 
-@pytest.mark.parametrize(
-    "content",
-    [
-        BASE,
-        "name = 'Zelle'\n"
-        + BASE
-        + "[decomposition]\nmax_dofs = 5000\n[petsc]\nfeti_ksp_rtol = 1e-8\nlog_view = true\n",
-        changed(('geometry = "hexagonal"\n', RANDOM + "seed = 7\nradius_spread = 0.2\n")),
-        MESH + '[material."fibre:2"]\nstiffness = [[3, 1, 0], [1, 3, 0], [0, 0, 1]]\n',
-        fibre("E1 = 10.0\nE2 = 5.0\nE3 = 5.0\nnu12 = 0.3\nnu13 = 0.3\nnu23 = 0.2\nG12 = 2.0\nangle = 30\n"),
-        BASE + '[output]\nfields = false\nstress = "S12"\ndeformation_scale = 2\nlength_unit = "µm"\n',
-        BASE + f"[interface]\ndebonded = [{ARC}]\n",
-        BASE + "[interface]\ncontact = false\ndebonded = []\n",
-        MESH + "[interface]\n",
-        of_type("angle", ANGLE, BARE_ARC, "contact = false"),
-        of_type("angle", ANGLE, "strain = [0, 0, 0.2]", '[[interface.debonded]]\nfibre = "all"\ncentre = 90'),
-        of_type("path", PATH),
-        of_type("path", "[path]\nwaypoints = [[1, 0, 0], [0, 0, 0]]\nmax_events = 7"),
-        of_type("path", PATH, 'method = "increments"\nincrements = 50\nrelease = "worst"'),
-        debonded("{fibre = [1, 2], angle = 360}", "normal_strength = inf\ntangential_strength = 3"),
-        debonded(f'{ARC}, {{fibre = "all", angle = 0}}', 'normal_strength = 1\ncriterion = "quadratic"'),
-    ],
-)
-def test_resolved_makes_the_same_case_again(tmp_path, content):
-    case = case_of(tmp_path, content)
+@pytest.mark.parametrize("name", VALID_CASES)
+def test_resolved_makes_the_same_case_again(tmp_path, name):
+    case = case_of(tmp_path, VALID_CASES[name])
     written = json.loads(json.dumps(case.resolved(), allow_nan=False))
     assert written == case.resolved()
     assert parse(written, Path("/nowhere")) == case
     assert pickle.loads(pickle.dumps(case)) == case
 
 
-def test_interface(tmp_path):
+def test_arcs_and_strengths_are_read(tmp_path):
     case = case_of(tmp_path, debonded('{fibre = "all", centre = -30, angle = 60}, {fibre = 2, angle = 10.5}'))
     arcs = (Arc(fibre="all", centre=-30.0, angle=60.0), Arc(fibre=(2,), centre=0.0, angle=10.5))
     assert case.interface == InterfaceSection(debonded=arcs)
@@ -139,13 +118,13 @@ def test_interface(tmp_path):
     assert (strong.interface.normal_strength, strong.interface.tangential_strength) == (None, 2.0)
 
 
-def test_angle(tmp_path):
+def test_openings_are_read(tmp_path):
     case = case_of(tmp_path, of_type("angle", "[angle]", "values = [0, 30, 360.0]", BARE_ARC))
     assert case.angle == Angle(values=(0.0, 30.0, 360.0), strain=None)
     assert case.interface == InterfaceSection(debonded=(Arc(fibre=(1,), angle=None),))
 
 
-def test_path(tmp_path):
+def test_targets_of_a_path_are_read(tmp_path):
     case = case_of(tmp_path, of_type("path", PATH))
     assert case.path == LoadPath(strain=(0.2, 0.0, 0.0))
     assert case.path.targets == ((0.2, 0.0, 0.0),)
@@ -154,7 +133,7 @@ def test_path(tmp_path):
     assert there_and_back.path.targets == ((1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
-def test_kinds_of_material(tmp_path):
+def test_the_keys_of_a_material_choose_its_kind(tmp_path):
     assert case_of(tmp_path, fibre("stiffness = [[3, 1, 0], [1, 3, 0], [0, 0, 1]]\n")).materials["fibre"] == General(
         ((3.0, 1.0, 0.0), (1.0, 3.0, 0.0), (0.0, 0.0, 1.0))
     )
@@ -170,7 +149,7 @@ def test_mesh_file_is_beside_the_case(tmp_path):
     assert case_of(tmp_path, content, "cases/one.toml").cell.file == (tmp_path / "cell.msh").resolve()
 
 
-def test_check_phases(tmp_path):
+def test_phases_of_mesh_and_case_must_match(tmp_path):
     case = case_of(tmp_path, MESH)
     check_phases(case, ["matrix", "fibre"])
     check_phases(case, ["matrix", "fibre:1", "fibre:2"])

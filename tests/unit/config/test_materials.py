@@ -27,7 +27,7 @@ def tensor(stiffness):
     )
 
 
-def test_isotropic_plane_strain():
+def test_isotropic_plane_strain_is_lames_law():
     young, poisson = 88.0, 0.299
     lame = young * poisson / ((1 + poisson) * (1 - 2 * poisson))
     shear = young / (2 * (1 + poisson))
@@ -35,14 +35,14 @@ def test_isotropic_plane_strain():
     np.testing.assert_allclose(plane_stiffness(Isotropic(young, poisson), "strain"), expected, rtol=1e-13)
 
 
-def test_isotropic_plane_stress():
+def test_isotropic_plane_stress_is_hookes_law():
     young, poisson = 88.0, 0.299
     expected = np.array([[1, poisson, 0], [poisson, 1, 0], [0, 0, (1 - poisson) / 2]]) * young / (1 - poisson**2)
     np.testing.assert_allclose(plane_stiffness(Isotropic(young, poisson), "stress"), expected, rtol=1e-13)
 
 
 @pytest.mark.parametrize("plane", ["strain", "stress"])
-def test_orthotropic_with_isotropic_constants(plane):
+def test_orthotropic_with_isotropic_constants_is_isotropic(plane):
     young, poisson = 200.0, 0.222
     constants = {name: young for name in ("E1", "E2", "E3")} | {name: poisson for name in ("nu12", "nu13", "nu23")}
     material = Orthotropic(**constants, G12=young / (2 * (1 + poisson)), angle=37.0)
@@ -80,7 +80,7 @@ def test_rotation_is_that_of_the_tensor(angle):
     np.testing.assert_allclose(tensor(rotated(stiffness, angle)), expected, atol=1e-12)
 
 
-def test_general_is_taken_as_it_is():
+def test_a_general_stiffness_is_taken_as_it_is():
     rows = ((5.0, 2.0, 0.3), (2.0, 4.0, -0.4), (0.3, -0.4, 1.5))
     for plane in ("strain", "stress"):
         np.testing.assert_array_equal(plane_stiffness(General(rows), plane), rows)
@@ -97,7 +97,7 @@ def test_general_is_taken_as_it_is():
         (General(((3.0, 1.0, 0.0), (1.1, 3.0, 0.0), (0.0, 0.0, 1.0))), "symmetric"),
     ],
 )
-def test_unstable(material, words):
+def test_unstable_materials_are_refused(material, words):
     with pytest.raises(ValueError, match=words):
         plane_stiffness(material, "strain")
 

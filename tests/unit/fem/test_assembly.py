@@ -1,4 +1,4 @@
-"""Refinement and assembly of one subdomain against element loops of the twin."""
+"""Refinement and assembly of one subdomain against element loops of the monolithic solve."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from reference import monolithic
 
 from feti_homog.cell.gmsh_mesher import generate
 from feti_homog.cell.periodic_topology import Torus
-from feti_homog.cell.refinement import Lattice, refine
+from feti_homog.cell.refinement import ReferenceLattice, refine
 from feti_homog.cell.submesh import cut
 from feti_homog.cell.unwrap import unwrap
 from feti_homog.fem.assembly import assemble, element_strain
@@ -27,7 +27,7 @@ def torus():
 
 @pytest.fixture(params=LATTICES, ids=lambda p: f"refine{p[0]}-order{p[1]}")
 def lattice(request):
-    return Lattice.of(*request.param)
+    return ReferenceLattice.of(*request.param)
 
 
 @pytest.fixture(params=range(3), ids=["matrix", "fibre", "cut-fibre"])
@@ -35,7 +35,7 @@ def mesh(torus, lattice, request):
     return refine(list(cut(torus, torus.constituent))[request.param], lattice)
 
 
-def test_agrees_with_element_loops(mesh):
+def test_stiffness_and_loads_are_those_of_element_loops(mesh):
     n = mesh.n_classes
     K, Q, area = np.zeros((2 * n, 2 * n)), np.zeros((2 * n, 3)), 0.0
     for triangle in mesh.triangles:
@@ -67,7 +67,7 @@ def test_only_triangles_off_the_circles_are_affine(mesh):
     assert np.array_equal(bent, mesh.curved) or mesh.lattice.intervals == 1
 
 
-def test_uniform_strain_of_every_element(mesh):
+def test_uniform_strain_is_that_of_every_element(mesh):
     gradient = np.array([[0.3, -0.1], [0.4, 0.2]])
     inner = np.flatnonzero(np.bincount(mesh.node_class) == 1)
     u = np.zeros((mesh.n_classes, 2))
@@ -79,7 +79,7 @@ def test_uniform_strain_of_every_element(mesh):
     assert area.sum() == pytest.approx(assemble(mesh, STIFFNESS).area)
 
 
-def test_unwrapped_bodies(torus):
+def test_fibres_close_when_unwrapped_and_the_matrix_winds_around(torus):
     """The matrix winds around the torus; a fibre that the boundary cuts closes once its parts are shifted."""
     matrix, *fibres = cut(torus, torus.constituent)
     assert not unwrap(matrix)[1]

@@ -16,12 +16,12 @@ def open_at(*arcs, opening=None, fibre=1):
     return ROUND[debonded(arcs, opening, np.full(36, fibre), ROUND)].tolist()
 
 
-def test_tips_of_arcs():
+def test_tips_are_half_an_opening_off_the_centre():
     arcs = [Arc(fibre="all", centre=0.0, angle=60.0), Arc(fibre=(2,), centre=180.0, angle=90.0)]
     assert tips(arcs, (), 3) == {0: [30.0, 330.0], 1: [30.0, 135.0, 225.0, 330.0], 2: [30.0, 330.0]}
 
 
-def test_tips_of_every_value():
+def test_every_value_of_the_opening_has_its_tips():
     arcs = [Arc(fibre=(1, 3), centre=-90.0)]
     marks = [180.0, 225.0, 315.0, 0.0]
     assert tips(arcs, (0.0, 90.0, 180.0, 360.0), 3) == {0: sorted(marks), 2: sorted(marks)}

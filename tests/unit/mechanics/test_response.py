@@ -53,12 +53,12 @@ def test_no_break_is_a_straight_line() -> None:
 
 
 @pytest.mark.parametrize(("count", "rows"), [(1, 6), (6, 6), (7, 6), (500, 15), (3, 2)])
-def test_first_and_last_are_chosen(count: int, rows: int) -> None:
+def test_the_first_and_the_last_state_are_drawn(count: int, rows: int) -> None:
     numbers = chosen([point(0.5, 1.0) for _ in range(count)], rows)
     assert numbers[0] == 0 and numbers[-1] == count - 1 and numbers == sorted(set(numbers))
     assert len(numbers) == min(count, rows)
 
 
-def test_they_are_where_bonds_break() -> None:
+def test_drawn_states_are_where_bonds_break() -> None:
     points = [point(0.01 * n, 1.0, broke=5 if n in (40, 60, 80) else 0) for n in range(101)]
     assert chosen(points, 5) == [0, 40, 60, 100]

@@ -14,7 +14,10 @@ from scipy import stats
 import feti_homog.output  # noqa: F401 (chooses the build of h5py)
 from feti_homog.output.text.units import unit, with_unit
 from feti_homog.sweep.report import figures, tables
-from feti_homog.sweep.report.statistics import Collected, Statistics, outputs
+from feti_homog.sweep.report.outputs import outputs
+from feti_homog.sweep.report.series import series_over
+from feti_homog.sweep.report.statistics import Statistics
+from feti_homog.sweep.report.sweep_table import SweepTable
 
 MATERIAL = {"matrix": {"young": 88.0, "poisson": 0.299}, "fibre": {"young": 200.0, "poisson": 0.222}}
 
@@ -28,7 +31,7 @@ def test_statistics_are_scipys():
         assert found.mean[k] + np.array([-1, 1]) * found.ci95[k] == pytest.approx([low, high])
 
 
-def test_statistics_of_few():
+def test_statistics_of_too_few_values_are_nan():
     found = Statistics.of(np.array([[1.0, 2.0, np.nan], [np.nan, 4.0, np.nan]]))
     assert found.count.tolist() == [1, 2, 0]
     assert found.mean[:2].tolist() == [1.0, 3.0] and math.isnan(found.mean[2])
@@ -64,7 +67,7 @@ def path_document(fibres, shift):
 def collected(inputs, documents, point, realisation):
     found = [outputs(d) if d else {} for d in documents]
     names = dict.fromkeys(name for row in found for name in row)
-    return Collected(
+    return SweepTable(
         name="test", stress_unit="GPa", folder=[f"case-{k + 1:04d}" for k in range(len(documents))],
         point=point, realisation=realisation, status=["done" if d else "waiting" for d in documents],
         reason=[""] * len(documents), inputs=inputs, documents=documents,
@@ -80,7 +83,7 @@ def fractions():
     return collected(inputs, documents, [1, 2] * 3, [1, 1, 2, 2, 3, 3])
 
 
-def test_tables(tmp_path):
+def test_tables_hold_cases_and_statistics_of_points(tmp_path):
     table = fractions()
     assert [path.name for path in tables.write(tmp_path, table)] == ["sweep.csv", "sweep.h5"]
     with (tmp_path / "sweep.csv").open() as stream:
@@ -99,7 +102,8 @@ def test_tables(tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["sweep.csv", "sweep.h5"]
 
 
-def test_curves(tmp_path):
+@pytest.mark.slow
+def test_mean_curves_keep_the_bonded_branch(tmp_path):
     documents = [path_document(fibres, shift) for shift in (0.0, 1.0) for fibres in (2, 4)]
     table = collected({"cell.fibres": [2, 4, 2, 4], "cell.seed": [0, 0, 1, 1]}, documents, [1, 2, 1, 2], [1, 1, 2, 2])
     tables.write(tmp_path, table)
@@ -117,7 +121,8 @@ def test_curves(tmp_path):
     assert_drawn(tmp_path, table, ["cell_size.png", "curves.png"])
 
 
-def test_pictures(tmp_path):
+@pytest.mark.slow
+def test_moduli_are_drawn(tmp_path):
     assert_drawn(tmp_path, fractions(), ["moduli.png"])
     documents = [document(0.4, fibres, shift / fibres) for shift in (-1.0, 0.0, 1.0) for fibres in (4, 8, 16)]
     inputs = {"cell.fibres": [4, 8, 16] * 3, "cell.mesh_size": [0.3, 0.2, 0.1] * 3, "cell.seed": [0] * 9}
@@ -137,17 +142,15 @@ def assert_drawn(folder, table, names):
 
 
 def test_what_varies_along_is_no_other_series():
-    from feti_homog.sweep.report.style import series
-
     documents = [document(0.4, fibres, 0.0) for fibres in (4, 8, 4, 8)]
     inputs = {"cell.fibres": [4, 8, 4, 8], "cell.mesh_size": [0.3, 0.2, 0.3, 0.2], "material.fibre.young": [1, 1, 2, 2]}
-    found = series(collected(inputs, documents, [1, 2, 3, 4], [1] * 4), "cell.fibres")
+    found = series_over(collected(inputs, documents, [1, 2, 3, 4], [1] * 4), "cell.fibres")
     assert [(one.label, one.points, one.x.tolist()) for one in found] == [
         ("young 1", [1, 2], [4.0, 8.0]), ("young 2", [3, 4], [4.0, 8.0]),
     ]  # fmt: skip
 
 
-def test_units():
+def test_outputs_have_their_units():
     assert unit("material.fibre.young", "GPa") == "GPa" == unit("C11_compression", "GPa") == unit("onset_S11", "GPa")
     assert with_unit("angle_60_C11", "MPa") == "angle_60_C11 (MPa)" and with_unit("bulk", "") == "bulk"
     assert unit("seconds_solve", "GPa") == "s" and unit("material.fibre.angle", "GPa") == "degrees"

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from sweeps import CASE, RANDOM
+from support.sweep_files import CASE, RANDOM
 
 from feti_homog.errors import CaseError
 from feti_homog.sweep import plan
@@ -48,7 +48,7 @@ def test_values_arrive_in_the_cases():
         ("{from = 0.01, to = 0.16, count = 3, scale = 'log'}", [0.01, 0.04, 0.16]),
     ],
 )
-def test_ranges(range_, expected):
+def test_ranges_end_at_their_last_step(range_, expected):
     assert values(f"cell.fibre_fraction = {range_}") == expected
 
 
@@ -60,7 +60,7 @@ def test_integers_stay_integers():
 
 
 @pytest.mark.parametrize("sampling", ["latin", "random"])
-def test_samples(sampling):
+def test_samples_fill_their_ranges_and_repeat_with_the_seed(sampling):
     table = f"samples = 50\nsampling = '{sampling}'\ncell.fibre_fraction = {{from = 0.1, to = 0.6}}\n"
     table += "material.fibre.young = {from = 1.0, to = 1000.0, scale = 'log'}"
     found = inputs(table)
@@ -74,7 +74,7 @@ def test_samples(sampling):
     assert np.mean(decades) == pytest.approx(1.5, abs=0.4)
 
 
-def test_samples_times_a_grid():
+def test_samples_are_repeated_at_every_point_of_a_grid():
     found = inputs("samples = 3\ncell.order = [1, 2]\ncell.fibre_fraction = {from = 0.1, to = 0.6}")
     assert [row["cell.order"] for row in found] == [1, 1, 1, 2, 2, 2]
     assert [row["cell.fibre_fraction"] for row in found[:3]] == [row["cell.fibre_fraction"] for row in found[3:]]
@@ -91,7 +91,7 @@ def test_realisations_are_seeds_and_come_last():
     assert sweep.entries[:4] == fewer.entries
 
 
-def test_tables_of_a_section_and_realisations_of_random_cells_only():
+def test_sections_vary_as_tables_and_only_random_cells_have_realisations():
     case = CASE.replace('geometry = "hexagonal"\n', "")
     table = "realisations = 2\ncell = [{geometry = 'square'}, {geometry = 'random', fibres = 3}]"
     sweep = expanded(f"{table}\n'cell.fibre_fraction' = [0.2, 0.3]", case)
@@ -146,19 +146,19 @@ FAULTY = {
 
 
 @pytest.mark.parametrize("name", FAULTY)
-def test_faults(name):
+def test_faults_of_a_sweep_are_told(name):
     table, expected = FAULTY[name]
     with pytest.raises(CaseError) as caught:
         expanded(table)
     assert all(any(words in fault for fault in caught.value.faults) for words in expected), caught.value.faults
 
 
-def test_seed_of_realisations_is_the_cells():
+def test_realisations_exclude_seeds_that_vary():
     with pytest.raises(CaseError, match=r"excludes cell\.seed"):
         expanded("realisations = 2\ncell.seed = [1, 2]", RANDOM)
 
 
-def test_a_file_without_the_table(tmp_path):
+def test_a_file_without_a_sweep_points_at_run(tmp_path):
     path = tmp_path / "case.toml"
     path.write_text(CASE)
     with pytest.raises(CaseError, match="feti-homog run"):
@@ -168,3 +168,16 @@ def test_a_file_without_the_table(tmp_path):
 def test_all_sampled_points_differ():
     found = values("samples = 20\ncell.fibre_fraction = {from = 0.1, to = 0.6}")
     assert all(a != b for a, b in pairwise(sorted(found)))
+
+
+def test_values_may_be_numpys():
+    base = tomllib.loads(CASE)
+    sweep = plan.expand(base | {"sweep": {"cell.fibre_fraction": np.linspace(0.1, 0.3, 3)}}, Path())
+    same = plan.expand(base | {"sweep": {"cell": {"fibre_fraction": np.linspace(0.1, 0.3, 3).tolist()}}}, Path())
+    assert sweep == same and len(sweep.cases) == 3
+    assert all(type(entry.inputs["cell.fibre_fraction"]) is float for entry in sweep.entries)
+
+
+def test_a_base_that_is_no_section():
+    with pytest.raises(CaseError, match=r"cell\.order: \"cell\" is no section"):
+        plan.expand({"cell": 3, "sweep": {"cell.order": [1]}}, Path())

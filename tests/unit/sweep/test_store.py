@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from feti_homog.common.file_locks import Busy, Lock, is_held
+from feti_homog.common.file_locks import Lock, LockHeld, is_locked
 from feti_homog.errors import FetiHomogError
 from feti_homog.output.files import atomic
 
@@ -33,30 +33,30 @@ def holder(path: Path, shared: bool = False) -> subprocess.Popen[bytes]:
 @pytest.mark.parametrize(("theirs", "ours", "free"), [
     (False, False, False), (False, True, False), (True, False, False), (True, True, True),
 ])  # fmt: skip
-def test_locks_between_processes(tmp_path, theirs, ours, free):
+def test_a_lock_excludes_unless_both_share_it(tmp_path, theirs, ours, free):
     path = tmp_path / "lock"
     process = holder(path, theirs)
     try:
-        lock = Lock(path, ours, patience=0.05)
+        lock = Lock(path, ours, timeout=0.05)
         if free:
             lock.acquire()
             lock.release()
         else:
-            with pytest.raises(Busy, match="another process" if theirs else f"process {process.pid}"):
+            with pytest.raises(LockHeld, match="another process" if theirs else f"process {process.pid}"):
                 lock.acquire()
-        assert is_held(path) != theirs
+        assert is_locked(path) != theirs
     finally:
         process.kill()
         process.wait()
     with Lock(path):
-        assert is_held(path)
-    assert not is_held(path)
+        assert is_locked(path)
+    assert not is_locked(path)
 
 
-def test_a_lock_that_cannot_be_made(tmp_path):
+def test_a_lock_that_cannot_be_made_is_told(tmp_path):
     with pytest.raises(FetiHomogError, match="cannot lock"):
         Lock(tmp_path / "none" / "lock").acquire()
-    assert not is_held(tmp_path / "none" / "lock")
+    assert not is_locked(tmp_path / "none" / "lock")
 
 
 def test_a_file_is_replaced_whole_or_not_at_all(tmp_path):
@@ -71,6 +71,6 @@ def test_a_file_is_replaced_whole_or_not_at_all(tmp_path):
     assert path.read_text() == "old" and list(tmp_path.iterdir()) == [path]
 
 
-def test_a_full_device():
+def test_a_full_device_is_told():
     with pytest.raises(FetiHomogError, match="No space left on device"):
         atomic.replace(Path("/dev/shm/feti_homog_none"), lambda part: Path("/dev/full").write_text("x"))

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from feti_homog.feti.linalg.packed_symmetric import BLOCK, SMALL, invert_upper, mirrored
+from feti_homog.feti.linalg.packed_symmetric import full_from_lower, invert_upper
+from feti_homog.feti.thresholds import MIRRORED_BLOCK_ROWS, TRIANGLE_INVERSE_ROWS
 
-SIZES = [1, 2, SMALL, SMALL + 1, BLOCK, BLOCK + 1, 203]
+SIZES = [1, 2, TRIANGLE_INVERSE_ROWS, TRIANGLE_INVERSE_ROWS + 1, MIRRORED_BLOCK_ROWS, MIRRORED_BLOCK_ROWS + 1, 203]
 
 
 def definite(n):
@@ -37,5 +38,5 @@ def test_an_indefinite_matrix_is_refused(n):
 def test_mirrored_is_symmetric_with_that_lower_triangle(n):
     A = np.asfortranarray(np.random.default_rng(n).standard_normal((n, n)))
     before = A.copy()
-    whole = mirrored(A)
+    whole = full_from_lower(A)
     assert (whole == whole.T).all() and (np.tril(whole) == np.tril(A)).all() and (before == A).all()

@@ -10,7 +10,8 @@ from mpi4py import MPI
 from scipy.sparse import csr_matrix, diags, kronsum
 
 from feti_homog.common import process_memory
-from feti_homog.feti.linalg.distributed_matrix import Blocks, assembled
+from feti_homog.feti.linalg.dense_block_sum import DenseBlockSum
+from feti_homog.feti.linalg.distributed_matrix import assemble_owned_rows
 from feti_homog.feti.linalg.saddle_point import SaddlePoint, _Augmented, _Indefinite
 from feti_homog.feti.linalg.sparse_direct import DirectSolver, IndefiniteSolver
 
@@ -29,18 +30,19 @@ def resident():
 
 @pytest.mark.parametrize("solver", [DirectSolver, IndefiniteSolver])
 @pytest.mark.parametrize("columns", [(), (1,), (3,), (40,)])
-def test_solves(solver, columns):
+def test_solvers_return_the_unknowns_that_made_the_right_hand_side(solver, columns):
     A = laplacian(12)
     x = np.random.default_rng(0).standard_normal((A.shape[0], *columns))
     np.testing.assert_allclose(solver(A, "test_").solve(A @ x), x, atol=1e-10)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "make",
     [
         lambda A: DirectSolver(A, "test_").solve(np.ones((A.shape[0], 20))),
         lambda A: IndefiniteSolver(A, "test_").solve(np.ones((A.shape[0], 20))),
-        lambda A: assembled(MPI.COMM_WORLD, A, np.arange(A.shape[0]), np.arange(A.shape[0]), A.shape),
+        lambda A: assemble_owned_rows(MPI.COMM_WORLD, A, np.arange(A.shape[0]), np.arange(A.shape[0]), A.shape),
     ],
     ids=["definite", "indefinite", "assembled"],
 )
@@ -65,11 +67,10 @@ def test_a_factor_can_be_freed_before_its_owner():
     assert resident() - before < 8 * MEGABYTE
 
 
-@pytest.mark.parametrize(("accurate", "inner"), [(1e-11, _Augmented), (0.0, _Indefinite)])
+@pytest.mark.parametrize(("accuracy", "inner"), [(1e-11, _Augmented), (0.0, _Indefinite)])
 @pytest.mark.parametrize("spread", [1.0, 1e7])
-def test_saddle_points(monkeypatch, spread, accurate, inner):
+def test_both_factors_solve_saddle_points(spread, accuracy, inner):
     """Both factors solve [E K^T; K 0], also where rows of K depend on each other and a motion is free."""
-    monkeypatch.setattr("feti_homog.feti.linalg.saddle_point.ACCURATE", accurate)
     rng = np.random.default_rng(1)
     n, m = 30, 6
     basis = np.linalg.qr(rng.standard_normal((n, n)))[0]
@@ -78,7 +79,7 @@ def test_saddle_points(monkeypatch, spread, accurate, inner):
     K[-1] = K[0] + K[1]
     null = np.array([1.0, 1, 0, 0, 0, -1]) / np.sqrt(3)
     c, a = rng.standard_normal((n, 2)), rng.standard_normal((m, 2))
-    saddle = SaddlePoint(MPI.COMM_WORLD, *(csr_matrix(x) for x in (E, K, np.outer(null, null))), "test_")
+    saddle = SaddlePoint(MPI.COMM_WORLD, *(csr_matrix(x) for x in (E, K, np.outer(null, null))), "test_", accuracy)
     found, work = saddle.solve(E @ c + K.T @ a, K @ c)
     np.testing.assert_allclose(found, c, atol=1e-6)
     np.testing.assert_allclose(K.T @ work, K.T @ a, rtol=1e-6, atol=1e-6 * spread)
@@ -87,11 +88,10 @@ def test_saddle_points(monkeypatch, spread, accurate, inner):
     assert isinstance(saddle._inner, inner)
 
 
-def test_blocks_sum_whatever_is_held(monkeypatch):
+def test_sum_of_blocks_does_not_depend_on_the_buffer():
     rng = np.random.default_rng(2)
-    for held in (1, 50, 10**6):
-        monkeypatch.setattr("feti_homog.feti.linalg.distributed_matrix.HELD", held)
-        blocks, expected = Blocks((20, 15)), np.zeros((20, 15))
+    for entries in (1, 50, 10**6):
+        blocks, expected = DenseBlockSum((20, 15), max_buffered_entries=entries), np.zeros((20, 15))
         for _ in range(30):
             rows, columns = rng.choice(20, 4, replace=False), rng.choice(15, 3, replace=False)
             values = rng.standard_normal((4, 3))
@@ -101,8 +101,8 @@ def test_blocks_sum_whatever_is_held(monkeypatch):
 
 
 def test_small_entries_of_blocks_are_left_out():
-    blocks = Blocks((4, 3))
+    blocks = DenseBlockSum((4, 3))
     values = np.array([[1.0, -2.0], [0.1, -5.0]])
-    blocks.add_larger(np.array([2, 0]), np.array([1, 2]), values, np.array([0.5, 2.0]))
+    blocks.add_entries_above(np.array([2, 0]), np.array([1, 2]), values, np.array([0.5, 2.0]))
     np.testing.assert_array_equal(blocks.matrix().toarray(), [[0, 0, -5.0], [0, 0, 0], [0, 1.0, 0], [0, 0, 0]])
     assert blocks.matrix().nnz == 2

@@ -41,13 +41,13 @@ def test_what_was_written_is_read(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_another_run(tmp_path):
+def test_the_checkpoint_of_another_run_is_refused(tmp_path):
     written(tmp_path)
     with pytest.raises(CaseError, match=r"--resume: .*000000\.h5 is of another run: expected that; found this run"):
         Checkpoint(tmp_path, MPI.COMM_SELF, "that").read()
 
 
-def test_a_missing_event(tmp_path):
+def test_a_checkpoint_without_one_of_its_events_is_refused(tmp_path):
     checkpoint = written(tmp_path)
     (tmp_path / "checkpoint" / "000001.h5").unlink()
     with pytest.raises(CaseError, match="--resume: event 000001 is missing"):
@@ -73,7 +73,7 @@ def test_an_event_of_another_format(tmp_path, version):
 
 
 @pytest.mark.parametrize("content", [b"", b"nothing", None])
-def test_an_unreadable_event(tmp_path, content):
+def test_an_unreadable_event_is_refused(tmp_path, content):
     checkpoint = written(tmp_path)
     path = tmp_path / "checkpoint" / "000002.h5"
     path.write_bytes(path.read_bytes()[:-200] if content is None else content)
@@ -81,6 +81,7 @@ def test_an_unreadable_event(tmp_path, content):
         checkpoint.read()
 
 
+@pytest.mark.slow
 def test_a_damaged_event_is_refused_or_harmless(tmp_path):
     checkpoint, chance = written(tmp_path), random.Random(0)
     path = tmp_path / "checkpoint" / "000003.h5"

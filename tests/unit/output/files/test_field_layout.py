@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import h5py
 from mpi4py import MPI
-from sample_output import sample
+from support.sample_output import sample
 
 from feti_homog.output.files.field_file import FieldFile
 from feti_homog.output.files.field_layout import items

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 from PIL import Image
-from sample_output import Sample, sample, without_interface
+from support.sample_output import Sample, sample, without_interface
 
 from feti_homog.errors import CaseError, FetiHomogError
 from feti_homog.output.files import xdmf
@@ -53,7 +53,7 @@ def test_coarser_triangles_have_the_means_of_theirs(tmp_path: Path, limit: int, 
 
 
 @pytest.mark.parametrize("block", [1, 7, 64, 1 << 18])
-def test_blocks_do_not_matter(tmp_path: Path, block: int) -> None:
+def test_decimation_does_not_depend_on_its_blocks(tmp_path: Path, block: int) -> None:
     with h5py.File(write(tmp_path, sample(4, refine=2)), "r") as file:
         whole = decimation.drawn_mesh(file, 200)
         means = decimation.triangle_means(file["state/1/stress"], 0, whole)
@@ -85,6 +85,7 @@ def test_outlines_leave_out_the_cuts_within_a_body(tmp_path: Path) -> None:
     assert length == pytest.approx(4 + 2 * 4 * 0.5 + 2 * 0.5)  # and both sides of the cut
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("order", "refine"), [(1, 1), (2, 0)])
 def test_all_pictures_are_made(tmp_path: Path, order: int, refine: int) -> None:
     write(tmp_path, sample(4, refine, order))
@@ -115,8 +116,9 @@ LISTS = [
 ]  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("document", "names"), LISTS, ids=["path", "angle, strain", "angle, stiffness"])
-def test_pictures_of_lists(tmp_path: Path, document: dict[str, Any], names: list[str]) -> None:
+def test_pictures_of_paths_and_angles_are_made(tmp_path: Path, document: dict[str, Any], names: list[str]) -> None:
     write(tmp_path, sample(4, refine=1))
     (tmp_path / "result.json").write_text(json.dumps(document))
     paths = figures.plot(tmp_path)
@@ -127,7 +129,7 @@ def test_pictures_of_lists(tmp_path: Path, document: dict[str, Any], names: list
             assert np.asarray(picture.convert("RGB")).std() > 20 and min(picture.size) > 300
 
 
-def test_curves_alone_without_fields(tmp_path: Path) -> None:
+def test_without_fields_only_curves_are_drawn(tmp_path: Path) -> None:
     document = LISTS[0][0] | {"case": LISTS[0][0]["case"] | {"output": {"fields": False}}}
     (tmp_path / "result.json").write_text(json.dumps(document))
     assert [path.name for path in figures.plot(tmp_path)] == ["path.png"]
@@ -148,6 +150,7 @@ def test_faces_are_as_their_worst_node(tmp_path: Path) -> None:
     assert [expected[y, round(16 * x)] for x, y in middle] == states.tolist()
 
 
+@pytest.mark.slow
 def test_the_case_chooses_component_and_scale(tmp_path: Path) -> None:
     write(tmp_path, sample(4))
     before = [path.read_bytes() for path in figures.plot(tmp_path)]
@@ -168,19 +171,19 @@ def test_the_case_chooses_component_and_scale(tmp_path: Path) -> None:
         (np.zeros(9), (-0.5, 0.5, "viridis", "neither")),
     ],
 )
-def test_the_colour_range(values: Any, expected: tuple[float, float, str, str]) -> None:
+def test_the_colour_range_leaves_out_outliers(values: Any, expected: tuple[float, float, str, str]) -> None:
     norm, colours, extend = plot_helpers.colour_range(values)
     assert (norm.vmin, norm.vmax) == pytest.approx(expected[:2], abs=0.02)
     assert (colours, extend) == expected[2:]
 
 
 @pytest.mark.parametrize(("largest", "scale"), [(1.0, 0.1), (1.2, 0.1), (0.01, 10.0), (0.3e-4, 5e3), (0.0, 1.0)])
-def test_the_deformation_scale(largest: float, scale: float) -> None:
+def test_the_deformation_scale_shows_a_tenth_of_the_cell(largest: float, scale: float) -> None:
     points = np.array([[0.0, 0.0], [1.0, 2.0]])
     assert plot_helpers.magnification(np.array([[largest, 0.0], [0.0, 0.0]]), points) == pytest.approx(scale)
 
 
-def test_no_result_or_a_broken_one(tmp_path: Path) -> None:
+def test_a_missing_or_broken_result_is_told(tmp_path: Path) -> None:
     with pytest.raises(FetiHomogError, match=r"^cannot draw .*result\.h5: "):
         figures.plot(tmp_path)
     (tmp_path / "result.h5").write_text("nothing")
@@ -213,7 +216,7 @@ def test_xdmf_points_at_tables_of_the_right_shape(tmp_path: Path) -> None:
     assert {topology.get("TopologyType") for topology in collections[0].iter("Topology")} == {"Triangle_6"}
 
 
-def test_xdmf_without_interface_nodes(tmp_path: Path) -> None:
+def test_xdmf_without_interface_nodes_has_the_cell_alone(tmp_path: Path) -> None:
     write(tmp_path, without_interface(sample(4)))
     root = ET.parse(xdmf.write(tmp_path)).getroot()
     assert [grid.get("Name") for grid in root.findall("./Domain/Grid")] == ["cell"]

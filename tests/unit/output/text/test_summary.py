@@ -49,7 +49,7 @@ def line(text: str, start: str) -> str:
     return next(line for line in text.splitlines() if line.strip().startswith(start))
 
 
-def test_it_is_aligned_and_narrow() -> None:
+def test_the_summary_is_aligned_and_narrow() -> None:
     lines = summary(DOCUMENT).splitlines()
     assert max(map(len, lines)) < 80
     assert all(text == text.rstrip() for text in lines)
@@ -57,7 +57,7 @@ def test_it_is_aligned_and_narrow() -> None:
     assert len(matrix) == 4 and len({len(text) for text in matrix}) == 1
 
 
-def test_it_says_what_was_computed() -> None:
+def test_the_summary_says_what_was_computed() -> None:
     text = summary(DOCUMENT)
     assert line(text, "S22").split() == ["S22", "56.97000", "149.69000", "0.00000"]
     assert line(text, "S11").split()[-1] == "0.00000"
@@ -72,14 +72,14 @@ def test_it_says_what_was_computed() -> None:
 
 
 @pytest.mark.parametrize(("entry", "text"), [(2.0e11, "2.0000000e+11"), (0.5, "0.50000000"), (12345.678, "12345.678")])
-def test_stiffnesses_of_any_size(entry: float, text: str) -> None:
+def test_stiffnesses_of_any_size_fit_the_columns(entry: float, text: str) -> None:
     stiffness = [[entry, 0.0, 0.0], [0.0, entry, 0.0], [0.0, 0.0, entry]]
     lines = summary(changed(effective_stiffness=stiffness)).splitlines()
     assert next(words for words in lines if words.startswith("  S11")).split()[1].startswith(text)
     assert max(map(len, lines)) < 80
 
 
-def test_checks_pass_and_fail() -> None:
+def test_checks_beyond_the_tolerance_fail() -> None:
     text = summary(DOCUMENT)
     assert line(text, "hill").split() == ["hill", "2.0e-12", "pass"]
     assert line(text, "jump").split() == ["jump", "3.0e-06", "FAIL"]
@@ -94,13 +94,13 @@ def test_a_value_out_of_its_bounds_is_marked() -> None:
     assert line(summary(changed(effective_stiffness=stiffness)), "C11").endswith("170           160  outside")
 
 
-def test_warnings_and_faults() -> None:
+def test_warnings_and_faults_are_told() -> None:
     text = summary(changed(faults=["check jump: 3e-06"], status="not converged"))
     assert "Warning     the matrix" in text and "Fault       check jump: 3e-06" in text
     assert "Warning" not in summary(changed(warnings=[]))
 
 
-def test_no_units_no_hashin_shtrikman_and_unknown_keys() -> None:
+def test_what_is_unknown_is_left_out() -> None:
     document = changed(something_else={"a": 1})
     document["case"]["output"] = {}
     document["bounds"]["hashin_shtrikman"] = None
@@ -109,7 +109,7 @@ def test_no_units_no_hashin_shtrikman_and_unknown_keys() -> None:
 
 
 @pytest.mark.parametrize("key", ["cell", "solver", "effective_stiffness", "checks", "timings", "memory", "status"])
-def test_what_must_be_there(key: str) -> None:
+def test_a_document_without_a_required_key_is_a_defect(key: str) -> None:
     document = changed()
     del document[key]
     with pytest.raises(KeyError, match=key):
@@ -120,7 +120,7 @@ def counted(bonded: int, **values: Any) -> dict[str, Any]:
     return values | {"bonded": bonded, "open": 9, "closed": 1, "iterations": 7}
 
 
-def test_an_angle() -> None:
+def test_an_angle_is_a_table_of_stiffnesses() -> None:
     stiffness = [[9.0, 2, 0], [2, 8, 0], [0, 0, 3]]
     document = changed(angle=[counted(20 - k, angle=90.0 * k, stiffness=stiffness) for k in (0, 4)])
     del document["effective_stiffness"], document["moduli"], document["bounds"]
@@ -131,10 +131,10 @@ def test_an_angle() -> None:
     assert line(text, "360 ").split() == ["360", "9", "8", "2", "3", "16", "9", "1"]
 
 
-def test_a_path() -> None:
+def test_a_path_is_a_table_of_chosen_points() -> None:
     points = [
         counted(100 - k, load_factor=0.01 * k, strain=[0, -2e-3 * k, 1e-5], stress=[1e-15, -3.5 * k, -2.0], broke=1,
-                dissipated=0.5 * k)
+                dissipated=0.5 * k, dissipated_strain_controlled=0.6 * k)
         for k in range(101)
     ]  # fmt: skip
     document = changed(path=points, kkt_tolerance=1e-6)
@@ -145,7 +145,7 @@ def test_a_path() -> None:
     text = summary(document)
     assert max(map(len, text.splitlines())) < 80
     assert "101 points, 15 shown; 101 bonds broke" in text
-    assert line(text, "Dissipated").endswith("per area (GPa): 50 along all equilibria")
+    assert line(text, "Dissipated").endswith("per area (GPa): 50 along all equilibria, 60 if the strain only rises")
     rows = [words.split() for words in text.splitlines() if words[:5].strip().isdigit()]
     assert len(rows) == 15
     assert rows[0] == ["0", "0.000000", "0", "0", "0", "-2", "100", "9", "1"]
@@ -156,7 +156,7 @@ def test_a_path() -> None:
     assert "at most 1.0e-07; of contact 1.0e-06" in text
 
 
-def test_bounds_of_bonded_cells_only() -> None:
+def test_bounds_are_those_of_bonded_cells_only() -> None:
     document = changed(effective_stiffness_compression=[[150.0, 57, 0], [57, 150, 0], [0, 0, 46]])
     document["case"]["interface"] = {"contact": True, "debonded": [{"fibre": "all", "centre": 0.0, "angle": 60.0}]}
     text = summary(document)

@@ -13,6 +13,7 @@ from feti_homog.analysis.context import AnalysisContext
 from feti_homog.common.petsc_options import case_options
 from feti_homog.common.progress import Progress
 from feti_homog.config import case as cases
+from feti_homog.feti.thresholds import DEFAULTS
 from feti_homog.homogenization.averaging import Homogenization
 from feti_homog.homogenization.unit_cell import tear
 
@@ -32,12 +33,12 @@ def make_case(*, matrix=MATRIX, fibre=FIBRE, plane="strain", petsc=None, decompo
     return cases.parse(document, Path(folder))
 
 
-def solve(case, comm):
+def solve(case, comm, thresholds=DEFAULTS):
     """The torn cell, L^ef and the responses."""
     PETSc.garbage_cleanup(comm)
     progress = Progress(comm, quiet=True)
     with case_options(case.petsc):
-        cell = tear(case, comm, progress)
+        cell = tear(case, comm, progress, thresholds)
         responses = []
         context = AnalysisContext(
             Homogenization(cell, contact=False),
@@ -48,8 +49,8 @@ def solve(case, comm):
         return cell, stiffness.run(context)["effective_stiffness"], responses
 
 
-def twin_stiffness(cell):
-    """L^ef of the same refined mesh by the twin, on every rank."""
+def monolithic_stiffness(cell):
+    """L^ef of the same refined mesh by one monolithic solve, on every rank."""
     parts = cell.comm.gather([(s.mesh.points, s.mesh.triangles, s.L) for s in cell.subdomains])
     result = None
     if cell.comm.rank == 0:
@@ -59,8 +60,8 @@ def twin_stiffness(cell):
             np.concatenate([points for points, _, _ in own]),
             np.concatenate([triangles + n for (_, triangles, _), n in zip(own, first, strict=False)]),
             np.concatenate([np.broadcast_to(L, (len(triangles), 3, 3)) for _, triangles, L in own]),
-            cell.plan.width,
-            cell.plan.height,
+            cell.summary.width,
+            cell.summary.height,
         )
     return cell.comm.bcast(result)
 

@@ -1,43 +1,44 @@
-"""Torn cells with interfaces for the tests, and the same cells for the twins."""
+"""Torn cells with interfaces, and the same cells for the quadratic programme that they are checked by."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
 import numpy as np
-from cells import make_case
 from petsc4py import PETSc
-from reference.quadratic_programme import QPTwin, keys
+from reference.quadratic_programme import QuadraticProgramme, torus_keys
 
 from feti_homog.cell.arrangement import arrange
 from feti_homog.common.petsc_options import case_options
 from feti_homog.common.progress import Progress
 from feti_homog.config import sections
+from feti_homog.feti.thresholds import DEFAULTS
 from feti_homog.homogenization import unit_cell
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface.contact import BONDED, OPEN, Interface
+from support.cases import make_case
 
 
 @dataclass(frozen=True)
-class Bonds:
-    """A torn cell, its twin (None but on rank 0) and, there, the twin's number of each node in the ranks' order."""
+class ReferencedCell:
+    """A torn cell and, on rank 0, its quadratic programme and that one's number of each interface node."""
 
     cell: TornCell
-    twin: QPTwin | None
+    reference: QuadraticProgramme | None
     order: np.ndarray
 
     def interface(self, contact):
         return interface(self.cell, contact)
 
     def status(self, bonded):
-        """The status on this rank, debonded nodes open, of the twin's `bonded` (k,) on rank 0.  Collective."""
+        """The status on this rank, debonded nodes open, of the reference's `bonded` (k,) on rank 0.  Collective."""
         comm = self.cell.comm
         bonded = comm.bcast(bonded[self.order] if comm.rank == 0 else None)
         first = comm.exscan(self.here) or 0
         return np.where(bonded[first : first + self.here], BONDED, OPEN).astype(np.int8)
 
-    def of_twin(self, values):
-        """Values of the interface nodes in the twin's order, on every rank.  Collective."""
+    def in_reference_order(self, values):
+        """Values of the interface nodes in the reference's order, on every rank.  Collective."""
         parts = self.cell.comm.gather(values)
         if parts is not None:
             values = np.concatenate(parts)
@@ -54,12 +55,12 @@ class Bonds:
         return np.zeros(self.cell.solver.rows)
 
 
-def tear(comm, arcs=(), **case):
+def tear(comm, arcs=(), thresholds=DEFAULTS, **case):
     """The torn cell of the case that `make_case` makes, the tips of arcs at its nodes.  Collective."""
     PETSc.garbage_cleanup(comm)
     case = replace(make_case(**case), interface=sections.InterfaceSection(debonded=tuple(arcs)))
     with case_options(case.petsc):
-        return unit_cell.tear(case, comm, Progress(comm, quiet=True))
+        return unit_cell.tear(case, comm, Progress(comm, quiet=True), thresholds)
 
 
 def printed(comm, capfd, **case):
@@ -72,25 +73,25 @@ def printed(comm, capfd, **case):
 
 def interface(cell, contact):
     """Its interfaces."""
-    return Interface(cell.solver, contact, np.array([cell.plan.width, cell.plan.height]))
+    return Interface(cell.solver, contact, np.array([cell.summary.width, cell.summary.height]))
 
 
 def build(comm, **case):
-    """The cell of `tear` and its twin.  Collective."""
+    """The cell of `tear` and its quadratic programme.  Collective."""
     cell = tear(comm, **case)
-    size = np.array([cell.plan.width, cell.plan.height])
+    size = np.array([cell.summary.width, cell.summary.height])
     parts = [
         (s.mesh.points, s.mesh.triangles, s.submesh.body, s.submesh.phase == "matrix", s.L) for s in cell.subdomains
     ]
     parts, points = comm.gather(parts), comm.gather(cell.solver.jump_operator.nodes.points)
     if parts is None:
-        return Bonds(cell, None, np.zeros(0, int))
+        return ReferencedCell(cell, None, np.zeros(0, int))
     fibres = arrange(cell.case.cell)
-    twin = QPTwin([part for own in parts for part in own], fibres.centres, fibres.radii, size)
-    key = keys(np.concatenate(points), size)
-    order = np.searchsorted(twin.key, key)
-    assert (np.sort(key) == twin.key).all()
-    return Bonds(cell, twin, order)
+    reference = QuadraticProgramme([part for own in parts for part in own], fibres.centres, fibres.radii, size)
+    key = torus_keys(np.concatenate(points), size)
+    order = np.searchsorted(reference.key, key)
+    assert (np.sort(key) == reference.key).all()
+    return ReferencedCell(cell, reference, order)
 
 
 def energy(cell, solution):
@@ -99,10 +100,10 @@ def energy(cell, solution):
     total = 0.0
     for s, offset in zip(cell.subdomains, cell.offsets, strict=False):
         own = u[offset : offset + len(s.Q)]
-        total += s.area * E @ s.L @ E / 2 + E @ s.Q.T @ own + own @ (s.K @ own) / 2
+        total += s.area * E @ s.L @ E / 2 + E @ s.Q.T @ own + own @ (s.assemble_stiffness() @ own) / 2
     return cell.comm.allreduce(total)
 
 
 def stress(cell, solution):
     """Sigma from the multipliers.  Collective."""
-    return cell.solver.stress_integral(solution) / cell.plan.area
+    return cell.solver.stress_integral(solution) / cell.summary.area

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 from pathlib import Path
 
-from unit.config.faulty_cases import BASE
+from support.base_case import BASE
 
 QUIET = '[output]\nfields = false\npictures = false\nstress_unit = "GPa"\n'
 CASE = BASE.replace("mesh_size = 0.05", "mesh_size = 0.3") + QUIET

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import bonds
 import numpy as np
-from cells import relative_error
 from mpi4py import MPI
 from reference import dense_feti
 from scipy.linalg import eigh
 
 from feti_homog.common.petsc_options import case_options
 from feti_homog.interface.contact import BONDED, CLOSED, OPEN
+from support import torn_cells
+from support.cases import relative_error
 
 # Sixteen fibres almost touch; the matrix is cut across the gaps.
 NARROW = {
@@ -27,22 +27,22 @@ SINGLE = 2e-6
 
 
 class Narrow:
-    """The narrow cell at one threshold, its twin, U, T and the preconditioner as dense matrices."""
+    """The narrow cell at one threshold, its dense dual problem, U, T and the preconditioner as dense matrices."""
 
-    def __init__(self, threshold, twin=None):
-        """The twin does not depend on the threshold.  Collective."""
+    def __init__(self, threshold, dense=None):
+        """The dense dual problem does not depend on the threshold.  Collective."""
         self.threshold = threshold
-        self.cell = bonds.tear(MPI.COMM_WORLD, **NARROW, petsc={"feti_coarse_threshold": threshold})
+        self.cell = torn_cells.tear(MPI.COMM_WORLD, **NARROW, petsc={"feti_coarse_threshold": threshold})
         self.solver = self.cell.solver
         self.coarse = self.solver.coarse
-        self.twin = twin or dense_feti.DualTwin(self.cell)
-        self.M = self.twin.preconditioner(np.ones(self.twin.total, bool))
+        self.dense = dense or dense_feti.DenseDual(self.cell)
+        self.M = self.dense.preconditioner(np.ones(self.dense.total, bool))
         self.U = dense_feti.gathered(self.cell, self.coarse.U.toarray())
-        self.T = dense_feti.deflation(self.twin.F, self.U, self.twin.G)
+        self.T = dense_feti.deflation(self.dense.F, self.U, self.dense.G)
 
     def soft_modes(self):
         """For each subdomain: (n,) all theta of S p = theta N p, rising, and (n, n) the modes."""
-        for B, S in zip(self.twin.B, self.twin.S, strict=True):
+        for B, S in zip(self.dense.B, self.dense.S, strict=True):
             yield eigh(S, B.T @ self.M @ B)
 
     def own(self, whole):
@@ -52,7 +52,7 @@ class Narrow:
 
     def random(self, seed, columns=()):
         """A vector on all rows."""
-        return np.random.default_rng(seed).standard_normal((self.twin.total, *columns))
+        return np.random.default_rng(seed).standard_normal((self.dense.total, *columns))
 
 
 def together(cell, strains=STRAINS, starts=None):
@@ -83,7 +83,7 @@ def statuses(cell, seed):
 
 def masks(cell, seeds):
     """This rank's active rows for statuses drawn at random.  Collective."""
-    interface = bonds.interface(cell, True)
+    interface = torn_cells.interface(cell, True)
     return [interface.active(statuses(cell, seed)) for seed in seeds]
 
 
@@ -91,7 +91,7 @@ def agree(cell, found, expected):
     """That solutions are the same.  Collective."""
     for a, b in zip(found, expected, strict=True):
         assert a.reason > 0 and b.reason > 0
-        assert relative_error(bonds.stress(cell, a), bonds.stress(cell, b)) < 1e-8
+        assert relative_error(torn_cells.stress(cell, a), torn_cells.stress(cell, b)) < 1e-8
         lam, other = (dense_feti.gathered(cell, s.lam) for s in (a, b))
         assert relative_error(lam, other) < 1e-6
         jump, other = (dense_feti.gathered(cell, s.jump) for s in (a, b))

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from support import mpirun
-from unit.config.faulty_cases import BASE
+from support.base_case import BASE
+from support.jobs import mpirun
 
 CASE = BASE.replace("mesh_size = 0.05", "mesh_size = 0.15")
 

@@ -26,18 +26,18 @@ def random_cell(rng):
     return cell
 
 
-def random_bonded(rng, twin):
-    """(k,) which interface nodes of a twin are bonded: arcs are open, or a fibre wholly, or but for one node."""
-    bonded = np.ones(len(twin.key), bool)
-    for f in np.unique(twin.fibre):
-        own = np.flatnonzero(twin.fibre == f)
+def random_bonded(rng, reference):
+    """(k,) which interface nodes of a `QuadraticProgramme` are bonded: arcs open, a fibre wholly, or but for a node."""
+    bonded = np.ones(len(reference.key), bool)
+    for f in np.unique(reference.fibre):
+        own = np.flatnonzero(reference.fibre == f)
         kind = rng.choice(["bonded", "arcs", "debonded", "one"], p=[0.2, 0.5, 0.2, 0.1])
         if kind in ("debonded", "one"):
             bonded[own] = False
         if kind == "one":
             bonded[rng.choice(own)] = True
         for _ in range(rng.integers(1, 4) if kind == "arcs" else 0):
-            away = (twin.angle[own] - rng.uniform(0, 360) + 180) % 360 - 180
+            away = (reference.angle[own] - rng.uniform(0, 360) + 180) % 360 - 180
             bonded[own[np.abs(away) < rng.uniform(5, 100)]] = False
     return bonded
 

@@ -1,4 +1,4 @@
-"""What the tests share: assertions that all ranks agree on, and runs under mpirun."""
+"""Programs that tests start: Python programs under mpirun, or without it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 LAUNCHER_VARIABLES = ("OMPI_", "PMIX_", "ORTE_", "PMI_")
 RUN_VARIABLES = {
     "OMPI_ALLOW_RUN_AS_ROOT": "1",
@@ -18,12 +18,6 @@ RUN_VARIABLES = {
     "OMP_NUM_THREADS": "1",
     "H5PY_ALWAYS_USE_MPI": "1",
 }
-
-
-def parallel_assert(comm: Any, condition: bool, message: str = "") -> None:
-    """Fails on every rank if the condition is false on any. Collective."""
-    failing = [rank for rank, holds in enumerate(comm.allgather(bool(condition))) if not holds]
-    assert not failing, f"{message} (on ranks {failing})"
 
 
 def environment() -> dict[str, str]:

@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from support import launched
+from support.jobs import launched
 
 DEADLINE = 100.0  # seconds
 

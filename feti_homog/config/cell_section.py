@@ -1,0 +1,80 @@
+"""The section [cell] of a case file: the geometry of the periodic cell and its mesh."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+from feti_homog.config.schema import Selector, key
+from feti_homog.config.section_values import MESH_FILE
+from feti_homog.config.values import choice, integer, real
+
+CIRCULAR = ("square", "hexagonal", "random")
+TOUCHING = {"square": math.pi / 4, "hexagonal": math.pi / math.sqrt(12), "random": math.pi / math.sqrt(12)}
+"""Fibre fraction at which the fibres touch; of a random cell, that of the densest packing of circles."""
+
+GEOMETRY = Selector("cell", "geometry")
+ALL_CIRCULAR, RANDOM, MESH = GEOMETRY.among(*CIRCULAR), GEOMETRY.among("random"), GEOMETRY.among("mesh")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cell:
+    """Geometry of the periodic cell and its mesh. Keys of another geometry keep their defaults."""
+
+    geometry: str = key(
+        choice(*CIRCULAR, "mesh"),
+        '"square": a fibre in the middle of a 1 x 1 cell; "hexagonal": a 1 x sqrt(3) cell with fibres in the middle '
+        'and at the corners; "random": a 1 x 1 cell; "mesh": a gmsh file.',
+    )
+    fibre_fraction: float | None = key(
+        real(above=0.0, below=1.0),
+        "Area of the fibres / area of the cell, below that at which they touch: pi/4 (square), pi/sqrt(12) "
+        "(hexagonal; random, where min_gap lowers it).",
+        only=ALL_CIRCULAR,
+    )
+    mesh_size: float = key(
+        real(least=1e-4, most=0.5),
+        "Size of the elements, before refine, / width of the cell.",
+        default=0.05,
+        only=ALL_CIRCULAR,
+    )
+    refine: int = key(
+        integer(least=0, most=8),
+        "How many times every element is split in four, on the ranks; new nodes of round interfaces lie on the circle.",
+        default=0,
+    )
+    order: int = key(
+        integer(least=1, most=2),
+        "Order of the triangles. 1: linear; they lock in plane strain where poisson is above 0.49. 2: quadratic, "
+        "curved on round interfaces.",
+        default=1,
+    )
+    bodies: str = key(
+        choice("torus", "plane"),
+        '"torus": a fibre that the boundary of the cell cuts is one body; "plane": its parts are bodies of their own. '
+        "The stiffness is the same.",
+        default="torus",
+    )
+    fibres: int | None = key(integer(least=1, most=100_000), "Number of fibres.", only=RANDOM)
+    min_gap: float = key(
+        real(least=0.0, most=1.0), "Smallest gap between fibres / their mean diameter.", default=0.05, only=RANDOM
+    )
+    seed: int = key(
+        integer(least=0),
+        "Seed of the random arrangement; the same seed gives the same cell on any machine and any number of ranks.",
+        default=0,
+        only=RANDOM,
+    )
+    radius_spread: float = key(
+        real(least=0.0, most=0.5),
+        "Largest difference of a radius from the mean / mean radius.",
+        default=0.0,
+        only=RANDOM,
+    )
+    file: Path | None = key(
+        MESH_FILE,
+        "The mesh, relative to the case file: triangles of three nodes that fill a rectangle, in physical surfaces "
+        '"matrix", "fibre", "fibre:2", ...; the nodes on opposite sides match. Fibres may have any shape.',
+        only=MESH,
+    )

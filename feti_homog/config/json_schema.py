@@ -1,0 +1,99 @@
+"""The case file as a JSON Schema (draft 2020-12), made of its keys alone: `feti-homog schema`.
+
+Types, choices, ranges and unknown keys are checked everywhere; which keys are required or belong to a case only in
+files without [sweep], where all keys must stand in their sections.  Relations between numbers, such as the fibre
+fraction at which fibres touch, are beyond a schema: `feti-homog check` knows them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from feti_homog.config.json_schema_rules import Schema, rules_of_one_case
+from feti_homog.config.material_sections import PHASE
+from feti_homog.config.materials import MATERIAL_FORMS
+from feti_homog.config.petsc_section import PREFIXED, WITHOUT_PREFIX
+from feti_homog.config.schema import Key, defaults_of, keys_of
+from feti_homog.config.sections import SECTIONS, Arc
+from feti_homog.config.sweep_section import AXIS_MEANING, RANGE_KEYS, SWEEP, SweepSection
+from feti_homog.config.tables import TOP_LEVEL
+from feti_homog.config.values import text
+
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+
+
+def json_schema() -> Schema:
+    """The schema of a case file, with or without [sweep]."""
+    return {
+        "$schema": DIALECT,
+        "title": "Case file of feti_homog",
+        "type": "object",
+        "properties": {
+            "name": dict(text.json_schema) | {"description": "Name of the case; by default that of the file."},
+            **{section: _reference(section) for section in SECTIONS},
+            "material": _materials(),
+            "petsc": _petsc(),
+            SWEEP: _sweep(),
+        },
+        "additionalProperties": False,
+        "$defs": {
+            **{section: _table(contents) for section, contents in SECTIONS.items()},
+            **{form: _table(contents) for form, contents in MATERIAL_FORMS.items()},
+            "arc": _table(Arc),
+            "axis": _axis(),
+            "range": _object({name: _key(entry) for name, entry in RANGE_KEYS.items()}) | {"required": ["from", "to"]},
+        },
+        "if": {"not": {"required": [SWEEP]}},
+        "then": rules_of_one_case(),
+    }
+
+
+def _reference(name: str) -> Schema:
+    return {"$ref": f"#/$defs/{name}"}
+
+
+def _object(properties: Mapping[str, Any]) -> Schema:
+    return {"type": "object", "properties": dict(properties), "additionalProperties": False}
+
+
+def _table(contents: type[Any]) -> Schema:
+    defaults = defaults_of(contents)
+    own = {name: {"default": default} for name, default in defaults.items()}
+    return _object({name: _key(entry) | own.get(name, {}) for name, entry in keys_of(contents).items()})
+
+
+def _key(entry: Key) -> Schema:
+    unit = f" Unit: {entry.unit}." if entry.unit else ""
+    return dict(entry.type.json_schema) | {"description": entry.meaning + unit}
+
+
+def _materials() -> Schema:
+    forms = {"anyOf": [_reference(form) for form in MATERIAL_FORMS]}
+    phases = {f"^({PHASE.pattern})$": forms}
+    return {"type": "object", "patternProperties": phases, "additionalProperties": False}
+
+
+def _petsc() -> Schema:
+    value = {"type": ["string", "number", "boolean"]}
+    names = {f"^({PREFIXED}|{'|'.join(WITHOUT_PREFIX)})$": value}
+    return {"type": "object", "patternProperties": names, "additionalProperties": False}
+
+
+def _sweep() -> Schema:
+    sections = [name for name in TOP_LEVEL if name != "name"]
+    table = _table(SweepSection)
+    table["properties"] |= {name: _reference("axis") for name in sections}
+    return table | {"patternProperties": {rf"^({'|'.join(sections)})\.": _reference("axis")}}
+
+
+def _axis() -> Schema:
+    """A list of values, a range, or a table of axes."""
+    nested = {
+        "type": "object",
+        "minProperties": 1,
+        "not": {"anyOf": [{"required": ["from"]}, {"required": ["to"]}]},
+        "additionalProperties": _reference("axis"),
+    }
+    values = {"type": "array", "minItems": 1}
+    return {"description": AXIS_MEANING, "anyOf": [values, _reference("range"), nested]}

@@ -1,0 +1,124 @@
+"""The rules of the JSON Schema of a case file: which keys are required, and which belong to a case."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from feti_homog.config.cell_section import ALL_CIRCULAR, GEOMETRY
+from feti_homog.config.materials import MATERIAL_FORMS
+from feti_homog.config.schema import Condition, Key, Selector, defaults_of, keys_of
+from feti_homog.config.sections import (
+    ANALYSIS_TYPE,
+    ANGLE_ANALYSIS,
+    METHOD,
+    SECTIONS,
+    SECTIONS_OF_AN_ANALYSIS,
+    Arc,
+)
+from feti_homog.config.tables import REQUIRED
+
+Schema = dict[str, Any]
+
+ITEMS = "items"  # on the way to a table: of a list
+
+
+def rules_of_one_case() -> Schema:
+    """What must be given, by conditions that are independent of each other."""
+    required = [_required(path, contents) for path, contents in _tables()]
+    selectors = (GEOMETRY, ANALYSIS_TYPE, METHOD)
+    conditional = [_rule(selector, value) for selector in selectors for value in _values(selector)]
+    return {
+        "required": list(REQUIRED),
+        "allOf": [
+            *filter(None, required),
+            *conditional,
+            *_material_rules(),
+            *_arc_rules(),
+            _at(("decomposition",), {"not": {"required": ["subdomains", "max_dofs"]}}),
+            _at(("path",), {"oneOf": [{"required": ["strain"]}, {"required": ["waypoints"]}]}),
+        ],
+    }
+
+
+def _tables() -> Iterator[tuple[tuple[str, ...], type[Any]]]:
+    """The way to each table with keys that may be conditional, and the table."""
+    for section, contents in SECTIONS.items():
+        yield (section,), contents
+    yield ("interface", "debonded", ITEMS), Arc
+
+
+def _at(path: Sequence[str], schema: Schema) -> Schema:
+    """The schema for what stands at a path, if it is there."""
+    for name in reversed(path):
+        schema = {ITEMS: schema} if name == ITEMS else {"properties": {name: schema}}
+    return schema
+
+
+def _required(path: Sequence[str], contents: type[Any]) -> Schema:
+    """The keys that a table always has; empty if there are none."""
+    names = [name for name, entry in keys_of(contents).items() if entry.required and entry.only is None]
+    return _at(path, {"required": names}) if names else {}
+
+
+def _values(selector: Selector) -> Sequence[str]:
+    values: Sequence[str] = keys_of(SECTIONS[selector.section])[selector.key].type.json_schema["enum"]
+    return values
+
+
+def _if(condition: Condition) -> Schema:
+    """That a selector has one of some values; its default if it is not given."""
+    selector = condition.selector
+    default = defaults_of(SECTIONS[selector.section]).get(selector.key)
+    has_value: Schema = {"properties": {selector.key: {"enum": list(condition.values)}}}
+    if default not in condition.values:
+        has_value["required"] = [selector.key]
+    return {"properties": {selector.section: has_value}, "required": [selector.section]}
+
+
+def _rule(selector: Selector, value: str) -> Schema:
+    """What follows from a selector's value: required keys, and those that belong to other values."""
+    consequences = [_consequence(path, keys_of(contents), selector, value) for path, contents in _tables()]
+    if selector == ANALYSIS_TYPE:
+        consequences.append(_section_consequence(value))
+    return {"if": _if(selector.among(value)), "then": {"allOf": [*filter(None, consequences)]}}
+
+
+def _consequence(path: Sequence[str], keys: Mapping[str, Key], selector: Selector, value: str) -> Schema:
+    own = {name: entry for name, entry in keys.items() if entry.only is not None and entry.only.selector == selector}
+    belongs = {name: entry.belongs({selector: value}) for name, entry in own.items()}
+    required = [name for name, entry in own.items() if entry.required and belongs[name]]
+    excluded = {name: False for name, is_own in belongs.items() if not is_own}
+    return _at(path, {"required": required, "properties": excluded}) if own else {}
+
+
+def _section_consequence(value: str) -> Schema:
+    conditions = SECTIONS_OF_AN_ANALYSIS.items()
+    required = [section for section, condition in conditions if value in condition.values]
+    excluded = {section: False for section, condition in conditions if value not in condition.values}
+    return {"required": required, "properties": excluded}
+
+
+def _material_rules() -> list[Schema]:
+    complete = [
+        {"required": [name for name, entry in keys_of(contents).items() if entry.required]}
+        for contents in MATERIAL_FORMS.values()
+    ]
+    of_circles = {"required": ["fibre"], "patternProperties": {"^fibre:": False}}
+    return [
+        _at(("material",), {"required": ["matrix"], "additionalProperties": {"anyOf": complete}}),
+        {"if": _if(ALL_CIRCULAR), "then": _at(("material",), of_circles)},
+    ]
+
+
+def _arc_rules() -> list[Schema]:
+    """Arcs must be told where nothing else can debond."""
+    some_arc = {"required": ["debonded"], "properties": {"debonded": {"minItems": 1}}}
+    stiffness = ANALYSIS_TYPE.among("stiffness")
+    return [
+        {"if": _if(ANGLE_ANALYSIS), "then": {"required": ["interface"], **_at(("interface",), some_arc)}},
+        {
+            "if": {"allOf": [_if(stiffness), _if(ALL_CIRCULAR)]},
+            "then": _at(("interface",), {"required": ["debonded"]}),
+        },
+    ]

@@ -1,0 +1,84 @@
+"""Reading the sections [material.PHASE], and which material a phase of the mesh has."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+
+from feti_homog.config.cell_section import CIRCULAR, GEOMETRY
+from feti_homog.config.materials import MATERIAL_FORMS, Material, plane_stiffness
+from feti_homog.config.schema import TableReader, keys_of
+from feti_homog.config.wording import suggestion, toml_key, toml_value
+
+PHASE = re.compile(r"matrix|fibre(:\w+)?")
+
+
+def read_materials(table: object, plane: str | None, reader: TableReader) -> dict[str, Material]:
+    """The materials by phase; what depends on a geometry or plane state that is faulty is not checked."""
+    if table is None:
+        return {}
+    if not isinstance(table, dict):
+        reader.faults.append(f"material = {toml_value(table)}: expected sections [material.matrix], [material.fibre]")
+        return {}
+    geometry = reader.selected[GEOMETRY]
+    materials = {}
+    for phase, constants in table.items():
+        fault = _phase_fault(phase, geometry, reader.owners)
+        material = None if fault else _read_material(constants, f"material.{toml_key(phase)}", plane, reader)
+        reader.faults += [fault] if fault else []
+        if material is not None:
+            materials[phase] = material
+    needed = ("matrix", "fibre") if geometry in CIRCULAR else ("matrix",)
+    reader.faults += [f"[material.{phase}]: missing section" for phase in needed if phase not in table]
+    return materials
+
+
+def _phase_fault(phase: str, geometry: str | None, owners: Mapping[str, str]) -> str:
+    """What is wrong with the name of a phase, empty if nothing."""
+    section = f"[material.{toml_key(phase)}]"
+    if not PHASE.fullmatch(phase):
+        return f"{section}: unknown phase; {suggestion(phase, ('matrix', 'fibre', 'fibre:2'), owners)}"
+    if ":" in phase and geometry in CIRCULAR:
+        return f'{section}: belongs to geometry = "mesh", not {toml_value(geometry)}'
+    return ""
+
+
+def _read_material(table: object, section: str, plane: str | None, reader: TableReader) -> Material | None:
+    """The material of a section, in the form that its keys tell; None if it is faulty."""
+    given = _keys_by_form(table)
+    forms = list(given) or ["isotropic"]
+    if len(forms) > 1:
+        groups = " and ".join(f"{', '.join(names)} ({form})" for form, names in given.items())
+        reader.faults.append(f"[{section}] {groups}: exclude each other; a material is of one kind")
+        return None
+    material: Material | None = reader.read(MATERIAL_FORMS[forms[0]], table, section)
+    if material is not None and plane is not None:
+        try:
+            plane_stiffness(material, plane)
+        except ValueError as error:
+            reader.faults.append(f"[{section}] {error}")
+    return material
+
+
+def _keys_by_form(table: object) -> dict[str, list[str]]:
+    """The keys of a table that belong to each form of a material, without the forms that have none."""
+    names = table if isinstance(table, dict) else {}
+    given = {form: [name for name in keys_of(cls) if name in names] for form, cls in MATERIAL_FORMS.items()}
+    return {form: names for form, names in given.items() if names}
+
+
+def provider(phase: str, materials: Mapping[str, Material]) -> str:
+    """The phase whose material a phase has: its own, or that of "fibre" for "fibre:2"."""
+    return phase if phase in materials else phase.partition(":")[0]
+
+
+def phase_faults(materials: Mapping[str, Material], phases: Iterable[str]) -> list[str]:
+    """Faults of phases of the mesh without a material, and of materials without a phase."""
+    phases = list(phases)
+    providers = [provider(phase, materials) for phase in phases]
+    without = [phase for phase, own in zip(phases, providers, strict=True) if own not in materials]
+    unused = [phase for phase in materials if phase not in providers]
+    has = ", ".join(map(toml_key, phases))
+    return [f"[material.{toml_key(phase)}]: missing section; the mesh has this phase" for phase in without] + [
+        f"[material.{toml_key(phase)}]: the mesh has no such phase; it has {has}" for phase in unused
+    ]

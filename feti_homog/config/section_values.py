@@ -1,0 +1,82 @@
+"""Types of values that stand in the sections of a case file: fibres, arcs, strengths, openings, strains."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+from feti_homog.config.values import ValueType, integer, is_number, is_number_list, text, to_floats
+
+STRAIN_COMPONENTS = "[E11, E22, gamma12]"
+FIBRE = integer(least=1)
+
+
+def _is_mesh_file(value: Any) -> bool:
+    return text.accepts(value) and value.endswith(".msh")
+
+
+def _is_fibre_or_fibres(value: Any) -> bool:
+    is_list = isinstance(value, list) and value != [] and all(map(FIBRE.accepts, value))
+    return value == "all" or FIBRE.accepts(value) or is_list
+
+
+def _are_openings(value: Any) -> bool:
+    rising = is_number_list(value) and all(a < b for a, b in pairwise(value))
+    return rising and value != [] and value[0] >= 0 and value[-1] <= 360
+
+
+def _is_strength(value: Any) -> bool:
+    return (is_number(value) and value > 0) or (isinstance(value, float) and value == math.inf)
+
+
+def _numbers(count: int) -> dict[str, Any]:
+    return {"type": "array", "items": {"type": "number"}, "minItems": count, "maxItems": count}
+
+
+MESH_FILE = ValueType("the name of a .msh file", _is_mesh_file, Path, {"type": "string", "pattern": "\\.msh$"})
+FIBRES = ValueType(
+    'the number of a fibre, counted from 1, a list of numbers, or "all"',
+    _is_fibre_or_fibres,
+    lambda v: v if v == "all" else tuple(v if isinstance(v, list) else [v]),
+    {
+        "anyOf": [
+            {"const": "all"},
+            FIBRE.json_schema,
+            {"type": "array", "items": FIBRE.json_schema, "minItems": 1},
+        ]
+    },
+)
+ARCS = ValueType(
+    "a list of arcs {fibre, centre, angle}",
+    lambda v: isinstance(v, list) and all(isinstance(arc, dict) for arc in v),
+    tuple,
+    {"type": "array", "items": {"$ref": "#/$defs/arc"}},
+)
+STRENGTH = ValueType(
+    "a traction above 0, or inf",
+    _is_strength,
+    lambda v: None if v == math.inf else float(v),
+    {"type": "number", "exclusiveMinimum": 0},
+)
+OPENINGS = ValueType(
+    "a rising list of numbers from 0 to 360",
+    _are_openings,
+    to_floats,
+    {
+        "type": "array",
+        "items": {"type": "number", "minimum": 0, "maximum": 360},
+        "minItems": 1,
+        "uniqueItems": True,
+    },
+)
+STRAIN = ValueType(
+    f"a list of three numbers {STRAIN_COMPONENTS}", lambda v: is_number_list(v, 3), to_floats, _numbers(3)
+)
+WAYPOINTS = ValueType(
+    f"a list of strains {STRAIN_COMPONENTS}",
+    lambda v: isinstance(v, list) and v != [] and all(is_number_list(strain, 3) for strain in v),
+    lambda v: tuple(map(to_floats, v)),
+    {"type": "array", "items": _numbers(3), "minItems": 1},
+)

@@ -1,0 +1,42 @@
+"""The words of faults: values and keys as TOML writes them, and where an unknown name may belong."""
+
+from __future__ import annotations
+
+import difflib
+import json
+import re
+from collections.abc import Iterable, Mapping
+
+LONGEST_VALUE = 60  # characters of a value in a message
+
+
+def toml_value(value: object) -> str:
+    """The value nearly as TOML writes it, in one short line."""
+    if isinstance(value, float):
+        return repr(value)
+    line = json.dumps(value, default=str, ensure_ascii=not str(value).isprintable())
+    return line if len(line) <= LONGEST_VALUE else line[: LONGEST_VALUE - 3] + "..."
+
+
+def toml_key(name: str) -> str:
+    """A key as TOML writes it: quoted if it is not bare."""
+    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else toml_value(name)
+
+
+def dotted_key(path: Iterable[str]) -> str:
+    """Nested keys as TOML writes them: a.b.c."""
+    return ".".join(map(toml_key, path))
+
+
+def suggestion(name: str, known: Iterable[str], owners: Mapping[str, str]) -> str:
+    """The end of a fault on an unknown name: where it belongs, the nearest known name, or all of them.
+
+    `owners` gives the place of each key that belongs elsewhere.
+    """
+    known = list(known)
+    nearest = difflib.get_close_matches(name, known, n=1)
+    if name in owners:
+        return f"it belongs to {owners[name]}"
+    if nearest:
+        return f"did you mean {toml_key(nearest[0])}?"
+    return "known here: " + ", ".join(map(toml_key, known))

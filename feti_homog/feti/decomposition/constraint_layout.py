@@ -1,0 +1,193 @@
+"""Rows and columns of the gluing constraints B of one rank, and the interface nodes among them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_matrix, csr_matrix
+
+from feti_homog.cell.refinement import ReferenceLattice, edge_node
+from feti_homog.feti.decomposition.shared_entities import SharedEntities
+from feti_homog.feti.decomposition.subdomain import Subdomain
+from feti_homog.typing import Bool, Float, Int
+
+
+@dataclass(frozen=True)
+class InterfaceNodes:
+    """The breakable nodes of which a rank owns the multipliers, i = 0..k-1.
+
+    Attributes:
+        row: (k,) local row of the normal constraint; the tangential one follows it.
+        points: (k, 2) position on the fibre.
+        normal: (k, 2) from fibre to matrix; the tangent is (-n_y, n_x).
+        length: (k,) tributary interface length: traction = nodal force / length.
+        fibre: (k,) constituent.
+        vertex: (k,) whether the node is one of the coarse mesh.
+        precracked: (k,) whether the mesh has it debonded from the start.
+    """
+
+    row: Int
+    points: Float
+    normal: Float
+    length: Float
+    fibre: Int
+    vertex: Bool
+    precracked: Bool
+
+
+class ConstraintLayout:
+    """Rows and columns of B of one rank, entity by entity.
+
+    Attributes:
+        count: (n,) rows of each shared entity.
+        first: (n,) the first of them among the local rows.
+        rows: (local rows,) their global numbers.
+        dofs: (subdomains + 1,) where each subdomain begins among the local dofs.
+        base: for each sharer, the number among the fine nodes of this rank of its first one on the entity; -1 if the
+            sharer is on another rank.
+    """
+
+    def __init__(self, shared: SharedEntities, subdomains: Sequence[Subdomain], lattice: ReferenceLattice) -> None:
+        self.shared, self.subdomains, self.lattice = shared, subdomains, lattice
+        copies = shared.copies
+        self.count = shared.nodes * 2 * (copies - 1)
+        self.first = np.cumsum(self.count) - self.count
+        shift: Int = np.repeat(shared.first_row - self.first, self.count)
+        self.rows: Int = shift + np.arange(self.count.sum(), dtype=np.int64)
+        self.dofs = np.cumsum([0, *(2 * s.mesh.n_classes for s in subdomains)])
+        self.base = self._first_nodes()
+
+    def _first_nodes(self) -> Int:
+        """For each sharer: rank-wide number of its first fine node on the entity, or -1 if it is elsewhere."""
+        shared = self.shared
+        base = np.full(len(shared.sharer), -1)
+        entity = np.repeat(np.arange(len(shared.key)), shared.copies)
+        for subdomain, offset in zip(self.subdomains, self.dofs // 2, strict=False):
+            submesh = subdomain.submesh
+            mine = np.flatnonzero(shared.sharer == submesh.index)
+            key, is_edge = shared.key[entity[mine]], shared.is_edge[entity[mine]]
+            edge = edge_node(
+                len(submesh.class_keys), np.searchsorted(submesh.edge_keys, key), np.ones_like(key), self.lattice
+            )
+            base[mine] = offset + np.where(is_edge, edge, np.searchsorted(submesh.class_keys, key))
+        return base
+
+    def matrix(self) -> csr_matrix:
+        """B (local rows, local dofs)."""
+        entries = [self._entries(*group) for group in self._signatures()]
+        rows, columns, values = (np.concatenate([e[i] for e in entries] or [np.zeros(0)]) for i in range(3))
+        shape = (len(self.rows), self.dofs[-1])
+        return coo_matrix((values, (rows.astype(np.int64), columns.astype(np.int64))), shape=shape).tocsr()
+
+    def _signatures(self) -> list[tuple[Int, Int, bool]]:
+        """Entities grouped by how many copies each body has and whether they can break."""
+        shared = self.shared
+        groups: list[tuple[Int, Int, bool]] = []
+        for k in np.unique(shared.copies):
+            some = np.flatnonzero(shared.copies == k)
+            body = shared.body[shared.pointer[some][:, None] + np.arange(k)]
+            starts = np.concatenate([np.ones((len(some), 1), bool), body[:, 1:] != body[:, :-1]], axis=1)
+            codes, which = np.unique(np.column_stack([starts, shared.fibre[some] >= 0]), axis=0, return_inverse=True)
+            for i, code in enumerate(codes):
+                sizes = np.diff(np.r_[np.flatnonzero(code[:-1]), k])
+                groups.append((some[which.ravel() == i], sizes, bool(code[-1])))
+        return groups
+
+    def _entries(self, entities: Int, sizes: Int, breakable: bool) -> tuple[Int, Int, Float]:
+        """Rows, columns and values of B on some entities whose bodies have `sizes` copies each."""
+        shared = self.shared
+        contrasts = _contrasts(sizes)
+        k = len(contrasts) + 1
+        entity, p = expand(entities, shared.nodes[entities])
+        first = self.first[entity] + p * 2 * (k - 1)
+        identity = np.broadcast_to(np.eye(2), (len(entity), 2, 2))
+        frame = _frames(self._normals(entity, p)) if breakable else identity
+        rows, columns, values = [], [], []
+        for j in range(k):
+            base = self.base[shared.pointer[entity] + j]
+            local = base >= 0
+            dof = 2 * (base + p)[local]
+            for r in np.flatnonzero(contrasts[:, j]):
+                turn = frame if r == k - 2 else identity
+                rows.append(
+                    np.broadcast_to((first[local] + 2 * r)[:, None, None] + [[0], [1]], (len(dof), 2, 2)).ravel()
+                )
+                columns.append(np.broadcast_to(dof[:, None, None] + [[0, 1]], (len(dof), 2, 2)).ravel())
+                values.append((contrasts[r, j] * turn[local]).ravel())
+        return np.concatenate(rows), np.concatenate(columns), np.concatenate(values)
+
+    def _normals(self, entity: Int, p: Int) -> Float:
+        """Normals at fine node p of the entities; along an arc they turn evenly."""
+        shared, m = self.shared, self.lattice.intervals
+        s = np.where(shared.is_edge[entity], (p + 1) / m, 0.0)
+        a, b = shared.normal[entity, 0], shared.normal[entity, 1]
+        angle = s * np.arctan2(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], (a * b).sum(axis=1))
+        cos, sin = np.cos(angle), np.sin(angle)
+        return np.stack([cos * a[:, 0] - sin * a[:, 1], sin * a[:, 0] + cos * a[:, 1]], axis=1)
+
+    def node_rows(self, owned: tuple[int, int]) -> tuple[Int, Int]:
+        """First owned row and number of rows of each fine node whose rows are owned."""
+        shared = self.shared
+        mine = np.flatnonzero((shared.first_row >= owned[0]) & (shared.first_row < owned[1]))
+        size = 2 * (shared.copies[mine] - 1)
+        entity, p = expand(np.arange(len(mine)), shared.nodes[mine])
+        return shared.first_row[mine][entity] - owned[0] + p * size[entity], size[entity]
+
+    def interface_nodes(self, owned: tuple[int, int]) -> InterfaceNodes:
+        """The breakable nodes whose rows are owned."""
+        shared, m = self.shared, self.lattice.intervals
+        mine = (shared.first_row >= owned[0]) & (shared.first_row < owned[1])
+        entity, p = expand(np.flatnonzero(mine & (shared.fibre >= 0)), shared.nodes[mine & (shared.fibre >= 0)])
+        k = shared.copies[entity]
+        # Row sums of the interface mass matrix: halves for linear, Simpson's rule for quadratic elements.
+        quadratic = self.lattice.triangles.shape[1] == 6
+        share = np.where((p % 2 == 0) & shared.is_edge[entity], 4, 2) / 3 if quadratic else np.ones(len(p))
+        share = share * np.where(shared.is_edge[entity], 1.0, 0.5)
+        positions = np.concatenate([_class_points(s) for s in self.subdomains] or [np.zeros((0, 2))])
+        return InterfaceNodes(
+            row=shared.first_row[entity] - owned[0] + (p + 1) * 2 * (k - 1) - 2,
+            points=positions[self.base[shared.pointer[entity + 1] - 1] + p],
+            normal=self._normals(entity, p),
+            length=share * shared.length[entity] / m,
+            fibre=shared.fibre[entity],
+            vertex=~shared.is_edge[entity],
+            precracked=shared.precracked[entity],
+        )
+
+
+def _class_points(subdomain: Subdomain) -> Float:
+    """(c, 2) a plane position of each class."""
+    points = np.empty((subdomain.mesh.n_classes, 2))
+    points[subdomain.mesh.node_class] = subdomain.mesh.points
+    return points
+
+
+def expand(entities: Int, nodes: Int) -> tuple[Int, Int]:
+    """Entity and position of every fine node."""
+    ends = np.cumsum(nodes)
+    p = np.arange(ends[-1] if len(ends) else 0) - np.repeat(ends - nodes, nodes)
+    return np.repeat(entities, nodes), p
+
+
+def _contrasts(sizes: Int) -> Float:
+    """(k - 1, k) orthonormal contrasts (Helmert) within each body, then differences of the bodies' means."""
+    k = int(sizes.sum())
+    ends = np.cumsum(sizes)
+    rows = []
+    for end, size in zip(ends, sizes, strict=True):
+        for i in range(1, size):
+            row = np.zeros(k)
+            row[end - size : end - size + i], row[end - size + i] = 1.0, -i
+            rows.append(row / np.sqrt(i * (i + 1)))
+    for (b, nb), (c, nc) in zip(zip(ends, sizes, strict=True), zip(ends[1:], sizes[1:], strict=True), strict=False):
+        row = np.zeros(k)
+        row[b - nb : b], row[c - nc : c] = 1.0 / nb, -1.0 / nc
+        rows.append(row)
+    return np.array(rows)
+
+
+def _frames(normal: Float) -> Float:
+    """(i, 2, 2) rows n and t."""
+    return np.stack([normal, np.stack([-normal[:, 1], normal[:, 0]], axis=1)], axis=1)

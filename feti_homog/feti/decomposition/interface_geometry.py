@@ -1,0 +1,83 @@
+"""Where fibres meet the matrix: normals and lengths of the shared vertices and edges, and which may break."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from feti_homog.cell.periodic_topology import Torus, edge_pairs, shared_edges
+from feti_homog.typing import Bool, Float, Int
+
+
+@dataclass(frozen=True)
+class InterfaceGeometry:
+    """Of n shared entities; the attributes are those of `SharedEntities`, 0 where fibres do not meet the matrix."""
+
+    fibre: Int
+    normal: Float
+    length: Float
+    precracked: Bool
+
+
+def interface_geometry(torus: Torus, key: Int, is_edge: Bool, pointer: Int, body: Int) -> InterfaceGeometry:
+    """Fibre, normals, length and precrack of n shared entities; arguments as in `SharedEntities`."""
+    fibre = _breakable_fibre(torus, pointer, body)
+    edge, normal, length = _edge_geometry(torus)
+    n_edges, n_classes = torus.torus_edge.max() + 1, torus.node_class.max() + 1
+    edge_normal, edge_length = np.zeros((n_edges, 2, 2)), np.zeros(n_edges)
+    edge_normal[edge], edge_length[edge] = normal, length
+    bonded = np.zeros(n_edges, bool)
+    bonded[edge] = True
+    bonded[torus.torus_edge[torus.plane_edges(torus.mesh.debonded_edges)]] = False
+    ends = torus.node_class[torus.edges[np.unique(torus.torus_edge, return_index=True)[1]]]
+    vertex_normal, vertex_length = np.zeros((n_classes, 2)), np.zeros(n_classes)
+    for end in range(2):
+        np.add.at(vertex_normal, ends[:, end], edge_normal[:, end] * edge_length[:, None])
+        np.add.at(vertex_length, ends[:, end], edge_length)
+    vertex_normal /= np.maximum(np.hypot(*vertex_normal.T), 1e-300)[:, None]
+    bonded_edges_at = np.bincount(ends[bonded].ravel(), minlength=n_classes)
+    vertices, edges = key[~is_edge], key[is_edge]
+    normals, lengths = np.empty((len(key), 2, 2)), np.empty(len(key))
+    normals[~is_edge], normals[is_edge] = vertex_normal[vertices][:, None], edge_normal[edges]
+    lengths[~is_edge], lengths[is_edge] = vertex_length[vertices], edge_length[edges]
+    precracked = np.empty(len(key), bool)
+    precracked[~is_edge], precracked[is_edge] = bonded_edges_at[vertices] == 0, ~bonded[edges]
+    return InterfaceGeometry(fibre, normals, lengths, precracked & (fibre >= 0))
+
+
+def _breakable_fibre(torus: Torus, pointer: Int, body: Int) -> Int:
+    """(n,) the fibre of the entities where one fibre and the matrix meet and no third body, else -1."""
+    is_fibre = torus.constituent_phase > 0
+    low, high = body[pointer[:-1]], body[pointer[1:] - 1]
+    copies = np.diff(pointer)
+    third = (body != np.repeat(low, copies)) & (body != np.repeat(high, copies))
+    thirds = np.bincount(np.repeat(np.arange(len(copies)), copies), third, len(copies))
+    return np.where((thirds == 0) & ~is_fibre[low] & is_fibre[high], high, -1)
+
+
+def _edge_geometry(torus: Torus) -> tuple[Int, Float, Float]:
+    """Torus edges between a fibre and the matrix, their normals at start and end, and their (arc) lengths."""
+    mesh, is_fibre = torus.mesh, torus.constituent_phase > 0
+    left, right = edge_pairs(torus.triangle_torus_edges)
+    mixed = is_fibre[torus.constituent[left]] != is_fibre[torus.constituent[right]]
+    fibre = np.where(is_fibre[torus.constituent[left]], left, right)[mixed]
+    edge = shared_edges(torus.triangle_torus_edges)[mixed]
+    k = np.argmax(torus.triangle_torus_edges[fibre] == edge[:, None], axis=1)
+    start, end = mesh.triangles[fibre, k], mesh.triangles[fibre, (k + 1) % 3]
+    plane = torus.triangle_edges[fibre, k]
+    backwards = torus.edges[plane, 0] != start
+    a, b = mesh.points[start], mesh.points[end]
+    chord = np.hypot(*(b - a).T)
+    outward = np.stack([b[:, 1] - a[:, 1], a[:, 0] - b[:, 0]], axis=1) / chord[:, None]
+    circle = torus.edge_circles[plane]
+    curved = circle[:, 2] > 0
+    radius = circle[curved, 2]
+    length = chord.copy()
+    length[curved] = 2 * radius * np.arcsin(chord[curved] / (2 * radius))
+    normal = np.stack([outward, outward], axis=1)
+    radial = np.stack([a, b], axis=1)[curved] - circle[curved, None, :2]
+    side = np.sign((radial.sum(axis=1) * outward[curved]).sum(axis=1))
+    normal[curved] = side[:, None, None] * radial / circle[curved, 2, None, None]
+    normal[backwards] = normal[backwards, ::-1]
+    return edge, normal, length

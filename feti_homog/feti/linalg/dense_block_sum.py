@@ -1,0 +1,58 @@
+"""Sparse matrices that are sums of dense blocks."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import csr_matrix
+
+from feti_homog.feti.thresholds import MAX_BUFFERED_ENTRIES
+from feti_homog.typing import Float, Int, Int32
+
+
+class DenseBlockSum:
+    """The sparse sum of dense blocks that are added one after the other.
+
+    Blocks wait in a buffer, which is added to the sum when it has more than `max_buffered_entries` entries and more
+    than the sum itself.  So memory is at most about twice that of the sum, which is copied only when it has doubled.
+    """
+
+    def __init__(self, shape: tuple[int, int], max_buffered_entries: int = MAX_BUFFERED_ENTRIES) -> None:
+        self._sum = csr_matrix(shape)
+        self._max_buffered_entries = max_buffered_entries
+        # Of each block: rows, how many entries each has, their columns and values.
+        self._buffer: list[tuple[Int, Int, Int32, Float]] = []
+        self._buffered_entries = 0
+
+    def add(self, rows: Int, columns: Int, values: Float) -> None:
+        """Add the block `values` (rows, columns)."""
+        counts = np.full(len(rows), len(columns))
+        self._add(rows, counts, np.tile(columns.astype(np.int32), len(rows)), values.ravel())
+
+    def add_entries_above(self, rows: Int, columns: Int, values: Float, limit: Float) -> None:
+        """Add those of `values` (rows, columns) whose modulus is above the `limit` (columns,) of their column."""
+        large = np.abs(values) > limit
+        self._add(rows, large.sum(axis=1), columns.astype(np.int32)[np.nonzero(large)[1]], values[large])
+
+    def matrix(self) -> csr_matrix:
+        """The sum of all blocks so far."""
+        self._flush()
+        return self._sum
+
+    def _add(self, rows: Int, counts: Int, columns: Int32, values: Float) -> None:
+        """Buffer rows with `counts` entries each, whose columns and values come row by row."""
+        self._buffer.append((rows, counts, columns, values))
+        self._buffered_entries += len(values)
+        if self._buffered_entries > max(self._max_buffered_entries, self._sum.nnz):
+            self._flush()
+
+    def _flush(self) -> None:
+        """Add the buffer to the sum."""
+        if not self._buffer:
+            return
+        rows, counts, columns, values = (np.concatenate(part) for part in zip(*self._buffer, strict=True))
+        self._buffer, self._buffered_entries = [], 0
+        m, n = self._sum.shape
+        # A product sums faster than a conversion from coordinates, which sorts.
+        stacked = csr_matrix((values, columns, np.r_[0, np.cumsum(counts)]), shape=(len(rows), n))
+        place = csr_matrix((np.ones(len(rows)), (rows, np.arange(len(rows)))), shape=(m, len(rows)))
+        self._sum = self._sum + place @ stacked

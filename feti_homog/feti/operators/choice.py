@@ -1,0 +1,72 @@
+"""Which subdomains get dense boundary operators, and which are examined for soft modes face by face.
+
+A pure function of sizes: it needs no mesh and no MPI.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from feti_homog.feti.thresholds import APPLY_SECONDS, DENSE_INVERSE_SECONDS, Thresholds
+
+KINDS = ("auto", "implicit", "explicit")
+
+
+@dataclass(frozen=True)
+class SubdomainSize:
+    """What the choice depends on.
+
+    Attributes:
+        dofs: degrees of freedom of the subdomain.
+        boundary_dofs: those of them that constraints act on.
+        is_whole_body: whether all that the subdomain shares, it shares with one other body.
+    """
+
+    dofs: int
+    boundary_dofs: int
+    is_whole_body: bool
+
+
+@dataclass(frozen=True)
+class OperatorChoice:
+    """Of one subdomain.
+
+    Attributes:
+        explicit: whether its boundary operators are dense matrices; else they are sparse factorizations.
+        facewise: whether its soft modes are to be looked for face by face.
+    """
+
+    explicit: bool
+    facewise: bool
+
+
+def choose(
+    sizes: Sequence[SubdomainSize],
+    kind: str,
+    applications: int,
+    soft_modes: bool,
+    can_condense: bool,
+    thresholds: Thresholds,
+) -> list[OperatorChoice]:
+    """The choice for each subdomain.
+
+    Dense matrices pay if their inverse takes no longer than all applications of sparse factors would.  Soft modes need
+    them, but for large whole bodies, which are examined face by face.
+
+    Args:
+        kind: of KINDS; what the user asks for, `auto` leaves the choice here.
+        applications: how many times the operators are expected to be applied.
+        soft_modes: whether soft modes will be looked for.
+        can_condense: whether PETSc has MUMPS, which condenses subdomains to their boundaries.
+    """
+    choices = []
+    for size in sizes:
+        n = size.boundary_dofs
+        facewise = size.is_whole_body and n > thresholds.whole_boundary_dofs
+        pays = DENSE_INVERSE_SECONDS * n**3 <= APPLY_SECONDS * size.dofs * applications
+        wanted = pays or (soft_modes and not facewise)
+        possible = n <= thresholds.dense_boundary_dofs and can_condense
+        explicit = kind == "explicit" or (kind == "auto" and wanted and possible)
+        choices.append(OperatorChoice(explicit and n > 0, facewise))
+    return choices

@@ -1,0 +1,69 @@
+"""The outputs of a case: the numbers of its result.json by the names of the sweep's columns."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from feti_homog.mechanics.voigt import STIFFNESSES, STRESSES
+from feti_homog.output.text import point_tables
+
+Document = Mapping[str, Any]
+
+
+def outputs(document: Document) -> dict[str, float]:
+    """The numbers of a result.json by the names of the table's columns."""
+    cell, solver = document["cell"], document["solver"]
+    found = {"fraction_meshed": cell["fibre_fraction"], "elements": cell["elements"], "nodes": cell["nodes"]}
+    found |= {name: solver[name] for name in ("ranks", "subdomains", "dofs", "multipliers")}
+    found |= {"iterations": sum(solver["iterations"])}
+    for name, suffix in (("effective_stiffness", ""), ("effective_stiffness_compression", "_compression")):
+        entries = np.ravel(document.get(name, [])).tolist()
+        found |= {f"{entry}{suffix}": value for entry, value in zip(STIFFNESSES, entries, strict=False)}
+    found |= _anisotropy(document.get("effective_stiffness"))
+    found |= document.get("moduli", {}) | _bounds(document.get("bounds", {}))
+    found |= _angles(document.get("angle", ())) | _path(document.get("path", ()))
+    found |= {f"check_{name}": error for name, error in document["checks"].items()}
+    found |= {f"seconds_{stage}": took for stage, took in document["timings"].items()}
+    return {name: float(value) for name, value in (found | {"memory": document["memory"]}).items()}
+
+
+def _anisotropy(stiffness: Any) -> dict[str, float]:
+    """Two numbers, in the unit of stress, the means of which are zero if the composite is isotropic in the plane."""
+    if stiffness is None:
+        return {}
+    C = np.asarray(stiffness)
+    return {
+        "anisotropy_axial": float(C[0, 0] - C[1, 1]),
+        "anisotropy_shear": float(C[2, 2] - (C[0, 0] + C[1, 1] - 2 * C[0, 1]) / 4),
+    }
+
+
+def _bounds(bounds: Document) -> dict[str, float]:
+    sides = {f"C{i + 1}{i + 1}_{side}": bounds[side][i][i] for side in ("reuss", "voigt") if bounds for i in range(3)}
+    for modulus, pair in ((bounds.get("hashin_shtrikman") or {}) if bounds else {}).items():
+        sides |= {f"{modulus}_lower": pair[0], f"{modulus}_upper": pair[1]}
+    return sides
+
+
+def _angles(points: Sequence[Document]) -> dict[str, float]:
+    found: dict[str, float] = {}
+    for point in points:
+        names, key = (STIFFNESSES, "stiffness") if "stiffness" in point else (STRESSES, "stress")
+        values = np.ravel(point[key]).tolist()
+        found |= {f"angle_{point['angle']:g}_{name}": v for name, v in zip(names, values, strict=True)}
+    return found
+
+
+def _path(points: Sequence[Document]) -> dict[str, float]:
+    """The first break, the largest stresses and the end."""
+    if not points:
+        return {}
+    stress = np.array([point["stress"] for point in points])
+    peak = stress[np.abs(stress).argmax(axis=0), range(3)]
+    found = {"onset_load_factor": points[0]["load_factor"], "dissipated": points[-1]["dissipated"]}
+    for place, values in (("onset", stress[0]), ("peak", peak), ("end", stress[-1])):
+        found |= {f"{place}_{name}": value for name, value in zip(STRESSES, values.tolist(), strict=True)}
+    return found | {f"end_{state}": points[-1][state] for state in point_tables.STATES}

@@ -1,0 +1,98 @@
+"""The table of a sweep: inputs, outputs and results of all cases, and what they are over realisations."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from feti_homog.mechanics import response
+from feti_homog.sweep.report.outputs import Document
+from feti_homog.sweep.report.statistics import Statistics
+from feti_homog.typing import Float
+
+CURVE_POINTS = 401  # strains at which curves are averaged
+
+
+@dataclass(frozen=True)
+class SweepTable:
+    """The table of a sweep, with a row for each case.
+
+    Attributes:
+        name, stress_unit: of the sweep.
+        folder, point, realisation, status, reason: of each case; `reason` is why it failed.
+        inputs: by dotted key, of each case its value, None where the key does not vary.
+        outputs: by name (cases,), NaN where there is none.
+        documents: result.json of each finished case, else None.
+    """
+
+    name: str
+    stress_unit: str
+    folder: Sequence[str]
+    point: Sequence[int]
+    realisation: Sequence[int]
+    status: Sequence[str]
+    reason: Sequence[str]
+    inputs: Mapping[str, Sequence[Any]]
+    outputs: Mapping[str, Float]
+    documents: Sequence[Document | None]
+
+    @cached_property
+    def points(self) -> list[int]:
+        """The numbers of the points."""
+        return sorted(set(self.point))
+
+    def rows(self, point: int) -> list[int]:
+        """The rows of the realisations of a point."""
+        return [row for row, number in enumerate(self.point) if number == point]
+
+    @cached_property
+    def statistics(self) -> dict[str, Statistics]:
+        """By output, over the realisations of each point."""
+        return {name: self._statistics(values) for name, values in self.outputs.items()}
+
+    @property
+    def finished(self) -> list[Document]:
+        """result.json of the finished cases."""
+        return [document for document in self.documents if document is not None]
+
+    def input_of(self, point: int, name: str) -> Any:
+        """The value of an input at a point, None if it does not vary there."""
+        return self.inputs[name][self.rows(point)[0]]
+
+    def results_of(self, point: int) -> list[Document]:
+        """result.json of the finished realisations of a point."""
+        return [document for row in self.rows(point) if (document := self.documents[row]) is not None]
+
+    def _statistics(self, values: Float) -> Statistics:
+        found = [Statistics.of(values[self.rows(point)]) for point in self.points]
+        return Statistics(*(np.array([getattr(s, part) for s in found]) for part in ("count", "mean", "std", "ci95")))
+
+    def label(self, point: int, without: Sequence[str] = ()) -> str:
+        """The inputs of a point in words, but for some keys and for what its realisations differ by."""
+        keys = [name for name in self.inputs if name not in without and name != "cell.seed"]
+        varied = [name for name in keys if len({repr(value) for value in self.inputs[name]}) > 1]
+        values = [(name.rpartition(".")[2], self.input_of(point, name)) for name in varied]
+        return ", ".join(_in_words(name.replace("_", " "), value) for name, value in values if value is not None)
+
+    def curves(self, point: int) -> tuple[Float, Float]:
+        """Strains (g,), g = CURVE_POINTS, and S11, S22, S12 of each finished realisation there, (n, g, 3).
+
+        Both are empty if the cases are no straight paths.
+        """
+        paths = [path for path in map(response.rising_strain, self.results_of(point)) if path is not None]
+        if not paths:
+            return np.zeros(0), np.zeros((0, 0, 3))
+        strain = np.linspace(0.0, min(path[-1, 3] for path in paths), CURVE_POINTS)
+        return strain, np.array([[np.interp(strain, p[:, 3], p[:, k]) for k in range(3)] for p in paths]).swapaxes(1, 2)
+
+
+def _in_words(name: str, value: Any) -> str:
+    if name == "fibres":
+        return f"{value} fibres"
+    if isinstance(value, float | int) and not isinstance(value, bool):
+        return f"{name} {value:g}"
+    return value if isinstance(value, str) else f"{name} {value}"

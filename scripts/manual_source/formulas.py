@@ -1,0 +1,38 @@
+"""A Sphinx extension that reads each formula as the manual is built: MathJax would tell of a fault to readers alone."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+from docutils import nodes
+from docutils.utils.math import MathError, pick_math_environment
+from docutils.utils.math.latex2mathml import tex2mathml
+from sphinx.application import Sphinx
+from sphinx.util import logging
+
+logger = logging.getLogger(__name__)
+
+
+def setup(app: Sphinx) -> dict[str, Any]:
+    app.connect("doctree-read", _warn_of_faults)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
+
+
+def _warn_of_faults(app: Sphinx, doctree: nodes.document) -> None:
+    for node in doctree.findall(lambda node: isinstance(node, nodes.math | nodes.math_block)):
+        if words := fault(node.astext()):
+            logger.warning("formula %r: %s", node.astext(), words, location=node)
+
+
+def fault(formula: str) -> str:
+    """What docutils does not understand of a formula in TeX; empty if nothing."""
+    formula = re.sub(r"\\tag\{[^{}]*\}", "", formula).strip()  # known to MathJax only
+    if r"\\" in formula and not formula.startswith(r"\begin"):
+        environment = pick_math_environment(formula)
+        formula = rf"\begin{{{environment}}}{formula}\end{{{environment}}}"
+    try:
+        tex2mathml(formula)
+    except MathError as error:
+        return str(error)
+    return ""

@@ -1,0 +1,101 @@
+"""`feti-homog sweep` and `collect` where files are damaged, the disk is full or the folder not ours."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import pytest
+from support.command_line import command_line
+from support.jobs import ROOT, RUN_VARIABLES, mpirun
+from support.sweep_files import rows, sweep_file
+from support.sweep_runs import TWO, collected, results, swept
+
+import feti_homog.output  # noqa: F401 (chooses the build of h5py)
+
+LIMITED = """
+import resource, sys
+from mpi4py import MPI
+from feti_homog import cli
+resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, {limit}))
+sys.exit(cli.main(sys.argv[1:]))
+"""
+
+
+@pytest.mark.parametrize("damage", ["truncated", "garbage", "foreign"])
+def test_a_corrupt_result_is_computed_again(tmp_path, damage):
+    out, path = tmp_path / "out", sweep_file(tmp_path, TWO)
+    swept(out, path)
+    result = out / "case-0002/result.json"
+    content = {
+        "truncated": result.read_bytes()[:500], "garbage": os.urandom(500),
+        "foreign": (out / "case-0001/result.json").read_bytes(),
+    }[damage]  # fmt: skip
+    result.write_bytes(content)
+    job = collected(out)
+    assert "1 done, 1 damaged" in job.stdout and "case-0002/result.json is" in job.stdout
+    assert [row["status"] for row in rows(out)][:2] == ["done", "damaged"]
+    job = swept(out, path)
+    assert "case-0002: " in job.stdout and "set aside, the case is computed again" in job.stdout
+    assert (out / "case-0002/result.json.damaged").read_bytes() == content
+    assert "2 done" in collected(out).stdout
+
+
+def test_a_damaged_list_of_cases_is_told(tmp_path):
+    out, path = tmp_path / "out", sweep_file(tmp_path, TWO)
+    swept(out, path)
+    (out / "sweep.json").write_text('{"cases": [')
+    for words in (["sweep", path, "--out", out], ["collect", out]):
+        job = command_line(1, *words)
+        assert job.returncode == 2 and "sweep.json is damaged" in job.stderr and "Traceback" not in job.stderr
+    assert len(results(out)) == 2
+
+
+@pytest.mark.parametrize("limit", [1500, 200])
+def test_a_full_disk_is_told_and_the_sweep_goes_on_later(tmp_path, limit):
+    """No file may be longer than the limit: below 1500 bytes no result can be written, below 200 not even the list."""
+    out, path, script = tmp_path / "out", sweep_file(tmp_path, TWO), tmp_path / "limited.py"
+    script.write_text(LIMITED.format(limit=limit))
+    job = mpirun(0, script, "sweep", path, "--out", out, timeout=60)
+    assert job.returncode == 1 and "Traceback" not in job.stderr, job.stderr
+    assert "cannot write" in job.stderr and "File too large" in job.stderr
+    assert not results(out) and not list(out.rglob("*.part"))
+    swept(out, path)
+    assert len(results(out)) == 2
+
+
+def test_a_full_disk_while_collecting_leaves_the_old_table(tmp_path):
+    out, script = tmp_path / "out", tmp_path / "limited.py"
+    swept(out, sweep_file(tmp_path, TWO))
+    collected(out)
+    before = (out / "sweep.csv").read_bytes()
+    script.write_text(LIMITED.format(limit=300))
+    job = mpirun(0, script, "collect", out, timeout=60)
+    assert job.returncode == 1 and "cannot write" in job.stderr and "Traceback" not in job.stderr
+    assert (out / "sweep.csv").read_bytes() == before
+
+
+def test_an_unwritable_folder_is_told(tmp_path):
+    """As a user who may not write: root may everywhere."""
+    folder = Path(tempfile.mkdtemp())
+    try:
+        folder.chmod(0o755)
+        path, program = sweep_file(folder, TWO), ["-m", "feti_homog", "sweep"]
+        user = {"user": 65534, "group": 65534} if os.geteuid() == 0 else {}
+        if not user:
+            folder.chmod(0o555)
+        words = [sys.executable, *program, path, "--out", folder / "out"]
+        environment = {"PATH": os.environ["PATH"], "HOME": "/nonexistent", "MPLCONFIGDIR": "/tmp"} | RUN_VARIABLES
+        job = subprocess.run(
+            list(map(str, words)), cwd=ROOT, env=environment, text=True, capture_output=True, timeout=60, **user
+        )
+        assert job.returncode == 2, job.stderr
+        assert f"--out {folder / 'out'}: expected a folder that can be written to" in job.stderr
+        assert not (folder / "out").exists()
+    finally:
+        folder.chmod(0o755)
+        shutil.rmtree(folder)

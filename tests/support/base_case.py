@@ -1,0 +1,57 @@
+"""A right case file, and the same with some of its words exchanged."""
+
+from __future__ import annotations
+
+BASE = """\
+[cell]
+geometry = "hexagonal"
+fibre_fraction = 0.4
+mesh_size = 0.05
+
+[material.matrix]
+young = 88.0
+poisson = 0.299
+
+[material.fibre]
+young = 200.0
+poisson = 0.222
+
+[analysis]
+type = "stiffness"
+plane = "strain"
+"""
+
+RANDOM = 'geometry = "random"\nfibres = 20\n'
+FIBRE = "[material.fibre]\nyoung = 200.0\npoisson = 0.222\n"
+ORTHOTROPIC = "E1 = 10.0\nE2 = 5.0\nnu12 = 0.3\nG12 = 2.0\n"
+OUT_OF_PLANE = "E3 = 5.0\nnu13 = 0.3\nnu23 = 0.3\n"
+
+MESH_CELL = (
+    'geometry = "hexagonal"\nfibre_fraction = 0.4\nmesh_size = 0.05',
+    'geometry = "mesh"\nfile = "cell.msh"',
+)
+
+
+def changed(*edits: tuple[str, str], end: str = "") -> str:
+    """The right case with its words exchanged and lines added at its end."""
+    document = BASE
+    for old, new in edits:
+        assert document.count(old) >= 1, old
+        document = document.replace(old, new, 1)
+    return document + end
+
+
+def fibre(constants: str, plane: str = "strain") -> str:
+    return changed((FIBRE, f"[material.fibre]\n{constants}"), ('"strain"', f'"{plane}"'))
+
+
+def cell(old: str, new: str) -> str:
+    return changed((old, new))
+
+
+def ended(text: str) -> str:
+    return changed(end=text)
+
+
+def fraction(value: str) -> str:
+    return cell("fibre_fraction = 0.4", f"fibre_fraction = {value}")

@@ -1,0 +1,11 @@
+"""Assertions that all ranks agree on."""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+def parallel_assert(comm: Any, condition: bool, message: str = "") -> None:
+    """Fails on every rank if the condition is false on any. Collective."""
+    failing = [rank for rank, holds in enumerate(comm.allgather(bool(condition))) if not holds]
+    assert not failing, f"{message} (on ranks {failing})"

@@ -1,0 +1,44 @@
+"""Case files without faults, of all kinds, and tables [sweep]."""
+
+from __future__ import annotations
+
+from support.base_case import BASE, MESH_CELL, RANDOM, changed, fibre
+from unit.config.faulty_bonding import ANGLE, ARC, BARE_ARC, PATH, debonded, of_type
+
+MESH = changed(MESH_CELL)
+
+VALID_CASES = {
+    "base": BASE,
+    "named, with options": "name = 'Zelle'\n"
+    + BASE
+    + "[decomposition]\nmax_dofs = 5000\n[petsc]\nfeti_ksp_rtol = 1e-8\nlog_view = true\n",
+    "random": changed(('geometry = "hexagonal"\n', RANDOM + "seed = 7\nradius_spread = 0.2\n")),
+    "mesh of three phases": MESH + '[material."fibre:2"]\nstiffness = [[3, 1, 0], [1, 3, 0], [0, 0, 1]]\n',
+    "orthotropic": fibre("E1 = 10.0\nE2 = 5.0\nE3 = 5.0\nnu12 = 0.3\nnu13 = 0.3\nnu23 = 0.2\nG12 = 2.0\nangle = 30\n"),
+    "output": BASE + '[output]\nfields = false\nstress = "S12"\ndeformation_scale = 2\nlength_unit = "µm"\n',
+    "arc": BASE + f"[interface]\ndebonded = [{ARC}]\n",
+    "no arc": BASE + "[interface]\ncontact = false\ndebonded = []\n",
+    "curve of a mesh": MESH + "[interface]\n",
+    "angle": of_type("angle", ANGLE, BARE_ARC, "contact = false"),
+    "angle under a strain": of_type(
+        "angle", ANGLE, "strain = [0, 0, 0.2]", '[[interface.debonded]]\nfibre = "all"\ncentre = 90'
+    ),
+    "path": of_type("path", PATH),
+    "path there and back": of_type("path", "[path]\nwaypoints = [[1, 0, 0], [0, 0, 0]]\nmax_events = 7"),
+    "increments": of_type("path", PATH, 'method = "increments"\nincrements = 50\nrelease = "worst"'),
+    "strengths": debonded("{fibre = [1, 2], angle = 360}", "normal_strength = inf\ntangential_strength = 3"),
+    "criterion": debonded(f'{ARC}, {{fibre = "all", angle = 0}}', 'normal_strength = 1\ncriterion = "quadratic"'),
+}
+
+WITHOUT_GEOMETRY = BASE.replace('geometry = "hexagonal"\n', "")
+
+VALID_SWEEPS = {
+    "nested and quoted": f"{BASE}[sweep]\ncell.fibre_fraction = [0.1, 0.2]\n'material.fibre.young' = [100, 200]\n",
+    "zip": f"{BASE}[sweep]\nmode = 'zip'\ncell.order = [1, 2]\ncell.refine = [0, 1]\n",
+    "step": f"{BASE}[sweep]\ncell.fibre_fraction = {{from = 0.1, to = 0.3, step = 0.1}}\n",
+    "count": f"{BASE}[sweep]\ncell.fibre_fraction = {{from = 0.01, to = 0.16, count = 3, scale = 'log'}}\n",
+    "samples": f"{BASE}[sweep]\nsamples = 3\nsampling = 'random'\nseed = 1\n"
+    "cell.fibre_fraction = {from = 0.1, to = 0.3}\n",
+    "tables": f"{WITHOUT_GEOMETRY}[sweep]\ncell = [{{geometry = 'square'}}, {{geometry = 'random', fibres = 3}}]\n"
+    "realisations = 2\n'cell.refine' = [0, 1]\n",
+}

@@ -1,0 +1,51 @@
+"""Kinds of boundary operators from sizes alone."""
+
+from __future__ import annotations
+
+import pytest
+
+from feti_homog.feti.operators.choice import KINDS, OperatorChoice, SubdomainSize, choose
+from feti_homog.feti.thresholds import Thresholds
+
+LIMITS = Thresholds(dense_boundary_dofs=600, whole_boundary_dofs=200)
+MANY = 10**6
+
+
+def choice(boundary_dofs, kind="auto", applications=0, soft_modes=False, is_whole_body=False, can_condense=True):
+    size = SubdomainSize(10 * boundary_dofs, boundary_dofs, is_whole_body)
+    (found,) = choose([size], kind, applications, soft_modes, can_condense, LIMITS)
+    return found
+
+
+@pytest.mark.parametrize("applications", [0, MANY])
+@pytest.mark.parametrize("soft_modes", [False, True])
+def test_the_user_decides(applications, soft_modes):
+    for n in (100, 10_000):
+        assert choice(n, "explicit", applications, soft_modes).explicit
+        assert not choice(n, "implicit", applications, soft_modes).explicit
+
+
+def test_dense_matrices_where_many_applications_pay_for_them():
+    assert not choice(500, applications=0).explicit
+    assert choice(500, applications=MANY).explicit
+
+
+def test_dense_matrices_for_soft_modes_but_of_large_whole_bodies():
+    assert choice(500, soft_modes=True).explicit
+    assert choice(100, soft_modes=True, is_whole_body=True) == OperatorChoice(explicit=True, facewise=False)
+    assert choice(500, soft_modes=True, is_whole_body=True) == OperatorChoice(explicit=False, facewise=True)
+
+
+def test_no_dense_matrices_that_are_too_large_or_cannot_be_made():
+    assert not choice(601, applications=MANY, soft_modes=True).explicit
+    assert not choice(500, applications=MANY, soft_modes=True, can_condense=False).explicit
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_subdomain_without_boundary_has_no_dense_matrix(kind):
+    assert choice(0, kind, MANY, soft_modes=True) == OperatorChoice(explicit=False, facewise=False)
+
+
+def test_each_subdomain_has_its_own_choice():
+    sizes = [SubdomainSize(5000, n, False) for n in (100, 700, 300)]
+    assert [c.explicit for c in choose(sizes, "auto", 0, True, True, LIMITS)] == [True, False, True]

@@ -1,0 +1,156 @@
+"""What the documents name exists: links, files, modules, commands, case files; and their recipe for a mesh works."""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import re
+import tomllib
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from feti_homog import cli
+from feti_homog.cell import msh_reader
+from feti_homog.cell.gmsh_mesher import gmsh_session
+from feti_homog.config.case import parse
+from feti_homog.config.sweep_section import SWEEP
+from feti_homog.sweep import plan
+
+ROOT = Path(__file__).parents[2]
+PLACES = ("drivers", "feti_homog", "meshes", "scripts", "tests")
+DOCUMENTS = [ROOT / "README.md", *(ROOT / f"{place}/README.md" for place in PLACES), ROOT / "feti_homog/THEORY.md"]
+# What scripts and runs make, and names that stand for the reader's own.
+MADE = re.compile(r"results/|build/|.*DIR|.*\.\.\.")
+# A dotted name below the package, and an attribute of it in brackets; files that runs write look alike.
+SYMBOL = re.compile(r"`([a-z_]+(?:\.(?!csv|h5|json|png|toml)[a-z_]+)+(?:\.[A-Z]\w*)?)`(?: \(`(\w+)`)?")
+
+documents = pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
+
+
+def prose(path):
+    """The text without its fenced blocks."""
+    return re.sub(r"^```.*?^```$", "", path.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+
+
+def blocks(path, language):
+    """The fenced blocks of a language."""
+    text = path.read_text(encoding="utf-8")
+    return re.findall(rf"^```{language}\n(.*?)^```$", text, flags=re.MULTILINE | re.DOTALL)
+
+
+@cache
+def anchors(path):
+    """The anchors of a document's headings, as GitHub makes them."""
+    headings = re.findall(r"^#+ (.+)$", prose(path), flags=re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+@cache
+def names_in(module):
+    """All names that a module defines or mentions."""
+    tree = ast.parse(module.read_text(encoding="utf-8"))
+    fields = ("name", "id", "attr", "arg")
+    return {value for node in ast.walk(tree) for field in fields if isinstance(value := getattr(node, field, 0), str)}
+
+
+def module_of(dotted):
+    """The file of a dotted name below the package, and the names after it: a package, a module, or names in one."""
+    words = dotted.removeprefix("feti_homog.").split(".")
+    place = ROOT / "feti_homog"
+    while words and (place / words[0]).is_dir():
+        place /= words.pop(0)
+    if words and (place / f"{words[0]}.py").is_file():
+        return place / f"{words[0]}.py", words[1:]
+    return place / "__init__.py", words
+
+
+def test_the_first_page_is_short():
+    assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 160
+
+
+@documents
+def test_links_lead_somewhere(path):
+    missing = []
+    for target in re.findall(r"\]\(([^)\s]+)\)", prose(path)):
+        if target.startswith(("http://", "https://")):
+            continue
+        file, _, anchor = target.partition("#")
+        place = (path.parent / file).resolve() if file else path
+        if not place.exists() or (anchor and anchor not in anchors(place)):
+            missing.append(target)
+    assert not missing
+
+
+@documents
+def test_files_that_are_named_exist(path):
+    text = path.read_text(encoding="utf-8")
+    # Not the middle of a longer path, of a web address or of a relative link, which the test of links sees.
+    named = re.findall(rf"(?<![\w/.\-])((?:{'|'.join(PLACES)})/[\w./\-]+)", text)
+    named = [name.rstrip("./") for name in named if not MADE.fullmatch(name)]
+    assert not [name for name in named if not (ROOT / name).exists()]
+
+
+@documents
+def test_modules_and_their_names_exist(path):
+    missing = []
+    for dotted, attribute in SYMBOL.findall(prose(path)):
+        if (ROOT / "feti_homog" / dotted.split(".")[0]).is_dir():
+            module, names = module_of(dotted)
+            names = [*names, *([attribute] if attribute else [])]
+            if not module.is_file() or set(names) - names_in(module):
+                missing.append((dotted, attribute))
+    assert not missing
+
+
+@documents
+def test_commands_exist(path):
+    actions = cli._parser()._actions
+    known = next(set(action.choices) for action in actions if isinstance(action, argparse._SubParsersAction))
+    named = re.findall(r"(?:feti-homog|-m feti_homog) ([a-z]+)", path.read_text(encoding="utf-8"))
+    assert set(named) <= known
+
+
+@documents
+def test_case_files_are_valid(path):
+    for block in blocks(path, "toml"):
+        document = tomllib.loads(block)
+        if "analysis" not in document:
+            assert set(document) <= {"cell"}
+        elif SWEEP in document:
+            assert len(plan.expand(document, path.parent).cases) > 1
+        else:
+            parse(document, path.parent if path.parent != ROOT else ROOT)
+
+
+@documents
+def test_programs_are_python(path):
+    for block in blocks(path, "python"):
+        compile(block, str(path), "exec")
+
+
+@pytest.mark.parametrize("name", ["hexagonal", "two_fibres", "sweep"])
+def test_case_files_in_the_documents_are_those_of_the_drivers(name):
+    shown = [tomllib.loads(block) for path in DOCUMENTS for block in blocks(path, "toml")]
+    document = tomllib.loads((ROOT / f"drivers/{name}.toml").read_text(encoding="utf-8"))
+    known = {"order", "stress_unit"}  # that a shortened file may leave out
+    assert any(_shortened(block, known) == _shortened(document, known) for block in shown)
+
+
+def _shortened(document, left_out):
+    """The document without some keys, and without sections that have no others."""
+    short = {section: {k: v for k, v in keys.items() if k not in left_out} for section, keys in document.items()}
+    return {section: keys for section, keys in short.items() if keys or section not in ("output",)}
+
+
+def test_the_recipe_for_a_mesh_is_the_file_and_is_read(tmp_path):
+    source = ROOT / "meshes/two_fibres.geo"
+    assert blocks(ROOT / "meshes/README.md", "geo") == [source.read_text(encoding="utf-8")]
+    with gmsh_session() as gmsh:
+        gmsh.open(str(source))
+        gmsh.model.mesh.generate(2)
+        gmsh.write(str(tmp_path / "two_fibres.msh"))
+    mesh = msh_reader.read(tmp_path / "two_fibres.msh")
+    assert mesh.phases == ("matrix", "fibre", "fibre:2")
+    assert len(mesh.debonded_edges) and len(mesh.circles) == 1
