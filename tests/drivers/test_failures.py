@@ -19,7 +19,7 @@ MESH_CASE = 'geometry = "mesh"\nfile = "faulty.msh"'
 # The command line with a fault in the dual operator of the last rank, at the application of a given number.
 SABOTAGED = """
 import os, signal, sys
-from feti_homog import cli
+from feti_homog import api, cli
 
 def launch():
     from feti_homog.feti.operators.dual_operator import DualOperator
@@ -39,7 +39,7 @@ def command(words, comm):
     launch()
     return cli._command(words, comm)
 
-sys.exit(cli.launch(command))
+sys.exit(api.start(command))
 """
 
 
