@@ -27,7 +27,8 @@ from feti_homog.config import case as cases  # noqa: E402
 from feti_homog.homogenization.averaging import Homogenization  # noqa: E402
 from feti_homog.homogenization.unit_cell import tear  # noqa: E402
 from feti_homog.interface.contact import BONDED  # noqa: E402
-from feti_homog.interface.path_following import events, unloaded  # noqa: E402
+from feti_homog.interface.path_following import events  # noqa: E402
+from feti_homog.interface.path_points import unloaded  # noqa: E402
 from feti_homog.interface.strength_criterion import StrengthCriterion  # noqa: E402
 
 STRAIN = [0.2, 0.0, 0.0]

@@ -16,8 +16,12 @@ from feti_homog.typing import Float
 
 UNIT_CASES = ("E11", "E22", "gamma12")
 
-# A check may exceed the solver's tolerance by what sums over the cell and jumps of stiffness make of it.
-CHECK_MARGIN = 1e3
+# Largest relative error of a check that passes, in relative tolerances of the Krylov method: sums over the cell and
+# jumps of stiffness make so much of the solver's error.
+CHECK_ERROR_PER_RTOL = 1e3
+# And whatever the tolerance: what is wrong by more than this is no result.
+MAX_CHECK_ERROR = 1e-4
+# Largest error of the KKT conditions that passes, relative to the scales of `contact_certificate.kkt_errors`.
 CONTACT_TOLERANCE = 1e-6
 
 
@@ -56,7 +60,8 @@ class AnalysisContext:
         state = response.state
         self.iterations.append(state.iterations)
         self.reasons.append(state.solution.reason)
-        words = f"{state.iterations} iterations, relative jump {state.solution.residual:.1e}"
+        jump = f"relative jump {response.checks['jump']:.1e}"
+        words = f"{state.iterations} iterations, {jump}"
         debonded = response.counts["open"] + response.counts["closed"]
         if debonded:
             words += f", {debonded} debonded ({response.counts['closed']} closed), {state.solves} solves"
@@ -65,8 +70,8 @@ class AnalysisContext:
         self.progress.say(f"  {name}: {words}")
         if state.solution.reason < 0:
             self.faults.append(
-                f"{name}: no convergence after {state.iterations} iterations, relative jump "
-                f"{state.solution.residual:.1e} (KSPConvergedReason {state.solution.reason}); result marked"
+                f"{name}: no convergence after {state.iterations} iterations, {jump} "
+                f"(KSPConvergedReason {state.solution.reason}); result marked"
             )
         self.check(name, response.checks)
 
@@ -79,8 +84,19 @@ class AnalysisContext:
 
     def tolerance(self, law: str) -> float:
         """Largest error of a check that passes."""
-        contact = law.startswith("kkt_")
-        return CONTACT_TOLERANCE if contact else CHECK_MARGIN * self.homogenization.cell.solver.rtol
+        if law.startswith("kkt_"):
+            return CONTACT_TOLERANCE
+        return min(CHECK_ERROR_PER_RTOL * self.homogenization.cell.solver.rtol, MAX_CHECK_ERROR)
+
+    def warnings(self) -> list[str]:
+        """What a user may have meant otherwise, in words."""
+        rtol = self.homogenization.cell.solver.rtol
+        if CHECK_ERROR_PER_RTOL * rtol <= MAX_CHECK_ERROR:
+            return []
+        return [
+            f"-feti_ksp_rtol {rtol:g} asks for less than the checks do: the result is marked unless their errors are "
+            f"at most {MAX_CHECK_ERROR:g}"
+        ]
 
     def unit_responses(
         self, label: str, status: Status, starts: Sequence[Float], sign: float

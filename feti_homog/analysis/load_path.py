@@ -7,80 +7,65 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.config.sections import LoadPath
 from feti_homog.feti.solver import DualSolution
-from feti_homog.homogenization.averaging import Response
-from feti_homog.interface.contact import BONDED, Equilibrium
-from feti_homog.interface.path_following import PathState, Point, events, increments, unloaded
+from feti_homog.interface.contact import Equilibrium
+from feti_homog.interface.path_following import events, increments
+from feti_homog.interface.path_points import PathState, Point, unloaded
 from feti_homog.interface.strength_criterion import StrengthCriterion
 from feti_homog.output.files.checkpoint import Arrays, Checkpoint
-from feti_homog.typing import Float
 
 KKT_LAWS = ("kkt_complementarity", "kkt_penetration", "kkt_tension")
 
 
 @dataclass
-class _Dissipation:
-    """Energy lost to new surfaces, per area of the cell, from one point to the next.
+class Dissipation:
+    """Energy lost to breaks per area of the cell up to a point's state, W - 1/2 E.Sigma with the work W = int Sigma.dE.
 
-    A break happens at constant strain E, so it loses 1/2 E.(Sigma before - Sigma after).  On the first leg, all of
-    one direction, the stress after it comes from the next point; else, from a solve.
+    Attributes:
+        followed: where every bond broke at its own load, the first leg with its snap-back.
+        strain_controlled: where the strain only rose on the first leg, as in a test: a bond of a snap-back breaks at
+            the largest load t so far, and loses (t / own load)^2 times as much, for all is of degree one in the load.
     """
 
-    context: AnalysisContext
-    left: PathState
-    total: float = 0.0
-    pending: tuple[float, Float] | None = None
+    followed: float = 0.0
+    strain_controlled: float = 0.0
+    _load: float = 0.0
+    _largest_load: float = 0.0
 
-    def at(self, point: Point, response: Response) -> float:
-        """What has been lost up to and including the arrival at this point; collective."""
-        E, stress = point.state.solution.strain, response.stress / point.scale
-        if self.pending is not None:
-            scale, before = self.pending
-            self.total += 0.5 * scale**2 * float(E @ (before - stress))
-        elif point.broke and point.scale == 1.0:
-            drop = self._stress(self.left, point, stress) - self._stress(point.after, point, stress)
-            self.total += 0.5 * float(E @ drop)
-        return self.recall(self.total, point, response)
+    def arrive(self, point: Point) -> None:
+        """Add what breaks lost on the way from the last point to this one."""
+        # Beyond the first leg loads do not fall.
+        rise = self._largest_load / self._load if self._load else 1.0
+        self.recall(self.followed + point.released, self.strain_controlled + rise**2 * point.released, point)
 
-    def recall(self, total: float, point: Point, response: Response) -> float:
-        """Go on from a point up to which `total` has been lost."""
-        self.total, self.left = total, point.after
-        self.pending = (point.scale, response.stress / point.scale) if point.broke and point.scale < 1.0 else None
-        return total
-
-    def _stress(self, stand: PathState, point: Point, stress: Float) -> Float:
-        """Sigma under the point's strain with what is debonded at `stand`; `stress` is that of the point itself."""
-        homogenization = self.context.homogenization
-        solver = homogenization.interface.solver
-        same = np.array_equal(stand.status == BONDED, point.state.status == BONDED)
-        if solver.comm.allreduce(same, MPI.LAND):
-            return stress
-        state = homogenization.interface.equilibrium(point.state.solution.strain, stand.status, stand.lam)
-        return solver.stress_integral(state.solution) / homogenization.cell.summary.area
+    def recall(self, followed: float, strain_controlled: float, point: Point) -> None:
+        """Go on from a point up to which so much has been lost."""
+        self.followed, self.strain_controlled = followed, strain_controlled
+        self._load, self._largest_load = point.load_factor, max(point.load_factor, self._largest_load)
 
 
 def run(
-    context: AnalysisContext, path: LoadPath, law: StrengthCriterion, checkpoint: Checkpoint, resume: bool
+    context: AnalysisContext, path: LoadPath, criterion: StrengthCriterion, checkpoint: Checkpoint, resume: bool
 ) -> dict[str, Any]:
     """`path`, a list of points, one an event (or increment); each is checkpointed before the next is sought."""
     interface = context.homogenization.interface
     known = _known(context, checkpoint, resume)
     begin = unloaded(interface, context.status(None))
-    dissipation, points = _Dissipation(context, begin), []
-    for number, point in enumerate(_points(context, path, law, begin, [point for point, _ in known])):
+    dissipation, points = Dissipation(), []
+    for number, point in enumerate(_points(context, path, criterion, begin, [point for point, *_ in known])):
         interface.solver.activate(interface.active(point.state.status))
         response = context.homogenization.response(point.state, point.scale)
         label, source = f"{'event' if path.method == 'events' else 'increment'} {number}", ""
         if number < len(known):
-            dissipated, source = dissipation.recall(known[number][1], point, response), ", from the checkpoint"
+            dissipation.recall(*known[number][1:], point)
+            source = ", from the checkpoint"
         else:
-            dissipated = dissipation.at(point, response)
+            dissipation.arrive(point)
             if point.state.solution.reason > 0:
-                checkpoint.write(number, *_stored(point, dissipated))
+                checkpoint.write(number, *_stored(point, dissipation))
         context.record_checks(f"{label} at {point.load_factor:.6f}{source}", response)
         context.record(response, point.load_factor, label)
         points.append(
@@ -90,7 +75,8 @@ def run(
                 "stress": response.stress,
                 "broke": point.broke,
                 "free_motions": point.state.free_motions,
-                "dissipated": dissipated,
+                "dissipated": dissipation.followed,
+                "dissipated_strain_controlled": dissipation.strain_controlled,
             }
             | context.point([response])
         )
@@ -103,8 +89,8 @@ def run(
     return {"path": points, "resumed": len(known)}
 
 
-def _known(context: AnalysisContext, checkpoint: Checkpoint, resume: bool) -> list[tuple[Point, float]]:
-    """The points of the checkpoint and what was dissipated up to each, if they are wanted; else it is cleared.
+def _known(context: AnalysisContext, checkpoint: Checkpoint, resume: bool) -> list[tuple[Point, float, float]]:
+    """The points of the checkpoint and both energies dissipated up to each, if they are wanted; else it is cleared.
 
     Raises:
         CaseError: the checkpoint cannot be used.
@@ -123,31 +109,28 @@ def _known(context: AnalysisContext, checkpoint: Checkpoint, resume: bool) -> li
 
 
 def _points(
-    context: AnalysisContext, path: LoadPath, law: StrengthCriterion, begin: PathState, known: Sequence[Point]
+    context: AnalysisContext, path: LoadPath, criterion: StrengthCriterion, begin: PathState, known: Sequence[Point]
 ) -> Iterator[Point]:
     """The points of the checkpoint, then those still to be found."""
     yield from known
     interface, waypoints = context.homogenization.interface, np.array(path.targets)
     begin = known[-1].after if known else begin
     if path.method == "events":
-        yield from events(interface, law, waypoints, begin)
+        yield from events(interface, criterion, waypoints, begin)
     else:
-        yield from increments(interface, law, waypoints, path.increments or 1, path.release == "worst", begin)
+        yield from increments(interface, criterion, waypoints, path.increments or 1, path.release == "worst", begin)
 
 
-def _stored(point: Point, dissipated: float) -> tuple[dict[str, Any], Arrays]:
+def _stored(point: Point, dissipation: Dissipation) -> tuple[dict[str, Any], Arrays]:
     """A point as plain numbers and distributed arrays, for the checkpoint."""
     state, solution, after = point.state, point.state.solution, point.after
+    counts = [point.broke, state.iterations, state.solves, state.free_motions, solution.iterations, solution.reason]
+    before = np.full(3, np.nan) if after.stress_before_break is None else after.stress_before_break
     whole: dict[str, Any] = {
-        "path": [point.load_factor, point.scale, float(after.leg), after.position, dissipated],
-        "numbers": [
-            point.broke,
-            state.iterations,
-            state.solves,
-            state.free_motions,
-            solution.iterations,
-            solution.reason,
-        ],
+        "path": [point.load_factor, point.scale, float(after.leg), after.position],
+        "energy": [point.released, dissipation.followed, dissipation.strain_controlled],
+        "numbers": counts,
+        "stress_before_break": before,
         "strain": solution.strain,
         "alpha": solution.alpha,
         "residual": solution.residual,
@@ -163,14 +146,16 @@ def _stored(point: Point, dissipated: float) -> tuple[dict[str, Any], Arrays]:
     return whole, distributed
 
 
-def _restored(event: Arrays) -> tuple[Point, float]:
+def _restored(event: Arrays) -> tuple[Point, float, float]:
     """What `_stored` took apart."""
-    load_factor, scale, leg, position, dissipated = event["path"].tolist()
+    load_factor, scale, leg, position = event["path"].tolist()
+    released, followed, strain_controlled = event["energy"].tolist()
     broke, iterations, solves, free_motions, last, reason = event["numbers"].tolist()
     solution = DualSolution(
         event["strain"], event["lam"], event["jump"], event["alpha"], last, reason, float(event["residual"])
     )
     certificate = dict(zip(KKT_LAWS, event["certificate"].tolist(), strict=True))
     state = Equilibrium(event["status"], solution, iterations, solves, free_motions, certificate)
-    after = PathState(int(leg), position, event["status_after"], event["lam_after"])
-    return Point(load_factor, scale, state, broke, after), dissipated
+    before = None if np.isnan(event["stress_before_break"]).any() else event["stress_before_break"]
+    after = PathState(int(leg), position, event["status_after"], event["lam_after"], before)
+    return Point(load_factor, scale, state, broke, released, after), followed, strain_controlled

@@ -125,6 +125,8 @@ def _run_and_write(cell: TornCell, directory: Path, progress: Progress, resume: 
     with file or nullcontext():
         states = _States(cell, file, keep_fields)
         context = _context(cell, progress, states)
+        for warning in context.warnings():
+            progress.say(f"warning: {warning}")
         checkpoint = _checkpoint(cell, directory)
         analysis = _analyse(context, checkpoint, resume)
     if file is not None:

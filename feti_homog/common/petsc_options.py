@@ -22,10 +22,11 @@ def case_options(options: Mapping[str, str | int | float | bool]) -> Iterator[No
     """Insert the options that the command line does not give, and remove them afterwards.
 
     Raises:
-        CaseError: an option of ours is misspelt.
+        CaseError: an option of ours is misspelt, or the tolerance is none.
     """
     database = PETSc.Options()
-    faults = unknown_options([*database.getAll(), *options])
+    given = {**options, **database.getAll()}
+    faults = [*unknown_options(given), *_faulty_tolerance(given)]
     if faults:
         raise CaseError(*faults)
     own = {name: value for name, value in options.items() if not database.hasName(name)}
@@ -36,6 +37,17 @@ def case_options(options: Mapping[str, str | int | float | bool]) -> Iterator[No
     finally:
         for name in own:
             database.delValue(name)
+
+
+def _faulty_tolerance(options: Mapping[str, str | int | float | bool]) -> list[str]:
+    """A fault if the relative tolerance is not between 0 and 1: with 1 or more, nothing is solved."""
+    if (name := "feti_ksp_rtol") not in options:
+        return []
+    try:
+        holds = 0.0 < float(options[name]) < 1.0
+    except ValueError:
+        holds = False
+    return [] if holds else [f"-{name} {options[name]}: expected a number above 0 and below 1"]
 
 
 def refuse_unused() -> None:

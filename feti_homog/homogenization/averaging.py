@@ -32,8 +32,10 @@ class Response:
         state: interface states, multipliers, jumps and amplitudes.
         u: (boundary dofs,) fluctuating displacement u* on the boundaries of this rank's subdomains.
         checks: relative errors of the laws: `strain` <eps> = E, Eq. (3), with the opening of debonded faces as
-            part of <eps>; `hill` <sigma:eps> = Sigma:E, Eq. (8); `jump`, the largest opening of a glued
-            node relative to the largest displacement; and the KKT certificate of contact.
+            part of <eps>; `hill` <sigma:eps> = Sigma:E, Eq. (8), relative to <sigma:eps> or, if that is less, to
+            what a bonded cell stores at least, E:<L^-1>^-1:E (Reuss), for a debonded one may store nothing;
+            `jump`, the largest opening of a glued node relative to the largest displacement, which does not
+            vanish where forces do; and the KKT certificate of contact.
         counts: numbers of `bonded`, `open` and `closed` interface nodes.
     """
 
@@ -85,10 +87,11 @@ class Homogenization:
         strain, u = state.solution.strain, solver.boundary_displacement(state.solution)
         stress, star, energy = self._averages(strain, u)
         opening = cell.comm.allreduce(self._strain_of_jumps.T @ (state.solution.jump * (1 - solver.active.mask)))
+        least = float(strain @ self.interface.least_bonded_stiffness @ strain)
         largest = (self._largest(u) + self.interface.imposed(strain)) or 1.0
         checks = {
             "strain": float(np.abs(star - opening / cell.summary.area).max() / (np.abs(strain).max() or 1.0)),
-            "hill": float(abs(energy - stress @ strain) / (abs(energy) or 1.0)),
+            "hill": float(abs(energy - stress @ strain) / (max(abs(energy), least) or 1.0)),
             "jump": self._largest(solver.active.mask * state.solution.jump) / largest,
         }
         counts = self.counts(state.status)

@@ -1,15 +1,14 @@
 """Unilateral, frictionless contact of debonded faces: the states that satisfy the KKT conditions.
 
 A debonded node is open (gap >= 0, no force) or closed (gap = 0, force <= 0, compression).  Which, is found by
-block principal pivoting (Judice & Pires, Computers & Operations Research 21, 1994) on the dual problem, which
-is strictly convex: all wrong nodes change state at once while their number falls, else only the first one
-does (Murty's rule), so that no cycle is possible.
+block principal pivoting on the dual problem, which is strictly convex.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from mpi4py import MPI
@@ -17,19 +16,23 @@ from numpy.typing import NDArray
 
 from feti_homog.feti.decomposition.constraint_layout import InterfaceNodes
 from feti_homog.feti.solver import DualSolution, FetiSolver
-from feti_homog.interface.rigid_placement import Placement, place
+from feti_homog.interface.block_pivoting import BlockPivoting
+from feti_homog.interface.contact_certificate import kkt_errors
+from feti_homog.interface.rigid_placement import place
+from feti_homog.mechanics.bounds import reuss
 from feti_homog.typing import Bool, Float
 
 Status = NDArray[np.int8]
 
 BONDED, CLOSED, OPEN = 0, 1, 2
 
-# Wrong by more than this many solver tolerances; below, the sign is noise.
-NOISE = 10.0
-# Block pivots that may pass without fewer wrong nodes than ever before.
-PATIENCE = 10
-# Solves after which the search is given up; the certificate then tells how far off it is.
-MOST_SOLVES = 500
+# A force or a gap has a sign if it is larger than this many relative tolerances of the Krylov method, times the
+# largest force or imposed displacement; below, the solver's error may have made it.
+SIGN_NOISE_PER_RTOL = 10.0
+# Block pivots in a row, the last one with progress included: ten without progress are usual in the literature.
+BLOCK_PIVOTS = 11
+# Dual problems after which the search is given up; the certificate then tells how far off it is.
+MAX_CONTACT_SOLVES = 500
 
 
 @dataclass(frozen=True)
@@ -40,10 +43,9 @@ class Equilibrium:
         status: (k,) BONDED, CLOSED or OPEN of the interface nodes that this rank owns.
         solution: of the last dual problem; its multipliers and jumps are those of the state.
         iterations, solves: Krylov iterations and dual problems that it took.
-        free_motions: rigid motions that no interface force resists.
-        certificate: errors of the KKT conditions: `kkt_penetration` relative to the largest imposed displacement,
-            `kkt_tension` on a closed node relative to the largest traction, `kkt_complementarity`, the
-            largest product of force and gap relative to the product of both scales.
+        free_motions: number of rigid motions of bodies that no interface force resists; a face that touches without
+            a force resists none.
+        certificate: errors of the KKT conditions, `contact_certificate.kkt_errors`.
     """
 
     status: Status
@@ -54,30 +56,6 @@ class Equilibrium:
     certificate: dict[str, float]
 
 
-@dataclass
-class _Pivots:
-    """Block principal pivoting: who of the wrong nodes changes state."""
-
-    comm: MPI.Intracomm
-    fewest: float = np.inf
-    patience: int = PATIENCE
-
-    def choose(self, wrong: Bool, count: int) -> Bool:
-        """The nodes to flip; collective."""
-        if count < self.fewest:
-            self.fewest, self.patience = count, PATIENCE
-            return wrong
-        if self.patience > 0:
-            self.patience -= 1
-            return wrong
-        here = int(np.argmax(wrong)) if wrong.any() else -1
-        rank = self.comm.allreduce(self.comm.rank if here >= 0 else self.comm.size, MPI.MIN)
-        alone = np.zeros_like(wrong)
-        if rank == self.comm.rank:
-            alone[here] = True
-        return alone
-
-
 @dataclass(frozen=True)
 class Interface:
     """All fibre-matrix interfaces of the torn cell.
@@ -86,15 +64,23 @@ class Interface:
         solver: of the dual problem.
         contact: false lets debonded faces overlap.
         size: (2,) of the cell, for the scale of displacements.
+        block_pivots: see `BlockPivoting`.
     """
 
     solver: FetiSolver
     contact: bool
     size: Float
-    nodes: InterfaceNodes = field(init=False)
+    block_pivots: int = BLOCK_PIVOTS
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "nodes", self.solver.jump_operator.nodes)
+    @property
+    def nodes(self) -> InterfaceNodes:
+        """Interface nodes that this rank owns."""
+        return self.solver.jump_operator.nodes
+
+    @property
+    def sign_noise(self) -> float:
+        """Share of the largest force, or of the imposed displacement, below which a sign is the solver's error."""
+        return SIGN_NOISE_PER_RTOL * self.solver.rtol
 
     def active(self, status: Status) -> Float:
         """(owned rows,) 1 for the multipliers that act: both of a bonded node, the normal one of a closed node."""
@@ -118,6 +104,17 @@ class Interface:
         """(k, 2) gap and slip, matrix minus fibre."""
         return np.asarray(solution.jump[self.nodes.row[:, None] + np.arange(2)])
 
+    def stress(self, solution: DualSolution) -> Float:
+        """(3,) Sigma from the multipliers alone; collective."""
+        return np.asarray(self.solver.stress_integral(solution) / self.size.prod())
+
+    @cached_property
+    def least_bonded_stiffness(self) -> Float:
+        """(3, 3) Reuss' bound <L^-1>^-1, collective: a scale of stress and energy that debonding does not make zero."""
+        parts = self.solver.comm.allgather([(s.area, s.L) for s in self.solver.subdomains])
+        areas, stiffnesses = zip(*(part for own in parts for part in own), strict=True)
+        return reuss(np.array(areas) / sum(areas), np.stack(stiffnesses))
+
     def linear(self, strain: Float, status: Status, start: Float) -> DualSolution:
         """The dual problem with the states as they are; `start` are first multipliers (owned rows,)."""
         self.solver.activate(self.active(status))
@@ -130,36 +127,32 @@ class Interface:
     def equilibria(self, strains: Float, status: Status, starts: Sequence[Float]) -> list[Equilibrium]:
         """Solve a linear problem for every strain of (k, 3) together.  Collective."""
         self.solver.activate(self.active(status))
-        free = self.solver.coarse.free.shape[1]
         solutions = self.solver.solve_together(strains, np.stack(starts, axis=1))
-        return [Equilibrium(status, s, s.iterations, 1, free, self._certificate(status, s)) for s in solutions]
+        return [self._equilibrium(status, solution, solution.iterations, 1) for solution in solutions]
 
     def equilibrium(self, strain: Float, status: Status, start: Float) -> Equilibrium:
         """Solve for the strain (3,), with `status` a first guess of who is in contact.  Collective."""
-        comm, pivots = self.solver.comm, _Pivots(self.solver.comm)
+        pivoting = BlockPivoting(self.solver.comm, self.block_pivots)
         iterations = solves = 0
         while True:
             solution = self.linear(strain, status, start)
             iterations, solves = iterations + solution.iterations, solves + 1
-            loose = Placement.none(len(status))
-            if self.contact and self.solver.coarse.free.shape[1]:
-                loose = place(comm, self.solver.coarse, self.nodes, status == OPEN, solution, self._tolerance(strain))
-                solution = replace(
-                    solution, alpha=solution.alpha + loose.alpha, jump=solution.jump + loose.jump(self.solver.coarse)
-                )
-            wrong = self._wrong(status, solution) | loose.squeezed if self.contact else np.zeros(len(status), bool)
-            count = comm.allreduce(int(wrong.sum()))
-            if count == 0 or solves == MOST_SOLVES or solution.reason < 0:
-                break
-            flip = pivots.choose(wrong, count)
+            solution, wrong = self._placed(status, solution)
+            count = self.solver.comm.allreduce(int(wrong.sum()))
+            if count == 0 or solves == MAX_CONTACT_SOLVES or solution.reason < 0:
+                return self._equilibrium(status, solution, iterations, solves)
+            flip = pivoting.choose(wrong, count)
             status = np.where(flip, CLOSED + OPEN - status, status).astype(np.int8)
             start = solution.lam
-        free = self.solver.coarse.free.shape[1]
-        return Equilibrium(status, solution, iterations, solves, free, self._certificate(status, solution))
 
-    def _tolerance(self, strain: Float) -> float:
-        """Gaps smaller than this are noise."""
-        return NOISE * self.solver.rtol * self.imposed(strain)
+    def gap_noise(self, strain: Float) -> float:
+        """Gaps smaller than this may be the solver's error."""
+        return self.sign_noise * self.imposed(strain)
+
+    def force_noise(self, solution: DualSolution) -> float:
+        """Nodal forces smaller than this may be the solver's error; collective."""
+        largest = self.solver.comm.allreduce(np.abs(solution.lam).max(initial=0.0), MPI.MAX)
+        return self.sign_noise * float(largest)
 
     def imposed(self, strain: Float) -> float:
         """Largest displacement E y that the strain imposes on the cell."""
@@ -167,30 +160,47 @@ class Interface:
         corners = self.size * np.array([[1, 0], [0, 1], [1, 1]])
         return float(np.abs(corners @ E).max())
 
-    def _wrong(self, status: Status, solution: DualSolution) -> Bool:
+    def _placed(self, status: Status, solution: DualSolution) -> tuple[DualSolution, Bool]:
+        """The solution with free fibres where they have room, and which nodes (k,) break the KKT conditions."""
+        if not self.contact:
+            return solution, np.zeros(len(status), bool)
+        squeezed = np.zeros(len(status), bool)
+        coarse, noise = self.solver.coarse, self.gap_noise(solution.strain)
+        if coarse.free.shape[1]:
+            placement = place(self.solver.comm, coarse, self.nodes, status == OPEN, solution, noise)
+            alpha, jump = solution.alpha + placement.alpha, solution.jump + placement.jump(coarse)
+            solution, squeezed = replace(solution, alpha=alpha, jump=jump), placement.squeezed
         force, gap = solution.lam[self.nodes.row], solution.jump[self.nodes.row]
-        largest = self.solver.comm.allreduce(np.abs(solution.lam).max(initial=0.0), MPI.MAX)
-        pulled = (status == CLOSED) & (force > NOISE * self.solver.rtol * largest)
-        return pulled | ((status == OPEN) & (gap < -self._tolerance(solution.strain)))
+        pulled = (status == CLOSED) & (force > self.force_noise(solution))
+        overlaps = (status == OPEN) & (gap < -noise)
+        return solution, pulled | overlaps | squeezed
 
-    def _certificate(self, status: Status, solution: DualSolution) -> dict[str, float]:
-        traction, gap = self.traction(solution), solution.jump[self.nodes.row]
-        force = solution.lam[self.nodes.row]
-        faces = (status != BONDED) & self.contact
-        worst = np.array(
-            [
-                np.where(faces, -gap, 0.0).max(initial=0.0),
-                np.where(faces & (status == CLOSED), traction[:, 0], 0.0).max(initial=0.0),
-                np.where(faces, np.abs(force * gap), 0.0).max(initial=0.0),
-                np.abs(traction).max(initial=0.0),
-                np.abs(force).max(initial=0.0),
-            ]
+    def _equilibrium(self, status: Status, solution: DualSolution, iterations: int, solves: int) -> Equilibrium:
+        """The state that a search ended with, its free motions and its certificate."""
+        force, gap = solution.lam[self.nodes.row], solution.jump[self.nodes.row]
+        certificate = kkt_errors(
+            self.solver.comm,
+            self.traction(solution),
+            force,
+            gap,
+            (status != BONDED) & self.contact,
+            status == CLOSED,
+            self.imposed(solution.strain),
         )
-        self.solver.comm.Allreduce(MPI.IN_PLACE, worst, MPI.MAX)
-        penetration, tension, product, largest_traction, largest_force = (float(w) for w in worst)
-        scale = self.imposed(solution.strain) or 1.0
-        return {
-            "kkt_penetration": penetration / scale,
-            "kkt_tension": tension / (largest_traction or 1.0),
-            "kkt_complementarity": product / ((largest_force or 1.0) * scale),
-        }
+        status, motions = self._without_idle(status, solution)
+        return Equilibrium(status, solution, iterations, solves, motions, certificate)
+
+    def _without_idle(self, status: Status, solution: DualSolution) -> tuple[Status, int]:
+        """The status and the number of rigid motions that neither a bond nor a face under compression resists.
+
+        A fibre may touch its hole without a force: such nodes count as open, lest they seem to hold it.  Collective.
+        """
+        coarse, idle = self.solver.coarse, np.zeros(len(status), bool)
+        held = int(coarse.free.shape[1])
+        if self.contact:
+            idle = (status == CLOSED) & (solution.lam[self.nodes.row] >= -self.force_noise(solution))
+        if not self.solver.comm.allreduce(bool(idle.any()), MPI.LOR):
+            return status, held
+        without = np.where(idle, OPEN, status).astype(np.int8)
+        motions = coarse.free_motions(self.active(without))
+        return (without, motions) if motions > held else (status, motions)

@@ -1,4 +1,8 @@
-"""Where fibres lie that nothing holds: rigid motions that open all their gaps, or the nodes that squeeze them."""
+"""Where fibres lie that nothing holds: rigid motions that open all their gaps, or the nodes that squeeze them.
+
+The gaps of such a fibre are known up to its rigid motions M a.  What is unique is whether it has room, i.e. whether
+there are amplitudes a with gap + M a >= 0: a linear programme for each fibre, solved on rank 0.
+"""
 
 from __future__ import annotations
 
@@ -6,17 +10,22 @@ from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
-from scipy.optimize import linprog
+from scipy.optimize import OptimizeResult, linprog
 from scipy.sparse import csr_matrix
 
 from feti_homog.feti.coarse.natural import NaturalCoarseSpace
 from feti_homog.feti.decomposition.constraint_layout import InterfaceNodes
 from feti_homog.feti.solver import DualSolution
-from feti_homog.typing import Bool, Float
+from feti_homog.typing import Array, Bool, Float
 
-# Motions whose gaps are smaller than this, relative to their slips, do not open (a round fibre turns).
-SLIDING = 1e-9
+# Rigid motions that change gaps by less than this, relative to slips, change none: a round fibre turns.
+LARGEST_GAP_OF_SLIDING = 1e-9
+# A node with less than this share of the largest contact force is not needed for the balance of forces.
+LEAST_FORCE_SHARE = 1e-6
+# Largest amplitude of a motion in a linear programme, in largest gaps: a fibre may have room without end on one side.
+LARGEST_MOTION = 1e3
+# The least tolerance of HiGHS, relative to the largest gap; its default of 1e-7 is coarser than the solver's error.
+LP_TOLERANCES = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}
 
 
 @dataclass(frozen=True)
@@ -26,14 +35,29 @@ class Placement:
     alpha: Float
     squeezed: Bool
 
-    @classmethod
-    def none(cls, nodes: int) -> Placement:
-        """Nothing moves, nothing is squeezed."""
-        return cls(np.zeros(0), np.zeros(nodes, bool))
-
     def jump(self, coarse: NaturalCoarseSpace) -> Float:
         """(owned rows,) G alpha."""
         return np.asarray(coarse.G @ self.alpha)
+
+
+@dataclass(frozen=True)
+class _Fibres:
+    """On rank 0, of all open nodes: the change of gap and slip with each free motion, (k, motions), and the fibre."""
+
+    is_open: Bool
+    opening: Float
+    slip: Float
+    fibre: Array
+
+    def nodes_and_motions(self, of: Bool) -> list[tuple[Array, Float, Float]]:
+        """For each fibre with an open node in `of` (k,): its open nodes (n,), their motions M (n, m), and the
+        motions' combinations of the free ones (motions, m); m = 0 where nothing that is free opens a gap."""
+        found = []
+        for f in np.unique(self.fibre[self.is_open & of]):
+            own = np.flatnonzero((self.fibre == f) & self.is_open)
+            modes = _opening_modes(self.opening[own], self.slip[own])
+            found.append((own, self.opening[own] @ modes, modes))
+        return found
 
 
 def place(
@@ -44,46 +68,111 @@ def place(
     solution: DualSolution,
     noise: float,
 ) -> Placement:
-    """Move the loose fibres so that no open node overlaps by more than `noise`; collective, decided on rank 0.
+    """Move the free fibres so that no open node overlaps by more than `noise`; collective, decided on rank 0.
 
-    A fibre that overlaps is put where its smallest gap is largest: a linear programme in its rigid motions.  If even
-    that overlaps, the programme's dual solution is a system of contact forces in balance, and its nodes close.
+    A fibre that overlaps is put where its smallest gap is largest.  If even that overlaps, the programme's dual
+    solution is a system of contact forces in balance, and its nodes close.
     """
-    free = csr_matrix(coarse.free)
-    opening, slip = (np.asarray((coarse.G[nodes.row + i] @ free).todense()) for i in range(2))
-    parts = comm.gather((solution.jump[nodes.row], opening, slip, nodes.fibre, is_open))
-    answer = _place_all(parts, noise) if parts is not None else None
+    fibres, gaps = _gathered(comm, coarse, nodes, is_open, [solution.jump[nodes.row]])
+    answer = None if fibres is None else _place_all(fibres, gaps[0], noise)
     amplitudes, squeezed = comm.bcast(answer)
     first = comm.exscan(len(nodes.row)) or 0
     return Placement(coarse.free @ amplitudes, squeezed[first : first + len(nodes.row)])
 
 
-def _place_all(parts: list[tuple[Float, Float, Float, NDArray[np.int64], Bool]], noise: float) -> tuple[Float, Bool]:
-    gap, opening, slip, fibre, is_open = (np.concatenate(p) for p in zip(*parts, strict=True))
-    squeezed, amplitudes = np.zeros(len(gap), bool), np.zeros(opening.shape[1])
-    for f in np.unique(fibre[is_open & (gap < -noise)]):
-        own = np.flatnonzero((fibre == f) & is_open)
-        modes = _opening_modes(opening[own], slip[own])
+def room_ahead(
+    comm: MPI.Intracomm,
+    coarse: NaturalCoarseSpace,
+    nodes: InterfaceNodes,
+    is_open: Bool,
+    here: Float,
+    ahead: Float,
+    noise: float,
+) -> tuple[float, float]:
+    """How far every fibre has room on the way from the gaps `here` (k,) to `ahead` (k,), of which it has some here.
+
+    The largest shares w <= 1 of the way for which all fibres have amplitudes a with
+
+        (1 - w) here + w ahead + M a >= 0,   and   >= -2 noise,
+
+    where the first fibre begins to be squeezed, and where it is beyond doubt.  Collective, decided on rank 0.
+    """
+    fibres, gaps = _gathered(comm, coarse, nodes, is_open, [here, ahead])
+    shares = None if fibres is None else _shares_of_all(fibres, gaps[0], gaps[1], noise)
+    found: tuple[float, float] = comm.bcast(shares)
+    return found
+
+
+def shares_to_zero(here: Float, ahead: Float, noise: float) -> tuple[float, float]:
+    """Shares of the way from values here (k,) to ahead (k,) at which the first is 0, and is -2 noise; else 1, 1.
+
+    Values that end above -2 noise may be the solver's error and do not count.
+    """
+    falls = ahead < -2 * noise
+    a, b = here[falls], ahead[falls]
+    begins, certain = (np.maximum(a + slack, 0.0) / (a - b) for slack in (0.0, 2 * noise))
+    return float(begins.min(initial=1.0)), float(certain.min(initial=1.0))
+
+
+def _gathered(
+    comm: MPI.Intracomm, coarse: NaturalCoarseSpace, nodes: InterfaceNodes, is_open: Bool, gaps: list[Float]
+) -> tuple[_Fibres | None, list[Float]]:
+    """The free motions of all open nodes, and values of all nodes, on rank 0."""
+    free = csr_matrix(coarse.free)
+    opening, slip = (np.asarray((coarse.G[nodes.row + i] @ free).todense()) for i in range(2))
+    parts = comm.gather((is_open, opening, slip, nodes.fibre, *gaps))
+    if parts is None:
+        return None, []
+    whole = [np.concatenate(p) for p in zip(*parts, strict=True)]
+    return _Fibres(*whole[:4]), whole[4:]
+
+
+def _place_all(fibres: _Fibres, gap: Float, noise: float) -> tuple[Float, Bool]:
+    squeezed, amplitudes = np.zeros(len(gap), bool), np.zeros(fibres.opening.shape[1])
+    for own, motion, modes in fibres.nodes_and_motions(gap < -noise):
         if modes.shape[1]:
-            a, room, forces = _largest_gap(gap[own], opening[own] @ modes)
+            a, room, forces = _largest_gap(gap[own], motion)
             amplitudes += modes @ a
             if room < -noise:
-                squeezed[own[forces > 1e-6 * forces.max()]] = True
+                squeezed[own[forces > LEAST_FORCE_SHARE * forces.max()]] = True
     return amplitudes, squeezed
+
+
+def _shares_of_all(fibres: _Fibres, here: Float, ahead: Float, noise: float) -> tuple[float, float]:
+    shares = [(1.0, 1.0)]
+    for own, motion, _ in fibres.nodes_and_motions(ahead < -2 * noise):
+        a, b = here[own], ahead[own]
+        if not motion.shape[1]:
+            shares.append(shares_to_zero(a, b, noise))
+        elif (certain := _last_share(a, b, motion, 2 * noise)) < 1.0:
+            shares.append((_last_share(np.maximum(a, 0.0), b, motion, 0.0), certain))
+    begins, certain = np.min(shares, axis=0)
+    return float(begins), float(certain)
 
 
 def _opening_modes(opening: Float, slip: Float) -> Float:
     """(modes, m) the combinations of modes that open gaps: neither those of other fibres nor those that slide."""
     _, size, basis = np.linalg.svd(opening, full_matrices=False)
-    return np.asarray(basis[size > SLIDING * max(size[0], np.abs(slip).max())].T)
+    return np.asarray(basis[size > LARGEST_GAP_OF_SLIDING * max(size[0], np.abs(slip).max())].T)
 
 
 def _largest_gap(gap: Float, motion: Float) -> tuple[Float, float, Float]:
     """max s with gap + motion a >= s: a, s, and the multipliers of the inequalities."""
     scale, size = np.abs(gap).max(), np.abs(motion).max(axis=0)
-    rows = np.column_stack([-motion / size, np.ones(len(gap))])
-    cost = np.r_[np.zeros(len(size)), -1.0]
-    # Bounds keep a fibre in place that has room without end on one side.
-    bounds = [(-1e3, 1e3)] * len(size) + [(None, 1.0)]
-    result = linprog(cost, A_ub=rows, b_ub=gap / scale, bounds=bounds, method="highs")
+    result = _maximised(-motion / size, np.ones(len(gap)), gap / scale, (None, 1.0))
     return result.x[:-1] * scale / size, float(result.x[-1] * scale), -result.ineqlin.marginals
+
+
+def _last_share(here: Float, ahead: Float, motion: Float, slack: float) -> float:
+    """max w <= 1 with (1 - w) here + w ahead + motion a >= -slack; w = 0 is possible."""
+    scale, size = np.abs([here, ahead]).max(), np.abs(motion).max(axis=0)
+    result = _maximised(-motion / size, (here - ahead) / scale, (here + slack) / scale, (0.0, 1.0))
+    return float(result.x[-1])
+
+
+def _maximised(motions: Float, last: Float, limits: Float, bounds: tuple[float | None, float]) -> OptimizeResult:
+    """max x_-1 with motions x_:-1 + last x_-1 <= limits and x_-1 within its bounds."""
+    cost = np.r_[np.zeros(motions.shape[1]), -1.0]
+    limited = [(-LARGEST_MOTION, LARGEST_MOTION)] * motions.shape[1] + [bounds]
+    rows = np.column_stack([motions, last])
+    return linprog(cost, A_ub=rows, b_ub=limits, bounds=limited, method="highs", options=LP_TOLERANCES)

@@ -32,4 +32,4 @@ class StrengthCriterion:
         shares /= [self.normal, self.tangential]
         if self.criterion == "max":
             return np.asarray(shares.max(axis=1, initial=0.0))
-        return np.hypot(*shares.T)
+        return np.asarray(np.hypot(*shares.T))

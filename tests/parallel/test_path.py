@@ -14,7 +14,8 @@ from support.ranks import parallel_assert
 
 from feti_homog.common.mpi_errors import on_root
 from feti_homog.interface.contact import BONDED, OPEN
-from feti_homog.interface.path_following import events, increments, unloaded
+from feti_homog.interface.path_following import events, increments
+from feti_homog.interface.path_points import unloaded
 from feti_homog.interface.strength_criterion import StrengthCriterion
 
 pytestmark = pytest.mark.parallel

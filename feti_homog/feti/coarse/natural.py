@@ -71,6 +71,12 @@ class NaturalCoarseSpace:
         """Whether more than rigid-body motions is taken out of the Krylov method."""
         return False
 
+    def free_motions(self, active: Float) -> int:
+        """How many rigid motions the owned rows of which `active` is 1 would leave free; collective."""
+        Ga = (diags(active) @ self.G).tocsr()
+        gram = allreduce_sparse(self.comm, (Ga.T @ Ga).tocsr())
+        return int(_null_vectors(gram, self.body, self.held, FREE * self.scale).shape[1])
+
     def amplitudes(self, x: Float) -> Float:
         """(G^T G)^-1 G^T x on every rank, for the owned rows x (rows,) or (rows, k)."""
         return self._solver.solve(self.everywhere(self.GaT @ x))

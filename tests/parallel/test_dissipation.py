@@ -1,0 +1,154 @@
+"""Energy: breaks dissipate the work done on the cell less the energy stored in it, whichever way it was loaded."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from support import torn_cells
+
+from feti_homog.analysis.load_path import Dissipation
+from feti_homog.interface.contact import BONDED
+from feti_homog.interface.path_following import events, increments
+from feti_homog.interface.path_points import unloaded
+from feti_homog.interface.strength_criterion import StrengthCriterion
+
+pytestmark = pytest.mark.parallel
+
+EXACT = 1e-9
+TIGHT = {"petsc": {"feti_pc_type": "influence", "feti_ksp_rtol": 1e-11}}
+SQUARE = {"geometry": "square", "mesh_size": 0.2} | TIGHT
+THREE = {"geometry": "random", "fibres": 3, "min_gap": 0.1, "seed": 4, "mesh_size": 0.2, "radius_spread": 0.3} | TIGHT
+STRAIGHT = np.array([1.0, 0.1, 0.2])
+CRITERION = StrengthCriterion(20.0, 30.0, "max")
+
+
+def start(cell, contact):
+    interface = torn_cells.interface(cell, contact)
+    return interface, unloaded(interface, np.full(len(interface.nodes.row), BONDED, np.int8))
+
+
+def follow(cell, waypoints, contact=True):
+    interface, begin = start(cell, contact)
+    return list(events(interface, CRITERION, np.array(waypoints), begin))
+
+
+def dissipated(points):
+    """(points, 2) along the snap-back, and at rising strain."""
+    dissipation, rows = Dissipation(), []
+    for point in points:
+        dissipation.arrive(point)
+        rows.append((dissipation.followed, dissipation.strain_controlled))
+    return np.array(rows)
+
+
+def strain(point):
+    return point.scale * point.state.solution.strain
+
+
+def stress(cell, point):
+    return point.scale * torn_cells.stress(cell, point.state.solution)
+
+
+def stored(cell, point):
+    """Strain energy per area, from the displacements."""
+    return point.scale**2 * torn_cells.energy(cell, point.state.solution) / cell.summary.area
+
+
+def stress_under(interface, cell, strain, point):
+    """Sigma under a strain with the bonds that a point leaves."""
+    return torn_cells.stress(cell, interface.equilibrium(strain, point.after.status, point.after.lam).solution)
+
+
+@pytest.mark.parametrize("contact", [True, False])
+@pytest.mark.parametrize("case", [SQUARE, THREE], ids=["square", "three"])
+@pytest.mark.parametrize(
+    "waypoints",
+    [[STRAIGHT], [0.6 * STRAIGHT, [0.0, 0.0, 0.0], [-0.4, 0.8, 1.5]], [[-0.2, -0.2, 0.7], 0.8 * STRAIGHT]],
+    ids=["straight", "through zero", "turning"],
+)
+def test_events_dissipate_the_work_that_is_not_stored(comm, case, contact, waypoints):
+    cell = torn_cells.tear(comm, **case)
+    interface, _ = start(cell, contact)
+    points = follow(cell, waypoints, contact)
+    found, work, worst = dissipated(points), 0.5 * strain(points[0]) @ stress(cell, points[0]), 0.0
+    assert sum(p.broke > 0 for p in points) > 8
+    for before, now, lost in zip(points, points[1:], found[1:, 0], strict=False):
+        # The response between points is straight, so the trapezoid's rule is exact.
+        after = stress_under(interface, cell, strain(before), before)
+        work += 0.5 * (after + stress(cell, now)) @ (strain(now) - strain(before))
+        worst = max(worst, abs(work - stored(cell, now) - lost))
+    assert worst < EXACT * found[-1, 0]
+    assert (np.diff(found, axis=0) >= 0).all() and (found[:, 1] >= found[:, 0]).all()
+
+
+@pytest.mark.parametrize("contact", [True, False])
+@pytest.mark.parametrize("case", [SQUARE, THREE], ids=["square", "three"])
+def test_rising_strain_dissipates_the_area_under_its_curve(comm, case, contact):
+    """At a load t the branch is that of the first point at t or more: the area under it, less what is stored."""
+    cell = torn_cells.tear(comm, **case)
+    points = follow(cell, [STRAIGHT], contact)
+    loads = np.array([p.load_factor for p in points])
+    records = np.flatnonzero(loads >= np.maximum.accumulate(loads))
+    slopes = np.array([STRAIGHT @ torn_cells.stress(cell, points[k].state.solution) for k in records])
+    area = 0.5 * slopes @ np.diff(loads[records] ** 2, prepend=0.0)
+    followed, controlled = dissipated(points)[-1]
+    assert abs(area - stored(cell, points[-1]) - controlled) < EXACT * controlled
+    # The curve has a snap-back, whose energy a test at rising strain loses too.
+    assert controlled > 1.01 * followed
+
+
+@pytest.mark.parametrize("worst_only", [True, False])
+def test_increments_dissipate_the_work_that_is_not_stored(comm, worst_only):
+    cell = torn_cells.tear(comm, **THREE)
+    interface, begin = start(cell, True)
+    points = list(increments(interface, CRITERION, STRAIGHT[None], 12, worst_only, begin))
+    found = dissipated(points)
+    work = 0.5 * strain(points[0]) @ stress(cell, points[0])
+    for before, now, lost in zip(points, points[1:], found[1:, 0], strict=False):
+        held = stress_under(interface, cell, strain(now), before)
+        work += 0.5 * (held + stress(cell, before)) @ (strain(now) - strain(before))
+        assert abs(work - stored(cell, now) - lost) < EXACT * found[-1, 0]
+    assert (found[:, 0] == found[:, 1]).all() and found[-1, 0] > 0
+
+
+def breaks(cell, points):
+    """(breaks, 3): share of the strain STRAIGHT, broken bonds, and energy dissipated along the snap-back; and the last
+    at rising strain."""
+    energies = dissipated(points)
+    rows = [
+        (strain(p) @ STRAIGHT / (STRAIGHT @ STRAIGHT), p.broke, *e)
+        for p, e in zip(points, energies, strict=True)
+        if p.broke
+    ]
+    return np.array(rows).reshape(-1, 4)
+
+
+def test_a_waypoint_on_a_straight_path_changes_nothing(comm):
+    """Where no bond breaks below an earlier load, the same breaks, loads and energies."""
+    cell = torn_cells.tear(comm, **THREE)
+    loads = np.array([p.load_factor for p in follow(cell, [STRAIGHT])])
+    rises = loads > np.maximum.accumulate(np.r_[0.0, loads[:-1]])
+    ends = np.flatnonzero(~np.r_[False, rises, False])
+    length, last = max((b - a, b - 2) for a, b in pairwise(ends))
+    assert length > 5
+    first, turn, end = ((loads[k] + loads[k + 1]) / 2 for k in (last - length + 2, last - length // 2, last - 1))
+    whole = breaks(cell, follow(cell, [end * STRAIGHT]))
+    for waypoints in ([first, end], [turn, end], [first, turn, end]):
+        split = breaks(cell, follow(cell, np.outer(waypoints, STRAIGHT)))
+        np.testing.assert_array_equal(split[:, 1], whole[:, 1])
+        assert np.abs(split - whole).max(axis=0) == pytest.approx([0.0] * 4, abs=1e-8)
+
+
+@pytest.mark.parametrize("contact", [True, False])
+def test_beyond_a_waypoint_a_straight_path_is_controlled_by_strain(comm, contact):
+    """The bonds of a snap-back break at the largest load so far, with the energies of rising strain."""
+    cell = torn_cells.tear(comm, **SQUARE)
+    whole = breaks(cell, follow(cell, [STRAIGHT], contact))
+    turn = 0.6 * whole[:, 0].max()
+    split = breaks(cell, follow(cell, [turn * STRAIGHT, STRAIGHT], contact))
+    np.testing.assert_array_equal(split[:, 1], whole[:, 1])
+    beyond = np.maximum.accumulate(whole[:, 0]) > turn
+    np.testing.assert_allclose(split[beyond, 0], np.maximum.accumulate(whole[:, 0])[beyond], rtol=1e-8)
+    np.testing.assert_allclose(split[:, 3], whole[:, 3], rtol=1e-8, atol=1e-8 * whole[-1, 3])

@@ -1,0 +1,98 @@
+"""Legs of a path beyond the first: no change of contact is passed over, fibres that nothing holds included."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from support import torn_cells
+
+from feti_homog.interface.contact import BONDED, OPEN
+from feti_homog.interface.path_following import events
+from feti_homog.interface.path_points import unloaded
+from feti_homog.interface.strength_criterion import StrengthCriterion
+
+pytestmark = pytest.mark.parallel
+
+STRAIGHT = 1e-7
+FREE = {
+    "square": {"geometry": "square", "mesh_size": 0.2},
+    "quadratic": {"geometry": "square", "mesh_size": 0.35, "order": 2, "plane": "stress"},
+    "hexagonal": {"geometry": "hexagonal", "mesh_size": 0.25, "decomposition": {"subdomains": 9}},
+    "plane": {"geometry": "hexagonal", "mesh_size": 0.25, "bodies": "plane", "petsc": {"feti_pc_type": "influence"}},
+}
+THREE = {"geometry": "random", "fibres": 3, "min_gap": 0.1, "seed": 4, "mesh_size": 0.2, "radius_spread": 0.3}
+# Through zero, beside it, and from squeezed fibres to others with room.
+WAYPOINTS = [
+    [[0.05, 0.05, 0.0], [-0.05, -0.05, 0.0]],
+    [[0.05, 0.05, 0.0], [-0.05, 0.02, 0.03], [0.02, -0.06, 0.01], [0.05, 0.05, -0.1]],
+    [[-0.05, -0.04, 0.0], [0.05, 0.05, 1e-4], [-0.05, -0.04, 0.0]],
+]
+NEVER = StrengthCriterion(np.inf, np.inf, "max")
+
+
+def interface_with(cell, is_debonded):
+    """The interface with contact and the beginning of a path with some nodes debonded."""
+    interface = torn_cells.interface(cell, True)
+    return interface, unloaded(interface, np.where(is_debonded, OPEN, BONDED).astype(np.int8))
+
+
+def largest_bend(interface, points, legs):
+    """Largest distance of the stress between points of later legs from the straight line, relative to the largest."""
+    stress, bend = interface.stress, 0.0
+    scale = max(np.abs(p.scale * stress(p.state.solution)).max() for p in points)
+    for before, now in pairwise(points):
+        if before.load_factor * legs < 1 - 1e-12 or before.scale != 1.0:
+            continue
+        ends = before.state.solution.strain, now.state.solution.strain
+        first = stress(interface.equilibrium(ends[0], before.after.status, before.after.lam).solution)
+        for share in (0.1, 0.5, 0.8):
+            strain = (1 - share) * ends[0] + share * ends[1]
+            between = stress(interface.equilibrium(strain, before.after.status, before.after.lam).solution)
+            line = (1 - share) * first + share * stress(now.state.solution)
+            bend = max(bend, np.abs(between - line).max() / scale)
+    return bend
+
+
+@pytest.mark.parametrize("waypoints", WAYPOINTS, ids=["through zero", "beside zero", "squeezed first"])
+@pytest.mark.parametrize("case", FREE)
+def test_free_fibres_are_straight_between_points(comm, case, waypoints):
+    cell = torn_cells.tear(comm, **FREE[case])
+    interface, begin = interface_with(cell, True)
+    solves = cell.solver.solves
+    points = list(events(interface, NEVER, np.array(waypoints), begin))
+    solves = cell.solver.solves - solves
+    assert all(p.state.solution.reason > 0 and max(p.state.certificate.values()) < 1e-8 for p in points)
+    assert largest_bend(interface, points, len(waypoints)) < STRAIGHT
+    # A state at each change, one past it, and one ahead, and a few pivots.
+    assert solves < 6 * len(points)
+
+
+def test_partly_free_and_breaking_fibres_are_straight_between_points(comm):
+    cell = torn_cells.tear(comm, **THREE)
+    fibre = cell.solver.jump_operator.nodes.fibre
+    interface, begin = interface_with(cell, fibre != comm.allreduce(fibre.min(initial=1000), min))
+    waypoints = np.array([[0.05, 0.05, 0.0], [-0.05, -0.02, 0.03], [0.6, -0.3, 0.1], [-0.8, -0.2, 0.0]])
+    points = list(events(interface, StrengthCriterion(20.0, 30.0, "max"), waypoints, begin))
+    assert sum(p.broke for p in points[1:]) > 3
+    assert largest_bend(interface, points, len(waypoints)) < STRAIGHT
+
+
+def test_a_free_fibre_is_squeezed_where_the_strain_is_zero(comm):
+    cell = torn_cells.tear(comm, **FREE["square"])
+    interface, begin = interface_with(cell, True)
+    tension, turn, pressed = events(interface, NEVER, np.array(WAYPOINTS[0]), begin)
+    assert [tension.load_factor, pressed.load_factor] == [0.5, 1.0]
+    assert abs(turn.load_factor - 0.75) < 1e-9 and np.abs(turn.state.solution.strain).max() < 1e-9
+    # On both sides the response is proportional to the strain, with the stiffnesses of a void and of a contact.
+    opening, closing = (p.state.solution.strain @ interface.stress(p.state.solution) for p in (tension, pressed))
+    assert 1.5 * opening < closing
+
+
+def test_faces_that_touch_without_force_hold_nothing(comm):
+    cell = torn_cells.tear(comm, **FREE["square"])
+    interface, begin = interface_with(cell, True)
+    waypoints = np.array([[-0.05, -0.05, 0.0], [0.0, 0.0, 0.0]])
+    pressed, unloaded_again = (p for p in events(interface, NEVER, waypoints, begin) if p.after.position == 0)
+    assert [pressed.state.free_motions, unloaded_again.state.free_motions] == [1, 3]
