@@ -33,9 +33,10 @@ NEVER = StrengthCriterion(np.inf, np.inf, "max")
 
 
 def interface_with(cell, is_debonded):
-    """The interface with contact and the beginning of a path with some nodes debonded."""
+    """The interface with contact and the beginning of a path with some nodes debonded, or all (True)."""
     interface = bonds.interface(cell, True)
-    return interface, unloaded(interface, np.where(is_debonded, OPEN, BONDED).astype(np.int8))
+    debonded = np.broadcast_to(is_debonded, len(interface.nodes.row))
+    return interface, unloaded(interface, np.where(debonded, OPEN, BONDED).astype(np.int8))
 
 
 def largest_bend(interface, points, legs):
