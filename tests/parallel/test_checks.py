@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import bonds
 import numpy as np
 import pytest
 from cells import make_case
-from support import parallel_assert
+from support import parallel_assert, torn_cells
 from unit.cell.faulty_meshes import grid
 
 from feti_homog.analysis.context import AnalysisContext
@@ -42,7 +41,7 @@ def test_hill_holds_where_a_debonded_cell_stores_nothing(comm, shared_path, cont
     if comm.rank == 0:
         grid(lambda x, y: abs(x - 0.5) < 0.25).write(shared_path / "strip.msh")
     comm.barrier()
-    cell = bonds.tear(comm, geometry="mesh", file="strip.msh", folder=shared_path)
+    cell = torn_cells.tear(comm, geometry="mesh", file="strip.msh", folder=shared_path)
     context = context_of(comm, cell, contact)
     status = np.full(len(cell.solver.jump_operator.nodes.row), OPEN, np.int8)
     responses = context.homogenization.respond(np.eye(3), status, [context.zero_multipliers()] * 3)
@@ -55,7 +54,7 @@ def test_hill_holds_where_a_debonded_cell_stores_nothing(comm, shared_path, cont
 
 
 def test_jumps_are_told_on_the_scale_on_which_they_are_checked(comm):
-    cell = bonds.tear(comm, geometry="square", mesh_size=0.3)
+    cell = torn_cells.tear(comm, geometry="square", mesh_size=0.3)
     context = context_of(comm, cell)
     (response,) = context.homogenization.respond(np.eye(3)[:1], context.status(None), [context.zero_multipliers()])
     # Where the forces vanish the torn cell's jump does, too, and relative to it any jump is large.
@@ -69,7 +68,7 @@ def test_jumps_are_told_on_the_scale_on_which_they_are_checked(comm):
 
 @pytest.mark.parametrize(("rtol", "limit"), [(1e-10, 1e-7), (1e-7, 1e-4), (1e-3, 1e-4), (0.5, 1e-4)])
 def test_no_tolerance_lifts_the_limit_of_the_checks(comm, rtol, limit):
-    cell = bonds.tear(comm, geometry="square", mesh_size=0.3, petsc={"feti_ksp_rtol": rtol})
+    cell = torn_cells.tear(comm, geometry="square", mesh_size=0.3, petsc={"feti_ksp_rtol": rtol})
     context = context_of(comm, cell)
     for law in ("hill", "jump", "strain", "symmetry"):
         assert context.tolerance(law) == pytest.approx(limit)

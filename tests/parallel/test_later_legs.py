@@ -33,9 +33,10 @@ NEVER = StrengthCriterion(np.inf, np.inf, "max")
 
 
 def interface_with(cell, is_debonded):
-    """The interface with contact and the beginning of a path with some nodes debonded."""
+    """The interface with contact and the beginning of a path with some nodes debonded, or all (True)."""
     interface = torn_cells.interface(cell, True)
-    return interface, unloaded(interface, np.where(is_debonded, OPEN, BONDED).astype(np.int8))
+    debonded = np.broadcast_to(is_debonded, len(interface.nodes.row))
+    return interface, unloaded(interface, np.where(debonded, OPEN, BONDED).astype(np.int8))
 
 
 def largest_bend(interface, points, legs):
@@ -65,8 +66,8 @@ def test_free_fibres_are_straight_between_points(comm, case, waypoints):
     solves = cell.solver.solves - solves
     assert all(p.state.solution.reason > 0 and max(p.state.certificate.values()) < 1e-8 for p in points)
     assert largest_bend(interface, points, len(waypoints)) < STRAIGHT
-    # A state at each change, one past it, and one ahead, and a few pivots.
-    assert solves < 6 * len(points)
+    # A state at each change, one past it, and one ahead; pivots, and halvings where a fibre comes free.
+    assert solves < 10 * len(points)
 
 
 def test_partly_free_and_breaking_fibres_are_straight_between_points(comm):
