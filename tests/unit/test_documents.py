@@ -106,7 +106,7 @@ def test_modules_and_their_names_exist(path):
 
 @documents
 def test_commands_exist(path):
-    actions = cli._parser()._actions
+    actions = cli.command_parser()._actions
     known = next(set(action.choices) for action in actions if isinstance(action, argparse._SubParsersAction))
     named = re.findall(r"(?:feti-homog|-m feti_homog) ([a-z]+)", path.read_text(encoding="utf-8"))
     assert set(named) <= known

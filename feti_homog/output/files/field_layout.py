@@ -71,8 +71,8 @@ class StatePart:
     displacement: Float = described("displacement, that of the macroscopic strain included", LENGTH, "(n, 2)")
     fluctuation: Float = described("displacement less that of the macroscopic strain, periodic", LENGTH, "(n, 2)")
     stress: Float = described(f"means over the elements, {', '.join(STRESSES)}", STRESS, "(m, 3)")
-    traction: Float = described("normal and tangential traction on the matrix, tension positive", STRESS, "(k, 2)")
-    jump: Float = described("gap and slip: displacement of the matrix minus that of the fibre", LENGTH, "(k, 2)")
+    traction: Float = described("(t_n, t_t) that the matrix exerts on the fibre; tension positive", STRESS, "(k, 2)")
+    jump: Float = described("(gap, slip): displacement of the matrix minus that of the fibre", LENGTH, "(k, 2)")
     status: AnyInt = described("0 bonded, 1 closed (debonded, in contact), 2 open", shape="(k,)", dtype="int8")
 
 
