@@ -11,6 +11,7 @@ arc's whole opening in degrees, measured at that centre.  0 is perfect bonding, 
 
 from __future__ import annotations
 
+import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -21,7 +22,7 @@ import numpy as np
 from figures import INK
 from mpi4py.MPI import Intracomm
 
-from feti_homog.cli import launch, parsed
+from feti_homog import launch
 
 SHEAR = [0.0, 0.0, 0.2]
 STIFFNESSES = {"11": (0, 0), "22": (1, 1), "12": (0, 1), "33": (2, 2)}
@@ -30,28 +31,24 @@ PLANES = {"strain": "--", "stress": "-."}
 CONTACT = {"with contact": "-", "without contact": "--"}
 
 
-def main(words: Sequence[str], comm: Intracomm) -> int:
-    options = figures.parser(__doc__ or "", "debonding_angle", mesh_size=0.06, refine=0, order=2)
-    options.add_argument("--step", type=float, default=15.0, help="of the angle, in degrees")
-    given = parsed(options, words, comm)
+def main(given: argparse.Namespace, comm: Intracomm) -> None:
+    """Run the cases of both figures, write a table and draw it."""
     angles = [*np.arange(0.0, 360.0, 90.0 if given.quick else given.step).tolist(), 360.0]
 
-    def points(name: str, plane: str, contact: bool, **load: Any) -> list[dict[str, Any]]:
-        document = figures.solved(
+    def points(name: str, plane: str, contact: bool, **load: Any) -> dict[str, Any]:
+        return figures.solved(
             given, comm, name, "hexagonal", figures.EQUATION_38,
             analysis={"type": "angle", "plane": plane},
             interface={"contact": contact, "debonded": [{"fibre": "all", "centre": 0.0}]},
             angle={"values": angles, **load},
-        )  # fmt: skip
-        return list(document["angle"])
+        ).points  # fmt: skip
 
     i, j = np.array(list(STIFFNESSES.values())).T
-    free = {p: np.array([np.array(q["stiffness"])[i, j] for q in points(f"plane {p}", p, False)]) for p in PLANES}
+    free = {plane: points(f"plane {plane}", plane, False)["stiffness"][:, i, j] for plane in PLANES}
     shear = {
-        word: np.array([q["stress"] for q in points(f"shear {word}", "strain", word == "with contact", strain=SHEAR)])
-        for word in CONTACT
+        word: points(f"shear {word}", "strain", word == "with contact", strain=SHEAR)["stress"] for word in CONTACT
     }
-    return figures.finish(comm, write, given.out, angles, free, shear)
+    figures.finish(comm, write, given.out, angles, free, shear)
 
 
 def write(folder: Path, angles: list[float], free: dict[str, Any], shear: dict[str, Any]) -> list[Path]:
@@ -87,5 +84,11 @@ def _curves(
     axes.legend(frameon=False, fontsize=9)
 
 
+def parser() -> argparse.ArgumentParser:
+    options = figures.parser(__doc__ or "", "debonding_angle", mesh_size=0.06, refine=0, order=2)
+    options.add_argument("--step", type=float, default=15.0, help="of the angle, in degrees")
+    return options
+
+
 if __name__ == "__main__":
-    sys.exit(launch(main))
+    sys.exit(launch(main, parser()))

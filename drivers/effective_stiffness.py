@@ -17,7 +17,7 @@ from typing import Any
 from figures import EQUATION_38
 from mpi4py.MPI import Intracomm
 
-from feti_homog.cli import Parser, launch, parsed
+from feti_homog import Case, launch, run
 
 # C11, C12, C33 of Fourier solutions whose truncations agree to 2e-9.
 REFERENCE = {
@@ -29,15 +29,14 @@ REFERENCE = {
 ENTRIES = {"C11": (0, 0), "C12": (0, 1), "C33": (2, 2)}
 
 
-def main(words: Sequence[str], comm: Intracomm) -> int:
+def main(arguments: argparse.Namespace, comm: Intracomm) -> None:
     """Run the four cases, and the fractions asked for; print a table and draw it."""
-    arguments = parsed(_parser(), words, comm)
     if comm.rank == 0:
         print(f"{'cell':<10}{'plane':<8}" + "".join(f"{name:>13}{'error':>10}" for name in ENTRIES))
     for (geometry, plane), reference in REFERENCE.items():
         L = stiffness(arguments, comm, geometry, plane, 0.4)
-        if L is not None:
-            values = [L[i][j] for i, j in ENTRIES.values()]
+        if comm.rank == 0:
+            values = [L[i, j] for i, j in ENTRIES.values()]
             pairs = zip(values, reference, strict=True)
             columns = "".join(f"{value:13.6f}{abs(value / exact - 1):10.1e}" for value, exact in pairs)
             print(f"{geometry:<10}{plane:<8}{columns}", flush=True)
@@ -45,17 +44,10 @@ def main(words: Sequence[str], comm: Intracomm) -> int:
         sweep = [stiffness(arguments, comm, "hexagonal", "strain", c) for c in arguments.fractions]
         if comm.rank == 0:
             print(draw(arguments.fractions, sweep, arguments.out / "entries.png"))
-    return 0
 
 
-def stiffness(
-    arguments: argparse.Namespace, comm: Intracomm, geometry: str, plane: str, fraction: float
-) -> list[list[float]] | None:
-    """L^ef of one cell on rank 0, None on the others; its results go to a folder of its own."""
-    from feti_homog.analysis.runner import run
-    from feti_homog.config.case import parse
-    from feti_homog.output.files import result_json
-
+def stiffness(arguments: argparse.Namespace, comm: Intracomm, geometry: str, plane: str, fraction: float) -> Any:
+    """(3, 3) L^ef of one cell; its results go to a folder of its own."""
     name = f"{geometry}_{plane}_{round(100 * fraction)}"
     document: dict[str, Any] = {
         "name": name,
@@ -67,11 +59,7 @@ def stiffness(
         "analysis": {"type": "stiffness", "plane": plane},
         "output": {"fields": arguments.fields, "pictures": arguments.fields, "stress_unit": "GPa"},
     }  # fmt: skip
-    run(parse(document, Path()), arguments.out / name, comm, quiet=True)
-    if comm.rank:
-        return None
-    L: list[list[float]] = result_json.read(arguments.out / name)["effective_stiffness"]
-    return L
+    return run(Case.parse(document), comm, out=arguments.out / name).effective_stiffness
 
 
 def draw(fractions: Sequence[float], sweep: Sequence[Any], path: Path) -> Path:
@@ -83,7 +71,7 @@ def draw(fractions: Sequence[float], sweep: Sequence[Any], path: Path) -> Path:
     FigureCanvasAgg(figure)
     axes = figure.subplots()
     for name, (i, j) in ENTRIES.items():
-        axes.plot(fractions, [L[i][j] for L in sweep], "o-", label=name)
+        axes.plot(fractions, [L[i, j] for L in sweep], "o-", label=name)
     axes.set(xlabel="fibre fraction", ylabel="effective stiffness (GPa)", ylim=(0, None))
     axes.set_title("hexagonal cell, plane strain")
     axes.legend(frameon=False)
@@ -91,8 +79,8 @@ def draw(fractions: Sequence[float], sweep: Sequence[Any], path: Path) -> Path:
     return path
 
 
-def _parser() -> Parser:
-    parser = Parser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, default=Path("results/effective_stiffness"), metavar="DIR")
     parser.add_argument("--mesh-size", type=float, default=0.1, help="coarse element size / cell width")
     parser.add_argument("--refine", type=int, default=1)
@@ -103,4 +91,4 @@ def _parser() -> Parser:
 
 
 if __name__ == "__main__":
-    sys.exit(launch(main))
+    sys.exit(launch(main, _parser()))

@@ -11,22 +11,20 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import sweeping
 from mpi4py.MPI import Intracomm
 
-from feti_homog.cli import Parser, launch, parsed
+from feti_homog import launch
 
 HEADS = f"{'cell':<11}{'fraction':>8}{'C11':>11}{'C12':>11}{'C33':>11}{'isotropy':>11}{'+- C11':>10}{'+- C33':>10}"
 
 
-def main(words: Sequence[str], comm: Intracomm) -> int:
+def main(given: argparse.Namespace, comm: Intracomm) -> None:
     """Run the sweep, print its points and draw them."""
-    given = parsed(_parser(), words, comm)
-    return sweeping.swept(given, comm, document(given), report)
+    sweeping.swept(given, comm, document(given), report)
 
 
 def document(given: argparse.Namespace) -> dict[str, Any]:
@@ -59,7 +57,7 @@ def report(table: Any) -> list[str]:
     return lines
 
 
-def _parser() -> Parser:
+def _parser() -> argparse.ArgumentParser:
     options = sweeping.parser(__doc__ or "", "fibre_fraction_sweep")
     options.add_argument("--fractions", type=float, nargs="+", default=[0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.65])
     options.add_argument("--fibres", type=int, default=30, help="of the random cells")
@@ -69,4 +67,4 @@ def _parser() -> Parser:
 
 
 if __name__ == "__main__":
-    sys.exit(launch(main))
+    sys.exit(launch(main, _parser()))

@@ -10,7 +10,7 @@ from typing import Any
 
 from mpi4py.MPI import Intracomm
 
-from feti_homog.cli import Parser
+from feti_homog import Case, Result, run
 
 EQUATION_38 = {"matrix": {"young": 88.0, "poisson": 0.299}, "fibre": {"young": 200.0, "poisson": 0.222}}  # GPa
 EQUATION_42 = {"matrix": {"young": 100.0, "poisson": 0.4}, "fibre": {"young": 500.0, "poisson": 0.2}}  # GPa
@@ -18,9 +18,9 @@ STYLE = {"font.size": 10, "savefig.dpi": 200, "axes.spines.top": False, "axes.sp
 INK = ("#1f4e9c", "#c44e00", "#2a7f3f", "#7a3e9d")
 
 
-def parser(description: str, name: str, mesh_size: float, refine: int, order: int) -> Parser:
+def parser(description: str, name: str, mesh_size: float, refine: int, order: int) -> argparse.ArgumentParser:
     """The options that they all have; results go to results/`name` by default."""
-    options = Parser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--out", type=Path, default=Path("results") / name, metavar="DIR")
     options.add_argument("--mesh-size", type=float, default=mesh_size, help="coarse element size / cell width")
     options.add_argument("--refine", type=int, default=refine, help="times that every element is cut in four")
@@ -32,14 +32,15 @@ def parser(description: str, name: str, mesh_size: float, refine: int, order: in
 
 
 def solved(
-    options: argparse.Namespace, comm: Intracomm, name: str, geometry: str, material: Mapping[str, Any], **rest: Any
-) -> dict[str, Any]:
-    """result.json, on every rank, of the case `name`, in a folder of its own; `rest` are its other sections."""
-    from feti_homog.analysis.runner import run
-    from feti_homog.common.mpi_errors import on_root
-    from feti_homog.config.case import parse
-    from feti_homog.output.files import result_json
-
+    options: argparse.Namespace,
+    comm: Intracomm,
+    name: str,
+    geometry: str,
+    material: Mapping[str, Any],
+    keep_fields: bool = False,
+    **rest: Any,
+) -> Result:
+    """The result, on every rank, of the case `name`, in a folder of its own; `rest` are its other sections."""
     cell = {
         "geometry": geometry,
         "fibre_fraction": options.fibre_fraction,
@@ -48,10 +49,8 @@ def solved(
         "order": options.order,
     }
     output = {"stress_unit": "GPa", "fields": options.fields, "pictures": options.fields} | rest.pop("output", {})
-    case = parse({"name": name, "cell": cell, "material": dict(material), "output": output, **rest}, Path())
-    folder = options.out / name.replace(" ", "_")
-    run(case, folder, comm, quiet=True)
-    return on_root(comm, result_json.read, folder)
+    case = Case.parse({"name": name, "cell": cell, "material": dict(material), "output": output, **rest})
+    return run(case, comm, out=options.out / name.replace(" ", "_"), fields=keep_fields)
 
 
 def tabulate(path: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> Path:
@@ -63,13 +62,11 @@ def tabulate(path: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) -
     return path
 
 
-def finish(comm: Intracomm, write: Callable[..., list[Path]], *args: Any) -> int:
-    """Let rank 0 write its files and tell which; the exit code."""
-    import matplotlib as mpl
+def finish(comm: Intracomm, write: Callable[..., list[Path]], *args: Any) -> None:
+    """Let rank 0 write its files and tell which."""
+    if comm.rank == 0:
+        import matplotlib as mpl
 
-    from feti_homog.common.mpi_errors import on_root_only
-
-    with mpl.rc_context(STYLE):
-        for path in on_root_only(comm, write, *args) or []:
-            print(path)
-    return 0
+        with mpl.rc_context(STYLE):
+            for path in write(*args):
+                print(path)

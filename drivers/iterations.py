@@ -8,22 +8,16 @@ from __future__ import annotations
 import argparse
 import sys
 import time
-from collections.abc import Sequence
 from pathlib import Path
 
 from figures import EQUATION_38
 from mpi4py.MPI import Intracomm
 
-from feti_homog.cli import Parser, launch, parsed
+from feti_homog import Case, launch, run
 
 
-def main(words: Sequence[str], comm: Intracomm) -> int:
+def main(arguments: argparse.Namespace, comm: Intracomm) -> None:
     """Print degrees of freedom, multipliers, iterations of the three unit strains, and seconds of the run."""
-    from feti_homog.analysis.runner import run
-    from feti_homog.config.case import parse
-    from feti_homog.output.files import result_json
-
-    arguments = parsed(_parser(), words, comm)
     if comm.rank == 0:
         print(f"{'refine':>6}{'dofs':>10}{'multipliers':>13}  {'iterations':<14}{'seconds':>8}")
     for refine in arguments.refine:
@@ -39,17 +33,15 @@ def main(words: Sequence[str], comm: Intracomm) -> int:
             "petsc": {"feti_ksp_rtol": 1e-10},
         }  # fmt: skip
         start = time.perf_counter()
-        run(parse(document, Path()), arguments.out / f"refine_{refine}", comm, quiet=True)
+        solver = run(Case.parse(document), comm, out=arguments.out / f"refine_{refine}").solver
         seconds = time.perf_counter() - start
         if comm.rank == 0:
-            solver = result_json.read(arguments.out / f"refine_{refine}")["solver"]
-            counts = ", ".join(map(str, solver["iterations"]))
-            print(f"{refine:>6}{solver['dofs']:>10}{solver['multipliers']:>13}  {counts:<14}{seconds:8.1f}", flush=True)
-    return 0
+            counts = ", ".join(map(str, solver.iterations))
+            print(f"{refine:>6}{solver.dofs:>10}{solver.multipliers:>13}  {counts:<14}{seconds:8.1f}", flush=True)
 
 
-def _parser() -> Parser:
-    parser = Parser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, default=Path("results/iterations"), metavar="DIR")
     parser.add_argument("--mesh-size", type=float, default=0.062, help="coarse element size / cell width")
     parser.add_argument("--refine", type=int, nargs="+", default=[1, 2, 3])
@@ -59,4 +51,4 @@ def _parser() -> Parser:
 
 
 if __name__ == "__main__":
-    sys.exit(launch(main))
+    sys.exit(launch(main, _parser()))

@@ -12,22 +12,20 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
 import sweeping
 from mpi4py.MPI import Intracomm
 
-from feti_homog.cli import Parser, launch, parsed
+from feti_homog import launch
 
 NAMES = ("C11", "bulk", "shear")
 
 
-def main(words: Sequence[str], comm: Intracomm) -> int:
+def main(given: argparse.Namespace, comm: Intracomm) -> None:
     """Run the sweep, print means and scatter for each size, say which is representative, and draw."""
-    given = parsed(_parser(), words, comm)
-    return sweeping.swept(given, comm, document(given), partial(report, tolerance=given.tolerance))
+    sweeping.swept(given, comm, document(given), partial(report, tolerance=given.tolerance))
 
 
 def document(given: argparse.Namespace) -> dict[str, Any]:
@@ -82,7 +80,7 @@ def _laws(statistics: Any, number: int) -> str:
     return "; ".join(found)
 
 
-def _parser() -> Parser:
+def _parser() -> argparse.ArgumentParser:
     options = sweeping.parser(__doc__ or "", "representative_cell")
     options.add_argument("--fibres", type=int, nargs="+", default=[4, 8, 16, 32, 64], help="numbers of fibres")
     options.add_argument("--realisations", type=int, default=20, help="arrangements of each number")
@@ -95,4 +93,4 @@ def _parser() -> Parser:
 
 
 if __name__ == "__main__":
-    sys.exit(launch(main))
+    sys.exit(launch(main, _parser()))

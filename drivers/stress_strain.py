@@ -9,17 +9,16 @@ After its first drop a curve depends on the mesh: the mesh is in the title, comp
 
 from __future__ import annotations
 
+import argparse
 import sys
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import figures
 import numpy as np
 from figures import INK
 from mpi4py.MPI import Intracomm
 
-from feti_homog.cli import launch, parsed
+from feti_homog import Result, launch
 
 STRENGTHS = [(5.0, 5.0), (10.0, 10.0), (10.0, 5.0), (5.0, 1.5)]  # GPa: R^n, R^t
 STRAIN = [0.2, 0.0, 0.0]
@@ -27,66 +26,61 @@ HEADS = "    Rn    Rt  nodes  onset E11       S11 after drop   debonded  S11 at 
 COLUMNS = ("Rn", "Rt", "load_factor", "E11", "S11", "S22", "S12", "bonded", "open", "closed", "dissipated")
 
 
-def main(words: Sequence[str], comm: Intracomm) -> int:
-    options = figures.parser(__doc__ or "", "stress_strain", mesh_size=0.04, refine=0, order=1)
-    given = parsed(options, words, comm)
+def main(given: argparse.Namespace, comm: Intracomm) -> None:
+    """Run a path for each pair of strengths; print, write and draw the curves."""
     curves = {}
     for normal, tangential in STRENGTHS[:2] if given.quick else STRENGTHS:
-        document = figures.solved(
+        curves[normal, tangential] = figures.solved(
             given, comm, f"Rn {normal:g} Rt {tangential:g}", "square", figures.EQUATION_42,
             analysis={"type": "path", "plane": "stress"},
             interface={"normal_strength": normal, "tangential_strength": tangential},
             path={"strain": STRAIN},
         )  # fmt: skip
-        curves[normal, tangential] = document["path"]
-    return figures.finish(comm, write, given.out, curves, document["cell"])
+    figures.finish(comm, write, given.out, curves)
 
 
-def drop(normal: float, tangential: float, points: list[dict[str, Any]]) -> str:
+def drop(normal: float, tangential: float, result: Result) -> str:
     """Onset, what is left after the first drop under rising strain, and the end."""
-    onset, end = points[0], points[-1]
-    total = sum(onset[state] for state in ("bonded", "open", "closed"))
-    after = next((p for p in points[1:] if p["load_factor"] >= onset["load_factor"]), end)
-    fallen = after["stress"][0] * onset["load_factor"] / after["load_factor"]
-    share = 1.0 - after["bonded"] / total
+    points = result.path or ()
+    onset, end, (fallen, number) = points[0], points[-1], result.first_drop()
+    total = onset.bonded + onset.open + onset.closed
+    share = 1.0 - points[number].bonded / total
     return (
-        f"{normal:>6g}{tangential:>6g}{total:>7}{onset['strain'][0]:>11.6f}{onset['stress'][0]:>10.4f}"
-        f"{fallen:>10.4f}{100 * share:>9.1f} %{end['stress'][0]:>10.4f}"
+        f"{normal:>6g}{tangential:>6g}{total:>7}{onset.strain[0]:>11.6f}{onset.stress[0]:>10.4f}"
+        f"{fallen[0]:>10.4f}{100 * share:>9.1f} %{end.stress[0]:>10.4f}"
     )
 
 
-def write(folder: Path, curves: dict[tuple[float, float], Any], cell: dict[str, Any]) -> list[Path]:
+def write(folder: Path, curves: dict[tuple[float, float], Result]) -> list[Path]:
     """stress_strain.csv and stress_strain.png."""
     from matplotlib.figure import Figure
-
-    from feti_homog.output.plots.response_curves import strain_controlled
 
     print(HEADS)
     rows = []
     figure = Figure(figsize=(9.6, 4.4), layout="constrained")
     grid = figure.subplots(1, 2, sharex=True)
     # Narrower from curve to curve, so that those beneath are seen where they coincide.
-    for ((normal, tangential), points), ink, width in zip(curves.items(), INK, (3.0, 2.4, 1.8, 1.2), strict=False):
-        keys = ("bonded", "open", "closed", "dissipated")
-        for point in points:
-            row = [point["load_factor"], point["strain"][0], *point["stress"], *(point[key] for key in keys)]
-            rows.append([normal, tangential, *row])
-        held = strain_controlled(points, 0)
-        print(drop(normal, tangential, points))
-        every = np.array([[0.0] * 4, *([*p["stress"], p["strain"][0]] for p in points)])
+    for ((normal, tangential), result), ink, width in zip(curves.items(), INK, (3.0, 2.4, 1.8, 1.2), strict=False):
+        for p in result.path or ():
+            numbers = [p.load_factor, p.strain[0], *p.stress, p.bonded, p.open, p.closed, p.dissipated]
+            rows.append([normal, tangential, *numbers])
+        print(drop(normal, tangential, result))
+        rising, points = result.rising_strain(), result.points
         label = f"$R^\\mathrm{{n}}$ = {normal:g}, $R^\\mathrm{{t}}$ = {tangential:g} GPa"
         for k, axes in enumerate(grid):
-            axes.plot(every[:, 3], every[:, k], color=ink, linewidth=0.6, alpha=0.8)
-            axes.plot(held[:, 3], held[:, k], color=ink, linewidth=width, label=label)
+            strain, stress = np.append(0.0, points["strain"][:, 0]), np.append(0.0, points["stress"][:, k])
+            axes.plot(strain, stress, color=ink, linewidth=0.6, alpha=0.8)
+            axes.plot(rising[:, 3], rising[:, k], color=ink, linewidth=width, label=label)
     for axes, component, where in zip(grid, ("11", "22"), ("along", "across"), strict=True):
         axes.set(xlabel="$E_{11}$", ylabel=f"$\\Sigma_{{{component}}}$ (GPa)", title=f"{where} the strain")
         axes.axhline(0.0, color="0.6", linewidth=0.6, zorder=0)
         axes.grid(color="0.92", linewidth=0.6)
     grid[0].legend(frameon=False, fontsize=9)
-    figure.suptitle(f"Single-fibre cell, plane stress, {cell['elements']} elements", fontsize=11)
+    figure.suptitle(f"Single-fibre cell, plane stress, {result.cell.elements} elements", fontsize=11)
     figure.savefig(folder / "stress_strain.png")
     return [figures.tabulate(folder / "stress_strain.csv", COLUMNS, rows), folder / "stress_strain.png"]
 
 
 if __name__ == "__main__":
-    sys.exit(launch(main))
+    options = figures.parser(__doc__ or "", "stress_strain", mesh_size=0.04, refine=0, order=1)
+    sys.exit(launch(main, options))

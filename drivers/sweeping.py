@@ -10,7 +10,7 @@ from typing import Any
 from figures import EQUATION_38
 from mpi4py.MPI import Intracomm
 
-from feti_homog.cli import Parser
+from feti_homog import collect_sweep, run_sweep
 
 STIFFNESS = {
     "material": EQUATION_38,
@@ -19,9 +19,9 @@ STIFFNESS = {
 }
 
 
-def parser(description: str, name: str) -> Parser:
+def parser(description: str, name: str) -> argparse.ArgumentParser:
     """The options that they all have; results go to results/`name` by default."""
-    options = Parser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--out", type=Path, default=Path("results") / name, metavar="DIR")
     options.add_argument("--refine", type=int, default=0, help="times that every element is cut in four")
     options.add_argument("--order", type=int, choices=(1, 2), default=2, help="of the elements; 2 are curved")
@@ -32,14 +32,9 @@ def parser(description: str, name: str) -> Parser:
 
 def swept(
     given: argparse.Namespace, comm: Intracomm, document: dict[str, Any], report: Callable[[Any], list[str]]
-) -> int:
-    """Run the sweep, print the report of its table, and draw; the exit code."""
-    from feti_homog.common.mpi_errors import on_root, on_root_only
-    from feti_homog.sweep import collect, execute, plan
-
-    sweep = on_root(comm, plan.expand, document, Path())
-    execute.run_all(sweep, given.out, comm, given.ranks_per_case or comm.size, retry=True, quiet=given.quiet)
-    for tell in (lambda: report(collect.read(given.out)), lambda: collect.collect(given.out, True)):
-        for line in on_root_only(comm, tell) or []:
-            print(line)
-    return 0
+) -> None:
+    """Run the sweep, print the report of its table, and draw."""
+    table = run_sweep(document, given.out, comm, ranks_per_case=given.ranks_per_case, retry=True, quiet=given.quiet)
+    lines = [*report(table), *collect_sweep(given.out, comm)]
+    if comm.rank == 0:
+        print(*lines, sep="\n")

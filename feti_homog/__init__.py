@@ -1,12 +1,38 @@
-"""FETI-based homogenization of fibre composites; see the README. Importing it does not start MPI or PETSc.
+"""FETI-based homogenization of fibre composites; see the README.  Importing it starts neither MPI nor PETSc.
 
-From a program of one's own: `run(Case.load("case.toml"), comm)` is the result as arrays.
+From a program of one's own, under `mpirun` or not:
+
+    from feti_homog import Case, run
+    result = run(Case.load("case.toml"))            # the same on every rank; no files, no output
+    print(result)                                   # a short summary; in a notebook, tables
+    result.effective_stiffness, result.moduli.E1    # arrays and numbers; `Result` says what there is
+    run(case, out="results", fields=True).fields    # with files, and with mesh and states in memory
+
+- `Case`: a checked case, of a file (`Case.load`) or of a document of the same sections (`Case.parse`).
+- `run`: a case's `Result`.  `run_sweep`, `collect_sweep`: those of many cases, and their table.
+- `draw_state`: the deformed cell of a state into Matplotlib's axes.
+- `launch`: a program with options of its own and PETSc's, whose errors end as those of the command line do.
+- `CaseError`, `MeshError`, `ConvergenceError`, all of them `FetiHomogError`: raised on all ranks, `faults` in words.
 """
 
 __version__ = "0.1.0"
 
-from feti_homog.api import run
+from feti_homog.analysis.result import Result
+from feti_homog.api import collect_sweep, draw_state, launch, run, run_sweep
 from feti_homog.config.case import Case
 from feti_homog.errors import CaseError, ConvergenceError, FetiHomogError, MeshError
 
-__all__ = ["Case", "CaseError", "ConvergenceError", "FetiHomogError", "MeshError", "__version__", "run"]
+__all__ = [
+    "Case",
+    "CaseError",
+    "ConvergenceError",
+    "FetiHomogError",
+    "MeshError",
+    "Result",
+    "__version__",
+    "collect_sweep",
+    "draw_state",
+    "launch",
+    "run",
+    "run_sweep",
+]

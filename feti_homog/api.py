@@ -1,38 +1,183 @@
-"""Computing a case from a program of one's own; PETSc starts when the first case is run."""
+"""Computing from a program of one's own; PETSc starts when the first case is run."""
 
 from __future__ import annotations
 
+import argparse
+import contextlib
+import io
 import os
 import sys
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
+from feti_homog.common.petsc_option_table import split_argv
 from feti_homog.config.case import Case
+from feti_homog.errors import EXIT_DONE
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from mpi4py.MPI import Intracomm
 
     from feti_homog.analysis.result import Result
+    from feti_homog.sweep.plan import Sweep
+    from feti_homog.sweep.report.sweep_table import SweepTable
 
 
-def run(case: Case, comm: Intracomm | None = None) -> Result:
-    """The result of a case on every rank of `comm` (default: all ranks); nothing is written or printed.
+def run(
+    case: Case,
+    comm: Intracomm | None = None,
+    *,
+    out: str | Path | None = None,
+    fields: bool = False,
+    resume: bool = False,
+    quiet: bool = True,
+) -> Result:
+    """The result of a case on every rank of `comm` (default: all ranks).
 
     Collective over `comm`; ranks outside of it need not call it, nor wait.  If the program has not started PETSc,
     this does, without options: those of the case are in its `petsc`.
 
+    Args:
+        out: a folder for the files that `feti-homog run` writes; without it none is written.
+        fields: whether `result.fields` has mesh, interface and states in memory, each rank its part.
+        resume: with `out`, go on from where a path to the same folder was ended.
+        quiet: print nothing; else, with `out`, what the command line prints.
+
     Raises:
-        CaseError, MeshError: the case cannot be run.
-        ConvergenceError: a solve did not converge or a check failed.
+        CaseError, MeshError: the case cannot be run, or `out` cannot be used.
+        ConvergenceError: a solve did not converge or a check failed; what was computed is in `out`.
     """
+    comm = _started(comm)
+    from feti_homog.analysis import runner
+
+    if out is None:
+        return runner.compute(case, comm, fields)
+    return runner.run(case, Path(out), comm, quiet, resume, fields)
+
+
+def run_sweep(
+    cases: str | Path | Mapping[str, Any],
+    out: str | Path,
+    comm: Intracomm | None = None,
+    *,
+    ranks_per_case: int | None = None,
+    retry: bool = False,
+    quiet: bool = True,
+) -> SweepTable:
+    """Run the cases of a file with [sweep], or of such a document, and return their table on every rank.  Collective.
+
+    Finished cases in `out` are kept, so that the same call goes on after an interruption.
+
+    Args:
+        ranks_per_case: as many cases run at once as there are groups of so many ranks (default: one, on all).
+        retry: compute again what failed before.
+        quiet: do not print a line for each case.
+
+    Raises:
+        CaseError: the cases are faulty, or `out` cannot be used.
+        ConvergenceError: cases failed; `collect_sweep` makes the table of the others.
+    """
+    comm = _started(comm)
+    from feti_homog.common.mpi_errors import on_root
+    from feti_homog.sweep import collect, execute
+
+    expanded = on_root(comm, _expanded, cases)
+    execute.run_all(expanded, Path(out), comm, ranks_per_case or comm.size, retry, quiet)
+    return on_root(comm, collect.read, Path(out))
+
+
+def collect_sweep(out: str | Path, comm: Intracomm | None = None, *, pictures: bool = True) -> list[str]:
+    """Write sweep.csv, sweep.h5 and pictures of a sweep's folder; returns what to tell of it, and the files.
+
+    Collective; the sweep may still be running.
+
+    Raises:
+        CaseError: `out` is no folder of a sweep.
+    """
+    comm = _started(comm)
+    from feti_homog.common.mpi_errors import on_root
+    from feti_homog.sweep import collect
+
+    return on_root(comm, collect.collect, Path(out), pictures)
+
+
+def draw_state(axes: Axes, out: str | Path, number: int = 0, **choices: Any) -> str:
+    """Draw the deformed cell of a state of `out`/result.h5 into Matplotlib's axes; returns what is drawn, in words.
+
+    `choices`: `stress` ("S11", "S22" or "S12"; by default that of the largest strain) and `scale` of the displacements
+    (default 1).  Call it on one rank.
+    """
+    os.environ.setdefault("H5PY_ALWAYS_USE_MPI", "1")
+    from feti_homog.output.plots import deformed_panels
+
+    return deformed_panels.draw_state(axes, Path(out), number, **choices)
+
+
+def launch(
+    main: Callable[[argparse.Namespace, Intracomm], object],
+    parser: argparse.ArgumentParser,
+    argv: Sequence[str] | None = None,
+) -> int:
+    """Run main(arguments, all ranks) as a program: its exit code, for `sys.exit`.
+
+    PETSc starts with the options among `argv` (default: the process's) that have a single dash; `parser` reads the
+    others.  A FetiHomogError is printed once and gives its exit code; any other exception ends the job on all ranks.
+    """
+    return start(lambda words, comm: _parsed_main(main, parser, words, comm), argv)
+
+
+def start(command: Callable[[Sequence[str], Intracomm], int], argv: Sequence[str] | None = None) -> int:
+    """Start PETSc with its options among `argv` (default: the process's) and run command(the rest, all ranks).
+
+    Returns the exit code of `run_main`.
+    """
+    words, petsc = split_argv(sys.argv[1:] if argv is None else argv)
+    # Debian's h5py is the MPI build only if it is told so before its first import.
+    os.environ["H5PY_ALWAYS_USE_MPI"] = "1"
+    import petsc4py
+    from mpi4py import MPI
+
+    petsc4py.init([sys.argv[0], *petsc], comm=MPI.COMM_WORLD)
+    from feti_homog.common.mpi_errors import run_main
+
+    return run_main(MPI.COMM_WORLD, lambda: command(words, MPI.COMM_WORLD))
+
+
+def parsed(parser: argparse.ArgumentParser, words: Sequence[str], comm: Intracomm) -> argparse.Namespace:
+    """The arguments; help, version and argparse's own complaints are printed by rank 0."""
+    with contextlib.ExitStack() as silence:
+        if comm.rank:
+            silence.enter_context(contextlib.redirect_stdout(io.StringIO()))
+            silence.enter_context(contextlib.redirect_stderr(io.StringIO()))
+        return parser.parse_args(words)
+
+
+def _parsed_main(
+    main: Callable[[argparse.Namespace, Intracomm], object],
+    parser: argparse.ArgumentParser,
+    words: Sequence[str],
+    comm: Intracomm,
+) -> int:
+    main(parsed(parser, words, comm), comm)
+    return EXIT_DONE
+
+
+def _started(comm: Intracomm | None) -> Intracomm:
+    """The communicator, all ranks' by default, with PETSc started."""
     os.environ.setdefault("H5PY_ALWAYS_USE_MPI", "1")
     from mpi4py import MPI
 
-    comm = MPI.COMM_WORLD if comm is None else comm
     if "petsc4py.PETSc" not in sys.modules:
         import petsc4py
 
         # On more ranks it would wait for those that run no case, or have run one; cases bring their own communicator.
         petsc4py.init([], comm=MPI.COMM_SELF)
-    from feti_homog.analysis.runner import compute
+    return MPI.COMM_WORLD if comm is None else comm
 
-    return compute(case, comm)
+
+def _expanded(cases: str | Path | Mapping[str, Any]) -> Sweep:
+    """The sweep of a file or of a document."""
+    from feti_homog.sweep import plan
+
+    return plan.expand(cases, Path()) if isinstance(cases, Mapping) else plan.load(cases)

@@ -7,19 +7,16 @@ Options with a double dash are ours, with a single dash PETSc's.
 from __future__ import annotations
 
 import argparse
-import contextlib
-import io
 import json
-import os
 import signal
-import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
 from feti_homog import __version__
-from feti_homog.common.petsc_option_table import help_text, split_argv
+from feti_homog.api import parsed, start
+from feti_homog.common.petsc_option_table import help_text
 from feti_homog.errors import EXIT_DONE, CaseError
 
 if TYPE_CHECKING:
@@ -41,31 +38,8 @@ class Parser(argparse.ArgumentParser):
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command on all ranks; returns the exit code of DESIGN section 4."""
-    return launch(_command, argv)
-
-
-def launch(command: Callable[[Sequence[str], Intracomm], int], argv: Sequence[str] | None = None) -> int:
-    """Start PETSc with its options among `argv` (default: the process's) and run command(the rest, world).
-
-    Returns the exit code of `run_main`. For programs of their own, such as those in drivers/.
-    """
-    ours, petsc = split_argv(sys.argv[1:] if argv is None else argv)
-    # Debian's h5py is the MPI build only if it is told so before its first import.
-    os.environ["H5PY_ALWAYS_USE_MPI"] = "1"
-    import petsc4py
-    from mpi4py import MPI
-
-    petsc4py.init([sys.argv[0], *petsc], comm=MPI.COMM_WORLD)
-    from feti_homog.common.mpi_errors import run_main
-
-    return run_main(MPI.COMM_WORLD, lambda: command(ours, MPI.COMM_WORLD))
-
-
-def parsed(parser: argparse.ArgumentParser, words: Sequence[str], comm: Intracomm) -> argparse.Namespace:
-    """The arguments; help and version are printed once."""
-    with contextlib.redirect_stdout(sys.stdout if comm.rank == 0 else io.StringIO()):
-        return parser.parse_args(words)
+    """Run the command on all ranks; returns the exit code of `errors`."""
+    return start(_command, argv)
 
 
 def _command(words: Sequence[str], comm: Intracomm) -> int:

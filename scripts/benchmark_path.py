@@ -11,6 +11,7 @@ import sys
 import time
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import petsc4py
@@ -66,13 +67,13 @@ def main() -> None:
     print(f"an event, mean of {len(seconds):4d}      {mean:8.3f} s, 1/{peer / mean:.1f} of the peer")
     print(f"an event, worst             {max(seconds):8.3f} s, 1/{peer / max(seconds):.1f} of the peer")
     print(f"dual problems an event      {np.mean(solves):8.1f}, Krylov iterations an event {np.mean(iterations):.1f}")
-    made, coarse = len(cell.subdomains), cell.solver.coarse.factorizations
+    made, coarse = len(cell.subdomains), cell.solver.natural.factorizations
     print(f"factorizations              {made} of subdomains in all, {coarse} of the coarse problem")
     print(f"all events with set-up      {setup + sum(seconds):8.1f} s, the peer {peer * len(seconds):.1f} s")
     cell.solver.destroy()
 
 
-def document(arguments: argparse.Namespace) -> dict:
+def document(arguments: argparse.Namespace) -> dict[str, Any]:
     """The case: bonded at first, strengths low enough that many nodes break."""
     geometry = {"geometry": "hexagonal", "fibre_fraction": 0.4}
     if arguments.fibres:

@@ -33,6 +33,7 @@ from feti_homog.config import case as cases  # noqa: E402
 from feti_homog.config.case import Case  # noqa: E402
 from feti_homog.homogenization import unit_cell  # noqa: E402
 from feti_homog.homogenization.averaging import Homogenization  # noqa: E402
+from feti_homog.typing import Float  # noqa: E402
 
 PREFIX = "peer_"
 MEGABYTE = 2**20
@@ -126,7 +127,7 @@ def _solver(tool: Peer, A: PETSc.Mat, rtol: float) -> PETSc.KSP:
 
 
 def _report(
-    dofs: int, subdomains: int, columns: Sequence[np.ndarray], iterations: list[int], reasons: list[int]
+    dofs: int, subdomains: int, columns: Sequence[Float], iterations: list[int], reasons: list[int]
 ) -> dict[str, Any]:
     """What is compared; `columns` of L^ef are the stresses under the unit strains."""
     return {

@@ -30,28 +30,32 @@ CELLS = (
     {"geometry": "random", "fibre_fraction": 0.6, "mesh_size": 0.03, "fibres": 20, "min_gap": 0.04},
 )
 REFINEMENTS = (0, 1, 2, 3)
+STAGES = ("mesh", "assemble", "factor", "solve")
 
 
 def main() -> None:
     """Run the cases, each in a process of its own, and fit."""
     runs = [document(cell, refine) for cell in CELLS for refine in REFINEMENTS]
-    dofs, subdomains, iterations = (np.array([cost_of(run)[k] for run in runs]) for k in range(3))
-    stages = ("mesh", "assemble", "factor", "solve")
-    seconds = {name: np.array([run["timings"][name] for run in runs]) for name in stages}
-    coarse = np.array([run["cell"]["elements"] / 4 ** run["case"]["cell"]["refine"] for run in runs])
-    wall = np.array([run["wall"] for run in runs])
-    memory = np.array([run["memory"] for run in runs])
-    found = {
-        "START": fitted(wall - sum(seconds.values()), np.ones(len(runs))),
-        "MESH": fitted(seconds["mesh"], coarse),
-        "SETUP, SUBDOMAIN": fitted(seconds["assemble"] + seconds["factor"], dofs, subdomains),
-        "APPLY": fitted(seconds["solve"], dofs * iterations),
-        "BASE_BYTES, DOF_BYTES": fitted(memory, np.ones(len(runs)), dofs),
-    }
-    for names, (constants, ratios) in found.items():
+    for names, (constants, ratios) in fits(runs).items():
         for name, value in zip(names.split(", "), constants, strict=True):
-            print(f"{name if 'BYTES' in name else f'{name}_SECONDS'} = {value:.1e}")
+            print(f"{name} = {value:.1e}")
         print(f"    estimates are {ratios.min():.2f} to {ratios.max():.2f} times what was measured")
+
+
+def fits(runs: list[dict[str, Any]]) -> dict[str, tuple[Any, Any]]:
+    """For the names of constants, as `cost_model` has them: their values, and estimates over measurements."""
+    dofs, subdomains, iterations = (np.array([cost_of(run)[k] for run in runs]) for k in range(3))
+    mesh, assemble, factor, solve = (np.array([run["timings"][name] for run in runs]) for name in STAGES)
+    coarse = np.array([run["cell"]["elements"] / 4 ** run["case"]["cell"]["refine"] for run in runs])
+    wall, memory = (np.array([run[name] for run in runs]) for name in ("wall", "memory"))
+    one = np.ones(len(runs))
+    return {
+        "START_SECONDS": fitted(wall - mesh - assemble - factor - solve, one),
+        "MESH_SECONDS": fitted(mesh, coarse),
+        "SETUP_SECONDS, SUBDOMAIN_SECONDS": fitted(assemble + factor, dofs, subdomains),
+        "APPLY_SECONDS": fitted(solve, dofs * iterations),
+        "BASE_BYTES, DOF_BYTES": fitted(memory, one, dofs),
+    }
 
 
 def document(cell: dict[str, Any], refine: int) -> dict[str, Any]:

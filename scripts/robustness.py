@@ -10,9 +10,11 @@ import argparse
 import csv
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, fields
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import petsc4py
 
@@ -26,6 +28,7 @@ from feti_homog.common.petsc_options import case_options  # noqa: E402
 from feti_homog.common.progress import Progress  # noqa: E402
 from feti_homog.config import case as cases  # noqa: E402
 from feti_homog.config.case import Case  # noqa: E402
+from feti_homog.feti.thresholds import DEFAULTS, Thresholds  # noqa: E402
 from feti_homog.homogenization.unit_cell import tear  # noqa: E402
 
 # Coarse elements along the side of a cell with one fibre.
@@ -79,56 +82,71 @@ class Row(Cell):
     iterations: int
     seconds: float
 
+    @property
+    def cell(self) -> Cell:
+        """The combination alone."""
+        return Cell(*(getattr(self, f.name) for f in fields(Cell)))
+
+    def line(self) -> str:
+        """Of the table."""
+        return (
+            f"{self.fibres:6}{self.fraction:9.2f}{self.gap:6.2f}{self.pieces:7}{self.contrast:9.0e}{self.refine:7}"
+            f"{self.dofs:9}{self.subdomains:8}{self.boundary:9}{self.vectors:8.2f}{self.iterations:11}{self.seconds:8.1f}"
+        )
+
 
 def main() -> None:
     """Work off the list."""
     arguments = _parser().parse_args()
     comm = MPI.COMM_WORLD
-    done = _read(arguments.out) if comm.rank == 0 else []
-    done = comm.bcast(done)
-    grid = [
-        Cell(*values)
-        for values in product(
-            arguments.fibres, arguments.fractions, arguments.gaps, arguments.pieces, arguments.contrasts,
-            arguments.refine,
-        )
-    ]  # fmt: skip
-    known = {tuple(asdict(row)[f.name] for f in fields(Cell)) for row in done}
-    wanted = [cell for cell in grid if cell.possible and tuple(asdict(cell).values()) not in known]
-    if comm.rank == 0:
-        print(f"{len(grid)} combinations, {len(done)} done, {len(wanted)} to do")
-        print("fibres fraction   gap pieces contrast refine     dofs subdom. boundary vectors iterations seconds")
+    say = print if comm.rank == 0 else _silent
+    done: list[Row] = comm.bcast(_read(arguments.out) if comm.rank == 0 else [])
+    grid = combinations(arguments)
+    known = {row.cell for row in done}
+    wanted = [cell for cell in grid if cell.possible and cell not in known]
+    say(f"{len(grid)} combinations, {len(done)} done, {len(wanted)} to do")
+    say("fibres fraction   gap pieces contrast refine     dofs subdom. boundary vectors iterations seconds")
     for cell in wanted:
-        row = measure(cell, arguments.space, comm)
-        done.append(row)
+        done.append(measure(cell, arguments.space, comm))
+        say(done[-1].line(), flush=True)
         if comm.rank == 0:
-            print(
-                f"{row.fibres:6}{row.fraction:9.2f}{row.gap:6.2f}{row.pieces:7}{row.contrast:9.0e}{row.refine:7}"
-                f"{row.dofs:9}{row.subdomains:8}{row.boundary:9}{row.vectors:8.2f}{row.iterations:11}{row.seconds:8.1f}",
-                flush=True,
-            )
             _write(arguments.out, done)
-    if comm.rank == 0 and done:
-        iterations, vectors = (np.array([getattr(row, name) for row in done]) for name in ("iterations", "vectors"))
-        print(
-            f"{len(done)} cells: {iterations.min()} to {iterations.max()} iterations, {np.mean(iterations <= 25):.1%} "
-            f"within 25; {vectors.mean():.2f} coarse vectors a subdomain, at most {vectors.max():.2f}"
-        )
+    if done:
+        say(summary(done))
 
 
-def measure(cell: Cell, space: str, comm: MPI.Intracomm) -> Row:
-    """Tear and solve one cell."""
+def _silent(*_: object, **__: object) -> None:
+    """Prints nothing."""
+
+
+def combinations(arguments: argparse.Namespace) -> list[Cell]:
+    """All cells that the lists of the command line make."""
+    a = arguments
+    return [Cell(*of) for of in product(a.fibres, a.fractions, a.gaps, a.pieces, a.contrasts, a.refine)]
+
+
+def summary(rows: list[Row]) -> str:
+    """The range of iterations and of coarse vectors."""
+    iterations, vectors = (np.array([getattr(row, name) for row in rows]) for name in ("iterations", "vectors"))
+    return (
+        f"{len(rows)} cells: {iterations.min()} to {iterations.max()} iterations, {np.mean(iterations <= 25):.1%} "
+        f"within 25; {vectors.mean():.2f} coarse vectors a subdomain, at most {vectors.max():.2f}"
+    )
+
+
+def measure(cell: Cell, space: str, comm: MPI.Intracomm, thresholds: Thresholds = DEFAULTS) -> Row:
+    """Tear and solve one cell.  Collective."""
     start = time.perf_counter()
     case = cell.case(space)
     with case_options(case.petsc):
-        torn = tear(case, comm, Progress(comm, quiet=True))
+        torn = tear(case, comm, Progress(comm, quiet=True), thresholds=thresholds)
         solver = torn.solver
-        solutions = solver.solve_together(np.eye(3), np.zeros((solver.rows, 3)))
-    boundary = comm.allreduce(max((len(d) for d in solver.boundary.dofs), default=0), MPI.MAX)
+        solutions = solver.solve_many(np.eye(3), np.zeros((solver.rows, 3)))
+    boundary = comm.allreduce(max((len(d) for d in solver.interface_operators.dofs), default=0), MPI.MAX)
     dofs = torn.sum_over_ranks(len(solver.Q))
     iterations = solutions[0].iterations if solutions[0].reason > 0 else 9999
     seconds = time.perf_counter() - start
-    vectors = solver.coarse.vectors / torn.summary.subdomains
+    vectors = solver.coarse.coarse_dimension / torn.summary.subdomains
     solver.destroy()
     PETSc.garbage_cleanup(comm)
     return Row(**asdict(cell), dofs=dofs, subdomains=torn.summary.subdomains, boundary=boundary, vectors=vectors,
@@ -138,7 +156,7 @@ def measure(cell: Cell, space: str, comm: MPI.Intracomm) -> Row:
 def _read(path: Path) -> list[Row]:
     if not path.exists():
         return []
-    kinds = {"fraction": float, "gap": float, "contrast": float, "vectors": float, "seconds": float}
+    kinds: dict[str, Callable[[str], Any]] = dict.fromkeys(("fraction", "gap", "contrast", "vectors", "seconds"), float)
     with path.open(newline="") as stream:
         return [Row(**{k: kinds.get(k, int)(v) for k, v in line.items()}) for line in csv.DictReader(stream)]
 

@@ -13,12 +13,13 @@ import json
 import os
 import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 from benchmark import job
 from scaling_forecast import assumptions, checks, forecast, table, verdict
-from scaling_model import Machine, measured
+from scaling_model import Machine, Prediction, measured
 from scaling_plot import plot
 from scaling_report import Row, by_ranks, by_size, speedups, write
 
@@ -53,9 +54,7 @@ def main() -> int:
     runs = planned(arguments)
     wanted = dict.fromkeys(run for study in arguments.studies for run in runs[study])
     done = [work_off(run, arguments) for run in wanted]
-    found = {study: [row for run in some for row in read(run.report(arguments.out))] for study, some in runs.items()}
-    # The largest run of weak scaling is one of strong scaling too; by itself it tells nothing.
-    found = {study: rows if study in arguments.studies or len(rows) > 1 else [] for study, rows in found.items()}
+    found = {study: rows_of(study, some, arguments) for study, some in runs.items()}
     print(*report(found, arguments), sep="\n")
     write(arguments.out / "scaling.csv", found)
     return int(not all(done) or any(not row.converged for rows in found.values() for row in rows))
@@ -99,31 +98,46 @@ def read(path: Path) -> list[Row]:
     return [Row(**json.loads(path.read_text()))] if path.exists() else []
 
 
+def rows_of(study: str, runs: Sequence[Run], arguments: argparse.Namespace) -> list[Row]:
+    """The runs of a study that are there.
+
+    The largest run of weak scaling is one of strong scaling too; by itself it tells nothing.
+    """
+    rows = [row for run in runs for row in read(run.report(arguments.out))]
+    return rows if study in arguments.studies or len(rows) > 1 else []
+
+
 def report(found: dict[str, list[Row]], arguments: argparse.Namespace) -> list[str]:
     """All tables and what the model says; draws the picture."""
-    lines: list[str] = []
-    for study, rows in found.items():
-        if rows:
-            lines += ["", STUDIES[study]]
-            lines += by_size(rows) if study == "sizes" else by_ranks(rows, arguments.cores)
-            lines += [] if study == "sizes" else speedups(rows, arguments.cores)
+    lines = [line for study, rows in found.items() if rows for line in study_tables(study, rows, arguments.cores)]
     rows = list({(row.dofs, row.ranks): row for some in found.values() for row in some}.values())
-    if not any(row.ranks == 1 for row in rows) or not any(row.ranks > 1 for row in rows):
+    if {row.ranks == 1 for row in rows} != {True, False}:
         return [*lines, "", "the cost model needs a run on one rank and one on more"]
-    lines += [
-        "",
-        f"counted bytes of multipliers and PETSc's log differ by {max(r.miscounted for r in rows):.1%} at most",
-    ]
+    miscounted = max(row.miscounted for row in rows)
     machine = Machine(1e-6 * arguments.latency, 1e9 * arguments.bandwidth)
     rates = measured(rows, arguments.cores)
-    lines += ["", *assumptions(rates, machine), "", *checks(rates, machine, rows, arguments.cores)]
     futures = forecast(rates, machine)
-    for title, series in futures.items():
-        lines += ["", *table(title, series)]
-    lines += ["", *(line for title, series in futures.items() for line in verdict(title, series))]
     picture = arguments.out / "scaling.png"
     plot(picture, found, futures)
-    return [*lines, "", f"{picture} {arguments.out / 'scaling.csv'}"]
+    return [
+        *lines,
+        *("", f"counted bytes of multipliers and PETSc's log differ by {miscounted:.1%} at most"),
+        *("", *assumptions(rates, machine), "", *checks(rates, machine, rows, arguments.cores)),
+        *forecast_lines(futures),
+        *("", f"{picture} {arguments.out / 'scaling.csv'}"),
+    ]
+
+
+def forecast_lines(futures: dict[str, list[Prediction]]) -> list[str]:
+    """A table of each series of predictions, then what stops the scaling."""
+    tables = [line for title, series in futures.items() for line in ("", *table(title, series))]
+    return [*tables, "", *(line for title, series in futures.items() for line in verdict(title, series))]
+
+
+def study_tables(study: str, rows: Sequence[Row], cores: int) -> list[str]:
+    """The tables of one study."""
+    tables = by_size(rows) if study == "sizes" else [*by_ranks(rows, cores), *speedups(rows, cores)]
+    return ["", STUDIES[study], *tables]
 
 
 def _parser() -> argparse.ArgumentParser:

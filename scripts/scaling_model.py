@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import ceil, log2, sqrt
+from typing import Any
 
 from scaling_report import COARSE_SUMS, GATHERS, SCALARS, SUMS, SUMS_TOGETHER, VALUE_BYTES, Row
 
@@ -64,12 +65,15 @@ class Rates:
 
 
 def measured(rows: Sequence[Row], cores: int) -> Rates:
-    """Rates from the rows: local work from those on one rank, sizes and counts from all."""
+    """Rates from the rows: times from those whose ranks each have a core, sizes and counts from all."""
+    return Rates(**_times(rows, cores), **_per_dof(rows), **_counts(rows, cores))
+
+
+def _times(rows: Sequence[Row], cores: int) -> dict[str, Any]:
+    """Seconds per unit of work: of the subdomains on one rank, of mesh and coarse problem on all that have a core."""
     timed = [row for row in rows if row.ranks <= cores]
     alone = [row for row in rows if row.ranks == 1]
-    told = [row for row in rows if row.ranks > 1] or rows
-    most = max(rows, key=lambda row: (row.ranks, row.dofs))
-    return Rates(
+    return dict(
         mesh=_rate((row.seconds["mesh"], row.triangles) for row in timed),
         assemble=_rate((row.seconds["assemble"], row.dofs) for row in alone),
         setup=_rate((row.seconds["set-up"] - row.coarse_factor, row.dofs) for row in alone),
@@ -78,13 +82,27 @@ def measured(rows: Sequence[Row], cores: int) -> Rates:
         ),
         factor=_rate((row.coarse_factor, _factored(row.coarse, row.vectors, row.ranks)) for row in timed),
         solve=_rate((row.coarse_solve, _solved(row.coarse, row.vectors, row.ranks, row.loads)) for row in timed),
-        loads=rows[0].loads,
+    )
+
+
+def _per_dof(rows: Sequence[Row]) -> dict[str, Any]:
+    """Sizes per dof."""
+    several = [row for row in rows if row.ranks > 1] or rows
+    return dict(
         triangles=_rate((row.triangles, row.dofs) for row in rows),
         subdomains=_rate((row.subdomains, row.dofs) for row in rows),
         vectors=_rate((row.vectors, row.dofs) for row in rows),
         coarse=_rate((row.coarse, row.dofs) for row in rows),
-        coarse_bytes=_rate((row.coarse_bytes, row.dofs) for row in told),
-        largest_coarse=max(row.coarse for row in timed),
+        coarse_bytes=_rate((row.coarse_bytes, row.dofs) for row in several),
+    )
+
+
+def _counts(rows: Sequence[Row], cores: int) -> dict[str, Any]:
+    """The largest counts of all rows."""
+    most = max(rows, key=lambda row: (row.ranks, row.dofs))
+    return dict(
+        loads=rows[0].loads,
+        largest_coarse=max(row.coarse for row in rows if row.ranks <= cores),
         iterations=max(row.iterations for row in rows),
         surface=max(row.values / sqrt(row.dofs / row.ranks) for row in rows),
         neighbours=max(max(row.neighbours) for row in rows),
@@ -94,21 +112,20 @@ def measured(rows: Sequence[Row], cores: int) -> Rates:
 
 def _factored(coarse: float, vectors: float, ranks: int) -> float:
     """Work of a coarse factorization on the busiest rank: all of it, or a share where ranks do it together."""
-    return coarse**COARSE_POWER / (ranks**TOGETHER if vectors > DEFAULTS.replicated_vectors else 1.0)
+    share: float = ranks**TOGETHER if vectors > DEFAULTS.replicated_vectors else 1.0
+    return float(coarse**COARSE_POWER) / share
 
 
 def _solved(coarse: float, vectors: float, ranks: int, loads: int) -> float:
     """Work of the coarse solves on the busiest rank: for the loads that are dealt to it, or a share of all."""
-    return (
-        coarse
-        * log2(coarse)
-        * (loads / ranks**TOGETHER if vectors > DEFAULTS.replicated_vectors else ceil(loads / ranks))
-    )
+    replicated = vectors <= DEFAULTS.replicated_vectors
+    share: float = ceil(loads / ranks) if replicated else loads / ranks**TOGETHER
+    return coarse * log2(coarse) * share
 
 
 def _rate(pairs: Iterable[tuple[float, float]]) -> float:
     """All seconds over all work, so that large runs count most."""
-    seconds, work = (sum(values) for values in zip(*pairs, strict=True))
+    seconds, work = (float(sum(values)) for values in zip(*pairs, strict=True))
     return max(seconds / work, 0.0)
 
 

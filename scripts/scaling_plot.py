@@ -22,26 +22,16 @@ STUDY_INK = {"weak": "#1f4e9c", "strong": "#c44e00"}
 
 def plot(path: Path, studies: dict[str, list[Row]], futures: dict[str, list[Prediction]]) -> None:
     """Iterations and messages by ranks, seconds by size, and the shares of the predicted times."""
-    figure, ((left, middle), (right, shares)) = plt.subplots(2, 2, figsize=(11, 7.5))
-    for study, ink in STUDY_INK.items():
-        rows = studies[study]
-        if not rows:
-            continue
-        ranks = [row.ranks for row in rows]
-        left.plot(ranks, [row.iterations for row in rows], "o-", color=ink, label=study)
-        several = [row for row in rows if row.ranks > 1]
-        sent = [row.sent / 1e3 for row in several]
-        middle.plot([row.ranks for row in several], sent, "o-", color=ink, label=f"{study}: multipliers sent")
-        middle.plot(ranks, [row.summed / 1e3 for row in rows], "s--", color=ink, label=f"{study}: coarse sums")
-    left.set(xlabel="ranks", ylabel="iterations")
-    left.set_ylim(0, 1.3 * max(row.iterations for study in STUDY_INK for row in studies[study]))
-    middle.set(xlabel="ranks", ylabel="kB of the busiest rank in an iteration", yscale="log")
-    for axes in (left, middle):
+    figure, ((iterations, messages), (sizes, shares)) = plt.subplots(2, 2, figsize=(11, 7.5))
+    by_ranks = {study: studies[study] for study in STUDY_INK if studies[study]}
+    _iterations(iterations, by_ranks)
+    _messages(messages, by_ranks)
+    for axes in (iterations, messages):
         axes.set_xscale("log", base=2)
         axes.xaxis.set_major_formatter("{x:g}")
-    _sizes(right, studies["sizes"])
+    _sizes(sizes, studies["sizes"])
     _shares(shares, futures)
-    for axes in (left, middle, right, shares):
+    for axes in (iterations, messages, sizes, shares):
         # Above the axes, where there are no data.
         axes.legend(fontsize=8, ncols=2, loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False)
         axes.spines[["top", "right"]].set_visible(False)
@@ -50,7 +40,28 @@ def plot(path: Path, studies: dict[str, list[Row]], futures: dict[str, list[Pred
     plt.close(figure)
 
 
+def _iterations(axes: Axes, studies: dict[str, list[Row]]) -> None:
+    """Iterations of weak and strong scaling by ranks."""
+    for study, rows in studies.items():
+        ranks, iterations = [row.ranks for row in rows], [row.iterations for row in rows]
+        axes.plot(ranks, iterations, "o-", color=STUDY_INK[study], label=study)
+    axes.set(xlabel="ranks", ylabel="iterations")
+    axes.set_ylim(0, 1.3 * max(row.iterations for rows in studies.values() for row in rows))
+
+
+def _messages(axes: Axes, studies: dict[str, list[Row]]) -> None:
+    """Multipliers sent and coarse vectors summed in an iteration by ranks."""
+    for study, rows in studies.items():
+        ink, several = STUDY_INK[study], [row for row in rows if row.ranks > 1]
+        sent = [row.sent / 1e3 for row in several]
+        axes.plot([row.ranks for row in several], sent, "o-", color=ink, label=f"{study}: multipliers sent")
+        summed = [row.summed / 1e3 for row in rows]
+        axes.plot([row.ranks for row in rows], summed, "s--", color=ink, label=f"{study}: coarse sums")
+    axes.set(xlabel="ranks", ylabel="kB of the busiest rank in an iteration", yscale="log")
+
+
 def _sizes(axes: Axes, rows: Sequence[Row]) -> None:
+    """Cost per dof by size."""
     axes.set_visible(len(rows) > 0)
     places, start = np.arange(len(rows)), np.zeros(len(rows))
     for stage, ink in zip(STAGES, STAGE_INK, strict=True):

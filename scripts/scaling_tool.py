@@ -31,6 +31,7 @@ from feti_homog.config.case import Case  # noqa: E402
 from feti_homog.feti.coarse.adaptive import AdaptiveCoarseSpace  # noqa: E402
 from feti_homog.feti.decomposition.jump_operator import JumpOperator  # noqa: E402
 from feti_homog.homogenization.unit_cell import TornCell, tear  # noqa: E402
+from feti_homog.typing import Int  # noqa: E402
 
 LOADS = 3
 RTOL = 1e-8
@@ -85,7 +86,7 @@ def measure(case: Case, progress: Progress) -> dict[str, Any]:
     solver = cell.solver
     progress.seconds["set-up"] = progress.seconds.pop("factor")
     with progress.stage("solve"):
-        solutions = solver.solve_together(np.eye(LOADS), np.zeros((solver.rows, LOADS)))
+        solutions = solver.solve_many(np.eye(LOADS), np.zeros((solver.rows, LOADS)))
     memory = sum(comm.allgather(peak()))
     if not isinstance(solver.coarse, AdaptiveCoarseSpace):
         raise TypeError("the study is of the adaptive coarse space")
@@ -96,8 +97,8 @@ def measure(case: Case, progress: Progress) -> dict[str, Any]:
         "fullest": max(own),
         "triangles": cell.summary.coarse_triangles,
         "subdomains": cell.summary.subdomains,
-        "vectors": solver.coarse.vectors,
-        "kernel": solver.coarse.dimension,
+        "vectors": solver.coarse.coarse_dimension,
+        "kernel": solver.natural.kernel_dimension,
         "iterations": solutions[0].iterations,
         "converged": solutions[0].reason > 0,
         "seconds": progress.timings(),
@@ -127,7 +128,7 @@ def _messages(cell: TornCell) -> dict[str, Any]:
     }
 
 
-def _foreign(jump_operator: JumpOperator, comm: MPI.Intracomm) -> np.ndarray:
+def _foreign(jump_operator: JumpOperator, comm: MPI.Intracomm) -> Int:
     """(ranks,) local rows that each of the other ranks owns."""
     ends = np.array(comm.allgather(jump_operator.owned[1]))
     counts = np.bincount(np.searchsorted(ends, jump_operator.rows, side="right"), minlength=comm.size)
@@ -137,7 +138,7 @@ def _foreign(jump_operator: JumpOperator, comm: MPI.Intracomm) -> np.ndarray:
 
 def _coarse(coarse: AdaptiveCoarseSpace, comm: MPI.Intracomm) -> dict[str, float]:
     """Seconds to sum and factor the coarse matrices and to solve with them once, and bytes that every rank is told."""
-    right = np.ones((coarse.vectors, LOADS)), np.ones((coarse.dimension, LOADS))
+    right = np.ones((coarse.coarse_dimension, LOADS)), np.ones((coarse.natural.kernel_dimension, LOADS))
     solve = min(_seconds(lambda: coarse.saddle.solve(*right)) for _ in range(TIMED))
     return {
         "coarse_factor": comm.allreduce(_seconds(coarse.factor), MPI.MAX),

@@ -10,7 +10,7 @@ import numpy as np
 
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.config.sections import LoadPath
-from feti_homog.feti.solver import DualSolution
+from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.interface.contact import Equilibrium
 from feti_homog.interface.path_following import events, increments
 from feti_homog.interface.path_points import PathState, Point, unloaded

@@ -13,6 +13,7 @@ from feti_homog.analysis.result_fields import Fields
 from feti_homog.analysis.result_html import tables
 from feti_homog.analysis.result_records import AnglePoint, CellInfo, Checks, PathPoint, SolverInfo, StiffnessBounds
 from feti_homog.common.records import BYTES, SECONDS, STRESS, Key, described, keys, plain, restored
+from feti_homog.mechanics import response
 from feti_homog.mechanics.bounds import Moduli
 from feti_homog.output.files.result_json import SCHEMA
 from feti_homog.output.text.summary import short_summary
@@ -83,6 +84,25 @@ class Result:
         """
         documents = [plain(point) for point in (*(self.angle or ()), *(self.path or ()))]
         return {name: np.array([point[name] for point in documents]) for name in (documents[0] if documents else ())}
+
+    def rising_strain(self) -> Float:
+        """(v, 4) corners S11, S22, S12 and size of the leading strain along a path of one leg, as a test with rising
+        strain follows it: where bonds break the stress drops to the next branch that holds.
+
+        Raises ValueError for any other result.
+        """
+        curve = response.rising_strain(self.document)
+        if curve is None:
+            raise ValueError("only a path of one leg has a response to a rising strain")
+        return curve
+
+    def first_drop(self) -> tuple[Float, int]:
+        """(3,) stress left after the first break of a path of one leg, the strain being held there, and the number of
+        the point whose branch it is on.  Raises ValueError for any other result."""
+        document = self.document
+        if not self.path or not response.is_proportional(document):
+            raise ValueError("only a path of one leg, followed by events, has a first drop")
+        return response.first_drop(document["path"])
 
     def __str__(self) -> str:
         return short_summary(self.document)

@@ -100,9 +100,7 @@ class PathPoint:
     broke: int = described("bonds that break here")
     free_motions: int = described("rigid motions of fibres that no interface force resists")
     dissipated: float = described("energy lost to breaks so far per area of the cell, along all equilibria", STRESS)
-    dissipated_strain_controlled: float | None = described(
-        "the same if the strain only rises on the first leg", STRESS, default=None
-    )
+    dissipated_strain_controlled: float = described("the same if the strain only rises on the first leg", STRESS)
     bonded: int = described("bonded interface nodes")
     open: int = described("debonded interface nodes without contact")
     closed: int = described("debonded interface nodes in contact")

@@ -18,6 +18,14 @@ class Option:
     help: str
 
 
+def _direct_solver(prefix: str, matrix: str, library: str = "cholmod") -> tuple[Option, Option]:
+    """The options of a direct solver."""
+    return (
+        Option(f"{prefix}pc_type", "cholesky|lu", "cholesky", f"factorization of {matrix}"),
+        Option(f"{prefix}pc_factor_mat_solver_type", "cholmod|mumps|...", library, f"library of {matrix}"),
+    )
+
+
 OPTIONS = (
     Option("feti_ksp_type", "cg|fcg|gmres|...", "cg", "Krylov method on the projected dual operator"),
     Option("feti_ksp_rtol", "<real>", "1e-8", "relative tolerance of the dual and the primal residuals"),
@@ -47,41 +55,23 @@ OPTIONS = (
     ),
     Option("feti_coarse_threshold", "<real>", "0.24", "softer modes are deflated; fewer iterations if larger"),
     Option("feti_view", "", "", "print subdomains, coarse space and estimated condition numbers"),
-    Option("feti_sub_ksp_type", "preonly|...", "preonly", "subdomain solves"),
-    Option("feti_sub_pc_type", "cholesky|lu", "cholesky", "subdomain factorizations"),
-    Option(
-        "feti_sub_pc_factor_mat_solver_type",
-        "cholmod|mumps",
-        "cholmod",
-        "library of the subdomain factorizations",
-    ),
-    Option(
-        "feti_interior_pc_type",
-        "cholesky|lu",
-        "cholesky",
-        "interior factorizations of the Dirichlet preconditioner",
-    ),
-    Option(
-        "feti_interior_pc_factor_mat_solver_type",
-        "cholmod|mumps",
-        "cholmod",
-        "library of the interior factorizations",
-    ),
-    Option("feti_natural_pc_type", "cholesky|lu", "cholesky", "factorization of the rigid-body coarse problem"),
-    Option(
-        "feti_natural_pc_factor_mat_solver_type",
-        "cholmod|mumps",
-        "cholmod",
-        "library of the rigid-body coarse factorization",
-    ),
-    Option("feti_coarse_pc_factor_mat_solver_type", "cholmod|mumps", "cholmod", "library of the coarse factor"),
-    Option("feti_bonded_pc_factor_mat_solver_type", "cholmod|mumps", "cholmod", "library of the bonded cell's factor"),
+    Option("feti_schur_mat_mumps_icntl_7", "0|2|3|4|5|6|7", "7", "MUMPS' ordering in the partial factorizations"),
+    Option("feti_schur_mat_mumps_icntl_14", "<integer>", "20", "MUMPS' extra workspace there, in per cent"),
+    Option("feti_sub_ksp_type", "preonly|...", "preonly", "solves with implicit subdomains"),
+    *_direct_solver("feti_sub_", "implicit subdomains"),
+    *_direct_solver("feti_interior_", "interiors, of implicit subdomains and for fields"),
+    *_direct_solver("feti_natural_", "the rigid-body coarse problem"),
+    *_direct_solver("feti_coarse_", "the adaptive coarse problem; mumps where all ranks factor it together"),
+    *_direct_solver("feti_bonded_", "the cell with all bonds intact, for influence columns"),
 )
+"""Every option that a run accepts whether or not it makes the solver which reads it."""
 
-PREFIXES = (
-    "feti_ksp_", "feti_pc_", "feti_sub_", "feti_interior_", "feti_schur_", "feti_natural_", "feti_coarse_",
-    "feti_bonded_",
+DIRECT_PREFIXES = (
+    "feti_sub_", "feti_interior_", "feti_schur_", "feti_natural_", "feti_coarse_", "feti_bonded_",
 )  # fmt: skip
+"""Prefixes of PETSc's direct solvers."""
+
+PREFIXES = ("feti_ksp_", "feti_pc_", *DIRECT_PREFIXES)
 """Prefixes of PETSc solvers: what follows is PETSc's to know."""
 
 OWN_SHORT = ("-h",)
@@ -120,14 +110,19 @@ def option_names(petsc: Iterable[str]) -> list[str]:
 
 def unknown_options(names: Iterable[str]) -> list[str]:
     """One fault for each name (without dash) that begins with feti_ but is no option of the solver."""
-    known = [option.name for option in OPTIONS]
-    unknown = [n for n in names if n.startswith("feti_") and n not in known and not _has_solver_prefix(n)]
-    faults = []
-    for name in unknown:
-        nearest = difflib.get_close_matches(name, known, n=1)
-        hint = f"did you mean -{nearest[0]}?" if nearest else f"known prefixes: -{', -'.join(PREFIXES)}"
-        faults.append(f"-{name}: unknown option; {hint}")
-    return faults
+    unknown = [n for n in names if n.startswith("feti_") and not is_in_table(n) and not _has_solver_prefix(n)]
+    return [f"-{name}: unknown option; {suggestion(name)}" for name in unknown]
+
+
+def is_in_table(name: str) -> bool:
+    """Whether OPTIONS has the name (without dash)."""
+    return any(name == option.name for option in OPTIONS)
+
+
+def suggestion(name: str) -> str:
+    """The option of the table that a misspelt name is nearest to, or the prefixes, in words."""
+    nearest = difflib.get_close_matches(name, [option.name for option in OPTIONS], n=1)
+    return f"did you mean -{nearest[0]}?" if nearest else f"known prefixes: -{', -'.join(PREFIXES)}"
 
 
 def _has_solver_prefix(name: str) -> bool:

@@ -110,7 +110,7 @@ def keys(kind: type, above: str = "") -> Iterator[Key]:
     hints = typing.get_type_hints(kind)
     for name, description in descriptions(kind).items():
         path, hint = f"{above}{name}", _without_none(hints[name])
-        yield Key(path, _type_words(hint, description), description.unit, description.meaning)
+        yield Key(path, type_words(hint, description), description.unit, description.meaning)
         for key, meaning in description.entries.items():
             item = typing.get_args(hint)[1]
             yield Key(f"{path}.{key}", WORDS.get(item, "any"), description.unit, meaning)
@@ -147,7 +147,8 @@ def _record_of_tuple(hint: Any) -> type | None:
     return item if dataclasses.is_dataclass(item) and isinstance(item, type) else None
 
 
-def _type_words(hint: Any, description: Description) -> str:
+def type_words(hint: Any, description: Description) -> str:
+    """The type of a field for a reference table."""
     if description.shape:
         return f"numbers {description.shape}"
     if dataclasses.is_dataclass(hint) or typing.get_origin(hint) not in (None, tuple):

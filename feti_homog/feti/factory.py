@@ -1,94 +1,93 @@
-"""The parts of the solver that the options ask for: boundary operators, preconditioner, coarse problem."""
+"""The parts of the solver: boundary operators, preconditioner and coarse spaces, made as `solver_plan` chooses."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from feti_homog.errors import CaseError
-from feti_homog.feti.coarse.adaptive import THRESHOLD, AdaptiveCoarseSpace
+from feti_homog.feti.coarse.adaptive import AdaptiveCoarseSpace
+from feti_homog.feti.coarse.coarse_space import CoarseSpace
 from feti_homog.feti.coarse.natural import NaturalCoarseSpace
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.subdomain import Subdomain
-from feti_homog.feti.operators.choice import KINDS
 from feti_homog.feti.operators.explicit import ExplicitInterfaceOperator
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.preconditioners.assembled_schur import shared_dofs
 from feti_homog.feti.preconditioners.influence import Influence
 from feti_homog.feti.preconditioners.scaled import Dirichlet, Identity, Lumped, Preconditioner
+from feti_homog.feti.solver_plan import ProblemSizes, SolverOptions, choose
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 
-COARSE_SPACES = ("auto", "natural", "adaptive")
-PRECONDITIONERS = ("auto", "none", "lumped", "dirichlet", "influence")
-# Applications of the dual operator from which on influence pays, the largest bonded cell to factor for it, and the
-# most nodes that may be debonded from the start.
-MANY, LARGEST_BONDED, MOST_PRECRACKED = 1000, 40_000, 500
+
+@dataclass(frozen=True)
+class SolverParts:
+    """What the Krylov method works with; `coarse` is `natural` itself where nothing else is deflated."""
+
+    operators: InterfaceOperators
+    preconditioner: Preconditioner
+    natural: NaturalCoarseSpace
+    coarse: CoarseSpace
 
 
-def parts(
+def build(
     comm: MPI.Intracomm,
     jump_operator: JumpOperator,
     subdomains: Sequence[Subdomain],
     applications: int,
     thresholds: Thresholds = DEFAULTS,
-) -> tuple[InterfaceOperators, Preconditioner, NaturalCoarseSpace]:
-    """What the options `feti_dual_operator`, `feti_pc_type` and `feti_coarse_*` name.  Collective.
+) -> SolverParts:
+    """Factor the subdomains and set up what the options and sizes ask for.  Collective.
+
+    Options: `feti_dual_operator`, `feti_pc_type`, `feti_coarse_space`, `feti_coarse_threshold`.
 
     Raises:
         CaseError: an option has no such value, or two exclude each other.
     """
-    pc = _choice("pc_type", PRECONDITIONERS, "auto")
-    operator = _choice("dual_operator", KINDS, "explicit" if pc == "influence" else "auto")
-    space = _choice("coarse_space", COARSE_SPACES, "auto")
-    threshold = PETSc.Options("feti_").getReal("coarse_threshold", THRESHOLD)
-    soft = space == "adaptive" or (space == "auto" and _cut(comm, subdomains))
-    boundary = InterfaceOperators(jump_operator, subdomains, operator, applications, soft, thresholds)
-    condensed = [isinstance(o, ExplicitInterfaceOperator) for o in boundary.operators]
-    dense = comm.allreduce(all(condensed), MPI.LAND)
-    examinable = comm.allreduce(all(np.logical_or(condensed, boundary.facewise)), MPI.LAND)
-    if pc == "influence" and not dense:
-        raise CaseError("-feti_pc_type influence: needs -feti_dual_operator explicit")
-    if pc == "auto":
-        pays = applications >= MANY and space != "adaptive" and dense and _fits(comm, jump_operator)
-        pc = "influence" if pays else "dirichlet"
-    if space == "adaptive" and not (examinable and pc == "dirichlet"):
-        raise CaseError("-feti_coarse_space adaptive: needs -feti_pc_type dirichlet, -feti_dual_operator not implicit")
-    preconditioner = _preconditioner(pc, comm, jump_operator, boundary)
-    if soft and examinable and isinstance(preconditioner, Dirichlet):
-        replicated = thresholds.replicated_vectors
-        coarse = AdaptiveCoarseSpace(comm, jump_operator, boundary, preconditioner, threshold, replicated)
-        return boundary, preconditioner, coarse
-    return boundary, preconditioner, NaturalCoarseSpace(comm, jump_operator, boundary)
+    database = PETSc.Options("feti_")
+    options = SolverOptions.read(database.getString, database.getReal, thresholds)
+    soft = options.want_soft_modes(_are_cut(comm, subdomains))
+    operators = InterfaceOperators(jump_operator, subdomains, options.operator, applications, soft, thresholds)
+    plan = choose(_sizes(comm, jump_operator, operators, applications), options, thresholds)
+    preconditioner = _preconditioner(plan.preconditioner, comm, jump_operator, operators)
+    natural = NaturalCoarseSpace(comm, jump_operator, operators)
+    coarse: CoarseSpace = natural
+    if plan.adaptive and isinstance(preconditioner, Dirichlet):
+        coarse = AdaptiveCoarseSpace(
+            comm, jump_operator, operators, preconditioner, natural, options.threshold, thresholds
+        )
+    return SolverParts(operators, preconditioner, natural, coarse)
 
 
-def _preconditioner(
-    kind: str, comm: MPI.Intracomm, jump_operator: JumpOperator, boundary: InterfaceOperators
-) -> Preconditioner:
-    if kind == "none":
-        return Identity()
-    if kind == "influence":
-        return Influence(comm, jump_operator, boundary)
-    return (Lumped if kind == "lumped" else Dirichlet)(comm, jump_operator, boundary)
+def _sizes(
+    comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators, applications: int
+) -> ProblemSizes:
+    """Those of a torn cell; collective."""
+    dense = [isinstance(o, ExplicitInterfaceOperator) for o in operators.operators]
+    return ProblemSizes(
+        applications=applications,
+        bodies_are_cut=_are_cut(comm, operators.subdomains),
+        all_dense=comm.allreduce(all(dense), MPI.LAND),
+        all_searchable=comm.allreduce(all(np.logical_or(dense, operators.facewise)), MPI.LAND),
+        shared_dofs=shared_dofs(comm, jump_operator),
+        precracked_nodes=comm.allreduce(int(jump_operator.nodes.precracked.sum())),
+    )
 
 
-def _fits(comm: MPI.Intracomm, jump_operator: JumpOperator) -> bool:
-    """Whether the bonded cell can be factored, and few enough nodes are debonded from the start; collective."""
-    precracked = comm.allreduce(int(jump_operator.nodes.precracked.sum()))
-    return shared_dofs(comm, jump_operator) <= LARGEST_BONDED and precracked <= MOST_PRECRACKED
-
-
-def _cut(comm: MPI.Intracomm, subdomains: Sequence[Subdomain]) -> bool:
-    """Whether bodies are cut into pieces: the webs that METIS makes of a matrix have soft modes."""
+def _are_cut(comm: MPI.Intracomm, subdomains: Sequence[Subdomain]) -> bool:
+    """Whether there are more subdomains than bodies; collective."""
     bodies = comm.allreduce(max((s.submesh.body for s in subdomains), default=-1), MPI.MAX) + 1
     return bool(comm.allreduce(len(subdomains)) > bodies)
 
 
-def _choice(name: str, known: Sequence[str], default: str) -> str:
-    """The value of the option -feti_`name`."""
-    value = PETSc.Options("feti_").getString(name, default)
-    if value not in known:
-        raise CaseError(f"-feti_{name} {value}: expected one of {', '.join(known)}")
-    return str(value)
+def _preconditioner(
+    kind: str, comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators
+) -> Preconditioner:
+    if kind == "none":
+        return Identity()
+    if kind == "influence":
+        return Influence(comm, jump_operator, operators)
+    return (Lumped if kind == "lumped" else Dirichlet)(comm, jump_operator, operators)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import weakref
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -18,52 +17,39 @@ from petsc4py import PETSc
 
 from feti_homog.cell.refinement import ReferenceLattice
 from feti_homog.common import process_memory
+from feti_homog.common.distributed_arrays import allreduce_sum
 from feti_homog.feti import factory, view
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.shared_entities import SharedEntities
 from feti_homog.feti.decomposition.subdomain import Subdomain
+from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.feti.krylov import ActiveRows, Krylov
 from feti_homog.feti.operators.dual_operator import DualOperator
-from feti_homog.feti.thresholds import DEFAULTS, Thresholds
+from feti_homog.feti.thresholds import DEFAULTS, MAX_RESTARTS, ZERO_JUMP, Thresholds
 from feti_homog.typing import Float
 
-# What a coarse space that is accurate to too few digits can end in, and how often to go on from there with it.
-BROKEN = (
+# What a coarse space that is accurate to too few digits can end in.
+BREAKDOWNS = (
     PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_PC,
     PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_MAT,
     PETSc.KSP.ConvergedReason.DIVERGED_BREAKDOWN,
 )
-RESTARTS = 2
-# A jump that the active rows see of the torn cell's is none if it is as small as this.
-ROUNDING = 1e-13
-
-
-@dataclass(frozen=True)
-class DualSolution:
-    """The multipliers under one macroscopic strain and what follows from them on the interface.
-
-    Attributes:
-        strain: (3,) E.
-        lam: (owned rows,) multipliers, nodal forces between the faces; 0 on inactive rows.
-        jump: (owned rows,) B u*, 0 up to tolerance on active rows, gap and slip on the others.
-        alpha: (dimension,) rigid-body amplitudes.
-        iterations, reason: of the Krylov method (PETSc's KSPConvergedReason).
-        residual: |B u*| on the active rows, relative to the jump of the torn cell.
-    """
-
-    strain: Float
-    lam: Float
-    jump: Float
-    alpha: Float
-    iterations: int
-    reason: int
-    residual: float
 
 
 class FetiSolver:
     """Set-up of the dual problem; all factorizations of subdomains are made here, once.
 
     Options have the prefix `feti_`.
+
+    Attributes:
+        jump_operator: B and the layout of the multipliers.
+        interface_operators: S and S+ of this rank's subdomains.
+        operator: F.
+        preconditioner: M^-1.
+        natural: the rigid-body motions, G and P.
+        coarse: what is deflated: `natural` itself, or soft modes beside it.
+        active: which rows carry multipliers.
+        solves: dual problems so far, one for each load.
     """
 
     def __init__(
@@ -75,23 +61,28 @@ class FetiSolver:
         applications: int,
         thresholds: Thresholds = DEFAULTS,
     ) -> None:
-        """Set up; `applications` is how many times the dual operator is expected to be applied."""
+        """Set up; `applications` is how many times the dual operator is expected to be applied.  Collective.
+
+        Raises:
+            CaseError: an option has no such value, or two exclude each other.
+        """
         self.comm, self.subdomains = comm, subdomains
         self.jump_operator = JumpOperator(comm, shared, subdomains, lattice)
-        self.boundary, self.preconditioner, self.coarse = factory.parts(
-            comm, self.jump_operator, subdomains, applications, thresholds
-        )
-        self.operator = DualOperator(self.jump_operator, self.boundary)
+        parts = factory.build(comm, self.jump_operator, subdomains, applications, thresholds)
+        self.interface_operators, self.preconditioner = parts.operators, parts.preconditioner
+        self.natural, self.coarse = parts.natural, parts.coarse
+        self.operator = DualOperator(self.jump_operator, self.interface_operators)
         process_memory.trim()
         self.active = ActiveRows(self.rows)
         self._view = PETSc.Options("feti_").getBool("view", False)
         self._krylov: dict[int, Krylov] = {}
-        # Left to PETSc's finalization, the shells would call a Python that is gone.
-        self._release = weakref.finalize(self, _free, self._krylov)
-        self._solver_for(1)
+        # The shells call Python, so they are destroyed with the solver: PETSc's own finalization comes when the
+        # interpreter has already shut down.
+        self._destroy_krylov = weakref.finalize(self, _destroy_all, self._krylov)
+        self._krylov_for(1)
         self.solves = 0
         if self._view:
-            PETSc.Sys.Print(view.setup(comm, self.boundary, self.preconditioner, self.coarse), comm=comm)
+            PETSc.Sys.Print(view.describe_setup(comm, parts), comm=comm)
 
     @property
     def rows(self) -> int:
@@ -101,7 +92,7 @@ class FetiSolver:
     @property
     def ksp(self) -> PETSc.KSP:
         """The Krylov method for one load case."""
-        return self._solver_for(1).ksp
+        return self._krylov_for(1).ksp
 
     @property
     def rtol(self) -> float:
@@ -116,123 +107,130 @@ class FetiSolver:
     @cached_property
     def loads(self) -> Float:
         """(boundary dofs, 3) Q there; inside the uniform bodies it vanishes."""
-        return self.Q[self.boundary.local_dofs]
+        loads: Float = self.Q[self.interface_operators.local_dofs]
+        return loads
 
     @cached_property
-    def _torn(self) -> Float:
-        """(boundary dofs, 3) K+ (-Q), the torn cell under the unit strains."""
-        return self.boundary.apply_flexibility(-self.loads)
+    def _torn_displacement(self) -> Float:
+        """(boundary dofs, 3) K+ (-Q), of the torn cell under the unit strains."""
+        return self.interface_operators.apply_flexibility(-self.loads)
 
     @cached_property
     def d(self) -> Float:
         """(owned rows, 3) jumps -B K+ Q of the torn cell under the unit strains."""
-        return self.operator.jump(self._torn)
+        return self.operator.jump(self._torn_displacement)
 
     @cached_property
     def torn_stiffness(self) -> Float:
         """(3, 3) sum |Omega_s| L_s - Q^T K+ Q: the stress integral of the torn cell under the unit strains."""
-        local = sum((s.area * s.L for s in self.subdomains), self.loads.T @ self._torn)
+        local = sum((s.area * s.L for s in self.subdomains), self.loads.T @ self._torn_displacement)
         return np.asarray(self.comm.allreduce(local))
 
     def stress_integral(self, solution: DualSolution) -> Float:
-        """(3,) |UC| Sigma = int sigma, from the multipliers alone: the torn cell's plus d^T lam."""
+        """(3,) |UC| Sigma = int sigma, from the multipliers alone: the torn cell's plus d^T lam.  Collective."""
         forces = self.comm.allreduce(self.d.T @ solution.lam)
         return np.asarray(self.torn_stiffness @ solution.strain + forces)
 
     def activate(self, active: Float) -> None:
-        """Let only the owned rows where `active` is 1 carry multipliers; refactors the coarse problem alone."""
+        """Let only the owned rows where `active` is 1 carry multipliers; refactors the coarse problem alone.
+        Collective."""
         if self.comm.allreduce(bool((active != self.active.mask).any()), MPI.LOR):
             self.active.mask = active
             self.coarse.activate(active)
             self.preconditioner.activate(active)
 
     def solve(self, strain: Float, start: Float) -> DualSolution:
-        """Solve for the strain (3,), beginning with the multipliers `start` (owned rows,).
+        """Solve for the strain (3,), beginning with the multipliers `start` (owned rows,).  Collective.
 
         Not to converge is no error here: the solution says so in its `reason`.
         """
-        return self.solve_together(strain[None], start[:, None])[0]
+        return self.solve_many(strain[None], start[:, None])[0]
 
-    def solve_together(self, strains: Float, starts: Float) -> list[DualSolution]:
-        """Solve for k strains (k, 3) at once, beginning with the multipliers `starts` (owned rows, k).
+    def solve_many(self, strains: Float, starts: Float) -> list[DualSolution]:
+        """Solve for k strains (k, 3) at once, beginning with the multipliers `starts` (owned rows, k).  Collective.
 
         One Krylov method works on all of them side by side, each scaled by the jump of its torn cell.
         """
         k = len(strains)
-        krylov = self._solver_for(k)
-        torn = self.d @ strains.T
-        free = self.coarse.projected(self.active.restrict(torn))
-        jump, least = self._norms(free), ROUNDING * self._norms(torn)
+        krylov = self._krylov_for(k)
+        torn_jump = self.d @ strains.T
+        right = self.natural.project(self.active.restrict(torn_jump))
+        jump, rounding = self._norms(right), ZERO_JUMP * self._norms(torn_jump)
         # A load that the active rows do not see has no multipliers.
-        seen = jump > least
-        scale = np.where(seen, jump, 1.0)
-        free = np.where(seen, free, 0.0) / scale
+        is_seen = jump > rounding
+        scale = np.where(is_seen, jump, 1.0)
+        right = np.where(is_seen, right, 0.0) / scale
         self.solves += k
-        closing = self.coarse.projected(self.preconditioner.apply(free))
-        krylov.test.start(float(np.sqrt(seen.sum())), float(np.linalg.norm(self._norms(closing))))
-        starts = np.where(seen, self.coarse.projected(self.active.restrict(starts)), 0.0) / scale
-        lam = self.preconditioner.first(starts, closing)
+        closing = self.natural.project(self.preconditioner.apply(right))
+        krylov.test.set_scales(float(np.sqrt(is_seen.sum())), float(np.linalg.norm(self._norms(closing))))
+        starts = np.where(is_seen, self.natural.project(self.active.restrict(starts)), 0.0) / scale
+        lam = self.preconditioner.initial_multipliers(starts, closing)
         iterations, reason = 0, int(PETSc.KSP.ConvergedReason.CONVERGED_ATOL)
-        if seen.any():
-            lam, iterations, reason = self._converged(krylov, lam, free)
+        if is_seen.any():
+            lam, iterations, reason = self._solve_with_restarts(krylov, lam, right)
             if self._view:
-                PETSc.Sys.Print(view.solve(krylov.ksp, k), comm=self.comm)
-        return self._recover(strains, lam * scale, torn, iterations, reason, np.maximum(jump, least))
+                PETSc.Sys.Print(view.describe_solve(krylov.ksp, k), comm=self.comm)
+        return self._solutions(strains, lam * scale, torn_jump, iterations, reason, np.maximum(jump, rounding))
 
-    def _converged(self, krylov: Krylov, lam: Float, free: Float) -> tuple[Float, int, int]:
+    def boundary_displacement(self, solution: DualSolution) -> Float:
+        """(boundary dofs,) u* of a solution, Eq. (34).  Collective."""
+        u = self._torn_displacement @ solution.strain - self.operator.displacement(solution.lam)
+        return np.asarray(u + self.natural.rigid_body_motion(solution.alpha))
+
+    def displacement(self, solution: DualSolution) -> Float:
+        """(local dofs,) u* of a solution; factors the interiors when first called.  Collective."""
+        return self.interface_operators.extend(self.boundary_displacement(solution))
+
+    def destroy(self) -> None:
+        """Free the Krylov methods and the coarse factor, after the last solve; collective.
+
+        Without this call the Krylov methods go with the solver, on each rank when it drops it.
+        """
+        self._destroy_krylov()
+        self.coarse.destroy()
+
+    def _solve_with_restarts(self, krylov: Krylov, lam: Float, right: Float) -> tuple[Float, int, int]:
         """Multipliers, iterations, and why they ended.
 
-        Of coarse vectors that depend on each other, rounding makes the preconditioner indefinite or the iteration
-        stagnate.  A fresh start takes away what the coarse space can; if that is not enough, rigid-body motions are.
+        If coarse vectors depend on each other, rounding makes the preconditioner indefinite or the iteration
+        stagnate.  A restart removes what the coarse space can; if MAX_RESTARTS of them are not enough, deflation is
+        disabled.
         """
         iterations = 0
-        for restart in range(RESTARTS + 2):
-            if restart > RESTARTS and not self.coarse.simplify():
+        for restart in range(MAX_RESTARTS + 2):
+            if restart > MAX_RESTARTS and not self.coarse.disable_deflation():
                 break
-            lam, more, reason = self._improved(krylov, lam, free)
-            iterations += more
-            if reason not in BROKEN:
+            lam, residual = self._initial_guess(lam, right)
+            lam = lam + krylov.solve(residual)
+            iterations += krylov.ksp.getIterationNumber()
+            reason = int(krylov.ksp.getConvergedReason())
+            if reason not in BREAKDOWNS:
                 break
         return lam, iterations, reason
 
-    def _improved(self, krylov: Krylov, lam: Float, free: Float) -> tuple[Float, int, int]:
-        """The same by one Krylov solve."""
-        lam, residual = self._begin(lam, free)
-        lam = lam + krylov.solve(residual)
-        return lam, krylov.ksp.getIterationNumber(), int(krylov.ksp.getConvergedReason())
-
-    def destroy(self) -> None:
-        """Free PETSc's shell objects and the coarse factor; collective.  The shells go with the solver anyway."""
-        self._release()
-        self.coarse.destroy()
-
-    def boundary_displacement(self, solution: DualSolution) -> Float:
-        """(boundary dofs,) u* of a solution, Eq. (34)."""
-        u = self._torn @ solution.strain - self.operator.displacement(solution.lam)
-        return np.asarray(u + self.coarse.motion(solution.alpha))
-
-    def displacement(self, solution: DualSolution) -> Float:
-        """(local dofs,) u* of a solution; factors the interiors when first called."""
-        return self.boundary.extend(self.boundary_displacement(solution))
-
-    def _begin(self, lam: Float, free: Float) -> tuple[Float, Float]:
+    def _initial_guess(self, lam: Float, right: Float) -> tuple[Float, Float]:
         """First multipliers, improved by the coarse space, and the residual that they leave."""
-        residual = free
+        residual = right
         if self._norms(lam).any():
-            residual = self.coarse.projected(free - self.active.restrict(self.operator.apply(lam)))
-        # Where they are no help, nothing is a better beginning.
-        worse = self._norms(residual) > self._norms(free)
-        lam, residual = np.where(worse, 0.0, lam), np.where(worse, free, residual)
-        return self.coarse.improved(lam, residual, lambda z: self.active.restrict(self.operator.apply(z)))
+            residual = self.natural.project(right - self._apply_active(lam))
+        # Where they leave more than was there, 0 is a better beginning.
+        is_worse = self._norms(residual) > self._norms(right)
+        lam, residual = np.where(is_worse, 0.0, lam), np.where(is_worse, right, residual)
+        return self.coarse.coarse_initial_guess(lam, residual, self._apply_active)
 
-    def _recover(
-        self, strains: Float, lam: Float, torn: Float, iterations: int, reason: int, scale: Float
+    def _apply_active(self, x: Float) -> Float:
+        """F x on the active rows."""
+        return self.active.restrict(self.operator.apply(x))
+
+    def _solutions(
+        self, strains: Float, lam: Float, torn_jump: Float, iterations: int, reason: int, scale: Float
     ) -> list[DualSolution]:
-        jump = torn - self.operator.apply(lam)
-        alpha = np.zeros((self.coarse.dimension, len(strains)))
-        if self.coarse.dimension:
-            alpha -= self.coarse.amplitudes(self.active.restrict(jump))
-            jump = jump + self.coarse.G @ alpha
+        """Amplitudes, jumps and residuals of the multipliers `lam` (owned rows, k)."""
+        jump = torn_jump - self.operator.apply(lam)
+        alpha = np.zeros((self.natural.kernel_dimension, len(strains)))
+        if self.natural.kernel_dimension:
+            alpha -= self.natural.amplitudes(self.active.restrict(jump))
+            jump = jump + self.natural.G @ alpha
         residual = self._norms(self.active.restrict(jump)) / np.where(scale > 0, scale, 1.0)
         return [
             DualSolution(
@@ -242,19 +240,21 @@ class FetiSolver:
         ]
 
     def _norms(self, x: Float) -> Float:
-        """Norms of the columns of x (owned rows, k)."""
-        return np.sqrt(self.coarse.everywhere(np.einsum("ik,ik->k", x, x)))
+        """Norms over all ranks of the columns of x (owned rows, k)."""
+        norms: Float = np.sqrt(allreduce_sum(self.comm, np.einsum("ik,ik->k", x, x)))
+        return norms
 
-    def _solver_for(self, columns: int) -> Krylov:
+    def _krylov_for(self, columns: int) -> Krylov:
+        """The Krylov method for so many load cases, set up when first asked for."""
         if columns not in self._krylov:
             vector, parts = self.jump_operator.vector, (self.operator, self.preconditioner, self.coarse, self.active)
-            self._krylov[columns] = Krylov(vector, *parts, columns)
+            self._krylov[columns] = Krylov(self.comm, vector, *parts, columns)
             if self._view:
                 self._krylov[columns].ksp.setComputeSingularValues(True)
         return self._krylov[columns]
 
 
-def _free(krylov: dict[int, Krylov]) -> None:
+def _destroy_all(krylov: dict[int, Krylov]) -> None:
     for solver in krylov.values():
         solver.destroy()
     krylov.clear()

@@ -1,8 +1,9 @@
 """Every number of the solver that was chosen: its unit, what it is for, and the command that measured it.
 
 This module imports nothing of the program, so that scripts may read it without starting MPI.  `Thresholds` holds what
-may be varied.  The constants below it are limits of rounding, and of memory and speed at a time; no result depends on
-them beyond the solver's tolerance.
+may be varied: `scripts/measure_thresholds NAME VALUE...` prints what each value of a field costs and gains.  The
+constants below it are limits of rounding and of memory at a time; no result depends on them beyond the solver's
+tolerance.
 """
 
 from __future__ import annotations
@@ -14,20 +15,48 @@ from dataclasses import dataclass
 class Thresholds:
     """Where the solver changes its ways.  Tests and studies pass others than the defaults.
 
-    `scripts/benchmark scripts/cases/benchmark_1m.toml --tools feti` times what follows from the first two.
+    "Measured" is what `scripts/measure_thresholds.py NAME VALUE...` says of the values in brackets.
 
     Attributes:
         dense_boundary_dofs: boundary degrees of freedom of a subdomain up to which `-feti_dual_operator auto` ever
             makes dense matrices, of 8 n^2 bytes.
+        soft_mode: tau, no unit; displacements p with S p = theta N p, theta < tau, are deflated.  The default of
+            `-feti_coarse_threshold`; the condition number is about 1 / tau.  Measured [0.1, 0.24, 0.5]: 29, 19, 14
+            iterations, 4.4, 5.6, 7.4 vectors a subdomain; at 0.2 some packings of `scripts/robustness` took 26.
+        face_factor: tau of a face's own eigenproblem over tau, no unit: the energy that other faces and the rest of
+            the body add is not in it.  Measured [0.8, 1, 1.25, 1.6]: 24, 22, 20, 18 iterations, 7.2, 8.0, 8.9, 9.9
+            vectors; one eigenproblem of the whole boundary takes 21 with 5.8.
+        face_layers: coarse triangles from a face to the far side of its neighbourhood.  Measured [1, 2, 3]: 17, 20, 21
+            iterations, 11.8, 8.9, 8.5 vectors: one layer finds modes that are none of the body's, three cost more.
+        min_trace_dofs: degrees of freedom that a trace space of a boundary or a face keeps at least.  Measured
+            [30, 60, 100, 250]: 21, 21, 21, 19 iterations; 5.9, 6.0, 6.0, 6.3 vectors.
+        rows_per_vector: active rows per coarse vector below which the vectors are taken to depend on each other.
+        drop_tolerance: entries of a coarse vector of a large body, relative to its largest, that are dropped: they
+            decay within few fibres.  Measured [1e-3, 1e-5, 1e-7]: 20 iterations each.
         whole_boundary_dofs: boundary degrees of freedom of a whole body above which its soft modes come from a dense
-            eigenproblem for each face, not from one.
+            eigenproblem for each face, not from one.  Measured [1000, 5000] with a boundary of 3644: 4.6 and 15.9 s.
         replicated_vectors: coarse vectors up to which every rank factors the whole coarse matrix and solves for some
-            of the load cases; above, all ranks factor it together (`scripts/scaling`).
+            of the load cases; above, all ranks factor it together (`scripts/scaling sizes`).
+        influence_applications: applications of the dual operator from which on influence columns pay
+            (`scripts/benchmark_path`).
+        assembled_schur_dofs: largest cell with all bonds intact that is factored for influence columns, in degrees
+            of freedom on shared nodes.
+        influence_precracked_nodes: most nodes that may be debonded from the start with influence columns, which take
+            two columns for each of them.
     """
 
     dense_boundary_dofs: int = 6000
+    soft_mode: float = 0.24
+    face_factor: float = 1.25
+    face_layers: int = 2
+    min_trace_dofs: int = 100
+    rows_per_vector: int = 4
+    drop_tolerance: float = 1e-5
     whole_boundary_dofs: int = 2000
     replicated_vectors: int = 20_000
+    influence_applications: int = 1000
+    assembled_schur_dofs: int = 40_000
+    influence_precracked_nodes: int = 500
 
 
 DEFAULTS = Thresholds()
@@ -56,6 +85,16 @@ TRIANGLE_INVERSE_ROWS = 48
 # Rows of the blocks in which a triangle is mirrored, so that they fit the cache.
 MIRRORED_BLOCK_ROWS = 64
 
+# decomposition
+
+# METIS takes whole numbers as weights of edges: lengths are rounded up to so many classes.  Cuts are 5 % shorter and
+# more than with one class (`tests/unit/feti/decomposition/test_partition.py`).
+LENGTH_CLASSES = 100
+# Load of the fullest rank, relative to that of the most even assignment, that is accepted to keep neighbours together.
+MAX_IMBALANCE = 1.03
+# Largest |K R| relative to |K|.  Rounding leaves about 1e-16; a rotation that is wrong by 1 % gives 1e-7 and more.
+KERNEL_TOLERANCE = 1e-10
+
 # operators
 
 # Seconds, up to a common factor, for the choice: of a dense inverse per n^3 of n boundary dofs, and of one application
@@ -65,3 +104,39 @@ DENSE_INVERSE_SECONDS, APPLY_SECONDS = 5e-10, 3.5e-7
 DENSE_COLUMNS_ONE_BY_ONE = 6
 # Columns for which sparse factors are solved at once: bounds the memory of their right-hand sides, 8 bytes a dof each.
 SPARSE_COLUMNS_AT_ONCE = 64
+
+# solver, krylov
+
+# Relative tolerance of both primal residuals: the default of `-feti_ksp_rtol`.
+RTOL = 1e-8
+# Iterations per load case: the default of `-feti_ksp_max_it`.
+MAX_ITERATIONS = 2000
+# Iterations in which the jump must halve once the forces are small enough; else rounding holds it, and the solve is
+# begun anew from where it is.  Without rounding CG at a condition number of 10 halves it in one or two.
+STALL_ITERATIONS = 4
+# Such new beginnings with the coarse space, before it is left out.
+MAX_RESTARTS = 2
+# A jump that the active rows see, relative to that of the torn cell, is rounding if it is as small as this.
+ZERO_JUMP = 1e-13
+
+# preconditioners
+
+# Influence columns found at once: bounds the memory of their right-hand sides, (boundary dofs, this).
+INFLUENCE_CHUNK = 32
+# Pivots of H on inactive rows, relative to its largest diagonal entry, that are rounding: forces on a free fibre as a
+# whole have none.
+SINGULAR_PIVOT = 1e-10
+
+# coarse
+
+# Eigenvalues of G^T G, relative to its largest diagonal entry, of motions that no active row resists: rounding leaves
+# about 1e-15, and one resisting row of n about 1 / n.
+UNCONSTRAINED_EIGENVALUE = 1e-10
+# Nodes of a face below which its neighbourhood has no eigenproblem of its own: a single node can only translate.
+MIN_FACE_NODES = 2
+# Eigenvalues of a matrix in single precision, relative to its largest, that are rounding.
+SINGLE_PRECISION_NULL = 1e-6
+# Coarse vectors M^-1 B V found at once: bounds the memory of their jumps, (rows of a subdomain, this).
+VECTOR_CHUNK = 128
+# |T T z - T z| / |T z| and |G^T T z| / |G^T z| above which the coarse matrix is too badly conditioned to be used.
+MAX_PROJECTOR_ERROR = 1e-6

@@ -107,7 +107,7 @@ class Homogenization:
     def _strain_of_jumps(self) -> Float:
         """(owned rows, 3) nu with int eps* = nu^T B u for every displacement u: nu = (B B^T)^-1 B int B_e."""
         solver = self.cell.solver
-        B = solver.boundary.B
+        B = solver.interface_operators.B
         unit = [np.linalg.solve(s.L, Q.T).T for s, Q in self._loads()]
         integrals = solver.jump_operator.sum(B @ np.concatenate([np.zeros((0, 3)), *unit]))
         gram = NodeBlocks(self.cell.comm, self.cell.solver.jump_operator, B @ B.T)
@@ -116,19 +116,22 @@ class Homogenization:
     def _averages(self, E: Float, u: Float) -> tuple[Float, Float, float]:
         """<sigma>, <eps*> over the bodies, and <sigma:eps>; collective."""
         cell, sums = self.cell, np.zeros(7)
-        for (s, Q), span in zip(self._loads(), cell.solver.boundary.slices, strict=True):
+        for (s, Q), span in zip(self._loads(), cell.solver.interface_operators.slices, strict=True):
             from_u = Q.T @ u[span]
             sums[:3] += s.area * s.L @ E + from_u
             sums[3:6] += np.linalg.solve(s.L, from_u)
             sums[6] += s.area * E @ s.L @ E + 2 * E @ from_u
-        sums[6] += u @ cell.solver.boundary.apply_schur(u)
+        sums[6] += u @ cell.solver.interface_operators.apply_schur(u)
         sums = allreduce_sum(cell.comm, sums) / cell.summary.area
         return sums[:3], sums[3:6], float(sums[6])
 
     def _loads(self) -> list[tuple[Subdomain, Float]]:
         """The subdomains and their Q on the boundary dofs; inside a uniform body it vanishes."""
         solver = self.cell.solver
-        return [(s, solver.loads[span]) for s, span in zip(solver.subdomains, solver.boundary.slices, strict=True)]
+        return [
+            (s, solver.loads[span])
+            for s, span in zip(solver.subdomains, solver.interface_operators.slices, strict=True)
+        ]
 
     def _largest(self, values: Float) -> float:
         """max |values| over all ranks."""

@@ -94,7 +94,8 @@ def tear(
     summary, shared, lattice, subdomains = assemble_subdomains(case, comm, progress, policy)
     with progress.stage("factor") as words:
         solver = FetiSolver(comm, shared, subdomains, lattice, cost_model.applications(case), thresholds)
-        words.append(f"{solver.jump_operator.global_rows} multipliers, coarse dimension {solver.coarse.vectors}")
+        multipliers, dimension = solver.jump_operator.global_rows, solver.coarse.coarse_dimension
+        words.append(f"{multipliers} multipliers, coarse dimension {dimension}")
     return TornCell(comm, case, summary, lattice, subdomains, solver)
 
 

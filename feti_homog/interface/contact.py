@@ -15,7 +15,8 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from feti_homog.feti.decomposition.constraint_layout import InterfaceNodes
-from feti_homog.feti.solver import DualSolution, FetiSolver
+from feti_homog.feti.dual_solution import DualSolution
+from feti_homog.feti.solver import FetiSolver
 from feti_homog.interface.block_pivoting import BlockPivoting
 from feti_homog.interface.contact_certificate import kkt_errors
 from feti_homog.interface.rigid_placement import place
@@ -127,7 +128,7 @@ class Interface:
     def equilibria(self, strains: Float, status: Status, starts: Sequence[Float]) -> list[Equilibrium]:
         """Solve a linear problem for every strain of (k, 3) together.  Collective."""
         self.solver.activate(self.active(status))
-        solutions = self.solver.solve_together(strains, np.stack(starts, axis=1))
+        solutions = self.solver.solve_many(strains, np.stack(starts, axis=1))
         return [self._equilibrium(status, solution, solution.iterations, 1) for solution in solutions]
 
     def equilibrium(self, strain: Float, status: Status, start: Float) -> Equilibrium:
@@ -165,8 +166,8 @@ class Interface:
         if not self.contact:
             return solution, np.zeros(len(status), bool)
         squeezed = np.zeros(len(status), bool)
-        coarse, noise = self.solver.coarse, self.gap_noise(solution.strain)
-        if coarse.free.shape[1]:
+        coarse, noise = self.solver.natural, self.gap_noise(solution.strain)
+        if coarse.unconstrained_modes.shape[1]:
             placement = place(self.solver.comm, coarse, self.nodes, status == OPEN, solution, noise)
             alpha, jump = solution.alpha + placement.alpha, solution.jump + placement.jump(coarse)
             solution, squeezed = replace(solution, alpha=alpha, jump=jump), placement.squeezed
@@ -195,8 +196,8 @@ class Interface:
 
         A fibre may touch its hole without a force: such nodes count as open, lest they seem to hold it.  Collective.
         """
-        coarse, idle = self.solver.coarse, np.zeros(len(status), bool)
-        held = int(coarse.free.shape[1])
+        coarse, idle = self.solver.natural, np.zeros(len(status), bool)
+        held = int(coarse.unconstrained_modes.shape[1])
         if self.contact:
             idle = (status == CLOSED) & (solution.lam[self.nodes.row] >= -self.force_noise(solution))
         if not self.solver.comm.allreduce(bool(idle.any()), MPI.LOR):

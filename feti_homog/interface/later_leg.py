@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from mpi4py import MPI
 
-from feti_homog.feti.solver import DualSolution
+from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.interface.contact import Equilibrium, Interface
 from feti_homog.interface.leg_prediction import first_break, first_change
 from feti_homog.interface.path_points import UTILISATION_TIE, PathState, Point, energy_released, most_utilised, total
@@ -19,7 +19,8 @@ LEAST_SHARE = 1e-9
 # A strain that is smaller than this, relative to those at the ends of its leg, is what rounding leaves of zero.
 STRAIN_ROUNDING = 1e-13
 # A stress is on a straight line if it is off by no more than this many relative tolerances of the Krylov method, and
-# by no more than rounding leaves of the best solves, both relative to the largest stress of the line.
+# by no more than rounding leaves of the best solves, both relative to the largest stress of the line.  The solver,
+# which begins with the multipliers of the line, was off by a few hundredths of a tolerance.
 OFF_LINE_PER_RTOL, OFF_LINE_ROUNDING = 10.0, 1e-10
 
 

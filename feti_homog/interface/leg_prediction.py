@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 
-from feti_homog.feti.solver import DualSolution
+from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.interface.contact import BONDED, CLOSED, OPEN, Equilibrium, Interface
 from feti_homog.interface.rigid_placement import room_ahead, shares_to_zero
 from feti_homog.interface.strength_criterion import StrengthCriterion
@@ -45,8 +45,8 @@ def first_change(interface: Interface, state: Equilibrium, ahead: DualSolution) 
     shares = [shares_to_zero(-state.solution.lam[nodes.row][closed], -ahead.lam[nodes.row][closed], noise)]
     is_open, here, there = state.status == OPEN, state.solution.jump[nodes.row], ahead.jump[nodes.row]
     noise = max(interface.gap_noise(state.solution.strain), interface.gap_noise(ahead.strain))
-    if solver.coarse.free.shape[1]:
-        shares.append(room_ahead(solver.comm, solver.coarse, nodes, is_open, here, there, noise))
+    if solver.natural.unconstrained_modes.shape[1]:
+        shares.append(room_ahead(solver.comm, solver.natural, nodes, is_open, here, there, noise))
     else:
         shares.append(shares_to_zero(here[is_open], there[is_open], noise))
     least = np.min(shares, axis=0)

@@ -34,20 +34,13 @@ def events(interface: Interface, criterion: StrengthCriterion, waypoints: Float,
     """Every break along zero -> waypoints[0] -> ... (n, 3), and the end of each leg.  Collective.
 
     A point's state is the one before its bonds break.  On later legs the changes of contact are points too, with
-    `broke` = 0: between points the response is straight.
+    `broke` = 0: between points the response is straight.  The last point is one that did not converge, if there is one.
     """
-    legs = len(waypoints)
-    if begin.leg == 0:
-        for point in _first_leg(interface, criterion, waypoints[0], legs, begin):
-            yield point
-            begin = point.after
-    for leg in range(max(begin.leg, 1), legs):
-        strains = (waypoints[leg - 1], waypoints[leg])
-        for point in LaterLeg(interface, criterion, strains, (leg, legs), begin).points():
-            yield point
-            begin = point.after
-            if point.state.solution.reason < 0:
-                return
+    for point in _legs(interface, criterion, waypoints, begin):
+        yield point
+        if point.state.solution.reason < 0:
+            # What breaks next cannot be decided on a state that does not hold.
+            return
 
 
 def increments(
@@ -83,6 +76,19 @@ def increments(
             status = interface.debond(status, which, lam)
         released = energy_released(strain, before, interface.stress(state.solution))
         yield Point(step / steps, 1.0, state, broke, released, PathState(step, 0.0, status, lam))
+
+
+def _legs(interface: Interface, criterion: StrengthCriterion, waypoints: Float, begin: PathState) -> Iterator[Point]:
+    legs = len(waypoints)
+    if begin.leg == 0:
+        for point in _first_leg(interface, criterion, waypoints[0], legs, begin):
+            yield point
+            begin = point.after
+    for leg in range(max(begin.leg, 1), legs):
+        strains = (waypoints[leg - 1], waypoints[leg])
+        for point in LaterLeg(interface, criterion, strains, (leg, legs), begin).points():
+            yield point
+            begin = point.after
 
 
 def _first_leg(

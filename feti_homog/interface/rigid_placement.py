@@ -15,7 +15,7 @@ from scipy.sparse import csr_matrix
 
 from feti_homog.feti.coarse.natural import NaturalCoarseSpace
 from feti_homog.feti.decomposition.constraint_layout import InterfaceNodes
-from feti_homog.feti.solver import DualSolution
+from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.typing import Array, Bool, Float
 
 # Rigid motions that change gaps by less than this, relative to slips, change none: a round fibre turns.
@@ -77,7 +77,7 @@ def place(
     answer = None if fibres is None else _place_all(fibres, gaps[0], noise)
     amplitudes, squeezed = comm.bcast(answer)
     first = comm.exscan(len(nodes.row)) or 0
-    return Placement(coarse.free @ amplitudes, squeezed[first : first + len(nodes.row)])
+    return Placement(coarse.unconstrained_modes @ amplitudes, squeezed[first : first + len(nodes.row)])
 
 
 def room_ahead(
@@ -118,7 +118,7 @@ def _gathered(
     comm: MPI.Intracomm, coarse: NaturalCoarseSpace, nodes: InterfaceNodes, is_open: Bool, gaps: list[Float]
 ) -> tuple[_Fibres | None, list[Float]]:
     """The free motions of all open nodes, and values of all nodes, on rank 0."""
-    free = csr_matrix(coarse.free)
+    free = csr_matrix(coarse.unconstrained_modes)
     opening, slip = (np.asarray((coarse.G[nodes.row + i] @ free).todense()) for i in range(2))
     parts = comm.gather((is_open, opening, slip, nodes.fibre, *gaps))
     if parts is None:

@@ -19,7 +19,7 @@ MESH_CASE = 'geometry = "mesh"\nfile = "faulty.msh"'
 # The command line with a fault in the dual operator of the last rank, at the application of a given number.
 SABOTAGED = """
 import os, signal, sys
-from feti_homog import cli
+from feti_homog import api, cli
 
 def launch():
     from feti_homog.feti.operators.dual_operator import DualOperator
@@ -39,7 +39,7 @@ def command(words, comm):
     launch()
     return cli._command(words, comm)
 
-sys.exit(cli.launch(command))
+sys.exit(api.start(command))
 """
 
 
@@ -78,6 +78,7 @@ def test_faulty_meshes_end_with_2_and_write_nothing(tmp_path, name, ranks):
     [
         (["-feti_ksp_rtoll", "1e-3"], "-feti_ksp_rtoll"),
         (["-feti_foo"], "-feti_foo: unknown option"),
+        (["-feti_ksp_rtol", "2.0"], "-feti_ksp_rtol 2.0: expected a number above 0 and below 1"),
         (["-feti_pc_typ", "none"], "-feti_pc_typ"),
         (["-feti_pc_type", "jacobi"], "-feti_pc_type jacobi: expected one of auto, none, lumped, dirichlet, influence"),
     ],
@@ -143,6 +144,17 @@ def test_no_convergence_ends_with_3_and_keeps_what_was_computed(tmp_path, ranks)
     assert document["status"] == "not converged"
     assert document["solver"]["iterations"] == [2, 2, 2]
     assert (out / "result.h5").exists()
+
+
+def test_loose_tolerance(tmp_path):
+    """It is told of, and what it makes wrong is marked."""
+    out = tmp_path / "results"
+    job = command_line(2, "run", case_file(tmp_path), "--out", out, "-feti_ksp_rtol", "0.3")
+    document = json.loads((out / "result.json").read_text())
+    assert job.stdout.count("warning: -feti_ksp_rtol 0.3 asks for less") == 1
+    assert any("-feti_ksp_rtol 0.3" in warning for warning in document["warnings"])
+    assert max(document["checks"].values()) > document["check_tolerance"] == 1e-4
+    assert job.returncode == 3 and document["status"] == "not converged"
 
 
 @pytest.mark.parametrize("ranks", [1, 2, 4])

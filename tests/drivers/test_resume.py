@@ -72,7 +72,7 @@ def killed(case: Path, out: Path, at: int, later: float, *words: str) -> int:
 
 def assert_same_curve(found, expected):
     assert len(found) == len(expected)
-    for key in ("load_factor", "strain", "stress", "dissipated"):
+    for key in ("load_factor", "strain", "stress", "dissipated", "dissipated_strain_controlled"):
         a, b = (np.array([point[key] for point in points]) for points in (found, expected))
         assert np.abs(a - b).max() <= 1e-6 * np.abs(b).max(), key
     for key in ("broke", "bonded", "open", "closed"):

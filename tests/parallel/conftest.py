@@ -10,8 +10,8 @@ def narrow():
     """The narrow cell at the default threshold."""
     from support.coarse_space_cells import Narrow
 
-    from feti_homog.feti.coarse.adaptive import THRESHOLD
+    from feti_homog.feti.thresholds import DEFAULTS
 
-    cell = Narrow(THRESHOLD)
+    cell = Narrow(DEFAULTS.soft_mode)
     yield cell
     cell.solver.destroy()

@@ -43,7 +43,7 @@ CELLS = pytest.mark.parametrize(
 def test_extension_is_harmonic(comm, case):
     """K u = 0 but on the boundary, where it is S x."""
     cell = torn_cells.tear(comm, **case)
-    boundary = cell.solver.boundary
+    boundary = cell.solver.interface_operators
     x = np.random.default_rng(comm.rank).standard_normal(boundary.offsets[-1])
     u, forces = boundary.extend(x), boundary.apply_schur(x)
     for s, dofs, first, span in zip(cell.subdomains, boundary.dofs, cell.offsets, boundary.slices, strict=False):
@@ -60,18 +60,18 @@ def test_extension_is_harmonic(comm, case):
 def test_boundary_is_where_the_constraints_act(comm, case):
     cell = torn_cells.tear(comm, **case)
     B = cell.solver.jump_operator.B.toarray()
-    for s, dofs, first in zip(cell.subdomains, cell.solver.boundary.dofs, cell.offsets, strict=False):
+    for s, dofs, first in zip(cell.subdomains, cell.solver.interface_operators.dofs, cell.offsets, strict=False):
         assert (dofs == boundary_of(B[:, first : first + len(s.Q)])).all()
-    assert (cell.solver.boundary.B.toarray() == B[:, cell.solver.boundary.local_dofs]).all()
+    assert (cell.solver.interface_operators.B.toarray() == B[:, cell.solver.interface_operators.local_dofs]).all()
     # Something is inside, else the tests here would hold of anything.
-    assert comm.allreduce(B.shape[1] - len(cell.solver.boundary.local_dofs)) > 0
+    assert comm.allreduce(B.shape[1] - len(cell.solver.interface_operators.local_dofs)) > 0
 
 
 @CELLS
 def test_load_vanishes_inside_the_bodies(comm, case):
     cell = torn_cells.tear(comm, **case)
     inside = cell.solver.Q.copy()
-    inside[cell.solver.boundary.local_dofs] = 0
+    inside[cell.solver.interface_operators.local_dofs] = 0
     largest = comm.allreduce(np.abs(cell.solver.Q).max(initial=0.0), MPI.MAX)
     assert largest > 0
     assert np.abs(inside).max(initial=0.0) < 1e-13 * largest
@@ -111,7 +111,7 @@ def test_implicit_and_explicit_operators_give_the_same(comm):
     found = []
     for kind, operators in (("implicit", ImplicitInterfaceOperator), ("explicit", ExplicitInterfaceOperator)):
         cell, L, _ = solve(make_case(**case, petsc={"feti_dual_operator": kind}), comm)
-        assert all(isinstance(o, operators) for o in cell.solver.boundary.operators)
+        assert all(isinstance(o, operators) for o in cell.solver.interface_operators.operators)
         found.append((L, matrix(cell, cell.solver.operator.apply)))
     for first, second in zip(*found, strict=True):
         assert relative_error(first, second) < 1e-9

@@ -8,17 +8,20 @@ from mpi4py import MPI
 from reference import dense_feti
 from support import torn_cells
 from support.cases import relative_error
-from support.coarse_space_cells import BOUND, BREAKING, NARROW, SINGLE, Narrow, agree, masks, of_all, together
+from support.coarse_space_cells import BOUND, BREAKING, NARROW, SINGLE, Narrow, agree, masks, of_all, solve_many
 
-from feti_homog.feti.coarse.adaptive import ROOM, THRESHOLD, AdaptiveCoarseSpace
-from feti_homog.feti.coarse.geneo import coarse_vectors, dual_blocks
+from feti_homog.feti.coarse.adaptive import AdaptiveCoarseSpace, Deflation
+from feti_homog.feti.coarse.geneo import kernels_and_soft_modes, subdomain_blocks
 from feti_homog.feti.decomposition.neighbours import Neighbours
 from feti_homog.feti.linalg.collectives import allreduce_sparse
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.preconditioners.scaled import Dirichlet
+from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 from feti_homog.interface.contact import BONDED, OPEN
 
 pytestmark = pytest.mark.parallel
+
+THRESHOLD = DEFAULTS.soft_mode
 
 
 # The coarse vectors.
@@ -32,7 +35,7 @@ def test_soft_modes_are_counted_as_dense_eigenvalues(comm, narrow):
     assert of_all(comm, narrow.coarse, narrow.cell) == expected
     assert max(expected) > 2
     assert min(expected) == 0
-    assert narrow.coarse.vectors == sum(expected) + narrow.dense.G.shape[1]
+    assert narrow.coarse.coarse_dimension == sum(expected) + narrow.dense.G.shape[1]
 
 
 def test_soft_modes_solve_the_eigenproblem(comm, narrow):
@@ -41,8 +44,8 @@ def test_soft_modes_solve_the_eigenproblem(comm, narrow):
     boundary = InterfaceOperators(jump_operator, subdomains, "explicit", 1, True)
     neighbours = Neighbours(comm, jump_operator, subdomains)
     scaled = Dirichlet(comm, jump_operator, boundary)
-    blocks = dual_blocks(comm, jump_operator, boundary, scaled, neighbours.rows)
-    found = coarse_vectors(blocks, neighbours, THRESHOLD)
+    blocks = subdomain_blocks(comm, jump_operator, boundary, scaled, neighbours.rows)
+    found = kernels_and_soft_modes(blocks, neighbours, THRESHOLD)
     for s, V, count in zip(subdomains, found, narrow.coarse.counts, strict=True):
         B, S = narrow.dense.B[s.submesh.index], narrow.dense.S[s.submesh.index]
         N, k = B.T @ narrow.M @ B, s.R.shape[1]
@@ -72,7 +75,7 @@ def test_coarse_vectors_are_preconditioned_jumps(comm, narrow):
 
 def test_deflation_leaves_what_no_coarse_vector_can_improve(narrow):
     """T z is what no coarse vector can improve; dense, with another generalized inverse."""
-    T = dense_feti.matrix(narrow.cell, narrow.coarse.admissible)
+    T = dense_feti.matrix(narrow.cell, narrow.coarse.deflate)
     assert relative_error(T, narrow.T) < 1e-9
     assert np.abs(T @ T - T).max() < 1e-9 * np.abs(T).max()
     assert np.abs(narrow.dense.G.T @ T).max() < 1e-9 * np.abs(T).max()
@@ -85,7 +88,7 @@ def test_deflation_leaves_what_no_coarse_vector_can_improve(narrow):
 
 def test_many_columns_are_deflated_as_each_alone(narrow):
     x = narrow.own(narrow.random(0, (3,)))
-    for function in (narrow.coarse.admissible, narrow.coarse.residual):
+    for function in (narrow.coarse.deflate, narrow.coarse.project_residual):
         columns = function(x)
         for k in range(3):
             alone = function(x[:, k].copy())
@@ -96,14 +99,14 @@ def test_the_iteration_applies_the_projected_operator(narrow):
     """What is left of residual(F T z) after T M^-1 is that of T^T F T z."""
     coarse, F, M = narrow.coarse, narrow.solver.operator, narrow.solver.preconditioner
     found = dense_feti.matrix(
-        narrow.cell, lambda z: coarse.admissible(M.apply(coarse.residual(F.apply(coarse.admissible(z)))))
+        narrow.cell, lambda z: coarse.deflate(M.apply(coarse.project_residual(F.apply(coarse.deflate(z)))))
     )
     assert relative_error(found, narrow.T @ narrow.M @ narrow.T.T @ narrow.dense.F @ narrow.T) < 1e-9
 
 
 def _improved(narrow, r):
     """This rank's rows of the coarse correction of nothing, and the residual that it leaves of r."""
-    lam, residual = narrow.coarse.improved(
+    lam, residual = narrow.coarse.coarse_initial_guess(
         np.zeros((narrow.solver.rows, 1)), narrow.own(r)[:, None], narrow.solver.operator.apply
     )
     return lam[:, 0], residual[:, 0]
@@ -121,7 +124,7 @@ def test_after_a_correction_coarse_vectors_see_rigid_motions_only(narrow):
     taken = r - F @ c - left
     P = dense_feti.projector(narrow.dense.G)
     assert np.linalg.norm(P @ taken) < 1e-9 * np.linalg.norm(taken)
-    again = dense_feti.gathered(narrow.cell, coarse.residual(narrow.own(left)))
+    again = dense_feti.gathered(narrow.cell, coarse.project_residual(narrow.own(left)))
     assert np.linalg.norm(again - left) < 1e-9 * np.linalg.norm(left)
 
 
@@ -168,7 +171,7 @@ def test_threshold_trades_vectors_for_conditioning(narrow):
         assert cell.coarse.threshold == threshold
         largest = dense_feti.extreme_eigenvalues(cell.T, cell.dense.F, cell.M)[1]
         assert largest < BOUND / threshold
-        found.append((cell.coarse.vectors, -largest))
+        found.append((cell.coarse.coarse_dimension, -largest))
     assert found == sorted(found)
     assert found[0][0] < found[1][0] < found[2][0]
 
@@ -176,12 +179,35 @@ def test_threshold_trades_vectors_for_conditioning(narrow):
 # Inactive rows.
 
 
+def test_states_of_deflation(comm):
+    """At first residuals lose P; once rows were inactive, G joins U; few rows, or a breakdown, turn deflation off."""
+    cell = torn_cells.tear(comm, **BREAKING)
+    coarse, every = cell.solver.coarse, np.ones(cell.solver.rows)
+    assert coarse.state is Deflation.ORTHOGONAL and coarse.deflates
+    first = coarse.coarse_dimension
+    active = masks(cell, [0])[0]
+    coarse.activate(active)
+    assert coarse.state is Deflation.OBLIQUE
+    assert coarse.coarse_dimension == first + coarse.natural.kernel_dimension
+    assert coarse.disable_deflation()
+    assert coarse.state is Deflation.OFF and not coarse.deflates
+    assert not coarse.disable_deflation()
+    z = active * np.sin(1.0 + np.arange(len(active)))
+    assert (coarse.deflate(z) == coarse.project(z)).all()
+    with pytest.raises(RuntimeError, match="deflation is off"):
+        _ = coarse.saddle
+    coarse.activate(every)
+    assert coarse.state is Deflation.OBLIQUE
+    demanding = torn_cells.tear(comm, thresholds=Thresholds(rows_per_vector=10**6), **BREAKING)
+    assert demanding.solver.coarse.state is Deflation.OFF
+
+
 def energies(cell, coarse):
     """The coarse matrix of U, dense, and the same by applying F to U."""
     active = cell.solver.active.mask[:, None]
-    U = active * coarse.U.toarray()
+    U = active * coarse.operator.U.toarray()
     expected = cell.comm.allreduce(U.T @ cell.solver.operator.apply(U))
-    return allreduce_sparse(cell.comm, coarse._E).toarray(), expected
+    return allreduce_sparse(cell.comm, coarse.operator.E).toarray(), expected
 
 
 def test_updated_coarse_matrix_equals_one_from_scratch(comm):
@@ -194,7 +220,7 @@ def test_updated_coarse_matrix_equals_one_from_scratch(comm):
     fresh.solver.activate(steps[-1])
     scratch, _ = energies(fresh, fresh.solver.coarse)
     assert relative_error(found, scratch) < 1e-12
-    first, second = (dense_feti.matrix(c, c.solver.coarse.admissible) for c in (cell, fresh))
+    first, second = (dense_feti.matrix(c, c.solver.coarse.deflate) for c in (cell, fresh))
     assert relative_error(first, second) < 1e-8
 
 
@@ -206,10 +232,10 @@ def test_deflation_on_active_rows_leaves_what_no_coarse_vector_can_improve(comm)
         cell.solver.activate(active)
         on = dense_feti.gathered(cell, active) > 0
         assert 0.05 < (~on).mean() < 0.5
-        U = dense_feti.gathered(cell, cell.solver.coarse.U.toarray())[on]
-        assert on.sum() > ROOM * U.shape[1]
+        U = dense_feti.gathered(cell, cell.solver.coarse.operator.U.toarray())[on]
+        assert on.sum() > DEFAULTS.rows_per_vector * U.shape[1]
         expected = dense_feti.deflation(dense.F[np.ix_(on, on)], U, dense.G[on])
-        T = dense_feti.matrix(cell, lambda z, a=active: cell.solver.coarse.admissible(a[:, None] * z))
+        T = dense_feti.matrix(cell, lambda z, a=active: cell.solver.coarse.deflate(a[:, None] * z))
         assert (T[~on] == 0).all() and (T[:, ~on] == 0).all()
         assert relative_error(T[np.ix_(on, on)], expected) < 1e-7
         M = dense.preconditioner(on)
@@ -229,12 +255,12 @@ def test_with_inactive_rows_the_solution_is_that_of_the_natural_space(comm, case
     )
     assert isinstance(adaptive.solver.coarse, AdaptiveCoarseSpace)
     assert not isinstance(natural.solver.coarse, AdaptiveCoarseSpace)
-    first = together(adaptive)
+    first = solve_many(adaptive)
     steps = masks(adaptive, range(3))
     for active in [*steps, np.ones(len(steps[0]))]:
         for cell in (adaptive, natural):
             cell.solver.activate(active)
-        found, expected = (together(c) for c in (adaptive, natural))
+        found, expected = (solve_many(c) for c in (adaptive, natural))
         agree(adaptive, found, expected)
         assert found[0].iterations <= share * expected[0].iterations
     agree(adaptive, found, first)
@@ -252,8 +278,8 @@ def test_fibres_that_float_keep_the_natural_spaces_solution(comm, case, which):
         status = np.where((fibre == lowest) | (which == "all"), OPEN, BONDED).astype(np.int8)
         cell.solver.activate(torn_cells.interface(cell, False).active(status))
         fibres = len(set().union(*comm.allgather(set(fibre)))) if which == "all" else 1
-        assert cell.solver.coarse.free.shape[1] == 3 * fibres
-        results.append(together(cell))
+        assert cell.solver.natural.unconstrained_modes.shape[1] == 3 * fibres
+        results.append(solve_many(cell))
     for found, expected in zip(*results, strict=True):
         assert found.reason > 0
         assert relative_error(*(torn_cells.stress(cell, solution) for solution in (found, expected))) < 1e-8

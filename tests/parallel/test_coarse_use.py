@@ -10,17 +10,19 @@ from mpi4py import MPI
 from reference import dense_feti
 from support import torn_cells
 from support.cases import make_case, monolithic_stiffness, relative_error, solve
-from support.coarse_space_cells import BOUND, BREAKING, NARROW, STRAINS, of_all, together
+from support.coarse_space_cells import BOUND, BREAKING, NARROW, STRAINS, of_all, solve_many
 
 from feti_homog.errors import CaseError
-from feti_homog.feti.coarse.adaptive import THRESHOLD, AdaptiveCoarseSpace
+from feti_homog.feti.coarse.adaptive import AdaptiveCoarseSpace
 from feti_homog.feti.linalg.distributed_direct import DistributedDirectSolver
 from feti_homog.feti.linalg.replicated_saddle_point import ReplicatedSaddlePoint
 from feti_homog.feti.linalg.saddle_point import SaddlePoint, _Augmented
 from feti_homog.feti.linalg.sparse_direct import DirectSolver
-from feti_homog.feti.thresholds import Thresholds
+from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 
 pytestmark = pytest.mark.parallel
+
+THRESHOLD = DEFAULTS.soft_mode
 
 
 # Solutions.
@@ -30,9 +32,9 @@ def test_loads_solved_together_give_the_solutions_of_each_alone(narrow):
     solver = narrow.solver
     strains = np.array([[1.0, 0, 0], [0.2, -3.0, 1e-3], [0, 0, 1e-4]])
     starts = narrow.own(narrow.random(4, (3,))) * [0.0, 1e-2, 0.0]
-    solutions = together(narrow.cell, strains, starts)
+    solutions = solve_many(narrow.cell, strains, starts)
     for strain, start, found in zip(strains, starts.T, solutions, strict=True):
-        (alone,) = together(narrow.cell, strain[None], start[:, None])
+        (alone,) = solve_many(narrow.cell, strain[None], start[:, None])
         assert alone.reason > 0 and found.reason > 0
         assert (found.strain == strain).all()
         assert relative_error(*(dense_feti.gathered(narrow.cell, s.lam) for s in (found, alone))) < 1e-7
@@ -41,9 +43,9 @@ def test_loads_solved_together_give_the_solutions_of_each_alone(narrow):
 
 
 def test_a_load_without_multipliers_leaves_the_others_alone(narrow):
-    zero, found = together(narrow.cell, np.array([[0.0, 0, 0], [1.0, 0, 0]]))
+    zero, found = solve_many(narrow.cell, np.array([[0.0, 0, 0], [1.0, 0, 0]]))
     assert (zero.lam == 0).all()
-    (alone,) = together(narrow.cell, STRAINS[:1])
+    (alone,) = solve_many(narrow.cell, STRAINS[:1])
     assert relative_error(*(dense_feti.gathered(narrow.cell, s.lam) for s in (found, alone))) < 1e-7
 
 
@@ -54,7 +56,9 @@ def test_soft_modes_and_stress_do_not_depend_on_the_ranks(comm):
         cell = torn_cells.tear(some, **NARROW)
         solution = cell.solver.solve(np.array([1.0, -0.5, 0.3]), np.zeros(cell.solver.rows))
         soft = of_all(some, cell.solver.coarse, cell)
-        found.append((cell.solver.coarse.vectors, soft, solution.iterations, torn_cells.stress(cell, solution)))
+        found.append(
+            (cell.solver.coarse.coarse_dimension, soft, solution.iterations, torn_cells.stress(cell, solution))
+        )
     (vectors, soft, iterations, stress), (of_one, soft_of_one, iterations_of_one, stress_of_one) = found
     assert vectors == of_one
     assert soft == soft_of_one
@@ -127,7 +131,7 @@ def test_a_distributed_coarse_problem_gives_the_same(comm, contrast):
         inner = saddle.local if isinstance(saddle, ReplicatedSaddlePoint) else saddle
         assert isinstance(inner._inner.solver, solver)
         assert isinstance(inner._inner, _Augmented) == (contrast < 1e3)
-        found.append(together(cell))
+        found.append(solve_many(cell))
     for one, other in zip(*found, strict=True):
         assert one.reason > 0 and other.reason > 0 and abs(one.iterations - other.iterations) <= 1
         assert relative_error(*(dense_feti.gathered(cell, s.lam) for s in (one, other))) < 1e-7
@@ -145,10 +149,11 @@ def number(pattern, text):
 
 def test_view_shows_the_adaptive_space_and_the_condition_number(comm, narrow, capfd):
     cell, text = torn_cells.printed(comm, capfd, **NARROW, petsc={"feti_view": True})
-    assert number("coarse dimension", text) == narrow.coarse.vectors
-    assert number("kernels:", text) == narrow.coarse.dimension
+    assert number("coarse dimension", text) == narrow.coarse.coarse_dimension
+    assert number("kernels:", text) == narrow.coarse.natural.kernel_dimension
     assert number("soft modes below", text) == THRESHOLD
-    assert f"soft modes below {THRESHOLD:g}: {narrow.coarse.vectors - narrow.coarse.dimension}," in text
+    soft = narrow.coarse.coarse_dimension - narrow.coarse.natural.kernel_dimension
+    assert f"soft modes below {THRESHOLD:g}: {soft}," in text
     assert f"{cell.summary.subdomains} subdomains, {cell.summary.subdomains} with dense boundary operators" in text
     least, largest = dense_feti.extreme_eigenvalues(narrow.T, narrow.dense.F, narrow.M)
     assert 0.7 * largest / least < number("condition number about", text) < 1.01 * largest / least
@@ -156,7 +161,7 @@ def test_view_shows_the_adaptive_space_and_the_condition_number(comm, narrow, ca
 
 def test_view_shows_the_natural_space_without_soft_modes(comm, narrow, capfd):
     _, text = torn_cells.printed(comm, capfd, **NARROW, petsc={"feti_view": True, "feti_coarse_space": "natural"})
-    assert number("coarse dimension", text) == narrow.coarse.dimension
+    assert number("coarse dimension", text) == narrow.coarse.natural.kernel_dimension
     assert "soft modes" not in text
     assert number("condition number about", text) > 10 * BOUND / THRESHOLD
 

@@ -143,7 +143,7 @@ def test_masked_rows_equal_constraints_built_without_them(comm, order):
     for row in range(solver.jump_operator.global_rows):
         unit = (np.arange(first, last) == row).astype(float)
         F.append(np.concatenate(comm.allgather(solver.operator.apply(unit))))
-    G, d = (np.concatenate(comm.allgather(x)) for x in (solver.coarse.G.toarray(), solver.d))
+    G, d = (np.concatenate(comm.allgather(x)) for x in (solver.natural.G.toarray(), solver.d))
     F, G, d = np.array(F)[np.ix_(active, active)], G[active], d[active]
     saddle = np.block([[F, -G], [-G.T, np.zeros((G.shape[1],) * 2)]])
     for strain in STRAINS:

@@ -1,4 +1,4 @@
-"""Soft modes of bodies too large to be examined as one: by the rings around their faces."""
+"""Soft modes of bodies too large to be one eigenproblem: by the neighbourhoods of their faces."""
 
 from __future__ import annotations
 
@@ -8,14 +8,13 @@ from mpi4py import MPI
 from reference import dense_feti
 from support import torn_cells
 from support.cases import make_case, monolithic_stiffness, relative_error, solve
-from support.coarse_space_cells import NARROW, agree, masks, of_all, together
+from support.coarse_space_cells import NARROW, agree, masks, of_all, solve_many
 
-from feti_homog.feti.coarse import face_neighbourhoods as rings_module
 from feti_homog.feti.coarse.adaptive import AdaptiveCoarseSpace
-from feti_homog.feti.coarse.face_neighbourhoods import rings
+from feti_homog.feti.coarse.face_neighbourhoods import face_neighbourhoods
 from feti_homog.feti.decomposition.neighbours import Neighbours
 from feti_homog.feti.decomposition.subdomain import both_directions
-from feti_homog.feti.thresholds import Thresholds
+from feti_homog.feti.thresholds import MIN_FACE_NODES, Thresholds
 
 pytestmark = pytest.mark.parallel
 
@@ -35,10 +34,10 @@ FACEWISE = Thresholds(whole_boundary_dofs=30)
 def faces(request, comm):
     """(subdomain, boundary dofs, S, face) of all pairs of neighbours."""
     cell = torn_cells.tear(comm, **request.param, petsc={"feti_coarse_space": "natural"})
-    solver, found = cell.solver, []
+    solver, operators, found = cell.solver, cell.solver.interface_operators, []
     neighbours = Neighbours(comm, solver.jump_operator, cell.subdomains)
     for i, s in enumerate(cell.subdomains):
-        B, dofs = solver.boundary.B[:, solver.boundary.slices[i]], solver.boundary.dofs[i]
+        B, dofs = operators.B[:, operators.slices[i]], operators.dofs[i]
         S = dense_feti.schur(s.assemble_stiffness().toarray(), dofs)
         for other, common in neighbours.common[i].items():
             if other != s.submesh.index:
@@ -47,48 +46,47 @@ def faces(request, comm):
     return found
 
 
-# Rings.
+# Neighbourhoods.
 
 
-def test_the_energy_of_a_body_lies_between_those_of_rings(comm, faces):
+def test_the_energy_of_a_body_lies_between_those_of_neighbourhoods(comm, faces):
     covered = np.zeros(2)
     for s, dofs, S, face in faces:
-        found = rings(s, dofs, face)
-        at = np.concatenate([np.zeros(0, int), *(ring.at for ring in found)])
+        found = face_neighbourhoods(s, dofs, face)
+        at = np.concatenate([np.zeros(0, int), *(near.at for near in found)])
         assert set(at) <= set(face)
         covered += [len(set(at)), len(face)]
         rest = S.copy()
-        for ring in found:
-            rest[np.ix_(ring.at, ring.at)] -= ring.operator.S
-            more = ring.clamped - S[np.ix_(ring.at, ring.at)]
+        for near in found:
+            rest[np.ix_(near.at, near.at)] -= near.operator.S
+            more = near.S_fixed - S[np.ix_(near.at, near.at)]
             assert np.linalg.eigvalsh(more)[0] > -TIGHT * np.abs(S).max()
         assert np.linalg.eigvalsh(rest)[0] > -TIGHT * np.abs(S).max()
     examined, whole = comm.allreduce(covered)
     assert examined > 0.9 * whole
 
 
-def test_kernels_of_rings_are_the_null_spaces_of_their_stiffness(comm, faces):
+def test_kernels_of_neighbourhoods_are_the_null_spaces_of_their_stiffness(comm, faces):
     kernels = set()
     for s, dofs, _, face in faces:
-        for ring in rings(s, dofs, face):
-            S = ring.operator.S
-            assert np.abs(S @ ring.R).max(initial=0.0) < TIGHT * np.abs(S).max()
-            assert dense_feti.kernel(S).shape[1] == ring.R.shape[1]
-            assert np.linalg.eigvalsh(ring.operator.regularised_schur)[0] > 0
-            kernels.add(ring.R.shape[1])
+        for near in face_neighbourhoods(s, dofs, face):
+            S = near.operator.S
+            assert np.abs(S @ near.R).max(initial=0.0) < TIGHT * np.abs(S).max()
+            assert dense_feti.kernel(S).shape[1] == near.R.shape[1]
+            assert np.linalg.eigvalsh(near.operator.regularised_schur)[0] > 0
+            kernels.add(near.R.shape[1])
     assert 3 in set().union(*comm.allgather(kernels))
 
 
-def test_a_ring_of_the_whole_body_is_as_stiff(faces, monkeypatch):
-    monkeypatch.setattr(rings_module, "LAYERS", 100)
+def test_a_neighbourhood_of_the_whole_body_is_as_stiff(faces):
     for s, dofs, S, face in faces:
-        if len(face) < 2 * rings_module.FEWEST:
+        if len(face) < 2 * MIN_FACE_NODES:
             continue
-        (ring,) = rings(s, dofs, face)
+        (near,) = face_neighbourhoods(s, dofs, face, Thresholds(face_layers=100))
         expected = np.zeros_like(S)
         expected[np.ix_(face, face)] = dense_feti.schur(S, face)
         found = np.zeros_like(S)
-        found[np.ix_(ring.at, ring.at)] = ring.operator.S
+        found[np.ix_(near.at, near.at)] = near.operator.S
         assert relative_error(found, expected) < TIGHT
 
 
@@ -103,7 +101,7 @@ def test_iterations_stay_few_at_any_contrast(comm, contrast):
     }  # fmt: skip
     torn, L, responses = solve(make_case(**case), comm, FACEWISE)
     assert isinstance(torn.solver.coarse, AdaptiveCoarseSpace)
-    assert comm.allreduce(any(torn.solver.boundary.facewise), MPI.LOR)
+    assert comm.allreduce(any(torn.solver.interface_operators.facewise), MPI.LOR)
     assert all(r.state.solution.reason > 0 for r in responses)
     assert max(r.state.iterations for r in responses) <= 25
     assert relative_error(L, monolithic_stiffness(torn)) < 1e-7
@@ -118,8 +116,8 @@ def test_a_whole_matrix_converges_as_with_one_eigenproblem(comm):
         cell = torn_cells.tear(
             comm, **case, thresholds=thresholds, petsc={"feti_coarse_space": space, "feti_ksp_rtol": 1e-8}
         )
-        iterations.append(together(cell)[0].iterations)
-        vectors.append(cell.solver.coarse.vectors)
+        iterations.append(solve_many(cell)[0].iterations)
+        vectors.append(cell.solver.coarse.coarse_dimension)
     assert iterations[0] <= iterations[1] + 5
     assert max(iterations[:2]) <= 25 < iterations[2] / 1.5
     assert vectors[2] < vectors[1] < vectors[0] < 2 * vectors[1]
@@ -146,4 +144,4 @@ def test_with_inactive_rows_the_solution_is_that_of_the_natural_space(comm):
     for active in masks(adaptive, range(2)):
         for cell in (adaptive, natural):
             cell.solver.activate(active)
-        agree(adaptive, *(together(cell) for cell in (adaptive, natural)))
+        agree(adaptive, *(solve_many(cell) for cell in (adaptive, natural)))

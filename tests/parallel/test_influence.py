@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from reference.dense_feti import DenseDual, gathered, matrix
 from scipy.linalg import null_space
 from support import torn_cells
 from support.cases import relative_error
-from support.coarse_space_cells import BREAKING, NARROW, together
+from support.coarse_space_cells import BREAKING, NARROW, solve_many
 
 from feti_homog.errors import CaseError
-from feti_homog.feti.factory import MANY
 from feti_homog.feti.operators.explicit import ExplicitInterfaceOperator
 from feti_homog.feti.preconditioners.influence import Influence
+from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 from feti_homog.interface.contact import BONDED, CLOSED, OPEN
 
 pytestmark = pytest.mark.parallel
 
 INFLUENCE = {"feti_pc_type": "influence"}
+# A stiffness is expected to apply the dual operator more often than this.
+WORTH_WHILE = Thresholds(influence_applications=60)
 CELLS = pytest.mark.parametrize(
     "case",
     [
@@ -79,7 +83,7 @@ def test_influence_columns_leave_nothing_to_iterate(comm, case):
     for status in states(cell):
         activate(cell, status)
         activate(other, status)
-        for found, expected in zip(together(cell), together(other), strict=True):
+        for found, expected in zip(solve_many(cell), solve_many(other), strict=True):
             assert found.reason > 0 and found.iterations <= 1
             assert expected.iterations > 1
             lam = [gathered(c, s.lam) for c, s in ((cell, found), (other, expected))]
@@ -89,33 +93,31 @@ def test_influence_columns_leave_nothing_to_iterate(comm, case):
 def test_influence_columns_stay_exact_at_narrow_gaps_and_contrasts(comm):
     for contrast in (1e-6, 1e6):
         cell = torn_cells.tear(comm, **NARROW, fibre={"young": 3.0 * contrast, "poisson": 0.3}, petsc=INFLUENCE)
-        solutions = together(cell)
+        solutions = solve_many(cell)
         assert all(s.reason > 0 and s.iterations <= 3 and s.residual < 1e-7 for s in solutions)
 
 
 @pytest.mark.parametrize(
-    ("applications", "petsc", "chosen"),
+    ("thresholds", "petsc", "chosen"),
     [
-        (MANY, {}, True),
-        (60, {}, False),
-        (MANY, {"feti_pc_type": "dirichlet"}, False),
-        (MANY, {"feti_coarse_space": "adaptive"}, False),
-        (MANY, {"feti_dual_operator": "implicit"}, False),
+        (WORTH_WHILE, {}, True),
+        (DEFAULTS, {}, False),
+        (WORTH_WHILE, {"feti_pc_type": "dirichlet"}, False),
+        (WORTH_WHILE, {"feti_coarse_space": "adaptive"}, False),
+        (WORTH_WHILE, {"feti_dual_operator": "implicit"}, False),
     ],
-    ids=["path", "stiffness", "dirichlet", "adaptive", "implicit"],
+    ids=["many applications", "few applications", "dirichlet", "adaptive", "implicit"],
 )
-def test_influence_columns_are_chosen_for_many_applications(comm, monkeypatch, applications, petsc, chosen):
-    monkeypatch.setattr("feti_homog.homogenization.cost_model.applications", lambda case: applications)
-    solver = torn_cells.tear(comm, **BREAKING, petsc=petsc).solver
+def test_influence_columns_are_chosen_for_many_applications(comm, thresholds, petsc, chosen):
+    solver = torn_cells.tear(comm, thresholds=thresholds, **BREAKING, petsc=petsc).solver
     assert isinstance(solver.preconditioner, Influence) == chosen
     if chosen:
-        assert all(isinstance(o, ExplicitInterfaceOperator) for o in solver.boundary.operators)
+        assert all(isinstance(o, ExplicitInterfaceOperator) for o in solver.interface_operators.operators)
 
 
-def test_influence_columns_are_not_chosen_where_the_bonded_cell_is_too_large(comm, monkeypatch):
-    monkeypatch.setattr("feti_homog.homogenization.cost_model.applications", lambda case: MANY)
-    monkeypatch.setattr("feti_homog.feti.factory.LARGEST_BONDED", 10)
-    assert not isinstance(torn_cells.tear(comm, **BREAKING).solver.preconditioner, Influence)
+def test_influence_columns_are_not_chosen_where_the_bonded_cell_is_too_large(comm):
+    cell = torn_cells.tear(comm, thresholds=replace(WORTH_WHILE, assembled_schur_dofs=10), **BREAKING)
+    assert not isinstance(cell.solver.preconditioner, Influence)
 
 
 def test_influence_columns_need_explicit_operators(comm):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import h5py
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -10,7 +11,8 @@ from support.cases import MATRIX, make_case
 from support.jobs import mpirun
 from support.ranks import parallel_assert
 
-from feti_homog import Case, CaseError, ConvergenceError, run
+from feti_homog import Case, CaseError, ConvergenceError, collect_sweep, run, run_sweep
+from feti_homog.output.files.field_layout import tables
 
 pytestmark = pytest.mark.parallel
 
@@ -45,6 +47,56 @@ def test_points_of_path_and_angle_have_their_shapes(comm):
     result = run(Case.parse(document | {"analysis": {"type": "angle", "plane": "stress"}}), comm)
     assert result.points["stiffness"].shape == (2, 3, 3) and result.effective_stiffness is None
     assert result.points["stiffness"][1, 0, 0] < result.points["stiffness"][0, 0, 0]
+
+
+def test_fields(comm, shared_path):
+    """In memory what result.h5 holds: each rank its part, gathered all of it in the file's order."""
+    result = run(with_fraction(0.4, geometry="square"), comm, out=shared_path / "out", fields=True)
+    fields = result.fields
+    assert [state.label for state in fields.states] == ["E11", "E22", "gamma12"]
+    assert len(fields.mesh.points) == len(fields.states[0].displacement)
+    parallel_assert(comm, comm.allreduce(len(fields.mesh.triangles)) == result.cell.elements)
+    whole = fields.gathered()
+    assert (whole is None) == (comm.rank > 0)
+    same = True
+    if whole is not None:
+        with h5py.File(shared_path / "out" / "result.h5", "r") as file:
+            same = all(
+                np.array_equal(file[f"{group}/{name}"][()], getattr(part, name))
+                for group, part in (("mesh", whole.mesh), ("interface", whole.interface), ("state/2", whole.states[2]))
+                for name in tables(part)
+            )
+    parallel_assert(comm, same)
+    assert run(with_fraction(0.4), comm).fields is None
+
+
+def test_with_files(comm, shared_path):
+    """The result that is returned is the one that is written; a finished path is read again."""
+    document = with_fraction(0.4, geometry="square").resolved()
+    document |= {"interface": {"normal_strength": 5.0}, "path": {"strain": [0.2, 0.0, 0.0]}}
+    document |= {"output": {"fields": False, "pictures": False}}
+    case = Case.parse(document | {"analysis": {"type": "path", "plane": "stress"}})
+    result = run(case, comm, out=shared_path / "out")
+    parallel_assert(comm, sorted(p.name for p in (shared_path / "out").iterdir()) == ["path.csv", "result.json"])
+    again = run(case, comm, out=shared_path / "out", resume=True)
+    assert [p.load_factor for p in again.path] == [p.load_factor for p in result.path]
+    assert np.array_equal(again.points["stress"], result.points["stress"]) and again.checks == result.checks
+    assert again.timings == result.timings and again.solver == result.solver and again.case == result.case
+    rising, (left, number) = result.rising_strain(), result.first_drop()
+    assert rising[2, :3] == pytest.approx(left) and rising[1, :3] == pytest.approx(result.path[0].stress) and number
+    with pytest.raises(ValueError, match="path of one leg"):
+        run(with_fraction(0.4), comm).rising_strain()
+
+
+def test_a_sweep(comm, shared_path):
+    document = {k: v for k, v in with_fraction(0.4).resolved().items() if v != {}}
+    document |= {"output": {"fields": False, "pictures": False}, "sweep": {"cell.fibre_fraction": [0.3, 0.4]}}
+    table = run_sweep(document, shared_path / "out", comm, ranks_per_case=1)
+    assert table.status == ["done", "done"] and table.outputs["C11"][0] < table.outputs["C11"][1]
+    words = collect_sweep(shared_path / "out", comm, pictures=False)
+    assert words[0] == "2 cases: 2 done" and words[1:] == [
+        str(shared_path / "out" / f"sweep.{s}") for s in ("csv", "h5")
+    ]
 
 
 def test_halves_of_the_ranks_run_cases_of_their_own(comm):

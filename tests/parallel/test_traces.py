@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from support import torn_cells
-from support.coarse_space_cells import NARROW, together
+from support.coarse_space_cells import NARROW, solve_many
 
 from feti_homog.cell.refinement import edge_node
-from feti_homog.feti.coarse import trace_spaces
-from feti_homog.feti.coarse.trace_spaces import ENOUGH, trace
+from feti_homog.feti.coarse.trace_spaces import trace_space
+from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 
 pytestmark = pytest.mark.parallel
 
@@ -18,18 +18,18 @@ ADAPTIVE = {"feti_coarse_space": "adaptive"}
 ALL = 10**9
 
 
-def tear(comm, enough, monkeypatch, **cell):
-    monkeypatch.setattr(trace_spaces, "ENOUGH", enough)
-    return torn_cells.tear(comm, **REFINED | cell)
+def tear(comm, enough, **cell):
+    """With trace spaces of at least so many dofs."""
+    return torn_cells.tear(comm, thresholds=Thresholds(min_trace_dofs=enough), **REFINED | cell)
 
 
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("enough", [0, 60, 150, ALL])
-def test_traces_are_piecewise_linear_along_the_coarse_edges(comm, monkeypatch, enough, order):
-    cell = tear(comm, enough, monkeypatch, order=order, refine=3 - order)
-    for s, dofs in zip(cell.subdomains, cell.solver.boundary.dofs, strict=True):
+def test_traces_are_piecewise_linear_along_the_coarse_edges(comm, enough, order):
+    cell = tear(comm, enough, order=order, refine=3 - order)
+    for s, dofs in zip(cell.subdomains, cell.solver.interface_operators.dofs, strict=True):
         nodes, M = dofs[::2] // 2, s.mesh.lattice.intervals
-        P = trace(s.submesh, s.mesh.lattice, nodes)
+        P = trace_space(s.submesh, s.mesh.lattice, nodes, enough)
         assert P.shape[0] == len(dofs)
         assert P.shape[1] >= min(enough, len(dofs))
         u = np.full((s.mesh.n_classes, 2), np.nan)
@@ -47,21 +47,21 @@ def test_traces_are_piecewise_linear_along_the_coarse_edges(comm, monkeypatch, e
                     assert np.allclose(values, np.interp(np.arange(M + 1), at, values[at]), atol=1e-13)
 
 
-def test_traces_of_few_dofs_keep_them_all(comm, monkeypatch):
-    cell = tear(comm, ALL, monkeypatch)
-    for s, dofs in zip(cell.subdomains, cell.solver.boundary.dofs, strict=True):
-        P = trace(s.submesh, s.mesh.lattice, dofs[::2] // 2)
+def test_traces_of_few_dofs_keep_them_all(comm):
+    cell = tear(comm, ALL)
+    for s, dofs in zip(cell.subdomains, cell.solver.interface_operators.dofs, strict=True):
+        P = trace_space(s.submesh, s.mesh.lattice, dofs[::2] // 2, ALL)
         assert P.shape == (len(dofs),) * 2
         assert np.array_equal(P.toarray(), np.eye(len(dofs)))
 
 
 @pytest.mark.parametrize("pieces", [17, 24], ids=["whole", "cut"])
-def test_coarser_traces_find_as_good_modes(comm, monkeypatch, pieces):
+def test_coarser_traces_find_as_good_modes(comm, pieces):
     found = []
-    for enough in (ALL, ENOUGH):
-        cell = tear(comm, enough, monkeypatch, decomposition={"subdomains": pieces}, petsc=ADAPTIVE)
-        solutions = together(cell)
-        vectors = cell.solver.coarse.vectors
+    for enough in (ALL, DEFAULTS.min_trace_dofs):
+        cell = tear(comm, enough, decomposition={"subdomains": pieces}, petsc=ADAPTIVE)
+        solutions = solve_many(cell)
+        vectors = cell.solver.coarse.coarse_dimension
         found.append((vectors, solutions[0].iterations, [cell.solver.stress_integral(s) for s in solutions]))
     (every, most, stress), (fewer, iterations, same) = found
     assert 0.8 * every <= fewer <= 1.05 * every

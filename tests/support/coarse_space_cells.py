@@ -37,7 +37,7 @@ class Narrow:
         self.coarse = self.solver.coarse
         self.dense = dense or dense_feti.DenseDual(self.cell)
         self.M = self.dense.preconditioner(np.ones(self.dense.total, bool))
-        self.U = dense_feti.gathered(self.cell, self.coarse.U.toarray())
+        self.U = dense_feti.gathered(self.cell, self.coarse.operator.U.toarray())
         self.T = dense_feti.deflation(self.dense.F, self.U, self.dense.G)
 
     def soft_modes(self):
@@ -55,11 +55,11 @@ class Narrow:
         return np.random.default_rng(seed).standard_normal((self.dense.total, *columns))
 
 
-def together(cell, strains=STRAINS, starts=None):
+def solve_many(cell, strains=STRAINS, starts=None):
     """The dual solutions under some strains, with the options of the case."""
     with case_options(cell.case.petsc):
         zero = np.zeros((cell.solver.rows, len(strains)))
-        return cell.solver.solve_together(strains, zero if starts is None else starts)
+        return cell.solver.solve_many(strains, zero if starts is None else starts)
 
 
 def of_all(comm, coarse, cell):

@@ -38,9 +38,9 @@ FLOORS = (
     ("output.plots",),
     ("output",),
     ("analysis",),
-    ("api",),
     ("sweep.report",),
     ("sweep",),
+    ("api",),
     ("cli",),
     ("__main__",),
 )

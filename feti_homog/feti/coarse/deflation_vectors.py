@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from mpi4py import MPI
@@ -13,67 +14,87 @@ from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.neighbours import Neighbours
 from feti_homog.feti.linalg.dense_block_sum import DenseBlockSum
 from feti_homog.feti.linalg.distributed_matrix import add_shared_rows
+from feti_homog.feti.thresholds import DEFAULTS, VECTOR_CHUNK
 from feti_homog.typing import Float, Int
 
-# Rows of the receiver, numbers of coarse vectors, and their jumps there (rows, vectors).
-Jumps = tuple[Int, Int, Float]
 
-# Vectors that are found at once; and entries, relative to the largest, that those of a large body do without: they
-# decay within few fibres.
-CHUNK, FAINT = 128, 1e-5
+class _Jumps(NamedTuple):
+    """What a neighbour's modes open on the rows of a subdomain: B V there.
+
+    `rows` (r,) are positions among the subdomain's rows, `columns` (c,) numbers of coarse vectors, `values` (r, c).
+    """
+
+    rows: Int
+    columns: Int
+    values: Float
 
 
-def preconditioned(
+def deflation_vectors(
     comm: MPI.Intracomm,
     jump_operator: JumpOperator,
     blocks: Sequence[SubdomainBlocks],
     neighbours: Neighbours,
     V: Sequence[Float],
+    drop_tolerance: float = DEFAULTS.drop_tolerance,
 ) -> csr_matrix:
-    """(local rows, vectors) U = M^-1 B V.  Collective."""
-    counts = np.array([v.shape[1] for v in V], dtype=np.int64)
-    every = np.zeros(len(neighbours.rank), np.int64)
-    every[neighbours.index] = counts
-    comm.Allreduce(MPI.IN_PLACE, every)
-    ends = np.cumsum(every)
+    """(local rows, vectors) U.  Collective.
 
-    def jumps() -> Iterator[tuple[int, int, tuple[Int, Float]]]:
-        for i, (block, v) in enumerate(zip(blocks, V, strict=True)):
-            Z, last = block.B @ v, ends[neighbours.index[i]]
-            for s, common in neighbours.common[i].items():
-                seen = np.flatnonzero(Z[common].any(axis=0))
-                yield i, s, (last - v.shape[1] + seen, Z[np.ix_(common, seen)])
-
-    received: list[list[Jumps]] = [[] for _ in blocks]
-    neighbours.exchange(jumps(), lambda i, sender, of: received[i].append((neighbours.common[i][sender], *of)))
-    U = DenseBlockSum((len(jump_operator.rows), int(every.sum())))
-    for i, (block, rows) in enumerate(zip(blocks, neighbours.rows, strict=True)):
-        for some in _groups(received[i]):
-            columns = np.concatenate([c for _, c, _ in some])
+    Every subdomain adds its part W^-1 B_s D^-1 S_s D^-1 B_s^T W^-1 of M^-1 to the jumps on its rows.  Of large bodies,
+    entries below `drop_tolerance`, relative to the largest of their vector, are dropped.
+    """
+    received, vectors = _exchange_jumps(comm, blocks, neighbours, V)
+    U = DenseBlockSum((len(jump_operator.rows), vectors))
+    for block, rows, messages in zip(blocks, neighbours.rows, received, strict=True):
+        for group in _groups(messages):
+            columns = np.concatenate([jumps.columns for jumps in group])
             jump, at = np.zeros((len(rows), len(columns))), 0
-            for where, _, Z in some:
-                jump[where, at : at + Z.shape[1]] = Z
-                at += Z.shape[1]
-            vectors = block.BW @ block.operator.apply_schur(block.BW.T @ jump)
+            for jumps in group:
+                jump[jumps.rows, at : at + len(jumps.columns)] = jumps.values
+                at += len(jumps.columns)
+            part = block.BW @ block.operator.apply_schur(block.BW.T @ jump)
             if block.facewise:
-                U.add_entries_above(rows, columns, vectors, FAINT * np.abs(vectors).max(axis=0))
+                U.add_entries_above(rows, columns, part, drop_tolerance * np.abs(part).max(axis=0))
             else:
-                U.add(rows, columns, vectors)
+                U.add(rows, columns, part)
     owned = jump_operator.owned[1] - jump_operator.owned[0]
     return add_shared_rows(comm, U.matrix(), jump_operator.rows, jump_operator.is_shared_row, owned)
 
 
-def _groups(messages: Sequence[Jumps]) -> Iterator[list[Jumps]]:
-    """The same jumps, at most CHUNK columns at a time."""
-    group: list[Jumps] = []
+def _exchange_jumps(
+    comm: MPI.Intracomm, blocks: Sequence[SubdomainBlocks], neighbours: Neighbours, V: Sequence[Float]
+) -> tuple[list[list[_Jumps]], int]:
+    """For each subdomain of this rank the jumps on its rows, and the number of coarse vectors.  Collective."""
+    counts = np.zeros(len(neighbours.rank), np.int64)
+    counts[neighbours.index] = [v.shape[1] for v in V]
+    comm.Allreduce(MPI.IN_PLACE, counts)
+    ends = np.cumsum(counts)
+
+    def messages() -> Iterator[tuple[int, int, tuple[Int, Float]]]:
+        for i, (block, v) in enumerate(zip(blocks, V, strict=True)):
+            Z, first = block.B @ v, ends[neighbours.index[i]] - v.shape[1]
+            for s, common in neighbours.common[i].items():
+                nonzero = np.flatnonzero(Z[common].any(axis=0))
+                yield i, s, (first + nonzero, Z[np.ix_(common, nonzero)])
+
+    received: list[list[_Jumps]] = [[] for _ in blocks]
+    neighbours.exchange(
+        messages(),
+        lambda i, sender, message: received[i].append(_Jumps(neighbours.common[i][sender], *message)),
+    )
+    return received, int(ends[-1]) if len(ends) else 0
+
+
+def _groups(messages: Sequence[_Jumps]) -> Iterator[list[_Jumps]]:
+    """The same jumps, at most VECTOR_CHUNK columns at a time."""
+    group: list[_Jumps] = []
     width = 0
-    for where, columns, Z in messages:
-        for first in range(0, len(columns), CHUNK):
-            some = slice(first, first + CHUNK)
-            if width + len(columns[some]) > CHUNK:
+    for rows, columns, values in messages:
+        for first in range(0, len(columns), VECTOR_CHUNK):
+            some = slice(first, first + VECTOR_CHUNK)
+            if width + len(columns[some]) > VECTOR_CHUNK:
                 yield group
                 group, width = [], 0
-            group.append((where, columns[some], Z[:, some]))
+            group.append(_Jumps(rows, columns[some], values[:, some]))
             width += len(columns[some])
     if group:
         yield group

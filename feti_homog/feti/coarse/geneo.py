@@ -12,19 +12,20 @@ import numpy as np
 from mpi4py import MPI
 from scipy.sparse import csc_matrix, csr_matrix
 
-from feti_homog.feti.coarse.local_eigenproblems import SubdomainBlocks, examined
+from feti_homog.feti.coarse.local_eigenproblems import SubdomainBlocks, eigenproblem
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.neighbours import Neighbours
 from feti_homog.feti.linalg.distributed_matrix import add_shared_rows
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.preconditioners.scaled import StiffnessScaled
+from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 from feti_homog.typing import Float, Float32, Int
 
 
-def dual_blocks(
+def subdomain_blocks(
     comm: MPI.Intracomm,
     jump_operator: JumpOperator,
-    boundary: InterfaceOperators,
+    operators: InterfaceOperators,
     scaling: StiffnessScaled,
     rows: Sequence[Int],
 ) -> list[SubdomainBlocks]:
@@ -34,33 +35,41 @@ def dual_blocks(
     at = np.searchsorted(jump_operator.rows, jump_operator.owned[0])
     shape = (len(jump_operator.rows), jump_operator.global_rows)
     wide = csr_matrix((inverse.data, (inverse.row + at, inverse.col + jump_operator.owned[0])), shape=shape)
-    rows_of_rank, is_shared_row = jump_operator.rows, jump_operator.is_shared_row
-    W_inverse = add_shared_rows(comm, wide, rows_of_rank, is_shared_row, owned)[:, rows_of_rank]
-    B, BW = boundary.B.tocsc(), (W_inverse @ scaling.BD).tocsc()
+    W_inverse = add_shared_rows(comm, wide, jump_operator.rows, jump_operator.is_shared_row, owned)[
+        :, jump_operator.rows
+    ]
+    B, BW = operators.B.tocsc(), (W_inverse @ scaling.BD).tocsc()
     blocks = []
-    for i, (subdomain, operator) in enumerate(zip(boundary.subdomains, boundary.operators, strict=True)):
-        own, scaled = (_columns(matrix, boundary.slices[i], rows[i]) for matrix in (B, BW))
-        blocks.append(SubdomainBlocks(subdomain, boundary.dofs[i], operator, own, scaled, boundary.facewise[i]))
+    for i, (subdomain, operator) in enumerate(zip(operators.subdomains, operators.operators, strict=True)):
+        own, scaled = (_columns(matrix, operators.slices[i], rows[i]) for matrix in (B, BW))
+        blocks.append(SubdomainBlocks(subdomain, operators.dofs[i], operator, own, scaled, operators.facewise[i]))
     return blocks
 
 
-def coarse_vectors(blocks: Sequence[SubdomainBlocks], neighbours: Neighbours, threshold: float) -> list[Float]:
-    """For each subdomain of this rank: (n, k + m) its kernel and its m modes below the threshold.  Collective."""
-    subdomains = [examined(*of) for of in zip(blocks, neighbours.common, strict=True)]
+def kernels_and_soft_modes(
+    blocks: Sequence[SubdomainBlocks],
+    neighbours: Neighbours,
+    threshold: float,
+    thresholds: Thresholds = DEFAULTS,
+) -> list[Float]:
+    """V: for each subdomain of this rank (n, k + m) its kernel and its m modes below the threshold.  Collective."""
+    problems = [
+        eigenproblem(block, common, thresholds) for block, common in zip(blocks, neighbours.common, strict=True)
+    ]
     # Of the neighbours' shares in M^-1 the rows that both have.
-    others: list[list[tuple[int, Float32]]] = [[] for _ in blocks]
+    received: list[list[tuple[int, Float32]]] = [[] for _ in blocks]
 
-    def shares() -> Iterator[tuple[int, int, Float32]]:
-        for i, subdomain in enumerate(subdomains):
-            for s, share in subdomain.shares():
+    def messages() -> Iterator[tuple[int, int, Float32]]:
+        for i, problem in enumerate(problems):
+            for s, share in problem.preconditioner_shares():
                 yield i, s, share
 
-    neighbours.exchange(shares(), lambda i, sender, share: others[i].append((sender, share)))
-    vectors = []
-    for block, subdomain, received in zip(blocks, subdomains, others, strict=True):
-        vectors.append(np.hstack([block.R, subdomain.modes(received, threshold)]))
-        received.clear()
-    return vectors
+    neighbours.exchange(messages(), lambda i, sender, share: received[i].append((sender, share)))
+    V = []
+    for block, problem, shares in zip(blocks, problems, received, strict=True):
+        V.append(np.hstack([block.R, problem.modes(shares, threshold)]))
+        shares.clear()
+    return V
 
 
 def _columns(matrix: csc_matrix, span: slice, rows: Int) -> csr_matrix:

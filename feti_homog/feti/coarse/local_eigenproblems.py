@@ -1,13 +1,13 @@
-"""Soft modes of one subdomain, examined as one or face by face.
+"""Soft modes of one subdomain, from one eigenproblem on its boundary or from one on each of its faces.
 
 For a subdomain s with Schur complement S_s and constraints B_s, the displacements p of its boundary with
 
     S_s p = theta N_s p,  N_s = B_s^T M^-1 B_s,  theta < tau
 
-are soft in s but stiff in the eyes of the preconditioner.  On a large boundary that takes a dense eigenproblem beyond
-reach.  But where each node is shared with one other body only, the weights of M^-1 hardly change along the boundary,
-its own share is no more than S_s, and what makes p stiff is the neighbour's: so each face is examined by itself, with
-the ring around it for S_s.  The eigenproblems are projected to trace spaces.
+are soft in s but stiff in the eyes of the preconditioner.  On a large boundary this dense eigenproblem is too large.
+But where each node is shared with one other body only, the weights of M^-1 hardly change along the boundary, its own
+share is no more than S_s, and what makes p stiff is the neighbour's: so each face has an eigenproblem of its own, with
+the Schur complement of the face's neighbourhood for S_s.  The eigenproblems are projected to trace spaces.
 """
 
 from __future__ import annotations
@@ -21,17 +21,13 @@ from scipy.linalg import eigh
 from scipy.linalg.lapack import dpotrf
 from scipy.sparse import csr_matrix
 
-from feti_homog.feti.coarse.face_neighbourhoods import rings
-from feti_homog.feti.coarse.trace_spaces import trace
+from feti_homog.feti.coarse.face_neighbourhoods import face_neighbourhoods
+from feti_homog.feti.coarse.trace_spaces import trace_space
 from feti_homog.feti.decomposition.subdomain import Subdomain, both_directions
 from feti_homog.feti.operators.explicit import ExplicitInterfaceOperator
 from feti_homog.feti.operators.implicit import ImplicitInterfaceOperator
+from feti_homog.feti.thresholds import DEFAULTS, SINGLE_PRECISION_NULL, Thresholds
 from feti_homog.typing import Float, Float32, Int
-
-# Of a symmetric matrix in single precision, relative to its largest eigenvalue: eigenvalues that are none.
-NULL = 1e-6
-# The threshold of a face, over tau, for what other faces and the rest of the body add is not in its eigenproblem.
-FACE = 1.25
 
 
 @dataclass(frozen=True)
@@ -43,7 +39,7 @@ class SubdomainBlocks:
         operator: its boundary operators.
         B: (rows, n) constraints.
         BW: (rows, n) scaled constraints W^-1 B D^-1.
-        facewise: whether it is to be examined face by face.
+        facewise: whether each face has an eigenproblem of its own.
     """
 
     subdomain: Subdomain
@@ -60,78 +56,89 @@ class SubdomainBlocks:
 
 
 class SubdomainEigenproblem:
-    """Examined as one.  `common` names the rows that it has in common with each subdomain, itself among them."""
+    """One eigenproblem on the whole boundary."""
 
-    def __init__(self, block: SubdomainBlocks, operator: ExplicitInterfaceOperator, common: Mapping[int, Int]) -> None:
+    def __init__(
+        self,
+        block: SubdomainBlocks,
+        operator: ExplicitInterfaceOperator,
+        common: Mapping[int, Int],
+        min_trace_dofs: int = DEFAULTS.min_trace_dofs,
+    ) -> None:
+        """`common` names the rows that it has in common with each subdomain, itself among them."""
         self.block, self.common = block, common
         subdomain, S = block.subdomain, operator.S
-        self._P = trace(subdomain.submesh, subdomain.mesh.lattice, block.dofs[::2] // 2)
-        self._held = congruent(self._P, S) + operator.regularisation(self._P)
+        self._P = trace_space(subdomain.submesh, subdomain.mesh.lattice, block.dofs[::2] // 2, min_trace_dofs)
+        self._regular_S = congruent(self._P, S) + operator.regularisation(self._P)
         # (rows, rows) its share W^-1 B D^-1 S D^-1 B^T W^-1 of M^-1; this precision tells soft from stiff.
         BW = block.BW.astype(np.float32)
         self._share = BW @ (BW @ S.astype(np.float32)).T
 
-    def shares(self) -> Iterator[tuple[int, Float32]]:
+    def preconditioner_shares(self) -> Iterator[tuple[int, Float32]]:
         """Its share of M^-1 on the rows in common with each other subdomain."""
         for s, rows in self.common.items():
             if s != self.block.subdomain.submesh.index:
                 yield s, self._share[np.ix_(rows, rows)]
 
     def modes(self, shares: Sequence[tuple[int, Float32]], threshold: float) -> Float:
-        """(n, m) soft modes besides the kernel, for the shares of others in M^-1."""
+        """(n, m) soft modes besides the kernel, for the shares of other subdomains in M^-1."""
         M = self._share.copy()
-        # In an order that no distribution changes.
+        # In the order of subdomains, so that rounding does not depend on the ranks.
         for s, share in sorted(shares, key=itemgetter(0)):
             M[np.ix_(self.common[s], self.common[s])] += share
         N = jump_energy(self.block.B, self._P, self.block.R, M)
-        return np.asarray(self._P @ soft_modes(self._held, N, threshold))
+        return np.asarray(self._P @ soft_modes(self._regular_S, N, threshold))
 
 
 class FaceEigenproblems:
-    """Examined face by face; see `SubdomainEigenproblem`."""
+    """One eigenproblem on each face; see `SubdomainEigenproblem`."""
 
-    def __init__(self, block: SubdomainBlocks, common: Mapping[int, Int]) -> None:
-        self.block, self.common = block, common
+    def __init__(self, block: SubdomainBlocks, common: Mapping[int, Int], thresholds: Thresholds = DEFAULTS) -> None:
+        self.block, self.common, self._factor = block, common, thresholds.face_factor
         faces = {s: np.unique(block.B[rows].indices // 2) for s, rows in common.items()}
-        self._rings = {
-            s: rings(block.subdomain, block.dofs, both_directions(nodes))
+        self._neighbourhoods = {
+            s: face_neighbourhoods(block.subdomain, block.dofs, both_directions(nodes), thresholds)
             for s, nodes in faces.items()
             if s != block.subdomain.submesh.index
         }
 
-    def shares(self) -> Iterator[tuple[int, Float32]]:
+    def preconditioner_shares(self) -> Iterator[tuple[int, Float32]]:
         """No less than its share of M^-1 on the rows in common with each other subdomain."""
-        for s, found in self._rings.items():
+        for s, found in self._neighbourhoods.items():
             share = np.zeros((len(self.common[s]),) * 2)
-            for ring in found:
-                BW = self.block.BW[self.common[s]][:, ring.at]
-                share += BW @ (BW @ ring.clamped).T
+            for near in found:
+                BW = self.block.BW[self.common[s]][:, near.at]
+                share += BW @ (BW @ near.S_fixed).T
             yield s, share.astype(np.float32)
 
     def modes(self, shares: Sequence[tuple[int, Float32]], threshold: float) -> Float:
-        """(n, m) soft modes of the faces, for the shares of others in M^-1."""
-        parts = [np.zeros((len(self.block.dofs), 0))]
+        """(n, m) soft modes of the faces, for the shares of other subdomains in M^-1."""
+        modes = [np.zeros((len(self.block.dofs), 0))]
         for s, share in shares:
-            for ring in self._rings[s]:
-                B = self.block.B[self.common[s]][:, ring.at]
-                N = jump_energy(B, ring.P, ring.R, share)
-                soft = ring.P @ soft_modes(congruent(ring.P, ring.operator.regularised_schur), N, FACE * threshold)
-                parts.append(np.zeros((len(self.block.dofs), soft.shape[1])))
-                parts[-1][ring.at] = soft
-        return np.hstack(parts)
+            for near in self._neighbourhoods[s]:
+                B = self.block.B[self.common[s]][:, near.at]
+                N = jump_energy(B, near.P, near.R, share)
+                soft = near.P @ soft_modes(
+                    congruent(near.P, near.operator.regularised_schur), N, self._factor * threshold
+                )
+                modes.append(np.zeros((len(self.block.dofs), soft.shape[1])))
+                modes[-1][near.at] = soft
+        return np.hstack(modes)
 
 
-def examined(block: SubdomainBlocks, common: Mapping[int, Int]) -> SubdomainEigenproblem | FaceEigenproblems:
-    """How a subdomain of that size is examined.
+def eigenproblem(
+    block: SubdomainBlocks, common: Mapping[int, Int], thresholds: Thresholds = DEFAULTS
+) -> SubdomainEigenproblem | FaceEigenproblems:
+    """The eigenproblem of a subdomain, or those of its faces.
 
     Raises:
-        TypeError: as one, but without dense boundary operators.
+        TypeError: one on the whole boundary is wanted, but its operators are not dense.
     """
     if block.facewise:
-        return FaceEigenproblems(block, common)
+        return FaceEigenproblems(block, common, thresholds)
     if not isinstance(block.operator, ExplicitInterfaceOperator):
         raise TypeError("soft modes of small boundaries need dense operators")
-    return SubdomainEigenproblem(block, block.operator, common)
+    return SubdomainEigenproblem(block, block.operator, common, thresholds.min_trace_dofs)
 
 
 def congruent(T: csr_matrix | Float, A: Float | Float32) -> Float:
@@ -146,18 +153,18 @@ def jump_energy(B: csr_matrix, P: csr_matrix, R: Float, M: Float32) -> Float:
     return np.block([[congruent(TP, M), TP.T @ MR], [(TP.T @ MR).T, TR.T @ MR]]).astype(float)
 
 
-def soft_modes(held: Float, N: Float, threshold: float) -> Float:
+def soft_modes(S: Float, N: Float, threshold: float) -> Float:
     """(m, j) eigenvectors q of P^T S P q = theta P^T N P q with theta < threshold, besides the kernel of S.
 
     Args:
-        held: (m, m) P^T S P, the kernel of S held.
+        S: (m, m) P^T S P, made definite on the kernel of S.
         N: (m + k, m + k) that of [P R], with the kernel R (n, k) of S.
     """
-    m = len(held)
+    m = len(S)
     NR, RNR = N[:m, m:], N[m:, m:]
-    # Less the kernel's part, N has eigenvectors N-orthogonal to the kernel, and S may be held.
-    rest = N[:m, :m] - NR @ np.linalg.pinv(RNR, rcond=NULL, hermitian=True) @ NR.T
+    # Without the kernel's part, N has eigenvectors N-orthogonal to the kernel, where the definite matrix is S.
+    rest = N[:m, :m] - NR @ np.linalg.pinv(RNR, rcond=SINGLE_PRECISION_NULL, hermitian=True) @ NR.T
     # A Cholesky factorization tells at a tenth of the cost whether there are any.
-    if not dpotrf(held - threshold * rest, lower=1)[1]:
+    if not dpotrf(S - threshold * rest, lower=1)[1]:
         return np.zeros((m, 0))
-    return np.asarray(eigh(rest, held, subset_by_value=(1.0 / threshold, np.inf), overwrite_a=True)[1])
+    return np.asarray(eigh(rest, S, subset_by_value=(1.0 / threshold, np.inf), overwrite_a=True)[1])

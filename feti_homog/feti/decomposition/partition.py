@@ -10,12 +10,8 @@ import pymetis
 from scipy.sparse import coo_matrix, csr_matrix
 
 from feti_homog.cell.periodic_topology import Torus, components, edge_pairs, shared_edges
+from feti_homog.feti.thresholds import LENGTH_CLASSES, MAX_IMBALANCE
 from feti_homog.typing import Int
-
-# METIS takes whole numbers as weights of edges: lengths are rounded up to so many classes.
-LENGTH_CLASSES = 100
-# Load of the fullest rank, relative to that of the most even assignment, that is accepted to keep neighbours together.
-MAX_IMBALANCE = 1.03
 
 
 @dataclass(frozen=True)

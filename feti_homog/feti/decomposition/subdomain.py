@@ -12,10 +12,8 @@ from feti_homog.cell.submesh import Submesh
 from feti_homog.cell.unwrap import unwrap
 from feti_homog.errors import MeshError
 from feti_homog.fem.assembly import assemble
+from feti_homog.feti.thresholds import KERNEL_TOLERANCE
 from feti_homog.typing import Float, Int
-
-# Largest |K R| relative to |K|.  Rounding leaves about 1e-16; a rotation that is wrong by 1 % gives 1e-7 and more.
-KERNEL_TOLERANCE = 1e-10
 
 
 @dataclass(eq=False)

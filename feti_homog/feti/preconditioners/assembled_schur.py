@@ -22,41 +22,43 @@ class AssembledSchur:
         size: dofs on the shared nodes of all ranks, two each.
     """
 
-    def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, boundary: InterfaceOperators) -> None:
-        """Assemble and factor; all boundary operators must be dense.  Collective.
+    def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators) -> None:
+        """Assemble and factor.  Options under `feti_bonded_` (default: cholesky by CHOLMOD).  Collective.
 
-        Options have the prefix `feti_bonded_` (default: cholesky by CHOLMOD).
+        Raises:
+            TypeError: a boundary operator is not dense.
         """
         self.comm = comm
-        self._shared = _originals(comm, jump_operator, boundary)
+        self._shared_dof = _shared_dof_of(comm, jump_operator, operators)
         self.size = shared_dofs(comm, jump_operator)
         stiffness = DenseBlockSum((self.size, self.size))
-        for operator, span in zip(boundary.operators, boundary.slices, strict=True):
+        for operator, span in zip(operators.operators, operators.slices, strict=True):
             if not isinstance(operator, ExplicitInterfaceOperator):
-                raise TypeError("the bonded cell needs dense boundary operators")
-            stiffness.add(self._shared[span], self._shared[span], operator.S)
+                raise TypeError("the assembled Schur complement needs dense boundary operators")
+            stiffness.add(self._shared_dof[span], self._shared_dof[span], operator.S)
         self._solver = DirectSolver(allreduce_sparse(comm, stiffness.matrix()), "feti_bonded_")
-        entries = np.ones(len(self._shared)), (self._shared, np.arange(len(self._shared)))
-        self._ZT = csr_matrix(entries, shape=(self.size, len(self._shared)))
+        n = len(self._shared_dof)
+        self._ZT = csr_matrix((np.ones(n), (self._shared_dof, np.arange(n))), shape=(self.size, n))
 
-    def relaxed(self, forces: Float) -> Float:
-        """-Z (Z^T S Z)^-1 Z^T f for boundary forces f (n,) or (n, k): the motion that takes them off shared nodes."""
+    def relieving_displacement(self, forces: Float) -> Float:
+        """-Z (Z^T S Z)^-1 Z^T f for boundary forces f (n,) or (n, k): it takes them off the shared nodes.
+        Collective."""
         right = -self._ZT @ forces
         self.comm.Allreduce(MPI.IN_PLACE, right)
-        return self._solver.solve(right)[self._shared]
+        return self._solver.solve(right)[self._shared_dof]
 
 
 def shared_dofs(comm: MPI.Intracomm, jump_operator: JumpOperator) -> int:
-    """The size of the bonded cell; collective."""
+    """Dofs on the shared nodes of all ranks; collective."""
     return int(comm.allreduce(2 * len(jump_operator.node_rows[0])))
 
 
-def _originals(comm: MPI.Intracomm, jump_operator: JumpOperator, boundary: InterfaceOperators) -> Int:
-    """The global number of the shared dof that each boundary dof is a copy of."""
+def _shared_dof_of(comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators) -> Int:
+    """(n,) the global number of the shared dof that each boundary dof is a copy of.  Collective."""
     starts, sizes = jump_operator.node_rows
     order = np.argsort(starts)
     first = comm.exscan(len(starts)) or 0
     node = jump_operator.gather(np.repeat(first + np.arange(len(starts)), sizes[order]).astype(float))
     # Each copy of a node takes part in some row of it, and its two dofs are neighbours.
-    row = boundary.BT.indices[boundary.BT.indptr[:-1]]
+    row = operators.BT.indices[operators.BT.indptr[:-1]]
     return np.asarray(2 * node[row].astype(np.int64) + np.arange(len(row)) % 2)

@@ -20,7 +20,7 @@ from feti_homog.typing import Float
 
 
 class Preconditioner(Protocol):
-    """z = M^-1 r on the owned rows, for r (owned rows,) or (owned rows, k)."""
+    """z = M^-1 r on the owned rows, for r (owned rows,) or (owned rows, k).  All calls are collective."""
 
     def activate(self, active: Float) -> None:
         """Restrict to the rows where `active` is 1."""
@@ -28,8 +28,8 @@ class Preconditioner(Protocol):
     def apply(self, r: Float) -> Float:
         """M^-1 r; r and the result are 0 on inactive rows."""
 
-    def first(self, start: Float, closing: Float) -> Float:
-        """First multipliers of a solve: `start`, those of an earlier one, or `closing`, P M^-1 of the jump."""
+    def initial_multipliers(self, previous: Float, closing: Float) -> Float:
+        """First multipliers (owned rows, k) of a solve: `previous` ones, or `closing` = P M^-1 P d of the jump d."""
 
 
 class Identity:
@@ -42,9 +42,9 @@ class Identity:
         """r."""
         return r.copy()
 
-    def first(self, start: Float, closing: Float) -> Float:
-        """What solved an earlier problem."""
-        return start
+    def initial_multipliers(self, previous: Float, closing: Float) -> Float:
+        """The previous ones."""
+        return previous
 
 
 class StiffnessScaled:
@@ -52,21 +52,23 @@ class StiffnessScaled:
 
     Attributes:
         BD: (local rows, boundary dofs) B D^-1.
+        W_inverse: (owned rows, owned rows) W^-1 of the active rows, 0 on the others.
     """
 
     def __init__(
         self,
         comm: MPI.Intracomm,
         jump_operator: JumpOperator,
-        boundary: InterfaceOperators,
+        operators: InterfaceOperators,
         stiffness: Callable[[Float], Float],
     ) -> None:
+        """`stiffness` is x -> S x for x (boundary dofs,) or (boundary dofs, k).  Collective."""
         self.jump_operator, self.stiffness = jump_operator, stiffness
         # Both directions of a node are on the boundary.
-        flexibility = diags(np.repeat(2.0 / boundary.diagonal.reshape(-1, 2).sum(axis=1), 2))
-        self.BD: csr_matrix = (boundary.B @ flexibility).tocsr()
+        flexibility = diags(np.repeat(2.0 / operators.diagonal.reshape(-1, 2).sum(axis=1), 2))
+        self.BD: csr_matrix = (operators.B @ flexibility).tocsr()
         self.DBT = self.BD.T.tocsr()
-        self.W = NodeBlocks(comm, jump_operator, self.BD @ boundary.B.T)
+        self.W = NodeBlocks(comm, jump_operator, self.BD @ operators.B.T)
         self.activate(np.ones(self.W.rows))
 
     def activate(self, active: Float) -> None:
@@ -78,20 +80,20 @@ class StiffnessScaled:
         x = self.DBT @ self.jump_operator.gather(self.W_inverse @ r)
         return np.asarray(self.W_inverse @ self.jump_operator.sum(self.BD @ self.stiffness(x)))
 
-    def first(self, start: Float, closing: Float) -> Float:
-        """What solved an earlier problem."""
-        return start
+    def initial_multipliers(self, previous: Float, closing: Float) -> Float:
+        """The previous ones."""
+        return previous
 
 
 class Dirichlet(StiffnessScaled):
     """Around the Schur complements."""
 
-    def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, boundary: InterfaceOperators) -> None:
-        super().__init__(comm, jump_operator, boundary, boundary.apply_schur)
+    def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators) -> None:
+        super().__init__(comm, jump_operator, operators, operators.apply_schur)
 
 
 class Lumped(StiffnessScaled):
     """Around the boundary blocks of K."""
 
-    def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, boundary: InterfaceOperators) -> None:
-        super().__init__(comm, jump_operator, boundary, boundary.Kbb.__matmul__)
+    def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators) -> None:
+        super().__init__(comm, jump_operator, operators, operators.Kbb.__matmul__)

@@ -6,11 +6,12 @@ of the file's, of which each rank has a part; nodes are torn, so that each subdo
 
 from __future__ import annotations
 
+import typing
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from feti_homog.common.records import LENGTH, STRESS, Description, described, descriptions
+from feti_homog.common.records import LENGTH, STRESS, Description, described, descriptions, type_words
 from feti_homog.mechanics.voigt import STRAINS, STRESSES
 from feti_homog.typing import AnyInt, Float
 
@@ -55,7 +56,7 @@ class InterfacePart:
     """The k fibre-matrix interface nodes whose multipliers this rank owns; k may be 0."""
 
     points: Float = described("positions of the interface nodes", LENGTH, "(k, 2)")
-    normal: Float = described("unit normals, from fibre to matrix", shape="(k, 2)")
+    normal: Float = described("unit normals (n1, n2), from fibre to matrix; tangents are (-n2, n1)", shape="(k, 2)")
     length: Float = described("tributary length: that of the interface which a node stands for", LENGTH, "(k,)")
     fibre: AnyInt = described("body of the fibre", shape="(k,)", dtype="int32")
 
@@ -71,8 +72,10 @@ class StatePart:
     displacement: Float = described("displacement, that of the macroscopic strain included", LENGTH, "(n, 2)")
     fluctuation: Float = described("displacement less that of the macroscopic strain, periodic", LENGTH, "(n, 2)")
     stress: Float = described(f"means over the elements, {', '.join(STRESSES)}", STRESS, "(m, 3)")
-    traction: Float = described("(t_n, t_t) that the matrix exerts on the fibre; tension positive", STRESS, "(k, 2)")
-    jump: Float = described("(gap, slip): displacement of the matrix minus that of the fibre", LENGTH, "(k, 2)")
+    traction: Float = described("sigma n, normal (tension positive) and tangential", STRESS, "(k, 2)")
+    jump: Float = described(
+        "gap and slip: displacement of the matrix minus that of the fibre, normal and tangential", LENGTH, "(k, 2)"
+    )
     status: AnyInt = described("0 bonded, 1 closed (debonded, in contact), 2 open", shape="(k,)", dtype="int8")
 
 
@@ -113,6 +116,7 @@ def rows_of(description: Description) -> str:
 
 
 def _items_of(part: type, group: str) -> Iterator[Item]:
+    hints = typing.get_type_hints(part)
     for name, d in descriptions(part).items():
         if rows_of(d):
             yield Item(f"/{group}/{name}", "dataset", d.shape, d.dtype, d.unit, d.meaning)
@@ -120,5 +124,5 @@ def _items_of(part: type, group: str) -> Iterator[Item]:
                 words = f"/{group}/{name} with a third component 0, as viewers want it; takes no space"
                 yield Item(f"/vector/{group}/{name}", "dataset", f"({rows_of(d)}, 3)", d.dtype, d.unit, words)
         else:
-            kind = "float64" if d.unit or d.shape or name == "load_factor" else "integer or text"
-            yield Item(f"/{group}", f"attribute {d.name or name}", d.shape, kind, d.unit, d.meaning)
+            words = type_words(hints[name], d)
+            yield Item(f"/{group}", f"attribute {d.name or name}", d.shape, words, d.unit, d.meaning)

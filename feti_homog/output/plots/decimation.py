@@ -1,4 +1,4 @@
-"""What the pictures show of result.h5: about LIMIT triangles at most, read in blocks, and their outlines."""
+"""What the pictures show of result.h5: about TRIANGLE_LIMIT triangles at most, read in blocks, and their outlines."""
 
 from __future__ import annotations
 
@@ -11,15 +11,16 @@ from scipy.spatial import cKDTree
 
 from feti_homog.typing import Array
 
-LIMIT = 100_000  # triangles in a picture
-BLOCK = 1 << 18  # rows of a table read at once
+TRIANGLE_LIMIT = 100_000  # triangles in a picture
+BLOCK_ROWS = 1 << 18
 QUARTERS = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])  # of a six-node triangle
 
 
 @dataclass(frozen=True)
-class Drawing:
+class DrawnMesh:
     """The drawn triangles: those of the file, or coarser ones that hold `group` of them each."""
 
+    block: int  # rows of a table read at once
     group: int
     pieces: int  # drawn triangles per element: 4 for a curved one
     nodes: Array  # (p,) numbers in the file of the nodes drawn, ascending
@@ -30,35 +31,38 @@ class Drawing:
     phase: Array  # (q,)
 
 
-def drawing(file: Any, limit: int = LIMIT) -> Drawing:
-    """The finest nested mesh of an open result.h5 with at most `limit` triangles, or else its coarsest."""
+def drawn_mesh(file: Any, limit: int = TRIANGLE_LIMIT, block: int = BLOCK_ROWS) -> DrawnMesh:
+    """The finest nested mesh of an open result.h5 with at most `limit` triangles, or else its coarsest.
+
+    Its tables are read `block` rows at a time.
+    """
     table = file["mesh/triangles"]
     refine, curved = int(file.attrs["refine"]), table.shape[1] == 6
     level = next((j for j in range(refine) if len(table) <= limit * 4**j), refine)
     group = 4**level
     pieces = 4 if curved and level == 0 and 4 * len(table) <= limit else 1
-    corners = _blocks(table, group, lambda rows: _corners(rows, pieces))
+    corners = _blocks(table, group, block, lambda rows: _corners(rows, pieces))
     nodes, triangles = np.unique(corners, return_inverse=True)
     labels = {
-        name: np.repeat(_blocks(file[f"mesh/{name}"], group, lambda rows: rows[:, 0]), pieces)
+        name: np.repeat(_blocks(file[f"mesh/{name}"], group, block, lambda rows: rows[:, 0]), pieces)
         for name in ("body", "subdomain", "phase")
     }
-    points = _picked(file["mesh/points"], nodes)
-    return Drawing(group, pieces, nodes, points, triangles.reshape(-1, 3), **labels)
+    points = _picked(file["mesh/points"], nodes, block)
+    return DrawnMesh(block, group, pieces, nodes, points, triangles.reshape(-1, 3), **labels)
 
 
-def on_nodes(table: Any, drawn: Drawing) -> Array:
+def nodal_values(table: Any, drawn: DrawnMesh) -> Array:
     """The rows (p, 2) of a table on nodes at the nodes drawn."""
-    return _picked(table, drawn.nodes)
+    return _picked(table, drawn.nodes, drawn.block)
 
 
-def on_triangles(table: Any, column: int, drawn: Drawing) -> Array:
+def triangle_means(table: Any, column: int, drawn: DrawnMesh) -> Array:
     """The means (q,) of a column of a table on elements over each triangle drawn."""
-    means = _blocks(table, drawn.group, lambda rows: rows[..., column].mean(axis=1))
+    means = _blocks(table, drawn.group, drawn.block, lambda rows: rows[..., column].mean(axis=1))
     return np.repeat(means, drawn.pieces)
 
 
-def outlines(drawn: Drawing, label: Array) -> Array:
+def outline_edges(drawn: DrawnMesh, label: Array) -> Array:
     """The edges (e, 2) between triangles of different label, on both sides, and those of the cell.
 
     Nodes are torn, so an edge with one triangle is on the border of a subdomain; it has a twin in the same
@@ -74,30 +78,34 @@ def outlines(drawn: Drawing, label: Array) -> Array:
     twins = cKDTree(middle).query_pairs(1e-6 * np.ptp(drawn.points, axis=0).max(), output_type="ndarray")
     kept = np.ones(len(border), dtype=bool)
     kept[twins[owner[twins[:, 0]] == owner[twins[:, 1]]].ravel()] = False
-    return border[kept]
+    outline: Array = border[kept]
+    return outline
 
 
 def _corners(rows: Array, pieces: int) -> Array:
     """The drawn triangles (q, 3) of rows (g, group, 3 or 6): corner i is vertex i of one of the group."""
     if pieces > 1:
-        return rows[:, 0][:, QUARTERS].reshape(-1, 3)
+        quarters: Array = rows[:, 0][:, QUARTERS].reshape(-1, 3)
+        return quarters
     members = np.arange(3) * ((rows.shape[1] - 1) // 3)
-    return rows[:, members, np.arange(3)]
+    corners: Array = rows[:, members, np.arange(3)]
+    return corners
 
 
-def _blocks(table: Any, group: int, function: Callable[[Array], Array]) -> Array:
+def _blocks(table: Any, group: int, block: int, function: Callable[[Array], Array]) -> Array:
     """function of each block of a table, its rows in groups: (g, group, columns)."""
-    step = max(group, BLOCK - BLOCK % group)
+    step = max(group, block - block % group)
     blocks = (table[start : start + step] for start in range(0, len(table), step))
     return np.concatenate([function(rows.reshape(-1, group, *rows.shape[1:])) for rows in blocks])
 
 
-def _picked(table: Any, numbers: Array) -> Array:
+def _picked(table: Any, numbers: Array, block: int) -> Array:
     """The rows `numbers` (ascending) of a table."""
-    return np.concatenate(list(_picks(table, numbers)))
+    return np.concatenate(list(_picks(table, numbers, block)))
 
 
-def _picks(table: Any, numbers: Array) -> Iterator[Array]:
-    for start in range(0, len(table), BLOCK):
-        first, last = np.searchsorted(numbers, (start, start + BLOCK))
-        yield table[start : start + BLOCK][numbers[first:last] - start]
+def _picks(table: Any, numbers: Array, block: int) -> Iterator[Array]:
+    for start in range(0, len(table), block):
+        first, last = np.searchsorted(numbers, (start, start + block))
+        rows: Array = table[start : start + block]
+        yield rows[numbers[first:last] - start]

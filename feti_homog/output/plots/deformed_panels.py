@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -15,79 +16,109 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from PIL import Image
 
-from feti_homog.output.plots.canvas import (
-    STRESSES,
-    lines,
+from feti_homog.errors import FetiHomogError
+from feti_homog.output.files import field_file
+from feti_homog.output.plots.decimation import DrawnMesh, drawn_mesh, nodal_values, outline_edges, triangle_means
+from feti_homog.output.plots.interface_marks import STATE_NAMES, InterfaceEdges, state_legend
+from feti_homog.output.plots.plot_helpers import (
+    STRESS_SYMBOLS,
+    draw_segments,
+    fill_triangles,
     load_label,
     magnification,
-    paint,
     save,
     unit_label,
     value_range,
 )
-from feti_homog.output.plots.decimation import Drawing, drawing, on_nodes, on_triangles, outlines
-from feti_homog.output.plots.interface_marks import WORDS, Faces, legend
 from feti_homog.output.text import point_tables
 from feti_homog.typing import Array
 
-PANELS = 6
-FRAMES, FRAME_TIME = 24, 250  # of the animation; milliseconds
-FRAME_LIMIT = 8000  # triangles in a frame
+MAX_PANELS = 6
+MAX_FRAMES, FRAME_TIME = 24, 250  # of the animation; milliseconds
+FRAME_LIMIT, PANEL_LIMIT, STATE_LIMIT = 8000, 30_000, 60_000  # triangles in a frame, a panel, a picture of one state
 INCHES, BAR = 8.0, 0.55  # of all panels of a row, and of the colour bar in each
 
 
 @dataclass(frozen=True)
-class Scene:
+class DeformedCell:
     """What is the same in every panel."""
 
     file: Any
-    drawn: Drawing
+    drawn: DrawnMesh
     borders: Array
-    faces: Faces
+    interface_edges: InterfaceEdges
     component: str
     scale: float
 
     @classmethod
-    def of(cls, file: Any, numbers: Sequence[int], output: Mapping[str, Any], true: bool, limit: int) -> Scene:
-        """The stress that suits all these states; the `true` scale of displacements unless the case has another."""
-        drawn = drawing(file, limit)
-        borders = outlines(drawn, drawn.body)
+    def of(
+        cls, file: Any, numbers: Sequence[int], output: Mapping[str, Any], magnify: bool, limit: int
+    ) -> DeformedCell:
+        """The stress that suits all these states; displacements at true scale, or at the one that `output` gives, or
+        magnified to be seen."""
+        drawn = drawn_mesh(file, limit)
+        borders = outline_edges(drawn, drawn.body)
         strain = np.abs([file[f"state/{n}"].attrs["strain"] for n in numbers]).max(axis=0)
         component = output.get("stress", "auto")
-        if component not in STRESSES:
-            component = list(STRESSES)[int(np.argmax(strain))]
-        displacements = (on_nodes(file[f"state/{n}/displacement"], drawn) for n in numbers)
-        automatic = 1.0 if true else min(magnification(d, drawn.points) for d in displacements)
+        if component not in STRESS_SYMBOLS:
+            component = list(STRESS_SYMBOLS)[int(np.argmax(strain))]
+        displacements = (nodal_values(file[f"state/{n}/displacement"], drawn) for n in numbers)
+        automatic = min(magnification(d, drawn.points) for d in displacements) if magnify else 1.0
         scale = output.get("deformation_scale") or automatic
-        return cls(file, drawn, borders, Faces.of(file, drawn, borders), component, scale)
+        return cls(file, drawn, borders, InterfaceEdges.of(file, drawn, borders), component, scale)
 
     def moved(self, number: int) -> Array:
         """(p, 2) places of the drawn nodes."""
-        places: Array = self.drawn.points + self.scale * on_nodes(self.file[f"state/{number}/displacement"], self.drawn)
+        displacement = nodal_values(self.file[f"state/{number}/displacement"], self.drawn)
+        places: Array = self.drawn.points + self.scale * displacement
         return places
 
-    def draw(self, figure: Figure, axes: Axes, number: int, moved: Array) -> None:
+    def draw(self, axes: Axes, number: int, moved: Array) -> None:
         """The cell of a state, drawn nodes at `moved`, in its own range of colours: stresses grow along a path."""
         state = self.file[f"state/{number}"]
-        stress = on_triangles(state["stress"], list(STRESSES).index(self.component), self.drawn)
+        stress = triangle_means(state["stress"], list(STRESS_SYMBOLS).index(self.component), self.drawn)
         norm, extend = value_range(stress)
-        shapes = paint(axes, self.drawn, moved, stress, edges=False, norm=norm, cmap="viridis")
-        lines(axes, moved[self.borders], "black", 0.5)
-        self.faces.mark(axes, moved, state["status"][:], magnified=0.8)
+        shapes = fill_triangles(axes, self.drawn, moved, stress, edges=False, norm=norm, cmap="viridis")
+        draw_segments(axes, moved[self.borders], "black", 0.5)
+        self.interface_edges.mark(axes, moved, state["status"][:], magnified=0.8)
         axes.set_aspect("equal")
         axes.set_axis_off()
         attributes = state.attrs
         axes.set_title(f"{attributes['label']}\n{load_label(attributes['strain'])}", fontsize=9)
+        figure: Any = axes.figure
         bar = figure.colorbar(shapes, cax=axes.inset_axes((1.02, 0.1, 0.035, 0.8)), extend=extend)
         bar.ax.tick_params(labelsize=7, pad=1, length=2)
         bar.locator = MaxNLocator(5)
 
     @property
-    def words(self) -> str:
+    def caption(self) -> str:
         """What is drawn."""
         unit = unit_label(self.file.attrs["stress_unit"]) or "(unit of the moduli)"
         scale = "true scale" if self.scale == 1 else f"displacement × {self.scale:g}"
-        return f"${STRESSES[self.component]}$ {unit}, {scale}"
+        return f"${STRESS_SYMBOLS[self.component]}$ {unit}, {scale}"
+
+
+def draw_state(axes: Axes, directory: Path, number: int, stress: str = "auto", scale: float = 1.0) -> str:
+    """Draw a state of `directory`/result.h5 into axes; returns the caption.
+
+    `axes.get_legend_handles_labels()` has the marks of bonded, open and closed interfaces.
+
+    Raises:
+        FetiHomogError: result.h5 cannot be read, or has no such state.
+    """
+    path = directory / field_file.NAME
+    try:
+        with h5py.File(path, "r") as file:
+            output = {"stress": stress, "deformation_scale": scale}
+            cell = DeformedCell.of(file, [number], output, False, limit=STATE_LIMIT)
+            cell.draw(axes, number, cell.moved(number))
+            caption = cell.caption
+    except (OSError, KeyError) as error:
+        raise FetiHomogError(f"cannot draw state {number} of {path}: {error}") from error
+    axes.autoscale_view()
+    for line in state_legend(list(STATE_NAMES)):
+        axes.add_line(line)
+    return caption
 
 
 def plot(directory: Path, file: Any, document: Mapping[str, Any]) -> list[Path]:
@@ -98,19 +129,19 @@ def plot(directory: Path, file: Any, document: Mapping[str, Any]) -> list[Path]:
     if "angle" in document:
         # The first of the unit cases, if there are three an angle.
         every = range(0, count, count // len(document["angle"]) or 1)
-        numbers = [every[round(k)] for k in np.linspace(0, len(every) - 1, min(PANELS, len(every)))]
-        true = document["case"]["angle"].get("strain") is not None
-        return [save(_side_by_side(file, numbers, output, true), directory / "angle_states.png")]
+        numbers = [every[round(k)] for k in np.linspace(0, len(every) - 1, min(MAX_PANELS, len(every)))]
+        magnify = document["case"]["angle"].get("strain") is None
+        return [save(_side_by_side(file, numbers, output, magnify), directory / "angle_states.png")]
     points = document["path"][:count]
     paths = [
-        save(_side_by_side(file, point_tables.chosen(points, PANELS), output, True), directory / "path_states.png")
+        save(_side_by_side(file, point_tables.chosen(points, MAX_PANELS), output, False), directory / "path_states.png")
     ]
-    return [*paths, _animation(file, point_tables.chosen(points, FRAMES), output, directory / "path.gif")]
+    return [*paths, _animation(file, point_tables.chosen(points, MAX_FRAMES), output, directory / "path.gif")]
 
 
-def _side_by_side(file: Any, numbers: Sequence[int], output: Mapping[str, Any], true: bool) -> Figure:
-    scene = Scene.of(file, numbers, output, true, limit=30_000)
-    places = [scene.moved(number) for number in numbers]
+def _side_by_side(file: Any, numbers: Sequence[int], output: Mapping[str, Any], magnify: bool) -> Figure:
+    cell = DeformedCell.of(file, numbers, output, magnify, limit=PANEL_LIMIT)
+    places = [cell.moved(number) for number in numbers]
     size = np.subtract(*_corners(places)[::-1])
     rows = max(1, round(math.sqrt(0.7 * len(numbers) * size[0] / size[1])))
     columns = -(-len(numbers) // rows)
@@ -118,30 +149,31 @@ def _side_by_side(file: Any, numbers: Sequence[int], output: Mapping[str, Any], 
     figure = Figure(figsize=(INCHES, rows * (panel * size[1] / size[0] + 0.5) + 0.7), layout="constrained")
     grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
     for axes, number, moved in zip(grid, numbers, places, strict=False):
-        scene.draw(figure, axes, number, moved)
+        cell.draw(axes, number, moved)
     for axes in grid[len(numbers) :]:
         axes.set_axis_off()
     grid[0].autoscale_view()
-    figure.suptitle(f"{file.attrs['title']}: {scene.words}".lstrip(": "), fontsize=11)
-    found = {int(kind) for n in numbers for kind in np.unique(scene.faces.state(file[f"state/{n}/status"][:]))}
-    handles = legend([kind for kind in WORDS if kind in found])
+    figure.suptitle(f"{file.attrs['title']}: {cell.caption}".lstrip(": "), fontsize=11)
+    states = [cell.interface_edges.state(file[f"state/{n}/status"][:]) for n in numbers]
+    found = np.unique(np.concatenate(states))
+    handles = state_legend([kind for kind in STATE_NAMES if kind in found])
     if handles:
         figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False)
     return figure
 
 
 def _animation(file: Any, numbers: Sequence[int], output: Mapping[str, Any], path: Path) -> Path:
-    scene = Scene.of(file, numbers, output, True, limit=FRAME_LIMIT)
-    places = [scene.moved(number) for number in numbers]
+    cell = DeformedCell.of(file, numbers, output, False, limit=FRAME_LIMIT)
+    places = [cell.moved(number) for number in numbers]
     low, high = _corners(places)
     size = high - low
     figure = Figure(figsize=(3.6 + BAR, 3.6 * size[1] / size[0] + 0.7), dpi=100, layout="constrained")
-    canvas = FigureCanvasAgg(figure)
+    canvas: Any = FigureCanvasAgg(figure)
     frames = []
     for number, moved in zip(numbers, places, strict=True):
         figure.clear()
         axes = figure.subplots()
-        scene.draw(figure, axes, number, moved)
+        cell.draw(axes, number, moved)
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
         canvas.draw()
         picture = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")

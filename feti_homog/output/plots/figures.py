@@ -16,25 +16,25 @@ from feti_homog.errors import FetiHomogError
 from feti_homog.mechanics.voigt import STRAINS
 from feti_homog.output.files import field_file, result_json
 from feti_homog.output.plots import deformed_panels, response_curves, traction_plots
-from feti_homog.output.plots.canvas import (
-    STRESSES,
+from feti_homog.output.plots.decimation import DrawnMesh, drawn_mesh, nodal_values, outline_edges, triangle_means
+from feti_homog.output.plots.interface_marks import InterfaceEdges
+from feti_homog.output.plots.plot_helpers import (
+    STRESS_SYMBOLS,
     STYLE,
     colour_range,
+    draw_segments,
     figure_of,
-    frame,
-    lines,
+    fill_triangles,
+    label_cell_axes,
     load_label,
     magnification,
-    paint,
     save,
     unit_label,
 )
-from feti_homog.output.plots.decimation import Drawing, drawing, on_nodes, on_triangles, outlines
-from feti_homog.output.plots.interface_marks import Faces
 from feti_homog.typing import Array
 
 MESH_LINES = 6000  # triangles up to which their edges are drawn
-FEW_BODIES = 8  # up to which the deformed cell is drawn over all that it has left
+OUTLINED_BODIES = 8  # up to which the deformed cell is drawn over all that it has left
 MATRIX = "#ece8df"
 FIBRES = ("Blues", "Oranges", "Greens", "Purples", "Reds", "Greys")  # one colour map for each phase
 
@@ -67,16 +67,16 @@ def plot(directory: Path) -> list[Path]:
 def _pictures(directory: Path, document: Mapping[str, Any], output: Mapping[str, Any]) -> list[Path]:
     """The pictures of result.h5."""
     with h5py.File(directory / field_file.NAME, "r") as file:
-        drawn = drawing(file)
-        borders = outlines(drawn, drawn.body)
-        faces = Faces.of(file, drawn, borders)
+        drawn = drawn_mesh(file)
+        borders = outline_edges(drawn, drawn.body)
+        interface_edges = InterfaceEdges.of(file, drawn, borders)
         paths = [save(_cell(file.attrs, drawn, borders), directory / "cell.png")]
         if "angle" in document or "path" in document:
             paths += deformed_panels.plot(directory, file, document)
         else:
             for number in sorted(file.get("state", ()), key=int):
                 state = file[f"state/{number}"]
-                figure = _deformed(file, state, drawn, borders, faces, output)
+                figure = _deformed(file, state, drawn, borders, interface_edges, output)
                 paths.append(save(figure, directory / f"{_name(number, state.attrs['strain'])}.png"))
         return paths + traction_plots.plot(directory, file, "path" in document)
 
@@ -94,17 +94,17 @@ def _unit_case(strain: Array) -> int | None:
     return cases[0] if cases else None
 
 
-def _cell(attributes: Any, drawn: Drawing, borders: Array) -> Figure:
+def _cell(attributes: Any, drawn: DrawnMesh, borders: Array) -> Figure:
     """The phases, each body in a shade of its own, beside the subdomains."""
     figure, (left, right) = figure_of(attributes, panels=2)
     edges = len(drawn.triangles) <= MESH_LINES
     bodies, subdomains = drawn.body.max() + 1, drawn.subdomain.max() + 1
     shades, legend = _shades(drawn, list(attributes["phases"]))
     for axes, label, colours in ((left, drawn.body, shades), (right, drawn.subdomain, _distinct(subdomains))):
-        paint(axes, drawn, drawn.points, colours[label], edges)
-        lines(axes, drawn.points[borders], "black", 0.9)
-        frame(axes, attributes)
-    lines(right, drawn.points[outlines(drawn, drawn.subdomain)], "black", 0.5)
+        fill_triangles(axes, drawn, drawn.points, colours[label], edges)
+        draw_segments(axes, drawn.points[borders], "black", 0.9)
+        label_cell_axes(axes, attributes)
+    draw_segments(right, drawn.points[outline_edges(drawn, drawn.subdomain)], "black", 0.5)
     left.set_title(_count(bodies, "body", "bodies"))
     right.set_title(_count(subdomains, "subdomain", "subdomains"))
     right.set_ylabel("")
@@ -113,41 +113,48 @@ def _cell(attributes: Any, drawn: Drawing, borders: Array) -> Figure:
     return figure
 
 
-def _deformed(file: Any, state: Any, drawn: Drawing, borders: Array, faces: Faces, output: Mapping[str, Any]) -> Figure:
+def _deformed(
+    file: Any,
+    state: Any,
+    drawn: DrawnMesh,
+    borders: Array,
+    interface_edges: InterfaceEdges,
+    output: Mapping[str, Any],
+) -> Figure:
     """The magnified deformed cell with a stress component in colour, and the outline it has left."""
     attributes, strain = file.attrs, state.attrs["strain"]
     figure, (axes,) = figure_of(attributes, panels=1)
-    displacement = on_nodes(state["displacement"], drawn)
+    displacement = nodal_values(state["displacement"], drawn)
     scale = output.get("deformation_scale") or magnification(displacement, drawn.points)
     component = output.get("stress", "auto")
-    if component not in STRESSES:
-        component = list(STRESSES)[_unit_case(strain) or 0]
-    stress = on_triangles(state["stress"], list(STRESSES).index(component), drawn)
+    if component not in STRESS_SYMBOLS:
+        component = list(STRESS_SYMBOLS)[_unit_case(strain) or 0]
+    stress = triangle_means(state["stress"], list(STRESS_SYMBOLS).index(component), drawn)
     norm, colours, extend = colour_range(stress)
     moved = drawn.points + scale * displacement
-    picture = paint(axes, drawn, moved, stress, edges=False, norm=norm, cmap=colours)
-    lines(axes, _left(attributes, drawn, borders), "0.5", 0.7)
-    lines(axes, moved[borders], "black", 0.8)
-    handles = faces.mark(axes, moved, state["status"][:])
-    frame(axes, attributes)
+    picture = fill_triangles(axes, drawn, moved, stress, edges=False, norm=norm, cmap=colours)
+    draw_segments(axes, _left(attributes, drawn, borders), "0.5", 0.7)
+    draw_segments(axes, moved[borders], "black", 0.8)
+    handles = interface_edges.mark(axes, moved, state["status"][:])
+    label_cell_axes(axes, attributes)
     bar = figure.colorbar(picture, cax=axes.inset_axes((1.03, 0.0, 0.04, 1.0)), extend=extend)
-    bar.set_label(f"${STRESSES[component]}$ " + (unit_label(attributes["stress_unit"]) or "(unit of the moduli)"))
+    bar.set_label(f"${STRESS_SYMBOLS[component]}$ " + (unit_label(attributes["stress_unit"]) or "(unit of the moduli)"))
     axes.set_title(f"{attributes['title']}\n{load_label(strain)}, displacement × {scale:g}".lstrip())
     if len(handles) > 1:
         axes.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=3, frameon=False)
     return figure
 
 
-def _left(attributes: Any, drawn: Drawing, borders: Array) -> Array:
+def _left(attributes: Any, drawn: DrawnMesh, borders: Array) -> Array:
     """The undeformed outlines (e, 2, 2): of the bodies if they are few, else of the cell alone."""
-    if drawn.body.max() < FEW_BODIES:
+    if drawn.body.max() < OUTLINED_BODIES:
         outline: Array = drawn.points[borders]
         return outline
     corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * [attributes["width"], attributes["height"]]
     return np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
 
 
-def _shades(drawn: Drawing, phases: list[str]) -> tuple[Array, list[Patch]]:
+def _shades(drawn: DrawnMesh, phases: list[str]) -> tuple[Array, list[Patch]]:
     """A colour (bodies, 4) for each body, a shade of its phase's; and the legend of the phases."""
     colours = np.zeros((drawn.body.max() + 1, 4))
     legend = []

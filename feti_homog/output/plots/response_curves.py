@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
 from feti_homog.mechanics import response
-from feti_homog.output.plots.canvas import STRAINS, save, unit_label
-from feti_homog.output.plots.interface_marks import BONDED, CLOSED, COLOURS, OPEN, WORDS
+from feti_homog.output.plots.interface_marks import BONDED, CLOSED, OPEN, STATE_COLOURS, STATE_NAMES
+from feti_homog.output.plots.plot_helpers import STRAIN_SYMBOLS, save, unit_label
 from feti_homog.output.text import point_tables
 from feti_homog.typing import Array
 
@@ -76,7 +76,7 @@ def _path(document: Document) -> Figure:
     upper.set_ylabel(f"macroscopic stress {_stress_unit(case)}")
     upper.set_title(f"{case.get('name', '')}: plane {case['analysis']['plane']}, {_strengths(case)}".lstrip(": "))
     _count_curves(lower, points, strain, first, style)
-    lower.set_xlabel(f"macroscopic strain ${STRAINS[component]}$")
+    lower.set_xlabel(f"macroscopic strain ${STRAIN_SYMBOLS[component]}$")
     for axes in (upper, lower):
         _finish(axes)
     return figure
@@ -109,9 +109,9 @@ def _count_curves(
 ) -> None:
     """Numbers of bonded, open and closed nodes; dotted on later legs."""
     for kind, key in STATES.items():
-        ink = "0.2" if kind == BONDED else COLOURS[kind]
+        ink = "0.2" if kind == BONDED else STATE_COLOURS[kind]
         number = [point[key] for point in points]
-        axes.plot(strain[:first], number[:first], color=ink, linewidth=1.4, label=WORDS[kind], **style)
+        axes.plot(strain[:first], number[:first], color=ink, linewidth=1.4, label=STATE_NAMES[kind], **style)
         if first < len(points):
             axes.plot(strain[first - 1 :], number[first - 1 :], ":", color=ink, linewidth=0.8, marker="o", ms=2.5)
     axes.set_ylabel("interface nodes")

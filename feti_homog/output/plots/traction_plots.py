@@ -11,11 +11,11 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import MultipleLocator
 
-from feti_homog.output.plots.canvas import load_label, save, unit_label
-from feti_homog.output.plots.interface_marks import BONDED, CLOSED, COLOURS, OPEN, WORDS
+from feti_homog.output.plots.interface_marks import BONDED, CLOSED, OPEN, STATE_COLOURS, STATE_NAMES
+from feti_homog.output.plots.plot_helpers import load_label, save, unit_label
 from feti_homog.typing import Array
 
-MOST_FIBRES = 4
+MAX_FIBRES = 4
 INK = ("#1f4e9c", "#2a7f3f")
 NAMES = {"traction": (r"$t_\mathrm{n}$", r"$t_\mathrm{t}$"), "jump": ("gap", "slip")}
 
@@ -42,7 +42,7 @@ def _figure(file: Any, names: list[str]) -> Figure:
     """A row for each of the fibres that are most debonded: tractions, and jumps."""
     fibre, status = file["interface/fibre"][:], file[f"state/{names[-1]}/status"][:]
     numbers, count = np.unique(fibre[status != BONDED], return_counts=True)
-    chosen = np.sort(numbers[np.argsort(-count, kind="stable")][:MOST_FIBRES])
+    chosen = np.sort(numbers[np.argsort(-count, kind="stable")][:MAX_FIBRES])
     first = int(fibre.min())
     figure = Figure(figsize=(9.0, 2.2 * len(chosen) + 1.5), layout="constrained")
     grid = figure.subplots(len(chosen), 2, sharex=True, sharey="col", squeeze=False)
@@ -73,7 +73,7 @@ def _shade(axes: Axes, angle: Array, status: Array) -> None:
     edges = np.concatenate([[-180.0], middle, [180.0]])
     for kind in (OPEN, CLOSED):
         for at in np.flatnonzero(status == kind):
-            axes.axvspan(edges[at], edges[at + 1], color=COLOURS[kind], alpha=0.18, linewidth=0)
+            axes.axvspan(edges[at], edges[at + 1], color=STATE_COLOURS[kind], alpha=0.18, linewidth=0)
 
 
 def _finish(axes: Axes) -> None:
@@ -93,7 +93,9 @@ def _labels(file: Any, figure: Figure, grid: Any, names: list[str]) -> None:
         axes.set_xlabel("direction of the normal (degrees)")
     for axes in grid[0]:
         axes.legend(frameon=False, fontsize=9, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.1, ncols=2)
-    patches = [Patch(color=COLOURS[kind], alpha=0.18, linewidth=0, label=WORDS[kind]) for kind in (OPEN, CLOSED)]
+    patches = [
+        Patch(color=STATE_COLOURS[kind], alpha=0.18, linewidth=0, label=STATE_NAMES[kind]) for kind in (OPEN, CLOSED)
+    ]
     figure.legend(handles=patches, loc="outside lower center", ncols=2, frameon=False)
     first, last = (file[f"state/{name}"].attrs for name in (names[0], names[-1]))
     title = f"{last['label']}: {load_label(last['strain'])}"

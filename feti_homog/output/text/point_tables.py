@@ -60,9 +60,8 @@ def path_table(points: Sequence[Point], stress: str) -> list[str]:
 
 def _dissipated(last: Point) -> str:
     """What breaks have lost at the end of a path, also if the strain only rose."""
-    words = f"{last['dissipated']:.6g} along all equilibria"
-    rising = last.get("dissipated_strain_controlled")
-    return words if rising is None else f"{words}, {rising:.6g} if the strain only rises"
+    rising = last["dissipated_strain_controlled"]
+    return f"{last['dissipated']:.6g} along all equilibria, {rising:.6g} if the strain only rises"
 
 
 def sweep_table(rows: Sequence[tuple[str, str, str]]) -> list[str]:

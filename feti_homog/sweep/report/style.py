@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from feti_homog.output.plots.canvas import unit_label
+from feti_homog.output.plots.plot_helpers import unit_label
 from feti_homog.sweep.report.series import Series
 from feti_homog.sweep.report.sweep_table import SweepTable
 from feti_homog.typing import Float

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from feti_homog.common.petsc_option_table import OPTIONS, help_text, option_names, split_argv, unknown_options
+from feti_homog.feti import solver_plan, thresholds
 
 
 @pytest.mark.parametrize(
@@ -40,6 +41,30 @@ def test_numbers_with_a_sign_are_no_options():
 def test_every_option_of_the_table_is_known():
     assert unknown_options(option.name for option in OPTIONS) == []
     assert unknown_options(["feti_ksp_gmres_restart", "feti_sub_mat_mumps_icntl_14", "log_view", "ksp_rtol"]) == []
+
+
+def test_defaults_are_the_solvers():
+    defaults = {option.name: option.default for option in OPTIONS}
+    assert float(defaults["feti_ksp_rtol"]) == thresholds.RTOL
+    assert int(defaults["feti_ksp_max_it"]) == thresholds.MAX_ITERATIONS
+    assert float(defaults["feti_coarse_threshold"]) == thresholds.DEFAULTS.soft_mode
+
+
+def test_names_are_unique():
+    assert len({option.name for option in OPTIONS}) == len(OPTIONS)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "default"),
+    [
+        ("feti_pc_type", solver_plan.PRECONDITIONERS, "auto"),
+        ("feti_dual_operator", solver_plan.OPERATORS, "auto"),
+        ("feti_coarse_space", solver_plan.COARSE_SPACES, "auto"),
+    ],
+)
+def test_values_are_the_solvers(name, value, default):
+    (option,) = (option for option in OPTIONS if option.name == name)
+    assert set(option.value.split("|")) == set(value) and option.default == default
 
 
 @pytest.mark.parametrize(

@@ -16,8 +16,8 @@ from feti_homog.errors import CaseError, FetiHomogError
 from feti_homog.output.files import xdmf
 from feti_homog.output.files.field_file import FieldFile
 from feti_homog.output.files.result_json import SCHEMA
-from feti_homog.output.plots import canvas, decimation, figures
-from feti_homog.output.plots.interface_marks import Faces
+from feti_homog.output.plots import decimation, figures, plot_helpers
+from feti_homog.output.plots.interface_marks import InterfaceEdges
 
 
 def write(directory: Path, whole: Sample) -> Path:
@@ -38,9 +38,9 @@ def areas(points: Any, triangles: Any) -> Any:
 def test_coarser_triangles_have_the_means_of_theirs(tmp_path: Path, limit: int, group: int) -> None:
     whole = sample(8, refine=3)
     with h5py.File(write(tmp_path, whole), "r") as file:
-        drawn = decimation.drawing(file, limit)
-        stress = decimation.on_triangles(file["state/0/stress"], 1, drawn)
-        displacement = decimation.on_nodes(file["state/2/displacement"], drawn)
+        drawn = decimation.drawn_mesh(file, limit)
+        stress = decimation.triangle_means(file["state/0/stress"], 1, drawn)
+        displacement = decimation.nodal_values(file["state/2/displacement"], drawn)
     assert drawn.group == group and len(drawn.triangles) == 128 * 64 // group
     np.testing.assert_allclose(areas(drawn.points, drawn.triangles), group / 64 / 128, rtol=1e-12)
     # The stress is linear, so its mean is its value at the middle of the coarser triangle.
@@ -53,22 +53,21 @@ def test_coarser_triangles_have_the_means_of_theirs(tmp_path: Path, limit: int, 
 
 
 @pytest.mark.parametrize("block", [1, 7, 64, 1 << 18])
-def test_decimation_does_not_depend_on_its_blocks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, block: int) -> None:
+def test_decimation_does_not_depend_on_its_blocks(tmp_path: Path, block: int) -> None:
     with h5py.File(write(tmp_path, sample(4, refine=2)), "r") as file:
-        whole = decimation.drawing(file, 200)
-        means = decimation.on_triangles(file["state/1/stress"], 0, whole)
-        monkeypatch.setattr(decimation, "BLOCK", block)
-        drawn = decimation.drawing(file, 200)
+        whole = decimation.drawn_mesh(file, 200)
+        means = decimation.triangle_means(file["state/1/stress"], 0, whole)
+        drawn = decimation.drawn_mesh(file, 200, block)
         np.testing.assert_array_equal(drawn.triangles, whole.triangles)
         np.testing.assert_array_equal(drawn.points, whole.points)
-        np.testing.assert_array_equal(decimation.on_triangles(file["state/1/stress"], 0, drawn), means)
+        np.testing.assert_array_equal(decimation.triangle_means(file["state/1/stress"], 0, drawn), means)
 
 
 def test_six_node_triangles_are_drawn_in_four(tmp_path: Path) -> None:
     whole = sample(4, order=2)
     with h5py.File(write(tmp_path, whole), "r") as file:
-        fine, coarse = decimation.drawing(file), decimation.drawing(file, 100)
-        stress = decimation.on_triangles(file["state/0/stress"], 0, fine)
+        fine, coarse = decimation.drawn_mesh(file), decimation.drawn_mesh(file, 100)
+        stress = decimation.triangle_means(file["state/0/stress"], 0, fine)
     assert (len(fine.triangles), len(coarse.triangles)) == (128, 32)
     np.testing.assert_allclose(areas(fine.points, fine.triangles), 1 / 128, rtol=1e-12)
     np.testing.assert_allclose(areas(coarse.points, coarse.triangles), 1 / 32, rtol=1e-12)
@@ -77,11 +76,11 @@ def test_six_node_triangles_are_drawn_in_four(tmp_path: Path) -> None:
 
 def test_outlines_leave_out_the_cuts_within_a_body(tmp_path: Path) -> None:
     with h5py.File(write(tmp_path, sample(8)), "r") as file:
-        drawn = decimation.drawing(file)
-    ends = drawn.points[decimation.outlines(drawn, drawn.body)]
+        drawn = decimation.drawn_mesh(file)
+    ends = drawn.points[decimation.outline_edges(drawn, drawn.body)]
     length = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).sum()
     assert length == pytest.approx(4 + 2 * 4 * 0.5)  # the cell, and both sides of the fibre
-    ends = drawn.points[decimation.outlines(drawn, drawn.subdomain)]
+    ends = drawn.points[decimation.outline_edges(drawn, drawn.subdomain)]
     length = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).sum()
     assert length == pytest.approx(4 + 2 * 4 * 0.5 + 2 * 0.5)  # and both sides of the cut
 
@@ -138,11 +137,11 @@ def test_without_fields_only_curves_are_drawn(tmp_path: Path) -> None:
 
 def test_faces_are_as_their_worst_node(tmp_path: Path) -> None:
     with h5py.File(write(tmp_path, sample(8)), "r") as file:
-        drawn = decimation.drawing(file)
-        faces = Faces.of(file, drawn, decimation.outlines(drawn, drawn.body))
-        ends = file["interface/points"][:][faces.nodes]
-        states = faces.state(file["state/0/status"][:])
-    np.testing.assert_allclose(ends, drawn.points[faces.edges], atol=1e-12)
+        drawn = decimation.drawn_mesh(file)
+        interface_edges = InterfaceEdges.of(file, drawn, decimation.outline_edges(drawn, drawn.body))
+        ends = file["interface/points"][:][interface_edges.nodes]
+        states = interface_edges.state(file["state/0/status"][:])
+    np.testing.assert_allclose(ends, drawn.points[interface_edges.edges], atol=1e-12)
     # Two sides of five nodes: bonded, closed, open, bonded, closed and open, bonded, closed, open, bonded.
     expected = {(0.25, x): state for x, state in zip((5, 7, 9, 11), (1, 2, 2, 1), strict=True)}
     expected |= {(0.75, x): state for x, state in zip((5, 7, 9, 11), (2, 1, 2, 2), strict=True)}
@@ -173,7 +172,7 @@ def test_the_case_chooses_component_and_scale(tmp_path: Path) -> None:
     ],
 )
 def test_the_colour_range_leaves_out_outliers(values: Any, expected: tuple[float, float, str, str]) -> None:
-    norm, colours, extend = canvas.colour_range(values)
+    norm, colours, extend = plot_helpers.colour_range(values)
     assert (norm.vmin, norm.vmax) == pytest.approx(expected[:2], abs=0.02)
     assert (colours, extend) == expected[2:]
 
@@ -181,7 +180,7 @@ def test_the_colour_range_leaves_out_outliers(values: Any, expected: tuple[float
 @pytest.mark.parametrize(("largest", "scale"), [(1.0, 0.1), (1.2, 0.1), (0.01, 10.0), (0.3e-4, 5e3), (0.0, 1.0)])
 def test_the_deformation_scale_shows_a_tenth_of_the_cell(largest: float, scale: float) -> None:
     points = np.array([[0.0, 0.0], [1.0, 2.0]])
-    assert canvas.magnification(np.array([[largest, 0.0], [0.0, 0.0]]), points) == pytest.approx(scale)
+    assert plot_helpers.magnification(np.array([[largest, 0.0], [0.0, 0.0]]), points) == pytest.approx(scale)
 
 
 def test_a_missing_or_broken_result_is_told(tmp_path: Path) -> None:

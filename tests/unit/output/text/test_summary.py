@@ -134,7 +134,7 @@ def test_an_angle_is_a_table_of_stiffnesses() -> None:
 def test_a_path_is_a_table_of_chosen_points() -> None:
     points = [
         counted(100 - k, load_factor=0.01 * k, strain=[0, -2e-3 * k, 1e-5], stress=[1e-15, -3.5 * k, -2.0], broke=1,
-                dissipated=0.5 * k)
+                dissipated=0.5 * k, dissipated_strain_controlled=0.6 * k)
         for k in range(101)
     ]  # fmt: skip
     document = changed(path=points, kkt_tolerance=1e-6)
@@ -145,7 +145,7 @@ def test_a_path_is_a_table_of_chosen_points() -> None:
     text = summary(document)
     assert max(map(len, text.splitlines())) < 80
     assert "101 points, 15 shown; 101 bonds broke" in text
-    assert line(text, "Dissipated").endswith("per area (GPa): 50 along all equilibria")
+    assert line(text, "Dissipated").endswith("per area (GPa): 50 along all equilibria, 60 if the strain only rises")
     rows = [words.split() for words in text.splitlines() if words[:5].strip().isdigit()]
     assert len(rows) == 15
     assert rows[0] == ["0", "0.000000", "0", "0", "0", "-2", "100", "9", "1"]

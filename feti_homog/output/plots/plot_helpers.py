@@ -16,13 +16,13 @@ from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Path2D
 
-from feti_homog.output.plots.decimation import Drawing
+from feti_homog.output.plots.decimation import DrawnMesh
 from feti_homog.typing import Array
 
-STRAINS = (r"E_{11}", r"E_{22}", r"\gamma_{12}")
-STRESSES = {"S11": r"\sigma_{11}", "S22": r"\sigma_{22}", "S12": r"\sigma_{12}"}
-SAME = 1e-6  # values that differ by less, relatively, are one
-SIDE = 4.8  # inches, the longer side of a drawn cell
+STRAIN_SYMBOLS = (r"E_{11}", r"E_{22}", r"\gamma_{12}")
+STRESS_SYMBOLS = {"S11": r"\sigma_{11}", "S22": r"\sigma_{22}", "S12": r"\sigma_{12}"}
+SAME_VALUE = 1e-6  # values that differ by less, relatively, are one
+CELL_INCHES = 4.8  # inches, the longer side of a drawn cell
 STYLE = {"font.size": 10, "axes.titlesize": 11, "axes.linewidth": 0.8, "savefig.dpi": 200}
 
 
@@ -34,12 +34,12 @@ def save(figure: Figure, path: Path) -> Path:
 
 def figure_of(attributes: Any, panels: int) -> tuple[Figure, Sequence[Axes]]:
     width, height = float(attributes["width"]), float(attributes["height"])
-    inches = SIDE / max(width, height)
+    inches = CELL_INCHES / max(width, height)
     figure = Figure(figsize=(panels * (width * inches + 0.7) + 0.1, height * inches + 1.2), layout="constrained")
     return figure, figure.subplots(1, panels, squeeze=False)[0]
 
 
-def frame(axes: Axes, attributes: Any) -> None:
+def label_cell_axes(axes: Axes, attributes: Any) -> None:
     unit = unit_label(attributes["length_unit"]) or "(cell units)"
     axes.set_aspect("equal")
     axes.autoscale_view()
@@ -49,7 +49,7 @@ def frame(axes: Axes, attributes: Any) -> None:
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def paint(axes: Axes, drawn: Drawing, points: Array, colours: Array, edges: bool, **mapping: Any) -> Any:
+def fill_triangles(axes: Axes, drawn: DrawnMesh, points: Array, colours: Array, edges: bool, **mapping: Any) -> Any:
     """Fills the triangles with values, or with colours (q, 4); antialiasing would leave seams."""
     fill = {"array": colours} if colours.ndim == 1 else {"facecolors": colours}
     border = {"edgecolors": "0.55", "linewidths": 0.15} if edges else {"edgecolors": "none", "antialiased": False}
@@ -60,7 +60,9 @@ def paint(axes: Axes, drawn: Drawing, points: Array, colours: Array, edges: bool
     return shapes
 
 
-def lines(axes: Axes, segments: Array, colour: str, width: float, cap: Literal["butt", "round"] = "butt") -> None:
+def draw_segments(
+    axes: Axes, segments: Array, colour: str, width: float, cap: Literal["butt", "round"] = "butt"
+) -> None:
     """Draws segments (e, 2, 2) as one path, in which they join without spots."""
     path = Path2D(segments.reshape(-1, 2), [Path2D.MOVETO, Path2D.LINETO] * len(segments))
     axes.add_patch(PathPatch(path, fill=False, edgecolor=colour, linewidth=width, capstyle=cap, snap=False))
@@ -70,7 +72,7 @@ def colour_range(values: Array) -> tuple[Normalize, str, str]:
     """Colour range, map and the ends at which values lie outside; zero is white if both signs matter."""
     norm, extend = value_range(values)
     least, most = float(norm.vmin or 0.0), float(norm.vmax or 0.0)
-    if min(-least, most) <= 0.05 * max(-least, most) or np.ptp(values) <= SAME * np.abs(values).max():
+    if min(-least, most) <= 0.05 * max(-least, most) or np.ptp(values) <= SAME_VALUE * np.abs(values).max():
         return norm, "viridis", extend
     most = max(-least, most)
     return Normalize(-most, most), "RdBu_r", _outside(values, -most, most)
@@ -79,7 +81,7 @@ def colour_range(values: Array) -> tuple[Normalize, str, str]:
 def value_range(values: Array) -> tuple[Normalize, str]:
     """Colour range and the ends at which values lie outside; the extreme 0.5 % may, at either end."""
     low, high = float(values.min()), float(values.max())
-    if high - low <= SAME * max(abs(low), abs(high), 1e-300):
+    if high - low <= SAME_VALUE * max(abs(low), abs(high), 1e-300):
         middle = 0.5 * (low + high)
         half = 0.5 * (abs(middle) or 1.0)
         return Normalize(middle - half, middle + half), "neither"
@@ -105,7 +107,9 @@ def magnification(displacement: Array, points: Array) -> float:
 
 
 def load_label(strain: Array) -> str:
-    return ", ".join(f"${STRAINS[i]} = {{{strain[i]:.4g}}}$" for i in range(3) if strain[i] != 0.0) or "no strain"
+    return (
+        ", ".join(f"${STRAIN_SYMBOLS[i]} = {{{strain[i]:.4g}}}$" for i in range(3) if strain[i] != 0.0) or "no strain"
+    )
 
 
 def unit_label(label: str) -> str:

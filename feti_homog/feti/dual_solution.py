@@ -1,0 +1,29 @@
+"""What a solve of the dual problem finds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from feti_homog.typing import Float
+
+
+@dataclass(frozen=True)
+class DualSolution:
+    """The multipliers under one macroscopic strain and what follows from them on the interface.
+
+    Attributes:
+        strain: (3,) E.
+        lam: (owned rows,) multipliers, nodal forces between the faces; 0 on inactive rows.
+        jump: (owned rows,) B u*, 0 up to tolerance on active rows, gap and slip on the others.
+        alpha: (kernel dimension,) rigid-body amplitudes.
+        iterations, reason: of the Krylov method (PETSc's KSPConvergedReason).
+        residual: |B u*| on the active rows, relative to the jump of the torn cell.
+    """
+
+    strain: Float
+    lam: Float
+    jump: Float
+    alpha: Float
+    iterations: int
+    reason: int
+    residual: float

@@ -1,0 +1,123 @@
+"""Which preconditioner and coarse space a problem gets: chosen from its sizes and the options, before any is made."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from feti_homog.errors import CaseError
+from feti_homog.feti.thresholds import DEFAULTS, Thresholds
+
+OPERATORS = ("auto", "implicit", "explicit")
+PRECONDITIONERS = ("auto", "none", "lumped", "dirichlet", "influence")
+COARSE_SPACES = ("auto", "natural", "adaptive")
+
+
+@dataclass(frozen=True)
+class SolverOptions:
+    """What the options say.
+
+    Attributes:
+        preconditioner: of PRECONDITIONERS, `-feti_pc_type`.
+        operator: of OPERATORS, `-feti_dual_operator`.
+        coarse_space: of COARSE_SPACES, `-feti_coarse_space`.
+        threshold: tau, `-feti_coarse_threshold`.
+    """
+
+    preconditioner: str = "auto"
+    operator: str = "auto"
+    coarse_space: str = "auto"
+    threshold: float = DEFAULTS.soft_mode
+
+    @classmethod
+    def read(
+        cls,
+        text: Callable[[str, str], str],
+        number: Callable[[str, float], float],
+        thresholds: Thresholds = DEFAULTS,
+    ) -> SolverOptions:
+        """The options that text(name, default) and number(name, default) find, names without `feti_`.
+
+        Raises:
+            CaseError: an option has no such value.
+        """
+
+        def choice(name: str, known: tuple[str, ...], default: str) -> str:
+            value = text(name, default)
+            if value not in known:
+                raise CaseError(f"-feti_{name} {value}: expected one of {', '.join(known)}")
+            return value
+
+        preconditioner = choice("pc_type", PRECONDITIONERS, "auto")
+        return cls(
+            preconditioner,
+            choice("dual_operator", OPERATORS, "explicit" if preconditioner == "influence" else "auto"),
+            choice("coarse_space", COARSE_SPACES, "auto"),
+            number("coarse_threshold", thresholds.soft_mode),
+        )
+
+    def want_soft_modes(self, bodies_are_cut: bool) -> bool:
+        """Whether soft modes are looked for: asked for, or bodies are cut, for the webs that METIS makes have them."""
+        return self.coarse_space == "adaptive" or (self.coarse_space == "auto" and bodies_are_cut)
+
+
+@dataclass(frozen=True)
+class ProblemSizes:
+    """What the choice depends on, summed up over all ranks.
+
+    Attributes:
+        applications: how many times the dual operator is expected to be applied.
+        bodies_are_cut: whether there are more subdomains than bodies.
+        all_dense: whether all boundary operators are dense.
+        all_searchable: whether all are dense, but of bodies whose faces are searched for soft modes one by one.
+        shared_dofs: dofs on the shared nodes, of the cell with all bonds intact.
+        precracked_nodes: interface nodes that are debonded from the start.
+    """
+
+    applications: int
+    bodies_are_cut: bool
+    all_dense: bool
+    all_searchable: bool
+    shared_dofs: int
+    precracked_nodes: int
+
+
+@dataclass(frozen=True)
+class SolverPlan:
+    """What is made.
+
+    Attributes:
+        preconditioner: of PRECONDITIONERS, not auto.
+        adaptive: whether soft modes are deflated beside the rigid-body motions.
+    """
+
+    preconditioner: str
+    adaptive: bool
+
+
+def choose(sizes: ProblemSizes, options: SolverOptions, thresholds: Thresholds = DEFAULTS) -> SolverPlan:
+    """The parts for a problem of these sizes.
+
+    Raises:
+        CaseError: two options exclude each other.
+    """
+    preconditioner = options.preconditioner
+    if preconditioner == "influence" and not sizes.all_dense:
+        raise CaseError("-feti_pc_type influence: needs -feti_dual_operator explicit")
+    if preconditioner == "auto":
+        pays = options.coarse_space != "adaptive" and _influence_pays(sizes, thresholds)
+        preconditioner = "influence" if pays else "dirichlet"
+    can_deflate = sizes.all_searchable and preconditioner == "dirichlet"
+    if options.coarse_space == "adaptive" and not can_deflate:
+        raise CaseError("-feti_coarse_space adaptive: needs -feti_pc_type dirichlet, -feti_dual_operator not implicit")
+    return SolverPlan(preconditioner, can_deflate and options.want_soft_modes(sizes.bodies_are_cut))
+
+
+def _influence_pays(sizes: ProblemSizes, thresholds: Thresholds) -> bool:
+    """Whether the columns of influence are worth their set-up, and fit."""
+    return (
+        sizes.all_dense
+        and sizes.applications >= thresholds.influence_applications
+        and sizes.shared_dofs <= thresholds.assembled_schur_dofs
+        and sizes.precracked_nodes <= thresholds.influence_precracked_nodes
+    )

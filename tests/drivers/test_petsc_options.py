@@ -1,0 +1,89 @@
+"""PETSc's options on the command line: those of the table are accepted by every run, misspelt ones are refused."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from support.command_line import case_file, command_line
+
+from feti_homog.common.petsc_option_table import OPTIONS
+
+PREFIXES = ("natural", "coarse", "bonded", "sub", "interior")
+WITHOUT_CHOLMOD = [word for p in PREFIXES for word in (f"-feti_{p}_pc_factor_mat_solver_type", "mumps")]
+CUT = "[output]\npictures = false\n[decomposition]\nsubdomains = 6\n"
+# A value that each kind of option takes; what is listed takes its default.
+VALUES = {"<real>": "1e-8", "<integer>": "50", "": None}
+
+
+@pytest.fixture(scope="module")
+def stiffness(tmp_path_factory):
+    """L^ef with the default options."""
+    folder = tmp_path_factory.mktemp("default")
+    job = command_line(1, "run", case_file(folder, CUT), "--out", folder / "out", "--quiet")
+    assert job.returncode == 0, job.stderr
+    return np.array(json.loads((folder / "out/result.json").read_text())["effective_stiffness"])
+
+
+def assert_runs(tmp_path, ranks, words, stiffness):
+    job = command_line(ranks, "run", case_file(tmp_path, CUT), "--out", tmp_path / "out", "--quiet", *words)
+    assert (job.returncode, job.stderr) == (0, "")
+    found = np.array(json.loads((tmp_path / "out/result.json").read_text())["effective_stiffness"])
+    assert np.abs(found - stiffness).max() < 1e-6 * np.abs(stiffness).max()
+
+
+@pytest.mark.parametrize(
+    "others",
+    [[], ["-feti_dual_operator", "implicit"], ["-feti_pc_type", "influence"], ["-feti_coarse_space", "natural"]],
+    ids=["default", "implicit", "influence", "natural"],
+)
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_petsc_without_cholmod(tmp_path, stiffness, ranks, others):
+    """Every factorization by MUMPS, whichever of them the run makes; it writes fields, which need the interiors."""
+    assert_runs(tmp_path, ranks, [*WITHOUT_CHOLMOD, *others], stiffness)
+
+
+def test_every_option_of_the_table_is_accepted(tmp_path, stiffness):
+    words = []
+    for option in OPTIONS:
+        value = VALUES.get(option.value, option.default)
+        words += [f"-{option.name}"] + ([value] if value else [])
+    job = command_line(1, "run", case_file(tmp_path, CUT), "--out", tmp_path / "out", *words)
+    assert job.returncode == 0, job.stderr
+    found = np.array(json.loads((tmp_path / "out/result.json").read_text())["effective_stiffness"])
+    assert np.abs(found - stiffness).max() < 1e-6 * np.abs(stiffness).max()
+
+
+def test_options_of_the_library_of_a_solver_that_the_run_does_not_make(tmp_path, stiffness):
+    """MUMPS' own options are read once MUMPS is chosen; the run makes no implicit subdomains."""
+    words = ["-feti_sub_pc_factor_mat_solver_type", "mumps", "-feti_sub_mat_mumps_icntl_14", "60"]
+    assert_runs(tmp_path, 1, words, stiffness)
+
+
+@pytest.mark.parametrize(
+    ("words", "fault"),
+    [
+        (["-feti_sub_pc_factor_mat_solver_typ", "mumps"], "did you mean -feti_sub_pc_factor_mat_solver_type?"),
+        (["-feti_interior_pc_factor_mat_solvertype", "mumps"], "-feti_interior_pc_factor_mat_solver_type?"),
+        (["-feti_bonded_typ", "mumps"], "-feti_bonded_typ: no solver has such an option"),
+        (["-feti_coarse_spase", "natural"], "did you mean -feti_coarse_space?"),
+        (["-feti_pctype", "lumped"], "did you mean -feti_pc_type?"),
+        (["-feti_projected_pc_type", "none"], "-feti_projected_pc_type: unknown option"),
+        (["-feti_sub_mat_mumps_icntl_14", "60"], "-feti_sub_mat_mumps_icntl_14: no solver has such an option"),
+        (["-feti_interior_pc_factor_mat_solver_type", "nolib", "-feti_interior_x", "1"], "-feti_interior_...: "),
+        (["-feti_pc_type", "ilu"], "expected one of auto, none, lumped, dirichlet, influence"),
+    ],
+)
+def test_misspelt_options_are_refused(tmp_path, words, fault):
+    job = command_line(1, "run", case_file(tmp_path, CUT), "--out", tmp_path / "out", *words)
+    assert job.returncode == 2, job.stderr
+    assert fault in job.stderr and not (tmp_path / "out").exists()
+    assert "Traceback" not in job.stderr
+
+
+def test_misspelt_options_of_a_case_file_are_refused(tmp_path):
+    path = case_file(tmp_path, CUT + "[petsc]\nfeti_interior_pc_factor_mat_solver_typ = 'mumps'\n")
+    job = command_line(2, "run", path, "--out", tmp_path / "out")
+    assert job.returncode == 2
+    assert job.stderr.count("did you mean -feti_interior_pc_factor_mat_solver_type?") == 1

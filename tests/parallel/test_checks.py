@@ -1,0 +1,89 @@
+"""What a result must obey to count as done: scales that do not vanish, and limits that no option lifts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import bonds
+import numpy as np
+import pytest
+from cells import make_case
+from support import parallel_assert
+from unit.cell.faulty_meshes import grid
+
+from feti_homog.analysis.context import AnalysisContext
+from feti_homog.common.petsc_options import case_options
+from feti_homog.common.progress import Progress
+from feti_homog.errors import CaseError
+from feti_homog.homogenization.averaging import Homogenization
+from feti_homog.interface.contact import OPEN
+
+pytestmark = pytest.mark.parallel
+
+
+class Words(Progress):
+    """Keeps what is said."""
+
+    def __init__(self, comm):
+        super().__init__(comm, quiet=True)
+        self.said = []
+
+    def say(self, words):
+        self.said.append(words)
+
+
+def context_of(comm, cell, contact=True):
+    return AnalysisContext(Homogenization(cell, contact), cell.debonded, Words(comm), lambda *_: None)
+
+
+@pytest.mark.parametrize("contact", [True, False])
+def test_hill_holds_where_a_debonded_cell_stores_nothing(comm, shared_path, contact):
+    """A strip across the cell that has come off: no stress under tension across it, nor under shear."""
+    if comm.rank == 0:
+        grid(lambda x, y: abs(x - 0.5) < 0.25).write(shared_path / "strip.msh")
+    comm.barrier()
+    cell = bonds.tear(comm, geometry="mesh", file="strip.msh", folder=shared_path)
+    context = context_of(comm, cell, contact)
+    status = np.full(len(cell.solver.jump_operator.nodes.row), OPEN, np.int8)
+    responses = context.homogenization.respond(np.eye(3), status, [context.zero_multipliers()] * 3)
+    for response in responses:
+        context.record_checks("strip", response)
+    for k in (0, 2):
+        assert np.abs(responses[k].stress).max() < 1e-12 * responses[1].stress[1]
+    assert not context.faults
+    comm.barrier()
+
+
+def test_jumps_are_told_on_the_scale_on_which_they_are_checked(comm):
+    cell = bonds.tear(comm, geometry="square", mesh_size=0.3)
+    context = context_of(comm, cell)
+    (response,) = context.homogenization.respond(np.eye(3)[:1], context.status(None), [context.zero_multipliers()])
+    # Where the forces vanish the torn cell's jump does, too, and relative to it any jump is large.
+    solution = replace(response.state.solution, residual=2.7e-5, reason=-3)
+    loose = replace(response, state=replace(response.state, solution=solution))
+    context.record_checks("E11", loose)
+    words = f"relative jump {response.checks['jump']:.1e}"
+    parallel_assert(comm, words in context.progress.said[0] and "2.7e-05" not in context.progress.said[0])
+    parallel_assert(comm, len(context.faults) == 1 and words in context.faults[0])
+
+
+@pytest.mark.parametrize(("rtol", "limit"), [(1e-10, 1e-7), (1e-7, 1e-4), (1e-3, 1e-4), (0.5, 1e-4)])
+def test_no_tolerance_lifts_the_limit_of_the_checks(comm, rtol, limit):
+    cell = bonds.tear(comm, geometry="square", mesh_size=0.3, petsc={"feti_ksp_rtol": rtol})
+    context = context_of(comm, cell)
+    for law in ("hill", "jump", "strain", "symmetry"):
+        assert context.tolerance(law) == pytest.approx(limit)
+    assert context.tolerance("kkt_tension") == 1e-6
+    assert bool(context.warnings()) == (rtol > 1e-7)
+    context.check("E11", {"hill": 1.1 * limit})
+    assert len(context.faults) == 1
+
+
+@pytest.mark.parametrize("rtol", [2.0, 1, 0, -1e-8, "small", "nan"])
+def test_tolerances_that_are_none_are_refused(rtol):
+    case = make_case(petsc={"feti_ksp_rtol": rtol})
+    with (
+        pytest.raises(CaseError, match=f"^-feti_ksp_rtol {rtol}: expected a number above 0 and below 1$"),
+        case_options(case.petsc),
+    ):
+        pass

@@ -1,0 +1,127 @@
+"""Results: what is described is what is written, what is written is read again, and what is printed is short."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+
+from feti_homog import Result
+from feti_homog.analysis.result import schema_keys
+from feti_homog.analysis.result_records import AnglePoint, CellInfo, Checks, PathPoint, SolverInfo, StiffnessBounds
+from feti_homog.mechanics.bounds import Bounds, engineering_moduli
+from feti_homog.output.files import csv_tables, result_json
+
+STIFFNESS = np.array([[9.0, 2.0, 0.0], [2.0, 8.0, 0.0], [0.0, 0.0, 3.0]])
+CELL = CellInfo(1.0, 2.0, 2.0, 0.4, {"matrix": 0.6, "fibre": 0.4}, 10, 20)
+SOLVER = SolverInfo(1, 2, 3, 40, 50, 6, 7, 8, 3, 1, 1e-8, 3, (5, 6, 7), (2, 2, 2))
+COUNTS = {"bonded": 5, "open": 3, "closed": 1, "iterations": 7}
+
+
+def path_point(load: float) -> PathPoint:
+    strain = np.array([load, 0.0, 0.0])
+    return PathPoint(
+        load_factor=load,
+        strain=strain,
+        stress=STIFFNESS @ strain,
+        broke=1,
+        free_motions=0,
+        dissipated=0.5,
+        dissipated_strain_controlled=0.6,
+        **COUNTS,
+    )
+
+
+def made(kind: str, **answer: Any) -> Result:
+    case = {"name": "a", "analysis": {"type": kind, "plane": "strain"}, "output": {"stress_unit": "GPa"}}
+    if kind == "path":
+        case["path"] = {"method": "events"}
+    return Result(
+        version="0", case=case, digest="d", cell=CELL, solver=SOLVER, checks=Checks(1e-9, 2e-9, 3e-9, symmetry=1e-12),
+        check_tolerance=1e-5, kkt_tolerance=1e-6, warnings=("w",), faults=(), status="done",
+        timings={"mesh": 0.5, "solve": 1.0}, memory=1 << 20, **answer,
+    )  # fmt: skip
+
+
+RESULTS = {
+    "stiffness": made(
+        "stiffness", effective_stiffness=STIFFNESS, moduli=engineering_moduli(STIFFNESS),
+        bounds=StiffnessBounds(voigt=2 * STIFFNESS, reuss=0.5 * STIFFNESS, hashin_shtrikman=Bounds((1, 9), (1, 4))),
+    ),
+    "anisotropic": made(
+        "stiffness", effective_stiffness=STIFFNESS, moduli=engineering_moduli(STIFFNESS),
+        bounds=StiffnessBounds(voigt=2 * STIFFNESS, reuss=0.5 * STIFFNESS, hashin_shtrikman=None),
+    ),
+    "angle": made("angle", angle=tuple(AnglePoint(angle=a, stiffness=STIFFNESS, **COUNTS) for a in (0.0, 90.0))),
+    "path": made("path", path=(path_point(0.5), path_point(1.0)), resumed=0),
+}  # fmt: skip
+
+
+def leaves(value: Any, place: str = "") -> list[str]:
+    """The places of all values of a document as `schema_keys` writes them."""
+    if isinstance(value, dict):
+        return [leaf for key, item in value.items() for leaf in leaves(item, f"{place}.{key}".lstrip("."))]
+    if isinstance(value, list) and value and isinstance(value[0], dict):
+        return [leaf for item in value for leaf in leaves(item, f"{place}[]")]
+    return [place]
+
+
+@pytest.mark.parametrize("name", RESULTS)
+def test_every_key_that_is_written_is_described(tmp_path, name):
+    result_json.write(tmp_path, RESULTS[name].document)
+    known = {re.sub(r"\.[A-Z]+$", ".*", key.path) for key in schema_keys()}
+    for place in leaves(result_json.read(tmp_path)):
+        assert place in known or re.sub(r"\.[^.]+$", ".*", place) in known or place.startswith("case."), place
+
+
+@pytest.mark.parametrize("name", RESULTS)
+def test_what_is_written_is_read_again(tmp_path, name):
+    result_json.write(tmp_path, RESULTS[name].document)
+    again = Result.of(result_json.read(tmp_path))
+    result_json.write(tmp_path / "again", again.document)
+    assert (tmp_path / "again" / "result.json").read_bytes() == (tmp_path / "result.json").read_bytes()
+    assert again.checks == RESULTS[name].checks and again.solver == SOLVER and again.fields is None
+
+
+def test_descriptions_are_complete():
+    described = list(schema_keys())
+    assert all((key.meaning and key.type != "any") or key.path == "case.KEY" for key in described)
+    by_path = {key.path: key for key in described}
+    assert by_path["schema"].type == "integer" and by_path["timings.STAGE"].unit == "s"
+    assert by_path["path[].stress"].type == "numbers (3,)" and by_path["checks.hill"].type == "number"
+    assert by_path["bounds.hashin_shtrikman.bulk"].unit and by_path["solver.iterations"].type == "list of integers"
+
+
+@pytest.mark.parametrize(("kind", "points"), [(AnglePoint, RESULTS["angle"].angle), (PathPoint, RESULTS["path"].path)])
+def test_columns_are_those_of_the_table(tmp_path, kind, points):
+    header, *rows = csv_tables.write(tmp_path / "table.csv", points).read_text().splitlines()
+    described = [column.name for column in csv_tables.columns(kind)]
+    written = header.split(",")
+    assert [name for name in described if name in written] == written and len(rows) == len(points)
+    if kind is PathPoint:
+        assert written[1:7] == ["E11", "E22", "gamma12", "S11", "S22", "S12"] and "free_motions" in written
+
+
+def test_points_are_arrays():
+    points = RESULTS["path"].points
+    assert points["strain"].shape == (2, 3) and points["load_factor"].tolist() == [0.5, 1.0]
+    assert RESULTS["angle"].points["stiffness"].shape == (2, 3, 3) and "strain" not in RESULTS["angle"].points
+    assert not RESULTS["stiffness"].points
+
+
+@pytest.mark.parametrize("name", RESULTS)
+def test_what_is_printed_is_short(name):
+    text = str(RESULTS[name])
+    assert len(text.splitlines()) < 25 and "largest relative error 3.0e-09 (jump)" in text
+    assert text.splitlines()[-1].split() == ["Status", "done"]
+
+
+def test_tables_for_notebooks():
+    html = RESULTS["stiffness"]._repr_html_()
+    assert html.count("<table>") == html.count("</table>") == 3
+    assert all(
+        words in html for words in ("L<sup>ef</sup> (GPa)", "<th>gamma12</th>", "<td>E1 (GPa)</td>", "<p>done</p>")
+    )
+    assert "<th>load_factor</th>" in RESULTS["path"]._repr_html_()

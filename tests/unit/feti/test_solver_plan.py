@@ -1,0 +1,117 @@
+"""The choice of preconditioner and coarse space from sizes and options, without MPI."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from feti_homog.errors import CaseError
+from feti_homog.feti.solver_plan import ProblemSizes, SolverOptions, SolverPlan, choose
+from feti_homog.feti.thresholds import DEFAULTS, Thresholds
+
+PATH = ProblemSizes(
+    applications=6000,
+    bodies_are_cut=True,
+    all_dense=True,
+    all_searchable=True,
+    shared_dofs=5000,
+    precracked_nodes=0,
+)
+STIFFNESS = replace(PATH, applications=60)
+INFLUENCE, ADAPTIVE, NATURAL = (
+    SolverPlan("influence", False), SolverPlan("dirichlet", True), SolverPlan("dirichlet", False),
+)  # fmt: skip
+
+
+def read(**given):
+    """The options of a database with these values."""
+    return SolverOptions.read(given.get, given.get)
+
+
+@pytest.mark.parametrize(
+    ("sizes", "plan"),
+    [
+        (STIFFNESS, ADAPTIVE),
+        (replace(STIFFNESS, bodies_are_cut=False), NATURAL),
+        (replace(STIFFNESS, all_dense=False), ADAPTIVE),
+        (replace(STIFFNESS, all_dense=False, all_searchable=False), NATURAL),
+        (PATH, INFLUENCE),
+        (replace(PATH, bodies_are_cut=False), INFLUENCE),
+        (replace(PATH, applications=DEFAULTS.influence_applications - 1), ADAPTIVE),
+        (replace(PATH, applications=DEFAULTS.influence_applications), INFLUENCE),
+        (replace(PATH, all_dense=False), ADAPTIVE),
+        (replace(PATH, shared_dofs=DEFAULTS.assembled_schur_dofs + 1), ADAPTIVE),
+        (replace(PATH, shared_dofs=DEFAULTS.assembled_schur_dofs), INFLUENCE),
+        (replace(PATH, precracked_nodes=DEFAULTS.influence_precracked_nodes + 1), ADAPTIVE),
+    ],
+)
+def test_default_plan(sizes, plan):
+    assert choose(sizes, SolverOptions()) == plan
+
+
+def test_other_thresholds():
+    assert choose(STIFFNESS, SolverOptions(), Thresholds(influence_applications=60)) == INFLUENCE
+    assert choose(PATH, SolverOptions(), Thresholds(assembled_schur_dofs=10)) == ADAPTIVE
+
+
+@pytest.mark.parametrize(
+    ("options", "plan"),
+    [
+        ({"preconditioner": "none"}, SolverPlan("none", False)),
+        ({"preconditioner": "lumped"}, SolverPlan("lumped", False)),
+        ({"preconditioner": "dirichlet"}, ADAPTIVE),
+        ({"preconditioner": "influence"}, INFLUENCE),
+        ({"coarse_space": "natural"}, INFLUENCE),
+        ({"coarse_space": "natural", "preconditioner": "dirichlet"}, NATURAL),
+        ({"coarse_space": "adaptive"}, ADAPTIVE),
+    ],
+)
+def test_options_have_their_way(options, plan):
+    assert choose(PATH, SolverOptions(**options)) == plan
+
+
+@pytest.mark.parametrize(
+    ("sizes", "options", "words"),
+    [
+        (replace(PATH, all_dense=False), {"preconditioner": "influence"}, "-feti_pc_type influence: needs"),
+        (PATH, {"coarse_space": "adaptive", "preconditioner": "lumped"}, "-feti_coarse_space adaptive: needs"),
+        (PATH, {"coarse_space": "adaptive", "preconditioner": "influence"}, "-feti_coarse_space adaptive: needs"),
+        (replace(PATH, all_searchable=False), {"coarse_space": "adaptive"}, "-feti_coarse_space adaptive: needs"),
+    ],
+)
+def test_options_that_exclude_each_other(sizes, options, words):
+    with pytest.raises(CaseError, match=words):
+        choose(sizes, SolverOptions(**options))
+
+
+@pytest.mark.parametrize(
+    ("space", "cut", "wanted"),
+    [
+        ("auto", True, True), ("auto", False, False), ("adaptive", False, True), ("natural", True, False),
+    ],
+)  # fmt: skip
+def test_soft_modes_are_looked_for(space, cut, wanted):
+    assert SolverOptions(coarse_space=space).want_soft_modes(cut) == wanted
+
+
+def test_options_are_read():
+    assert read() == SolverOptions()
+    found = read(pc_type="lumped", dual_operator="implicit", coarse_space="natural", coarse_threshold=0.1)
+    assert found == SolverOptions("lumped", "implicit", "natural", 0.1)
+    assert read(pc_type="influence").operator == "explicit"
+    assert read(pc_type="influence", dual_operator="auto").operator == "auto"
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"pc_type": "ilu"}, "-feti_pc_type ilu: expected one of auto, none, lumped, dirichlet, influence"),
+        ({"dual_operator": "direct"}, "-feti_dual_operator direct: expected one of auto, implicit, explicit"),
+        ({"coarse_space": "deluxe"}, "-feti_coarse_space deluxe: expected one of auto, natural, adaptive"),
+    ],
+)
+def test_unknown_values(given, words):
+    with pytest.raises(CaseError) as caught:
+        read(**given)
+    assert caught.value.faults == (words,)
