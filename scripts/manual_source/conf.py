@@ -9,6 +9,8 @@ ROOT = HERE.parents[1]
 sys.path[:0] = [str(HERE), str(ROOT)]
 
 from docstrings import add_filters  # noqa: E402
+from pygments.lexers.special import TextLexer  # noqa: E402
+from sphinx.highlighting import lexers  # noqa: E402
 
 from feti_homog import __version__  # noqa: E402
 
@@ -42,10 +44,11 @@ python_use_unqualified_type_names = True
 python_maximum_signature_line_length = 100
 napoleon_use_ivar = True
 default_role = "py:obj"
-# autoapi does not see constants that are assigned several at a time.
-suppress_warnings = ["autoapi.python_import_resolution"]
+# autoapi does not see constants that are assigned several at a time; the annotation `type` is taken for a field.
+suppress_warnings = ["autoapi.python_import_resolution", "ref.python"]
 
 highlight_language = "none"
+lexers["geo"] = TextLexer()  # files of gmsh
 smartquotes = False
 
 html_theme = "furo"

@@ -13,6 +13,7 @@ from jinja2 import Environment
 from sphinx.application import Sphinx
 
 NAME = re.compile(r"[A-Za-z_][\w.]*")
+SECTION = re.compile(r"(Args|Attributes|Raises|Returns|Yields):")
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
@@ -30,8 +31,19 @@ def _to_markup(app: Sphinx, what: str, name: str, obj: Any, options: Any, lines:
 
 
 def markup(docstring: str) -> str:
-    """The docstring in reStructuredText."""
-    pieces = re.split(r"``?([^`]+)``?", docstring)
+    """The docstring in reStructuredText; indented blocks, as of formulas, stay as they are."""
+    blocks, in_section = [], False
+    for block in re.split(r"\n[ ]*\n", docstring):
+        if block.startswith(" ") and not in_section:
+            blocks.append(f"::\n\n{block}")
+        else:
+            in_section = any(map(SECTION.fullmatch, block.splitlines()))
+            blocks.append(_paragraph(block))
+    return "\n\n".join(blocks)
+
+
+def _paragraph(block: str) -> str:
+    pieces = re.split(r"``?([^`]+)``?", block)
     text = [_plain(piece) for piece in pieces[::2]]
     code = [f"`{piece}`" if NAME.fullmatch(piece) else f"``{piece}``" for piece in pieces[1::2]]
     return "".join(part for pair in zip(text, [*code, ""], strict=True) for part in pair)
@@ -43,7 +55,8 @@ def _plain(text: str) -> str:
 
 def names_described(cls: Any) -> list[str]:
     """The attributes that the docstring of a class, as napoleon leaves it, describes."""
-    return re.findall(r"^:ivar (\w+):", cls.docstring, flags=re.MULTILINE)
+    described = re.findall(r"^:ivar ([\w, ]+):", cls.docstring, flags=re.MULTILINE)
+    return [name for names in described for name in names.split(", ")]
 
 
 def described(cls: Any) -> str:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import argparse
 import json
-import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from pathlib import Path
+
+from markdown_text import capitalised, code, page, plain, table
+from results_page import results
 
 from feti_homog import errors
 from feti_homog.cli import command_parser
@@ -21,8 +23,8 @@ ERRORS = (errors.FetiHomogError, errors.CaseError, errors.MeshError, errors.Conv
 def write(folder: Path) -> None:
     """Writes every page to the folder, under its name, and the JSON Schema of case files."""
     folder.mkdir()
-    for name, page in PAGES.items():
-        (folder / f"{name}.md").write_text(page(), encoding="utf-8")
+    for name, text in PAGES.items():
+        (folder / f"{name}.md").write_text(text(), encoding="utf-8")
     (folder / SCHEMA).write_text(json.dumps(json_schema(), indent=2), encoding="utf-8")
 
 
@@ -33,7 +35,7 @@ def command_line() -> str:
         parts += [f"## feti-homog {name}", _console(parser.format_help())]
     codes = [(str(errors.EXIT_DONE), "done; every check is within its tolerance")]
     codes += [(str(error.exit_code), f"{error.__doc__}") for error in ERRORS]
-    return _page(*parts, "## Exit codes", table(["exit code", "meaning"], sorted(codes)))
+    return page(*parts, "## Exit codes", table(["exit code", "meaning"], sorted(codes)))
 
 
 def case_file() -> str:
@@ -44,10 +46,10 @@ def case_file() -> str:
     )
     parts = ["# Case file", words]
     for each in reference.tables():
-        rows = [(_code(r.key), _accepts(r), r.default, r.applies, r.meaning) for r in each.rows]
-        parts += [f"## {plain(_capitalised(each.place))}", plain(_capitalised(each.meaning))]
+        rows = [(code(r.key), _accepts(r), r.default, r.applies, r.meaning) for r in each.rows]
+        parts += [f"## {plain(capitalised(each.place))}", plain(capitalised(each.meaning))]
         parts.append(table(["key", "accepts", "default", "applies if", "meaning"], rows))
-    return _page(*parts)
+    return page(*parts)
 
 
 def petsc_options() -> str:
@@ -56,51 +58,24 @@ def petsc_options() -> str:
         "Options of the solver, on the command line, or without the dash in the section `[petsc]` of a case file; "
         "the command line has precedence. `feti-homog options` prints them."
     )
-    rows = [(_code(f"-{o.name}"), _choices(o.value), _choices(o.default), o.help) for o in OPTIONS]
-    return _page("# PETSc options", words, table(["option", "takes", "default", "meaning"], rows))
+    rows = [(code(f"-{o.name}"), _choices(o.value), _choices(o.default), o.help) for o in OPTIONS]
+    return page("# PETSc options", words, table(["option", "takes", "default", "meaning"], rows))
 
 
 PAGES: dict[str, Callable[[], str]] = {
     "command_line": command_line,
     "case_file": case_file,
     "petsc_options": petsc_options,
+    "results": results,
 }
-
-
-def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """A table in Markdown; columns that are empty in all rows are left out."""
-    rows = list(rows)
-    used = [i for i in range(len(head)) if any(row[i] for row in rows)]
-    lines = [[head[i] for i in used], ["---"] * len(used), *([plain(row[i]) for i in used] for row in rows)]
-    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
-
-
-def plain(text: str) -> str:
-    """The text with what Markdown would take for markup escaped, but for `code`."""
-    pieces = text.split("`")
-    pieces[::2] = [re.sub(r"[\\*_\[\]<>$#~|]", r"\\\g<0>", piece) for piece in pieces[::2]]
-    pieces[1::2] = [piece.replace("|", r"\|") for piece in pieces[1::2]]
-    return "`".join(pieces)
-
-
-def _page(*parts: str) -> str:
-    return "\n\n".join(parts)
-
-
-def _capitalised(words: str) -> str:
-    return words[:1].upper() + words[1:]
 
 
 def _console(text: str) -> str:
     return f"```text\n{text.rstrip()}\n```"
 
 
-def _code(word: str) -> str:
-    return word and f"`{word}`"
-
-
 def _choices(words: str) -> str:
-    return ", ".join(_code(word) for word in words.split("|") if word)
+    return ", ".join(code(word) for word in words.split("|") if word)
 
 
 def _accepts(row: reference.KeyRow) -> str:

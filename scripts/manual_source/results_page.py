@@ -1,0 +1,45 @@
+"""The page on what a run and a sweep write, made from the records that the writers of the files use."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from markdown_text import code, page, table
+
+from feti_homog.analysis.result import schema_keys
+from feti_homog.analysis.result_records import AnglePoint, PathPoint
+from feti_homog.output.files.csv_tables import Column, columns
+from feti_homog.output.files.field_layout import items
+from feti_homog.sweep.report.columns import COLUMNS, DATASETS
+
+INTRODUCTION = """\
+Any consistent units: the unit of stresses is that of the moduli in the case file, that of lengths the unit of the cell.
+Orders and signs: [README](../README.md#units-order-and-signs). Words in capitals stand for names that vary."""
+
+JSON = """\
+All numbers are finite. `KEY[]` is a list, whose entries have the keys that follow. Keys without a value are absent."""
+
+HDF5 = """\
+n nodes, m elements, k interface nodes; nodes are torn, each subdomain has its own. `result.xdmf` opens the file in
+ParaView. K is the number of a state, from 0: of a stiffness the unit strains, of a path its points."""
+
+SWEEP_CSV = """\
+A row for each case, then four for each point: the statistics of its realisations. Names have their units in brackets; i
+and j stand for 1, 2 or 3."""
+
+
+def results() -> str:
+    """result.json, result.h5 and the tables."""
+    keys = table(["key", "type", "unit", "meaning"], [(code(k.path), k.type, k.unit, k.meaning) for k in schema_keys()])
+    fields = table(
+        ["place", "name", "shape", "type", "unit", "meaning"],
+        [(code(i.path), i.kind, i.shape, i.dtype, i.unit, i.meaning) for i in items()],
+    )
+    parts = ["# Results", INTRODUCTION, "## result.json", JSON, keys, "## result.h5", HDF5, fields]
+    parts += ["## angle.csv", _columns(columns(AnglePoint)), "## path.csv", _columns(columns(PathPoint))]
+    parts += ["## sweep.csv", SWEEP_CSV, _columns(COLUMNS), "## sweep.h5", _columns(DATASETS, "dataset")]
+    return page(*parts)
+
+
+def _columns(described: Iterable[Column], head: str = "column") -> str:
+    return table([head, "unit", "meaning"], [(code(c.name), c.unit, c.meaning) for c in described])

@@ -1,0 +1,149 @@
+"""The reference of what is written has all that small runs write, and nothing else."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+import h5py
+import pytest
+import tomli_w
+from mpi4py import MPI
+
+from feti_homog.analysis.result import schema_keys
+from feti_homog.analysis.result_records import AnglePoint, PathPoint
+from feti_homog.analysis.runner import run
+from feti_homog.config.case import Case
+from feti_homog.output.files.csv_tables import columns
+from feti_homog.output.files.field_layout import items
+from feti_homog.sweep import collect, execute, plan
+from feti_homog.sweep.report.columns import COLUMNS, DATASETS, OUTPUT_COLUMNS
+from feti_homog.sweep.report.outputs import outputs
+
+BASE = {
+    "cell": {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.25},
+    "material": {"matrix": {"young": 88.0, "poisson": 0.299}, "fibre": {"young": 200.0, "poisson": 0.222}},
+    "output": {"pictures": False},
+}
+ARC = {"fibre": "all", "centre": 0.0}
+HALF_OPEN = {"debonded": [ARC | {"angle": 60.0}]}
+STRAIN = [0.1, 0.0, 0.0]
+CASES = {
+    "bonded": {"analysis": {"type": "stiffness", "plane": "strain"}},
+    "debonded": {"analysis": {"type": "stiffness", "plane": "strain"}, "interface": HALF_OPEN},
+    "angle": {
+        "analysis": {"type": "angle", "plane": "strain"},
+        "interface": {"debonded": [ARC]},
+        "angle": {"values": [0, 60]},
+    },
+    "angle of a strain": {
+        "analysis": {"type": "angle", "plane": "strain"},
+        "interface": {"debonded": [ARC]},
+        "angle": {"values": [0, 60], "strain": STRAIN},
+    },
+    "path": {
+        "analysis": {"type": "path", "plane": "strain"},
+        "interface": HALF_OPEN | {"normal_strength": 1.0},
+        "path": {"strain": STRAIN},
+    },
+}
+SWEEP = {"sweep": {"cell.mesh_size": [0.25, 0.3]}}
+
+
+@pytest.fixture(scope="module")
+def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """A folder of results of each case."""
+    root = tmp_path_factory.mktemp("results")
+    for name, sections in CASES.items():
+        run(Case.parse(BASE | sections), root / name, MPI.COMM_SELF, quiet=True)
+    return {name: root / name for name in CASES}
+
+
+@pytest.fixture(scope="module")
+def documents(folders) -> list[dict[str, Any]]:
+    return [json.loads((folder / "result.json").read_text()) for folder in folders.values()]
+
+
+@pytest.fixture(scope="module")
+def sweep_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("sweep")
+    (folder / "sweep.toml").write_text(tomli_w.dumps(BASE | CASES["path"] | SWEEP))
+    execute.run_all(plan.load(folder / "sweep.toml"), folder / "cases", MPI.COMM_SELF, 1, False, True)
+    collect.collect(folder / "cases", pictures=False)
+    return folder / "cases"
+
+
+def paths_of(value: Any, above: str = "") -> Iterator[str]:
+    """The places of a document as the reference writes them; a case is not gone into."""
+    entries = value.items() if isinstance(value, dict) else ()
+    for name, item in entries:
+        yield f"{above}{name}"
+        if isinstance(item, list) and item and isinstance(item[0], dict):
+            yield from (path for entry in item for path in paths_of(entry, f"{above}{name}[]."))
+        elif (above, name) != ("", "case"):
+            yield from paths_of(item, f"{above}{name}.")
+
+
+def unmatched(names: Iterable[str], patterns: Iterable[str]) -> tuple[set[str], set[str]]:
+    """The names that are of no pattern and the patterns that are of no name; capitals, i and j stand for anything."""
+    expressions = {pattern: expression(pattern) for pattern in patterns}
+    names = set(names)
+    unknown = {name for name in names if not any(e.fullmatch(name) for e in expressions.values())}
+    return unknown, {p for p, e in expressions.items() if not any(map(e.fullmatch, names))}
+
+
+def expression(pattern: str) -> re.Pattern[str]:
+    words = re.escape(pattern)
+    words = re.sub(r"(?<=[CS])(ij|ii)", r"[1-3][1-3]", words)
+    return re.compile(re.sub(r"(?<![A-Za-z])([A-Z]{2,}|K)(?![a-z])", ".+", words))
+
+
+def test_keys_of_result_json(documents):
+    found = {path for document in documents for path in paths_of(document)}
+    unknown, unused = unmatched(found, {key.path for key in schema_keys()})
+    assert (unknown, unused) == (set(), {"case.KEY"})
+
+
+def test_datasets_and_attributes_of_result_h5(folders):
+    found = set()
+
+    def note(name: str, item: Any) -> None:
+        place = f"/{name}".rstrip("/")
+        found.update((place or "/", f"attribute {attribute}") for attribute in item.attrs)
+        found.update({(place, "dataset")} if isinstance(item, h5py.Dataset) else ())
+
+    with h5py.File(folders["debonded"] / "result.h5") as file:
+        note("", file)
+        file.visititems(note)
+    states = {(re.sub(r"^((?:/vector)?/state)/\d+", r"\1/K", place), kind) for place, kind in found}
+    assert states == {(item.path, item.kind) for item in items()}
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"), [("angle", AnglePoint), ("angle of a strain", AnglePoint), ("path", PathPoint)]
+)
+def test_columns_of_the_tables_of_points(folders, name, kind):
+    with (folders[name] / f"{name.split()[0]}.csv").open() as stream:
+        (header, *_) = csv.reader(stream)
+    described = [column.name for column in columns(kind)]
+    assert header == [name for name in described if name in header]
+
+
+def test_columns_of_sweeps(documents, sweep_folder):
+    found = {name for document in documents for name in outputs(document)}
+    assert unmatched(found, {column.name for column in OUTPUT_COLUMNS}) == (set(), set())
+    with (sweep_folder / "sweep.csv").open() as stream:
+        header = {name.partition(" (")[0] for name in next(csv.reader(stream))}
+    assert not unmatched(header, {column.name for column in COLUMNS})[0]
+
+
+def test_datasets_of_sweep_h5(sweep_folder):
+    found = set()
+    with h5py.File(sweep_folder / "sweep.h5") as file:
+        file.visititems(lambda name, item: found.add(f"/{name}") if isinstance(item, h5py.Dataset) else None)
+    unknown, unused = unmatched(found, {dataset.name for dataset in DATASETS})
+    assert (unknown, unused) == (set(), set())
