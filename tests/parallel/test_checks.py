@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from cells import make_case
 from support import parallel_assert, torn_cells
+from support.cases import make_case
 from unit.cell.faulty_meshes import grid
 
 from feti_homog.analysis.context import AnalysisContext
