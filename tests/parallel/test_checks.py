@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support import parallel_assert, torn_cells
+from support import torn_cells
 from support.cases import make_case
+from support.ranks import parallel_assert
 from unit.cell.faulty_meshes import grid
 
 from feti_homog.analysis.context import AnalysisContext
