@@ -62,14 +62,19 @@ OPTIONS = (
     *_direct_solver("feti_interior_", "interiors, of implicit subdomains and for fields"),
     *_direct_solver("feti_natural_", "the rigid-body coarse problem"),
     *_direct_solver("feti_coarse_", "the adaptive coarse problem; mumps where all ranks factor it together"),
+    *_direct_solver("feti_coarse_indefinite_", "badly conditioned adaptive coarse problems", "mumps"),
     *_direct_solver("feti_bonded_", "the cell with all bonds intact, for influence columns"),
 )
 """Every option that a run accepts whether or not it makes the solver which reads it."""
 
 DIRECT_PREFIXES = (
-    "feti_sub_", "feti_interior_", "feti_schur_", "feti_natural_", "feti_coarse_", "feti_bonded_",
+    "feti_sub_", "feti_interior_", "feti_schur_", "feti_natural_", "feti_coarse_", "feti_coarse_indefinite_",
+    "feti_bonded_",
 )  # fmt: skip
 """Prefixes of PETSc's direct solvers."""
+
+MUMPS_PREFIXES = ("feti_schur_", "feti_coarse_indefinite_")
+"""Those of them that are MUMPS by default."""
 
 PREFIXES = ("feti_ksp_", "feti_pc_", *DIRECT_PREFIXES)
 """Prefixes of PETSc solvers: what follows is PETSc's to know."""

@@ -8,7 +8,13 @@ from contextlib import contextmanager
 from petsc4py import PETSc
 
 from feti_homog.common import petsc_ctypes
-from feti_homog.common.petsc_option_table import DIRECT_PREFIXES, is_in_table, suggestion, unknown_options
+from feti_homog.common.petsc_option_table import (
+    DIRECT_PREFIXES,
+    MUMPS_PREFIXES,
+    is_in_table,
+    suggestion,
+    unknown_options,
+)
 from feti_homog.errors import CaseError
 
 # Options that PETSc looks for only in KSPSolve.
@@ -85,7 +91,7 @@ def _let_solver_read(prefix: str) -> None:
     ksp.setOperators(A)
     ksp.setType(PETSc.KSP.Type.PREONLY)
     ksp.getPC().setType(PETSc.PC.Type.CHOLESKY)
-    if prefix == "feti_schur_":
+    if prefix in MUMPS_PREFIXES:
         ksp.getPC().setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
     try:
         ksp.setFromOptions()

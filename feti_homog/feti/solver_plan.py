@@ -6,9 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from feti_homog.errors import CaseError
+from feti_homog.feti.operators.choice import KINDS
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 
-OPERATORS = ("auto", "implicit", "explicit")
 PRECONDITIONERS = ("auto", "none", "lumped", "dirichlet", "influence")
 COARSE_SPACES = ("auto", "natural", "adaptive")
 
@@ -19,7 +19,7 @@ class SolverOptions:
 
     Attributes:
         preconditioner: of PRECONDITIONERS, `-feti_pc_type`.
-        operator: of OPERATORS, `-feti_dual_operator`.
+        operator: of KINDS, `-feti_dual_operator`.
         coarse_space: of COARSE_SPACES, `-feti_coarse_space`.
         threshold: tau, `-feti_coarse_threshold`.
     """
@@ -51,7 +51,7 @@ class SolverOptions:
         preconditioner = choice("pc_type", PRECONDITIONERS, "auto")
         return cls(
             preconditioner,
-            choice("dual_operator", OPERATORS, "explicit" if preconditioner == "influence" else "auto"),
+            choice("dual_operator", KINDS, "explicit" if preconditioner == "influence" else "auto"),
             choice("coarse_space", COARSE_SPACES, "auto"),
             number("coarse_threshold", thresholds.soft_mode),
         )

@@ -58,7 +58,7 @@ def test_names_are_unique():
     ("name", "value", "default"),
     [
         ("feti_pc_type", solver_plan.PRECONDITIONERS, "auto"),
-        ("feti_dual_operator", solver_plan.OPERATORS, "auto"),
+        ("feti_dual_operator", solver_plan.KINDS, "auto"),
         ("feti_coarse_space", solver_plan.COARSE_SPACES, "auto"),
     ],
 )
