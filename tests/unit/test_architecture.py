@@ -1,4 +1,4 @@
-"""The rules of the house: imports point to floors below, importing starts nothing, files are short."""
+"""The rules of the house: imports point to floors below, importing starts nothing, modules and functions are short."""
 
 from __future__ import annotations
 
@@ -7,13 +7,15 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
+from radon.complexity import cc_visit
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "feti_homog"
 FOLDERS = ("feti_homog", "drivers", "scripts", "tests")
-LONGEST = 400
+LONGEST_MODULE, LONGEST_FUNCTION, MOST_COMPLEX = 300, 60, 12
 
 # From the ground up: each line may import from itself and from the lines above it.  A package that has floors of its
 # own is listed by them; `feti` and `output` alone stand for the modules that lie flat in them, and their `__init__`.
@@ -103,10 +105,72 @@ def test_only_a_rank_that_draws_loads_matplotlib():
     assert "matplotlib" not in run.stdout.split()
 
 
-def test_files_are_short():
-    files = [path for folder in FOLDERS for path in (ROOT / folder).rglob("*.py")]
-    lengths = {path: len(path.read_text(encoding="utf-8").splitlines()) for path in files}
-    assert not {str(path): n for path, n in lengths.items() if n > LONGEST}
+def sources(*folders: str) -> list[Path]:
+    return sorted(path for folder in folders for path in (ROOT / folder).rglob("*.py"))
+
+
+def nodes(path: Path, *kinds: type[ast.AST]) -> list[Any]:
+    return [node for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(node, kinds)]
+
+
+def functions(path: Path) -> list[Any]:
+    return nodes(path, ast.FunctionDef, ast.AsyncFunctionDef)
+
+
+def place(path: Path, node: ast.AST) -> str:
+    return f"{path.relative_to(ROOT)}:{node.lineno}"
+
+
+def test_modules_are_short():
+    lengths = {path: len(path.read_text(encoding="utf-8").splitlines()) for path in sources(*FOLDERS)}
+    assert not {str(path.relative_to(ROOT)): n for path, n in lengths.items() if n > LONGEST_MODULE}
+
+
+def test_functions_fit_a_screen():
+    found = {place(path, f): f.end_lineno - f.lineno + 1 for path in sources(*FOLDERS) for f in functions(path)}
+    assert not {where: lines for where, lines in found.items() if lines > LONGEST_FUNCTION}
+
+
+def test_functions_are_simple():
+    """Cyclomatic complexity, of classes the mean of their methods, by radon."""
+    found = {
+        f"{path.relative_to(ROOT)}:{block.lineno} {block.name}": block.complexity
+        for path in sources("feti_homog", "drivers", "scripts")
+        for block in cc_visit(path.read_text(encoding="utf-8"))
+    }
+    assert not {name: complexity for name, complexity in found.items() if complexity > MOST_COMPLEX}
+
+
+def test_types_are_known_not_asked_for():
+    calls = [(path, node) for path in sources(*FOLDERS) for node in nodes(path, ast.Call)]
+    assert not [place(*at) for at in calls if isinstance(at[1].func, ast.Name) and at[1].func.id == "hasattr"]
+
+
+def test_defaults_are_immutable():
+    """No list, dictionary, set or comprehension that all calls of a function would share."""
+    mutable = (ast.List, ast.Dict, ast.Set, ast.ListComp, ast.DictComp, ast.SetComp)
+    found = [
+        place(path, default)
+        for path in sources(*FOLDERS)
+        for f in nodes(path, ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)
+        for default in [*f.args.defaults, *f.args.kw_defaults]
+        if isinstance(default, mutable)
+        or (isinstance(default, ast.Call) and ast.unparse(default.func) in ("list", "dict", "set"))
+    ]
+    assert not found
+
+
+def test_tests_replace_no_constants():
+    """What a test varies is an argument: monkeypatch leaves names in capitals alone."""
+    found = [
+        place(path, call)
+        for path in sources("tests")
+        for call in nodes(path, ast.Call)
+        if isinstance(call.func, ast.Attribute) and call.func.attr in ("setattr", "patch", "object")
+        for word in call.args
+        if isinstance(word, ast.Constant) and re.fullmatch(r"(.*\.)?_?[A-Z][A-Z0-9_]+", str(word.value))
+    ]
+    assert not found
 
 
 def is_known(name: str) -> bool:
