@@ -24,6 +24,8 @@ from feti_homog.sweep import collect, execute, plan
 from feti_homog.sweep.report.columns import COLUMNS, DATASETS, OUTPUT_COLUMNS
 from feti_homog.sweep.report.outputs import outputs
 
+pytestmark = pytest.mark.slow
+
 BASE = {
     "cell": {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.25},
     "material": {"matrix": {"young": 88.0, "poisson": 0.299}, "fibre": {"young": 200.0, "poisson": 0.222}},
