@@ -1,7 +1,8 @@
 """Block principal pivoting (Judice & Pires, Computers & Operations Research 21, 1994): which nodes change state.
 
-All wrong nodes change at once while their number falls, else only the first one (Murty's rule), so that no set of
-states comes again and the search ends.
+All wrong nodes change at once while their number falls, else only the first one (Murty's rule).  While no fibre is free
+the gaps are q + A p with contact pressures p and a positive definite A, so no set of states comes again and the search
+ends.  With free fibres A is semi-definite only, and that is not proven.
 """
 
 from __future__ import annotations
