@@ -178,15 +178,15 @@ class Interface:
 
     def _equilibrium(self, status: Status, solution: DualSolution, iterations: int, solves: int) -> Equilibrium:
         """The state that a search ended with, its free motions and its certificate."""
-        force, gap = solution.lam[self.nodes.row], solution.jump[self.nodes.row]
+        stress = float(np.abs(self.least_bonded_stiffness @ solution.strain).max())
         certificate = kkt_errors(
             self.solver.comm,
             self.traction(solution),
-            force,
-            gap,
+            self.nodes.length,
+            solution.jump[self.nodes.row],
             (status != BONDED) & self.contact,
             status == CLOSED,
-            self.imposed(solution.strain),
+            (self.imposed(solution.strain), stress),
         )
         status, motions = self._without_idle(status, solution)
         return Equilibrium(status, solution, iterations, solves, motions, certificate)
