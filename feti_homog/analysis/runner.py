@@ -19,7 +19,7 @@ from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.result import Result
 from feti_homog.analysis.result_fields import Fields
 from feti_homog.common import process_memory
-from feti_homog.common.mpi_errors import on_root, on_root_only
+from feti_homog.common.mpi_errors import all_raise, on_root, on_root_only
 from feti_homog.common.petsc_options import case_options, refuse_unused
 from feti_homog.common.progress import Progress
 from feti_homog.config.case import Case
@@ -89,8 +89,11 @@ def _torn(case: Case, comm: MPI.Intracomm, progress: Progress) -> Iterator[TornC
         try:
             refuse_unused()
             yield cell
-        finally:
-            cell.solver.destroy()
+        except BaseException as error:
+            if all_raise(comm, error):  # else the ranks that go on would not come to destroy it
+                cell.solver.destroy()
+            raise
+        cell.solver.destroy()
 
 
 class _States:

@@ -96,6 +96,14 @@ def others_come(comm: Comm, timeout: float) -> bool:
     return all_came
 
 
+def all_raise(comm: Comm, error: BaseException) -> bool:
+    """Whether all ranks have met an error for the user, so that they can clean up together.
+
+    Each rank with such an error calls it, and waits ARRIVAL_TIMEOUT_S for the others; a defect is one rank's own.
+    """
+    return isinstance(error, FetiHomogError) and others_come(comm, ARRIVAL_TIMEOUT_S)
+
+
 def _attempt(function: Callable[..., T], *args: Any, **kwargs: Any) -> tuple[T | None, Exception | None]:
     try:
         return function(*args, **kwargs), None
