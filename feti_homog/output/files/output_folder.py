@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -40,29 +41,41 @@ def usable(directory: Path) -> None:
 def held(directory: Path, comm: Intracomm) -> Iterator[None]:
     """The folder, made with its parents, is this run's alone while the block lasts.  Collective.
 
-    What earlier runs left unfinished in it is removed.
+    What earlier runs left unfinished in it is removed; so are, at the end, the folders made here that are empty.
 
     Raises:
         CaseError: it cannot be made, or another run has it.
     """
     lock = TemporaryLock(directory / LOCK)
-    on_root(comm, _hold, lock, directory)
+    made = on_root(comm, _hold, lock, directory)
     try:
         yield
     finally:
         lock.release()
+        if comm.rank == 0:
+            _remove_empty(made)
 
 
-def _hold(lock: TemporaryLock, directory: Path) -> None:
+def _hold(lock: TemporaryLock, directory: Path) -> list[Path]:
+    """Make and lock the folder; returns what was made, the innermost first."""
+    made = [path for path in (directory, *directory.parents) if not path.exists()]
     try:
         directory.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise CaseError(f"--out {directory}: cannot be made: {error.strerror}") from error
-    try:
         lock.acquire()
+    except OSError as error:
+        _remove_empty(made)
+        raise CaseError(f"--out {directory}: cannot be made: {error.strerror}") from error
     except LockHeld as held:
         raise _busy(directory, str(held)) from held
     atomic.remove_unfinished(directory)
+    return made
+
+
+def _remove_empty(folders: list[Path]) -> None:
+    """Remove these folders, each in the next, as far as they are empty."""
+    with contextlib.suppress(OSError):
+        for folder in folders:
+            folder.rmdir()
 
 
 def _busy(directory: Path, who: str) -> CaseError:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -11,6 +12,7 @@ from support.cases import make_case
 from feti_homog.analysis import runner
 from feti_homog.common.progress import Progress
 from feti_homog.errors import CaseError
+from feti_homog.output.files import output_folder
 
 
 @pytest.mark.parametrize(("error", "destroyed"), [(None, 1), (CaseError("refused"), 1), (MemoryError("defect"), 0)])
@@ -27,3 +29,20 @@ def test_only_ranks_that_all_come_destroy_the_solver(monkeypatch, error, destroy
     except (CaseError, MemoryError) as caught:
         assert caught is error
     assert len(calls) == destroyed
+
+
+def test_the_folder_is_held_before_the_work_begins(tmp_path, monkeypatch):
+    held = []
+
+    def no_tear(case, comm, progress):
+        held.append(output_folder.holder(tmp_path / "out" / output_folder.LOCK))
+        raise CaseError("refused")
+
+    monkeypatch.setattr(runner, "tear", no_tear)
+    case = make_case(fibre_fraction=0.4, mesh_size=0.3)
+    with pytest.raises(CaseError, match="refused"):
+        runner.run(case, tmp_path / "out", MPI.COMM_SELF, quiet=True)
+    assert held[0] is not None and not (tmp_path / "out").exists()
+    with pytest.raises(CaseError, match="cannot be made"):
+        runner.run(case, Path("/proc/results"), MPI.COMM_SELF, quiet=True)
+    assert len(held) == 1

@@ -1,0 +1,33 @@
+"""The folder of the results: held by one run, and gone again if nothing was written."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from mpi4py import MPI
+
+from feti_homog.errors import CaseError
+from feti_homog.output.files import output_folder
+
+
+def test_folders_that_stay_empty_are_removed(tmp_path):
+    with pytest.raises(CaseError, match="bad input"), output_folder.held(tmp_path / "new" / "out", MPI.COMM_SELF):
+        raise CaseError("bad input")
+    assert not list(tmp_path.iterdir())
+
+
+def test_folders_with_results_or_of_others_stay(tmp_path):
+    (tmp_path / "there").mkdir()
+    with output_folder.held(tmp_path / "there", MPI.COMM_SELF):
+        pass
+    with output_folder.held(tmp_path / "new" / "out", MPI.COMM_SELF):
+        (tmp_path / "new" / "out" / "result.json").touch()
+    assert [path.name for path in (tmp_path / "new" / "out").iterdir()] == ["result.json"]
+    assert not list((tmp_path / "there").iterdir())
+
+
+def test_a_folder_that_cannot_be_made_is_refused():
+    refusal = pytest.raises(CaseError, match="--out /proc/results: cannot be made: ")
+    with refusal, output_folder.held(Path("/proc/results"), MPI.COMM_SELF):
+        pass
