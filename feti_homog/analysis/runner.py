@@ -27,7 +27,7 @@ from feti_homog.errors import ConvergenceError
 from feti_homog.homogenization.averaging import Homogenization, Response
 from feti_homog.homogenization.unit_cell import TornCell, tear
 from feti_homog.interface.strength_criterion import StrengthCriterion
-from feti_homog.output.files import csv_tables, field_parts, output_folder, result_json, xdmf
+from feti_homog.output.files import csv_tables, field_file, field_parts, output_folder, result_json, xdmf
 from feti_homog.output.files.checkpoint import Checkpoint, NoCheckpoint, finished
 from feti_homog.output.files.field_file import FieldFile
 from feti_homog.output.files.field_layout import StatePart
@@ -195,11 +195,14 @@ def _law(case: Case) -> StrengthCriterion:
 
 
 def _write(result: Result, directory: Path, cell: TornCell) -> None:
-    """result.json, and the table of an angle or path."""
+    """result.json, and the table of an angle or path; files of an earlier result do not stay beside them."""
     on_root_only(cell.comm, result_json.write, directory, result.document)
-    for name, points in (("angle", result.angle), ("path", result.path)):
+    written = {result_json.NAME} | ({field_file.NAME, xdmf.NAME} if cell.case.output.fields else set())
+    for name, points in (("angle.csv", result.angle), ("path.csv", result.path)):
         if points is not None:
-            on_root_only(cell.comm, csv_tables.write, directory / f"{name}.csv", points)
+            on_root_only(cell.comm, csv_tables.write, directory / name, points)
+            written.add(name)
+    on_root_only(cell.comm, output_folder.remove_other_results, directory, written)
 
 
 def _draw(directory: Path) -> list[Path]:

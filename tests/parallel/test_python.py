@@ -88,6 +88,17 @@ def test_with_files(comm, shared_path):
         run(with_fraction(0.4), comm).rising_strain()
 
 
+def test_files_of_an_earlier_run_do_not_stay_beside_the_result(comm, shared_path):
+    document = with_fraction(0.4).resolved() | {"output": {"fields": False, "pictures": False}}
+    if comm.rank == 0:
+        for name in ("result.h5", "path.csv", "case_E11.png", "mine.png"):
+            (shared_path / name).touch()
+    comm.barrier()
+    run(Case.parse(document), comm, out=shared_path)
+    comm.barrier()
+    parallel_assert(comm, sorted(p.name for p in shared_path.iterdir()) == ["mine.png", "result.json"])
+
+
 def test_a_sweep(comm, shared_path):
     document = {k: v for k, v in with_fraction(0.4).resolved().items() if v != {}}
     document |= {"output": {"fields": False, "pictures": False}, "sweep": {"cell.fibre_fraction": [0.3, 0.4]}}

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Iterator
+import re
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,6 +19,11 @@ if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
 
 LOCK = "result.lock"
+# The files of a result, those of all analyses and of what `plot` draws.
+RESULT_FILE = re.compile(
+    r"result\.(json|h5|xdmf)|(angle|path)\.csv|(cell|interface|(angle|path)(_states)?)\.png|path\.gif"
+    r"|case_(minus_)?(E11|E22|gamma12)\.png|state_\d+\.png"
+)
 
 
 def usable(directory: Path) -> None:
@@ -54,6 +60,14 @@ def held(directory: Path, comm: Intracomm) -> Iterator[None]:
         lock.release()
         if comm.rank == 0:
             _remove_empty(made)
+
+
+def remove_other_results(directory: Path, written: Collection[str]) -> None:
+    """Remove what an earlier run left of the files of a result but for those named `written`.  Call on one rank."""
+    for path in directory.iterdir():
+        if RESULT_FILE.fullmatch(path.name) and path.name not in written and not path.is_dir():
+            with contextlib.suppress(OSError):
+                path.unlink()
 
 
 def _hold(lock: TemporaryLock, directory: Path) -> list[Path]:

@@ -31,3 +31,23 @@ def test_a_folder_that_cannot_be_made_is_refused():
     refusal = pytest.raises(CaseError, match="--out /proc/results: cannot be made: ")
     with refusal, output_folder.held(Path("/proc/results"), MPI.COMM_SELF):
         pass
+
+
+def test_files_of_an_earlier_result_are_removed_and_nothing_else(tmp_path):
+    earlier = [
+        "result.h5",
+        "result.xdmf",
+        "path.csv",
+        "angle.csv",
+        "path.gif",
+        "path.png",
+        "path_states.png",
+        "cell.png",
+        "state_3.png",
+    ]
+    earlier += ["interface.png", "case_minus_gamma12.png", "case_E11.png", "angle_states.png"]
+    others = ["case.toml", "my.png", "case_mine.png", "cell.svg", "checkpoint", "result.h5.old", "sweep.csv"]
+    for name in [*earlier, *others, "result.json"]:
+        (tmp_path / name).touch()
+    output_folder.remove_other_results(tmp_path, {"result.json", "path.csv"})
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted([*others, "result.json", "path.csv"])
