@@ -47,16 +47,18 @@ def read(directory: Path) -> dict[str, Any]:
     """The document of `directory`/result.json.
 
     Raises:
-        FetiHomogError: it is missing or not JSON.
+        FetiHomogError: it is missing, not JSON, or no table.
         CaseError: its layout is of another version than this program's.
     """
     path = Path(directory) / NAME
     try:
-        document: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        document = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise FetiHomogError(f"cannot read {path}: {error.strerror or error}") from error
     except ValueError as error:
         raise FetiHomogError(f"cannot read {path}: {error}") from error
+    if not isinstance(document, dict):
+        raise FetiHomogError(f"cannot read {path}: it is damaged: no table of keys and values")
     found = document.get("schema", "none")
     if found != SCHEMA:
         raise CaseError(f"{path}: its schema is {found}, this program reads schema {SCHEMA}; run the case again")

@@ -109,3 +109,10 @@ def test_a_missing_or_broken_file_is_told(tmp_path: Path) -> None:
     (tmp_path / "result.json").write_text('{"a": 1')
     with pytest.raises(FetiHomogError, match=r"^cannot read .*result\.json: Expecting"):
         result_json.read(tmp_path)
+
+
+@pytest.mark.parametrize("text", ["[]", "null", "3", '"done"'])
+def test_a_file_that_is_no_table_is_told(tmp_path: Path, text: str) -> None:
+    (tmp_path / "result.json").write_text(text)
+    with pytest.raises(FetiHomogError, match=r"^cannot read .*result\.json: it is damaged"):
+        result_json.read(tmp_path)
