@@ -9,6 +9,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+from support.ranks import parallel_assert
 from support.sample_output import Sample, part_of, sample, without_interface
 
 from feti_homog.errors import FetiHomogError
@@ -121,3 +122,16 @@ def test_a_wrong_number_of_rows_is_heard_everywhere(comm: Any, shared_path: Path
     with pytest.raises((ValueError, RuntimeError), match="/state/0/stress has 3 rows"):
         file.write_state(0, state)
     file.close()
+
+
+@pytest.mark.parametrize("error", [FetiHomogError("refused"), ValueError("a defect")])
+def test_an_error_of_all_ranks_closes_and_removes_the_file(comm: Any, shared_path: Path, error: Exception) -> None:
+    part = part_of(sample(2, 0, 1), comm.rank, comm.size)
+    file = FieldFile(shared_path, comm, part.header, part.mesh, part.interface)
+    with pytest.raises(type(error)), file:
+        raise error
+    comm.barrier()
+    removed = isinstance(error, FetiHomogError)
+    parallel_assert(comm, file.part.exists() != removed and bool(file._file) != removed)
+    if not removed:
+        file._file.close()

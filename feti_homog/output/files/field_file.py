@@ -14,7 +14,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from feti_homog.common.mpi_errors import agree, on_root
+from feti_homog.common.mpi_errors import agree, all_raise, on_root
 from feti_homog.errors import FetiHomogError
 from feti_homog.output.files import atomic
 from feti_homog.output.files.field_layout import (
@@ -56,8 +56,9 @@ class FieldFile:
 
     `field_layout` says which tables and attributes it has; the virtual datasets of /vector take no space.
 
-    Until `close` the file is called `part`. As a context manager it closes when the block ends well;
-    after an exception it leaves the unfinished file. Empty parts still need their columns: shape (0, 2).
+    Until `close` the file is called `part`. As a context manager it closes when the block ends well; an error that
+    all ranks raise removes it, any other exception leaves the unfinished file. Empty parts still need their columns:
+    shape (0, 2).
 
     Raises:
         FetiHomogError: the file cannot be written; on every rank, and what there was of it is removed.
@@ -94,8 +95,10 @@ class FieldFile:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if kind is None:
+        if error is None:
             self.close()
+        elif all_raise(self._comm, error):
+            self._remove()
 
     def _write_part(self, group: str, part: Any) -> None:
         """Makes the tables of a group, each rank giving its rows, and the views of its vectors."""

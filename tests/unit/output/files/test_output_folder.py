@@ -34,18 +34,15 @@ def test_a_folder_that_cannot_be_made_is_refused():
 
 
 def test_files_of_an_earlier_result_are_removed_and_nothing_else(tmp_path):
-    earlier = [
-        "result.h5",
-        "result.xdmf",
-        "path.csv",
-        "angle.csv",
-        "path.gif",
-        "path.png",
-        "path_states.png",
+    earlier = ["result.h5", "result.xdmf", "path.csv", "angle.csv", "path.gif", "path.png", "angle_states.png"]
+    earlier += [
         "cell.png",
         "state_3.png",
+        "interface.png",
+        "case_minus_gamma12.png",
+        "case_E11.png",
+        "angle_states.png",
     ]
-    earlier += ["interface.png", "case_minus_gamma12.png", "case_E11.png", "angle_states.png"]
     others = ["case.toml", "my.png", "case_mine.png", "cell.svg", "checkpoint", "result.h5.old", "sweep.csv"]
     for name in [*earlier, *others, "result.json"]:
         (tmp_path / name).touch()
