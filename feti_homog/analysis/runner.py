@@ -54,7 +54,7 @@ def run(
         progress.say(f"{directory} holds the finished result of this case: nothing to do")
         return Result.of(on_root(comm, result_json.read, directory))
     on_root(comm, output_folder.usable, directory)
-    with output_folder.held(directory, comm), _torn(case, comm, progress) as cell:
+    with output_folder.held(directory, comm, progress.say), _torn(case, comm, progress) as cell:
         result = _run_and_write(cell, directory, progress, resume, keep_fields)
     if result.faults:
         raise ConvergenceError(*result.faults)

@@ -18,10 +18,17 @@ from feti_homog.errors import FetiHomogError
 
 # Seconds that a lock is tried for: one who only looks whether it is held, holds it for a moment.
 LOCK_TIMEOUT_S = 0.2
+# What the system says of a lock that somebody else has, and of a file system that has no locks.
+HELD = (errno.EAGAIN, errno.EACCES)
+UNSUPPORTED = (errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP)
 
 
 class LockHeld(Exception):
     """Somebody else holds the lock; the text says who."""
+
+
+class LocksUnsupported(FetiHomogError):
+    """The file system has no locks."""
 
 
 class Lock:
@@ -39,6 +46,7 @@ class Lock:
 
         Raises:
             LockHeld: somebody else has it.
+            LocksUnsupported: nobody can have one on this file system.
             FetiHomogError: the file cannot be written or locked.
         """
         try:
@@ -49,7 +57,8 @@ class Lock:
                 os.pwrite(self._file, this_process().encode(), 0)
         except OSError as error:
             self._close()
-            raise FetiHomogError(f"cannot lock {self.path}: {error.strerror}") from error
+            kind = LocksUnsupported if error.errno in UNSUPPORTED else FetiHomogError
+            raise kind(f"cannot lock {self.path}: {error.strerror}") from error
         except LockHeld:
             self._close()
             raise
@@ -73,7 +82,7 @@ class Lock:
             try:
                 return fcntl.flock(self._file, kind | fcntl.LOCK_NB)
             except OSError as error:
-                if error.errno not in (errno.EAGAIN, errno.EACCES):
+                if error.errno not in HELD:
                     raise
                 if time.monotonic() > deadline:
                     raise LockHeld(_written(self._file)) from error
@@ -121,11 +130,10 @@ def holder(path: Path) -> str | None:
     try:
         fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
         return None
-    except OSError:
-        return _written(file)
+    except OSError as error:
+        return _written(file) if error.errno in HELD else None
     finally:
         os.close(file)
-
 
 
 def is_locked(path: Path) -> bool:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import contextlib
 import os
 import re
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from feti_homog.common.file_locks import LockHeld, TemporaryLock, holder
+from feti_homog.common.file_locks import LockHeld, LocksUnsupported, TemporaryLock, holder
 from feti_homog.common.mpi_errors import on_root
 from feti_homog.errors import CaseError
 from feti_homog.output.files import atomic
@@ -44,16 +44,19 @@ def usable(directory: Path) -> None:
 
 
 @contextmanager
-def held(directory: Path, comm: Intracomm) -> Iterator[None]:
+def held(directory: Path, comm: Intracomm, say: Callable[[str], object]) -> Iterator[None]:
     """The folder, made with its parents, is this run's alone while the block lasts.  Collective.
 
     What earlier runs left unfinished in it is removed; so are, at the end, the folders made here that are empty.
+    Where the file system has no locks, `say` is told so and the run goes on without one.
 
     Raises:
         CaseError: it cannot be made, or another run has it.
     """
     lock = TemporaryLock(directory / LOCK)
-    made = on_root(comm, _hold, lock, directory)
+    made, warning = on_root(comm, _hold, lock, directory)
+    if warning:
+        say(f"warning: {warning}")
     try:
         yield
     finally:
@@ -70,8 +73,8 @@ def remove_other_results(directory: Path, written: Collection[str]) -> None:
                 path.unlink()
 
 
-def _hold(lock: TemporaryLock, directory: Path) -> list[Path]:
-    """Make and lock the folder; returns what was made, the innermost first."""
+def _hold(lock: TemporaryLock, directory: Path) -> tuple[list[Path], str]:
+    """Make and lock the folder; returns the folders made, the innermost first, and a warning if it is not locked."""
     made = [path for path in (directory, *directory.parents) if not path.exists()]
     try:
         directory.mkdir(parents=True, exist_ok=True)
@@ -81,8 +84,11 @@ def _hold(lock: TemporaryLock, directory: Path) -> list[Path]:
         raise CaseError(f"--out {directory}: cannot be made: {error.strerror}") from error
     except LockHeld as held:
         raise _busy(directory, str(held)) from held
+    except LocksUnsupported as error:
+        lock.path.unlink(missing_ok=True)
+        return made, f"{error}; nothing keeps another run from writing to the same folder"
     atomic.remove_unfinished(directory)
-    return made
+    return made, ""
 
 
 def _remove_empty(folders: list[Path]) -> None:

@@ -11,7 +11,7 @@ def test_unfinished_files_are_removed(tmp_path):
     kept = [tmp_path / name for name in ("result.json", "my.part", "cases.csv")]
     for path in [*kept, atomic.part_of(tmp_path / "result.h5")]:
         path.write_text("")
-    with output_folder.held(tmp_path, MPI.COMM_SELF):
+    with output_folder.held(tmp_path, MPI.COMM_SELF, print):
         assert {path.name for path in tmp_path.iterdir()} == {path.name for path in kept} | {output_folder.LOCK}
     assert sorted(tmp_path.iterdir()) == sorted(kept)
 
