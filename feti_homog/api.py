@@ -45,9 +45,13 @@ def run(
         quiet: print nothing; else, with `out`, what the command line prints.
 
     Raises:
+        TypeError: `case` is not a Case.
         CaseError, MeshError: the case cannot be run, or `out` cannot be used.
         ConvergenceError: a solve did not converge or a check failed; what was computed is in `out`.
     """
+    if not isinstance(case, Case):
+        kind = type(case).__name__
+        raise TypeError(f"run takes a Case, not {kind}: Case.load reads a case file, Case.parse takes a document")
     comm = _started(comm)
     from feti_homog.analysis import runner
 
@@ -75,7 +79,7 @@ def run_sweep(
         quiet: do not print a line for each case.
 
     Raises:
-        CaseError: the cases are faulty, or `out` cannot be used.
+        CaseError: the cases are faulty, `out` cannot be used, or `ranks_per_case` does not divide the ranks.
         ConvergenceError: cases failed; `collect_sweep` makes the table of the others.
     """
     comm = _started(comm)
@@ -83,7 +87,8 @@ def run_sweep(
     from feti_homog.sweep import collect, execute
 
     expanded = on_root(comm, _expanded, cases)
-    execute.run_all(expanded, Path(out), comm, ranks_per_case or comm.size, retry, quiet)
+    group = comm.size if ranks_per_case is None else ranks_per_case
+    execute.run_all(expanded, Path(out), comm, group, retry, quiet)
     return on_root(comm, collect.read, Path(out))
 
 

@@ -160,9 +160,6 @@ def _sweep(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
     if arguments.out is None and not arguments.list:
         raise CaseError("command line: the following arguments are required: --out (see --help)")
-    group = comm.size if arguments.ranks_per_case is None else arguments.ranks_per_case
-    if group < 1 or comm.size % group:
-        raise CaseError(f"--ranks-per-case {group}: expected a divisor of the {comm.size} ranks")
     sweep = on_root(comm, plan.load, arguments.case)
     if arguments.list:
         for line in on_root_only(comm, execute.list_cases, sweep, arguments.out) or []:
@@ -170,6 +167,7 @@ def _sweep(arguments: argparse.Namespace, comm: Intracomm) -> None:
         return
     on_root(comm, output_folder.usable, arguments.out)
     if arguments.index is None:
+        group = comm.size if arguments.ranks_per_case is None else arguments.ranks_per_case
         execute.run_all(sweep, arguments.out, comm, group, arguments.retry, arguments.quiet)
     else:
         execute.run_one(sweep, arguments.index, arguments.out, comm, arguments.retry, arguments.quiet)

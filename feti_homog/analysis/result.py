@@ -20,7 +20,7 @@ from feti_homog.output.text.summary import short_summary
 from feti_homog.typing import Float
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)  # arrays have no single answer to "equal"
 class Result:
     """The result of a case, the same on every rank but for `fields`.
 

@@ -31,13 +31,14 @@ def list_cases(sweep: Sweep, directory: Path | None) -> list[str]:
 def run_all(sweep: Sweep, directory: Path, comm: Intracomm, ranks_per_case: int, retry: bool, quiet: bool) -> None:
     """Run all cases, each on so many ranks; as many at once as there are such groups.  Collective.
 
-    `ranks_per_case` divides the number of ranks.
-
     Raises:
-        CaseError: the folder cannot be used: it holds another sweep, or another process runs this one.
+        CaseError: `ranks_per_case` does not divide the number of ranks, or the folder cannot be used: it holds
+            another sweep, or another process runs this one.
         ConvergenceError: cases failed; they are printed.
         FetiHomogError: a result could not be written; the finished ones are kept.
     """
+    if ranks_per_case < 1 or comm.size % ranks_per_case:
+        raise CaseError(f"--ranks-per-case {ranks_per_case}: expected a divisor of the {comm.size} ranks")
     with _sweep_lock(directory, comm, sweep, shared=False):
         group = comm if ranks_per_case == comm.size else _group(comm, ranks_per_case)
         if retry:

@@ -78,6 +78,8 @@ def expand(values: Mapping[str, Any], folder: Path) -> Sweep:
     Raises CaseError as `load` does.
     """
     document = to_document(values)
+    if SWEEP not in document:
+        raise CaseError(f"[{SWEEP}]: missing section; a single case is not a sweep")
     table = document.pop(SWEEP)
     if not isinstance(table, dict):
         raise CaseError(f"{SWEEP} = {toml_value(table)}: expected a section [{SWEEP}]")

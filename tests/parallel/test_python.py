@@ -99,6 +99,23 @@ def test_files_of_an_earlier_run_do_not_stay_beside_the_result(comm, shared_path
     parallel_assert(comm, sorted(p.name for p in shared_path.iterdir()) == ["mine.png", "result.json"])
 
 
+@pytest.mark.parametrize("case", ["case.toml", {"cell": {}}, 3])
+def test_what_is_no_case_is_refused(comm, case):
+    with pytest.raises(TypeError, match=r"run takes a Case, not .*Case.load .*Case.parse"):
+        run(case, comm)
+
+
+def test_faulty_sweeps_are_refused(comm, shared_path):
+    document = {k: v for k, v in with_fraction(0.4).resolved().items() if v != {}}
+    with pytest.raises(CaseError, match=r"^\[sweep\]: missing section"):
+        run_sweep(document, shared_path / "out", comm)
+    document |= {"sweep": {"cell.fibre_fraction": [0.3, 0.4]}}
+    for ranks in (0, comm.size + 1):
+        with pytest.raises(CaseError, match=f"{ranks}: expected a divisor of the {comm.size} ranks"):
+            run_sweep(document, shared_path / "out", comm, ranks_per_case=ranks)
+    parallel_assert(comm, not (shared_path / "out").exists())
+
+
 def test_a_sweep(comm, shared_path):
     document = {k: v for k, v in with_fraction(0.4).resolved().items() if v != {}}
     document |= {"output": {"fields": False, "pictures": False}, "sweep": {"cell.fibre_fraction": [0.3, 0.4]}}

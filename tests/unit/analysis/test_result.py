@@ -111,6 +111,12 @@ def test_points_are_arrays():
     assert not RESULTS["stiffness"].points
 
 
+def test_results_can_be_told_apart():
+    """Compared as objects: their arrays have no single answer."""
+    result = RESULTS["stiffness"]
+    assert result == result and result != Result.of(result.document) and len({*RESULTS.values()}) == len(RESULTS)
+
+
 @pytest.mark.parametrize("name", RESULTS)
 def test_what_is_printed_is_short(name):
     text = str(RESULTS[name])
