@@ -84,7 +84,10 @@ def run(
             # What broke next was decided on a state that does not hold.
             break
         if number + 1 == path.max_events and point.load_factor < 1.0:
-            context.faults.append(f"[path] max_events = {number + 1}: the path was not finished; result marked")
+            context.faults.append(
+                f"[path] max_events = {number + 1}: the path was not finished: "
+                'result.json has status "not converged"; --resume with a higher max_events goes on'
+            )
             break
     return {"path": points, "resumed": len(known)}
 

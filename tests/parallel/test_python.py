@@ -88,6 +88,17 @@ def test_with_files(comm, shared_path):
         run(with_fraction(0.4), comm).rising_strain()
 
 
+def test_a_path_that_ends_at_max_events_goes_on_with_more(comm, shared_path):
+    document = with_fraction(0.4, geometry="square").resolved() | {"interface": {"normal_strength": 5.0}}
+    document |= {"analysis": {"type": "path", "plane": "stress"}, "output": {"fields": False, "pictures": False}}
+    path = {"strain": [0.2, 0.0, 0.0]}
+    message = r'^\[path\] max_events = 1: .* status "not converged"; --resume with a higher max_events goes on$'
+    with pytest.raises(ConvergenceError, match=message):
+        run(Case.parse(document | {"path": path | {"max_events": 1}}), comm, out=shared_path / "out")
+    result = run(Case.parse(document | {"path": path}), comm, out=shared_path / "out", resume=True)
+    assert result.status == "done" and result.resumed == 1 and result.path[-1].load_factor == 1.0
+
+
 def test_files_of_an_earlier_run_do_not_stay_beside_the_result(comm, shared_path):
     document = with_fraction(0.4).resolved() | {"output": {"fields": False, "pictures": False}}
     if comm.rank == 0:
