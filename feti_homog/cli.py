@@ -149,7 +149,10 @@ def _plot(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.common.mpi_errors import on_root_only
     from feti_homog.output.plots import figures
 
-    for path in on_root_only(comm, figures.plot, arguments.directory) or []:
+    paths = on_root_only(comm, figures.plot, arguments.directory)
+    if paths == []:
+        print(f"{arguments.directory}: nothing to draw: its case has no fields, and no points of an angle or path")
+    for path in paths or []:
         print(path)
 
 

@@ -1,4 +1,4 @@
-"""Errors that a user can cause or must hear of, and the exit codes of DESIGN section 4."""
+"""Errors that a user can cause or must hear of, and the exit codes of the program."""
 
 from __future__ import annotations
 

@@ -96,8 +96,13 @@ class PathPoint:
 
     load_factor: float = described("position on the whole path, 0 to 1, every leg taking the same share")
     strain: Float = described("macroscopic strain", "", "(3,)", STRAINS)
-    stress: Float = described("macroscopic stress, before bonds break here", STRESS, "(3,)", STRESSES)
-    broke: int = described("bonds that break here")
+    stress: Float = described(
+        "macroscopic stress: of events before the bonds that `broke` break, of increments after them",
+        STRESS,
+        "(3,)",
+        STRESSES,
+    )
+    broke: int = described("bonds that break at this event, or broke in the step to this increment")
     free_motions: int = described("rigid motions of fibres that no interface force resists")
     dissipated: float = described("energy lost to breaks so far per area of the cell, along all equilibria", STRESS)
     dissipated_strain_controlled: float = described("the same if the strain only rises on the first leg", STRESS)

@@ -122,6 +122,17 @@ def test_plot_needs_the_fields_alone(tmp_path):
     assert_pictures(out)
 
 
+@pytest.mark.parametrize(("fields", "drawn"), [("true", PICTURES), ("false", [])])
+def test_plot_draws_what_the_run_did_not(tmp_path, fields, drawn):
+    out = tmp_path / "results"
+    command_line(1, "run", case_file(tmp_path, f"[output]\npictures = false\nfields = {fields}\n"), "--out", out)
+    job = command_line(1, "plot", out)
+    assert job.returncode == 0, job.stderr
+    assert sorted(path.name for path in out.glob("*.png")) == sorted(drawn)
+    if not drawn:
+        assert job.stdout == f"{out}: nothing to draw: its case has no fields, and no points of an angle or path\n"
+
+
 def test_plot_of_an_empty_folder_names_the_missing_file(tmp_path):
     job = command_line(1, "plot", tmp_path)
     assert job.returncode not in (0, 1) or "Traceback" not in job.stderr

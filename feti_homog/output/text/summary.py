@@ -27,7 +27,7 @@ def summary(document: Document) -> str:
 
     Cell, solver, effective stiffness with moduli and bounds or else the points of `angle` or `path`, checks,
     timings, memory, warnings and status.
-    Keys that it does not know are left out. Raises KeyError if one that DESIGN names is missing.
+    Keys that it does not know are left out. Raises KeyError if one that it prints is missing.
     """
     blocks = [
         _heading(document),
