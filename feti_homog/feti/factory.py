@@ -9,6 +9,7 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from feti_homog.common.mpi_errors import agree
 from feti_homog.feti.coarse.adaptive import AdaptiveCoarseSpace
 from feti_homog.feti.coarse.coarse_space import CoarseSpace
 from feti_homog.feti.coarse.natural import NaturalCoarseSpace
@@ -45,12 +46,14 @@ def build(
     Options: `feti_dual_operator`, `feti_pc_type`, `feti_coarse_space`, `feti_coarse_threshold`.
 
     Raises:
-        CaseError: an option has no such value, or two exclude each other.
+        CaseError: an option has no such value, or two exclude each other; a library has no such factorization.
     """
     database = PETSc.Options("feti_")
     options = SolverOptions.read(database.getString, database.getReal, thresholds)
     soft = options.want_soft_modes(_are_cut(comm, subdomains))
-    operators = InterfaceOperators(jump_operator, subdomains, options.operator, applications, soft, thresholds)
+    operators = agree(
+        comm, InterfaceOperators, jump_operator, subdomains, options.operator, applications, soft, thresholds
+    )
     plan = choose(_sizes(comm, jump_operator, operators, applications), options, thresholds)
     preconditioner = _preconditioner(plan.preconditioner, comm, jump_operator, operators)
     natural = NaturalCoarseSpace(comm, jump_operator, operators)
