@@ -127,7 +127,6 @@ def holder(path: Path) -> str | None:
         os.close(file)
 
 
-
 def is_locked(path: Path) -> bool:
     """Whether somebody holds the lock exclusively just now."""
     return holder(path) is not None
