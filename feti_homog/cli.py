@@ -25,13 +25,13 @@ if TYPE_CHECKING:
 
 SWEEP_HELP = (
     "Expand the file into numbered cases, check all of them, and run them one after the other. Finished cases are "
-    "skipped, so after an interruption the same command goes on. Cases that fail are kept with their error and told "
-    "of at the end, with exit code 3."
+    "skipped, so after an interruption the same command goes on. Cases that fail are kept with their error and "
+    "reported at the end, with exit code 3."
 )
 
 
 class Parser(argparse.ArgumentParser):
-    """Whose errors are told once and give exit code 2, like those of the case."""
+    """Whose errors are reported once and give exit code 2, like those of the case."""
 
     def error(self, message: str) -> NoReturn:
         raise CaseError(f"command line: {message} (see --help)")
@@ -206,5 +206,5 @@ def _options(arguments: argparse.Namespace, comm: Intracomm) -> None:
 def _print_reference(comm: Intracomm, text: str) -> None:
     """Print a text on rank 0; if its reader leaves early, as `head` does, the program ends without a word."""
     if comm.rank == 0:
-        signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # PETSc's handler would tell of an error
+        signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # PETSc's handler would report an error
         print(text, flush=True)

@@ -1,4 +1,4 @@
-"""What the analyses share: the cell, its interfaces, who is told of progress and where states go."""
+"""What the analyses share: the cell, its interfaces, to whom progress is reported and where states go."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ OPTIONS = (
     Option("feti_ksp_view_singularvalues", "", "", "print the estimated condition number"),
     Option(
         "feti_pc_type",
-        "auto|dirichlet|influence|lumped|none",
+        "auto|none|lumped|dirichlet|influence",
         "auto",
         "preconditioner of the dual problem; influence: exact, by columns of unit jumps",
     ),
@@ -79,6 +79,9 @@ MUMPS_PREFIXES = ("feti_schur_", "feti_coarse_indefinite_")
 PREFIXES = ("feti_ksp_", "feti_pc_", *DIRECT_PREFIXES)
 """Prefixes of PETSc solvers: what follows is PETSc's to know."""
 
+CLOSE = 0.9
+"""Similarity (difflib's, 1 for equal names) from which on a name is taken for a misspelt one: a letter or two."""
+
 OWN_SHORT = ("-h",)
 
 
@@ -108,15 +111,17 @@ def _is_petsc(word: str) -> bool:
     return re.match(r"-[A-Za-z]", word) is not None and word not in OWN_SHORT
 
 
-def option_names(petsc: Iterable[str]) -> list[str]:
-    """The names, without dash, of the options among PETSc's words."""
-    return [word[1:] for word in petsc if _is_petsc(word)]
-
-
 def unknown_options(names: Iterable[str]) -> list[str]:
     """One fault for each name (without dash) that begins with feti_ but is no option of the solver."""
-    unknown = [n for n in names if n.startswith("feti_") and not is_in_table(n) and not _has_solver_prefix(n)]
+    unknown = [n for n in names if n.startswith("feti_") and not is_in_table(n) and not solver_prefix(n)]
     return [f"-{name}: unknown option; {suggestion(name)}" for name in unknown]
+
+
+def almost_in_table(name: str) -> bool:
+    """Whether the name is probably one of OPTIONS misspelt, behind the prefix of a PETSc solver."""
+    prefix = solver_prefix(name)
+    table = [option.name for option in OPTIONS if solver_prefix(option.name) == prefix]
+    return bool(prefix and not is_in_table(name) and difflib.get_close_matches(name, table, 1, CLOSE))
 
 
 def is_in_table(name: str) -> bool:
@@ -130,8 +135,9 @@ def suggestion(name: str) -> str:
     return f"did you mean -{nearest[0]}?" if nearest else f"known prefixes: -{', -'.join(PREFIXES)}"
 
 
-def _has_solver_prefix(name: str) -> bool:
-    return any(name.startswith(prefix) and name != prefix for prefix in PREFIXES)
+def solver_prefix(name: str) -> str:
+    """The longest of PREFIXES that the name goes on from, empty if there is none."""
+    return max((prefix for prefix in PREFIXES if name.startswith(prefix) and name != prefix), key=len, default="")
 
 
 def help_text() -> str:

@@ -112,7 +112,7 @@ def _material_rules() -> list[Schema]:
 
 
 def _arc_rules() -> list[Schema]:
-    """Arcs must be told where nothing else can debond."""
+    """Arcs must be given where nothing else can debond."""
     some_arc = {"required": ["debonded"], "properties": {"debonded": {"minItems": 1}}}
     stiffness = ANALYSIS_TYPE.among("stiffness")
     return [

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from feti_homog.common.mpi_errors import agree
 from feti_homog.feti.coarse.adaptive import AdaptiveCoarseSpace
 from feti_homog.feti.coarse.coarse_space import CoarseSpace
 from feti_homog.feti.coarse.natural import NaturalCoarseSpace
@@ -21,6 +22,14 @@ from feti_homog.feti.preconditioners.influence import Influence
 from feti_homog.feti.preconditioners.scaled import Dirichlet, Identity, Lumped, Preconditioner
 from feti_homog.feti.solver_plan import ProblemSizes, SolverOptions, choose
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
+
+CLASSES: dict[str, Callable[[MPI.Intracomm, JumpOperator, InterfaceOperators], Preconditioner]] = {
+    "none": lambda *_: Identity(),
+    "lumped": Lumped,
+    "dirichlet": Dirichlet,
+    "influence": Influence,
+}
+"""What makes the preconditioner of each name of `PRECONDITIONERS` but auto."""
 
 
 @dataclass(frozen=True)
@@ -45,14 +54,16 @@ def build(
     Options: `feti_dual_operator`, `feti_pc_type`, `feti_coarse_space`, `feti_coarse_threshold`.
 
     Raises:
-        CaseError: an option has no such value, or two exclude each other.
+        CaseError: an option has no such value, or two exclude each other; a library has no such factorization.
     """
     database = PETSc.Options("feti_")
     options = SolverOptions.read(database.getString, database.getReal, thresholds)
     soft = options.want_soft_modes(_are_cut(comm, subdomains))
-    operators = InterfaceOperators(jump_operator, subdomains, options.operator, applications, soft, thresholds)
+    operators = agree(
+        comm, InterfaceOperators, jump_operator, subdomains, options.operator, applications, soft, thresholds
+    )
     plan = choose(_sizes(comm, jump_operator, operators, applications), options, thresholds)
-    preconditioner = _preconditioner(plan.preconditioner, comm, jump_operator, operators)
+    preconditioner = CLASSES[plan.preconditioner](comm, jump_operator, operators)
     natural = NaturalCoarseSpace(comm, jump_operator, operators)
     coarse: CoarseSpace = natural
     if plan.adaptive and isinstance(preconditioner, Dirichlet):
@@ -81,13 +92,3 @@ def _are_cut(comm: MPI.Intracomm, subdomains: Sequence[Subdomain]) -> bool:
     """Whether there are more subdomains than bodies; collective."""
     bodies = comm.allreduce(max((s.submesh.body for s in subdomains), default=-1), MPI.MAX) + 1
     return bool(comm.allreduce(len(subdomains)) > bodies)
-
-
-def _preconditioner(
-    kind: str, comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators
-) -> Preconditioner:
-    if kind == "none":
-        return Identity()
-    if kind == "influence":
-        return Influence(comm, jump_operator, operators)
-    return (Lumped if kind == "lumped" else Dirichlet)(comm, jump_operator, operators)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from feti_homog.analysis.runner import run
 from feti_homog.common.file_locks import Lock, LockHeld
-from feti_homog.common.mpi_errors import on_root, on_root_only, others_come
+from feti_homog.common.mpi_errors import ARRIVAL_TIMEOUT_S, on_root, on_root_only, others_come
 from feti_homog.config.case import Case
 from feti_homog.errors import CaseError, ConvergenceError, FetiHomogError, MeshError
 from feti_homog.sweep import store
@@ -19,9 +19,6 @@ from feti_homog.sweep.store import LOCK_FILE, Status
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
-
-PEER_TIMEOUT_S = 5.0
-"""How long a rank whose case failed waits for the others to say so too."""
 
 
 class Outcome(Enum):
@@ -89,7 +86,7 @@ class CaseRunner:
             run(case, self.directory / entry.folder, self.comm, quiet=True, resume=case.path is not None)
             return Status.DONE
         except (CaseError, MeshError, ConvergenceError) as error:
-            if not others_come(self.comm, PEER_TIMEOUT_S):
+            if not others_come(self.comm, ARRIVAL_TIMEOUT_S):
                 raise
             on_root_only(self.comm, store.write_error, self.directory, entry, error)
             return f"failed ({error.faults[0]})"

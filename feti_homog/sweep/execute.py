@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from feti_homog.common.file_locks import Lock, LockHeld
-from feti_homog.common.mpi_errors import on_root, on_root_only, others_come
+from feti_homog.common.mpi_errors import ARRIVAL_TIMEOUT_S, on_root, on_root_only, others_come
 from feti_homog.errors import CaseError, ConvergenceError, FetiHomogError
 from feti_homog.output.text.point_tables import sweep_failures, sweep_table
 from feti_homog.sweep import store
-from feti_homog.sweep.case_runner import PEER_TIMEOUT_S, CaseRunner, Outcome
+from feti_homog.sweep.case_runner import CaseRunner, Outcome
 from feti_homog.sweep.plan import Sweep
 from feti_homog.sweep.store import LOCK_FILE, CaseState, Status
 
@@ -94,7 +94,7 @@ def _run_free_cases(runner: CaseRunner, sweep: Sweep) -> FetiHomogError | None:
                 outcome, _ = runner.run(entry, case, len(sweep.entries))
                 some_computed = some_computed or outcome is Outcome.COMPUTED
     except FetiHomogError as error:
-        if not others_come(runner.comm, PEER_TIMEOUT_S):
+        if not others_come(runner.comm, ARRIVAL_TIMEOUT_S):
             raise
         if runner.comm.rank == 0:
             print(*error.faults, sep="\n", file=sys.stderr, flush=True)

@@ -71,7 +71,10 @@ def test_options_of_the_library_of_a_solver_that_the_run_does_not_make(tmp_path,
         (["-feti_pctype", "lumped"], "did you mean -feti_pc_type?"),
         (["-feti_projected_pc_type", "none"], "-feti_projected_pc_type: unknown option"),
         (["-feti_sub_mat_mumps_icntl_14", "60"], "-feti_sub_mat_mumps_icntl_14: no solver has such an option"),
-        (["-feti_interior_pc_factor_mat_solver_type", "nolib", "-feti_interior_x", "1"], "-feti_interior_...: "),
+        (
+            ["-feti_interior_pc_factor_mat_solver_type", "nolib", "-feti_interior_x", "1"],
+            "-feti_interior_pc_factor_mat_solver_type nolib -feti_interior_x 1: ",
+        ),
         (["-feti_pc_type", "ilu"], "expected one of auto, none, lumped, dirichlet, influence"),
     ],
 )
@@ -87,3 +90,32 @@ def test_misspelt_options_of_a_case_file_are_refused(tmp_path):
     job = command_line(2, "run", path, "--out", tmp_path / "out")
     assert job.returncode == 2
     assert job.stderr.count("did you mean -feti_interior_pc_factor_mat_solver_type?") == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "fault"),
+    [
+        (["-feti_pc_type", "ilu"], "-feti_pc_type ilu: expected one of auto, none"),
+        (["-feti_dual_operator", "direct"], "-feti_dual_operator direct: expected one of auto, implicit, explicit"),
+        (["-feti_coarse_space", "deluxe"], "-feti_coarse_space deluxe: expected one of auto, natural, adaptive"),
+        (["-feti_coarse_threshold", "1.5"], "-feti_coarse_threshold 1.5: expected a number above 0 and below 1"),
+        (["-feti_ksp_rtol"], "-feti_ksp_rtol: expected a number"),
+        (["-feti_ksp_max_it", "0"], "-feti_ksp_max_it 0: expected an integer of at least 1"),
+        (["-feti_ksp_type", "cgg"], "-feti_ksp_type cgg: PETSc has no such Krylov method"),
+        (["-feti_ksp_rtoll", "1e-3"], "-feti_ksp_rtoll: no solver has such an option; did you mean -feti_ksp_rtol?"),
+        (["-feti_pc_typ", "none"], "-feti_pc_typ: no solver has such an option; did you mean -feti_pc_type?"),
+        (["-feti_interior_pc_typ", "lu"], "-feti_interior_pc_typ: no solver has such an option; did you mean"),
+        (["-feti_sub_pc_factor_mat_solver_type", "x"], "-feti_sub_pc_factor_mat_solver_type x: "),
+        (["-feti_interior_pc_type", "x"], "-feti_interior_pc_type x: "),
+    ],
+)
+def test_options_are_checked_before_the_work(tmp_path, words, fault):
+    job = command_line(1, "check", case_file(tmp_path, CUT), *words)
+    assert (job.returncode, job.stdout) == (2, "")
+    assert fault in job.stderr and job.stderr.count("error: ") == 1
+
+
+def test_options_that_petsc_alone_knows_pass(tmp_path):
+    words = ["-feti_ksp_monitor_true_residual", "-feti_sub_pc_factor_mat_ordering_type", "nd", "-feti_ksp_type", "fcg"]
+    job = command_line(1, "check", case_file(tmp_path, CUT), *words)
+    assert (job.returncode, job.stderr) == (0, "")

@@ -13,7 +13,13 @@ import numpy as np
 from mpi4py import MPI
 from scipy.sparse import csc_matrix, csr_matrix
 
-from feti_homog.feti.coarse.local_eigenproblems import SubdomainBlocks, eigenproblem
+from feti_homog.common.mpi_errors import agree
+from feti_homog.feti.coarse.local_eigenproblems import (
+    FaceEigenproblems,
+    SubdomainBlocks,
+    SubdomainEigenproblem,
+    eigenproblem,
+)
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.neighbours import Neighbours
 from feti_homog.feti.linalg.distributed_matrix import add_shared_rows
@@ -53,10 +59,12 @@ def kernels_and_soft_modes(
     threshold: float,
     thresholds: Thresholds = DEFAULTS,
 ) -> list[Float]:
-    """V: for each subdomain of this rank (n, k + m) its kernel and its m modes below the threshold.  Collective."""
-    problems = [
-        eigenproblem(block, common, thresholds) for block, common in zip(blocks, neighbours.common, strict=True)
-    ]
+    """V: for each subdomain of this rank (n, k + m) its kernel and its m modes below the threshold.  Collective.
+
+    Raises:
+        MeshError: the neighbourhood of a face, on any rank, is no subdomain.
+    """
+    problems = agree(neighbours.comm, _eigenproblems, blocks, neighbours, thresholds)
     # Of the neighbours' shares in M^-1 the rows that both have.
     received: list[list[tuple[int, Float32]]] = [[] for _ in blocks]
 
@@ -71,6 +79,13 @@ def kernels_and_soft_modes(
         V.append(np.hstack([block.R, problem.modes(shares, threshold)]))
         shares.clear()
     return V
+
+
+def _eigenproblems(
+    blocks: Sequence[SubdomainBlocks], neighbours: Neighbours, thresholds: Thresholds
+) -> list[SubdomainEigenproblem | FaceEigenproblems]:
+    """Those of this rank's subdomains, without communication."""
+    return [eigenproblem(block, common, thresholds) for block, common in zip(blocks, neighbours.common, strict=True)]
 
 
 def _columns(matrix: csc_matrix, span: slice, rows: Int) -> csr_matrix:

@@ -62,7 +62,7 @@ class NaturalCoarseSpace:
     def activate(self, active: Float) -> None:
         """Factor G^T G for the owned rows of which `active` is 1; the others, 0, carry no multiplier.  Collective.
 
-        Motions that no active row resists, of a fibre that has come loose, get a stiffness: G^T G + s Z Z^T.
+        Motions that no active row resists, of a fibre that nothing holds, get a stiffness: G^T G + s Z Z^T.
         """
         self.G_active = (diags(active) @ self.G).tocsr()
         self.GT_active = self.G_active.T.tocsr()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from feti_homog.common.petsc_option_table import OPTIONS, help_text, option_names, split_argv, unknown_options
+from feti_homog.common.petsc_option_table import OPTIONS, help_text, split_argv, unknown_options
 from feti_homog.feti import solver_plan, thresholds
 
 
@@ -28,14 +28,6 @@ from feti_homog.feti import solver_plan, thresholds
 )
 def test_words_with_one_dash_are_petscs_and_the_others_ours(line, ours, petsc):
     assert split_argv(line.split()) == (ours.split(), petsc.split())
-
-
-def test_numbers_with_a_sign_are_no_options():
-    assert option_names(["-feti_ksp_rtol", "1e-8", "-shift", "-1", "-log_view"]) == [
-        "feti_ksp_rtol",
-        "shift",
-        "log_view",
-    ]
 
 
 def test_every_option_of_the_table_is_known():
