@@ -60,7 +60,7 @@ def write(folder: Path, angles: list[float], free: dict[str, Any], shear: dict[s
     rows = np.column_stack([angles, *free.values(), *shear.values()]).tolist()
     figure = Figure(figsize=(9.6, 4.2), layout="constrained")
     left, right = figure.subplots(1, 2)
-    _curves(left, angles, free, PLANES, "L", list(STIFFNESSES), "plane ")
+    _curves(left, angles, free, PLANES, "C", list(STIFFNESSES), "plane ")
     left.set(title="a. effective stiffness, no contact", ylabel="effective stiffness (GPa)", ylim=(0, None))
     _curves(right, angles, shear, CONTACT, r"\Sigma", STRESSES, "")
     right.set(title=r"b. $E = [0, 0, 0.2]$, plane strain", ylabel="macroscopic stress (GPa)")

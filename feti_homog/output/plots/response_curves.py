@@ -61,7 +61,7 @@ def _angle_columns(points: Sequence[Mapping[str, Any]], stiff: bool) -> list[tup
     if not stiff:
         return list(zip(MACROSCOPIC, np.array([point["stress"] for point in points]).T, strict=True))
     stiffness = np.array([point["stiffness"] for point in points])
-    return [(f"L_{{{i + 1}{j + 1}}}", stiffness[:, i, j]) for i, j in point_tables.ENTRIES.values()]
+    return [(f"C_{{{i + 1}{j + 1}}}", stiffness[:, i, j]) for i, j in point_tables.ENTRIES.values()]
 
 
 def _path(document: Document) -> Figure:

@@ -17,8 +17,8 @@ COLOURS = ("#1f4e9c", "#c44e00", "#2a7f3f", "#7a3e9d", "#8c6d1f", "#c2185b")
 MARKERS = ("o", "s", "^", "D", "v", "P")
 REALISATION_STYLE: dict[str, Any] = {"markersize": 3.5, "alpha": 0.4, "markeredgewidth": 0}
 NAMES = {
-    "C11": "$L_{11}$",
-    "C33": "$L_{33}$",
+    "C11": "$C_{11}$",
+    "C33": "$C_{33}$",
     "bulk": "plane bulk modulus $k$",
     "shear": "shear modulus $\\mu$",
     "onset_S11": "$\\Sigma_{11}$ at the first break",
