@@ -64,12 +64,12 @@ class Homogenization:
             ConvergenceError: a solve broke down and left no numbers.
         """
         if self.interface.is_linear(status):
-            return [self._finite_response(state) for state in self.interface.equilibria(strains, status, starts)]
+            return [self.response(state, 1.0) for state in self.interface.equilibria(strains, status, starts)]
         pairs = zip(strains, starts, strict=True)
-        return [self._finite_response(self.interface.equilibrium(strain, status, start)) for strain, start in pairs]
+        return [self.response(self.interface.equilibrium(strain, status, start), 1.0) for strain, start in pairs]
 
-    def _finite_response(self, state: Equilibrium) -> Response:
-        """The response of a state.
+    def response(self, state: Equilibrium, scale: float) -> Response:
+        """The averages of `scale` times an equilibrium.  Collective.
 
         Raises:
             ConvergenceError: its numbers are not finite.
@@ -79,10 +79,6 @@ class Homogenization:
                 f"strain {state.solution.strain.tolist()}: the Krylov method broke down after {state.iterations} "
                 f"iterations (KSPConvergedReason {state.solution.reason})"
             )
-        return self.response(state, 1.0)
-
-    def response(self, state: Equilibrium, scale: float) -> Response:
-        """The averages of `scale` times an equilibrium.  Collective."""
         cell, solver = self.cell, self.cell.solver
         strain, u = state.solution.strain, solver.boundary_displacement(state.solution)
         stress, star, energy = self._averages(strain, u)
