@@ -54,7 +54,8 @@ def increments(
     """The paper's loop: at each of `steps` equal load steps, release overloaded bonds until none is left.
 
     A point's state is the one after its bonds broke.  `begin.leg` is the number of steps done.  With `worst_only`
-    just the most overloaded bonds are released at a time.
+    just the most overloaded bonds are released at a time.  The last point is one that did not converge, if there is
+    one.
     """
     corners = np.vstack([np.zeros(3), waypoints])
     status, lam = begin.status, begin.lam
@@ -66,7 +67,7 @@ def increments(
             state = interface.equilibrium(strain, status, lam)
             status, lam = state.status, state.solution.lam
             load, which = most_utilised(interface, criterion, state)
-            if load <= 1.0 + UTILISATION_TIE:
+            if load <= 1.0 + UTILISATION_TIE or state.solution.reason < 0:
                 break
             if not worst_only:
                 which = utilisation(interface, criterion, state) > 1.0
@@ -76,6 +77,8 @@ def increments(
             status = interface.debond(status, which, lam)
         released = energy_released(strain, before, interface.stress(state.solution))
         yield Point(step / steps, 1.0, state, broke, released, PathState(step, 0.0, status, lam))
+        if state.solution.reason < 0:
+            return
 
 
 def _legs(interface: Interface, criterion: StrengthCriterion, waypoints: Float, begin: PathState) -> Iterator[Point]:
