@@ -18,6 +18,7 @@ from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.operators.node_blocks import NodeBlocks
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface.contact import BONDED, CLOSED, OPEN, Equilibrium, Interface, Status
+from feti_homog.mechanics.voigt import strain_tensor
 from feti_homog.typing import Float
 
 
@@ -141,9 +142,8 @@ def asymmetry(L: Float) -> float:
 
 def displacement(cell: TornCell, strain: Float, u: Float) -> Float:
     """(nodes, 2) total displacement E y + u*, Eq. (14), at this rank's plane nodes."""
-    E = np.array([[strain[0], strain[2] / 2], [strain[2] / 2, strain[1]]])
     points = np.concatenate([s.mesh.points for s in cell.subdomains] or [np.zeros((0, 2))])
-    return np.asarray(points @ E + fluctuation(cell, u))
+    return np.asarray(points @ strain_tensor(strain) + fluctuation(cell, u))
 
 
 def fluctuation(cell: TornCell, u: Float) -> Float:

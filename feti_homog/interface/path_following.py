@@ -21,9 +21,9 @@ from feti_homog.interface.path_points import (
     UTILISATION_TIE,
     PathState,
     Point,
+    count_on_all_ranks,
     energy_released,
     most_utilised,
-    total,
     utilisation,
 )
 from feti_homog.interface.strength_criterion import StrengthCriterion
@@ -73,7 +73,7 @@ def increments(
                 which = utilisation(interface, criterion, state) > 1.0
             if before is None:
                 before = interface.stress(state.solution)
-            broke += total(interface, which)
+            broke += count_on_all_ranks(interface, which)
             status = interface.debond(status, which, lam)
         released = energy_released(strain, before, interface.stress(state.solution))
         yield Point(step / steps, 1.0, state, broke, released, PathState(step, 0.0, status, lam))
@@ -108,5 +108,5 @@ def _first_leg(
             yield Point(1.0 / legs, 1.0, state, 0, released, PathState(1, 0.0, state.status, lam))
             return
         factor, before = 1.0 / load, stress / load
-        broke, status = total(interface, worst), interface.debond(state.status, worst, lam)
+        broke, status = count_on_all_ranks(interface, worst), interface.debond(state.status, worst, lam)
         yield Point(factor / legs, factor, state, broke, released, PathState(0, factor, status, lam, before))
