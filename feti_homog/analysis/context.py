@@ -76,10 +76,10 @@ class AnalysisContext:
         self.check(name, response.checks)
 
     def check(self, name: str, errors: Mapping[str, float]) -> None:
-        """Keep the largest errors; a fault for each above its tolerance."""
+        """Keep the largest errors; a fault for each that is not within its tolerance: NaN is not."""
         for law, error in errors.items():
             self.checks[law] = max(error, self.checks.get(law, 0.0))
-            if error > (tolerance := self.tolerance(law)):
+            if not error <= (tolerance := self.tolerance(law)):
                 self.faults.append(f"{name}: check {law}: {error:.1e}, expected at most {tolerance:.1e}; result marked")
 
     def tolerance(self, law: str) -> float:

@@ -18,6 +18,7 @@ from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.operators.node_blocks import NodeBlocks
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface.contact import BONDED, CLOSED, OPEN, Equilibrium, Interface, Status
+from feti_homog.mechanics.voigt import strain_tensor
 from feti_homog.typing import Float
 
 
@@ -64,12 +65,12 @@ class Homogenization:
             ConvergenceError: a solve broke down and left no numbers.
         """
         if self.interface.is_linear(status):
-            return [self._finite_response(state) for state in self.interface.equilibria(strains, status, starts)]
+            return [self.response(state, 1.0) for state in self.interface.equilibria(strains, status, starts)]
         pairs = zip(strains, starts, strict=True)
-        return [self._finite_response(self.interface.equilibrium(strain, status, start)) for strain, start in pairs]
+        return [self.response(self.interface.equilibrium(strain, status, start), 1.0) for strain, start in pairs]
 
-    def _finite_response(self, state: Equilibrium) -> Response:
-        """The response of a state.
+    def response(self, state: Equilibrium, scale: float) -> Response:
+        """The averages of `scale` times an equilibrium.  Collective.
 
         Raises:
             ConvergenceError: its numbers are not finite.
@@ -79,10 +80,6 @@ class Homogenization:
                 f"strain {state.solution.strain.tolist()}: the Krylov method broke down after {state.iterations} "
                 f"iterations (KSPConvergedReason {state.solution.reason})"
             )
-        return self.response(state, 1.0)
-
-    def response(self, state: Equilibrium, scale: float) -> Response:
-        """The averages of `scale` times an equilibrium.  Collective."""
         cell, solver = self.cell, self.cell.solver
         strain, u = state.solution.strain, solver.boundary_displacement(state.solution)
         stress, star, energy = self._averages(strain, u)
@@ -145,9 +142,8 @@ def asymmetry(L: Float) -> float:
 
 def displacement(cell: TornCell, strain: Float, u: Float) -> Float:
     """(nodes, 2) total displacement E y + u*, Eq. (14), at this rank's plane nodes."""
-    E = np.array([[strain[0], strain[2] / 2], [strain[2] / 2, strain[1]]])
     points = np.concatenate([s.mesh.points for s in cell.subdomains] or [np.zeros((0, 2))])
-    return np.asarray(points @ E + fluctuation(cell, u))
+    return np.asarray(points @ strain_tensor(strain) + fluctuation(cell, u))
 
 
 def fluctuation(cell: TornCell, u: Float) -> Float:

@@ -21,6 +21,7 @@ from feti_homog.interface.block_pivoting import BlockPivoting
 from feti_homog.interface.contact_certificate import kkt_errors
 from feti_homog.interface.rigid_placement import place
 from feti_homog.mechanics.bounds import reuss
+from feti_homog.mechanics.voigt import strain_tensor
 from feti_homog.typing import Bool, Float
 
 Status = NDArray[np.int8]
@@ -30,6 +31,8 @@ BONDED, CLOSED, OPEN = 0, 1, 2
 # A force or a gap has a sign if it is larger than this many relative tolerances of the Krylov method, times the
 # largest force or imposed displacement; below, the solver's error may have made it.
 SIGN_NOISE_PER_RTOL = 10.0
+# An amplitude takes part in new motions if its square is larger than this, of motions of size one.
+LEAST_SHARE_OF_MOTION = 1e-6
 # Block pivots in a row, the last one with progress included: ten without progress are usual in the literature.
 BLOCK_PIVOTS = 11
 # Dual problems after which the search is given up; the certificate then tells how far off it is.
@@ -157,9 +160,8 @@ class Interface:
 
     def imposed(self, strain: Float) -> float:
         """Largest displacement E y that the strain imposes on the cell."""
-        E = np.array([[strain[0], strain[2] / 2], [strain[2] / 2, strain[1]]])
         corners = self.size * np.array([[1, 0], [0, 1], [1, 1]])
-        return float(np.abs(corners @ E).max())
+        return float(np.abs(corners @ strain_tensor(strain)).max())
 
     def _placed(self, status: Status, solution: DualSolution) -> tuple[DualSolution, Bool]:
         """The solution with free fibres where they have room, and which nodes (k,) break the KKT conditions."""
@@ -194,14 +196,18 @@ class Interface:
     def _without_idle(self, status: Status, solution: DualSolution) -> tuple[Status, int]:
         """The status and the number of rigid motions that neither a bond nor a face under compression resists.
 
-        A fibre may touch its hole without a force: such nodes count as open, lest they seem to hold it.  Collective.
+        A fibre may touch its hole without a force: such nodes count as open if it moves without them, lest they seem
+        to hold it; those of other fibres stay closed.  Collective.
         """
         coarse, idle = self.solver.natural, np.zeros(len(status), bool)
-        held = int(coarse.unconstrained_modes.shape[1])
+        motions = coarse.unconstrained_modes
         if self.contact:
             idle = (status == CLOSED) & (solution.lam[self.nodes.row] >= -self.force_noise(solution))
         if not self.solver.comm.allreduce(bool(idle.any()), MPI.LOR):
-            return status, held
-        without = np.where(idle, OPEN, status).astype(np.int8)
-        motions = coarse.free_motions(self.active(without))
-        return (without, motions) if motions > held else (status, motions)
+            return status, motions.shape[1]
+        more = coarse.free_motions(self.active(np.where(idle, OPEN, status).astype(np.int8)))
+        # The squares are the diagonal of the projector on the motions, which rises where a body comes free.
+        risen = np.square(more).sum(axis=1) - np.square(motions).sum(axis=1) > LEAST_SHARE_OF_MOTION
+        freed = np.isin(coarse.body, coarse.body[risen])
+        idle &= (abs(coarse.G[self.nodes.row]) + abs(coarse.G[self.nodes.row + 1])) @ freed > 0
+        return np.where(idle, OPEN, status).astype(np.int8), more.shape[1]

@@ -10,7 +10,14 @@ from mpi4py import MPI
 from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.interface.contact import Equilibrium, Interface
 from feti_homog.interface.leg_prediction import first_break, first_change
-from feti_homog.interface.path_points import UTILISATION_TIE, PathState, Point, energy_released, most_utilised, total
+from feti_homog.interface.path_points import (
+    UTILISATION_TIE,
+    PathState,
+    Point,
+    count_on_all_ranks,
+    energy_released,
+    most_utilised,
+)
 from feti_homog.interface.strength_criterion import StrengthCriterion
 from feti_homog.typing import Float
 
@@ -163,7 +170,7 @@ class LaterLeg:
 
     def _break(self) -> Iterator[Point]:
         """Break the worst bonds here, and find the state after it."""
-        solution, broke = self._state.solution, total(self.interface, self._worst)
+        solution, broke = self._state.solution, count_on_all_ranks(self.interface, self._worst)
         status = self.interface.debond(self._state.status, self._worst, solution.lam)
         stress = self.interface.stress(solution)
         yield self._point(broke, PathState(self.leg, self._share, status, solution.lam, stress))

@@ -21,9 +21,9 @@ from feti_homog.interface.path_points import (
     UTILISATION_TIE,
     PathState,
     Point,
+    count_on_all_ranks,
     energy_released,
     most_utilised,
-    total,
     utilisation,
 )
 from feti_homog.interface.strength_criterion import StrengthCriterion
@@ -54,7 +54,8 @@ def increments(
     """The paper's loop: at each of `steps` equal load steps, release overloaded bonds until none is left.
 
     A point's state is the one after its bonds broke.  `begin.leg` is the number of steps done.  With `worst_only`
-    just the most overloaded bonds are released at a time.
+    just the most overloaded bonds are released at a time.  The last point is one that did not converge, if there is
+    one.
     """
     corners = np.vstack([np.zeros(3), waypoints])
     status, lam = begin.status, begin.lam
@@ -66,16 +67,18 @@ def increments(
             state = interface.equilibrium(strain, status, lam)
             status, lam = state.status, state.solution.lam
             load, which = most_utilised(interface, criterion, state)
-            if load <= 1.0 + UTILISATION_TIE:
+            if load <= 1.0 + UTILISATION_TIE or state.solution.reason < 0:
                 break
             if not worst_only:
                 which = utilisation(interface, criterion, state) > 1.0
             if before is None:
                 before = interface.stress(state.solution)
-            broke += total(interface, which)
+            broke += count_on_all_ranks(interface, which)
             status = interface.debond(status, which, lam)
         released = energy_released(strain, before, interface.stress(state.solution))
         yield Point(step / steps, 1.0, state, broke, released, PathState(step, 0.0, status, lam))
+        if state.solution.reason < 0:
+            return
 
 
 def _legs(interface: Interface, criterion: StrengthCriterion, waypoints: Float, begin: PathState) -> Iterator[Point]:
@@ -105,5 +108,5 @@ def _first_leg(
             yield Point(1.0 / legs, 1.0, state, 0, released, PathState(1, 0.0, state.status, lam))
             return
         factor, before = 1.0 / load, stress / load
-        broke, status = total(interface, worst), interface.debond(state.status, worst, lam)
+        broke, status = count_on_all_ranks(interface, worst), interface.debond(state.status, worst, lam)
         yield Point(factor / legs, factor, state, broke, released, PathState(0, factor, status, lam, before))

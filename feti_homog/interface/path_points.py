@@ -82,6 +82,6 @@ def most_utilised(interface: Interface, criterion: StrengthCriterion, state: Equ
     return float(largest), (used >= largest * (1.0 - UTILISATION_TIE)) & (used > 0.0)
 
 
-def total(interface: Interface, which: Bool) -> int:
+def count_on_all_ranks(interface: Interface, which: Bool) -> int:
     """Number of nodes of `which` (k,) on all ranks; collective."""
     return int(interface.solver.comm.allreduce(int(which.sum())))

@@ -6,17 +6,23 @@ there are amplitudes a with gap + M a >= 0: a linear programme for each fibre, s
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from mpi4py import MPI
 from scipy.optimize import OptimizeResult, linprog
 from scipy.sparse import csr_matrix
 
+from feti_homog.common.mpi_errors import on_root
+from feti_homog.errors import ConvergenceError
 from feti_homog.feti.coarse.natural import NaturalCoarseSpace
 from feti_homog.feti.decomposition.constraint_layout import InterfaceNodes
 from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.typing import Array, Bool, Float
+
+T = TypeVar("T")
 
 # Rigid motions that change gaps by less than this, relative to slips, change none: a round fibre turns.
 LARGEST_GAP_OF_SLIDING = 1e-9
@@ -72,10 +78,12 @@ def place(
 
     A fibre that overlaps is put where its smallest gap is largest.  If even that overlaps, the programme's dual
     solution is a system of contact forces in balance, and its nodes close.
+
+    Raises:
+        ConvergenceError: on every rank; a linear programme was not solved.
     """
-    fibres, gaps = _gathered(comm, coarse, nodes, is_open, [solution.jump[nodes.row]])
-    answer = None if fibres is None else _place_all(fibres, gaps[0], noise)
-    amplitudes, squeezed = comm.bcast(answer)
+    gaps = [solution.jump[nodes.row]]
+    amplitudes, squeezed = _decided_on_root(comm, coarse, nodes, is_open, _place_all, gaps, noise)
     first = comm.exscan(len(nodes.row)) or 0
     return Placement(coarse.unconstrained_modes @ amplitudes, squeezed[first : first + len(nodes.row)])
 
@@ -95,12 +103,10 @@ def room_ahead(
 
         (1 - w) here + w ahead + M a >= 0,   and   >= -2 noise,
 
-    where the first fibre begins to be squeezed, and where it is beyond doubt.  Collective, decided on rank 0.
+    where the first fibre begins to be squeezed, and where it is beyond doubt.
+    Collective, decided on rank 0; raises as `place`.
     """
-    fibres, gaps = _gathered(comm, coarse, nodes, is_open, [here, ahead])
-    shares = None if fibres is None else _shares_of_all(fibres, gaps[0], gaps[1], noise)
-    found: tuple[float, float] = comm.bcast(shares)
-    return found
+    return _decided_on_root(comm, coarse, nodes, is_open, _shares_of_all, [here, ahead], noise)
 
 
 def shares_to_zero(here: Float, ahead: Float, noise: float) -> tuple[float, float]:
@@ -114,17 +120,25 @@ def shares_to_zero(here: Float, ahead: Float, noise: float) -> tuple[float, floa
     return float(begins.min(initial=1.0)), float(certain.min(initial=1.0))
 
 
-def _gathered(
-    comm: MPI.Intracomm, coarse: NaturalCoarseSpace, nodes: InterfaceNodes, is_open: Bool, gaps: list[Float]
-) -> tuple[_Fibres | None, list[Float]]:
-    """The free motions of all open nodes, and values of all nodes, on rank 0."""
+def _decided_on_root(
+    comm: MPI.Intracomm,
+    coarse: NaturalCoarseSpace,
+    nodes: InterfaceNodes,
+    is_open: Bool,
+    decide: Callable[..., T],
+    gaps: list[Float],
+    noise: float,
+) -> T:
+    """decide(fibres, *gaps, noise) of rank 0, with the gaps of all nodes, on every rank; collective."""
     free = csr_matrix(coarse.unconstrained_modes)
     opening, slip = (np.asarray((coarse.G[nodes.row + i] @ free).todense()) for i in range(2))
     parts = comm.gather((is_open, opening, slip, nodes.fibre, *gaps))
-    if parts is None:
-        return None, []
-    whole = [np.concatenate(p) for p in zip(*parts, strict=True)]
-    return _Fibres(*whole[:4]), whole[4:]
+
+    def decided() -> T:
+        whole = [np.concatenate(p) for p in zip(*(parts or []), strict=True)]
+        return decide(_Fibres(*whole[:4]), *whole[4:], noise)
+
+    return on_root(comm, decided)
 
 
 def _place_all(fibres: _Fibres, gap: Float, noise: float) -> tuple[Float, Bool]:
@@ -171,8 +185,15 @@ def _last_share(here: Float, ahead: Float, motion: Float, slack: float) -> float
 
 
 def _maximised(motions: Float, last: Float, limits: Float, bounds: tuple[float | None, float]) -> OptimizeResult:
-    """max x_-1 with motions x_:-1 + last x_-1 <= limits and x_-1 within its bounds."""
+    """max x_-1 with motions x_:-1 + last x_-1 <= limits and x_-1 within its bounds.
+
+    Raises:
+        ConvergenceError: there is no solution, or it was not found.
+    """
     cost = np.r_[np.zeros(motions.shape[1]), -1.0]
     limited = [(-LARGEST_MOTION, LARGEST_MOTION)] * motions.shape[1] + [bounds]
     rows = np.column_stack([motions, last])
-    return linprog(cost, A_ub=rows, b_ub=limits, bounds=limited, method="highs", options=LP_TOLERANCES)
+    result = linprog(cost, A_ub=rows, b_ub=limits, bounds=limited, method="highs", options=LP_TOLERANCES)
+    if not result.success:
+        raise ConvergenceError(f"the linear programme that places a free fibre was not solved: {result.message}")
+    return result

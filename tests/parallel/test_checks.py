@@ -11,12 +11,16 @@ from support.cases import make_case
 from support.ranks import parallel_assert
 from unit.cell.faulty_meshes import grid
 
+from feti_homog.analysis import load_path
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.common.petsc_options import case_options
 from feti_homog.common.progress import Progress
-from feti_homog.errors import CaseError
+from feti_homog.config.sections import LoadPath
+from feti_homog.errors import CaseError, ConvergenceError
 from feti_homog.homogenization.averaging import Homogenization
 from feti_homog.interface.contact import OPEN
+from feti_homog.interface.strength_criterion import StrengthCriterion
+from feti_homog.output.files.checkpoint import NoCheckpoint
 
 pytestmark = pytest.mark.parallel
 
@@ -77,6 +81,27 @@ def test_no_tolerance_lifts_the_limit_of_the_checks(comm, rtol, limit):
     assert bool(context.warnings()) == (rtol > 1e-7)
     context.check("E11", {"hill": 1.1 * limit})
     assert len(context.faults) == 1
+
+
+def test_what_is_no_number_is_within_no_tolerance(comm):
+    context = context_of(comm, torn_cells.tear(comm, geometry="square", mesh_size=0.3))
+    context.check("E11", {"hill": np.nan})
+    assert len(context.faults) == 1 and "check hill: nan" in context.faults[0]
+
+
+@pytest.mark.parametrize("method", ["events", "increments"])
+def test_a_path_whose_solve_breaks_down_is_no_result(comm, monkeypatch, method):
+    cell = torn_cells.tear(comm, geometry="square", mesh_size=0.3)
+    context, solve = context_of(comm, cell), cell.solver.solve
+
+    def broken_down(strain, start):
+        return replace(solve(strain, start), residual=np.nan, reason=-9)
+
+    monkeypatch.setattr(cell.solver, "solve", broken_down)
+    path = LoadPath(strain=(1.0, 0.0, 0.0), method=method, increments=3)
+    law, checkpoint = StrengthCriterion(10.0, 10.0, "max"), NoCheckpoint(comm)
+    with pytest.raises(ConvergenceError, match="broke down after"):
+        load_path.run(context, path, law, checkpoint, False)
 
 
 @pytest.mark.parametrize("rtol", [2.0, 1, 0, -1e-8, "small", "nan"])

@@ -10,6 +10,7 @@ from reference.references import ARC_OF_120_DEGREES, VOID
 from support import torn_cells
 from support.cases import relative_error
 from support.random_cells import random_bonded, random_cell, random_strain
+from support.ranks import parallel_assert
 
 from feti_homog.config.sections import Arc
 from feti_homog.interface.contact import BONDED, CLOSED, OPEN
@@ -172,6 +173,18 @@ def test_free_motions_of_debonded_fibres_are_counted(comm, bodies, subdomains):
         (True, one, pressed, 1),
     ):  # fmt: skip
         assert response(cell, contact, strain, status)[1].free_motions == expected
+
+
+def test_a_fibre_that_comes_free_opens_no_other_fibres_faces(comm):
+    cell = torn_cells.tear(comm, geometry="hexagonal", mesh_size=0.2)
+    fibre = cell.solver.jump_operator.nodes.fibre
+    free = fibre == comm.allreduce(fibre.min(initial=1000), min)
+    bonded = ~free & (np.abs(directions(cell)) < 90)
+    status, start = np.where(bonded, BONDED, CLOSED).astype(np.int8), np.zeros(cell.solver.rows)
+    # Without a strain no face carries a force.
+    (state,) = torn_cells.interface(cell, True).equilibria(np.zeros((1, 3)), status, [start])
+    assert state.free_motions == 3
+    parallel_assert(comm, bool((state.status == np.where(free, OPEN, status)).all()))
 
 
 def test_no_strain_is_no_stress(comm):

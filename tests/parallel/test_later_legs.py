@@ -80,6 +80,18 @@ def test_partly_free_and_breaking_fibres_are_straight_between_points(comm):
     assert largest_bend(interface, points, len(waypoints)) < STRAIGHT
 
 
+def test_a_fibre_that_breaks_bond_by_bond_takes_few_solves(comm):
+    material = {"matrix": {"young": 100.0, "poisson": 0.4}, "fibre": {"young": 500.0, "poisson": 0.2}}
+    cell = torn_cells.tear(comm, geometry="square", mesh_size=0.2, plane="stress", **material)
+    interface, begin = interface_with(cell, False)
+    waypoints = np.array([[0.02, 0.0, 0.0], [-0.05, 0.02, 0.0], [0.1, 0.0, 0.0]])
+    solves = cell.solver.solves
+    points = list(events(interface, StrengthCriterion(4.0, 3.0, "max"), waypoints, begin))
+    assert len(points) > 30 and points[-1].load_factor == 1.0
+    # A state at each change or break, one past it, and one ahead, with a pivot now and then: no halvings.
+    assert cell.solver.solves - solves < 3.5 * len(points)
+
+
 def test_a_free_fibre_is_squeezed_where_the_strain_is_zero(comm):
     cell = torn_cells.tear(comm, **FREE["square"])
     interface, begin = interface_with(cell, True)

@@ -185,6 +185,16 @@ def test_events_do_not_depend_on_bodies_and_pieces(comm):
         assert relative_error(other, curves[0]) < 1e-7
 
 
+@pytest.mark.parametrize("worst_only", [True, False])
+def test_increments_stop_at_a_solve_that_does_not_converge(comm, worst_only):
+    loose = {"petsc": {"feti_ksp_max_it": 1, "feti_pc_type": "none"}}
+    cell = torn_cells.tear(comm, **SQUARE, **loose)
+    interface, law = torn_cells.interface(cell, True), StrengthCriterion(1e-3, 1e-3, "max")
+    begin = unloaded(interface, bonded_status(cell))
+    (point,) = increments(interface, law, np.array([MIXED]), 4, worst_only, begin)
+    assert point.state.solution.reason < 0 and point.broke == 0
+
+
 def test_infinite_strengths_never_break(comm):
     cell = torn_cells.tear(comm, **SQUARE)
     points = follow(cell, True, StrengthCriterion(np.inf, np.inf, "quadratic"), [TENSION, SHEAR])

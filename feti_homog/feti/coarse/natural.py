@@ -100,10 +100,10 @@ class NaturalCoarseSpace:
         projected: Float = x - self.G_active @ self.amplitudes(x)
         return projected
 
-    def free_motions(self, active: Float) -> int:
-        """How many rigid motions the owned rows of which `active` is 1 would leave free.  Collective."""
+    def free_motions(self, active: Float) -> Float:
+        """(m, z) as `unconstrained_modes`, if those owned rows were active of which `active` is 1.  Collective."""
         G = (diags(active) @ self.G).tocsr()
-        return int(self._null_space((G.T @ G).tocsr())[1].shape[1])
+        return self._null_space((G.T @ G).tocsr())[1]
 
     def rigid_body_motion(self, amplitudes: Float) -> Float:
         """R alpha on the boundary dofs, for alpha (m,) or (m, k)."""
