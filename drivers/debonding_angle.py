@@ -55,7 +55,7 @@ def write(folder: Path, angles: list[float], free: dict[str, Any], shear: dict[s
     """debonding_angle.csv and debonding_angle.png."""
     from matplotlib.figure import Figure
 
-    header = ["angle", *(f"L{e} plane {plane}" for plane in free for e in STIFFNESSES)]
+    header = ["angle", *(f"C{e} plane {plane}" for plane in free for e in STIFFNESSES)]
     header += [f"S{e} {word}" for word in shear for e in STRESSES]
     rows = np.column_stack([angles, *free.values(), *shear.values()]).tolist()
     figure = Figure(figsize=(9.6, 4.2), layout="constrained")

@@ -2,7 +2,7 @@
 
 May use `fem`, `cell` and `common`.  Main entry: `solver.FetiSolver`.  Its own floors, each on those below:
 
-    solver, view, factory, krylov
+    solver, view, factory, solver_plan, krylov
     coarse           natural and adaptive coarse space, projector
     preconditioners  lumped, Dirichlet, influence columns
     operators        S and S+ of subdomains, the dual operator F
