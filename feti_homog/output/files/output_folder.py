@@ -63,6 +63,8 @@ def held(directory: Path, comm: Intracomm, say: Callable[[str], object]) -> Iter
         lock.release()
         if comm.rank == 0:
             _remove_empty(made)
+    # No rank goes on while rank 0's lock is still to be seen; after an error of one rank the others may not come.
+    comm.Barrier()
 
 
 def remove_other_results(directory: Path, written: Collection[str]) -> None:
