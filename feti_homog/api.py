@@ -11,9 +11,10 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from feti_homog.common.petsc_option_table import split_argv
+from feti_homog.common.command_words import named_values, petsc_words, split_argv
+from feti_homog.common.petsc_option_values import faulty_values
 from feti_homog.config.case import Case
-from feti_homog.errors import EXIT_DONE
+from feti_homog.errors import EXIT_DONE, CaseError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -140,13 +141,33 @@ def start(command: Callable[[Sequence[str], Intracomm], int], argv: Sequence[str
     words, petsc = split_argv(sys.argv[1:] if argv is None else argv)
     # Debian's h5py is the MPI build only if it is told so before its first import.
     os.environ["H5PY_ALWAYS_USE_MPI"] = "1"
-    import petsc4py
     from mpi4py import MPI
 
-    petsc4py.init([sys.argv[0], *petsc], comm=MPI.COMM_WORLD)
     from feti_homog.common.mpi_errors import run_main
 
-    return run_main(MPI.COMM_WORLD, lambda: command(words, MPI.COMM_WORLD))
+    def main() -> int:
+        _start_petsc(petsc, MPI.COMM_WORLD)
+        return command(words, MPI.COMM_WORLD)
+
+    return run_main(MPI.COMM_WORLD, main)
+
+
+def _start_petsc(words: Sequence[str], comm: Intracomm) -> None:
+    """Start PETSc with its words of the command line.  Collective.
+
+    Raises:
+        CaseError: it cannot be started with them.
+    """
+    options = named_values(words)
+    faults = faulty_values(options)
+    if faults:
+        raise CaseError(*faults)
+    import petsc4py
+
+    try:
+        petsc4py.init([sys.argv[0], *petsc_words(options)], comm=comm)
+    except RuntimeError as error:  # PETSc's own, which there is no PETSc yet to name
+        raise CaseError(f"PETSc does not start with {' '.join(words)}: {error}") from error
 
 
 def parsed(parser: argparse.ArgumentParser, words: Sequence[str], comm: Intracomm) -> argparse.Namespace:

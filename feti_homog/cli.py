@@ -52,7 +52,7 @@ def command_parser() -> Parser:
     parser = Parser(
         prog="feti-homog",
         description="Effective stiffness of fibre composites by FETI, on any number of MPI ranks.",
-        epilog=f"PETSc's options, with a single dash:\n{help_text()}",
+        epilog=help_text(),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"feti-homog {__version__}")
