@@ -11,7 +11,9 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from feti_homog.common import standard_streams
 from feti_homog.common.command_words import named_values, petsc_words, split_argv
+from feti_homog.common.interrupts import end_on_signals
 from feti_homog.common.petsc_option_values import faulty_values
 from feti_homog.config.case import Case
 from feti_homog.errors import EXIT_DONE, CaseError
@@ -141,12 +143,14 @@ def start(command: Callable[[Sequence[str], Intracomm], int], argv: Sequence[str
     words, petsc = split_argv(sys.argv[1:] if argv is None else argv)
     # Debian's h5py is the MPI build only if it is told so before its first import.
     os.environ["H5PY_ALWAYS_USE_MPI"] = "1"
+    standard_streams.prepare()
     from mpi4py import MPI
 
     from feti_homog.common.mpi_errors import run_main
 
     def main() -> int:
         _start_petsc(petsc, MPI.COMM_WORLD)
+        end_on_signals(is_speaker=MPI.COMM_WORLD.rank == 0)
         return command(words, MPI.COMM_WORLD)
 
     return run_main(MPI.COMM_WORLD, main)
@@ -171,12 +175,19 @@ def _start_petsc(words: Sequence[str], comm: Intracomm) -> None:
 
 
 def parsed(parser: argparse.ArgumentParser, words: Sequence[str], comm: Intracomm) -> argparse.Namespace:
-    """The arguments; help, version and argparse's own complaints are printed by rank 0."""
-    with contextlib.ExitStack() as silence:
-        if comm.rank:
-            silence.enter_context(contextlib.redirect_stdout(io.StringIO()))
-            silence.enter_context(contextlib.redirect_stderr(io.StringIO()))
-        return parser.parse_args(words)
+    """The arguments; help, version and argparse's own complaints are printed by rank 0.  Collective."""
+    from feti_homog.common.mpi_errors import on_root_only
+
+    printed = io.StringIO()
+    try:
+        with contextlib.ExitStack() as redirected:
+            redirected.enter_context(contextlib.redirect_stdout(printed))
+            if comm.rank:
+                redirected.enter_context(contextlib.redirect_stderr(io.StringIO()))
+            return parser.parse_args(words)
+    except SystemExit:
+        on_root_only(comm, standard_streams.print_product, printed.getvalue().removesuffix("\n"))
+        raise
 
 
 def _parsed_main(

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import signal
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
@@ -17,6 +16,7 @@ from typing import TYPE_CHECKING, NoReturn
 from feti_homog import __version__
 from feti_homog.api import parsed, start
 from feti_homog.common.petsc_option_table import help_text
+from feti_homog.common.standard_streams import print_product, say
 from feti_homog.errors import EXIT_DONE, CaseError
 
 if TYPE_CHECKING:
@@ -141,8 +141,7 @@ def _check(arguments: argparse.Namespace, comm: Intracomm) -> None:
         case, words = on_root(comm, cases.load, arguments.case), ""
     with case_options(case.petsc):
         text = on_root_only(comm, describe, case, comm.size)
-    if text is not None:
-        print(words + text)
+    _print_product(comm, f"{words}{text}")
 
 
 def _plot(arguments: argparse.Namespace, comm: Intracomm) -> None:
@@ -151,9 +150,9 @@ def _plot(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
     paths = on_root_only(comm, figures.plot, arguments.directory)
     if paths == []:
-        print(f"{arguments.directory}: nothing to draw: its case has no fields, and no points of an angle or path")
+        say(f"{arguments.directory}: nothing to draw: its case has no fields, and no points of an angle or path")
     for path in paths or []:
-        print(path)
+        say(str(path))
 
 
 def _sweep(arguments: argparse.Namespace, comm: Intracomm) -> None:
@@ -165,9 +164,8 @@ def _sweep(arguments: argparse.Namespace, comm: Intracomm) -> None:
         raise CaseError("command line: the following arguments are required: --out (see --help)")
     sweep = on_root(comm, plan.load, arguments.case)
     if arguments.list:
-        for line in on_root_only(comm, execute.list_cases, sweep, arguments.out) or []:
-            print(line)
-        return
+        lines = on_root_only(comm, execute.list_cases, sweep, arguments.out) or []
+        return _print_product(comm, "\n".join(lines))
     on_root(comm, output_folder.usable, arguments.out)
     if arguments.index is None:
         group = comm.size if arguments.ranks_per_case is None else arguments.ranks_per_case
@@ -181,7 +179,7 @@ def _collect(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.sweep import collect
 
     for line in on_root_only(comm, collect.collect, arguments.directory, not arguments.no_pictures) or []:
-        print(line)
+        say(line)
 
 
 def _keys(arguments: argparse.Namespace, comm: Intracomm) -> None:
@@ -190,21 +188,21 @@ def _keys(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
     section = arguments.section
     tables = on_root_only(comm, reference.tables if section is None else partial(reference.tables_of, section))
-    _print_reference(comm, reference.as_text(tables or []))
+    _print_product(comm, reference.as_text(tables or []))
 
 
 def _schema(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.config.json_schema import json_schema
 
-    _print_reference(comm, json.dumps(json_schema(), indent=2))
+    _print_product(comm, json.dumps(json_schema(), indent=2))
 
 
 def _options(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    _print_reference(comm, help_text())
+    _print_product(comm, help_text())
 
 
-def _print_reference(comm: Intracomm, text: str) -> None:
-    """Print a text on rank 0; if its reader leaves early, as `head` does, the program ends without a word."""
-    if comm.rank == 0:
-        signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # PETSc's handler would report an error
-        print(text, flush=True)
+def _print_product(comm: Intracomm, text: str) -> None:
+    """Print the text of rank 0, which is all that a command makes.  Collective."""
+    from feti_homog.common.mpi_errors import on_root_only
+
+    on_root_only(comm, print_product, text)

@@ -23,6 +23,10 @@ HELD = (errno.EAGAIN, errno.EACCES)
 UNSUPPORTED = (errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP)
 
 
+# Files of temporary locks that this process holds.
+_held_files: set[Path] = set()
+
+
 class LockHeld(Exception):
     """Somebody else holds the lock; the text says who."""
 
@@ -106,12 +110,14 @@ class TemporaryLock(Lock):
         while not self._is_at_path():  # its last holder removed the file after it was opened here
             self._close()
             super().acquire()
+        _held_files.add(self.path)
 
     def release(self) -> None:
         """Remove the file and give the lock back, if it is held."""
         if self._file >= 0:
             with contextlib.suppress(OSError):
                 self.path.unlink()
+        _held_files.discard(self.path)
         self._close()
 
     def _is_at_path(self) -> bool:
@@ -119,6 +125,13 @@ class TemporaryLock(Lock):
             return os.path.samestat(os.fstat(self._file), self.path.stat())
         except FileNotFoundError:
             return False
+
+
+def remove_files_of_held_locks() -> None:
+    """Remove the files of temporary locks that this process holds, for it is about to end without giving them back."""
+    for path in tuple(_held_files):
+        with contextlib.suppress(OSError):
+            path.unlink()
 
 
 def holder(path: Path) -> str | None:

@@ -8,6 +8,7 @@ import traceback
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
+from feti_homog.common.standard_streams import complain
 from feti_homog.errors import EXIT_DEFECT, FetiHomogError
 
 if TYPE_CHECKING:
@@ -71,12 +72,12 @@ def run_main(comm: Comm, main: Callable[[], int]) -> int:
     except FetiHomogError as error:
         all_came = others_come(comm, ARRIVAL_TIMEOUT_S)
         if comm.rank == 0 or not all_came:
-            print(*(f"error: {fault}" for fault in error.faults), sep="\n", file=sys.stderr, flush=True)
+            complain(*(f"error: {fault}" for fault in error.faults))
         if not all_came:
             abort(comm, error.exit_code)
         return error.exit_code
     except Exception:
-        print(f"rank {comm.rank} of {comm.size}:\n{traceback.format_exc()}", file=sys.stderr, flush=True)
+        complain(f"rank {comm.rank} of {comm.size}:\n{traceback.format_exc()}")
         abort(comm, EXIT_DEFECT)
 
 

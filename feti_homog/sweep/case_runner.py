@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from feti_homog.analysis.runner import run
 from feti_homog.common.file_locks import Lock, LockHeld
 from feti_homog.common.mpi_errors import ARRIVAL_TIMEOUT_S, on_root, on_root_only, others_come
+from feti_homog.common.standard_streams import say
 from feti_homog.config.case import Case
 from feti_homog.errors import CaseError, ConvergenceError, FetiHomogError, MeshError
 from feti_homog.sweep import store
@@ -93,4 +94,4 @@ class CaseRunner:
 
     def _print(self, line: str) -> None:
         if self.comm.rank == 0 and not self.quiet:
-            print(line, flush=True)
+            say(line)
