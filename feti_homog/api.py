@@ -144,13 +144,13 @@ def start(command: Callable[[Sequence[str], Intracomm], int], argv: Sequence[str
     # Debian's h5py is the MPI build only if it is told so before its first import.
     os.environ["H5PY_ALWAYS_USE_MPI"] = "1"
     standard_streams.prepare()
+    end_on_signals()
     from mpi4py import MPI
 
     from feti_homog.common.mpi_errors import run_main
 
     def main() -> int:
         _start_petsc(petsc, MPI.COMM_WORLD)
-        end_on_signals(is_speaker=MPI.COMM_WORLD.rank == 0)
         return command(words, MPI.COMM_WORLD)
 
     return run_main(MPI.COMM_WORLD, main)

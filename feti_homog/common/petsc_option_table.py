@@ -81,6 +81,7 @@ PREFIXES = ("feti_ksp_", "feti_pc_", *DIRECT_PREFIXES)
 CLOSE = 0.9
 """Similarity (difflib's, 1 for equal names) from which on a name is taken for a misspelt one: a letter or two."""
 
+
 def unknown_options(names: Iterable[str]) -> list[str]:
     """One fault for each name (without dash) that begins with feti_ but is no option of the solver."""
     unknown = [n for n in names if n.startswith("feti_") and not is_in_table(n) and not solver_prefix(n)]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 
 from petsc4py import PETSc
 
@@ -80,7 +81,7 @@ def examine(given: Mapping[str, str]) -> tuple[list[str], set[str]]:
     for prefix in DIRECT_PREFIXES:
         own = {name: value for name, value in tried.items() if solver_prefix(name) == prefix}
         library = PETSc.Mat.SolverType.MUMPS if prefix in MUMPS_PREFIXES else None
-        found, read_here = Trial(prefix, lambda library=library: _solve_directly(library)).examine(own)
+        found, read_here = Trial(prefix, partial(_solve_directly, library)).examine(own)
         faults += found
         read |= read_here
     return faults, read

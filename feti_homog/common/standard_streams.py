@@ -11,12 +11,14 @@ from feti_homog.errors import CaseError
 
 
 def prepare() -> None:
-    """Call before anything is printed or opened: characters that the locale lacks are escaped, closed streams silent."""
+    """Call before anything is printed: characters that the locale lacks are escaped, and closed streams are silent."""
     for number in (0, 1, 2):
         try:
             os.fstat(number)
         except OSError:  # the next file that is opened would take its place, and what is printed
             os.open(os.devnull, os.O_RDWR)
+    sys.stdout = sys.stdout or open(os.devnull, "w")  # noqa: SIM115 (None if it was closed)
+    sys.stderr = sys.stderr or open(os.devnull, "w")  # noqa: SIM115
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
