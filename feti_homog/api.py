@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from feti_homog.common.matplotlib_toolkits import prefer_own_toolkits
 from feti_homog.common.petsc_option_table import split_argv
 from feti_homog.config.case import Case
 from feti_homog.errors import EXIT_DONE
@@ -138,6 +139,7 @@ def start(command: Callable[[Sequence[str], Intracomm], int], argv: Sequence[str
     Returns the exit code of `run_main`.
     """
     words, petsc = split_argv(sys.argv[1:] if argv is None else argv)
+    prefer_own_toolkits()
     # Debian's h5py is the MPI build only if it is told so before its first import.
     os.environ["H5PY_ALWAYS_USE_MPI"] = "1"
     import petsc4py
@@ -170,6 +172,7 @@ def _parsed_main(
 
 def _started(comm: Intracomm | None) -> Intracomm:
     """The communicator, all ranks' by default, with PETSc started."""
+    prefer_own_toolkits()
     os.environ.setdefault("H5PY_ALWAYS_USE_MPI", "1")
     from mpi4py import MPI
 
