@@ -10,6 +10,7 @@ import h5py
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from feti_homog.errors import FetiHomogError
@@ -26,6 +27,7 @@ from feti_homog.output.plots.plot_helpers import (
     figure_of,
     fill_triangles,
     label_cell_axes,
+    largest_length,
     load_label,
     magnification,
     save,
@@ -35,6 +37,7 @@ from feti_homog.typing import Array
 
 MESH_LINES = 6000  # triangles up to which their edges are drawn
 OUTLINED_BODIES = 8  # up to which the deformed cell is drawn over all that it has left
+UNDEFORMED = "0.5"
 MATRIX = "#ece8df"
 FIBRES = ("Blues", "Oranges", "Greens", "Purples", "Reds", "Greys")  # one colour map for each phase
 
@@ -109,7 +112,7 @@ def _cell(attributes: Any, drawn: DrawnMesh, borders: Array) -> Figure:
     right.set_title(_count(subdomains, "subdomain", "subdomains"))
     right.set_ylabel("")
     figure.suptitle(attributes["title"], fontsize=12)
-    left.legend(handles=legend, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=3, frameon=False)
+    figure.legend(handles=legend, loc="outside lower center", ncols=4, frameon=False)
     return figure
 
 
@@ -125,7 +128,8 @@ def _deformed(
     attributes, strain = file.attrs, state.attrs["strain"]
     figure, (axes,) = figure_of(attributes, panels=1)
     displacement = nodal_values(state["displacement"], drawn)
-    scale = output.get("deformation_scale") or magnification(displacement, drawn.points)
+    seen = magnification(largest_length(displacement), float(np.ptp(drawn.points, axis=0).min()))
+    scale = output.get("deformation_scale") or seen
     component = output.get("stress", "auto")
     if component not in STRESS_SYMBOLS:
         component = list(STRESS_SYMBOLS)[_unit_case(strain) or 0]
@@ -133,15 +137,16 @@ def _deformed(
     norm, colours, extend = colour_range(stress)
     moved = drawn.points + scale * displacement
     picture = fill_triangles(axes, drawn, moved, stress, edges=False, norm=norm, cmap=colours)
-    draw_segments(axes, _left(attributes, drawn, borders), "0.5", 0.7)
+    draw_segments(axes, _left(attributes, drawn, borders), UNDEFORMED, 0.7)
     draw_segments(axes, moved[borders], "black", 0.8)
-    handles = interface_edges.mark(axes, moved, state["status"][:])
+    marks = interface_edges.mark(axes, moved, state["status"][:])
     label_cell_axes(axes, attributes)
     bar = figure.colorbar(picture, cax=axes.inset_axes((1.03, 0.0, 0.04, 1.0)), extend=extend)
     bar.set_label(f"${STRESS_SYMBOLS[component]}$ " + (unit_label(attributes["stress_unit"]) or "(unit of the moduli)"))
     axes.set_title(f"{attributes['title']}\n{load_label(strain)}, displacement × {scale:g}".lstrip())
-    if len(handles) > 1:
-        axes.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=3, frameon=False)
+    undeformed = Line2D([], [], color=UNDEFORMED, linewidth=0.7, label="undeformed")
+    handles = [*(marks if len(marks) > 1 else ()), undeformed]
+    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), frameon=False)
     return figure
 
 

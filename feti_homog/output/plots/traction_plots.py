@@ -57,7 +57,7 @@ def _figure(file: Any, names: list[str]) -> Figure:
                 _curves(axes, quantity, angle, file[f"state/{name}/{quantity}"][:][own], name == names[-1])
             _finish(axes)
         row[0].set_title(f"fibre {number - first + 1}", fontsize=10, loc="left")
-    _labels(file, figure, grid, names)
+    _labels(file, figure, grid, names, status[np.isin(fibre, chosen)])
     return figure
 
 
@@ -83,7 +83,7 @@ def _finish(axes: Axes) -> None:
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def _labels(file: Any, figure: Figure, grid: Any, names: list[str]) -> None:
+def _labels(file: Any, figure: Figure, grid: Any, names: list[str], shaded: Array) -> None:
     stress = unit_label(file.attrs["stress_unit"]) or "(unit of the moduli)"
     length = unit_label(file.attrs["length_unit"]) or "(cell units)"
     for row in grid:
@@ -94,7 +94,9 @@ def _labels(file: Any, figure: Figure, grid: Any, names: list[str]) -> None:
     for axes in grid[0]:
         axes.legend(frameon=False, fontsize=9, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.1, ncols=2)
     patches = [
-        Patch(color=STATE_COLOURS[kind], alpha=0.18, linewidth=0, label=STATE_NAMES[kind]) for kind in (OPEN, CLOSED)
+        Patch(color=STATE_COLOURS[kind], alpha=0.18, linewidth=0, label=STATE_NAMES[kind])
+        for kind in (OPEN, CLOSED)
+        if kind in shaded
     ]
     figure.legend(handles=patches, loc="outside lower center", ncols=2, frameon=False)
     first, last = (file[f"state/{name}"].attrs for name in (names[0], names[-1]))

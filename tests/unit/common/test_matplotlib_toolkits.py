@@ -16,7 +16,11 @@ toolkits.__path__ = [sys.argv[1]]
 sys.modules["mpl_toolkits"] = toolkits
 """
 PAIR = "from feti_homog.common.matplotlib_toolkits import prefer_own_toolkits; prefer_own_toolkits()\n"
-CHECK = "assert 'matplotlib' not in sys.modules\nfrom matplotlib import figure, projections\nprint('3d' in projections.get_projection_names())"
+CHECK = """
+assert 'matplotlib' not in sys.modules
+from matplotlib import figure, projections
+print('3d' in projections.get_projection_names())
+"""
 
 
 def words_of(tmp_path: Path, program: str) -> tuple[str, str]:
