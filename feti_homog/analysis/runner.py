@@ -119,7 +119,8 @@ class _States:
             return None
         cell = self._cell
         mesh, interface = field_parts.mesh_part(cell), field_parts.interface_part(cell)
-        return Fields(cell.comm, field_parts.header(cell), mesh, interface, tuple(self._states))
+        fibres = field_parts.fibre_part(cell)
+        return Fields(cell.comm, field_parts.header(cell), mesh, fibres, interface, tuple(self._states))
 
 
 def _run_and_write(cell: TornCell, directory: Path, progress: Progress, resume: bool, keep_fields: bool) -> Result:
@@ -153,6 +154,7 @@ def _field_file(cell: TornCell, directory: Path, progress: Progress) -> FieldFil
             cell.comm,
             field_parts.header(cell),
             field_parts.mesh_part(cell),
+            field_parts.fibre_part(cell),
             field_parts.interface_part(cell),
         )
 
