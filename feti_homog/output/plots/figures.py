@@ -18,10 +18,12 @@ from feti_homog.mechanics.voigt import STRAINS
 from feti_homog.output.files import field_file, result_json
 from feti_homog.output.plots import deformed_panels, response_curves, traction_plots
 from feti_homog.output.plots.decimation import DrawnMesh, drawn_mesh, nodal_values, outline_edges, triangle_means
+from feti_homog.output.plots.fibre_numbers import write_fibre_numbers
 from feti_homog.output.plots.interface_marks import InterfaceEdges
 from feti_homog.output.plots.plot_helpers import (
     STRESS_SYMBOLS,
     STYLE,
+    cell_scale,
     colour_range,
     draw_segments,
     figure_of,
@@ -73,7 +75,7 @@ def _pictures(directory: Path, document: Mapping[str, Any], output: Mapping[str,
         drawn = drawn_mesh(file)
         borders = outline_edges(drawn, drawn.body)
         interface_edges = InterfaceEdges.of(file, drawn, borders)
-        paths = [save(_cell(file.attrs, drawn, borders), directory / "cell.png")]
+        paths = [save(_cell(file, drawn, borders), directory / "cell.png")]
         if "angle" in document or "path" in document:
             paths += deformed_panels.plot(directory, file, document)
         else:
@@ -81,7 +83,7 @@ def _pictures(directory: Path, document: Mapping[str, Any], output: Mapping[str,
                 state = file[f"state/{number}"]
                 figure = _deformed(file, state, drawn, borders, interface_edges, output)
                 paths.append(save(figure, directory / f"{_name(number, state.attrs['strain'])}.png"))
-        return paths + traction_plots.plot(directory, file, "path" in document)
+        return paths + traction_plots.plot(directory, file, interface_edges, "path" in document)
 
 
 def _name(number: str, strain: Array) -> str:
@@ -97,8 +99,9 @@ def _unit_case(strain: Array) -> int | None:
     return cases[0] if cases else None
 
 
-def _cell(attributes: Any, drawn: DrawnMesh, borders: Array) -> Figure:
-    """The phases, each body in a shade of its own, beside the subdomains."""
+def _cell(file: Any, drawn: DrawnMesh, borders: Array) -> Figure:
+    """The phases, each body in a shade of its own and with the fibre's number, beside the subdomains."""
+    attributes = file.attrs
     figure, (left, right) = figure_of(attributes, panels=2)
     edges = len(drawn.triangles) <= MESH_LINES
     bodies, subdomains = drawn.body.max() + 1, drawn.subdomain.max() + 1
@@ -108,6 +111,7 @@ def _cell(attributes: Any, drawn: DrawnMesh, borders: Array) -> Figure:
         draw_segments(axes, drawn.points[borders], "black", 0.9)
         label_cell_axes(axes, attributes)
     draw_segments(right, drawn.points[outline_edges(drawn, drawn.subdomain)], "black", 0.5)
+    write_fibre_numbers(left, file, drawn, borders, cell_scale(attributes))
     left.set_title(_count(bodies, "body", "bodies"))
     right.set_title(_count(subdomains, "subdomain", "subdomains"))
     right.set_ylabel("")

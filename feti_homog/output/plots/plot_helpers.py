@@ -54,9 +54,14 @@ def _trimmed(pixels: Array, padding: int) -> Array:
 
 def figure_of(attributes: Any, panels: int) -> tuple[Figure, Sequence[Axes]]:
     width, height = float(attributes["width"]), float(attributes["height"])
-    inches = CELL_INCHES / max(width, height)
+    inches = cell_scale(attributes)
     figure = Figure(figsize=(panels * (width * inches + 0.7) + 0.1, height * inches + 1.2), layout="constrained")
     return figure, figure.subplots(1, panels, squeeze=False)[0]
+
+
+def cell_scale(attributes: Any) -> float:
+    """Inches in the picture for a length unit of the cell."""
+    return CELL_INCHES / max(float(attributes["width"]), float(attributes["height"]))
 
 
 def label_cell_axes(axes: Axes, attributes: Any) -> None:
