@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from feti_homog.errors import LibraryError
 
 if TYPE_CHECKING:
-    from mpi4py.MPI import Comm
+    from mpi4py.MPI import Intracomm
 
 DEBIAN_PETSC = Path("/usr/lib/petscdir")
 DEBIAN_MODULES = "/usr/lib/python3/dist-packages"
@@ -34,7 +34,7 @@ def require() -> None:
         raise LibraryError(*filter(None, faults))
 
 
-def start_petsc(words: Sequence[str], comm: Comm) -> None:
+def start_petsc(words: Sequence[str], comm: Intracomm) -> None:
     """Start PETSc with the words of a command line, the program's name first.  Collective over `comm`.
 
     At its end PETSc does not list options that nobody read, unless -options_left asks for it: the program refuses
@@ -81,7 +81,7 @@ def _fault(name: str, advice: str) -> str:
 
 
 def _unfit(name: str, error: Exception, advice: str) -> str:
-    """Of a module that is there and cannot be imported; errors about NumPy's types mean that it was built for another."""
+    """Of a module that cannot be imported; errors about NumPy's types mean that it was built for another release."""
     if "numpy" not in str(error):
         return f"{name} cannot be imported ({error}): {advice}"
     import numpy as np
