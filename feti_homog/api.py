@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from feti_homog.common import libraries
 from feti_homog.common.petsc_option_table import split_argv
 from feti_homog.config.case import Case
-from feti_homog.errors import EXIT_DONE, LibraryError
+from feti_homog.errors import EXIT_DONE, CaseError, LibraryError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -59,7 +59,7 @@ def run(
 
     if out is None:
         return runner.compute(case, comm, fields)
-    return runner.run(case, Path(out), comm, quiet, resume, fields)
+    return runner.run(case, folder(out), comm, quiet, resume, fields)
 
 
 def run_sweep(
@@ -90,7 +90,7 @@ def run_sweep(
 
     expanded = on_root(comm, _expanded, cases)
     group = comm.size if ranks_per_case is None else ranks_per_case
-    execute.run_all(expanded, Path(out), comm, group, retry, quiet)
+    execute.run_all(expanded, folder(out), comm, group, retry, quiet)
     return on_root(comm, collect.read, Path(out))
 
 
@@ -152,6 +152,13 @@ def start(command: Callable[[Sequence[str], Intracomm], int], argv: Sequence[str
     from feti_homog.common.mpi_errors import run_main
 
     return run_main(MPI.COMM_WORLD, lambda: command(words, MPI.COMM_WORLD))
+
+
+def folder(name: str | Path) -> Path:
+    """The folder of that name.  Raises CaseError for an empty one, by which Path means the current folder."""
+    if name == "":
+        raise CaseError('"" is no name of a folder; the current one is "."')
+    return Path(name)
 
 
 def parsed(parser: argparse.ArgumentParser, words: Sequence[str], comm: Intracomm) -> argparse.Namespace:
