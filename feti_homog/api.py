@@ -11,12 +11,13 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from feti_homog.common import standard_streams
+from feti_homog.common import libraries, standard_streams
 from feti_homog.common.command_words import named_values, petsc_words, split_argv
-from feti_homog.common.interrupts import end_on_signals
+from feti_homog.common.interrupts import end_on_signals, launched_rank
+from feti_homog.common.matplotlib_toolkits import prefer_own_toolkits
 from feti_homog.common.petsc_option_values import faulty_values
 from feti_homog.config.case import Case
-from feti_homog.errors import EXIT_DONE, CaseError
+from feti_homog.errors import EXIT_DONE, CaseError, LibraryError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -51,6 +52,7 @@ def run(
         TypeError: `case` is not a Case.
         CaseError, MeshError: the case cannot be run, or `out` cannot be used.
         ConvergenceError: a solve did not converge or a check failed; what was computed is in `out`.
+        LibraryError: mpi4py, petsc4py or h5py is missing or does not fit.
     """
     if not isinstance(case, Case):
         kind = type(case).__name__
@@ -60,7 +62,7 @@ def run(
 
     if out is None:
         return runner.compute(case, comm, fields)
-    return runner.run(case, Path(out), comm, quiet, resume, fields)
+    return runner.run(case, folder(out), comm, quiet, resume, fields)
 
 
 def run_sweep(
@@ -91,7 +93,7 @@ def run_sweep(
 
     expanded = on_root(comm, _expanded, cases)
     group = comm.size if ranks_per_case is None else ranks_per_case
-    execute.run_all(expanded, Path(out), comm, group, retry, quiet)
+    execute.run_all(expanded, folder(out), comm, group, retry, quiet)
     return on_root(comm, collect.read, Path(out))
 
 
@@ -141,10 +143,15 @@ def start(command: Callable[[Sequence[str], Intracomm], int], argv: Sequence[str
     Returns the exit code of `run_main`.
     """
     words, petsc = split_argv(sys.argv[1:] if argv is None else argv)
-    # Debian's h5py is the MPI build only if it is told so before its first import.
-    os.environ["H5PY_ALWAYS_USE_MPI"] = "1"
     standard_streams.prepare()
     end_on_signals()
+    prefer_own_toolkits()
+    try:
+        libraries.require()
+    except LibraryError as error:
+        if launched_rank() == 0:  # there may be no mpi4py to ask
+            standard_streams.complain(*(f"error: {fault}" for fault in error.faults))
+        return error.exit_code
     from mpi4py import MPI
 
     from feti_homog.common.mpi_errors import run_main
@@ -161,17 +168,23 @@ def _start_petsc(words: Sequence[str], comm: Intracomm) -> None:
 
     Raises:
         CaseError: it cannot be started with them.
+        LibraryError: petsc4py does not fit NumPy.
     """
     options = named_values(words)
     faults = faulty_values(options)
     if faults:
         raise CaseError(*faults)
-    import petsc4py
-
     try:
-        petsc4py.init([sys.argv[0], *petsc_words(options)], comm=comm)
+        libraries.start_petsc([sys.argv[0], *petsc_words(options)], comm)
     except RuntimeError as error:  # PETSc's own, which there is no PETSc yet to name
         raise CaseError(f"PETSc does not start with {' '.join(words)}: {error}") from error
+
+
+def folder(name: str | Path) -> Path:
+    """The folder of that name.  Raises CaseError for an empty one, by which Path means the current folder."""
+    if name == "":
+        raise CaseError('"" is no name of a folder; the current one is "."')
+    return Path(name)
 
 
 def parsed(parser: argparse.ArgumentParser, words: Sequence[str], comm: Intracomm) -> argparse.Namespace:
@@ -202,14 +215,13 @@ def _parsed_main(
 
 def _started(comm: Intracomm | None) -> Intracomm:
     """The communicator, all ranks' by default, with PETSc started."""
-    os.environ.setdefault("H5PY_ALWAYS_USE_MPI", "1")
+    prefer_own_toolkits()
+    libraries.require()
     from mpi4py import MPI
 
     if "petsc4py.PETSc" not in sys.modules:
-        import petsc4py
-
         # On more ranks it would wait for those that run no case, or have run one; cases bring their own communicator.
-        petsc4py.init([], comm=MPI.COMM_SELF)
+        libraries.start_petsc([], MPI.COMM_SELF)
     return MPI.COMM_WORLD if comm is None else comm
 
 

@@ -36,9 +36,14 @@ def end_on_signals() -> None:
         threading.Thread(target=_wait_and_end, args=(awaited,), daemon=True).start()
 
 
+def launched_rank() -> int:
+    """The rank of this process among those that a launcher started, as far as that says it; does not need MPI."""
+    return int(next((os.environ[name] for name in RANK_VARIABLES if name in os.environ), 0))
+
+
 def _wait_and_end(awaited: set[signal.Signals]) -> None:
     number = signal.sigwait(awaited)
-    if int(next((os.environ[name] for name in RANK_VARIABLES if name in os.environ), 0)) == 0:
+    if launched_rank() == 0:
         complain(f"error: interrupted by {signal.Signals(number).name}")
     else:
         time.sleep(SILENT_SECONDS)
