@@ -131,10 +131,12 @@ def _check(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.config.sweep_section import SWEEP
     from feti_homog.homogenization.unit_cell import describe
     from feti_homog.sweep import plan
+    from feti_homog.sweep.option_checks import check_options
 
     document = on_root(comm, read_document, arguments.case)
     if SWEEP in document:
         sweep = on_root(comm, plan.load, arguments.case)
+        check_options(sweep)
         case, points = sweep.cases[0], len({entry.point for entry in sweep.entries})
         words = f"sweep      {len(sweep.cases)} cases, {points} points, all of them valid; the first:\n"
     else:

@@ -100,10 +100,7 @@ class Lock:
 
 
 class TemporaryLock(Lock):
-    """An exclusive lock whose file is removed when the lock is given back."""
-
-    def __init__(self, path: Path, timeout: float = LOCK_TIMEOUT_S) -> None:
-        super().__init__(path, shared=False, timeout=timeout)
+    """A lock whose file is removed when its last holder gives it back."""
 
     def acquire(self) -> None:
         """Take the lock.  Raises as `Lock.acquire`."""
@@ -111,15 +108,24 @@ class TemporaryLock(Lock):
         while not self._is_at_path():  # its last holder removed the file after it was opened here
             self._close()
             super().acquire()
-        _held_files.add(self.path)
+        if not self.shared:
+            _held_files.add(self.path)
 
     def release(self) -> None:
-        """Remove the file and give the lock back, if it is held."""
-        if self._file >= 0:
+        """Give the lock back, if it is held, and remove its file unless others share it."""
+        if self._file >= 0 and self._is_alone():
             with contextlib.suppress(OSError):
                 self.path.unlink()
         _held_files.discard(self.path)
         self._close()
+
+    def _is_alone(self) -> bool:
+        """Whether nobody shares the lock; then it is exclusive."""
+        try:
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            return False
+        return self._is_at_path()
 
     def _is_at_path(self) -> bool:
         try:

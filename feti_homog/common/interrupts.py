@@ -44,7 +44,7 @@ def launched_rank() -> int:
 def _wait_and_end(awaited: set[signal.Signals]) -> None:
     number = signal.sigwait(awaited)
     if launched_rank() == 0:
-        complain(f"error: interrupted by {signal.Signals(number).name}")
+        complain(f"interrupted by {signal.Signals(number).name}")
     else:
         time.sleep(SILENT_SECONDS)
     file_locks.remove_files_of_held_locks()

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from feti_homog.common.file_locks import Lock, LockHeld
+from feti_homog.common.file_locks import LockHeld, TemporaryLock
 from feti_homog.common.mpi_errors import ARRIVAL_TIMEOUT_S, on_root, on_root_only, others_come
 from feti_homog.common.standard_streams import complain, say
 from feti_homog.errors import CaseError, ConvergenceError, FetiHomogError
@@ -129,7 +129,7 @@ def _reset_failures(directory: Path, sweep: Sweep) -> None:
 @contextmanager
 def _sweep_lock(directory: Path, comm: Intracomm, sweep: Sweep, shared: bool) -> Iterator[None]:
     """The folder made and held: by one sweep, or by any number of single cases.  Collective."""
-    lock = Lock(directory / LOCK_FILE, shared)
+    lock = TemporaryLock(directory / LOCK_FILE, shared)
     on_root(comm, _prepare_and_lock, lock, directory, sweep)
     try:
         yield
@@ -137,7 +137,7 @@ def _sweep_lock(directory: Path, comm: Intracomm, sweep: Sweep, shared: bool) ->
         lock.release()
 
 
-def _prepare_and_lock(lock: Lock, directory: Path, sweep: Sweep) -> None:
+def _prepare_and_lock(lock: TemporaryLock, directory: Path, sweep: Sweep) -> None:
     store.prepare_folder(directory, sweep)
     try:
         lock.acquire()
