@@ -23,7 +23,7 @@ from feti_homog.output.plots.interface_marks import InterfaceEdges
 def write(directory: Path, whole: Sample) -> Path:
     from mpi4py import MPI
 
-    with FieldFile(directory, MPI.COMM_SELF, whole.header, whole.mesh, whole.interface) as file:
+    with FieldFile(directory, MPI.COMM_SELF, whole.header, whole.mesh, whole.fibres, whole.interface) as file:
         for k, state in enumerate(whole.states):
             file.write_state(k, state)
     return directory / "result.h5"
