@@ -80,7 +80,7 @@ def command_parser() -> Parser:
     plot.set_defaults(action=_plot)
     verify = actions.add_parser("verify", help="check from its files alone that a result obeys its laws",
                                 description=VERIFY_HELP)  # fmt: skip
-    verify.add_argument("directory", type=Path, metavar="DIR")
+    verify.add_argument("directory", type=folder, metavar="DIR")
     verify.add_argument("--json", action="store_true", help="print the certificate as JSON")
     _add_sweep(actions.add_parser("sweep", help="run the cases of a file with [sweep]", description=SWEEP_HELP))
     collect = actions.add_parser(
