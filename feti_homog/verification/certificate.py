@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.errors import CaseError
+from feti_homog.verification.arc_laws import check_arcs
 from feti_homog.verification.discrete_cell import DiscreteCell
 from feti_homog.verification.field_laws import check_fields
 from feti_homog.verification.interface_laws import check_interface_state
@@ -72,7 +73,7 @@ def verify(directory: Path) -> Certificate:
 
 
 def _verified(files: ResultFiles) -> Certificate:
-    ledger = Ledger(laws(float(files.document["solver"]["rtol"])))
+    ledger = Ledger(laws(float(files.document["solver"]["rtol"]), files.case["cell"]["geometry"] == "mesh"))
     cell = DiscreteCell.of(files)
     check_mesh(ledger, cell)
     check_interface(ledger, cell)
@@ -85,6 +86,7 @@ def _verified(files: ResultFiles) -> Certificate:
         check_interface_state(ledger, cell, state)
         states.append(StateNumbers.of(cell, state, fields))
     check_load(ledger, cell, states)
+    check_arcs(ledger, cell, states)
     if "path" in files.document:
         check_path(ledger, cell, states)
     check_summary(ledger, cell)

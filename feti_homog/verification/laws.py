@@ -17,16 +17,20 @@ CHECK_PER_RTOL, LARGEST_CHECK = 1e3, 1e-4
 CONTACT_PER_RTOL, LEAST_CONTACT = 100.0, 1e-6
 # Bonds whose utilisation differs by 1e-6 break together.
 STRENGTH = 2e-6
+# Coordinates of a user's mesh are rounded: sides match to 1e-7 of the cell, circles are round to 1e-6 of their radius.
+OWN_MESH, USERS_MESH = 1e-9, 1e-5
 
 
-def laws(rtol: float) -> tuple[Law, ...]:
+def laws(rtol: float, users_mesh: bool) -> tuple[Law, ...]:
     """The laws of a result whose dual problems were solved to the relative tolerance `rtol`."""
+    shape = USERS_MESH if users_mesh else OWN_MESH
     solver = min(CHECK_PER_RTOL * rtol, LARGEST_CHECK)
     contact = min(max(CONTACT_PER_RTOL * rtol, LEAST_CONTACT), LARGEST_CHECK)
     return (
         Law("numbers", "all numbers are finite", 0.0),
-        Law("mesh", "elements have positive areas and fill the cell; torn sides meet in pairs", 1e-6),
-        Law("interface", "interface nodes lie where one fibre meets the matrix, all of them, with their normals", 1e-6),
+        Law("mesh", "elements have positive areas and fill the cell; torn sides meet in pairs", shape),
+        Law("interface", "interface nodes are where one fibre meets the matrix, with its normals and lengths", shape),
+        Law("arcs", "debonded from the start is what the case says, in numbers of nodes", 0.0),
         Law("displacement", "u = E x + u*, relative to its terms", 1e-13),
         Law("stress", "stresses of the elements follow from u and the case's materials", 1e-13),
         Law("periodicity", "u* is the same at the copies of a node in its subdomain, relative to the largest u", 1e-13),

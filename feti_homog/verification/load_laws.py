@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -46,6 +47,8 @@ class StateNumbers:
 def check_load(ledger: Ledger, cell: DiscreteCell, states: Sequence[StateNumbers]) -> None:
     """Strains against the case, and points or columns of result.json against the states."""
     document, case = cell.files.document, cell.files.case
+    same = json.loads(str(cell.files.file.attrs["case"])) == case
+    ledger.record("tables", 0.0 if same else np.inf, "the case, which the two files tell otherwise")
     expected = list(_expected_strains(document, case))
     ledger.record("load", abs(len(expected) - len(states)), f"{len(states)} states, {len(expected)} asked for")
     largest = cell.largest_strain or 1.0

@@ -38,12 +38,27 @@ class Mesh:
 
 @dataclass(frozen=True)
 class InterfaceRows:
-    """The k interface nodes: points (k, 2), normals (k, 2) from fibre to matrix, tributary lengths and fibres (k,)."""
+    """The k interface nodes.
+
+    Attributes:
+        points: (k, 2).
+        normal: (k, 2) from fibre to matrix.
+        length: (k,) tributary length.
+        fibre: (k,) number of the fibre, from 1.
+    """
 
     points: Float
     normal: Float
     length: Float
     fibre: AnyInt
+
+
+@dataclass(frozen=True)
+class Fibres:
+    """The f fibres in the order of their numbers: centres (f, 2), radii (f,); NaN where there is none."""
+
+    centre: Float
+    radius: Float
 
 
 @dataclass(frozen=True)
@@ -85,6 +100,7 @@ class ResultFiles:
     phases: tuple[str, ...]
     mesh: Mesh
     interface: InterfaceRows
+    fibres: Fibres
     file: h5py.File
 
     @property
@@ -147,7 +163,8 @@ def _document(path: Path) -> Mapping[str, Any]:
 def _contents(document: Mapping[str, Any], file: h5py.File) -> ResultFiles:
     """The whole of both files but the states."""
     mesh = Mesh(*(_rows(file[f"mesh/{name}"]) for name in ("points", "triangles", "subdomain", "phase")))
-    rows = InterfaceRows(*(_rows(file[f"interface/{name}"]) for name in ("points", "normal", "length", "fibre")))
+    rows = InterfaceRows(*(_rows(file[f"interface/{name}"]) for name in ("points", "normal", "length", "fibre_number")))
+    fibres = Fibres(*(_rows(file[f"fibre/{name}"]) for name in ("centre", "radius")))
     size = np.array([file.attrs["width"], file.attrs["height"]], float)
     phases = tuple(map(str, file.attrs["phases"]))
     n, m, k = len(mesh.points), len(mesh.triangles), len(rows.points)
@@ -158,7 +175,10 @@ def _contents(document: Mapping[str, Any], file: h5py.File) -> ResultFiles:
     _expect(bool((mesh.phase >= 0).all() and (mesh.phase < len(phases)).all()), "/mesh/phase names unknown phases")
     _expect(rows.points.shape == rows.normal.shape == (k, 2), "/interface has tables of different lengths")
     _expect(rows.length.shape == rows.fibre.shape == (k,), "/interface has tables of different lengths")
-    return ResultFiles(document, size, phases, mesh, rows, file)
+    _expect(fibres.centre.shape == (len(fibres.radius), 2), "/fibre has tables of different lengths")
+    within = (rows.fibre >= 1) & (rows.fibre <= len(fibres.radius))
+    _expect(bool(within.all()), "/interface/fibre_number names unknown fibres")
+    return ResultFiles(document, size, phases, mesh, rows, fibres, file)
 
 
 def _rows(table: h5py.Dataset) -> Any:

@@ -56,13 +56,19 @@ def write(kind: str, folder: Path) -> Path:
 
 
 def falsified(folder: Path, copy: Path, edit: Callable[[dict[str, Any], Any], object]) -> Path:
-    """A copy of a result after edit(document of result.json, open result.h5); returns its folder."""
+    """A copy of a result after edit(document of result.json, open result.h5); returns its folder.
+
+    Both files have the case: an edit of that in the document is one of both.
+    """
     import h5py
 
     shutil.copytree(folder, copy)
     path = copy / "result.json"
     content = json.loads(path.read_text())
+    case = json.dumps(content["case"])
     with h5py.File(copy / "result.h5", "r+") as file:
         edit(content, file)
+        if json.dumps(content["case"]) != case:
+            file.attrs["case"] = json.dumps(content["case"])
     path.write_text(json.dumps(content))
     return copy

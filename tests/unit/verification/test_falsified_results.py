@@ -75,7 +75,7 @@ def swap_rows(*names):
         for name in names:
             table = file[name]
             values = table[()]
-            values[[0, 5]] = values[[5, 0]]
+            values[[0, -1]] = values[[-1, 0]]
             table[()] = values
 
     return edit
@@ -108,6 +108,22 @@ def attribute(name, factor=1 + SMALL, state=0):
     return edit
 
 
+def other_fibre(_, file):
+    number = file["interface/fibre_number"]
+    number[0] = 1 if number[0] > 1 else 2
+
+
+def length_and_traction(_, file):
+    """With the same forces: what a node stands for is longer, and pulled less."""
+    file["interface/length"][0] *= 1 + SMALL
+    for state in file["state"].values():
+        state["traction"][0] = state["traction"][0] / (1 + SMALL)
+
+
+def case_of_fields(_, file):
+    file.attrs["case"] = str(file.attrs["case"]).replace("0.299", "0.2991")
+
+
 def delete_state(_, file):
     del file[f"state/{len(file['state']) - 1}"]
 
@@ -122,9 +138,16 @@ FALSE = {
     "one jump": ("angle", scale("jump", state=3), {"jump"}),
     "tractions of two nodes": ("bonded", swap_rows("state/0/traction"), {"equilibrium"}),
     "an interface node moved": ("bonded", shift("points", 1e-3, group="interface"), {"interface", "jump"}),
-    "a length": ("bonded", shift("length", group="interface"), {"equilibrium"}),
-    "a normal": ("bonded", shift("normal", 1e-3, group="interface"), {"equilibrium"}),
-    "fibres of two nodes": ("angle", shift("fibre", 1, group="interface"), {"interface"}),
+    "a length": ("bonded", shift("length", group="interface"), {"interface", "equilibrium"}),
+    "a normal": ("bonded", shift("normal", group="interface"), {"interface", "equilibrium"}),
+    "fibres of two nodes": ("angle", other_fibre, {"interface"}),
+    "a radius": ("bonded", shift("radius", group="fibre"), {"interface"}),
+    "a centre": ("bonded", shift("centre", group="fibre"), {"interface"}),
+    "a length with its traction": ("bonded", length_and_traction, {"interface"}),
+    "the case in one file": ("bonded", case_of_fields, {"tables"}),
+    "an arc": ("contact", document("case", "interface", "debonded", 0, "angle", factor=1.5), {"arcs"}),
+    "where an arc is": ("angle", document("case", "interface", "debonded", 0, "centre", factor=5), {"arcs"}),
+    "an angle": ("angle", document("angle", 1, "angle", to=170.0), {"arcs"}),
     "a mean stress": ("bonded", attribute("stress"), {"mean stress", "tables"}),
     "a strain": ("bonded", attribute("strain"), {"displacement", "load"}),
     "a missing state": ("path", delete_state, {"load"}),
