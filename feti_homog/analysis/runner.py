@@ -151,6 +151,9 @@ def _run_and_write(cell: TornCell, directory: Path, progress: Progress, resume: 
     if cell.case.output.pictures:
         with progress.stage("pictures") as words:
             words.append(", ".join(p.name for p in on_root_only(cell.comm, _draw, directory) or []))
+    if cell.case.output.report:
+        with progress.stage("report") as words:
+            words.append(", ".join(p.name for p in on_root_only(cell.comm, _report, directory) or []))
     progress.say("\n" + summary(replace(result, timings=progress.timings()).document))
     return result
 
@@ -221,3 +224,10 @@ def _draw(directory: Path) -> list[Path]:
     from feti_homog.output.plots import figures
 
     return figures.plot(directory)
+
+
+def _report(directory: Path) -> list[Path]:
+    """report.html; only a rank that writes it loads Bokeh."""
+    from feti_homog.output.report import page
+
+    return [page.write(directory)]

@@ -38,6 +38,7 @@ FLOORS = (
     ("output.files",),
     ("output.text",),
     ("output.plots",),
+    ("output.report",),
     ("output",),
     ("analysis",),
     ("sweep.report",),

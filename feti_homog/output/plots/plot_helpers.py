@@ -55,7 +55,7 @@ def _trimmed(pixels: Array, padding: int) -> Array:
 def figure_of(attributes: Any, panels: int) -> tuple[Figure, Sequence[Axes]]:
     width, height = float(attributes["width"]), float(attributes["height"])
     inches = cell_scale(attributes)
-    figure = Figure(figsize=(panels * (width * inches + 0.7) + 0.1, height * inches + 1.2), layout="constrained")
+    figure = Figure(figsize=(panels * (width * inches + 0.7) + 0.1, height * inches + 1.2), layout="compressed")
     return figure, figure.subplots(1, panels, squeeze=False)[0]
 
 
