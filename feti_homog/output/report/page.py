@@ -20,7 +20,7 @@ from feti_homog.output.files import atomic, field_file, result_json
 from feti_homog.output.report import curves, states, tables
 from feti_homog.output.text.summary import title_of
 
-NAME = "report.html"
+NAME, SWEEP = "report.html", "sweep.json"
 PICTURES = {
     "cell": "The cell: phases, numbers of the fibres, subdomains",
     "case_E11": "Deformed cell under E11",
@@ -85,6 +85,8 @@ def page(document: Document, directory: Path) -> str:
 def _document(directory: Path) -> dict[str, Any]:
     if not directory.is_dir():
         raise CaseError(f"cannot report {directory}: there is no such folder")
+    if (directory / SWEEP).exists():
+        raise CaseError(f"cannot report {directory}: it is the folder of a sweep; name that of one of its cases")
     try:
         return result_json.read(directory)
     except CaseError:

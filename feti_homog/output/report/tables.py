@@ -43,14 +43,14 @@ def facts(document: Document) -> list[tuple[str, str]]:
     case, cell, solver = document["case"], document["cell"], document["solver"]
     length = case["output"].get("length_unit", "")
     fractions = ", ".join(f"{phase} {share:.4f}" for phase, share in cell["fractions"].items())
-    iterations = solver["iterations"]
+    iterations, ranks = solver["iterations"], solver["ranks"]
     return [
         ("Analysis", f"{case['analysis']['type']}, plane {case['analysis']['plane']}"),
         ("Cell", f"{case['cell']['geometry']}, {cell['width']:.6g} x {cell['height']:.6g} {length}".rstrip()),
         ("Phases", fractions),
         ("Mesh", f"{_count(cell['elements'])} elements, {_count(cell['nodes'])} nodes, "
                  f"order {case['cell'].get('order', 1)}, refine {case['cell'].get('refine', 0)}"),
-        ("Solver", f"{_count(solver['ranks'])} ranks, {_count(solver['subdomains'])} subdomains, "
+        ("Solver", f"{_count(ranks)} rank{'' if ranks == 1 else 's'}, {_count(solver['subdomains'])} subdomains, "
                    f"{_count(solver['dofs'])} degrees of freedom"),
         ("Iterations", f"{sum(iterations)} in {len(iterations)} states, to {solver['rtol']:g}"),
         ("Time", ", ".join(f"{stage} {seconds:.2f} s" for stage, seconds in document["timings"].items())),
