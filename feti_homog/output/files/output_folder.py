@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 LOCK = "result.lock"
 # The files of a result, those of all analyses and of what `plot` draws.
 RESULT_FILE = re.compile(
-    r"result\.(json|h5|xdmf)|(angle|path)\.csv|(cell|interface|(angle|path)(_states)?)\.png|path\.gif"
+    r"result\.(json|h5|xdmf)|interface\.xdmf|(angle|path)\.csv|(cell|interface|(angle|path)(_states)?)\.png|path\.gif"
     r"|case_(minus_)?(E11|E22|gamma12)\.png|state_\d+\.png"
 )
 
