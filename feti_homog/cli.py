@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
 from feti_homog import __version__
-from feti_homog.api import parsed, start
+from feti_homog.api import folder, parsed, start
 from feti_homog.common.petsc_option_table import help_text
 from feti_homog.errors import EXIT_DONE, CaseError
 
@@ -59,7 +59,7 @@ def command_parser() -> Parser:
     actions = parser.add_subparsers(dest="command", required=True, parser_class=Parser)
     run = actions.add_parser("run", help="run a case file and write its results to a folder")
     run.add_argument("case", type=Path, metavar="CASE.toml")
-    run.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the results")
+    run.add_argument("--out", type=folder, required=True, metavar="DIR", help="folder of the results")
     run.add_argument("--quiet", action="store_true", help="print nothing but errors")
     run.add_argument("--resume", action="store_true", help="go on from where a path to the same folder was ended")
     run.set_defaults(action=_run)
@@ -67,7 +67,7 @@ def command_parser() -> Parser:
     check.add_argument("case", type=Path, metavar="CASE.toml")
     check.set_defaults(action=_check)
     plot = actions.add_parser("plot", help="make the pictures of a results folder again")
-    plot.add_argument("directory", type=Path, metavar="DIR")
+    plot.add_argument("directory", type=folder, metavar="DIR")
     plot.set_defaults(action=_plot)
     _add_sweep(actions.add_parser("sweep", help="run the cases of a file with [sweep]", description=SWEEP_HELP))
     collect = actions.add_parser(
@@ -76,7 +76,7 @@ def command_parser() -> Parser:
         description="Write sweep.h5 and sweep.csv, with the inputs and outputs of all cases and their statistics over "
         "realisations, and draw what varies. The sweep may still be running: what is there is collected.",
     )
-    collect.add_argument("directory", type=Path, metavar="DIR", help="--out of the sweep")
+    collect.add_argument("directory", type=folder, metavar="DIR", help="--out of the sweep")
     collect.add_argument("--no-pictures", action="store_true", help="make the tables alone")
     collect.set_defaults(action=_collect)
     _add_reference(actions)
@@ -95,7 +95,7 @@ def _add_reference(actions: argparse._SubParsersAction[Parser]) -> None:
 
 def _add_sweep(sweep: argparse.ArgumentParser) -> None:
     sweep.add_argument("case", type=Path, metavar="CASE.toml", help="a case file with a section [sweep]")
-    sweep.add_argument("--out", type=Path, metavar="DIR", help="folder of the sweep, in which each case has its own")
+    sweep.add_argument("--out", type=folder, metavar="DIR", help="folder of the sweep, in which each case has its own")
     one = sweep.add_mutually_exclusive_group()
     one.add_argument("--list", action="store_true", help="print the cases, with --out also their status; run none")
     one.add_argument("--index", type=int, metavar="K", help="run case K alone, counted from 1, as a job array does")

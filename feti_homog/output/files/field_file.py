@@ -88,8 +88,13 @@ class FieldFile:
             "f": len(fibres.number),
         }
         self._rows = {symbol: _Rows.of(comm, count) for symbol, count in counts.items()}
-        on_root(comm, _with_write_errors, self._path, _probe, self.part, comm.size)
-        self._file = agree(comm, _with_write_errors, self._path, _create, self.part, comm)
+        size = self._table_bytes(mesh) + self._table_bytes(interface)
+        on_root(comm, _with_write_errors, self._path, _create, self.part, comm.size, size + RESERVE)
+        # MPI-IO keeps names in short buffers: it has the folder by its descriptor, while the file is open.
+        folder: int = agree(comm, _with_write_errors, self._path, os.open, self.part.parent, os.O_RDONLY)
+        self._folder = contextlib.ExitStack()
+        self._folder.callback(os.close, folder)
+        self._file = agree(comm, _with_write_errors, self._path, _open, folder, self.part.name, comm)
         self._collectively(_set_attributes, self._file, attributes(header) | {"created_by": PROGRAM})
         self._write_part("mesh", replace(mesh, triangles=mesh.triangles + np.int64(self._rows["n"].start)))
         self._write_part("fibre", fibres)
@@ -105,6 +110,7 @@ class FieldFile:
     def close(self) -> Path:
         """Completes the file, gives it its final name, and returns its path."""
         self._collectively(self._file.close)
+        self._folder.close()
         on_root(self._comm, _with_write_errors, self._path, atomic.commit, self.part, self._path)
         return self._path
 
@@ -118,6 +124,13 @@ class FieldFile:
             self.close()
         elif all_raise(self._comm, error):
             self._remove()
+
+    def _table_bytes(self, part: Any) -> int:
+        """Bytes of the tables of a part, those of all ranks."""
+        return sum(
+            np.dtype(d.dtype).itemsize * int(np.prod(np.shape(getattr(part, name))[1:])) * self._rows[rows_of(d)].total
+            for name, d in tables(part).items()
+        )
 
     def _write_part(self, group: str, part: Any) -> None:
         """Makes the tables of a group, each rank giving its rows, and the views of them."""
@@ -163,6 +176,7 @@ class FieldFile:
         self._comm.barrier()
         with contextlib.suppress(OSError, RuntimeError):
             self._file.close()
+        self._folder.close()
         if self._comm.rank == 0:
             with contextlib.suppress(OSError):
                 self.part.unlink()
@@ -174,16 +188,32 @@ def _with_write_errors(path: Path, function: Callable[..., Any], *args: Any) -> 
         return function(*args)
 
 
-def _probe(part: Path, ranks: int) -> None:
-    """Finds out in plain terms whether the file can be made, before MPI-IO tries."""
+def _create(part: Path, ranks: int, size: int) -> None:
+    """Makes an empty HDF5 file with `size` bytes of space, by plain calls: HDF5 may crash or hang where they fail."""
     if ranks > 1 and not h5py.get_config().mpi:
         raise FetiHomogError(f"h5py is built without MPI: {ranks} ranks cannot write {NAME}")
     part.parent.mkdir(parents=True, exist_ok=True)
-    part.open("wb").close()
+    try:
+        with part.open("wb") as stream:
+            stream.write(_empty_file())
+            stream.flush()
+            os.posix_fallocate(stream.fileno(), 0, size)
+    except OSError:
+        part.unlink(missing_ok=True)
+        raise
 
 
-def _create(part: Path, comm: Comm) -> Any:
-    return h5py.File(part, "w", driver="mpio", comm=comm) if h5py.get_config().mpi else h5py.File(part, "w")
+def _empty_file() -> bytes:
+    """An HDF5 file without content."""
+    with h5py.File("empty", "w", driver="core", backing_store=False) as file:
+        file.flush()
+        return bytes(file.id.get_file_image())
+
+
+def _open(folder: int, name: str, comm: Comm) -> Any:
+    """The file of that name in an open folder, opened by all ranks."""
+    path = f"/proc/self/fd/{folder}/{name}"
+    return h5py.File(path, "r+", driver="mpio", comm=comm) if h5py.get_config().mpi else h5py.File(path, "r+")
 
 
 def _create_view(file: Any, view: View, group: str, rows: int, words: Mapping[str, str]) -> None:
