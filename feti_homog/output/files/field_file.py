@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
@@ -88,7 +88,7 @@ class FieldFile:
             "f": len(fibres.number),
         }
         self._rows = {symbol: _Rows.of(comm, count) for symbol, count in counts.items()}
-        size = self._table_bytes(mesh) + self._table_bytes(interface)
+        size = sum(map(self._table_bytes, (mesh, fibres, interface)))
         on_root(comm, _with_write_errors, self._path, _create, self.part, comm.size, size + RESERVE)
         # MPI-IO keeps names in short buffers: it has the folder by its descriptor, while the file is open.
         folder: int = agree(comm, _with_write_errors, self._path, os.open, self.part.parent, os.O_RDONLY)
@@ -139,12 +139,12 @@ class FieldFile:
             own = {name: d for name, d in described.items() if rows_of(d) == symbol}
             if own:
                 self._write_tables(group, rows, part, own)
-        for view in VIEWS.get(GROUP_OF_STATES if group.startswith("state/") else group, ()):
-            source = described[view.source]
-            total = self._rows[rows_of(source)].total
-            if total:
-                words = self._words(source) | {"meaning": view.words}
-                self._collectively(_create_view, self._file, view, group, total, words)
+        views = VIEWS.get(GROUP_OF_STATES if group.startswith("state/") else group, ())
+        rows_and_words = [
+            (self._rows[rows_of(source)].total, self._words(source) | {"meaning": view.words})
+            for view, source in ((view, described[view.source]) for view in views)
+        ]
+        self._collectively(_create_views, self._file, group, views, rows_and_words)
 
     def _write_tables(self, group: str, rows: _Rows, part: Any, described: Mapping[str, Description]) -> None:
         """Makes tables of the same rows of a part."""
@@ -214,6 +214,15 @@ def _open(folder: int, name: str, comm: Comm) -> Any:
     """The file of that name in an open folder, opened by all ranks."""
     path = f"/proc/self/fd/{folder}/{name}"
     return h5py.File(path, "r+", driver="mpio", comm=comm) if h5py.get_config().mpi else h5py.File(path, "r+")
+
+
+def _create_views(
+    file: Any, group: str, views: Sequence[View], rows_and_words: Sequence[tuple[int, Mapping[str, str]]]
+) -> None:
+    """Makes the virtual datasets of a group, each with its number of rows, which may be none, and its attributes."""
+    for view, (rows, words) in zip(views, rows_and_words, strict=True):
+        if rows:
+            _create_view(file, view, group, rows, words)
 
 
 def _create_view(file: Any, view: View, group: str, rows: int, words: Mapping[str, str]) -> None:
