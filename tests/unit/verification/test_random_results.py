@@ -11,7 +11,7 @@ from feti_homog import Case, run
 from feti_homog.verification.certificate import verify
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3, 5, 6, 7, 8, 10])
+@pytest.mark.parametrize("seed", [1, 3, 5, 6, 10, 15])
 def test_random_cases_obey_every_law(tmp_path, seed):
     case = Case.parse(random_document(np.random.default_rng(seed)))
     run(case, MPI.COMM_SELF, out=tmp_path)
