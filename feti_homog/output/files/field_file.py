@@ -78,8 +78,8 @@ class FieldFile:
         interface: InterfacePart,
     ) -> None:
         self._comm = comm
-        self._path = Path(directory) / NAME
-        self.part: Path = on_root(comm, atomic.part_of, self._path)
+        self.path = Path(directory) / NAME
+        self.part: Path = on_root(comm, atomic.part_of, self.path)
         self._units = {LENGTH: header.length_unit, STRESS: header.stress_unit}
         counts = {
             "n": len(mesh.points),
@@ -88,13 +88,14 @@ class FieldFile:
             "f": len(fibres.number),
         }
         self._rows = {symbol: _Rows.of(comm, count) for symbol, count in counts.items()}
-        size = self._table_bytes(mesh) + self._table_bytes(interface)
-        on_root(comm, _with_write_errors, self._path, _create, self.part, comm.size, size + RESERVE)
+        size = sum(map(self._table_bytes, (mesh, fibres, interface)))
+        on_root(comm, _with_write_errors, self.path, _create, self.part, comm.size, size + RESERVE)
         # MPI-IO keeps names in short buffers: it has the folder by its descriptor, while the file is open.
-        folder: int = agree(comm, _with_write_errors, self._path, os.open, self.part.parent, os.O_RDONLY)
+        folder: int = agree(comm, _with_write_errors, self.path, os.open, self.part.parent, os.O_RDONLY)
+        self._is_open = True
         self._folder = contextlib.ExitStack()
         self._folder.callback(os.close, folder)
-        self._file = agree(comm, _with_write_errors, self._path, _open, folder, self.part.name, comm)
+        self._file = agree(comm, _with_write_errors, self.path, _open, folder, self.part.name, comm)
         self._collectively(_set_attributes, self._file, attributes(header) | {"created_by": PROGRAM})
         self._write_part("mesh", replace(mesh, triangles=mesh.triangles + np.int64(self._rows["n"].start)))
         self._write_part("fibre", fibres)
@@ -111,8 +112,9 @@ class FieldFile:
         """Completes the file, gives it its final name, and returns its path."""
         self._collectively(self._file.close)
         self._folder.close()
-        on_root(self._comm, _with_write_errors, self._path, atomic.commit, self.part, self._path)
-        return self._path
+        self._is_open = False
+        on_root(self._comm, _with_write_errors, self.path, atomic.commit, self.part, self.path)
+        return self.path
 
     def __enter__(self) -> FieldFile:
         return self
@@ -120,6 +122,8 @@ class FieldFile:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        if not self._is_open:
+            return
         if error is None:
             self.close()
         elif all_raise(self._comm, error):
@@ -170,13 +174,14 @@ class FieldFile:
     def _collectively(self, function: Callable[..., object], *args: Any) -> None:
         """function(*args) on all ranks; if any cannot write, the file is removed and all raise."""
         try:
-            agree(self._comm, _with_write_errors, self._path, function, *args)
+            agree(self._comm, _with_write_errors, self.path, function, *args)
         except FetiHomogError:
             self._remove()
             raise
 
     def _remove(self) -> None:
-        """Closes and removes the file. On a full disk HDF5 can close it only after it was cut to nothing."""
+        """Closes and removes the file, once. On a full disk HDF5 can close it only after it was cut to nothing."""
+        self._is_open = False
         if self._comm.rank == 0:
             with contextlib.suppress(OSError):
                 os.truncate(self.part, 0)
