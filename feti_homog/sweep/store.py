@@ -128,8 +128,12 @@ def stored_state(directory: Path, entry: SweepCase) -> CaseState:
             return _result_state(folder, entry)
     except (FetiHomogError, KeyError, TypeError, ValueError) as error:
         return CaseState(Status.DAMAGED, f"{folder / result_json.NAME} is no readable result: {error}")
-    if (folder / ERROR_FILE).exists():
-        return CaseState(Status.FAILED, "; ".join((folder / ERROR_FILE).read_text("utf-8", "replace").splitlines()))
+    if (folder / ERROR_FILE).is_file():
+        try:
+            lines = (folder / ERROR_FILE).read_text("utf-8", "replace").splitlines()
+        except OSError as error:
+            lines = [f"{ERROR_FILE} cannot be read: {error.strerror}"]
+        return CaseState(Status.FAILED, "; ".join(lines))
     return CaseState(Status.WAITING)
 
 
