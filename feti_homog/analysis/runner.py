@@ -231,8 +231,8 @@ def _write(result: Result, directory: Path, cell: TornCell) -> None:
     on_root_only(cell.comm, result_json.write, directory, result.document)
     written = {result_json.NAME}
     if result.result_h5 is not None:
-        on_root_only(cell.comm, xdmf.write, directory)
-        written |= {field_file.NAME, xdmf.NAME}
+        views = on_root_only(cell.comm, xdmf.write, directory) or []
+        written |= {field_file.NAME, *(path.name for path in views)}
     for name, points in (("angle.csv", result.angle), ("path.csv", result.path)):
         if points is not None:
             on_root_only(cell.comm, csv_tables.write, directory / name, points)
