@@ -4,18 +4,9 @@ from __future__ import annotations
 
 import json
 
-from support.base_case import BASE
 from support.command_line import command_line
 from support.jobs import mpirun
-
-PATH = (
-    BASE.replace('"hexagonal"', '"square"')
-    .replace("mesh_size = 0.05", "mesh_size = 0.3")
-    .replace('"stiffness"', '"path"')
-) + (
-    "[interface]\nnormal_strength = 4.0\ntangential_strength = 4.0\n"
-    "[path]\nstrain = [0.2, 0.0, 0.0]\n[output]\npictures = false\n"
-)
+from support.small_path import PATH
 
 # The command line, with one rank killed when it is about to give a file its name, or to write a state.
 SABOTAGED = """

@@ -11,18 +11,11 @@ import numpy as np
 import pytest
 from support.base_case import BASE
 from support.ranks import parallel_assert
+from support.small_path import PATH
 
 from feti_homog import cli
 
 pytestmark = pytest.mark.parallel
-
-PATH = (
-    BASE.replace('"hexagonal"', '"square"')
-    .replace("mesh_size = 0.05", "mesh_size = 0.3")
-    .replace('"stiffness"', '"path"')
-    + "[interface]\nnormal_strength = 4.0\ntangential_strength = 4.0\n"
-    + "[path]\nstrain = [0.2, 0.0, 0.0]\n[output]\npictures = false\n"
-)
 
 
 @pytest.fixture(autouse=True)
