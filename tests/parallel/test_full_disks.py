@@ -167,7 +167,7 @@ def test_a_disk_that_another_program_fills_meanwhile(comm, shared_path, small_di
     """What was reserved is there; what follows is told, and closing the file does not crash."""
     disk = small_disk("1M")
     part = part_of(sample(8), comm.rank, comm.size)
-    file = FieldFile(disk, comm, part.header, part.mesh, part.interface)
+    file = FieldFile(disk, comm, part.header, part.mesh, part.fibres, part.interface)
     if comm.rank == 0:
         fill(disk / "other")
     comm.barrier()
