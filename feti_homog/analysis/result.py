@@ -73,6 +73,10 @@ class Result:
         "wall time of each stage, the largest over ranks", SECONDS, entries={"STAGE": "of mesh, assemble, factor, ..."}
     )
     memory: int = described("peak resident memory, the largest over ranks", BYTES)
+    checksum: str | None = described(
+        "of result.json: CRC-32, in hexadecimal, of its text without this key; checked and taken away when it is read",
+        default=None,
+    )
     fields: Fields | None = field(default=None, repr=False, compare=False)
 
     @classmethod
