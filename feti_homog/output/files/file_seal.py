@@ -31,19 +31,19 @@ class FileSeal:
     checksum: str = described("CRC-32, in hexadecimal, of the CRC-32s (32 bits, little-endian) of its blocks of 64 MiB")
 
 
-def seal(path: Path, comm: Comm) -> FileSeal:
-    """The seal of a file that all ranks can read, each reading its share.  Collective.
+def seal(path: Path, comm: Comm, block: int = BLOCK) -> FileSeal:
+    """The seal of a file that all ranks can read, each reading its share of the blocks.  Collective.
 
     Raises:
         FetiHomogError: it cannot be read.
     """
     size = on_root(comm, _size, path)
-    blocks = np.zeros(-(-size // BLOCK), "<u4")
-    blocks[comm.rank :: comm.size] = agree(comm, _checksums, path, range(comm.rank, len(blocks), comm.size))
+    blocks = np.zeros(-(-size // block), "<u4")
+    blocks[comm.rank :: comm.size] = agree(comm, _checksums, path, range(comm.rank, len(blocks), comm.size), block)
     return FileSeal(size, _combined(np.bitwise_or.reduce(comm.allgather(blocks))))
 
 
-def check(path: Path, expected: FileSeal) -> None:
+def check(path: Path, expected: FileSeal, block: int = BLOCK) -> None:
     """Check that a file is the one of this seal.  Call on one rank.
 
     Raises:
@@ -53,7 +53,7 @@ def check(path: Path, expected: FileSeal) -> None:
     size = _size(path)
     if size != expected.bytes:
         raise CaseError(f"{path}: it is damaged, or of another run: it has {size} bytes, not {expected.bytes}")
-    if _combined(np.array(_checksums(path, range(-(-size // BLOCK))), "<u4")) != expected.checksum:
+    if _combined(np.array(_checksums(path, range(-(-size // block)), block), "<u4")) != expected.checksum:
         raise CaseError(f"{path}: it is damaged, or of another run: its checksum is wrong")
 
 
@@ -62,14 +62,10 @@ def _size(path: Path) -> int:
         return os.stat(path).st_size
 
 
-def _checksums(path: Path, blocks: Iterable[int]) -> list[int]:
-    """The CRC-32 of each of these blocks."""
+def _checksums(path: Path, blocks: Iterable[int], size: int) -> list[int]:
+    """The CRC-32 of each of these blocks of `size` bytes."""
     with atomic.file_errors("read", path), path.open("rb", buffering=0) as stream:
-        return [zlib.crc32(_block(stream.fileno(), number)) for number in blocks]
-
-
-def _block(descriptor: int, number: int) -> bytes:
-    return os.pread(descriptor, BLOCK, number * BLOCK)
+        return [zlib.crc32(os.pread(stream.fileno(), size, number * size)) for number in blocks]
 
 
 def _combined(checksums: NDArray[np.uint32]) -> str:
