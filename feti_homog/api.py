@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from feti_homog.common import libraries
+from feti_homog.common.matplotlib_toolkits import prefer_own_toolkits
 from feti_homog.common.petsc_option_table import split_argv
 from feti_homog.config.case import Case
 from feti_homog.errors import EXIT_DONE, CaseError, LibraryError
@@ -140,6 +141,7 @@ def start(command: Callable[[Sequence[str], Intracomm], int], argv: Sequence[str
     Returns the exit code of `run_main`.
     """
     words, petsc = split_argv(sys.argv[1:] if argv is None else argv)
+    prefer_own_toolkits()
     try:
         libraries.require()
         from mpi4py import MPI
@@ -182,6 +184,7 @@ def _parsed_main(
 
 def _started(comm: Intracomm | None) -> Intracomm:
     """The communicator, all ranks' by default, with PETSc started."""
+    prefer_own_toolkits()
     libraries.require()
     from mpi4py import MPI
 

@@ -1,5 +1,5 @@
-"""The command line: `feti-homog run CASE.toml --out DIR`, `check CASE.toml`, `plot DIR`, `sweep`, `collect`,
-`keys`, `schema`, `options`.
+"""The command line: `feti-homog run CASE.toml --out DIR`, `check CASE.toml`, `plot DIR`, `verify DIR`, `sweep`,
+`collect`, `keys`, `schema`, `options`.
 
 Options with a double dash are ours, with a single dash PETSc's.
 """
@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import signal
+import sys
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
@@ -17,7 +19,7 @@ from typing import TYPE_CHECKING, NoReturn
 from feti_homog import __version__
 from feti_homog.api import folder, parsed, start
 from feti_homog.common.petsc_option_table import help_text
-from feti_homog.errors import EXIT_DONE, CaseError
+from feti_homog.errors import EXIT_DONE, EXIT_UNCONVERGED, CaseError, FetiHomogError
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
@@ -28,6 +30,12 @@ SWEEP_HELP = (
     "skipped, so after an interruption the same command goes on. Cases that fail are kept with their error and "
     "reported at the end, with exit code 3."
 )
+VERIFY_HELP = (
+    "Recompute stresses, equilibrium, periodicity, averages, contact, strengths and energies from result.json and "
+    "result.h5, with elements of its own: one line a law, with its largest violation and the limit. Exit code 3 if a "
+    "law is broken. Needs neither MPI nor PETSc; of several ranks the first one does it."
+)
+LAUNCHED_RANKS = ("OMPI_COMM_WORLD_RANK", "PMI_RANK", "SLURM_PROCID")
 
 
 class Parser(argparse.ArgumentParser):
@@ -38,8 +46,9 @@ class Parser(argparse.ArgumentParser):
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command on all ranks; returns the exit code of `errors`."""
-    return start(_command, argv)
+    """Run the command on all ranks, `verify` without MPI; returns the exit code of `errors`."""
+    words = sys.argv[1:] if argv is None else list(argv)
+    return _verify(words) if words[:1] == ["verify"] else start(_command, words)
 
 
 def _command(words: Sequence[str], comm: Intracomm) -> int:
@@ -69,6 +78,10 @@ def command_parser() -> Parser:
     plot = actions.add_parser("plot", help="make the pictures of a results folder again")
     plot.add_argument("directory", type=folder, metavar="DIR")
     plot.set_defaults(action=_plot)
+    verify = actions.add_parser("verify", help="check from its files alone that a result obeys its laws",
+                                description=VERIFY_HELP)  # fmt: skip
+    verify.add_argument("directory", type=folder, metavar="DIR")
+    verify.add_argument("--json", action="store_true", help="print the certificate as JSON")
     _add_sweep(actions.add_parser("sweep", help="run the cases of a file with [sweep]", description=SWEEP_HELP))
     collect = actions.add_parser(
         "collect",
@@ -154,6 +167,24 @@ def _plot(arguments: argparse.Namespace, comm: Intracomm) -> None:
         print(f"{arguments.directory}: nothing to draw: its case has no fields, and no points of an angle or path")
     for path in paths or []:
         print(path)
+
+
+def _verify(words: Sequence[str]) -> int:
+    """Print the certificate of a result; the exit code."""
+    if any(int(os.environ.get(name, "0")) for name in LAUNCHED_RANKS):
+        return EXIT_DONE
+    os.environ.pop("H5PY_ALWAYS_USE_MPI", None)  # the serial h5py reads the files
+    from feti_homog.verification.certificate import verify
+
+    try:
+        arguments = command_parser().parse_args(words)
+        certificate = verify(arguments.directory)
+    except FetiHomogError as error:
+        print(*(f"error: {fault}" for fault in error.faults), sep="\n", file=sys.stderr, flush=True)
+        return error.exit_code
+    signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # a reader may leave early, as `head` does
+    print(json.dumps(certificate.document, indent=1) if arguments.json else certificate.text, flush=True)
+    return EXIT_DONE if certificate.holds else EXIT_UNCONVERGED
 
 
 def _sweep(arguments: argparse.Namespace, comm: Intracomm) -> None:

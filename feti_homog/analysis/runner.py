@@ -142,10 +142,11 @@ def _run_and_write(cell: TornCell, directory: Path, progress: Progress, resume: 
             progress.say(f"warning: {warning}")
         checkpoint = _checkpoint(cell, directory)
         analysis = _analyse(context, checkpoint, resume)
+    fields = []
     if file is not None:
-        on_root_only(cell.comm, xdmf.write, directory)
+        fields = [field_file.NAME, *(path.name for path in on_root_only(cell.comm, xdmf.write, directory) or [])]
     result = result_builder.result(context, analysis, states.kept())
-    _write(result, directory, cell)
+    _write(result, directory, cell, fields)
     if cell.case.path is not None and not result.faults:
         checkpoint.clear()
     if cell.case.output.pictures:
@@ -205,10 +206,11 @@ def _law(case: Case) -> StrengthCriterion:
     return StrengthCriterion(bond.normal_strength or math.inf, bond.tangential_strength or math.inf, bond.criterion)
 
 
-def _write(result: Result, directory: Path, cell: TornCell) -> None:
-    """result.json, and the table of an angle or path; files of an earlier result do not stay beside them."""
+def _write(result: Result, directory: Path, cell: TornCell, fields: list[str]) -> None:
+    """result.json, and the table of an angle or path; files of an earlier result do not stay beside them and the files
+    of `fields`, which are there."""
     on_root_only(cell.comm, result_json.write, directory, result.document)
-    written = {result_json.NAME} | ({field_file.NAME, xdmf.NAME} if cell.case.output.fields else set())
+    written = {result_json.NAME, *fields}
     for name, points in (("angle.csv", result.angle), ("path.csv", result.path)):
         if points is not None:
             on_root_only(cell.comm, csv_tables.write, directory / name, points)
