@@ -163,9 +163,11 @@ def _check(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def _plot(arguments: argparse.Namespace, comm: Intracomm) -> None:
+    from feti_homog.analysis import stored_result
     from feti_homog.common.mpi_errors import on_root_only
     from feti_homog.output.plots import figures
 
+    on_root_only(comm, stored_result.read, arguments.directory)
     paths = on_root_only(comm, figures.plot, arguments.directory)
     if paths == []:
         say(f"{arguments.directory}: nothing to draw: its case has no fields, and no points of an angle or path")
@@ -174,8 +176,10 @@ def _plot(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def _report(arguments: argparse.Namespace, comm: Intracomm) -> None:
+    from feti_homog.analysis import stored_result
     from feti_homog.common.mpi_errors import on_root_only
 
+    on_root_only(comm, stored_result.read, arguments.directory)
     path = on_root_only(comm, _written_report, arguments.directory)
     if path is not None:
         say(str(path))

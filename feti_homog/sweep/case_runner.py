@@ -91,6 +91,10 @@ class CaseRunner:
                 raise
             on_root_only(self.comm, store.write_error, self.directory, entry, error)
             return f"failed ({error.faults[0]})"
+        except FetiHomogError:  # a file could not be written: the case is to be computed again
+            if others_come(self.comm, ARRIVAL_TIMEOUT_S):
+                on_root_only(self.comm, store.set_aside, self.directory, entry, Status.DAMAGED)
+            raise
 
     def _print(self, line: str) -> None:
         if self.comm.rank == 0 and not self.quiet:
