@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import chain, pairwise
@@ -13,12 +14,15 @@ import numpy as np
 from feti_homog.cell.arrangement import arrange
 from feti_homog.cell.coarse_mesh import CoarseMesh, areas, flip_double_arcs, representatives
 from feti_homog.cell.outline import MATRIX, Curve, Outline, outline
+from feti_homog.errors import MeshError
 from feti_homog.typing import Float, Index, Int32
 
 if TYPE_CHECKING:
     from feti_homog.config.cell_section import Cell
 
 
+# Elements that are meshed on one rank in some minutes, and how many there are about a fibre of a random cell.
+MAX_TRIANGLES, TRIANGLES_OF_A_FIBRE = 1_000_000, 160
 NO_MARKS: Mapping[int, Sequence[float]] = MappingProxyType({})
 FRONTAL_DELAUNAY = 6
 # Decimals of the coordinates that gmsh is given. The last bits of the outline's differ from machine to machine, and
@@ -39,8 +43,9 @@ def generate(cell: Cell, marks: Mapping[int, Sequence[float]] = NO_MARKS) -> Coa
     boundary, or of another mark, is moved there.
 
     Raises:
-        MeshError: the fibres cannot be arranged.
+        MeshError: the fibres cannot be arranged, or there would be too many elements.
     """
+    _refuse_extremes(cell)
     arrangement = arrange(cell)
     lines = outline(arrangement, cell.mesh_size * arrangement.width, marks)
     points, triangles, circle = _fill(lines, cell.mesh_size * arrangement.width)
@@ -62,6 +67,18 @@ def generate(cell: Cell, marks: Mapping[int, Sequence[float]] = NO_MARKS) -> Coa
         arc_circle=arc_circle.astype(np.int32),
         debonded_edges=np.zeros((0, 2), np.int32),
     )
+
+
+def _refuse_extremes(cell: Cell) -> None:
+    """Raise MeshError for a cell that would take hours to mesh, before it is begun."""
+    height = math.sqrt(3.0) if cell.geometry == "hexagonal" else 1.0
+    count = height / (math.sqrt(3.0) / 4.0 * cell.mesh_size**2) + TRIANGLES_OF_A_FIBRE * (cell.fibres or 0)
+    if count > MAX_TRIANGLES:
+        given = f"mesh_size = {cell.mesh_size}" + ("" if cell.fibres is None else f", fibres = {cell.fibres}")
+        raise MeshError(
+            f"[cell] {given}: about {count:.2g} elements before refine; expected at most {MAX_TRIANGLES}; "
+            "refine splits them on the ranks"
+        )
 
 
 @contextmanager

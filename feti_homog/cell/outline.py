@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 
 from feti_homog.cell.arrangement import Arrangement
 from feti_homog.cell.size_field import circle_size, line_size
+from feti_homog.errors import MeshError
 from feti_homog.typing import Float, Int
 
 MATRIX = -1
@@ -21,6 +22,8 @@ MERGED = np.radians(0.05)
 TURN = 2 * np.pi
 QUARTER = TURN / 4
 # Positions at which the size is sampled along an arc and along a piece of a side.
+# Nodes on lines with which a cell is still meshed in minutes.
+MAX_LINE_NODES = 120_000
 ARC_SAMPLES = 65
 SIDE_SAMPLES = 513
 
@@ -217,11 +220,18 @@ def _arc_curves(
 def _stations(share: Float, sizes: Float, lengths: Float, least: Int) -> list[Float]:
     """For each curve the positions in [0, 1] of its nodes, equidistant in the measure ds / h.
 
+    Raises MeshError if they would be too many.
+
     The sizes h (c, s) are given at the positions `share` (s,), the lengths (c,) in the same unit.
     """
     density = lengths[:, None] / sizes
     steps = (density[:, 1:] + density[:, :-1]) / 2 * np.diff(share)
     measure = np.concatenate([np.zeros((len(lengths), 1)), np.cumsum(steps, axis=1)], axis=1)
+    if measure[:, -1].sum() > MAX_LINE_NODES:
+        raise MeshError(
+            f"[cell] the lines of the cell need about {measure[:, -1].sum():.2g} nodes; expected at most "
+            f"{MAX_LINE_NODES}: make mesh_size larger, or fibre_fraction or fibres smaller"
+        )
     counts = np.maximum(np.ceil(measure[:, -1] - 1e-6).astype(int), least)
     pairs = zip(measure, counts, strict=True)
     return [np.interp(np.linspace(0, own[-1], count + 1), own, share) for own, count in pairs]

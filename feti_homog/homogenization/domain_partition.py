@@ -16,6 +16,8 @@ from feti_homog.config.case import Case
 from feti_homog.errors import CaseError
 from feti_homog.feti.decomposition.partition import decompose, pieces_for_count, pieces_for_size
 from feti_homog.feti.decomposition.shared_entities import SharedEntities, share_entities
+from feti_homog.homogenization import arc_selection
+from feti_homog.homogenization.arc_selection import InterfaceNodes
 from feti_homog.interface import debonded_arcs
 from feti_homog.typing import Float, Int
 
@@ -137,13 +139,16 @@ def distribute(
     """Cut the cell into subdomains and share them among the ranks; one share for each rank.
 
     Raises:
-        CaseError: an arc of the case lies on a fibre that cannot have it.
+        CaseError: an arc of the case lies on a fibre that cannot have it, or selects no node.
     """
     torus = Torus.of(mesh)
     first_fibre = int(np.count_nonzero(torus.constituent_phase == 0))
     circles = fibre_circles(torus)
     centres = _in_cell(circles[:, :2], mesh.period)
     faults = debonded_arcs.faults(case.arcs, centres[first_fibre:])
+    if case.arcs and not faults:
+        moved = case.cell.file is None
+        faults = arc_selection.faults(case, InterfaceNodes.of(torus, lattice, first_fibre, centres, moved))
     if faults:
         raise CaseError(*faults)
     parts = torus.constituent if case.cell.bodies == "torus" else torus.plane_parts()
