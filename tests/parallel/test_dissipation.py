@@ -19,8 +19,8 @@ pytestmark = pytest.mark.parallel
 
 EXACT = 1e-9
 TIGHT = {"petsc": {"feti_pc_type": "influence", "feti_ksp_rtol": 1e-11}}
-SQUARE = {"geometry": "square", "mesh_size": 0.2} | TIGHT
-THREE = {"geometry": "random", "fibres": 3, "min_gap": 0.1, "seed": 4, "mesh_size": 0.2, "radius_spread": 0.3} | TIGHT
+SQUARE = {"geometry": "square", "mesh_size": 0.25} | TIGHT
+THREE = {"geometry": "random", "fibres": 3, "min_gap": 0.1, "seed": 4, "mesh_size": 0.25, "radius_spread": 0.3} | TIGHT
 CASES = {"square": SQUARE, "three": THREE}
 STRAIGHT = np.array([1.0, 0.1, 0.2])
 CRITERION = StrengthCriterion(20.0, 30.0, "max")

@@ -17,7 +17,7 @@ pytestmark = pytest.mark.parallel
 
 STRAIGHT = 1e-7
 FREE = {
-    "square": {"geometry": "square", "mesh_size": 0.2},
+    "square": {"geometry": "square", "mesh_size": 0.25},
     "quadratic": {"geometry": "square", "mesh_size": 0.35, "order": 2, "plane": "stress"},
     "hexagonal": {"geometry": "hexagonal", "mesh_size": 0.25, "decomposition": {"subdomains": 9}},
     "plane": {"geometry": "hexagonal", "mesh_size": 0.25, "bodies": "plane", "petsc": {"feti_pc_type": "influence"}},
