@@ -19,7 +19,7 @@ setup(
     python_requires=">=3.11",
     packages=find_packages(include=["feti_homog", "feti_homog.*"]),
     install_requires=[
-        "numpy>=1.23,<2",  # NumPy 2 breaks petsc4py 3.18
+        "numpy>=1.23",  # of the major version that petsc4py was built for: scripts/bootstrap takes that one
         "scipy>=1.10",
         "matplotlib>=3.6",
         "gmsh>=4.11",

@@ -15,12 +15,18 @@ From a program of one's own, under `mpirun` or not:
 - `CaseError`, `MeshError`, `ConvergenceError`, all of them `FetiHomogError`: raised on all ranks, `faults` in words.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
 __version__ = "0.1.0"
 
-from feti_homog.analysis.result import Result
 from feti_homog.api import collect_sweep, draw_state, launch, run, run_sweep
 from feti_homog.config.case import Case
 from feti_homog.errors import CaseError, ConvergenceError, FetiHomogError, MeshError
+
+if TYPE_CHECKING:
+    from feti_homog.analysis.result import Result
 
 __all__ = [
     "Case",
@@ -36,3 +42,12 @@ __all__ = [
     "run",
     "run_sweep",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """`Result`, when it is first asked for: `feti-homog verify` loads nothing that the analyses are made of."""
+    if name == "Result":
+        from feti_homog.analysis.result import Result
+
+        return Result
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

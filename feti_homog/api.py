@@ -11,9 +11,11 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from feti_homog.common import libraries
+from feti_homog.common.matplotlib_toolkits import prefer_own_toolkits
 from feti_homog.common.petsc_option_table import split_argv
 from feti_homog.config.case import Case
-from feti_homog.errors import EXIT_DONE
+from feti_homog.errors import EXIT_DONE, CaseError, LibraryError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -48,6 +50,7 @@ def run(
         TypeError: `case` is not a Case.
         CaseError, MeshError: the case cannot be run, or `out` cannot be used.
         ConvergenceError: a solve did not converge or a check failed; what was computed is in `out`.
+        LibraryError: mpi4py, petsc4py or h5py is missing or does not fit.
     """
     if not isinstance(case, Case):
         kind = type(case).__name__
@@ -57,7 +60,7 @@ def run(
 
     if out is None:
         return runner.compute(case, comm, fields)
-    return runner.run(case, Path(out), comm, quiet, resume, fields)
+    return runner.run(case, folder(out), comm, quiet, resume, fields)
 
 
 def run_sweep(
@@ -88,7 +91,7 @@ def run_sweep(
 
     expanded = on_root(comm, _expanded, cases)
     group = comm.size if ranks_per_case is None else ranks_per_case
-    execute.run_all(expanded, Path(out), comm, group, retry, quiet)
+    execute.run_all(expanded, folder(out), comm, group, retry, quiet)
     return on_root(comm, collect.read, Path(out))
 
 
@@ -138,15 +141,26 @@ def start(command: Callable[[Sequence[str], Intracomm], int], argv: Sequence[str
     Returns the exit code of `run_main`.
     """
     words, petsc = split_argv(sys.argv[1:] if argv is None else argv)
-    # Debian's h5py is the MPI build only if it is told so before its first import.
-    os.environ["H5PY_ALWAYS_USE_MPI"] = "1"
-    import petsc4py
-    from mpi4py import MPI
+    prefer_own_toolkits()
+    try:
+        libraries.require()
+        from mpi4py import MPI
 
-    petsc4py.init([sys.argv[0], *petsc], comm=MPI.COMM_WORLD)
+        libraries.start_petsc([sys.argv[0], *petsc], MPI.COMM_WORLD)
+    except LibraryError as error:
+        if os.environ.get("OMPI_COMM_WORLD_RANK", "0") == "0":  # there may be no mpi4py to ask
+            print(*(f"error: {fault}" for fault in error.faults), sep="\n", file=sys.stderr)
+        return error.exit_code
     from feti_homog.common.mpi_errors import run_main
 
     return run_main(MPI.COMM_WORLD, lambda: command(words, MPI.COMM_WORLD))
+
+
+def folder(name: str | Path) -> Path:
+    """The folder of that name.  Raises CaseError for an empty one, by which Path means the current folder."""
+    if name == "":
+        raise CaseError('"" is no name of a folder; the current one is "."')
+    return Path(name)
 
 
 def parsed(parser: argparse.ArgumentParser, words: Sequence[str], comm: Intracomm) -> argparse.Namespace:
@@ -170,14 +184,13 @@ def _parsed_main(
 
 def _started(comm: Intracomm | None) -> Intracomm:
     """The communicator, all ranks' by default, with PETSc started."""
-    os.environ.setdefault("H5PY_ALWAYS_USE_MPI", "1")
+    prefer_own_toolkits()
+    libraries.require()
     from mpi4py import MPI
 
     if "petsc4py.PETSc" not in sys.modules:
-        import petsc4py
-
         # On more ranks it would wait for those that run no case, or have run one; cases bring their own communicator.
-        petsc4py.init([], comm=MPI.COMM_SELF)
+        libraries.start_petsc([], MPI.COMM_SELF)
     return MPI.COMM_WORLD if comm is None else comm
 
 

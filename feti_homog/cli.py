@@ -1,5 +1,5 @@
-"""The command line: `feti-homog run CASE.toml --out DIR`, `check CASE.toml`, `plot DIR`, `sweep`, `collect`,
-`keys`, `schema`, `options`.
+"""The command line: `feti-homog run CASE.toml --out DIR`, `check CASE.toml`, `plot DIR`, `verify DIR`, `sweep`,
+`collect`, `keys`, `schema`, `options`.
 
 Options with a double dash are ours, with a single dash PETSc's.
 """
@@ -8,16 +8,18 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import signal
+import sys
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
 from feti_homog import __version__
-from feti_homog.api import parsed, start
+from feti_homog.api import folder, parsed, start
 from feti_homog.common.petsc_option_table import help_text
-from feti_homog.errors import EXIT_DONE, CaseError
+from feti_homog.errors import EXIT_DONE, EXIT_UNCONVERGED, CaseError, FetiHomogError
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
@@ -28,6 +30,12 @@ SWEEP_HELP = (
     "skipped, so after an interruption the same command goes on. Cases that fail are kept with their error and "
     "reported at the end, with exit code 3."
 )
+VERIFY_HELP = (
+    "Recompute stresses, equilibrium, periodicity, averages, contact, strengths and energies from result.json and "
+    "result.h5, with elements of its own: one line a law, with its largest violation and the limit. Exit code 3 if a "
+    "law is broken. Needs neither MPI nor PETSc; of several ranks the first one does it."
+)
+LAUNCHED_RANKS = ("OMPI_COMM_WORLD_RANK", "PMI_RANK", "SLURM_PROCID")
 
 
 class Parser(argparse.ArgumentParser):
@@ -38,8 +46,9 @@ class Parser(argparse.ArgumentParser):
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command on all ranks; returns the exit code of `errors`."""
-    return start(_command, argv)
+    """Run the command on all ranks, `verify` without MPI; returns the exit code of `errors`."""
+    words = sys.argv[1:] if argv is None else list(argv)
+    return _verify(words) if words[:1] == ["verify"] else start(_command, words)
 
 
 def _command(words: Sequence[str], comm: Intracomm) -> int:
@@ -59,7 +68,7 @@ def command_parser() -> Parser:
     actions = parser.add_subparsers(dest="command", required=True, parser_class=Parser)
     run = actions.add_parser("run", help="run a case file and write its results to a folder")
     run.add_argument("case", type=Path, metavar="CASE.toml")
-    run.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the results")
+    run.add_argument("--out", type=folder, required=True, metavar="DIR", help="folder of the results")
     run.add_argument("--quiet", action="store_true", help="print nothing but errors")
     run.add_argument("--resume", action="store_true", help="go on from where a path to the same folder was ended")
     run.set_defaults(action=_run)
@@ -67,8 +76,12 @@ def command_parser() -> Parser:
     check.add_argument("case", type=Path, metavar="CASE.toml")
     check.set_defaults(action=_check)
     plot = actions.add_parser("plot", help="make the pictures of a results folder again")
-    plot.add_argument("directory", type=Path, metavar="DIR")
+    plot.add_argument("directory", type=folder, metavar="DIR")
     plot.set_defaults(action=_plot)
+    verify = actions.add_parser("verify", help="check from its files alone that a result obeys its laws",
+                                description=VERIFY_HELP)  # fmt: skip
+    verify.add_argument("directory", type=folder, metavar="DIR")
+    verify.add_argument("--json", action="store_true", help="print the certificate as JSON")
     _add_sweep(actions.add_parser("sweep", help="run the cases of a file with [sweep]", description=SWEEP_HELP))
     collect = actions.add_parser(
         "collect",
@@ -76,7 +89,7 @@ def command_parser() -> Parser:
         description="Write sweep.h5 and sweep.csv, with the inputs and outputs of all cases and their statistics over "
         "realisations, and draw what varies. The sweep may still be running: what is there is collected.",
     )
-    collect.add_argument("directory", type=Path, metavar="DIR", help="--out of the sweep")
+    collect.add_argument("directory", type=folder, metavar="DIR", help="--out of the sweep")
     collect.add_argument("--no-pictures", action="store_true", help="make the tables alone")
     collect.set_defaults(action=_collect)
     _add_reference(actions)
@@ -95,7 +108,7 @@ def _add_reference(actions: argparse._SubParsersAction[Parser]) -> None:
 
 def _add_sweep(sweep: argparse.ArgumentParser) -> None:
     sweep.add_argument("case", type=Path, metavar="CASE.toml", help="a case file with a section [sweep]")
-    sweep.add_argument("--out", type=Path, metavar="DIR", help="folder of the sweep, in which each case has its own")
+    sweep.add_argument("--out", type=folder, metavar="DIR", help="folder of the sweep, in which each case has its own")
     one = sweep.add_mutually_exclusive_group()
     one.add_argument("--list", action="store_true", help="print the cases, with --out also their status; run none")
     one.add_argument("--index", type=int, metavar="K", help="run case K alone, counted from 1, as a job array does")
@@ -154,6 +167,24 @@ def _plot(arguments: argparse.Namespace, comm: Intracomm) -> None:
         print(f"{arguments.directory}: nothing to draw: its case has no fields, and no points of an angle or path")
     for path in paths or []:
         print(path)
+
+
+def _verify(words: Sequence[str]) -> int:
+    """Print the certificate of a result; the exit code."""
+    if any(int(os.environ.get(name, "0")) for name in LAUNCHED_RANKS):
+        return EXIT_DONE
+    os.environ.pop("H5PY_ALWAYS_USE_MPI", None)  # the serial h5py reads the files
+    from feti_homog.verification.certificate import verify
+
+    try:
+        arguments = command_parser().parse_args(words)
+        certificate = verify(arguments.directory)
+    except FetiHomogError as error:
+        print(*(f"error: {fault}" for fault in error.faults), sep="\n", file=sys.stderr, flush=True)
+        return error.exit_code
+    signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # a reader may leave early, as `head` does
+    print(json.dumps(certificate.document, indent=1) if arguments.json else certificate.text, flush=True)
+    return EXIT_DONE if certificate.holds else EXIT_UNCONVERGED
 
 
 def _sweep(arguments: argparse.Namespace, comm: Intracomm) -> None:

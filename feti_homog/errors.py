@@ -34,3 +34,9 @@ class ConvergenceError(FetiHomogError):
     """A solve did not converge or a check failed; what was computed is written and marked."""
 
     exit_code = EXIT_UNCONVERGED
+
+
+class LibraryError(FetiHomogError):
+    """A library that pip does not bring is missing or does not fit; each fault says what to do."""
+
+    exit_code = EXIT_INPUT

@@ -1,13 +1,15 @@
 """Check that every module that feti_homog needs is there and fit for use; names what is missing, exit code 1.
 
-With --quick, only that the modules are found, without importing them.
+With --quick, only that the modules are found, without importing them. With --versions, say what is there.
 """
 
 from __future__ import annotations
 
 import importlib
+import importlib.metadata
 import importlib.util
 import os
+import platform
 import shutil
 import sys
 from collections.abc import Callable
@@ -44,7 +46,6 @@ PROVIDERS = {
 
 # module: (what else it must fulfil, in words; the test)
 DEMANDS: dict[str, tuple[str, Callable[[Any], bool]]] = {
-    "numpy": ("version below 2", lambda numpy: int(numpy.__version__.split(".")[0]) < 2),
     "h5py": ("built with MPI", lambda h5py: h5py.get_config().mpi),
     "petsc4py.PETSc": ("built with real numbers", lambda petsc: petsc.ScalarType().dtype.kind == "f"),
 }
@@ -65,8 +66,28 @@ def fault_imported(module: str) -> str:
     return "" if fulfils(imported) else f"must be {words}"
 
 
+def versions() -> str:
+    """What results may depend on, in one line."""
+    import h5py
+    import numpy
+    import scipy
+    from mpi4py import MPI
+    from petsc4py import PETSc
+
+    mpi = MPI.Get_library_version().split(",")[0]
+    petsc = ".".join(map(str, PETSc.Sys.getVersion()))
+    return (
+        f"Python {platform.python_version()}, PETSc {petsc}, {mpi}, mpi4py {importlib.metadata.version('mpi4py')}, "
+        f"HDF5 {h5py.version.hdf5_version}, h5py {h5py.__version__}, NumPy {numpy.__version__}, "
+        f"SciPy {scipy.__version__}, gmsh {importlib.metadata.version('gmsh')}"
+    )
+
+
 def main() -> int:
     os.environ["H5PY_ALWAYS_USE_MPI"] = "1"
+    if "--versions" in sys.argv:
+        print(versions())
+        return 0
     fault = fault_found if "--quick" in sys.argv else fault_imported
     faults = {module: fault(module) for module in PROVIDERS}
     lines = [f"{module}: {text} (from: {PROVIDERS[module]})" for module, text in faults.items() if text]

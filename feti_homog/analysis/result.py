@@ -11,7 +11,15 @@ from numpy.typing import NDArray
 
 from feti_homog.analysis.result_fields import Fields
 from feti_homog.analysis.result_html import tables
-from feti_homog.analysis.result_records import AnglePoint, CellInfo, Checks, PathPoint, SolverInfo, StiffnessBounds
+from feti_homog.analysis.result_records import (
+    AnglePoint,
+    CellInfo,
+    Checks,
+    FibreInfo,
+    PathPoint,
+    SolverInfo,
+    StiffnessBounds,
+)
 from feti_homog.common.records import BYTES, SECONDS, STRESS, Key, described, keys, plain, restored
 from feti_homog.mechanics import response
 from feti_homog.mechanics.bounds import Moduli
@@ -40,6 +48,7 @@ class Result:
     case: Mapping[str, Any] = described("the case with its defaults, as in a case file", entries={"KEY": "as there"})
     digest: str = described("short name of what the case computes, whatever its name, output and PETSc options")
     cell: CellInfo = described("the meshed cell")
+    fibres: tuple[FibreInfo, ...] = described("the fibres in the order of their numbers", default=())
     solver: SolverInfo = described("how the dual problem was solved")
     checks: Checks = described("largest relative error of each law over all states")
     check_tolerance: float = described("largest error of a check that passes")

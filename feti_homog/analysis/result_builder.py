@@ -5,13 +5,24 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from feti_homog import __version__
 from feti_homog.analysis.context import CONTACT_TOLERANCE, AnalysisContext
 from feti_homog.analysis.result import Result
 from feti_homog.analysis.result_fields import Fields
-from feti_homog.analysis.result_records import AnglePoint, CellInfo, Checks, PathPoint, SolverInfo, StiffnessBounds
+from feti_homog.analysis.result_records import (
+    AnglePoint,
+    CellInfo,
+    Checks,
+    FibreInfo,
+    PathPoint,
+    SolverInfo,
+    StiffnessBounds,
+)
 from feti_homog.common.mpi_errors import on_root
 from feti_homog.config.materials import plane_stiffness
+from feti_homog.homogenization.domain_partition import CellSummary
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.mechanics import bounds
 from feti_homog.mechanics.bounds import Moduli
@@ -35,6 +46,7 @@ def result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Fields
         case=cell.case.resolved(),
         digest=on_root(cell.comm, cell.case.digest),
         cell=_cell_info(cell, fractions),
+        fibres=_fibres(cell.summary),
         solver=_solver_info(context),
         checks=Checks(**context.checks),
         check_tolerance=context.tolerance("jump"),
@@ -59,6 +71,20 @@ def _cell_info(cell: TornCell, fractions: dict[str, float]) -> CellInfo:
         fractions=fractions,
         elements=cell.sum_over_ranks(sum(len(s.mesh.triangles) for s in cell.subdomains)),
         nodes=cell.sum_over_ranks(sum(len(s.mesh.points) for s in cell.subdomains)),
+    )
+
+
+def _fibres(summary: CellSummary) -> tuple[FibreInfo, ...]:
+    """The fibres of the cell."""
+    bodies = range(summary.first_fibre, len(summary.centres))
+    return tuple(
+        FibreInfo(
+            number=number,
+            phase=summary.phases[summary.constituent_phase[body]],
+            centre=None if np.isnan(summary.centres[body, 0]) else summary.centres[body],
+            radius=None if np.isnan(summary.radii[body]) else float(summary.radii[body]),
+        )
+        for number, body in enumerate(bodies, start=1)
     )
 
 

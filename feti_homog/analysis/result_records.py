@@ -29,6 +29,21 @@ class CellInfo:
     nodes: int = described("nodes of the refined mesh, those on cuts once for each subdomain")
 
 
+@dataclass(frozen=True, kw_only=True)
+class FibreInfo:
+    """One fibre, as `fibre = N` of a case file selects it."""
+
+    number: int = described("number in `fibre = N` of case files, from 1")
+    phase: str = described("name of its phase")
+    centre: Float | None = described(
+        "centre of its circle, or of its area if it is not round, within the cell; absent if it winds around the cell",
+        LENGTH,
+        "(2,)",
+        default=None,
+    )
+    radius: float | None = described("radius of its circle; absent if it is not round", LENGTH, default=None)
+
+
 @dataclass(frozen=True)
 class SolverInfo:
     """How the dual problem was solved."""

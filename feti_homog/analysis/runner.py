@@ -27,7 +27,15 @@ from feti_homog.errors import ConvergenceError
 from feti_homog.homogenization.averaging import Homogenization, Response
 from feti_homog.homogenization.unit_cell import TornCell, tear
 from feti_homog.interface.strength_criterion import StrengthCriterion
-from feti_homog.output.files import csv_tables, field_file, field_parts, output_folder, result_json, xdmf
+from feti_homog.output.files import (
+    csv_tables,
+    field_file,
+    field_parts,
+    folder_contents,
+    output_folder,
+    result_json,
+    xdmf,
+)
 from feti_homog.output.files.checkpoint import Checkpoint, NoCheckpoint, finished
 from feti_homog.output.files.field_file import FieldFile
 from feti_homog.output.files.field_layout import StatePart
@@ -54,6 +62,7 @@ def run(
         progress.say(f"{directory} holds the finished result of this case: nothing to do")
         return Result.of(on_root(comm, result_json.read, directory))
     on_root(comm, output_folder.usable, directory)
+    on_root(comm, folder_contents.refuse_files_of_others, directory)
     with output_folder.held(directory, comm, progress.say), _torn(case, comm, progress) as cell:
         result = _run_and_write(cell, directory, progress, resume, keep_fields)
     if result.faults:
@@ -119,7 +128,8 @@ class _States:
             return None
         cell = self._cell
         mesh, interface = field_parts.mesh_part(cell), field_parts.interface_part(cell)
-        return Fields(cell.comm, field_parts.header(cell), mesh, interface, tuple(self._states))
+        fibres = field_parts.fibre_part(cell)
+        return Fields(cell.comm, field_parts.header(cell), mesh, fibres, interface, tuple(self._states))
 
 
 def _run_and_write(cell: TornCell, directory: Path, progress: Progress, resume: bool, keep_fields: bool) -> Result:
@@ -153,6 +163,7 @@ def _field_file(cell: TornCell, directory: Path, progress: Progress) -> FieldFil
             cell.comm,
             field_parts.header(cell),
             field_parts.mesh_part(cell),
+            field_parts.fibre_part(cell),
             field_parts.interface_part(cell),
         )
 

@@ -1,4 +1,4 @@
-"""Centres of the fibres, about which directions on their interfaces are measured; on rank 0."""
+"""Centres and radii of the fibres; directions on their interfaces are measured about the centres.  On rank 0."""
 
 from __future__ import annotations
 
@@ -14,32 +14,34 @@ from feti_homog.typing import Float
 SAME_CIRCLE = 1e-9
 
 
-def fibre_centres(torus: Torus) -> Float:
-    """(constituents, 2) centre of each fibre's circle or, if it is not round, of its area; any image of it.
+def fibre_circles(torus: Torus) -> Float:
+    """(constituents, 3) centre and radius of each fibre's circle; any image of it.
 
-    NaN for the matrix, and for a fibre that winds around the torus, which has no centre.
+    The centre of a fibre that is not round is that of its area, and its radius NaN.  NaN for the matrix, and for a
+    fibre that winds around the torus, which has no centre.
     """
-    centres = np.full((len(torus.constituent_phase), 2), np.nan)
+    circles = np.full((len(torus.constituent_phase), 3), np.nan)
     for submesh in cut(torus, torus.constituent):
         if torus.constituent_phase[submesh.body] > 0:
-            centres[submesh.body] = _centre(submesh)
-    return centres
+            circles[submesh.body] = _circle(submesh)
+    return circles
 
 
-def _centre(submesh: Submesh) -> Float:
-    """(2,) that of one fibre."""
+def _circle(submesh: Submesh) -> Float:
+    """(3,) that of one fibre."""
     around = _boundary_circles(submesh)
     radius = around[0, 2] if len(around) else 0.0
     offset = around[:, :2] - around[:1, :2]
     offset -= np.round(offset / submesh.period) * submesh.period
     away = np.abs(np.column_stack([offset, around[:, 2] - radius]))
     if radius > 0 and np.all(away < SAME_CIRCLE * radius):
-        return np.asarray(around[0, :2])
+        return np.asarray(around[0])
     shift, closes = unwrap(submesh)
     if not closes:
-        return np.full(2, np.nan)
+        return np.full(3, np.nan)
     middles = submesh.points[submesh.triangles].mean(axis=1) + shift
-    return np.asarray(np.average(middles, axis=0, weights=areas(submesh.points, submesh.triangles.astype(np.int32))))
+    weights = areas(submesh.points, submesh.triangles.astype(np.int32))
+    return np.asarray(np.r_[np.average(middles, axis=0, weights=weights), np.nan])
 
 
 def _boundary_circles(submesh: Submesh) -> Float:

@@ -13,7 +13,7 @@ import numpy as np
 from feti_homog.cell.arrangement import arrange
 from feti_homog.cell.coarse_mesh import CoarseMesh, areas, flip_double_arcs, representatives
 from feti_homog.cell.outline import MATRIX, Curve, Outline, outline
-from feti_homog.typing import Float, Index
+from feti_homog.typing import Float, Index, Int32
 
 if TYPE_CHECKING:
     from feti_homog.config.cell_section import Cell
@@ -82,7 +82,7 @@ def gmsh_session() -> Iterator[ModuleType]:
         gmsh.finalize()
 
 
-def _fill(lines: Outline, largest: float) -> tuple[Float, Index, Index]:
+def _fill(lines: Outline, largest: float) -> tuple[Float, Int32, Index]:
     """Nodes (n, 2), those of the outline first, triangles (m, 3) and the circle around each (or MATRIX)."""
     with gmsh_session() as gmsh:
         gmsh.option.setNumber("Mesh.MeshSizeMax", largest)

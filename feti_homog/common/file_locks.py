@@ -47,14 +47,15 @@ class Lock:
         Raises:
             LockHeld: somebody else has it.
             LocksUnsupported: nobody can have one on this file system.
-            FetiHomogError: the file cannot be written or locked.
+            FetiHomogError: the file cannot be made or locked.
         """
         try:
             self._file = os.open(self.path, os.O_RDWR | os.O_CREAT, 0o666)
             self._try_until(time.monotonic() + self.timeout)
             if not self.shared:
-                os.truncate(self._file, 0)
-                os.pwrite(self._file, this_process().encode(), 0)
+                with contextlib.suppress(OSError):  # it holds on a full disk too, without the name of its holder
+                    os.truncate(self._file, 0)
+                    os.pwrite(self._file, this_process().encode(), 0)
         except OSError as error:
             self._close()
             kind = LocksUnsupported if error.errno in UNSUPPORTED else FetiHomogError

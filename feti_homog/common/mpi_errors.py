@@ -69,15 +69,23 @@ def run_main(comm: Comm, main: Callable[[], int]) -> int:
     try:
         return main()
     except FetiHomogError as error:
-        all_came = others_come(comm, ARRIVAL_TIMEOUT_S)
-        if comm.rank == 0 or not all_came:
-            print(*(f"error: {fault}" for fault in error.faults), sep="\n", file=sys.stderr, flush=True)
-        if not all_came:
-            abort(comm, error.exit_code)
+        if not others_come(comm, ARRIVAL_TIMEOUT_S):
+            end_job(comm, error)
+        if comm.rank == 0:
+            print(_told(error), file=sys.stderr, flush=True)
         return error.exit_code
-    except Exception:
-        print(f"rank {comm.rank} of {comm.size}:\n{traceback.format_exc()}", file=sys.stderr, flush=True)
-        abort(comm, EXIT_DEFECT)
+    except Exception as error:
+        end_job(comm, error)
+
+
+def end_job(comm: Comm, error: BaseException) -> NoReturn:
+    """Tell of an error that one rank has met alone, and end the processes of all."""
+    if isinstance(error, FetiHomogError):
+        print(_told(error), file=sys.stderr, flush=True)
+        abort(comm, error.exit_code)
+    text = "".join(traceback.format_exception(error))
+    print(f"rank {comm.rank} of {comm.size}:\n{text}", file=sys.stderr, flush=True)
+    abort(comm, EXIT_DEFECT)
 
 
 def abort(comm: Comm, exit_code: int) -> NoReturn:
@@ -102,6 +110,11 @@ def all_raise(comm: Comm, error: BaseException) -> bool:
     Each rank with such an error calls it, and waits ARRIVAL_TIMEOUT_S for the others; a defect is one rank's own.
     """
     return isinstance(error, FetiHomogError) and others_come(comm, ARRIVAL_TIMEOUT_S)
+
+
+def _told(error: FetiHomogError) -> str:
+    """A line for each fault."""
+    return "\n".join(f"error: {fault}" for fault in error.faults)
 
 
 def _attempt(function: Callable[..., T], *args: Any, **kwargs: Any) -> tuple[T | None, Exception | None]:

@@ -95,11 +95,13 @@ def restored(kind: type[T], document: Mapping[str, Any]) -> T:
     """The record of a class from what `plain` made of it; keys that it does not know are left out.
 
     Raises:
-        KeyError: a key is missing.
+        KeyError: a key without a default is missing.
     """
     hints, values = typing.get_type_hints(kind), {}
     for field in dataclasses.fields(kind):  # type: ignore[arg-type]
-        if DESCRIPTION not in field.metadata or (field.name not in document and field.default is None):
+        if DESCRIPTION not in field.metadata or (
+            field.name not in document and field.default is not dataclasses.MISSING
+        ):
             continue
         values[field.name] = _restored_value(hints[field.name], document[field.name])
     return kind(**values)

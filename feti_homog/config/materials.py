@@ -93,7 +93,7 @@ def plane_stiffness(material: Material, plane: str) -> Float:
     if isinstance(material, Isotropic):
         return _isotropic(material, plane)
     if isinstance(material, Orthotropic):
-        return rotated(np.linalg.inv(_orthotropic_compliance(material, plane)), material.angle)
+        return rotated(np.asarray(np.linalg.inv(_orthotropic_compliance(material, plane)), float), material.angle)
     stiffness = np.array(material.stiffness)
     if not np.allclose(stiffness, stiffness.T, rtol=0.0, atol=1e-9 * np.abs(stiffness).max()):
         raise ValueError(f"stiffness = {toml_value(material.stiffness)}: expected a symmetric matrix")

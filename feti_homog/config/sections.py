@@ -187,7 +187,8 @@ class Output:
     )
     deformation_scale: float | None = key(
         real(least=0.0),
-        "Factor of the displacements drawn; by default 1 under a given strain, and less under unit strains.",
+        "Factor of the displacements drawn; by default such that displacements and openings are seen, and at least 1 "
+        "under a given strain.",
         default=None,
         default_words="automatic",
     )

@@ -1,6 +1,7 @@
 """PETSc contexts of the projected dual problem: shell matrix, shell preconditioner, convergence test.
 
 A vector holds k multiplier vectors, the k values of a row side by side, so that load cases are solved together.
+What the contexts raise is kept until PETSc has returned (`CallbackErrors`).
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from feti_homog.common.callback_errors import CallbackErrors
 from feti_homog.common.distributed_arrays import allreduce_sum, scale_rows
 from feti_homog.feti.coarse.coarse_space import CoarseSpace
 from feti_homog.feti.operators.dual_operator import DualOperator
@@ -35,8 +37,11 @@ class ActiveRows:
 class ProjectedOperator:
     """y = T^T F x on the active rows; x is in the range of T (of P, if the coarse space is the natural one)."""
 
-    def __init__(self, operator: DualOperator, coarse: CoarseSpace, active: ActiveRows, columns: int) -> None:
+    def __init__(
+        self, errors: CallbackErrors, operator: DualOperator, coarse: CoarseSpace, active: ActiveRows, columns: int
+    ) -> None:
         """For vectors of so many columns."""
+        self._errors = errors
         self.operator, self.coarse, self.active = operator, coarse, active
         self.shape = (-1, columns)
         self.event = PETSc.Log.Event("FETIDual")
@@ -44,15 +49,26 @@ class ProjectedOperator:
     def mult(self, mat: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """y = T^T F x.  Collective."""
         with self.event:
-            result = self.operator.apply(x.getArray(readonly=True).reshape(self.shape))
-            y.setArray(self.coarse.project_residual(self.active.restrict(result)).ravel())
+            values = x.getArray(readonly=True).reshape(self.shape)
+            y.setArray(self._errors.call(lambda: self._apply(values), np.full(values.shape, np.nan)).ravel())
+
+    def _apply(self, x: Float) -> Float:
+        return self.coarse.project_residual(self.active.restrict(self.operator.apply(x)))
 
 
 class ProjectedPreconditioner:
     """z = T M^-1 r; keeps r, which tells the interface jump B u of the iterate."""
 
-    def __init__(self, comm: MPI.Intracomm, preconditioner: Preconditioner, coarse: CoarseSpace, columns: int) -> None:
+    def __init__(
+        self,
+        comm: MPI.Intracomm,
+        errors: CallbackErrors,
+        preconditioner: Preconditioner,
+        coarse: CoarseSpace,
+        columns: int,
+    ) -> None:
         """For vectors of so many columns."""
+        self._errors = errors
         self.comm, self.preconditioner, self.coarse = comm, preconditioner, coarse
         self.shape = (-1, columns)
         self.event = PETSc.Log.Event("FETIPrecond")
@@ -62,7 +78,10 @@ class ProjectedPreconditioner:
         """z = T M^-1 r.  Collective."""
         with self.event:
             self._residual = r.getArray(readonly=True).reshape(self.shape)
-            z.setArray(self.coarse.deflate(self.preconditioner.apply(self._residual)).ravel())
+            z.setArray(self._errors.call(self._apply, np.full(self._residual.shape, np.nan)).ravel())
+
+    def _apply(self) -> Float:
+        return self.coarse.deflate(self.preconditioner.apply(self._residual))
 
     def jump_norm(self) -> float:
         """|P r| of the last r: the jump that the best rigid-body motions leave.  Collective."""
@@ -78,8 +97,8 @@ class PrimalTest:
     the coarse space, and no iteration, takes it away; the test ends with a breakdown when only that is left.
     """
 
-    def __init__(self, preconditioner: ProjectedPreconditioner) -> None:
-        self.preconditioner = preconditioner
+    def __init__(self, errors: CallbackErrors, preconditioner: ProjectedPreconditioner) -> None:
+        self._errors, self.preconditioner = errors, preconditioner
         self._jump_scale, self._force_scale = 1.0, 1.0
         self._smallest_jump, self._found_at = np.inf, 0
 
@@ -89,6 +108,10 @@ class PrimalTest:
 
     def __call__(self, ksp: PETSc.KSP, iteration: int, residual: float) -> PETSc.KSP.ConvergedReason:
         """Whether to go on; `residual` is the norm of the preconditioned one, |T M^-1 r|.  Collective."""
+        ended = PETSc.KSP.ConvergedReason.DIVERGED_NANORINF
+        return self._errors.call(lambda: self._judge(ksp, iteration, residual), ended)
+
+    def _judge(self, ksp: PETSc.KSP, iteration: int, residual: float) -> PETSc.KSP.ConvergedReason:
         rtol, atol, divtol, _ = ksp.getTolerances()
         if iteration == 0:
             self._smallest_jump = np.inf
@@ -135,11 +158,11 @@ class Krylov:
         """Set up; `vector` is one of the multiplier vectors.  Collective."""
         own, whole = vector.getSizes()
         sizes = (own * columns, whole * columns)
-        self._preconditioner = ProjectedPreconditioner(comm, preconditioner, coarse, columns)
-        self.test = PrimalTest(self._preconditioner)
-        A = PETSc.Mat().createPython(
-            (sizes, sizes), ProjectedOperator(operator, coarse, active, columns), comm=vector.comm
-        )
+        self._errors = CallbackErrors(comm)
+        self._preconditioner = ProjectedPreconditioner(comm, self._errors, preconditioner, coarse, columns)
+        self.test = PrimalTest(self._errors, self._preconditioner)
+        context = ProjectedOperator(self._errors, operator, coarse, active, columns)
+        A = PETSc.Mat().createPython((sizes, sizes), context, comm=vector.comm)
         A.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         A.setUp()
         self._right, self._solution = A.createVecs()
@@ -157,10 +180,14 @@ class Krylov:
         self.ksp.setFromOptions()
 
     def solve(self, residual: Float) -> Float:
-        """The multipliers (rows, k) that remove the residual (rows, k), as far as `ksp` converged.  Collective."""
+        """The multipliers (rows, k) that remove the residual (rows, k), as far as `ksp` converged.  Collective.
+
+        Raises what operator, preconditioner or test raise on all ranks; a rank that raises alone ends the job.
+        """
         self._right.setArray(residual.ravel())
         self._solution.zeroEntries()
-        self.ksp.solve(self._right, self._solution)
+        with self._errors.raised():
+            self.ksp.solve(self._right, self._solution)
         found: Float = self._solution.getArray(readonly=True).reshape(residual.shape).copy()
         return found
 

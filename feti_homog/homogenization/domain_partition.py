@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from feti_homog.cell.coarse_mesh import CoarseMesh
-from feti_homog.cell.fibre_centres import fibre_centres
+from feti_homog.cell.fibre_centres import fibre_circles
 from feti_homog.cell.periodic_topology import Torus, edge_pairs
 from feti_homog.cell.refinement import ReferenceLattice
 from feti_homog.cell.submesh import Submesh, cut
@@ -20,6 +20,7 @@ from feti_homog.interface import debonded_arcs
 from feti_homog.typing import Float, Int
 
 FIBRES_OF = {"square": 1, "hexagonal": 2}
+ROUNDING = 1e-9  # of coordinates, relative to the cell
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,9 @@ class CellSummary:
         phases: names of the material phases, the matrix first.
         bodies, subdomains, coarse_triangles: numbers of them.
         first_fibre: the constituent that is fibre number 1 of the case file.
-        centres: (constituents, 2) centre of each fibre, NaN where there is none.
+        constituent_phase: (constituents,) place of the phase of each in `phases`.
+        centres, radii: (constituents, 2) and (constituents,) centre, within the cell, and radius of each fibre, NaN
+            where there is none.
     """
 
     width: float
@@ -74,7 +77,18 @@ class CellSummary:
     subdomains: int
     coarse_triangles: int
     first_fibre: int
+    constituent_phase: Int
     centres: Float
+    radii: Float
+
+    @property
+    def fibres(self) -> int:
+        """Number of fibres."""
+        return len(self.centres) - self.first_fibre
+
+    def fibre_number(self, constituent: Int) -> Int:
+        """(k,) numbers from 1, as a case file has them, of fibres that are these constituents (k,)."""
+        return np.asarray(constituent - self.first_fibre + 1)
 
     @property
     def period(self) -> Float:
@@ -127,7 +141,8 @@ def distribute(
     """
     torus = Torus.of(mesh)
     first_fibre = int(np.count_nonzero(torus.constituent_phase == 0))
-    centres = fibre_centres(torus)
+    circles = fibre_circles(torus)
+    centres = _in_cell(circles[:, :2], mesh.period)
     faults = debonded_arcs.faults(case.arcs, centres[first_fibre:])
     if faults:
         raise CaseError(*faults)
@@ -144,7 +159,9 @@ def distribute(
         subdomains=len(submeshes),
         coarse_triangles=len(mesh.triangles),
         first_fibre=first_fibre,
+        constituent_phase=torus.constituent_phase,
         centres=centres,
+        radii=circles[:, 2],
     )
     own: list[list[Submesh]] = [[] for _ in range(n_ranks)]
     for submesh, rank in zip(submeshes, decomposition.rank, strict=True):
@@ -185,6 +202,12 @@ def wanted_pieces(
     by_boundary = np.minimum(-(-boundary // policy.piece_boundary_dofs), load)
     pieces = np.where(to_cut, np.maximum(by_size, by_boundary), 1)
     return pieces if pieces.sum() >= n_ranks else pieces_for_count(load, n_ranks)
+
+
+def _in_cell(points: Float, period: Float) -> Float:
+    """The images of points (k, 2) in [0, period); those that rounding puts at its end are at 0."""
+    inside = np.mod(points, period)
+    return np.where(inside > (1 - ROUNDING) * period, 0.0, inside)
 
 
 def _outer_edges(torus: Torus, parts: Int) -> Int:

@@ -63,7 +63,7 @@ class TornCell:
         # The mesher moves a tip to a vertex that is as near as this.
         moved = nodes.vertex & (self.case.cell.file is None)
         near = np.where(moved, np.degrees(MERGED), debonded_arcs.TIP_TOLERANCE_DEGREES)
-        number = nodes.fibre - self.summary.first_fibre + 1
+        number = self.summary.fibre_number(nodes.fibre)
         cracks = nodes.precracked & (self.case.interface is not None)
         return cracks | debonded_arcs.debonded(self.case.arcs, opening, number, self.directions, near)
 
@@ -146,7 +146,7 @@ def describe(case: Case, n_ranks: int) -> str:
         f"cell       {summary.width:g} x {summary.height:g}, phases {', '.join(summary.phases)}",
         f"mesh       {summary.coarse_triangles} coarse triangles, {summary.coarse_triangles * len(lattice.triangles)} "
         f"elements of order {case.cell.order}, about {2 * sum(nodes)} degrees of freedom",
-        *([f"fibres     {len(summary.centres) - summary.first_fibre}, numbered from 1"] if case.interface else []),
+        *([f"fibres     {summary.fibres}, numbered from 1"] if case.interface else []),
         f"tearing    {summary.bodies} bodies, {summary.subdomains} subdomains, {multipliers} multipliers",
         *(
             f"rank {rank:<5} {count} subdomains, about {2 * n} degrees of freedom"

@@ -24,7 +24,7 @@ from feti_homog import __version__
 from feti_homog.common.file_locks import Lock, LockHeld, is_locked
 from feti_homog.config.case import Case
 from feti_homog.errors import CaseError, FetiHomogError
-from feti_homog.output.files import atomic, checkpoint, result_json
+from feti_homog.output.files import atomic, checkpoint, output_folder, result_json
 from feti_homog.sweep.plan import Sweep, SweepCase, identity_of
 
 INDEX_FILE, TABLE_FILE, ERROR_FILE, CASE_FILE, LOCK_FILE = (
@@ -163,6 +163,7 @@ def reset(directory: Path, entry: SweepCase, status: Status) -> None:
         shutil.rmtree(folder / checkpoint.FOLDER, ignore_errors=True)
         if (folder / result_json.NAME).exists():
             atomic.rename(folder / result_json.NAME, folder / f"{result_json.NAME}.{status.replace(' ', '_')}")
+        output_folder.remove_other_results(folder, ())
     except OSError as error:
         raise FetiHomogError(f"cannot write {folder}: {error.strerror}") from error
 

@@ -20,8 +20,10 @@ JSON = """\
 All numbers are finite. `KEY[]` is a list, whose entries have the keys that follow. Keys without a value are absent."""
 
 HDF5 = """\
-n nodes, m elements, k interface nodes; nodes are torn, each subdomain has its own. `result.xdmf` opens the file in
-ParaView. K is the number of a state, from 0: of a stiffness the unit strains, of a path its points."""
+n nodes, m elements, k interface nodes, f fibres; nodes are torn, each subdomain has its own. K is the number of a
+state, from 0: of a stiffness the unit strains, of a path its points. `result.xdmf` opens the file in ParaView. Every
+dataset has the attributes `meaning` and `unit`; the unit is that of the case's labels, if it has them, and 1 of pure
+numbers."""
 
 SWEEP_CSV = """\
 A row for each case, then four for each point: the statistics of its realisations. Names have their units in brackets; i

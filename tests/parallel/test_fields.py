@@ -20,7 +20,7 @@ pytestmark = pytest.mark.parallel
 
 def write(directory: Path, comm: Any, whole: Sample, states: int = 3) -> Path:
     part = part_of(whole, comm.rank, comm.size)
-    with FieldFile(directory, comm, part.header, part.mesh, part.interface) as file:
+    with FieldFile(directory, comm, part.header, part.mesh, part.fibres, part.interface) as file:
         for k, state in enumerate(part.states[:states]):
             file.write_state(k, state)
     return directory / "result.h5"
@@ -69,7 +69,7 @@ def test_tables_without_interface_nodes_are_empty(comm: Any, shared_path: Path) 
 
 def test_states_are_on_disk_before_the_file_has_its_name(comm: Any, shared_path: Path) -> None:
     part = part_of(sample(4), comm.rank, comm.size)
-    file = FieldFile(shared_path, comm, part.header, part.mesh, part.interface)
+    file = FieldFile(shared_path, comm, part.header, part.mesh, part.fibres, part.interface)
     for k, state in enumerate(part.states):
         file.write_state(k, state)
         assert not (shared_path / "result.h5").exists()
@@ -86,7 +86,7 @@ def test_states_are_on_disk_before_the_file_has_its_name(comm: Any, shared_path:
 def test_an_exception_leaves_the_old_file(comm: Any, shared_path: Path) -> None:
     old = write(shared_path, comm, sample(4), states=1)
     part = part_of(sample(4), comm.rank, comm.size)
-    arguments = (shared_path, comm, part.header, part.mesh, part.interface)
+    arguments = (shared_path, comm, part.header, part.mesh, part.fibres, part.interface)
     with pytest.raises(ZeroDivisionError), FieldFile(*arguments):
         raise ZeroDivisionError
     with h5py.File(old, "r") as file:
@@ -118,7 +118,7 @@ def test_a_wrong_number_of_rows_is_heard_everywhere(comm: Any, shared_path: Path
     state = part.states[0]
     if comm.rank == comm.size - 1:
         object.__setattr__(state, "stress", np.zeros((3, 3)))
-    file = FieldFile(shared_path, comm, part.header, part.mesh, part.interface)
+    file = FieldFile(shared_path, comm, part.header, part.mesh, part.fibres, part.interface)
     with pytest.raises((ValueError, RuntimeError), match="/state/0/stress has 3 rows"):
         file.write_state(0, state)
     file.close()
@@ -127,7 +127,7 @@ def test_a_wrong_number_of_rows_is_heard_everywhere(comm: Any, shared_path: Path
 @pytest.mark.parametrize("error", [FetiHomogError("refused"), ValueError("a defect")])
 def test_an_error_of_all_ranks_closes_and_removes_the_file(comm: Any, shared_path: Path, error: Exception) -> None:
     part = part_of(sample(2, 0, 1), comm.rank, comm.size)
-    file = FieldFile(shared_path, comm, part.header, part.mesh, part.interface)
+    file = FieldFile(shared_path, comm, part.header, part.mesh, part.fibres, part.interface)
     with pytest.raises(type(error)), file:
         raise error
     comm.barrier()

@@ -60,10 +60,11 @@ def test_fields(comm, shared_path):
     assert (whole is None) == (comm.rank > 0)
     same = True
     if whole is not None:
+        parts = {"mesh": whole.mesh, "fibre": whole.fibres, "interface": whole.interface, "state/2": whole.states[2]}
         with h5py.File(shared_path / "out" / "result.h5", "r") as file:
             same = all(
                 np.array_equal(file[f"{group}/{name}"][()], getattr(part, name))
-                for group, part in (("mesh", whole.mesh), ("interface", whole.interface), ("state/2", whole.states[2]))
+                for group, part in parts.items()
                 for name in tables(part)
             )
     parallel_assert(comm, same)

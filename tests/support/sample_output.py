@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.output.files.field_layout import Header, InterfacePart, MeshPart, StatePart
+from feti_homog.output.files.field_layout import FibrePart, Header, InterfacePart, MeshPart, StatePart
 
 GRADIENTS = tuple(np.array([[a, b], [b, c]]) for a, b, c in ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.5, 0.0)))
 
@@ -16,6 +16,7 @@ GRADIENTS = tuple(np.array([[a, b], [b, c]]) for a, b, c in ((1.0, 0.0, 0.0), (0
 class Sample:
     header: Header
     mesh: MeshPart
+    fibres: FibrePart
     interface: InterfacePart
     states: tuple[StatePart, ...]
 
@@ -38,7 +39,8 @@ def sample(cells: int = 8, refine: int = 0, order: int = 1) -> Sample:
     phase = (submesh == 2).astype(int)
     mesh = MeshPart(points, triangles, body=phase, subdomain=submesh, phase=phase)
     header = Header("sample", "0", 1.0, 1.0, order, refine, ("matrix", "fibre"), "mm", "GPa")
-    return Sample(header, mesh, _interface(), tuple(_state(mesh, gradient) for gradient in GRADIENTS))
+    fibres = FibrePart(*(np.array([number]) for number in (1, 1, 1)), np.array([[0.5, 0.5]]), np.array([np.nan]))
+    return Sample(header, mesh, fibres, _interface(mesh), tuple(_state(mesh, gradient) for gradient in GRADIENTS))
 
 
 def part_of(whole: Sample, rank: int, size: int) -> Sample:
@@ -50,9 +52,10 @@ def part_of(whole: Sample, rank: int, size: int) -> Sample:
     labels = {name: getattr(mesh, name)[rows] for name in ("body", "subdomain", "phase")}
     part = MeshPart(mesh.points[nodes], triangles.reshape(-1, mesh.triangles.shape[1]), **labels)
     owned = slice(None) if last in mine else slice(0)
+    fibres = FibrePart(**{name: table[: 1 if rank == 0 else 0] for name, table in vars(whole.fibres).items()})
     interface = InterfacePart(**{name: table[owned] for name, table in vars(whole.interface).items()})
     states = tuple(_cut(state, nodes, rows, owned) for state in whole.states)
-    return Sample(whole.header, part, interface, states)
+    return Sample(whole.header, part, fibres, interface, states)
 
 
 def without_interface(whole: Sample) -> Sample:
@@ -86,12 +89,20 @@ def _merge(corners: np.ndarray, submesh: np.ndarray) -> tuple[np.ndarray, np.nda
     return np.ascontiguousarray(nodes[:, 1:]), triangles.reshape(corners.shape[:2])
 
 
-def _interface() -> InterfacePart:
+def _interface(mesh: MeshPart) -> InterfacePart:
     s = np.linspace(0.25, 0.75, 5)
     sides = [np.stack([s, 0 * s + 0.25], 1), np.stack([s, 0 * s + 0.75], 1)]
     normals = [np.tile([0.0, -1.0], (5, 1)), np.tile([0.0, 1.0], (5, 1))]
-    length, fibre = np.full(10, 0.125), np.zeros(10, int)
-    return InterfacePart(np.concatenate(sides), np.concatenate(normals), length, fibre)
+    points, length, fibre = np.concatenate(sides), np.full(10, 0.125), np.ones(10, int)
+    faces = [_nodes_at(mesh, points, body) for body in (1, 0)]
+    return InterfacePart(points, np.concatenate(normals), length, fibre, fibre, *faces)
+
+
+def _nodes_at(mesh: MeshPart, points: np.ndarray, body: int) -> np.ndarray:
+    """The nodes of a body at the points."""
+    nodes = np.unique(mesh.triangles[mesh.body == body])
+    away = np.abs(mesh.points[nodes][:, None] - points).max(axis=2)
+    return nodes[away.argmin(axis=0)]
 
 
 def _state(mesh: MeshPart, gradient: np.ndarray) -> StatePart:

@@ -24,6 +24,7 @@ FLOORS = (
     ("common",),
     ("config",),
     ("mechanics",),
+    ("verification",),
     ("cell",),
     ("fem",),
     ("feti.thresholds",),
@@ -97,6 +98,16 @@ def test_importing_starts_nothing():
     program = "import sys, feti_homog, feti_homog.config.case, feti_homog.cli; print(*sys.modules)"
     run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert not {"petsc4py", "mpi4py", "gmsh", "h5py", "matplotlib"} & set(run.stdout.split())
+
+
+def test_results_are_verified_without_the_solver(tmp_path):
+    program = "import sys, feti_homog.cli as c; assert c.main(['verify', 'nowhere']) == 2; print(*sys.modules)"
+    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=tmp_path)
+    loaded = set(run.stdout.split())
+    assert "feti_homog.verification.certificate" in loaded and "h5py" in loaded
+    assert not {"petsc4py", "mpi4py", "gmsh", "matplotlib"} & loaded
+    floors = {floor_of(name.removeprefix("feti_homog.")) for name in loaded if name.startswith("feti_homog.")}
+    assert floors <= {"errors", "typing", "common", "config", "verification", "api", "cli"}
 
 
 def test_only_a_rank_that_draws_loads_matplotlib():

@@ -115,8 +115,11 @@ def test_datasets_and_attributes_of_result_h5(folders):
 
     def note(name: str, item: Any) -> None:
         place = f"/{name}".rstrip("/")
-        found.update((place or "/", f"attribute {attribute}") for attribute in item.attrs)
-        found.update({(place, "dataset")} if isinstance(item, h5py.Dataset) else ())
+        if isinstance(item, h5py.Dataset):
+            found.add((place, "dataset"))
+            assert set(item.attrs) == {"meaning", "unit"}, place
+        else:
+            found.update((place or "/", f"attribute {attribute}") for attribute in item.attrs)
 
     with h5py.File(folders["debonded"] / "result.h5") as file:
         note("", file)

@@ -26,6 +26,7 @@ class InterfaceNodes:
         fibre: (k,) constituent.
         vertex: (k,) whether the node is one of the coarse mesh.
         precracked: (k,) whether the mesh has it debonded from the start.
+        fibre_node: (k,) the fibre's copy among the fine nodes of this rank.
     """
 
     row: Int
@@ -35,6 +36,7 @@ class InterfaceNodes:
     fibre: Int
     vertex: Bool
     precracked: Bool
+    fibre_node: Int
 
 
 class ConstraintLayout:
@@ -146,15 +148,27 @@ class ConstraintLayout:
         share = np.where((p % 2 == 0) & shared.is_edge[entity], 4, 2) / 3 if quadratic else np.ones(len(p))
         share = share * np.where(shared.is_edge[entity], 1.0, 0.5)
         positions = np.concatenate([_class_points(s) for s in self.subdomains] or [np.zeros((0, 2))])
+        # Sharers are sorted by body, so the last one is the fibre's, and it is this rank's, which owns the rows.
+        copy = self.base[shared.pointer[entity + 1] - 1] + p
         return InterfaceNodes(
             row=shared.first_row[entity] - owned[0] + (p + 1) * 2 * (k - 1) - 2,
-            points=positions[self.base[shared.pointer[entity + 1] - 1] + p],
+            points=positions[copy],
             normal=self._normals(entity, p),
             length=share * shared.length[entity] / m,
             fibre=shared.fibre[entity],
             vertex=~shared.is_edge[entity],
             precracked=shared.precracked[entity],
+            fibre_node=copy,
         )
+
+    def matrix_copies(self) -> tuple[Int, Int]:
+        """The breakable nodes of which this rank has the matrix's first copy: the local row of the normal constraint
+        of each, and that copy among the fine nodes of this rank."""
+        shared = self.shared
+        first = self.base[shared.pointer[:-1]]
+        here = np.flatnonzero((shared.fibre >= 0) & (first >= 0))
+        entity, p = expand(here, shared.nodes[here])
+        return self.first[entity] + (p + 1) * 2 * (shared.copies[entity] - 1) - 2, first[entity] + p
 
 
 def _class_points(subdomain: Subdomain) -> Float:

@@ -29,6 +29,8 @@ class JumpOperator:
         rows: global number of each local row.
         node_rows: first owned row and number of rows of each fine node that this rank owns.
         nodes: the interface nodes that this rank owns.
+        matrix_copies: local rows of the interface nodes of which this rank has a copy of the matrix, and these copies,
+            as `ConstraintLayout.matrix_copies` has them.
         owned: first global row of this rank and the one after its last.
         global_rows: number of rows on all ranks.
         shared: the vertices and edges that the rows belong to.
@@ -48,6 +50,7 @@ class JumpOperator:
         self.rows, self.B = layout.rows, layout.matrix()
         self.node_rows = layout.node_rows(shared.owned)
         self.nodes = layout.interface_nodes(shared.owned)
+        self.matrix_copies = layout.matrix_copies()
         self.vector = PETSc.Vec().createMPI((shared.owned[1] - shared.owned[0], shared.global_rows), comm=comm)
         self._exchanges: dict[int, _Exchange] = {}
 
@@ -63,6 +66,14 @@ class JumpOperator:
     def sum(self, local: Float) -> Float:
         """The owned rows of the sum over ranks of `local`, (local rows,) or (local rows, k)."""
         return self._exchange(local).sum(local)
+
+    def from_matrix(self, numbers: Int) -> Int:
+        """(k,) the numbers that the ranks of the matrix give their fine nodes, at the interface nodes that this rank
+        owns; each has one for all of its own fine nodes.  Collective."""
+        rows, copies = self.matrix_copies
+        local = np.zeros(len(self.rows))
+        local[rows] = numbers[copies]  # exact, as integers below 2^53 are
+        return self.sum(local)[self.nodes.row].astype(np.int64)
 
     def _exchange(self, x: Float) -> _Exchange:
         """The exchange for vectors of as many columns as x, made at the first use."""

@@ -87,7 +87,7 @@ def _assemble(comm: MPI.Intracomm, local: csr_matrix, rows: Int, columns: Int, o
     """The sum of the contributions as PETSc's distributed sparse matrix; arguments as `assemble_owned_rows`."""
     maps = [PETSc.LGMap().create(i.astype(PETSc.IntType), comm=comm) for i in (rows, columns)]
     sizes = tuple((n, comm.allreduce(n)) for n in owned)
-    A = PETSc.Mat().createIS(sizes, *maps, comm=comm)
+    A = PETSc.Mat().createIS(sizes, lgmapr=maps[0], lgmapc=maps[1], comm=comm)
     csr = csr_matrix(local)
     part = PETSc.Mat().createAIJ(csr.shape, csr=(csr.indptr, csr.indices, csr.data), comm=PETSc.COMM_SELF)
     A.setISLocalMat(part)

@@ -47,7 +47,7 @@ class NodeBlocks:
             unit = np.eye(at.shape[1]) * (1 - mask)[:, :, None]
             rows.append(np.broadcast_to(at[:, :, None], dense.shape).ravel())
             columns.append(np.broadcast_to(at[:, None, :], dense.shape).ravel())
-            inverse: Float = np.linalg.inv(both * dense + unit)
+            inverse = np.asarray(np.linalg.inv(both * dense + unit), float)
             values.append((both * inverse).ravel())
         shape = (self.rows, self.rows)
         return csr_matrix((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=shape)

@@ -1,12 +1,13 @@
 """Checkpoints of a path: one small HDF5 file an event, written whole or not at all.
 
 Rank 0 writes what the ranks' parts add up to; it concerns the interfaces only.  The events' files are numbered
-without gaps; each carries the format, the run that it belongs to and a checksum.
+without gaps; each carries the run that it belongs to and, ahead of what HDF5 reads, the format and a checksum.
 """
 
 from __future__ import annotations
 
 import hashlib
+import re
 import shutil
 from collections.abc import Mapping
 from pathlib import Path
@@ -23,7 +24,11 @@ from feti_homog.errors import CaseError
 from feti_homog.output.files import atomic, result_json
 
 FOLDER = "checkpoint"
-FORMAT = 1  # of an event's file: to be raised when what an event holds changes
+FORMAT = 2  # of an event's file: to be raised when what an event holds changes
+# HDF5 leaves so many bytes at the beginning of a file to its writer; there stands the header.
+USER_BLOCK = 512
+HEADER = re.compile(rb"feti-homog checkpoint, format (\d+), sha256 ([0-9a-f]{64})\n")
+UNMARKED = re.compile(rb"\x89HDF\r\n\x1a\n")  # HDF5's own first bytes, as in format 1
 
 Arrays = dict[str, NDArray[Any]]
 
@@ -91,21 +96,16 @@ class Checkpoint:
 
     def _read_event(self, path: Path) -> Arrays:
         try:
+            _check_bytes(path)
             with h5py.File(path, "r") as file:
-                version = int(file.attrs.get("format", 0))
-                signature, checksum = str(file.attrs.get("signature", "")), str(file.attrs.get("checksum", ""))
+                signature = str(file.attrs.get("signature", ""))
                 event = {name: table[()] for name, table in file.items()}
-        except Exception as error:  # of damaged files h5py says anything
+        except CaseError:
+            raise
+        except Exception as error:  # h5py may say anything
             raise CaseError(f"--resume: {path} is no readable event of a path: {error}") from error
-        if version != FORMAT:
-            raise CaseError(
-                f"--resume: {path} has the checkpoints' format {version}, this program reads format {FORMAT}; "
-                "go on with the program that wrote it, or start again without --resume"
-            )
         if signature != self.signature:
             raise CaseError(f"--resume: {path} is of another run: expected {self.signature}; found {signature}")
-        if checksum != _checksum(event):
-            raise CaseError(f"--resume: {path} is damaged: its checksum is wrong")
         return event
 
     def _write(self, number: int, whole: Mapping[str, Any], gathered: Mapping[str, list[NDArray[Any]]]) -> None:
@@ -115,10 +115,11 @@ class Checkpoint:
 
         def write_event(part: Path) -> None:
             part.parent.mkdir(parents=True, exist_ok=True)
-            with h5py.File(part, "w") as file:
+            with h5py.File(part, "w", userblock_size=USER_BLOCK) as file:
                 for name, value in event.items():
                     file[name] = value
-                file.attrs.update(format=FORMAT, signature=self.signature, checksum=_checksum(event))
+                file.attrs["signature"] = self.signature
+            _mark(part)
 
         atomic.replace(self.folder / f"{number:06d}.h5", write_event)
 
@@ -139,11 +140,37 @@ class NoCheckpoint(Checkpoint):
         """Nothing."""
 
 
-def _checksum(event: Arrays) -> str:
-    content = hashlib.sha256()
-    for name in sorted(event):
-        content.update(name.encode() + np.ascontiguousarray(event[name]).tobytes())
-    return content.hexdigest()
+def _digest(path: Path) -> str:
+    """SHA-256 of what follows the user block."""
+    with path.open("rb") as file:
+        file.seek(USER_BLOCK)
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _mark(path: Path) -> None:
+    """Write format and checksum into the user block of a finished file."""
+    header = f"feti-homog checkpoint, format {FORMAT}, sha256 {_digest(path)}\n"
+    with path.open("r+b") as file:
+        file.write(header.encode())
+
+
+def _check_bytes(path: Path) -> None:
+    """Refuse a file of another format or other bytes than were written, before HDF5, which a wrong bit may crash.
+
+    Raises:
+        CaseError: what is wrong.
+    """
+    with path.open("rb") as file:
+        start = file.read(USER_BLOCK)
+    header = HEADER.match(start)
+    version = int(header[1]) if header else int(UNMARKED.match(start) is not None)
+    if version not in (0, FORMAT):
+        raise CaseError(
+            f"--resume: {path} has the checkpoints' format {version}, this program reads format {FORMAT}; "
+            "go on with the program that wrote it, or start again without --resume"
+        )
+    if header is None or header[2].decode() != _digest(path):
+        raise CaseError(f"--resume: {path} is damaged: its checksum is wrong")
 
 
 def _part(event: Arrays, rank: int) -> Arrays:

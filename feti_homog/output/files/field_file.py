@@ -15,11 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feti_homog.common.mpi_errors import agree, all_raise, on_root
+from feti_homog.common.records import LENGTH, STRESS, Description
 from feti_homog.errors import FetiHomogError
 from feti_homog.output.files import atomic
 from feti_homog.output.files.field_layout import (
     PLANE_VECTORS,
     PROGRAM,
+    FibrePart,
     Header,
     InterfacePart,
     MeshPart,
@@ -27,6 +29,7 @@ from feti_homog.output.files.field_layout import (
     attributes,
     rows_of,
     tables,
+    view_words,
 )
 
 if TYPE_CHECKING:
@@ -34,6 +37,7 @@ if TYPE_CHECKING:
 
 
 NAME = "result.h5"
+PURE_NUMBER = "1"  # the unit of what has none
 RESERVE = 1 << 17  # bytes for what HDF5 itself adds to the tables of a group
 
 
@@ -64,16 +68,36 @@ class FieldFile:
         FetiHomogError: the file cannot be written; on every rank, and what there was of it is removed.
     """
 
-    def __init__(self, directory: Path, comm: Comm, header: Header, mesh: MeshPart, interface: InterfacePart) -> None:
+    def __init__(
+        self,
+        directory: Path,
+        comm: Comm,
+        header: Header,
+        mesh: MeshPart,
+        fibres: FibrePart,
+        interface: InterfacePart,
+    ) -> None:
         self._comm = comm
         self._path = Path(directory) / NAME
         self.part: Path = on_root(comm, atomic.part_of, self._path)
-        counts = {"n": len(mesh.points), "m": len(mesh.triangles), "k": len(interface.points)}
+        self._units = {LENGTH: header.length_unit, STRESS: header.stress_unit}
+        counts = {
+            "n": len(mesh.points),
+            "m": len(mesh.triangles),
+            "k": len(interface.points),
+            "f": len(fibres.number),
+        }
         self._rows = {symbol: _Rows.of(comm, count) for symbol, count in counts.items()}
-        on_root(comm, _with_write_errors, self._path, _probe, self.part, comm.size)
-        self._file = agree(comm, _with_write_errors, self._path, _create, self.part, comm)
+        size = self._table_bytes(mesh) + self._table_bytes(interface)
+        on_root(comm, _with_write_errors, self._path, _create, self.part, comm.size, size + RESERVE)
+        # MPI-IO keeps names in short buffers: it has the folder by its descriptor, while the file is open.
+        folder: int = agree(comm, _with_write_errors, self._path, os.open, self.part.parent, os.O_RDONLY)
+        self._folder = contextlib.ExitStack()
+        self._folder.callback(os.close, folder)
+        self._file = agree(comm, _with_write_errors, self._path, _open, folder, self.part.name, comm)
         self._collectively(_set_attributes, self._file, attributes(header) | {"created_by": PROGRAM})
         self._write_part("mesh", replace(mesh, triangles=mesh.triangles + np.int64(self._rows["n"].start)))
+        self._write_part("fibre", fibres)
         self._write_part("interface", interface)
 
     def write_state(self, number: int, state: StatePart) -> None:
@@ -86,6 +110,7 @@ class FieldFile:
     def close(self) -> Path:
         """Completes the file, gives it its final name, and returns its path."""
         self._collectively(self._file.close)
+        self._folder.close()
         on_root(self._comm, _with_write_errors, self._path, atomic.commit, self.part, self._path)
         return self._path
 
@@ -100,31 +125,47 @@ class FieldFile:
         elif all_raise(self._comm, error):
             self._remove()
 
+    def _table_bytes(self, part: Any) -> int:
+        """Bytes of the tables of a part, those of all ranks."""
+        return sum(
+            np.dtype(d.dtype).itemsize * int(np.prod(np.shape(getattr(part, name))[1:])) * self._rows[rows_of(d)].total
+            for name, d in tables(part).items()
+        )
+
     def _write_part(self, group: str, part: Any) -> None:
         """Makes the tables of a group, each rank giving its rows, and the views of its vectors."""
         described = tables(part)
         for symbol, rows in self._rows.items():
-            own = {name: (getattr(part, name), d.dtype) for name, d in described.items() if rows_of(d) == symbol}
+            own = {name: d for name, d in described.items() if rows_of(d) == symbol}
             if own:
-                self._write_tables(group, rows, own)
+                self._write_tables(group, rows, part, own)
         for name, d in described.items():
             if name in PLANE_VECTORS:
-                self._view(f"{group}/{name}", self._rows[rows_of(d)])
+                self._view(
+                    f"{group}/{name}", self._rows[rows_of(d)], self._words(d) | {"meaning": view_words(group, name)}
+                )
 
-    def _write_tables(self, group: str, rows: _Rows, described: Mapping[str, tuple[Any, str]]) -> None:
-        """Makes tables of the same rows; each comes with its type."""
-        arrays = agree(self._comm, _arrays, group, rows.count, described)
+    def _write_tables(self, group: str, rows: _Rows, part: Any, described: Mapping[str, Description]) -> None:
+        """Makes tables of the same rows of a part."""
+        arrays = agree(self._comm, _arrays, group, rows.count, part, described)
         row = sum(array.dtype.itemsize * int(np.prod(array.shape[1:])) for array in arrays.values())
         self._collectively(_reserve, self._comm.rank, self.part, row * rows.total)
         for name, array in arrays.items():
-            self._collectively(_write_rows, self._file, f"{group}/{name}", rows, array)
+            words = self._words(described[name])
+            self._collectively(_write_rows, self._file, f"{group}/{name}", rows, array, words)
 
-    def _view(self, name: str, rows: _Rows) -> None:
+    def _words(self, described: Description) -> dict[str, str]:
+        """The attributes of a dataset: what it holds, and in which unit, by its label if the case gives one."""
+        unit = self._units.get(described.unit) or described.unit or PURE_NUMBER
+        return {"meaning": described.meaning, "unit": unit}
+
+    def _view(self, name: str, rows: _Rows, words: Mapping[str, str]) -> None:
         """The table `name` (rows, 2) as /vector/`name` (rows, 3)."""
         if rows.total:
             layout = h5py.VirtualLayout((rows.total, 3), dtype=np.float64)
             layout[:, :2] = h5py.VirtualSource(".", name, shape=(rows.total, 2), dtype=np.float64)
             self._collectively(self._file.create_virtual_dataset, f"vector/{name}", layout, 0.0)
+            self._collectively(_set_attributes, self._file[f"vector/{name}"], words)
 
     def _collectively(self, function: Callable[..., object], *args: Any) -> None:
         """function(*args) on all ranks; if any cannot write, the file is removed and all raise."""
@@ -142,6 +183,7 @@ class FieldFile:
         self._comm.barrier()
         with contextlib.suppress(OSError, RuntimeError):
             self._file.close()
+        self._folder.close()
         if self._comm.rank == 0:
             with contextlib.suppress(OSError):
                 self.part.unlink()
@@ -153,16 +195,32 @@ def _with_write_errors(path: Path, function: Callable[..., Any], *args: Any) -> 
         return function(*args)
 
 
-def _probe(part: Path, ranks: int) -> None:
-    """Finds out in plain terms whether the file can be made, before MPI-IO tries."""
+def _create(part: Path, ranks: int, size: int) -> None:
+    """Makes an empty HDF5 file with `size` bytes of space, by plain calls: HDF5 may crash or hang where they fail."""
     if ranks > 1 and not h5py.get_config().mpi:
         raise FetiHomogError(f"h5py is built without MPI: {ranks} ranks cannot write {NAME}")
     part.parent.mkdir(parents=True, exist_ok=True)
-    part.open("wb").close()
+    try:
+        with part.open("wb") as stream:
+            stream.write(_empty_file())
+            stream.flush()
+            os.posix_fallocate(stream.fileno(), 0, size)
+    except OSError:
+        part.unlink(missing_ok=True)
+        raise
 
 
-def _create(part: Path, comm: Comm) -> Any:
-    return h5py.File(part, "w", driver="mpio", comm=comm) if h5py.get_config().mpi else h5py.File(part, "w")
+def _empty_file() -> bytes:
+    """An HDF5 file without content."""
+    with h5py.File("empty", "w", driver="core", backing_store=False) as file:
+        file.flush()
+        return bytes(file.id.get_file_image())
+
+
+def _open(folder: int, name: str, comm: Comm) -> Any:
+    """The file of that name in an open folder, opened by all ranks."""
+    path = f"/proc/self/fd/{folder}/{name}"
+    return h5py.File(path, "r+", driver="mpio", comm=comm) if h5py.get_config().mpi else h5py.File(path, "r+")
 
 
 def _set_attributes(target: Any, attributes: Mapping[str, Any]) -> None:
@@ -170,8 +228,8 @@ def _set_attributes(target: Any, attributes: Mapping[str, Any]) -> None:
         target.attrs[key] = value
 
 
-def _arrays(group: str, count: int, described: Mapping[str, tuple[Any, str]]) -> dict[str, NDArray[Any]]:
-    arrays = {name: np.ascontiguousarray(table, np.dtype(dtype)) for name, (table, dtype) in described.items()}
+def _arrays(group: str, count: int, part: Any, described: Mapping[str, Description]) -> dict[str, NDArray[Any]]:
+    arrays = {name: np.ascontiguousarray(getattr(part, name), np.dtype(d.dtype)) for name, d in described.items()}
     for name, array in arrays.items():
         if len(array) != count:
             raise ValueError(f"/{group}/{name} has {len(array)} rows, not {count}")
@@ -185,9 +243,10 @@ def _reserve(rank: int, part: Path, size: int) -> None:
             os.posix_fallocate(stream.fileno(), stream.seek(0, os.SEEK_END), size + RESERVE)
 
 
-def _write_rows(file: Any, name: str, rows: _Rows, array: NDArray[Any]) -> None:
+def _write_rows(file: Any, name: str, rows: _Rows, array: NDArray[Any], words: Mapping[str, str]) -> None:
     """Makes a table and writes this rank's rows. An empty rank takes part with an empty selection."""
     table = file.create_dataset(name, (rows.total, *array.shape[1:]), array.dtype)
+    _set_attributes(table, words)
     memory, place = h5py.h5s.create_simple(array.shape), table.id.get_space()
     if rows.count:
         place.select_hyperslab((rows.start,) + (0,) * (array.ndim - 1), array.shape)

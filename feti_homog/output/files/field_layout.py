@@ -1,7 +1,7 @@
 """What result.h5 holds: the parts that each rank hands over, and where the file has them.
 
-Lengths are in the unit of the cell, stresses in that of the moduli.  n nodes, m elements and k interface nodes are all
-of the file's, of which each rank has a part; nodes are torn, so that each subdomain has its own.
+Lengths are in the unit of the cell, stresses in that of the moduli.  n nodes, m elements, k interface nodes, f fibres
+are all of the file's, of which each rank has a part; nodes are torn, so that each subdomain has its own.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ class Header:
     phases: tuple[str, ...] = described("names of the phases")
     length_unit: str = described("label of the unit of lengths, may be empty", default="")
     stress_unit: str = described("label of the unit of stresses, may be empty", default="")
+    case: str = described("the case with its defaults as JSON, the same as `case` of result.json", default="{}")
 
 
 @dataclass(frozen=True)
@@ -52,6 +53,21 @@ class MeshPart:
 
 
 @dataclass(frozen=True)
+class FibrePart:
+    """The f fibres, all of them on the first rank: numbered as in case files."""
+
+    number: AnyInt = described("number in `fibre = N` of case files, from 1", shape="(f,)", dtype="int32")
+    body: AnyInt = described("body in /mesh/body", shape="(f,)", dtype="int32")
+    phase: AnyInt = described("phase, a place in `phases`", shape="(f,)", dtype="int32")
+    centre: Float = described(
+        "centre of the circle, within the cell; of a fibre that is not round that of its area; NaN if it winds around",
+        LENGTH,
+        "(f, 2)",
+    )
+    radius: Float = described("radius; NaN of a fibre that is not round", LENGTH, "(f,)")
+
+
+@dataclass(frozen=True)
 class InterfacePart:
     """The k fibre-matrix interface nodes whose multipliers this rank owns; k may be 0."""
 
@@ -59,6 +75,13 @@ class InterfacePart:
     normal: Float = described("unit normals (n1, n2), from fibre to matrix; tangents are (-n2, n1)", shape="(k, 2)")
     length: Float = described("tributary length: that of the interface which a node stands for", LENGTH, "(k,)")
     fibre: AnyInt = described("body of the fibre", shape="(k,)", dtype="int32")
+    fibre_number: AnyInt = described("number of the fibre, from 1", shape="(k,)", dtype="int32")
+    fibre_node: AnyInt = described("a node of the mesh on the fibre's face, from 0", shape="(k,)", dtype="int64")
+    matrix_node: AnyInt = described(
+        "a node of the mesh on the matrix's face, from 0, where `fibre_node` is or an image of it by the periods",
+        shape="(k,)",
+        dtype="int64",
+    )
 
 
 @dataclass(frozen=True)
@@ -79,6 +102,9 @@ class StatePart:
     status: AnyInt = described("0 bonded, 1 closed (debonded, in contact), 2 open", shape="(k,)", dtype="int8")
 
 
+GROUPS: dict[str, type] = {"mesh": MeshPart, "fibre": FibrePart, "interface": InterfacePart, "state/K": StatePart}
+
+
 @dataclass(frozen=True)
 class Item:
     """A dataset or an attribute of result.h5; K in `path` is the number of a state, from 0."""
@@ -95,7 +121,7 @@ def items() -> Iterator[Item]:
     """All that result.h5 holds, with unit and meaning: the reference table of the file."""
     yield from _items_of(Header, "")
     yield Item("/", "attribute created_by", "", "text", "", f"`{PROGRAM}`")
-    for group, part in (("mesh", MeshPart), ("interface", InterfacePart), ("state/K", StatePart)):
+    for group, part in GROUPS.items():
         yield from _items_of(part, group)
 
 
@@ -110,9 +136,15 @@ def attributes(part: Any) -> dict[str, Any]:
 
 
 def rows_of(description: Description) -> str:
-    """What a dataset has rows of: `n` nodes, `m` elements, `k` interface nodes; empty for attributes."""
+    """What a dataset has rows of: `n` nodes, `m` elements, `k` interface nodes, `f` fibres; empty for attributes."""
     first = description.shape[1:2]
-    return first if first in ("n", "m", "k") else ""
+    return first if first in ("n", "m", "k", "f") else ""
+
+
+def view_words(group: str, name: str) -> str:
+    """What a dataset of /vector is."""
+    group = "state/K" if group.startswith("state/") else group
+    return f"/{group}/{name} with a third component 0, as viewers want it; takes no space"
 
 
 def _items_of(part: type, group: str) -> Iterator[Item]:
@@ -121,8 +153,8 @@ def _items_of(part: type, group: str) -> Iterator[Item]:
         if rows_of(d):
             yield Item(f"/{group}/{name}", "dataset", d.shape, d.dtype, d.unit, d.meaning)
             if name in PLANE_VECTORS:
-                words = f"/{group}/{name} with a third component 0, as viewers want it; takes no space"
-                yield Item(f"/vector/{group}/{name}", "dataset", f"({rows_of(d)}, 3)", d.dtype, d.unit, words)
+                words, shape = view_words(group, name), f"({rows_of(d)}, 3)"
+                yield Item(f"/vector/{group}/{name}", "dataset", shape, d.dtype, d.unit, words)
         else:
             words = type_words(hints[name], d)
             yield Item(f"/{group}", f"attribute {d.name or name}", d.shape, words, d.unit, d.meaning)

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import json
+import os
+
 import numpy as np
 
 from feti_homog import __version__
 from feti_homog.fem.assembly import element_strain
 from feti_homog.homogenization.averaging import Response, displacement, fluctuation
 from feti_homog.homogenization.unit_cell import TornCell
-from feti_homog.output.files.field_layout import Header, InterfacePart, MeshPart, StatePart
-from feti_homog.typing import Float
+from feti_homog.output.files.field_layout import FibrePart, Header, InterfacePart, MeshPart, StatePart
+from feti_homog.typing import Float, Int
 
 
 def header(cell: TornCell) -> Header:
@@ -25,6 +28,7 @@ def header(cell: TornCell) -> Header:
         phases=plan.phases,
         length_unit=case.output.length_unit,
         stress_unit=case.output.stress_unit,
+        case=json.dumps(case.resolved(), default=os.fspath),
     )
 
 
@@ -45,10 +49,32 @@ def mesh_part(cell: TornCell) -> MeshPart:
     )
 
 
+def fibre_part(cell: TornCell) -> FibrePart:
+    """The fibres on rank 0, none on the others."""
+    summary = cell.summary
+    body = np.arange(summary.first_fibre, len(summary.centres) if cell.comm.rank == 0 else 0)
+    return FibrePart(
+        number=summary.fibre_number(body),
+        body=body,
+        phase=summary.constituent_phase[body],
+        centre=summary.centres[body],
+        radius=summary.radii[body],
+    )
+
+
 def interface_part(cell: TornCell) -> InterfacePart:
-    """The interface nodes whose multipliers this rank owns."""
-    nodes = cell.solver.jump_operator.nodes
-    return InterfacePart(nodes.points, nodes.normal, nodes.length, nodes.fibre.astype(np.int32))
+    """The interface nodes whose multipliers this rank owns.  Collective."""
+    jumps, numbers = cell.solver.jump_operator, _node_numbers(cell)
+    nodes = jumps.nodes
+    return InterfacePart(
+        points=nodes.points,
+        normal=nodes.normal,
+        length=nodes.length,
+        fibre=nodes.fibre,
+        fibre_number=cell.summary.fibre_number(nodes.fibre),
+        fibre_node=numbers[nodes.fibre_node],
+        matrix_node=jumps.from_matrix(numbers),
+    )
 
 
 def state_part(cell: TornCell, response: Response, load_factor: float, label: str) -> StatePart:
@@ -68,6 +94,19 @@ def state_part(cell: TornCell, response: Response, load_factor: float, label: st
         jump=response.scale * solution.jump[pair],
         status=response.state.status,
     )
+
+
+def _node_numbers(cell: TornCell) -> Int:
+    """(c,) number in the file of a node of each of this rank's classes, one subdomain after the other.  Collective."""
+    meshes = [s.mesh for s in cell.subdomains]
+    first = cell.comm.exscan(sum(len(m.points) for m in meshes)) or 0
+    starts = first + np.cumsum([0, *(len(m.points) for m in meshes)])
+    numbers = [np.zeros(0, np.int64)]
+    for mesh, start in zip(meshes, starts, strict=False):
+        own = np.empty(mesh.n_classes, np.int64)
+        own[mesh.node_class] = start + np.arange(len(mesh.points))
+        numbers.append(own)
+    return np.concatenate(numbers)
 
 
 def _element_stress(cell: TornCell, E: Float, u: Float) -> Float:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
 
 LOCK = "result.lock"
+DEEPEST = "checkpoint/000000.h5"  # of a run's files the one of the longest name
 # The files of a result, those of all analyses and of what `plot` draws.
 RESULT_FILE = re.compile(
     r"result\.(json|h5|xdmf)|(angle|path)\.csv|(cell|interface|(angle|path)(_states)?)\.png|path\.gif"
@@ -34,11 +35,18 @@ def usable(directory: Path) -> None:
     Raises:
         CaseError: it cannot be used.
     """
-    there = next(p for p in (directory.absolute(), *directory.absolute().parents) if p.exists())
-    if not there.is_dir():
-        raise CaseError(f"--out {directory}: expected a folder, but {there} is a file")
-    if not os.access(there, os.W_OK | os.X_OK):
-        raise CaseError(f"--out {directory}: expected a folder that can be written to; {there} cannot")
+    try:
+        with contextlib.suppress(FileNotFoundError, NotADirectoryError):
+            os.stat(atomic.part_of(directory / DEEPEST))  # is such a name too long?
+        there = next(p for p in (directory.absolute(), *directory.absolute().parents) if os.path.lexists(p))
+        if there.is_symlink() and not there.exists():
+            raise CaseError(f"--out {directory}: expected a folder, but {there} is a link that leads nowhere")
+        if not there.is_dir():
+            raise CaseError(f"--out {directory}: expected a folder, but {there} is a file")
+        if not os.access(there, os.W_OK | os.X_OK):
+            raise CaseError(f"--out {directory}: expected a folder that can be written to; {there} cannot")
+    except OSError as error:
+        raise CaseError(f"--out {directory}: cannot be used: {error.strerror}") from error
     if (who := holder(directory / LOCK)) is not None:
         raise _busy(directory, who)
 

@@ -18,7 +18,14 @@ from PIL import Image
 
 from feti_homog.errors import FetiHomogError
 from feti_homog.output.files import field_file
-from feti_homog.output.plots.decimation import DrawnMesh, drawn_mesh, nodal_values, outline_edges, triangle_means
+from feti_homog.output.plots.decimation import (
+    BLOCK_ROWS,
+    DrawnMesh,
+    drawn_mesh,
+    nodal_values,
+    outline_edges,
+    triangle_means,
+)
 from feti_homog.output.plots.interface_marks import STATE_NAMES, InterfaceEdges, state_legend
 from feti_homog.output.plots.plot_helpers import (
     STRESS_SYMBOLS,
@@ -51,20 +58,14 @@ class DeformedCell:
     scale: float
 
     @classmethod
-    def of(
-        cls, file: Any, numbers: Sequence[int], output: Mapping[str, Any], magnify: bool, limit: int
-    ) -> DeformedCell:
-        """The stress that suits all these states; displacements at true scale, or at the one that `output` gives, or
-        magnified to be seen."""
+    def of(cls, file: Any, numbers: Sequence[int], output: Mapping[str, Any], scale: float, limit: int) -> DeformedCell:
+        """The stress that `output` chooses, or that suits all these states."""
         drawn = drawn_mesh(file, limit)
         borders = outline_edges(drawn, drawn.body)
         strain = np.abs([file[f"state/{n}"].attrs["strain"] for n in numbers]).max(axis=0)
         component = output.get("stress", "auto")
         if component not in STRESS_SYMBOLS:
             component = list(STRESS_SYMBOLS)[int(np.argmax(strain))]
-        displacements = (nodal_values(file[f"state/{n}/displacement"], drawn) for n in numbers)
-        automatic = min(magnification(d, drawn.points) for d in displacements) if magnify else 1.0
-        scale = output.get("deformation_scale") or automatic
         return cls(file, drawn, borders, InterfaceEdges.of(file, drawn, borders), component, scale)
 
     def moved(self, number: int) -> Array:
@@ -82,9 +83,10 @@ class DeformedCell:
         draw_segments(axes, moved[self.borders], "black", 0.5)
         self.interface_edges.mark(axes, moved, state["status"][:], magnified=0.8)
         axes.set_aspect("equal")
+        axes.set(xticks=(), yticks=())
         axes.set_axis_off()
         attributes = state.attrs
-        axes.set_title(f"{attributes['label']}\n{load_label(attributes['strain'])}", fontsize=9)
+        axes.set_title(f"{attributes['label']}\n{load_label(attributes['strain'])}", fontsize=9, y=1.0)
         figure: Any = axes.figure
         bar = figure.colorbar(shapes, cax=axes.inset_axes((1.02, 0.1, 0.035, 0.8)), extend=extend)
         bar.ax.tick_params(labelsize=7, pad=1, length=2)
@@ -109,8 +111,7 @@ def draw_state(axes: Axes, directory: Path, number: int, stress: str = "auto", s
     path = directory / field_file.NAME
     try:
         with h5py.File(path, "r") as file:
-            output = {"stress": stress, "deformation_scale": scale}
-            cell = DeformedCell.of(file, [number], output, False, limit=STATE_LIMIT)
+            cell = DeformedCell.of(file, [number], {"stress": stress}, scale, limit=STATE_LIMIT)
             cell.draw(axes, number, cell.moved(number))
             caption = cell.caption
     except (OSError, KeyError) as error:
@@ -126,21 +127,47 @@ def plot(directory: Path, file: Any, document: Mapping[str, Any]) -> list[Path]:
     output, count = document["case"]["output"], len(file.get("state", ()))
     if not count:
         return []
+    scale = shown_scale(file, document)
     if "angle" in document:
         # The first of the unit cases, if there are three an angle.
         every = range(0, count, count // len(document["angle"]) or 1)
         numbers = [every[round(k)] for k in np.linspace(0, len(every) - 1, min(MAX_PANELS, len(every)))]
-        magnify = document["case"]["angle"].get("strain") is None
-        return [save(_side_by_side(file, numbers, output, magnify), directory / "angle_states.png")]
+        return [save(_side_by_side(file, numbers, output, scale), directory / "angle_states.png")]
     points = document["path"][:count]
-    paths = [
-        save(_side_by_side(file, point_tables.chosen(points, MAX_PANELS), output, False), directory / "path_states.png")
-    ]
-    return [*paths, _animation(file, point_tables.chosen(points, MAX_FRAMES), output, directory / "path.gif")]
+    panels = _side_by_side(file, point_tables.chosen(points, MAX_PANELS), output, scale)
+    paths = [save(panels, directory / "path_states.png")]
+    return [*paths, _animation(file, point_tables.chosen(points, MAX_FRAMES), output, scale, directory / "path.gif")]
 
 
-def _side_by_side(file: Any, numbers: Sequence[int], output: Mapping[str, Any], magnify: bool) -> Figure:
-    cell = DeformedCell.of(file, numbers, output, magnify, limit=PANEL_LIMIT)
+def shown_scale(file: Any, document: Mapping[str, Any]) -> float:
+    """The factor of displacements in all pictures of a result: that of the case or, by default, one at which the
+    largest displacement and opening are seen, at least 1 under a given strain."""
+    chosen = document.get("case", {}).get("output", {}).get("deformation_scale")
+    if chosen:
+        return float(chosen)
+    states = [file[f"state/{number}"] for number in _frames(document, len(file["state"]))]
+    displacement = max(_largest_length(state["displacement"]) for state in states)
+    opening = max(float(state["jump"][:, 0].max(initial=0.0)) for state in states)
+    scale = magnification(displacement, float(min(file.attrs["width"], file.attrs["height"])), opening)
+    given = "path" in document or document.get("case", {}).get("angle", {}).get("strain") is not None
+    return max(scale, 1.0) if given else scale
+
+
+def _frames(document: Mapping[str, Any], count: int) -> list[int]:
+    """Numbers of at most MAX_FRAMES of so many states."""
+    if "path" in document:
+        return point_tables.chosen(document["path"][:count], MAX_FRAMES)
+    return sorted({round(k) for k in np.linspace(0, count - 1, min(MAX_FRAMES, count))})
+
+
+def _largest_length(table: Any) -> float:
+    """The largest length of the rows (n, 2) of a table, which is read in blocks."""
+    blocks = (table[start : start + BLOCK_ROWS] for start in range(0, len(table), BLOCK_ROWS))
+    return max((float(np.linalg.norm(rows, axis=1).max()) for rows in blocks), default=0.0)
+
+
+def _side_by_side(file: Any, numbers: Sequence[int], output: Mapping[str, Any], scale: float) -> Figure:
+    cell = DeformedCell.of(file, numbers, output, scale, limit=PANEL_LIMIT)
     places = [cell.moved(number) for number in numbers]
     size = np.subtract(*_corners(places)[::-1])
     rows = max(1, round(math.sqrt(0.7 * len(numbers) * size[0] / size[1])))
@@ -162,24 +189,27 @@ def _side_by_side(file: Any, numbers: Sequence[int], output: Mapping[str, Any], 
     return figure
 
 
-def _animation(file: Any, numbers: Sequence[int], output: Mapping[str, Any], path: Path) -> Path:
-    cell = DeformedCell.of(file, numbers, output, False, limit=FRAME_LIMIT)
+def _animation(file: Any, numbers: Sequence[int], output: Mapping[str, Any], scale: float, path: Path) -> Path:
+    """Frames of one layout, that of the last state."""
+    cell = DeformedCell.of(file, numbers, output, scale, limit=FRAME_LIMIT)
     places = [cell.moved(number) for number in numbers]
     low, high = _corners(places)
     size = high - low
-    figure = Figure(figsize=(3.6 + BAR, 3.6 * size[1] / size[0] + 0.7), dpi=100, layout="constrained")
+    figure = Figure(figsize=(3.6 + BAR, 3.6 * size[1] / size[0] + 0.9), dpi=100, layout="constrained")
     canvas: Any = FigureCanvasAgg(figure)
-    frames = []
-    for number, moved in zip(numbers, places, strict=True):
-        figure.clear()
-        axes = figure.subplots()
+    axes = figure.subplots()
+    figure.suptitle(cell.caption, fontsize=10)
+    frames: list[Image.Image] = []
+    for number, moved in zip(reversed(numbers), reversed(places), strict=True):
+        axes.clear()
         cell.draw(axes, number, moved)
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
         canvas.draw()
-        picture = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
-        frames.append(picture.quantize(128, dither=Image.Dither.NONE))
+        figure.set_layout_engine("none")
+        picture = Image.fromarray(np.ascontiguousarray(np.asarray(canvas.buffer_rgba())[..., :3]))
+        frames.insert(0, picture.quantize(128, dither=Image.Dither.NONE))
     times = [FRAME_TIME] * (len(frames) - 1) + [6 * FRAME_TIME]
-    frames[0].save(path, save_all=True, append_images=frames[1:], duration=times, loop=0, optimize=True)
+    frames[0].save(path, save_all=True, append_images=frames[1:], duration=times, loop=0)
     return path
 
 

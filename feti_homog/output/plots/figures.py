@@ -10,6 +10,7 @@ import h5py
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from feti_homog.errors import FetiHomogError
@@ -17,15 +18,18 @@ from feti_homog.mechanics.voigt import STRAINS
 from feti_homog.output.files import field_file, result_json
 from feti_homog.output.plots import deformed_panels, response_curves, traction_plots
 from feti_homog.output.plots.decimation import DrawnMesh, drawn_mesh, nodal_values, outline_edges, triangle_means
+from feti_homog.output.plots.fibre_numbers import write_fibre_numbers
 from feti_homog.output.plots.interface_marks import InterfaceEdges
 from feti_homog.output.plots.plot_helpers import (
     STRESS_SYMBOLS,
     STYLE,
+    cell_scale,
     colour_range,
     draw_segments,
     figure_of,
     fill_triangles,
     label_cell_axes,
+    largest_length,
     load_label,
     magnification,
     save,
@@ -35,6 +39,7 @@ from feti_homog.typing import Array
 
 MESH_LINES = 6000  # triangles up to which their edges are drawn
 OUTLINED_BODIES = 8  # up to which the deformed cell is drawn over all that it has left
+UNDEFORMED = "0.5"
 MATRIX = "#ece8df"
 FIBRES = ("Blues", "Oranges", "Greens", "Purples", "Reds", "Greys")  # one colour map for each phase
 
@@ -70,7 +75,7 @@ def _pictures(directory: Path, document: Mapping[str, Any], output: Mapping[str,
         drawn = drawn_mesh(file)
         borders = outline_edges(drawn, drawn.body)
         interface_edges = InterfaceEdges.of(file, drawn, borders)
-        paths = [save(_cell(file.attrs, drawn, borders), directory / "cell.png")]
+        paths = [save(_cell(file, drawn, borders), directory / "cell.png")]
         if "angle" in document or "path" in document:
             paths += deformed_panels.plot(directory, file, document)
         else:
@@ -78,7 +83,7 @@ def _pictures(directory: Path, document: Mapping[str, Any], output: Mapping[str,
                 state = file[f"state/{number}"]
                 figure = _deformed(file, state, drawn, borders, interface_edges, output)
                 paths.append(save(figure, directory / f"{_name(number, state.attrs['strain'])}.png"))
-        return paths + traction_plots.plot(directory, file, "path" in document)
+        return paths + traction_plots.plot(directory, file, interface_edges, "path" in document)
 
 
 def _name(number: str, strain: Array) -> str:
@@ -94,8 +99,9 @@ def _unit_case(strain: Array) -> int | None:
     return cases[0] if cases else None
 
 
-def _cell(attributes: Any, drawn: DrawnMesh, borders: Array) -> Figure:
-    """The phases, each body in a shade of its own, beside the subdomains."""
+def _cell(file: Any, drawn: DrawnMesh, borders: Array) -> Figure:
+    """The phases, each body in a shade of its own and with the fibre's number, beside the subdomains."""
+    attributes = file.attrs
     figure, (left, right) = figure_of(attributes, panels=2)
     edges = len(drawn.triangles) <= MESH_LINES
     bodies, subdomains = drawn.body.max() + 1, drawn.subdomain.max() + 1
@@ -105,11 +111,12 @@ def _cell(attributes: Any, drawn: DrawnMesh, borders: Array) -> Figure:
         draw_segments(axes, drawn.points[borders], "black", 0.9)
         label_cell_axes(axes, attributes)
     draw_segments(right, drawn.points[outline_edges(drawn, drawn.subdomain)], "black", 0.5)
+    write_fibre_numbers(left, file, drawn, borders, cell_scale(attributes))
     left.set_title(_count(bodies, "body", "bodies"))
     right.set_title(_count(subdomains, "subdomain", "subdomains"))
     right.set_ylabel("")
     figure.suptitle(attributes["title"], fontsize=12)
-    left.legend(handles=legend, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=3, frameon=False)
+    figure.legend(handles=legend, loc="outside lower center", ncols=4, frameon=False)
     return figure
 
 
@@ -125,7 +132,8 @@ def _deformed(
     attributes, strain = file.attrs, state.attrs["strain"]
     figure, (axes,) = figure_of(attributes, panels=1)
     displacement = nodal_values(state["displacement"], drawn)
-    scale = output.get("deformation_scale") or magnification(displacement, drawn.points)
+    seen = magnification(largest_length(displacement), float(np.ptp(drawn.points, axis=0).min()))
+    scale = output.get("deformation_scale") or seen
     component = output.get("stress", "auto")
     if component not in STRESS_SYMBOLS:
         component = list(STRESS_SYMBOLS)[_unit_case(strain) or 0]
@@ -133,15 +141,16 @@ def _deformed(
     norm, colours, extend = colour_range(stress)
     moved = drawn.points + scale * displacement
     picture = fill_triangles(axes, drawn, moved, stress, edges=False, norm=norm, cmap=colours)
-    draw_segments(axes, _left(attributes, drawn, borders), "0.5", 0.7)
+    draw_segments(axes, _left(attributes, drawn, borders), UNDEFORMED, 0.7)
     draw_segments(axes, moved[borders], "black", 0.8)
-    handles = interface_edges.mark(axes, moved, state["status"][:])
+    marks = interface_edges.mark(axes, moved, state["status"][:])
     label_cell_axes(axes, attributes)
     bar = figure.colorbar(picture, cax=axes.inset_axes((1.03, 0.0, 0.04, 1.0)), extend=extend)
     bar.set_label(f"${STRESS_SYMBOLS[component]}$ " + (unit_label(attributes["stress_unit"]) or "(unit of the moduli)"))
     axes.set_title(f"{attributes['title']}\n{load_label(strain)}, displacement × {scale:g}".lstrip())
-    if len(handles) > 1:
-        axes.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=3, frameon=False)
+    undeformed = Line2D([], [], color=UNDEFORMED, linewidth=0.7, label="undeformed")
+    handles = [*(marks if len(marks) > 1 else ()), undeformed]
+    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), frameon=False)
     return figure
 
 

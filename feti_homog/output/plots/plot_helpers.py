@@ -15,6 +15,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Path2D
+from PIL import Image
 
 from feti_homog.output.plots.decimation import DrawnMesh
 from feti_homog.typing import Array
@@ -23,20 +24,44 @@ STRAIN_SYMBOLS = (r"E_{11}", r"E_{22}", r"\gamma_{12}")
 STRESS_SYMBOLS = {"S11": r"\sigma_{11}", "S22": r"\sigma_{22}", "S12": r"\sigma_{12}"}
 SAME_VALUE = 1e-6  # values that differ by less, relatively, are one
 CELL_INCHES = 4.8  # inches, the longer side of a drawn cell
-STYLE = {"font.size": 10, "axes.titlesize": 11, "axes.linewidth": 0.8, "savefig.dpi": 200}
+STYLE = {"font.size": 10, "axes.titlesize": 11, "axes.linewidth": 0.8}
+DPI, PADDING = 200, 0.08  # dots per inch; inches
+# Shares of the cell that the largest displacement and opening are drawn as, and to which the former may be stretched.
+SEEN_DISPLACEMENT, SEEN_OPENING, MOST_DISPLACEMENT = 0.1, 0.04, 0.25
 
 
 def save(figure: Figure, path: Path) -> Path:
-    FigureCanvasAgg(figure)
-    figure.savefig(path, bbox_inches="tight", pad_inches=0.08)
+    """Write the figure without the white around it; `bbox_inches="tight"` would draw it twice."""
+    figure.set_dpi(DPI)
+    canvas: Any = FigureCanvasAgg(figure)
+    canvas.draw()
+    pixels = np.asarray(canvas.buffer_rgba())[..., :3]
+    Image.fromarray(np.ascontiguousarray(_trimmed(pixels, round(PADDING * DPI)))).save(path)
     return path
+
+
+def _trimmed(pixels: Array, padding: int) -> Array:
+    """The part of an image (rows, columns, 3) that is not white, with some white around."""
+    drawn = (pixels != 255).any(axis=2)
+    places = []
+    for axis in (1, 0):
+        found = np.flatnonzero(drawn.any(axis=axis))
+        low, high = (found[0], found[-1] + 1) if len(found) else (0, drawn.shape[1 - axis])
+        places.append(slice(max(low - padding, 0), high + padding))
+    part: Array = pixels[tuple(places)]
+    return part
 
 
 def figure_of(attributes: Any, panels: int) -> tuple[Figure, Sequence[Axes]]:
     width, height = float(attributes["width"]), float(attributes["height"])
-    inches = CELL_INCHES / max(width, height)
+    inches = cell_scale(attributes)
     figure = Figure(figsize=(panels * (width * inches + 0.7) + 0.1, height * inches + 1.2), layout="constrained")
     return figure, figure.subplots(1, panels, squeeze=False)[0]
+
+
+def cell_scale(attributes: Any) -> float:
+    """Inches in the picture for a length unit of the cell."""
+    return CELL_INCHES / max(float(attributes["width"]), float(attributes["height"]))
 
 
 def label_cell_axes(axes: Axes, attributes: Any) -> None:
@@ -65,7 +90,10 @@ def draw_segments(
 ) -> None:
     """Draws segments (e, 2, 2) as one path, in which they join without spots."""
     path = Path2D(segments.reshape(-1, 2), [Path2D.MOVETO, Path2D.LINETO] * len(segments))
-    axes.add_patch(PathPatch(path, fill=False, edgecolor=colour, linewidth=width, capstyle=cap, snap=False))
+    lines = PathPatch(path, fill=False, edgecolor=colour, linewidth=width, capstyle=cap, snap=False)
+    axes.add_artist(lines)
+    lines.set_clip_path(axes.patch)
+    axes.update_datalim(path.vertices)  # as `add_patch` does, one segment after the other
 
 
 def colour_range(values: Array) -> tuple[Normalize, str, str]:
@@ -96,14 +124,24 @@ def _outside(values: Array, least: float, most: float) -> str:
     return {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}[ends]
 
 
-def magnification(displacement: Array, points: Array) -> float:
-    """1, 2 or 5 times a power of ten, with which the largest displacement is about a tenth of the cell."""
-    largest = float(np.linalg.norm(displacement, axis=1).max())
-    if largest == 0.0:
+def magnification(displacement: float, size: float, opening: float = 0.0) -> float:
+    """1, 2 or 5 times a power of ten, at which both are seen in a cell of this size.
+
+    The largest displacement is drawn as about a tenth of the cell; if there is a narrow opening, as more than that.
+    """
+    if displacement == 0.0:
         return 1.0
-    wanted = 0.1 * float(np.ptp(points, axis=0).min()) / largest
+    wanted = SEEN_DISPLACEMENT * size / displacement
+    if opening > 0.0:
+        most = MOST_DISPLACEMENT * size / displacement
+        wanted = max(wanted, min(SEEN_OPENING * size / opening, most))
     power = 10.0 ** math.floor(math.log10(wanted))
     return power * min((1, 2, 5, 10), key=lambda factor: abs(math.log(factor * power / wanted)))
+
+
+def largest_length(vectors: Array) -> float:
+    """The largest length of vectors (n, 2)."""
+    return float(np.linalg.norm(vectors, axis=1).max(initial=0.0))
 
 
 def load_label(strain: Array) -> str:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MultipleLocator
+from matplotlib.ticker import MaxNLocator, MultipleLocator
 
 from feti_homog.mechanics import response
 from feti_homog.output.plots.interface_marks import BONDED, CLOSED, OPEN, STATE_COLOURS, STATE_NAMES
@@ -22,6 +22,8 @@ Document = Mapping[str, Any]
 MACROSCOPIC = (r"\Sigma_{11}", r"\Sigma_{22}", r"\Sigma_{12}")
 INK = ("#1f4e9c", "#c44e00", "#2a7f3f", "#7a3e9d")
 MARKS = ("o", "s", "^", "D")
+NUMBERED_POINTS = 6  # of a path
+ARROWS, SHORTEST_ARROW = 6, 0.06  # that show its direction: how many, and on steps of which share of the picture
 MARKED_POINTS = 60  # points of a path up to which each has a mark
 STATES = {BONDED: "bonded", OPEN: "open", CLOSED: "closed"}
 
@@ -39,7 +41,7 @@ def _angle(document: Document) -> Figure:
     """Stiffnesses or stresses against the debonding angle."""
     points, case = document["angle"], document["case"]
     stiff = "stiffness" in points[0]
-    figure = Figure(figsize=(5.6, 4.2), layout="constrained")
+    figure = Figure(figsize=(6.4, 4.2), layout="constrained")
     axes = figure.subplots()
     angles = [point["angle"] for point in points]
     for (name, column), ink, mark in zip(_angle_columns(points, stiff), INK, MARKS, strict=False):
@@ -65,20 +67,30 @@ def _angle_columns(points: Sequence[Mapping[str, Any]], stiff: bool) -> list[tup
 
 
 def _path(document: Document) -> Figure:
-    """Stresses against the leading strain, over the numbers of bonded, open and closed nodes."""
+    """Stresses against the leading strain; below, they and the numbers of bonded, open and closed nodes against the
+    number of the point, for the first folds back. Some points are numbered in all three."""
     points, case = document["path"], document["case"]
     component, first = response.leading_component(points), response.first_leg(document)
     strain = np.array([point["strain"] for point in points])[:, component]
     style: dict[str, Any] = {"marker": "o", "markersize": 2.5} if len(points) <= MARKED_POINTS else {}
-    figure = Figure(figsize=(5.8, 5.6), layout="constrained")
-    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1))
+    figure = Figure(figsize=(7.2, 8.0), layout="constrained")
+    upper, middle, lower = figure.subplots(3, 1, height_ratios=(2.2, 1, 1))
+    middle.sharex(lower)
     _stress_curves(upper, document, strain, component, first, style)
     upper.set_ylabel(f"macroscopic stress {_stress_unit(case)}")
+    upper.set_xlabel(f"macroscopic strain ${STRAIN_SYMBOLS[component]}$")
     upper.set_title(f"{case.get('name', '')}: plane {case['analysis']['plane']}, {_strengths(case)}".lstrip(": "))
-    _count_curves(lower, points, strain, first, style)
-    lower.set_xlabel(f"macroscopic strain ${STRAIN_SYMBOLS[component]}$")
-    for axes in (upper, lower):
+    stress = np.array([point["stress"] for point in points])
+    for column, ink in zip(stress.T, INK, strict=False):
+        middle.plot(column, color=ink, linewidth=1.2, **style)
+    middle.set_ylabel(f"stress {_stress_unit(case)}")
+    middle.tick_params(labelbottom=False)
+    _count_curves(lower, points, style)
+    lower.set_xlabel("number of the point, in the order of the path")
+    for axes in (upper, middle, lower):
         _finish(axes)
+    numbers = point_tables.chosen(points, NUMBERED_POINTS)
+    _number_points(upper, (middle, lower), np.stack([strain, stress[:, component]], axis=1), numbers)
     return figure
 
 
@@ -104,17 +116,40 @@ def _stress_curves(
         axes.plot([], [], color="0.3", linewidth=0.8, marker="o", ms=2, label="later legs")
 
 
-def _count_curves(
-    axes: Axes, points: Sequence[Mapping[str, Any]], strain: Array, first: int, style: Mapping[str, Any]
-) -> None:
-    """Numbers of bonded, open and closed nodes; dotted on later legs."""
+def _count_curves(axes: Axes, points: Sequence[Mapping[str, Any]], style: Mapping[str, Any]) -> None:
+    """Numbers of bonded, open and closed nodes."""
     for kind, key in STATES.items():
         ink = "0.2" if kind == BONDED else STATE_COLOURS[kind]
-        number = [point[key] for point in points]
-        axes.plot(strain[:first], number[:first], color=ink, linewidth=1.4, label=STATE_NAMES[kind], **style)
-        if first < len(points):
-            axes.plot(strain[first - 1 :], number[first - 1 :], ":", color=ink, linewidth=0.8, marker="o", ms=2.5)
+        axes.plot([point[key] for point in points], color=ink, linewidth=1.4, label=STATE_NAMES[kind], **style)
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set_ylabel("interface nodes")
+
+
+def _number_points(upper: Axes, below: Sequence[Axes], curve: Array, numbers: Sequence[int]) -> None:
+    """Points of a curve (points, 2) as ringed numbers, with arrows along it, and lines at their numbers below."""
+    ring = {"boxstyle": "circle,pad=0.15", "facecolor": "white", "edgecolor": "0.3", "linewidth": 0.6}
+    for number in numbers:
+        style: dict[str, Any] = {"color": "0.3", "fontsize": 7, "ha": "center", "va": "center", "bbox": ring}
+        pointer = {"arrowstyle": "-", "color": "0.3", "linewidth": 0.5, "shrinkA": 0, "shrinkB": 0}
+        upper.annotate(str(number), curve[number], (-9, 11), textcoords="offset points", arrowprops=pointer, **style)
+        for axes in below:
+            axes.axvline(number, color="0.7", linewidth=0.7, linestyle=":", zorder=0)
+        above = (number, 1.05)
+        below[0].annotate(str(number), above, xycoords=below[0].get_xaxis_transform(), annotation_clip=False, **style)
+    pointer = {"arrowstyle": "-|>", "color": INK[0], "linewidth": 0, "shrinkB": 0}
+    for (x0, y0), (x1, y1) in _direction_marks(curve):
+        upper.annotate("", (x1, y1), (x0, y0), arrowprops=pointer)
+
+
+def _direction_marks(curve: Array) -> list[tuple[Array, Array]]:
+    """Starts and ends of arrows on a curve (points, 2): in the middles of its longest steps, and few."""
+    steps = np.diff(np.vstack([np.zeros(2), curve]), axis=0)
+    extent = np.ptp(np.vstack([np.zeros(2), curve]), axis=0)
+    length = np.linalg.norm(steps / np.where(extent > 0.0, extent, 1.0), axis=1)
+    longest = np.argsort(-length, kind="stable")[:ARROWS]
+    starts = np.vstack([np.zeros(2), curve[:-1]])
+    middles = starts + 0.5 * steps
+    return [(starts[k], middles[k] + 0.02 * steps[k]) for k in sorted(longest) if length[k] > SHORTEST_ARROW]
 
 
 def _strengths(case: Mapping[str, Any]) -> str:
@@ -133,4 +168,5 @@ def _finish(axes: Axes) -> None:
     axes.grid(color="0.92", linewidth=0.6)
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
-    axes.legend(frameon=False, fontsize=9)
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(frameon=False, fontsize=9, loc="upper left", bbox_to_anchor=(1.0, 1.0))

@@ -11,7 +11,15 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import MultipleLocator
 
-from feti_homog.output.plots.interface_marks import BONDED, CLOSED, OPEN, STATE_COLOURS, STATE_NAMES
+from feti_homog.output.plots.interface_coordinate import DEGREES, Coordinate, coordinate
+from feti_homog.output.plots.interface_marks import (
+    BONDED,
+    CLOSED,
+    OPEN,
+    STATE_COLOURS,
+    STATE_NAMES,
+    InterfaceEdges,
+)
 from feti_homog.output.plots.plot_helpers import load_label, save, unit_label
 from feti_homog.typing import Array
 
@@ -20,7 +28,7 @@ INK = ("#1f4e9c", "#2a7f3f")
 NAMES = {"traction": (r"$t_\mathrm{n}$", r"$t_\mathrm{t}$"), "jump": ("gap", "slip")}
 
 
-def plot(directory: Path, file: Any, is_path: bool) -> list[Path]:
+def plot(directory: Path, file: Any, edges: InterfaceEdges, is_path: bool) -> list[Path]:
     """interface.png, if any state has debonded nodes: of a path's last state and first, else of one state."""
     names = sorted(file.get("state", ()), key=int)
     debonded = {name: int((file[f"state/{name}/status"][:] != BONDED).sum()) for name in names}
@@ -31,70 +39,69 @@ def plot(directory: Path, file: Any, is_path: bool) -> list[Path]:
     last = next((n for n in reversed(names) if 0 < debonded[n] < total or _touching(file, n)), names[-1])
     partly = [name for name in names if 0 < debonded[name] < total]
     shown = list(dict.fromkeys([names[0], last])) if is_path else [(partly or [last])[len(partly) // 2]]
-    return [save(_figure(file, shown), directory / "interface.png")]
+    return [save(_figure(file, edges, shown), directory / "interface.png")]
 
 
 def _touching(file: Any, name: str) -> bool:
     return bool((file[f"state/{name}/status"][:] == CLOSED).any())
 
 
-def _figure(file: Any, names: list[str]) -> Figure:
+def _figure(file: Any, edges: InterfaceEdges, names: list[str]) -> Figure:
     """A row for each of the fibres that are most debonded: tractions, and jumps."""
-    fibre, status = file["interface/fibre"][:], file[f"state/{names[-1]}/status"][:]
+    fibre, status = file["interface/fibre_number"][:], file[f"state/{names[-1]}/status"][:]
     numbers, count = np.unique(fibre[status != BONDED], return_counts=True)
     chosen = np.sort(numbers[np.argsort(-count, kind="stable")][:MAX_FIBRES])
-    first = int(fibre.min())
-    figure = Figure(figsize=(9.0, 2.2 * len(chosen) + 1.5), layout="constrained")
-    grid = figure.subplots(len(chosen), 2, sharex=True, sharey="col", squeeze=False)
-    normal = file["interface/normal"][:]
+    figure = Figure(figsize=(9.0, 2.4 * len(chosen) + 1.5), layout="constrained")
+    grid = figure.subplots(len(chosen), 2, sharex="row", sharey="col", squeeze=False)
     for row, number in zip(grid, chosen, strict=True):
-        own = np.flatnonzero(fibre == number)
-        angle = np.degrees(np.arctan2(normal[own, 1], normal[own, 0]))
-        own, angle = own[np.argsort(angle)], np.sort(angle)
+        place = coordinate(file, edges, number)
         for axes, quantity in zip(row, NAMES, strict=True):
-            _shade(axes, angle, status[own])
+            _shade(axes, place, status[place.nodes])
             for name in names:
-                _curves(axes, quantity, angle, file[f"state/{name}/{quantity}"][:][own], name == names[-1])
-            _finish(axes)
-        row[0].set_title(f"fibre {number - first + 1}", fontsize=10, loc="left")
-    _labels(file, figure, grid, names)
+                values = file[f"state/{name}/{quantity}"][:][place.nodes]
+                _curves(axes, quantity, place.values, values, name == names[-1])
+            _finish(axes, place)
+        row[0].set_title(f"fibre {number}", fontsize=10, loc="left")
+    _labels(file, figure, grid, names, status[np.isin(fibre, chosen)])
     return figure
 
 
-def _curves(axes: Axes, quantity: str, angle: Array, values: Array, last: bool) -> None:
+def _curves(axes: Axes, quantity: str, place: Array, values: Array, last: bool) -> None:
     for label, column, ink in zip(NAMES[quantity], values.T, INK, strict=True):
         width, style = (1.5, "-") if last else (0.9, "--")
-        axes.plot(angle, column, style, color=ink, linewidth=width, label=label if last else None)
+        axes.plot(place, column, style, color=ink, linewidth=width, label=label if last else None)
 
 
-def _shade(axes: Axes, angle: Array, status: Array) -> None:
+def _shade(axes: Axes, place: Coordinate, status: Array) -> None:
     """The debonded parts of the last state; each node stands for half of the way to its neighbours."""
-    middle = (angle[1:] + angle[:-1]) / 2
-    edges = np.concatenate([[-180.0], middle, [180.0]])
+    middle = (place.values[1:] + place.values[:-1]) / 2
+    edges = np.concatenate([[place.ends[0]], middle, [place.ends[1]]])
     for kind in (OPEN, CLOSED):
         for at in np.flatnonzero(status == kind):
             axes.axvspan(edges[at], edges[at + 1], color=STATE_COLOURS[kind], alpha=0.18, linewidth=0)
 
 
-def _finish(axes: Axes) -> None:
+def _finish(axes: Axes, place: Coordinate) -> None:
     axes.axhline(0.0, color="0.6", linewidth=0.6)
-    axes.set_xlim(-180, 180)
-    axes.xaxis.set_major_locator(MultipleLocator(60))
+    axes.set_xlim(*place.ends)
+    axes.set_xlabel(place.label)
+    if place.ends == DEGREES:
+        axes.xaxis.set_major_locator(MultipleLocator(60))
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def _labels(file: Any, figure: Figure, grid: Any, names: list[str]) -> None:
+def _labels(file: Any, figure: Figure, grid: Any, names: list[str], shaded: Array) -> None:
     stress = unit_label(file.attrs["stress_unit"]) or "(unit of the moduli)"
     length = unit_label(file.attrs["length_unit"]) or "(cell units)"
     for row in grid:
         row[0].set_ylabel(f"traction {stress}")
         row[1].set_ylabel(f"jump {length}")
-    for axes in grid[-1]:
-        axes.set_xlabel("direction of the normal (degrees)")
     for axes in grid[0]:
         axes.legend(frameon=False, fontsize=9, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.1, ncols=2)
     patches = [
-        Patch(color=STATE_COLOURS[kind], alpha=0.18, linewidth=0, label=STATE_NAMES[kind]) for kind in (OPEN, CLOSED)
+        Patch(color=STATE_COLOURS[kind], alpha=0.18, linewidth=0, label=STATE_NAMES[kind])
+        for kind in (OPEN, CLOSED)
+        if kind in shaded
     ]
     figure.legend(handles=patches, loc="outside lower center", ncols=2, frameon=False)
     first, last = (file[f"state/{name}"].attrs for name in (names[0], names[-1]))

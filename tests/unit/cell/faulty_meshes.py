@@ -30,7 +30,7 @@ class MshFile:
         lines += [f'1 {tag} "{name}"' for tag, name in self.curves.items()]
         lines += [f'2 {tag} "{name}"' for tag, name in self.names.items()]
         lines += ["$EndPhysicalNames", "$Nodes", str(len(self.nodes))]
-        lines += [f"{tag} {x!r} {y!r} {z!r}" for tag, (x, y, z) in self.nodes.items()]
+        lines += [f"{tag} {float(x)!r} {float(y)!r} {float(z)!r}" for tag, (x, y, z) in self.nodes.items()]
         lines += ["$EndNodes", "$Elements", str(len(self.elements))]
         for tag, (kind, physical, entity, nodes) in self.elements.items():
             lines.append(" ".join(map(str, (tag, kind, 2, physical, entity, *nodes))))

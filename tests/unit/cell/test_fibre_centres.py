@@ -9,7 +9,7 @@ import pytest
 from unit.cell.faulty_meshes import ALL_SIDES, FIBRE, MATRIX, RIGHT_SIDE, grid, node
 
 from feti_homog.cell.arrangement import arrange
-from feti_homog.cell.fibre_centres import fibre_centres
+from feti_homog.cell.fibre_centres import fibre_circles
 from feti_homog.cell.gmsh_mesher import generate
 from feti_homog.cell.msh_reader import read
 from feti_homog.cell.periodic_topology import Torus
@@ -17,9 +17,14 @@ from feti_homog.config.cell_section import Cell
 from feti_homog.errors import MeshError
 
 
-def centres_of(mesh):
+def circles_of(mesh):
     torus = Torus.of(mesh)
-    return torus, fibre_centres(torus)
+    return torus, fibre_circles(torus)
+
+
+def centres_of(mesh):
+    torus, circles = circles_of(mesh)
+    return torus, circles[:, :2]
 
 
 @pytest.mark.parametrize(
@@ -36,11 +41,12 @@ def centres_of(mesh):
 def test_fibres_are_numbered_as_arranged(cell):
     """Also those that the boundary cuts, whose images come from all sides."""
     arrangement = arrange(cell)
-    _, centres = centres_of(generate(cell))
+    _, circles = circles_of(generate(cell))
     size = np.array([arrangement.width, arrangement.height])
-    offset = centres[1:] - arrangement.centres
+    offset = circles[1:, :2] - arrangement.centres
     assert np.abs(offset - np.round(offset / size) * size).max() < 1e-12
-    assert np.isnan(centres[0]).all()
+    assert circles[1:, 2] == pytest.approx(arrangement.radii, rel=1e-12)
+    assert np.isnan(circles[0]).all()
 
 
 def test_numbers_do_not_depend_on_marks():
@@ -52,8 +58,8 @@ def test_numbers_do_not_depend_on_marks():
 
 def test_centre_of_a_polygon_is_that_of_its_area(tmp_path):
     grid().write(tmp_path / "good.msh")
-    _, centres = centres_of(read(tmp_path / "good.msh"))
-    assert centres[1] == pytest.approx([0.5, 0.5])
+    _, circles = circles_of(read(tmp_path / "good.msh"))
+    assert circles[1, :2] == pytest.approx([0.5, 0.5]) and np.isnan(circles[1, 2])
 
 
 def test_a_fibre_around_the_corner_has_its_centre_at_the_corner(tmp_path):

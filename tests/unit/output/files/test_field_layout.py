@@ -6,13 +6,21 @@ import h5py
 from mpi4py import MPI
 from support.sample_output import sample
 
+from feti_homog.common.records import LENGTH, STRESS
 from feti_homog.output.files.field_file import FieldFile
 from feti_homog.output.files.field_layout import items
+
+UNITS = {LENGTH: "mm", STRESS: "GPa", "": "1"}  # of the sample
+
+
+def words_of(described):
+    """The attributes by which a dataset describes itself."""
+    return {"meaning": described.meaning, "unit": UNITS[described.unit]}
 
 
 def test_all_that_the_file_holds_is_described(tmp_path):
     whole = sample(4)
-    with FieldFile(tmp_path, MPI.COMM_SELF, whole.header, whole.mesh, whole.interface) as file:
+    with FieldFile(tmp_path, MPI.COMM_SELF, whole.header, whole.mesh, whole.fibres, whole.interface) as file:
         file.write_state(0, whole.states[0])
     found = set()
     with h5py.File(tmp_path / "result.h5", "r") as reader:
@@ -23,10 +31,12 @@ def test_all_that_the_file_holds_is_described(tmp_path):
             if isinstance(item, h5py.Dataset):
                 found.add((path, "dataset"))
                 described = next(i for i in items() if i.path == path and i.kind == "dataset")
+                assert dict(item.attrs) == words_of(described), path
                 assert item.dtype == described.dtype and item.ndim == described.shape.count(",") + (
                     0 if described.shape.endswith(",)") else 1
                 ), path
-            found.update((path, f"attribute {key}") for key in item.attrs)
+            else:
+                found.update((path, f"attribute {key}") for key in item.attrs)
 
         reader.visititems(visit)
     assert found == {(item.path, item.kind) for item in items()}

@@ -1,0 +1,132 @@
+"""The cell of a result as the laws see it: its elements, its torn nodes, and the faces of its interfaces."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from feti_homog.typing import Bool, Float, Int
+from feti_homog.verification.constitutive_law import plane_stiffnesses
+from feti_homog.verification.elements import Elements
+from feti_homog.verification.reading import ResultFiles
+from feti_homog.verification.torus import TornNodes, TornSides, constituents, torn, wrapped
+
+# Scales of a state are no less than this share of those of the run: a path may come back to zero strain.
+FAINT = 1e-9
+
+
+@dataclass(frozen=True)
+class Faces:
+    """Which torn nodes make up the two faces at each of the k interface nodes.
+
+    Attributes:
+        row: (b,) the interface node at the place of each torn node, -1 if there is none.
+        is_fibre: (b,) whether the torn node belongs to a fibre.
+        distance: (k,) of each interface node from its place, infinite if there is no such place.
+        breakable: (places,) whether exactly one fibre and the matrix meet there.
+        place: (k,) of each interface node, -1 if there is none.
+    """
+
+    row: Int
+    is_fibre: Bool
+    distance: Float
+    breakable: Bool
+    place: Int
+
+    def sums(self, values: Float, of_fibre: bool) -> Float:
+        """(k, 2) sums of values (b, 2) over the copies on one of the faces."""
+        own = (self.row >= 0) & (self.is_fibre == of_fibre)
+        k = len(self.place)
+        return np.stack([np.bincount(self.row[own], values[own, i], k) for i in range(2)], axis=1)
+
+    def means(self, values: Float, of_fibre: bool) -> Float:
+        """(k, 2) means of values (b, 2) over the copies on one of the faces; NaN where there is none."""
+        with np.errstate(invalid="ignore"):
+            return self.sums(values, of_fibre) / self.sums(np.ones_like(values), of_fibre)
+
+
+@dataclass(frozen=True)
+class DiscreteCell:
+    """Mesh, materials and interface of a result.
+
+    Attributes:
+        stiffnesses: (phases, 3, 3).
+        constituent: (subdomains,) part of a phase that each subdomain belongs to.
+        fractions: (phases,) shares of the meshed area.
+        radius: how near copies of a node are.
+        largest_strain: the largest component of the strains of all states.
+    """
+
+    files: ResultFiles
+    stiffnesses: Float
+    elements: Elements
+    sides: TornSides
+    nodes: TornNodes
+    constituent: Int
+    faces: Faces
+    fractions: Float
+    radius: float
+    largest_strain: float
+
+    @classmethod
+    def of(cls, files: ResultFiles) -> DiscreteCell:
+        """The cell of a result.  Raises CaseError if a phase has no material."""
+        mesh = files.mesh
+        stiffnesses = plane_stiffnesses(files.case, files.phases)
+        elements = Elements(mesh, stiffnesses)
+        sides, nodes, radius = torn(mesh, files.size)
+        parts = constituents(mesh, sides)
+        faces = _faces(files, nodes, parts, radius)
+        areas = np.bincount(mesh.phase, elements.area, len(files.phases))
+        strains = [np.abs(state.attrs["strain"]).max() for state in files.file.get("state", {}).values()]
+        largest = float(np.max(strains, initial=0.0))
+        return cls(
+            files, stiffnesses, elements, sides, nodes, parts, faces, areas / areas.sum(), radius, largest
+        )  # fmt: skip
+
+    @property
+    def area(self) -> float:
+        """Of the rectangle."""
+        return float(self.files.size.prod())
+
+    @property
+    def reuss(self) -> Float:
+        """(3, 3) <L^-1>^-1, the least stiffness of the bonded cell."""
+        return np.asarray(np.linalg.inv(np.einsum("p,pij->ij", self.fractions, np.linalg.inv(self.stiffnesses))))
+
+    def imposed(self, strain: Float) -> float:
+        """Largest displacement E x that a strain imposes across the cell, at least that of a faint one."""
+        width, height = self.files.size
+        corners = np.array([[width, 0.0], [0.0, height], [width, height]])
+        own = float(np.abs(corners @ tensor(strain)).max())
+        return max(own, FAINT * self.largest_strain * float(self.files.size.max()))
+
+    def least_stress(self, strain: Float) -> float:
+        """A stress that the strain makes in the bonded cell at least, for scales that debonding does not make zero."""
+        own, most = np.abs(self.reuss @ strain).max(), np.abs(self.reuss).max() * self.largest_strain
+        return float(max(own, FAINT * most))
+
+
+def tensor(strain: Float) -> Float:
+    """(2, 2) of [E11, E22, gamma12]."""
+    return np.array([[strain[0], strain[2] / 2], [strain[2] / 2, strain[1]]])
+
+
+def _faces(files: ResultFiles, nodes: TornNodes, parts: Int, radius: float) -> Faces:
+    """Where the interface nodes of a result are on its mesh."""
+    is_fibre = np.asarray(nodes.phase > 0)
+    members = np.unique(np.column_stack([nodes.place, parts[nodes.subdomain], is_fibre]), axis=0)
+    meeting = [np.bincount(members[members[:, 2] == kind, 0], minlength=nodes.places) for kind in (0, 1)]
+    breakable = np.asarray((meeting[0] == 1) & (meeting[1] == 1))
+    points, size = files.interface.points, files.size
+    place, distance = np.full(len(points), -1), np.full(len(points), np.inf)
+    if len(points) and len(nodes.node):
+        tree = cKDTree(wrapped(files.mesh.points[nodes.node], size), boxsize=size)
+        away, nearest = tree.query(wrapped(points, size), distance_upper_bound=radius)
+        found = np.flatnonzero(np.isfinite(away))
+        place[found], distance[found] = nodes.place[nearest[found]], away[found]
+    row_of = np.full(nodes.places, -1)
+    row_of[place[place >= 0]] = np.flatnonzero(place >= 0)
+    return Faces(row_of[nodes.place], is_fibre, distance, breakable, place)

@@ -1,0 +1,55 @@
+"""Laws of the interfaces in one state: jumps, bonds, contact."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from feti_homog.typing import Float
+from feti_homog.verification.discrete_cell import DiscreteCell
+from feti_homog.verification.field_laws import in_plane, largest_displacement
+from feti_homog.verification.ledger import Ledger, relative
+from feti_homog.verification.reading import State
+
+BONDED, CLOSED, OPEN = 0, 1, 2
+
+
+def check_interface_state(ledger: Ledger, cell: DiscreteCell, state: State) -> None:
+    """The jumps are those of the displacements; bonds hold; debonded faces obey the conditions of contact."""
+    at = f"{state.name}, interface node {{}}".format
+    values = state.fluctuation[cell.nodes.node]
+    parted = cell.faces.means(values, of_fibre=False) - cell.faces.means(values, of_fibre=True)
+    largest = largest_displacement(cell, state)
+    ledger.record("jump", relative(np.abs(in_plane(cell, state.jump) - parted).max(axis=1, initial=0.0), largest), at)
+    ledger.record("bond", relative(np.where(state.status != OPEN, np.abs(state.jump[:, 0]), 0.0), largest), at)
+    ledger.record("bond", relative(np.where(state.status == BONDED, np.abs(state.jump[:, 1]), 0.0), largest), at)
+    if (state.status != BONDED).any():
+        _check_contact(ledger, cell, state)
+
+
+def utilisation(section: Mapping[str, Any], traction: Float) -> Float:
+    """(k,) share of their strength that tractions (k, 2) use; compression uses none."""
+    strengths = np.array([section.get(name) or np.inf for name in ("normal_strength", "tangential_strength")], float)
+    pulls = np.stack([np.maximum(traction[:, 0], 0.0), np.abs(traction[:, 1])], axis=1)
+    shares = pulls / strengths
+    return np.asarray(
+        np.hypot(*shares.T) if section.get("criterion") == "quadratic" else shares.max(axis=1, initial=0.0)
+    )
+
+
+def _check_contact(ledger: Ledger, cell: DiscreteCell, state: State) -> None:
+    """gap >= 0, traction <= 0, gap traction = 0, and no other force on debonded faces."""
+    at = f"{state.name}, interface node {{}}".format
+    debonded, closed = state.status != BONDED, state.status == CLOSED
+    gap, (normal, shear), length = state.jump[:, 0], state.traction.T, cell.files.interface.length
+    imposed, least = cell.imposed(state.strain), cell.least_stress(state.strain)
+    pull, force = max(float(np.abs(state.traction).max()), least), np.abs(normal) * length
+    push = max(float(force.max()), least * float(length.max()))
+    free = np.where(debonded, np.abs(shear), 0.0) + np.where(state.status == OPEN, np.abs(normal), 0.0)
+    ledger.record("free faces", relative(free, pull), at)
+    if cell.files.contact:
+        ledger.record("penetration", relative(np.where(debonded, np.maximum(-gap, 0.0), 0.0), imposed), at)
+        ledger.record("tension", relative(np.where(closed, np.maximum(normal, 0.0), 0.0), pull), at)
+        ledger.record("complementarity", relative(np.where(debonded, force * gap, 0.0), push * imposed), at)

@@ -1,0 +1,115 @@
+"""Laws of the states as a whole: their strains are those that the case asks for, their numbers those of result.json."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from feti_homog.typing import AnyInt, Float
+from feti_homog.verification.discrete_cell import DiscreteCell
+from feti_homog.verification.elements import ElementFields
+from feti_homog.verification.interface_laws import BONDED, CLOSED, OPEN, utilisation
+from feti_homog.verification.ledger import Ledger, relative
+from feti_homog.verification.reading import State
+
+COUNTS = {"bonded": BONDED, "closed": CLOSED, "open": OPEN}
+
+
+@dataclass(frozen=True)
+class StateNumbers:
+    """What the laws of paths and tables need of a state.
+
+    Attributes:
+        stored: energy per area of the cell, from the fields.
+        used: (k,) share of the strength that the bonded nodes use, 0 elsewhere.
+    """
+
+    name: str
+    load_factor: float
+    strain: Float
+    stress: Float
+    stored: float
+    status: AnyInt
+    used: Float
+
+    @classmethod
+    def of(cls, cell: DiscreteCell, state: State, fields: ElementFields) -> StateNumbers:
+        """Those of a state of a cell."""
+        used = np.where(state.status == BONDED, utilisation(cell.files.case.get("interface", {}), state.traction), 0.0)
+        stored = fields.energy / (2 * cell.area)
+        return cls(state.name, state.load_factor, state.strain, state.mean_stress, stored, state.status, used)
+
+
+def check_load(ledger: Ledger, cell: DiscreteCell, states: Sequence[StateNumbers]) -> None:
+    """Strains against the case, and points or columns of result.json against the states."""
+    document, case = cell.files.document, cell.files.case
+    same = json.loads(str(cell.files.file.attrs["case"])) == case
+    ledger.record("tables", 0.0 if same else np.inf, "the case, which the two files tell otherwise")
+    expected = list(_expected_strains(document, case))
+    ledger.record("load", abs(len(expected) - len(states)), f"{len(states)} states, {len(expected)} asked for")
+    largest = cell.largest_strain or 1.0
+    stress = max((float(np.abs(s.stress).max()) for s in states), default=0.0) or 1.0
+    for state, strain in zip(states, expected, strict=False):
+        ledger.record("load", np.abs(state.strain - strain) / largest, state.name)
+    for state, entries in zip(states, _entries(document), strict=False):
+        for name, value, scale in (("strain", state.strain, largest), ("stress", state.stress, stress)):
+            if name in entries:
+                ledger.record("tables", relative(np.array(entries[name]) - value, scale), f"{state.name}, {name}")
+        if "load_factor" in entries:
+            ledger.record("tables", abs(entries["load_factor"] - state.load_factor), f"{state.name}, load_factor")
+        for name in COUNTS.keys() & entries.keys():
+            counted = np.count_nonzero(state.status == COUNTS[name])
+            ledger.record("tables", abs(entries[name] - counted), f"{state.name}, {name}")
+    for place, matrix in _linear_stiffnesses(document, cell.files.contact):
+        ledger.record("symmetry", relative(matrix - matrix.T, float(np.abs(matrix).max())), place)
+
+
+def _expected_strains(document: Mapping[str, Any], case: Mapping[str, Any]) -> Iterator[Float]:
+    """The strains that the states of a case should have, in their order."""
+    if "path" in document:
+        path = case["path"]
+        corners = np.array([[0.0] * 3, *(path["waypoints"] if path.get("waypoints") else [path["strain"]])])
+        legs = len(corners) - 1
+        for point in document["path"]:
+            along = float(point["load_factor"]) * legs
+            leg = min(int(np.ceil(along - 1e-12)), legs) if along > 0 else 1
+            share = along - (leg - 1)
+            yield (1 - share) * corners[leg - 1] + share * corners[leg]
+    elif "angle" in document:
+        given = case["angle"].get("strain")
+        for _ in document["angle"]:
+            yield from np.eye(3) if given is None else np.array([given])
+    else:
+        yield from np.eye(3)
+        if "effective_stiffness_compression" in document:
+            yield from -np.eye(3)
+
+
+def _entries(document: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
+    """For each state what result.json says of it."""
+    if "path" in document:
+        yield from document["path"]
+    elif "angle" in document:
+        for point in document["angle"]:
+            if "stiffness" in point:
+                columns = [{"stress": column} for column in np.array(point["stiffness"]).T]
+                yield from columns[:2]
+                yield columns[2] | {name: point[name] for name in COUNTS}
+            else:
+                yield point
+    else:
+        for name, sign in (("effective_stiffness", 1.0), ("effective_stiffness_compression", -1.0)):
+            yield from ({"stress": sign * column} for column in np.array(document.get(name, np.zeros((3, 0)))).T)
+
+
+def _linear_stiffnesses(document: Mapping[str, Any], contact: bool) -> Iterator[tuple[str, Float]]:
+    """The stiffnesses in result.json of cells without one-sided contact, and what they are called."""
+    if "effective_stiffness" in document and "effective_stiffness_compression" not in document:
+        yield "effective_stiffness", np.array(document["effective_stiffness"])
+    for number, point in enumerate(document.get("angle", ())):
+        if "stiffness" in point and not (contact and point["open"] + point["closed"]):
+            yield f"angle[{number}].stiffness", np.array(point["stiffness"])

@@ -1,0 +1,200 @@
+"""The files of a result as arrays: result.json with the resolved case, result.h5 with mesh, interface and states."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from feti_homog.errors import CaseError
+from feti_homog.typing import AnyInt, Float, Int
+
+JSON, FIELDS = "result.json", "result.h5"
+SCHEMA = 1
+MISSING_FIELDS = "only a run with `fields = true` in [output] leaves what there is to verify"
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """n nodes and m elements; each subdomain has nodes of its own.
+
+    Attributes:
+        points: (n, 2).
+        triangles: (m, 3 or 6) vertices, then the nodes on the sides 01, 12, 20.
+        subdomain, phase: (m,) of the elements; phase 0 is the matrix.
+    """
+
+    points: Float
+    triangles: Int
+    subdomain: AnyInt
+    phase: AnyInt
+
+
+@dataclass(frozen=True)
+class InterfaceRows:
+    """The k interface nodes.
+
+    Attributes:
+        points: (k, 2).
+        normal: (k, 2) from fibre to matrix.
+        length: (k,) tributary length.
+        fibre: (k,) number of the fibre, from 1.
+    """
+
+    points: Float
+    normal: Float
+    length: Float
+    fibre: AnyInt
+
+
+@dataclass(frozen=True)
+class Fibres:
+    """The f fibres in the order of their numbers: centres (f, 2), radii (f,); NaN where there is none."""
+
+    centre: Float
+    radius: Float
+
+
+@dataclass(frozen=True)
+class State:
+    """A state: what /state/K holds, and `name`, under which a violation is reported.
+
+    Attributes:
+        strain, mean_stress: (3,) macroscopic.
+        displacement, fluctuation: (n, 2).
+        stress: (m, 3) means over the elements.
+        traction, jump: (k, 2) normal and tangential.
+        status: (k,) 0 bonded, 1 closed, 2 open.
+    """
+
+    name: str
+    strain: Float
+    mean_stress: Float
+    load_factor: float
+    displacement: Float
+    fluctuation: Float
+    stress: Float
+    traction: Float
+    jump: Float
+    status: AnyInt
+
+
+@dataclass(frozen=True)
+class ResultFiles:
+    """A folder of results, opened.
+
+    Attributes:
+        document: result.json.
+        size: (2,) width and height of the cell.
+        phases: names of the phases, the matrix first.
+    """
+
+    document: Mapping[str, Any]
+    size: Float
+    phases: tuple[str, ...]
+    mesh: Mesh
+    interface: InterfaceRows
+    fibres: Fibres
+    file: h5py.File
+
+    @property
+    def case(self) -> Mapping[str, Any]:
+        """The resolved case."""
+        case: Mapping[str, Any] = self.document["case"]
+        return case
+
+    @property
+    def contact(self) -> bool:
+        """Whether debonded faces must not overlap."""
+        return bool(self.case.get("interface", {}).get("contact", False))
+
+    def states(self) -> Iterator[State]:
+        """The states in their order, one in memory at a time."""
+        for number in sorted(map(int, self.file.get("state", ()))):
+            with _reading(Path(self.file.filename)):
+                yield self._state(number)
+
+    def _state(self, number: int) -> State:
+        group = self.file[f"state/{number}"]
+        names = ("displacement", "fluctuation", "stress", "traction", "jump", "status")
+        arrays = {name: _rows(group[name]) for name in names}
+        strain, mean = (np.array(group.attrs[name], float) for name in ("strain", "stress"))
+        label, factor = str(group.attrs["label"]), float(group.attrs["load_factor"])
+        n, m, k = len(self.mesh.points), len(self.mesh.triangles), len(self.interface.points)
+        wanted = ((n, 2), (n, 2), (m, 3), (k, 2), (k, 2), (k,))
+        for (name, array), shape in zip(arrays.items(), wanted, strict=True):
+            _expect(array.shape == shape, f"/state/{number}/{name} has shape {array.shape}, expected {shape}")
+        return State(f"state {number} ({label})", strain, mean, factor, **arrays)
+
+
+@contextmanager
+def opened(directory: Path) -> Iterator[ResultFiles]:
+    """The results in a folder, while the block lasts.
+
+    Raises:
+        CaseError: there are none that can be read; one line.
+    """
+    document = _document(directory / JSON)
+    path = directory / FIELDS
+    if not path.is_file():
+        raise CaseError(f"{directory}: has no {FIELDS}; {MISSING_FIELDS}")
+    with _reading(path), h5py.File(path, "r") as file:
+        yield _contents(document, file)
+
+
+def _document(path: Path) -> Mapping[str, Any]:
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise CaseError(f"cannot read {path}: {error.strerror or error}") from error
+    except ValueError as error:
+        raise CaseError(f"cannot read {path}: it is damaged: {error}") from error
+    if not isinstance(document, dict) or document.get("schema") != SCHEMA or not isinstance(document.get("case"), dict):
+        raise CaseError(f"{path}: is no result of this version: expected schema {SCHEMA} and a case")
+    return document
+
+
+def _contents(document: Mapping[str, Any], file: h5py.File) -> ResultFiles:
+    """The whole of both files but the states."""
+    mesh = Mesh(*(_rows(file[f"mesh/{name}"]) for name in ("points", "triangles", "subdomain", "phase")))
+    rows = InterfaceRows(*(_rows(file[f"interface/{name}"]) for name in ("points", "normal", "length", "fibre_number")))
+    fibres = Fibres(*(_rows(file[f"fibre/{name}"]) for name in ("centre", "radius")))
+    size = np.array([file.attrs["width"], file.attrs["height"]], float)
+    phases = tuple(map(str, file.attrs["phases"]))
+    n, m, k = len(mesh.points), len(mesh.triangles), len(rows.points)
+    _expect(mesh.points.shape == (n, 2) and n > 0, "/mesh/points is no table of positions")
+    _expect(mesh.triangles.shape in ((m, 3), (m, 6)) and m > 0, "/mesh/triangles is no table of triangles")
+    _expect(bool((mesh.triangles >= 0).all() and (mesh.triangles < n).all()), "/mesh/triangles names unknown nodes")
+    _expect(mesh.subdomain.shape == mesh.phase.shape == (m,), "/mesh has labels of another number of elements")
+    _expect(bool((mesh.phase >= 0).all() and (mesh.phase < len(phases)).all()), "/mesh/phase names unknown phases")
+    _expect(rows.points.shape == rows.normal.shape == (k, 2), "/interface has tables of different lengths")
+    _expect(rows.length.shape == rows.fibre.shape == (k,), "/interface has tables of different lengths")
+    _expect(fibres.centre.shape == (len(fibres.radius), 2), "/fibre has tables of different lengths")
+    within = (rows.fibre >= 1) & (rows.fibre <= len(fibres.radius))
+    _expect(bool(within.all()), "/interface/fibre_number names unknown fibres")
+    return ResultFiles(document, size, phases, mesh, rows, fibres, file)
+
+
+def _rows(table: h5py.Dataset) -> Any:
+    return np.asarray(table[()])
+
+
+def _expect(holds: bool, fault: str) -> None:
+    if not holds:
+        raise ValueError(fault)
+
+
+@contextmanager
+def _reading(path: Path) -> Iterator[None]:
+    """What goes wrong in reading a damaged or foreign file, as one line about it."""
+    try:
+        yield
+    except (OSError, RuntimeError, KeyError, ValueError, TypeError) as error:
+        words = error.args[0] if error.args else error
+        raise CaseError(f"cannot read {path}: {' '.join(str(words).split())}") from error

@@ -1,0 +1,37 @@
+"""What the solver's Python code raises while PETSc calls it comes out of the solve, after PETSc has returned."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from support.torn_cells import tear
+
+from feti_homog.errors import CaseError
+from feti_homog.feti.krylov import PrimalTest, ProjectedOperator, ProjectedPreconditioner
+
+pytestmark = [pytest.mark.parallel, pytest.mark.quick]
+
+E11 = np.array([1.0, 0.0, 0.0])
+CALLBACKS = [(ProjectedOperator, "_apply"), (ProjectedPreconditioner, "_apply"), (PrimalTest, "_judge")]
+
+
+@pytest.mark.parametrize("method", ["cg", "gmres"])
+@pytest.mark.parametrize(("context", "function"), CALLBACKS)
+def test_the_solve_raises_it_and_the_next_one_works(comm, monkeypatch, method, context, function):
+    solver = tear(comm, petsc={"feti_ksp_type": method}).solver
+    start, calls = np.zeros(solver.rows), []
+    expected = solver.solve(E11, start)
+    right = getattr(context, function)
+
+    def refuse_the_third(*arguments):
+        calls.append(arguments)
+        if len(calls) == 3:
+            raise CaseError("refused")
+        return right(*arguments)
+
+    monkeypatch.setattr(context, function, refuse_the_third)
+    with pytest.raises(CaseError, match="refused"):
+        solver.solve(E11, start)
+    assert len(calls) == 3
+    again = solver.solve(E11, start)
+    assert again.iterations == expected.iterations and np.array_equal(again.lam, expected.lam)

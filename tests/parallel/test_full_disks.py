@@ -1,0 +1,119 @@
+"""A disk that is full at any moment: one line, the exit code of a file that cannot be written, no rank left waiting."""
+
+from __future__ import annotations
+
+import os
+import resource
+import subprocess
+from contextlib import contextmanager
+
+import pytest
+from support.base_case import BASE
+from support.ranks import parallel_assert
+from support.sample_output import part_of, sample
+
+from feti_homog import cli
+from feti_homog.errors import FetiHomogError
+from feti_homog.output.files.field_file import RESERVE, FieldFile
+
+pytestmark = pytest.mark.parallel
+
+
+@pytest.fixture(autouse=True)
+def few_ranks(comm):
+    """More than two ranks meet nothing else, and take longer."""
+    if comm.size > 2:
+        pytest.skip("at one and two ranks")
+
+
+CASE = BASE.replace("mesh_size = 0.05", "mesh_size = 0.3") + "[output]\npictures = false\n"
+
+
+@pytest.fixture
+def small_disk(comm, shared_path):
+    """Mounts a disk of that size and returns its path; it is taken away after the test."""
+    mounted = []
+
+    def mount(size):
+        path = shared_path / "disk"
+        if comm.rank == 0:
+            path.mkdir()
+            words = ["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", str(path)]
+            mounted.append(subprocess.run(words, capture_output=True).returncode == 0)
+        if not comm.bcast(mounted and mounted[-1]):
+            pytest.skip("only root can mount a small disk")
+        return path
+
+    yield mount
+    comm.barrier()
+    if comm.rank == 0 and any(mounted):
+        subprocess.run(["umount", "--lazy", str(shared_path / "disk")], check=True)
+    comm.barrier()
+
+
+@contextmanager
+def file_limit(size):
+    """No file may grow beyond so many bytes, whoever writes it."""
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, limits[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+
+
+def run(comm, folder, out):
+    if comm.rank == 0 and not (folder / "cell.toml").exists():
+        (folder / "cell.toml").write_text(CASE)
+    comm.barrier()
+    return cli.main(["run", str(folder / "cell.toml"), "--out", str(out), "--quiet"])
+
+
+def told_once(comm, capsys, words):
+    errors = capsys.readouterr().err
+    lines = errors.splitlines()
+    good = len(lines) == 1 and all(word in lines[0] for word in words) if comm.rank == 0 else not lines
+    parallel_assert(comm, good, errors)
+
+
+@pytest.mark.parametrize("size", ["4k", "16k", "64k", "200k"])
+def test_a_disk_that_is_full_before_the_first_byte(comm, shared_path, small_disk, capsys, size):
+    """HDF5 crashes or waits for ever if its own first bytes do not fit."""
+    disk = small_disk(size)
+    parallel_assert(comm, run(comm, shared_path, disk / "out") == 1)
+    told_once(comm, capsys, ["error: cannot ", "No space left on device"])
+    parallel_assert(comm, not list(disk.iterdir()))
+
+
+@pytest.mark.parametrize("size", [1000, RESERVE + 10_000])
+def test_files_that_may_not_grow(comm, shared_path, capsys, size):
+    """The same without a disk of its own."""
+    with file_limit(size):
+        code = run(comm, shared_path, shared_path / "out")
+    parallel_assert(comm, code == 1)
+    told_once(comm, capsys, ["error: cannot ", "File too large"])
+    parallel_assert(comm, not (shared_path / "out").exists())
+
+
+def test_a_disk_that_another_program_fills_meanwhile(comm, shared_path, small_disk):
+    """What was reserved is there; what follows is told, and closing the file does not crash."""
+    disk = small_disk("1M")
+    part = part_of(sample(8), comm.rank, comm.size)
+    file = FieldFile(disk, comm, part.header, part.mesh, part.interface)
+    if comm.rank == 0:
+        fill(disk / "other")
+    comm.barrier()
+    with pytest.raises(FetiHomogError, match=r"^cannot write .*result\.h5: No space left on device$"), file:
+        for k in range(100):
+            file.write_state(k, part.states[0])
+    comm.barrier()
+    parallel_assert(comm, [path.name for path in disk.iterdir()] == ["other"])
+
+
+def fill(path):
+    with path.open("wb") as stream:
+        try:
+            while True:
+                os.write(stream.fileno(), b"x" * 4096)
+        except OSError:
+            pass

@@ -1,0 +1,74 @@
+"""Results of every kind of analysis, as the command line writes them, and falsified copies of them."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import feti_homog.output  # noqa: F401 (chooses the build of h5py)
+
+MATRIX, FIBRE = {"young": 88.0, "poisson": 0.299}, {"young": 200.0, "poisson": 0.222}
+TURNED = {
+    "E1": 15.0, "E2": 20.0, "E3": 200.0, "nu12": 0.3, "nu13": 0.02, "nu23": 0.03, "G12": 7.0, "angle": 30.0,
+}  # fmt: skip
+HEXAGONAL = {"geometry": "hexagonal", "fibre_fraction": 0.4, "mesh_size": 0.2}
+SQUARE = {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.15}
+RANDOM = {"geometry": "random", "fibres": 4, "fibre_fraction": 0.3, "mesh_size": 0.15, "radius_spread": 0.3}
+ARC = {"fibre": "all", "centre": 20.0}
+STRENGTHS = {"normal_strength": 5.0, "tangential_strength": 5.0}
+WAYPOINTS = [[0.2, 0.0, 0.0], [0.1, 0.05, 0.05], [0.0, 0.0, 0.0], [-0.1, 0.0, 0.1]]
+
+CASES: dict[str, dict[str, Any]] = {
+    "bonded": {"cell": HEXAGONAL | {"order": 2}, "decomposition": {"subdomains": 6}},
+    "plane": {"cell": HEXAGONAL | {"bodies": "plane", "refine": 1}, "plane": "stress"},
+    "contact": {"cell": SQUARE | {"order": 2}, "interface": {"debonded": [ARC | {"angle": 110.0}]}},
+    "overlap": {"cell": SQUARE, "interface": {"contact": False, "debonded": [ARC | {"angle": 200.0}]}},
+    "angle": {"cell": RANDOM, "fibre": TURNED, "interface": {"debonded": [ARC]}, "angle": {"values": [0, 120, 360]}},
+    "path": {"cell": SQUARE, "interface": STRENGTHS, "path": {"waypoints": WAYPOINTS}},
+    "increments": {
+        "cell": SQUARE,
+        "interface": STRENGTHS | {"criterion": "quadratic"},
+        "path": {"waypoints": WAYPOINTS, "method": "increments", "increments": 12},
+    },
+}
+
+
+def document(kind: str) -> dict[str, Any]:
+    """The case of a kind of result."""
+    parts = dict(CASES[kind])
+    analysis = next((name for name in ("angle", "path") if name in parts), "stiffness")
+    material = {"matrix": MATRIX, "fibre": parts.pop("fibre", FIBRE)}
+    plane = {"type": analysis, "plane": parts.pop("plane", "strain")}
+    return {"name": kind, "material": material, "analysis": plane, "output": {"pictures": False}} | parts
+
+
+def write(kind: str, folder: Path) -> Path:
+    """Compute a result on this rank alone and write it to a folder; returns the folder."""
+    from mpi4py import MPI
+
+    from feti_homog import Case, run
+
+    run(Case.parse(document(kind)), MPI.COMM_SELF, out=folder)
+    return folder
+
+
+def falsified(folder: Path, copy: Path, edit: Callable[[dict[str, Any], Any], object]) -> Path:
+    """A copy of a result after edit(document of result.json, open result.h5); returns its folder.
+
+    Both files have the case: an edit of that in the document is one of both.
+    """
+    import h5py
+
+    shutil.copytree(folder, copy)
+    path = copy / "result.json"
+    content = json.loads(path.read_text())
+    case = json.dumps(content["case"])
+    with h5py.File(copy / "result.h5", "r+") as file:
+        edit(content, file)
+        if json.dumps(content["case"]) != case:
+            file.attrs["case"] = json.dumps(content["case"])
+    path.write_text(json.dumps(content))
+    return copy

@@ -1,0 +1,130 @@
+"""What the pictures say beside what they draw: legends, scales, numbers of points."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.legend import Legend
+from matplotlib.text import Annotation
+from support.sample_output import Sample, sample
+
+from feti_homog.output.files.field_file import FieldFile
+from feti_homog.output.files.result_json import SCHEMA
+from feti_homog.output.plots import deformed_panels, figures, plot_helpers, response_curves, traction_plots
+from feti_homog.output.plots.interface_marks import BONDED, CLOSED
+
+DRAWING = (figures, deformed_panels, response_curves, traction_plots)
+
+
+def path_of(strains: list[float]) -> dict[str, Any]:
+    """The document of a path whose points have these strains E11."""
+    counts = {"bonded": 4, "open": 3, "closed": 3, "broke": 1}
+    points = [counts | {"load_factor": e, "strain": [e, 0, 0], "stress": [3 * e, e, 0]} for e in strains]
+    section = {"strain": [1.0, 0.0, 0.0], "method": "events"}
+    case = {"analysis": {"type": "path", "plane": "strain"}, "interface": {"contact": True}, "path": section}
+    return {"schema": SCHEMA, "case": case | {"output": {"stress_unit": "GPa"}}, "path": points}
+
+
+def write(directory: Path, whole: Sample, document: dict[str, Any] | None) -> None:
+    from mpi4py import MPI
+
+    *parts, states = vars(whole).values()
+    with FieldFile(directory, MPI.COMM_SELF, *parts) as file:
+        for k, state in enumerate(states):
+            file.write_state(k, state)
+    if document is not None:
+        (directory / "result.json").write_text(json.dumps(document))
+
+
+def drawn(directory: Path, monkeypatch: Any) -> dict[str, Figure]:
+    """The figures of a result by the names of their files."""
+    found: dict[str, Figure] = {}
+
+    def keep(figure: Figure, path: Path) -> Path:
+        FigureCanvasAgg(figure).draw()
+        found[path.name] = figure
+        return path
+
+    for module in DRAWING:
+        monkeypatch.setattr(module, "save", keep)
+    figures.plot(directory)
+    return found
+
+
+def legends(figure: Figure) -> list[Legend]:
+    found = [*figure.legends, *(axes.get_legend() for axes in figure.axes)]
+    return [legend for legend in found if legend is not None]
+
+
+def entries(figure: Figure) -> list[str]:
+    return [text.get_text() for legend in legends(figure) for text in legend.get_texts()]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("document", [None, path_of([0.5, 0.2, 1.0])], ids=["load cases", "path"])
+def test_legends_cover_nothing(tmp_path: Path, monkeypatch: Any, document: dict[str, Any] | None) -> None:
+    write(tmp_path, sample(4), document)
+    for name, figure in drawn(tmp_path, monkeypatch).items():
+        renderer: Any = FigureCanvasAgg(figure).get_renderer()
+        boxes = [axes.get_window_extent(renderer) for axes in figure.axes if axes.axison]
+        boxes += [axes.xaxis.label.get_window_extent(renderer) for axes in figure.axes if axes.axison]
+        for legend in legends(figure):
+            box = legend.get_window_extent(renderer)
+            assert not [other for other in boxes if other.width and box.shrunk(0.99, 0.95).overlaps(other)], name
+
+
+def test_the_grey_outline_has_its_name(tmp_path: Path, monkeypatch: Any) -> None:
+    write(tmp_path, sample(4), None)
+    assert entries(drawn(tmp_path, monkeypatch)["case_E11.png"]) == ["in contact", "open", "undeformed"]
+
+
+@pytest.mark.parametrize(("status", "names"), [(CLOSED, ["in contact"]), (2, ["open"])])
+def test_the_legend_of_tractions_has_only_what_is_there(
+    tmp_path: Path, monkeypatch: Any, status: int, names: list[str]
+) -> None:
+    whole = sample(4)
+    states = tuple(replace(state, status=np.where(state.status == BONDED, BONDED, status)) for state in whole.states)
+    write(tmp_path, replace(whole, states=states), None)
+    assert [text.get_text() for text in drawn(tmp_path, monkeypatch)["interface.png"].legends[0].texts] == names
+
+
+@pytest.mark.parametrize(
+    ("displacement", "opening", "scale"),
+    [(2e-3, 0.0, 50.0), (2e-3, 1e-3, 50.0), (2e-2, 2e-3, 10.0), (0.5, 1e-3, 0.5), (0.1, 0.1, 1.0)],
+)
+def test_narrow_openings_are_seen(displacement: float, opening: float, scale: float) -> None:
+    """Of 0.2 % of the cell too; displacements stay below a quarter of it, or about."""
+    found = plot_helpers.magnification(displacement, 1.0, opening)
+    assert found == pytest.approx(scale)
+
+
+def test_a_path_of_small_strains_is_magnified_and_says_so(tmp_path: Path, monkeypatch: Any) -> None:
+    whole, small = sample(4), 0.002
+    states = tuple(
+        replace(s, strain=small * s.strain, displacement=small * s.displacement, jump=0.2 * small * s.jump)
+        for s in whole.states
+    )
+    write(tmp_path, replace(whole, states=states), path_of([0.001, 0.0015, 0.002]))
+    with h5py.File(tmp_path / "result.h5") as file:
+        scale = deformed_panels.shown_scale(file, path_of([0.001, 0.0015, 0.002]))
+        opening = max(file[f"state/{k}/jump"][:, 0].max() for k in range(3))
+    assert scale * opening > 0.02
+    title: Any = drawn(tmp_path, monkeypatch)["path_states.png"].get_suptitle()
+    assert title.endswith(f"displacement × {scale:g}")
+
+
+def test_points_of_a_path_are_numbered_where_its_curve_folds_back(tmp_path: Path, monkeypatch: Any) -> None:
+    write(tmp_path, sample(4), path_of([0.5, 0.2, 1.0]))
+    upper, middle, lower = drawn(tmp_path, monkeypatch)["path.png"].axes
+    for axes in (upper, middle):
+        assert {"0", "1", "2"} <= {text.get_text() for text in axes.texts if isinstance(text, Annotation)}
+    np.testing.assert_allclose(lower.lines[0].get_xdata(), [0, 1, 2])
+    np.testing.assert_allclose(middle.lines[0].get_ydata(), [1.5, 0.6, 3.0])

@@ -1,0 +1,210 @@
+"""What the program computes is verified; a copy in which one thing is false breaks the laws that it must break."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from support.verified_results import CASES, falsified, write
+
+from feti_homog.verification.certificate import verify
+from feti_homog.verification.discrete_cell import DiscreteCell, tensor
+from feti_homog.verification.reading import opened
+
+SMALL = 1e-6
+MATRIX = ("material", "matrix")
+MATERIAL = {"stress", "equilibrium", "mean stress", "Hill"}
+
+
+@pytest.fixture(scope="session")
+def results(tmp_path_factory):
+    """kind -> folder of a result, computed when first asked for."""
+    folders = {}
+
+    def folder(kind):
+        if kind not in folders:
+            folders[kind] = write(kind, tmp_path_factory.mktemp(kind) / "result")
+        return folders[kind]
+
+    return folder
+
+
+def broken(folder):
+    """The laws that a result breaks."""
+    return {finding.law.name for finding in verify(folder).findings if not finding.holds}
+
+
+@pytest.mark.parametrize("kind", CASES)
+def test_results_obey_every_law(results, kind):
+    certificate = verify(results(kind))
+    assert certificate.holds, certificate.text
+    told = {finding.law.name for finding in certificate.findings}
+    assert told >= {"stress", "equilibrium", "periodicity", "jump", "mean stress", "Hill", "load", "tables", "cell"}
+    assert ("penetration" in told) == (kind not in ("bonded", "plane", "overlap"))
+    assert ("energy" in told) == ("strength" in told) == (kind in ("path", "increments"))
+    assert ("moduli" in told) == (kind in ("bonded", "plane"))
+
+
+def scale(name, factor=1 + SMALL, state=0):
+    """Multiply the largest number of a table of a state."""
+
+    def edit(_, file):
+        table = file[f"state/{state}/{name}"]
+        values = table[()]
+        values.ravel()[np.abs(values).argmax()] *= factor
+        table[()] = values
+
+    return edit
+
+
+def shift(name, by=SMALL, row=0, group="state/0"):
+    """Add to the first number of a row of a table."""
+
+    def edit(_, file):
+        table = file[f"{group}/{name}"]
+        values = table[()]
+        values.reshape(len(values), -1)[row, 0] += by
+        table[()] = values
+
+    return edit
+
+
+def swap_rows(*names):
+    """Exchange two interface nodes, or some of what is known of them."""
+
+    def edit(_, file):
+        for name in names:
+            table = file[name]
+            values = table[()]
+            values[[0, -1]] = values[[-1, 0]]
+            table[()] = values
+
+    return edit
+
+
+def document(*places, factor=1 + SMALL, to=None):
+    """Change a number of result.json."""
+
+    def edit(content, _):
+        for key in places[:-1]:
+            content = content[key]
+        content[places[-1]] = content[places[-1]] * factor if to is None else to
+
+    return edit
+
+
+def both(*edits):
+    def edit(content, file):
+        for each in edits:
+            each(content, file)
+
+    return edit
+
+
+def attribute(name, factor=1 + SMALL, state=0):
+    def edit(_, file):
+        attributes = file[f"state/{state}"].attrs
+        attributes[name] = attributes[name] * factor
+
+    return edit
+
+
+def other_fibre(_, file):
+    number = file["interface/fibre_number"]
+    number[0] = 1 if number[0] > 1 else 2
+
+
+def length_and_traction(_, file):
+    """With the same forces: what a node stands for is longer, and pulled less."""
+    file["interface/length"][0] *= 1 + SMALL
+    for state in file["state"].values():
+        state["traction"][0] = state["traction"][0] / (1 + SMALL)
+
+
+def case_of_fields(_, file):
+    file.attrs["case"] = str(file.attrs["case"]).replace("0.299", "0.2991")
+
+
+def delete_state(_, file):
+    del file[f"state/{len(file['state']) - 1}"]
+
+
+FALSE = {
+    "one stress": ("bonded", scale("stress"), {"stress"}),
+    "one stress of a path": ("path", scale("stress", state=7), {"stress"}),
+    "one displacement": ("bonded", shift("displacement"), {"displacement", "stress", "equilibrium", "mean stress"}),
+    "one fluctuation": ("contact", shift("fluctuation"), {"displacement", "periodicity"}),
+    "one traction": ("bonded", scale("traction"), {"equilibrium"}),
+    "one traction of a path": ("path", scale("traction", state=7), {"equilibrium"}),
+    "one jump": ("angle", scale("jump", state=3), {"jump"}),
+    "tractions of two nodes": ("bonded", swap_rows("state/0/traction"), {"equilibrium"}),
+    "an interface node moved": ("bonded", shift("points", 1e-3, group="interface"), {"interface", "jump"}),
+    "a length": ("bonded", shift("length", group="interface"), {"interface", "equilibrium"}),
+    "a normal": ("bonded", shift("normal", group="interface"), {"interface", "equilibrium"}),
+    "fibres of two nodes": ("angle", other_fibre, {"interface"}),
+    "a radius": ("bonded", shift("radius", group="fibre"), {"interface"}),
+    "a centre": ("bonded", shift("centre", group="fibre"), {"interface"}),
+    "a length with its traction": ("bonded", length_and_traction, {"interface"}),
+    "the case in one file": ("bonded", case_of_fields, {"tables"}),
+    "an arc": ("contact", document("case", "interface", "debonded", 0, "angle", factor=1.5), {"arcs"}),
+    "where an arc is": ("angle", document("case", "interface", "debonded", 0, "centre", factor=5), {"arcs"}),
+    "an angle": ("angle", document("angle", 1, "angle", to=170.0), {"arcs"}),
+    "a mean stress": ("bonded", attribute("stress"), {"mean stress", "tables"}),
+    "a strain": ("bonded", attribute("strain"), {"displacement", "load"}),
+    "a missing state": ("path", delete_state, {"load"}),
+    "not a number": ("bonded", shift("stress", np.nan), {"numbers", "stress"}),
+    "Poisson's ratio": ("bonded", document("case", *MATRIX, "poisson", factor=1 + 1e-4), MATERIAL | {"bounds"}),
+    "the plane state": ("plane", document("case", "analysis", "plane", to="strain"), MATERIAL | {"bounds"}),
+    "an angle of axes": ("angle", document("case", "material", "fibre", "angle"), MATERIAL - {"Hill"}),
+    "contact that was not asked for": ("overlap", document("case", "interface", "contact", to=True), {"penetration"}),
+    "an entry of the stiffness": ("bonded", document("effective_stiffness", 0, 1), {"tables", "moduli"}),
+    "an entry under pressure": ("contact", document("effective_stiffness_compression", 1, 1), {"tables"}),
+    "a stiffness of an angle": ("angle", document("angle", 1, "stiffness", 2, 2), {"tables"}),
+    "a load factor in one file": ("path", attribute("load_factor", state=3), {"tables"}),
+    "a load factor": (
+        "path",
+        both(attribute("load_factor", state=3), document("path", 3, "load_factor")),
+        {"load"},
+    ),
+    "a stress of a point": ("path", document("path", 4, "stress", 0), {"tables"}),
+    "bonds that broke": ("path", document("path", 4, "broke", factor=2), {"breaks"}),
+    "a count of bonds": ("path", document("path", 4, "bonded", factor=2), {"tables"}),
+    "a strength too low": ("path", document("case", "interface", "normal_strength", factor=0.99), {"strength"}),
+    "a strength too high": ("path", document("case", "interface", "normal_strength", factor=1.01), {"strength"}),
+    "a strength of steps": ("increments", document("case", "interface", "normal_strength", factor=0.5), {"strength"}),
+    "a dissipated energy": ("path", document("path", 5, "dissipated", factor=1.01), {"energy"}),
+    "a rising dissipation": ("path", document("path", 5, "dissipated_strain_controlled", factor=1.01), {"energy"}),
+    "a dissipation of increments": ("increments", document("path", 11, "dissipated", factor=-1.0), {"energy"}),
+    "a waypoint": ("increments", document("case", "path", "waypoints", 1, 0), {"load"}),
+    "a modulus": ("bonded", document("moduli", "E1"), {"moduli"}),
+    "a bound": ("bonded", document("bounds", "hashin_shtrikman", "shear", 1), {"bounds"}),
+    "a fraction": ("bonded", document("cell", "fractions", "fibre"), {"cell"}),
+    "an area": ("bonded", document("cell", "area"), {"cell"}),
+    "a number of elements": ("bonded", document("cell", "elements", to=1), {"cell"}),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", FALSE)
+def test_a_falsified_copy_breaks_its_laws(results, tmp_path, name):
+    kind, edit, laws = FALSE[name]
+    assert broken(falsified(results(kind), tmp_path / "copy", edit)) == laws
+
+
+def test_a_mesh_node_that_was_moved_is_noticed(results, tmp_path):
+    found = broken(falsified(results("bonded"), tmp_path / "copy", shift("points", group="mesh")))
+    assert found >= {"displacement", "stress", "equilibrium"}
+
+
+def test_displacements_that_fit_their_stresses_break_equilibrium_alone(results, tmp_path):
+    """A node is moved with its fluctuation, and the stresses of its elements after it."""
+
+    def edit(_, file):
+        with opened(results("bonded")) as files:
+            cell, state = DiscreteCell.of(files), next(files.states())
+        inner = np.setdiff1d(np.arange(len(state.fluctuation)), cell.nodes.node)[3]
+        state.fluctuation[inner] += SMALL
+        displacement = state.fluctuation + cell.files.mesh.points @ tensor(state.strain)
+        for name in ("fluctuation", "displacement", "stress"):
+            fields = {"fluctuation": state.fluctuation, "displacement": displacement}
+            file[f"state/0/{name}"][()] = fields.get(name, cell.elements.fields(displacement).stress)
+
+    assert broken(falsified(results("bonded"), tmp_path / "copy", edit)) == {"equilibrium"}
