@@ -18,9 +18,9 @@ pytestmark = pytest.mark.parallel
 STRAIGHT = 1e-7
 FREE = {
     "square": {"geometry": "square", "mesh_size": 0.25},
-    "quadratic": {"geometry": "square", "mesh_size": 0.35, "order": 2, "plane": "stress"},
-    "hexagonal": {"geometry": "hexagonal", "mesh_size": 0.25, "decomposition": {"subdomains": 9}},
-    "plane": {"geometry": "hexagonal", "mesh_size": 0.25, "bodies": "plane", "petsc": {"feti_pc_type": "influence"}},
+    "quadratic": {"geometry": "square", "mesh_size": 0.45, "order": 2, "plane": "stress"},
+    "hexagonal": {"geometry": "hexagonal", "mesh_size": 0.3, "decomposition": {"subdomains": 9}},
+    "plane": {"geometry": "hexagonal", "mesh_size": 0.3, "bodies": "plane", "petsc": {"feti_pc_type": "influence"}},
 }
 THREE = {"geometry": "random", "fibres": 3, "min_gap": 0.1, "seed": 4, "mesh_size": 0.2, "radius_spread": 0.3}
 # Through zero, beside it, and from squeezed fibres to others with room.
