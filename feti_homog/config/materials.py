@@ -102,6 +102,28 @@ def plane_stiffness(material: Material, plane: str) -> Float:
     return np.asarray((stiffness + stiffness.T) / 2.0)
 
 
+def out_of_plane(material: Material, plane: str) -> tuple[Float, Float]:
+    """s and e, (3,) each, with S33 = s . [S11, S22, S12] and E33 = e . [S11, S22, S12].
+
+    S33 vanishes in plane stress, E33 in plane strain. NaN if the constants of the material do not say it.
+    """
+    row, young = _compliance_33(material)
+    return (np.zeros(3), row) if plane == "stress" else (-young * row, np.zeros(3))
+
+
+def _compliance_33(material: Material) -> tuple[Float, float]:
+    """c (3,) and E3 of E33 = c . [S11, S22, S12] + S33 / E3; NaN where the constants do not say it."""
+    if isinstance(material, Isotropic):
+        ratio = -material.poisson / material.young
+        return np.array([ratio, ratio, 0.0]), material.young
+    if isinstance(material, General):
+        return np.full(3, np.nan), np.nan
+    E3, nu13, nu23 = (np.nan if c is None else c for c in (material.E3, material.nu13, material.nu23))
+    c, s = np.cos(np.radians(material.angle)), np.sin(np.radians(material.angle))
+    along_axes = np.array([[c * c, s * s, 2 * c * s], [s * s, c * c, -2 * c * s]])
+    return np.array([-nu13 / material.E1, -nu23 / material.E2]) @ along_axes, E3
+
+
 def _isotropic(material: Isotropic, plane: str) -> Float:
     if plane == "strain" and material.poisson >= 0.5:
         raise ValueError(f"poisson = {material.poisson}: expected less than 0.5 in plane strain")

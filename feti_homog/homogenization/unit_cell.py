@@ -49,6 +49,18 @@ class TornCell:
         return np.cumsum([0, *(len(s.Q) for s in self.subdomains)])
 
     @cached_property
+    def class_nodes(self) -> Int:
+        """(c,) a plane node of each class of this rank's subdomains, one subdomain after the other; the nodes are
+        numbered alike."""
+        nodes, first = [np.zeros(0, np.int64)], 0
+        for mesh in (s.mesh for s in self.subdomains):
+            own = np.empty(mesh.n_classes, np.int64)
+            own[mesh.node_class] = first + np.arange(len(mesh.points))
+            nodes.append(own)
+            first += len(mesh.points)
+        return np.concatenate(nodes)
+
+    @cached_property
     def directions(self) -> Float:
         """(k,) directions in degrees of this rank's interface nodes about the centres of their fibres."""
         nodes = self.solver.jump_operator.nodes

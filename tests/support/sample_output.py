@@ -7,9 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.output.files.field_layout import FibrePart, Header, InterfacePart, MeshPart, StatePart
+from feti_homog.output.files.field_layout import FibrePart, Header, InterfacePart, MeshPart, StatePart, rows_of, tables
 
 GRADIENTS = tuple(np.array([[a, b], [b, c]]) for a, b, c in ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.5, 0.0)))
+
+MEASURES = ("von_mises", "principal_1", "principal_2", "principal_3")
+VECTORS = ("traction_vector", "jump_vector", "displacement_fibre", "displacement_matrix")
 
 
 @dataclass(frozen=True)
@@ -37,10 +40,16 @@ def sample(cells: int = 8, refine: int = 0, order: int = 1) -> Sample:
         corners = np.concatenate([corners, mids], axis=1)
     points, triangles = _merge(corners, submesh)
     phase = (submesh == 2).astype(int)
-    mesh = MeshPart(points, triangles, body=phase, subdomain=submesh, phase=phase)
+    mesh = MeshPart(points, triangles, body=phase, subdomain=submesh, phase=phase, fibre_number=phase)
     header = Header("sample", "0", 1.0, 1.0, order, refine, ("matrix", "fibre"), "mm", "GPa")
     fibres = FibrePart(*(np.array([number]) for number in (1, 1, 1)), np.array([[0.5, 0.5]]), np.array([np.nan]))
-    return Sample(header, mesh, fibres, _interface(mesh), tuple(_state(mesh, gradient) for gradient in GRADIENTS))
+    return Sample(
+        header,
+        mesh,
+        fibres,
+        _interface(mesh),
+        tuple(_state(mesh, gradient, f"state {k}") for k, gradient in enumerate(GRADIENTS)),
+    )
 
 
 def part_of(whole: Sample, rank: int, size: int) -> Sample:
@@ -49,7 +58,7 @@ def part_of(whole: Sample, rank: int, size: int) -> Sample:
     mine = [submesh for submesh in range(last + 1) if min(submesh, size - 1) == rank]
     rows = np.isin(mesh.subdomain, mine)
     nodes, triangles = np.unique(mesh.triangles[rows], return_inverse=True)
-    labels = {name: getattr(mesh, name)[rows] for name in ("body", "subdomain", "phase")}
+    labels = {name: getattr(mesh, name)[rows] for name in ("body", "subdomain", "phase", "fibre_number")}
     part = MeshPart(mesh.points[nodes], triangles.reshape(-1, mesh.triangles.shape[1]), **labels)
     owned = slice(None) if last in mine else slice(0)
     fibres = FibrePart(**{name: table[: 1 if rank == 0 else 0] for name, table in vars(whole.fibres).items()})
@@ -94,8 +103,9 @@ def _interface(mesh: MeshPart) -> InterfacePart:
     sides = [np.stack([s, 0 * s + 0.25], 1), np.stack([s, 0 * s + 0.75], 1)]
     normals = [np.tile([0.0, -1.0], (5, 1)), np.tile([0.0, 1.0], (5, 1))]
     points, length, fibre = np.concatenate(sides), np.full(10, 0.125), np.ones(10, int)
-    faces = [_nodes_at(mesh, points, body) for body in (1, 0)]
-    return InterfacePart(points, np.concatenate(normals), length, fibre, fibre, *faces)
+    in_fibre, in_matrix = (_nodes_at(mesh, points, body) for body in (1, 0))
+    vertex = np.arange(10)[:, None]
+    return InterfacePart(points, np.concatenate(normals), length, fibre, fibre, in_fibre, vertex, in_matrix)
 
 
 def _nodes_at(mesh: MeshPart, points: np.ndarray, body: int) -> np.ndarray:
@@ -105,20 +115,35 @@ def _nodes_at(mesh: MeshPart, points: np.ndarray, body: int) -> np.ndarray:
     return nodes[away.argmin(axis=0)]
 
 
-def _state(mesh: MeshPart, gradient: np.ndarray) -> StatePart:
+def _state(mesh: MeshPart, gradient: np.ndarray, label: str) -> StatePart:
     """u = gradient x plus a bubble; the stress of an element is linear in its centre's position."""
     x = mesh.points
     bubble = 0.05 * np.sin(2 * np.pi * x)[:, ::-1]
     centre = x[mesh.triangles[:, :3]].mean(axis=1)
     strain = np.array([gradient[0, 0], gradient[1, 1], 2 * gradient[0, 1]])
     stress = np.stack([1.0 + centre[:, 0], 2.0 + centre[:, 1], centre[:, 0] - centre[:, 1]], axis=1)
-    k = np.arange(10.0)
+    k, place = np.arange(10.0), stress[:, 0]
     traction, jump, status = np.stack([k, -k], 1), np.stack([0.1 * k, 0.2 * k], 1), np.arange(10) % 3
     displacement = x @ gradient.T + bubble
-    return StatePart(strain, strain * 3, 1.0, "a state", displacement, bubble, stress, traction, jump, status)
+    return StatePart(
+        strain=strain,
+        stress_mean=strain * 3,
+        load_factor=1.0,
+        label=label,
+        displacement=displacement,
+        fluctuation=bubble,
+        stress=stress,
+        stress_33=4.0 + place,
+        element_strain=np.stack([place, 2 * place, 3 * place, 4 * place], axis=1).astype(np.float32),
+        **{name: (n * place).astype(np.float32) for n, name in enumerate(MEASURES)},
+        traction=traction,
+        jump=jump,
+        **{name: np.stack([n * k, k, 0 * k], axis=1) for n, name in enumerate(VECTORS)},
+        status=status,
+    )
 
 
 def _cut(state: StatePart, nodes: Any, rows: Any, owned: Any) -> StatePart:
-    on_nodes = {name: getattr(state, name)[nodes] for name in ("displacement", "fluctuation")}
-    on_interface = {name: getattr(state, name)[owned] for name in ("traction", "jump", "status")}
-    return replace(state, **on_nodes, **on_interface, stress=state.stress[rows])
+    chosen = {"n": nodes, "m": rows, "k": owned}
+    parts = {name: getattr(state, name)[chosen[rows_of(d)]] for name, d in tables(state).items()}
+    return replace(state, **parts)

@@ -124,7 +124,7 @@ def test_datasets_and_attributes_of_result_h5(folders):
     with h5py.File(folders["debonded"] / "result.h5") as file:
         note("", file)
         file.visititems(note)
-    states = {(re.sub(r"^((?:/vector)?/state)/\d+", r"\1/K", place), kind) for place, kind in found}
+    states = {(re.sub(r"^((?:/(?:vector|tensor|column))?/state)/\d+", r"\1/K", place), kind) for place, kind in found}
     assert states == {(item.path, item.kind) for item in items()}
 
 

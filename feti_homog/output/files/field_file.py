@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
@@ -19,7 +19,7 @@ from feti_homog.common.records import LENGTH, STRESS, Description
 from feti_homog.errors import FetiHomogError
 from feti_homog.output.files import atomic
 from feti_homog.output.files.field_layout import (
-    PLANE_VECTORS,
+    GROUP_OF_STATES,
     PROGRAM,
     FibrePart,
     Header,
@@ -29,8 +29,8 @@ from feti_homog.output.files.field_layout import (
     attributes,
     rows_of,
     tables,
-    view_words,
 )
+from feti_homog.output.files.field_views import VIEWS, WHOLE, View
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Comm
@@ -58,7 +58,7 @@ class _Rows:
 class FieldFile:
     """The file `directory`/result.h5 while it is being written; every method is collective over `comm`.
 
-    `field_layout` says which tables and attributes it has; the virtual datasets of /vector take no space.
+    `field_layout` says which tables and attributes it has, `field_views` which of them show others.
 
     Until `close` the file is called `part`. As a context manager it closes when the block ends well; an error that
     all ranks raise removes it, any other exception leaves the unfinished file. Empty parts still need their columns:
@@ -88,7 +88,7 @@ class FieldFile:
             "f": len(fibres.number),
         }
         self._rows = {symbol: _Rows.of(comm, count) for symbol, count in counts.items()}
-        size = self._table_bytes(mesh) + self._table_bytes(interface)
+        size = sum(map(self._table_bytes, (mesh, fibres, interface)))
         on_root(comm, _with_write_errors, self._path, _create, self.part, comm.size, size + RESERVE)
         # MPI-IO keeps names in short buffers: it has the folder by its descriptor, while the file is open.
         folder: int = agree(comm, _with_write_errors, self._path, os.open, self.part.parent, os.O_RDONLY)
@@ -133,17 +133,18 @@ class FieldFile:
         )
 
     def _write_part(self, group: str, part: Any) -> None:
-        """Makes the tables of a group, each rank giving its rows, and the views of its vectors."""
+        """Makes the tables of a group, each rank giving its rows, and the views of them."""
         described = tables(part)
         for symbol, rows in self._rows.items():
             own = {name: d for name, d in described.items() if rows_of(d) == symbol}
             if own:
                 self._write_tables(group, rows, part, own)
-        for name, d in described.items():
-            if name in PLANE_VECTORS:
-                self._view(
-                    f"{group}/{name}", self._rows[rows_of(d)], self._words(d) | {"meaning": view_words(group, name)}
-                )
+        views = VIEWS.get(GROUP_OF_STATES if group.startswith("state/") else group, ())
+        rows_and_words = [
+            (self._rows[rows_of(source)].total, self._words(source) | {"meaning": view.words})
+            for view, source in ((view, described[view.source]) for view in views)
+        ]
+        self._collectively(_create_views, self._file, group, views, rows_and_words)
 
     def _write_tables(self, group: str, rows: _Rows, part: Any, described: Mapping[str, Description]) -> None:
         """Makes tables of the same rows of a part."""
@@ -158,14 +159,6 @@ class FieldFile:
         """The attributes of a dataset: what it holds, and in which unit, by its label if the case gives one."""
         unit = self._units.get(described.unit) or described.unit or PURE_NUMBER
         return {"meaning": described.meaning, "unit": unit}
-
-    def _view(self, name: str, rows: _Rows, words: Mapping[str, str]) -> None:
-        """The table `name` (rows, 2) as /vector/`name` (rows, 3)."""
-        if rows.total:
-            layout = h5py.VirtualLayout((rows.total, 3), dtype=np.float64)
-            layout[:, :2] = h5py.VirtualSource(".", name, shape=(rows.total, 2), dtype=np.float64)
-            self._collectively(self._file.create_virtual_dataset, f"vector/{name}", layout, 0.0)
-            self._collectively(_set_attributes, self._file[f"vector/{name}"], words)
 
     def _collectively(self, function: Callable[..., object], *args: Any) -> None:
         """function(*args) on all ranks; if any cannot write, the file is removed and all raise."""
@@ -221,6 +214,28 @@ def _open(folder: int, name: str, comm: Comm) -> Any:
     """The file of that name in an open folder, opened by all ranks."""
     path = f"/proc/self/fd/{folder}/{name}"
     return h5py.File(path, "r+", driver="mpio", comm=comm) if h5py.get_config().mpi else h5py.File(path, "r+")
+
+
+def _create_views(
+    file: Any, group: str, views: Sequence[View], rows_and_words: Sequence[tuple[int, Mapping[str, str]]]
+) -> None:
+    """Makes the virtual datasets of a group, each with its number of rows, which may be none, and its attributes."""
+    for view, (rows, words) in zip(views, rows_and_words, strict=True):
+        if rows:
+            _create_view(file, view, group, rows, words)
+
+
+def _create_view(file: Any, view: View, group: str, rows: int, words: Mapping[str, str]) -> None:
+    """Makes a virtual dataset of so many rows over the tables of a group."""
+    shape = (rows, view.components) if view.components else (rows,)
+    layout = h5py.VirtualLayout(shape, file[f"{group}/{view.source}"].dtype)
+    for place, (name, column) in view.columns.items():
+        table = file[f"{group}/{name}"]
+        source = h5py.VirtualSource(".", table.name, shape=table.shape, dtype=table.dtype)
+        own: Any = (slice(None), place) if view.components else slice(None)
+        layout[own] = source if column == WHOLE else source[:, column]
+    nothing = np.zeros((), layout.dtype)[()]
+    _set_attributes(file.create_virtual_dataset(view.path(group), layout, nothing), words)
 
 
 def _set_attributes(target: Any, attributes: Mapping[str, Any]) -> None:

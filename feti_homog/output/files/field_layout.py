@@ -13,10 +13,10 @@ from typing import Any
 
 from feti_homog.common.records import LENGTH, STRESS, Description, described, descriptions, type_words
 from feti_homog.mechanics.voigt import STRAINS, STRESSES
-from feti_homog.typing import AnyInt, Float
+from feti_homog.output.files.field_views import VIEWS
+from feti_homog.typing import AnyInt, Float, Float32
 
 PROGRAM = "feti_homog"
-PLANE_VECTORS = ("normal", "displacement", "fluctuation")  # which /vector has with a third component
 
 
 @dataclass(frozen=True)
@@ -50,6 +50,7 @@ class MeshPart:
     body: AnyInt = described("body of each element, from 0, the matrix", shape="(m,)", dtype="int32")
     subdomain: AnyInt = described("subdomain of each element, from 0", shape="(m,)", dtype="int32")
     phase: AnyInt = described("phase of each element, a place in `phases`", shape="(m,)", dtype="int32")
+    fibre_number: AnyInt = described("number of the fibre, from 1; 0 in the matrix", shape="(m,)", dtype="int32")
 
 
 @dataclass(frozen=True)
@@ -77,6 +78,7 @@ class InterfacePart:
     fibre: AnyInt = described("body of the fibre", shape="(k,)", dtype="int32")
     fibre_number: AnyInt = described("number of the fibre, from 1", shape="(k,)", dtype="int32")
     fibre_node: AnyInt = described("a node of the mesh on the fibre's face, from 0", shape="(k,)", dtype="int64")
+    vertex: AnyInt = described("number of the interface node, from 0: viewers' elements", shape="(k, 1)", dtype="int64")
     matrix_node: AnyInt = described(
         "a node of the mesh on the matrix's face, from 0, where `fibre_node` is or an image of it by the periods",
         shape="(k,)",
@@ -95,14 +97,38 @@ class StatePart:
     displacement: Float = described("displacement, that of the macroscopic strain included", LENGTH, "(n, 2)")
     fluctuation: Float = described("displacement less that of the macroscopic strain, periodic", LENGTH, "(n, 2)")
     stress: Float = described(f"means over the elements, {', '.join(STRESSES)}", STRESS, "(m, 3)")
+    stress_33: Float = described(
+        "stress 33, out of the plane: 0 of plane stress, NaN where the material's constants do not say it",
+        STRESS,
+        "(m,)",
+    )
+    element_strain: Float32 = described(
+        "strains of the means over the elements, components of the tensor 11, 22, 12 = gamma12 / 2, 33 (NaN as of "
+        "`stress_33`)",
+        shape="(m, 4)",
+        dtype="float32",
+    )
+    von_mises: Float32 = described("von Mises stress of `stress` and `stress_33`", STRESS, "(m,)", dtype="float32")
+    principal_1: Float32 = described("largest principal stress of the same", STRESS, "(m,)", dtype="float32")
+    principal_2: Float32 = described("middle principal stress", STRESS, "(m,)", dtype="float32")
+    principal_3: Float32 = described("smallest principal stress", STRESS, "(m,)", dtype="float32")
     traction: Float = described("sigma n, normal (tension positive) and tangential", STRESS, "(k, 2)")
     jump: Float = described(
         "gap and slip: displacement of the matrix minus that of the fibre, normal and tangential", LENGTH, "(k, 2)"
     )
+    traction_vector: Float = described("`traction` as (x, y, 0)", STRESS, "(k, 3)")
+    jump_vector: Float = described("`jump` as (x, y, 0)", LENGTH, "(k, 3)")
+    displacement_fibre: Float = described("displacement (x, y, 0) of the fibre's face", LENGTH, "(k, 3)")
+    displacement_matrix: Float = described(
+        "displacement (x, y, 0) of the matrix's face, at the same place: `displacement_fibre` plus `jump_vector`",
+        LENGTH,
+        "(k, 3)",
+    )
     status: AnyInt = described("0 bonded, 1 closed (debonded, in contact), 2 open", shape="(k,)", dtype="int8")
 
 
-GROUPS: dict[str, type] = {"mesh": MeshPart, "fibre": FibrePart, "interface": InterfacePart, "state/K": StatePart}
+GROUP_OF_STATES = "state/K"
+GROUPS = {"mesh": MeshPart, "fibre": FibrePart, "interface": InterfacePart, GROUP_OF_STATES: StatePart}
 
 
 @dataclass(frozen=True)
@@ -141,20 +167,15 @@ def rows_of(description: Description) -> str:
     return first if first in ("n", "m", "k", "f") else ""
 
 
-def view_words(group: str, name: str) -> str:
-    """What a dataset of /vector is."""
-    group = "state/K" if group.startswith("state/") else group
-    return f"/{group}/{name} with a third component 0, as viewers want it; takes no space"
-
-
 def _items_of(part: type, group: str) -> Iterator[Item]:
     hints = typing.get_type_hints(part)
     for name, d in descriptions(part).items():
         if rows_of(d):
             yield Item(f"/{group}/{name}", "dataset", d.shape, d.dtype, d.unit, d.meaning)
-            if name in PLANE_VECTORS:
-                words, shape = view_words(group, name), f"({rows_of(d)}, 3)"
-                yield Item(f"/vector/{group}/{name}", "dataset", shape, d.dtype, d.unit, words)
         else:
             words = type_words(hints[name], d)
             yield Item(f"/{group}", f"attribute {d.name or name}", d.shape, words, d.unit, d.meaning)
+    for view in VIEWS.get(group, ()):
+        d = descriptions(part)[view.source]
+        shape = f"({rows_of(d)}, {view.components})" if view.components else f"({rows_of(d)},)"
+        yield Item(f"/{view.path(group)}", "dataset", shape, d.dtype, d.unit, view.words)

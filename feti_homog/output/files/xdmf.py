@@ -1,7 +1,12 @@
-"""result.xdmf: says where in result.h5 ParaView finds mesh, interface and states."""
+"""result.xdmf and interface.xdmf: say where in result.h5 ParaView finds the cell, the interface and their states.
+
+All of ParaView's and VTK's readers understand them: whole datasets alone, points with a connectivity, tensors of nine
+components, one collection a file.  The readers show no texts, so the label of a state is the name of its block.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
@@ -12,81 +17,104 @@ import numpy as np
 from feti_homog.mechanics.voigt import STRESSES
 from feti_homog.output.files import atomic, field_file
 
-NAME = "result.xdmf"
+CELL, INTERFACE = "result.xdmf", "interface.xdmf"
 NUMBERS = {"f": "Float", "i": "Int"}
+SHAPES = {1: "Scalar", 3: "Vector", 9: "Tensor"}  # by the number of components
+# The arrays of the cell and of the interface, and the datasets of result.h5, or of one of its states, that they are.
+CELL_NODES = {name: f"vector/state/K/{name}" for name in ("displacement", "fluctuation")}
+CELL_ELEMENTS = {
+    **{name: f"mesh/{name}" for name in ("body", "fibre_number", "phase", "subdomain")},
+    **{name: f"tensor/state/K/{name}" for name in ("stress", "strain")},
+    **{name: f"column/state/K/{name}" for name in STRESSES},
+    "S33": "state/K/stress_33",
+    **{name: f"state/K/{name}" for name in ("von_mises", "principal_1", "principal_2", "principal_3")},
+}
+INTERFACE_POINTS = {
+    "displacement": "state/K/displacement_fibre",
+    "displacement_matrix": "state/K/displacement_matrix",
+    "traction": "state/K/traction_vector",
+    "jump": "state/K/jump_vector",
+    **{name: f"column/state/K/{name}" for name in ("traction_n", "traction_t", "jump_n", "jump_t")},
+    "status": "state/K/status",
+    "normal": "vector/interface/normal",
+    **{name: f"interface/{name}" for name in ("length", "fibre", "fibre_number")},
+}
 
 
-def write(directory: Path) -> Path:
-    """Writes `directory`/result.xdmf for the result.h5 beside it; returns its path. Call on one rank.
+def write(directory: Path) -> list[Path]:
+    """Writes result.xdmf and, if there are interface nodes, interface.xdmf for the result.h5 of `directory`; returns
+    their paths.  Call on one rank.
 
-    Two temporal collections, the time being the number of the state: "cell" with the fields on nodes and
-    elements and, if there are interface nodes, "interface" with those at its points.
+    Each has one temporal collection, the time being the number of the state: of fields on the nodes and elements of the
+    cell, or of those at the points of the interface.
 
     Raises:
-        FetiHomogError: result.h5 cannot be read or the file cannot be written.
+        FetiHomogError: result.h5 cannot be read or a file cannot be written.
     """
-    path = Path(directory) / NAME
-    root = ET.Element("Xdmf", Version="3.0")
-    domain = ET.SubElement(root, "Domain")
-    with atomic.write_errors(path), h5py.File(path.with_name(field_file.NAME), "r") as file:
-        states = sorted(file.get("state", ()), key=int)
-        _collection(domain, "cell", [_cell(file, state) for state in states])
+    h5, paths = Path(directory) / field_file.NAME, []
+    with atomic.write_errors(Path(directory) / CELL), h5py.File(h5, "r") as file:
+        paths.append(_write(h5.with_name(CELL), "cell", file, _cell))
         if len(file["interface/points"]):
-            _collection(domain, "interface", [_interface(file, state) for state in states])
+            paths.append(_write(h5.with_name(INTERFACE), "interface", file, _interface))
+    return paths
+
+
+def _write(path: Path, name: str, file: h5py.File, fill: Callable[[ET.Element, h5py.File, str], None]) -> Path:
+    """One file; `fill` puts mesh and fields of a state into its grid."""
+    root = ET.Element("Xdmf", Version="3.0")
+    collection = ET.SubElement(
+        ET.SubElement(root, "Domain"), "Grid", Name=name, GridType="Collection", CollectionType="Temporal"
+    )
+    for state in sorted(file.get("state", ()), key=int):
+        fill(_grid(collection, file, state), file, state)
     ET.indent(root)
     return atomic.replace(path, lambda part: ET.ElementTree(root).write(part, encoding="utf-8", xml_declaration=True))
 
 
-def _collection(domain: ET.Element, name: str, grids: list[ET.Element]) -> None:
-    collection = ET.SubElement(domain, "Grid", Name=name, GridType="Collection", CollectionType="Temporal")
-    collection.extend(grids)
+def _grid(collection: ET.Element, file: h5py.File, state: str) -> ET.Element:
+    """The grid of a state, in a collection of its own: readers pass on the name of a grid in such a one only."""
+    attributes = file[f"state/{state}"].attrs
+    block = ET.SubElement(collection, "Grid", Name=f"state {state}", GridType="Collection", CollectionType="Spatial")
+    ET.SubElement(block, "Time", Value=state)
+    grid = ET.SubElement(block, "Grid", Name=str(attributes["label"]), GridType="Uniform")
+    for name, source in (("load_factor", "load_factor"), ("mean_strain", "strain"), ("mean_stress", "stress")):
+        values = np.atleast_1d(attributes[source])
+        size = {"Dimensions": "1" if len(values) == 1 else f"1 {len(values)}"}
+        item = ET.Element("DataItem", size, Format="XML", NumberType="Float", Precision="8")
+        item.text = " ".join(repr(float(value)) for value in values)
+        _attribute(grid, name, len(values), "Grid", item)
+    return grid
 
 
-def _cell(file: h5py.File, state: str) -> ET.Element:
-    grid = _grid("cell", state)
+def _cell(grid: ET.Element, file: h5py.File, state: str) -> None:
     triangles = file["mesh/triangles"]
     kind = "Triangle_6" if triangles.shape[1] == 6 else "Triangle"
-    topology = ET.SubElement(grid, "Topology", TopologyType=kind, NumberOfElements=str(len(triangles)))
-    topology.append(_table(triangles))
-    _points(grid, file["mesh/points"])
-    for name in ("displacement", "fluctuation"):
-        _attribute(grid, name, "Vector", "Node", _table(file[f"vector/state/{state}/{name}"]))
-    for name in ("body", "subdomain", "phase"):
-        _attribute(grid, name, "Scalar", "Cell", _table(file[f"mesh/{name}"]))
-    for column, name in enumerate(STRESSES):
-        _attribute(grid, name, "Scalar", "Cell", _column(file[f"state/{state}/stress"], column))
-    return grid
+    _mesh(grid, {"TopologyType": kind}, triangles, file["mesh/points"])
+    _attributes(grid, file, state, CELL_NODES.items(), "Node")
+    _attributes(grid, file, state, CELL_ELEMENTS.items(), "Cell")
 
 
-def _interface(file: h5py.File, state: str) -> ET.Element:
-    grid = _grid("interface", state)
-    points = file["interface/points"]
-    topology = {"TopologyType": "Polyvertex", "NumberOfElements": str(len(points)), "NodesPerElement": "1"}
-    ET.SubElement(grid, "Topology", topology)
-    _points(grid, points)
-    _attribute(grid, "normal", "Vector", "Node", _table(file["vector/interface/normal"]))
-    for name in ("length", "fibre"):
-        _attribute(grid, name, "Scalar", "Node", _table(file[f"interface/{name}"]))
-    for name in ("traction", "jump"):
-        for column, direction in enumerate("nt"):
-            values = _column(file[f"state/{state}/{name}"], column)
-            _attribute(grid, f"{name}_{direction}", "Scalar", "Node", values)
-    _attribute(grid, "status", "Scalar", "Node", _table(file[f"state/{state}/status"]))
-    return grid
+def _interface(grid: ET.Element, file: h5py.File, state: str) -> None:
+    vertices = {"TopologyType": "Polyvertex", "NodesPerElement": "1"}
+    _mesh(grid, vertices, file["interface/vertex"], file["interface/points"])
+    _attributes(grid, file, state, INTERFACE_POINTS.items(), "Node")
 
 
-def _grid(name: str, state: str) -> ET.Element:
-    grid = ET.Element("Grid", Name=name, GridType="Uniform")
-    ET.SubElement(grid, "Time", Value=state)
-    return grid
-
-
-def _points(grid: ET.Element, points: Any) -> None:
+def _mesh(grid: ET.Element, kind: dict[str, str], connectivity: Any, points: Any) -> None:
+    topology = ET.SubElement(grid, "Topology", kind, NumberOfElements=str(len(connectivity)))
+    topology.append(_table(connectivity))
     ET.SubElement(grid, "Geometry", GeometryType="XY").append(_table(points))
 
 
-def _attribute(grid: ET.Element, name: str, kind: str, center: str, values: ET.Element) -> None:
-    ET.SubElement(grid, "Attribute", Name=name, AttributeType=kind, Center=center).append(values)
+def _attributes(grid: ET.Element, file: h5py.File, state: str, arrays: Iterable[tuple[str, str]], centre: str) -> None:
+    """The arrays of a state, each with its dataset."""
+    for name, place in arrays:
+        table = file[place.replace("/K/", f"/{state}/")]
+        _attribute(grid, name, 1 if table.ndim == 1 else table.shape[1], centre, _table(table))
+
+
+def _attribute(grid: ET.Element, name: str, components: int, centre: str, values: ET.Element) -> None:
+    ET.SubElement(grid, "Attribute", Name=name, AttributeType=SHAPES[components], Center=centre).append(values)
 
 
 def _table(table: Any) -> ET.Element:
@@ -95,13 +123,4 @@ def _table(table: Any) -> ET.Element:
     form = {"Format": "HDF", "NumberType": number, "Precision": str(table.dtype.itemsize)}
     item = ET.Element("DataItem", form, Dimensions=" ".join(map(str, table.shape)))
     item.text = f"{field_file.NAME}:{table.name}"
-    return item
-
-
-def _column(table: Any, column: int) -> ET.Element:
-    """One column of a dataset: start, stride and count of the hyperslab."""
-    item = ET.Element("DataItem", ItemType="HyperSlab", Dimensions=f"{len(table)} 1")
-    slab = ET.SubElement(item, "DataItem", Dimensions="3 2", Format="XML")
-    slab.text = f"0 {column} 1 1 {len(table)} 1"
-    item.append(_table(table))
     return item

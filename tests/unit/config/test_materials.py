@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from feti_homog.config.materials import General, Isotropic, Orthotropic, plane_stiffness, rotated
+from feti_homog.config.materials import General, Isotropic, Orthotropic, out_of_plane, plane_stiffness, rotated
 
 CONSTANTS = {"E1": 140.0, "E2": 10.0, "E3": 12.0, "nu12": 0.3, "nu13": 0.25, "nu23": 0.4, "G12": 5.0}
 
@@ -105,3 +105,43 @@ def test_unstable_materials_are_refused(material, words):
 def test_near_incompressible_is_stable():
     stiffness = plane_stiffness(Isotropic(1.0, 0.4999999), "strain")
     assert np.linalg.eigvalsh(stiffness).min() > 0.0
+
+
+def in_space(material, plane, strain):
+    """The stress (3, 3) and strain (3, 3) of the plane state with these strains [11, 22, 12] in space, turned back."""
+    whole = three_dimensional_stiffness(**CONSTANTS)
+    c, s = np.cos(np.radians(material.angle)), np.sin(np.radians(material.angle))
+    turn = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])  # to the axes of the material
+    E = np.array([[strain[0], strain[2] / 2, 0.0], [strain[2] / 2, strain[1], 0.0], [0.0, 0.0, 0.0]])
+    own = turn @ E @ turn.T
+    voigt = np.array([own[0, 0], own[1, 1], 0.0, 0.0, 0.0, 2 * own[0, 1]])
+    if plane == "stress":
+        voigt[2] = -whole[2] @ voigt / whole[2, 2]
+    S = whole @ voigt
+    stress = np.array([[S[0], S[5], 0.0], [S[5], S[1], 0.0], [0.0, 0.0, S[2]]])
+    return turn.T @ stress @ turn, voigt[2]
+
+
+@pytest.mark.parametrize("plane", ["strain", "stress"])
+@pytest.mark.parametrize("angle", [0.0, 33.0])
+def test_what_is_out_of_the_plane_is_that_of_the_three_dimensional_law(plane, angle):
+    material, strain = Orthotropic(**CONSTANTS, angle=angle), np.array([0.3, -0.2, 0.5])
+    stress = plane_stiffness(material, plane) @ strain
+    expected, E33 = in_space(material, plane, strain)
+    np.testing.assert_allclose(stress, expected[[0, 1, 0], [0, 1, 1]], rtol=1e-12)
+    to_S33, to_E33 = out_of_plane(material, plane)
+    np.testing.assert_allclose([to_S33 @ stress, to_E33 @ stress], [expected[2, 2], E33], rtol=1e-12, atol=1e-14)
+
+
+def test_isotropic_phases_out_of_the_plane():
+    stress = np.array([3.0, 1.0, 7.0])
+    to_S33, to_E33 = out_of_plane(Isotropic(88.0, 0.25), "strain")
+    assert to_S33 @ stress == pytest.approx(0.25 * 4.0) and to_E33 @ stress == 0
+    to_S33, to_E33 = out_of_plane(Isotropic(88.0, 0.25), "stress")
+    assert to_E33 @ stress == pytest.approx(-0.25 / 88.0 * 4.0) and to_S33 @ stress == 0
+
+
+@pytest.mark.parametrize("plane", ["strain", "stress"])
+def test_a_general_stiffness_does_not_say_what_is_out_of_the_plane(plane):
+    rows = out_of_plane(General(((3.0, 1.0, 0.0), (1.0, 3.0, 0.0), (0.0, 0.0, 1.0))), plane)
+    assert [bool(np.isnan(row).all()) for row in rows] == [plane == "strain", plane == "stress"]

@@ -3,17 +3,15 @@ from __future__ import annotations
 import json
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree as ET
 
 import h5py
 import numpy as np
 import pytest
 from matplotlib.image import imread
 from PIL import Image
-from support.sample_output import Sample, sample, without_interface
+from support.sample_output import Sample, sample
 
 from feti_homog.errors import CaseError, FetiHomogError
-from feti_homog.output.files import xdmf
 from feti_homog.output.files.field_file import FieldFile
 from feti_homog.output.files.result_json import SCHEMA
 from feti_homog.output.plots import decimation, figures, plot_helpers
@@ -197,25 +195,3 @@ def test_a_result_of_another_schema(tmp_path: Path, schema: dict[str, int]) -> N
     found = rf"result\.json: its schema is {schema.get('schema', 'none')}, this program reads schema {SCHEMA}"
     with pytest.raises(CaseError, match=found):
         figures.plot(tmp_path)
-
-
-def test_xdmf_points_at_tables_of_the_right_shape(tmp_path: Path) -> None:
-    whole = sample(4, order=2)
-    with h5py.File(write(tmp_path, whole), "r") as file:
-        root = ET.parse(xdmf.write(tmp_path)).getroot()
-        tables = [item for item in root.iter("DataItem") if item.get("Format") == "HDF"]
-        assert len(tables) == 3 * (2 + 2 + 3 + 3 + 1 + 3 + 4 + 1)
-        for item in tables:
-            name, _, path = str(item.text).partition(":")
-            assert name == "result.h5"
-            assert " ".join(map(str, file[path].shape)) == item.get("Dimensions")
-    collections = root.findall("./Domain/Grid")
-    assert [grid.get("Name") for grid in collections] == ["cell", "interface"]
-    assert [time.get("Value") for time in collections[0].iter("Time")] == ["0", "1", "2"]
-    assert {topology.get("TopologyType") for topology in collections[0].iter("Topology")} == {"Triangle_6"}
-
-
-def test_xdmf_without_interface_nodes_has_the_cell_alone(tmp_path: Path) -> None:
-    write(tmp_path, without_interface(sample(4)))
-    root = ET.parse(xdmf.write(tmp_path)).getroot()
-    assert [grid.get("Name") for grid in root.findall("./Domain/Grid")] == ["cell"]
