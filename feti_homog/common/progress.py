@@ -12,6 +12,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from feti_homog.common import process_memory
+from feti_homog.common.standard_streams import say
 
 T = TypeVar("T")
 
@@ -31,10 +32,10 @@ class Progress:
         if self.on_terminal:
             from tqdm import tqdm
 
-            tqdm.write(line, file=sys.stdout)
-            sys.stdout.flush()
+            with tqdm.external_write_mode(file=sys.stdout):
+                say(line)
         elif self.prints:
-            print(line, flush=True)
+            say(line)
 
     @contextmanager
     def stage(self, name: str) -> Iterator[list[str]]:
