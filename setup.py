@@ -18,10 +18,13 @@ setup(
     license="MIT",
     python_requires=">=3.11",
     packages=find_packages(include=["feti_homog", "feti_homog.*"]),
+    package_data={"feti_homog.output.report": ["templates/*"]},
     install_requires=[
         "numpy>=1.23",  # of the major version that petsc4py was built for: scripts/bootstrap takes that one
         "scipy>=1.10",
         "matplotlib>=3.6",
+        "bokeh>=3.4",
+        "jinja2>=3.1",
         "gmsh>=4.11",
         "pymetis>=2023.1",
         "tqdm>=4.64",
@@ -33,6 +36,7 @@ setup(
         "mpi": ["petsc4py>=3.18", "mpi4py>=3.1", "h5py>=3.7"],
         "dev": [
             "pytest>=7.4",
+            "selenium>=4.20",
             "hypothesis>=6.100",
             "coverage>=7.10",
             "radon>=6",

@@ -1,5 +1,5 @@
-"""The command line: `feti-homog run CASE.toml --out DIR`, `check CASE.toml`, `plot DIR`, `verify DIR`, `sweep`,
-`collect`, `keys`, `schema`, `options`.
+"""The command line: `feti-homog run CASE.toml --out DIR`, `check CASE.toml`, `plot DIR`, `report DIR`, `verify DIR`,
+`sweep`, `collect`, `keys`, `schema`, `options`.
 
 Options with a double dash are ours, with a single dash PETSc's.
 """
@@ -78,6 +78,9 @@ def command_parser() -> Parser:
     plot = actions.add_parser("plot", help="make the pictures of a results folder again")
     plot.add_argument("directory", type=folder, metavar="DIR")
     plot.set_defaults(action=_plot)
+    report = actions.add_parser("report", help="write report.html of a results folder: one page with all there is")
+    report.add_argument("directory", type=folder, metavar="DIR")
+    report.set_defaults(action=_report)
     verify = actions.add_parser("verify", help="check from its files alone that a result obeys its laws",
                                 description=VERIFY_HELP)  # fmt: skip
     verify.add_argument("directory", type=folder, metavar="DIR")
@@ -167,6 +170,21 @@ def _plot(arguments: argparse.Namespace, comm: Intracomm) -> None:
         print(f"{arguments.directory}: nothing to draw: its case has no fields, and no points of an angle or path")
     for path in paths or []:
         print(path)
+
+
+def _report(arguments: argparse.Namespace, comm: Intracomm) -> None:
+    from feti_homog.common.mpi_errors import on_root_only
+
+    path = on_root_only(comm, _written_report, arguments.directory)
+    if path is not None:
+        print(path)
+
+
+def _written_report(directory: Path) -> Path:
+    """The report; only a rank that writes it loads Bokeh."""
+    from feti_homog.output.report import page
+
+    return page.write(directory)
 
 
 def _verify(words: Sequence[str]) -> int:

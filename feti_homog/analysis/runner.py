@@ -134,7 +134,8 @@ class _States:
 
 def _run_and_write(cell: TornCell, directory: Path, progress: Progress, resume: bool, keep_fields: bool) -> Result:
     """Analyse and write; the result may have faults."""
-    file = _field_file(cell, directory, progress) if cell.case.output.fields else None
+    output = cell.case.output
+    file = _field_file(cell, directory, progress) if output.fields else None
     with file or nullcontext():
         states = _States(cell, file, keep_fields)
         context = _context(cell, progress, states)
@@ -144,14 +145,15 @@ def _run_and_write(cell: TornCell, directory: Path, progress: Progress, resume: 
         analysis = _analyse(context, checkpoint, resume)
     fields = []
     if file is not None:
-        fields = [field_file.NAME, *(path.name for path in on_root_only(cell.comm, xdmf.write, directory) or [])]
+        fields = [field_file.NAME, *(path.name for path in on_root(cell.comm, xdmf.write, directory))]
     result = result_builder.result(context, analysis, states.kept())
     _write(result, directory, cell, fields)
     if cell.case.path is not None and not result.faults:
         checkpoint.clear()
-    if cell.case.output.pictures:
-        with progress.stage("pictures") as words:
-            words.append(", ".join(p.name for p in on_root_only(cell.comm, _draw, directory) or []))
+    for name, wanted, make in (("pictures", output.pictures, _draw), ("report", output.report, _report)):
+        if wanted:
+            with progress.stage(name) as words:
+                words.append(", ".join(path.name for path in on_root(cell.comm, make, directory)))
     progress.say("\n" + summary(replace(result, timings=progress.timings()).document))
     return result
 
@@ -223,3 +225,10 @@ def _draw(directory: Path) -> list[Path]:
     from feti_homog.output.plots import figures
 
     return figures.plot(directory)
+
+
+def _report(directory: Path) -> list[Path]:
+    """report.html; only a rank that writes it loads Bokeh."""
+    from feti_homog.output.report import page
+
+    return [page.write(directory)]

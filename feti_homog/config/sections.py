@@ -180,6 +180,7 @@ class Output:
 
     fields: bool = key(boolean, "Write result.h5 and result.xdmf.", default=True)
     pictures: bool = key(boolean, "Draw the PNG files; without fields, the curves alone.", default=True)
+    report: bool = key(boolean, "Write report.html: numbers, pictures, curves and states on one page.", default=False)
     stress: str = key(
         choice("auto", "S11", "S22", "S12"),
         'The component drawn; "auto": that of the unit strain.',

@@ -1,6 +1,7 @@
-"""What a run leaves behind: files, the printed summary, pictures.
+"""What a run leaves behind: files, the printed summary, pictures, report.
 
-May use `homogenization` and the floors below it.  Main entries: its own floors, from above `plots`, `text`, `files`.
+May use `homogenization` and the floors below it.  Main entries: its own floors, from
+above `report`, `plots`, `text`, `files`.
 """
 
 from __future__ import annotations

@@ -24,6 +24,7 @@ class Faces:
     Attributes:
         row: (b,) the interface node at the place of each torn node, -1 if there is none.
         is_fibre: (b,) whether the torn node belongs to a fibre.
+        copies: (b,) how many copies of the torn node its subdomain has, periodic images of each other.
         distance: (k,) of each interface node from its place, infinite if there is no such place.
         breakable: (places,) whether exactly one fibre and the matrix meet there.
         place: (k,) of each interface node, -1 if there is none.
@@ -31,6 +32,7 @@ class Faces:
 
     row: Int
     is_fibre: Bool
+    copies: Int
     distance: Float
     breakable: Bool
     place: Int
@@ -42,9 +44,10 @@ class Faces:
         return np.stack([np.bincount(self.row[own], values[own, i], k) for i in range(2)], axis=1)
 
     def means(self, values: Float, of_fibre: bool) -> Float:
-        """(k, 2) means of values (b, 2) over the copies on one of the faces; NaN where there is none."""
+        """(k, 2) means of values (b, 2) over the subdomains on one of the faces; NaN where there is none."""
+        share = 1.0 / self.copies[:, None]
         with np.errstate(invalid="ignore"):
-            return self.sums(values, of_fibre) / self.sums(np.ones_like(values), of_fibre)
+            return self.sums(values * share, of_fibre) / self.sums(np.ones_like(values) * share, of_fibre)
 
 
 @dataclass(frozen=True)
@@ -129,4 +132,8 @@ def _faces(files: ResultFiles, nodes: TornNodes, parts: Int, radius: float) -> F
         place[found], distance[found] = nodes.place[nearest[found]], away[found]
     row_of = np.full(nodes.places, -1)
     row_of[place[place >= 0]] = np.flatnonzero(place >= 0)
-    return Faces(row_of[nodes.place], is_fibre, distance, breakable, place)
+    _, which, count = np.unique(
+        nodes.place * (int(nodes.subdomain.max(initial=0)) + 1) + nodes.subdomain,
+        return_inverse=True, return_counts=True,
+    )  # fmt: skip
+    return Faces(row_of[nodes.place], is_fibre, count[which.ravel()], distance, breakable, place)

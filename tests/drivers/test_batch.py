@@ -173,7 +173,9 @@ def test_a_faulty_sweep_is_not_submitted(tmp_path, scheduler, kind):
 def test_a_single_case_is_run_with_its_options(elsewhere, scheduler, kind, options):
     sweep_file(elsewhere, "", CASE, "case")
     words = ["case.toml", "out", *options, "--", "-feti_ksp_rtol", "1e-6"]
-    job, notes = submitted(scheduler, ROOT / f"scripts/{kind}/submit_case", *words, cwd=elsewhere)
+    link = elsewhere.parent / "submit"
+    link.symlink_to(ROOT / f"scripts/{kind}/submit_case")
+    job, notes = submitted(scheduler, link, *words, cwd=elsewhere)
     assert job.stdout == f"job 77{'.server' * (kind == 'pbs')}, log in {elsewhere}/out/logs\n"
     submission, run, code = notes
     assert all(word in submission for word in options) and code == "exit 0"
@@ -200,8 +202,11 @@ def test_a_faulty_case_is_not_submitted(elsewhere, scheduler, kind):
     script = ROOT / f"scripts/{kind}/submit_case"
     job, notes = submitted(scheduler, script, "case.toml", "out", cwd=elsewhere, code=2)
     assert "[material.matrix] young" in job.stderr and not notes and not (elsewhere / "out").exists()
-    job, notes = submitted(scheduler, script, "case.toml", cwd=elsewhere, code=2)
-    assert job.stderr.startswith("usage: ")
+    job, notes = submitted(scheduler, script, "missing/case.toml", "out", cwd=elsewhere, code=2)
+    assert "missing/case.toml" in job.stderr and not notes
+    for words in (["case.toml"], ["case.toml", "out", "--retry"]):
+        job, notes = submitted(scheduler, script, *words, cwd=elsewhere, code=2)
+        assert "usage: " in job.stderr and not notes
 
 
 def test_a_job_that_is_put_back_into_the_queue_resumes(elsewhere, scheduler):

@@ -158,6 +158,9 @@ def _configure(folder: Path) -> None:
         (folder / name).mkdir()
     (folder / "munge.key").write_bytes(os.urandom(128))
     (folder / "munge.key").chmod(0o600)
+    version = subprocess.run(["slurmd", "-V"], env=os.environ | {"PATH": PATH}, capture_output=True, text=True).stdout
+    plugin = "disabled" if re.findall(r"\d+", version)[0] >= "23" else "cgroup/v1"  # neither looks for cgroups
+    (folder / "cgroup.conf").write_text(f"CgroupPlugin={plugin}\n")
     with ExitStack() as stack:
         sockets = [stack.enter_context(socket.create_server(("127.0.0.1", 0))) for _ in range(2)]
         ports = [each.getsockname()[1] for each in sockets]
@@ -188,7 +191,7 @@ def _await_start(reached: Callable[[], bool], folder: Path) -> None:
     try:
         wait(reached, STARTED_S, "it does not start")
     except TimeoutError as error:
-        logs = [path.read_text() for path in folder.glob("*.out")]
+        logs = [path.read_text() for path in sorted(folder.glob("*.out"))]
         said = [line for log in logs for line in log.splitlines() if re.search("error|fatal", line, re.IGNORECASE)]
         raise NotStartedError("; ".join([str(error), *said[-3:]])) from None
 

@@ -39,6 +39,7 @@ FLOORS = (
     ("output.files",),
     ("output.text",),
     ("output.plots",),
+    ("output.report",),
     ("output",),
     ("analysis",),
     ("sweep.report",),

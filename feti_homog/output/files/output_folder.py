@@ -22,7 +22,8 @@ LOCK = "result.lock"
 DEEPEST = "checkpoint/000000.h5"  # of a run's files the one of the longest name
 # The files of a result, those of all analyses and of what `plot` draws.
 RESULT_FILE = re.compile(
-    r"result\.(json|h5|xdmf)|interface\.xdmf|(angle|path)\.csv|(cell|interface|(angle|path)(_states)?)\.png|path\.gif"
+    r"report\.html|result\.(json|h5|xdmf)|interface\.xdmf"
+    r"|(angle|path)\.csv|(cell|interface|(angle|path)(_states)?)\.png|path\.gif"
     r"|case_(minus_)?(E11|E22|gamma12)\.png|state_\d+\.png"
 )
 

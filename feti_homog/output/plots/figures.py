@@ -39,7 +39,7 @@ from feti_homog.typing import Array
 
 MESH_LINES = 6000  # triangles up to which their edges are drawn
 OUTLINED_BODIES = 8  # up to which the deformed cell is drawn over all that it has left
-UNDEFORMED = "0.5"
+UNDEFORMED, BAR_INCHES = "0.5", 1.1
 MATRIX = "#ece8df"
 FIBRES = ("Blues", "Oranges", "Greens", "Purples", "Reds", "Greys")  # one colour map for each phase
 
@@ -130,7 +130,7 @@ def _deformed(
 ) -> Figure:
     """The magnified deformed cell with a stress component in colour, and the outline it has left."""
     attributes, strain = file.attrs, state.attrs["strain"]
-    figure, (axes,) = figure_of(attributes, panels=1)
+    figure, (axes,) = figure_of(attributes, panels=1, beside=BAR_INCHES)
     displacement = nodal_values(state["displacement"], drawn)
     seen = magnification(largest_length(displacement), float(np.ptp(drawn.points, axis=0).min()))
     scale = output.get("deformation_scale") or seen

@@ -52,10 +52,13 @@ def _trimmed(pixels: Array, padding: int) -> Array:
     return part
 
 
-def figure_of(attributes: Any, panels: int) -> tuple[Figure, Sequence[Axes]]:
+def figure_of(attributes: Any, panels: int, beside: float = 0.0) -> tuple[Figure, Sequence[Axes]]:
+    """A figure with panels for pictures of the cell, and so many inches beside them."""
     width, height = float(attributes["width"]), float(attributes["height"])
     inches = cell_scale(attributes)
-    figure = Figure(figsize=(panels * (width * inches + 0.7) + 0.1, height * inches + 1.2), layout="constrained")
+    figure = Figure(
+        figsize=(panels * (width * inches + 0.7) + 0.1 + beside, height * inches + 1.2), layout="compressed"
+    )
     return figure, figure.subplots(1, panels, squeeze=False)[0]
 
 

@@ -1,0 +1,119 @@
+"""The numbers of a result as rows of tables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from feti_homog.mechanics.voigt import STRAINS, STRESSES
+from feti_homog.output.text.point_tables import chosen
+from feti_homog.output.text.units import with_unit
+
+MOST_ROWS = 60  # of a table of points
+NOISE = 1e-12  # what the solver leaves of a zero
+
+Document = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows of words; the first column has their names."""
+
+    caption: str
+    head: Sequence[str]
+    rows: Sequence[Sequence[str]]
+
+
+@dataclass(frozen=True)
+class Check:
+    """A law with its largest relative error and the limit of it."""
+
+    law: str
+    error: float
+    limit: float
+
+    @property
+    def holds(self) -> bool:
+        return self.error <= self.limit
+
+
+def facts(document: Document) -> list[tuple[str, str]]:
+    """What was computed, of what, and by what."""
+    case, cell, solver = document["case"], document["cell"], document["solver"]
+    length = case["output"].get("length_unit", "")
+    fractions = ", ".join(f"{phase} {share:.4f}" for phase, share in cell["fractions"].items())
+    iterations, ranks = solver["iterations"], solver["ranks"]
+    return [
+        ("Analysis", f"{case['analysis']['type']}, plane {case['analysis']['plane']}"),
+        ("Cell", f"{case['cell']['geometry']}, {cell['width']:.6g} x {cell['height']:.6g} {length}".rstrip()),
+        ("Phases", fractions),
+        ("Mesh", f"{_count(cell['elements'])} elements, {_count(cell['nodes'])} nodes, "
+                 f"order {case['cell'].get('order', 1)}, refine {case['cell'].get('refine', 0)}"),
+        ("Solver", f"{_count(ranks)} rank{'' if ranks == 1 else 's'}, {_count(solver['subdomains'])} subdomains, "
+                   f"{_count(solver['dofs'])} degrees of freedom"),
+        ("Iterations", f"{sum(iterations)} in {len(iterations)} states, to {solver['rtol']:g}"),
+        ("Time", ", ".join(f"{stage} {seconds:.2f} s" for stage, seconds in document["timings"].items())),
+        ("Version", f"feti-homog {document['version']}, layout {document['schema']}"),
+    ]  # fmt: skip
+
+
+def answers(document: Document) -> list[Table]:
+    """What was asked for: stiffness with moduli and bounds, or points of an angle or path."""
+    unit = document["case"]["output"].get("stress_unit", "")
+    label = f" ({unit})" if unit else ""
+    found = []
+    for key, words in (
+        ("effective_stiffness", "Effective stiffness"),
+        ("effective_stiffness_compression", "Effective stiffness under minus the unit strains"),
+    ):
+        if document.get(key) is not None:
+            rows = [[name, *map(_number, row)] for name, row in zip(STRESSES, document[key], strict=True)]
+            found.append(Table(f"{words}{label}", ["", *STRAINS], rows))
+    if document.get("moduli") is not None:
+        rows = [[with_unit(name, unit), _number(value)] for name, value in document["moduli"].items()]
+        found.append(Table("Engineering moduli", ["", "computed"], rows))
+    if document.get("bounds") is not None:
+        found.append(Table(f"Bounds{label}", ["", "lower", "computed", "upper"], list(_bounds(document))))
+    found += [_points(key, document[key], label) for key in ("angle", "path") if document.get(key)]
+    return found
+
+
+def checks(document: Document) -> list[Check]:
+    """Every law that was checked."""
+    tolerance, contact = document["check_tolerance"], document["kkt_tolerance"]
+    return [
+        Check(law, error, contact if law.startswith("kkt_") else tolerance) for law, error in document["checks"].items()
+    ]
+
+
+def _bounds(document: Document) -> Iterator[list[str]]:
+    bounds, here = document["bounds"], document["effective_stiffness"]
+    for i, name in enumerate(("C11", "C22", "C33")):
+        values = (bounds["reuss"][i][i], here[i][i], bounds["voigt"][i][i])
+        yield [f"{name} (Reuss, Voigt)", *map(_number, values)]
+    for name, (lower, upper) in (bounds["hashin_shtrikman"] or {}).items():
+        yield [f"{name} (Hashin-Shtrikman)", *map(_number, (lower, document["moduli"][name], upper))]
+
+
+def _points(key: str, points: Sequence[Document], label: str) -> Table:
+    """The points of an angle or path, of many some."""
+    numbers = chosen(points, MOST_ROWS) if key == "path" else range(min(len(points), MOST_ROWS))
+    some = "" if len(numbers) == len(points) else f", {len(numbers)} of {len(points)}"
+    names = [name for name, value in points[0].items() if isinstance(value, int | float)]
+    head = ["point", *names, *(STRESSES if "stress" in points[0] else ("C11", "C22", "C12", "C33"))]
+    rows = []
+    for number in numbers:
+        point = points[number]
+        stiff = point.get("stiffness")
+        values = point["stress"] if stiff is None else (stiff[0][0], stiff[1][1], stiff[0][1], stiff[2][2])
+        rows.append([str(number), *(_number(point[name]) for name in names), *map(_number, values)])
+    return Table(f"Points of the {key}{some}; stress{label}", head, rows)
+
+
+def _number(value: float) -> str:
+    return f"{value:.7g}" if isinstance(value, int) or abs(value) > NOISE else "0"
+
+
+def _count(number: int) -> str:
+    return f"{number:,}".replace(",", "\N{NO-BREAK SPACE}")
