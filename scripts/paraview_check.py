@@ -31,26 +31,28 @@ def main():
     parser.add_argument("--pictures", type=Path, metavar="FOLDER", help="draw every array into this folder")
     parser.add_argument("--ranges", type=Path, metavar="FILE", help="write what was seen as JSON")
     arguments = parser.parse_args()
-    seen, faults = {}, []
-    for path in [arguments.directory.resolve() / name for name in FILES]:
-        if not path.exists():
-            continue
-        for kind in READERS:
-            reader = opened(kind, path)
-            states = [state_of(reader, time) for time in reader.TimestepValues]
-            faults += [f"{path.name}, {kind}: {fault}" for fault in faults_of(states, path)]
-            seen.setdefault(path.name, {})[kind] = states
-            print(f"{path.name} {kind}: {len(states)} states, {len(states[-1]['arrays'])} arrays")
-            if arguments.pictures:
-                draw(reader, arguments.pictures / f"{path.stem}_{kind}")
-            simple.Delete(reader)
-        first, *others = seen[path.name].values()
-        faults += [f"{path.name}: readers see different values" for other in others if other != first]
-    if not seen:
-        faults.append(f"{arguments.directory}: no {' or '.join(FILES)}")
+    paths = [path for path in (arguments.directory.resolve() / name for name in FILES) if path.exists()]
+    faults = [] if paths else [f"{arguments.directory}: no {' or '.join(FILES)}"]
+    seen = {path.name: seen_in(path, faults, arguments.pictures) for path in paths}
     if arguments.ranges:
         arguments.ranges.write_text(json.dumps(seen))
     sys.exit("\n".join(faults) or 0)
+
+
+def seen_in(path, faults, pictures):
+    """The states of a file by reader; what is wrong is added to `faults`; drawn if there is a folder for it."""
+    seen = {}
+    for kind in READERS:
+        reader = opened(kind, path)
+        seen[kind] = [state_of(reader, time) for time in reader.TimestepValues]
+        faults += [f"{path.name}, {kind}: {fault}" for fault in faults_of(seen[kind], path)]
+        print(f"{path.name} {kind}: {len(seen[kind])} states, {len(seen[kind][-1]['arrays'])} arrays")
+        if pictures:
+            draw(reader, pictures / f"{path.stem}_{kind}")
+        simple.Delete(reader)
+    first = next(iter(seen.values()))
+    faults += [f"{path.name}, {kind}: other values than with the first reader" for kind in seen if seen[kind] != first]
+    return seen
 
 
 def opened(kind, path):
