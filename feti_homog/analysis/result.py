@@ -23,6 +23,7 @@ from feti_homog.analysis.result_records import (
 from feti_homog.common.records import BYTES, SECONDS, STRESS, Key, described, keys, plain, restored
 from feti_homog.mechanics import response
 from feti_homog.mechanics.bounds import Moduli
+from feti_homog.output.files.file_seal import FileSeal
 from feti_homog.output.files.result_json import SCHEMA
 from feti_homog.output.text.summary import short_summary
 from feti_homog.typing import Float
@@ -67,10 +68,15 @@ class Result:
     angle: tuple[AnglePoint, ...] | None = described("points of analysis `angle`, as in angle.csv", default=None)
     path: tuple[PathPoint, ...] | None = described("points of analysis `path`, as in path.csv", default=None)
     resumed: int | None = described("points of a path that were taken from a checkpoint", default=None)
+    result_h5: FileSeal | None = described("by what result.h5 is known, if the run wrote it", default=None)
     timings: Mapping[str, float] = described(
         "wall time of each stage, the largest over ranks", SECONDS, entries={"STAGE": "of mesh, assemble, factor, ..."}
     )
     memory: int = described("peak resident memory, the largest over ranks", BYTES)
+    checksum: str | None = described(
+        "of result.json: CRC-32, in hexadecimal, of its text without this key; checked and taken away when it is read",
+        default=None,
+    )
     fields: Fields | None = field(default=None, repr=False, compare=False)
 
     @classmethod

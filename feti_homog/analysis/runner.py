@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from itertools import count
@@ -14,7 +14,7 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from feti_homog.analysis import debonding_angle, load_path, result_builder, stiffness
+from feti_homog.analysis import debonding_angle, load_path, result_builder, stiffness, stored_result
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.result import Result
 from feti_homog.analysis.result_fields import Fields
@@ -23,7 +23,7 @@ from feti_homog.common.mpi_errors import all_raise, on_root, on_root_only
 from feti_homog.common.petsc_options import case_options, refuse_unused
 from feti_homog.common.progress import Progress
 from feti_homog.config.case import Case
-from feti_homog.errors import ConvergenceError
+from feti_homog.errors import ConvergenceError, FetiHomogError
 from feti_homog.homogenization.averaging import Homogenization, Response
 from feti_homog.homogenization.unit_cell import TornCell, tear
 from feti_homog.interface.strength_criterion import StrengthCriterion
@@ -31,14 +31,16 @@ from feti_homog.output.files import (
     csv_tables,
     field_file,
     field_parts,
+    file_seal,
     folder_contents,
     output_folder,
     result_json,
     xdmf,
 )
-from feti_homog.output.files.checkpoint import Checkpoint, NoCheckpoint, finished
+from feti_homog.output.files.checkpoint import Checkpoint, NoCheckpoint
 from feti_homog.output.files.field_file import FieldFile
 from feti_homog.output.files.field_layout import StatePart
+from feti_homog.output.files.file_seal import FileSeal
 from feti_homog.output.text.summary import summary
 
 
@@ -58,7 +60,7 @@ def run(
     progress = Progress(comm, quiet)
     for warning in case.warnings():
         progress.say(f"warning: {warning}")
-    if resume and on_root(comm, finished, directory, case):
+    if resume and on_root(comm, stored_result.finished, directory, case):
         progress.say(f"{directory} holds the finished result of this case: nothing to do")
         return Result.of(on_root(comm, result_json.read, directory))
     on_root(comm, output_folder.usable, directory)
@@ -79,7 +81,7 @@ def compute(case: Case, comm: MPI.Intracomm, keep_fields: bool = False) -> Resul
     """
     progress = Progress(comm, quiet=True)
     with _torn(case, comm, progress) as cell:
-        states = _States(cell, None, keep_fields)
+        states = _States(cell, None, keep_fields, progress.say)
         context = _context(cell, progress, states)
         analysis = _analyse(context, NoCheckpoint(comm), resume=False)
         result = result_builder.result(context, analysis, states.kept())
@@ -106,21 +108,39 @@ def _torn(case: Case, comm: MPI.Intracomm, progress: Progress) -> Iterator[TornC
 
 
 class _States:
-    """Where the states of a run go: to the file if there is one, and to memory if they are to be kept."""
+    """Where the states of a run go: to the file if there is one, and to memory if they are to be kept.
 
-    def __init__(self, cell: TornCell, file: FieldFile | None, keep: bool) -> None:
+    Attributes:
+        error: why the file was given up; the numbers are computed without it.
+    """
+
+    def __init__(self, cell: TornCell, file: FieldFile | None, keep: bool, say: Callable[[str], object]) -> None:
         self._cell, self._file, self._keep = cell, file, keep
-        self._number, self._states = count(), list[StatePart]()
+        self._number, self._states, self._say = count(), list[StatePart](), say
+        self.error: FetiHomogError | None = None
 
     def record(self, response: Response, load_factor: float, label: str) -> None:
         """Take a response as the next state; collective."""
         if self._file is None and not self._keep:
             return
         state = field_parts.state_part(self._cell, response, load_factor, label)
-        if self._file is not None:
-            self._file.write_state(next(self._number), state)
+        self._write(lambda file: file.write_state(next(self._number), state))
         if self._keep:
             self._states.append(state)
+
+    def seal(self) -> FileSeal | None:
+        """Complete the file; returns its seal, None without a file.  Collective."""
+        self._write(FieldFile.close)
+        return None if self._file is None else file_seal.seal(self._file.path, self._cell.comm)
+
+    def _write(self, write: Callable[[FieldFile], object]) -> None:
+        """Do it to the file if there is one; if it cannot be written, which all ranks hear, there is none any more."""
+        if self._file is not None:
+            try:
+                write(self._file)
+            except FetiHomogError as error:
+                self._file, self.error = None, error
+                self._say(f"warning: {error}; what follows is computed without it")
 
     def kept(self) -> Fields | None:
         """This rank's fields, if they were to be kept."""
@@ -137,17 +157,17 @@ def _run_and_write(cell: TornCell, directory: Path, progress: Progress, resume: 
     output = cell.case.output
     file = _field_file(cell, directory, progress) if output.fields else None
     with file or nullcontext():
-        states = _States(cell, file, keep_fields)
+        states = _States(cell, file, keep_fields, progress.say)
         context = _context(cell, progress, states)
         for warning in context.warnings():
             progress.say(f"warning: {warning}")
         checkpoint = _checkpoint(cell, directory)
         analysis = _analyse(context, checkpoint, resume)
-    fields = []
-    if file is not None:
-        fields = [field_file.NAME, *(path.name for path in on_root(cell.comm, xdmf.write, directory))]
-    result = result_builder.result(context, analysis, states.kept())
-    _write(result, directory, cell, fields)
+        seal = states.seal()
+    result = replace(result_builder.result(context, analysis, states.kept()), result_h5=seal)
+    _write(result, directory, cell)
+    if states.error is not None:
+        raise states.error
     if cell.case.path is not None and not result.faults:
         checkpoint.clear()
     for name, wanted, make in (("pictures", output.pictures, _draw), ("report", output.report, _report)):
@@ -208,11 +228,12 @@ def _law(case: Case) -> StrengthCriterion:
     return StrengthCriterion(bond.normal_strength or math.inf, bond.tangential_strength or math.inf, bond.criterion)
 
 
-def _write(result: Result, directory: Path, cell: TornCell, fields: list[str]) -> None:
-    """result.json, and the table of an angle or path; files of an earlier result do not stay beside them and the files
-    of `fields`, which are there."""
+def _write(result: Result, directory: Path, cell: TornCell) -> None:
+    """result.json, then what can be made of it again; files of an earlier result do not stay beside them."""
     on_root_only(cell.comm, result_json.write, directory, result.document)
-    written = {result_json.NAME, *fields}
+    written = {result_json.NAME}
+    if result.result_h5 is not None:
+        written |= {field_file.NAME, *(path.name for path in on_root(cell.comm, xdmf.write, directory))}
     for name, points in (("angle.csv", result.angle), ("path.csv", result.path)):
         if points is not None:
             on_root_only(cell.comm, csv_tables.write, directory / name, points)

@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 
 NO_MARKS: Mapping[int, Sequence[float]] = MappingProxyType({})
 FRONTAL_DELAUNAY = 6
+# Decimals of the coordinates that gmsh is given. The last bits of the outline's differ from machine to machine, and
+# with them gmsh would make other triangles.
+DECIMALS = 12
 # gmsh's element types.
 LINE, TRIANGLE = 1, 2
 
@@ -102,7 +105,7 @@ def _fill(lines: Outline, largest: float) -> tuple[Float, Int32, Index]:
 def _add_lines(gmsh: ModuleType, lines: Outline) -> list[list[int]]:
     """Make each edge of the outline a line of one element, node n a point n + 1; the lines of each curve."""
     geo = gmsh.model.geo
-    for tag, (x, y) in enumerate(lines.points.tolist(), 1):
+    for tag, (x, y) in enumerate(lines.points.round(DECIMALS).tolist(), 1):
         geo.addPoint(x, y, 0.0, tag=tag)
     made = []
     for curve in lines.curves:

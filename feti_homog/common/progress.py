@@ -13,6 +13,7 @@ from petsc4py import PETSc
 from tqdm import tqdm
 
 from feti_homog.common import process_memory
+from feti_homog.common.standard_streams import say
 
 T = TypeVar("T")
 
@@ -30,8 +31,8 @@ class Progress:
     def say(self, line: str) -> None:
         """Print one line on rank 0, past the progress bar if there is one."""
         if self.prints:
-            tqdm.write(line, file=sys.stdout)
-            sys.stdout.flush()
+            with tqdm.external_write_mode(file=sys.stdout):
+                say(line)
 
     @contextmanager
     def stage(self, name: str) -> Iterator[list[str]]:

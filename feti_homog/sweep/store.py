@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 import shutil
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -21,10 +20,10 @@ from typing import Any
 import tomli_w
 
 from feti_homog import __version__
-from feti_homog.common.file_locks import Lock, LockHeld, is_locked
+from feti_homog.common.file_locks import LockHeld, TemporaryLock, is_locked
 from feti_homog.config.case import Case
 from feti_homog.errors import CaseError, FetiHomogError
-from feti_homog.output.files import atomic, checkpoint, output_folder, result_json
+from feti_homog.output.files import atomic, checkpoint, output_folder, result_json, sealed_json
 from feti_homog.sweep.plan import Sweep, SweepCase, identity_of
 
 INDEX_FILE, TABLE_FILE, ERROR_FILE, CASE_FILE, LOCK_FILE = (
@@ -85,14 +84,14 @@ def prepare_folder(directory: Path, sweep: Sweep) -> None:
     if _existing_entries(directory) == sweep.entries:
         return
     try:
-        with Lock(directory / INDEX_LOCK_FILE, timeout=INDEX_LOCK_TIMEOUT_S):
+        with TemporaryLock(directory / INDEX_LOCK_FILE, timeout=INDEX_LOCK_TIMEOUT_S):
             known = _existing_entries(directory)
             _refuse_another(directory, known, sweep.entries)
             if known != sweep.entries:
                 atomic.replace_text(directory / TABLE_FILE, _table(sweep.entries))
                 document = {"version": __version__, "name": sweep.name, "stress_unit": sweep.stress_unit}
                 entries = [asdict(entry) for entry in sweep.entries]
-                atomic.replace_text(directory / INDEX_FILE, json.dumps(document | {"cases": entries}, indent=1) + "\n")
+                atomic.replace_text(directory / INDEX_FILE, sealed_json.dumps(document | {"cases": entries}))
     except LockHeld as error:
         raise CaseError(f"--out {directory}: {error} has been writing its list of cases for long") from error
 
@@ -105,7 +104,7 @@ def read_index(directory: Path) -> SweepIndex:
     """The cases of a sweep's folder.  Raises CaseError if it is none."""
     path = directory / INDEX_FILE
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
+        document = sealed_json.loads(path.read_text(encoding="utf-8"))
         entries = tuple(SweepCase(**entry) for entry in document["cases"])
         return SweepIndex(document["name"], document["stress_unit"], entries)
     except OSError as error:
@@ -129,8 +128,12 @@ def stored_state(directory: Path, entry: SweepCase) -> CaseState:
             return _result_state(folder, entry)
     except (FetiHomogError, KeyError, TypeError, ValueError) as error:
         return CaseState(Status.DAMAGED, f"{folder / result_json.NAME} is no readable result: {error}")
-    if (folder / ERROR_FILE).exists():
-        return CaseState(Status.FAILED, "; ".join((folder / ERROR_FILE).read_text(encoding="utf-8").splitlines()))
+    if (folder / ERROR_FILE).is_file():
+        try:
+            lines = (folder / ERROR_FILE).read_text("utf-8", "replace").splitlines()
+        except OSError as error:
+            lines = [f"{ERROR_FILE} cannot be read: {error.strerror}"]
+        return CaseState(Status.FAILED, "; ".join(lines))
     return CaseState(Status.WAITING)
 
 
@@ -161,11 +164,23 @@ def reset(directory: Path, entry: SweepCase, status: Status) -> None:
     try:
         (folder / ERROR_FILE).unlink(missing_ok=True)
         shutil.rmtree(folder / checkpoint.FOLDER, ignore_errors=True)
-        if (folder / result_json.NAME).exists():
-            atomic.rename(folder / result_json.NAME, folder / f"{result_json.NAME}.{status.replace(' ', '_')}")
-        output_folder.remove_other_results(folder, ())
     except OSError as error:
         raise FetiHomogError(f"cannot write {folder}: {error.strerror}") from error
+    set_aside(directory, entry, status)
+
+
+def set_aside(directory: Path, entry: SweepCase, status: Status) -> None:
+    """Give the result.json of a case another name, so that the case waits, and remove its other files.  On one rank.
+
+    Raises:
+        FetiHomogError: the folder cannot be written.
+    """
+    folder = directory / entry.folder
+    path = folder / result_json.NAME
+    with atomic.write_errors(folder):
+        if path.exists():
+            atomic.rename(path, path.with_name(f"{path.name}.{status.replace(' ', '_')}"))
+        output_folder.remove_other_results(folder, ())
 
 
 def write_error(directory: Path, entry: SweepCase, error: FetiHomogError) -> None:

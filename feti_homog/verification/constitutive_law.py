@@ -39,7 +39,7 @@ def _plane_stiffness(constants: Mapping[str, Any], plane: str) -> Float:
         own = np.linalg.inv(compliance[np.ix_(PLANE, PLANE)])
     else:
         own = np.linalg.inv(compliance)[np.ix_(PLANE, PLANE)]
-    return _turned(own, float(constants.get("angle", 0.0)))
+    return _turned(np.asarray(own, float), float(constants.get("angle", 0.0)))
 
 
 def _compliance(constants: Mapping[str, Any]) -> Float:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 from reference import references
+from support.command_line import assert_verified
 from support.jobs import mpirun
 
 BONDED, VOID = references.BONDED["hexagonal", "strain"].value, references.VOID["hexagonal"].value
@@ -53,6 +54,7 @@ def test_contact_prevents_overlap_and_stiffens(tmp_path):
     assert int(free["closed"]) == 0 < int(contact["closed"])
     assert int(free["bonded"]) == int(contact["bonded"]) > 0
     assert float(contact["largest overlap"]) < 1e-7 < 1e-3 < float(free["largest overlap"])
+    assert_verified(*(path.parent for path in tmp_path.glob("*/result.h5")))
 
 
 def test_onset_is_proportional_to_strength_and_no_point_is_above_the_bonded_line(tmp_path):
@@ -84,3 +86,4 @@ def test_every_case_of_a_driver_has_its_pictures(tmp_path):
         loads = [float(row["load_factor"]) for row in csv.DictReader(stream)]
     assert loads == [point["load_factor"] for point in json.loads((folder / "result.json").read_text())["path"]]
     assert loads[-1] == 1.0
+    assert_verified(*(path.parent for path in tmp_path.glob("*/result.h5")))

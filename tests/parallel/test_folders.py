@@ -123,7 +123,7 @@ def test_folders_may_have_any_name(comm, shared_path, name):
     assert run(comm, shared_path, out) == 0
     if comm.rank == 0:
         written = sorted(path.name for path in out.iterdir())
-        assert written == ["result.h5", "result.json", "result.xdmf"]
+        assert written == ["interface.xdmf", "result.h5", "result.json", "result.xdmf"]
         assert json.loads((out / "result.json").read_text())["status"] == "done"
 
 

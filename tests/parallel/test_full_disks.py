@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import json
 import os
 import resource
 import subprocess
@@ -11,9 +13,11 @@ import pytest
 from support.base_case import BASE
 from support.ranks import parallel_assert
 from support.sample_output import part_of, sample
+from support.small_path import PATH
 
 from feti_homog import cli
 from feti_homog.errors import FetiHomogError
+from feti_homog.output.files import atomic
 from feti_homog.output.files.field_file import RESERVE, FieldFile
 
 pytestmark = pytest.mark.parallel
@@ -62,11 +66,11 @@ def file_limit(size):
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
 
 
-def run(comm, folder, out):
-    if comm.rank == 0 and not (folder / "cell.toml").exists():
-        (folder / "cell.toml").write_text(CASE)
+def run(comm, folder, out, case=CASE, *words):
+    if comm.rank == 0:
+        (folder / "cell.toml").write_text(case)
     comm.barrier()
-    return cli.main(["run", str(folder / "cell.toml"), "--out", str(out), "--quiet"])
+    return cli.main(["run", str(folder / "cell.toml"), "--out", str(out), "--quiet", *words])
 
 
 def told_once(comm, capsys, words):
@@ -95,11 +99,75 @@ def test_files_that_may_not_grow(comm, shared_path, capsys, size):
     parallel_assert(comm, not (shared_path / "out").exists())
 
 
+@pytest.mark.parametrize("name", ["000002.h5", "result.h5", "result.json", "result.xdmf", "interface.xdmf", "path.csv"])
+def test_every_file_may_be_the_one_that_does_not_fit(comm, shared_path, capsys, monkeypatch, name):
+    """It is told, and --resume goes on from the events that are kept."""
+    out, commit = shared_path / "out", atomic.commit
+
+    def full(part, path):
+        if path.name == name:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        commit(part, path)
+
+    monkeypatch.setattr(atomic, "commit", full)
+    parallel_assert(comm, run(comm, shared_path, out, PATH) == 1)
+    told_once(comm, capsys, ["error: cannot write ", f"{name}: No space left on device"])
+    events = [path.name for path in sorted((out / "checkpoint").iterdir())]
+    parallel_assert(comm, len(events) == 2 if name == "000002.h5" else len(events) > 2)
+    later = ("result.json", "000002.h5")
+    parallel_assert(comm, (out / "result.json").exists() == (name not in later) and not (out / name).exists())
+    comm.barrier()
+    monkeypatch.setattr(atomic, "commit", commit)
+    assert run(comm, shared_path, out, PATH, "--resume") == 0
+    parallel_assert(comm, json.loads((out / "result.json").read_text())["resumed"] == len(events))
+    parallel_assert(comm, not list(out.glob("*.part")))
+
+
+@pytest.mark.parametrize("name", ["cell.png", "path.gif", "path.png"])
+def test_pictures_that_do_not_fit_are_told(comm, shared_path, capsys, monkeypatch, name):
+    """The results stay, the old picture too."""
+    if comm.size > 1:
+        pytest.skip("one rank draws")
+    out, commit = shared_path / "out", atomic.commit
+    assert run(comm, shared_path, out, PATH) == 0
+    (out / name).write_text("old")
+
+    def full(part, path):
+        if path.name == name:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        commit(part, path)
+
+    monkeypatch.setattr(atomic, "commit", full)
+    capsys.readouterr()
+    assert cli.main(["plot", str(out)]) == 1
+    told_once(comm, capsys, ["error: cannot write ", f"{name}: No space left on device"])
+    assert (out / name).read_text() == "old" and not list(out.glob("*.part"))
+
+
+def test_numbers_survive_when_the_fields_do_not_fit(comm, shared_path, capsys):
+    """A few states fit; the path is followed to its end all the same, and --resume makes the fields of it."""
+    out = shared_path / "out"
+    with file_limit(400_000):
+        parallel_assert(comm, run(comm, shared_path, out, PATH) == 1)
+    told_once(comm, capsys, ["error: cannot write ", "result.h5: File too large"])
+    if comm.rank == 0:
+        document = json.loads((out / "result.json").read_text())
+        assert document["status"] == "done" and document["path"][-1]["load_factor"] == 1.0
+        assert "result_h5" not in document and not (out / "result.h5").exists() and not (out / "result.xdmf").exists()
+    comm.barrier()
+    assert run(comm, shared_path, out, PATH, "--resume") == 0
+    if comm.rank == 0:
+        again = json.loads((out / "result.json").read_text())
+        assert again["resumed"] == len(document["path"]) and (out / "result.h5").stat().st_size > 400_000
+        assert not (out / "checkpoint").exists()
+    comm.barrier()
+
+
 def test_a_disk_that_another_program_fills_meanwhile(comm, shared_path, small_disk):
     """What was reserved is there; what follows is told, and closing the file does not crash."""
     disk = small_disk("1M")
     part = part_of(sample(8), comm.rank, comm.size)
-    file = FieldFile(disk, comm, part.header, part.mesh, part.interface)
+    file = FieldFile(disk, comm, part.header, part.mesh, part.fibres, part.interface)
     if comm.rank == 0:
         fill(disk / "other")
     comm.barrier()

@@ -66,14 +66,19 @@ def remove_unfinished(folder: Path) -> None:
                 path.unlink()
 
 
-@contextlib.contextmanager
-def write_errors(path: Path) -> Iterator[None]:
+def write_errors(path: Path) -> contextlib.AbstractContextManager[None]:
     """In the block, failures of the file system and of HDF5 (RuntimeError) become a FetiHomogError about `path`."""
+    return file_errors("write", path)
+
+
+@contextlib.contextmanager
+def file_errors(verb: str, path: Path) -> Iterator[None]:
+    """The same with another verb."""
     try:
         yield
     except (OSError, RuntimeError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else error
-        raise FetiHomogError(f"cannot write {path}: {reason}") from error
+        raise FetiHomogError(f"cannot {verb} {path}: {reason}") from error
 
 
 def _synchronise(path: Path) -> None:

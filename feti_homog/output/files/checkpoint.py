@@ -19,9 +19,8 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from feti_homog.common.mpi_errors import on_root, on_root_only
-from feti_homog.config.case import Case
 from feti_homog.errors import CaseError
-from feti_homog.output.files import atomic, result_json
+from feti_homog.output.files import atomic
 
 FOLDER = "checkpoint"
 FORMAT = 2  # of an event's file: to be raised when what an event holds changes
@@ -31,14 +30,6 @@ HEADER = re.compile(rb"feti-homog checkpoint, format (\d+), sha256 ([0-9a-f]{64}
 UNMARKED = re.compile(rb"\x89HDF\r\n\x1a\n")  # HDF5's own first bytes, as in format 1
 
 Arrays = dict[str, NDArray[Any]]
-
-
-def finished(directory: Path, case: Case) -> bool:
-    """Whether `directory` has the finished result of this case and no checkpoint of a later run.  Call on one rank."""
-    if (directory / FOLDER).is_dir() or not (directory / result_json.NAME).is_file():
-        return False
-    document = result_json.read(directory)
-    return document.get("status") == "done" and document.get("digest") == case.digest()
 
 
 class Checkpoint:
@@ -92,13 +83,13 @@ class Checkpoint:
         missing = next((n for n, path in enumerate(files) if path.stem != f"{n:06d}"), None)
         if missing is not None:
             raise CaseError(f"--resume: event {missing:06d} is missing in {self.folder}")
-        return [self._read_event(path) for path in files]
+        return [self._read_event(path, number) for number, path in enumerate(files)]
 
-    def _read_event(self, path: Path) -> Arrays:
+    def _read_event(self, path: Path, number: int) -> Arrays:
         try:
             _check_bytes(path)
             with h5py.File(path, "r") as file:
-                signature = str(file.attrs.get("signature", ""))
+                signature, found = str(file.attrs.get("signature", "")), int(file.attrs.get("number", -1))
                 event = {name: table[()] for name, table in file.items()}
         except CaseError:
             raise
@@ -106,6 +97,8 @@ class Checkpoint:
             raise CaseError(f"--resume: {path} is no readable event of a path: {error}") from error
         if signature != self.signature:
             raise CaseError(f"--resume: {path} is of another run: expected {self.signature}; found {signature}")
+        if found != number:
+            raise CaseError(f"--resume: {path} is a copy of event {found:06d}: expected event {number:06d}")
         return event
 
     def _write(self, number: int, whole: Mapping[str, Any], gathered: Mapping[str, list[NDArray[Any]]]) -> None:
@@ -115,11 +108,9 @@ class Checkpoint:
 
         def write_event(part: Path) -> None:
             part.parent.mkdir(parents=True, exist_ok=True)
-            with h5py.File(part, "w", userblock_size=USER_BLOCK) as file:
-                for name, value in event.items():
-                    file[name] = value
-                file.attrs["signature"] = self.signature
-            _mark(part)
+            image = _image(event, {"signature": self.signature, "number": number})
+            header = f"feti-homog checkpoint, format {FORMAT}, sha256 {hashlib.sha256(image).hexdigest()}\n"
+            part.write_bytes(header.encode().ljust(USER_BLOCK, b"\0") + image)
 
         atomic.replace(self.folder / f"{number:06d}.h5", write_event)
 
@@ -147,11 +138,14 @@ def _digest(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def _mark(path: Path) -> None:
-    """Write format and checksum into the user block of a finished file."""
-    header = f"feti-homog checkpoint, format {FORMAT}, sha256 {_digest(path)}\n"
-    with path.open("r+b") as file:
-        file.write(header.encode())
+def _image(event: Arrays, attributes: Mapping[str, Any]) -> bytes:
+    """An HDF5 file in memory: on a full disk HDF5 may crash, and writing bytes does not."""
+    with h5py.File("event", "w", driver="core", backing_store=False) as file:
+        for name, value in event.items():
+            file[name] = value
+        file.attrs.update(attributes)
+        file.flush()
+        return bytes(file.id.get_file_image())
 
 
 def _check_bytes(path: Path) -> None:

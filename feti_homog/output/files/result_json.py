@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import os
 from collections.abc import Iterator, Mapping
@@ -12,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.errors import CaseError, FetiHomogError
-from feti_homog.output.files import atomic
+from feti_homog.output.files import atomic, sealed_json
 
 NAME = "result.json"
 SCHEMA = 1  # version of the layout: to be raised when a key is renamed, removed or changes its meaning
@@ -36,9 +35,7 @@ def write(directory: Path, document: Mapping[str, Any]) -> Path:
 
     def write_text(part: Path) -> None:
         part.parent.mkdir(parents=True, exist_ok=True)
-        with part.open("w", encoding="utf-8") as stream:
-            json.dump(content, stream, indent=1, ensure_ascii=False, allow_nan=False)
-            stream.write("\n")
+        part.write_text(sealed_json.dumps(content), encoding="utf-8")
 
     return atomic.replace(Path(directory) / NAME, write_text)
 
@@ -47,18 +44,16 @@ def read(directory: Path) -> dict[str, Any]:
     """The document of `directory`/result.json.
 
     Raises:
-        FetiHomogError: it is missing, not JSON, or no table.
-        CaseError: its layout is of another version than this program's.
+        CaseError: it is missing, not JSON, no table or changed, or its layout is of another version than that
+            of this program.
     """
     path = Path(directory) / NAME
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
+        document = sealed_json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise FetiHomogError(f"cannot read {path}: {error.strerror or error}") from error
+        raise CaseError(f"cannot read {path}: {error.strerror or error}") from error
     except ValueError as error:
-        raise FetiHomogError(f"cannot read {path}: {error}") from error
-    if not isinstance(document, dict):
-        raise FetiHomogError(f"cannot read {path}: it is damaged: no table of keys and values")
+        raise CaseError(f"cannot read {path}: {error}") from error
     found = document.get("schema", "none")
     if found != SCHEMA:
         raise CaseError(f"{path}: its schema is {found}, this program reads schema {SCHEMA}; run the case again")

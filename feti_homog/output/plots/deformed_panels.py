@@ -17,7 +17,7 @@ from matplotlib.ticker import MaxNLocator
 from PIL import Image
 
 from feti_homog.errors import FetiHomogError
-from feti_homog.output.files import field_file
+from feti_homog.output.files import atomic, field_file
 from feti_homog.output.plots.decimation import (
     BLOCK_ROWS,
     DrawnMesh,
@@ -209,8 +209,8 @@ def _animation(file: Any, numbers: Sequence[int], output: Mapping[str, Any], sca
         picture = Image.fromarray(np.ascontiguousarray(np.asarray(canvas.buffer_rgba())[..., :3]))
         frames.insert(0, picture.quantize(128, dither=Image.Dither.NONE))
     times = [FRAME_TIME] * (len(frames) - 1) + [6 * FRAME_TIME]
-    frames[0].save(path, save_all=True, append_images=frames[1:], duration=times, loop=0)
-    return path
+    film = {"save_all": True, "append_images": frames[1:], "duration": times, "loop": 0}
+    return atomic.replace(path, lambda part: frames[0].save(part, format="GIF", **film))
 
 
 def _corners(places: Sequence[Array]) -> tuple[Array, Array]:

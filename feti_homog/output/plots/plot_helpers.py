@@ -17,6 +17,7 @@ from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Path2D
 from PIL import Image
 
+from feti_homog.output.files import atomic
 from feti_homog.output.plots.decimation import DrawnMesh
 from feti_homog.typing import Array
 
@@ -31,13 +32,16 @@ SEEN_DISPLACEMENT, SEEN_OPENING, MOST_DISPLACEMENT = 0.1, 0.04, 0.25
 
 
 def save(figure: Figure, path: Path) -> Path:
-    """Write the figure without the white around it; `bbox_inches="tight"` would draw it twice."""
+    """Write the figure as PNG without the white around it; `bbox_inches="tight"` would draw it twice.
+
+    Raises FetiHomogError if it cannot be written.
+    """
     figure.set_dpi(DPI)
     canvas: Any = FigureCanvasAgg(figure)
     canvas.draw()
     pixels = np.asarray(canvas.buffer_rgba())[..., :3]
-    Image.fromarray(np.ascontiguousarray(_trimmed(pixels, round(PADDING * DPI)))).save(path)
-    return path
+    picture = Image.fromarray(np.ascontiguousarray(_trimmed(pixels, round(PADDING * DPI))))
+    return atomic.replace(path, lambda part: picture.save(part, format="PNG"))
 
 
 def _trimmed(pixels: Array, padding: int) -> Array:

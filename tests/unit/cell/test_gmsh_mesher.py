@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -11,7 +12,8 @@ from support.circular_cells import cell
 
 from feti_homog.cell.arrangement import arrange
 from feti_homog.cell.coarse_mesh import areas, flip_double_arcs
-from feti_homog.cell.gmsh_mesher import generate
+from feti_homog.cell.gmsh_mesher import _fill, generate
+from feti_homog.cell.outline import outline
 
 CELLS = {
     "square": cell("square"),
@@ -140,6 +142,20 @@ def test_arcs_stay_clear_of_the_next_fibre(name):
 def test_mesh_is_reproducible():
     mesh, again = generate(CELLS["sixteen"]), mesh_of("sixteen")
     assert np.array_equal(mesh.points, again.points) and np.array_equal(mesh.triangles, again.triangles)
+
+
+@pytest.mark.parametrize("name", ["square", "hexagonal", "seven", "sixteen"])
+@pytest.mark.parametrize("seed", range(2))
+def test_the_last_bits_of_the_outline_do_not_change_the_mesh(name, seed):
+    """They are another machine's."""
+    case, chance = CELLS[name], np.random.default_rng(seed)
+    lines = outline(arrange(case), case.mesh_size, {})
+    points, triangles, circle = _fill(lines, case.mesh_size)
+    ends = lines.points + chance.choice([-1.0, 1.0], lines.points.shape)
+    elsewhere = _fill(replace(lines, points=np.nextafter(lines.points, ends)), case.mesh_size)
+    assert np.array_equal(triangles, elsewhere[1]) and np.array_equal(circle, elsewhere[2])
+    assert np.abs(points - elsewhere[0]).max() < 1e-15
+    assert np.array_equal(points[len(lines.points) :], elsewhere[0][len(lines.points) :])
 
 
 def test_a_triangle_with_two_arc_edges_is_flipped():

@@ -12,12 +12,23 @@ from feti_homog.cell.periodic_topology import Torus, components, edge_pairs, sha
 from feti_homog.feti.decomposition.partition import decompose, pieces_for_count, pieces_for_size
 
 
-@pytest.fixture(scope="module")
-def torus():
+def torus_of(fibres, seed, mesh_size):
+    """A random cell of 60 %."""
     cell = SimpleNamespace(
-        geometry="random", fibres=16, fibre_fraction=0.6, min_gap=0.06, seed=1, radius_spread=0.0, mesh_size=0.03
+        geometry="random",
+        fibres=fibres,
+        fibre_fraction=0.6,
+        min_gap=0.06,
+        seed=seed,
+        radius_spread=0.0,
+        mesh_size=mesh_size,
     )
     return Torus.of(generate(cell))
+
+
+@pytest.fixture(scope="module")
+def torus():
+    return torus_of(16, 1, 0.03)
 
 
 def fine(torus, n_ranks, size=20, **options):
@@ -73,14 +84,19 @@ def test_pieces_for_count_halves_the_largest():
     assert pieces_for_count(np.array([2, 2]), 9).tolist() == [2, 2]
 
 
-def test_cuts_are_short(torus):
-    """Shorter in all than where every edge counts alike."""
+@pytest.mark.slow
+def test_cuts_are_short():
+    """On the mean over cells shorter than where every edge counts alike; METIS itself scatters by 3 % a cell."""
+    ratios = [
+        cut_length(cell) / cut_length(cell, length_classes=1) for cell in (torus_of(8, k, 0.04) for k in range(8))
+    ]
+    assert np.mean(ratios) < 0.98, ratios
+
+
+def cut_length(torus, **options):
+    """Length of all edges along which bodies are cut into pieces of about 20 triangles."""
     left, right = edge_pairs(torus.triangle_torus_edges)
     length = torus.edge_lengths[shared_edges(torus.triangle_torus_edges)]
-    inside = torus.constituent[left] == torus.constituent[right]
-
-    def cut_length(**options):
-        subdomain = fine(torus, 1, **options).subdomain
-        return length[inside & (subdomain[left] != subdomain[right])].sum()
-
-    assert cut_length() < 0.95 * cut_length(length_classes=1)
+    subdomain = fine(torus, 1, **options).subdomain
+    within = torus.constituent[left] == torus.constituent[right]
+    return length[within & (subdomain[left] != subdomain[right])].sum()

@@ -104,3 +104,12 @@ def test_bits_that_nobody_reads_are_harmless(tmp_path):
     damaged[USER_BLOCK - 1] ^= 1
     path.write_bytes(damaged)
     assert same(checkpoint.read())
+
+
+@pytest.mark.parametrize(("old", "new"), [(1, 2), (3, 0), (0, EVENTS)])
+def test_a_copy_of_another_event_is_refused(tmp_path, old, new):
+    checkpoint = written(tmp_path)
+    path = tmp_path / "checkpoint" / f"{new:06d}.h5"
+    path.write_bytes((tmp_path / "checkpoint" / f"{old:06d}.h5").read_bytes())
+    with pytest.raises(CaseError, match=rf"{new:06d}\.h5 is a copy of event {old:06d}: expected event {new:06d}"):
+        checkpoint.read()

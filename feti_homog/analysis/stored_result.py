@@ -1,0 +1,60 @@
+"""The result that a folder holds: read by whoever did not compute it, and known to be what its run wrote."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from feti_homog.analysis.result import Result
+from feti_homog.config.case import Case
+from feti_homog.errors import CaseError
+from feti_homog.output.files import checkpoint, field_file, file_seal, result_json
+
+
+def read(directory: Path) -> dict[str, Any]:
+    """The document of `directory`/result.json, whose result.h5 is that of its run.  Call on one rank.
+
+    Raises:
+        CaseError: one of both is missing, damaged, or of another program or run.
+    """
+    document = result_json.read(directory)
+    result = _restored(directory, document)
+    if document["case"]["output"]["fields"]:
+        _check_fields(directory, result)
+    return document
+
+
+def finished(directory: Path, case: Case) -> bool:
+    """Whether `directory` has the whole result of this case and no checkpoint of a later run.  Call on one rank.
+
+    Raises:
+        CaseError: the result is damaged, or of another case.
+    """
+    if (directory / checkpoint.FOLDER).is_dir() or not (directory / result_json.NAME).is_file():
+        return False
+    document = result_json.read(directory)
+    result = _restored(directory, document)
+    if result.digest != case.digest():
+        raise CaseError(f"--resume: {directory} holds the result of another case; choose another folder")
+    if case.output.fields and not (directory / field_file.NAME).exists():
+        return False
+    if case.output.fields:
+        _check_fields(directory, result)
+    return result.status == "done"
+
+
+def _restored(directory: Path, document: Mapping[str, Any]) -> Result:
+    try:
+        return Result.of(document)
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
+        path, place = directory / result_json.NAME, f"{type(error).__name__}: {error}"
+        raise CaseError(f"{path}: it is damaged, or no result of this program ({place})") from error
+
+
+def _check_fields(directory: Path, result: Result) -> None:
+    path = directory / field_file.NAME
+    if not path.is_file():
+        raise CaseError(f"{path}: it is missing; run the case again")
+    if result.result_h5 is not None:
+        file_seal.check(path, result.result_h5)
