@@ -11,9 +11,11 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from feti_homog.common import libraries
+from feti_homog.common import libraries, standard_streams
+from feti_homog.common.command_words import named_values, petsc_words, split_argv
+from feti_homog.common.interrupts import end_on_signals, launched_rank
 from feti_homog.common.matplotlib_toolkits import prefer_own_toolkits
-from feti_homog.common.petsc_option_table import split_argv
+from feti_homog.common.petsc_option_values import faulty_values
 from feti_homog.config.case import Case
 from feti_homog.errors import EXIT_DONE, CaseError, LibraryError
 
@@ -141,19 +143,41 @@ def start(command: Callable[[Sequence[str], Intracomm], int], argv: Sequence[str
     Returns the exit code of `run_main`.
     """
     words, petsc = split_argv(sys.argv[1:] if argv is None else argv)
+    standard_streams.prepare()
+    end_on_signals()
     prefer_own_toolkits()
     try:
         libraries.require()
-        from mpi4py import MPI
-
-        libraries.start_petsc([sys.argv[0], *petsc], MPI.COMM_WORLD)
     except LibraryError as error:
-        if os.environ.get("OMPI_COMM_WORLD_RANK", "0") == "0":  # there may be no mpi4py to ask
-            print(*(f"error: {fault}" for fault in error.faults), sep="\n", file=sys.stderr)
+        if launched_rank() == 0:  # there may be no mpi4py to ask
+            standard_streams.complain(*(f"error: {fault}" for fault in error.faults))
         return error.exit_code
+    from mpi4py import MPI
+
     from feti_homog.common.mpi_errors import run_main
 
-    return run_main(MPI.COMM_WORLD, lambda: command(words, MPI.COMM_WORLD))
+    def main() -> int:
+        _start_petsc(petsc, MPI.COMM_WORLD)
+        return command(words, MPI.COMM_WORLD)
+
+    return run_main(MPI.COMM_WORLD, main)
+
+
+def _start_petsc(words: Sequence[str], comm: Intracomm) -> None:
+    """Start PETSc with its words of the command line.  Collective.
+
+    Raises:
+        CaseError: it cannot be started with them.
+        LibraryError: petsc4py does not fit NumPy.
+    """
+    options = named_values(words)
+    faults = faulty_values(options)
+    if faults:
+        raise CaseError(*faults)
+    try:
+        libraries.start_petsc([sys.argv[0], *petsc_words(options)], comm)
+    except RuntimeError as error:  # PETSc's own, which there is no PETSc yet to name
+        raise CaseError(f"PETSc does not start with {' '.join(words)}: {error}") from error
 
 
 def folder(name: str | Path) -> Path:
@@ -164,12 +188,19 @@ def folder(name: str | Path) -> Path:
 
 
 def parsed(parser: argparse.ArgumentParser, words: Sequence[str], comm: Intracomm) -> argparse.Namespace:
-    """The arguments; help, version and argparse's own complaints are printed by rank 0."""
-    with contextlib.ExitStack() as silence:
-        if comm.rank:
-            silence.enter_context(contextlib.redirect_stdout(io.StringIO()))
-            silence.enter_context(contextlib.redirect_stderr(io.StringIO()))
-        return parser.parse_args(words)
+    """The arguments; help, version and argparse's own complaints are printed by rank 0.  Collective."""
+    from feti_homog.common.mpi_errors import on_root_only
+
+    printed = io.StringIO()
+    try:
+        with contextlib.ExitStack() as redirected:
+            redirected.enter_context(contextlib.redirect_stdout(printed))
+            if comm.rank:
+                redirected.enter_context(contextlib.redirect_stderr(io.StringIO()))
+            return parser.parse_args(words)
+    except SystemExit:
+        on_root_only(comm, standard_streams.print_product, printed.getvalue().removesuffix("\n"))
+        raise
 
 
 def _parsed_main(

@@ -9,7 +9,6 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import signal
 import sys
 from collections.abc import Sequence
 from functools import partial
@@ -19,6 +18,7 @@ from typing import TYPE_CHECKING, NoReturn
 from feti_homog import __version__
 from feti_homog.api import folder, parsed, start
 from feti_homog.common.petsc_option_table import help_text
+from feti_homog.common.standard_streams import complain, print_product, say
 from feti_homog.errors import EXIT_DONE, EXIT_UNCONVERGED, CaseError, FetiHomogError
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ def command_parser() -> Parser:
     parser = Parser(
         prog="feti-homog",
         description="Effective stiffness of fibre composites by FETI, on any number of MPI ranks.",
-        epilog=f"PETSc's options, with a single dash:\n{help_text()}",
+        epilog=help_text(),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"feti-homog {__version__}")
@@ -147,18 +147,19 @@ def _check(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.config.sweep_section import SWEEP
     from feti_homog.homogenization.unit_cell import describe
     from feti_homog.sweep import plan
+    from feti_homog.sweep.option_checks import check_options
 
     document = on_root(comm, read_document, arguments.case)
     if SWEEP in document:
         sweep = on_root(comm, plan.load, arguments.case)
+        check_options(sweep)
         case, points = sweep.cases[0], len({entry.point for entry in sweep.entries})
         words = f"sweep      {len(sweep.cases)} cases, {points} points, all of them valid; the first:\n"
     else:
         case, words = on_root(comm, cases.load, arguments.case), ""
     with case_options(case.petsc):
         text = on_root_only(comm, describe, case, comm.size)
-    if text is not None:
-        print(words + text)
+    _print_product(comm, f"{words}{text}")
 
 
 def _plot(arguments: argparse.Namespace, comm: Intracomm) -> None:
@@ -169,9 +170,9 @@ def _plot(arguments: argparse.Namespace, comm: Intracomm) -> None:
     on_root_only(comm, stored_result.read, arguments.directory)
     paths = on_root_only(comm, figures.plot, arguments.directory)
     if paths == []:
-        print(f"{arguments.directory}: nothing to draw: its case has no fields, and no points of an angle or path")
+        say(f"{arguments.directory}: nothing to draw: its case has no fields, and no points of an angle or path")
     for path in paths or []:
-        print(path)
+        say(str(path))
 
 
 def _report(arguments: argparse.Namespace, comm: Intracomm) -> None:
@@ -181,7 +182,7 @@ def _report(arguments: argparse.Namespace, comm: Intracomm) -> None:
     on_root_only(comm, stored_result.read, arguments.directory)
     path = on_root_only(comm, _written_report, arguments.directory)
     if path is not None:
-        print(path)
+        say(str(path))
 
 
 def _written_report(directory: Path) -> Path:
@@ -201,11 +202,10 @@ def _verify(words: Sequence[str]) -> int:
     try:
         arguments = command_parser().parse_args(words)
         certificate = verify(arguments.directory)
+        print_product(json.dumps(certificate.document, indent=1) if arguments.json else certificate.text)
     except FetiHomogError as error:
-        print(*(f"error: {fault}" for fault in error.faults), sep="\n", file=sys.stderr, flush=True)
+        complain(*(f"error: {fault}" for fault in error.faults))
         return error.exit_code
-    signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # a reader may leave early, as `head` does
-    print(json.dumps(certificate.document, indent=1) if arguments.json else certificate.text, flush=True)
     return EXIT_DONE if certificate.holds else EXIT_UNCONVERGED
 
 
@@ -218,9 +218,8 @@ def _sweep(arguments: argparse.Namespace, comm: Intracomm) -> None:
         raise CaseError("command line: the following arguments are required: --out (see --help)")
     sweep = on_root(comm, plan.load, arguments.case)
     if arguments.list:
-        for line in on_root_only(comm, execute.list_cases, sweep, arguments.out) or []:
-            print(line)
-        return
+        lines = on_root_only(comm, execute.list_cases, sweep, arguments.out) or []
+        return _print_product(comm, "\n".join(lines))
     on_root(comm, output_folder.usable, arguments.out)
     if arguments.index is None:
         group = comm.size if arguments.ranks_per_case is None else arguments.ranks_per_case
@@ -234,7 +233,7 @@ def _collect(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.sweep import collect
 
     for line in on_root_only(comm, collect.collect, arguments.directory, not arguments.no_pictures) or []:
-        print(line)
+        say(line)
 
 
 def _keys(arguments: argparse.Namespace, comm: Intracomm) -> None:
@@ -243,21 +242,21 @@ def _keys(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
     section = arguments.section
     tables = on_root_only(comm, reference.tables if section is None else partial(reference.tables_of, section))
-    _print_reference(comm, reference.as_text(tables or []))
+    _print_product(comm, reference.as_text(tables or []))
 
 
 def _schema(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.config.json_schema import json_schema
 
-    _print_reference(comm, json.dumps(json_schema(), indent=2))
+    _print_product(comm, json.dumps(json_schema(), indent=2))
 
 
 def _options(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    _print_reference(comm, help_text())
+    _print_product(comm, help_text())
 
 
-def _print_reference(comm: Intracomm, text: str) -> None:
-    """Print a text on rank 0; if its reader leaves early, as `head` does, the program ends without a word."""
-    if comm.rank == 0:
-        signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # PETSc's handler would report an error
-        print(text, flush=True)
+def _print_product(comm: Intracomm, text: str) -> None:
+    """Print the text of rank 0, which is all that a command makes.  Collective."""
+    from feti_homog.common.mpi_errors import on_root_only
+
+    on_root_only(comm, print_product, text)

@@ -23,6 +23,10 @@ HELD = (errno.EAGAIN, errno.EACCES)
 UNSUPPORTED = (errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP)
 
 
+# Files of temporary locks that this process holds.
+_held_files: set[Path] = set()
+
+
 class LockHeld(Exception):
     """Somebody else holds the lock; the text says who."""
 
@@ -96,10 +100,7 @@ class Lock:
 
 
 class TemporaryLock(Lock):
-    """An exclusive lock whose file is removed when the lock is given back."""
-
-    def __init__(self, path: Path, timeout: float = LOCK_TIMEOUT_S) -> None:
-        super().__init__(path, shared=False, timeout=timeout)
+    """A lock whose file is removed when its last holder gives it back."""
 
     def acquire(self) -> None:
         """Take the lock.  Raises as `Lock.acquire`."""
@@ -107,19 +108,37 @@ class TemporaryLock(Lock):
         while not self._is_at_path():  # its last holder removed the file after it was opened here
             self._close()
             super().acquire()
+        if not self.shared:
+            _held_files.add(self.path)
 
     def release(self) -> None:
-        """Remove the file and give the lock back, if it is held."""
-        if self._file >= 0:
+        """Give the lock back, if it is held, and remove its file unless others share it."""
+        if self._file >= 0 and self._is_alone():
             with contextlib.suppress(OSError):
                 self.path.unlink()
+        _held_files.discard(self.path)
         self._close()
+
+    def _is_alone(self) -> bool:
+        """Whether nobody shares the lock; then it is exclusive."""
+        try:
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            return False
+        return self._is_at_path()
 
     def _is_at_path(self) -> bool:
         try:
             return os.path.samestat(os.fstat(self._file), self.path.stat())
         except FileNotFoundError:
             return False
+
+
+def remove_files_of_held_locks() -> None:
+    """Remove the files of temporary locks that this process holds, for it is about to end without giving them back."""
+    for path in tuple(_held_files):
+        with contextlib.suppress(OSError):
+            path.unlink()
 
 
 def holder(path: Path) -> str | None:

@@ -8,6 +8,7 @@ import traceback
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
+from feti_homog.common.standard_streams import complain
 from feti_homog.errors import EXIT_DEFECT, FetiHomogError
 
 if TYPE_CHECKING:
@@ -72,7 +73,7 @@ def run_main(comm: Comm, main: Callable[[], int]) -> int:
         if not others_come(comm, ARRIVAL_TIMEOUT_S):
             end_job(comm, error)
         if comm.rank == 0:
-            print(_told(error), file=sys.stderr, flush=True)
+            complain(_told(error))
         return error.exit_code
     except Exception as error:
         end_job(comm, error)
@@ -81,10 +82,10 @@ def run_main(comm: Comm, main: Callable[[], int]) -> int:
 def end_job(comm: Comm, error: BaseException) -> NoReturn:
     """Tell of an error that one rank has met alone, and end the processes of all."""
     if isinstance(error, FetiHomogError):
-        print(_told(error), file=sys.stderr, flush=True)
+        complain(_told(error))
         abort(comm, error.exit_code)
     text = "".join(traceback.format_exception(error))
-    print(f"rank {comm.rank} of {comm.size}:\n{text}", file=sys.stderr, flush=True)
+    complain(f"rank {comm.rank} of {comm.size}:\n{text}")
     abort(comm, EXIT_DEFECT)
 
 

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import difflib
-import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 
@@ -82,39 +81,17 @@ PREFIXES = ("feti_ksp_", "feti_pc_", *DIRECT_PREFIXES)
 CLOSE = 0.9
 """Similarity (difflib's, 1 for equal names) from which on a name is taken for a misspelt one: a letter or two."""
 
-OWN_SHORT = ("-h",)
-
-
-def split_argv(argv: Sequence[str]) -> tuple[list[str], list[str]]:
-    """The words that are ours and those that are PETSc's, each in their order.
-
-    PETSc's are single-dash options with the word after each as its value, unless that word begins another
-    option; a negative number is a value.
-    """
-    ours: list[str] = []
-    petsc: list[str] = []
-    takes_value = False
-    for word in argv:
-        if _is_petsc(word):
-            petsc.append(word)
-            takes_value = True
-        elif takes_value and not word.startswith("--") and word not in OWN_SHORT:
-            petsc.append(word)
-            takes_value = False
-        else:
-            ours.append(word)
-            takes_value = False
-    return ours, petsc
-
-
-def _is_petsc(word: str) -> bool:
-    return re.match(r"-[A-Za-z]", word) is not None and word not in OWN_SHORT
-
 
 def unknown_options(names: Iterable[str]) -> list[str]:
     """One fault for each name (without dash) that begins with feti_ but is no option of the solver."""
     unknown = [n for n in names if n.startswith("feti_") and not is_in_table(n) and not solver_prefix(n)]
     return [f"-{name}: unknown option; {suggestion(name)}" for name in unknown]
+
+
+def without_prefix(names: Iterable[str]) -> list[str]:
+    """One fault for each name (without dash) that lacks the prefix feti_ of an option of the solver."""
+    known = [name for name in names if is_in_table(f"feti_{name}")]
+    return [f"-{name}: not an option of this program; did you mean -feti_{name}?" for name in known]
 
 
 def almost_in_table(name: str) -> bool:
@@ -148,4 +125,4 @@ def help_text() -> str:
         f"  {usage:{width}}  {option.help}" + (f" (default {option.default})" if option.default else "")
         for usage, option in zip(usages, OPTIONS, strict=True)
     ]
-    return "\n".join(["options of the solver, PETSc's:", *lines])
+    return "\n".join(["PETSc's options of the solver, with a single dash:", *lines])

@@ -1,48 +1,136 @@
-"""Values of the solver's own options, checked without PETSc before any work."""
+"""Values of PETSc's options that can be checked without PETSc, before any work."""
 
 from __future__ import annotations
 
+import math
+import os
+import re
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
 
 from feti_homog.common.petsc_option_table import OPTIONS
 
 Value = str | int | float | bool
 
+TRUE, FALSE = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
+LARGEST_INTEGER = 2**31 - 1  # of a PETSc with 32-bit integers
+VIEWER = re.compile(r"(ascii)?(:(?P<file>[^:]*)(:(default|ascii_\w+)?(:(write|append))?)?)?")
+
+
+@dataclass(frozen=True)
+class Rule:
+    """What an option takes, in words, and whether a text is that; the text is empty if no value is given."""
+
+    expected: str
+    holds: Callable[[str], bool]
+
 
 def faulty_values(options: Mapping[str, Value]) -> list[str]:
     """One fault for each option (name without dash) that cannot have its value."""
-    faults = []
-    for name in RULES.keys() & options.keys():
-        (expected, holds), text = RULES[name], str(options[name])
-        if not holds(text):
-            faults.append(f"{f'-{name} {text}'.strip()}: expected {expected}")
-    return sorted(faults)
+    texts = {name: _text(value) for name, value in options.items()}
+    return sorted(
+        f"{in_words(name, texts[name])}: expected {rule.expected}"
+        for name, rule in RULES.items()
+        if name in texts and not rule.holds(texts[name])
+    )
 
 
-def _is_share(text: str) -> bool:
-    try:
-        return 0.0 < float(text) < 1.0
-    except ValueError:
-        return False
+def in_words(name: str, value: str) -> str:
+    """An option (name without dash) as on the command line."""
+    return f"-{name} {value}".strip()
 
 
-def _is_count(text: str) -> bool:
-    return text.isascii() and text.isdigit() and int(text) > 0
+def flag_value(value: Value) -> str | None:
+    """What PETSc takes for the value of a flag: empty if it is set, None if it is not; a viewer stays."""
+    text = _text(value)
+    return "" if text.lower() in TRUE else None if text.lower() in FALSE else text
 
 
-def _names(known: list[str]) -> tuple[str, Callable[[str], bool]]:
-    return f"one of {', '.join(known)}", known.__contains__
+def is_flag(name: str) -> bool:
+    """Whether an option (name without dash) is a flag, which needs no value and may have that of a viewer."""
+    return name in FLAGS or name in VIEWERS
 
 
-SHARE = "a number above 0 and below 1", _is_share
+def is_flag_value(text: str) -> bool:
+    """Whether a word after a flag is its value."""
+    return SWITCH.holds(text) or VIEWER.fullmatch(text) is not None
+
+
+def _text(value: Value) -> str:
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def _real(expected: str, holds: Callable[[float], bool]) -> Rule:
+    def rule(text: str) -> bool:
+        try:
+            return holds(float(text)) and "_" not in text
+        except ValueError:
+            return False
+
+    return Rule(expected, rule)
+
+
+def _integer(least: int) -> Rule:
+    def holds(text: str) -> bool:
+        return re.fullmatch(r"\+?[0-9]{1,10}", text) is not None and least <= int(text) <= LARGEST_INTEGER
+
+    return Rule(f"an integer of at least {least} and at most {LARGEST_INTEGER}", holds)
+
+
+def _names(known: list[str]) -> Rule:
+    return Rule(f"one of {', '.join(known)}", known.__contains__)
+
+
+def _is_viewer(text: str) -> bool:
+    """Whether the text says where to print, in a folder that exists."""
+    match = VIEWER.fullmatch(text)
+    return match is not None and _can_be_written(match["file"] or "stdout")
+
+
+def _can_be_written(file: str) -> bool:
+    folder = Path(file).parent
+    return folder.is_dir() and os.access(folder, os.W_OK) and not Path(file).is_dir()
+
+
+def _can_be_read(file: str) -> bool:
+    return os.path.isfile(file) and os.access(file, os.R_OK)
+
+
+SWITCH = Rule("true or false, or no value", lambda text: text.lower() in ("", *TRUE, *FALSE))
+PRINTS = Rule(
+    "true or false, no value, or ascii:FILE of an existing folder",
+    lambda text: SWITCH.holds(text) or _is_viewer(text),
+)
+SHARE = _real("a number above 0 and below 1", lambda number: 0.0 < number < 1.0)
+NOT_NEGATIVE = _real("a number of at least 0", lambda number: 0.0 <= number < math.inf)
+
+FLAGS = ("feti_view", "malloc_debug", "options_left", "on_error_abort", "fp_trap")
+VIEWERS = (
+    *(option.name for option in OPTIONS if not option.value and option.name != "feti_view"),
+    *(f"feti_ksp_{name}" for name in ("monitor_true_residual", "monitor_singular_value", "view_final_residual")),
+    *(f"feti_ksp_{name}" for name in ("converged_rate", "view_eigenvalues", "view_rhs", "view_solution")),
+    "log_view",
+    "options_view",
+)
+"""Flags that print, whose value may say where."""
+
 # With a relative tolerance of 1 or more nothing is solved.
-RULES = {
+RULES: dict[str, Rule] = {
+    **{name: SWITCH for name in FLAGS},
+    **{name: PRINTS for name in VIEWERS},
+    **{
+        option.name: _names(option.value.split("|"))
+        for option in OPTIONS
+        if "|" in option.value and not option.value.endswith("...")
+    },
     "feti_ksp_rtol": SHARE,
     "feti_coarse_threshold": SHARE,
-    "feti_ksp_max_it": ("an integer of at least 1", _is_count),
-} | {
-    option.name: _names(option.value.split("|"))
-    for option in OPTIONS
-    if option.name in ("feti_pc_type", "feti_dual_operator", "feti_coarse_space")
+    "feti_ksp_atol": NOT_NEGATIVE,
+    "feti_ksp_divtol": _real("a number above 1", lambda number: 1.0 < number < math.inf),
+    "feti_ksp_max_it": _integer(1),
+    "feti_schur_mat_mumps_icntl_14": _integer(0),
+    "options_file": Rule("a file that can be read", _can_be_read),
+    "log_trace": Rule("a file of an existing folder, or no value", lambda text: not text or _can_be_written(text)),
 }
 """For each of these options, what is expected in words, and whether a text is that."""

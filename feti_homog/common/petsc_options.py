@@ -7,20 +7,16 @@ from contextlib import contextmanager
 
 from petsc4py import PETSc
 
-from feti_homog.common import petsc_ctypes
+from feti_homog.common import petsc_ctypes, petsc_option_trials
 from feti_homog.common.petsc_option_table import (
-    DIRECT_PREFIXES,
-    MUMPS_PREFIXES,
     almost_in_table,
     is_in_table,
-    solver_prefix,
     suggestion,
     unknown_options,
+    without_prefix,
 )
-from feti_homog.common.petsc_option_values import RULES, Value, faulty_values
+from feti_homog.common.petsc_option_values import Value, faulty_values, flag_value, is_flag
 from feti_homog.errors import CaseError
-
-KRYLOV_PREFIXES = ("feti_ksp_", "feti_pc_")
 
 # Options that PETSc looks for only in KSPSolve.
 READ_WHEN_SOLVING = {
@@ -37,19 +33,30 @@ def case_options(options: Mapping[str, Value]) -> Iterator[None]:
             made with what is given.
     """
     database = PETSc.Options()
-    given = {**options, **_given()}
-    faults = [*unknown_options(given), *faulty_values(given)]
+    on_command_line = _given()
+    given = {**options, **on_command_line}
+    faults = [*unknown_options(given), *without_prefix(given), *faulty_values(given)]
     if faults:
         raise CaseError(*faults)
-    own = {name: value for name, value in options.items() if not database.hasName(name)}
-    for name, value in own.items():
-        database.setValue(name, value)
+    own = {name: value for name, value in options.items() if name not in on_command_line}
+    for name, value in given.items():
+        if name in own or is_flag(name):
+            _set(database, name, value)
     try:
         _refuse_early()
         yield
     finally:
         for name in own:
             database.delValue(name)
+
+
+def _set(database: PETSc.Options, name: str, value: Value) -> None:
+    """Set an option; PETSc knows no flags that are true or false, but such as are there or not."""
+    kept = flag_value(value) if is_flag(name) else value
+    if kept is None:
+        database.delValue(name)
+    else:
+        database.setValue(name, None if kept == "" else kept)
 
 
 def _given() -> dict[str, str]:
@@ -63,14 +70,12 @@ def _refuse_early() -> None:
     Some options are read by larger solvers alone: other names are left to `refuse_unused`.
     """
     given = _given()
-    misspelt = list(filter(almost_in_table, given))
-    if "feti_ksp_type" in given or any(name.startswith(KRYLOV_PREFIXES) for name in misspelt):
-        _let_krylov_method_read(given)
-    for prefix in DIRECT_PREFIXES:
-        own = [name for name in given if solver_prefix(name) == prefix and name not in RULES]
-        if own:
-            _let_direct_solver_read(prefix, " ".join(f"-{name} {given[name]}".strip() for name in own))
-    _refuse([name for name in _unused_names() if name in misspelt])
+    faults, read = petsc_option_trials.examine(given)
+    if faults:
+        raise CaseError(*faults)
+    for name in read:
+        PETSc.Options().hasName(name)  # so that PETSc marks it as read
+    _refuse([name for name in sorted(given) if almost_in_table(name) and not is_flag(name) and name not in read])
 
 
 def refuse_unused() -> None:
@@ -93,52 +98,3 @@ def _unused_names() -> list[str]:
     """The options with our prefix, but for those of the table, that no solver has read or will read."""
     given = [name for name in sorted(PETSc.Options().getAll().keys() - READ_WHEN_SOLVING) if name.startswith("feti_")]
     return [name for name in given if not is_in_table(name) and not petsc_ctypes.option_was_used(name)]
-
-
-def _let_krylov_method_read(given: Mapping[str, str]) -> None:
-    """Make a Krylov method for a 1 x 1 matrix, so that PETSc marks what it reads.
-
-    Raises:
-        CaseError: PETSc has no such method.
-    """
-    with _solver("feti_", PETSc.KSP.Type.CG) as ksp:
-        ksp.getPC().setOptionsPrefix("feti_projected_")
-        try:
-            ksp.setType(given.get("feti_ksp_type", PETSc.KSP.Type.CG))
-        except PETSc.Error as error:
-            raise CaseError(f"-feti_ksp_type {given['feti_ksp_type']}: PETSc has no such Krylov method") from error
-        if any(name.startswith(KRYLOV_PREFIXES) and not is_in_table(name) for name in given):
-            ksp.setFromOptions()
-
-
-def _let_direct_solver_read(prefix: str, words: str) -> None:
-    """Set up a direct solver of a 1 x 1 matrix with the options under the prefix, so that PETSc marks what it reads.
-
-    Raises:
-        CaseError: it cannot be made with these options, `words` as the user wrote them.
-    """
-    with _solver(prefix, PETSc.KSP.Type.PREONLY) as ksp:
-        ksp.getPC().setType(PETSc.PC.Type.CHOLESKY)
-        if prefix in MUMPS_PREFIXES:
-            ksp.getPC().setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
-        try:
-            ksp.setFromOptions()
-            ksp.setUp()
-        except PETSc.Error as error:
-            raise CaseError(f"{words}: {str(error).splitlines()[-1].split('] ', 1)[-1]}") from error
-
-
-@contextmanager
-def _solver(prefix: str, kind: str) -> Iterator[PETSc.KSP]:
-    """A solver of a 1 x 1 matrix on this rank, freed at the end of the block."""
-    A = PETSc.Mat().createAIJ((1, 1), csr=([0, 1], [0], [1.0]), comm=PETSc.COMM_SELF)
-    A.setOption(PETSc.Mat.Option.SPD, True)
-    ksp = PETSc.KSP().create(PETSc.COMM_SELF)
-    ksp.setOptionsPrefix(prefix)
-    ksp.setOperators(A)
-    ksp.setType(kind)
-    try:
-        yield ksp
-    finally:
-        ksp.destroy()
-        A.destroy()

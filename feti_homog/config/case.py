@@ -33,7 +33,7 @@ from feti_homog.config.sections import (
 from feti_homog.config.sweep_section import SWEEP
 from feti_homog.config.tables import KEY_OWNERS, REQUIRED, TOP_LEVEL
 from feti_homog.config.values import text
-from feti_homog.config.wording import suggestion, toml_key, toml_value
+from feti_homog.config.wording import limit_in_words, suggestion, toml_key, toml_value
 from feti_homog.errors import CaseError
 
 LOCKING_POISSON = 0.49
@@ -176,8 +176,9 @@ def _top_level_faults(document: Mapping[str, Any]) -> list[str]:
         elif name not in TOP_LEVEL:
             faults.append(f"{toml_key(name)}: unknown key; {hint}")
     name = document.get("name", "case")
-    if not text.accepts(name):
-        faults.append(f"name = {toml_value(name)}: expected {text.expected}")
+    complaint = text.complaint(name)
+    if complaint:
+        faults.append(f"name = {toml_value(name)}: {complaint}")
     return faults
 
 
@@ -196,7 +197,8 @@ def _checked_cell(cell: Cell, folder: Path, faults: list[str]) -> Cell:
         if cell.fibre_fraction >= limit:
             reason = "no circles min_gap apart are denser" if crowding > 1 else "there the fibres touch"
             faults.append(
-                f"[cell] fibre_fraction = {cell.fibre_fraction}: expected less than {limit:.4g} for "
+                f"[cell] fibre_fraction = {cell.fibre_fraction}: expected less than "
+                f"{limit_in_words(limit, cell.fibre_fraction, 4)} for "
                 f"geometry = {toml_value(cell.geometry)}: {reason}"
             )
     if cell.file is None:

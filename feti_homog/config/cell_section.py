@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from feti_homog.config.schema import Selector, key
-from feti_homog.config.section_values import MESH_FILE
+from feti_homog.config.section_values import MESH_FILE, SEED
 from feti_homog.config.values import choice, integer, real
 
 CIRCULAR = ("square", "hexagonal", "random")
@@ -61,7 +61,7 @@ class Cell:
         real(least=0.0, most=1.0), "Smallest gap between fibres / their mean diameter.", default=0.05, only=RANDOM
     )
     seed: int = key(
-        integer(least=0),
+        SEED,
         "Seed of the random arrangement; the same seed gives the same cell on any machine and any number of ranks.",
         default=0,
         only=RANDOM,

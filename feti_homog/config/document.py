@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path, PurePath
@@ -29,7 +30,8 @@ def read_document(path: str | Path) -> dict[str, Any]:
         raise CaseError(f"{path}: not TOML: {str(error).replace('end of document', place)}") from None
     except OSError as error:
         raise CaseError(f"{path}: cannot be read: {error.strerror}") from None
-    return {"name": path.stem} | document
+    # Where the locale knows no UTF-8, Python escapes the bytes of names of files.
+    return {"name": os.fsencode(path.stem).decode("utf-8", "replace")} | document
 
 
 def to_document(values: object) -> dict[str, Any]:

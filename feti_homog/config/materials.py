@@ -10,7 +10,7 @@ import numpy as np
 
 from feti_homog.config.schema import key
 from feti_homog.config.values import ValueType, is_number, real
-from feti_homog.config.wording import toml_value
+from feti_homog.config.wording import limit_in_words, toml_value
 from feti_homog.typing import Float
 
 Matrix3 = tuple[tuple[float, float, float], ...]
@@ -138,7 +138,8 @@ def _orthotropic_compliance(material: Orthotropic, plane: str) -> Float:
     E1, E2, G12, nu12 = material.E1, material.E2, material.G12, material.nu12
     compliance = np.array([[1 / E1, -nu12 / E1, 0.0], [-nu12 / E1, 1 / E2, 0.0], [0.0, 0.0, 1 / G12]])
     if not is_positive_definite(compliance):
-        raise ValueError(f"nu12 = {nu12}: expected nu12^2 < E1/E2 = {E1 / E2:.6g}; no material is stable otherwise")
+        limit = limit_in_words(E1 / E2, nu12**2, 6)
+        raise ValueError(f"nu12 = {nu12}: expected nu12^2 < E1/E2 = {limit}; no material is stable otherwise")
     if plane == "stress":
         return compliance
     E3, nu13, nu23 = material.E3, material.nu13, material.nu23

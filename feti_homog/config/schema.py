@@ -157,7 +157,8 @@ class TableReader:
             found = self.selected.get(entry.only.selector)
             if found is not None:
                 return f"{line}belongs to {entry.only.in_words(section)}, not {toml_value(found)}"
-        return "" if entry.type.accepts(table[name]) else f"{line}expected {entry.type.expected}"
+        complaint = entry.type.complaint(table[name])
+        return f"{line}{complaint}" if complaint else ""
 
 
 def to_table(instance: Any, selected: Selected) -> dict[str, Any]:

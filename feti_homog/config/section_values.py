@@ -7,10 +7,11 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from feti_homog.config.values import ValueType, integer, is_number, is_number_list, text, to_floats
+from feti_homog.config.values import SMALLEST, ValueType, integer, is_number, is_number_list, real, text, to_floats
 
 STRAIN_COMPONENTS = "[E11, E22, gamma12]"
 FIBRE = integer(least=1)
+SEED = integer(least=0, most=10**15)
 
 
 def _is_mesh_file(value: Any) -> bool:
@@ -32,7 +33,7 @@ def _is_strength(value: Any) -> bool:
 
 
 def _numbers(count: int) -> dict[str, Any]:
-    return {"type": "array", "items": {"type": "number"}, "minItems": count, "maxItems": count}
+    return {"type": "array", "items": real().json_schema, "minItems": count, "maxItems": count}
 
 
 MESH_FILE = ValueType("the name of a .msh file", _is_mesh_file, Path, {"type": "string", "pattern": "\\.msh$"})
@@ -58,7 +59,7 @@ STRENGTH = ValueType(
     "a traction above 0, or inf",
     _is_strength,
     lambda v: None if v == math.inf else float(v),
-    {"type": "number", "exclusiveMinimum": 0},
+    {"type": "number", "minimum": SMALLEST},
 )
 OPENINGS = ValueType(
     "a rising list of numbers from 0 to 360",

@@ -142,7 +142,7 @@ class LoadPath:
         only=BY_INCREMENTS,
     )
     max_events: int = key(
-        integer(least=1),
+        integer(least=1, most=10**9),
         "Stop after so many events, with exit code 3; --resume with a higher number goes on.",
         default=100_000,
         only=BY_EVENTS,
@@ -167,7 +167,7 @@ class Decomposition:
         default_words="automatic",
     )
     max_dofs: int | None = key(
-        integer(least=100),
+        integer(least=100, most=10**9),
         "Bodies are cut such that no subdomain has many more unknowns than this.",
         default=None,
         default_words="automatic",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from feti_homog.config.schema import Key, key
+from feti_homog.config.section_values import SEED
 from feti_homog.config.values import ValueType, choice, integer, real
 
 SWEEP = "sweep"
@@ -55,7 +56,7 @@ class SweepSection:
     sampling: str = key(
         choice("latin", "random"), '"latin": a Latin hypercube; "random": independent points.', default="latin"
     )
-    seed: int = key(integer(least=0), "Seed of the samples.", default=0)
+    seed: int = key(SEED, "Seed of the samples.", default=0)
     realisations: int | None = key(
         integer(least=1, most=MAX_CASES),
         "Arrangements of each point with a random cell; the k-th has the seed [cell] seed + k - 1 at all points.",

@@ -11,6 +11,7 @@ from feti_homog.config.wording import toml_value
 
 SMALLEST, LARGEST = 1e-100, 1e100
 """Magnitudes of numbers other than 0: no product of a few over- or underflows."""
+MAGNITUDES = f"; numbers other than 0 have magnitudes from {SMALLEST:g} to {LARGEST:g}"
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,18 @@ class ValueType:
     accepts: Callable[[Any], bool]
     store: Callable[[Any], Any]
     json_schema: Mapping[str, Any]
+
+    def complaint(self, value: Any) -> str:
+        """What is expected of a wrong value, empty if it is right."""
+        return "" if self.accepts(value) else f"expected {self.expected}{magnitudes_in_words(value)}"
+
+
+def magnitudes_in_words(value: Any) -> str:
+    """The limits of magnitudes, where a number in a value is beyond them; else empty."""
+    if isinstance(value, list | tuple):
+        return next(filter(None, map(magnitudes_in_words, value)), "")
+    is_of_type = isinstance(value, int | float) and not isinstance(value, bool)
+    return MAGNITUDES if is_of_type and not is_number(value) and value == value else ""
 
 
 def is_number(value: object) -> bool:
@@ -64,7 +77,8 @@ class Limits:
 
     def json_schema(self) -> dict[str, float]:
         limits = {
-            "exclusiveMinimum": self.above, "minimum": max(self.least, -LARGEST),
+            "exclusiveMinimum": self.above if self.above else -math.inf,
+            "minimum": max(self.least, -LARGEST if self.above else SMALLEST),
             "exclusiveMaximum": self.below, "maximum": min(self.most, LARGEST),
         }  # fmt: skip
         return {word: limit for word, limit in limits.items() if math.isfinite(limit)}

@@ -40,3 +40,9 @@ def suggestion(name: str, known: Iterable[str], owners: Mapping[str, str]) -> st
     if nearest:
         return f"did you mean {toml_key(nearest[0])}?"
     return "known here: " + ", ".join(map(toml_key, known))
+
+
+def limit_in_words(limit: float, value: float, digits: int) -> str:
+    """A limit that a value is not below, in at least so many digits and in as many as show that."""
+    texts = (f"{limit:.{count}g}" for count in range(digits, 18))
+    return next((text for text in texts if value >= float(text)), repr(limit))

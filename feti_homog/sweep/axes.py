@@ -14,7 +14,7 @@ from feti_homog.config.schema import keys_of
 from feti_homog.config.sections import SECTIONS
 from feti_homog.config.sweep_section import AXIS_EXPECTED, MAX_CASES, RANGE_KEYS, SWEEP, SweepSection
 from feti_homog.config.tables import TOP_LEVEL
-from feti_homog.config.values import is_number
+from feti_homog.config.values import is_number, magnitudes_in_words
 from feti_homog.config.wording import dotted_key, suggestion, toml_value
 
 STEP_TOLERANCE = 1e-9  # of a step: what rounding may take from the last one
@@ -126,7 +126,7 @@ def range_fault(table: Mapping[str, Any], is_sampled: bool) -> str:
 def _ends_fault(table: Mapping[str, Any]) -> str:
     low, high, scale = table.get("from"), table.get("to"), table.get("scale", "linear")
     if not (is_number(low) and is_number(high) and low < high):  # type: ignore[operator]
-        return "expected numbers from < to"
+        return f"expected numbers from < to{magnitudes_in_words([low, high])}"
     if scale not in ("linear", "log") or (scale == "log" and low <= 0):  # type: ignore[operator]
         return 'expected scale = "linear" or "log", this from a number above 0'
     return ""
@@ -138,14 +138,19 @@ def _spacing_fault(table: Mapping[str, Any], is_sampled: bool) -> str:
     if step is not None and count is not None:
         return "step, count: exclude each other; give one"
     if step is not None:
-        return "" if _is_step(step, table) else "expected a step above 0 and at most to - from, linear"
+        return _step_fault(step, table)
     if count is not None:
         return "" if _is_count(count) else f"expected a count from 2 to {MAX_CASES}"
     return "" if is_sampled else f"expected {AXIS_EXPECTED}"
 
 
-def _is_step(step: Any, table: Mapping[str, Any]) -> bool:
-    return is_number(step) and 0 < step <= table["to"] - table["from"] and table.get("scale") != "log"
+def _step_fault(step: Any, table: Mapping[str, Any]) -> str:
+    width = table["to"] - table["from"]
+    if not is_number(step) or not 0 < step <= width or table.get("scale") == "log":
+        return f"expected a step above 0 and at most to - from, linear{magnitudes_in_words(step)}"
+    if width / step >= MAX_CASES:
+        return f"about {width / step:.6g} values; expected a step that makes at most {MAX_CASES}"
+    return ""
 
 
 def _is_count(count: Any) -> bool:

@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from feti_homog.analysis.runner import run
-from feti_homog.common.file_locks import Lock, LockHeld
+from feti_homog.common.file_locks import LockHeld, TemporaryLock
 from feti_homog.common.mpi_errors import ARRIVAL_TIMEOUT_S, on_root, on_root_only, others_come
+from feti_homog.common.standard_streams import say
 from feti_homog.config.case import Case
 from feti_homog.errors import CaseError, ConvergenceError, FetiHomogError, MeshError
 from feti_homog.sweep import store
@@ -45,7 +46,7 @@ class CaseRunner:
         Returns what came of it, and which process has the case if another one has.  Raises FetiHomogError if the
         folder cannot be written.
         """
-        lock = Lock(self.directory / entry.folder / LOCK_FILE)
+        lock = TemporaryLock(self.directory / entry.folder / LOCK_FILE)
         try:
             outcome, holder = on_root(self.comm, self._claim, lock, entry, case)
             if outcome is not Outcome.COMPUTED:
@@ -59,7 +60,7 @@ class CaseRunner:
         finally:
             lock.release()
 
-    def _claim(self, lock: Lock, entry: SweepCase, case: Case) -> tuple[Outcome, str]:
+    def _claim(self, lock: TemporaryLock, entry: SweepCase, case: Case) -> tuple[Outcome, str]:
         """Take the case's lock, and keep it if the case is to be computed."""
         folder = self.directory / entry.folder
         try:
@@ -97,4 +98,4 @@ class CaseRunner:
 
     def _print(self, line: str) -> None:
         if self.comm.rank == 0 and not self.quiet:
-            print(line, flush=True)
+            say(line)

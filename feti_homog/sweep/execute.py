@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from feti_homog.common.file_locks import Lock, LockHeld
+from feti_homog.common.file_locks import LockHeld, TemporaryLock
 from feti_homog.common.mpi_errors import ARRIVAL_TIMEOUT_S, on_root, on_root_only, others_come
+from feti_homog.common.standard_streams import complain, say
 from feti_homog.errors import CaseError, ConvergenceError, FetiHomogError
 from feti_homog.output.text.point_tables import sweep_failures, sweep_table
 from feti_homog.sweep import store
@@ -48,11 +48,11 @@ def run_all(sweep: Sweep, directory: Path, comm: Intracomm, ranks_per_case: int,
     states = on_root(comm, lambda: [store.case_state(directory, entry) for entry in sweep.entries])
     if comm.rank == 0 and not quiet:
         done = sum(state.status is Status.DONE for state in states)
-        print(f"{done} of {len(states)} cases done in {directory}", flush=True)
+        say(f"{done} of {len(states)} cases done in {directory}")
     failures = _failures(sweep, states)
     if failures:
         if comm.rank == 0:
-            print(*sweep_failures(failures), sep="\n", flush=True)
+            say("\n".join(sweep_failures(failures)))
         raise ConvergenceError(f"{len(failures)} of {len(states)} cases failed; --retry computes them again")
 
 
@@ -72,7 +72,7 @@ def run_one(sweep: Sweep, number: int, directory: Path, comm: Intracomm, retry: 
     if outcome is Outcome.HELD_ELSEWHERE:
         raise CaseError(f"--index {number}: {entry.folder} is being computed by {holder}")
     if outcome is Outcome.FINISHED_BEFORE and comm.rank == 0 and not quiet:
-        print(f"{entry.folder} is finished: nothing to do", flush=True)
+        say(f"{entry.folder} is finished: nothing to do")
     state = on_root(comm, store.case_state, directory, entry)
     if state.status.is_failure:
         hint = "; it failed before, --retry computes it again" if outcome is Outcome.FAILED_BEFORE else ""
@@ -97,7 +97,7 @@ def _run_free_cases(runner: CaseRunner, sweep: Sweep) -> FetiHomogError | None:
         if not others_come(runner.comm, ARRIVAL_TIMEOUT_S):
             raise
         if runner.comm.rank == 0:
-            print(*error.faults, sep="\n", file=sys.stderr, flush=True)
+            complain(*error.faults)
         return error
     return None
 
@@ -129,7 +129,7 @@ def _reset_failures(directory: Path, sweep: Sweep) -> None:
 @contextmanager
 def _sweep_lock(directory: Path, comm: Intracomm, sweep: Sweep, shared: bool) -> Iterator[None]:
     """The folder made and held: by one sweep, or by any number of single cases.  Collective."""
-    lock = Lock(directory / LOCK_FILE, shared)
+    lock = TemporaryLock(directory / LOCK_FILE, shared)
     on_root(comm, _prepare_and_lock, lock, directory, sweep)
     try:
         yield
@@ -137,7 +137,7 @@ def _sweep_lock(directory: Path, comm: Intracomm, sweep: Sweep, shared: bool) ->
         lock.release()
 
 
-def _prepare_and_lock(lock: Lock, directory: Path, sweep: Sweep) -> None:
+def _prepare_and_lock(lock: TemporaryLock, directory: Path, sweep: Sweep) -> None:
     store.prepare_folder(directory, sweep)
     try:
         lock.acquire()

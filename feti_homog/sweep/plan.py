@@ -102,7 +102,7 @@ def _checked(name: str, unchecked: Sequence[CaseDocument], folder: Path) -> Swee
             for fault in error.faults:
                 numbers_by_fault.setdefault(fault, []).append(number)
     if numbers_by_fault:
-        raise CaseError(*(f"{_case_names(numbers)}: {fault}" for fault, numbers in numbers_by_fault.items()))
+        raise CaseError(*(f"{case_names(numbers)}: {fault}" for fault, numbers in numbers_by_fault.items()))
     entries, checked = zip(*found, strict=True)
     return Sweep(name, entries, checked)
 
@@ -116,7 +116,7 @@ def _identity(case: Case) -> str:
     return identity_of(case.digest(), case.petsc)
 
 
-def _case_names(numbers: list[int]) -> str:
+def case_names(numbers: list[int]) -> str:
     """Which cases, in words."""
     names = ", ".join(f"case-{number:04d}" for number in numbers[:MAX_NAMED_CASES])
     rest = len(numbers) - MAX_NAMED_CASES

@@ -20,7 +20,7 @@ from typing import Any
 import tomli_w
 
 from feti_homog import __version__
-from feti_homog.common.file_locks import Lock, LockHeld, is_locked
+from feti_homog.common.file_locks import LockHeld, TemporaryLock, is_locked
 from feti_homog.config.case import Case
 from feti_homog.errors import CaseError, FetiHomogError
 from feti_homog.output.files import atomic, checkpoint, output_folder, result_json, sealed_json
@@ -84,7 +84,7 @@ def prepare_folder(directory: Path, sweep: Sweep) -> None:
     if _existing_entries(directory) == sweep.entries:
         return
     try:
-        with Lock(directory / INDEX_LOCK_FILE, timeout=INDEX_LOCK_TIMEOUT_S):
+        with TemporaryLock(directory / INDEX_LOCK_FILE, timeout=INDEX_LOCK_TIMEOUT_S):
             known = _existing_entries(directory)
             _refuse_another(directory, known, sweep.entries)
             if known != sweep.entries:

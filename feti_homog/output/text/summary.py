@@ -163,17 +163,26 @@ def _between(label: str, lower: float, value: float, upper: float) -> str:
 
 
 def _checks(document: Document) -> list[str]:
+    """The checks that say anything."""
+    shown = {name: error for name, error in document["checks"].items() if _applies(name, document)}
     tolerance = document.get("check_tolerance")
     limit = "" if tolerance is None else f" (relative, at most {tolerance:.1e})"
     lines = [f"Checks{limit}"]
     contact = document.get("kkt_tolerance", tolerance)
-    if any(name.startswith("kkt_") for name in document["checks"]) and contact != tolerance:
+    if any(name.startswith("kkt_") for name in shown) and contact != tolerance:
         lines[0] = lines[0].replace(")", f"; of contact {contact:.1e})")
-    for name, error in document["checks"].items():
+    for name, error in shown.items():
         tolerance = contact if name.startswith("kkt_") else document.get("check_tolerance")
         verdict = "" if tolerance is None else "pass" if error <= tolerance else "FAIL"
         lines.append(f"  {name:<{NAME - 2}}{error:>14.1e}    {verdict}".rstrip())
     return lines
+
+
+def _applies(check: str, document: Document) -> bool:
+    """Whether a check says anything: those of contact do not where all is bonded."""
+    return (
+        not check.startswith("kkt_") or "effective_stiffness" not in document or bool(document["case"].get("interface"))
+    )
 
 
 def _timings(timings: Document) -> list[str]:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from feti_homog.common.petsc_option_table import OPTIONS, help_text, split_argv, unknown_options
+from feti_homog.common.command_words import split_argv
+from feti_homog.common.petsc_option_table import OPTIONS, help_text, unknown_options
 from feti_homog.feti import solver_plan, thresholds
 
 
@@ -24,6 +25,13 @@ from feti_homog.feti import solver_plan, thresholds
         ("-help", "", "-help"),
         ("check --quiet -1", "check --quiet -1", ""),
         ("", "", ""),
+        ("run -feti_view a.toml --out d", "run a.toml --out d", "-feti_view"),
+        ("run -feti_view true a.toml", "run a.toml", "-feti_view true"),
+        ("run -feti_ksp_monitor ascii:m.txt a.toml", "run a.toml", "-feti_ksp_monitor ascii:m.txt"),
+        ("plot -log_view ./results", "plot ./results", "-log_view"),
+        ("plot -log_view results", "plot", "-log_view results"),
+        ("check -feti_ksp_rtol a.toml", "check a.toml", "-feti_ksp_rtol"),
+        ("check -options_file a.toml b.toml", "check b.toml", "-options_file a.toml"),
     ],
 )
 def test_words_with_one_dash_are_petscs_and_the_others_ours(line, ours, petsc):
