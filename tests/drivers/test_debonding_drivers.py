@@ -92,4 +92,4 @@ def test_every_case_of_a_driver_has_its_pictures(stress_strain):
         loads = [float(row["load_factor"]) for row in csv.DictReader(stream)]
     assert loads == [point["load_factor"] for point in json.loads((folder / "result.json").read_text())["path"]]
     assert loads[-1] == 1.0
-    assert_verified(*(path.parent for path in tmp_path.glob("*/result.h5")))
+    assert_verified(*(path.parent for path in stress_strain[0].glob("*/result.h5")))
