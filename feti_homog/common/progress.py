@@ -10,7 +10,6 @@ from typing import TypeVar
 
 from mpi4py import MPI
 from petsc4py import PETSc
-from tqdm import tqdm
 
 from feti_homog.common import process_memory
 from feti_homog.common.standard_streams import say
@@ -30,9 +29,13 @@ class Progress:
 
     def say(self, line: str) -> None:
         """Print one line on rank 0, past the progress bar if there is one."""
-        if self.prints:
+        if self.on_terminal:
+            from tqdm import tqdm
+
             with tqdm.external_write_mode(file=sys.stdout):
                 say(line)
+        elif self.prints:
+            say(line)
 
     @contextmanager
     def stage(self, name: str) -> Iterator[list[str]]:
@@ -47,7 +50,11 @@ class Progress:
 
     def bar(self, items: Iterable[T], label: str) -> Iterator[T]:
         """The items, with a progress bar if rank 0 writes to a terminal."""
-        return iter(tqdm(items, desc=label, leave=False, disable=not self.on_terminal))
+        if not self.on_terminal:
+            return iter(items)
+        from tqdm import tqdm  # of no use to most runs, and slow to import
+
+        return iter(tqdm(items, desc=label, leave=False))
 
     def timings(self) -> dict[str, float]:
         """Seconds of each stage, the maximum over ranks."""

@@ -8,11 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from mpi4py import MPI
-from scipy.optimize import OptimizeResult, linprog
 from scipy.sparse import csr_matrix
 
 from feti_homog.common.mpi_errors import on_root
@@ -21,6 +20,9 @@ from feti_homog.feti.coarse.natural import NaturalCoarseSpace
 from feti_homog.feti.decomposition.constraint_layout import InterfaceNodes
 from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.typing import Array, Bool, Float
+
+if TYPE_CHECKING:
+    from scipy.optimize import OptimizeResult
 
 T = TypeVar("T")
 
@@ -190,6 +192,8 @@ def _maximised(motions: Float, last: Float, limits: Float, bounds: tuple[float |
     Raises:
         ConvergenceError: there is no solution, or it was not found.
     """
+    from scipy.optimize import linprog  # slow to import, and few cells have free fibres
+
     cost = np.r_[np.zeros(motions.shape[1]), -1.0]
     limited = [(-LARGEST_MOTION, LARGEST_MOTION)] * motions.shape[1] + [bounds]
     rows = np.column_stack([motions, last])

@@ -29,6 +29,8 @@ class ElementFields:
         strain, stress: (m, 3) means.
         strain_size: (m,) sum |u_a| |dN_a/dx|, of whose rounding the strain has its share.
         force: (n, 2) int B^T sigma, what the elements of a node resist with.
+        force_size: the largest sum of |dN/dx| |L| strain_size over the elements of a node, of whose rounding the forces
+            have their share: large where a phase is far stiffer than it is strained.
         largest_force: the largest that a single element exerts on a node.
         energy: int sigma : eps.
     """
@@ -37,6 +39,7 @@ class ElementFields:
     stress: Float
     strain_size: Float
     force: Float
+    force_size: float
     largest_force: float
     energy: float
 
@@ -70,7 +73,7 @@ class Elements:
         """Strains, stresses, forces and energy of the displacements (n, 2)."""
         m = len(self._mesh.triangles)
         strain, stress, size = np.empty((m, 3)), np.empty((m, 3)), np.empty(m)
-        force, largest, energy = np.zeros_like(displacement), 0.0, 0.0
+        force, terms, largest, energy = np.zeros_like(displacement), np.zeros_like(displacement), 0.0, 0.0
         for part, gradients, weights in self._parts():
             nodes = self._mesh.triangles[part]
             u, share = displacement[nodes], weights / weights.sum(axis=1)[:, None]
@@ -82,9 +85,11 @@ class Elements:
             tensor = answer[..., [0, 2, 2, 1]].reshape(*answer.shape[:2], 2, 2)
             own = np.einsum("eqad,eqid,eq->eai", gradients, tensor, weights, optimize=True)
             _add(force, nodes, own)
+            rounded = np.abs(self._stiffnesses).max(axis=(1, 2))[self._mesh.phase[part]] * size[part]
+            _add(terms, nodes, np.einsum("eqad,eq,e->ead", np.abs(gradients), weights, rounded, optimize=True))
             largest = max(largest, float(np.abs(own).max()))
             energy += float(np.einsum("eqi,eqi,eq->", answer, local, weights, optimize=True))
-        return ElementFields(strain, stress, size, force, largest, energy)
+        return ElementFields(strain, stress, size, force, float(terms.max()), largest, energy)
 
     def _parts(self) -> Iterator[tuple[slice, Float, Float]]:
         """Elements in portions, with gradients (e, q, a, 2) and weights (e, q) at their quadrature points."""

@@ -10,6 +10,9 @@ from feti_homog.verification.elements import ElementFields
 from feti_homog.verification.ledger import Ledger, relative
 from feti_homog.verification.reading import State
 
+# So much of the terms that forces and stresses are summed of counts as their scale: 1e-15 of the terms are rounding.
+ROUNDED_TERMS = 1e-5
+
 
 def check_fields(ledger: Ledger, cell: DiscreteCell, state: State, fields: ElementFields) -> None:
     """Everything that the fields of a state obey by themselves; `fields` are what its displacements make."""
@@ -74,6 +77,7 @@ def _check_equilibrium(ledger: Ledger, cell: DiscreteCell, state: State, fields:
     scale = max(scale, cell.least_stress(state.strain) * float(np.sqrt(cell.elements.area.min())) * 1e-3)
     rest = fields.force.copy()
     rest[nodes.node] = 0.0
+    scale += ROUNDED_TERMS * fields.force_size  # of all nodes: the one that is held collects what is left of the others
     ledger.record("equilibrium", relative(np.abs(rest).max(axis=1), scale), f"{state.name}, mesh node {{}}".format)
     side, inverse = np.unique(_sides(cell), return_inverse=True)
     own = fields.force[nodes.node]
@@ -98,6 +102,8 @@ def _check_averages(ledger: Ledger, cell: DiscreteCell, state: State, fields: El
     area, weights = cell.area, cell.elements.area[:, None]
     mean = (weights * fields.stress).sum(axis=0) / area
     size = float(((weights * np.abs(fields.stress)).sum(axis=0) / area).max())
+    stiffest = np.abs(cell.stiffnesses).max(axis=(1, 2))[cell.files.mesh.phase]
+    size += ROUNDED_TERMS * float((weights[:, 0] * stiffest * fields.strain_size).sum() / area)
     ledger.record(
         "mean stress", relative(mean - state.mean_stress, max(size, cell.least_stress(state.strain))), state.name
     )

@@ -33,6 +33,7 @@ tangential_strength = 5.0
 strain = [0.2, 0.0, 0.0]
 [output]
 report = true
+pictures = false
 stress_unit = "GPa </script><script>window.hacked = 2</script>"
 """
 ANGLE = """
@@ -47,7 +48,6 @@ pictures = false
 STIFFNESS = """
 [output]
 report = true
-pictures = false
 """
 ENDS = {"path": PATH, "angle": ANGLE, "stiffness": STIFFNESS}
 
@@ -58,9 +58,9 @@ def reports(tmp_path_factory: Any) -> dict[str, Path]:
     folder, found = tmp_path_factory.mktemp("reports"), {}
     for kind, end in ENDS.items():
         case, out = folder / f"{kind}.toml", folder / kind
-        text = BASE.replace("mesh_size = 0.05", "mesh_size = 0.15").replace('type = "stiffness"', f'type = "{kind}"')
+        text = BASE.replace("mesh_size = 0.05", "mesh_size = 0.2").replace('type = "stiffness"', f'type = "{kind}"')
         case.write_text(f"name = '''{NAME}'''\n{text}{end}")
-        run = mpirun(0, "-m", "feti_homog", "run", case, "--out", out)
+        run = mpirun(0, "-m", "feti_homog", "run", case, "--out", out, timeout=240.0)
         assert run.returncode == 0, run.stdout + run.stderr
         found[kind] = out / "report.html"
     return found

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 from reference.references import BONDED
-from support.command_line import case_file, command_line
+from support.command_line import assert_verified, case_file, command_line
 
 import feti_homog.output  # noqa: F401 (chooses the build of h5py)
 
@@ -62,6 +62,7 @@ def test_run_writes_every_file_at_any_number_of_ranks(tmp_path, ranks):
     assert_document(json.loads((out / "result.json").read_text()), max(ranks, 1))
     assert_fields(out)
     assert_pictures(out)
+    assert_verified(out)
 
 
 def assert_document(document, ranks):
@@ -98,21 +99,23 @@ def assert_fields(out):
 
 
 def test_fields_do_not_depend_on_the_ranks(tmp_path):
-    """Traction and jump at the same interface nodes, whatever rank owns them."""
+    """Traction and jump at the same interface nodes, whatever rank owns them; --quiet prints nothing."""
     tractions = []
     for ranks in (1, 2):
         out = tmp_path / str(ranks)
         end = "[decomposition]\nsubdomains = 3\n[output]\npictures = false\n[petsc]\nfeti_ksp_rtol = 1e-11\n"
-        assert command_line(ranks, "run", case_file(tmp_path, end), "--out", out, "--quiet").returncode == 0
+        job = command_line(ranks, "run", case_file(tmp_path, end), "--out", out, "--quiet")
+        assert (job.returncode, job.stdout) == (0, "")
         tables = contents(out / "result.h5")
         order = np.lexsort(tables["interface/points"].round(9).T)
         tractions.append(tables["state/0/traction"][order])
     assert np.abs(tractions[0] - tractions[1]).max() < 1e-7 * np.abs(tractions[0]).max()
 
 
-def test_plot_needs_the_fields_alone(tmp_path):
+def test_plot_draws_what_the_run_did_not_and_needs_the_fields_alone(tmp_path):
     out = tmp_path / "results"
-    command_line(2, "run", case_file(tmp_path, ""), "--out", out)
+    command_line(2, "run", case_file(tmp_path), "--out", out)
+    assert not list(out.glob("*.png"))
     for path in out.iterdir():
         if path.name != "result.h5":
             path.unlink()
@@ -122,32 +125,19 @@ def test_plot_needs_the_fields_alone(tmp_path):
     assert_pictures(out)
 
 
-@pytest.mark.parametrize(("fields", "drawn"), [("true", PICTURES), ("false", [])])
-def test_plot_draws_what_the_run_did_not(tmp_path, fields, drawn):
-    out = tmp_path / "results"
-    command_line(1, "run", case_file(tmp_path, f"[output]\npictures = false\nfields = {fields}\n"), "--out", out)
-    job = command_line(1, "plot", out)
-    assert job.returncode == 0, job.stderr
-    assert sorted(path.name for path in out.glob("*.png")) == sorted(drawn)
-    if not drawn:
-        assert job.stdout == f"{out}: nothing to draw: its case has no fields, and no points of an angle or path\n"
-
-
 def test_plot_of_an_empty_folder_names_the_missing_file(tmp_path):
     job = command_line(1, "plot", tmp_path)
     assert job.returncode not in (0, 1) or "Traceback" not in job.stderr
     assert "result.h5" in job.stderr
 
 
-def test_without_fields_only_the_json_is_written(tmp_path):
+def test_without_fields_only_the_json_is_written_and_nothing_drawn(tmp_path):
     out = tmp_path / "results"
     command_line(2, "run", case_file(tmp_path, "[output]\nfields = false\n"), "--out", out)
+    job = command_line(1, "plot", out)
+    assert job.returncode == 0, job.stderr
     assert {path.name for path in out.iterdir()} == {"result.json"}
-
-
-def test_quiet_prints_nothing(tmp_path):
-    job = command_line(2, "run", case_file(tmp_path), "--out", tmp_path / "results", "--quiet")
-    assert (job.returncode, job.stdout) == (0, "")
+    assert job.stdout == f"{out}: nothing to draw: its case has no fields, and no points of an angle or path\n"
 
 
 @pytest.mark.parametrize("ranks", [1, 2, 4])

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 from reference import references
+from support.command_line import assert_verified
 from support.jobs import mpirun
 
 BONDED, VOID = references.BONDED["hexagonal", "strain"].value, references.VOID["hexagonal"].value
@@ -53,10 +54,18 @@ def test_contact_prevents_overlap_and_stiffens(tmp_path):
     assert int(free["closed"]) == 0 < int(contact["closed"])
     assert int(free["bonded"]) == int(contact["bonded"]) > 0
     assert float(contact["largest overlap"]) < 1e-7 < 1e-3 < float(free["largest overlap"])
+    assert_verified(*(path.parent for path in tmp_path.glob("*/result.h5")))
 
 
-def test_onset_is_proportional_to_strength_and_no_point_is_above_the_bonded_line(tmp_path):
-    rows = driven("stress_strain", tmp_path)
+@pytest.fixture(scope="module")
+def stress_strain(tmp_path_factory):
+    """The folder and the table of the driver of Figure 5, with the pictures of its cases."""
+    folder = tmp_path_factory.mktemp("stress_strain")
+    return folder, driven("stress_strain", folder, "--fields")
+
+
+def test_onset_is_proportional_to_strength_and_no_point_is_above_the_bonded_line(stress_strain):
+    rows = stress_strain[1]
     strengths = sorted({(row["Rn"], row["Rt"]) for row in rows})
     assert len(strengths) == 2
     onset = {}
@@ -74,9 +83,8 @@ def test_onset_is_proportional_to_strength_and_no_point_is_above_the_bonded_line
     assert onset[high] / onset[low] == pytest.approx(high / low, rel=1e-6)
 
 
-def test_every_case_of_a_driver_has_its_pictures(tmp_path):
-    driven("stress_strain", tmp_path, "--fields")
-    folder = tmp_path / "Rn_5_Rt_5"
+def test_every_case_of_a_driver_has_its_pictures(stress_strain):
+    folder = stress_strain[0] / "Rn_5_Rt_5"
     for name in ("path", "path_states", "interface", "cell"):
         assert imread(folder / f"{name}.png")[..., :3].std() > 0.05, f"{name}.png is nearly blank"
     assert (folder / "path.gif").read_bytes()[:6] == b"GIF89a"
@@ -84,3 +92,4 @@ def test_every_case_of_a_driver_has_its_pictures(tmp_path):
         loads = [float(row["load_factor"]) for row in csv.DictReader(stream)]
     assert loads == [point["load_factor"] for point in json.loads((folder / "result.json").read_text())["path"]]
     assert loads[-1] == 1.0
+    assert_verified(*(path.parent for path in stress_strain[0].glob("*/result.h5")))

@@ -135,7 +135,8 @@ def test_a_finished_run_is_left_alone(tmp_path, reference):
 
 
 def test_without_checkpoint_or_resume_a_run_begins_anew(tmp_path, interrupted):
-    job = command_line(2, "run", case_file(tmp_path), "--out", tmp_path / "new", "--resume")
+    coarse = case_file(tmp_path, name="coarse", refine="refine = 0")
+    job = command_line(2, "run", coarse, "--out", tmp_path / "new", "--resume")
     assert job.returncode == 0 and "there is no checkpoint" in job.stdout
     shutil.copytree(interrupted, tmp_path / "old")
     job = command_line(2, "run", case_file(tmp_path), "--out", tmp_path / "old")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import pytest
 
 
@@ -15,3 +17,35 @@ def narrow():
     cell = Narrow(DEFAULTS.soft_mode)
     yield cell
     cell.solver.destroy()
+
+
+@pytest.fixture(scope="module")
+def torn():
+    """torn(**case): the torn cell of a case, made at the first call of the module and shared by its tests."""
+    from support import torn_cells
+
+    made = {}
+    yield partial(_made, made, torn_cells.tear)
+    for cell in made.values():
+        cell.solver.destroy()
+
+
+@pytest.fixture(scope="module")
+def built():
+    """built(**case): the same, with its quadratic programme."""
+    from support import torn_cells
+
+    made = {}
+    yield partial(_made, made, torn_cells.build)
+    for referenced in made.values():
+        referenced.cell.solver.destroy()
+
+
+def _made(made, make, **case):
+    """make(all ranks, **case), once for each case.  Collective."""
+    from mpi4py import MPI
+
+    key = repr(sorted(case.items()))
+    if key not in made:
+        made[key] = make(MPI.COMM_WORLD, **case)
+    return made[key]

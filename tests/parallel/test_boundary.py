@@ -40,9 +40,9 @@ CELLS = pytest.mark.parametrize(
 
 
 @CELLS
-def test_extension_is_harmonic(comm, case):
+def test_extension_is_harmonic(comm, torn, case):
     """K u = 0 but on the boundary, where it is S x."""
-    cell = torn_cells.tear(comm, **case)
+    cell = torn(**case)
     boundary = cell.solver.interface_operators
     x = np.random.default_rng(comm.rank).standard_normal(boundary.offsets[-1])
     u, forces = boundary.extend(x), boundary.apply_schur(x)
@@ -57,8 +57,8 @@ def test_extension_is_harmonic(comm, case):
 
 
 @CELLS
-def test_boundary_is_where_the_constraints_act(comm, case):
-    cell = torn_cells.tear(comm, **case)
+def test_boundary_is_where_the_constraints_act(comm, torn, case):
+    cell = torn(**case)
     B = cell.solver.jump_operator.B.toarray()
     for s, dofs, first in zip(cell.subdomains, cell.solver.interface_operators.dofs, cell.offsets, strict=False):
         assert (dofs == boundary_of(B[:, first : first + len(s.Q)])).all()
@@ -68,8 +68,8 @@ def test_boundary_is_where_the_constraints_act(comm, case):
 
 
 @CELLS
-def test_load_vanishes_inside_the_bodies(comm, case):
-    cell = torn_cells.tear(comm, **case)
+def test_load_vanishes_inside_the_bodies(comm, torn, case):
+    cell = torn(**case)
     inside = cell.solver.Q.copy()
     inside[cell.solver.interface_operators.local_dofs] = 0
     largest = comm.allreduce(np.abs(cell.solver.Q).max(initial=0.0), MPI.MAX)
@@ -99,8 +99,8 @@ def test_torn_cell_equals_the_dense_one(comm, case, kind):
 
 
 @CELLS
-def test_preconditioner_equals_the_dense_one(comm, case):
-    cell = torn_cells.tear(comm, **case)
+def test_preconditioner_equals_the_dense_one(torn, case):
+    cell = torn(**case)
     active = np.ones(cell.solver.jump_operator.global_rows, bool)
     expected = DenseDual(cell).preconditioner(active)
     assert relative_error(matrix(cell, cell.solver.preconditioner.apply), expected) < 1e-11
@@ -192,8 +192,8 @@ def torn_by_default(comm, interface, policy=SMALL_PIECES):
 
 
 @pytest.mark.parametrize("case", [{"geometry": "square"}, RANDOM, RANDOM | {"bodies": "plane", "mesh_size": 0.25}])
-def test_default_pieces_give_every_rank_one(comm, case):
-    cell = torn_cells.tear(comm, **case)
+def test_default_pieces_give_every_rank_one(comm, torn, case):
+    cell = torn(**case)
     assert min(comm.allgather(len(cell.subdomains))) > 0
     assert cell.summary.subdomains == max(cell.summary.bodies, comm.size)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -18,8 +19,9 @@ pytestmark = pytest.mark.parallel
 
 EXACT = 1e-9
 TIGHT = {"petsc": {"feti_pc_type": "influence", "feti_ksp_rtol": 1e-11}}
-SQUARE = {"geometry": "square", "mesh_size": 0.2} | TIGHT
-THREE = {"geometry": "random", "fibres": 3, "min_gap": 0.1, "seed": 4, "mesh_size": 0.2, "radius_spread": 0.3} | TIGHT
+SQUARE = {"geometry": "square", "mesh_size": 0.25} | TIGHT
+THREE = {"geometry": "random", "fibres": 3, "min_gap": 0.1, "seed": 4, "mesh_size": 0.25, "radius_spread": 0.3} | TIGHT
+CASES = {"square": SQUARE, "three": THREE}
 STRAIGHT = np.array([1.0, 0.1, 0.2])
 CRITERION = StrengthCriterion(20.0, 30.0, "max")
 
@@ -32,6 +34,18 @@ def start(cell, contact):
 def follow(cell, waypoints, contact=True):
     interface, begin = start(cell, contact)
     return list(events(interface, CRITERION, np.array(waypoints), begin))
+
+
+@pytest.fixture(scope="module")
+def straight(torn):
+    """straight(case, contact): the cell and the points of the path to STRAIGHT, followed at the first call."""
+
+    @cache
+    def followed(case, contact):
+        cell = torn(**CASES[case])
+        return cell, follow(cell, [STRAIGHT], contact)
+
+    return followed
 
 
 def dissipated(points):
@@ -62,16 +76,17 @@ def stress_under(interface, cell, strain, point):
 
 
 @pytest.mark.parametrize("contact", [True, False])
-@pytest.mark.parametrize("case", [SQUARE, THREE], ids=["square", "three"])
+@pytest.mark.parametrize("case", CASES)
 @pytest.mark.parametrize(
     "waypoints",
-    [[STRAIGHT], [0.6 * STRAIGHT, [0.0, 0.0, 0.0], [-0.4, 0.8, 1.5]], [[-0.2, -0.2, 0.7], 0.8 * STRAIGHT]],
+    [None, [0.6 * STRAIGHT, [0.0, 0.0, 0.0], [-0.4, 0.8, 1.5]], [[-0.2, -0.2, 0.7], 0.8 * STRAIGHT]],
     ids=["straight", "through zero", "turning"],
 )
-def test_events_dissipate_the_work_that_is_not_stored(comm, case, contact, waypoints):
-    cell = torn_cells.tear(comm, **case)
+def test_events_dissipate_the_work_that_is_not_stored(straight, case, contact, waypoints):
+    cell, points = straight(case, contact)
     interface, _ = start(cell, contact)
-    points = follow(cell, waypoints, contact)
+    if waypoints is not None:
+        points = follow(cell, waypoints, contact)
     found, work, worst = dissipated(points), 0.5 * strain(points[0]) @ stress(cell, points[0]), 0.0
     assert sum(p.broke > 0 for p in points) > 8
     for before, now, lost in zip(points, points[1:], found[1:, 0], strict=False):
@@ -84,11 +99,10 @@ def test_events_dissipate_the_work_that_is_not_stored(comm, case, contact, waypo
 
 
 @pytest.mark.parametrize("contact", [True, False])
-@pytest.mark.parametrize("case", [SQUARE, THREE], ids=["square", "three"])
-def test_rising_strain_dissipates_the_area_under_its_curve(comm, case, contact):
+@pytest.mark.parametrize("case", CASES)
+def test_rising_strain_dissipates_the_area_under_its_curve(straight, case, contact):
     """At a load t the branch is that of the first point at t or more: the area under it, less what is stored."""
-    cell = torn_cells.tear(comm, **case)
-    points = follow(cell, [STRAIGHT], contact)
+    cell, points = straight(case, contact)
     loads = np.array([p.load_factor for p in points])
     records = np.flatnonzero(loads >= np.maximum.accumulate(loads))
     slopes = np.array([STRAIGHT @ torn_cells.stress(cell, points[k].state.solution) for k in records])
@@ -100,8 +114,8 @@ def test_rising_strain_dissipates_the_area_under_its_curve(comm, case, contact):
 
 
 @pytest.mark.parametrize("worst_only", [True, False])
-def test_increments_dissipate_the_work_that_is_not_stored(comm, worst_only):
-    cell = torn_cells.tear(comm, **THREE)
+def test_increments_dissipate_the_work_that_is_not_stored(torn, worst_only):
+    cell = torn(**THREE)
     interface, begin = start(cell, True)
     points = list(increments(interface, CRITERION, STRAIGHT[None], 12, worst_only, begin))
     found = dissipated(points)
@@ -125,10 +139,10 @@ def breaks(cell, points):
     return np.array(rows).reshape(-1, 4)
 
 
-def test_a_waypoint_on_a_straight_path_changes_nothing(comm):
+def test_a_waypoint_on_a_straight_path_changes_nothing(straight):
     """Where no bond breaks below an earlier load, the same breaks, loads and energies."""
-    cell = torn_cells.tear(comm, **THREE)
-    loads = np.array([p.load_factor for p in follow(cell, [STRAIGHT])])
+    cell, points = straight("three", True)
+    loads = np.array([p.load_factor for p in points])
     rises = loads > np.maximum.accumulate(np.r_[0.0, loads[:-1]])
     ends = np.flatnonzero(~np.r_[False, rises, False])
     length, last = max((b - a, b - 2) for a, b in pairwise(ends))
@@ -142,10 +156,10 @@ def test_a_waypoint_on_a_straight_path_changes_nothing(comm):
 
 
 @pytest.mark.parametrize("contact", [True, False])
-def test_beyond_a_waypoint_a_straight_path_is_controlled_by_strain(comm, contact):
+def test_beyond_a_waypoint_a_straight_path_is_controlled_by_strain(straight, contact):
     """The bonds of a snap-back break at the largest load so far, with the energies of rising strain."""
-    cell = torn_cells.tear(comm, **SQUARE)
-    whole = breaks(cell, follow(cell, [STRAIGHT], contact))
+    cell, points = straight("square", contact)
+    whole = breaks(cell, points)
     turn = 0.6 * whole[:, 0].max()
     split = breaks(cell, follow(cell, [turn * STRAIGHT, STRAIGHT], contact))
     np.testing.assert_array_equal(split[:, 1], whole[:, 1])

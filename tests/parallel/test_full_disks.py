@@ -102,6 +102,8 @@ def test_files_that_may_not_grow(comm, shared_path, capsys, size):
 @pytest.mark.parametrize("name", ["000002.h5", "result.h5", "result.json", "result.xdmf", "interface.xdmf", "path.csv"])
 def test_every_file_may_be_the_one_that_does_not_fit(comm, shared_path, capsys, monkeypatch, name):
     """It is told, and --resume goes on from the events that are kept."""
+    if comm.size > 1 and name in ("result.h5", "result.xdmf", "interface.xdmf"):
+        pytest.skip("as the others; it takes longer on two ranks")
     out, commit = shared_path / "out", atomic.commit
 
     def full(part, path):
@@ -123,7 +125,7 @@ def test_every_file_may_be_the_one_that_does_not_fit(comm, shared_path, capsys, 
     parallel_assert(comm, not list(out.glob("*.part")))
 
 
-@pytest.mark.parametrize("name", ["cell.png", "path.gif", "path.png"])
+@pytest.mark.parametrize("name", ["cell.png", "path.gif"])
 def test_pictures_that_do_not_fit_are_told(comm, shared_path, capsys, monkeypatch, name):
     """The results stay, the old picture too."""
     if comm.size > 1:
@@ -185,3 +187,29 @@ def fill(path):
                 os.write(stream.fileno(), b"x" * 4096)
         except OSError:
             pass
+
+
+def test_a_disk_that_fills_in_the_middle_of_a_sweep(comm, shared_path, capsys, monkeypatch):
+    """The sweep ends; its finished cases are kept, and the one that was not written is computed again."""
+    out, commit = shared_path / "out", atomic.commit
+
+    def full(part, path):
+        if (path.parent.name, path.name) == ("case-0002", "result.xdmf"):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        commit(part, path)
+
+    if comm.rank == 0:
+        (shared_path / "sweep.toml").write_text(f"{CASE}[sweep]\ncell.fibre_fraction = [0.2, 0.3]\n")
+    comm.barrier()
+    words = ["sweep", str(shared_path / "sweep.toml"), "--out", str(out), "--quiet"]
+    monkeypatch.setattr(atomic, "commit", full)
+    parallel_assert(comm, cli.main(words) == 1)
+    errors = capsys.readouterr().err
+    parallel_assert(comm, comm.rank > 0 or "result.xdmf: No space left on device" in errors, errors)
+    first = (out / "case-0001" / "result.json").stat().st_mtime_ns
+    parallel_assert(comm, not (out / "case-0002" / "result.json").exists())
+    comm.barrier()
+    monkeypatch.setattr(atomic, "commit", commit)
+    assert cli.main(words) == 0
+    parallel_assert(comm, (out / "case-0001" / "result.json").stat().st_mtime_ns == first)
+    parallel_assert(comm, (out / "case-0002" / "result.xdmf").exists())

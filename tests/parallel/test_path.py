@@ -23,6 +23,7 @@ pytestmark = pytest.mark.parallel
 SQUARE = {"geometry": "square", "mesh_size": 0.2}
 HEXAGONAL = {"geometry": "hexagonal", "mesh_size": 0.4, "order": 2, "plane": "stress"}
 THREE = {"geometry": "random", "fibres": 3, "min_gap": 0.1, "seed": 4, "mesh_size": 0.2, "radius_spread": 0.3}
+PHASES = {"matrix": {"young": 1.0, "poisson": 0.35}, "fibre": {"young": 5.0, "poisson": 0.2}}
 INFLUENCE = {"petsc": {"feti_pc_type": "influence"}}
 CELLS = [
     SQUARE,
@@ -62,8 +63,8 @@ def is_certified(points):
     ("criterion", "contact", "strain"),
     [("max", True, MIXED), ("quadratic", True, SHEAR), ("max", False, TENSION), ("quadratic", False, MIXED)],
 )
-def test_events_are_those_of_the_quadratic_programme(comm, cell, criterion, contact, strain):
-    case = torn_cells.build(comm, matrix={"young": 1.0, "poisson": 0.35}, fibre={"young": 5.0, "poisson": 0.2}, **cell)
+def test_events_are_those_of_the_quadratic_programme(comm, built, cell, criterion, contact, strain):
+    case = built(**PHASES, **cell)
     strengths = (0.15, 0.3) if criterion == "max" else (0.25, 0.2)
     expected = on_root(
         comm, lambda: SlowLoadPath(case.reference, contact, *strengths, criterion).proportional(np.array(strain))
@@ -80,10 +81,8 @@ def test_events_are_those_of_the_quadratic_programme(comm, cell, criterion, cont
 
 
 @pytest.mark.parametrize("back", [[0.0, 0.0, 0.0], [-0.6, 0.8, -0.3]], ids=["unloading", "reversal"])
-def test_events_of_later_legs_are_those_of_small_steps_and_bisection(comm, back):
-    case = torn_cells.build(
-        comm, matrix={"young": 1.0, "poisson": 0.35}, fibre={"young": 5.0, "poisson": 0.2}, **SQUARE
-    )
+def test_events_of_later_legs_are_those_of_small_steps_and_bisection(comm, built, back):
+    case = built(**PHASES, **SQUARE)
     legs = np.array([[0.3, -0.4, 0.15], back, [0.9, -0.9, 0.7]])
     expected = on_root(comm, lambda: SlowLoadPath(case.reference, True, 0.15, 0.3, "max").legs(legs, 12))
     points = follow(case.cell, True, StrengthCriterion(0.15, 0.3, "max"), legs)
@@ -120,8 +119,8 @@ def test_debonding_begins_at_the_load_of_the_series_solution(comm):
 
 
 @pytest.mark.parametrize("contact", [True, False])
-def test_bonds_never_heal_and_every_break_dissipates(comm, contact):
-    case = torn_cells.build(comm, **THREE)
+def test_bonds_never_heal_and_every_break_dissipates(built, contact):
+    case = built(**THREE)
     points = follow(case.cell, contact, StrengthCriterion(20.0, 30.0, "quadratic"), [SHEAR])
     after = broken(case, points)
     assert (after[1:] >= after[:-1]).all()
@@ -130,9 +129,9 @@ def test_bonds_never_heal_and_every_break_dissipates(comm, contact):
         assert drop @ SHEAR > -1e-9 * np.abs(drop).max()
 
 
-def test_increments_meet_events_and_the_curve_between_them_converges_with_first_order(comm):
+def test_increments_meet_events_and_the_curve_between_them_converges_with_first_order(torn):
     """Releasing the worst bonds one after the other, an increment ends where events end that break no later."""
-    cell = torn_cells.tear(comm, **SQUARE)
+    cell = torn(**SQUARE)
     law, strain = StrengthCriterion(0.05, 0.05, "max"), np.array([[1e-3, 0.0, 0.0]])
     exact = curve(cell, follow(cell, True, law, strain))[:, :2]
     interface, loads, errors = torn_cells.interface(cell, True), np.linspace(0, 1, 20001), []
@@ -146,8 +145,8 @@ def test_increments_meet_events_and_the_curve_between_them_converges_with_first_
     assert constants.max() < 2.1 * constants.min()
 
 
-def test_onset_by_increments_is_late_by_less_than_one_increment(comm):
-    cell = torn_cells.tear(comm, **SQUARE)
+def test_onset_by_increments_is_late_by_less_than_one_increment(torn):
+    cell = torn(**SQUARE)
     law, strain = StrengthCriterion(0.05, 0.05, "max"), np.array([[1e-3, 0.0, 0.0]])
     interface, exact = torn_cells.interface(cell, True), follow(cell, True, law, strain)[0].load_factor
     for steps in (10, 40):
@@ -195,8 +194,8 @@ def test_increments_stop_at_a_solve_that_does_not_converge(comm, worst_only):
     assert point.state.solution.reason < 0 and point.broke == 0
 
 
-def test_infinite_strengths_never_break(comm):
-    cell = torn_cells.tear(comm, **SQUARE)
+def test_infinite_strengths_never_break(torn):
+    cell = torn(**SQUARE)
     points = follow(cell, True, StrengthCriterion(np.inf, np.inf, "quadratic"), [TENSION, SHEAR])
     assert [(p.load_factor, p.broke) for p in points] == [(0.5, 0), (1.0, 0)]
     status = np.full(len(bonded_status(cell)), OPEN, np.int8)

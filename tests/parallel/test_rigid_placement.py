@@ -22,7 +22,7 @@ def test_an_unsolved_programme_is_raised_on_every_rank(comm, monkeypatch):
     cell = torn_cells.tear(comm, geometry="square", mesh_size=0.3)
     status = np.full(len(cell.solver.jump_operator.nodes.row), OPEN, np.int8)
     interface, start = torn_cells.interface(cell, True), np.zeros(cell.solver.rows)
-    monkeypatch.setattr(rigid_placement, "linprog", unsolved)
+    monkeypatch.setattr("scipy.optimize.linprog", unsolved)
     with pytest.raises(ConvergenceError, match="not solved: Numerical difficulties"):
         interface.equilibrium(np.array([-1.0, -1.0, 0.0]), status, start)
     nodes, gap = interface.nodes, np.ones(len(status))

@@ -18,15 +18,15 @@ ADAPTIVE = {"feti_coarse_space": "adaptive"}
 ALL = 10**9
 
 
-def tear(comm, enough, **cell):
-    """With trace spaces of at least so many dofs."""
-    return torn_cells.tear(comm, thresholds=Thresholds(min_trace_dofs=enough), **REFINED | cell)
+def traced(enough, **cell):
+    """The refined cell with trace spaces of at least so many dofs."""
+    return {"thresholds": Thresholds(min_trace_dofs=enough)} | REFINED | cell
 
 
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("enough", [0, 60, 150, ALL])
-def test_traces_are_piecewise_linear_along_the_coarse_edges(comm, enough, order):
-    cell = tear(comm, enough, order=order, refine=3 - order)
+def test_traces_are_piecewise_linear_along_the_coarse_edges(torn, enough, order):
+    cell = torn(**traced(0, order=order, refine=3 - order))
     for s, dofs in zip(cell.subdomains, cell.solver.interface_operators.dofs, strict=True):
         nodes, M = dofs[::2] // 2, s.mesh.lattice.intervals
         P = trace_space(s.submesh, s.mesh.lattice, nodes, enough)
@@ -47,8 +47,8 @@ def test_traces_are_piecewise_linear_along_the_coarse_edges(comm, enough, order)
                     assert np.allclose(values, np.interp(np.arange(M + 1), at, values[at]), atol=1e-13)
 
 
-def test_traces_of_few_dofs_keep_them_all(comm):
-    cell = tear(comm, ALL)
+def test_traces_of_few_dofs_keep_them_all(torn):
+    cell = torn(**traced(0, order=1, refine=2))
     for s, dofs in zip(cell.subdomains, cell.solver.interface_operators.dofs, strict=True):
         P = trace_space(s.submesh, s.mesh.lattice, dofs[::2] // 2, ALL)
         assert P.shape == (len(dofs),) * 2
@@ -59,7 +59,7 @@ def test_traces_of_few_dofs_keep_them_all(comm):
 def test_coarser_traces_find_as_good_modes(comm, pieces):
     found = []
     for enough in (ALL, DEFAULTS.min_trace_dofs):
-        cell = tear(comm, enough, decomposition={"subdomains": pieces}, petsc=ADAPTIVE)
+        cell = torn_cells.tear(comm, **traced(enough, decomposition={"subdomains": pieces}, petsc=ADAPTIVE))
         solutions = solve_many(cell)
         vectors = cell.solver.coarse.coarse_dimension
         found.append((vectors, solutions[0].iterations, [cell.solver.stress_integral(s) for s in solutions]))

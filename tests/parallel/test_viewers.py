@@ -94,6 +94,7 @@ def _is_state(file: Any, number: int, seen: Any) -> None:
     """Its name, time and numbers."""
     attributes = file[f"state/{number}"].attrs
     assert (seen.label, seen.time) == (attributes["label"], number)
+    assert seen.grid["label"].astype("u1").tobytes().decode().rstrip() == attributes["label"]
     assert seen.grid["load_factor"] == attributes["load_factor"]
     for name in ("strain", "stress"):
         np.testing.assert_array_equal(seen.grid[f"mean_{name}"].ravel(), attributes[name])

@@ -20,3 +20,11 @@ def case_file(folder: Path, end: str = "[output]\npictures = false\n") -> Path:
 def command_line(ranks: int, *words: str | Path, timeout: float = 60.0):
     """`python -m feti_homog words...` on so many ranks; none: without mpirun."""
     return mpirun(ranks, "-m", "feti_homog", *words, timeout=timeout)
+
+
+def assert_verified(*folders: Path) -> None:
+    """The results in these folders obey every law of `feti-homog verify`."""
+    assert folders
+    for folder in folders:
+        job = command_line(0, "verify", folder)
+        assert job.returncode == 0, job.stdout + job.stderr

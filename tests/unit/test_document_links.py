@@ -24,7 +24,7 @@ DOCUMENTS = [ROOT / "README.md", *(ROOT / f"{place}/README.md" for place in PLAC
 # What scripts and runs make, and names that stand for the reader's own.
 MADE = re.compile(r"results/|build/|.*DIR|.*\.\.\.")
 # A dotted name below the package, and an attribute of it in brackets; files that runs write look alike.
-SYMBOL = re.compile(r"`([a-z_]+(?:\.(?!csv|h5|json|png|toml)[a-z_]+)+(?:\.[A-Z]\w*)?)`(?: \(`(\w+)`)?")
+SYMBOL = re.compile(r"`([a-z_]+(?:\.(?!csv|h5|json|png|toml|xdmf)[a-z_]+)+(?:\.[A-Z]\w*)?)`(?: \(`(\w+)`)?")
 
 documents = pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
 

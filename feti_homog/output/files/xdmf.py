@@ -1,12 +1,13 @@
 """result.xdmf and interface.xdmf: say where in result.h5 ParaView finds the cell, the interface and their states.
 
 All of ParaView's and VTK's readers understand them: whole datasets alone, points with a connectivity, tensors of nine
-components, one collection a file.  The readers show no texts, so the label of a state is the name of its block.
+components, one collection a file.  The readers take no texts: the label of a state is the name of its block, which two
+of them show, and an array of the bytes of its letters, as many in all states.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
@@ -65,25 +66,40 @@ def _write(path: Path, name: str, file: h5py.File, fill: Callable[[ET.Element, h
     collection = ET.SubElement(
         ET.SubElement(root, "Domain"), "Grid", Name=name, GridType="Collection", CollectionType="Temporal"
     )
-    for state in sorted(file.get("state", ()), key=int):
-        fill(_grid(collection, file, state), file, state)
+    states = sorted(file.get("state", ()), key=int)
+    labels = [str(file[f"state/{state}"].attrs["label"]) for state in states]
+    longest = max((len(label.encode()) for label in labels), default=0)
+    for state, label in zip(states, labels, strict=True):
+        grid = _grid(collection, state, label)
+        _numbers(grid, "label", "Scalar", list(label.encode().ljust(longest)))
+        _means(grid, file[f"state/{state}"].attrs)
+        fill(grid, file, state)
     ET.indent(root)
     return atomic.replace(path, lambda part: ET.ElementTree(root).write(part, encoding="utf-8", xml_declaration=True))
 
 
-def _grid(collection: ET.Element, file: h5py.File, state: str) -> ET.Element:
+def _grid(collection: ET.Element, state: str, label: str) -> ET.Element:
     """The grid of a state, in a collection of its own: readers pass on the name of a grid in such a one only."""
-    attributes = file[f"state/{state}"].attrs
     block = ET.SubElement(collection, "Grid", Name=f"state {state}", GridType="Collection", CollectionType="Spatial")
     ET.SubElement(block, "Time", Value=state)
-    grid = ET.SubElement(block, "Grid", Name=str(attributes["label"]), GridType="Uniform")
-    for name, source in (("load_factor", "load_factor"), ("mean_strain", "strain"), ("mean_stress", "stress")):
-        values = np.atleast_1d(attributes[source])
-        size = {"Dimensions": "1" if len(values) == 1 else f"1 {len(values)}"}
-        item = ET.Element("DataItem", size, Format="XML", NumberType="Float", Precision="8")
-        item.text = " ".join(repr(float(value)) for value in values)
-        _attribute(grid, name, len(values), "Grid", item)
-    return grid
+    return ET.SubElement(block, "Grid", Name=label, GridType="Uniform")
+
+
+def _means(grid: ET.Element, attributes: Mapping[str, Any]) -> None:
+    """The cell's own numbers in a state."""
+    _numbers(grid, "load_factor", "Scalar", [float(attributes["load_factor"])])
+    _numbers(grid, "mean_strain", "Vector", attributes["strain"].tolist())
+    _numbers(grid, "mean_stress", "Vector", attributes["stress"].tolist())
+
+
+def _numbers(grid: ET.Element, name: str, kind: str, values: Sequence[float]) -> None:
+    """Numbers of the state as a whole, written out."""
+    size = f"1 {len(values)}" if kind == "Vector" else str(len(values))
+    number, precision = ("Float", "8") if isinstance(values[0], float) else ("Int", "4")
+    item = ET.Element("DataItem", Dimensions=size, Format="XML", NumberType=number, Precision=precision)
+    item.text = " ".join(map(repr, values))
+    attribute = ET.SubElement(grid, "Attribute", Name=name, AttributeType=kind, Center="Grid")
+    attribute.append(item)
 
 
 def _cell(grid: ET.Element, file: h5py.File, state: str) -> None:

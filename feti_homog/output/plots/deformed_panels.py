@@ -201,13 +201,14 @@ def _animation(file: Any, numbers: Sequence[int], output: Mapping[str, Any], sca
     figure.suptitle(cell.caption, fontsize=10)
     frames: list[Image.Image] = []
     for number, moved in zip(reversed(numbers), reversed(places), strict=True):
-        axes.clear()
+        for artist in [*axes.collections, *axes.patches, *axes.child_axes]:
+            artist.remove()
         cell.draw(axes, number, moved)
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
         canvas.draw()
         figure.set_layout_engine("none")
         picture = Image.fromarray(np.ascontiguousarray(np.asarray(canvas.buffer_rgba())[..., :3]))
-        frames.insert(0, picture.quantize(128, dither=Image.Dither.NONE))
+        frames.insert(0, picture.quantize(256, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE))
     times = [FRAME_TIME] * (len(frames) - 1) + [6 * FRAME_TIME]
     film = {"save_all": True, "append_images": frames[1:], "duration": times, "loop": 0}
     return atomic.replace(path, lambda part: frames[0].save(part, format="GIF", **film))

@@ -42,10 +42,15 @@ def around(whole: Sample, count: int, number: int) -> Sample:
     old = vars(whole.interface)
     tables = {name: np.resize(table, (len(sides), *table.shape[1:])) for name, table in old.items()}
     tables |= {"points": sides[order], "normal": normals[order], "fibre_number": np.full(len(sides), number)}
-    values = {name: np.zeros((len(sides), 2)) for name in ("traction", "jump")} | {"status": order % 3}
-    states = tuple(replace(state, **values) for state in whole.states)
+    states = tuple(replace(state, **_resized(state, len(whole.interface.points), len(sides))) for state in whole.states)
     fibres = replace(whole.fibres, number=np.array([number]))
     return replace(whole, interface=type(whole.interface)(**tables), fibres=fibres, states=states)
+
+
+def _resized(state: Any, old: int, new: int) -> dict[str, Any]:
+    """The tables of a state on `old` interface nodes, for `new` ones."""
+    tables = {name: value for name, value in vars(state).items() if isinstance(value, np.ndarray) and len(value) == old}
+    return {name: np.resize(table, (new, *table.shape[1:])) for name, table in tables.items()}
 
 
 def found(path: Path, number: int, limit: int) -> tuple[Coordinate, Any]:

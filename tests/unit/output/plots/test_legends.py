@@ -13,7 +13,9 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
+from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
+from PIL import Image
 from support.sample_output import Sample, sample
 
 from feti_homog.output.files.field_file import FieldFile
@@ -79,6 +81,23 @@ def test_legends_cover_nothing(tmp_path: Path, monkeypatch: Any, document: dict[
         for legend in legends(figure):
             box = legend.get_window_extent(renderer)
             assert not [other for other in boxes if other.width and box.shrunk(0.99, 0.95).overlaps(other)], name
+
+
+def test_a_picture_is_drawn_once(tmp_path: Path) -> None:
+    """Without white around it, which needs no second drawing."""
+    times: list[str] = []
+
+    class Counted(Line2D):
+        def draw(self, renderer: Any) -> None:
+            times.append(str(renderer))
+            super().draw(renderer)
+
+    figure = Figure(figsize=(4, 3), layout="constrained")
+    figure.add_artist(Counted([0.4, 0.6], [0.5, 0.5], color="black", linewidth=4))
+    plot_helpers.save(figure, tmp_path / "picture.png")
+    with Image.open(tmp_path / "picture.png") as picture:
+        assert picture.size == pytest.approx((0.2 * 800 + 11 + 32, 11 + 32), abs=8)
+    assert len(times) == 1
 
 
 def test_the_grey_outline_has_its_name(tmp_path: Path, monkeypatch: Any) -> None:
