@@ -18,6 +18,8 @@ SAME_PLACE = 1e-7
 HANGING_DISTANCE = 1e-2
 # Area of a triangle, relative to its longest edge squared, up to which it is zero but for rounding of coordinates.
 FLAT_AREA = 1e-9
+# Lengths that can be computed with, as of the numbers in a case file.
+SMALLEST, LARGEST = 1e-100, 1e100
 # The physical curve of the edges that are debonded from the start.
 DEBONDED = "debonded"
 PHASE = re.compile(r"matrix|fibre(:\S+)?")
@@ -95,9 +97,16 @@ def unknown_phases(mesh: RawMesh) -> list[str]:
 
 
 def not_finite(mesh: RawMesh) -> list[str]:
-    """Nodes whose coordinates are not numbers."""
+    """Nodes whose coordinates are not numbers, or no lengths to compute with."""
     bad = np.flatnonzero(~np.isfinite(mesh.points).all(axis=1))
-    return [f"{first_of(map(mesh.node, bad), len(bad))}: coordinates are not finite"] if len(bad) else []
+    if len(bad):
+        return [f"{first_of(map(mesh.node, bad), len(bad))}: coordinates are not finite"]
+    size = np.ptp(mesh.points[:, :2], axis=0)
+    if np.abs(mesh.points).max() > LARGEST or size.min() < SMALLEST:
+        return [
+            f"the cell is {size[0]:.3g} x {size[1]:.3g}: expected lengths and coordinates from {SMALLEST} to {LARGEST}"
+        ]
+    return []
 
 
 def not_planar(mesh: RawMesh) -> list[str]:
@@ -206,6 +215,21 @@ def uncovered(plane: Float, triangles: Int32, size: Float) -> list[str]:
         return []
     what = "overlap" if abs(total) > whole else "leave parts uncovered"
     return [f"the elements {what}: their area is {abs(total):.9g}, that of the cell {whole:.9g}"]
+
+
+def unrefined_sides(plane: Float, size: Float) -> list[str]:
+    """Sides without a node between their corners: there an element would be its own neighbour."""
+    bare = [
+        SIDES[axis, side]
+        for axis in (0, 1)
+        for side, level in enumerate((0.0, size[axis]))
+        if np.count_nonzero(plane[:, axis] == level) < 3
+    ]
+    return (
+        [f"no node between the corners of the {first_of(bare, len(bare), 4)} side: expected one at least"]
+        if bare
+        else []
+    )
 
 
 def stray_lines(mesh: RawMesh) -> list[str]:

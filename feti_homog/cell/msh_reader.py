@@ -47,7 +47,7 @@ def read(path: Path) -> CoarseMesh:
     corners = mesh_checks.missing_corners(plane, origin, size)
     _refuse(path, mesh_checks.overlapping(raw), mesh_checks.open_edges(raw, plane, size), corners)
     _refuse(path, mesh_checks.uncovered(plane, raw.triangles, size))
-    _refuse(path, mesh_checks.not_periodic(raw, plane, size))
+    _refuse(path, mesh_checks.not_periodic(raw, plane, size), mesh_checks.unrefined_sides(plane, size))
     mesh = _coarse_mesh(raw, _matched(plane, size), size)
     _refuse(path, mesh_checks.cannot_debond(raw, mesh.debonded_edges, can_debond(mesh, mesh.debonded_edges)))
     return with_circles(mesh)

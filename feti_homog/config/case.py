@@ -36,7 +36,7 @@ from feti_homog.config.values import text
 from feti_homog.config.wording import limit_in_words, suggestion, toml_key, toml_value
 from feti_homog.errors import CaseError
 
-LOCKING_POISSON = 0.49
+LOCKING_POISSON, ROUNDING_POISSON = 0.49, 0.49999
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,13 +82,24 @@ class Case:
 
     def warnings(self) -> tuple[str, ...]:
         """What is allowed but probably not wanted, one line each."""
-        may_lock = self.analysis.plane == "strain" and self.cell.order == 1
-        return tuple(
-            f"[material.{toml_key(phase)}] poisson = {material.poisson}: linear triangles lock "
-            f"above {LOCKING_POISSON} in plane strain; use order = 2 in [cell]"
-            for phase, material in self.materials.items()
-            if may_lock and isinstance(material, Isotropic) and material.poisson > LOCKING_POISSON
-        )
+        if self.analysis.plane != "strain":
+            return ()
+        solids = {phase: material for phase, material in self.materials.items() if isinstance(material, Isotropic)}
+        lines = {
+            f"[material.{toml_key(phase)}] poisson = {material.poisson}: ": material.poisson
+            for phase, material in solids.items()
+        }
+        locking = [
+            f"{line}linear triangles lock above {LOCKING_POISSON} in plane strain; use order = 2 in [cell]"
+            for line, poisson in lines.items()
+            if self.cell.order == 1 and poisson > LOCKING_POISSON
+        ]
+        rounding = [
+            f"{line}so near to 0.5 rounding may exceed what the checks allow; use at most {ROUNDING_POISSON}"
+            for line, poisson in lines.items()
+            if poisson > ROUNDING_POISSON
+        ]
+        return (*locking, *rounding)
 
     def resolved(self) -> dict[str, Any]:
         """The case with its defaults as a plain document, of which `parse` makes an equal case."""

@@ -136,7 +136,8 @@ class AdaptiveCoarseSpace:
         """Factor the coarse matrix of the active rows, and choose the state.  Collective."""
         self.destroy()
         rows = int(allreduce_sum(self.comm, np.array([self._active.sum()]))[0])
-        if rows < self._thresholds.rows_per_vector * self.coarse_dimension or not self._factor_saddle():
+        few = rows < self._thresholds.rows_per_vector * self.coarse_dimension
+        if not self.coarse_dimension or few or not self._factor_saddle():
             return
         self.state = Deflation.OBLIQUE
         if not self._deflation_is_projector():

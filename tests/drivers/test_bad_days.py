@@ -1,0 +1,139 @@
+"""What is not the case's fault: Ctrl-C, outputs that cannot be written, a locale without the letters of a name."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from support.base_case import changed
+from support.command_line import case_file, command_line
+from support.hostile_inputs import of_mesh, write_grid
+from support.jobs import ROOT, environment, launched
+
+LARGE = changed(("mesh_size = 0.05", "mesh_size = 0.01\nrefine = 3"))
+WAIT = 60.0  # seconds
+TEXTS = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+
+
+def listens(process):
+    """Whether a process waits for SIGINT in a thread, so that no other gets it."""
+    lines = Path(f"/proc/{process.pid}/status").read_text().splitlines()
+    blocked = next(line for line in lines if line.startswith("SigBlk:")).split()[1]
+    return int(blocked, 16) >> (signal.SIGINT - 1) & 1
+
+
+def interrupted(process, is_ready):
+    """Exit code, outputs and the seconds that it took after SIGINT."""
+    deadline = time.monotonic() + WAIT
+    while not is_ready() and process.poll() is None and time.monotonic() < deadline:
+        time.sleep(0.01)
+    start = time.monotonic()
+    process.send_signal(signal.SIGINT)
+    output, errors = process.communicate(timeout=WAIT)
+    return process.returncode, output, errors, time.monotonic() - start
+
+
+@pytest.mark.parametrize("command", ["check", "run", "sweep"])
+def test_ctrl_c_is_one_line_and_130(tmp_path, command):
+    path, out = tmp_path / "large.toml", tmp_path / "out"
+    path.write_text(LARGE + ('[sweep]\n"cell.order" = [1, 2]\n' if command == "sweep" else ""))
+    words = [command, path] + ([] if command == "check" else ["--out", out])
+    process = launched(0, "-m", "feti_homog", *words, **TEXTS)
+    code, _, errors, seconds = interrupted(process, lambda: listens(process))
+    assert (code, errors) == (130, "interrupted by SIGINT\n") and seconds < WAIT / 2
+    assert not list(tmp_path.rglob("*lock"))
+
+
+def test_ctrl_c_under_mpirun_is_one_line(tmp_path):
+    """mpirun passes it on as SIGTERM, and ends with 1."""
+    (tmp_path / "large.toml").write_text(LARGE)
+    out = tmp_path / "out"
+    process = launched(2, "-m", "feti_homog", "run", tmp_path / "large.toml", "--out", out, **TEXTS)
+    code, _, errors, _ = interrupted(process, (out / "result.lock").exists)
+    assert (code, errors.splitlines()) == (1, ["interrupted by SIGTERM"])
+    assert not list(out.glob("*lock"))
+
+
+def run_into(stdout, *words):
+    return subprocess.run(
+        [sys.executable, "-m", "feti_homog", *map(str, words)],
+        cwd=ROOT, env=environment(), stdout=stdout, stderr=subprocess.PIPE, text=True, timeout=WAIT,
+    )  # fmt: skip
+
+
+def test_a_full_output_costs_no_results(tmp_path):
+    with open("/dev/full", "w") as full:
+        job = run_into(full, "run", case_file(tmp_path), "--out", tmp_path / "out")
+        listing = run_into(full, "keys")
+    assert job.returncode == 0 and json.loads((tmp_path / "out/result.json").read_text())["status"] == "done"
+    assert job.stderr.count("standard output cannot be written: No space left on device") == 1
+    assert (listing.returncode, len(listing.stderr.splitlines())) == (2, 1)
+
+
+@pytest.mark.parametrize("words", [["run"], ["--help"]])
+def test_a_reader_that_leaves_costs_no_results(tmp_path, words):
+    out = tmp_path / "out"
+    reader, writer = os.pipe()
+    os.close(reader)
+    job = run_into(writer, *words, *([case_file(tmp_path), "--out", out] if words == ["run"] else []))
+    os.close(writer)
+    assert (job.returncode, job.stderr) == (0, "")
+    assert words != ["run"] or (out / "result.h5").exists()
+
+
+def test_a_closed_output_costs_no_results(tmp_path):
+    command = f'"{sys.executable}" -m feti_homog run {case_file(tmp_path)} --out {tmp_path / "out"} >&-'
+    assert subprocess.run(["bash", "-c", command], cwd=ROOT, env=environment(), timeout=WAIT).returncode == 0
+    assert (tmp_path / "out/result.json").exists()
+
+
+def test_names_that_the_locale_cannot_write(tmp_path):
+    path = tmp_path / "größe.toml"
+    path.write_bytes(case_file(tmp_path).read_bytes())
+    words = [sys.executable, "-m", "feti_homog", "run", path, "--out", tmp_path / "öut"]
+    locale = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+    job = subprocess.run(words, cwd=ROOT, env=environment() | locale, capture_output=True, timeout=WAIT)
+    assert (job.returncode, job.stderr) == (0, b"")
+    assert json.loads((tmp_path / "öut/result.json").read_text(encoding="utf-8"))["case"]["name"] == "größe"
+
+
+def test_a_matrix_without_fibres_runs_on_two_ranks_without_a_word_of_cholmod(tmp_path):
+    write_grid(tmp_path / "plain.msh", 4, 1.0)
+    mesh = (tmp_path / "plain.msh").read_text().replace("1 2 2 2 2 ", "1 2 2 1 1 ").replace('2\n2 1 "m', '1\n2 1 "m')
+    (tmp_path / "plain.msh").write_text(mesh.replace('2 2 "fibre"\n', ""))
+    content = of_mesh("plain").replace("[material.fibre]\nyoung = 200.0\npoisson = 0.222\n", "")
+    (tmp_path / "plain.toml").write_text(content + "[output]\npictures = false\n")
+    job = command_line(2, "run", tmp_path / "plain.toml", "--out", tmp_path / "out", "--quiet")
+    assert (job.returncode, job.stderr) == (0, "")
+
+
+def test_a_failed_check_of_a_nearly_incompressible_phase_has_a_hint(tmp_path):
+    path = case_file(tmp_path)
+    path.write_text(path.read_text().replace("0.299", "0.4999999").replace("= 0.15", "= 0.15\norder = 2"))
+    job = command_line(1, "run", path, "--out", tmp_path / "out")
+    assert "warning: [material.matrix] poisson = 0.4999999: so near to 0.5 rounding may exceed" in job.stdout
+
+
+def test_a_sweep_leaves_no_lock_files(tmp_path):
+    path = case_file(tmp_path, '[output]\npictures = false\nfields = false\n[sweep]\n"cell.mesh_size" = [0.2, 0.25]\n')
+    job = command_line(2, "sweep", path, "--out", tmp_path / "out")
+    assert job.returncode == 0, job.stderr
+    assert not list(tmp_path.rglob("*lock"))
+
+
+def test_a_flag_does_not_swallow_the_case_file(tmp_path):
+    job = command_line(1, "run", "-feti_view", case_file(tmp_path), "--out", tmp_path / "out")
+    assert job.returncode == 0 and "FETI: 3 subdomains" in job.stdout
+
+
+def test_flags_may_be_false(tmp_path):
+    path = case_file(tmp_path, "[output]\npictures = false\n[petsc]\nfeti_ksp_monitor = false\nfeti_view = true\n")
+    job = command_line(1, "run", path, "--out", tmp_path / "out", "-feti_ksp_converged_reason", "no")
+    assert job.returncode == 0, job.stderr
+    assert "KSP Residual" not in job.stdout and "converged due" not in job.stdout and "FETI: 3" in job.stdout
