@@ -15,7 +15,7 @@ from feti_homog.common.distributed_arrays import allreduce_sum, scale_rows
 from feti_homog.feti.coarse.coarse_space import CoarseSpace
 from feti_homog.feti.operators.dual_operator import DualOperator
 from feti_homog.feti.preconditioners.scaled import Preconditioner
-from feti_homog.feti.thresholds import MAX_ITERATIONS, RTOL, STALL_ITERATIONS
+from feti_homog.feti.thresholds import FORCE_STALL_ITERATIONS, MAX_ITERATIONS, RTOL, STALL_ITERATIONS
 from feti_homog.typing import Float
 
 # Methods that apply the preconditioner to the residual itself, so that the jump can be read off there.  With the
@@ -89,6 +89,23 @@ class ProjectedPreconditioner:
         return float(np.sqrt(allreduce_sum(self.comm, np.array([(r * r).sum()]))[0]))
 
 
+class Stall:
+    """Whether a norm has not halved for `patience` iterations."""
+
+    def __init__(self, patience: int) -> None:
+        self._patience = patience
+        self.reset()
+
+    def reset(self) -> None:
+        self._smallest, self._found_at = np.inf, 0
+
+    def is_reached(self, iteration: int, norm: float) -> bool:
+        """With the norm of this iteration."""
+        if norm < self._smallest / 2:
+            self._smallest, self._found_at = norm, iteration
+        return iteration - self._found_at >= self._patience
+
+
 class PrimalTest:
     """PETSc's convergence test: converged when both primal residuals, the jump and the forces, are below rtol.
 
@@ -100,7 +117,7 @@ class PrimalTest:
     def __init__(self, errors: CallbackErrors, preconditioner: ProjectedPreconditioner) -> None:
         self._errors, self.preconditioner = errors, preconditioner
         self._jump_scale, self._force_scale = 1.0, 1.0
-        self._smallest_jump, self._found_at = np.inf, 0
+        self._jump_stall, self._force_stall = Stall(STALL_ITERATIONS), Stall(FORCE_STALL_ITERATIONS)
 
     def set_scales(self, jump: float, forces: float) -> None:
         """Norms of the torn cell's jump and of the forces that close it, for the next solve."""
@@ -114,7 +131,8 @@ class PrimalTest:
     def _judge(self, ksp: PETSc.KSP, iteration: int, residual: float) -> PETSc.KSP.ConvergedReason:
         rtol, atol, divtol, _ = ksp.getTolerances()
         if iteration == 0:
-            self._smallest_jump = np.inf
+            self._jump_stall.reset()
+            self._force_stall.reset()
         if not np.isfinite(residual):
             return PETSc.KSP.ConvergedReason.DIVERGED_NANORINF
         if residual > divtol * self._force_scale:
@@ -122,7 +140,7 @@ class PrimalTest:
         if residual <= atol:
             return PETSc.KSP.ConvergedReason.CONVERGED_ATOL
         if residual > rtol * self._force_scale:
-            return PETSc.KSP.ConvergedReason.ITERATING
+            return self._go_on(self._force_stall.is_reached(iteration, residual))
         if ksp.getType() not in PRECONDITION_TRUE_RESIDUAL:
             return PETSc.KSP.ConvergedReason.CONVERGED_RTOL
         return self._judge_jump(rtol, iteration)
@@ -132,10 +150,13 @@ class PrimalTest:
         jump = self.preconditioner.jump_norm()
         if jump <= rtol * self._jump_scale:
             return PETSc.KSP.ConvergedReason.CONVERGED_RTOL
-        if jump < self._smallest_jump / 2:
-            self._smallest_jump, self._found_at = jump, iteration
-        stalled = self.preconditioner.coarse.deflates and iteration - self._found_at >= STALL_ITERATIONS
-        return PETSc.KSP.ConvergedReason.DIVERGED_BREAKDOWN if stalled else PETSc.KSP.ConvergedReason.ITERATING
+        return self._go_on(self._jump_stall.is_reached(iteration, jump))
+
+    def _go_on(self, stalled: bool) -> PETSc.KSP.ConvergedReason:
+        """Iterating, or a breakdown where the coarse space is the reason that it stalls."""
+        if stalled and self.preconditioner.coarse.deflates:
+            return PETSc.KSP.ConvergedReason.DIVERGED_BREAKDOWN
+        return PETSc.KSP.ConvergedReason.ITERATING
 
 
 class Krylov:

@@ -114,6 +114,9 @@ MAX_ITERATIONS = 2000
 # Iterations in which the jump must halve once the forces are small enough; else rounding holds it, and the solve is
 # begun anew from where it is.  Without rounding CG at a condition number of 10 halves it in one or two.
 STALL_ITERATIONS = 4
+# Iterations in which the forces must halve before they are small enough: plateaus of CG are shorter where the coarse
+# space deflates, which leaves a condition number of about 1 / tau (`scripts/robustness`: at most 23 iterations in all).
+FORCE_STALL_ITERATIONS = 50
 # Such new beginnings with the coarse space, before it is left out.
 MAX_RESTARTS = 2
 # A jump that the active rows see, relative to that of the torn cell, is rounding if it is as small as this.

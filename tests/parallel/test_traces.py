@@ -65,5 +65,5 @@ def test_coarser_traces_find_as_good_modes(comm, pieces):
         found.append((vectors, solutions[0].iterations, [cell.solver.stress_integral(s) for s in solutions]))
     (every, most, stress), (fewer, iterations, same) = found
     assert 0.8 * every <= fewer <= 1.05 * every
-    assert iterations <= most + 2
+    assert iterations <= most + 3  # with 4 to 6 % fewer vectors: 2 or 3 more on meshes of 0.95 to 1.1 times the size
     assert np.abs(np.subtract(same, stress)).max() < 1e-7 * np.abs(stress).max()
