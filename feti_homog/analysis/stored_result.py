@@ -26,7 +26,7 @@ def read(directory: Path) -> dict[str, Any]:
 
 
 def check_to_draw(directory: Path) -> None:
-    """Check that the fields of `directory` are those of its result.json; alone they can be drawn too.  Call on one rank.
+    """Check that the fields of `directory` are those of its result.json; they may stand alone.  Call on one rank.
 
     Raises:
         CaseError: result.h5 is missing, or one of both is damaged, or of another program or run.
