@@ -167,7 +167,7 @@ def _plot(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.common.mpi_errors import on_root_only
     from feti_homog.output.plots import figures
 
-    on_root_only(comm, stored_result.read, arguments.directory)
+    on_root_only(comm, stored_result.check_to_draw, arguments.directory)
     paths = on_root_only(comm, figures.plot, arguments.directory)
     if paths == []:
         say(f"{arguments.directory}: nothing to draw: its case has no fields, and no points of an angle or path")

@@ -25,6 +25,18 @@ def read(directory: Path) -> dict[str, Any]:
     return document
 
 
+def check_to_draw(directory: Path) -> None:
+    """Check that the fields of `directory` are those of its result.json; they may stand alone.  Call on one rank.
+
+    Raises:
+        CaseError: result.h5 is missing, or one of both is damaged, or of another program or run.
+    """
+    if (directory / result_json.NAME).exists():
+        read(directory)
+    elif not (directory / field_file.NAME).is_file():
+        raise CaseError(f"cannot read {directory / field_file.NAME}: No such file or directory")
+
+
 def finished(directory: Path, case: Case) -> bool:
     """Whether `directory` has the whole result of this case and no checkpoint of a later run.  Call on one rank.
 

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 # Elements that are meshed on one rank in some minutes, and how many there are about a fibre of a random cell.
 MAX_TRIANGLES, TRIANGLES_OF_A_FIBRE = 1_000_000, 160
+# Radius / width of the cell above which positions on a circle differ by more than rounding.
+SMALLEST_RADIUS = 1e-6
 NO_MARKS: Mapping[int, Sequence[float]] = MappingProxyType({})
 FRONTAL_DELAUNAY = 6
 # Decimals of the coordinates that gmsh is given. The last bits of the outline's differ from machine to machine, and
@@ -47,6 +49,11 @@ def generate(cell: Cell, marks: Mapping[int, Sequence[float]] = NO_MARKS) -> Coa
     """
     _refuse_extremes(cell)
     arrangement = arrange(cell)
+    if arrangement.radii.min() < SMALLEST_RADIUS * arrangement.width:
+        raise MeshError(
+            f"[cell] fibre_fraction = {cell.fibre_fraction}: a fibre has a radius of {arrangement.radii.min():.2g}; "
+            f"expected at least {SMALLEST_RADIUS} of the width of the cell"
+        )
     lines = outline(arrangement, cell.mesh_size * arrangement.width, marks)
     points, triangles, circle = _fill(lines, cell.mesh_size * arrangement.width)
     phase = (circle != MATRIX).astype(np.int32)

@@ -100,7 +100,10 @@ DAMAGES = {
     "no table": (lambda out: (out / "result.json").write_text("[]"), "no table"),
 }
 OF_PLOT = {
-    "no result.json": (lambda out: (out / "result.json").unlink(), "cannot read"),
+    "neither": (
+        lambda out: [(out / name).unlink() for name in ("result.json", "result.h5")],
+        "No such file or directory",
+    ),
     "result.json is a folder": (lambda out: gone(out / "result.json"), "Is a directory"),
     "no result.h5": (lambda out: (out / "result.h5").unlink(), "result.h5: it is missing"),
     "result.h5 is a folder": (lambda out: gone(out / "result.h5"), "result.h5: it is missing"),
@@ -110,7 +113,7 @@ OF_PLOT = {
     ),
     "no folder": (shutil.rmtree, "No such file or directory"),
     "unfinished": (
-        lambda out: (out / "result.json").rename(out / "result.json.vm.1.part"),
+        lambda out: [(out / name).rename(out / f"{name}.vm.1.part") for name in ("result.json", "result.h5")],
         "No such file or directory",
     ),
 }

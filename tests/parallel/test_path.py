@@ -102,7 +102,7 @@ def test_events_of_later_legs_are_those_of_small_steps_and_bisection(comm, built
 
 
 def test_debonding_begins_at_the_load_of_the_series_solution(comm):
-    cell = torn_cells.tear(comm, geometry="square", order=2, mesh_size=0.06, refine=1)
+    cell = torn_cells.tear(comm, geometry="square", order=2, mesh_size=0.07, refine=1)
     interface = torn_cells.interface(cell, True)
     first = next(
         events(interface, StrengthCriterion(0.1, 0.1, "max"), np.eye(3)[:1], unloaded(interface, bonded_status(cell)))

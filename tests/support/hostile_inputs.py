@@ -80,6 +80,8 @@ CASES: dict[str, tuple[str, str]] = {
         "fibres = 100000: about 1.6e+07 elements before refine; expected at most 1000000",
     ),
     "fibres that nearly touch": (fraction("0.90689968"), "the lines of the cell need about "),
+    "fibres of no size": (fraction("1e-99"), "a fibre has a radius of 1.7e-50; expected at least 1e-06 of the width"),
+    "tables without end": ("a." * 2000 + "b = 1\n", "nested more than 50 deep"),
     "arc of no node": (
         arc("{fibre = 1, angle = 0.05}"),
         "[interface] debonded[0]: no node of fibre 1 is within the arc of 0.05 degrees",
