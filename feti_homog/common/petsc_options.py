@@ -18,6 +18,9 @@ from feti_homog.common.petsc_option_table import (
 from feti_homog.common.petsc_option_values import Value, faulty_values, flag_value, is_flag
 from feti_homog.errors import CaseError
 
+# Flags that newer PETSc takes for set where they are not there.
+TRUE_BY_DEFAULT = ("options_left",)
+
 # Options that PETSc looks for only in KSPSolve.
 READ_WHEN_SOLVING = {
     f"feti_ksp_{name}" for name in ("converged_reason", "converged_rate", "view", "view_final_residual")
@@ -51,9 +54,11 @@ def case_options(options: Mapping[str, Value]) -> Iterator[None]:
 
 
 def _set(database: PETSc.Options, name: str, value: Value) -> None:
-    """Set an option; PETSc knows no flags that are true or false, but such as are there or not."""
+    """Set an option; PETSc knows no flags that are true or false, but such as are there or not, save one."""
     kept = flag_value(value) if is_flag(name) else value
-    if kept is None:
+    if kept is None and name in TRUE_BY_DEFAULT:
+        database.setValue(name, "no")
+    elif kept is None:
         database.delValue(name)
     else:
         database.setValue(name, None if kept == "" else kept)

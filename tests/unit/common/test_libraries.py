@@ -7,8 +7,10 @@ import subprocess
 import sys
 
 import pytest
+from petsc4py import PETSc
 
 from feti_homog.common.libraries import DEBIAN_MODULES, petsc4py_advice
+from feti_homog.common.petsc_options import case_options
 from feti_homog.errors import EXIT_DONE, EXIT_INPUT
 
 MISSING = "raise ModuleNotFoundError(f'No module named {__name__!r}', name=__name__)"
@@ -72,3 +74,13 @@ def test_petsc_lists_options_that_nobody_read_only_if_asked(asked):
     job = subprocess.run([sys.executable, "-m", "feti_homog", *words], capture_output=True, text=True, timeout=60)
     assert job.returncode == EXIT_DONE
     assert ("name:-feti_pc_type" in job.stdout) == asked
+
+
+def test_a_case_leaves_the_list_switched_off():
+    database = PETSc.Options()
+    database.setValue("options_left", "no")
+    try:
+        with case_options({}):
+            assert database.getString("options_left") == "no"
+    finally:
+        database.delValue("options_left")
