@@ -13,7 +13,9 @@ LAUNCHER_VARIABLES = ("OMPI_", "PMIX_", "ORTE_", "PMI_")
 RUN_VARIABLES = {
     "OMPI_ALLOW_RUN_AS_ROOT": "1",
     "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
-    "OMPI_MCA_btl_vader_single_copy_mechanism": "none",
+    "OMPI_MCA_btl_vader_single_copy_mechanism": "none",  # Open MPI 4
+    "OMPI_MCA_smsc": "^cma",  # the same of Open MPI 5
+    "OMPI_MCA_btl_tcp_if_include": "lo",  # which complains of networks that lead nowhere
     "OMPI_MCA_mpi_yield_when_idle": "1",  # jobs share the cores
     "OMP_NUM_THREADS": "1",
     "H5PY_ALWAYS_USE_MPI": "1",
