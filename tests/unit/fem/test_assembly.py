@@ -21,7 +21,7 @@ LATTICES = [(0, 1), (2, 1), (0, 2), (1, 2)]
 
 @pytest.fixture(scope="module")
 def torus():
-    cell = SimpleNamespace(geometry="hexagonal", fibre_fraction=0.5, mesh_size=0.25)
+    cell = SimpleNamespace(geometry="hexagonal", fibre_fraction=0.5, mesh_size=0.25, fibres=None)
     return Torus.of(generate(cell))
 
 
