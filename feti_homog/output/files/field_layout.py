@@ -13,7 +13,7 @@ from typing import Any
 
 from feti_homog.common.records import LENGTH, STRESS, Description, described, descriptions, type_words
 from feti_homog.mechanics.voigt import STRAINS, STRESSES
-from feti_homog.output.files.field_views import VIEWS
+from feti_homog.output.files.field_views import GROUP_OF_STATES, VIEWS
 from feti_homog.typing import AnyInt, Float, Float32
 
 PROGRAM = "feti_homog"
@@ -127,7 +127,6 @@ class StatePart:
     status: AnyInt = described("0 bonded, 1 closed (debonded, in contact), 2 open", shape="(k,)", dtype="int8")
 
 
-GROUP_OF_STATES = "state/K"
 GROUPS = {"mesh": MeshPart, "fibre": FibrePart, "interface": InterfacePart, GROUP_OF_STATES: StatePart}
 
 

@@ -7,9 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
+
+import h5py
+import numpy as np
 
 from feti_homog.mechanics.voigt import STRESSES
 
+GROUP_OF_STATES = "state/K"
 WHOLE = -1  # instead of a column: all of a dataset that has none
 
 
@@ -66,7 +71,7 @@ PAIRS = [(f"{source}_{name}", source, column) for source in ("traction", "jump")
 # The views of each group; those of /state/K are made for every state.
 VIEWS: dict[str, tuple[View, ...]] = {
     "interface": (_vector("normal"),),
-    "state/K": (
+    GROUP_OF_STATES: (
         _vector("displacement"),
         _vector("fluctuation"),
         _tensor("stress", "stress", STRESS_TENSOR),
@@ -75,3 +80,46 @@ VIEWS: dict[str, tuple[View, ...]] = {
         *(_column(*pair) for pair in PAIRS),
     ),
 }
+
+BYTES = 1 << 12  # that a view takes at most (a tensor of 9 columns: 1.7 KB)
+
+
+def add_views(file: Any) -> None:
+    """Makes the views of all groups of an open file whose tables are complete; empty tables have none."""
+    for group, view in _views_of(file):
+        _add_view(file, view, group)
+
+
+def bytes_of_views(file: Any) -> int:
+    """Space that `add_views` takes at most."""
+    return BYTES * (1 + len(_views_of(file)))
+
+
+def _views_of(file: Any) -> list[tuple[str, View]]:
+    """Group and view of all that the tables of the file allow."""
+    groups = {"interface": VIEWS["interface"]} | {
+        f"state/{number}": VIEWS[GROUP_OF_STATES] for number in sorted(file.get("state", ()), key=int)
+    }
+    return [(group, view) for group, views in groups.items() for view in views if _has_rows(file[group], view)]
+
+
+def _has_rows(group: Any, view: View) -> bool:
+    """Whether the tables that a view shows are there, and not empty."""
+    names = {name for name, _ in view.columns.values()} | {view.source}
+    return names <= group.keys() and len(group[view.source]) > 0
+
+
+def _add_view(file: Any, view: View, group: str) -> None:
+    """Makes one virtual dataset over the tables of a group, with the unit of its source."""
+    original = file[f"{group}/{view.source}"]
+    rows = len(original)
+    shape = (rows, view.components) if view.components else (rows,)
+    layout = h5py.VirtualLayout(shape, original.dtype)
+    for place, (name, column) in view.columns.items():
+        table = file[f"{group}/{name}"]
+        source = h5py.VirtualSource(".", table.name, shape=table.shape, dtype=table.dtype)
+        own: Any = (slice(None), place) if view.components else slice(None)
+        layout[own] = source if column == WHOLE else source[:, column]
+    dataset = file.create_virtual_dataset(view.path(group), layout, np.zeros((), layout.dtype)[()])
+    dataset.attrs["meaning"] = view.words
+    dataset.attrs["unit"] = original.attrs["unit"]
