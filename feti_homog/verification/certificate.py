@@ -11,6 +11,7 @@ import numpy as np
 
 from feti_homog.errors import CaseError
 from feti_homog.verification.arc_laws import check_arcs
+from feti_homog.verification.derived_laws import check_derived
 from feti_homog.verification.discrete_cell import DiscreteCell
 from feti_homog.verification.field_laws import check_fields
 from feti_homog.verification.interface_laws import check_interface_state
@@ -83,6 +84,7 @@ def _verified(files: ResultFiles) -> Certificate:
         ledger.record("numbers", [np.count_nonzero(~np.isfinite(array)) for array in arrays], state.name)
         fields = cell.elements.fields(state.displacement)
         check_fields(ledger, cell, state, fields)
+        check_derived(ledger, cell, state, fields)
         check_interface_state(ledger, cell, state)
         states.append(StateNumbers.of(cell, state, fields))
     check_load(ledger, cell, states)

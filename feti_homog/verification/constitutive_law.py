@@ -19,14 +19,42 @@ def plane_stiffnesses(case: Mapping[str, Any], phases: Sequence[str]) -> Float:
     Raises:
         CaseError: a phase of the mesh has no material in the case.
     """
-    materials, plane = case["material"], case["analysis"]["plane"]
-    found = []
-    for phase in phases:
-        constants = materials.get(phase, materials.get(phase.partition(":")[0]))
-        if constants is None:
-            raise CaseError(f"result.json: its case has no material for the phase {phase} of result.h5")
-        found.append(_plane_stiffness(constants, plane))
-    return np.stack(found)
+    return np.stack([_plane_stiffness(_constants(case, phase), case["analysis"]["plane"]) for phase in phases])
+
+
+def out_of_plane(case: Mapping[str, Any], phases: Sequence[str]) -> Float:
+    """(phases, 2, 3) matrices that turn [S11, S22, S12] into [S33, E33]; NaN where the constants do not say it.
+
+    Raises:
+        CaseError: a phase of the mesh has no material in the case.
+    """
+    return np.stack([_out_of_plane(_constants(case, phase), case["analysis"]["plane"]) for phase in phases])
+
+
+def _constants(case: Mapping[str, Any], phase: str) -> Mapping[str, Any]:
+    materials = case["material"]
+    constants = materials.get(phase, materials.get(phase.partition(":")[0]))
+    if constants is None:
+        raise CaseError(f"result.json: its case has no material for the phase {phase} of result.h5")
+    found: Mapping[str, Any] = constants
+    return found
+
+
+def _out_of_plane(constants: Mapping[str, Any], plane: str) -> Float:
+    """E33 = s13 S11' + s23 S22' + s33 S33 with the stresses in the material axes; one of S33 and E33 is 0."""
+    wanted = {"young": ("poisson",), "E1": ("nu13", "nu23", *(["E3"] if plane == "strain" else []))}
+    form = next((name for name in wanted if name in constants), None)
+    if form is None or any(constants.get(name) is None for name in wanted[form]):
+        rule = np.full(3, np.nan)
+    else:
+        compliance = _compliance(constants)
+        share = compliance[2, 2] if plane == "strain" else -1.0
+        angle = np.radians(float(constants.get("angle", 0.0)))
+        axes = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+        # S11' = a S a with a the first axis; [S11, S22, S12] has S12 once.
+        rule = -np.array([[a[0] ** 2, a[1] ** 2, 2 * a[0] * a[1]] for a in axes]).T @ compliance[2, :2] / share
+    nothing = np.zeros(3)
+    return np.stack([rule, nothing] if plane == "strain" else [nothing, rule])
 
 
 def _plane_stiffness(constants: Mapping[str, Any], plane: str) -> Float:

@@ -35,6 +35,9 @@ def laws(rtol: float, users_mesh: bool) -> tuple[Law, ...]:
         Law("arcs", "debonded from the start is what the case says, in numbers of nodes", 0.0),
         Law("displacement", "u = E x + u*, relative to its terms", 1e-13),
         Law("stress", "stresses of the elements follow from u and the case's materials", 1e-13),
+        Law("stress 33", "stresses out of the plane follow from those in it and the case's materials", 1e-13),
+        Law("shown", "strains, von Mises and principal stresses follow from these, in single precision", 3e-7),
+        Law("vectors", "vectors and the faces' displacements follow from tractions, jumps and displacements", 1e-13),
         Law("periodicity", "u* is the same at the copies of a node in its subdomain, relative to the largest u", 1e-13),
         Law("continuity", "u* is the same where subdomains are glued, relative to the largest u", solver),
         Law(

@@ -17,6 +17,13 @@ from feti_homog.typing import AnyInt, Float, Int
 
 JSON, FIELDS = "result.json", "result.h5"
 SCHEMA = 1
+# Tables of a state that are there to be looked at: rows of elements or of interface nodes, and columns.
+DERIVED: dict[str, tuple[Any, ...]] = {
+    "stress_33": ("m",), "element_strain": ("m", 4), "von_mises": ("m",),
+    "principal_1": ("m",), "principal_2": ("m",), "principal_3": ("m",),
+    "traction_vector": ("k", 3), "jump_vector": ("k", 3),
+    "displacement_fibre": ("k", 3), "displacement_matrix": ("k", 3),
+}  # fmt: skip
 MISSING_FIELDS = "only a run with `fields = true` in [output] leaves what there is to verify"
 
 
@@ -71,6 +78,7 @@ class State:
         stress: (m, 3) means over the elements.
         traction, jump: (k, 2) normal and tangential.
         status: (k,) 0 bonded, 1 closed, 2 open.
+        derived: the tables of `DERIVED`, which follow from those above.
     """
 
     name: str
@@ -83,6 +91,7 @@ class State:
     traction: Float
     jump: Float
     status: AnyInt
+    derived: Mapping[str, Float]
 
 
 @dataclass(frozen=True)
@@ -93,6 +102,7 @@ class ResultFiles:
         document: result.json.
         size: (2,) width and height of the cell.
         phases: names of the phases, the matrix first.
+        faces: (k, 2) a node of the mesh on each face of the interface nodes, fibre and matrix.
     """
 
     document: Mapping[str, Any]
@@ -101,6 +111,7 @@ class ResultFiles:
     mesh: Mesh
     interface: InterfaceRows
     fibres: Fibres
+    faces: Int
     file: h5py.File
 
     @property
@@ -122,15 +133,24 @@ class ResultFiles:
 
     def _state(self, number: int) -> State:
         group = self.file[f"state/{number}"]
-        names = ("displacement", "fluctuation", "stress", "traction", "jump", "status")
-        arrays = {name: _rows(group[name]) for name in names}
+        n, m, k = len(self.mesh.points), len(self.mesh.triangles), len(self.interface.points)
+        basic = {
+            "displacement": (n, 2), "fluctuation": (n, 2), "stress": (m, 3),
+            "traction": (k, 2), "jump": (k, 2), "status": (k,),
+        }  # fmt: skip
+        derived = {name: (m if of == "m" else k, *columns) for name, (of, *columns) in DERIVED.items()}
+        arrays, others = (
+            {name: self._table(number, name, shape) for name, shape in shapes.items()} for shapes in (basic, derived)
+        )
         strain, mean = (np.array(group.attrs[name], float) for name in ("strain", "stress"))
         label, factor = str(group.attrs["label"]), float(group.attrs["load_factor"])
-        n, m, k = len(self.mesh.points), len(self.mesh.triangles), len(self.interface.points)
-        wanted = ((n, 2), (n, 2), (m, 3), (k, 2), (k, 2), (k,))
-        for (name, array), shape in zip(arrays.items(), wanted, strict=True):
-            _expect(array.shape == shape, f"/state/{number}/{name} has shape {array.shape}, expected {shape}")
-        return State(f"state {number} ({label})", strain, mean, factor, **arrays)
+        return State(f"state {number} ({label})", strain, mean, factor, **arrays, derived=others)
+
+    def _table(self, number: int, name: str, shape: tuple[int, ...]) -> Any:
+        """A table of a state, of the shape that it must have."""
+        array = _rows(self.file[f"state/{number}/{name}"])
+        _expect(array.shape == shape, f"/state/{number}/{name} has shape {array.shape}, expected {shape}")
+        return array
 
 
 @contextmanager
@@ -165,6 +185,7 @@ def _contents(document: Mapping[str, Any], file: h5py.File) -> ResultFiles:
     mesh = Mesh(*(_rows(file[f"mesh/{name}"]) for name in ("points", "triangles", "subdomain", "phase")))
     rows = InterfaceRows(*(_rows(file[f"interface/{name}"]) for name in ("points", "normal", "length", "fibre_number")))
     fibres = Fibres(*(_rows(file[f"fibre/{name}"]) for name in ("centre", "radius")))
+    faces = np.stack([_rows(file[f"interface/{name}"]) for name in ("fibre_node", "matrix_node")], axis=1)
     size = np.array([file.attrs["width"], file.attrs["height"]], float)
     phases = tuple(map(str, file.attrs["phases"]))
     n, m, k = len(mesh.points), len(mesh.triangles), len(rows.points)
@@ -176,9 +197,11 @@ def _contents(document: Mapping[str, Any], file: h5py.File) -> ResultFiles:
     _expect(rows.points.shape == rows.normal.shape == (k, 2), "/interface has tables of different lengths")
     _expect(rows.length.shape == rows.fibre.shape == (k,), "/interface has tables of different lengths")
     _expect(fibres.centre.shape == (len(fibres.radius), 2), "/fibre has tables of different lengths")
+    _expect(faces.shape == (k, 2), "/interface has tables of different lengths")
+    _expect(bool((faces >= 0).all() and (faces < n).all()), "/interface names unknown nodes")
     within = (rows.fibre >= 1) & (rows.fibre <= len(fibres.radius))
     _expect(bool(within.all()), "/interface/fibre_number names unknown fibres")
-    return ResultFiles(document, size, phases, mesh, rows, fibres, file)
+    return ResultFiles(document, size, phases, mesh, rows, fibres, faces, file)
 
 
 def _rows(table: h5py.Dataset) -> Any:
