@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from figures import EQUATION_38
+from figures import EQUATION_38, add_output_options, written
 from mpi4py.MPI import Intracomm
 
 from feti_homog import Case, launch, run
@@ -57,7 +57,7 @@ def stiffness(arguments: argparse.Namespace, comm: Intracomm, geometry: str, pla
         },
         "material": EQUATION_38,
         "analysis": {"type": "stiffness", "plane": plane},
-        "output": {"fields": arguments.fields, "pictures": arguments.fields, "stress_unit": "GPa"},
+        "output": written(arguments),
     }  # fmt: skip
     return run(Case.parse(document), comm, out=arguments.out / name).effective_stiffness
 
@@ -86,7 +86,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--refine", type=int, default=1)
     parser.add_argument("--order", type=int, choices=(1, 2), default=2)
     parser.add_argument("--fractions", type=float, nargs="*", default=[0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7])
-    parser.add_argument("--fields", action="store_true", help="write fields and pictures of every case")
+    add_output_options(parser)
     return parser
 
 

@@ -26,9 +26,20 @@ def parser(description: str, name: str, mesh_size: float, refine: int, order: in
     options.add_argument("--refine", type=int, default=refine, help="times that every element is cut in four")
     options.add_argument("--order", type=int, default=order, choices=(1, 2), help="of the elements; 2 are curved")
     options.add_argument("--fibre-fraction", type=float, default=0.4)
-    options.add_argument("--fields", action="store_true", help="write fields and pictures of every case")
+    add_output_options(options)
     options.add_argument("--quick", action="store_true", help="a coarse mesh and few points")
     return options
+
+
+def add_output_options(options: argparse.ArgumentParser) -> None:
+    """What is written of every case besides its numbers."""
+    options.add_argument("--fields", action="store_true", help="write the fields of every case")
+    options.add_argument("--pictures", action="store_true", help="draw every case, and write its fields")
+
+
+def written(options: argparse.Namespace) -> dict[str, Any]:
+    """The section [output] that these options ask for."""
+    return {"stress_unit": "GPa", "fields": options.fields or options.pictures, "pictures": options.pictures}
 
 
 def solved(
@@ -48,7 +59,7 @@ def solved(
         "refine": 0 if options.quick else options.refine,
         "order": options.order,
     }
-    output = {"stress_unit": "GPa", "fields": options.fields, "pictures": options.fields} | rest.pop("output", {})
+    output = written(options) | rest.pop("output", {})
     case = Case.parse({"name": name, "cell": cell, "material": dict(material), "output": output, **rest})
     return run(case, comm, out=options.out / name.replace(" ", "_"), fields=keep_fields)
 

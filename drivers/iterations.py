@@ -29,7 +29,7 @@ def main(arguments: argparse.Namespace, comm: Intracomm) -> None:
             "material": EQUATION_38,
             "analysis": {"type": "stiffness", "plane": "strain"},
             "decomposition": {"subdomains": 1},
-            "output": {"fields": False, "pictures": False},
+            "output": {"fields": arguments.fields, "pictures": False},
             "petsc": {"feti_ksp_rtol": 1e-10},
         }  # fmt: skip
         start = time.perf_counter()
@@ -46,6 +46,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--mesh-size", type=float, default=0.062, help="coarse element size / cell width")
     parser.add_argument("--refine", type=int, nargs="+", default=[1, 2, 3])
     parser.add_argument("--order", type=int, choices=(1, 2), default=1)
+    parser.add_argument("--fields", action="store_true", help="write the fields of every case")
     parser.add_argument("--bodies", choices=("torus", "plane"), default="torus")
     return parser
 

@@ -7,16 +7,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from figures import EQUATION_38
+from figures import EQUATION_38, add_output_options, written
 from mpi4py.MPI import Intracomm
 
 from feti_homog import collect_sweep, run_sweep
 
-STIFFNESS = {
-    "material": EQUATION_38,
-    "analysis": {"type": "stiffness", "plane": "strain"},
-    "output": {"fields": False, "pictures": False, "stress_unit": "GPa"},
-}
+STIFFNESS = {"material": EQUATION_38, "analysis": {"type": "stiffness", "plane": "strain"}}
 
 
 def parser(description: str, name: str) -> argparse.ArgumentParser:
@@ -26,6 +22,7 @@ def parser(description: str, name: str) -> argparse.ArgumentParser:
     options.add_argument("--refine", type=int, default=0, help="times that every element is cut in four")
     options.add_argument("--order", type=int, choices=(1, 2), default=2, help="of the elements; 2 are curved")
     options.add_argument("--ranks-per-case", type=int, metavar="R", help="by default all")
+    add_output_options(options)
     options.add_argument("--quiet", action="store_true", help="do not tell of every case")
     return options
 
@@ -34,6 +31,7 @@ def swept(
     given: argparse.Namespace, comm: Intracomm, document: dict[str, Any], report: Callable[[Any], list[str]]
 ) -> None:
     """Run the sweep, print the report of its table, and draw."""
+    document["output"] = written(given)
     table = run_sweep(document, given.out, comm, ranks_per_case=given.ranks_per_case, retry=True, quiet=given.quiet)
     lines = [*report(table), *collect_sweep(given.out, comm)]
     if comm.rank == 0:

@@ -27,7 +27,7 @@ class ElementFields:
 
     Attributes:
         strain, stress: (m, 3) means.
-        strain_size: (m,) sum |u_a| |dN_a/dx|, of whose rounding the strain has its share.
+        strain_size: (m,) sum t_a |dN_a/dx| with the terms t of u, of whose rounding the strain has its share.
         force: (n, 2) int B^T sigma, what the elements of a node resist with.
         force_size: the largest sum of |dN/dx| |L| strain_size over the elements of a node, of whose rounding the forces
             have their share: large where a phase is far stiffer than it is strained.
@@ -69,8 +69,8 @@ class Elements:
             _add(sums, self._mesh.triangles[part], np.einsum("eqad,eq->ead", gradients, weights))
         return sums
 
-    def fields(self, displacement: Float) -> ElementFields:
-        """Strains, stresses, forces and energy of the displacements (n, 2)."""
+    def fields(self, displacement: Float, terms_of_u: Float) -> ElementFields:
+        """Strains, stresses, forces and energy of the displacements (n, 2), sums of terms of these sizes (n, 2)."""
         m = len(self._mesh.triangles)
         strain, stress, size = np.empty((m, 3)), np.empty((m, 3)), np.empty(m)
         force, terms, largest, energy = np.zeros_like(displacement), np.zeros_like(displacement), 0.0, 0.0
@@ -81,7 +81,7 @@ class Elements:
             local = np.stack([slope[..., 0, 0], slope[..., 1, 1], slope[..., 0, 1] + slope[..., 1, 0]], axis=2)
             answer = np.einsum("eij,eqj->eqi", self._stiffnesses[self._mesh.phase[part]], local)
             strain[part], stress[part] = (np.einsum("eqi,eq->ei", field, share) for field in (local, answer))
-            size[part] = np.einsum("eqad,eai->eq", np.abs(gradients), np.abs(u)).max(axis=1)
+            size[part] = np.einsum("eqad,eai->eq", np.abs(gradients), terms_of_u[nodes]).max(axis=1)
             tensor = answer[..., [0, 2, 2, 1]].reshape(*answer.shape[:2], 2, 2)
             own = np.einsum("eqad,eqid,eq->eai", gradients, tensor, weights, optimize=True)
             _add(force, nodes, own)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 from reference.references import BONDED
-from support.command_line import assert_verified, case_file, command_line
+from support.command_line import case_file, command_line
 
 import feti_homog.output  # noqa: F401 (chooses the build of h5py)
 
@@ -62,7 +62,7 @@ def test_run_writes_every_file_at_any_number_of_ranks(tmp_path, ranks):
     assert_document(json.loads((out / "result.json").read_text()), max(ranks, 1))
     assert_fields(out)
     assert_pictures(out)
-    assert_verified(out)
+    assert command_line(0, "verify", out).returncode == 0
 
 
 def assert_document(document, ranks):

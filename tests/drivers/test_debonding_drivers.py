@@ -32,7 +32,7 @@ def column(rows: list[dict[str, str]], name: str) -> np.ndarray:
 
 
 def test_stiffness_falls_with_the_angle_from_bonded_to_void(tmp_path):
-    rows = driven("debonding_angle", tmp_path)
+    rows = driven("debonding_angle", tmp_path, "--fields")
     assert column(rows, "angle").tolist() == [0.0, 90.0, 180.0, 270.0, 360.0]
     for entry in ("C11", "C22", "C33"):
         strain, stress = column(rows, f"{entry} plane strain"), column(rows, f"{entry} plane stress")
@@ -46,6 +46,7 @@ def test_stiffness_falls_with_the_angle_from_bonded_to_void(tmp_path):
     assert contact[0] == pytest.approx(free[0]) == pytest.approx(0.2 * BONDED[2], rel=0.02)
     # Faces that meet under shear push the cell apart.
     assert (column(rows, "S11 with contact")[2:] < -0.1).all() and (column(rows, "S22 with contact")[2:] < -0.1).all()
+    assert_verified(*(path.parent for path in tmp_path.glob("*/result.h5")))
 
 
 def test_contact_prevents_overlap_and_stiffens(tmp_path):
@@ -61,7 +62,7 @@ def test_contact_prevents_overlap_and_stiffens(tmp_path):
 def stress_strain(tmp_path_factory):
     """The folder and the table of the driver of Figure 5, with the pictures of its cases."""
     folder = tmp_path_factory.mktemp("stress_strain")
-    return folder, driven("stress_strain", folder, "--fields")
+    return folder, driven("stress_strain", folder, "--pictures")
 
 
 def test_onset_is_proportional_to_strength_and_no_point_is_above_the_bonded_line(stress_strain):

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 from reference.references import BONDED
+from support.command_line import assert_verified
 from support.jobs import ROOT, mpirun
 from support.sweep_files import rows
 
@@ -19,7 +20,7 @@ def driven(name, folder, *options):
 
 
 def test_fibre_fraction_sweep_reaches_the_references(tmp_path):
-    options = ("--fractions", "0.2", "0.4", "--fibres", "6", "--realisations", "3", "--mesh-size", "0.25")
+    options = ("--fractions", "0.2", "0.4", "--fibres", "6", "--realisations", "3", "--mesh-size", "0.25", "--fields")
     output = driven("fibre_fraction_sweep", tmp_path, *options)
     found = {
         (m[1], float(m[2])): [float(x) for x in m[3].split()]
@@ -31,11 +32,15 @@ def test_fibre_fraction_sweep_reaches_the_references(tmp_path):
     assert found["hexagonal", 0.2][3] < 1e-3 < 1e-2 < found["square", 0.2][3]
     assert all(output.count(str(tmp_path / name)) == 1 for name in ("sweep.csv", "moduli.png"))
     assert imread(tmp_path / "moduli.png")[..., :3].std() > 0.05
+    results = [path.parent for path in tmp_path.rglob("result.h5")]
+    assert len(results) == 10
+    assert_verified(*results)
     assert driven("fibre_fraction_sweep", tmp_path, *options) == output
 
 
 def test_representative_cell_prints_what_scatters(tmp_path):
-    output = driven("representative_cell", tmp_path, "--fibres", "2", "8", "--realisations", "4", "--tolerance", "0.5")
+    options = ("--fibres", "2", "8", "--realisations", "4", "--tolerance", "0.5", "--fields")
+    output = driven("representative_cell", tmp_path, *options)
     lines = re.findall(r"^ +\d+ +\d+\..*$", output, re.MULTILINE)
     table = np.array([[float(x) for x in line.split()] for line in lines])
     assert table.shape == (2, 10) and table[:, 0].tolist() == [2, 8]
@@ -43,5 +48,6 @@ def test_representative_cell_prints_what_scatters(tmp_path):
     assert "one cell scatters by less than 50 %: from 2 fibres on" in output
     assert output.count("C11 - C22 = ") == output.count("bulk between ") == 2
     assert imread(tmp_path / "cell_size.png")[..., :3].std() > 0.02
+    assert_verified(*(path.parent for path in tmp_path.rglob("result.h5")))
     means = [row for row in rows(tmp_path) if row["row"] == "mean"]
     assert [float(row["bulk (GPa)"]) for row in means] == pytest.approx(table[:, 4], rel=1e-4)

@@ -216,6 +216,6 @@ def test_displacements_that_fit_their_stresses_break_equilibrium_alone(results, 
         displacement = state.fluctuation + cell.files.mesh.points @ tensor(state.strain)
         for name in ("fluctuation", "displacement", "stress"):
             fields = {"fluctuation": state.fluctuation, "displacement": displacement}
-            file[f"state/0/{name}"][()] = fields.get(name, cell.elements.fields(displacement).stress)
+            file[f"state/0/{name}"][()] = fields.get(name, cell.elements.fields(displacement, displacement).stress)
 
     assert broken(falsified(results("bonded"), tmp_path / "copy", edit)) - {"stress 33", "shown"} == {"equilibrium"}
