@@ -55,7 +55,7 @@ def test_a_run_that_is_killed_while_it_writes_goes_on(tmp_path):
         assert (out / "result.h5").exists() == (name in ("result.json", "path.csv"))
         assert (out / "result.json").exists() == (name == "path.csv")
         if name == "result.json":
-            refused = command_line(0, "plot", out)
+            refused = command_line(0, "verify", out)
             assert refused.returncode == 2 and refused.stderr.startswith(f"error: cannot read {out / 'result.json'}")
     job = command_line(2, "run", case, "--out", out, "--resume", timeout=100)
     assert job.returncode == 0 and f"{kept} events are taken from the checkpoint" in job.stdout, job.stderr
