@@ -17,8 +17,10 @@ from typing import TYPE_CHECKING, NoReturn
 
 from feti_homog import __version__
 from feti_homog.api import folder, parsed, start
+from feti_homog.common.command_words import split_argv
+from feti_homog.common.interrupts import launched_rank
 from feti_homog.common.petsc_option_table import help_text
-from feti_homog.common.standard_streams import complain, print_product, say
+from feti_homog.common.standard_streams import complain, prepare, print_product, say
 from feti_homog.errors import EXIT_DONE, EXIT_UNCONVERGED, CaseError, FetiHomogError
 
 if TYPE_CHECKING:
@@ -33,9 +35,8 @@ SWEEP_HELP = (
 VERIFY_HELP = (
     "Recompute stresses, equilibrium, periodicity, averages, contact, strengths and energies from result.json and "
     "result.h5, with elements of its own: one line a law, with its largest violation and the limit. Exit code 3 if a "
-    "law is broken. Needs neither MPI nor PETSc; of several ranks the first one does it."
+    "law is broken. Needs neither MPI nor PETSc; of several ranks each does all of it, and the first one prints."
 )
-LAUNCHED_RANKS = ("OMPI_COMM_WORLD_RANK", "PMI_RANK", "SLURM_PROCID")
 
 
 class Parser(argparse.ArgumentParser):
@@ -48,7 +49,8 @@ class Parser(argparse.ArgumentParser):
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command on all ranks, `verify` without MPI; returns the exit code of `errors`."""
     words = sys.argv[1:] if argv is None else list(argv)
-    return _verify(words) if words[:1] == ["verify"] else start(_command, words)
+    ours, _ = split_argv(words)
+    return _verify(ours) if ours[:1] == ["verify"] else start(_command, words)
 
 
 def _command(words: Sequence[str], comm: Intracomm) -> int:
@@ -194,17 +196,19 @@ def _written_report(directory: Path) -> Path:
 
 def _verify(words: Sequence[str]) -> int:
     """Print the certificate of a result; the exit code."""
-    if any(int(os.environ.get(name, "0")) for name in LAUNCHED_RANKS):
-        return EXIT_DONE
+    prepare()
+    prints = launched_rank() == 0
     os.environ.pop("H5PY_ALWAYS_USE_MPI", None)  # the serial h5py reads the files
     from feti_homog.verification.certificate import verify
 
     try:
         arguments = command_parser().parse_args(words)
         certificate = verify(arguments.directory)
-        print_product(json.dumps(certificate.document, indent=1) if arguments.json else certificate.text)
+        if prints:
+            print_product(json.dumps(certificate.document, indent=1) if arguments.json else certificate.text)
     except FetiHomogError as error:
-        complain(*(f"error: {fault}" for fault in error.faults))
+        if prints:
+            complain(*(f"error: {fault}" for fault in error.faults))
         return error.exit_code
     return EXIT_DONE if certificate.holds else EXIT_UNCONVERGED
 

@@ -131,7 +131,7 @@ class _States:
     def seal(self) -> FileSeal | None:
         """Complete the file; returns its seal, None without a file.  Collective."""
         self._write(FieldFile.close)
-        return None if self._file is None else file_seal.seal(self._file.path, self._cell.comm)
+        return None if self._file is None else on_root(self._cell.comm, file_seal.seal, self._file.path)
 
     def _write(self, write: Callable[[FieldFile], object]) -> None:
         """Do it to the file if there is one; if it cannot be written, which all ranks hear, there is none any more."""

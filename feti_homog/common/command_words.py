@@ -6,7 +6,7 @@ import os
 import re
 from collections.abc import Mapping, Sequence
 
-from feti_homog.common.petsc_option_values import flag_value, is_flag, is_flag_value
+from feti_homog.common.petsc_option_values import flag_value, is_flag, is_flag_value, is_own_flag
 
 OWN_SHORT = ("-h",)
 CASE_FILE = ".toml"
@@ -48,8 +48,11 @@ def named_values(words: Sequence[str]) -> dict[str, str]:
 
 
 def petsc_words(options: Mapping[str, str]) -> list[str]:
-    """The words of options by name without dash, with flags that are true or false there or not."""
-    kept = {name: flag_value(text) if is_flag(name) else text for name, text in options.items()}
+    """The words of options by name without dash, for PETSc's start: its own flags are there or not, true or false.
+
+    False flags of the solver stay, for a case may have them true.
+    """
+    kept = {name: flag_value(text) if is_own_flag(name) else text for name, text in options.items()}
     words = [(f"-{name}", text) for name, text in kept.items() if text is not None]
     return [word for pair in words for word in pair if word]
 

@@ -52,6 +52,11 @@ def is_flag(name: str) -> bool:
     return name in FLAGS or name in VIEWERS
 
 
+def is_own_flag(name: str) -> bool:
+    """Whether an option (name without dash) is a flag of PETSc itself, which it reads when it starts or ends."""
+    return is_flag(name) and not name.startswith("feti_")
+
+
 def is_flag_value(text: str) -> bool:
     """Whether a word after a flag is its value."""
     return SWITCH.holds(text) or VIEWER.fullmatch(text) is not None
@@ -85,7 +90,7 @@ def _names(known: list[str]) -> Rule:
 def _is_viewer(text: str) -> bool:
     """Whether the text says where to print, in a folder that exists."""
     match = VIEWER.fullmatch(text)
-    return match is not None and _can_be_written(match["file"] or "stdout")
+    return match is not None and (not match["file"] or _can_be_written(match["file"]))
 
 
 def _can_be_written(file: str) -> bool:

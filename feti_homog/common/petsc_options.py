@@ -15,11 +15,8 @@ from feti_homog.common.petsc_option_table import (
     unknown_options,
     without_prefix,
 )
-from feti_homog.common.petsc_option_values import Value, faulty_values, flag_value, is_flag
+from feti_homog.common.petsc_option_values import Value, faulty_values, flag_value, is_flag, is_own_flag
 from feti_homog.errors import CaseError
-
-# Flags that newer PETSc takes for set where they are not there.
-TRUE_BY_DEFAULT = ("options_left",)
 
 # Options that PETSc looks for only in KSPSolve.
 READ_WHEN_SOLVING = {
@@ -29,7 +26,9 @@ READ_WHEN_SOLVING = {
 
 @contextmanager
 def case_options(options: Mapping[str, Value]) -> Iterator[None]:
-    """Insert the options that the command line does not give, and remove them afterwards.
+    """Insert the options that the command line does not give, and take them out afterwards.
+
+    PETSc knows no flags that are true or false, but such as are there or not: false ones are taken out meanwhile.
 
     Raises:
         CaseError: before the block, if an option of ours is misspelt or has no such value, or a solver cannot be
@@ -41,27 +40,24 @@ def case_options(options: Mapping[str, Value]) -> Iterator[None]:
     faults = [*unknown_options(given), *without_prefix(given), *faulty_values(given)]
     if faults:
         raise CaseError(*faults)
-    own = {name: value for name, value in options.items() if name not in on_command_line}
-    for name, value in given.items():
-        if name in own or is_flag(name):
-            _set(database, name, value)
+    kept = {name: flag_value(value) if is_flag(name) else value for name, value in given.items()}
+    changed = [name for name in given if kept[name] != on_command_line.get(name) and not is_own_flag(name)]
     try:
+        for name in changed:
+            _set(database, name, kept[name])
         _refuse_early()
         yield
     finally:
-        for name in own:
-            database.delValue(name)
+        for name in changed:
+            _set(database, name, on_command_line.get(name))
 
 
-def _set(database: PETSc.Options, name: str, value: Value) -> None:
-    """Set an option; PETSc knows no flags that are true or false, but such as are there or not, save one."""
-    kept = flag_value(value) if is_flag(name) else value
-    if kept is None and name in TRUE_BY_DEFAULT:
-        database.setValue(name, "no")
-    elif kept is None:
+def _set(database: PETSc.Options, name: str, value: Value | None) -> None:
+    """Set an option, without a value if that is empty; None takes it out."""
+    if value is None:
         database.delValue(name)
     else:
-        database.setValue(name, None if kept == "" else kept)
+        database.setValue(name, None if value == "" else value)
 
 
 def _given() -> dict[str, str]:

@@ -13,7 +13,7 @@ from typing import Any
 from feti_homog.config.json_schema_rules import Schema, rules_of_one_case
 from feti_homog.config.material_sections import PHASE
 from feti_homog.config.materials import MATERIAL_FORMS
-from feti_homog.config.petsc_section import PREFIXED, WITHOUT_PREFIX
+from feti_homog.config.petsc_section import PREFIXED
 from feti_homog.config.schema import Key, defaults_of, keys_of
 from feti_homog.config.sections import SECTIONS, Arc
 from feti_homog.config.sweep_section import AXIS_MEANING, RANGE_KEYS, SWEEP, SweepSection
@@ -76,7 +76,7 @@ def _materials() -> Schema:
 
 def _petsc() -> Schema:
     value = {"type": ["string", "number", "boolean"]}
-    names = {f"^({PREFIXED}|{'|'.join(WITHOUT_PREFIX)})$": value}
+    names = {f"^{PREFIXED}$": value}
     return {"type": "object", "patternProperties": names, "additionalProperties": False}
 
 

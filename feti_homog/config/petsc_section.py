@@ -1,4 +1,7 @@
-"""Reading the section [petsc]: PETSc's options without their dash."""
+"""Reading the section [petsc]: PETSc's options of the solver without their dash.
+
+What PETSc itself takes, as -log_view, it reads when it starts and ends, which is on the command line alone.
+"""
 
 from __future__ import annotations
 
@@ -10,13 +13,6 @@ from feti_homog.config.wording import toml_key, toml_value
 Scalar = str | int | float | bool
 
 PREFIXED = r"feti_\w+"
-WITHOUT_PREFIX = (
-    "log_view", "log_view_memory", "log_trace", "options_left", "options_view", "malloc_debug", "malloc_view",
-    "malloc_dump", "memory_view", "on_error_abort", "fp_trap", "info",
-)  # fmt: skip
-"""PETSc's own options that a case may set."""
-
-
 OPTION_EXPECTED = "a text, a number, true or false"
 
 
@@ -36,8 +32,8 @@ def _option_fault(name: str, value: object) -> str:
     """What is wrong with an option, empty if nothing."""
     if name.startswith("-"):
         return "expected the option's name without its dash"
-    if not re.fullmatch(PREFIXED, name) and name not in WITHOUT_PREFIX:
-        return f"expected the prefix feti_, or one of {', '.join(WITHOUT_PREFIX)}"
+    if not re.fullmatch(PREFIXED, name):
+        return "expected the prefix feti_; PETSc's own options are for the command line"
     if not (isinstance(value, bool) or is_number(value) or text.accepts(value)):
         return f"expected {OPTION_EXPECTED}"
     return ""

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from feti_homog.config.materials import Isotropic
-from feti_homog.config.petsc_section import OPTION_EXPECTED, WITHOUT_PREFIX
+from feti_homog.config.petsc_section import OPTION_EXPECTED
 from feti_homog.config.schema import Key, keys_of
 from feti_homog.config.sections import SECTIONS_OF_AN_ANALYSIS
 from feti_homog.config.sweep_section import AXIS_EXPECTED, AXIS_MEANING, RANGE_KEYS, SWEEP, SweepSection
@@ -127,16 +127,13 @@ def _name_table() -> TableReference:
 
 
 def _petsc_table() -> TableReference:
-    def row(key: str, meaning: str) -> KeyRow:
-        return KeyRow("petsc", "[petsc]", key, OPTION_EXPECTED, "", "", "", meaning)
-
-    own = ", ".join(WITHOUT_PREFIX)
-    options = (
-        row("feti_OPTION", "An option of the solver, such as feti_ksp_rtol = 1e-10; `feti-homog options` lists them."),
-        row("OPTION", f"One of PETSc's own: {own}."),
+    words = "An option of the solver, such as feti_ksp_rtol = 1e-10; `feti-homog options` lists them."
+    option = KeyRow("petsc", "[petsc]", "feti_OPTION", OPTION_EXPECTED, "", "", "", words)
+    meaning = (
+        "PETSc's options without their dash. Those of the command line come first; PETSc's own, as -log_view, "
+        "belong there alone."
     )
-    meaning = "PETSc's options without their dash. Those of the command line come first."
-    return TableReference("petsc", "[petsc]", meaning, options)
+    return TableReference("petsc", "[petsc]", meaning, (option,))
 
 
 def _sweep_table() -> TableReference:

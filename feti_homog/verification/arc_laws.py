@@ -26,7 +26,7 @@ def check_arcs(ledger: Ledger, cell: DiscreteCell, states: Sequence[StateNumbers
     document, case = cell.files.document, cell.files.case
     arcs, from_mesh = case.get("interface", {}).get("debonded", ()), case["cell"]["geometry"] == "mesh"
     points = document.get("angle", ())
-    each = len(states) // len(points) if points else 1
+    each = max(1, len(states) // max(1, len(points)))  # a number that is wrong breaks the law of the load
     for number, state in enumerate(states):
         opening = points[min(number // each, len(points) - 1)]["angle"] if points else None
         inside, outside = _sides(cell, arcs, opening)

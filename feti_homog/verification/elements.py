@@ -58,7 +58,7 @@ class Elements:
     @cached_property
     def least_jacobian(self) -> Float:
         """(m,) least determinant at the quadrature points, relative to the mean one of the element."""
-        parts = [weights / weights.mean(axis=1)[:, None] * np.sign(weights.mean()) for _, _, weights in self._parts()]
+        parts = [weights / np.abs(weights.mean(axis=1))[:, None] for _, _, weights in self._parts()]
         return np.concatenate([part.min(axis=1) for part in parts])
 
     @cached_property
@@ -108,8 +108,12 @@ class Elements:
             # r_0 = 1 - r_1 - r_2, so the columns of the Jacobian are dx/dr_1 - dx/dr_0 and dx/dr_2 - dx/dr_0.
             free = slopes[:, :, 1:] - slopes[:, :, :1]
             jacobian = np.einsum("qas,ead->eqds", free, corners)
-            determinant = np.linalg.det(jacobian)
-            gradients = np.einsum("qas,eqsd->eqad", free, np.linalg.inv(jacobian))
+            (a, b), (c, d) = np.moveaxis(jacobian, (2, 3), (0, 1))
+            determinant = a * d - b * c
+            adjugate = np.moveaxis(np.array([[d, -b], [-c, a]]), (0, 1), (2, 3))
+            # Of an element without area nothing is finite, and every law says so.
+            inverse = adjugate / determinant[..., None, None]
+            gradients = np.einsum("qas,eqsd->eqad", free, inverse)
             yield part, gradients, determinant * shares / 2
 
 

@@ -29,6 +29,7 @@ def laws(rtol: float, users_mesh: bool) -> tuple[Law, ...]:
     solver = min(CHECK_PER_RTOL * rtol, LARGEST_CHECK)
     contact = min(max(CONTACT_PER_RTOL * rtol, LEAST_CONTACT), LARGEST_CHECK)
     return (
+        Law("files", "the files are those that the run wrote, by their checksums", 0.0),
         Law("numbers", "all numbers are finite", 0.0),
         Law("mesh", "elements have positive areas and fill the cell; torn sides meet in pairs", shape),
         Law("interface", "interface nodes are where one fibre meets the matrix, with its normals and lengths", shape),

@@ -99,7 +99,7 @@ def _check_energy(ledger: Ledger, states: Sequence[StateNumbers], points: Sequen
         low, high = _losses(states[number], states[number + 1], before, now, on_first)
         name = states[number + 1].name
         ledger.record("energy", max(low - lost, lost - high, 0.0) / scale, f"{name}, dissipated")
-        rise = largest / before["load_factor"] if on_first else 1.0
+        rise = largest / before["load_factor"] if on_first and before["load_factor"] > 0 else 1.0
         off = now["dissipated_strain_controlled"] - before["dissipated_strain_controlled"] - rise**2 * lost
         ledger.record("energy", abs(off) / scale, f"{name}, dissipated_strain_controlled")
 

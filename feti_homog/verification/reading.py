@@ -14,6 +14,7 @@ import numpy as np
 
 from feti_homog.errors import CaseError
 from feti_homog.typing import AnyInt, Float, Int
+from feti_homog.verification.checksums import is_as_written, seal_of
 
 JSON, FIELDS = "result.json", "result.h5"
 SCHEMA = 1
@@ -103,6 +104,7 @@ class ResultFiles:
         size: (2,) width and height of the cell.
         phases: names of the phases, the matrix first.
         faces: (k, 2) a node of the mesh on each face of the interface nodes, fibre and matrix.
+        altered: names of the files that are not as the run wrote them.
     """
 
     document: Mapping[str, Any]
@@ -113,6 +115,7 @@ class ResultFiles:
     fibres: Fibres
     faces: Int
     file: h5py.File
+    altered: tuple[str, ...]
 
     @property
     def case(self) -> Mapping[str, Any]:
@@ -160,15 +163,21 @@ def opened(directory: Path) -> Iterator[ResultFiles]:
     Raises:
         CaseError: there are none that can be read; one line.
     """
-    document = _document(directory / JSON)
+    document, is_whole = _document(directory / JSON)
     path = directory / FIELDS
     if not path.is_file():
         raise CaseError(f"{directory}: has no {FIELDS}; {MISSING_FIELDS}")
-    with _reading(path), h5py.File(path, "r") as file:
-        yield _contents(document, file)
+    with _reading(path):
+        holds = {JSON: is_whole, FIELDS: seal_of(path) == document.get("result_h5")}
+        file = h5py.File(path, "r")
+    with file:
+        with _reading(path):
+            files = _contents(document, file, tuple(name for name, as_written in holds.items() if not as_written))
+        yield files
 
 
-def _document(path: Path) -> Mapping[str, Any]:
+def _document(path: Path) -> tuple[Mapping[str, Any], bool]:
+    """The table of result.json, and whether its checksum is right."""
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
@@ -177,10 +186,10 @@ def _document(path: Path) -> Mapping[str, Any]:
         raise CaseError(f"cannot read {path}: it is damaged: {error}") from error
     if not isinstance(document, dict) or document.get("schema") != SCHEMA or not isinstance(document.get("case"), dict):
         raise CaseError(f"{path}: is no result of this version: expected schema {SCHEMA} and a case")
-    return document
+    return document, is_as_written(document)
 
 
-def _contents(document: Mapping[str, Any], file: h5py.File) -> ResultFiles:
+def _contents(document: Mapping[str, Any], file: h5py.File, altered: tuple[str, ...]) -> ResultFiles:
     """The whole of both files but the states."""
     mesh = Mesh(*(_rows(file[f"mesh/{name}"]) for name in ("points", "triangles", "subdomain", "phase")))
     rows = InterfaceRows(*(_rows(file[f"interface/{name}"]) for name in ("points", "normal", "length", "fibre_number")))
@@ -201,7 +210,7 @@ def _contents(document: Mapping[str, Any], file: h5py.File) -> ResultFiles:
     _expect(bool((faces >= 0).all() and (faces < n).all()), "/interface names unknown nodes")
     within = (rows.fibre >= 1) & (rows.fibre <= len(fibres.radius))
     _expect(bool(within.all()), "/interface/fibre_number names unknown fibres")
-    return ResultFiles(document, size, phases, mesh, rows, fibres, faces, file)
+    return ResultFiles(document, size, phases, mesh, rows, fibres, faces, file, altered)
 
 
 def _rows(table: h5py.Dataset) -> Any:

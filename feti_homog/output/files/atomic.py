@@ -28,7 +28,7 @@ def replace(path: Path, write: Callable[[Path], object]) -> Path:
         try:
             write(part)
             commit(part, path)
-        except (OSError, RuntimeError):
+        except BaseException:
             with contextlib.suppress(OSError):
                 part.unlink(missing_ok=True)
             raise

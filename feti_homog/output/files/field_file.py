@@ -90,13 +90,10 @@ class FieldFile:
         self._rows = {symbol: _Rows.of(comm, count) for symbol, count in counts.items()}
         self._reserved = RESERVE
         size = RESERVE + sum(map(self._bytes, (mesh, fibres, interface)))
-        on_root(comm, _with_write_errors, self.path, _create, self.part, comm.size, size)
-        # MPI-IO keeps names in short buffers: it has the folder by its descriptor, while the file is open.
-        folder: int = agree(comm, _with_write_errors, self.path, os.open, self.part.parent, os.O_RDONLY)
+        on_root(comm, _with_write_errors, self.path, _create, self.part, size)
         self._is_open = True
-        self._folder = contextlib.ExitStack()
-        self._folder.callback(os.close, folder)
-        self._file = agree(comm, _with_write_errors, self.path, _open, folder, self.part.name, comm)
+        self._opened = contextlib.ExitStack()
+        self._file = self._collectively(_open, self.part, comm, self._opened)
         self._collectively(_set_attributes, self._file, attributes(header) | {"created_by": PROGRAM})
         self._write_part("mesh", replace(mesh, triangles=mesh.triangles + np.int64(self._rows["n"].start)))
         self._write_part("fibre", fibres)
@@ -111,11 +108,9 @@ class FieldFile:
 
     def close(self) -> Path:
         """Completes the file, gives it its final name, and returns its path."""
-        self._collectively(self._file.close)
-        self._collectively(_complete, self._comm.rank, self.part)
-        self._folder.close()
+        self._collectively(self._opened.close)
+        self._collectively(_complete, self._comm.rank, self.part, self.path)
         self._is_open = False
-        on_root(self._comm, _with_write_errors, self.path, atomic.commit, self.part, self.path)
         return self.path
 
     def __enter__(self) -> FieldFile:
@@ -164,10 +159,10 @@ class FieldFile:
         unit = self._units.get(described.unit) or described.unit or PURE_NUMBER
         return {"meaning": described.meaning, "unit": unit}
 
-    def _collectively(self, function: Callable[..., object], *args: Any) -> None:
+    def _collectively(self, function: Callable[..., Any], *args: Any) -> Any:
         """function(*args) on all ranks; if any cannot write, the file is removed and all raise."""
         try:
-            agree(self._comm, _with_write_errors, self.path, function, *args)
+            return agree(self._comm, _with_write_errors, self.path, function, *args)
         except FetiHomogError:
             self._remove()
             raise
@@ -180,8 +175,7 @@ class FieldFile:
                 os.truncate(self.part, 0)
         self._comm.barrier()
         with contextlib.suppress(OSError, RuntimeError):
-            self._file.close()
-        self._folder.close()
+            self._opened.close()
         if self._comm.rank == 0:
             with contextlib.suppress(OSError):
                 self.part.unlink()
@@ -193,10 +187,8 @@ def _with_write_errors(path: Path, function: Callable[..., Any], *args: Any) -> 
         return function(*args)
 
 
-def _create(part: Path, ranks: int, size: int) -> None:
+def _create(part: Path, size: int) -> None:
     """Makes an empty HDF5 file with `size` bytes of space, by plain calls: HDF5 may crash or hang where they fail."""
-    if ranks > 1 and not h5py.get_config().mpi:
-        raise FetiHomogError(f"h5py is built without MPI: {ranks} ranks cannot write {NAME}")
     part.parent.mkdir(parents=True, exist_ok=True)
     try:
         with part.open("wb") as stream:
@@ -215,21 +207,28 @@ def _empty_file() -> bytes:
         return bytes(file.id.get_file_image())
 
 
-def _open(folder: int, name: str, comm: Comm) -> Any:
-    """The file of that name in an open folder, opened by all ranks."""
-    path = f"/proc/self/fd/{folder}/{name}"
-    return h5py.File(path, "r+", driver="mpio", comm=comm) if h5py.get_config().mpi else h5py.File(path, "r+")
+def _open(part: Path, comm: Comm, opened: contextlib.ExitStack) -> Any:
+    """The file, opened by all ranks until `opened` is closed.
+
+    MPI-IO keeps names in short buffers: it has the folder by its descriptor, while the file is open.
+    """
+    folder = os.open(part.parent, os.O_RDONLY)
+    opened.callback(os.close, folder)
+    path = f"/proc/self/fd/{folder}/{part.name}"
+    return opened.enter_context(h5py.File(path, "r+", driver="mpio", comm=comm))
 
 
-def _complete(rank: int, part: Path) -> None:
-    """Adds the views, by rank 0 alone: on all ranks together each would cost as much as a table."""
+def _complete(rank: int, part: Path, path: Path) -> None:
+    """Adds the views and gives the file its name, by rank 0: on all ranks each view would cost as much as a table."""
     if rank:
         return
-    with h5py.File(part, "r") as file:
+    # Nobody else has the file, and some file systems cannot lock.
+    with h5py.File(part, "r", locking=False) as file:
         size = bytes_of_views(file)
-    _reserve(0, part, part.stat().st_size, size)
-    with h5py.File(part, "r+") as file:
+    _reserve(rank, part, part.stat().st_size, size)
+    with h5py.File(part, "r+", locking=False) as file:
         add_views(file)
+    atomic.commit(part, path)
 
 
 def _set_attributes(target: Any, attributes: Mapping[str, Any]) -> None:
@@ -263,7 +262,6 @@ def _write_rows(file: Any, name: str, rows: _Rows, array: NDArray[Any], words: M
         memory.select_none()
         place.select_none()
     transfer = h5py.h5p.create(h5py.h5p.DATASET_XFER)
-    if h5py.get_config().mpi:
-        transfer.set_dxpl_mpio(h5py.h5fd.MPIO_COLLECTIVE)
+    transfer.set_dxpl_mpio(h5py.h5fd.MPIO_COLLECTIVE)
     if rows.total:
         table.id.write(memory, place, array, dxpl=transfer)

@@ -4,21 +4,14 @@ from __future__ import annotations
 
 import os
 import zlib
-from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from feti_homog.common.mpi_errors import agree, on_root
 from feti_homog.common.records import BYTES, described
 from feti_homog.errors import CaseError
 from feti_homog.output.files import atomic
-
-if TYPE_CHECKING:
-    from mpi4py.MPI import Comm
 
 BLOCK = 1 << 26  # bytes
 
@@ -31,16 +24,14 @@ class FileSeal:
     checksum: str = described("CRC-32, in hexadecimal, of the CRC-32s (32 bits, little-endian) of its blocks of 64 MiB")
 
 
-def seal(path: Path, comm: Comm, block: int = BLOCK) -> FileSeal:
-    """The seal of a file that all ranks can read, each reading its share of the blocks.  Collective.
+def seal(path: Path, block: int = BLOCK) -> FileSeal:
+    """The seal of a file.  Call on the rank that completed it: others may still see an earlier file of its name.
 
     Raises:
         FetiHomogError: it cannot be read.
     """
-    size = on_root(comm, _size, path)
-    blocks = np.zeros(-(-size // block), "<u4")
-    blocks[comm.rank :: comm.size] = agree(comm, _checksums, path, range(comm.rank, len(blocks), comm.size), block)
-    return FileSeal(size, _combined(np.bitwise_or.reduce(comm.allgather(blocks))))
+    size = _size(path)
+    return FileSeal(size, _checksum(path, size, block))
 
 
 def check(path: Path, expected: FileSeal, block: int = BLOCK) -> None:
@@ -53,7 +44,7 @@ def check(path: Path, expected: FileSeal, block: int = BLOCK) -> None:
     size = _size(path)
     if size != expected.bytes:
         raise CaseError(f"{path}: it is damaged, or of another run: it has {size} bytes, not {expected.bytes}")
-    if _combined(np.array(_checksums(path, range(-(-size // block)), block), "<u4")) != expected.checksum:
+    if _checksum(path, size, block) != expected.checksum:
         raise CaseError(f"{path}: it is damaged, or of another run: its checksum is wrong")
 
 
@@ -62,11 +53,8 @@ def _size(path: Path) -> int:
         return os.stat(path).st_size
 
 
-def _checksums(path: Path, blocks: Iterable[int], size: int) -> list[int]:
-    """The CRC-32 of each of these blocks of `size` bytes."""
+def _checksum(path: Path, size: int, block: int) -> str:
     with atomic.file_errors("read", path), path.open("rb", buffering=0) as stream:
-        return [zlib.crc32(os.pread(stream.fileno(), size, number * size)) for number in blocks]
-
-
-def _combined(checksums: NDArray[np.uint32]) -> str:
-    return f"{zlib.crc32(checksums.tobytes()):08x}"
+        starts = range(0, size, block)
+        checksums = [zlib.crc32(os.pread(stream.fileno(), block, start)) for start in starts]
+    return f"{zlib.crc32(np.array(checksums, '<u4').tobytes()):08x}"

@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING
 
 from feti_homog.common.file_locks import LockHeld, LocksUnsupported, TemporaryLock, holder
 from feti_homog.common.mpi_errors import on_root
-from feti_homog.errors import CaseError
+from feti_homog.errors import CaseError, FetiHomogError
 from feti_homog.output.files import atomic
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
 
 LOCK = "result.lock"
-DEEPEST = "checkpoint/000000.h5"  # of a run's files the one of the longest name
+LONGEST = "case_minus_gamma12.png"  # of a run's files the one of the longest name
 # The files of a result, those of all analyses and of what `plot` draws.
 RESULT_FILE = re.compile(
     r"report\.html|result\.(json|h5|xdmf)|interface\.xdmf"
@@ -38,7 +38,7 @@ def usable(directory: Path) -> None:
     """
     try:
         with contextlib.suppress(FileNotFoundError, NotADirectoryError):
-            os.stat(atomic.part_of(directory / DEEPEST))  # is such a name too long?
+            os.stat(atomic.part_of(directory / LONGEST))  # is such a name too long?
         there = next(p for p in (directory.absolute(), *directory.absolute().parents) if os.path.lexists(p))
         if there.is_symlink() and not there.exists():
             raise CaseError(f"--out {directory}: expected a folder, but {there} is a link that leads nowhere")
@@ -98,6 +98,9 @@ def _hold(lock: TemporaryLock, directory: Path) -> tuple[list[Path], str]:
     except LocksUnsupported as error:
         lock.path.unlink(missing_ok=True)
         return made, f"{error}; nothing keeps another run from writing to the same folder"
+    except FetiHomogError:
+        _remove_empty(made)
+        raise
     atomic.remove_unfinished(directory)
     return made, ""
 

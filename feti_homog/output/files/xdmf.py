@@ -53,7 +53,7 @@ def write(directory: Path) -> list[Path]:
         FetiHomogError: result.h5 cannot be read or a file cannot be written.
     """
     h5, paths = Path(directory) / field_file.NAME, []
-    with atomic.write_errors(Path(directory) / CELL), h5py.File(h5, "r") as file:
+    with atomic.write_errors(Path(directory) / CELL), h5py.File(h5, "r", locking=False) as file:
         paths.append(_write(h5.with_name(CELL), "cell", file, _cell))
         if len(file["interface/points"]):
             paths.append(_write(h5.with_name(INTERFACE), "interface", file, _interface))

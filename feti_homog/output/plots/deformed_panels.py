@@ -140,10 +140,10 @@ def plot(directory: Path, file: Any, document: Mapping[str, Any]) -> list[Path]:
 
 
 def shown_scale(file: Any, document: Mapping[str, Any]) -> float:
-    """The factor of displacements in all pictures of a result: that of the case or, by default, one at which the
-    largest displacement and opening are seen, at least 1 under a given strain."""
+    """The factor of displacements in all pictures of an angle or a path and in the report: that of the case or, by
+    default, one at which the largest displacement and opening are seen, at least 1 under a given strain."""
     chosen = document.get("case", {}).get("output", {}).get("deformation_scale")
-    if chosen:
+    if chosen is not None:
         return float(chosen)
     states = [file[f"state/{number}"] for number in _frames(document, len(file["state"]))]
     displacement = max(_largest_length(state["displacement"]) for state in states)

@@ -133,7 +133,8 @@ def _deformed(
     figure, (axes,) = figure_of(attributes, panels=1, beside=BAR_INCHES)
     displacement = nodal_values(state["displacement"], drawn)
     seen = magnification(largest_length(displacement), float(np.ptp(drawn.points, axis=0).min()))
-    scale = output.get("deformation_scale") or seen
+    chosen = output.get("deformation_scale")
+    scale = seen if chosen is None else chosen
     component = output.get("stress", "auto")
     if component not in STRESS_SYMBOLS:
         component = list(STRESS_SYMBOLS)[_unit_case(strain) or 0]

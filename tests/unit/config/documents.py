@@ -115,7 +115,7 @@ def documents(draw: st.DrawFn) -> dict[str, Any]:
             fields=st.booleans(), pictures=st.booleans(), stress=st.sampled_from(["auto", "S11", "S22", "S12"]),
             deformation_scale=st.integers(0, 100), length_unit=LABELS, stress_unit=LABELS,
         ),
-        "petsc": optional(feti_ksp_rtol=st.floats(1e-14, 1e-2), log_view=st.booleans(), feti_pc_type=LABELS),
+        "petsc": optional(feti_ksp_rtol=st.floats(1e-14, 1e-2), feti_view=st.booleans(), feti_pc_type=LABELS),
     }  # fmt: skip
     return document | draw(st.fixed_dictionaries({}, optional=rest))
 

@@ -197,6 +197,10 @@ FAULTY_CASES: dict[str, tuple[str, tuple[str, ...]]] = {
         ended("[petsc]\nksp_rtol = 1e-8\n"),
         ("[petsc] ksp_rtol = 1e-08: expected the prefix feti_",),
     ),
+    "petsc_without_effect": (
+        ended("[petsc]\nlog_view = true\n"),
+        ("[petsc] log_view = true: expected the prefix feti_; PETSc's own options are for the command line",),
+    ),
     "petsc_array": (
         ended("[petsc]\nfeti_ksp_rtol = [1e-8]\n"),
         ("[petsc] feti_ksp_rtol = [1e-08]: expected a text, a number, true or false",),

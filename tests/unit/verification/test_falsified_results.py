@@ -197,7 +197,34 @@ FALSE = {
 @pytest.mark.parametrize("name", FALSE)
 def test_a_falsified_copy_breaks_its_laws(results, tmp_path, name):
     kind, edit, laws = FALSE[name]
-    assert broken(falsified(results(kind), tmp_path / "copy", edit)) == laws
+    assert broken(falsified(results(kind), tmp_path / "copy", edit)) == laws | {"files"}
+
+
+def test_a_file_with_another_byte_is_noticed(results, tmp_path):
+    copy = falsified(results("bonded"), tmp_path / "copy", lambda content, _: content.update(created="2001-01-01"))
+    assert broken(copy) == {"files"}
+
+
+def test_an_element_turned_over_is_noticed(results, tmp_path):
+    def edit(_, file):
+        file["mesh/triangles"][5] = file["mesh/triangles"][5][[0, 2, 1, 5, 4, 3]]
+
+    assert "mesh" in broken(falsified(results("bonded"), tmp_path / "copy", edit))
+
+
+def test_an_element_without_area_is_noticed(results, tmp_path):
+    def edit(_, file):
+        file["mesh/triangles"][5] = file["mesh/triangles"][5][[0, 0, 0, 0, 0, 0]]
+
+    assert "mesh" in broken(falsified(results("bonded"), tmp_path / "copy", edit))
+
+
+def test_a_missing_state_of_an_angle_is_noticed(results, tmp_path):
+    def edit(_, file):
+        for number in list(file["state"])[1:]:
+            del file[f"state/{number}"]
+
+    assert "load" in broken(falsified(results("angle"), tmp_path / "copy", edit))
 
 
 def test_a_mesh_node_that_was_moved_is_noticed(results, tmp_path):
@@ -218,4 +245,7 @@ def test_displacements_that_fit_their_stresses_break_equilibrium_alone(results, 
             fields = {"fluctuation": state.fluctuation, "displacement": displacement}
             file[f"state/0/{name}"][()] = fields.get(name, cell.elements.fields(displacement, displacement).stress)
 
-    assert broken(falsified(results("bonded"), tmp_path / "copy", edit)) - {"stress 33", "shown"} == {"equilibrium"}
+    assert broken(falsified(results("bonded"), tmp_path / "copy", edit)) - {"stress 33", "shown"} == {
+        "equilibrium",
+        "files",
+    }

@@ -97,6 +97,17 @@ def test_unreadable_results_are_told_in_one_line(result, tmp_path, name, capsys)
     assert capsys.readouterr().err == f"error: {fault}\n"
 
 
+def test_every_rank_of_a_launcher_has_the_verdict_and_the_first_one_prints(result, tmp_path, capsys, monkeypatch):
+    copy = falsified(result, tmp_path / "copy", lambda _, file: file["state/1/traction"].__setitem__(3, [1.0, 2.0]))
+    monkeypatch.setenv("SLURM_PROCID", "1")
+    assert main(["verify", str(copy)]) == 3 and main(["-feti_ksp_rtol", "1e-8", "verify", str(result)]) == 0
+    assert main(["verify", str(tmp_path)]) == 2
+    assert capsys.readouterr() == ("", "")
+    monkeypatch.setenv("SLURM_PROCID", "0")
+    assert main(["verify", str(copy)]) == 3
+    assert "laws are broken" in capsys.readouterr().out
+
+
 def test_the_command_line_tells_every_law_and_ends_with_its_verdict(result, tmp_path, capsys):
     assert main(["verify", str(result)]) == 0
     lines = capsys.readouterr().out.splitlines()
@@ -108,7 +119,7 @@ def test_the_command_line_tells_every_law_and_ends_with_its_verdict(result, tmp_
     copy = falsified(result, tmp_path / "copy", lambda _, file: file["state/1/traction"].__setitem__(3, [1.0, 2.0]))
     assert main(["verify", str(copy)]) == 3
     output = capsys.readouterr().out
-    other, line = (line for line in output.splitlines() if "BROKEN" in line)
-    assert other.startswith("vectors") and line.startswith("equilibrium")
+    files, other, line = (line for line in output.splitlines() if "BROKEN" in line)
+    assert files.startswith("files") and other.startswith("vectors") and line.startswith("equilibrium")
     assert "state 1 (E22), mesh node" in line and "(interface node 3)" in line
-    assert output.endswith(f"2 of {len(laws)} laws are broken\n")
+    assert output.endswith(f"3 of {len(laws)} laws are broken\n")
