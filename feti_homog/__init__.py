@@ -17,9 +17,13 @@ From a program of one's own, under `mpirun` or not:
 
 from __future__ import annotations
 
+import os
 from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
+
+# Debian's h5py is the build with MPI only if it is told so before its first import.
+os.environ.setdefault("H5PY_ALWAYS_USE_MPI", "1")
 
 from feti_homog.api import collect_sweep, draw_state, launch, run, run_sweep
 from feti_homog.config.case import Case

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import contextlib
 import io
-import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -118,7 +117,6 @@ def draw_state(axes: Axes, out: str | Path, number: int = 0, **choices: Any) -> 
     `choices`: `stress` ("S11", "S22" or "S12"; by default that of the largest strain) and `scale` of the displacements
     (default 1).  Call it on one rank.
     """
-    os.environ.setdefault("H5PY_ALWAYS_USE_MPI", "1")
     from feti_homog.output.plots import deformed_panels
 
     return deformed_panels.draw_state(axes, Path(out), number, **choices)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib
-import os
 import re
 import sys
 from collections.abc import Sequence
@@ -27,8 +26,6 @@ def require() -> None:
     Raises:
         LibraryError: one line for each that is missing, broken or without MPI, with what to do about it.
     """
-    # Debian's h5py is the MPI build only if it is told so before its first import.
-    os.environ.setdefault("H5PY_ALWAYS_USE_MPI", "1")
     faults = [_fault("mpi4py", MPI4PY), _fault("petsc4py", petsc4py_advice()), _fault("h5py", H5PY) or _serial_h5py()]
     if any(faults):
         raise LibraryError(*filter(None, faults))
@@ -96,4 +93,8 @@ def _serial_h5py() -> str:
     """Empty if h5py is built with MPI, else what to do."""
     import h5py
 
-    return "" if h5py.get_config().mpi else f"h5py {h5py.__file__} is built without MPI: {H5PY}, and remove this one"
+    return (
+        ""
+        if h5py.get_config().mpi
+        else f"h5py {h5py.__file__} is built without MPI: import feti_homog before h5py, or {H5PY}, and remove this one"
+    )

@@ -1,4 +1,4 @@
-"""Options of the command line: ours (double dash) and PETSc's (single dash)."""
+"""PETSc's options that the solver takes, and names that are almost theirs."""
 
 from __future__ import annotations
 

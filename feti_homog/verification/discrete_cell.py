@@ -14,7 +14,7 @@ from feti_homog.verification.reading import ResultFiles
 from feti_homog.verification.torus import TornNodes, TornSides, constituents, torn, wrapped
 
 # Scales of a state are no less than this share of those of the run: a path may come back to zero strain.
-FAINT = 1e-9
+LEAST_SHARE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -104,12 +104,12 @@ class DiscreteCell:
         width, height = self.files.size
         corners = np.array([[width, 0.0], [0.0, height], [width, height]])
         own = float(np.abs(corners @ tensor(strain)).max())
-        return max(own, FAINT * self.largest_strain * float(self.files.size.max()))
+        return max(own, LEAST_SHARE * self.largest_strain * float(self.files.size.max()))
 
     def least_stress(self, strain: Float) -> float:
         """A stress that the strain makes in the bonded cell at least, for scales that debonding does not make zero."""
         own, most = np.abs(self.reuss @ strain).max(), np.abs(self.reuss).max() * self.largest_strain
-        return float(max(own, FAINT * most))
+        return float(max(own, LEAST_SHARE * most))
 
 
 def tensor(strain: Float) -> Float:

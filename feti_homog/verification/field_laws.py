@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from feti_homog.typing import Float, Int
-from feti_homog.verification.discrete_cell import DiscreteCell, tensor
+from feti_homog.verification.discrete_cell import LEAST_SHARE, DiscreteCell, tensor
 from feti_homog.verification.elements import ElementFields
 from feti_homog.verification.ledger import Ledger, relative
 from feti_homog.verification.reading import State
@@ -112,7 +112,7 @@ def _check_averages(ledger: Ledger, cell: DiscreteCell, state: State, fields: El
     opening = np.einsum("ki,kj->ij", jump, integral)
     opened = np.array([opening[0, 0], opening[1, 1], opening[0, 1] + opening[1, 0]]) / area
     off = (weights * fields.strain).sum(axis=0) / area - state.strain - opened
-    scale = max(float(np.abs(state.strain).max()), 1e-9 * cell.largest_strain)
+    scale = max(float(np.abs(state.strain).max()), LEAST_SHARE * cell.largest_strain)
     ledger.record("mean strain", relative(off, scale), state.name)
     work = area * float(state.mean_stress @ state.strain) - float((interface_forces(cell, state) * jump).sum())
     scale = max(abs(fields.energy), area * cell.least_stress(state.strain) * scale)

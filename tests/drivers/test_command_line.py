@@ -13,8 +13,6 @@ from matplotlib.image import imread
 from reference.references import BONDED
 from support.command_line import case_file, command_line
 
-import feti_homog.output  # noqa: F401 (chooses the build of h5py)
-
 PICTURES = ("cell.png", "case_E11.png", "case_E22.png", "case_gamma12.png")
 FILES = {"result.json", "result.h5", "result.xdmf", "interface.xdmf", *PICTURES}
 DOCUMENT = {

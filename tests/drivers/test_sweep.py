@@ -18,8 +18,6 @@ from support.jobs import ROOT
 from support.sweep_files import CASE, FAILING, FAILING_POINTS, RANDOM, rows, sweep_file
 from support.sweep_runs import TWO, collected, contents, results, swept
 
-import feti_homog.output  # noqa: F401 (chooses the build of h5py)
-
 FORTY = "cell.fibre_fraction = {from = 0.1, to = 0.4, count = 20}\nmaterial.fibre.young = [150.0, 200.0]\n"
 
 

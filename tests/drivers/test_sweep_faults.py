@@ -15,8 +15,6 @@ from support.jobs import ROOT, RUN_VARIABLES, mpirun
 from support.sweep_files import rows, sweep_file
 from support.sweep_runs import TWO, collected, results, swept
 
-import feti_homog.output  # noqa: F401 (chooses the build of h5py)
-
 LIMITED = """
 import resource, sys
 from mpi4py import MPI

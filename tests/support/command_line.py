@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import feti_homog.output  # noqa: F401 (chooses the build of h5py)
 from feti_homog.verification.certificate import verify
 from support.base_case import BASE
 from support.jobs import mpirun

@@ -8,8 +8,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import feti_homog.output  # noqa: F401 (chooses the build of h5py)
-
 MATRIX, FIBRE = {"young": 88.0, "poisson": 0.299}, {"young": 200.0, "poisson": 0.222}
 TURNED = {
     "E1": 15.0, "E2": 20.0, "E3": 200.0, "nu12": 0.3, "nu13": 0.02, "nu23": 0.03, "G12": 7.0, "angle": 30.0,

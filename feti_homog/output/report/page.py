@@ -15,7 +15,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from feti_homog import __version__
-from feti_homog.errors import CaseError, FetiHomogError
+from feti_homog.errors import CaseError
 from feti_homog.output.files import atomic, field_file, result_json
 from feti_homog.output.report import curves, states, tables
 from feti_homog.output.text.summary import title_of
@@ -51,11 +51,9 @@ def write(directory: Path) -> Path:
     document = _document(directory)
     try:
         html = page(document, directory)
-    except (OSError, KeyError, ValueError, TypeError, IndexError) as error:
+    except (OSError, KeyError) as error:  # KeyError: what h5py does not find in result.h5
         raise CaseError(f"cannot report {directory}: a file of the result is missing or damaged: {error}") from error
-    path = directory / NAME
-    with atomic.write_errors(path):
-        return atomic.replace(path, lambda part: part.write_text(html, encoding="utf-8"))
+    return atomic.replace_text(directory / NAME, html)
 
 
 def page(document: Document, directory: Path) -> str:
@@ -87,12 +85,7 @@ def _document(directory: Path) -> dict[str, Any]:
         raise CaseError(f"cannot report {directory}: there is no such folder")
     if (directory / SWEEP).exists():
         raise CaseError(f"cannot report {directory}: it is the folder of a sweep; name that of one of its cases")
-    try:
-        return result_json.read(directory)
-    except CaseError:
-        raise
-    except FetiHomogError as error:
-        raise CaseError(*error.faults) from error
+    return result_json.read(directory)
 
 
 def _shown(document: Document, directory: Path) -> dict[str, Any] | None:

@@ -1,4 +1,4 @@
 """Results in words: the printed summary and its tables.
 
-Uses no other floor.  Main entry: `summary.summary`.
+Uses `mechanics`.  Main entry: `summary.summary`.
 """

@@ -11,7 +11,6 @@ import pytest
 from matplotlib.image import imread
 from scipy import stats
 
-import feti_homog.output  # noqa: F401 (chooses the build of h5py)
 from feti_homog.output.text.units import unit, with_unit
 from feti_homog.sweep.report import figures, tables
 from feti_homog.sweep.report.outputs import outputs
