@@ -17,6 +17,7 @@ From a program of one's own, under `mpirun` or not:
 
 from __future__ import annotations
 
+import importlib
 import os
 from typing import TYPE_CHECKING, Any
 
@@ -25,12 +26,12 @@ __version__ = "0.1.0"
 # Debian's h5py is the build with MPI only if it is told so before its first import.
 os.environ.setdefault("H5PY_ALWAYS_USE_MPI", "1")
 
-from feti_homog.api import collect_sweep, draw_state, launch, run, run_sweep
-from feti_homog.config.case import Case
 from feti_homog.errors import CaseError, ConvergenceError, FetiHomogError, MeshError
 
 if TYPE_CHECKING:
     from feti_homog.analysis.result import Result
+    from feti_homog.api import collect_sweep, draw_state, launch, run, run_sweep
+    from feti_homog.config.case import Case
 
 __all__ = [
     "Case",
@@ -48,10 +49,11 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
-    """`Result`, when it is first asked for: `feti-homog verify` loads nothing that the analyses are made of."""
-    if name == "Result":
-        from feti_homog.analysis.result import Result
+HOMES = {"Result": "analysis.result", "Case": "config.case"}
 
-        return Result
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+def __getattr__(name: str) -> Any:
+    """What is first asked for: `feti-homog` starts at once, and `verify` loads nothing that analyses are made of."""
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(f"{__name__}.{HOMES.get(name, 'api')}"), name)

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, NoReturn
 from feti_homog import __version__
 from feti_homog.api import folder, parsed, start
 from feti_homog.common.command_words import split_argv
-from feti_homog.common.interrupts import launched_rank
+from feti_homog.common.interrupts import end_on_signals, launched_rank
 from feti_homog.common.petsc_option_table import help_text
 from feti_homog.common.standard_streams import complain, prepare, print_product, say
 from feti_homog.errors import EXIT_DONE, EXIT_UNCONVERGED, CaseError, FetiHomogError
@@ -54,9 +54,22 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _command(words: Sequence[str], comm: Intracomm) -> int:
-    arguments = parsed(command_parser(), words or ["--help"], comm)
+    parser = command_parser()
+    _refuse_single_dashes(parser)
+    arguments = parsed(parser, words or ["--help"], comm)
     arguments.action(arguments, comm)
     return EXIT_DONE
+
+
+def _refuse_single_dashes(parser: Parser) -> None:
+    """Refuse our own options among PETSc's, which would take them without a word."""
+    from petsc4py import PETSc
+
+    commands = next(action.choices for action in parser._actions if isinstance(action, argparse._SubParsersAction))
+    ours = {word[2:] for each in commands.values() for word in each._option_string_actions if word.startswith("--")}
+    given = sorted(ours & PETSc.Options().getAll().keys() - {"help"})
+    if given:
+        raise CaseError(*(f"command line: -{name} is no option of PETSc; did you mean --{name}?" for name in given))
 
 
 def command_parser() -> Parser:
@@ -197,6 +210,7 @@ def _written_report(directory: Path) -> Path:
 def _verify(words: Sequence[str]) -> int:
     """Print the certificate of a result; the exit code."""
     prepare()
+    end_on_signals()
     prints = launched_rank() == 0
     os.environ.pop("H5PY_ALWAYS_USE_MPI", None)  # the serial h5py reads the files
     from feti_homog.verification.certificate import verify

@@ -40,7 +40,7 @@ def named_values(words: Sequence[str]) -> dict[str, str]:
     name = ""
     for word in words:
         if _is_petsc(word):
-            name = word[1:]
+            name = word[1:].lower()  # PETSc takes names in either case
             values[name] = ""
         else:
             values[name] = word

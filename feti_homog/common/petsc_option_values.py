@@ -76,11 +76,11 @@ def _real(expected: str, holds: Callable[[float], bool]) -> Rule:
     return Rule(expected, rule)
 
 
-def _integer(least: int) -> Rule:
+def _integer(least: int, most: int = LARGEST_INTEGER) -> Rule:
     def holds(text: str) -> bool:
-        return re.fullmatch(r"\+?[0-9]{1,10}", text) is not None and least <= int(text) <= LARGEST_INTEGER
+        return re.fullmatch(r"\+?[0-9]{1,10}", text) is not None and least <= int(text) <= most
 
-    return Rule(f"an integer of at least {least} and at most {LARGEST_INTEGER}", holds)
+    return Rule(f"an integer of at least {least} and at most {most}", holds)
 
 
 def _names(known: list[str]) -> Rule:
@@ -98,6 +98,16 @@ def _can_be_written(file: str) -> bool:
     return folder.is_dir() and os.access(folder, os.W_OK) and not Path(file).is_dir()
 
 
+def _is_new_file(text: str) -> bool:
+    """Whether the text is empty, or what may stand before its first colon is a file that can be written."""
+    file = text.partition(":")[0]
+    return not file or SWITCH.holds(file) or _can_be_written(file)
+
+
+def _never(text: str) -> bool:
+    return text.lower() in FALSE
+
+
 def _can_be_read(file: str) -> bool:
     return os.path.isfile(file) and os.access(file, os.R_OK)
 
@@ -110,7 +120,7 @@ PRINTS = Rule(
 SHARE = _real("a number above 0 and below 1", lambda number: 0.0 < number < 1.0)
 NOT_NEGATIVE = _real("a number of at least 0", lambda number: 0.0 <= number < math.inf)
 
-FLAGS = ("feti_view", "malloc_debug", "options_left", "on_error_abort", "fp_trap")
+FLAGS = ("feti_view", "malloc_debug", "options_left", "on_error_abort")
 VIEWERS = (
     *(option.name for option in OPTIONS if not option.value and option.name != "feti_view"),
     *(f"feti_ksp_{name}" for name in ("monitor_true_residual", "monitor_singular_value", "view_final_residual")),
@@ -134,7 +144,11 @@ RULES: dict[str, Rule] = {
     "feti_ksp_atol": NOT_NEGATIVE,
     "feti_ksp_divtol": _real("a number above 1", lambda number: 1.0 < number < math.inf),
     "feti_ksp_max_it": _integer(1),
-    "feti_schur_mat_mumps_icntl_14": _integer(0),
+    "feti_schur_mat_mumps_icntl_14": _integer(0, 10_000),
+    "feti_ksp_error_if_not_converged": Rule("nothing: the run says it itself, and keeps what it computed", _never),
+    "fp_trap": Rule("nothing: numbers that are not finite are checked where they may occur", _never),
+    "info": Rule("a file of an existing folder, or no value", _is_new_file),
+    "malloc_view": Rule("a file of an existing folder, or no value", _is_new_file),
     "options_file": Rule("a file that can be read", _can_be_read),
     "log_trace": Rule("a file of an existing folder, or no value", lambda text: not text or _can_be_written(text)),
 }

@@ -36,6 +36,7 @@ def case_options(options: Mapping[str, Value]) -> Iterator[None]:
     """
     database = PETSc.Options()
     on_command_line = _given()
+    options = {name.lower(): value for name, value in options.items()}
     given = {**options, **on_command_line}
     faults = [*unknown_options(given), *without_prefix(given), *faulty_values(given)]
     if faults:
@@ -61,8 +62,8 @@ def _set(database: PETSc.Options, name: str, value: Value | None) -> None:
 
 
 def _given() -> dict[str, str]:
-    """PETSc's options by name, with an empty text where there is no value."""
-    return {name: value or "" for name, value in PETSc.Options().getAll().items()}
+    """PETSc's options by name, in small letters, with an empty text where there is no value."""
+    return {name.lower(): value or "" for name, value in PETSc.Options().getAll().items()}
 
 
 def _refuse_early() -> None:

@@ -13,6 +13,7 @@ import numpy as np
 from feti_homog.config.wording import dotted_key
 from feti_homog.errors import CaseError
 
+MAX_BYTES = 1 << 24
 MAX_DEPTH = 50
 
 TomlPath = tuple[str, ...]
@@ -22,7 +23,7 @@ def read_document(path: str | Path) -> dict[str, Any]:
     """The TOML document in a file, named after the file. Raises CaseError if it is none."""
     path = Path(path)
     try:
-        content = path.read_bytes().decode("utf-8-sig")
+        content = _bytes_of(path).decode("utf-8-sig")
         document = tomllib.loads(content)
     except UnicodeDecodeError as error:
         line = error.object.count(b"\n", 0, error.start) + 1
@@ -36,6 +37,15 @@ def read_document(path: str | Path) -> dict[str, Any]:
         raise CaseError(f"{path}: tables and arrays are nested more than {MAX_DEPTH} deep")
     # Where the locale knows no UTF-8, Python escapes the bytes of names of files.
     return {"name": os.fsencode(path.stem).decode("utf-8", "replace")} | document
+
+
+def _bytes_of(path: Path) -> bytes:
+    """The content of a file that may be a pipe; of one that does not end too much is refused."""
+    with path.open("rb") as stream:
+        content = stream.read(MAX_BYTES + 1)
+    if len(content) > MAX_BYTES:
+        raise CaseError(f"{path}: not a case file: it has more than {MAX_BYTES >> 20} MiB")
+    return content
 
 
 def _is_deeper(document: dict[str, Any], depth: int) -> bool:

@@ -9,7 +9,7 @@ from feti_homog.config.section_values import SEED
 from feti_homog.config.values import ValueType, choice, integer, real
 
 SWEEP = "sweep"
-MAX_CASES = 100_000
+MAX_CASES = 20_000
 
 AXIS_EXPECTED = "a list of values, or a range {from, to} with step, with count, or with samples in [sweep]"
 AXIS_MEANING = (

@@ -19,8 +19,9 @@ from feti_homog.verification.laws import laws
 from feti_homog.verification.ledger import Finding, Ledger
 from feti_homog.verification.load_laws import StateNumbers, check_load
 from feti_homog.verification.mesh_laws import check_interface, check_mesh
+from feti_homog.verification.own_process import in_own_process
 from feti_homog.verification.path_laws import check_path
-from feti_homog.verification.reading import ResultFiles, opened
+from feti_homog.verification.reading import ResultFiles, altered, opened
 from feti_homog.verification.summary_laws import check_summary
 
 
@@ -63,11 +64,15 @@ def verify(directory: Path) -> Certificate:
     Raises:
         CaseError: it has no result, or one whose files cannot be read; one line.
     """
+    return in_own_process(directory, _of) if altered(directory) else _of(directory)
+
+
+def _of(directory: Path) -> Certificate:
     with opened(directory) as files:
         try:
             with np.errstate(all="ignore"):  # numbers that are not finite break the laws that they are in
                 return _verified(files)
-        except (KeyError, TypeError, IndexError, ValueError) as error:
+        except (KeyError, TypeError, IndexError, ValueError, AttributeError, MemoryError) as error:
             words = f"{type(error).__name__} {error}"
             raise CaseError(
                 f"{directory}: its files do not belong together or lack what they must have: {words}"

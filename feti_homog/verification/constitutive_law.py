@@ -34,7 +34,7 @@ def out_of_plane(case: Mapping[str, Any], phases: Sequence[str]) -> Float:
 def _constants(case: Mapping[str, Any], phase: str) -> Mapping[str, Any]:
     materials = case["material"]
     constants = materials.get(phase, materials.get(phase.partition(":")[0]))
-    if constants is None:
+    if not isinstance(constants, Mapping):
         raise CaseError(f"result.json: its case has no material for the phase {phase} of result.h5")
     found: Mapping[str, Any] = constants
     return found

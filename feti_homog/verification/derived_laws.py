@@ -62,6 +62,6 @@ def _check_interface(ledger: Ledger, cell: DiscreteCell, state: State) -> None:
 
 
 def _off(shown: Float, true: Float, terms: Float) -> Float:
-    """(m,) relative errors of what is shown; none where both are unknown."""
-    unknown = np.isnan(true) & np.isnan(shown)
-    return np.where(unknown, 0.0, relative(np.where(unknown, 0.0, shown - true), np.where(unknown, 1.0, terms)))
+    """(m,) relative errors of what is shown; none where both are unknown, or too large for single precision."""
+    same = (np.isnan(true) & np.isnan(shown)) | (np.isinf(shown) & (true.astype(shown.dtype) == shown))
+    return np.where(same, 0.0, relative(np.where(same, 0.0, shown - true), np.where(same, 1.0, terms)))

@@ -156,6 +156,22 @@ class ResultFiles:
         return array
 
 
+def altered(directory: Path) -> tuple[str, ...]:
+    """Names of the files of a result that are not as the run wrote them, by their checksums.
+
+    Raises:
+        CaseError: one is missing or cannot be read; one line.
+    """
+    document, path = _document(directory / JSON), directory / FIELDS
+    if not path.is_file():
+        asked = document["case"].get("output", {}).get("fields", False)
+        reason = "it is missing; run the case again" if asked else MISSING_FIELDS
+        raise CaseError(f"{path}: {reason}")
+    with _reading(path):
+        holds = {JSON: is_as_written(document), FIELDS: seal_of(path) == document.get("result_h5")}
+    return tuple(name for name, as_written in holds.items() if not as_written)
+
+
 @contextmanager
 def opened(directory: Path) -> Iterator[ResultFiles]:
     """The results in a folder, while the block lasts.
@@ -163,21 +179,18 @@ def opened(directory: Path) -> Iterator[ResultFiles]:
     Raises:
         CaseError: there are none that can be read; one line.
     """
-    document, is_whole = _document(directory / JSON)
-    path = directory / FIELDS
-    if not path.is_file():
-        raise CaseError(f"{directory}: has no {FIELDS}; {MISSING_FIELDS}")
+    changed, path = altered(directory), directory / FIELDS
     with _reading(path):
-        holds = {JSON: is_whole, FIELDS: seal_of(path) == document.get("result_h5")}
         file = h5py.File(path, "r")
     with file:
         with _reading(path):
-            files = _contents(document, file, tuple(name for name, as_written in holds.items() if not as_written))
+            files = _contents(_document(directory / JSON), file, changed)
         yield files
 
 
-def _document(path: Path) -> tuple[Mapping[str, Any], bool]:
-    """The table of result.json, and whether its checksum is right."""
+def _document(path: Path) -> Mapping[str, Any]:
+    if path.exists() and not path.is_file():
+        raise CaseError(f"cannot read {path}: it is no file")
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
@@ -186,7 +199,7 @@ def _document(path: Path) -> tuple[Mapping[str, Any], bool]:
         raise CaseError(f"cannot read {path}: it is damaged: {error}") from error
     if not isinstance(document, dict) or document.get("schema") != SCHEMA or not isinstance(document.get("case"), dict):
         raise CaseError(f"{path}: is no result of this version: expected schema {SCHEMA} and a case")
-    return document, is_as_written(document)
+    return document
 
 
 def _contents(document: Mapping[str, Any], file: h5py.File, altered: tuple[str, ...]) -> ResultFiles:

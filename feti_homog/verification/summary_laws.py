@@ -33,7 +33,8 @@ def _check_cell(ledger: Ledger, cell: DiscreteCell, told: Section) -> None:
     expected = {"width": width, "height": height, "area": width * height, "elements": len(mesh.triangles)}
     expected |= {"nodes": len(mesh.points), "fibre_fraction": 1.0 - cell.fractions[0]}
     for name, value in expected.items():
-        ledger.record("cell", abs(told[name] - value) / (abs(value) or 1.0), f"cell.{name}")
+        scale = 1.0 if name == "fibre_fraction" else abs(value) or 1.0
+        ledger.record("cell", abs(told[name] - value) / scale, f"cell.{name}")
     for name, value in zip(names, cell.fractions, strict=True):
         ledger.record("cell", abs(told["fractions"][name] - value), f"cell.fractions.{name}")
 

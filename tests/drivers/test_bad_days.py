@@ -21,6 +21,14 @@ WAIT = 60.0  # seconds
 TEXTS = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
 
 
+@pytest.fixture(autouse=True)
+def attentive():
+    """Programs that the test starts hear SIGINT, also where the suite itself is a background job, which ignores it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 def listens(process):
     """Whether a process waits for SIGINT in a thread, so that no other gets it."""
     lines = Path(f"/proc/{process.pid}/status").read_text().splitlines()

@@ -38,6 +38,15 @@ OPTIONS: dict[str, tuple[str, str]] = {
     "no folder of a log": ("-log_view :/nonexistent/x", "-log_view :/nonexistent/x: expected"),
     "no folder of a monitor": ("-feti_ksp_monitor ascii:/nonexistent/m", "-feti_ksp_monitor ascii:/nonexistent/m: "),
     "flag with a word": ("-feti_view abc", "-feti_view abc: expected true or false, or no value"),
+    "capital letters": ("-FETI_KSP_RTOL abc", "-feti_ksp_rtol abc: expected a number above 0 and below 1"),
+    "errors of PETSc": ("-feti_ksp_error_if_not_converged", "-feti_ksp_error_if_not_converged: expected nothing"),
+    "traps": ("-fp_trap", "-fp_trap: expected nothing"),
+    "no folder of the news": ("-info /nonexistent/x", "-info /nonexistent/x: expected a file"),
+    "no folder of memory": ("-malloc_view /nonexistent/x", "-malloc_view /nonexistent/x: expected a file"),
+    "workspace of a thousand times": (
+        "-feti_schur_mat_mumps_icntl_14 2000000000",
+        "-feti_schur_mat_mumps_icntl_14 2000000000: expected an integer of at least 0 and at most 10000",
+    ),
     "switch with a word": ("-malloc_debug maybe", "-malloc_debug maybe: expected true or false"),
 }
 """Words after `check CASE.toml`."""

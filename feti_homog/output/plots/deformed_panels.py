@@ -11,7 +11,6 @@ from typing import Any
 import h5py
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from PIL import Image
@@ -33,6 +32,8 @@ from feti_homog.output.plots.plot_helpers import (
     fill_triangles,
     load_label,
     magnification,
+    pixels_of,
+    plain,
     save,
     unit_label,
     value_range,
@@ -180,7 +181,7 @@ def _side_by_side(file: Any, numbers: Sequence[int], output: Mapping[str, Any], 
     for axes in grid[len(numbers) :]:
         axes.set_axis_off()
     grid[0].autoscale_view()
-    figure.suptitle(f"{file.attrs['title']}: {cell.caption}".lstrip(": "), fontsize=11)
+    figure.suptitle(f"{plain(file.attrs['title'])}: {cell.caption}".lstrip(": "), fontsize=11)
     states = [cell.interface_edges.state(file[f"state/{n}/status"][:]) for n in numbers]
     found = np.unique(np.concatenate(states))
     handles = state_legend([kind for kind in STATE_NAMES if kind in found])
@@ -196,7 +197,6 @@ def _animation(file: Any, numbers: Sequence[int], output: Mapping[str, Any], sca
     low, high = _corners(places)
     size = high - low
     figure = Figure(figsize=(3.6 + BAR, 3.6 * size[1] / size[0] + 0.9), dpi=100, layout="constrained")
-    canvas: Any = FigureCanvasAgg(figure)
     axes = figure.subplots()
     figure.suptitle(cell.caption, fontsize=10)
     frames: list[Image.Image] = []
@@ -205,9 +205,8 @@ def _animation(file: Any, numbers: Sequence[int], output: Mapping[str, Any], sca
             artist.remove()
         cell.draw(axes, number, moved)
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-        canvas.draw()
+        picture = Image.fromarray(pixels_of(figure))
         figure.set_layout_engine("none")
-        picture = Image.fromarray(np.ascontiguousarray(np.asarray(canvas.buffer_rgba())[..., :3]))
         frames.insert(0, picture.quantize(256, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE))
     times = [FRAME_TIME] * (len(frames) - 1) + [6 * FRAME_TIME]
     film = {"save_all": True, "append_images": frames[1:], "duration": times, "loop": 0}

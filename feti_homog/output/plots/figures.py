@@ -32,6 +32,7 @@ from feti_homog.output.plots.plot_helpers import (
     largest_length,
     load_label,
     magnification,
+    plain,
     save,
     unit_label,
 )
@@ -115,7 +116,7 @@ def _cell(file: Any, drawn: DrawnMesh, borders: Array) -> Figure:
     left.set_title(_count(bodies, "body", "bodies"))
     right.set_title(_count(subdomains, "subdomain", "subdomains"))
     right.set_ylabel("")
-    figure.suptitle(attributes["title"], fontsize=12)
+    figure.suptitle(plain(attributes["title"]), fontsize=12)
     figure.legend(handles=legend, loc="outside lower center", ncols=4, frameon=False)
     return figure
 
@@ -148,7 +149,7 @@ def _deformed(
     label_cell_axes(axes, attributes)
     bar = figure.colorbar(picture, cax=axes.inset_axes((1.03, 0.0, 0.04, 1.0)), extend=extend)
     bar.set_label(f"${STRESS_SYMBOLS[component]}$ " + (unit_label(attributes["stress_unit"]) or "(unit of the moduli)"))
-    axes.set_title(f"{attributes['title']}\n{load_label(strain)}, displacement × {scale:g}".lstrip())
+    axes.set_title(f"{plain(attributes['title'])}\n{load_label(strain)}, displacement × {scale:g}".lstrip())
     undeformed = Line2D([], [], color=UNDEFORMED, linewidth=0.7, label="undeformed")
     handles = [*(marks if len(marks) > 1 else ()), undeformed]
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), frameon=False)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Literal
@@ -37,11 +38,17 @@ def save(figure: Figure, path: Path) -> Path:
     Raises FetiHomogError if it cannot be written.
     """
     figure.set_dpi(DPI)
-    canvas: Any = FigureCanvasAgg(figure)
-    canvas.draw()
-    pixels = np.asarray(canvas.buffer_rgba())[..., :3]
-    picture = Image.fromarray(np.ascontiguousarray(_trimmed(pixels, round(PADDING * DPI))))
+    picture = Image.fromarray(np.ascontiguousarray(_trimmed(pixels_of(figure), round(PADDING * DPI))))
     return atomic.replace(path, lambda part: picture.save(part, format="PNG"))
+
+
+def pixels_of(figure: Figure) -> Array:
+    """The drawn figure (rows, columns, 3).  Letters that the font lacks are boxes, without a warning each."""
+    canvas: Any = FigureCanvasAgg(figure)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", r"Glyph \d+")
+        canvas.draw()
+    return np.ascontiguousarray(np.asarray(canvas.buffer_rgba())[..., :3])
 
 
 def _trimmed(pixels: Array, padding: int) -> Array:
@@ -157,5 +164,10 @@ def load_label(strain: Array) -> str:
     )
 
 
+def plain(text: str) -> str:
+    """A user's text for Matplotlib, which would read formulas between dollars."""
+    return text.replace("$", r"\$")
+
+
 def unit_label(label: str) -> str:
-    return f"({label})" if label else ""
+    return f"({plain(label)})" if label else ""

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from feti_homog.mechanics import response
-from feti_homog.output.plots.plot_helpers import STRAIN_SYMBOLS
+from feti_homog.output.plots.plot_helpers import STRAIN_SYMBOLS, plain
 from feti_homog.sweep.report.statistics import Statistics
 from feti_homog.sweep.report.style import COLOURS, label_axes, legend
 from feti_homog.sweep.report.sweep_table import SweepTable
@@ -29,7 +29,7 @@ def figure(table: SweepTable) -> Figure:
         axes.xaxis.set_major_locator(MaxNLocator(5))
         axes.axhline(0.0, color="0.6", linewidth=0.6, zorder=0)
         label_axes(axes, f"$\\Sigma_{{{COMPONENTS[component]}}}$", table, f"${STRAIN_SYMBOLS[along]}$")
-    picture.suptitle(f"{table.name}: realisations, means and their 95 % confidence intervals", fontsize=12)
+    picture.suptitle(f"{plain(table.name)}: realisations, means and their 95 % confidence intervals", fontsize=12)
     legend(picture, list(panels))
     return picture
 

@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
+from feti_homog.output.plots.plot_helpers import plain
 from feti_homog.sweep.report.series import Series, series_over
 from feti_homog.sweep.report.style import COLOURS, MARKERS, label_axes, legend, plot_series
 from feti_homog.sweep.report.sweep_table import SweepTable
@@ -34,7 +35,7 @@ def figure(table: SweepTable, key: str) -> Figure:
         lower.set_ylabel("scatter / mean (%)")
         lower.set_ylim(bottom=0.0)
     _logarithmic(panels[0, 0], sorted({int(x) for series in found for x in series.x}))
-    picture.suptitle(f"{table.name}: realisations and means with 95 % confidence intervals", fontsize=12)
+    picture.suptitle(f"{plain(table.name)}: realisations and means with 95 % confidence intervals", fontsize=12)
     legend(picture, list(panels.flat))
     return picture
 

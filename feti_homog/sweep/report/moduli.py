@@ -13,6 +13,7 @@ from feti_homog.config.material_sections import read_materials
 from feti_homog.config.materials import plane_stiffness
 from feti_homog.config.schema import TableReader
 from feti_homog.mechanics import bounds as mechanics
+from feti_homog.output.plots.plot_helpers import plain
 from feti_homog.sweep.report.series import Series, series_over
 from feti_homog.sweep.report.style import COLOURS, label_axes, legend, plot_series
 from feti_homog.sweep.report.sweep_table import SweepTable
@@ -47,7 +48,7 @@ def figure(table: SweepTable) -> Figure:
         if bounds is not None:
             _draw_above_reuss(panels[1, k], table, series, bounds, name)
     planes = sorted({document["case"]["analysis"]["plane"] for document in table.finished})
-    picture.suptitle(f"{table.name}: plane {' and '.join(planes)}", fontsize=12)
+    picture.suptitle(f"{plain(table.name)}: plane {' and '.join(planes)}", fontsize=12)
     legend(picture, list(panels.flat)[::-1])
     return picture
 

@@ -129,7 +129,7 @@ FAULTY = {
     "twice": ("cell.order = [1]\n'cell.order' = [2]", ["[sweep] cell.order: given twice"]),
     "twice by table": ("cell = [{order = 2}]\n'cell.order' = [1]", ["[sweep] cell.order: given twice"]),
     "regular realisations": ("realisations = 2\ncell.order = [1]", ['only cells with geometry = "random"']),
-    "too many": ("samples = 100000\ncell.order = [1, 2]\ncell.fibre_fraction = {from = 0.1, to = 0.2}", ["200000"]),
+    "too many": ("samples = 20000\ncell.order = [1, 2]\ncell.fibre_fraction = {from = 0.1, to = 0.2}", ["40000"]),
     "a case's fault": (
         "cell.fibre_fraction = [0.4, 0.95, 0.99]",
         ["case-0002: [cell] fibre_fraction = 0.95", "case-0003: [cell] fibre_fraction = 0.99"],

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -93,6 +94,14 @@ def test_all_pictures_are_made(tmp_path: Path, order: int, refine: int) -> None:
     for path in paths:
         picture = imread(path)
         assert min(picture.shape[:2]) > 500 and picture[..., :3].std() > 0.1
+
+
+def test_texts_of_the_user_are_no_formulas(tmp_path: Path, recwarn: pytest.WarningsRecorder) -> None:
+    example = sample(4)
+    header = replace(example.header, title="costs $\\frac{1$ or 纤维", stress_unit="$$GPa$$", length_unit="$")
+    write(tmp_path, replace(example, header=header))
+    figures.plot(tmp_path)
+    assert not [warning for warning in recwarn if "Glyph" in str(warning.message)]
 
 
 def listed(kind: str, **points: Any) -> dict[str, Any]:
