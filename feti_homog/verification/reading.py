@@ -63,8 +63,10 @@ class InterfaceRows:
 
 @dataclass(frozen=True)
 class Fibres:
-    """The f fibres in the order of their numbers: centres (f, 2), radii (f,); NaN where there is none."""
+    """The f fibres by number: numbers and phases (f,), centres (f, 2), radii (f,); NaN where there is none."""
 
+    number: AnyInt
+    phase: AnyInt
     centre: Float
     radius: Float
 
@@ -206,7 +208,7 @@ def _contents(document: Mapping[str, Any], file: h5py.File, altered: tuple[str, 
     """The whole of both files but the states."""
     mesh = Mesh(*(_rows(file[f"mesh/{name}"]) for name in ("points", "triangles", "subdomain", "phase")))
     rows = InterfaceRows(*(_rows(file[f"interface/{name}"]) for name in ("points", "normal", "length", "fibre_number")))
-    fibres = Fibres(*(_rows(file[f"fibre/{name}"]) for name in ("centre", "radius")))
+    fibres = Fibres(*(_rows(file[f"fibre/{name}"]) for name in ("number", "phase", "centre", "radius")))
     faces = np.stack([_rows(file[f"interface/{name}"]) for name in ("fibre_node", "matrix_node")], axis=1)
     size = np.array([file.attrs["width"], file.attrs["height"]], float)
     phases = tuple(map(str, file.attrs["phases"]))

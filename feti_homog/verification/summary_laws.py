@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,7 @@ def check_summary(ledger: Ledger, cell: DiscreteCell) -> None:
     """The sections `cell`, `moduli` and `bounds` of result.json, where they are."""
     document = cell.files.document
     _check_cell(ledger, cell, document["cell"])
+    _check_fibres(ledger, cell, document["fibres"])
     if document.get("moduli") is not None:
         stiffness = np.array(document["effective_stiffness"])
         for name, value in _moduli(stiffness).items():
@@ -37,6 +38,21 @@ def _check_cell(ledger: Ledger, cell: DiscreteCell, told: Section) -> None:
         ledger.record("cell", abs(told[name] - value) / scale, f"cell.{name}")
     for name, value in zip(names, cell.fractions, strict=True):
         ledger.record("cell", abs(told["fractions"][name] - value), f"cell.fractions.{name}")
+
+
+def _check_fibres(ledger: Ledger, cell: DiscreteCell, told: Sequence[Section]) -> None:
+    """The list of fibres is that of result.h5, in the order of their numbers."""
+    fibres, phases = cell.files.fibres, cell.files.phases
+    numbers = np.arange(1, len(fibres.number) + 1)
+    ledger.record("tables", np.where(np.array_equal(fibres.number, numbers), 0.0, np.inf), "/fibre/number")
+    listed = [(fibre["number"], fibre["phase"]) for fibre in told]
+    expected = [(number, phases[phase]) for number, phase in zip(numbers, fibres.phase, strict=True)]
+    ledger.record("tables", np.where(listed == expected, 0.0, np.inf), "fibres")
+    if listed == expected:
+        circles = np.array([[*(fibre["centre"] or (None, None)), fibre["radius"]] for fibre in told], float)
+        stored = np.column_stack([fibres.centre, fibres.radius])
+        off = np.where(np.isnan(circles) & np.isnan(stored), 0.0, circles - stored)
+        ledger.record("tables", relative(off, cell.files.size.max()).max(axis=1), lambda i: f"fibres[{i}]")
 
 
 def _moduli(stiffness: Float) -> dict[str, float]:
