@@ -37,7 +37,7 @@ class Arrangement:
 
 
 def arrange(cell: Cell) -> Arrangement:
-    """The arrangement that a case asks for, whose area fraction is `cell.fibre_fraction` to rounding.
+    """The arrangement that a case asks for in a cell of width 1, its area fraction `cell.fibre_fraction` to rounding.
 
     square: one disc in the middle of a 1 x 1 cell. hexagonal: 1 x sqrt(3), a disc in the middle and one at
     the corner. random: `cell.fibres` discs in a 1 x 1 cell, see `random_arrangement`.

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from feti_homog.cell.arrangement import arrange
+from feti_homog.cell.arrangement import Arrangement, arrange
 from feti_homog.cell.coarse_mesh import CoarseMesh, areas, flip_double_arcs, representatives
 from feti_homog.cell.outline import MATRIX, Curve, Outline, outline
 from feti_homog.errors import MeshError
@@ -40,6 +40,8 @@ Signed = tuple[int, Curve]
 def generate(cell: Cell, marks: Mapping[int, Sequence[float]] = NO_MARKS) -> CoarseMesh:
     """The periodic coarse mesh of a square, hexagonal or random cell, elements about mesh_size * width.
 
+    It is made at the width 1 and then scaled, so that cells of one shape have one mesh at all sizes.
+
     `marks` maps a fibre (its number in the arrangement) to angles in degrees, measured at its centre, where
     the mesh gets nodes: tips of debonded arcs. A mark within MERGED of where the circle crosses the cell's
     boundary, or of another mark, is moved there.
@@ -61,19 +63,27 @@ def generate(cell: Cell, marks: Mapping[int, Sequence[float]] = NO_MARKS) -> Coa
     arc_edges = np.concatenate([np.stack([arc.nodes[:-1], arc.nodes[1:]], axis=1) for arc in arcs])
     arc_edges = arc_edges.astype(np.int32)
     arc_circle = np.repeat([arc.circle for arc in arcs], [len(arc.nodes) - 1 for arc in arcs])
+    scale = _scale(cell, arrangement)
     return CoarseMesh(
-        width=arrangement.width,
-        height=arrangement.height,
-        points=points,
+        width=scale * arrangement.width,
+        height=scale * arrangement.height,
+        points=scale * points,
         triangles=flip_double_arcs(triangles, phase, arc_edges, arc_circle, len(points)),
         phase=phase,
         phases=("matrix", "fibre"),
         representative=representatives(points, arrangement.width, arrangement.height),
-        circles=lines.circles,
+        circles=scale * lines.circles,
         arc_edges=arc_edges,
         arc_circle=arc_circle.astype(np.int32),
         debonded_edges=np.zeros((0, 2), np.int32),
     )
+
+
+def _scale(cell: Cell, arrangement: Arrangement) -> float:
+    """Lengths of the cell / those of the arrangement."""
+    if cell.fibre_radius is not None:
+        return float(cell.fibre_radius / arrangement.radii.mean())
+    return cell.width or 1.0
 
 
 def _refuse_extremes(cell: Cell) -> None:

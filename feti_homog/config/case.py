@@ -212,6 +212,8 @@ def _checked_cell(cell: Cell, folder: Path, faults: list[str]) -> Cell:
                 f"{limit_in_words(limit, cell.fibre_fraction, 4)} for "
                 f"geometry = {toml_value(cell.geometry)}: {reason}"
             )
+    if cell.width is not None and cell.fibre_radius is not None:
+        faults.append("[cell] width, fibre_radius: exclude each other; give one")
     if cell.file is None:
         return cell
     file = (folder / cell.file).resolve()

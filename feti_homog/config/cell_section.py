@@ -24,8 +24,8 @@ class Cell:
 
     geometry: str = key(
         choice(*CIRCULAR, "mesh"),
-        '"square": a fibre in the middle of a 1 x 1 cell; "hexagonal": a 1 x sqrt(3) cell with fibres in the middle '
-        'and at the corners; "random": a 1 x 1 cell; "mesh": a gmsh file.',
+        '"square": a fibre in the middle of a square cell; "hexagonal": a cell sqrt(3) times as high as wide with '
+        'fibres in the middle and at the corners; "random": fibres in a square cell; "mesh": a gmsh file.',
     )
     fibre_fraction: float | None = key(
         real(above=0.0, below=1.0),
@@ -33,6 +33,14 @@ class Cell:
         "(hexagonal; random, where min_gap lowers it).",
         only=ALL_CIRCULAR,
     )
+    width: float | None = key(
+        real(least=1e-9, most=1e9), "Width of the cell.", unit="length", default=None, only=ALL_CIRCULAR,
+        default_words="1, or what fibre_radius makes it",
+    )  # fmt: skip
+    fibre_radius: float | None = key(
+        real(least=1e-9, most=1e9), "Mean radius of the fibres, in place of width.", unit="length", default=None,
+        only=ALL_CIRCULAR, default_words="what width makes it",
+    )  # fmt: skip
     mesh_size: float = key(
         real(least=1e-4, most=0.5),
         "Size of the elements, before refine, / width of the cell.",

@@ -35,6 +35,7 @@ def rules_of_one_case() -> Schema:
             *conditional,
             *_material_rules(),
             *_arc_rules(),
+            _at(("cell",), {"not": {"required": ["width", "fibre_radius"]}}),
             _at(("decomposition",), {"not": {"required": ["subdomains", "max_dofs"]}}),
             _at(("path",), {"oneOf": [{"required": ["strain"]}, {"required": ["waypoints"]}]}),
         ],

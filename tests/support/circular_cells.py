@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
+from feti_homog.config.cell_section import Cell
 
 
-def cell(geometry="random", fraction=0.4, size=0.05, fibres=16, gap=0.06, seed=0, spread=0.0):
-    """What arrangements and the mesher read of [cell]."""
-    return SimpleNamespace(
+def cell(geometry="random", fraction=0.4, size=0.05, fibres=16, gap=0.06, seed=0, spread=0.0, **lengths):
+    """The section [cell], with a size of its own if `lengths` give one."""
+    return Cell(
         geometry=geometry,
         fibre_fraction=fraction,
         mesh_size=size,
@@ -15,4 +15,5 @@ def cell(geometry="random", fraction=0.4, size=0.05, fibres=16, gap=0.06, seed=0
         min_gap=gap,
         seed=seed,
         radius_spread=spread,
+        **lengths,
     )

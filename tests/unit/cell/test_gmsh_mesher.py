@@ -33,6 +33,19 @@ CELLS = {
 named = pytest.mark.parametrize("name", CELLS)
 
 
+@pytest.mark.parametrize("geometry", ["square", "hexagonal", "random"])
+def test_cells_of_all_sizes_have_one_mesh(geometry):
+    unit, small = (generate(cell(geometry, spread=0.3, **width)) for width in ({}, {"width": 2e-4}))
+    assert np.array_equal(small.triangles, unit.triangles) and np.array_equal(small.arc_edges, unit.arc_edges)
+    for name in ("points", "circles", "period"):
+        assert getattr(small, name) == pytest.approx(2e-4 * getattr(unit, name), rel=1e-14)
+    assert (small.width, small.height) == pytest.approx((2e-4, 2e-4 * unit.height))
+    of_radius = generate(cell(geometry, spread=0.3, fibre_radius=5e-6))
+    radii = np.unique(of_radius.circles[:, 2])
+    assert radii.min() <= 5e-6 * (1 + 1e-12) and radii.max() >= 5e-6 * (1 - 1e-12)
+    assert of_radius.circles == pytest.approx(unit.circles * of_radius.width, rel=1e-12)
+
+
 @cache
 def mesh_of(name):
     return generate(CELLS[name])

@@ -188,6 +188,14 @@ FAULTY_CASES: dict[str, tuple[str, tuple[str, ...]]] = {
         ended("[output]\ndeformation_scale = -1\n"),
         ("[output] deformation_scale = -1: expected a number at least 0",),
     ),
+    "two_sizes": (
+        cell("mesh_size = 0.05", "mesh_size = 0.05\nwidth = 2.0\nfibre_radius = 1.0"),
+        ("[cell] width, fibre_radius: exclude each other; give one",),
+    ),
+    "width_zero": (
+        cell("mesh_size = 0.05", "mesh_size = 0.05\nwidth = 0.0"),
+        ("[cell] width = 0.0: expected a number at least 1e-09 and at most 1e+09",),
+    ),
     # [petsc]
     "petsc_dash": (
         ended("[petsc]\n-feti_ksp_rtol = 1e-8\n"),

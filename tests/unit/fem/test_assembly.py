@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from reference import monolithic
@@ -13,6 +11,7 @@ from feti_homog.cell.periodic_topology import Torus
 from feti_homog.cell.refinement import ReferenceLattice, refine
 from feti_homog.cell.submesh import cut
 from feti_homog.cell.unwrap import unwrap
+from feti_homog.config.cell_section import Cell
 from feti_homog.fem.assembly import assemble, element_strain
 
 STIFFNESS = np.array([[5.0, 1.5, 0.4], [1.5, 3.0, -0.2], [0.4, -0.2, 1.2]])
@@ -21,7 +20,7 @@ LATTICES = [(0, 1), (2, 1), (0, 2), (1, 2)]
 
 @pytest.fixture(scope="module")
 def torus():
-    cell = SimpleNamespace(geometry="hexagonal", fibre_fraction=0.5, mesh_size=0.25, fibres=None)
+    cell = Cell(geometry="hexagonal", fibre_fraction=0.5, mesh_size=0.25)
     return Torus.of(generate(cell))
 
 

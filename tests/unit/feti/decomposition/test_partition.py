@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
 from feti_homog.cell.gmsh_mesher import generate
 from feti_homog.cell.periodic_topology import Torus, components, edge_pairs, shared_edges
+from feti_homog.config.cell_section import Cell
 from feti_homog.feti.decomposition.partition import decompose, pieces_for_count, pieces_for_size
 
 
 def torus_of(fibres, seed, mesh_size):
     """A random cell of 60 %."""
-    cell = SimpleNamespace(
+    cell = Cell(
         geometry="random",
         fibres=fibres,
         fibre_fraction=0.6,
