@@ -110,7 +110,8 @@ def read_index(directory: Path) -> SweepIndex:
     except OSError as error:
         raise CaseError(f"{path}: cannot be read: {error.strerror}; expected the folder of a sweep") from error
     except (ValueError, KeyError, TypeError) as error:
-        raise CaseError(f"{path} cannot be read: {error}; move it away and start the sweep again") from error
+        words = str(error).removeprefix("it is damaged: ")
+        raise CaseError(f"{path} is damaged: {words}; move it away and start the sweep again") from error
 
 
 def case_state(directory: Path, entry: SweepCase) -> CaseState:

@@ -191,9 +191,9 @@ def opened(directory: Path) -> Iterator[ResultFiles]:
 
 
 def _document(path: Path) -> Mapping[str, Any]:
-    if path.exists() and not path.is_file():
-        raise CaseError(f"cannot read {path}: it is no file")
     try:
+        if path.is_fifo():
+            raise CaseError(f"cannot read {path}: it is a pipe")
         document = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise CaseError(f"cannot read {path}: {error.strerror or error}") from error

@@ -48,9 +48,9 @@ def read(directory: Path) -> dict[str, Any]:
             of this program.
     """
     path = Path(directory) / NAME
-    if path.exists() and not path.is_file():
-        raise CaseError(f"cannot read {path}: it is no file")
     try:
+        if path.is_fifo():
+            raise CaseError(f"cannot read {path}: it is a pipe")
         document = sealed_json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise CaseError(f"cannot read {path}: {error.strerror or error}") from error
