@@ -61,6 +61,12 @@ STRENGTH = ValueType(
     lambda v: None if v == math.inf else float(v),
     {"type": "number", "minimum": SMALLEST},
 )
+STIFFNESS = ValueType(
+    "a stiffness above 0, or inf",
+    _is_strength,
+    lambda v: None if v == math.inf else float(v),
+    {"type": "number", "minimum": SMALLEST},
+)
 OPENINGS = ValueType(
     "a rising list of numbers from 0 to 360",
     _are_openings,

@@ -7,7 +7,7 @@ from typing import Any
 
 from feti_homog.config.cell_section import Cell
 from feti_homog.config.schema import Selector, key
-from feti_homog.config.section_values import ARCS, FIBRES, OPENINGS, STRAIN, STRENGTH, WAYPOINTS
+from feti_homog.config.section_values import ARCS, FIBRES, OPENINGS, STIFFNESS, STRAIN, STRENGTH, WAYPOINTS
 from feti_homog.config.values import boolean, choice, integer, real, text
 
 Strain = tuple[float, ...]
@@ -78,6 +78,20 @@ class InterfaceSection:
         'What is debonded from the start; needed in type = "angle", and in type = "stiffness" unless the cell is a '
         'mesh (there lines in a physical curve "debonded" are debonded too).',
         default=(),
+    )
+    normal_stiffness: float | None = key(
+        STIFFNESS,
+        "k_n: normal traction / opening of the bonds that hold, in tension and compression.",
+        unit="stress / length",
+        default=None,
+        default_words="inf",
+    )
+    tangential_stiffness: float | None = key(
+        STIFFNESS,
+        "k_t: tangential traction / slip of the bonds that hold.",
+        unit="stress / length",
+        default=None,
+        default_words="inf",
     )
     normal_strength: float | None = key(
         STRENGTH,

@@ -14,10 +14,10 @@ class DualSolution:
     Attributes:
         strain: (3,) E.
         lam: (owned rows,) multipliers, nodal forces between the faces; 0 on inactive rows.
-        jump: (owned rows,) B u*, 0 up to tolerance on active rows, gap and slip on the others.
+        jump: (owned rows,) B u* - C lam, 0 up to tolerance on active rows, gap and slip on the others.
         alpha: (kernel dimension,) rigid-body amplitudes.
         iterations, reason: of the Krylov method (PETSc's KSPConvergedReason).
-        residual: |B u*| on the active rows, relative to the jump of the torn cell.
+        residual: |B u* - C lam| on the active rows, relative to the jump of the torn cell.
     """
 
     strain: Float

@@ -22,6 +22,7 @@ from feti_homog.feti.preconditioners.influence import Influence
 from feti_homog.feti.preconditioners.scaled import Dirichlet, Identity, Lumped, Preconditioner
 from feti_homog.feti.solver_plan import ProblemSizes, SolverOptions, choose
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
+from feti_homog.typing import Float
 
 CLASSES: dict[str, Callable[[MPI.Intracomm, JumpOperator, InterfaceOperators], Preconditioner]] = {
     "none": lambda *_: Identity(),
@@ -47,9 +48,11 @@ def build(
     jump_operator: JumpOperator,
     subdomains: Sequence[Subdomain],
     applications: int,
+    compliance: Float,
     thresholds: Thresholds = DEFAULTS,
 ) -> SolverParts:
-    """Factor the subdomains and set up what the options and sizes ask for.  Collective.
+    """Factor the subdomains and set up what the options and sizes ask for; `compliance` (owned rows,) is C.
+    Collective.
 
     Options: `feti_dual_operator`, `feti_pc_type`, `feti_coarse_space`, `feti_coarse_threshold`.
 
@@ -60,15 +63,23 @@ def build(
     options = SolverOptions.read(database.getString, database.getReal, thresholds)
     soft = options.want_soft_modes(_are_cut(comm, subdomains))
     operators = agree(
-        comm, InterfaceOperators, jump_operator, subdomains, options.operator, applications, soft, thresholds
-    )
+        comm,
+        InterfaceOperators,
+        jump_operator,
+        subdomains,
+        options.operator,
+        applications,
+        soft,
+        thresholds,
+        compliance,
+    )  # fmt: skip
     plan = choose(_sizes(comm, jump_operator, operators, applications), options, thresholds)
     preconditioner = CLASSES[plan.preconditioner](comm, jump_operator, operators)
     natural = NaturalCoarseSpace(comm, jump_operator, operators)
     coarse: CoarseSpace = natural
     if plan.adaptive and isinstance(preconditioner, Dirichlet):
         coarse = AdaptiveCoarseSpace(
-            comm, jump_operator, operators, preconditioner, natural, options.threshold, thresholds
+            comm, jump_operator, operators, preconditioner, natural, options.threshold, compliance, thresholds
         )
     return SolverParts(operators, preconditioner, natural, coarse)
 

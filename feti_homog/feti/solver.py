@@ -2,7 +2,9 @@
 
 With f = -Q E for the macroscopic strain E, Eqs. (34), (36), (37) read on the active rows
 
-    F lam - G alpha = d E,  G^T lam = 0,  u* = K+ (-Q E - B^T lam) + R alpha,  d = -B K+ Q.
+    (F + C) lam - G alpha = d E,  G^T lam = 0,  u* = K+ (-Q E - B^T lam) + R alpha,  d = -B K+ Q.
+
+C is the compliance of elastic bonds, 0 of glue; then the faces part by B u* = C lam.
 """
 
 from __future__ import annotations
@@ -19,6 +21,7 @@ from feti_homog.cell.refinement import ReferenceLattice
 from feti_homog.common import process_memory
 from feti_homog.common.distributed_arrays import allreduce_sum
 from feti_homog.feti import factory, view
+from feti_homog.feti.decomposition.interface_springs import GLUE, InterfaceSprings
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.shared_entities import SharedEntities
 from feti_homog.feti.decomposition.subdomain import Subdomain
@@ -44,7 +47,7 @@ class FetiSolver:
     Attributes:
         jump_operator: B and the layout of the multipliers.
         interface_operators: S and S+ of this rank's subdomains.
-        operator: F.
+        operator: F + C.
         preconditioner: M^-1.
         natural: the rigid-body motions, G and P.
         coarse: what is deflated: `natural` itself, or soft modes beside it.
@@ -60,6 +63,7 @@ class FetiSolver:
         lattice: ReferenceLattice,
         applications: int,
         thresholds: Thresholds = DEFAULTS,
+        springs: InterfaceSprings = GLUE,
     ) -> None:
         """Set up; `applications` is how many times the dual operator is expected to be applied.  Collective.
 
@@ -68,10 +72,11 @@ class FetiSolver:
         """
         self.comm, self.subdomains = comm, subdomains
         self.jump_operator = JumpOperator(comm, shared, subdomains, lattice)
-        parts = factory.build(comm, self.jump_operator, subdomains, applications, thresholds)
+        compliance = springs.compliance(self.jump_operator)
+        parts = factory.build(comm, self.jump_operator, subdomains, applications, compliance, thresholds)
         self.interface_operators, self.preconditioner = parts.operators, parts.preconditioner
         self.natural, self.coarse = parts.natural, parts.coarse
-        self.operator = DualOperator(self.jump_operator, self.interface_operators)
+        self.operator = DualOperator(self.jump_operator, self.interface_operators, compliance)
         process_memory.trim()
         self.active = ActiveRows(self.rows)
         self._view = PETSc.Options("feti_").getBool("view", False)
@@ -171,6 +176,10 @@ class FetiSolver:
             if self._view:
                 PETSc.Sys.Print(view.describe_solve(krylov.ksp, k), comm=self.comm)
         return self._solutions(strains, lam * scale, torn_jump, iterations, reason, np.maximum(jump, rounding))
+
+    def opening(self, solution: DualSolution) -> Float:
+        """(owned rows,) B u*: what the springs give way, and the jump of rows without multipliers."""
+        return solution.jump + self.operator.compliance * solution.lam
 
     def boundary_displacement(self, solution: DualSolution) -> Float:
         """(boundary dofs,) u* of a solution, Eq. (34).  Collective."""

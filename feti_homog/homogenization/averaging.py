@@ -33,7 +33,7 @@ class Response:
         state: interface states, multipliers, jumps and amplitudes.
         u: (boundary dofs,) fluctuating displacement u* on the boundaries of this rank's subdomains.
         checks: relative errors of the laws: `strain` <eps> = E, Eq. (3), with the opening of debonded faces as
-            part of <eps>; `hill` <sigma:eps> = Sigma:E, Eq. (8), relative to <sigma:eps> or, if that is less, to
+            part of <eps>; `hill` <sigma:eps> = Sigma:E, Eq. (8), springs included, relative to <sigma:eps> or, if that is less, to
             what a bonded cell stores at least, E:<L^-1>^-1:E (Reuss), for a debonded one may store nothing;
             `jump`, the largest opening of a glued node relative to the largest displacement, which does not
             vanish where forces do; and the KKT certificate of contact.
@@ -83,7 +83,10 @@ class Homogenization:
         cell, solver = self.cell, self.cell.solver
         strain, u = state.solution.strain, solver.boundary_displacement(state.solution)
         stress, star, energy = self._averages(strain, u)
-        opening = cell.comm.allreduce(self._strain_of_jumps.T @ (state.solution.jump * (1 - solver.active.mask)))
+        springs = solver.operator.compliance * state.solution.lam
+        opened = state.solution.jump * (1 - solver.active.mask) + springs
+        opening, stretched = allreduce_sum(cell.comm, self._strain_of_jumps.T @ opened), state.solution.lam @ springs
+        energy += float(cell.comm.allreduce(stretched)) / cell.summary.area
         least = float(strain @ self.interface.least_bonded_stiffness @ strain)
         largest = (self._largest(u) + self.interface.imposed(strain)) or 1.0
         checks = {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -15,6 +16,7 @@ from feti_homog.common.mpi_errors import agree, on_root_only
 from feti_homog.common.progress import Progress
 from feti_homog.config.case import Case
 from feti_homog.config.materials import plane_stiffness
+from feti_homog.feti.decomposition.interface_springs import GLUE, InterfaceSprings
 from feti_homog.feti.decomposition.shared_entities import SharedEntities
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.solver import FetiSolver
@@ -105,10 +107,20 @@ def tear(
     """
     summary, shared, lattice, subdomains = assemble_subdomains(case, comm, progress, policy)
     with progress.stage("factor") as words:
-        solver = FetiSolver(comm, shared, subdomains, lattice, cost_model.applications(case), thresholds)
+        solver = FetiSolver(
+            comm, shared, subdomains, lattice, cost_model.applications(case), thresholds, _springs(case)
+        )
         multipliers, dimension = solver.jump_operator.global_rows, solver.coarse.coarse_dimension
         words.append(f"{multipliers} multipliers, coarse dimension {dimension}")
     return TornCell(comm, case, summary, lattice, subdomains, solver)
+
+
+def _springs(case: Case) -> InterfaceSprings:
+    """Those of the section [interface]; without it, or without stiffnesses, bonds are rigid."""
+    bond = case.interface
+    if bond is None:
+        return GLUE
+    return InterfaceSprings(bond.normal_stiffness or math.inf, bond.tangential_stiffness or math.inf)
 
 
 def assemble_subdomains(

@@ -106,7 +106,7 @@ class Interface:
 
     def jump(self, solution: DualSolution) -> Float:
         """(k, 2) gap and slip, matrix minus fibre."""
-        return np.asarray(solution.jump[self.nodes.row[:, None] + np.arange(2)])
+        return np.asarray(self.solver.opening(solution)[self.nodes.row[:, None] + np.arange(2)])
 
     def stress(self, solution: DualSolution) -> Float:
         """(3,) Sigma from the multipliers alone; collective."""

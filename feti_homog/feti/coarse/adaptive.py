@@ -75,6 +75,7 @@ class AdaptiveCoarseSpace:
         scaling: StiffnessScaled,
         natural: NaturalCoarseSpace,
         threshold: float,
+        compliance: Float,
         thresholds: Thresholds = DEFAULTS,
     ) -> None:
         """Find the modes below the threshold tau and factor.  All boundary operators must be dense but of large
@@ -95,7 +96,7 @@ class AdaptiveCoarseSpace:
         self.state = Deflation.OFF
         U = deflation_vectors(comm, jump_operator, blocks, neighbours, V, thresholds.drop_tolerance)
         process_memory.trim()
-        self.operator = CoarseOperator(jump_operator, operators, blocks, neighbours.rows, U)
+        self.operator = CoarseOperator(jump_operator, operators, blocks, neighbours.rows, U, compliance)
         self._active = np.ones(self.operator.U.shape[0])
         self.factor()
 

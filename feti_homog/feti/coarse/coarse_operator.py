@@ -1,6 +1,6 @@
-"""The matrix E = U^T F U of coarse vectors U, kept up to date while rows leave and come back.
+"""The matrix E = U^T (F + C) U of coarse vectors U, kept up to date while rows leave and come back.
 
-    E = sum_s X_s^T S_s+ X_s,  X_s = B_s^T U on the active rows.
+    E = sum_s X_s^T S_s+ X_s + U^T C U,  X_s = B_s^T U on the active rows.
 
 Each subdomain keeps Y_s = S_s+ X_s, so that a row that leaves costs only the subdomains which it glues, and no solve is
 needed for U^T F z = sum_s Y_s^T B_s^T z.
@@ -11,8 +11,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.sparse import csr_matrix
+from scipy.sparse import csr_matrix, diags
 
+from feti_homog.common.distributed_arrays import scale_rows
 from feti_homog.feti.coarse.local_eigenproblems import SubdomainBlocks
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.linalg.dense_block_sum import DenseBlockSum
@@ -26,7 +27,6 @@ class CoarseOperator:
     Attributes:
         U_local: (local rows, vectors) the coarse vectors, whatever rows are active.
         U: (owned rows, vectors) those of its rows that this rank owns.
-        E: (vectors, vectors) this rank's part of E on the active rows.
     """
 
     def __init__(
@@ -36,15 +36,24 @@ class CoarseOperator:
         blocks: Sequence[SubdomainBlocks],
         rows: Sequence[Int],
         U_local: csr_matrix,
+        compliance: Float,
     ) -> None:
-        """For all rows active; `rows` are the local rows of each of the `blocks`."""
+        """For all rows active; `rows` are the local rows of each of the `blocks`, `compliance` (owned rows,) is C."""
         self._jump_operator, self._operators = jump_operator, operators
         self._blocks, self._rows = blocks, rows
         self._mask = np.ones(len(jump_operator.rows))
+        self._compliance, self._active = compliance, np.ones(len(compliance))
         # Of each subdomain: the nonzero columns of X_s, and Y_s (boundary dofs, columns) there.
         self._flexed: list[tuple[Int, Float]]
-        self.E: csr_matrix
+        self._of_bodies: csr_matrix
         self.set_vectors(U_local)
+
+    @property
+    def E(self) -> csr_matrix:
+        """(vectors, vectors) this rank's part of E on the active rows."""
+        if not self._compliance.any():
+            return self._of_bodies
+        return self._of_bodies + self.U.T @ diags(self._active * self._compliance) @ self.U
 
     @property
     def vectors(self) -> int:
@@ -61,14 +70,14 @@ class CoarseOperator:
             Y = block.operator.apply_flexibility(X)
             self._flexed.append((columns, Y))
             E.add(columns, columns, X.T @ Y)
-        self.E = E.matrix()
+        self._of_bodies = E.matrix()
 
     def activate(self, active: Float) -> None:
         """Update E for the owned rows of which `active` is 1.  Collective."""
         mask = self._jump_operator.gather(active).copy()
         changed = mask != self._mask
         touched = [i for i, rows in enumerate(self._rows) if changed[rows].any()]
-        change = DenseBlockSum(self.E.shape)
+        change = DenseBlockSum(self._of_bodies.shape)
         for i in touched:
             columns, X = self._loads(i)
             change.add(columns, columns, -X.T @ self._flexed[i][1])
@@ -77,7 +86,7 @@ class CoarseOperator:
             columns, X = self._loads(i)
             self._flexed[i] = columns, self._blocks[i].operator.apply_flexibility(X)
             change.add(columns, columns, X.T @ self._flexed[i][1])
-        self.E = self.E + change.matrix()
+        self._of_bodies, self._active = self._of_bodies + change.matrix(), active
 
     def energy(self, z: Float) -> Float:
         """This rank's part of U^T F z, (vectors,) or (vectors, k), for z (owned rows,) or (owned rows, k)."""
@@ -85,7 +94,7 @@ class CoarseOperator:
         energy = np.zeros((self.vectors, *z.shape[1:]))
         for (columns, Y), span in zip(self._flexed, self._operators.slices, strict=True):
             energy[columns] += Y.T @ x[span]
-        return energy
+        return np.asarray(energy + self.U.T @ scale_rows(self._compliance, z))
 
     def _loads(self, i: int) -> tuple[Int, Float]:
         """X_s = B_s^T U of subdomain i on the active rows: its nonzero columns, and (boundary dofs, columns)."""

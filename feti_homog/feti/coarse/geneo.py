@@ -47,7 +47,7 @@ def subdomain_blocks(
     ]
     B, BW = operators.B.tocsc(), (W_inverse @ scaling.BD).tocsc()
     blocks = []
-    for i, (subdomain, operator) in enumerate(zip(operators.subdomains, operators.operators, strict=True)):
+    for i, (subdomain, operator) in enumerate(zip(operators.subdomains, operators.skins, strict=True)):
         own, scaled = (_columns(matrix, operators.slices[i], rows[i]) for matrix in (B, BW))
         blocks.append(SubdomainBlocks(subdomain, operators.dofs[i], operator, own, scaled, operators.facewise[i]))
     return blocks

@@ -21,11 +21,13 @@ class SubdomainSize:
         dofs: degrees of freedom of the subdomain.
         boundary_dofs: those of them that constraints act on.
         is_whole_body: whether all that the subdomain shares, it shares with one other body.
+        has_springs: whether springs hold it, whose soft skin is a dense matrix.
     """
 
     dofs: int
     boundary_dofs: int
     is_whole_body: bool
+    has_springs: bool = False
 
 
 @dataclass(frozen=True)
@@ -63,9 +65,9 @@ def choose(
     choices = []
     for size in sizes:
         n = size.boundary_dofs
-        facewise = size.is_whole_body and n > thresholds.whole_boundary_dofs
+        facewise = size.is_whole_body and n > thresholds.whole_boundary_dofs and not size.has_springs
         pays = DENSE_INVERSE_SECONDS * n**3 <= APPLY_SECONDS * size.dofs * applications
-        wanted = pays or (soft_modes and not facewise)
+        wanted = pays or size.has_springs or (soft_modes and not facewise)
         possible = n <= thresholds.dense_boundary_dofs and can_condense
         explicit = kind == "explicit" or (kind == "auto" and wanted and possible)
         choices.append(OperatorChoice(explicit and n > 0, facewise))

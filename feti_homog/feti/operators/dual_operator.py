@@ -1,21 +1,26 @@
-"""The dual operator F = sum_s B K+ B^T, Eq. (36), on the owned rows of multiplier vectors."""
+"""The dual operator F = sum_s B K+ B^T, Eq. (36), and the compliance C of elastic bonds, on the owned rows."""
 
 from __future__ import annotations
 
+from feti_homog.common.distributed_arrays import scale_rows
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.typing import Float
 
 
 class DualOperator:
-    """y = F x.  Symmetric positive definite, since B has full row rank and K+ is definite."""
+    """y = (F + C) x.  Symmetric positive definite, since B has full row rank and K+ is definite.
 
-    def __init__(self, jump_operator: JumpOperator, boundary: InterfaceOperators) -> None:
-        self.jump_operator, self.boundary = jump_operator, boundary
+    Attributes:
+        compliance: (owned rows,) the diagonal C.
+    """
+
+    def __init__(self, jump_operator: JumpOperator, boundary: InterfaceOperators, compliance: Float) -> None:
+        self.jump_operator, self.boundary, self.compliance = jump_operator, boundary, compliance
 
     def apply(self, x: Float) -> Float:
-        """sum_s B K+ B^T x for x (owned rows,) or (owned rows, k)."""
-        return self.jump(self.displacement(x))
+        """sum_s B K+ B^T x + C x for x (owned rows,) or (owned rows, k)."""
+        return self.jump(self.displacement(x)) + scale_rows(self.compliance, x)
 
     def displacement(self, lam: Float) -> Float:
         """K+ B^T lam on the boundary dofs: minus the torn cell's answer to multipliers in Eq. (34)."""

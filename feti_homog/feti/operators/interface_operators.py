@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
+from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.sparse import block_diag, csr_matrix
 
@@ -16,9 +18,11 @@ from feti_homog.feti.decomposition.subdomain import Subdomain, both_directions
 from feti_homog.feti.operators.choice import SubdomainSize, choose
 from feti_homog.feti.operators.explicit import ExplicitInterfaceOperator
 from feti_homog.feti.operators.implicit import ImplicitInterfaceOperator, Interior
+from feti_homog.feti.operators.soft_skin import SoftSkinOperator, compliance_root
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 from feti_homog.typing import Float, Int
 
+MATRIX = "matrix"
 InterfaceOperator = ExplicitInterfaceOperator | ImplicitInterfaceOperator
 
 
@@ -30,9 +34,10 @@ class InterfaceOperators:
         offsets: (subdomains + 1,) where each subdomain begins among the n.
         local_dofs: (n,) their numbers among all dofs of this rank.
         operators: dense or factored, of each subdomain.
+        skins: the same for the preconditioner and the coarse space, to whom a fibre on springs has a soft skin.
         facewise: whether the soft modes of each are to be looked for face by face.
         B: (local rows, n) the constraints on them, and `BT` its transpose.
-        diagonal: (n,) of K.
+        diagonal: (n,) of K, with springs that of their chain.
     """
 
     def __init__(
@@ -43,8 +48,12 @@ class InterfaceOperators:
         applications: int,
         soft_modes: bool,
         thresholds: Thresholds = DEFAULTS,
+        compliance: Float | None = None,
     ) -> None:
-        """Factor every subdomain, once, as `choose` says; takes the stiffness of each.  Arguments as of `choose`."""
+        """Factor every subdomain, once, as `choose` says; takes the stiffness of each.  Arguments as of `choose`.
+
+        `compliance` (owned rows,) is that of the springs of the interfaces, none by default.  Collective.
+        """
         self.subdomains = subdomains
         self.dofs = _constrained_dofs(jump_operator.B, subdomains)
         self.offsets = np.cumsum([0, *(len(d) for d in self.dofs)])
@@ -55,15 +64,38 @@ class InterfaceOperators:
         self.BT = self.B.T.tocsr()
         sizes = _sizes(jump_operator.shared, subdomains, self.dofs)
         can_condense = bool(PETSc.Sys.hasExternalPackage("mumps"))
+        roots = self._compliance_roots(jump_operator, compliance)
+        sizes = [replace(size, has_springs=root is not None) for size, root in zip(sizes, roots, strict=True)]
         chosen = choose(sizes, kind, applications, soft_modes, can_condense, thresholds)
         self.facewise = [choice.facewise for choice in chosen]
         self.operators: list[InterfaceOperator] = []
+        self.skins: list[InterfaceOperator] = []
         diagonals = [np.zeros(0)]
-        for subdomain, dofs, choice in zip(subdomains, self.dofs, chosen, strict=True):
+        for subdomain, dofs, choice, root in zip(subdomains, self.dofs, chosen, roots, strict=True):
             operator, diagonal = _factor(subdomain, dofs, choice.explicit)
             self.operators.append(operator)
+            if root is None or not isinstance(operator, ExplicitInterfaceOperator):
+                self.skins.append(operator)
+            else:
+                self.skins.append(SoftSkinOperator(operator, root))
+                diagonal = 1.0 / (1.0 / diagonal + np.asarray(root.multiply(root).sum(axis=1)).ravel())
             diagonals.append(diagonal)
         self.diagonal = np.concatenate(diagonals)
+
+    def _compliance_roots(self, jump_operator: JumpOperator, compliance: Float | None) -> list[csr_matrix | None]:
+        """Of each subdomain the root of the compliance of its skin, None without springs.  Collective."""
+        if compliance is None or not self._any(jump_operator, compliance):
+            return [None for _ in self.subdomains]
+        local = jump_operator.gather(compliance)
+        return [
+            None if subdomain.submesh.phase == MATRIX else compliance_root(self.B[:, span], local)
+            for subdomain, span in zip(self.subdomains, self.slices, strict=True)
+        ]
+
+    @staticmethod
+    def _any(jump_operator: JumpOperator, compliance: Float) -> bool:
+        comm = jump_operator.vector.comm.tompi4py()
+        return bool(comm.allreduce(bool(compliance.any()), MPI.LOR))
 
     @property
     def slices(self) -> list[slice]:
@@ -73,6 +105,10 @@ class InterfaceOperators:
     def apply_schur(self, x: Float) -> Float:
         """S x for x (n,) or (n, k)."""
         return self._each([o.apply_schur for o in self.operators], x)
+
+    def apply_skin(self, x: Float) -> Float:
+        """S~ x for x (n,) or (n, k): S x, with soft skins where there are springs."""
+        return self._each([o.apply_schur for o in self.skins], x)
 
     def apply_flexibility(self, x: Float) -> Float:
         """The boundary part of K+ x for x (n,) or (n, k)."""

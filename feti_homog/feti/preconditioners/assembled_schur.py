@@ -32,7 +32,7 @@ class AssembledSchur:
         self._shared_dof = _shared_dof_of(comm, jump_operator, operators)
         self.size = shared_dofs(comm, jump_operator)
         stiffness = DenseBlockSum((self.size, self.size))
-        for operator, span in zip(operators.operators, operators.slices, strict=True):
+        for operator, span in zip(operators.skins, operators.slices, strict=True):
             if not isinstance(operator, ExplicitInterfaceOperator):
                 raise TypeError("the assembled Schur complement needs dense boundary operators")
             stiffness.add(self._shared_dof[span], self._shared_dof[span], operator.S)

@@ -117,8 +117,8 @@ class Influence:
 
     def _reactions(self, x: Float) -> Float:
         """S x - S Z (Z^T S Z)^-1 Z^T S x."""
-        forces = self.operators.apply_schur(x)
-        return forces + self.operators.apply_schur(self.assembled.relieving_displacement(forces))
+        forces = self.operators.apply_skin(x)
+        return forces + self.operators.apply_skin(self.assembled.relieving_displacement(forces))
 
     def _compute_columns(self, rows: Int) -> None:
         """Append the columns of H for these rows.  Collective."""

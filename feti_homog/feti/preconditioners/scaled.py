@@ -89,7 +89,7 @@ class Dirichlet(StiffnessScaled):
     """Around the Schur complements."""
 
     def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators) -> None:
-        super().__init__(comm, jump_operator, operators, operators.apply_schur)
+        super().__init__(comm, jump_operator, operators, operators.apply_skin)
 
 
 class Lumped(StiffnessScaled):

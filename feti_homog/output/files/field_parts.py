@@ -94,7 +94,10 @@ def state_part(cell: TornCell, response: Response, load_factor: float, label: st
     pair = nodes.row[:, None] + np.arange(2)
     total = displacement(cell, response.strain, u)
     fibre = total[cell.class_nodes[nodes.fibre_node]]
-    traction, jump = response.scale * solution.lam[pair] / nodes.length[:, None], response.scale * solution.jump[pair]
+    traction, jump = (
+        response.scale * solution.lam[pair] / nodes.length[:, None],
+        response.scale * cell.solver.opening(solution)[pair],
+    )
     opening = _in_axes(nodes.normal, jump)
     strain, stress, stress_33 = _element_fields(cell, response.strain, u)
     first, second, third = stress_measures.principal(stress, stress_33).T

@@ -1,0 +1,32 @@
+"""Elastic bonds between fibres and matrix: springs of finite stiffness in place of glue."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from feti_homog.feti.decomposition.jump_operator import JumpOperator
+from feti_homog.typing import Float
+
+
+@dataclass(frozen=True)
+class InterfaceSprings:
+    """Traction = stiffness x jump at every node that holds, in tension and compression.
+
+    Attributes:
+        normal, tangential: stress per opening and per slip; infinite ones are glue.
+    """
+
+    normal: float = np.inf
+    tangential: float = np.inf
+
+    def compliance(self, jump_operator: JumpOperator) -> Float:
+        """(owned rows,) C = 1 / (k l) of the rows of interface nodes with the tributary lengths l, 0 of all others."""
+        nodes, C = jump_operator.nodes, np.zeros(jump_operator.owned[1] - jump_operator.owned[0])
+        C[nodes.row] = 1.0 / (self.normal * nodes.length)
+        C[nodes.row + 1] = 1.0 / (self.tangential * nodes.length)
+        return C
+
+
+GLUE = InterfaceSprings()
