@@ -33,9 +33,9 @@ class Response:
         state: interface states, multipliers, jumps and amplitudes.
         u: (boundary dofs,) fluctuating displacement u* on the boundaries of this rank's subdomains.
         checks: relative errors of the laws: `strain` <eps> = E, Eq. (3), with the opening of debonded faces as
-            part of <eps>; `hill` <sigma:eps> = Sigma:E, Eq. (8), springs included, relative to <sigma:eps> or, if that is less, to
-            what a bonded cell stores at least, E:<L^-1>^-1:E (Reuss), for a debonded one may store nothing;
-            `jump`, the largest opening of a glued node relative to the largest displacement, which does not
+            part of <eps>; `hill` <sigma:eps> = Sigma:E, Eq. (8), springs included, relative to <sigma:eps> or, if
+            that is less, to what a bonded cell stores at least, E:<L^-1>^-1:E (Reuss), for a debonded one may store
+            nothing; `jump`, the largest opening of a glued node relative to the largest displacement, which does not
             vanish where forces do; and the KKT certificate of contact.
         counts: numbers of `bonded`, `open` and `closed` interface nodes.
     """

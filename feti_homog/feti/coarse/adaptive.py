@@ -88,8 +88,8 @@ class AdaptiveCoarseSpace:
         V = kernels_and_soft_modes(blocks, neighbours, threshold, thresholds)
         process_memory.trim()
         self.counts = [v.shape[1] - b.R.shape[1] for v, b in zip(V, blocks, strict=True)]
-        # The smallest entries of U are dropped for large bodies.
-        self._is_exact = not comm.allreduce(any(operators.facewise), MPI.LOR)
+        # The smallest entries of U are dropped for large bodies, and U knows no springs where all bodies are cut.
+        self._is_exact = not comm.allreduce(any(operators.facewise) or bool(operators.compliance.any()), MPI.LOR)
         self._includes_G = False
         self._G_local = _local_motions(operators, natural)
         self._saddle: SaddlePoint | ReplicatedSaddlePoint | None = None

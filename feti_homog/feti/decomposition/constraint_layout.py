@@ -161,6 +161,20 @@ class ConstraintLayout:
             fibre_node=copy,
         )
 
+    def copies(self) -> Int:
+        """(local rows, 2) how many copies matrix and fibre have where a row is between them; 0 of other rows."""
+        shared = self.shared
+        entity = np.repeat(np.arange(len(shared.key)), shared.copies)
+        # Sharers are sorted by body: the first is the matrix's.
+        is_matrix = shared.body == shared.body[shared.pointer[:-1]][entity]
+        of_matrix = np.bincount(entity[is_matrix], minlength=len(shared.key))
+        breakable = np.flatnonzero(shared.fibre >= 0)
+        e, p = expand(breakable, shared.nodes[breakable])
+        row = self.first[e] + (p + 1) * 2 * (shared.copies[e] - 1) - 2
+        found = np.zeros((len(self.rows), 2), np.int64)
+        found[row] = found[row + 1] = np.stack([of_matrix[e], shared.copies[e] - of_matrix[e]], axis=1)
+        return found
+
     def matrix_copies(self) -> tuple[Int, Int]:
         """The breakable nodes of which this rank has the matrix's first copy: the local row of the normal constraint
         of each, and that copy among the fine nodes of this rank."""

@@ -31,6 +31,7 @@ class JumpOperator:
         nodes: the interface nodes that this rank owns.
         matrix_copies: local rows of the interface nodes of which this rank has a copy of the matrix, and these copies,
             as `ConstraintLayout.matrix_copies` has them.
+        copies: (local rows, 2) of matrix and fibre where a row is between them, 0 of other rows.
         owned: first global row of this rank and the one after its last.
         global_rows: number of rows on all ranks.
         shared: the vertices and edges that the rows belong to.
@@ -51,6 +52,7 @@ class JumpOperator:
         self.node_rows = layout.node_rows(shared.owned)
         self.nodes = layout.interface_nodes(shared.owned)
         self.matrix_copies = layout.matrix_copies()
+        self.copies = layout.copies()
         self.vector = PETSc.Vec().createMPI((shared.owned[1] - shared.owned[0], shared.global_rows), comm=comm)
         self._exchanges: dict[int, _Exchange] = {}
 

@@ -18,7 +18,7 @@ from feti_homog.feti.decomposition.subdomain import Subdomain, both_directions
 from feti_homog.feti.operators.choice import SubdomainSize, choose
 from feti_homog.feti.operators.explicit import ExplicitInterfaceOperator
 from feti_homog.feti.operators.implicit import ImplicitInterfaceOperator, Interior
-from feti_homog.feti.operators.soft_skin import SoftSkinOperator, compliance_root
+from feti_homog.feti.operators.soft_skin import compliance_root, soft_skin
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 from feti_homog.typing import Float, Int
 
@@ -38,6 +38,7 @@ class InterfaceOperators:
         facewise: whether the soft modes of each are to be looked for face by face.
         B: (local rows, n) the constraints on them, and `BT` its transpose.
         diagonal: (n,) of K, with springs that of their chain.
+        compliance: (owned rows,) of the springs that no skin stands for, where fibre and matrix are both cut.
     """
 
     def __init__(
@@ -64,8 +65,10 @@ class InterfaceOperators:
         self.BT = self.B.T.tocsr()
         sizes = _sizes(jump_operator.shared, subdomains, self.dofs)
         can_condense = bool(PETSc.Sys.hasExternalPackage("mumps"))
+        self.compliance = _of_cut_nodes(jump_operator, compliance)
         roots = self._compliance_roots(jump_operator, compliance)
-        sizes = [replace(size, has_springs=root is not None) for size, root in zip(sizes, roots, strict=True)]
+        springs = [s.submesh.phase != MATRIX and root is not None for s, root in zip(subdomains, roots, strict=True)]
+        sizes = [replace(size, has_springs=has) for size, has in zip(sizes, springs, strict=True)]
         chosen = choose(sizes, kind, applications, soft_modes, can_condense, thresholds)
         self.facewise = [choice.facewise for choice in chosen]
         self.operators: list[InterfaceOperator] = []
@@ -74,11 +77,10 @@ class InterfaceOperators:
         for subdomain, dofs, choice, root in zip(subdomains, self.dofs, chosen, roots, strict=True):
             operator, diagonal = _factor(subdomain, dofs, choice.explicit)
             self.operators.append(operator)
-            if root is None or not isinstance(operator, ExplicitInterfaceOperator):
-                self.skins.append(operator)
-            else:
-                self.skins.append(SoftSkinOperator(operator, root))
+            if root is not None:
+                operator = soft_skin(operator, root)
                 diagonal = 1.0 / (1.0 / diagonal + np.asarray(root.multiply(root).sum(axis=1)).ravel())
+            self.skins.append(operator)
             diagonals.append(diagonal)
         self.diagonal = np.concatenate(diagonals)
 
@@ -86,11 +88,12 @@ class InterfaceOperators:
         """Of each subdomain the root of the compliance of its skin, None without springs.  Collective."""
         if compliance is None or not self._any(jump_operator, compliance):
             return [None for _ in self.subdomains]
-        local = jump_operator.gather(compliance)
-        return [
-            None if subdomain.submesh.phase == MATRIX else compliance_root(self.B[:, span], local)
+        local, copies = jump_operator.gather(compliance), jump_operator.copies
+        found = [
+            compliance_root(self.B[:, span], local, copies, subdomain.submesh.phase != MATRIX)
             for subdomain, span in zip(self.subdomains, self.slices, strict=True)
         ]
+        return [root if root.shape[1] else None for root in found]
 
     @staticmethod
     def _any(jump_operator: JumpOperator, compliance: Float) -> bool:
@@ -157,6 +160,14 @@ def _factor(subdomain: Subdomain, dofs: Int, explicit: bool) -> tuple[InterfaceO
     K = subdomain.take_stiffness()
     operator = (ExplicitInterfaceOperator if explicit else ImplicitInterfaceOperator)(subdomain, K, dofs)
     return operator, K.diagonal()[dofs]
+
+
+def _of_cut_nodes(jump_operator: JumpOperator, compliance: Float | None) -> Float:
+    """(owned rows,) the compliance of the rows where neither fibre nor matrix is whole."""
+    first, last = jump_operator.owned
+    at = np.searchsorted(jump_operator.rows, first)
+    own = jump_operator.copies[at : at + last - first]
+    return np.zeros(len(own)) if compliance is None else np.where((own > 1).all(axis=1), compliance, 0.0)
 
 
 def _constrained_dofs(B: csr_matrix, subdomains: Sequence[Subdomain]) -> list[Int]:

@@ -10,23 +10,23 @@ which is exact however stiff or soft the springs are.
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import cholesky, solve_triangular
 from scipy.sparse import csr_matrix, diags
 
 from feti_homog.feti.operators.explicit import ExplicitInterfaceOperator
-from feti_homog.typing import Float
+from feti_homog.feti.operators.implicit import ImplicitInterfaceOperator
+from feti_homog.typing import Float, Int
 
 
-class SoftSkinOperator(ExplicitInterfaceOperator):
+class DenseSoftSkin(ExplicitInterfaceOperator):
     """The boundary operators of a body, with the stiffness of its skin; the flexibility is that of the body alone."""
 
     def __init__(self, body: ExplicitInterfaceOperator, T: csr_matrix) -> None:
         """`T` (n, r) is the root of the springs' compliance on the boundary dofs."""
         self._body, self.n = body, body.n
         S = body.S
-        ST = T.T @ S  # (r, n), S being symmetric
-        middle = np.eye(T.shape[1]) + np.asarray(T.T @ ST.T)
-        self._S = np.asfortranarray(S - ST.T @ cho_solve(cho_factor(middle), ST))
+        half = _half(T, T.T @ S)
+        self._S = np.asfortranarray(S - half.T @ half)
 
     def apply_schur(self, x: Float, out: Float | None = None) -> Float:
         """S~ x for x (n,) or (n, k), into `out` if it is given."""
@@ -50,13 +50,47 @@ class SoftSkinOperator(ExplicitInterfaceOperator):
         return self._body.regularisation(P)
 
 
-def compliance_root(B: csr_matrix, compliance: Float) -> csr_matrix:
-    """(n, r) T of the springs of one body, for its constraints B (rows, n) and the compliance C (rows,) of the rows.
+class SparseSoftSkin(ImplicitInterfaceOperator):
+    """The same of a body whose operators are sparse factors, for few springs."""
 
-    Where the body is cut, each of its k copies of a node has the entry 1 / k in B and a spring of the compliance k C,
-    so that all of them together have C on the row.
+    def __init__(self, body: ImplicitInterfaceOperator, T: csr_matrix) -> None:
+        self._body = body
+        self._half = _half(T, body.apply_schur(T.toarray(order="F")).T)
+
+    def apply_schur(self, x: Float, out: Float | None = None) -> Float:
+        """S~ x for x (n,) or (n, k), into `out` if it is given."""
+        y = self._body.apply_schur(x, out)
+        y -= self._half.T @ (self._half @ x)
+        return y
+
+    def apply_flexibility(self, x: Float, out: Float | None = None) -> Float:
+        """S+ x of the body."""
+        return self._body.apply_flexibility(x, out)
+
+
+def soft_skin(
+    body: ExplicitInterfaceOperator | ImplicitInterfaceOperator, T: csr_matrix
+) -> ExplicitInterfaceOperator | ImplicitInterfaceOperator:
+    """The operators of a body whose springs have the compliance T T^T on its boundary dofs."""
+    return DenseSoftSkin(body, T) if isinstance(body, ExplicitInterfaceOperator) else SparseSoftSkin(body, T)
+
+
+def _half(T: csr_matrix, TS: Float) -> Float:
+    """(r, n) H with H^T H = S T (I + T^T S T)^-1 T^T S, for T^T S (r, n)."""
+    middle = np.eye(T.shape[1]) + np.asarray(T.T @ TS.T)
+    return np.asarray(solve_triangular(cholesky(middle, lower=True), TS, lower=True))
+
+
+def compliance_root(B: csr_matrix, compliance: Float, copies: Int, is_fibre: bool) -> csr_matrix:
+    """(n, r) T of the springs on one body, for its constraints B (rows, n) and the compliance C (rows,) of the rows.
+
+    A node's spring belongs to the fibre, but where the fibre is cut, to the matrix: so it softens one body alone.
+    Where both are cut it belongs to neither; see `preconditioners.spring_update`.
+
+    Args:
+        copies: (rows, 2) how many copies matrix and fibre have there.
     """
-    rows = np.flatnonzero((compliance > 0) & (B.getnnz(axis=1) > 0))
-    own = B[rows]
-    size = np.sqrt(np.asarray(own.multiply(own).sum(axis=1)).ravel())  # 1 / k
-    return (diags(np.sqrt(compliance[rows] / size**3)) @ own).T.tocsr()
+    of_fibre = copies[:, 1] == 1
+    own = of_fibre if is_fibre else ~of_fibre & (copies[:, 0] == 1)
+    rows = np.flatnonzero((compliance > 0) & own & (B.getnnz(axis=1) > 0))
+    return (diags(np.sqrt(compliance[rows])) @ B[rows]).T.tocsr()

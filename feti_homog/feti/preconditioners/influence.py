@@ -24,6 +24,7 @@ from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.preconditioners.assembled_schur import AssembledSchur
 from feti_homog.feti.preconditioners.scaled import StiffnessScaled
+from feti_homog.feti.preconditioners.spring_update import SpringUpdate
 from feti_homog.feti.thresholds import INFLUENCE_CHUNK, SINGULAR_PIVOT
 from feti_homog.typing import Float, Int
 
@@ -73,7 +74,7 @@ class Influence:
 
     Attributes:
         assembled: the cell with all bonds intact.
-        scaled: x -> H x.
+        scaled: x -> H x, but for the `springs` at nodes where fibre and matrix are both cut.
     """
 
     def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators) -> None:
@@ -81,6 +82,7 @@ class Influence:
         self.comm, self.first = comm, jump_operator.owned[0]
         self.operators, self.assembled = operators, AssembledSchur(comm, jump_operator, operators)
         self.scaled = StiffnessScaled(comm, jump_operator, operators, self._reactions)
+        self.springs = SpringUpdate(comm, self.first, operators.compliance, self.scaled.apply)
         rows = jump_operator.owned[1] - self.first
         self._columns = InfluenceColumns(comm, self.first, rows)
         self.activate(np.ones(rows))
@@ -99,7 +101,7 @@ class Influence:
 
     def apply(self, r: Float) -> Float:
         """H_D r for r (owned rows,) or (owned rows, k); 0 on inactive rows.  Collective."""
-        z = self.scaled.apply(r)
+        z = self.springs.apply(self.scaled.apply(r))
         if len(self._inactive):
             z -= self._columns.owned @ self._inactive_jumps(gather_rows(self.comm, z, self.first, self._columns.rows))
         return scale_rows(self._active, z)
@@ -127,4 +129,4 @@ class Influence:
             unit = np.zeros((len(self._active), len(some)))
             mine = (some >= self.first) & (some < self.first + len(unit))
             unit[some[mine] - self.first, np.flatnonzero(mine)] = 1.0
-            self._columns.append(some, self.scaled.apply(unit))
+            self._columns.append(some, self.springs.apply(self.scaled.apply(unit)))

@@ -16,6 +16,7 @@ from scipy.sparse import csr_matrix, diags
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.operators.node_blocks import NodeBlocks
+from feti_homog.feti.preconditioners.spring_update import SpringUpdate
 from feti_homog.typing import Float
 
 
@@ -86,10 +87,20 @@ class StiffnessScaled:
 
 
 class Dirichlet(StiffnessScaled):
-    """Around the Schur complements."""
+    """Around the Schur complements, with the springs of nodes where fibre and matrix are both cut."""
 
     def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators) -> None:
+        self._comm, self._first, self._compliance = comm, jump_operator.owned[0], operators.compliance
         super().__init__(comm, jump_operator, operators, operators.apply_skin)
+
+    def activate(self, active: Float) -> None:
+        """Invert the active part of W, and update."""
+        super().activate(active)
+        self.springs = SpringUpdate(self._comm, self._first, active * self._compliance, super().apply)
+
+    def apply(self, r: Float) -> Float:
+        """M^-1 r with all springs."""
+        return self.springs.apply(super().apply(r))
 
 
 class Lumped(StiffnessScaled):

@@ -1,0 +1,42 @@
+"""Springs at the few nodes where both fibre and matrix are cut, which no single body's skin can stand for.
+
+With the compliances C of the rows X the preconditioner M becomes M + X C X^T, and its inverse
+
+    M^-1 - M^-1 X (C^-1 + X^T M^-1 X)^-1 X^T M^-1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from mpi4py import MPI
+from scipy.linalg import cho_factor, cho_solve
+
+from feti_homog.common.distributed_arrays import gather_rows
+from feti_homog.typing import Float
+
+
+class SpringUpdate:
+    """The update for the rows where `compliance` (owned rows,) is not 0."""
+
+    def __init__(self, comm: MPI.Intracomm, first: int, compliance: Float, inverse: Callable[[Float], Float]) -> None:
+        """`inverse` is r -> M^-1 r for r (owned rows, k); `first` is this rank's first row.  Collective."""
+        self.comm, self.first = comm, first
+        own = np.flatnonzero(compliance)
+        self.rows = np.concatenate(comm.allgather(first + own))
+        if not len(self.rows):
+            return
+        mine = (self.rows >= first) & (self.rows < first + len(compliance))
+        unit = np.zeros((len(compliance), len(self.rows)))
+        unit[own, np.flatnonzero(mine)] = 1.0
+        self._columns = inverse(unit)
+        stiffness = 1.0 / np.concatenate(comm.allgather(compliance[own]))
+        block = gather_rows(comm, self._columns, first, self.rows)
+        self._factor = cho_factor(np.diag(stiffness) + (block + block.T) / 2)
+
+    def apply(self, z: Float) -> Float:
+        """The updated inverse times r, for z = M^-1 r (owned rows,) or (owned rows, k).  Collective."""
+        if not len(self.rows):
+            return z
+        return np.asarray(z - self._columns @ cho_solve(self._factor, gather_rows(self.comm, z, self.first, self.rows)))
