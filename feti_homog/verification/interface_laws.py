@@ -23,10 +23,18 @@ def check_interface_state(ledger: Ledger, cell: DiscreteCell, state: State) -> N
     parted = cell.faces.means(values, of_fibre=False) - cell.faces.means(values, of_fibre=True)
     largest = largest_displacement(cell, state)
     ledger.record("jump", relative(np.abs(in_plane(cell, state.jump) - parted).max(axis=1, initial=0.0), largest), at)
-    ledger.record("bond", relative(np.where(state.status != OPEN, np.abs(state.jump[:, 0]), 0.0), largest), at)
-    ledger.record("bond", relative(np.where(state.status == BONDED, np.abs(state.jump[:, 1]), 0.0), largest), at)
+    slack = state.jump - spring_jumps(cell, state)
+    ledger.record("bond", relative(np.where(state.status != OPEN, np.abs(slack[:, 0]), 0.0), largest), at)
+    ledger.record("bond", relative(np.where(state.status == BONDED, np.abs(slack[:, 1]), 0.0), largest), at)
     if (state.status != BONDED).any():
         _check_contact(ledger, cell, state)
+
+
+def spring_jumps(cell: DiscreteCell, state: State) -> Float:
+    """(k, 2) what elastic bonds give way: traction / stiffness."""
+    section = cell.files.case.get("interface", {})
+    stiffness = [section.get(name) or np.inf for name in ("normal_stiffness", "tangential_stiffness")]
+    return np.asarray(state.traction / np.array(stiffness, float))
 
 
 def utilisation(section: Mapping[str, Any], traction: Float) -> Float:
@@ -43,7 +51,8 @@ def _check_contact(ledger: Ledger, cell: DiscreteCell, state: State) -> None:
     """gap >= 0, traction <= 0, gap traction = 0, and no other force on debonded faces."""
     at = f"{state.name}, interface node {{}}".format
     debonded, closed = state.status != BONDED, state.status == CLOSED
-    gap, (normal, shear), length = state.jump[:, 0], state.traction.T, cell.files.interface.length
+    gap = (state.jump - spring_jumps(cell, state))[:, 0]
+    (normal, shear), length = state.traction.T, cell.files.interface.length
     imposed, least = cell.imposed(state.strain), cell.least_stress(state.strain)
     pull, force = max(float(np.abs(state.traction).max()), least), np.abs(normal) * length
     push = max(float(force.max()), least * float(length.max()))

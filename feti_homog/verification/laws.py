@@ -46,7 +46,9 @@ def laws(rtol: float, users_mesh: bool) -> tuple[Law, ...]:
         ),
         Law("jump", "gap and slip are the differences of the faces' u*, relative to the largest u", 1e-11),
         Law(
-            "bond", "bonded faces do not part, closed ones neither open nor overlap, relative to the largest u", solver
+            "bond",
+            "bonded and closed faces part as their springs give way, relative to the largest u",
+            solver,
         ),
         Law("penetration", "debonded faces do not overlap, relative to the displacement imposed", contact),
         Law("tension", "closed faces are not pulled, relative to the largest traction", contact),

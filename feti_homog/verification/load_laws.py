@@ -12,7 +12,7 @@ import numpy as np
 from feti_homog.typing import AnyInt, Float
 from feti_homog.verification.discrete_cell import DiscreteCell
 from feti_homog.verification.elements import ElementFields
-from feti_homog.verification.interface_laws import BONDED, CLOSED, OPEN, utilisation
+from feti_homog.verification.interface_laws import BONDED, CLOSED, OPEN, spring_jumps, utilisation
 from feti_homog.verification.ledger import Ledger, relative
 from feti_homog.verification.reading import State
 
@@ -40,7 +40,8 @@ class StateNumbers:
     def of(cls, cell: DiscreteCell, state: State, fields: ElementFields) -> StateNumbers:
         """Those of a state of a cell."""
         used = np.where(state.status == BONDED, utilisation(cell.files.case.get("interface", {}), state.traction), 0.0)
-        stored = fields.energy / (2 * cell.area)
+        stretched = state.traction * spring_jumps(cell, state) * cell.files.interface.length[:, None]
+        stored = (fields.energy + float(stretched.sum())) / (2 * cell.area)
         return cls(state.name, state.load_factor, state.strain, state.mean_stress, stored, state.status, used)
 
 

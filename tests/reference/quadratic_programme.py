@@ -7,11 +7,12 @@ system with the constraints that it finds active makes the answer exact to round
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
 
 import clarabel
 import numpy as np
-from scipy.sparse import bmat, coo_matrix, csc_matrix, csr_matrix, triu
+from scipy.sparse import block_diag, bmat, coo_matrix, csc_matrix, csr_matrix, diags, hstack, identity, triu
 from scipy.sparse.linalg import splu
 
 from reference import monolithic
@@ -118,6 +119,37 @@ class QuadraticProgramme:
         turned = [np.einsum("kij,kj->ki", frame, x) for x in (apart, residual[self.fibre_node])]
         return State(float(energy), stress, u, *turned, closed)
 
+    def solve_elastic(self, strain, bonded, contact, springs):
+        """The same with springs of the stiffnesses `springs` (normal, tangential) at bonded nodes, and normal ones in
+        compression between debonded faces.  The energy is that of the bodies and of the springs."""
+        lengths, k = self.lengths(), len(bonded)
+        free = np.flatnonzero(~bonded) if contact else np.zeros(0, int)
+        T, reach = self._together(np.zeros(k, bool)), self.size.max() * np.abs(strain).max()
+        stretched = [jumps[bonded] for jumps in (self._gaps(np.arange(k)), self._slips())]
+        own = [J.T @ diags(s * lengths[bonded]) @ J for s, J in zip(springs, stretched, strict=True)]
+        whole = (self.K + own[0] + own[1]).tocsc()
+        # How far the springs of touching faces give way is an unknown of its own.
+        K = block_diag([T.T @ whole @ T, diags(springs[0] * lengths[free])]).tocsc() / self.scale
+        f = np.r_[-T.T @ (self.Q @ strain), np.zeros(len(free))] / self.scale
+        gaps = (self._gaps(free) @ T).tocsr()
+        C = hstack([gaps, identity(len(free))]).tocsr()
+
+        def motions(active):
+            rigid = self._free_motions(T, bonded, gaps[active])
+            return np.concatenate([rigid, np.zeros((len(free), rigid.shape[1]))])
+
+        v, pressure = _minimise(K, f, C, motions, reach)
+        u, give = T @ v[: T.shape[1]], v[T.shape[1] :]
+        energy = strain @ self.mean @ strain / 2 + strain @ self.Q.T @ u + u @ (whole @ u) / 2
+        energy += springs[0] * lengths[free] @ give**2 / 2
+        stress = (self.mean @ strain + self.Q.T @ u) / self.size.prod()
+        closed = np.zeros(k, bool)
+        closed[free] = pressure > 0
+        jump = np.stack([self._gaps(np.arange(k)) @ u, self._slips() @ u], axis=1)
+        force = np.where(bonded, 1.0, 0.0)[:, None] * jump * springs * lengths[:, None]
+        force[closed, 0] = springs[0] * lengths[closed] * jump[closed, 0]
+        return State(float(energy), stress, u.reshape(-1, 2), jump, force, closed)
+
     def _together(self, bonded):
         """(2n, free dofs) displacements of all nodes from those that are free; bonded nodes move as one."""
         number = np.arange(self.n)
@@ -138,6 +170,12 @@ class QuadraticProgramme:
             _, size, modes = np.linalg.svd(np.concatenate([*held, np.zeros((3, 3))]), full_matrices=False)
             motions.append(v @ modes[size < 1e-9].T)
         return np.concatenate(motions, axis=1)
+
+    def _slips(self):
+        """Rows t.(u_matrix - u_fibre) of all interface nodes."""
+        turned = copy(self)
+        turned.normal = self.normal[:, ::-1] * [-1, 1]
+        return turned._gaps(np.arange(len(self.key)))
 
     def _gaps(self, which):
         """Rows n.(u_matrix - u_fibre) of the interface nodes `which`."""

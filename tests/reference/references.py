@@ -46,6 +46,15 @@ ARC_OF_120_DEGREES = Reference(
     (72.549, 128.352, 29.259, 28.884, -146.256, -60.185), 0.07, "curved quadratic elements, refined: below 5e-4 of each"
 )
 
+# (cell, k_n, k_t): C11, C12, C33 with elastic interfaces of these stiffnesses in GPa / width; plane strain.
+ELASTIC = {
+    ("hexagonal", 1000, 1000): Reference((122.31627, 41.047189, 40.634540), 5e-6, SERIES),
+    ("hexagonal", 1000, 250): Reference((117.92832, 45.435125, 36.246598), 5e-6, SERIES),
+    ("hexagonal", 10, 2.5): Reference((39.303404, 15.303089, 12.000157), 5e-7, SERIES),
+    ("square", 1000, 250): Reference((119.65372, 45.923049, 36.555449), 5e-6, SERIES),
+    ("square", 500, 500): Reference((107.972984, 33.641333, 36.986503), 5e-7, SERIES),
+}
+
 FORMULA = "closed form"
 # Plane strain bulk modulus and shear modulus: the bounds of any arrangement, the lower and the upper.
 VOIGT_MODULI = Reference((109.428, 53.057), 6e-4, FORMULA)

@@ -55,10 +55,13 @@ class ReferencedCell:
         return np.zeros(self.cell.solver.rows)
 
 
-def tear(comm, arcs=(), thresholds=DEFAULTS, **case):
-    """The torn cell of the case that `make_case` makes, the tips of arcs at its nodes.  Collective."""
+def tear(comm, arcs=(), thresholds=DEFAULTS, springs=(None, None), **case):
+    """The torn cell of the case that `make_case` makes, the tips of arcs at its nodes, with elastic interfaces of the
+    stiffnesses `springs`.  Collective."""
     PETSc.garbage_cleanup(comm)
-    case = replace(make_case(**case), interface=sections.InterfaceSection(debonded=tuple(arcs)))
+    normal, tangential = springs
+    bonding = sections.InterfaceSection(debonded=tuple(arcs), normal_stiffness=normal, tangential_stiffness=tangential)
+    case = replace(make_case(**case), interface=bonding)
     with case_options(case.petsc):
         return unit_cell.tear(case, comm, Progress(comm, quiet=True), thresholds)
 
@@ -95,7 +98,7 @@ def build(comm, **case):
 
 
 def energy(cell, solution):
-    """Strain energy of the cell from its displacements.  Collective."""
+    """Strain energy of the bodies from their displacements.  Collective."""
     E, u = solution.strain, cell.solver.displacement(solution)
     total = 0.0
     for s, offset in zip(cell.subdomains, cell.offsets, strict=False):

@@ -1,0 +1,120 @@
+"""Elastic interfaces: published numbers, exact relations, quadratic programming, limits; at any number of ranks."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from reference.references import BONDED as GLUED
+from reference.references import ELASTIC, VOID
+from support import torn_cells
+from support.cases import FIBRE, MATRIX, relative_error
+from support.random_cells import random_bonded, random_cell, random_strain
+
+from feti_homog.homogenization.averaging import Homogenization
+from feti_homog.interface.contact import BONDED, CLOSED, OPEN
+
+pytestmark = pytest.mark.parallel
+
+UNIT = np.eye(3)
+
+
+def bonded_responses(cell):
+    """The responses to the unit strains with all bonds intact."""
+    status = np.full(len(cell.solver.jump_operator.nodes.row), BONDED, np.int8)
+    return Homogenization(cell, True).respond(UNIT, status, [np.zeros(cell.solver.rows)] * 3)
+
+
+def stiffness(comm, **case):
+    """L^ef (3, 3), the largest error of a check, and the largest number of iterations."""
+    responses = bonded_responses(torn_cells.tear(comm, **case))
+    L = np.array([response.stress for response in responses]).T
+    return L, max(max(r.checks.values()) for r in responses), max(r.state.iterations for r in responses)
+
+
+def errors(comm, key, **mesh):
+    """(3,) relative errors of C11, C12 and C33."""
+    geometry, *springs = key
+    L, worst, _ = stiffness(comm, geometry=geometry, springs=springs, **mesh)
+    assert worst < 1e-5
+    return np.abs(L[[0, 0, 2], [0, 1, 2]] / ELASTIC[key].value - 1)
+
+
+@pytest.mark.parametrize("key", ELASTIC, ids=str)
+def test_curved_elements_reach_the_published_numbers(comm, key):
+    # The softer the springs, the more of the strain is theirs.
+    refine = 3 if key[1] == 10 else 2
+    assert errors(comm, key, order=2, mesh_size=0.1, refine=refine).max() < 2e-6
+
+
+@pytest.mark.parametrize("key", [("square", 500, 500), ("hexagonal", 10, 2.5)], ids=str)
+def test_linear_elements_converge_to_them(comm, key):
+    coarse, fine = (errors(comm, key, order=1, mesh_size=0.1, refine=refine) for refine in (1, 3))
+    assert fine.max() < 2e-3
+    assert np.log2(coarse.max() / fine.max()) > 2 * 1.8
+
+
+PIECES = [{}, {"subdomains": 12}]
+
+
+@pytest.mark.quick
+@pytest.mark.parametrize("pieces", PIECES, ids=["whole", "cut"])
+@pytest.mark.parametrize("preconditioner", ["dirichlet", "influence"])
+def test_iterations_hardly_depend_on_the_springs(comm, preconditioner, pieces):
+    case = {"geometry": "hexagonal", "mesh_size": 0.1, "refine": 1, "order": 2, "decomposition": pieces}
+    case["petsc"] = {"feti_pc_type": preconditioner, "feti_dual_operator": "explicit"}
+    glued, _, few = stiffness(comm, **case)
+    last = glued
+    for k in (1e12, 1e4, 1e2, 1.0, 0.1):
+        L, worst, iterations = stiffness(comm, springs=(k, k / 4), **case)
+        assert worst < 1e-5 and iterations <= max(2 * few, 1 + few)
+        assert (np.linalg.eigvalsh(last - L) > -1e-9 * np.abs(L).max()).all()
+        if k == 1e12:
+            assert relative_error(L, glued) < 1e-8
+        last = L
+    assert last[0, 0] == pytest.approx(VOID["hexagonal"].value[0], rel=0.01)
+
+
+def test_a_neutral_fibre_is_not_seen(comm):
+    """2 / (k_n a) = 1 / k_m - 1 / k_f gives the bulk modulus of the matrix in any arrangement."""
+    bulk = [phase["young"] / (2 * (1 + phase["poisson"]) * (1 - 2 * phase["poisson"])) for phase in (MATRIX, FIBRE)]
+    case = {"geometry": "random", "fibres": 4, "min_gap": 0.1, "seed": 2, "fibre_fraction": 0.35}
+    radius = np.sqrt(0.35 / (4 * np.pi))
+    normal = 2 / radius / (1 / bulk[0] - 1 / bulk[1])
+    L, worst, _ = stiffness(comm, mesh_size=0.1, refine=1, order=2, springs=(normal, 0.3 * normal), **case)
+    assert (L[0, 0] + 2 * L[0, 1] + L[1, 1]) / 4 == pytest.approx(bulk[0], rel=2e-6)
+    assert worst < 1e-5
+
+
+@pytest.mark.parametrize("number", range(8))
+def test_random_cells_equal_the_quadratic_programme(comm, number):
+    rng = np.random.default_rng([comm.size, number, 7])
+    springs = tuple(10.0 ** rng.uniform(-2, 3, size=2))
+    pc = ("dirichlet", "influence")[number % 2]
+    case = torn_cells.build(comm, springs=springs, **random_cell(rng), petsc={"feti_pc_type": pc})
+    for _ in range(4):
+        bonded, strain = random_bonded(rng, case.reference) if case.reference else None, None
+        bonded, strain = comm.bcast((bonded, random_strain(rng)))
+        contact = bool(comm.bcast(rng.random() < 0.85))
+        interface = case.interface(contact)
+        state = interface.equilibrium(strain, case.status(bonded), case.start())
+        assert state.solution.reason > 0 and max(state.certificate.values()) < 1e-9
+        expected = comm.bcast(case.reference and case.reference.solve_elastic(strain, bonded, contact, springs))
+        assert relative_error(torn_cells.stress(case.cell, state.solution), expected.stress) < 1e-7
+        stored = strain @ torn_cells.stress(case.cell, state.solution) * case.cell.summary.area / 2
+        assert abs(stored - expected.energy) < 1e-7 * expected.energy
+        largest = np.abs(expected.u).max() + np.abs(strain).max()
+        jump = case.in_reference_order(interface.jump(state.solution))
+        status = case.in_reference_order(state.status)
+        held = bonded | ((status == CLOSED) & expected.closed)
+        assert np.abs(jump[held] - expected.jump[held])[:, 0].max(initial=0.0) < 1e-6 * largest
+        if contact:
+            assert (jump[status == OPEN, 0] > -1e-7 * largest).all()
+
+
+def test_one_stiffness_alone_may_be_finite(comm):
+    case = {"geometry": "square", "mesh_size": 0.1, "order": 2}
+    glued = GLUED["square", "strain"].value
+    sliding, *_ = stiffness(comm, springs=(None, 1e-6), **case)
+    stiff, *_ = stiffness(comm, springs=(1e12, 1e-6), **case)
+    assert relative_error(sliding, stiff) < 1e-7
+    assert VOID["square"].value[0] < sliding[0, 0] < glued[0] and sliding[2, 2] < glued[2]
