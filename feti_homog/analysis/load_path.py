@@ -11,10 +11,10 @@ import numpy as np
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.config.sections import LoadPath
 from feti_homog.feti.dual_solution import DualSolution
+from feti_homog.interface.bond_criterion import BondCriterion
 from feti_homog.interface.contact import Equilibrium
 from feti_homog.interface.path_following import events, increments
 from feti_homog.interface.path_points import PathState, Point, unloaded
-from feti_homog.interface.strength_criterion import StrengthCriterion
 from feti_homog.output.files.checkpoint import Arrays, Checkpoint
 
 KKT_LAWS = ("kkt_complementarity", "kkt_penetration", "kkt_tension")
@@ -48,7 +48,7 @@ class Dissipation:
 
 
 def run(
-    context: AnalysisContext, path: LoadPath, criterion: StrengthCriterion, checkpoint: Checkpoint, resume: bool
+    context: AnalysisContext, path: LoadPath, criterion: BondCriterion, checkpoint: Checkpoint, resume: bool
 ) -> dict[str, Any]:
     """`path`, a list of points, one an event (or increment); each is checkpointed before the next is sought."""
     interface = context.homogenization.interface
@@ -112,7 +112,7 @@ def _known(context: AnalysisContext, checkpoint: Checkpoint, resume: bool) -> li
 
 
 def _points(
-    context: AnalysisContext, path: LoadPath, criterion: StrengthCriterion, begin: PathState, known: Sequence[Point]
+    context: AnalysisContext, path: LoadPath, criterion: BondCriterion, begin: PathState, known: Sequence[Point]
 ) -> Iterator[Point]:
     """The points of the checkpoint, then those still to be found."""
     yield from known

@@ -26,6 +26,8 @@ from feti_homog.config.case import Case
 from feti_homog.errors import ConvergenceError, FetiHomogError
 from feti_homog.homogenization.averaging import Homogenization, Response
 from feti_homog.homogenization.unit_cell import TornCell, tear
+from feti_homog.interface.bond_criterion import BondCriterion
+from feti_homog.interface.energy_criterion import EnergyCriterion
 from feti_homog.interface.strength_criterion import StrengthCriterion
 from feti_homog.output.files import (
     csv_tables,
@@ -221,10 +223,13 @@ def _checkpoint(cell: TornCell, directory: Path) -> Checkpoint:
     return Checkpoint(directory, cell.comm, f"case {on_root(cell.comm, cell.case.digest)}, {parts}")
 
 
-def _law(case: Case) -> StrengthCriterion:
+def _law(case: Case) -> BondCriterion:
     bond = case.interface
     if bond is None:
         return StrengthCriterion(math.inf, math.inf, "max")
+    if bond.criterion == "energy":
+        stiffnesses = bond.normal_stiffness or math.inf, bond.tangential_stiffness or math.inf
+        return EnergyCriterion(*stiffnesses, bond.toughness or math.inf, bond.mode_sensitivity)
     return StrengthCriterion(bond.normal_strength or math.inf, bond.tangential_strength or math.inf, bond.criterion)
 
 

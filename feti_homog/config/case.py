@@ -20,6 +20,7 @@ from feti_homog.config.petsc_section import Scalar, read_petsc
 from feti_homog.config.schema import Selected, TableReader, selected_value, to_table
 from feti_homog.config.sections import (
     ANALYSIS_TYPE,
+    CRITERION,
     METHOD,
     SECTIONS,
     Analysis,
@@ -107,6 +108,7 @@ class Case:
             GEOMETRY: self.cell.geometry,
             ANALYSIS_TYPE: self.analysis.type,
             METHOD: None if self.path is None else self.path.method,
+            CRITERION: None if self.interface is None else self.interface.criterion,
         }
         document: dict[str, Any] = {"name": self.name, "cell": to_table(self.cell, selected)}
         document["material"] = {phase: to_table(material, selected) for phase, material in self.materials.items()}
@@ -166,7 +168,7 @@ def parse(values: Mapping[str, Any], folder: Path) -> Case:
 
 def _selected(document: Mapping[str, Any]) -> Selected:
     """The values that decide which keys belong to the case."""
-    selectors = (GEOMETRY, ANALYSIS_TYPE, METHOD)
+    selectors = (GEOMETRY, ANALYSIS_TYPE, METHOD, CRITERION)
     return {s: selected_value(SECTIONS[s.section], document.get(s.section), s.key) for s in selectors}
 
 

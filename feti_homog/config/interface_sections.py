@@ -45,7 +45,24 @@ def read_interface(table: Any, reader: TableReader) -> InterfaceSection | None:
     debonded = table.get("debonded", []) if isinstance(table, dict) else []
     given = debonded if ARCS.accepts(debonded) else []
     arcs = [reader.read(Arc, arc, "interface", f"debonded[{k}].") for k, arc in enumerate(given)]
+    if interface is not None and interface.criterion == "energy":
+        reader.faults += _energy_faults(interface)
     return interface and dataclasses.replace(interface, debonded=tuple(arc for arc in arcs if arc is not None))
+
+
+def _energy_faults(interface: InterfaceSection) -> list[str]:
+    """Faults of a criterion of energy: springs have some, glue has none; and strengths belong to the others."""
+    stiffnesses = ("normal_stiffness", "tangential_stiffness")
+    faults = [
+        f'[interface] {name}: missing; criterion = "energy" needs it'
+        for name in stiffnesses
+        if getattr(interface, name) is None
+    ]
+    return faults + [
+        f'[interface] {name}: belongs to criterion = "max" or "quadratic", not "energy"'
+        for name in ("normal_strength", "tangential_strength")
+        if getattr(interface, name) is not None
+    ]
 
 
 def _missing_arcs(table: Any, selected: Selected) -> list[str]:

@@ -67,6 +67,12 @@ STIFFNESS = ValueType(
     lambda v: None if v == math.inf else float(v),
     {"type": "number", "minimum": SMALLEST},
 )
+TOUGHNESS = ValueType(
+    "an energy per area above 0",
+    lambda v: _is_strength(v) and v != math.inf,
+    float,
+    {"type": "number", "minimum": SMALLEST},
+)
 OPENINGS = ValueType(
     "a rising list of numbers from 0 to 360",
     _are_openings,

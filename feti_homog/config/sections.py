@@ -7,15 +7,17 @@ from typing import Any
 
 from feti_homog.config.cell_section import Cell
 from feti_homog.config.schema import Selector, key
-from feti_homog.config.section_values import ARCS, FIBRES, OPENINGS, STIFFNESS, STRAIN, STRENGTH, WAYPOINTS
+from feti_homog.config.section_values import ARCS, FIBRES, OPENINGS, STIFFNESS, STRAIN, STRENGTH, TOUGHNESS, WAYPOINTS
 from feti_homog.config.values import boolean, choice, integer, real, text
 
 Strain = tuple[float, ...]
 
 ANALYSIS_TYPE = Selector("analysis", "type")
 METHOD = Selector("path", "method")
+CRITERION = Selector("interface", "criterion")
 
 ANGLE_ANALYSIS, PATH_ANALYSIS = ANALYSIS_TYPE.among("angle"), ANALYSIS_TYPE.among("path")
+BY_ENERGY = CRITERION.among("energy")
 BY_EVENTS, BY_INCREMENTS = METHOD.among("events"), METHOD.among("increments")
 
 
@@ -110,11 +112,25 @@ class InterfaceSection:
         only=PATH_ANALYSIS,
     )
     criterion: str = key(
-        choice("max", "quadratic"),
+        choice("max", "quadratic", "energy"),
         'A bond breaks when this reaches 1: "max": the larger of t_n / R^n and |t_t| / R^t; "quadratic": the root of '
-        "the sum of their squares. Compression never breaks a bond.",
+        'the sum of their squares; "energy": the energy of its spring / G_c, see toughness. Compression never breaks a '
+        "bond.",
         default="max",
         only=PATH_ANALYSIS,
+    )
+    toughness: float | None = key(
+        TOUGHNESS,
+        "G_Ic, energy per area. A bond breaks when G_I + G_II = <t_n>^2 / (2 k_n) + t_t^2 / (2 k_t) reaches "
+        "G_c = G_Ic (1 + tan^2((1 - mode_sensitivity) psi)), tan^2 psi = G_II / G_I.",
+        unit="stress * length",
+        only=BY_ENERGY,
+    )
+    mode_sensitivity: float = key(
+        real(least=0.0, most=1.0),
+        "How much of the toughness in opening holds in shear: 1 all modes have the same, 0 shear alone breaks nothing.",
+        default=0.25,
+        only=BY_ENERGY,
     )
 
 

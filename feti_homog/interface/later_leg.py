@@ -8,6 +8,7 @@ import numpy as np
 from mpi4py import MPI
 
 from feti_homog.feti.dual_solution import DualSolution
+from feti_homog.interface.bond_criterion import BondCriterion
 from feti_homog.interface.contact import Equilibrium, Interface
 from feti_homog.interface.leg_prediction import first_break, first_change
 from feti_homog.interface.path_points import (
@@ -18,7 +19,6 @@ from feti_homog.interface.path_points import (
     energy_released,
     most_utilised,
 )
-from feti_homog.interface.strength_criterion import StrengthCriterion
 from feti_homog.typing import Float
 
 # Shares of a leg that are not told apart.
@@ -59,7 +59,7 @@ class LaterLeg:
     def __init__(
         self,
         interface: Interface,
-        criterion: StrengthCriterion,
+        criterion: BondCriterion,
         strains: tuple[Float, Float],
         number: tuple[int, int],
         begin: PathState,

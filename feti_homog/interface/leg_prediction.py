@@ -6,15 +6,15 @@ import numpy as np
 from mpi4py import MPI
 
 from feti_homog.feti.dual_solution import DualSolution
+from feti_homog.interface.bond_criterion import BondCriterion
 from feti_homog.interface.contact import BONDED, CLOSED, OPEN, Equilibrium, Interface
 from feti_homog.interface.rigid_placement import room_ahead, shares_to_zero
-from feti_homog.interface.strength_criterion import StrengthCriterion
 
 # Halvings of an interval of length one, after which double precision tells no more.
 BISECTIONS = 60
 
 
-def first_break(interface: Interface, criterion: StrengthCriterion, state: Equilibrium, ahead: DualSolution) -> float:
+def first_break(interface: Interface, criterion: BondCriterion, state: Equilibrium, ahead: DualSolution) -> float:
     """Share of the way to `ahead` at which the first bond reaches its strength, or inf.  Collective.
 
     Utilisation is convex along a straight way, so below 1 here and above 1 there it passes 1 once: bisection.

@@ -15,6 +15,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from feti_homog.interface.bond_criterion import BondCriterion
 from feti_homog.interface.contact import Interface
 from feti_homog.interface.later_leg import LaterLeg, strain_between
 from feti_homog.interface.path_points import (
@@ -26,11 +27,10 @@ from feti_homog.interface.path_points import (
     most_utilised,
     utilisation,
 )
-from feti_homog.interface.strength_criterion import StrengthCriterion
 from feti_homog.typing import Float
 
 
-def events(interface: Interface, criterion: StrengthCriterion, waypoints: Float, begin: PathState) -> Iterator[Point]:
+def events(interface: Interface, criterion: BondCriterion, waypoints: Float, begin: PathState) -> Iterator[Point]:
     """Every break along zero -> waypoints[0] -> ... (n, 3), and the end of each leg.  Collective.
 
     A point's state is the one before its bonds break.  On later legs the changes of contact are points too, with
@@ -45,7 +45,7 @@ def events(interface: Interface, criterion: StrengthCriterion, waypoints: Float,
 
 def increments(
     interface: Interface,
-    criterion: StrengthCriterion,
+    criterion: BondCriterion,
     waypoints: Float,
     steps: int,
     worst_only: bool,
@@ -81,7 +81,7 @@ def increments(
             return
 
 
-def _legs(interface: Interface, criterion: StrengthCriterion, waypoints: Float, begin: PathState) -> Iterator[Point]:
+def _legs(interface: Interface, criterion: BondCriterion, waypoints: Float, begin: PathState) -> Iterator[Point]:
     legs = len(waypoints)
     if begin.leg == 0:
         for point in _first_leg(interface, criterion, waypoints[0], legs, begin):
@@ -95,7 +95,7 @@ def _legs(interface: Interface, criterion: StrengthCriterion, waypoints: Float, 
 
 
 def _first_leg(
-    interface: Interface, criterion: StrengthCriterion, strain: Float, legs: int, begin: PathState
+    interface: Interface, criterion: BondCriterion, strain: Float, legs: int, begin: PathState
 ) -> Iterator[Point]:
     """From zero to `strain` through all equilibria; with the bonds of now, Sigma(t E) = t Sigma(E) for t >= 0."""
     status, lam, factor, before = begin.status, begin.lam, begin.position, begin.stress_before_break

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 
+from feti_homog.interface.bond_criterion import BondCriterion
 from feti_homog.interface.contact import BONDED, Equilibrium, Interface, Status
-from feti_homog.interface.strength_criterion import StrengthCriterion
 from feti_homog.typing import Bool, Float
 
 # Bonds whose utilisation differs by no more than this, relatively, break together: those of a symmetric cell do, but
@@ -68,13 +68,13 @@ def energy_released(strain: Float, before: Float | None, after: Float) -> float:
     return 0.0 if before is None else 0.5 * float(strain @ (before - after))
 
 
-def utilisation(interface: Interface, criterion: StrengthCriterion, state: Equilibrium) -> Float:
+def utilisation(interface: Interface, criterion: BondCriterion, state: Equilibrium) -> Float:
     """(k,) share of strength that bonded nodes use, 0 on debonded ones."""
     used = criterion.utilisation(interface.traction(state.solution))
     return np.where(state.status == BONDED, used, 0.0)
 
 
-def most_utilised(interface: Interface, criterion: StrengthCriterion, state: Equilibrium) -> tuple[float, Bool]:
+def most_utilised(interface: Interface, criterion: BondCriterion, state: Equilibrium) -> tuple[float, Bool]:
     """The largest utilisation of all bonds, and which (k,) of this rank's have it; collective, rank 0 decides."""
     comm = interface.solver.comm
     used = utilisation(interface, criterion, state)

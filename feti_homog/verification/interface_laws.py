@@ -39,12 +39,27 @@ def spring_jumps(cell: DiscreteCell, state: State) -> Float:
 
 def utilisation(section: Mapping[str, Any], traction: Float) -> Float:
     """(k,) share of their strength that tractions (k, 2) use; compression uses none."""
+    if section.get("criterion") == "energy":
+        return _energy_share(section, traction)
     strengths = np.array([section.get(name) or np.inf for name in ("normal_strength", "tangential_strength")], float)
     pulls = np.stack([np.maximum(traction[:, 0], 0.0), np.abs(traction[:, 1])], axis=1)
     shares = pulls / strengths
     return np.asarray(
         np.hypot(*shares.T) if section.get("criterion") == "quadratic" else shares.max(axis=1, initial=0.0)
     )
+
+
+def _energy_share(section: Mapping[str, Any], traction: Float) -> Float:
+    """(k,) sqrt(G / G_c) of the springs' energies G = G_I + G_II and G_c = G_Ic [1 + tan^2((1 - lambda) psi)]."""
+    first, second = (
+        pull**2 / (2 * float(section[name]))
+        for pull, name in (
+            (np.maximum(traction[:, 0], 0.0), "normal_stiffness"),
+            (traction[:, 1], "tangential_stiffness"),
+        )
+    )
+    turned = (1 - float(section["mode_sensitivity"])) * np.arctan2(np.sqrt(second), np.sqrt(first))
+    return np.asarray(np.sqrt((first + second) / (float(section["toughness"]) * (1 + np.tan(turned) ** 2))))
 
 
 def _check_contact(ledger: Ledger, cell: DiscreteCell, state: State) -> None:

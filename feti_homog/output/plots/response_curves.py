@@ -154,6 +154,8 @@ def _direction_marks(curve: Array) -> list[tuple[Array, Array]]:
 
 def _strengths(case: Mapping[str, Any]) -> str:
     bond, unit = case.get("interface", {}), case.get("output", {}).get("stress_unit", "")
+    if bond.get("criterion") == "energy":
+        return rf"$G_\mathrm{{Ic}} = {bond['toughness']:g}$"
     limits = ((r"R^\mathrm{n}", "normal_strength"), (r"R^\mathrm{t}", "tangential_strength"))
     words = [f"${name} = {bond[key]:g}$ {unit}".rstrip() for name, key in limits if bond.get(key)]
     return ", ".join(words) or "no debonding by load"
