@@ -70,6 +70,18 @@ def test_ctrl_c_under_mpirun_is_one_line(tmp_path):
     assert not list(out.glob("*lock"))
 
 
+def test_a_refused_case_is_one_line_under_a_quiet_mpirun(tmp_path):
+    words = ["mpirun", "-q", "--oversubscribe", "-n", "2", sys.executable, "-m", "feti_homog", "check"]
+    faulty = tmp_path / "faulty.toml"
+    faulty.write_text(changed(("fibre_fraction = 0.4", "fibre_fraction = 1.4")))
+    job = subprocess.run(
+        [*words, faulty], cwd=ROOT, env=environment(), capture_output=True, text=True, timeout=WAIT, check=False
+    )
+    assert job.returncode == 2 and job.stdout == ""
+    (line,) = job.stderr.splitlines()
+    assert line.startswith("error: [cell] fibre_fraction = 1.4: expected")
+
+
 def run_into(stdout, *words):
     return subprocess.run(
         [sys.executable, "-m", "feti_homog", *map(str, words)],
