@@ -23,12 +23,15 @@ from feti_homog.common.mpi_errors import all_raise, on_root, on_root_only
 from feti_homog.common.petsc_options import case_options, refuse_unused
 from feti_homog.common.progress import Progress
 from feti_homog.config.case import Case
-from feti_homog.errors import ConvergenceError, FetiHomogError
+from feti_homog.errors import CaseError, ConvergenceError, FetiHomogError
+from feti_homog.feti.decomposition.interface_neighbours import InterfaceNeighbours
+from feti_homog.feti.preconditioners.influence import Influence
 from feti_homog.homogenization.averaging import Homogenization, Response
 from feti_homog.homogenization.unit_cell import TornCell, tear
 from feti_homog.interface.bond_criterion import BondCriterion
 from feti_homog.interface.energy_criterion import EnergyCriterion
 from feti_homog.interface.strength_criterion import StrengthCriterion
+from feti_homog.interface.tip_criterion import TipCriterion
 from feti_homog.output.files import (
     csv_tables,
     field_file,
@@ -210,7 +213,7 @@ def _analyse(context: AnalysisContext, checkpoint: Checkpoint, resume: bool) -> 
 def _analysis(context: AnalysisContext, checkpoint: Checkpoint, resume: bool) -> dict[str, Any]:
     case = context.homogenization.cell.case
     if case.path is not None:
-        return load_path.run(context, case.path, _law(case), checkpoint, resume)
+        return load_path.run(context, case.path, _law(context.homogenization.cell), checkpoint, resume)
     if case.angle is not None:
         strain = None if case.angle.strain is None else np.array(case.angle.strain)
         return debonding_angle.run(context, case.angle.values, strain)
@@ -223,14 +226,26 @@ def _checkpoint(cell: TornCell, directory: Path) -> Checkpoint:
     return Checkpoint(directory, cell.comm, f"case {on_root(cell.comm, cell.case.digest)}, {parts}")
 
 
-def _law(case: Case) -> BondCriterion:
+def _law(cell: TornCell) -> BondCriterion:
+    """What breaks the bonds of a cell.  Collective."""
+    case = cell.case
     bond = case.interface
     if bond is None:
         return StrengthCriterion(math.inf, math.inf, "max")
     if bond.criterion == "energy":
         stiffnesses = bond.normal_stiffness or math.inf, bond.tangential_stiffness or math.inf
-        return EnergyCriterion(*stiffnesses, bond.toughness or math.inf, bond.mode_sensitivity)
+        springs = EnergyCriterion(*stiffnesses, bond.toughness or math.inf, bond.mode_sensitivity)
+        return _at_tips(cell, springs) if bond.growth == "released" else springs
     return StrengthCriterion(bond.normal_strength or math.inf, bond.tangential_strength or math.inf, bond.criterion)
+
+
+def _at_tips(cell: TornCell, springs: EnergyCriterion) -> TipCriterion:
+    """Raises CaseError if the solver has no inverse of the dual operator.  Collective."""
+    influence, matrix = cell.solver.preconditioner, cell.summary.phases[0]
+    if not isinstance(influence, Influence):
+        raise CaseError('[interface] growth = "released": needs -feti_pc_type influence; or growth = "springs"')
+    neighbours = InterfaceNeighbours(cell.comm, cell.solver.jump_operator, cell.subdomains, matrix)
+    return TipCriterion(springs, neighbours, influence)
 
 
 def _write(result: Result, directory: Path, cell: TornCell) -> None:

@@ -126,6 +126,13 @@ class InterfaceSection:
         unit="stress * length",
         only=BY_ENERGY,
     )
+    growth: str = key(
+        choice("released", "springs"),
+        'Where debonding has begun: "released": a bond beside a broken one breaks when that releases G_c times its '
+        'length, which hardly depends on the mesh; "springs": by the energy of its spring, as any other.',
+        default="released",
+        only=BY_ENERGY,
+    )
     mode_sensitivity: float = key(
         real(least=0.0, most=1.0),
         "How much of the toughness in opening holds in shear: 1 all modes have the same, 0 shear alone breaks nothing.",

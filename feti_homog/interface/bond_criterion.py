@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from feti_homog.interface.energy_criterion import EnergyCriterion
 from feti_homog.interface.strength_criterion import StrengthCriterion
+from feti_homog.interface.tip_criterion import TipCriterion
 
-BondCriterion = StrengthCriterion | EnergyCriterion
-"""Its `utilisation` tells how much of their strength tractions use: convex and homogeneous of degree one in them."""
+BondCriterion = StrengthCriterion | EnergyCriterion | TipCriterion
+"""Its `law` tells how much of their strength tractions use: homogeneous of degree one in them."""

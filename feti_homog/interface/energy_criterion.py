@@ -5,10 +5,12 @@ Tavara, Mantic, Graciani, Paris, Eng. Anal. Bound. Elem. 35 (2011) 207; the mode
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
+from feti_homog.interface.contact import Interface, Status
 from feti_homog.typing import Float
 
 
@@ -30,14 +32,24 @@ class EnergyCriterion:
     toughness: float
     mode_sensitivity: float
 
+    def law(self, interface: Interface, status: Status) -> Callable[[Float], Float]:
+        """`utilisation`, whatever is debonded."""
+        return self.utilisation
+
+    def mode_factor(self, traction: Float) -> Float:
+        """(k,) sqrt(G_Ic / G_c) of the modes of tractions (k, 2)."""
+        opening, shear = self._roots(traction)
+        # 1 / (1 + tan^2 x) = cos^2 x
+        return np.asarray(np.cos((1.0 - self.mode_sensitivity) * np.arctan2(shear, opening)))
+
     def utilisation(self, traction: Float) -> Float:
         """(k,) sqrt((G_I + G_II) / G_c) of tractions (k, 2), normal and tangential: 1 breaks.
 
         Homogeneous of degree one in the traction, for psi does not depend on its size, and convex.
         """
+        return np.asarray(np.hypot(*self._roots(traction)) * self.mode_factor(traction) / np.sqrt(self.toughness))
+
+    def _roots(self, traction: Float) -> tuple[Float, Float]:
+        """(k,) sqrt(G_I) and sqrt(G_II)."""
         opening = np.maximum(traction[:, 0], 0.0) / np.sqrt(2.0 * self.normal_stiffness)
-        shear = np.abs(traction[:, 1]) / np.sqrt(2.0 * self.tangential_stiffness)
-        psi = np.arctan2(shear, opening)
-        # 1 / (1 + tan^2 x) = cos^2 x
-        used = np.hypot(opening, shear) * np.cos((1.0 - self.mode_sensitivity) * psi)
-        return np.asarray(used / np.sqrt(self.toughness))
+        return opening, np.abs(traction[:, 1]) / np.sqrt(2.0 * self.tangential_stiffness)

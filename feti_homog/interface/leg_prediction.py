@@ -20,14 +20,14 @@ def first_break(interface: Interface, criterion: BondCriterion, state: Equilibri
     Utilisation is convex along a straight way, so below 1 here and above 1 there it passes 1 once: bisection.
     """
     here, there = interface.traction(state.solution), interface.traction(ahead)
-    over = (state.status == BONDED) & (criterion.utilisation(there) > 1.0)
-    here, step = here[over], there[over] - here[over]
-    low, high = np.zeros(len(here)), np.ones(len(here))
-    for _ in range(BISECTIONS):
+    utilisation = criterion.law(interface, state.status)
+    over = (state.status == BONDED) & (utilisation(there) > 1.0)
+    step, low, high = there - here, np.zeros(len(here)), np.ones(len(here))
+    for _ in range(BISECTIONS if over.any() else 0):
         middle = (low + high) / 2
-        broken = criterion.utilisation(here + middle[:, None] * step) > 1.0
+        broken = utilisation(here + middle[:, None] * step) > 1.0
         low, high = np.where(broken, low, middle), np.where(broken, middle, high)
-    return float(interface.solver.comm.allreduce(high.min(initial=np.inf), MPI.MIN))
+    return float(interface.solver.comm.allreduce(high[over].min(initial=np.inf), MPI.MIN))
 
 
 def first_change(interface: Interface, state: Equilibrium, ahead: DualSolution) -> tuple[float, float]:

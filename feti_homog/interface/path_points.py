@@ -70,7 +70,7 @@ def energy_released(strain: Float, before: Float | None, after: Float) -> float:
 
 def utilisation(interface: Interface, criterion: BondCriterion, state: Equilibrium) -> Float:
     """(k,) share of strength that bonded nodes use, 0 on debonded ones."""
-    used = criterion.utilisation(interface.traction(state.solution))
+    used = criterion.law(interface, state.status)(interface.traction(state.solution))
     return np.where(state.status == BONDED, used, 0.0)
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
+from feti_homog.interface.contact import Interface, Status
 from feti_homog.typing import Float
 
 
@@ -22,6 +24,10 @@ class StrengthCriterion:
     normal: float
     tangential: float
     criterion: str
+
+    def law(self, interface: Interface, status: Status) -> Callable[[Float], Float]:
+        """`utilisation`, whatever is debonded."""
+        return self.utilisation
 
     def utilisation(self, traction: Float) -> Float:
         """(k,) share of the strength that tractions (k, 2), normal and tangential, use: 1 breaks.

@@ -106,6 +106,20 @@ class Influence:
             z -= self._columns.owned @ self._inactive_jumps(gather_rows(self.comm, z, self.first, self._columns.rows))
         return scale_rows(self._active, z)
 
+    def inverse_blocks(self, pairs: Int) -> Float:
+        """(m, 2, 2) diagonal blocks of H_D, for the same pairs (m, 2) of active global rows on every rank.  Collective.
+
+        Rows that leave together change the multipliers of their own by all of them, and open by H_ii^-1 lam_i.
+        """
+        self._compute_columns(np.setdiff1d(pairs, self._columns.rows))
+        at = self._columns.positions(pairs.ravel()).reshape(-1, 2)
+        blocks = self._columns.block[at[:, :, None], at[:, None, :]]
+        if len(self._inactive):
+            half = solve_triangular(self._factor, self._columns.block[np.ix_(self._kept, at.ravel())], lower=True)
+            half = half.reshape(len(half), -1, 2)
+            blocks = blocks - np.einsum("kmi,kmj->mij", half, half)
+        return np.asarray(blocks)
+
     def initial_multipliers(self, previous: Float, closing: Float) -> Float:
         """What closes the jump is the solution."""
         return closing

@@ -1,0 +1,68 @@
+"""Which interface nodes lie beside each other: what debonds spreads along the interface."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from mpi4py import MPI
+from scipy.sparse import coo_matrix, csr_matrix
+
+from feti_homog.feti.decomposition.jump_operator import JumpOperator
+from feti_homog.feti.decomposition.subdomain import Subdomain
+from feti_homog.typing import Int
+
+# Neighbours along the sides of a triangle: vertices 0, 1, 2, and the nodes 3, 4, 5 between them if there are any.
+SIDES = {3: ((0, 1), (1, 2), (2, 0)), 6: ((0, 3), (3, 1), (1, 4), (4, 2), (2, 5), (5, 0))}
+
+
+class InterfaceNeighbours:
+    """The interface nodes of all ranks in the order of their rows, and their neighbours.
+
+    Attributes:
+        rows: (n,) global rows of the normal constraints.
+        first: number of this rank's first node.
+        adjacency: (n, n) 1 between neighbours.
+    """
+
+    def __init__(
+        self, comm: MPI.Intracomm, jump_operator: JumpOperator, subdomains: Sequence[Subdomain], matrix: str
+    ) -> None:
+        """`matrix` is the name of its phase.  Collective."""
+        own = jump_operator.owned[0] + jump_operator.nodes.row
+        if (np.diff(own) <= 0).any():
+            raise ValueError("the interface nodes of a rank are not in the order of their rows")
+        self.comm = comm
+        self.rows: Int = np.concatenate(comm.allgather(own))
+        self.first = int(np.searchsorted(self.rows, own[0])) if len(own) else 0
+        pairs = np.concatenate(comm.allgather(self._pairs(jump_operator, subdomains, matrix)))
+        # A side between two pieces of a fibre is no interface, though both its ends may be.
+        pairs, count = np.unique(pairs, axis=0, return_counts=True)
+        a, b = pairs[count == 1].T
+        n = len(self.rows)
+        entries = np.ones(2 * len(a)), (np.concatenate([a, b]), np.concatenate([b, a]))
+        self.adjacency: csr_matrix = coo_matrix(entries, shape=(n, n)).tocsr()
+
+    def _pairs(self, jump_operator: JumpOperator, subdomains: Sequence[Subdomain], matrix: str) -> Int:
+        """(e, 2) numbers, the lower first, of neighbours on the outer sides of this rank's fibres."""
+        number = self._node_numbers(jump_operator)
+        found, first = [np.zeros((0, 2), np.int64)], 0
+        for s in subdomains:
+            nodes = first + s.mesh.node_class[s.mesh.triangles]
+            first += s.mesh.n_classes
+            if s.submesh.phase == matrix:
+                continue
+            sides = np.sort(number[nodes[:, SIDES[nodes.shape[1]]].reshape(-1, 2)], axis=1)
+            pairs, count = np.unique(sides[sides[:, 0] >= 0], axis=0, return_counts=True)
+            found.append(pairs[count == 1])
+        return np.concatenate(found)
+
+    def _node_numbers(self, jump_operator: JumpOperator) -> Int:
+        """(fine nodes of this rank,) number of the interface node that each is a copy of, or -1."""
+        number = np.full(jump_operator.B.shape[1] // 2, -1)
+        normal = np.searchsorted(jump_operator.rows, self.rows)
+        normal = np.minimum(normal, max(len(jump_operator.rows) - 1, 0))
+        here = np.flatnonzero(jump_operator.rows[normal] == self.rows) if len(jump_operator.rows) else np.zeros(0, int)
+        B = jump_operator.B[normal[here]].tocoo()
+        number[B.col // 2] = here[B.row]
+        return number

@@ -1,0 +1,64 @@
+"""Break by energy where debonding has begun: at a tip it is what the break really releases that counts.
+
+The energy of a tip's own spring falls with the length that it stands for, so that growth by it depends on the mesh.
+What the break of bond i releases does not: with H the inverse of the dual operator on the active rows, its faces then
+part by j = H_ii^-1 lam_i, and the energy of the cell falls, at constant strain, by
+
+    1/2 lam_i . H_ii^-1 lam_i;  1/2 lam_t^2 / H_tt if they would overlap and the normal force stays.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from feti_homog.feti.decomposition.interface_neighbours import InterfaceNeighbours
+from feti_homog.feti.preconditioners.influence import Influence
+from feti_homog.interface.contact import BONDED, Interface, Status
+from feti_homog.interface.energy_criterion import EnergyCriterion
+from feti_homog.typing import Float
+
+
+@dataclass(frozen=True)
+class TipCriterion:
+    """Bonds beside a broken one break when that releases G_c l, l being the length that they stand for; others when
+    the energy of their spring reaches G_c.
+
+    Attributes:
+        springs: the criterion of the others, and the toughness.
+        neighbours: which bonds lie beside each other.
+        influence: the inverse of the dual operator.
+    """
+
+    springs: EnergyCriterion
+    neighbours: InterfaceNeighbours
+    influence: Influence
+
+    def law(self, interface: Interface, status: Status) -> Callable[[Float], Float]:
+        """The utilisation (k,) of tractions (k, 2) on the interface nodes of this rank, with these bonds.  Collective;
+        what it returns is not."""
+        interface.solver.activate(interface.active(status))
+        everywhere = np.concatenate(self.neighbours.comm.allgather(status))
+        tips = np.flatnonzero((everywhere == BONDED) & (self.neighbours.adjacency @ (everywhere != BONDED) > 0))
+        H = self.influence.inverse_blocks(self.neighbours.rows[tips][:, None] + np.arange(2))
+        own = tips - self.neighbours.first
+        mine = (own >= 0) & (own < len(status))
+        own, H = own[mine], H[mine]
+        length = interface.nodes.length[own]
+
+        def utilisation(traction: Float) -> Float:
+            used = self.springs.utilisation(traction)
+            released = released_energy(H, traction[own] * length[:, None])
+            used[own] = np.sqrt(released / (self.springs.toughness * length)) * self.springs.mode_factor(traction[own])
+            return used
+
+        return utilisation
+
+
+def released_energy(H: Float, lam: Float) -> Float:
+    """(m,) energies that the breaks of single bonds release, for their blocks H (m, 2, 2) and forces lam (m, 2)."""
+    parted = np.linalg.solve(H, lam[:, :, None])[:, :, 0]
+    both, shear = (lam * parted).sum(axis=1), lam[:, 1] ** 2 / H[:, 1, 1]
+    return np.asarray(np.where(parted[:, 0] >= 0.0, both, shear) / 2)
