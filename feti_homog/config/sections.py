@@ -83,14 +83,14 @@ class InterfaceSection:
     )
     normal_stiffness: float | None = key(
         STIFFNESS,
-        "k_n: normal traction / opening of the bonds that hold, in tension and compression.",
+        "Normal traction / opening, k_n, of the bonds that hold, in tension and compression.",
         unit="stress / length",
         default=None,
         default_words="inf",
     )
     tangential_stiffness: float | None = key(
         STIFFNESS,
-        "k_t: tangential traction / slip of the bonds that hold.",
+        "Tangential traction / slip, k_t, of the bonds that hold.",
         unit="stress / length",
         default=None,
         default_words="inf",
