@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -88,6 +89,18 @@ class DiscreteCell:
         return cls(
             files, stiffnesses, elements, sides, nodes, parts, faces, areas / areas.sum(), radius, largest
         )  # fmt: skip
+
+    @cached_property
+    def beside(self) -> Int:
+        """(e, 2) interface nodes that lie beside each other."""
+        sides, phase = self.sides, self.files.mesh.phase
+        outer = (phase[sides.element] > 0) & (sides.partner >= 0) & (phase[sides.element[sides.partner]] == 0)
+        row_of = np.full(len(self.files.mesh.points), -1)
+        row_of[self.nodes.node] = self.faces.row
+        rows = row_of[sides.nodes[outer]]
+        along = rows[:, [0, 2, 2, 1]] if rows.shape[1] == 3 else rows
+        pairs = along.reshape(-1, 2)
+        return np.asarray(pairs[(pairs >= 0).all(axis=1)])
 
     @property
     def area(self) -> float:

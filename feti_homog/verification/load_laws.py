@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.typing import AnyInt, Float
+from feti_homog.typing import AnyInt, Bool, Float
 from feti_homog.verification.discrete_cell import DiscreteCell
 from feti_homog.verification.elements import ElementFields
 from feti_homog.verification.interface_laws import BONDED, CLOSED, OPEN, spring_jumps, utilisation
@@ -25,7 +25,8 @@ class StateNumbers:
 
     Attributes:
         stored: energy per area of the cell, from the fields.
-        used: (k,) share of the strength that the bonded nodes use, 0 elsewhere.
+        used: (k,) share of the strength that the bonded nodes use, 0 elsewhere; NaN at tips of which the energy counts
+            that their break would release, for it is not in the files.
     """
 
     name: str
@@ -39,10 +40,22 @@ class StateNumbers:
     @classmethod
     def of(cls, cell: DiscreteCell, state: State, fields: ElementFields) -> StateNumbers:
         """Those of a state of a cell."""
-        used = np.where(state.status == BONDED, utilisation(cell.files.case.get("interface", {}), state.traction), 0.0)
+        section = cell.files.case.get("interface", {})
+        used = np.where(state.status == BONDED, utilisation(section, state.traction), 0.0)
+        if section.get("growth") == "released":
+            used[_tips(cell, state)] = np.nan
         stretched = state.traction * spring_jumps(cell, state) * cell.files.interface.length[:, None]
         stored = (fields.energy + float(stretched.sum())) / (2 * cell.area)
         return cls(state.name, state.load_factor, state.strain, state.mean_stress, stored, state.status, used)
+
+
+def _tips(cell: DiscreteCell, state: State) -> Bool:
+    """(k,) which bonds lie beside a broken one."""
+    broken, beside = state.status != BONDED, cell.beside
+    tips = np.zeros(len(broken), bool)
+    for here, there in (beside.T, beside.T[::-1]):
+        tips[here[broken[there]]] = True
+    return np.asarray(tips & ~broken)
 
 
 def check_load(ledger: Ledger, cell: DiscreteCell, states: Sequence[StateNumbers]) -> None:

@@ -59,11 +59,13 @@ def _check_strength(ledger: Ledger, states: Sequence[StateNumbers], points: Sequ
     """No bond is over its strength but in a cascade, where one break overloads others; events break the worst bonds."""
     for number, state in enumerate(states):
         where = f"{state.name}, interface node {{}}".format
+        used, known = np.nan_to_num(state.used), ~np.isnan(state.used)
         if not (by_events and _in_cascade(points, number)):
-            ledger.record("strength", np.maximum(state.used - 1.0, 0.0), where)
+            ledger.record("strength", np.maximum(used - 1.0, 0.0), where)
         if by_events and number + 1 < len(states):
-            due = max(float(state.used.max(initial=0.0)), 1.0)
-            ledger.record("strength", np.where(_broken(state, states[number + 1]), 1.0 - state.used / due, 0.0), where)
+            due = max(float(used.max(initial=0.0)), 1.0)
+            broken = _broken(state, states[number + 1]) & known
+            ledger.record("strength", np.where(broken, 1.0 - used / due, 0.0), where)
 
 
 def _in_cascade(points: Sequence[Point], number: int) -> bool:

@@ -26,6 +26,20 @@ CASES: dict[str, dict[str, Any]] = {
     "overlap": {"cell": SQUARE, "interface": {"contact": False, "debonded": [ARC | {"angle": 200.0}]}},
     "angle": {"cell": RANDOM, "fibre": TURNED, "interface": {"debonded": [ARC]}, "angle": {"values": [0, 120, 360]}},
     "path": {"cell": SQUARE, "interface": STRENGTHS, "path": {"waypoints": WAYPOINTS}},
+    "springs": {
+        "cell": SQUARE | {"order": 2},
+        "interface": {"normal_stiffness": 900.0, "tangential_stiffness": 300.0, "debonded": [ARC | {"angle": 110.0}]},
+    },
+    "energy": {
+        "cell": SQUARE,
+        "interface": {
+            "normal_stiffness": 900.0,
+            "tangential_stiffness": 300.0,
+            "criterion": "energy",
+            "toughness": 0.02,
+        },
+        "path": {"waypoints": WAYPOINTS},
+    },
     "increments": {
         "cell": SQUARE,
         "interface": STRENGTHS | {"criterion": "quadratic"},

@@ -13,6 +13,7 @@ from feti_homog.verification.reading import opened
 SMALL = 1e-6
 MATRIX = ("material", "matrix")
 MATERIAL = {"stress", "stress 33", "equilibrium", "mean stress", "Hill"}
+SPRINGS = {"bond", "penetration", "complementarity"}
 MATERIAL_33 = MATERIAL | {"bounds", "shown"}
 
 
@@ -41,7 +42,7 @@ def test_results_obey_every_law(results, kind):
     told = {finding.law.name for finding in certificate.findings}
     assert told >= {"stress", "equilibrium", "periodicity", "jump", "mean stress", "Hill", "load", "tables", "cell"}
     assert ("penetration" in told) == (kind not in ("bonded", "plane", "overlap"))
-    assert ("energy" in told) == ("strength" in told) == (kind in ("path", "increments"))
+    assert ("energy" in told) == ("strength" in told) == (kind in ("path", "energy", "increments"))
     assert ("moduli" in told) == (kind in ("bonded", "plane"))
 
 
@@ -186,6 +187,8 @@ FALSE = {
     "a strength too low": ("path", document("case", "interface", "normal_strength", factor=0.99), {"strength"}),
     "a strength too high": ("path", document("case", "interface", "normal_strength", factor=1.01), {"strength"}),
     "a strength of steps": ("increments", document("case", "interface", "normal_strength", factor=0.5), {"strength"}),
+    "a stiffness of springs": ("springs", document("case", "interface", "normal_stiffness", factor=1.01), SPRINGS),
+    "a toughness too low": ("energy", document("case", "interface", "toughness", factor=0.98), {"strength"}),
     "a dissipated energy": ("path", document("path", 5, "dissipated", factor=1.01), {"energy"}),
     "a rising dissipation": ("path", document("path", 5, "dissipated_strain_controlled", factor=1.01), {"energy"}),
     "a dissipation of increments": ("increments", document("path", 11, "dissipated", factor=-1.0), {"energy"}),
