@@ -21,9 +21,9 @@ SAME_PLACE = 1e-9
 MERGED = np.radians(0.05)
 TURN = 2 * np.pi
 QUARTER = TURN / 4
-# Positions at which the size is sampled along an arc and along a piece of a side.
 # Nodes on lines with which a cell is still meshed in minutes.
 MAX_LINE_NODES = 120_000
+# Positions at which the size is sampled along an arc and along a piece of a side.
 ARC_SAMPLES = 65
 SIDE_SAMPLES = 513
 
@@ -220,9 +220,8 @@ def _arc_curves(
 def _stations(share: Float, sizes: Float, lengths: Float, least: Int) -> list[Float]:
     """For each curve the positions in [0, 1] of its nodes, equidistant in the measure ds / h.
 
-    Raises MeshError if they would be too many.
-
     The sizes h (c, s) are given at the positions `share` (s,), the lengths (c,) in the same unit.
+    Raises MeshError if they would be too many.
     """
     density = lengths[:, None] / sizes
     steps = (density[:, 1:] + density[:, :-1]) / 2 * np.diff(share)

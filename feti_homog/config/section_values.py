@@ -36,6 +36,12 @@ def _numbers(count: int) -> dict[str, Any]:
     return {"type": "array", "items": real().json_schema, "minItems": count, "maxItems": count}
 
 
+def _positive_or_inf(what: str) -> ValueType:
+    """A number above 0; inf is read as None."""
+    schema = {"type": "number", "minimum": SMALLEST}
+    return ValueType(f"{what} above 0, or inf", _is_strength, lambda v: None if v == math.inf else float(v), schema)
+
+
 MESH_FILE = ValueType("the name of a .msh file", _is_mesh_file, Path, {"type": "string", "pattern": "\\.msh$"})
 FIBRES = ValueType(
     'the number of a fibre, counted from 1, a list of numbers, or "all"',
@@ -55,18 +61,8 @@ ARCS = ValueType(
     tuple,
     {"type": "array", "items": {"$ref": "#/$defs/arc"}},
 )
-STRENGTH = ValueType(
-    "a traction above 0, or inf",
-    _is_strength,
-    lambda v: None if v == math.inf else float(v),
-    {"type": "number", "minimum": SMALLEST},
-)
-STIFFNESS = ValueType(
-    "a stiffness above 0, or inf",
-    _is_strength,
-    lambda v: None if v == math.inf else float(v),
-    {"type": "number", "minimum": SMALLEST},
-)
+STRENGTH = _positive_or_inf("a traction")
+STIFFNESS = _positive_or_inf("a stiffness")
 TOUGHNESS = ValueType(
     "an energy per area above 0",
     lambda v: _is_strength(v) and v != math.inf,

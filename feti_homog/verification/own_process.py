@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import signal
 from collections.abc import Callable
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -41,6 +42,9 @@ def in_own_process(directory: Path, function: Callable[[Path], T], patience: flo
 
 
 def _send(end: Connection, function: Callable[[Path], T], directory: Path) -> None:
+    # The thread that listens for signals stays with the parent; Ctrl-C ends both.
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_SETMASK, ())
     try:
         end.send(function(directory))
     except CaseError as error:

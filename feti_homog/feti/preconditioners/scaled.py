@@ -91,16 +91,19 @@ class Dirichlet(StiffnessScaled):
 
     def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators) -> None:
         self._comm, self._first, self._compliance = comm, jump_operator.owned[0], operators.compliance
+        self._has_springs = bool(comm.allreduce(bool(operators.compliance.any()), MPI.LOR))
         super().__init__(comm, jump_operator, operators, operators.apply_skin)
 
     def activate(self, active: Float) -> None:
         """Invert the active part of W, and update."""
         super().activate(active)
-        self.springs = SpringUpdate(self._comm, self._first, active * self._compliance, super().apply)
+        if self._has_springs:
+            self._springs = SpringUpdate(self._comm, self._first, active * self._compliance, super().apply)
 
     def apply(self, r: Float) -> Float:
         """M^-1 r with all springs."""
-        return self.springs.apply(super().apply(r))
+        z = super().apply(r)
+        return self._springs.apply(z) if self._has_springs else z
 
 
 class Lumped(StiffnessScaled):
