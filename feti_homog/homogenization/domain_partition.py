@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from feti_homog.cell.arrangement import FIBRES_OF
 from feti_homog.cell.coarse_mesh import CoarseMesh
 from feti_homog.cell.fibre_centres import fibre_circles
 from feti_homog.cell.periodic_topology import Torus, edge_pairs
@@ -21,7 +22,6 @@ from feti_homog.homogenization.arc_selection import InterfaceNodes
 from feti_homog.interface import debonded_arcs
 from feti_homog.typing import Float, Int
 
-FIBRES_OF = {"square": 1, "hexagonal": 2}
 ROUNDING = 1e-9  # of coordinates, relative to the cell
 
 
