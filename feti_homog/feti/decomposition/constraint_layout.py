@@ -24,7 +24,6 @@ class InterfaceNodes:
         normal: (k, 2) from fibre to matrix; the tangent is (-n_y, n_x).
         length: (k,) tributary interface length: traction = nodal force / length.
         fibre: (k,) constituent.
-        vertex: (k,) whether the node is one of the coarse mesh.
         precracked: (k,) whether the mesh has it debonded from the start.
         fibre_node: (k,) the fibre's copy among the fine nodes of this rank.
     """
@@ -34,7 +33,6 @@ class InterfaceNodes:
     normal: Float
     length: Float
     fibre: Int
-    vertex: Bool
     precracked: Bool
     fibre_node: Int
 
@@ -156,7 +154,6 @@ class ConstraintLayout:
             normal=self._normals(entity, p),
             length=share * shared.length[entity] / m,
             fibre=shared.fibre[entity],
-            vertex=~shared.is_edge[entity],
             precracked=shared.precracked[entity],
             fibre_node=copy,
         )
