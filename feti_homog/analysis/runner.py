@@ -24,7 +24,6 @@ from feti_homog.common.petsc_options import case_options, refuse_unused
 from feti_homog.common.progress import Progress
 from feti_homog.config.case import Case
 from feti_homog.errors import CaseError, ConvergenceError, FetiHomogError
-from feti_homog.feti.decomposition.interface_neighbours import InterfaceNeighbours
 from feti_homog.feti.preconditioners.influence import Influence
 from feti_homog.homogenization.averaging import Homogenization, Response
 from feti_homog.homogenization.unit_cell import TornCell, tear
@@ -240,12 +239,11 @@ def _law(cell: TornCell) -> BondCriterion:
 
 
 def _at_tips(cell: TornCell, springs: EnergyCriterion) -> TipCriterion:
-    """Raises CaseError if the solver has no inverse of the dual operator.  Collective."""
-    influence, matrix = cell.solver.preconditioner, cell.summary.phases[0]
+    """Raises CaseError if the solver has no inverse of the dual operator."""
+    influence = cell.solver.preconditioner
     if not isinstance(influence, Influence):
         raise CaseError('[interface] growth = "released": needs -feti_pc_type influence; or growth = "springs"')
-    neighbours = InterfaceNeighbours(cell.comm, cell.solver.jump_operator, cell.subdomains, matrix)
-    return TipCriterion(springs, neighbours, influence)
+    return TipCriterion(springs, influence)
 
 
 def _write(result: Result, directory: Path, cell: TornCell) -> None:

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from feti_homog.feti.decomposition.interface_neighbours import InterfaceNeighbours
 from feti_homog.feti.preconditioners.influence import Influence
 from feti_homog.interface.contact import BONDED, Interface, Status
 from feti_homog.interface.energy_criterion import EnergyCriterion
@@ -28,22 +27,21 @@ class TipCriterion:
 
     Attributes:
         springs: the criterion of the others, and the toughness.
-        neighbours: which bonds lie beside each other.
-        influence: the inverse of the dual operator.
+        influence: the inverse of the dual operator, which knows the bonds beside each other.
     """
 
     springs: EnergyCriterion
-    neighbours: InterfaceNeighbours
     influence: Influence
 
     def law(self, interface: Interface, status: Status) -> Callable[[Float], Float]:
         """The utilisation (k,) of tractions (k, 2) on the interface nodes of this rank, with these bonds.  Collective;
         what it returns is not."""
         interface.solver.activate(interface.active(status))
-        everywhere = np.concatenate(self.neighbours.comm.allgather(status))
-        tips = np.flatnonzero((everywhere == BONDED) & (self.neighbours.adjacency @ (everywhere != BONDED) > 0))
-        H = self.influence.inverse_blocks(self.neighbours.rows[tips][:, None] + np.arange(2))
-        own = tips - self.neighbours.first
+        neighbours = self.influence.neighbours
+        everywhere = np.concatenate(neighbours.comm.allgather(status))
+        tips = np.flatnonzero((everywhere == BONDED) & (neighbours.adjacency @ (everywhere != BONDED) > 0))
+        H = self.influence.inverse_blocks(neighbours.rows[tips][:, None] + np.arange(2))
+        own = tips - neighbours.first
         mine = (own >= 0) & (own < len(status))
         own, H = own[mine], H[mine]
         length = interface.nodes.length[own]
