@@ -39,10 +39,8 @@ class Thresholds:
             of the load cases; above, all ranks factor it together (`scripts/scaling sizes`).
         influence_applications: applications of the dual operator from which on influence columns pay
             (`scripts/benchmark_path`).
-        assembled_schur_dofs: largest cell with all bonds intact that is factored for influence columns, in degrees
-            of freedom on shared nodes.
-        influence_precracked_nodes: most nodes that may be debonded from the start with influence columns, which take
-            two columns for each of them.
+        assembled_schur_dofs: largest cell that is factored for influence columns, in degrees of freedom on shared nodes
+            with all bonds intact.
     """
 
     dense_boundary_dofs: int = 6000
@@ -56,7 +54,6 @@ class Thresholds:
     replicated_vectors: int = 20_000
     influence_applications: int = 1000
     assembled_schur_dofs: int = 40_000
-    influence_precracked_nodes: int = 500
 
 
 DEFAULTS = Thresholds()
