@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feti_homog.common.progress import Progress
+from feti_homog.homogenization import process_zone
 from feti_homog.homogenization.averaging import Homogenization, Response
 from feti_homog.interface.contact import OPEN, Status
 from feti_homog.typing import Float
@@ -95,12 +96,15 @@ class AnalysisContext:
 
     def warnings(self) -> list[str]:
         """What a user may have meant otherwise, in words."""
-        rtol = self.homogenization.cell.solver.rtol
+        cell = self.homogenization.cell
+        lines = process_zone.warnings(cell.case, cell.summary.width, cell.summary.interface_edge)
+        rtol = cell.solver.rtol
         if CHECK_ERROR_PER_RTOL * rtol <= MAX_CHECK_ERROR:
-            return []
+            return lines
         return [
+            *lines,
             f"-feti_ksp_rtol {rtol:g} asks for less than the checks do: the result is marked unless their errors are "
-            f"at most {MAX_CHECK_ERROR:g}"
+            f"at most {MAX_CHECK_ERROR:g}",
         ]
 
     def unit_responses(

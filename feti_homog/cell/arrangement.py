@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from feti_homog.config.cell_section import Cell
 
 
+# Fibres of the lattices.
+FIBRES_OF = {"square": 1, "hexagonal": 2}
 # Quenched random packings jam near this area fraction.
 JAMMED = 0.84
 # Relative excess of the radii that push over those that must not overlap: the descent ends in finite time.

@@ -11,9 +11,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from feti_homog.cell.arrangement import Arrangement, arrange
+from feti_homog.cell.arrangement import FIBRES_OF, Arrangement, arrange
 from feti_homog.cell.coarse_mesh import CoarseMesh, areas, flip_double_arcs, representatives
+from feti_homog.cell.graded_size import MeshSizes
 from feti_homog.cell.outline import MATRIX, Curve, Outline, outline
+from feti_homog.cell.size_field import MAX_GROWTH
 from feti_homog.errors import MeshError
 from feti_homog.typing import Float, Index, Int32
 
@@ -23,10 +25,14 @@ if TYPE_CHECKING:
 
 # Elements that are meshed on one rank in some minutes, and how many there are about a fibre of a random cell.
 MAX_TRIANGLES, TRIANGLES_OF_A_FIBRE = 1_000_000, 160
+# Area of an equilateral triangle / its side squared.
+TRIANGLE_AREA = math.sqrt(3.0) / 4.0
 # Radius / width of the cell above which positions on a circle differ by more than rounding.
 SMALLEST_RADIUS = 1e-6
 NO_MARKS: Mapping[int, Sequence[float]] = MappingProxyType({})
-FRONTAL_DELAUNAY = 6
+# gmsh's algorithms. The first makes the better triangles of one size, but leaves a disc with thousands of nodes on its
+# circle unfilled.
+FRONTAL_DELAUNAY, DELAUNAY = 6, 5
 # Decimals of the coordinates that gmsh is given. The last bits of the outline's differ from machine to machine, and
 # with them gmsh would make other triangles.
 DECIMALS = 12
@@ -38,7 +44,8 @@ Signed = tuple[int, Curve]
 
 
 def generate(cell: Cell, marks: Mapping[int, Sequence[float]] = NO_MARKS) -> CoarseMesh:
-    """The periodic coarse mesh of a square, hexagonal or random cell, elements about mesh_size * width.
+    """The periodic coarse mesh of a square, hexagonal or random cell, elements about mesh_size * width, on
+    circles interface_size * width.
 
     It is made at the width 1 and then scaled, so that cells of one shape have one mesh at all sizes.
 
@@ -56,8 +63,9 @@ def generate(cell: Cell, marks: Mapping[int, Sequence[float]] = NO_MARKS) -> Coa
             f"[cell] fibre_fraction = {cell.fibre_fraction}: a fibre has a radius of {arrangement.radii.min():.2g}; "
             f"expected at least {SMALLEST_RADIUS} of the width of the cell"
         )
-    lines = outline(arrangement, cell.mesh_size * arrangement.width, marks)
-    points, triangles, circle = _fill(lines, cell.mesh_size * arrangement.width)
+    sizes = _sizes(cell)
+    lines = outline(arrangement, sizes, marks)
+    points, triangles, circle = _fill(lines, sizes)
     phase = (circle != MATRIX).astype(np.int32)
     arcs = [curve for curve in lines.curves if curve.circle != MATRIX]
     arc_edges = np.concatenate([np.stack([arc.nodes[:-1], arc.nodes[1:]], axis=1) for arc in arcs])
@@ -79,6 +87,12 @@ def generate(cell: Cell, marks: Mapping[int, Sequence[float]] = NO_MARKS) -> Coa
     )
 
 
+def _sizes(cell: Cell) -> MeshSizes:
+    """Those that a cell of width 1 is asked for."""
+    interface = cell.mesh_size if cell.interface_size is None else cell.interface_size
+    return MeshSizes(cell.mesh_size, interface, interface)
+
+
 def _scale(cell: Cell, arrangement: Arrangement) -> float:
     """Lengths of the cell / those of the arrangement."""
     if cell.fibre_radius is not None:
@@ -89,9 +103,14 @@ def _scale(cell: Cell, arrangement: Arrangement) -> float:
 def _refuse_extremes(cell: Cell) -> None:
     """Raise MeshError for a cell that would take hours to mesh, before it is begun."""
     height = math.sqrt(3.0) if cell.geometry == "hexagonal" else 1.0
-    count = height / (math.sqrt(3.0) / 4.0 * cell.mesh_size**2) + TRIANGLES_OF_A_FIBRE * (cell.fibres or 0)
+    count = height / (TRIANGLE_AREA * cell.mesh_size**2) + TRIANGLES_OF_A_FIBRE * (cell.fibres or 0)
+    given = f"mesh_size = {cell.mesh_size}" + ("" if cell.fibres is None else f", fibres = {cell.fibres}")
+    if cell.interface_size is not None and cell.fibre_fraction is not None:
+        # On both sides of circles of this length the triangles / length are int dx / (A (h + g x)^2).
+        around = 2 * math.sqrt(math.pi * cell.fibre_fraction * height * (cell.fibres or FIBRES_OF[cell.geometry]))
+        count += 2 * around / (TRIANGLE_AREA * MAX_GROWTH * cell.interface_size)
+        given += f", interface_size = {cell.interface_size}"
     if count > MAX_TRIANGLES:
-        given = f"mesh_size = {cell.mesh_size}" + ("" if cell.fibres is None else f", fibres = {cell.fibres}")
         raise MeshError(
             f"[cell] {given}: about {count:.2g} elements before refine; expected at most {MAX_TRIANGLES}; "
             "refine splits them on the ranks"
@@ -119,11 +138,13 @@ def gmsh_session() -> Iterator[ModuleType]:
         gmsh.finalize()
 
 
-def _fill(lines: Outline, largest: float) -> tuple[Float, Int32, Index]:
+def _fill(lines: Outline, sizes: MeshSizes) -> tuple[Float, Int32, Index]:
     """Nodes (n, 2), those of the outline first, triangles (m, 3) and the circle around each (or MATRIX)."""
     with gmsh_session() as gmsh:
-        gmsh.option.setNumber("Mesh.MeshSizeMax", largest)
+        gmsh.option.setNumber("Mesh.MeshSizeMax", sizes.largest)
         surfaces, circle = _add_surfaces(gmsh, lines)
+        if sizes.is_graded:
+            _grow_from_lines(gmsh, surfaces, sizes.largest)
         gmsh.model.mesh.generate(2)
         tags, coordinates, _ = gmsh.model.mesh.getNodes()
         elements = [gmsh.model.mesh.getElementsByType(TRIANGLE, surface)[1] for surface in surfaces]
@@ -134,6 +155,22 @@ def _fill(lines: Outline, largest: float) -> tuple[Float, Int32, Index]:
     clockwise = areas(points, triangles) < 0
     triangles[clockwise] = triangles[clockwise][:, ::-1]
     return points, triangles, np.repeat(circle, [len(nodes) // 3 for nodes in elements])
+
+
+def _grow_from_lines(gmsh: ModuleType, surfaces: list[int], largest: float) -> None:
+    """Let elements be as large as the nearest edge of the outline, h, h + g d at the distance d from it.
+
+    Without this, gmsh interpolates between the lines: a disc would be as fine within as on its circle.
+    """
+    field = gmsh.model.mesh.field
+    extended = field.add("Extend")
+    field.setNumbers(extended, "CurvesList", [tag for _, tag in gmsh.model.getEntities(1)])
+    field.setNumbers(extended, "SurfacesList", surfaces)
+    for option, value in {"SizeMax": largest, "DistMax": largest / MAX_GROWTH, "Power": 1}.items():
+        field.setNumber(extended, option, value)
+    field.setAsBackgroundMesh(extended)
+    gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
+    gmsh.option.setNumber("Mesh.Algorithm", DELAUNAY)
 
 
 def _add_lines(gmsh: ModuleType, lines: Outline) -> list[list[int]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -10,8 +10,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from feti_homog.cell.arrangement import Arrangement
-from feti_homog.cell.size_field import circle_size, line_size
-from feti_homog.errors import MeshError
+from feti_homog.cell.edge_samples import EdgeSamples
+from feti_homog.cell.graded_size import MeshSizes, SizeField, size_field
+from feti_homog.cell.size_field import circle_size
 from feti_homog.typing import Float, Int
 
 MATRIX = -1
@@ -21,13 +22,9 @@ SAME_PLACE = 1e-9
 MERGED = np.radians(0.05)
 TURN = 2 * np.pi
 QUARTER = TURN / 4
-# Nodes on lines with which a cell is still meshed in minutes.
-MAX_LINE_NODES = 120_000
 # Positions at which the size is sampled along an arc and along a piece of a side.
 ARC_SAMPLES = 65
 SIDE_SAMPLES = 513
-
-Spacing = Callable[[Float], Float]
 
 
 @dataclass(frozen=True)
@@ -69,8 +66,8 @@ def images(arrangement: Arrangement) -> tuple[Float, Int]:
     return np.concatenate(circles)[order], owner[order]
 
 
-def outline(arrangement: Arrangement, largest: float, marks: Mapping[int, Sequence[float]]) -> Outline:
-    """All lines of the cell with nodes at distances of at most `largest`, closer in narrow passages.
+def outline(arrangement: Arrangement, sizes: MeshSizes, marks: Mapping[int, Sequence[float]]) -> Outline:
+    """All lines of the cell with nodes at distances of at most `sizes`, closer in narrow passages.
 
     Opposite sides have the same nodes. `marks` maps a fibre to angles in degrees, measured at its centre,
     that become nodes.
@@ -84,12 +81,13 @@ def outline(arrangement: Arrangement, largest: float, marks: Mapping[int, Sequen
     ends = _on_circle(circles[circle], start)
     away = cKDTree(border).query(ends)[0] > SAME_PLACE * size.max()
     numbering = _Numbering(np.concatenate([np.unique(border, axis=0), ends[away]]))
-    spacing = line_size(arrangement, largest, numbering.vertices)
+    field = size_field(arrangement, sizes, numbering.vertices, _tips(arrangement, marks, numbering.vertices))
 
     curves = []
     for axis in (0, 1):
-        curves += _side_curves(axis, places[axis], circles, size, spacing, numbering)
-    curves += _arc_curves(circles, circle, start, stop, spacing, largest, numbering)
+        curves += _side_curves(axis, places[axis], circles, size, field, numbering)
+    caps = circle_size(circles[circle, 2], sizes.interface)
+    curves += _arc_curves(circles, circle, start, stop, caps, field, numbering)
     return Outline(numbering.points(), tuple(curves), circles)
 
 
@@ -166,20 +164,31 @@ def _arcs(circles: Float, angles: list[Float], size: Float) -> tuple[Int, Float,
     return whose[within], first[within], last[within]
 
 
+def _tips(arrangement: Arrangement, marks: Mapping[int, Sequence[float]], vertices: Float) -> Float:
+    """The vertices (t, 2) that the marks have become."""
+    fibre = np.repeat(list(marks), [len(own) for own in marks.values()]).astype(int)
+    angle = np.radians([mark for own in marks.values() for mark in own])
+    size = np.array([arrangement.width, arrangement.height])
+    places = _on_circle(np.column_stack([arrangement.centres, arrangement.radii])[fibre], angle)
+    return np.asarray(vertices[cKDTree(vertices % size, boxsize=size).query(places % size)[1]])
+
+
 def _side_curves(
-    axis: int, places: Float, circles: Float, size: Float, spacing: Spacing, numbering: _Numbering
+    axis: int, places: Float, circles: Float, size: Float, field: SizeField, numbering: _Numbering
 ) -> list[Curve]:
     """The pieces of the two sides along `axis`, with the same nodes on both."""
-    share = np.linspace(0, 1, SIDE_SAMPLES)
     begin, span = places[:-1], np.diff(places)
-    samples = _on_side((begin[:, None] + span[:, None] * share).ravel(), axis, 0.0)
-    sizes = spacing(samples).reshape(len(span), -1)
+
+    def point(piece: Int, share: Float) -> Float:
+        return _on_side(begin[piece] + span[piece] * share, axis, 0.0)
+
+    samples = EdgeSamples.of(field, point, span, np.full(len(span), np.inf), SIDE_SAMPLES)
     curves = []
     for level, low in ((0.0, True), (size[1 - axis], False)):
         inside = _disc_at(_on_side(begin + span / 2, axis, level), circles)
         # A chord has two edges or more: a triangle with two arc edges beside it could not be flipped.
         least = np.where(inside == MATRIX, 1, 2)
-        for number, stations in enumerate(_stations(share, sizes, span, least)):
+        for number, stations in enumerate(samples.stations(least)):
             along = begin[number] + span[number] * stations
             along[[0, -1]] = places[number : number + 2]
             nodes = numbering.along(_on_side(along, axis, level))
@@ -195,42 +204,18 @@ def _disc_at(points: Float, circles: Float) -> Int:
 
 
 def _arc_curves(
-    circles: Float,
-    circle: Int,
-    start: Float,
-    stop: Float,
-    spacing: Spacing,
-    largest: float,
-    numbering: _Numbering,
+    circles: Float, circle: Int, start: Float, stop: Float, caps: Float, field: SizeField, numbering: _Numbering
 ) -> list[Curve]:
-    """The arcs (a,) from angle `start` to `stop` on their circles as curves."""
-    share = np.linspace(0, 1, ARC_SAMPLES)
+    """The arcs (a,) from angle `start` to `stop` on their circles as curves, with edges of at most `caps` (a,)."""
     span = stop - start
-    samples = _on_circle(circles[circle, None], start[:, None] + span[:, None] * share)
-    caps = circle_size(circles[circle, 2], largest)
-    sizes = np.minimum(spacing(samples.reshape(-1, 2)).reshape(len(span), -1), caps[:, None])
+
+    def point(arc: Int, share: Float) -> Float:
+        return _on_circle(circles[circle[arc]], start[arc] + span[arc] * share)
+
+    samples = EdgeSamples.of(field, point, span * circles[circle, 2], caps, ARC_SAMPLES)
     curves = []
-    stations = _stations(share, sizes, span * circles[circle, 2], np.ones(len(span), dtype=np.intp))
+    stations = samples.stations(np.ones(len(span), dtype=np.intp))
     for number, begin, turn, own in zip(circle.tolist(), start, span, stations, strict=True):
         nodes = numbering.along(_on_circle(circles[number], begin + turn * own))
         curves.append(Curve(nodes, number, number))
     return curves
-
-
-def _stations(share: Float, sizes: Float, lengths: Float, least: Int) -> list[Float]:
-    """For each curve the positions in [0, 1] of its nodes, equidistant in the measure ds / h.
-
-    The sizes h (c, s) are given at the positions `share` (s,), the lengths (c,) in the same unit.
-    Raises MeshError if they would be too many.
-    """
-    density = lengths[:, None] / sizes
-    steps = (density[:, 1:] + density[:, :-1]) / 2 * np.diff(share)
-    measure = np.concatenate([np.zeros((len(lengths), 1)), np.cumsum(steps, axis=1)], axis=1)
-    if measure[:, -1].sum() > MAX_LINE_NODES:
-        raise MeshError(
-            f"[cell] the lines of the cell need about {measure[:, -1].sum():.2g} nodes; expected at most "
-            f"{MAX_LINE_NODES}: make mesh_size larger, or fibre_fraction or fibres smaller"
-        )
-    counts = np.maximum(np.ceil(measure[:, -1] - 1e-6).astype(int), least)
-    pairs = zip(measure, counts, strict=True)
-    return [np.interp(np.linspace(0, own[-1], count + 1), own, share) for own, count in pairs]

@@ -41,13 +41,13 @@ def line_size(arrangement: Arrangement, largest: float, vertices: Float) -> Call
     ]
     places, lengths, growths = (np.concatenate(parts) for parts in zip(*sources, strict=True))
     lengths, growths = np.append(lengths, np.inf), np.append(growths, MAX_GROWTH)
-    places = _wrap(places, size)
+    places = wrap(places, size)
     tree = cKDTree(places, boxsize=size)
     count = min(16, len(places))
 
     def at(points: Float) -> Float:
         # Beyond the bound the tree gives the source behind the last, which is infinite.
-        distance, nearest = tree.query(_wrap(points, size), k=count, distance_upper_bound=largest / MAX_GROWTH)
+        distance, nearest = tree.query(wrap(points, size), k=count, distance_upper_bound=largest / MAX_GROWTH)
         graded = (lengths[nearest] + growths[nearest] * distance).reshape(len(points), -1)
         return np.asarray(np.minimum(largest, graded.min(axis=1)))
 
@@ -59,7 +59,7 @@ def circle_size(radii: Float, largest: float) -> Float:
     return np.minimum(largest, 2 * np.pi * radii / MIN_EDGES_AROUND)
 
 
-def _wrap(points: Float, size: Float) -> Float:
+def wrap(points: Float, size: Float) -> Float:
     """Positions (n, 2) on the torus, in [0, size)."""
     wrapped = points % size
     return np.where(wrapped >= size, 0.0, wrapped)
@@ -134,7 +134,7 @@ def _at_corners(arrangement: Arrangement, size: Float, caps: Float) -> Source:
 
 def _at_vertices(vertices: Float, size: Float, largest: float) -> Source:
     """Vertices, once on the torus, with the distance to the nearest other one."""
-    places = _wrap(vertices, size)
+    places = wrap(vertices, size)
     tree = cKDTree(places, boxsize=size)
     same = tree.query_pairs(1e-9 * size.max(), output_type="ndarray")
     places = np.delete(places, same[:, 1], axis=0)

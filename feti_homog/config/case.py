@@ -214,6 +214,10 @@ def _checked_cell(cell: Cell, folder: Path, faults: list[str]) -> Cell:
                 f"{limit_in_words(limit, cell.fibre_fraction, 4)} for "
                 f"geometry = {toml_value(cell.geometry)}: {reason}"
             )
+    if cell.interface_size is not None and cell.interface_size > cell.mesh_size:
+        faults.append(
+            f"[cell] interface_size = {cell.interface_size}: expected at most mesh_size, which is {cell.mesh_size}"
+        )
     if cell.width is not None and cell.fibre_radius is not None:
         faults.append("[cell] width, fibre_radius: exclude each other; give one")
     if cell.file is None:

@@ -47,6 +47,14 @@ class Cell:
         default=0.05,
         only=ALL_CIRCULAR,
     )
+    interface_size: float | None = key(
+        real(least=1e-5, most=0.5),
+        "Size of the elements on interfaces, before refine, / width of the cell; from there they grow to mesh_size, by "
+        "0.4 of the distance. At most mesh_size.",
+        default=None,
+        default_words="mesh_size",
+        only=ALL_CIRCULAR,
+    )
     refine: int = key(
         integer(least=0, most=8),
         "How many times every element is split in four, on the ranks; new nodes of round interfaces lie on the circle.",

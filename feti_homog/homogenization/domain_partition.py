@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from feti_homog.cell.arrangement import FIBRES_OF
 from feti_homog.cell.coarse_mesh import CoarseMesh
 from feti_homog.cell.fibre_centres import fibre_circles
 from feti_homog.cell.periodic_topology import Torus, edge_pairs
@@ -16,12 +17,11 @@ from feti_homog.config.case import Case
 from feti_homog.errors import CaseError
 from feti_homog.feti.decomposition.partition import decompose, pieces_for_count, pieces_for_size
 from feti_homog.feti.decomposition.shared_entities import SharedEntities, share_entities
-from feti_homog.homogenization import arc_selection
+from feti_homog.homogenization import arc_selection, process_zone
 from feti_homog.homogenization.arc_selection import InterfaceNodes
 from feti_homog.interface import debonded_arcs
 from feti_homog.typing import Float, Int
 
-FIBRES_OF = {"square": 1, "hexagonal": 2}
 ROUNDING = 1e-9  # of coordinates, relative to the cell
 
 
@@ -66,6 +66,7 @@ class CellSummary:
         width, height: periods.
         phases: names of the material phases, the matrix first.
         bodies, subdomains, coarse_triangles: numbers of them.
+        interface_edge: longest coarse edge between a fibre and the matrix.
         first_fibre: the constituent that is fibre number 1 of the case file.
         constituent_phase: (constituents,) place of the phase of each in `phases`.
         centres, radii: (constituents, 2) and (constituents,) centre, within the cell, and radius of each fibre, NaN
@@ -78,6 +79,7 @@ class CellSummary:
     bodies: int
     subdomains: int
     coarse_triangles: int
+    interface_edge: float
     first_fibre: int
     constituent_phase: Int
     centres: Float
@@ -163,6 +165,7 @@ def distribute(
         bodies=int(parts.max()) + 1,
         subdomains=len(submeshes),
         coarse_triangles=len(mesh.triangles),
+        interface_edge=process_zone.longest_edge(mesh),
         first_fibre=first_fibre,
         constituent_phase=torus.constituent_phase,
         centres=centres,

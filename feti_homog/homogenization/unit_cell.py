@@ -21,7 +21,7 @@ from feti_homog.feti.decomposition.shared_entities import SharedEntities
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.solver import FetiSolver
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
-from feti_homog.homogenization import cost_model
+from feti_homog.homogenization import cost_model, process_zone
 from feti_homog.homogenization.domain_partition import (
     DEFAULT_POLICY,
     CellSummary,
@@ -165,6 +165,7 @@ def describe(case: Case, n_ranks: int) -> str:
     taken = cost_model.estimate(
         [2 * n for n in nodes], own, summary.coarse_triangles, summary.bodies, cost_model.applications(case)
     )
+    unresolved = process_zone.warnings(case, summary.width, summary.interface_edge)
     lines = [
         f"case       {case.name}: {case.analysis.type}, plane {case.analysis.plane}",
         f"cell       {summary.width:g} x {summary.height:g}, phases {', '.join(summary.phases)}",
@@ -177,7 +178,7 @@ def describe(case: Case, n_ranks: int) -> str:
             for rank, (count, n) in enumerate(zip(own, nodes, strict=True))
         ),
         *cost_model.estimate_lines(taken, n_ranks),
-        *(f"warning    {warning}" for warning in case.warnings()),
+        *(f"warning    {warning}" for warning in (*case.warnings(), *unresolved)),
         "the case is valid",
     ]
     return "\n".join(lines)

@@ -22,8 +22,9 @@ TIGHT = 1e-9
         {"geometry": "hexagonal", "refine": 1},
         {"geometry": "hexagonal", "order": 2},
         {"geometry": "random", "fibres": 5, "fibre_fraction": 0.45, "min_gap": 0.15, "seed": 3, "order": 2},
+        {"geometry": "hexagonal", "interface_size": 0.02},
     ],
-    ids=["square", "hexagonal", "quadratic", "random"],
+    ids=["square", "hexagonal", "quadratic", "random", "fine interfaces"],
 )
 def test_torn_cell_has_the_monolithic_stiffness(comm, cell, pieces, bodies):
     torn, L, responses = solve(make_case(bodies=bodies, decomposition=pieces, **cell), comm)

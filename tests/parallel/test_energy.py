@@ -10,6 +10,7 @@ import pytest
 from support import torn_cells
 from support.ranks import parallel_assert
 
+from feti_homog import Case, run
 from feti_homog.feti.decomposition.interface_neighbours import InterfaceNeighbours
 from feti_homog.interface.contact import BONDED
 from feti_homog.interface.energy_criterion import EnergyCriterion
@@ -51,6 +52,25 @@ def onset(comm, **case):
     _, interface, (first, *_) = path(comm, "springs", [1.2 * ONSET_STRAIN, 0.0, 0.0], **case)
     stress = first.scale * interface.stress(first.state.solution)
     return first.load_factor * 1.2 - 1, stress[0] / ONSET_STRESS - 1
+
+
+def test_elements_too_long_for_the_energy_are_warned_of(comm):
+    document = {
+        "cell": {name: SQUARE[name] for name in ("geometry", "fibre_fraction", "fibre_radius")},
+        "material": GLASS_EPOXY,
+        "analysis": {"type": "path", "plane": "strain"},
+        "interface": {
+            "normal_stiffness": NORMAL,
+            "tangential_stiffness": TANGENTIAL,
+            "criterion": "energy",
+            "toughness": TOUGHNESS,
+        },
+        "path": {"strain": [0.5 * ONSET_STRAIN, 0.0, 0.0]},
+    }
+    (line,) = run(Case.parse(document), comm).warnings
+    parallel_assert(comm, "elements on the interface are up to 0.981 long" in line)
+    document["cell"] |= {"interface_size": 0.018}
+    parallel_assert(comm, run(Case.parse(document), comm).warnings == ())
 
 
 def test_onset_in_the_square_cell_is_the_published_one(comm):

@@ -13,6 +13,7 @@ from support.circular_cells import cell
 from feti_homog.cell.arrangement import arrange
 from feti_homog.cell.coarse_mesh import areas, flip_double_arcs
 from feti_homog.cell.gmsh_mesher import _fill, generate
+from feti_homog.cell.graded_size import MeshSizes
 from feti_homog.cell.outline import outline
 
 CELLS = {
@@ -29,6 +30,10 @@ CELLS = {
     "spread": cell(fibres=60, fraction=0.6, gap=0.01, spread=0.8),
     "gap of a fifth": cell(fibres=64, fraction=0.5, gap=0.2),
     "hundred": cell(fibres=100, fraction=0.65, gap=0.03),
+    "square, fine interface": cell("square", interface_size=0.002),
+    "hexagonal, fine interfaces": cell("hexagonal", interface_size=0.01),
+    "seven, fine interfaces": cell(fibres=7, fraction=0.65, interface_size=0.01),
+    "spread, fine interfaces": cell(fibres=60, fraction=0.6, gap=0.01, spread=0.8, interface_size=0.01),
 }
 named = pytest.mark.parametrize("name", CELLS)
 
@@ -162,10 +167,11 @@ def test_mesh_is_reproducible():
 def test_the_last_bits_of_the_outline_do_not_change_the_mesh(name, seed):
     """They are another machine's."""
     case, chance = CELLS[name], np.random.default_rng(seed)
-    lines = outline(arrange(case), case.mesh_size, {})
-    points, triangles, circle = _fill(lines, case.mesh_size)
+    sizes = MeshSizes.uniform(case.mesh_size)
+    lines = outline(arrange(case), sizes, {})
+    points, triangles, circle = _fill(lines, sizes)
     ends = lines.points + chance.choice([-1.0, 1.0], lines.points.shape)
-    elsewhere = _fill(replace(lines, points=np.nextafter(lines.points, ends)), case.mesh_size)
+    elsewhere = _fill(replace(lines, points=np.nextafter(lines.points, ends)), sizes)
     assert np.array_equal(triangles, elsewhere[1]) and np.array_equal(circle, elsewhere[2])
     assert np.abs(points - elsewhere[0]).max() < 1e-15
     assert np.array_equal(points[len(lines.points) :], elsewhere[0][len(lines.points) :])

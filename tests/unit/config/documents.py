@@ -40,6 +40,7 @@ def cells(draw: st.DrawFn) -> dict[str, Any]:
             bodies=st.sampled_from(["torus", "plane"]),
         )
     )
+    cell |= draw(optional(interface_size=st.floats(1e-5, cell.get("mesh_size", 0.05))))
     limit = TOUCHING[geometry]
     if geometry == "random":
         cell |= draw(optional(seed=st.integers(0, 2**40), radius_spread=numbers(0.0, 0.5)))

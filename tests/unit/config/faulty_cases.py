@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from support.base_case import BASE, RANDOM, cell, changed, ended, fraction
+from support.base_case import BASE, MESH_CELL, RANDOM, cell, changed, ended, fraction
 from unit.config.faulty_materials import FAULTY_MATERIALS
 
 # name: (content of the file, words that must stand in its faults)
@@ -86,6 +86,22 @@ FAULTY_CASES: dict[str, tuple[str, tuple[str, ...]]] = {
         ("[cell] mesh_size = 0: expected a number at least 0.0001 and at most 0.5",),
     ),
     "mesh_size_huge": (cell("= 0.05", f"= 1{'0' * 400}"), ("[cell] mesh_size = 1000000",)),
+    "interface_size_zero": (
+        cell("= 0.05", "= 0.05\ninterface_size = 0"),
+        ("[cell] interface_size = 0: expected a number at least 1e-05 and at most 0.5",),
+    ),
+    "interface_size_above_mesh_size": (
+        cell("= 0.05", "= 0.05\ninterface_size = 0.06"),
+        ("[cell] interface_size = 0.06: expected at most mesh_size, which is 0.05",),
+    ),
+    "interface_size_above_the_default_mesh_size": (
+        cell("mesh_size = 0.05", "interface_size = 0.1"),
+        ("[cell] interface_size = 0.1: expected at most mesh_size, which is 0.05",),
+    ),
+    "interface_size_of_a_mesh": (
+        changed((MESH_CELL[0], MESH_CELL[1] + "\ninterface_size = 0.01")),
+        ('[cell] interface_size = 0.01: belongs to geometry = "square" or "hexagonal" or "random", not "mesh"',),
+    ),
     "refine_negative": (
         cell("mesh_size", "refine = -1\nmesh_size"),
         ("[cell] refine = -1: expected an integer at least 0",),

@@ -1,0 +1,90 @@
+"""Meshes that are finer on circles, and at the tips of debonded arcs, than elsewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from feti_homog.cell.arrangement import Arrangement
+from feti_homog.cell.size_field import MAX_GROWTH, line_size, wrap
+from feti_homog.typing import Float
+
+# Samples of a size on a line for each of its edges, where the size is graded.
+SAMPLES_OF_AN_EDGE = 3
+
+
+@dataclass(frozen=True)
+class MeshSizes:
+    """Edge lengths that a mesh is asked for, at most; each no larger than the one before.
+
+    Attributes:
+        largest: anywhere.
+        interface: on the circles.
+        tip: at the tips of debonded arcs.
+    """
+
+    largest: float
+    interface: float
+    tip: float
+
+    @classmethod
+    def uniform(cls, largest: float) -> MeshSizes:
+        """One size for all."""
+        return cls(largest, largest, largest)
+
+    @property
+    def is_graded(self) -> bool:
+        """Whether the mesh is finer on circles or at tips than elsewhere."""
+        return self.tip < self.largest
+
+
+@dataclass(frozen=True)
+class SizeField:
+    """The size of edges on the lines of a cell.
+
+    Attributes:
+        at: sizes (n,) at positions (n, 2).
+        step: distance of positions on a line between which it may be interpolated / size.
+    """
+
+    at: Callable[[Float], Float]
+    step: float = np.inf
+
+
+def size_field(arrangement: Arrangement, sizes: MeshSizes, vertices: Float, tips: Float) -> SizeField:
+    """`line_size`, but at most h_i + g d at the distance d from a circle and h_t + g d from one of the `tips` (t, 2),
+    with the growth g = MAX_GROWTH."""
+    base = line_size(arrangement, sizes.largest, vertices)
+    if not sizes.is_graded:
+        return SizeField(base)
+    size = np.array([arrangement.width, arrangement.height])
+    to_circle = _circle_distance(arrangement, size, sizes.interface)
+    tree = cKDTree(wrap(tips.reshape(-1, 2), size), boxsize=size)
+
+    def at(points: Float) -> Float:
+        # Without tips the distance is infinite.
+        at_tips = sizes.tip + MAX_GROWTH * tree.query(wrap(points, size))[0]
+        on_circles = sizes.interface + MAX_GROWTH * to_circle(points)
+        return np.asarray(np.minimum(base(points), np.minimum(on_circles, at_tips)))
+
+    return SizeField(at, 1 / SAMPLES_OF_AN_EDGE)
+
+
+def _circle_distance(arrangement: Arrangement, size: Float, spacing: float) -> Callable[[Float], Float]:
+    """Distances (n,) of positions (n, 2) on the torus from the nearest circle; which that is, points `spacing` apart
+    on the circles tell."""
+    counts = np.ceil(2 * np.pi * arrangement.radii / spacing).astype(int)
+    circle = np.repeat(np.arange(len(counts)), counts)
+    angle = 2 * np.pi * (np.arange(len(circle)) - np.repeat(np.cumsum(counts) - counts, counts)) / counts[circle]
+    spokes = arrangement.radii[circle, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    tree = cKDTree(wrap(arrangement.centres[circle] + spokes, size), boxsize=size)
+
+    def distance(points: Float) -> Float:
+        nearest = circle[tree.query(wrap(points, size))[1]]
+        offset = (points - arrangement.centres[nearest] + size / 2) % size - size / 2
+        return np.asarray(np.abs(np.linalg.norm(offset, axis=1) - arrangement.radii[nearest]))
+
+    return distance

@@ -1,0 +1,89 @@
+"""Meshes that are finer on interfaces: sizes as asked for, bounded growth, and no more elements than that takes.
+
+That they are meshes at all, periodic and of good triangles, `test_gmsh_mesher.py` holds for them too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.circular_cells import cell
+
+from feti_homog.cell.arrangement import arrange
+from feti_homog.cell.gmsh_mesher import generate
+from feti_homog.cell.size_field import MAX_GROWTH
+from feti_homog.errors import MeshError
+
+SQUARE, WIDE_GAPS = cell("square"), cell(fibres=9, fraction=0.35, gap=0.3, spread=0.4)
+CROWDED = cell(fibres=20, fraction=0.6, gap=0.02)
+
+
+def edge_lengths(mesh):
+    """(a,) edges on the circles."""
+    return np.linalg.norm(np.diff(mesh.points[mesh.arc_edges], axis=1)[:, 0], axis=1)
+
+
+def sides(mesh):
+    """(m, 3) lengths of the sides of triangles."""
+    corners = mesh.points[mesh.triangles]
+    return np.stack([np.linalg.norm(corners[:, i] - corners[:, i - 1], axis=1) for i in range(3)], axis=1)
+
+
+def circle_distance(points, arrangement):
+    """(n,) distances on the torus from the nearest circle."""
+    offset = (points[:, None] - arrangement.centres + 0.5) % 1.0 - 0.5
+    return np.abs(np.linalg.norm(offset, axis=2) - arrangement.radii).min(axis=1)
+
+
+@pytest.mark.parametrize("case", [SQUARE, WIDE_GAPS], ids=["square", "random"])
+@pytest.mark.parametrize(("size", "rounding"), [(0.02, 0.1), (0.01, 0.05), (0.002, 0.01)])
+def test_edges_on_interfaces_are_as_long_as_asked(case, size, rounding):
+    """But for the number of edges of an arc, which is rounded up."""
+    lengths = edge_lengths(generate(replace(case, interface_size=size)))
+    assert lengths.max() <= size and lengths.mean() > (1 - rounding) * size and lengths.min() > 0.8 * size
+
+
+def test_narrow_passages_keep_their_own_size():
+    plain, fine = (edge_lengths(generate(replace(CROWDED, interface_size=size))) for size in (None, 0.01))
+    assert plain.max() > 0.012 > 0.01 >= fine.max() and 0.8 < fine.min() / plain.min() < 1.2
+
+
+@pytest.mark.parametrize("case", [SQUARE, WIDE_GAPS], ids=["square", "random"])
+@pytest.mark.parametrize("size", [0.01, 0.001])
+def test_elements_grow_with_the_distance_from_the_interface(case, size):
+    mesh = generate(replace(case, interface_size=size))
+    away = circle_distance(mesh.points[mesh.triangles].mean(axis=1), arrange(case))
+    asked = np.minimum(case.mesh_size, size + MAX_GROWTH * away)
+    mean = sides(mesh).mean(axis=1)
+    assert (mean < 1.5 * asked).all() and 0.8 < np.mean(mean / asked) < 1.05
+    assert sides(mesh).max() < 1.5 * case.mesh_size
+
+
+@pytest.mark.parametrize("case", [SQUARE, WIDE_GAPS], ids=["square", "random"])
+def test_a_fine_interface_takes_elements_beside_it_only(case):
+    """On both sides of a length P there are 2 P / (A g h) triangles, A = sqrt(3) / 4: not as many as 1 / h^2."""
+    sizes = np.array([0.004, 0.002, 0.001])
+    counts = np.array([len(generate(replace(case, interface_size=size)).triangles) for size in sizes])
+    around = 2 * np.pi * arrange(case).radii.sum()
+    expected = 2 * around / (np.sqrt(3) / 4 * MAX_GROWTH * sizes)
+    assert np.all((counts > expected) & (counts < 1.6 * expected + 1 / (np.sqrt(3) / 4 * case.mesh_size**2)))
+    assert np.all((counts[1:] / counts[:-1] > 1.6) & (counts[1:] / counts[:-1] < 2.1))
+
+
+def test_cells_of_all_sizes_have_one_graded_mesh():
+    unit, small = (generate(cell("hexagonal", interface_size=0.01, **width)) for width in ({}, {"width": 2e-4}))
+    assert np.array_equal(small.triangles, unit.triangles)
+    assert small.points == pytest.approx(2e-4 * unit.points, rel=1e-14)
+
+
+def test_the_size_of_the_mesh_asks_for_no_grading():
+    plain, same = (generate(cell("square", interface_size=size)) for size in (None, 0.05))
+    assert np.array_equal(plain.points, same.points) and np.array_equal(plain.triangles, same.triangles)
+
+
+@pytest.mark.parametrize("geometry", ["square", "random"])
+def test_what_would_take_hours_is_refused(geometry):
+    with pytest.raises(MeshError, match=r"interface_size = 1e-05: about .* elements before refine; expected at most"):
+        generate(cell(geometry, interface_size=1e-5))

@@ -1,0 +1,90 @@
+"""The length along which bonds break by energy, and the warning of elements that do not resolve it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from unit.cell.faulty_meshes import grid
+
+from feti_homog.config import case as cases
+from feti_homog.homogenization import process_zone
+from feti_homog.homogenization.domain_partition import coarse_mesh
+from feti_homog.homogenization.unit_cell import describe
+
+# Glass and epoxy in MPa and micrometres, G_Ic = 2 J/m2, fibres of 7.5 micrometres: Tavara and others, Eng. Anal. Bound.
+# Elem. 35 (2011) 207. k_n = 2025 has the strength 90 MPa and the length 0.77 micrometres.
+GLASS, EPOXY = {"young": 70800.0, "poisson": 0.22}, {"young": 2790.0, "poisson": 0.33}
+CELL = {"geometry": "square", "fibre_fraction": 0.4, "fibre_radius": 7.5, "mesh_size": 0.05}
+
+
+def case_of(normal_stiffness=2025.0, criterion="energy", plane="strain", folder=".", **cell):
+    cell = {name: value for name, value in cell.items() if value is not None}
+    bond = {"normal_stiffness": normal_stiffness, "tangential_stiffness": normal_stiffness / 4}
+    own = {"criterion": criterion} | ({"toughness": 2.0} if criterion == "energy" else {})
+    document = {
+        "cell": cell if "file" in cell else CELL | cell,
+        "material": {"matrix": EPOXY, "fibre": GLASS},
+        "analysis": {"type": "path", "plane": plane},
+        "interface": bond | own,
+        "path": {"strain": [0.02, 0.0, 0.0]},
+    }
+    return cases.parse(document, Path(folder))
+
+
+def warnings(case):
+    mesh = coarse_mesh(case)
+    return process_zone.warnings(case, mesh.width, process_zone.longest_edge(mesh))
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "plane", "length"), [(2025.0, "strain", 0.773), (900.0, "strain", 1.739), (2025.0, "stress", 0.689)]
+)
+def test_the_length_is_that_of_the_matrix_and_the_strength(stiffness, plane, length):
+    """E' G_Ic / sigma_c^2 with sigma_c = 90 or 60 MPa, E' = 2790 / (1 - 0.33^2) or 2790."""
+    strength = {2025.0: 90.0, 900.0: 60.0}[stiffness]
+    modulus = 2790.0 / (1 - 0.33**2) if plane == "strain" else 2790.0
+    found = process_zone.process_zone(case_of(stiffness, plane=plane))
+    assert found == pytest.approx(modulus * 2.0 / strength**2, rel=1e-12) and found == pytest.approx(length, abs=5e-4)
+
+
+@pytest.mark.parametrize(("size", "edges"), [(None, 48), (0.01, 4 * 57)])
+def test_the_longest_edge_is_a_chord(size, edges):
+    """The circle in quarters, each of as many edges as its length takes: the cell is 21.02 micrometres wide."""
+    found = process_zone.longest_edge(coarse_mesh(case_of(interface_size=size)))
+    assert found == pytest.approx(2 * 7.5 * np.sin(np.pi / edges), rel=1e-9)
+
+
+def test_long_elements_are_warned_of():
+    (line,) = warnings(case_of())
+    assert line == (
+        '[interface] criterion = "energy": elements on the interface are up to 0.981 long; their break takes '
+        "E' G_Ic / sigma_c^2 = 0.773, of which they should be half at most: set interface_size = 0.018 (or mesh_size, "
+        "of all elements), or refine = 2"
+    )
+    (refined,) = warnings(case_of(refine=1))
+    assert "up to 0.491 long after refine = 1" in refined and "interface_size = 0.036" in refined
+
+
+@pytest.mark.parametrize("remedy", [{"interface_size": 0.018}, {"mesh_size": 0.018}, {"refine": 2}])
+def test_what_the_warning_asks_for_is_enough(remedy):
+    assert warnings(case_of(**remedy)) == []
+    assert warnings(case_of(refine=1, interface_size=0.036)) == []
+
+
+def test_other_bonds_have_no_such_length():
+    assert process_zone.process_zone(case_of(criterion="max")) is None and warnings(case_of(criterion="max")) == []
+
+
+def test_a_mesh_of_ones_own_is_refined(tmp_path):
+    grid().write(tmp_path / "grid.msh")
+    (line,) = warnings(case_of(geometry="mesh", file="grid.msh", normal_stiffness=1e5, folder=tmp_path))
+    assert "up to 0.25 long" in line and line.endswith("set refine = 5 or a finer mesh")
+    assert warnings(case_of(geometry="mesh", file="grid.msh", normal_stiffness=1e5, refine=5, folder=tmp_path)) == []
+
+
+def test_check_tells_of_it():
+    lines = describe(case_of(), 1).splitlines()
+    assert [line.startswith('warning    [interface] criterion = "energy": elements') for line in lines].count(True) == 1
+    assert "warning" not in describe(case_of(refine=2), 1)
