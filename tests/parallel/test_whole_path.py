@@ -40,7 +40,7 @@ def test_whole_paths_are_those_of_brute_force(comm, built, growth):
         case = built(**FOUR, petsc=petsc)
         if expected is None:
             slow = SlowEnergyPath(case.reference, SPRINGS, TOUGHNESS, SENSITIVITY, growth)
-            expected = on_root(comm, lambda: slow.proportional(STRAIN))
+            expected = on_root(comm, slow.proportional, STRAIN)
         points = follow(case.cell, growth)
         found = np.array([case.in_reference_order(p.after.status) != BONDED for p in points])
         np.testing.assert_array_equal(found, np.cumsum([e.broke for e in expected], axis=0) > 0)
