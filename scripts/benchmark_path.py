@@ -22,9 +22,11 @@ from composite import MATERIAL  # noqa: E402
 from monolithic import factor_and_solve, glued  # noqa: E402
 from mpi4py import MPI  # noqa: E402
 
+from feti_homog.common import process_memory  # noqa: E402
 from feti_homog.common.petsc_options import case_options  # noqa: E402
 from feti_homog.common.progress import Progress  # noqa: E402
 from feti_homog.config import case as cases  # noqa: E402
+from feti_homog.feti.preconditioners.influence import Influence  # noqa: E402
 from feti_homog.homogenization.averaging import Homogenization  # noqa: E402
 from feti_homog.homogenization.unit_cell import tear  # noqa: E402
 from feti_homog.interface.contact import BONDED  # noqa: E402
@@ -43,6 +45,7 @@ def main() -> None:
     parser.add_argument("--mesh-size", type=float, default=0.0435)
     parser.add_argument("--refine", type=int, default=3)
     parser.add_argument("--events", type=int, default=50)
+    parser.add_argument("--to-the-end", action="store_true", help="all events of the path")
     parser.add_argument("--operator", choices=["auto", "implicit", "explicit"], default="auto")
     arguments = parser.parse_args()
     comm = MPI.COMM_WORLD
@@ -55,7 +58,8 @@ def main() -> None:
         homogenization = Homogenization(cell, contact=True)
         stiffness = homogenization.interface.solver.torn_stiffness
         setup = time.perf_counter() - start
-        seconds, iterations, solves = run_events(homogenization, arguments.events)
+        seconds, iterations, solves = run_events(homogenization, None if arguments.to_the_end else arguments.events)
+    peak = process_memory.peak()
     K, Q = glued(cell)
     factor, solve = factor_and_solve(K, Q[:, :1])
     peer = factor + solve
@@ -69,7 +73,10 @@ def main() -> None:
     print(f"dual problems an event      {np.mean(solves):8.1f}, Krylov iterations an event {np.mean(iterations):.1f}")
     made, coarse = len(cell.subdomains), cell.solver.natural.factorizations
     print(f"factorizations              {made} of subdomains in all, {coarse} of the coarse problem")
+    if isinstance(cell.solver.preconditioner, Influence):
+        print(f"reference cells factored    {cell.solver.preconditioner.factorizations}")
     print(f"all events with set-up      {setup + sum(seconds):8.1f} s, the peer {peer * len(seconds):.1f} s")
+    print(f"memory at most              {peak / 2**30:8.2f} GiB, before the peer")
     cell.solver.destroy()
 
 
@@ -88,8 +95,8 @@ def document(arguments: argparse.Namespace) -> dict[str, Any]:
     }
 
 
-def run_events(homogenization: Homogenization, count: int) -> tuple[list[float], list[int], list[int]]:
-    """Seconds, Krylov iterations and dual problems of each event."""
+def run_events(homogenization: Homogenization, count: int | None) -> tuple[list[float], list[int], list[int]]:
+    """Seconds, Krylov iterations and dual problems of each of the first `count` events, of all if None."""
     interface = homogenization.interface
     bonded = np.full(len(interface.nodes.row), BONDED, np.int8)
     found = events(

@@ -33,20 +33,25 @@ class AnalysisContext:
     Attributes:
         homogenization: the cell and its interfaces.
         debonded: opening angle (or None for the arcs' own) -> (k,) prescribed debonded nodes of this rank.
-        record: called with each response that is to be kept as a state, its load factor and its name.
+        record: called with each response that is to be kept as a state, its load factor, its name and the number of its
+            point; collective.
         iterations, reasons: of every dual solve so far.
         checks: largest error of each law so far.
         faults: what did not converge or hold, in words.
+        states: which points of a path to record, `kept_points.kept`; None: none.
+        log: called with a line about each event of a path.
     """
 
     homogenization: Homogenization
     debonded: Callable[[float | None], NDArray[np.bool_]]
     progress: Progress
-    record: Callable[[Response, float, str], None]
+    record: Callable[[Response, float, str, int], None]
     iterations: list[int] = field(default_factory=list)
     reasons: list[int] = field(default_factory=list)
     checks: dict[str, float] = field(default_factory=dict)
     faults: list[str] = field(default_factory=list)
+    states: int | str | None = None
+    log: Callable[[str], object] = lambda line: None
 
     def status(self, opening: float | None) -> Status:
         """Interface states before any load: prescribed debonded nodes are open."""
@@ -56,8 +61,8 @@ class AnalysisContext:
         """First multipliers when there are no better ones."""
         return np.zeros(self.homogenization.cell.solver.rows)
 
-    def record_checks(self, name: str, response: Response) -> None:
-        """Keep the numbers of a response, tell of it, and complain if it breaks a law."""
+    def record_checks(self, name: str, response: Response) -> str:
+        """Keep the numbers of a response, with a fault if it breaks a law; returns a line that tells of it."""
         state = response.state
         self.iterations.append(state.iterations)
         self.reasons.append(state.solution.reason)
@@ -68,13 +73,13 @@ class AnalysisContext:
             words += f", {debonded} debonded ({response.counts['closed']} closed), {state.solves} solves"
         if state.free_motions:
             words += f", {state.free_motions} free motions"
-        self.progress.say(f"  {name}: {words}")
         if state.solution.reason < 0:
             self.faults.append(
                 f"{name}: no convergence after {state.iterations} iterations, {jump} "
                 f"(KSPConvergedReason {state.solution.reason}); result marked"
             )
         self.check(name, response.checks)
+        return f"  {name}: {words}"
 
     def check(self, name: str, errors: Mapping[str, float]) -> None:
         """Keep the largest errors; a fault for each that is not within its tolerance: NaN is not."""
@@ -108,7 +113,7 @@ class AnalysisContext:
         """Secant stiffness (3, 3) to plus or minus each unit strain (39), and the responses."""
         responses = self.homogenization.respond(sign * np.eye(3), status, starts)
         for name, response in zip(UNIT_CASES, responses, strict=True):
-            self.record_checks(f"{label}{'-' if sign < 0 else ''}{name}", response)
+            self.progress.say(self.record_checks(f"{label}{'-' if sign < 0 else ''}{name}", response))
         return np.stack([sign * r.stress for r in responses], axis=1), responses
 
     def point(self, responses: Sequence[Response]) -> dict[str, Any]:

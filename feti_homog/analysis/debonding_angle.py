@@ -20,7 +20,7 @@ def run(context: AnalysisContext, values: Sequence[float], strain: Float | None)
     unit = strain is None
     starts = [context.zero_multipliers()] * (3 if unit else 1)
     points = []
-    for value in context.progress.bar(values, "angles"):
+    for number, value in enumerate(context.progress.bar(values, "angles")):
         status, label = context.status(value), f"{value:g} deg"
         point: dict[str, Any] = {"angle": value}
         responses: list[Response]
@@ -32,10 +32,10 @@ def run(context: AnalysisContext, values: Sequence[float], strain: Float | None)
                 context.check(label, {"symmetry": asymmetry(L)})
         else:
             responses = context.homogenization.respond(np.array([strain]), status, starts)
-            context.record_checks(label, responses[0])
+            context.progress.say(context.record_checks(label, responses[0]))
             point |= {"strain": responses[0].strain, "stress": responses[0].stress}
         for name, response in zip(UNIT_CASES if unit else ("",), responses, strict=True):
-            context.record(response, 1.0, f"{label} {name}".strip())
+            context.record(response, 1.0, f"{label} {name}".strip(), number)
         starts = [r.state.solution.lam for r in responses]
         points.append(point | context.point(responses))
     return {"angle": points}

@@ -67,6 +67,9 @@ class Result:
     )
     angle: tuple[AnglePoint, ...] | None = described("points of analysis `angle`, as in angle.csv", default=None)
     path: tuple[PathPoint, ...] | None = described("points of analysis `path`, as in path.csv", default=None)
+    states: tuple[int, ...] | None = described(
+        "of a path: the numbers, from 0, of the points whose fields are kept; /state/K is that of entry K", default=None
+    )
     resumed: int | None = described("points of a path that were taken from a checkpoint", default=None)
     result_h5: FileSeal | None = described("by what result.h5 is known, if the run wrote it", default=None)
     timings: Mapping[str, float] = described(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import closing, contextmanager, nullcontext
 from dataclasses import replace
 from itertools import count
 from pathlib import Path
@@ -24,7 +24,6 @@ from feti_homog.common.petsc_options import case_options, refuse_unused
 from feti_homog.common.progress import Progress
 from feti_homog.config.case import Case
 from feti_homog.errors import CaseError, ConvergenceError, FetiHomogError
-from feti_homog.feti.decomposition.interface_neighbours import InterfaceNeighbours
 from feti_homog.feti.preconditioners.influence import Influence
 from feti_homog.homogenization.averaging import Homogenization, Response
 from feti_homog.homogenization.unit_cell import TornCell, tear
@@ -34,6 +33,7 @@ from feti_homog.interface.strength_criterion import StrengthCriterion
 from feti_homog.interface.tip_criterion import TipCriterion
 from feti_homog.output.files import (
     csv_tables,
+    event_log,
     field_file,
     field_parts,
     file_seal,
@@ -42,7 +42,8 @@ from feti_homog.output.files import (
     result_json,
     xdmf,
 )
-from feti_homog.output.files.checkpoint import Checkpoint, NoCheckpoint
+from feti_homog.output.files.checkpoint import Checkpoint, EventsInMemory, NoCheckpoint
+from feti_homog.output.files.event_log import EventLog
 from feti_homog.output.files.field_file import FieldFile
 from feti_homog.output.files.field_layout import StatePart
 from feti_homog.output.files.file_seal import FileSeal
@@ -88,7 +89,8 @@ def compute(case: Case, comm: MPI.Intracomm, keep_fields: bool = False) -> Resul
     with _torn(case, comm, progress) as cell:
         states = _States(cell, None, keep_fields, progress.say)
         context = _context(cell, progress, states)
-        analysis = _analyse(context, NoCheckpoint(comm), resume=False)
+        checkpoint = EventsInMemory(comm) if keep_fields else NoCheckpoint(comm)
+        analysis = _analyse(context, checkpoint, resume=False)
         result = result_builder.result(context, analysis, states.kept())
     if result.faults:
         raise ConvergenceError(*result.faults)
@@ -116,19 +118,21 @@ class _States:
     """Where the states of a run go: to the file if there is one, and to memory if they are to be kept.
 
     Attributes:
+        wanted: which points of a path to record, None if there is no place for any.
         error: why the file was given up; the numbers are computed without it.
     """
 
     def __init__(self, cell: TornCell, file: FieldFile | None, keep: bool, say: Callable[[str], object]) -> None:
         self._cell, self._file, self._keep = cell, file, keep
+        self.wanted = cell.case.output.states if keep or file is not None else None
         self._number, self._states, self._say = count(), list[StatePart](), say
         self.error: FetiHomogError | None = None
 
-    def record(self, response: Response, load_factor: float, label: str) -> None:
+    def record(self, response: Response, load_factor: float, label: str, point: int) -> None:
         """Take a response as the next state; collective."""
         if self._file is None and not self._keep:
             return
-        state = field_parts.state_part(self._cell, response, load_factor, label)
+        state = field_parts.state_part(self._cell, response, load_factor, label, point)
         self._write(lambda file: file.write_state(next(self._number), state))
         if self._keep:
             self._states.append(state)
@@ -161,14 +165,16 @@ def _run_and_write(cell: TornCell, directory: Path, progress: Progress, resume: 
     """Analyse and write; the result may have faults."""
     output = cell.case.output
     file = _field_file(cell, directory, progress) if output.fields else None
-    with file or nullcontext():
+    with file or nullcontext(), closing(EventLog(directory, cell.comm, cell.case.name, progress.say)) as log:
         states = _States(cell, file, keep_fields, progress.say)
-        context = _context(cell, progress, states)
+        context = replace(_context(cell, progress, states), log=log.write)
         for warning in context.warnings():
             progress.say(f"warning: {warning}")
         checkpoint = _checkpoint(cell, directory)
         analysis = _analyse(context, checkpoint, resume)
         seal = states.seal()
+        if states.error is not None and not keep_fields:
+            analysis.pop("states", None)
     result = replace(result_builder.result(context, analysis, states.kept()), result_h5=seal)
     _write(result, directory, cell)
     if states.error is not None:
@@ -199,7 +205,7 @@ def _field_file(cell: TornCell, directory: Path, progress: Progress) -> FieldFil
 def _context(cell: TornCell, progress: Progress, states: _States) -> AnalysisContext:
     """The analysis of a cell."""
     contact = cell.case.interface is not None and cell.case.interface.contact
-    return AnalysisContext(Homogenization(cell, contact), cell.debonded, progress, states.record)
+    return AnalysisContext(Homogenization(cell, contact), cell.debonded, progress, states.record, states=states.wanted)
 
 
 def _analyse(context: AnalysisContext, checkpoint: Checkpoint, resume: bool) -> dict[str, Any]:
@@ -240,12 +246,11 @@ def _law(cell: TornCell) -> BondCriterion:
 
 
 def _at_tips(cell: TornCell, springs: EnergyCriterion) -> TipCriterion:
-    """Raises CaseError if the solver has no inverse of the dual operator.  Collective."""
-    influence, matrix = cell.solver.preconditioner, cell.summary.phases[0]
+    """Raises CaseError if the solver has no inverse of the dual operator."""
+    influence = cell.solver.preconditioner
     if not isinstance(influence, Influence):
         raise CaseError('[interface] growth = "released": needs -feti_pc_type influence; or growth = "springs"')
-    neighbours = InterfaceNeighbours(cell.comm, cell.solver.jump_operator, cell.subdomains, matrix)
-    return TipCriterion(springs, neighbours, influence)
+    return TipCriterion(springs, influence)
 
 
 def _write(result: Result, directory: Path, cell: TornCell) -> None:
@@ -258,6 +263,7 @@ def _write(result: Result, directory: Path, cell: TornCell) -> None:
         if points is not None:
             on_root_only(cell.comm, csv_tables.write, directory / name, points)
             written.add(name)
+    written |= {event_log.NAME} if result.path is not None else set()
     on_root_only(cell.comm, output_folder.remove_other_results, directory, written)
 
 

@@ -16,12 +16,12 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     one_sided = context.homogenization.interface.contact and context.homogenization.counts(status)["open"] > 0
     L, responses = context.unit_responses("", status, starts, 1.0)
     for name, response in zip(UNIT_CASES, responses, strict=True):
-        context.record(response, 1.0, name)
+        context.record(response, 1.0, name, 0)
     document: dict[str, Any] = {"effective_stiffness": L}
     if one_sided:
         minus, responses = context.unit_responses("", status, starts, -1.0)
         for name, response in zip(UNIT_CASES, responses, strict=True):
-            context.record(response, -1.0, f"-{name}")
+            context.record(response, -1.0, f"-{name}", 0)
         document["effective_stiffness_compression"] = minus
     else:
         context.check("L^ef", {"symmetry": asymmetry(L)})

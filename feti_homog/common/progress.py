@@ -26,6 +26,7 @@ class Progress:
         # mpirun gives rank 0 a terminal for its output even if mpirun has none itself, but none for its errors.
         self.on_terminal = self.prints and sys.stdout.isatty() and sys.stderr.isatty()
         self.seconds: dict[str, float] = {}
+        self._within = [0.0]  # seconds that stages within those now open took, the innermost last
 
     def say(self, line: str) -> None:
         """Print one line on rank 0, past the progress bar if there is one."""
@@ -39,12 +40,18 @@ class Progress:
 
     @contextmanager
     def stage(self, name: str) -> Iterator[list[str]]:
-        """A PETSc log stage; the block may append words to the list, which are printed with its time."""
+        """A PETSc log stage; the block may append words to the list, which are printed with its time, that of stages
+        within it left out."""
         words: list[str] = []
         start = time.perf_counter()
-        with PETSc.Log.Stage(name):
-            yield words
-        took = time.perf_counter() - start
+        self._within.append(0.0)
+        try:
+            with PETSc.Log.Stage(name):
+                yield words
+        finally:
+            whole = time.perf_counter() - start
+            took = whole - self._within.pop()
+            self._within[-1] += whole
         self.seconds[name] = self.seconds.get(name, 0.0) + took
         self.say(f"{name:<9} {took:8.2f} s  {' '.join(words)}".rstrip())
 

@@ -55,6 +55,13 @@ FIBRES = ValueType(
         ]
     },
 )
+KEPT = integer(least=2, most=10**9)
+STATES = ValueType(
+    f'"all", "peaks" or {KEPT.expected}',
+    lambda v: v in ("all", "peaks") or KEPT.accepts(v),
+    lambda v: v,
+    {"anyOf": [{"enum": ["all", "peaks"]}, KEPT.json_schema]},
+)
 ARCS = ValueType(
     "a list of arcs {fibre, centre, angle}",
     lambda v: isinstance(v, list) and all(isinstance(arc, dict) for arc in v),

@@ -7,7 +7,17 @@ from typing import Any
 
 from feti_homog.config.cell_section import Cell
 from feti_homog.config.schema import Selector, key
-from feti_homog.config.section_values import ARCS, FIBRES, OPENINGS, STIFFNESS, STRAIN, STRENGTH, TOUGHNESS, WAYPOINTS
+from feti_homog.config.section_values import (
+    ARCS,
+    FIBRES,
+    OPENINGS,
+    STATES,
+    STIFFNESS,
+    STRAIN,
+    STRENGTH,
+    TOUGHNESS,
+    WAYPOINTS,
+)
 from feti_homog.config.values import boolean, choice, integer, real, text
 
 Strain = tuple[float, ...]
@@ -216,6 +226,14 @@ class Output:
     """What is written and drawn."""
 
     fields: bool = key(boolean, "Write result.h5 and result.xdmf.", default=True)
+    states: int | str = key(
+        STATES,
+        "The points of a path whose fields are written: at most so many, the first, the last and those around drops of "
+        'the stress, the others between them; "peaks": none of these others; "all". A drop is by more than 1 % of the '
+        "largest stress. The curve has every point.",
+        default=100,
+        only=PATH_ANALYSIS,
+    )
     pictures: bool = key(boolean, "Draw the PNG files; without fields, the curves alone.", default=True)
     report: bool = key(boolean, "Write report.html: numbers, pictures, curves and states on one page.", default=False)
     stress: str = key(

@@ -95,7 +95,6 @@ def _sizes(
         all_dense=comm.allreduce(all(dense), MPI.LAND),
         all_searchable=comm.allreduce(all(np.logical_or(dense, operators.facewise)), MPI.LAND),
         shared_dofs=shared_dofs(comm, jump_operator),
-        precracked_nodes=comm.allreduce(int(jump_operator.nodes.precracked.sum())),
     )
 
 

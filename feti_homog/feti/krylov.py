@@ -123,6 +123,10 @@ class PrimalTest:
         """Norms of the torn cell's jump and of the forces that close it, for the next solve."""
         self._jump_scale, self._force_scale = jump, forces
 
+    def is_met(self, rtol: float, jump: float, forces: float) -> bool:
+        """Whether norms of the jump and of the forces are both below rtol; no jump at all is."""
+        return jump <= rtol * self._jump_scale and (forces <= rtol * self._force_scale or jump == 0.0)
+
     def __call__(self, ksp: PETSc.KSP, iteration: int, residual: float) -> PETSc.KSP.ConvergedReason:
         """Whether to go on; `residual` is the norm of the preconditioned one, |T M^-1 r|.  Collective."""
         ended = PETSc.KSP.ConvergedReason.DIVERGED_NANORINF

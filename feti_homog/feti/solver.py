@@ -12,6 +12,7 @@ from __future__ import annotations
 import weakref
 from collections.abc import Sequence
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from mpi4py import MPI
@@ -37,6 +38,14 @@ BREAKDOWNS = (
     PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_MAT,
     PETSc.KSP.ConvergedReason.DIVERGED_BREAKDOWN,
 )
+
+
+class Iterate(NamedTuple):
+    """Multipliers lam, F lam on all rows, and the projected residual on the active ones, (owned rows, k) each."""
+
+    lam: Float
+    applied: Float
+    residual: Float
 
 
 class FetiSolver:
@@ -166,16 +175,19 @@ class FetiSolver:
         scale = np.where(is_seen, jump, 1.0)
         right = np.where(is_seen, right, 0.0) / scale
         self.solves += k
-        closing = self.natural.project(self.preconditioner.apply(right))
+        E = np.where(is_seen, strains.T, 0.0) / scale
+        closing = self.natural.project(self.preconditioner.close(right, self.d, E))
         krylov.test.set_scales(float(np.sqrt(is_seen.sum())), float(np.linalg.norm(self._norms(closing))))
         starts = np.where(is_seen, self.natural.project(self.active.restrict(starts)), 0.0) / scale
         lam = self.preconditioner.initial_multipliers(starts, closing)
+        found = Iterate(lam, np.zeros_like(lam), right)
         iterations, reason = 0, int(PETSc.KSP.ConvergedReason.CONVERGED_ATOL)
         if is_seen.any():
-            lam, iterations, reason = self._solve_with_restarts(krylov, lam, right)
+            found, iterations, reason = self._solve_with_restarts(krylov, lam, right)
             if self._view:
                 PETSc.Sys.Print(view.describe_solve(krylov.ksp, k), comm=self.comm)
-        return self._solutions(strains, lam * scale, torn_jump, iterations, reason, np.maximum(jump, rounding))
+        lam, jump_left = found.lam * scale, torn_jump - found.applied * scale
+        return self._solutions(strains, lam, jump_left, iterations, reason, np.maximum(jump, rounding))
 
     def opening(self, solution: DualSolution) -> Float:
         """(owned rows,) B u*: what the springs give way, and the jump of rows without multipliers."""
@@ -198,7 +210,7 @@ class FetiSolver:
         self._destroy_krylov()
         self.coarse.destroy()
 
-    def _solve_with_restarts(self, krylov: Krylov, lam: Float, right: Float) -> tuple[Float, int, int]:
+    def _solve_with_restarts(self, krylov: Krylov, lam: Float, right: Float) -> tuple[Iterate, int, int]:
         """Multipliers, iterations, and why they ended.
 
         If coarse vectors depend on each other, rounding makes the preconditioner indefinite or the iteration
@@ -209,33 +221,37 @@ class FetiSolver:
         for restart in range(MAX_RESTARTS + 2):
             if restart > MAX_RESTARTS and not self.coarse.disable_deflation():
                 break
-            lam, residual = self._initial_guess(lam, right)
+            first = self._first_iterate(lam, right)
+            left = float(np.linalg.norm(self._norms(first.residual)))
+            if krylov.test.is_met(self.rtol, left, self.preconditioner.norm * left):
+                return first, iterations, int(PETSc.KSP.ConvergedReason.CONVERGED_RTOL)
+            lam, residual = self.coarse.coarse_initial_guess(first.lam, first.residual, self._apply_active)
             lam = lam + krylov.solve(residual)
             iterations += krylov.ksp.getIterationNumber()
             reason = int(krylov.ksp.getConvergedReason())
             if reason not in BREAKDOWNS:
                 break
-        return lam, iterations, reason
+        return Iterate(lam, self.operator.apply(lam), residual), iterations, reason
 
-    def _initial_guess(self, lam: Float, right: Float) -> tuple[Float, Float]:
-        """First multipliers, improved by the coarse space, and the residual that they leave."""
-        residual = right
+    def _first_iterate(self, lam: Float, right: Float) -> Iterate:
+        """Multipliers to begin with, 0 where `lam` leave more than was there."""
+        applied, residual = np.zeros_like(lam), right
         if self._norms(lam).any():
-            residual = self.natural.project(right - self._apply_active(lam))
-        # Where they leave more than was there, 0 is a better beginning.
-        is_worse = self._norms(residual) > self._norms(right)
-        lam, residual = np.where(is_worse, 0.0, lam), np.where(is_worse, right, residual)
-        return self.coarse.coarse_initial_guess(lam, residual, self._apply_active)
+            applied = self.operator.apply(lam)
+            residual = self.natural.project(right - self.active.restrict(applied))
+        is_better = self._norms(residual) <= self._norms(right)
+        lam, applied = np.where(is_better, lam, 0.0), np.where(is_better, applied, 0.0)
+        return Iterate(lam, applied, np.where(is_better, residual, right))
 
     def _apply_active(self, x: Float) -> Float:
         """F x on the active rows."""
         return self.active.restrict(self.operator.apply(x))
 
     def _solutions(
-        self, strains: Float, lam: Float, torn_jump: Float, iterations: int, reason: int, scale: Float
+        self, strains: Float, lam: Float, jump: Float, iterations: int, reason: int, scale: Float
     ) -> list[DualSolution]:
-        """Amplitudes, jumps and residuals of the multipliers `lam` (owned rows, k)."""
-        jump = torn_jump - self.operator.apply(lam)
+        """Amplitudes, jumps and residuals of the multipliers `lam` (owned rows, k), which leave `jump` = (d E - F lam)
+        but for rigid-body motions."""
         alpha = np.zeros((self.natural.kernel_dimension, len(strains)))
         if self.natural.kernel_dimension:
             alpha -= self.natural.amplitudes(self.active.restrict(jump))

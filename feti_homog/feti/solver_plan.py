@@ -71,7 +71,6 @@ class ProblemSizes:
         all_dense: whether all boundary operators are dense.
         all_searchable: whether all are dense, but of bodies whose faces are searched for soft modes one by one.
         shared_dofs: dofs on the shared nodes, of the cell with all bonds intact.
-        precracked_nodes: interface nodes that are debonded from the start.
     """
 
     applications: int
@@ -79,7 +78,6 @@ class ProblemSizes:
     all_dense: bool
     all_searchable: bool
     shared_dofs: int
-    precracked_nodes: int
 
 
 @dataclass(frozen=True)
@@ -119,5 +117,4 @@ def _influence_pays(sizes: ProblemSizes, thresholds: Thresholds) -> bool:
         sizes.all_dense
         and sizes.applications >= thresholds.influence_applications
         and sizes.shared_dofs <= thresholds.assembled_schur_dofs
-        and sizes.precracked_nodes <= thresholds.influence_precracked_nodes
     )

@@ -39,10 +39,8 @@ class Thresholds:
             of the load cases; above, all ranks factor it together (`scripts/scaling sizes`).
         influence_applications: applications of the dual operator from which on influence columns pay
             (`scripts/benchmark_path`).
-        assembled_schur_dofs: largest cell with all bonds intact that is factored for influence columns, in degrees
-            of freedom on shared nodes.
-        influence_precracked_nodes: most nodes that may be debonded from the start with influence columns, which take
-            two columns for each of them.
+        assembled_schur_dofs: largest cell that is factored for influence columns, in degrees of freedom on shared nodes
+            with all bonds intact.
     """
 
     dense_boundary_dofs: int = 6000
@@ -56,7 +54,6 @@ class Thresholds:
     replicated_vectors: int = 20_000
     influence_applications: int = 1000
     assembled_schur_dofs: int = 40_000
-    influence_precracked_nodes: int = 500
 
 
 DEFAULTS = Thresholds()
@@ -126,6 +123,18 @@ ZERO_JUMP = 1e-13
 
 # Influence columns found at once: bounds the memory of their right-hand sides, (boundary dofs, this).
 INFLUENCE_CHUNK = 32
+# Columns after which the cell as it stands is factored in place of them: the default of `-feti_influence_columns`
+# (`scripts/benchmark_path --to-the-end`).
+INFLUENCE_COLUMNS = 700
+# Bonds on each side of one that breaks whose columns are found with its own: fewer and larger batches, but columns that
+# may not be needed.
+NEXT_BONDS = 6
+# Stiffness of the fibres over that of the matrix, as the diagonals of K have them, above which influence columns take
+# the forces of the matrix: those of the fibres lose as many digits as this has.
+STIFF_FIBRES = 1e3
+# Steps of the power method for the norm of the inverse of the dual operator, which find it to some per cent, and what
+# they find is taken so many times.
+NORM_ITERATIONS, NORM_MARGIN = 20, 2.0
 # Pivots of H on inactive rows, relative to its largest diagonal entry, that are rounding: forces on a free fibre as a
 # whole have none.
 SINGULAR_PIVOT = 1e-10

@@ -25,7 +25,7 @@ def describe_setup(comm: MPI.Intracomm, parts: SolverParts) -> str:
         f"  kernels: {parts.natural.kernel_dimension} rigid-body modes",
     ]
     if isinstance(preconditioner, Influence):
-        size = preconditioner.assembled.size
+        size = preconditioner.reference.assembled.size
         lines.append(f"  influence columns by the bonded cell, {size} dofs on its shared nodes")
     if isinstance(coarse, AdaptiveCoarseSpace):
         counts = np.array([n for part in comm.allgather(coarse.counts) for n in part])

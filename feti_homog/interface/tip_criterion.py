@@ -14,11 +14,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from feti_homog.feti.decomposition.interface_neighbours import InterfaceNeighbours
 from feti_homog.feti.preconditioners.influence import Influence
 from feti_homog.interface.contact import BONDED, Interface, Status
 from feti_homog.interface.energy_criterion import EnergyCriterion
 from feti_homog.typing import Float
+
+# Share of a spring's stiffness that the inverse of the dual operator is where only rounding is left of it.
+RIGID = 1e-9
 
 
 @dataclass(frozen=True)
@@ -28,37 +30,47 @@ class TipCriterion:
 
     Attributes:
         springs: the criterion of the others, and the toughness.
-        neighbours: which bonds lie beside each other.
-        influence: the inverse of the dual operator.
+        influence: the inverse of the dual operator, which knows the bonds beside each other.
     """
 
     springs: EnergyCriterion
-    neighbours: InterfaceNeighbours
     influence: Influence
 
     def law(self, interface: Interface, status: Status) -> Callable[[Float], Float]:
         """The utilisation (k,) of tractions (k, 2) on the interface nodes of this rank, with these bonds.  Collective;
         what it returns is not."""
         interface.solver.activate(interface.active(status))
-        everywhere = np.concatenate(self.neighbours.comm.allgather(status))
-        tips = np.flatnonzero((everywhere == BONDED) & (self.neighbours.adjacency @ (everywhere != BONDED) > 0))
-        H = self.influence.inverse_blocks(self.neighbours.rows[tips][:, None] + np.arange(2))
-        own = tips - self.neighbours.first
+        neighbours = self.influence.neighbours
+        everywhere = np.concatenate(neighbours.comm.allgather(status))
+        tips = np.flatnonzero((everywhere == BONDED) & (neighbours.adjacency @ (everywhere != BONDED) > 0))
+        H = self.influence.inverse_blocks(neighbours.rows[tips][:, None] + np.arange(2))
+        own = tips - neighbours.first
         mine = (own >= 0) & (own < len(status))
         own, H = own[mine], H[mine]
         length = interface.nodes.length[own]
+        stiffness = length[:, None] * [self.springs.normal_stiffness, self.springs.tangential_stiffness]
 
         def utilisation(traction: Float) -> Float:
             used = self.springs.utilisation(traction)
-            released = released_energy(H, traction[own] * length[:, None])
+            released = released_energy(H, traction[own] * length[:, None], stiffness)
             used[own] = np.sqrt(released / (self.springs.toughness * length)) * self.springs.mode_factor(traction[own])
             return used
 
         return utilisation
 
 
-def released_energy(H: Float, lam: Float) -> Float:
-    """(m,) energies that the breaks of single bonds release, for their blocks H (m, 2, 2) and forces lam (m, 2)."""
-    parted = np.linalg.solve(H, lam[:, :, None])[:, :, 0]
-    both, shear = (lam * parted).sum(axis=1), lam[:, 1] ** 2 / H[:, 1, 1]
-    return np.asarray(np.where(parted[:, 0] >= 0.0, both, shear) / 2)
+def released_energy(H: Float, lam: Float, stiffness: Float) -> Float:
+    """(m,) energies that the breaks of single bonds release, for their blocks H (m, 2, 2) and forces lam (m, 2).
+
+    `stiffness` (m, 2) is that of their springs, the most that H can be: where H is rounding beside it, as at the last
+    bond of a fibre, no force can act.
+    """
+    root = np.sqrt(stiffness)
+    share, vectors = np.linalg.eigh(H / (root[:, :, None] * root[:, None, :]))
+    along = np.einsum("mij,mi->mj", vectors, lam / root)
+    inverse = np.where(share > RIGID, 1.0 / np.where(share > RIGID, share, 1.0), 0.0)
+    opens = np.einsum("mj,mj->m", vectors[:, 0], inverse * along) >= 0.0
+    both, tangential = (inverse * along**2).sum(axis=1), H[:, 1, 1] / stiffness[:, 1]
+    slides = tangential > RIGID
+    shear = np.where(slides, lam[:, 1] ** 2 / stiffness[:, 1] / np.where(slides, tangential, 1.0), 0.0)
+    return np.asarray(np.where(opens, both, shear) / 2)

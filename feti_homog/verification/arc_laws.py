@@ -26,14 +26,14 @@ def check_arcs(ledger: Ledger, cell: DiscreteCell, states: Sequence[StateNumbers
     document, case = cell.files.document, cell.files.case
     arcs, from_mesh = case.get("interface", {}).get("debonded", ()), case["cell"]["geometry"] == "mesh"
     points = document.get("angle", ())
-    each = max(1, len(states) // max(1, len(points)))  # a number that is wrong breaks the law of the load
-    for number, state in enumerate(states):
-        opening = points[min(number // each, len(points) - 1)]["angle"] if points else None
+    for state in states:
+        # A number that is wrong breaks the law of the tables.
+        opening = points[min(max(state.point, 0), len(points) - 1)]["angle"] if points else None
         inside, outside = _sides(cell, arcs, opening)
         bonded = state.status == BONDED
         ledger.record("arcs", np.count_nonzero(inside & bonded), f"{state.name}, bonded within arcs")
         # The first state of a path by events is the one at which the first bonds break.
-        intact = "path" not in document or (number == 0 and case["path"]["method"] == "events")
+        intact = "path" not in document or (state.point == 0 and case["path"]["method"] == "events")
         if intact and not (from_mesh and "interface" in case):
             ledger.record("arcs", np.count_nonzero(outside & ~bonded), f"{state.name}, debonded outside of arcs")
 

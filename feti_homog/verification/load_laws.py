@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ class StateNumbers:
     """What the laws of paths and tables need of a state.
 
     Attributes:
+        point: number of its point in `path` or `angle` of result.json.
         stored: energy per area of the cell, from the fields.
         used: (k,) share of the strength that the bonded nodes use, 0 elsewhere; NaN at tips of which the energy counts
             that their break would release, for it is not in the files.
@@ -31,6 +33,7 @@ class StateNumbers:
 
     name: str
     load_factor: float
+    point: int
     strain: Float
     stress: Float
     stored: float
@@ -46,7 +49,8 @@ class StateNumbers:
             used[_tips(cell, state)] = np.nan
         stretched = state.traction * spring_jumps(cell, state) * cell.files.interface.length[:, None]
         stored = (fields.energy + float(stretched.sum())) / (2 * cell.area)
-        return cls(state.name, state.load_factor, state.strain, state.mean_stress, stored, state.status, used)
+        means = state.strain, state.mean_stress
+        return cls(state.name, state.load_factor, state.point, *means, stored, state.status, used)
 
 
 def _tips(cell: DiscreteCell, state: State) -> Bool:
@@ -63,27 +67,61 @@ def check_load(ledger: Ledger, cell: DiscreteCell, states: Sequence[StateNumbers
     document, case = cell.files.document, cell.files.case
     same = json.loads(str(cell.files.file.attrs["case"])) == case
     ledger.record("tables", 0.0 if same else np.inf, "the case, which the two files tell otherwise")
-    expected = list(_expected_strains(document, case))
-    ledger.record("load", abs(len(expected) - len(states)), f"{len(states)} states, {len(expected)} asked for")
+    rows = list(zip(_expected_strains(document, case), _entries(document), strict=False))
     largest = cell.largest_strain or 1.0
     stress = max((float(np.abs(s.stress).max()) for s in states), default=0.0) or 1.0
-    for state, strain in zip(states, expected, strict=False):
+    if "path" in document:
+        _check_kept(ledger, document, case, [state.point for state in states])
+        for number, (strain, entries) in enumerate(rows):
+            ledger.record("load", np.abs(np.array(entries["strain"]) - strain) / largest, f"path[{number}].strain")
+        pairs = [(state, rows[state.point]) for state in states if 0 <= state.point < len(rows)]
+    else:
+        _check_all(ledger, document, states, len(rows))
+        pairs = list(zip(states, rows, strict=False))
+    for state, (strain, entries) in pairs:
         ledger.record("load", np.abs(state.strain - strain) / largest, state.name)
-    for state, entries in zip(states, _entries(document), strict=False):
-        for name, value, scale in (("strain", state.strain, largest), ("stress", state.stress, stress)):
-            if name in entries:
-                ledger.record("tables", relative(np.array(entries[name]) - value, scale), f"{state.name}, {name}")
-        if "load_factor" in entries:
-            ledger.record("tables", abs(entries["load_factor"] - state.load_factor), f"{state.name}, load_factor")
-        for name in COUNTS.keys() & entries.keys():
-            counted = np.count_nonzero(state.status == COUNTS[name])
-            ledger.record("tables", abs(entries[name] - counted), f"{state.name}, {name}")
+        _check_entries(ledger, state, entries, (largest, stress))
     for place, matrix in _linear_stiffnesses(document, cell.files.contact):
         ledger.record("symmetry", relative(matrix - matrix.T, float(np.abs(matrix).max())), place)
 
 
+def _check_kept(ledger: Ledger, document: Mapping[str, Any], case: Mapping[str, Any], numbers: Sequence[int]) -> None:
+    """The states of a path are of the points that result.json says, in their order: the first, the last, and as many
+    as the case asks for."""
+    count, asked = len(document["path"]), case["output"]["states"]
+    told = list(document["states"]) == list(numbers)
+    ledger.record("tables", 0.0 if told else np.inf, "states, which the two files tell otherwise")
+    rising = all(a < b for a, b in pairwise(numbers))
+    ends = len(numbers) > 0 and numbers[0] == 0 and numbers[-1] == count - 1
+    ledger.record("load", 0.0 if rising and ends else np.inf, "states, which are not from the first point to the last")
+    wanted = count if asked == "all" else len(numbers) if asked == "peaks" else min(asked, count)
+    ledger.record("load", abs(wanted - len(numbers)), f"{len(numbers)} states, {wanted} asked for")
+
+
+def _check_all(ledger: Ledger, document: Mapping[str, Any], states: Sequence[StateNumbers], count: int) -> None:
+    """The states of other analyses are all that the case asks for, and know their points."""
+    ledger.record("load", abs(count - len(states)), f"{len(states)} states, {count} asked for")
+    each = count // len(document["angle"]) if "angle" in document else count
+    off = [abs(state.point - number // each) for number, state in enumerate(states)]
+    ledger.record("tables", off, lambda i: f"{states[i].name}, point")
+
+
+def _check_entries(
+    ledger: Ledger, state: StateNumbers, entries: Mapping[str, Any], scales: tuple[float, float]
+) -> None:
+    """What result.json says of a state; `scales` are of strain and stress."""
+    for name, value, scale in (("strain", state.strain, scales[0]), ("stress", state.stress, scales[1])):
+        if name in entries:
+            ledger.record("tables", relative(np.array(entries[name]) - value, scale), f"{state.name}, {name}")
+    if "load_factor" in entries:
+        ledger.record("tables", abs(entries["load_factor"] - state.load_factor), f"{state.name}, load_factor")
+    for name in COUNTS.keys() & entries.keys():
+        counted = np.count_nonzero(state.status == COUNTS[name])
+        ledger.record("tables", abs(entries[name] - counted), f"{state.name}, {name}")
+
+
 def _expected_strains(document: Mapping[str, Any], case: Mapping[str, Any]) -> Iterator[Float]:
-    """The strains that the states of a case should have, in their order."""
+    """The strains of the points of a path, or of the states of another case, in their order."""
     if "path" in document:
         path = case["path"]
         corners = np.array([[0.0] * 3, *(path["waypoints"] if path.get("waypoints") else [path["strain"]])])
@@ -104,7 +142,7 @@ def _expected_strains(document: Mapping[str, Any], case: Mapping[str, Any]) -> I
 
 
 def _entries(document: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
-    """For each state what result.json says of it."""
+    """What result.json says of each point of a path, or of each state of another case."""
     if "path" in document:
         yield from document["path"]
     elif "angle" in document:

@@ -77,6 +77,7 @@ class State:
 
     Attributes:
         strain, mean_stress: (3,) macroscopic.
+        point: number of its point in `path` or `angle` of result.json.
         displacement, fluctuation: (n, 2).
         stress: (m, 3) means over the elements.
         traction, jump: (k, 2) normal and tangential.
@@ -88,6 +89,7 @@ class State:
     strain: Float
     mean_stress: Float
     load_factor: float
+    point: int
     displacement: Float
     fluctuation: Float
     stress: Float
@@ -148,8 +150,8 @@ class ResultFiles:
             {name: self._table(number, name, shape) for name, shape in shapes.items()} for shapes in (basic, derived)
         )
         strain, mean = (np.array(group.attrs[name], float) for name in ("strain", "stress"))
-        label, factor = str(group.attrs["label"]), float(group.attrs["load_factor"])
-        return State(f"state {number} ({label})", strain, mean, factor, **arrays, derived=others)
+        label, factor, point = str(group.attrs["label"]), float(group.attrs["load_factor"]), int(group.attrs["point"])
+        return State(f"state {number} ({label})", strain, mean, factor, point, **arrays, derived=others)
 
     def _table(self, number: int, name: str, shape: tuple[int, ...]) -> Any:
         """A table of a state, of the shape that it must have."""

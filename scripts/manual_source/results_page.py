@@ -21,8 +21,9 @@ All numbers are finite. `KEY[]` is a list, whose entries have the keys that foll
 
 HDF5 = """\
 n nodes, m elements, k interface nodes, f fibres; nodes are torn, each subdomain has its own. K is the number of a
-state, from 0: of a stiffness the unit strains, of a path its points. Every dataset has the attributes `meaning` and
-`unit`; the unit is that of the case's labels, if it has them, and 1 of pure numbers.
+state, from 0: of a stiffness the unit strains, of a path the points whose numbers are `states` in result.json. Every
+dataset has the attributes `meaning` and `unit`; the unit is that of the case's labels, if it has them, and 1 of pure
+numbers.
 
 In ParaView `result.xdmf` opens the cell and `interface.xdmf` the interface; there `displacement` is that of the fibre's
 face. The filter Python Annotation, of the field data, shows a state's label by

@@ -35,8 +35,7 @@ CURVE = {1.05: 24.18, 1.2: 25.81, 1.5: 29.71, 2.0: 36.91, 3.0: 52.06}
 def criterion(cell, growth):
     if growth == "springs":
         return SPRINGS
-    neighbours = InterfaceNeighbours(cell.comm, cell.solver.jump_operator, cell.subdomains, "matrix")
-    return TipCriterion(SPRINGS, neighbours, cell.solver.preconditioner)
+    return TipCriterion(SPRINGS, cell.solver.preconditioner)
 
 
 def path(comm, growth, strain, **case):
@@ -106,7 +105,9 @@ def test_a_tip_releases_its_toughness(comm):
             continue
         broken = (before.state.status == BONDED) & (now.state.status != BONDED)
         everywhere = np.concatenate(comm.allgather(before.state.status))
-        beside = (law.neighbours.adjacency @ (everywhere != BONDED) > 0)[law.neighbours.first :][: len(broken)]
+        beside = (law.influence.neighbours.adjacency @ (everywhere != BONDED) > 0)[law.influence.neighbours.first :][
+            : len(broken)
+        ]
         traction = before.scale * interface.traction(before.state.solution)
         toughness = TOUGHNESS / SPRINGS.mode_factor(traction) ** 2 * interface.nodes.length
         own = broken & beside

@@ -49,6 +49,7 @@ REFUSED = {
     "checkpoint is a file": (lambda path: make(path, "checkpoint", "mine"), "checkpoint is a file there"),
     "somebody's picture": (lambda path: make(path, "cell.png", "mine"), "no run of this program wrote cell.png"),
     "somebody's table": (lambda path: make(path, "path.csv", "mine"), "no run of this program wrote path.csv"),
+    "somebody's log": (lambda path: make(path, "events.log", "mine"), "no run of this program wrote events.log"),
     "other JSON": (lambda path: make(path, "result.json", '{"result": 1}'), "wrote result.json"),
     "JSON no table": (lambda path: make(path, "result.json", "[1, 2]"), "wrote result.json"),
     "no JSON": (lambda path: make(path, "result.json", "result: 1"), "wrote result.json"),
@@ -137,12 +138,15 @@ def test_own_files_beside_the_results_are_nobodys_business(comm, shared_path):
     parallel_assert(comm, (out / "notes.txt").read_text() == "mine" and (out / "figures").is_dir())
 
 
-@pytest.mark.parametrize("left", [["result.h5"], ["result.json", "cell.png"], ["result.lock", "path.csv"]])
+@pytest.mark.parametrize(
+    "left", [["result.h5"], ["result.json", "cell.png"], ["result.lock", "path.csv"], ["events.log", "path.csv"]]
+)
 def test_what_a_run_left_may_be_replaced(comm, shared_path, left):
     """A run that was killed may leave any of its files."""
     if comm.rank == 0:
         header = b"\x89HDF\r\n\x1a\n" + b"\0" * 500 + b"feti_homog"
         contents = {"result.h5": header, "result.json": b'{"version": "0", "case": {}, "solver": {}}'}
+        contents["events.log"] = b"# feti-homog: events of cell, version 0\n"
         for name in left:
             (shared_path / name).write_bytes(contents.get(name, b"x"))
         folder_contents.refuse_files_of_others(shared_path)

@@ -155,7 +155,12 @@ def test_numbers_survive_when_the_fields_do_not_fit(comm, shared_path, capsys):
     if comm.rank == 0:
         document = json.loads((out / "result.json").read_text())
         assert document["status"] == "done" and document["path"][-1]["load_factor"] == 1.0
-        assert "result_h5" not in document and not (out / "result.h5").exists() and not (out / "result.xdmf").exists()
+        assert (
+            "result_h5" not in document
+            and "states" not in document
+            and not (out / "result.h5").exists()
+            and not (out / "result.xdmf").exists()
+        )
     comm.barrier()
     assert run(comm, shared_path, out, PATH, "--resume") == 0
     if comm.rank == 0:
@@ -163,6 +168,19 @@ def test_numbers_survive_when_the_fields_do_not_fit(comm, shared_path, capsys):
         assert again["resumed"] == len(document["path"]) and (out / "result.h5").stat().st_size > 400_000
         assert not (out / "checkpoint").exists()
     comm.barrier()
+
+
+def test_a_log_that_does_not_fit_costs_no_results(comm, shared_path, capsys):
+    out = shared_path / "out"
+    if comm.rank == 0:
+        out.mkdir()
+        (out / "events.log").symlink_to("/dev/full")
+        (shared_path / "cell.toml").write_text(PATH)
+    comm.barrier()
+    parallel_assert(comm, cli.main(["run", str(shared_path / "cell.toml"), "--out", str(out)]) == 0)
+    told = [line for line in capsys.readouterr().out.splitlines() if "events.log: No space left on device" in line]
+    words = "warning: cannot write ", "the path goes on without it"
+    parallel_assert(comm, len(told) == (comm.rank == 0) and all(word in line for line in told for word in words))
 
 
 def test_a_disk_that_another_program_fills_meanwhile(comm, shared_path, small_disk):

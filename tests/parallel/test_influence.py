@@ -62,8 +62,9 @@ def states(cell):
 
 
 @CELLS
-def test_influence_columns_give_the_inverse_for_any_active_rows(comm, case):
-    cell = torn_cells.tear(comm, **case, petsc=INFLUENCE)
+@pytest.mark.parametrize("columns", [700, 20, 1], ids=["one reference cell", "some", "one a state"])
+def test_influence_columns_give_the_inverse_for_any_active_rows(comm, case, columns):
+    cell = torn_cells.tear(comm, **case, petsc=INFLUENCE | {"feti_influence_columns": columns})
     dense, influence = DenseDual(cell), cell.solver.preconditioner
     assert isinstance(influence, Influence)
     for status in states(cell):
@@ -74,6 +75,15 @@ def test_influence_columns_give_the_inverse_for_any_active_rows(comm, case):
         assert np.abs(found[~active]).max(initial=0.0) == 0.0
         alone = gathered(cell, influence.apply(np.ones(cell.solver.rows)))
         assert relative_error(alone, expected @ np.ones(dense.total)) < 1e-8
+        d, E = cell.solver.d, np.array([[1.0, 0.2], [-0.5, 0.0], [0.3, 1.0]])
+        assert relative_error(gathered(cell, influence.close(d @ E, d, E)), expected @ gathered(cell, d) @ E) < 1e-8
+        rows = influence.neighbours.rows
+        bonded = rows[active[rows] & active[rows + 1]]
+        blocks = influence.inverse_blocks(bonded[:, None] + np.arange(2))
+        for row, block in zip(bonded, blocks, strict=True):
+            assert relative_error(block, expected[row : row + 2, row : row + 2]) < 1e-8
+        assert np.linalg.eigvalsh(expected).max() <= influence.norm
+    assert (influence.factorizations > 1) == (columns < 700)
 
 
 @CELLS

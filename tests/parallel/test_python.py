@@ -78,7 +78,8 @@ def test_with_files(comm, shared_path):
     document |= {"output": {"fields": False, "pictures": False}}
     case = Case.parse(document | {"analysis": {"type": "path", "plane": "stress"}})
     result = run(case, comm, out=shared_path / "out")
-    parallel_assert(comm, sorted(p.name for p in (shared_path / "out").iterdir()) == ["path.csv", "result.json"])
+    written = sorted(p.name for p in (shared_path / "out").iterdir())
+    parallel_assert(comm, written == ["events.log", "path.csv", "result.json"])
     again = run(case, comm, out=shared_path / "out", resume=True)
     assert [p.load_factor for p in again.path] == [p.load_factor for p in result.path]
     assert np.array_equal(again.points["stress"], result.points["stress"]) and again.checks == result.checks

@@ -48,7 +48,7 @@ def sample(cells: int = 8, refine: int = 0, order: int = 1) -> Sample:
         mesh,
         fibres,
         _interface(mesh),
-        tuple(_state(mesh, gradient, f"state {k}") for k, gradient in enumerate(GRADIENTS)),
+        tuple(_state(mesh, gradient, k) for k, gradient in enumerate(GRADIENTS)),
     )
 
 
@@ -115,7 +115,7 @@ def _nodes_at(mesh: MeshPart, points: np.ndarray, body: int) -> np.ndarray:
     return nodes[away.argmin(axis=0)]
 
 
-def _state(mesh: MeshPart, gradient: np.ndarray, label: str) -> StatePart:
+def _state(mesh: MeshPart, gradient: np.ndarray, number: int) -> StatePart:
     """u = gradient x plus a bubble; the stress of an element is linear in its centre's position."""
     x = mesh.points
     bubble = 0.05 * np.sin(2 * np.pi * x)[:, ::-1]
@@ -129,7 +129,8 @@ def _state(mesh: MeshPart, gradient: np.ndarray, label: str) -> StatePart:
         strain=strain,
         stress_mean=strain * 3,
         load_factor=1.0,
-        label=label,
+        point=number,
+        label=f"state {number}",
         displacement=displacement,
         fluctuation=bubble,
         stress=stress,

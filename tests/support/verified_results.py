@@ -26,6 +26,8 @@ CASES: dict[str, dict[str, Any]] = {
     "overlap": {"cell": SQUARE, "interface": {"contact": False, "debonded": [ARC | {"angle": 200.0}]}},
     "angle": {"cell": RANDOM, "fibre": TURNED, "interface": {"debonded": [ARC]}, "angle": {"values": [0, 120, 360]}},
     "path": {"cell": SQUARE, "interface": STRENGTHS, "path": {"waypoints": WAYPOINTS}},
+    "thinned": {"cell": SQUARE, "interface": STRENGTHS, "path": {"waypoints": WAYPOINTS}, "states": 7},
+    "peaks": {"cell": SQUARE, "interface": STRENGTHS, "path": {"strain": [0.2, 0.0, 0.1]}, "states": "peaks"},
     "springs": {
         "cell": SQUARE | {"order": 2},
         "interface": {"normal_stiffness": 900.0, "tangential_stiffness": 300.0, "debonded": [ARC | {"angle": 110.0}]},
@@ -54,7 +56,8 @@ def document(kind: str) -> dict[str, Any]:
     analysis = next((name for name in ("angle", "path") if name in parts), "stiffness")
     material = {"matrix": MATRIX, "fibre": parts.pop("fibre", FIBRE)}
     plane = {"type": analysis, "plane": parts.pop("plane", "strain")}
-    return {"name": kind, "material": material, "analysis": plane, "output": {"pictures": False}} | parts
+    output = {"pictures": False} | ({"states": parts.pop("states")} if "states" in parts else {})
+    return {"name": kind, "material": material, "analysis": plane, "output": output} | parts
 
 
 def write(kind: str, folder: Path) -> Path:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
 
 import numpy as np
 from mpi4py import MPI
-from scipy.sparse import block_diag, csr_matrix, diags, hstack
+from scipy.sparse import block_diag, csr_matrix, diags
 
-from feti_homog.cell.periodic_topology import components
 from feti_homog.common.distributed_arrays import allreduce_sum
+from feti_homog.feti.coarse.gram_matrix import GramMatrix
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.linalg.collectives import allreduce_sparse
 from feti_homog.feti.linalg.distributed_matrix import assemble_owned_rows
@@ -54,10 +55,12 @@ class NaturalCoarseSpace:
         owned = jump_operator.owned[1] - jump_operator.owned[0]
         columns = np.arange(first, first + modes)
         self.G = assemble_owned_rows(comm, operators.B @ self.R, jump_operator.rows, columns, (owned, modes))
-        self.factorizations = 0
+        self.GT_active: csr_matrix = self.G.T.tocsr()
+        self.G_active, self.factorizations = self.G, 0
         squares = np.asarray(self.G.power(2).sum(axis=0)).ravel()
         self._largest_diagonal = float(comm.allreduce(squares).max(initial=0.0))
-        self.activate(np.ones(owned))
+        self.unconstrained_modes = np.zeros((self.kernel_dimension, 0))
+        self._factor(allreduce_sparse(comm, (self.GT_active @ self.G).tocsr()))
 
     def activate(self, active: Float) -> None:
         """Factor G^T G for the owned rows of which `active` is 1; the others, 0, carry no multiplier.  Collective.
@@ -66,18 +69,44 @@ class NaturalCoarseSpace:
         """
         self.G_active = (diags(active) @ self.G).tocsr()
         self.GT_active = self.G_active.T.tocsr()
-        gram, self.unconstrained_modes = self._null_space((self.GT_active @ self.G_active).tocsr())
+        entries = self._gram.entries(active)
+        self.unconstrained_modes = self._null_space(entries)
+        gram, Z = self._gram.matrix(entries), self.unconstrained_modes
+        self._factor((gram + self._largest_diagonal * csr_matrix(Z @ Z.T)).tocsr() if Z.shape[1] else gram)
+
+    def _factor(self, gram: csr_matrix) -> None:
+        """Solve with G^T G from now on."""
         if self.kernel_dimension:
-            Z = self.unconstrained_modes
-            regular = gram + self._largest_diagonal * csr_matrix(Z @ Z.T)
-            self._solver = DirectSolver(regular.tocsr(), "feti_natural_")
+            self._solver = DirectSolver(gram, "feti_natural_")
             self.factorizations += 1
 
-    def _null_space(self, part: csr_matrix) -> tuple[csr_matrix, Float]:
-        """G^T G of active rows, of which this rank has a part, and its null space (m, z).  Collective."""
-        gram = allreduce_sparse(self.comm, part)
-        tolerance = UNCONSTRAINED_EIGENVALUE * self._largest_diagonal
-        return gram, _null_space(gram, self.body, self.pinned_body, tolerance)
+    @cached_property
+    def _gram(self) -> GramMatrix:
+        """Made when rows first leave: it takes 36 numbers a row.  Collective."""
+        return GramMatrix(self.comm, self.G)
+
+    @cached_property
+    def _groups(self) -> list[tuple[Int, Int]]:
+        """Modes that may be coupled, (groups, size), and where their blocks are in the entries of G^T G.
+
+        The pieces of the pinned body are glued to the pinned class and cannot move.  Of the others, those that are
+        coupled have an eigenproblem together, so each is about as large as a fibre's kernel.
+        """
+        movable = np.flatnonzero(self.body != self.pinned_body)
+        return [(members, self._gram.places(members)) for members in self._gram.groups(movable)]
+
+    def _null_space(self, entries: Float) -> Float:
+        """(m, z) orthonormal null space of G^T G with these entries: eigenvectors whose eigenvalues are rounding."""
+        tolerance, padded = UNCONSTRAINED_EIGENVALUE * self._largest_diagonal, np.append(entries, 0.0)
+        null = [np.zeros((self.kernel_dimension, 0))]
+        for members, places in self._groups:
+            values, vectors = np.linalg.eigh(padded[places])
+            which, mode = np.nonzero(values < tolerance)
+            if len(which):
+                Z = np.zeros((self.kernel_dimension, len(which)))
+                Z[members[which].T, np.arange(len(which))] = vectors[which, :, mode].T
+                null.append(Z)
+        return np.hstack(null)
 
     @property
     def coarse_dimension(self) -> int:
@@ -102,8 +131,7 @@ class NaturalCoarseSpace:
 
     def free_motions(self, active: Float) -> Float:
         """(m, z) as `unconstrained_modes`, if those owned rows were active of which `active` is 1.  Collective."""
-        G = (diags(active) @ self.G).tocsr()
-        return self._null_space((G.T @ G).tocsr())[1]
+        return self._null_space(self._gram.entries(active))
 
     def rigid_body_motion(self, amplitudes: Float) -> Float:
         """R alpha on the boundary dofs, for alpha (m,) or (m, k)."""
@@ -132,33 +160,3 @@ class NaturalCoarseSpace:
 
     def destroy(self) -> None:
         """The factor is this rank's own and goes with the object."""
-
-
-def _null_space(gram: csr_matrix, body: Int, pinned_body: int, tolerance: float) -> Float:
-    """(m, z) orthonormal null space of G^T G (m, m): its eigenvectors of eigenvalues below `tolerance`.
-
-    The pieces of the pinned body are glued to the pinned class and cannot move.  Of the others, those that are coupled
-    in G^T G have an eigenproblem together, so each is about as large as a fibre's kernel; those of one size are solved
-    at once.
-    """
-    movable = np.flatnonzero(body != pinned_body)
-    coupling = gram[movable][:, movable].tocoo()
-    number = np.unique(body[movable], return_inverse=True)[1]
-    group = components(int(number.max(initial=-1)) + 1, number[coupling.row], number[coupling.col])[number]
-    order = np.argsort(group, kind="stable")
-    sizes, blocks = np.bincount(group), coupling.tocsr()
-    starts = np.cumsum(sizes) - sizes
-    null = [csr_matrix((len(body), 0))]
-    for size in np.unique(sizes):
-        members = order[starts[sizes == size][:, None] + np.arange(size)]
-        values, vectors = np.linalg.eigh(_dense_blocks(blocks, members))
-        which, mode = np.nonzero(values < tolerance)
-        at = movable[members[which]].ravel(), np.repeat(np.arange(len(which)), size)
-        null.append(csr_matrix((vectors[which, :, mode].ravel(), at), shape=(len(body), len(which))))
-    return np.asarray(hstack(null).toarray())
-
-
-def _dense_blocks(matrix: csr_matrix, members: Int) -> Float:
-    """(b, m, m) dense blocks of the rows and columns `members` (b, m)."""
-    rows, columns = np.broadcast_arrays(members[:, :, None], members[:, None, :])
-    return np.asarray(matrix[rows.ravel(), columns.ravel()]).reshape(rows.shape)

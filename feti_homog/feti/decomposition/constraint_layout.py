@@ -24,6 +24,7 @@ class InterfaceNodes:
         normal: (k, 2) from fibre to matrix; the tangent is (-n_y, n_x).
         length: (k,) tributary interface length: traction = nodal force / length.
         fibre: (k,) constituent.
+        bodies: (k, 2) the body around the fibre, and the fibre's own.
         precracked: (k,) whether the mesh has it debonded from the start.
         fibre_node: (k,) the fibre's copy among the fine nodes of this rank.
     """
@@ -33,6 +34,7 @@ class InterfaceNodes:
     normal: Float
     length: Float
     fibre: Int
+    bodies: Int
     precracked: Bool
     fibre_node: Int
 
@@ -154,6 +156,7 @@ class ConstraintLayout:
             normal=self._normals(entity, p),
             length=share * shared.length[entity] / m,
             fibre=shared.fibre[entity],
+            bodies=shared.body[np.stack([shared.pointer[entity], shared.pointer[entity + 1] - 1], axis=1)],
             precracked=shared.precracked[entity],
             fibre_node=copy,
         )

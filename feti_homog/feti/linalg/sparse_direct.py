@@ -133,5 +133,7 @@ def _destroy(ksp: PETSc.KSP, *vectors: PETSc.Vec) -> None:
 
 
 def _sequential(matrix: csr_matrix) -> PETSc.Mat:
-    """The matrix as PETSc's, on this rank alone."""
-    return PETSc.Mat().createAIJ(matrix.shape, csr=(matrix.indptr, matrix.indices, matrix.data), comm=PETSc.COMM_SELF)
+    """The matrix as PETSc's, on this rank alone; both have the same arrays."""
+    matrix.sort_indices()
+    csr = matrix.indptr, matrix.indices, matrix.data
+    return PETSc.Mat().createAIJWithArrays(matrix.shape, csr, comm=PETSc.COMM_SELF)

@@ -113,6 +113,15 @@ class InterfaceOperators:
         """S~ x for x (n,) or (n, k): S x, with soft skins where there are springs."""
         return self._each([o.apply_schur for o in self.skins], x)
 
+    def apply_some_skins(self, which: Sequence[bool], x: Float) -> Float:
+        """S~ x for x (n,) or (n, k) on some of the subdomains, 0 on the others."""
+        x = np.asfortranarray(x)
+        y = np.zeros(x.shape, order="F")
+        for operator, own, is_wanted in zip(self.skins, self.slices, which, strict=True):
+            if is_wanted and x[own].any():
+                operator.apply_schur(x[own], y[own])
+        return y
+
     def apply_flexibility(self, x: Float) -> Float:
         """The boundary part of K+ x for x (n,) or (n, k)."""
         return self._each([o.apply_flexibility for o in self.operators], x)

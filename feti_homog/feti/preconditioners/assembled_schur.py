@@ -1,51 +1,61 @@
-"""The cell with all bonds intact, on the shared nodes: one displacement a node, u = Z y with B Z = 0."""
+"""The cell with the bonds of its active rows, on its shared nodes: u = Z y with B Z = 0 on these rows."""
 
 from __future__ import annotations
 
 import numpy as np
 from mpi4py import MPI
-from scipy.sparse import csr_matrix
+from scipy.sparse import csr_matrix, diags, hstack
 
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.linalg.collectives import allreduce_sparse
 from feti_homog.feti.linalg.dense_block_sum import DenseBlockSum
 from feti_homog.feti.linalg.sparse_direct import DirectSolver
 from feti_homog.feti.operators.explicit import ExplicitInterfaceOperator
-from feti_homog.feti.operators.interface_operators import InterfaceOperators
-from feti_homog.typing import Float, Int
+from feti_homog.feti.operators.interface_operators import MATRIX, InterfaceOperators
+from feti_homog.typing import Float
+
+# Entries of Z, which are cosines of angles or their products, that rounding leaves of zero.
+DIRECTION_ROUNDING = 1e-14
 
 
 class AssembledSchur:
     """Z^T S Z of all subdomains, factored once; every rank holds the factor.
 
+    All copies of a node move together, but along a row that is not active the copies of the fibre move on their own.
+
     Attributes:
-        size: dofs on the shared nodes of all ranks, two each.
+        size: columns of Z, on all ranks.
     """
 
-    def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators) -> None:
-        """Assemble and factor.  Options under `feti_bonded_` (default: cholesky by CHOLMOD).  Collective.
+    def __init__(
+        self, comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators, active: Float
+    ) -> None:
+        """Assemble and factor for the owned rows of which `active` is 1; they must leave no rigid-body motion free.
+        Options under `feti_bonded_` (default: cholesky by CHOLMOD).  Collective.
 
         Raises:
             TypeError: a boundary operator is not dense.
         """
         self.comm = comm
-        self._shared_dof = _shared_dof_of(comm, jump_operator, operators)
-        self.size = shared_dofs(comm, jump_operator)
+        together = _copies_together(comm, jump_operator, operators)
+        Z = _released(comm, jump_operator, operators, together, active)
+        self.size = Z.shape[1]
         stiffness = DenseBlockSum((self.size, self.size))
         for operator, span in zip(operators.skins, operators.slices, strict=True):
             if not isinstance(operator, ExplicitInterfaceOperator):
                 raise TypeError("the assembled Schur complement needs dense boundary operators")
-            stiffness.add(self._shared_dof[span], self._shared_dof[span], operator.S)
+            columns = np.unique(Z[span].indices)
+            T = Z[span][:, columns].T.tocsr()
+            stiffness.add(columns, columns, T @ (T @ operator.S).T)
         self._solver = DirectSolver(allreduce_sparse(comm, stiffness.matrix()), "feti_bonded_")
-        n = len(self._shared_dof)
-        self._ZT = csr_matrix((np.ones(n), (self._shared_dof, np.arange(n))), shape=(self.size, n))
+        self._Z, self._ZT = Z, Z.T.tocsr()
 
     def relieving_displacement(self, forces: Float) -> Float:
         """-Z (Z^T S Z)^-1 Z^T f for boundary forces f (n,) or (n, k): it takes them off the shared nodes.
         Collective."""
         right = -self._ZT @ forces
         self.comm.Allreduce(MPI.IN_PLACE, right)
-        return self._solver.solve(right)[self._shared_dof]
+        return np.asarray(self._Z @ self._solver.solve(right))
 
 
 def shared_dofs(comm: MPI.Intracomm, jump_operator: JumpOperator) -> int:
@@ -53,12 +63,42 @@ def shared_dofs(comm: MPI.Intracomm, jump_operator: JumpOperator) -> int:
     return int(comm.allreduce(2 * len(jump_operator.node_rows[0])))
 
 
-def _shared_dof_of(comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators) -> Int:
-    """(n,) the global number of the shared dof that each boundary dof is a copy of.  Collective."""
+def _copies_together(comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators) -> csr_matrix:
+    """(n, shared dofs) Z with all rows active.  Collective."""
     starts, sizes = jump_operator.node_rows
     order = np.argsort(starts)
     first = comm.exscan(len(starts)) or 0
     node = jump_operator.gather(np.repeat(first + np.arange(len(starts)), sizes[order]).astype(float))
     # Each copy of a node takes part in some row of it, and its two dofs are neighbours.
     row = operators.BT.indices[operators.BT.indptr[:-1]]
-    return np.asarray(2 * node[row].astype(np.int64) + np.arange(len(row)) % 2)
+    n = len(row)
+    shared = 2 * node[row].astype(np.int64) + np.arange(n) % 2
+    return csr_matrix((np.ones(n), (np.arange(n), shared)), shape=(n, shared_dofs(comm, jump_operator)))
+
+
+def _released(
+    comm: MPI.Intracomm,
+    jump_operator: JumpOperator,
+    operators: InterfaceOperators,
+    together: csr_matrix,
+    active: Float,
+) -> csr_matrix:
+    """(n, columns) Z, for the one with all rows active: u_f = y - e (e . y) + e w along the direction e of each row
+    that is not active, and w is a column of its own.  Collective."""
+    released = active == 0
+    counts = comm.allgather(int(released.sum()))
+    number = np.where(released, sum(counts[: comm.rank]) + np.cumsum(released), 0)
+    number = jump_operator.gather(number.astype(float)).astype(np.int64) - 1
+    rows = np.flatnonzero(number >= 0)
+    of_fibre = np.repeat([s.submesh.phase != MATRIX for s in operators.subdomains], np.diff(operators.offsets))
+    # A row takes the mean of the fibre's copies, with the sign of minus.
+    e = -diags(jump_operator.copies[rows, 1].astype(float)) @ operators.B[rows] @ diags(of_fibre.astype(float))
+    here = np.asarray(e.multiply(e).sum(axis=1)).ravel()
+    rows, e, here = rows[here > 0], e.tocsr()[here > 0], here[here > 0]
+    own = csr_matrix((np.ones(len(rows)), (np.arange(len(rows)), number[rows])), shape=(len(rows), sum(counts)))
+    common = (together - e.T @ (diags(1.0 / here) @ (e @ together))).tocsr()
+    common.data[np.abs(common.data) < DIRECTION_ROUNDING] = 0.0
+    common.eliminate_zeros()
+    apart = (e.T @ own).tocsr()
+    apart.eliminate_zeros()
+    return hstack([common, apart]).tocsr()

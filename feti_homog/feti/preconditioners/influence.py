@@ -1,146 +1,182 @@
-"""Influence of unit jumps: the inverse of the projected dual operator, exact for any active rows.
+"""The inverse H of the projected dual operator, exact for any active rows, by columns of a reference cell.
 
-With all bonds intact the multipliers that close the jumps g are H g,
+Let Gamma be the response of a cell whose active rows are A, `reference_cell`, and C the rows that are active either
+here or there: D of A have left, R beside A have come.  The multipliers that close the jumps g are
 
-    H = B_D (S - S Z (Z^T S Z)^-1 Z^T S) B_D^T,  B_D = W^-1 B D^-1,  G^T H = 0,
+    y = Gamma_:A g_A,  c = N (y_C + g_R),  lam_A = y_A - Gamma_AC c,  lam_R = -c_R,  N = Gamma_CC^-1.
 
-for the displacements Z y of the cell with all bonds intact.  Without the rows D (no force there, jumps as they like)
-they are
-
-    H_D g = H g - H[:, D] H[D, D]^-1 (H g)[D].
-
-A node that debonds costs two columns of H, a face that closes or opens nothing; the cell is never factored again.
+A bond that breaks costs two columns and two borders of N, a face that closes or opens one border; no factor is made
+anew.  After as many columns as an option says, the cell as it stands becomes the reference.
 """
 
 from __future__ import annotations
 
 import numpy as np
 from mpi4py import MPI
-from scipy.linalg import solve_triangular
-from scipy.linalg.lapack import dpstrf
+from petsc4py import PETSc
+from scipy.sparse import csr_matrix, identity
 
-from feti_homog.common.distributed_arrays import gather_rows, scale_rows
+from feti_homog.common.distributed_arrays import allreduce_sum, gather_rows, scale_rows
+from feti_homog.feti.decomposition.interface_neighbours import InterfaceNeighbours
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
-from feti_homog.feti.operators.interface_operators import InterfaceOperators
-from feti_homog.feti.preconditioners.assembled_schur import AssembledSchur
-from feti_homog.feti.preconditioners.scaled import StiffnessScaled
-from feti_homog.feti.preconditioners.spring_update import SpringUpdate
-from feti_homog.feti.thresholds import INFLUENCE_CHUNK, SINGULAR_PIVOT
+from feti_homog.feti.operators.interface_operators import MATRIX, InterfaceOperators
+from feti_homog.feti.preconditioners.body_ties import BodyTies
+from feti_homog.feti.preconditioners.bordered_inverse import BorderedInverse
+from feti_homog.feti.preconditioners.reference_cell import ReferenceCell, one_sided_jumps
+from feti_homog.feti.preconditioners.response_columns import ResponseColumns
+from feti_homog.feti.thresholds import INFLUENCE_COLUMNS, NEXT_BONDS, NORM_ITERATIONS, NORM_MARGIN
 from feti_homog.typing import Float, Int
 
 
-class InfluenceColumns:
-    """H[:, K] and H[K, K] for the rows K that have ever been inactive, in the order in which they came.
-
-    Attributes:
-        rows: (k,) K, global numbers.
-        block: (k, k) H[K, K] on every rank.
-    """
-
-    def __init__(self, comm: MPI.Intracomm, first: int, owned: int) -> None:
-        """No columns yet; `first` of the `owned` rows is this rank's first global one."""
-        self.comm, self.first = comm, first
-        self.rows: Int = np.zeros(0, np.int64)
-        self.block = np.zeros((0, 0))
-        # Columns are appended in place; when they fill the buffer it doubles.
-        self._buffer = np.zeros((owned, INFLUENCE_CHUNK), order="F")
-
-    @property
-    def owned(self) -> Float:
-        """(owned rows, k) H[:, K]."""
-        return self._buffer[:, : len(self.rows)]
-
-    def append(self, rows: Int, columns: Float) -> None:
-        """Append the columns H[:, rows], (owned rows, new).  Collective."""
-        old, self.rows = len(self.rows), np.concatenate([self.rows, rows])
-        n = len(self.rows)
-        if n > self._buffer.shape[1]:
-            self._buffer = np.concatenate([self._buffer.T, np.empty((n, len(columns)))]).T
-        self._buffer[:, old:n] = columns
-        block = np.empty((n, n))
-        block[:old, :old] = self.block
-        block[:, old:] = gather_rows(self.comm, columns, self.first, self.rows)
-        block[old:, :old] = block[:old, old:].T
-        self.block = block
-
-    def positions(self, rows: Int) -> Int:
-        """Where some rows of K are in K."""
-        order = np.argsort(self.rows)
-        return np.asarray(order[np.searchsorted(self.rows, rows, sorter=order)])
-
-
 class Influence:
-    """z = H_D r on the active rows: the Krylov method confirms it in one iteration.
+    """z = H r on the active rows, H the inverse of the dual operator there: nothing is left to iterate.
 
     Attributes:
-        assembled: the cell with all bonds intact.
-        scaled: x -> H x, but for the `springs` at nodes where fibre and matrix are both cut.
+        neighbours: which bonds lie beside each other.
+        reference: the reference cell.
+        norm: a bound of |H|, for any active rows.
+        factorizations: reference cells so far.
     """
 
     def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators) -> None:
-        """Factor the cell with all bonds intact; all boundary operators must be dense.  Collective."""
-        self.comm, self.first = comm, jump_operator.owned[0]
-        self.operators, self.assembled = operators, AssembledSchur(comm, jump_operator, operators)
-        self.scaled = StiffnessScaled(comm, jump_operator, operators, self._reactions)
-        self.springs = SpringUpdate(comm, self.first, operators.compliance, self.scaled.apply)
-        rows = jump_operator.owned[1] - self.first
-        self._columns = InfluenceColumns(comm, self.first, rows)
-        self.activate(np.ones(rows))
+        """Factor the cell with all bonds intact; all boundary operators must be dense.  Collective.
+
+        Options: `feti_influence_columns`.
+        """
+        self.comm, self._jump_operator, self._operators = comm, jump_operator, operators
+        self._first = jump_operator.owned[0]
+        self._rows = jump_operator.owned[1] - self._first
+        self._most_columns = PETSc.Options("feti_").getInt("influence_columns", INFLUENCE_COLUMNS)
+        self._BD = one_sided_jumps(comm, jump_operator, operators)
+        self._ties = BodyTies(comm, jump_operator)
+        self.neighbours = InterfaceNeighbours(comm, jump_operator, operators.subdomains, MATRIX)
+        self._near = within(self.neighbours.adjacency, NEXT_BONDS)
+        # Columns without which the reference cell is not the one at hand.
+        self.factorizations = self._tied = 0
+        self._answer: Float | None = None
+        self._active = np.ones(self._rows)
+        self._refer(self._active)
+        # Rows that leave make H smaller.
+        self.norm = NORM_MARGIN * self._largest_eigenvalue()
 
     def activate(self, active: Float) -> None:
-        """Restrict to the rows where `active` is 1: factor H[D, D], where D are the others.  Collective."""
+        """Restrict to the rows where `active` is 1.  Collective."""
         self._active = active
-        inactive = np.concatenate(self.comm.allgather(self.first + np.flatnonzero(active == 0)))
-        self._compute_columns(np.setdiff1d(inactive, self._columns.rows))
-        # Where the rows D, and those of them that the factor keeps, are in K.
-        self._inactive = self._columns.positions(inactive)
-        if len(inactive):
-            block = self._columns.block[np.ix_(self._inactive, self._inactive)]
-            factor, order, rank, _ = dpstrf(block, tol=SINGULAR_PIVOT * block.diagonal().max(), lower=1)
-            self._factor, self._kept = factor[:rank, :rank], self._inactive[order[:rank] - 1]
+        changed = self._changed()
+        new = changed[self._columns.positions(changed) < 0]
+        if len(self._columns.rows) + len(new) > self._tied + self._most_columns:
+            self._refer(active)
+            changed = self._changed()
+            new, self._tied = changed, len(changed)
+        if len(new):
+            self._columns.add(self._with_next(new))
+        self._follow(self._columns.positions(changed))
 
     def apply(self, r: Float) -> Float:
-        """H_D r for r (owned rows,) or (owned rows, k); 0 on inactive rows.  Collective."""
-        z = self.springs.apply(self.scaled.apply(r))
-        if len(self._inactive):
-            z -= self._columns.owned @ self._inactive_jumps(gather_rows(self.comm, z, self.first, self._columns.rows))
-        return scale_rows(self._active, z)
+        """H r for r (owned rows,) or (owned rows, k); 0 on inactive rows.  Collective."""
+        return self._restricted(self.reference.respond(scale_rows(self.reference.active, r)), r)
+
+    def close(self, right: Float, d: Float, E: Float) -> Float:
+        """H d E for d (owned rows, 3), the same at every call, and E (3, k), from the reference cell's answer to d.
+        Collective."""
+        if self._answer is None:
+            self._answer = self.reference.respond(scale_rows(self.reference.active, d))
+        return self._restricted(self._answer @ E, d @ E)
 
     def inverse_blocks(self, pairs: Int) -> Float:
-        """(m, 2, 2) diagonal blocks of H_D, for the same pairs (m, 2) of active global rows on every rank.  Collective.
+        """(m, 2, 2) diagonal blocks of H, for the same pairs (m, 2) of active global rows on every rank.  Collective.
 
         Rows that leave together change the multipliers of their own by all of them, and open by H_ii^-1 lam_i.
         """
-        self._compute_columns(np.setdiff1d(pairs, self._columns.rows))
-        at = self._columns.positions(pairs.ravel()).reshape(-1, 2)
-        blocks = self._columns.block[at[:, :, None], at[:, None, :]]
-        if len(self._inactive):
-            half = solve_triangular(self._factor, self._columns.block[np.ix_(self._kept, at.ravel())], lower=True)
-            half = half.reshape(len(half), -1, 2)
-            blocks = blocks - np.einsum("kmi,kmj->mij", half, half)
-        return np.asarray(blocks)
+        self._columns.add(pairs.ravel())
+        at, members = self._columns.positions(pairs.ravel()), self._inverse.members
+        block = self._columns.block
+        # The rows of U, and of the identity on A.
+        U = block[at[:, None], members]
+        own = block[at.reshape(-1, 2)[:, :, None], at.reshape(-1, 2)[:, None, :]]
+        returned = gather_rows(self.comm, self.reference.active, self._first, pairs.ravel()) == 0
+        U[returned] = at[returned, None] == members
+        both = ~returned.reshape(-1, 2)
+        own = np.where(both[:, :, None] & both[:, None, :], own, 0.0)
+        paired = U.reshape(len(pairs), 2, len(members))
+        return np.asarray(own - np.matmul((U @ self._inverse.N).reshape(paired.shape), paired.transpose(0, 2, 1)))
 
     def initial_multipliers(self, previous: Float, closing: Float) -> Float:
         """What closes the jump is the solution."""
         return closing
 
-    def _inactive_jumps(self, z: Float) -> Float:
-        """H[D, D]^-1 z[D] on K (k,) or (k, columns), 0 off D: jumps that take the forces z off the inactive rows."""
-        jumps = np.zeros_like(z)
-        half = solve_triangular(self._factor, z[self._kept], lower=True)
-        jumps[self._kept] = solve_triangular(self._factor, half, lower=True, trans=1)
-        return jumps
+    def _changed(self) -> Int:
+        """The global rows that are active here or in the reference cell, not both.  Collective."""
+        own = self._first + np.flatnonzero(self._active != self.reference.active)
+        return np.concatenate(self.comm.allgather(own))
 
-    def _reactions(self, x: Float) -> Float:
-        """S x - S Z (Z^T S Z)^-1 Z^T S x."""
-        forces = self.operators.apply_skin(x)
-        return forces + self.operators.apply_skin(self.assembled.relieving_displacement(forces))
+    def _refer(self, active: Float) -> None:
+        """Take a cell with these active rows, and what it takes to hold its bodies, for the reference.  Collective."""
+        tied = self._ties.tied(active)
+        self.reference = ReferenceCell(self.comm, self._jump_operator, self._operators, self._BD, tied)
+        self.factorizations += 1
+        owned = self._jump_operator.owned
+        self._columns = ResponseColumns(self.comm, self.reference, owned, self._jump_operator.global_rows)
+        self._inverse, self._dependent = BorderedInverse(), np.zeros(0, np.int64)
+        self._answer, self._tied = None, 0
 
-    def _compute_columns(self, rows: Int) -> None:
-        """Append the columns of H for these rows.  Collective."""
-        for start in range(0, len(rows), INFLUENCE_CHUNK):
-            some = rows[start : start + INFLUENCE_CHUNK]
-            unit = np.zeros((len(self._active), len(some)))
-            mine = (some >= self.first) & (some < self.first + len(unit))
-            unit[some[mine] - self.first, np.flatnonzero(mine)] = 1.0
-            self._columns.append(some, self.springs.apply(self.scaled.apply(unit)))
+    def _with_next(self, rows: Int) -> Int:
+        """The rows, and those of the bonds near them: they break next, and columns are cheaper together."""
+        normal = self.neighbours.rows
+        at = np.searchsorted(normal, rows, side="right") - 1
+        near = np.unique(self._near[at].indices)
+        beside = (normal[near][:, None] + np.arange(2)).ravel()
+        still = gather_rows(self.comm, self._active, self._first, beside) > 0
+        return np.concatenate([rows, beside[still]])
+
+    def _follow(self, changed: Int) -> None:
+        """Let N be that of the columns `changed`.  Collective."""
+        inverse, M = self._inverse, self._columns.block
+        returned = gather_rows(self.comm, self.reference.active, self._first, self._columns.rows[changed]) == 0
+        gone = np.setdiff1d(inverse.members, changed)
+        inverse.remove(gone)
+        taken_in = np.setdiff1d(changed[returned], inverse.members)
+        inverse.append(M, taken_in, -1)
+        if len(gone) or len(taken_in):
+            self._dependent = np.zeros(0, np.int64)
+        left_out = np.setdiff1d(changed[~returned], np.concatenate([inverse.members, self._dependent]))
+        inverse.append(M, left_out, 1)
+        self._dependent = np.setdiff1d(changed, inverse.members)
+
+    def _largest_eigenvalue(self) -> float:
+        """|H| of the reference cell, as some steps of the power method find it.  Collective."""
+        x = np.cos(np.arange(self._first, self._first + self._rows) ** 2.0)
+        norm = 0.0
+        for _ in range(NORM_ITERATIONS):
+            length = np.sqrt(allreduce_sum(self.comm, np.array([x @ x]))[0])
+            if length == 0.0:
+                break
+            x = self.reference.respond(x / length)
+            norm = float(np.sqrt(allreduce_sum(self.comm, np.array([x @ x]))[0]))
+        return norm
+
+    def _restricted(self, y: Float, g: Float) -> Float:
+        """H g for y = Gamma g_A.  Collective."""
+        members = self._inverse.members
+        z = y
+        if len(members):
+            rows = self._columns.rows[members]
+            outside = 1.0 - self.reference.active
+            jumps = gather_rows(self.comm, y + scale_rows(outside, g), self._first, rows)
+            c = self._inverse.N @ jumps
+            whole = np.zeros((len(self._columns.rows), *y.shape[1:]))
+            whole[members] = c
+            z = y - self._columns.owned @ whole
+            mine = np.flatnonzero((rows >= self._first) & (rows < self._first + self._rows))
+            taken_in = mine[outside[rows[mine] - self._first] > 0]
+            z[rows[taken_in] - self._first] = -c[taken_in]
+        return scale_rows(self._active, z)
+
+
+def within(adjacency: csr_matrix, steps: int) -> csr_matrix:
+    """(n, n) whose entries are the pairs of nodes that are at most so many steps apart."""
+    one = adjacency + identity(adjacency.shape[0], format="csr")
+    reach = one
+    for _ in range(steps - 1):
+        reach = reach @ one
+    return reach

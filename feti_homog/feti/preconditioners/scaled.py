@@ -21,13 +21,22 @@ from feti_homog.typing import Float
 
 
 class Preconditioner(Protocol):
-    """z = M^-1 r on the owned rows, for r (owned rows,) or (owned rows, k).  All calls are collective."""
+    """z = M^-1 r on the owned rows, for r (owned rows,) or (owned rows, k).  All calls are collective.
+
+    Attributes:
+        norm: a bound of |M^-1|, inf if none is known.
+    """
+
+    norm: float
 
     def activate(self, active: Float) -> None:
         """Restrict to the rows where `active` is 1."""
 
     def apply(self, r: Float) -> Float:
         """M^-1 r; r and the result are 0 on inactive rows."""
+
+    def close(self, right: Float, d: Float, E: Float) -> Float:
+        """M^-1 r for the loads r = P d E (owned rows, k), `right`; d (owned rows, 3) is the same at every call."""
 
     def initial_multipliers(self, previous: Float, closing: Float) -> Float:
         """First multipliers (owned rows, k) of a solve: `previous` ones, or `closing` = P M^-1 P d of the jump d."""
@@ -36,12 +45,18 @@ class Preconditioner(Protocol):
 class Identity:
     """z = r."""
 
+    norm = 1.0
+
     def activate(self, active: Float) -> None:
         """Nothing depends on the rows."""
 
     def apply(self, r: Float) -> Float:
         """r."""
         return r.copy()
+
+    def close(self, right: Float, d: Float, E: Float) -> Float:
+        """`right`."""
+        return right.copy()
 
     def initial_multipliers(self, previous: Float, closing: Float) -> Float:
         """The previous ones."""
@@ -55,6 +70,8 @@ class StiffnessScaled:
         BD: (local rows, boundary dofs) B D^-1.
         W_inverse: (owned rows, owned rows) W^-1 of the active rows, 0 on the others.
     """
+
+    norm = np.inf
 
     def __init__(
         self,
@@ -76,10 +93,21 @@ class StiffnessScaled:
         """Invert the active part of W."""
         self.W_inverse = self.W.inverse(active)
 
+    def displacement_with_jump(self, g: Float) -> Float:
+        """(boundary dofs,) or (boundary dofs, k) B_D^T g = D^-1 B^T W^-1 g, which jumps by g on the active rows."""
+        return np.asarray(self.DBT @ self.jump_operator.gather(self.W_inverse @ g))
+
+    def multipliers(self, forces: Float) -> Float:
+        """B_D f = W^-1 B D^-1 f: those on the active rows with B^T lam = f, if there are any."""
+        return np.asarray(self.W_inverse @ self.jump_operator.sum(self.BD @ forces))
+
     def apply(self, r: Float) -> Float:
         """W^-1 B D^-1 S D^-1 B^T W^-1 r."""
-        x = self.DBT @ self.jump_operator.gather(self.W_inverse @ r)
-        return np.asarray(self.W_inverse @ self.jump_operator.sum(self.BD @ self.stiffness(x)))
+        return self.multipliers(self.stiffness(self.displacement_with_jump(r)))
+
+    def close(self, right: Float, d: Float, E: Float) -> Float:
+        """M^-1 of `right`."""
+        return self.apply(right)
 
     def initial_multipliers(self, previous: Float, closing: Float) -> Float:
         """The previous ones."""

@@ -46,15 +46,26 @@ class Checkpoint:
         """Forget all events; returns how many there were."""
         return on_root(self.comm, self._clear)
 
-    def read(self) -> list[Arrays]:
-        """The events so far, in their order: this rank's part of distributed arrays, all of the others.
+    def count(self) -> int:
+        """How many events there are, each of which is checked.
 
         Raises:
-            CaseError: an event is unreadable or of another run.
+            CaseError: an event is missing, unreadable or of another run.
         """
-        events = on_root_only(self.comm, self._read_all)
-        parts = None if events is None else [[_part(e, rank) for e in events] for rank in range(self.comm.size)]
-        own: list[Arrays] = self.comm.scatter(parts or [])
+        try:
+            return on_root(self.comm, self._count_checked)
+        except CaseError as error:
+            raise CaseError(*(f"--resume: {fault}" for fault in error.faults)) from error
+
+    def read(self, number: int) -> Arrays:
+        """An event: this rank's part of distributed arrays, all of the others.
+
+        Raises:
+            CaseError: it is unreadable or of another run.
+        """
+        event = on_root_only(self.comm, self._read_event, number)
+        parts = [] if event is None else [_part(event, rank) for rank in range(self.comm.size)]
+        own: Arrays = self.comm.scatter(parts)
         return own
 
     def write(self, number: int, whole: Mapping[str, Any], distributed: Mapping[str, NDArray[Any]]) -> None:
@@ -78,14 +89,20 @@ class Checkpoint:
     def _files(self) -> list[Path]:
         return sorted(self.folder.glob("[0-9]*.h5")) if self.folder.is_dir() else []
 
-    def _read_all(self) -> list[Arrays]:
-        files = self._files()
-        missing = next((n for n, path in enumerate(files) if path.stem != f"{n:06d}"), None)
-        if missing is not None:
-            raise CaseError(f"--resume: event {missing:06d} is missing in {self.folder}")
-        return [self._read_event(path, number) for number, path in enumerate(files)]
+    def _file(self, number: int) -> Path:
+        return self.folder / f"{number:06d}.h5"
 
-    def _read_event(self, path: Path, number: int) -> Arrays:
+    def _count_checked(self) -> int:
+        files = self._files()
+        missing = next((n for n, path in enumerate(files) if path != self._file(n)), None)
+        if missing is not None:
+            raise CaseError(f"event {missing:06d} is missing in {self.folder}")
+        for number in range(len(files)):
+            self._read_event(number)
+        return len(files)
+
+    def _read_event(self, number: int) -> Arrays:
+        path = self._file(number)
         try:
             _check_bytes(path)
             with h5py.File(path, "r") as file:
@@ -94,11 +111,11 @@ class Checkpoint:
         except CaseError:
             raise
         except Exception as error:  # h5py may say anything
-            raise CaseError(f"--resume: {path} is no readable event of a path: {error}") from error
+            raise CaseError(f"{path} is no readable event of a path: {error}") from error
         if signature != self.signature:
-            raise CaseError(f"--resume: {path} is of another run: expected {self.signature}; found {signature}")
+            raise CaseError(f"{path} is of another run: expected {self.signature}; found {signature}")
         if found != number:
-            raise CaseError(f"--resume: {path} is a copy of event {found:06d}: expected event {number:06d}")
+            raise CaseError(f"{path} is a copy of event {found:06d}: expected event {number:06d}")
         return event
 
     def _write(self, number: int, whole: Mapping[str, Any], gathered: Mapping[str, list[NDArray[Any]]]) -> None:
@@ -112,7 +129,7 @@ class Checkpoint:
             header = f"feti-homog checkpoint, format {FORMAT}, sha256 {hashlib.sha256(image).hexdigest()}\n"
             part.write_bytes(header.encode().ljust(USER_BLOCK, b"\0") + image)
 
-        atomic.replace(self.folder / f"{number:06d}.h5", write_event)
+        atomic.replace(self._file(number), write_event)
 
 
 class NoCheckpoint(Checkpoint):
@@ -124,11 +141,25 @@ class NoCheckpoint(Checkpoint):
     def clear(self) -> int:
         return 0
 
-    def read(self) -> list[Arrays]:
-        return []
+    def count(self) -> int:
+        return 0
 
     def write(self, number: int, whole: Mapping[str, Any], distributed: Mapping[str, NDArray[Any]]) -> None:
         """Nothing."""
+
+
+class EventsInMemory(NoCheckpoint):
+    """Keeps the events for fields in memory, for runs that leave no files: what stands on the interfaces, by rank."""
+
+    def __init__(self, comm: MPI.Intracomm) -> None:
+        super().__init__(comm)
+        self._events: dict[int, Arrays] = {}
+
+    def read(self, number: int) -> Arrays:
+        return self._events[number]
+
+    def write(self, number: int, whole: Mapping[str, Any], distributed: Mapping[str, NDArray[Any]]) -> None:
+        self._events[number] = {name: np.asarray(value) for name, value in {**whole, **distributed}.items()}
 
 
 def _digest(path: Path) -> str:
@@ -160,11 +191,11 @@ def _check_bytes(path: Path) -> None:
     version = int(header[1]) if header else int(UNMARKED.match(start) is not None)
     if version not in (0, FORMAT):
         raise CaseError(
-            f"--resume: {path} has the checkpoints' format {version}, this program reads format {FORMAT}; "
+            f"{path} has the checkpoints' format {version}, this program reads format {FORMAT}; "
             "go on with the program that wrote it, or start again without --resume"
         )
     if header is None or header[2].decode() != _digest(path):
-        raise CaseError(f"--resume: {path} is damaged: its checksum is wrong")
+        raise CaseError(f"{path} is damaged: its checksum is wrong")
 
 
 def _part(event: Arrays, rank: int) -> Arrays:

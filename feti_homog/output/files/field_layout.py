@@ -93,6 +93,7 @@ class StatePart:
     strain: Float = described(f"macroscopic strain {', '.join(STRAINS)}", shape="(3,)")
     stress_mean: Float = described(f"macroscopic stress {', '.join(STRESSES)}", STRESS, "(3,)", name="stress")
     load_factor: float = described("position on the path, 0 to 1; 1 of other analyses")
+    point: int = described("number, from 0, of its point in `path` or `angle` of result.json; 0 of a stiffness")
     label: str = described("the state in words, as `E11`, `60 deg E11`, `event 12`")
     displacement: Float = described("displacement, that of the macroscopic strain included", LENGTH, "(n, 2)")
     fluctuation: Float = described("displacement less that of the macroscopic strain, periodic", LENGTH, "(n, 2)")

@@ -87,7 +87,7 @@ def interface_part(cell: TornCell) -> InterfacePart:
     )
 
 
-def state_part(cell: TornCell, response: Response, load_factor: float, label: str) -> StatePart:
+def state_part(cell: TornCell, response: Response, load_factor: float, label: str, point: int) -> StatePart:
     """The fields of a response; tractions and jumps are scaled like it."""
     nodes, solution = cell.solver.jump_operator.nodes, response.state.solution
     u = response.scale * cell.solver.displacement(solution)
@@ -105,6 +105,7 @@ def state_part(cell: TornCell, response: Response, load_factor: float, label: st
         strain=response.strain,
         stress_mean=response.stress,
         load_factor=load_factor,
+        point=point,
         label=label,
         displacement=total,
         fluctuation=fluctuation(cell, u),

@@ -6,13 +6,13 @@ import json
 from pathlib import Path
 
 from feti_homog.errors import CaseError
-from feti_homog.output.files import checkpoint, field_file, output_folder, result_json
+from feti_homog.output.files import checkpoint, event_log, field_file, output_folder, result_json
 from feti_homog.output.files.field_layout import PROGRAM
 
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 HEAD = 1 << 20  # bytes of result.h5 in which its attributes are
 # The files that show that a run has written to the folder.
-SIGNS = (result_json.NAME, field_file.NAME, output_folder.LOCK)
+SIGNS = (result_json.NAME, field_file.NAME, event_log.NAME, output_folder.LOCK)
 
 
 def refuse_files_of_others(directory: Path) -> None:
@@ -56,7 +56,7 @@ def _refuse_foreign(directory: Path, names: list[str]) -> None:
 
 
 def _is_own(path: Path) -> bool:
-    """Whether a run wrote this result.json, of whatever version, or result.h5."""
+    """Whether a run wrote this result.json, of whatever version, result.h5 or events.log."""
     if path.name == result_json.NAME:
         try:
             document = json.loads(path.read_text(encoding="utf-8"))
@@ -67,4 +67,7 @@ def _is_own(path: Path) -> bool:
         with path.open("rb") as stream:
             head = stream.read(HEAD)
         return head.startswith(HDF5_SIGNATURE) and PROGRAM.encode() in head
+    if path.name == event_log.NAME:
+        with path.open("rb") as stream:
+            return stream.read(len(event_log.HEADER)) == event_log.HEADER.encode()
     return True

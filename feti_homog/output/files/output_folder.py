@@ -22,7 +22,7 @@ LOCK = "result.lock"
 LONGEST = "case_minus_gamma12.png"  # of a run's files the one of the longest name
 # The files of a result, those of all analyses and of what `plot` draws.
 RESULT_FILE = re.compile(
-    r"report\.html|result\.(json|h5|xdmf)|interface\.xdmf"
+    r"report\.html|events\.log|result\.(json|h5|xdmf)|interface\.xdmf"
     r"|(angle|path)\.csv|(cell|interface|(angle|path)(_states)?)\.png|path\.gif"
     r"|case_(minus_)?(E11|E22|gamma12)\.png|state_\d+\.png"
 )

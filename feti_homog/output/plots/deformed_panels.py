@@ -134,10 +134,10 @@ def plot(directory: Path, file: Any, document: Mapping[str, Any]) -> list[Path]:
         every = range(0, count, count // len(document["angle"]) or 1)
         numbers = [every[round(k)] for k in np.linspace(0, len(every) - 1, min(MAX_PANELS, len(every)))]
         return [save(_side_by_side(file, numbers, output, scale), directory / "angle_states.png")]
-    points = document["path"][:count]
-    panels = _side_by_side(file, point_tables.chosen(points, MAX_PANELS), output, scale)
+    panels = _side_by_side(file, point_tables.chosen_states(document, MAX_PANELS, count), output, scale)
     paths = [save(panels, directory / "path_states.png")]
-    return [*paths, _animation(file, point_tables.chosen(points, MAX_FRAMES), output, scale, directory / "path.gif")]
+    frames = point_tables.chosen_states(document, MAX_FRAMES, count)
+    return [*paths, _animation(file, frames, output, scale, directory / "path.gif")]
 
 
 def shown_scale(file: Any, document: Mapping[str, Any]) -> float:
@@ -157,7 +157,7 @@ def shown_scale(file: Any, document: Mapping[str, Any]) -> float:
 def _frames(document: Mapping[str, Any], count: int) -> list[int]:
     """Numbers of at most MAX_FRAMES of so many states."""
     if "path" in document:
-        return point_tables.chosen(document["path"][:count], MAX_FRAMES)
+        return point_tables.chosen_states(document, MAX_FRAMES, count)
     return sorted({round(k) for k in np.linspace(0, count - 1, min(MAX_FRAMES, count))})
 
 

@@ -89,7 +89,8 @@ def _path(document: Document) -> Figure:
     lower.set_xlabel("number of the point, in the order of the path")
     for axes in (upper, middle, lower):
         _finish(axes)
-    numbers = point_tables.chosen(points, NUMBERED_POINTS)
+    # The panels of path_states.png show the same points.
+    numbers = point_tables.chosen(points, NUMBERED_POINTS, point_tables.kept_points(document))
     _number_points(upper, (middle, lower), np.stack([strain, stress[:, component]], axis=1), numbers)
     return figure
 

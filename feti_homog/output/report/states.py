@@ -54,7 +54,7 @@ def _numbers(file: Any, document: Document) -> list[int]:
     """The states that are shown: all, or of many some."""
     count = len(file["state"])
     if document.get("path"):
-        return point_tables.chosen(document["path"][:count], MOST_STATES)
+        return point_tables.chosen_states(document, MOST_STATES, count)
     return sorted({round(k) for k in np.linspace(0, count - 1, min(MOST_STATES, count))})
 
 
@@ -67,7 +67,7 @@ def _state(file: Any, number: int, drawn: DrawnMesh, edges: InterfaceEdges, docu
     strain = [f"{name} = {value:.4g}" for name, value in zip(STRAINS, attributes["strain"], strict=True) if value]
     return {
         "number": number,
-        "point": _point_of(number, len(file["state"]), document),
+        "point": int(attributes["point"]) if document.get("angle") or document.get("path") else None,
         "label": str(attributes["label"]),
         "load": ", ".join(strain) or "no strain",
         "stress": [float(value) for value in attributes["stress"]],
@@ -77,14 +77,6 @@ def _state(file: Any, number: int, drawn: DrawnMesh, edges: InterfaceEdges, docu
         "fields": [_field(triangle_means(state["stress"], column, drawn)) for column in range(3)],
         "status": _base64(edges.state(status), "u1"),
     }
-
-
-def _point_of(number: int, count: int, document: Document) -> int | None:
-    """The point of the angle or path that a state is of; under unit strains several are of one."""
-    points = document.get("angle") or document.get("path")
-    if not points:
-        return None
-    return number if document.get("path") else number // max(1, count // len(points))
 
 
 def _field(values: NDArray[Any]) -> dict[str, Any]:

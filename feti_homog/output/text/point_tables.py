@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from feti_homog.mechanics.response import leading_component
 from feti_homog.mechanics.voigt import STRAINS, STRESSES
 
@@ -15,15 +17,27 @@ STATES = ("bonded", "open", "closed")
 Point = Mapping[str, Any]
 
 
-def chosen(points: Sequence[Point], rows: int) -> list[int]:
-    """Numbers of at most `rows` points of a path: the first, the last, and between them as evenly as bonds broke."""
-    if len(points) <= rows:
-        return list(range(len(points)))
-    broken = [sum(point["broke"] for point in points[: n + 1]) for n in range(len(points))]
-    least, most = broken[0], broken[-1]
-    wanted = [least + (most - least) * k / (rows - 1) for k in range(1, rows - 1)]
-    between = {min(range(len(points)), key=lambda n: abs(broken[n] - w)) for w in wanted}
-    return sorted(between | {0, len(points) - 1})
+def chosen(points: Sequence[Point], rows: int, among: Sequence[int] | None = None) -> list[int]:
+    """Numbers of at most `rows` points of a path: the first, the last, and between them as evenly as bonds broke;
+    with `among`, rising, of these points."""
+    numbers = np.arange(len(points)) if among is None else np.asarray(among, int)
+    if len(numbers) <= rows:
+        return [int(number) for number in numbers]
+    broken = np.cumsum([point["broke"] for point in points])[numbers]
+    wanted = np.linspace(broken[0], broken[-1], rows)[1:-1]
+    places = {int(np.abs(broken - w).argmin()) for w in wanted} | {0, len(numbers) - 1}
+    return [int(numbers[place]) for place in sorted(places)]
+
+
+def kept_points(document: Mapping[str, Any]) -> list[int]:
+    """Numbers of the points of a path whose fields are kept, in the order of the states; of all if none are."""
+    return list(document.get("states") or range(len(document["path"])))
+
+
+def chosen_states(document: Mapping[str, Any], rows: int, count: int) -> list[int]:
+    """Numbers of at most `rows` of the first `count` states of a path, chosen as `chosen` chooses points."""
+    among = kept_points(document)[:count]
+    return [among.index(number) for number in chosen(document["path"], rows, among)]
 
 
 def angle_table(points: Sequence[Point], stress: str) -> list[str]:

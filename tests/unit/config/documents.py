@@ -120,7 +120,10 @@ def documents(draw: st.DrawFn) -> dict[str, Any]:
         ),
         "petsc": optional(feti_ksp_rtol=st.floats(1e-14, 1e-2), feti_view=st.booleans(), feti_pc_type=LABELS),
     }  # fmt: skip
-    return document | draw(st.fixed_dictionaries({}, optional=rest))
+    document |= draw(st.fixed_dictionaries({}, optional=rest))
+    if analysis == "path" and draw(st.booleans()):
+        document["output"] = document.get("output", {}) | {"states": draw(st.sampled_from(["all", "peaks", 2, 12345]))}
+    return document
 
 
 def with_numpy_values(value: Any) -> Any:

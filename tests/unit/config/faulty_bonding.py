@@ -208,6 +208,22 @@ FAULTY_BONDINGS: dict[str, tuple[str, tuple[str, ...]]] = {
         of_type("path", PATH, "max_events = 0"),
         ("[path] max_events = 0: expected an integer at least 1",),
     ),
+    "one_state": (
+        of_type("path", PATH, "[output]", "states = 1"),
+        ('[output] states = 1: expected "all", "peaks" or an integer at least 2',),
+    ),
+    "unknown_states": (
+        of_type("path", PATH, "[output]", 'states = "none"'),
+        ('[output] states = "none": expected "all", "peaks" or an integer at least 2',),
+    ),
+    "states_are_a_truth": (
+        of_type("path", PATH, "[output]", "states = true"),
+        ('[output] states = true: expected "all", "peaks" or an integer at least 2',),
+    ),
+    "states_of_a_stiffness": (
+        ended("[output]\nstates = 10\n"),
+        ('[output] states = 10: belongs to [analysis] type = "path", not "stiffness"',),
+    ),
     "key_of_path": (
         ended("[output]\nwaypoints = []\n"),
         ("[output] waypoints = []: unknown key; it belongs to [path]",),

@@ -25,6 +25,8 @@ VALID_CASES = {
         "angle", ANGLE, "strain = [0, 0, 0.2]", '[[interface.debonded]]\nfibre = "all"\ncentre = 90'
     ),
     "path": of_type("path", PATH),
+    "path, few states": of_type("path", PATH, "[output]\nstates = 7"),
+    "path, its peaks": of_type("path", PATH, '[output]\nstates = "peaks"'),
     "path there and back": of_type("path", "[path]\nwaypoints = [[1, 0, 0], [0, 0, 0]]\nmax_events = 7"),
     "increments": of_type("path", PATH, 'method = "increments"\nincrements = 50\nrelease = "worst"'),
     "strengths": debonded("{fibre = [1, 2], angle = 360}", "normal_strength = inf\ntangential_strength = 3"),

@@ -16,7 +16,6 @@ PATH = ProblemSizes(
     all_dense=True,
     all_searchable=True,
     shared_dofs=5000,
-    precracked_nodes=0,
 )
 STIFFNESS = replace(PATH, applications=60)
 INFLUENCE, ADAPTIVE, NATURAL = (
@@ -43,7 +42,6 @@ def read(**given):
         (replace(PATH, all_dense=False), ADAPTIVE),
         (replace(PATH, shared_dofs=DEFAULTS.assembled_schur_dofs + 1), ADAPTIVE),
         (replace(PATH, shared_dofs=DEFAULTS.assembled_schur_dofs), INFLUENCE),
-        (replace(PATH, precracked_nodes=DEFAULTS.influence_precracked_nodes + 1), ADAPTIVE),
     ],
 )
 def test_default_plan(sizes, plan):

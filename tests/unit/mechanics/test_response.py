@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from feti_homog.mechanics.response import first_drop, first_leg, rising_strain, strain_controlled
-from feti_homog.output.text.point_tables import chosen
+from feti_homog.output.text.point_tables import chosen, chosen_states
 
 
 def point(load: float, stiffness: float, broke: int = 1) -> dict[str, Any]:
@@ -62,3 +62,15 @@ def test_the_first_and_the_last_state_are_drawn(count: int, rows: int) -> None:
 def test_drawn_states_are_where_bonds_break() -> None:
     points = [point(0.01 * n, 1.0, broke=5 if n in (40, 60, 80) else 0) for n in range(101)]
     assert chosen(points, 5) == [0, 40, 60, 100]
+
+
+def test_of_points_with_fields_those_are_drawn_that_share_the_broken_bonds_evenly() -> None:
+    points = [point(0.5, 1.0) for _ in range(101)]
+    kept = [0, 1, 2, 48, 75, 99, 100]
+    assert chosen(points, 5, kept) == [0, 2, 48, 75, 100]
+    assert chosen(points, 10, kept) == kept
+    document = {"path": points, "states": kept}
+    assert chosen_states(document, 5, 7) == [0, 2, 3, 4, 6]
+    # Of a file that ends early there is what there is.
+    assert chosen_states(document, 5, 3) == [0, 1, 2]
+    assert chosen_states({"path": points[:3]}, 5, 3) == [0, 1, 2]

@@ -14,6 +14,7 @@ SMALL = 1e-6
 MATRIX = ("material", "matrix")
 MATERIAL = {"stress", "stress 33", "equilibrium", "mean stress", "Hill"}
 SPRINGS = {"bond", "penetration", "complementarity"}
+PATHS = ("path", "thinned", "peaks", "energy", "increments")
 MATERIAL_33 = MATERIAL | {"bounds", "shown"}
 
 
@@ -42,7 +43,7 @@ def test_results_obey_every_law(results, kind):
     told = {finding.law.name for finding in certificate.findings}
     assert told >= {"stress", "equilibrium", "periodicity", "jump", "mean stress", "Hill", "load", "tables", "cell"}
     assert ("penetration" in told) == (kind not in ("bonded", "plane", "overlap"))
-    assert ("energy" in told) == ("strength" in told) == (kind in ("path", "energy", "increments"))
+    assert ("energy" in told) == ("strength" in told) == (kind in PATHS)
     assert ("moduli" in told) == (kind in ("bonded", "plane"))
 
 
@@ -166,7 +167,7 @@ FALSE = {
     "an angle": ("angle", document("angle", 1, "angle", to=170.0), {"arcs"}),
     "a mean stress": ("bonded", attribute("stress"), {"mean stress", "tables"}),
     "a strain": ("bonded", attribute("strain"), {"displacement", "load"}),
-    "a missing state": ("path", delete_state, {"load"}),
+    "a missing state": ("path", delete_state, {"load", "tables"}),
     "not a number": ("bonded", shift("stress", np.nan), {"numbers", "stress", "stress 33", "shown"}),
     "Poisson's ratio": ("bonded", document("case", *MATRIX, "poisson", factor=1 + 1e-4), MATERIAL_33),
     "the plane state": ("plane", document("case", "analysis", "plane", to="strain"), MATERIAL_33),
@@ -182,8 +183,14 @@ FALSE = {
         {"load"},
     ),
     "a stress of a point": ("path", document("path", 4, "stress", 0), {"tables"}),
-    "bonds that broke": ("path", document("path", 4, "broke", factor=2), {"breaks"}),
-    "a count of bonds": ("path", document("path", 4, "bonded", factor=2), {"tables"}),
+    "bonds that broke": ("path", document("path", 4, "broke", factor=2), {"breaks", "strength"}),
+    "a count of bonds": ("path", document("path", 4, "bonded", factor=2), {"tables", "breaks"}),
+    "a stress of a point without fields": ("thinned", document("path", 1, "stress", 0, factor=1.01), {"energy"}),
+    "a strain of a point without fields": ("thinned", document("path", 1, "strain", 0), {"load"}),
+    "a count of a point without fields": ("thinned", document("path", 1, "bonded", factor=2), {"breaks"}),
+    "the point of a state": ("thinned", attribute("point", factor=2, state=1), {"load", "tables", "breaks", "energy"}),
+    "the points of states": ("thinned", document("states", 1, factor=2), {"tables"}),
+    "more states than were asked for": ("thinned", document("case", "output", "states", to=6), {"load"}),
     "a strength too low": ("path", document("case", "interface", "normal_strength", factor=0.99), {"strength"}),
     "a strength too high": ("path", document("case", "interface", "normal_strength", factor=1.01), {"strength"}),
     "a strength of steps": ("increments", document("case", "interface", "normal_strength", factor=0.5), {"strength"}),

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import base64
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -60,14 +61,14 @@ def bonded() -> dict[str, Any]:
     return document("stiffness", effective_stiffness=stiffness, moduli=moduli, bounds=bounds)
 
 
-def written(directory: Path, result: dict[str, Any]) -> Path:
+def written(directory: Path, result: dict[str, Any], points: Sequence[int] = (0, 1, 2)) -> Path:
     from mpi4py import MPI
 
     whole = sample(4)
     *parts, _ = vars(whole).values()
     with FieldFile(directory, MPI.COMM_SELF, *parts) as file:
         for k, state in enumerate(whole.states):
-            file.write_state(k, state)
+            file.write_state(k, replace(state, point=points[k]))
     result_json.write(directory, result)
     return directory
 
@@ -94,6 +95,13 @@ class Words(HTMLParser):
             self.data += data
         elif not self._within:
             self.text.append(data.strip())
+
+
+def test_the_states_of_a_path_know_their_points(tmp_path: Path) -> None:
+    directory = written(tmp_path, path(9) | {"states": [0, 5, 8]}, points=(0, 5, 8))
+    page.write(directory)
+    shown = json.loads(Words((tmp_path / "report.html").read_text(encoding="utf-8")).data)["states"]
+    assert [(state["number"], state["point"]) for state in shown] == [(0, 0), (1, 5), (2, 8)]
 
 
 @pytest.mark.parametrize("result", [path, angle, bonded])

@@ -1,0 +1,60 @@
+"""The inverse of a block of a symmetric matrix, for rows that come and go: O(k^2) a row."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import solve_triangular
+from scipy.linalg.lapack import dpstrf
+
+from feti_homog.feti.thresholds import SINGULAR_PIVOT
+from feti_homog.typing import Float, Int
+
+
+class BorderedInverse:
+    """N = M[C, C]^-1 for members C of a quasi-definite matrix M.
+
+    Attributes:
+        members: (k,) C, in the order of the rows of N.
+        N: (k, k).
+    """
+
+    def __init__(self) -> None:
+        self.members: Int = np.zeros(0, np.int64)
+        self.N = np.zeros((0, 0))
+
+    def append(self, M: Float, new: Int, sign: int) -> None:
+        """Border with the members `new`, on which `sign` M, Schur's complement of the others, is semi-definite.
+
+        Those that depend on others are left out: with s the pivots, b = M[C, new], w = N b,
+
+            N <- [ N + w s^-1 w^T    -w s^-1 ]
+                 [ -s^-1 w^T          s^-1   ].
+        """
+        if not len(new):
+            return
+        border = M[self.members[:, None], new]
+        w = self.N @ border
+        pivots = sign * (M[new[:, None], new] - border.T @ w)
+        rounding = SINGULAR_PIVOT * max((sign * M.diagonal()).max(), 0.0)
+        factor, order, rank, _ = dpstrf(pivots, tol=rounding, lower=1)
+        # The first pivot is taken whatever it is.
+        rank = min(rank, int((factor.diagonal() ** 2 > rounding).sum()))
+        kept = order[:rank] - 1
+        half = solve_triangular(factor[:rank, :rank], np.eye(rank), lower=True)
+        inverse, w = sign * half.T @ half, w[:, kept]
+        k, scaled = len(self.members), w @ inverse
+        N = np.empty((k + rank, k + rank))
+        np.matmul(scaled, w.T, out=N[:k, :k])
+        N[:k, :k] += self.N
+        N[:k, k:], N[k:, :k], N[k:, k:] = -scaled, -scaled.T, inverse
+        self.N, self.members = N, np.concatenate([self.members, new[kept]])
+
+    def remove(self, gone: Int) -> None:
+        """Take members out: N <- N_cc - N_cg N_gg^-1 N_gc."""
+        if not len(gone):
+            return
+        leaves = np.isin(self.members, gone)
+        c, g = np.flatnonzero(~leaves), np.flatnonzero(leaves)
+        coupling = self.N[c[:, None], g]
+        self.N = self.N[c[:, None], c] - coupling @ np.linalg.solve(self.N[g[:, None], g], coupling.T)
+        self.members = self.members[c]

@@ -1,0 +1,90 @@
+"""The cell with a reference set A of active rows, factored: what unit jumps on A and unit forces on the others do.
+
+Jumps g on the rows of A and forces f on the others I, each on both faces, make multipliers on A and gaps on I,
+
+    (lam, gap) = Gamma (g, f),  Gamma = [ F_AA^-1          -F_AA^-1 F_AI                  ]
+                                        [ -F_IA F_AA^-1    F_IA F_AA^-1 F_AI - F_II       ],
+
+the principal pivot transform of the dual operator, with F_AA^-1 the inverse on forces in equilibrium.  It is symmetric,
+positive semi-definite on A and negative definite on I.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from mpi4py import MPI
+from scipy.sparse import csr_matrix, diags
+
+from feti_homog.common.distributed_arrays import allreduce_sum, scale_rows
+from feti_homog.feti.decomposition.jump_operator import JumpOperator
+from feti_homog.feti.operators.interface_operators import MATRIX, InterfaceOperators
+from feti_homog.feti.preconditioners.assembled_schur import AssembledSchur
+from feti_homog.feti.preconditioners.spring_update import SpringUpdate
+from feti_homog.feti.thresholds import STIFF_FIBRES
+from feti_homog.typing import Float
+
+
+class ReferenceCell:
+    """Gamma of one reference set.
+
+    Attributes:
+        active: (owned rows,) 1 on A.
+        assembled: the cell with the bonds of A.
+    """
+
+    def __init__(
+        self,
+        comm: MPI.Intracomm,
+        jump_operator: JumpOperator,
+        operators: InterfaceOperators,
+        one_sided: csr_matrix,
+        active: Float,
+    ) -> None:
+        """Factor the cell; A must leave no rigid-body motion free.  `one_sided` is B_D.  Collective."""
+        self.active = active
+        self._jump_operator, self._operators = jump_operator, operators
+        self._BD, self._BDT = one_sided, one_sided.T.tocsr()
+        reached = self._BDT.getnnz(axis=1) > 0
+        self._reached = [bool(reached[own].any()) for own in operators.slices]
+        self.assembled = AssembledSchur(comm, jump_operator, operators, active)
+        self._is_bonded = not comm.allreduce(bool((active == 0).any()), MPI.LOR)
+        first = jump_operator.owned[0]
+        self._springs = SpringUpdate(comm, first, active * operators.compliance, self._without_springs)
+
+    def respond(self, x: Float) -> Float:
+        """Gamma x for x (owned rows,) or (owned rows, k).  Collective."""
+        return self._springs.apply(self._without_springs(x))
+
+    def _without_springs(self, x: Float) -> Float:
+        """The same without the springs at nodes of A where fibre and matrix are both cut.
+
+        Displacements u = B_D^T g + Z y whose forces S u - B_I^T f vanish on Z; then B_A^T lam = S u - B_I^T f.
+        """
+        operators, jump_operator = self._operators, self._jump_operator
+        g, f = scale_rows(self.active, x), scale_rows(1.0 - self.active, x)
+        u = self._BDT @ jump_operator.gather(g)
+        pulled = 0.0 if self._is_bonded else operators.BT @ jump_operator.gather(f)
+        u = u + self.assembled.relieving_displacement(operators.apply_some_skins(self._reached, u) - pulled)
+        forces = operators.apply_some_skins(self._reached, u) - pulled
+        lam = scale_rows(self.active, jump_operator.sum(self._BD @ forces))
+        if self._is_bonded:
+            return lam
+        gap = -jump_operator.sum(operators.B @ u) - scale_rows(operators.compliance, f)
+        return lam + scale_rows(1.0 - self.active, gap)
+
+
+def one_sided_jumps(comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators) -> csr_matrix:
+    """(local rows, boundary dofs) B_D with B B_D^T = I that leaves one side of the interfaces at rest, so that forces
+    are wanted of the other alone: of the fibres, if they are not so stiff that rounding would tell.  Collective."""
+    of_fibre = np.repeat([s.submesh.phase != MATRIX for s in operators.subdomains], np.diff(operators.offsets))
+    side = [operators.diagonal[of_fibre], operators.diagonal[~of_fibre]]
+    sums = allreduce_sum(comm, np.array([[x.sum(), len(x)] for x in side]))
+    fibre, matrix = sums[:, 0] / np.maximum(sums[:, 1], 1.0)
+    moved = of_fibre if fibre <= STIFF_FIBRES * matrix else ~of_fibre
+    copies = jump_operator.copies[:, 1 if moved is of_fibre else 0]
+    is_bond = jump_operator.copies[:, 1] > 0
+    bonds = diags(np.where(is_bond, copies, 0.0)) @ operators.B @ diags(moved.astype(float))
+    others = diags((~is_bond).astype(float)) @ operators.B
+    BD = (bonds + others).tocsr()
+    BD.eliminate_zeros()
+    return BD

@@ -1,0 +1,89 @@
+"""Which points of a path are kept with their fields: the ends, those around drops of the stress, the rest evenly.
+
+Points are those of `response`.  A path does not know its future, so the choice is made at its end.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from heapq import heapify, heapreplace
+from itertools import pairwise
+
+import numpy as np
+
+from feti_homog.mechanics.response import SAME_LOAD, Point
+from feti_homog.typing import Float
+
+# A drop is a fall of the stress by more than this share of the largest: saw teeth of single nodes are none.
+LEAST_DROP = 0.01
+
+Drop = tuple[float, int, int]
+"""How far the stress falls, and the numbers of the points before and after."""
+
+
+def kept(points: Sequence[Point], states: int | str, legs: int) -> list[int]:
+    """Numbers of the points to keep, rising.
+
+    `states` is "all", "peaks": the ends and the points around every drop, or how many at most: the ends, the points
+    around drops as long as there is room, the deepest first, and between them the others as evenly as they can be.
+    Of `legs` legs the first goes through all equilibria; 0 of increments.
+    """
+    if states == "all" or not points:
+        return list(range(len(points)))
+    ends, around = {0, len(points) - 1}, drops(points, legs)
+    if isinstance(states, str):
+        return sorted(ends.union(*(drop[1:] for drop in around)))
+    if len(points) <= states:
+        return list(range(len(points)))
+    chosen = ends
+    for _, *pair in sorted(around, key=lambda drop: -drop[0]):
+        if len(chosen.union(pair)) <= states:
+            chosen = chosen.union(pair)
+    return _filled(sorted(chosen), states)
+
+
+def drops(points: Sequence[Point], legs: int) -> list[Drop]:
+    """The drops of the stress: from each peak to the valley after it, and on a first leg of events also from each load
+    at which bonds break to the next point that a rising strain comes to."""
+    stress = np.array([point["stress"] for point in points], float)
+    size = np.sqrt((np.square(stress) * [1.0, 1.0, 2.0]).sum(axis=1))
+    least = LEAST_DROP * float(size.max())
+    found = [(float(size[a] - size[b]), a, b) for a, b in pairwise(turning_points(size, least)) if size[a] > size[b]]
+    return found + _drops_of_rising_strain(points, size, least, legs)
+
+
+def turning_points(values: Float, least: float) -> list[int]:
+    """Numbers of the peaks and valleys of a curve (n,), in turn, that are more than `least` apart.
+
+    The ends count if the curve falls or rises by so much from them, or to them.
+    """
+    found, low, high, rises, falls = list[int](), 0, 0, True, True
+    for number, value in enumerate(values):
+        low = number if value < values[low] else low
+        high = number if value > values[high] else high
+        if rises and value < values[high] - least:
+            found.append(high)
+            low, rises, falls = number, False, True
+        elif falls and value > values[low] + least:
+            found.append(low)
+            high, rises, falls = number, True, False
+    return [*found, high if rises else low] if found else []
+
+
+def _drops_of_rising_strain(points: Sequence[Point], size: Float, least: float, legs: int) -> list[Drop]:
+    """On rays through zero: the point after a drop is at another load, to which the stress is scaled."""
+    load = np.array([point["load_factor"] for point in points])
+    load = load[load * legs <= 1.0 + SAME_LOAD] if legs else load[:0]
+    records = np.flatnonzero(load >= np.maximum.accumulate(load)).tolist() if len(load) else []
+    falls = ((float(size[a] - size[b] * load[a] / load[b]), a, b) for a, b in pairwise(records) if b > a + 1)
+    return [drop for drop in falls if drop[0] > least]
+
+
+def _filled(numbers: list[int], count: int) -> list[int]:
+    """`numbers` and others between them, `count` in all: the widest gap is always the next to be divided further."""
+    gaps: list[tuple[float, int, int, int]] = [(a - b, 1, a, b) for a, b in pairwise(numbers)]
+    heapify(gaps)
+    for _ in range(count - len(numbers)):
+        _, parts, a, b = gaps[0]
+        heapreplace(gaps, ((a - b) / (parts + 1), parts + 1, a, b))
+    return sorted({a + (b - a) * k // parts for _, parts, a, b in gaps for k in range(parts)} | {numbers[-1]})

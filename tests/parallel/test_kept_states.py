@@ -1,0 +1,150 @@
+"""Fields of some points of a path: those of a run that keeps all, also after an interruption and an early end."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+from mpi4py import MPI
+from support.ranks import parallel_assert
+
+from feti_homog import Case, run
+from feti_homog.common.mpi_errors import on_root
+from feti_homog.errors import ConvergenceError
+from feti_homog.output.files import field_file
+from feti_homog.verification.certificate import verify
+
+pytestmark = pytest.mark.parallel
+
+EXACT = 1e-12
+PATHS: dict[str, dict[str, Any]] = {
+    "straight": {"strain": [0.2, 0.0, 0.05]},
+    "legs": {"waypoints": [[0.1, 0.0, 0.0], [-0.05, 0.02, 0.0], [0.1, 0.0, 0.1]]},
+    "increments": {"waypoints": [[0.1, 0.0, 0.0], [-0.05, 0.02, 0.0]], "method": "increments", "increments": 12},
+}
+STATES = (2, 5, "peaks")
+
+
+def case(kind: str, states: int | str, **path: Any) -> Case:
+    return Case.parse(
+        {
+            "name": kind,
+            "cell": {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.3},
+            "material": {"matrix": {"young": 100.0, "poisson": 0.4}, "fibre": {"young": 500.0, "poisson": 0.2}},
+            "analysis": {"type": "path", "plane": "stress"},
+            "interface": {"normal_strength": 4.0, "tangential_strength": 3.0},
+            "path": PATHS[kind] | path,
+            "output": {"pictures": False, "states": states},
+        }
+    )
+
+
+def states_of(folder: Path) -> list[dict[str, Any]]:
+    """Tables and attributes of each state of a result.h5."""
+    with h5py.File(folder / field_file.NAME, "r") as file:
+        groups = [file[f"state/{k}"] for k in range(len(file["state"]))]
+        return [
+            {name: table[()] for name, table in group.items()} | {f"@{name}": v for name, v in group.attrs.items()}
+            for group in groups
+        ]
+
+
+def document(folder: Path) -> dict[str, Any]:
+    content: dict[str, Any] = json.loads((folder / "result.json").read_text())
+    return content
+
+
+def assert_kept_of(folder: Path, whole: Path) -> None:
+    """On one rank: the states of a folder are the same points' of a run that kept all, and so is the curve."""
+    some, every, numbers = states_of(folder), states_of(whole), document(folder)["states"]
+    assert document(whole)["states"] == list(range(len(every))) == [state["@point"] for state in every]
+    assert [state["@point"] for state in some] == numbers
+    for state in some:
+        expected = every[state["@point"]]
+        assert state.keys() == expected.keys()
+        for name, values in state.items():
+            if name in ("@label", "status"):
+                assert np.array_equal(values, expected[name]), name
+            else:
+                scale = np.nanmax(np.abs(expected[name]), initial=0.0)
+                np.testing.assert_allclose(values, expected[name], rtol=0, atol=EXACT * scale, err_msg=name)
+    curves = [[point | {"iterations": 0} for point in document(each)["path"]] for each in (folder, whole)]
+    assert curves[0] == curves[1]
+    assert (folder / "path.csv").read_text() == (whole / "path.csv").read_text()
+    assert len((folder / "events.log").read_text().splitlines()) == 1 + len(curves[0])
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """kind -> folder of a run that keeps the fields of all points."""
+    folders: dict[str, Path] = {}
+
+    def folder(kind: str) -> Path:
+        if kind not in folders:
+            folders[kind] = Path(MPI.COMM_WORLD.bcast(str(tmp_path_factory.mktemp(kind)))) / "all"
+            run(case(kind, "all"), MPI.COMM_WORLD, out=folders[kind])
+        return folders[kind]
+
+    return folder
+
+
+@pytest.mark.parametrize("states", STATES)
+@pytest.mark.parametrize("kind", PATHS)
+def test_kept_states_are_those_of_a_run_that_keeps_all(comm, shared_path, whole, kind, states):
+    result = run(case(kind, states), comm, out=shared_path)
+    assert len(result.states) == states if states != "peaks" else 2 <= len(result.states) < len(result.path)
+    expected = whole(kind)
+    on_root(comm, assert_kept_of, shared_path, expected)
+    parallel_assert(comm, verify(shared_path).holds if comm.rank == 0 else True)
+
+
+@pytest.mark.parametrize("kind", ["straight", "legs"])
+def test_an_interrupted_path_keeps_the_same_states(comm, shared_path, whole, kind):
+    """Ended by max_events twice; each time the fields of what there is are written."""
+    for events, resume in ((6, False), (9, True)):
+        with pytest.raises(ConvergenceError, match="max_events"):
+            run(case(kind, 4, max_events=events), comm, out=shared_path, resume=resume)
+        assert document(shared_path)["states"][-1] == events - 1 == states_of(shared_path)[-1]["@point"]
+        assert len(states_of(shared_path)) == 4
+        comm.barrier()
+    result = run(case(kind, 5), comm, out=shared_path, resume=True)
+    assert result.resumed == 9
+    expected = whole(kind)
+    on_root(comm, assert_kept_of, shared_path, expected)
+
+
+def test_states_in_memory_are_those_of_the_files(comm, whole):
+    result = run(case("legs", 4), comm, fields=True)
+    gathered = result.fields.gathered()
+    expected = whole("legs")
+    if comm.rank == 0:
+        every = states_of(expected)
+        assert [state.point for state in gathered.states] == list(result.states) and len(result.states) == 4
+        for state in gathered.states:
+            np.testing.assert_allclose(state.stress, every[state.point]["stress"], rtol=1e-12, atol=1e-12)
+            np.testing.assert_array_equal(state.status, every[state.point]["status"])
+    assert run(case("legs", 4), comm).states is None
+
+
+def test_a_point_that_does_not_converge_is_kept(comm, shared_path):
+    unsolvable = case("straight", 3)
+    unsolvable.petsc.update({"feti_ksp_max_it": 4, "feti_pc_type": "none", "feti_ksp_rtol": 1e-12})
+    with pytest.raises(ConvergenceError):
+        run(unsolvable, comm, out=shared_path)
+    found = document(shared_path)
+    assert found["status"] == "not converged" and found["states"][-1] == len(found["path"]) - 1
+    assert len(states_of(shared_path)) == len(found["states"])
+    comm.barrier()
+
+
+def test_without_fields_none_are_kept(comm, shared_path):
+    without = case("straight", 3)
+    document_of = without.resolved()
+    document_of["output"]["fields"] = False
+    result = run(Case.parse(document_of), comm, out=shared_path)
+    assert result.states is None and "states" not in document(shared_path)
+    parallel_assert(comm, not (shared_path / field_file.NAME).exists())

@@ -1,0 +1,61 @@
+"""Whole paths of bonds that break by energy, to complete debonding, against brute force."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from reference.energy_path import SlowEnergyPath
+from support import torn_cells
+from support.cases import relative_error
+
+from feti_homog.common.mpi_errors import on_root
+from feti_homog.interface.contact import BONDED
+from feti_homog.interface.energy_criterion import EnergyCriterion
+from feti_homog.interface.path_following import events
+from feti_homog.interface.path_points import unloaded
+from feti_homog.interface.tip_criterion import TipCriterion
+
+pytestmark = pytest.mark.parallel
+
+SPRINGS, TOUGHNESS, SENSITIVITY = (30.0, 12.0), 1e-4, 0.3
+FOUR = {
+    "geometry": "random",
+    "fibres": 4,
+    "fibre_fraction": 0.4,
+    "min_gap": 0.1,
+    "seed": 2,
+    "mesh_size": 0.2,
+    "matrix": {"young": 1.0, "poisson": 0.35},
+    "fibre": {"young": 20.0, "poisson": 0.2},
+    "springs": SPRINGS,
+}
+STRAIN = np.array([1.0, 0.1, 0.05])
+
+
+@pytest.mark.parametrize("growth", ["released", "springs"])
+def test_whole_paths_are_those_of_brute_force(comm, built, growth):
+    expected = None
+    for columns in (700, 24):
+        petsc = {"feti_pc_type": "influence", "feti_influence_columns": columns, "feti_ksp_rtol": 1e-10}
+        case = built(**FOUR, petsc=petsc)
+        if expected is None:
+            slow = SlowEnergyPath(case.reference, SPRINGS, TOUGHNESS, SENSITIVITY, growth)
+            expected = on_root(comm, slow.proportional, STRAIN)
+        points = follow(case.cell, growth)
+        found = np.array([case.in_reference_order(p.after.status) != BONDED for p in points])
+        np.testing.assert_array_equal(found, np.cumsum([e.broke for e in expected], axis=0) > 0)
+        assert len(points) > 30 and found[-1].mean() > 0.5
+        assert relative_error(np.array([p.load_factor for p in points]), [e.load_factor for e in expected]) < 1e-8
+        stress = np.array([p.scale * torn_cells.stress(case.cell, p.state.solution) for p in points])
+        assert relative_error(stress, np.array([e.stress for e in expected])) < 1e-8
+        assert all(p.state.solution.reason > 0 and max(p.state.certificate.values()) < 1e-8 for p in points)
+        # With few columns the cell is factored anew on the way.
+        assert (case.cell.solver.preconditioner.factorizations > 2) == (columns < 100)
+
+
+def follow(cell, growth):
+    """The points of the path."""
+    interface, springs = torn_cells.interface(cell, True), EnergyCriterion(*SPRINGS, TOUGHNESS, SENSITIVITY)
+    law = TipCriterion(springs, cell.solver.preconditioner) if growth == "released" else springs
+    bonded = np.full(len(interface.nodes.row), BONDED, np.int8)
+    return list(events(interface, law, STRAIN[None], unloaded(interface, bonded)))

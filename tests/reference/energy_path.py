@@ -1,0 +1,72 @@
+"""Load paths of bonds that break by energy, by brute force: every state anew by `quadratic_programme`, and what a break
+releases from the dense compliance of the cell in displacements."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import diags
+
+from reference.load_path import SlowLoadPath
+from reference.quadratic_programme import QuadraticProgramme
+
+
+@dataclass(frozen=True)
+class SlowEnergyPath:
+    """A cell on springs of the stiffnesses `springs` (normal, tangential); bonds beside a broken one break by what that
+    releases, with growth "released", or by the energy of their own springs."""
+
+    programme: QuadraticProgramme
+    springs: tuple[float, float]
+    toughness: float
+    mode_sensitivity: float
+    growth: str
+
+    proportional = SlowLoadPath.proportional
+
+    def state(self, strain, bonded):
+        """The state, and the square root of the share of the toughness that the break of each node releases."""
+        state = self.programme.solve_elastic(strain, bonded, True, self.springs)
+        tn, tt = (state.force / self.programme.lengths()[:, None]).T
+        GI, GII = np.maximum(tn, 0.0) ** 2 / (2 * self.springs[0]), tt**2 / (2 * self.springs[1])
+        psi = np.arctan2(np.sqrt(GII), np.sqrt(GI))
+        energy = GI + GII
+        if self.growth == "released":
+            tips = self.tips(bonded)
+            # The last bond of a fibre has no force, and rounding a sign.
+            energy[tips] = np.maximum(self.released(state, bonded, tips), 0.0) / self.programme.lengths()[tips]
+        critical = self.toughness * (1 + np.tan((1 - self.mode_sensitivity) * psi) ** 2)
+        return state, np.sqrt(energy / critical) * bonded
+
+    def tips(self, bonded):
+        """Bonded nodes beside one that is not, around each fibre."""
+        programme, found = self.programme, np.zeros(len(bonded), bool)
+        for f in np.unique(programme.fibre):
+            own = np.flatnonzero(programme.fibre == f)
+            own = own[np.argsort(programme.angle[own])]
+            broken = ~bonded[own]
+            found[own] = bonded[own] & (np.roll(broken, 1) | np.roll(broken, -1))
+        return np.flatnonzero(found)
+
+    def released(self, state, bonded, tips):
+        """(t,) energies that the single breaks release at fixed strain, with the faces that touch as they are: the
+        springs lam = k j go, and their ends part by (1 - A k)^-1 j, A being the compliance of the cell with them."""
+        programme, lengths = self.programme, self.programme.lengths()
+        stiff = np.stack([self.springs[0] * lengths, self.springs[1] * lengths], axis=1)
+        rows = [programme._gaps(np.arange(len(bonded))), programme._slips()]
+        holds = [bonded | state.closed, bonded]
+        K = programme.K + sum(
+            J.T @ diags(np.where(h, k, 0.0)) @ J for J, k, h in zip(rows, stiff.T, holds, strict=True)
+        )
+        T = programme._together(np.zeros(len(bonded), bool))
+        # Free fibres as a whole have no stiffness, and the springs of tips no part in that.
+        compliance = np.linalg.pinv((T.T @ K @ T).toarray(), rcond=1e-11, hermitian=True)
+        energies = []
+        for i in tips:
+            J = np.stack([(R[i] @ T).toarray().ravel() for R in rows])
+            A, k, j = J @ compliance @ J.T, np.diag(stiff[i]), state.jump[i]
+            parted = np.linalg.solve(np.eye(2) - A @ k, j)
+            sheared = j[1] / (1 - A[1, 1] * stiff[i, 1])
+            energies.append((k @ j @ parted if parted[0] >= 0 else stiff[i, 1] * j[1] * sheared) / 2)
+        return np.array(energies)

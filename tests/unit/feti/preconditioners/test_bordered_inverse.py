@@ -1,0 +1,52 @@
+"""The inverse of a block, for rows that come and go, against inverses made anew."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from feti_homog.feti.preconditioners.bordered_inverse import BorderedInverse
+
+
+def quasi_definite(n, negative, rank, seed=0):
+    """(n, n) symmetric, positive semi-definite of this rank on the first rows, negative definite on the last ones."""
+    rng = np.random.default_rng(seed)
+    half = rng.standard_normal((n - negative, rank))
+    M = np.zeros((n, n))
+    M[: n - negative, : n - negative] = half @ half.T
+    other = rng.standard_normal((negative, negative))
+    M[n - negative :, n - negative :] = -(other @ other.T + np.eye(negative))
+    M[: n - negative, n - negative :] = half @ rng.standard_normal((rank, negative))
+    M[n - negative :, : n - negative] = M[: n - negative, n - negative :].T
+    return M
+
+
+def test_rows_come_and_go():
+    M, found = quasi_definite(12, 4, 8), BorderedInverse()
+    steps = [([0, 3], [], 1), ([9], [], -1), ([1, 2, 7], [3], 1), ([8, 11], [9, 1], -1), ([3], [0, 8], 1)]
+    for new, gone, sign in steps:
+        found.remove(np.array(gone, int))
+        found.append(M, np.array(new, int), sign)
+        expected = np.linalg.inv(M[np.ix_(found.members, found.members)])
+        np.testing.assert_allclose(found.N, expected, rtol=1e-9, atol=1e-12 * np.abs(expected).max())
+    assert sorted(found.members) == [2, 3, 7, 11]
+
+
+@pytest.mark.parametrize("at_once", [1, 2, 6], ids=["one by one", "in pairs", "all together"])
+def test_rows_that_depend_on_others_are_left_out(at_once):
+    M, found = quasi_definite(6, 0, 4), BorderedInverse()
+    for first in range(0, 6, at_once):
+        found.append(M, np.arange(first, first + at_once), 1)
+    assert len(found.members) == 4
+    # What the others would add is in the range of those that were kept.
+    x = M @ np.arange(6.0)
+    np.testing.assert_allclose(M[:, found.members] @ found.N @ x[found.members], x, rtol=1e-8)
+
+
+def test_a_row_of_nothing_is_left_out_though_it_comes_first():
+    found = BorderedInverse()
+    M = np.diag([1e-14, 1.0])
+    found.append(M, np.array([0]), 1)
+    assert len(found.members) == 0
+    found.append(M, np.array([0, 1]), 1)
+    assert found.members.tolist() == [1]
