@@ -157,7 +157,5 @@ def test_tips_that_would_take_hours_are_refused():
         cell(fibres=1000, tip_size=1e-6, size=0.01),
         {fibre: tuple(range(0, 360, 30)) for fibre in range(1000)},
     )
-    with pytest.raises(
-        MeshError, match=r"tip_size = 1e-06, fibres = 1000: about .* elements before refine; expected"
-    ):
+    with pytest.raises(MeshError, match=r"tip_size = 1e-06, fibres = 1000: about .* elements before refine; expected"):
         generate(case, marks)
