@@ -54,7 +54,14 @@ def onset(given: argparse.Namespace, comm: Intracomm, radius: float) -> Onset:
     stiffness = solved(given, comm, radius, analysis={"type": "stiffness", "plane": "strain"}).effective_stiffness
     strain = np.linalg.solve(np.array(stiffness), [1.5 * exact, 0.0, 0.0])
     energy = {"criterion": "energy", "toughness": TOUGHNESS, "mode_sensitivity": SENSITIVITY}
-    result = solved(given, comm, radius, analysis={"type": "path", "plane": "strain"}, interface=energy, path={"strain": strain.tolist()})
+    result = solved(
+        given,
+        comm,
+        radius,
+        analysis={"type": "path", "plane": "strain"},
+        interface=energy,
+        path={"strain": strain.tolist()},
+    )
     points = result.path or ()
     first = points[0]
     stable = next((p for p in points[1:] if p.load_factor > first.load_factor), points[-1])
@@ -79,7 +86,7 @@ def solved(given: argparse.Namespace, comm: Intracomm, radius: float, **sections
             "interface_size": 2 * node_distance / width,
         },
         "material": MATERIAL,
-        "output": {"stress_unit": "MPa", "fields": False, "pictures": False},
+        "output": figures.written(given) | {"stress_unit": "MPa", "length_unit": "um"},
         **sections,
         "interface": springs | sections.get("interface", {}),
     }
@@ -136,6 +143,8 @@ def write(folder: Path, found: dict[float, Onset]) -> list[Path]:
     right.set(xscale="log", xlabel="radius of the fibre (um)", ylabel="semi-angle of each debond after onset (deg)")
     right.set_ylim(0.0, 90.0)
     for axes in (left, right):
+        axes.set_xticks([1, 3, 10, 30, 100], ["1", "3", "10", "30", "100"])
+        axes.set_xlim(1.0, 100.0)
         axes.grid(color="0.92", linewidth=0.6)
     figure.suptitle("One glass fibre in epoxy, interface that breaks by energy", fontsize=11)
     figure.savefig(folder / "energy_debonding.png")
@@ -147,4 +156,5 @@ if __name__ == "__main__":
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--out", type=Path, default=Path("results") / "energy_debonding", metavar="DIR")
     options.add_argument("--quick", action="store_true", help="two radii, longer elements")
+    figures.add_output_options(options)
     sys.exit(launch(main, options))

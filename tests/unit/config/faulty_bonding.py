@@ -69,7 +69,9 @@ FAULTY_BONDINGS: dict[str, tuple[str, tuple[str, ...]]] = {
         ),
     ),
     "energy_and_a_strength": (
-        of_type("path", PATH, "[interface]", SPRINGS, 'criterion = "energy"', "toughness = 1.0", "normal_strength = 1.0"),
+        of_type(
+            "path", PATH, "[interface]", SPRINGS, 'criterion = "energy"', "toughness = 1.0", "normal_strength = 1.0"
+        ),
         ('[interface] normal_strength: belongs to criterion = "max" or "quadratic", not "energy"',),
     ),
     "energy_without_toughness": (
@@ -85,7 +87,9 @@ FAULTY_BONDINGS: dict[str, tuple[str, tuple[str, ...]]] = {
         ('[interface] growth = "springs": belongs to ',),
     ),
     "mode_sensitivity_above_one": (
-        of_type("path", PATH, "[interface]", SPRINGS, 'criterion = "energy"', "toughness = 1", "mode_sensitivity = 1.5"),
+        of_type(
+            "path", PATH, "[interface]", SPRINGS, 'criterion = "energy"', "toughness = 1", "mode_sensitivity = 1.5"
+        ),
         ("[interface] mode_sensitivity = 1.5: expected",),
     ),
     "stiffness_zero": (
