@@ -19,6 +19,13 @@ VALID_CASES = {
     "output": BASE + '[output]\nfields = false\nstress = "S12"\ndeformation_scale = 2\nlength_unit = "µm"\n',
     "arc": BASE + f"[interface]\ndebonded = [{ARC}]\n",
     "no arc": BASE + "[interface]\ncontact = false\ndebonded = []\n",
+    "springs": BASE + "[interface]\nnormal_stiffness = 10.0\n",
+    "energy": of_type(
+        "path",
+        PATH,
+        "[interface]\nnormal_stiffness = 10\ntangential_stiffness = 5",
+        'criterion = "energy"\ntoughness = 2\ngrowth = "springs"\nmode_sensitivity = 0',
+    ),
     "curve of a mesh": MESH + "[interface]\n",
     "angle": of_type("angle", ANGLE, BARE_ARC, "contact = false"),
     "angle under a strain": of_type(
