@@ -4,18 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from feti_homog.analysis.result_records import TipInfo
 from feti_homog.common.progress import Progress
 from feti_homog.homogenization import process_zone
 from feti_homog.homogenization.averaging import Homogenization, Response
+from feti_homog.homogenization.energy_release import TipEnergies
 from feti_homog.interface.contact import OPEN, Status
 from feti_homog.typing import Float
 
 UNIT_CASES = ("E11", "E22", "gamma12")
+TIP_COLUMNS = ("fibre", "direction", "G", "G_I", "G_II", "mode_angle", "length")
 
 # Largest relative error of a check that passes, in relative tolerances of the Krylov method: sums over the cell and
 # jumps of stiffness make so much of the solver's error.
@@ -115,6 +119,22 @@ class AnalysisContext:
         for name, response in zip(UNIT_CASES, responses, strict=True):
             self.progress.say(self.record_checks(f"{label}{'-' if sign < 0 else ''}{name}", response))
         return np.stack([sign * r.stress for r in responses], axis=1), responses
+
+    @cached_property
+    def _tip_energies(self) -> TipEnergies:
+        """Collective when first used."""
+        return TipEnergies(self.homogenization.cell, self.homogenization.interface)
+
+    def tips(self, responses: Sequence[Response], loads: Sequence[str]) -> tuple[TipInfo, ...]:
+        """Energy release rates at all tips under each load; none while all is bonded.  Collective."""
+        found = []
+        for response, load in zip(responses, loads, strict=True):
+            if response.counts["open"] + response.counts["closed"]:
+                at = self._tip_energies.of(response)
+                columns = (at.fibre, at.direction, at.total, *at.modes.T, at.mode_angle, at.length)
+                rows = zip(*(column.tolist() for column in columns), strict=True)
+                found += [TipInfo(load=load, **dict(zip(TIP_COLUMNS, row, strict=True))) for row in rows]
+        return tuple(found)
 
     def point(self, responses: Sequence[Response]) -> dict[str, Any]:
         """The numbers of a point of a list in result.json: states of its last response, all iterations."""

@@ -37,5 +37,6 @@ def run(context: AnalysisContext, values: Sequence[float], strain: Float | None)
         for name, response in zip(UNIT_CASES if unit else ("",), responses, strict=True):
             context.record(response, 1.0, f"{label} {name}".strip(), number)
         starts = [r.state.solution.lam for r in responses]
-        points.append(point | context.point(responses))
+        tips = context.tips(responses, UNIT_CASES if unit else ("strain",))
+        points.append(point | context.point(responses) | {"tips": tips})
     return {"angle": points}

@@ -19,8 +19,9 @@ from feti_homog.analysis.result_records import (
     PathPoint,
     SolverInfo,
     StiffnessBounds,
+    TipInfo,
 )
-from feti_homog.common.records import BYTES, SECONDS, STRESS, Key, described, keys, plain, restored
+from feti_homog.common.records import BYTES, SECONDS, STRESS, Key, cells, described, keys, plain, restored
 from feti_homog.mechanics import response
 from feti_homog.mechanics.bounds import Moduli
 from feti_homog.output.files.file_seal import FileSeal
@@ -40,6 +41,7 @@ class Result:
         effective_stiffness_compression: (3, 3) the same under minus the unit strains, where debonded faces touch
             without tension.
         moduli, bounds: of perfectly bonded cells, else None.
+        tips: energy release rates of a stiffness with debonded arcs, else None; those of an angle are in its points.
         angle, path: the points of these analyses, else None; `points` has them as arrays.
         fields: mesh, interface and states on this rank if they were asked for, else None; not written to result.json.
     """
@@ -64,6 +66,9 @@ class Result:
     )
     effective_stiffness_compression: Float | None = described(
         "the same under minus the unit strains, with contact", STRESS, "(3, 3)", default=None
+    )
+    tips: tuple[TipInfo, ...] | None = described(
+        "of a stiffness with debonded arcs on round fibres: each tip under each load", default=None
     )
     angle: tuple[AnglePoint, ...] | None = described("points of analysis `angle`, as in angle.csv", default=None)
     path: tuple[PathPoint, ...] | None = described("points of analysis `path`, as in path.csv", default=None)
@@ -100,8 +105,10 @@ class Result:
         `angle` or `load_factor` (n,), `strain` and `stress` (n, 3), `stiffness` (n, 3, 3), `bonded`, `open`,
         `closed`, ... (n,).
         """
-        documents = [plain(point) for point in (*(self.angle or ()), *(self.path or ()))]
-        return {name: np.array([point[name] for point in documents]) for name in (documents[0] if documents else ())}
+        points = (*(self.angle or ()), *(self.path or ()))
+        documents = [plain(point) for point in points]
+        names = [name for point in points[:1] for name in cells(type(point)) if name in documents[0]]
+        return {name: np.array([point[name] for point in documents]) for name in names}
 
     def rising_strain(self) -> Float:
         """(v, 4) corners S11, S22, S12 and size of the leading strain along a path of one leg, as a test with rising

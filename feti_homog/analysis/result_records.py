@@ -13,6 +13,8 @@ from feti_homog.mechanics.bounds import Bounds
 from feti_homog.mechanics.voigt import STIFFNESSES, STRAINS, STRESSES
 from feti_homog.typing import Float
 
+TOUGHNESS = f"{STRESS} times {LENGTH}"
+
 
 @dataclass(frozen=True)
 class CellInfo:
@@ -92,6 +94,20 @@ class StiffnessBounds:
 
 
 @dataclass(frozen=True, kw_only=True)
+class TipInfo:
+    """The energy release rate at a tip of a debonded arc, at constant macroscopic strain."""
+
+    load: str = described("`E11`, `E22`, `gamma12`: under that unit strain; `-E11`, ... under minus it; else `strain`")
+    fibre: int = described("number of the fibre")
+    direction: float = described("direction of the tip about the centre of the fibre, 0 to 360", DEGREES)
+    G: float = described("energy released per length of debonding along the interface, and per depth", TOUGHNESS)
+    G_I: float = described("its part in opening", TOUGHNESS)
+    G_II: float = described("its part in shear", TOUGHNESS)
+    mode_angle: float = described("psi, tan^2 psi = G_II / G_I: 0 is opening, 90 shear", DEGREES)
+    length: float = described("length behind the tip at which the modes of rigid bonds are told apart", LENGTH)
+
+
+@dataclass(frozen=True, kw_only=True)
 class AnglePoint:
     """The response at one debonding angle."""
 
@@ -103,6 +119,7 @@ class AnglePoint:
     open: int = described("debonded interface nodes without contact")
     closed: int = described("debonded interface nodes in contact")
     iterations: int = described("Krylov iterations")
+    tips: tuple[TipInfo, ...] | None = described("each tip on a round fibre under each load", default=None)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,7 +10,7 @@ from feti_homog.homogenization.averaging import asymmetry
 
 def run(context: AnalysisContext) -> dict[str, Any]:
     """`effective_stiffness`, whose columns are the stresses under the unit strains; with contact between debonded
-    faces also `effective_stiffness_compression`, its columns -Sigma(-E)."""
+    faces also `effective_stiffness_compression`, its columns -Sigma(-E); `tips` of debonded arcs under each of them."""
     status = context.status(None)
     starts = [context.zero_multipliers()] * 3
     one_sided = context.homogenization.interface.contact and context.homogenization.counts(status)["open"] > 0
@@ -18,11 +18,13 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     for name, response in zip(UNIT_CASES, responses, strict=True):
         context.record(response, 1.0, name, 0)
     document: dict[str, Any] = {"effective_stiffness": L}
+    tips = context.tips(responses, UNIT_CASES)
     if one_sided:
         minus, responses = context.unit_responses("", status, starts, -1.0)
         for name, response in zip(UNIT_CASES, responses, strict=True):
             context.record(response, -1.0, f"-{name}", 0)
         document["effective_stiffness_compression"] = minus
+        tips += context.tips(responses, [f"-{name}" for name in UNIT_CASES])
     else:
         context.check("L^ef", {"symmetry": asymmetry(L)})
-    return document
+    return document | ({} if context.homogenization.cell.case.interface is None else {"tips": tips})

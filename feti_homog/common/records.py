@@ -75,6 +75,12 @@ def descriptions(record: type | Any) -> dict[str, Description]:
     return {f.name: f.metadata[DESCRIPTION] for f in dataclasses.fields(record) if DESCRIPTION in f.metadata}
 
 
+def cells(record: type) -> dict[str, Description]:
+    """The described fields of a record's class that fill cells of a row: all but lists of records."""
+    hints = typing.get_type_hints(record)
+    return {n: d for n, d in descriptions(record).items() if _record_of_tuple(_without_none(hints[n])) is None}
+
+
 def plain(value: Any) -> Any:
     """The value with records as mappings of their described fields.
 

@@ -13,8 +13,7 @@ def energy_change(points: Float, u: Float, L: Float, moved: Float, changed: Floa
 
         int sigma : (grad du - grad u grad dx) + W div dx,  sigma = L eps(u),  W = sigma : eps(u) / 2.
 
-    Exact for the elements as they are (deLorenzi, Int. J. Fract. 19 (1982) 183; Haber and Koh, Int. J. Numer. Methods
-    Eng. 21 (1985) 301).
+    Exact for the elements as they are (deLorenzi, Int. J. Fract. 19 (1982) 183).
 
     Args:
         points, u: (e, a, 2) nodes of the elements and their displacements.

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.common.records import descriptions, plain
+from feti_homog.common.records import cells, plain
 from feti_homog.output.files import atomic
 
 
@@ -25,7 +25,7 @@ class Column:
 
 def columns(kind: type) -> Iterator[Column]:
     """The columns that a record of this class fills: the reference table of its file."""
-    for name, description in descriptions(kind).items():
+    for name, description in cells(kind).items():
         for component in description.components or (name,):
             words = f"{component}, {description.meaning}" if description.components else description.meaning
             yield Column(component, description.unit, words)
@@ -52,8 +52,8 @@ def write(path: Path, points: Sequence[Any]) -> Path:
 
 def _row(point: Any) -> dict[str, Any]:
     row: dict[str, Any] = {}
-    described = descriptions(point)
-    for name, value in plain(point).items():
-        components = described[name].components or (name,)
-        row |= dict(zip(components, np.ravel(value).tolist(), strict=True))
+    values = plain(point)
+    for name, described in cells(type(point)).items():
+        if name in values:
+            row |= dict(zip(described.components or (name,), np.ravel(values[name]).tolist(), strict=True))
     return row

@@ -9,6 +9,7 @@ from typing import Any
 
 from feti_homog.mechanics.voigt import STRAINS, STRESSES
 from feti_homog.output.text.point_tables import angle_table, path_table
+from feti_homog.output.text.tip_tables import angle_tip_table, tip_table
 
 WIDTH = 79
 LABEL = 12  # columns of the labels at the left
@@ -71,15 +72,17 @@ def _answer(document: Document) -> list[list[str]]:
     """The blocks of what was asked for."""
     unit = document["case"].get("output", {}).get("stress_unit", "")
     stress = f" ({unit})" if unit else ""
+    length = document["case"].get("output", {}).get("length_unit", "")
+    toughness = f" ({unit} {length})" if unit and length else ""
     if "angle" in document:
-        return [angle_table(document["angle"], stress)]
+        return [angle_table(document["angle"], stress), angle_tip_table(document["angle"], toughness)]
     if "path" in document:
         return [path_table(document["path"], stress)]
     blocks = [_matrix(f"Effective stiffness{stress}", document["effective_stiffness"])]
     if "effective_stiffness_compression" in document:
         blocks.append(_matrix(f"Under minus E{stress}", document["effective_stiffness_compression"]))
     if document["case"].get("interface"):  # moduli and bounds are of bonded, linear composites
-        return blocks
+        return [*blocks, tip_table(document.get("tips", ()), toughness)]
     return [
         *blocks,
         _moduli(f"Engineering moduli{stress}", document["moduli"]),

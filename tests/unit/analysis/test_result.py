@@ -10,13 +10,25 @@ import pytest
 
 from feti_homog import Result
 from feti_homog.analysis.result import schema_keys
-from feti_homog.analysis.result_records import AnglePoint, CellInfo, Checks, PathPoint, SolverInfo, StiffnessBounds
+from feti_homog.analysis.result_records import (
+    AnglePoint,
+    CellInfo,
+    Checks,
+    PathPoint,
+    SolverInfo,
+    StiffnessBounds,
+    TipInfo,
+)
 from feti_homog.mechanics.bounds import Bounds, engineering_moduli
 from feti_homog.output.files import csv_tables, result_json
 
 STIFFNESS = np.array([[9.0, 2.0, 0.0], [2.0, 8.0, 0.0], [0.0, 0.0, 3.0]])
 CELL = CellInfo(1.0, 2.0, 2.0, 0.4, {"matrix": 0.6, "fibre": 0.4}, 10, 20)
 SOLVER = SolverInfo(1, 2, 3, 40, 50, 6, 7, 8, 3, 1, 1e-8, 3, (5, 6, 7), (2, 2, 2))
+TIPS = tuple(
+    TipInfo(load="E11", fibre=1, direction=d, G=3.0, G_I=1.0, G_II=2.0, mode_angle=54.7, length=1e-3)
+    for d in (45.0, 315.0)
+)
 COUNTS = {"bonded": 5, "open": 3, "closed": 1, "iterations": 7}
 
 
@@ -38,6 +50,8 @@ def made(kind: str, **answer: Any) -> Result:
     case = {"name": "a", "analysis": {"type": kind, "plane": "strain"}, "output": {"stress_unit": "GPa"}}
     if kind == "path":
         case["path"] = {"method": "events"}
+    if "tips" in answer:
+        case["interface"] = {"contact": True}
     return Result(
         version="0", case=case, digest="d", cell=CELL, solver=SOLVER, checks=Checks(1e-9, 2e-9, 3e-9, symmetry=1e-12),
         check_tolerance=1e-5, kkt_tolerance=1e-6, warnings=("w",), faults=(), status="done",
@@ -54,7 +68,13 @@ RESULTS = {
         "stiffness", effective_stiffness=STIFFNESS, moduli=engineering_moduli(STIFFNESS),
         bounds=StiffnessBounds(voigt=2 * STIFFNESS, reuss=0.5 * STIFFNESS, hashin_shtrikman=None),
     ),
-    "angle": made("angle", angle=tuple(AnglePoint(angle=a, stiffness=STIFFNESS, **COUNTS) for a in (0.0, 90.0))),
+    "debonded": made("stiffness", effective_stiffness=STIFFNESS, tips=TIPS),
+    "angle": made(
+        "angle",
+        angle=tuple(
+            AnglePoint(angle=a, stiffness=STIFFNESS, tips=tips, **COUNTS) for a, tips in ((0.0, ()), (90.0, TIPS))
+        ),
+    ),
     "path": made("path", path=(path_point(0.5), path_point(1.0)), resumed=0),
 }  # fmt: skip
 
@@ -108,7 +128,16 @@ def test_points_are_arrays():
     points = RESULTS["path"].points
     assert points["strain"].shape == (2, 3) and points["load_factor"].tolist() == [0.5, 1.0]
     assert RESULTS["angle"].points["stiffness"].shape == (2, 3, 3) and "strain" not in RESULTS["angle"].points
-    assert not RESULTS["stiffness"].points
+    assert "tips" not in RESULTS["angle"].points and not RESULTS["stiffness"].points
+
+
+def test_tips_are_records_and_no_cells_of_a_table(tmp_path):
+    result_json.write(tmp_path, RESULTS["angle"].document)
+    again = Result.of(result_json.read(tmp_path))
+    assert again.angle[1].tips == TIPS and again.angle[0].tips == () and RESULTS["stiffness"].tips is None
+    assert "tips" not in [column.name for column in csv_tables.columns(AnglePoint)]
+    by_path = {key.path: key for key in schema_keys()}
+    assert by_path["tips[].G"].unit == by_path["angle[].tips[].G"].unit == "unit of the moduli times unit of the cell"
 
 
 def test_results_can_be_told_apart():

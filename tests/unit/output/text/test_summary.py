@@ -161,3 +161,37 @@ def test_bounds_are_those_of_bonded_cells_only() -> None:
     document["case"]["interface"] = {"contact": True, "debonded": [{"fibre": "all", "centre": 0.0, "angle": 60.0}]}
     text = summary(document)
     assert "Under minus E (GPa)" in text and "Bounds" not in text and "moduli" not in text
+
+
+def tip(load: str, G: float, fibre: int = 1, direction: float = 60.0) -> dict[str, Any]:
+    """A tip of a third opening."""
+    rest = {"G_I": G / 3, "G_II": 2 * G / 3, "mode_angle": 54.7356, "length": 1e-3}
+    return {"load": load, "fibre": fibre, "direction": direction, "G": G} | rest
+
+
+def bonding(**top: Any) -> dict[str, Any]:
+    document = changed(**top)
+    document["case"]["interface"] = {"contact": True}
+    return document
+
+
+def test_the_largest_energy_release_rate_of_each_load_is_told() -> None:
+    tips = [tip("E11", 3.0), tip("E11", 6.0, 12, 300.0), tip("-E11", 0.0), tip("-E11", 1e-12, 2)]
+    text = summary(bonding(tips=tips))
+    assert "Largest energy release rate (GPa mm)" in text
+    assert line(text, "E11 ").split() == ["E11", "6", "2", "4", "54.7", "12", "300"]
+    assert line(text, "-E11").split()[-2:] == ["2", "60"] and max(map(len, text.splitlines())) < 80
+    assert "energy release" not in summary(bonding(tips=[])) and "energy release" not in summary(bonding())
+
+
+def test_energy_release_rates_against_the_angle() -> None:
+    states = {"bonded": 5, "open": 3, "closed": 1, "iterations": 4}
+    stiff = {"stiffness": DOCUMENT["effective_stiffness"]} | states
+    points = [{"angle": 0.0, "tips": []} | stiff, {"angle": 60.0, "tips": [tip("E11", 3.0), tip("E22", 6.0)]} | stiff]
+    lines = summary(bonding(angle=points)).splitlines()
+    where = lines.index("Largest energy release rate (GPa mm) under each load")
+    assert [text.split() for text in lines[where + 1 : where + 4]] == [["angle", "E11", "E22"], ["60", "3", "6"], []]
+    given = [{"angle": 60.0, "stress": [1.0, 0.0, 0.0], "tips": [tip("strain", 3.0), tip("strain", 5.0, 2)]} | states]
+    lines = summary(bonding(angle=given)).splitlines()
+    where = lines.index("Largest energy release rate (GPa mm)")
+    assert lines[where + 2].split() == ["60", "5", "1.6667", "3.3333", "54.7", "2", "60"]

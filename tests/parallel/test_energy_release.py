@@ -1,0 +1,211 @@
+"""Energy release rates at tips: against differences of the energy, published numbers and laws, on all numbers
+of ranks."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from reference.references import DEBONDED_FIBRE_BEM, DEBONDED_FIBRE_FEM, DEBONDED_FIBRE_TOTAL
+from support.cases import FIBRE, MATRIX
+from support.ranks import parallel_assert
+from unit.cell.faulty_meshes import RIGHT_SIDE, grid
+
+from feti_homog import Case, run
+
+pytestmark = pytest.mark.parallel
+
+SQUARE = {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.08, "order": 2}
+RADIUS = np.sqrt(0.4 / np.pi)
+FREE, TOUCHING, SPRINGS = (
+    {"contact": False},
+    {"contact": True},
+    {"normal_stiffness": 1000.0, "tangential_stiffness": 250.0},
+)
+ORTHOTROPIC = {"E1": 40.0, "E2": 15.0, "E3": 15.0, "nu12": 0.25, "nu13": 0.25, "nu23": 0.3, "G12": 6.0, "angle": 20.0}
+# Half of the difference of two openings, in degrees.
+STEP = 0.5
+
+
+def solved(comm, strain, openings, bond, arc=(), materials=(), pieces=None, folder=".", **cell):
+    """The points of an angle under a strain, and the area of the cell."""
+    document = {
+        "cell": SQUARE | cell,
+        "material": {"matrix": MATRIX, "fibre": FIBRE} | dict(materials),
+        "analysis": {"type": "angle", "plane": "strain"},
+        "interface": {"debonded": [{"fibre": 1} | dict(arc)]} | bond,
+        "angle": {"values": openings, "strain": strain},
+        "petsc": {"feti_ksp_rtol": 1e-10},
+        "decomposition": pieces or {},
+    }
+    result = run(Case.parse(document, Path(folder)), comm)
+    return result.angle, result.cell.area
+
+
+def rates(comm, strain, opening, bond, **case):
+    """G of the tips at an opening, and -dE / da of both tips together, from two other openings on a mesh of theirs."""
+    (point,), area = solved(comm, strain, [opening], bond, **case)
+    energies = [
+        area * np.dot(other.stress, strain) / 2
+        for half in (-STEP, STEP)
+        for other in solved(comm, strain, [opening + 2 * half], bond, **case)[0]
+    ]
+    return point.tips, (energies[0] - energies[1]) / (2 * np.radians(STEP) * RADIUS)
+
+
+@pytest.mark.parametrize(
+    ("bond", "strain"),
+    [
+        (FREE, [1.0, 0.0, 0.0]),
+        (FREE, [0.3, 0.2, 0.5]),
+        (TOUCHING, [0.0, 1.0, 0.0]),
+        (TOUCHING, [-1.0, 0.0, 0.0]),
+        (TOUCHING, [0.3, -0.5, 0.4]),
+    ],
+)
+def test_the_total_is_what_the_energy_loses(comm, bond, strain):
+    """From analyses of two other openings, whatever the modes."""
+    tips, expected = rates(comm, strain, 120.0, bond, mesh_size=0.05)
+    parallel_assert(comm, len(tips) == 2 and abs(sum(tip.G for tip in tips) / expected - 1) < 2e-3)
+    parallel_assert(comm, all(abs(tip.G_I + tip.G_II - tip.G) < 1e-12 for tip in tips))
+
+
+@pytest.mark.parametrize(
+    ("case", "error"),
+    [
+        ({"order": 1, "refine": 2}, 6e-3),
+        ({"materials": {"fibre": ORTHOTROPIC}}, 3e-3),
+        ({"bodies": "plane", "pieces": {"subdomains": 7}}, 3e-3),
+        ({"fibre_fraction": 0.7, "arc": {"centre": 20.0}}, 3e-3),
+    ],
+    ids=["linear", "anisotropic", "pieces", "narrow"],
+)
+def test_so_it_is_on_other_meshes_and_of_other_phases(comm, case, error):
+    tips, expected = rates(comm, [1.0, 0.2, 0.3], 100.0, FREE, **case)
+    radius = np.sqrt(case.get("fibre_fraction", 0.4) / np.pi)
+    parallel_assert(comm, abs(sum(tip.G for tip in tips) * radius / RADIUS / expected - 1) < error)
+
+
+@pytest.mark.parametrize("strain", [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.3, -0.5, 0.4]])
+def test_elastic_bonds_release_the_energy_of_the_spring_at_the_tip(comm, strain):
+    tips, expected = rates(comm, strain, 120.0, SPRINGS, tip_size=2e-4)
+    parallel_assert(comm, abs(sum(tip.G for tip in tips) / expected - 1) < 5e-3)
+    if strain == [-1.0, 0.0, 0.0]:
+        parallel_assert(comm, all(tip.G_I == 0.0 and tip.mode_angle == 90.0 for tip in tips))
+
+
+@pytest.mark.parametrize(("bond", "strain"), [(FREE, [1.0, 0.0, 0.0]), (TOUCHING, [-1.0, 0.0, 0.0])])
+def test_the_energy_lost_edge_by_edge_is_the_integral_of_the_rate(comm, bond, strain):
+    """On one mesh, in analyses whose arcs differ by one or two edges of one size at each tip.  The energy errs by the
+    size of the triangles at a tip, which are others at the next vertex: single steps by some per cent, all by less.
+    """
+    edges = 80
+    size = 2 * np.pi * RADIUS / edges
+    openings = [360.0 / edges * 2 * n for n in range(edges // 8, edges // 8 + 9)]
+    points, area = solved(comm, strain, openings, bond, mesh_size=0.05, interface_size=size, tip_size=size)
+    energies = np.array([area * point.stress @ strain / 2 for point in points])
+    rate = np.array([sum(tip.G for tip in point.tips) for point in points])
+    lost, expected = -np.diff(energies), (rate[1:] + rate[:-1]) / 2 * size
+    debonded = np.array([point.open + point.closed for point in points])
+    parallel_assert(comm, np.isin(np.diff(debonded), (4, 8)).all())
+    parallel_assert(comm, np.abs(lost / expected - 1).max() < 0.04 and abs(lost.sum() / expected.sum() - 1) < 8e-3)
+
+
+def test_all_numbers_of_ranks_bodies_and_pieces_agree(comm):
+    """The fibre at the corner of the hexagonal cell, in four parts on the plane, one tip beside its cut."""
+    case = {"geometry": "hexagonal", "arc": {"centre": 40.0}, "fibre_fraction": 0.4}
+    strain, openings = [0.3, -0.5, 0.4], [98.0]
+    (alone,), _ = solved(MPI.COMM_SELF, strain, openings, TOUCHING, **case)
+    for variant in ({}, {"bodies": "plane"}, {"pieces": {"subdomains": 9}}):
+        (point,), _ = solved(comm, strain, openings, TOUCHING, **case, **variant)
+        for tip, same in zip(point.tips, alone.tips, strict=True):
+            parallel_assert(comm, (tip.fibre, tip.load) == (same.fibre, same.load))
+            for name in ("direction", "G", "G_I", "G_II", "mode_angle", "length"):
+                found, expected = getattr(tip, name), getattr(same, name)
+                parallel_assert(comm, abs(found - expected) < 1e-5 * max(abs(expected), same.G), f"{variant} {name}")
+
+
+def test_energy_release_rates_are_of_degree_two_and_symmetric(comm):
+    strain = np.array([0.5, 0.2, 0.0])
+    (point,), _ = solved(comm, strain.tolist(), [100.0], TOUCHING)
+    upper, lower = point.tips
+    parallel_assert(comm, (upper.direction, lower.direction) == pytest.approx((50.0, 310.0)))
+    for name in ("G", "G_I", "G_II"):
+        parallel_assert(comm, abs(getattr(upper, name) / getattr(lower, name) - 1) < 5e-3, name)
+    (twice,), _ = solved(comm, (2 * strain).tolist(), [100.0], TOUCHING)
+    parallel_assert(comm, abs(twice.tips[0].G / upper.G / 4 - 1) < 1e-6)
+    parallel_assert(comm, abs(twice.tips[0].mode_angle - upper.mode_angle) < 1e-3)
+
+
+def test_modes_do_not_depend_on_the_mesh(comm):
+    """They belong to a length of R / 1000, if the elements are smaller."""
+    angles = []
+    for cell in ({"tip_size": 3e-4}, {"tip_size": 2e-5}, {"tip_size": 1e-4, "refine": 1, "order": 1}):
+        (point,), _ = solved(comm, [1.0, 0.0, 0.0], [120.0], FREE, **cell)
+        parallel_assert(comm, abs(point.tips[0].length / (1e-3 * RADIUS) - 1) < 1e-6)
+        angles.append(point.tips[0].mode_angle)
+    parallel_assert(comm, max(angles) - min(angles) < 1.0, str(angles))
+
+
+@pytest.mark.parametrize("opening", [0.0, 360.0])
+def test_without_tips_there_is_no_rate(comm, opening):
+    (point,), _ = solved(comm, [1.0, 0.0, 0.0], [opening], TOUCHING, order=1)
+    parallel_assert(comm, point.tips == ())
+
+
+def test_stiffness_has_the_tips_of_all_its_loads(comm):
+    document = {
+        "cell": SQUARE | {"order": 1},
+        "material": {"matrix": MATRIX, "fibre": FIBRE},
+        "analysis": {"type": "stiffness", "plane": "strain"},
+    }
+    arc = {"debonded": [{"fibre": 1, "angle": 90.0, "centre": 30.0}]}
+    parallel_assert(comm, run(Case.parse(document), comm).tips is None)
+    for contact, loads in (
+        (False, ("E11", "E22", "gamma12")),
+        (True, ("E11", "E22", "gamma12", "-E11", "-E22", "-gamma12")),
+    ):
+        result = run(Case.parse(document | {"interface": arc | {"contact": contact}}), comm)
+        expected = [(load, direction) for load in loads for direction in (75.0, 345.0)]
+        found = [(tip.load, round(tip.direction, 6)) for tip in result.tips]
+        parallel_assert(comm, found == expected and all(tip.G >= 0 for tip in result.tips))
+    free, touching = (run(Case.parse(document | {"interface": arc | {"contact": c}}), comm).tips for c in (False, True))
+    parallel_assert(comm, [tip.G for tip in touching[:2]] == pytest.approx([tip.G for tip in free[:2]], rel=1e-6))
+
+
+def test_fibres_that_are_not_round_have_no_tips(comm, shared_path):
+    """A square one, debonded on its right side."""
+    if comm.rank == 0:
+        grid().with_curve(RIGHT_SIDE).write(shared_path / "grid.msh")
+    comm.barrier()
+    document = {
+        "cell": {"geometry": "mesh", "file": "grid.msh", "refine": 1},
+        "material": {"matrix": MATRIX, "fibre": FIBRE},
+        "analysis": {"type": "stiffness", "plane": "strain"},
+        "interface": {},
+    }
+    result = run(Case.parse(document, shared_path), comm)
+    parallel_assert(comm, result.tips == ())
+    comm.barrier()
+
+
+def test_one_fibre_in_a_large_matrix_has_the_published_rates(comm):
+    """In a cell 40 radii wide, whose strain is that of the matrix under uniaxial stress."""
+    young, poisson, widths = 3.5, 0.4, 40
+    shear, kappa = young / (2 * (1 + poisson)), 3 - 4 * poisson
+    cell = {"fibre_fraction": np.pi / widths**2, "fibre_radius": 1.0, "mesh_size": 0.05}
+    cell |= {"interface_size": 0.06 / widths, "tip_size": 6e-4 / widths}
+    materials = {"matrix": {"young": young, "poisson": poisson}, "fibre": {"young": 70.0, "poisson": 0.2}}
+    strain = [(1 - poisson**2) / young, -poisson * (1 + poisson) / young, 0.0]
+    points, _ = solved(comm, strain, [2.0 * t for t in DEBONDED_FIBRE_TOTAL], TOUCHING, (), materials, **cell)
+    largest = max(reference.value[0] for reference in DEBONDED_FIBRE_TOTAL.values())
+    for point in points:
+        t, scale = round(point.angle / 2), (1 + kappa) / (8 * shear) * np.pi * point.stress[0] ** 2
+        for tip in point.tips:
+            total, modes = tip.G / scale, np.array([tip.G_I, tip.G_II]) / scale
+            parallel_assert(comm, abs(total - DEBONDED_FIBRE_TOTAL[t].value[0]) < 5e-3 * largest, f"{t}: {total}")
+            parallel_assert(comm, abs(total - sum(DEBONDED_FIBRE_FEM[t])) < 5e-3 * largest, f"{t}: {total}")
+            parallel_assert(comm, np.abs(modes - DEBONDED_FIBRE_FEM[t]).max() < 0.015 * largest, f"{t}: {modes}")
+            parallel_assert(comm, np.abs(modes - DEBONDED_FIBRE_BEM[t]).max() < 0.06 * largest, f"{t}: {modes}")
