@@ -1,7 +1,7 @@
 """Strips on springs, exact in closed form: stiffness, and a path that breaks all bonds at once.
 
-1 / C11 = <1 / M> + 2 / (k_n W), M = lambda + 2 mu, and 1 / C33 = <1 / mu> + 2 / (k_t W) for a strip normal to x1 in a cell
-of width W; under E11 the stress rises in a straight line to sqrt(2 k_n G_Ic), and is none from there on.
+1 / C11 = <1 / M> + 2 / (k_n W), M = lambda + 2 mu, and 1 / C33 = <1 / mu> + 2 / (k_t W) for a strip normal to x1 in a
+cell of width W; under E11 the stress rises in a straight line to sqrt(2 k_n G_Ic), and is none from there on.
 """
 
 from __future__ import annotations
