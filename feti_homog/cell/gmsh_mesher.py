@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import chain, pairwise
@@ -11,7 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from feti_homog.cell.arrangement import FIBRES_OF, Arrangement, arrange
+from feti_homog.cell import element_estimate
+from feti_homog.cell.arrangement import Arrangement, arrange
 from feti_homog.cell.coarse_mesh import CoarseMesh, areas, flip_double_arcs, representatives
 from feti_homog.cell.graded_size import MeshSizes
 from feti_homog.cell.outline import MATRIX, Curve, Outline, outline
@@ -23,10 +23,8 @@ if TYPE_CHECKING:
     from feti_homog.config.cell_section import Cell
 
 
-# Elements that are meshed on one rank in some minutes, and how many there are about a fibre of a random cell.
-MAX_TRIANGLES, TRIANGLES_OF_A_FIBRE = 1_000_000, 160
-# Area of an equilateral triangle / its side squared.
-TRIANGLE_AREA = math.sqrt(3.0) / 4.0
+# Elements that are meshed on one rank in some minutes.
+MAX_TRIANGLES = 1_000_000
 # Radius / width of the cell above which positions on a circle differ by more than rounding.
 SMALLEST_RADIUS = 1e-6
 NO_MARKS: Mapping[int, Sequence[float]] = MappingProxyType({})
@@ -56,14 +54,14 @@ def generate(cell: Cell, marks: Mapping[int, Sequence[float]] = NO_MARKS) -> Coa
     Raises:
         MeshError: the fibres cannot be arranged, or there would be too many elements.
     """
-    _refuse_extremes(cell)
+    sizes = _sizes(cell, marks)
+    _refuse_extremes(cell, sizes, sum(len(own) for own in marks.values()))
     arrangement = arrange(cell)
     if arrangement.radii.min() < SMALLEST_RADIUS * arrangement.width:
         raise MeshError(
             f"[cell] fibre_fraction = {cell.fibre_fraction}: a fibre has a radius of {arrangement.radii.min():.2g}; "
             f"expected at least {SMALLEST_RADIUS} of the width of the cell"
         )
-    sizes = _sizes(cell)
     lines = outline(arrangement, sizes, marks)
     points, triangles, circle = _fill(lines, sizes)
     phase = (circle != MATRIX).astype(np.int32)
@@ -87,10 +85,11 @@ def generate(cell: Cell, marks: Mapping[int, Sequence[float]] = NO_MARKS) -> Coa
     )
 
 
-def _sizes(cell: Cell) -> MeshSizes:
+def _sizes(cell: Cell, marks: Mapping[int, Sequence[float]]) -> MeshSizes:
     """Those that a cell of width 1 is asked for."""
     interface = cell.mesh_size if cell.interface_size is None else cell.interface_size
-    return MeshSizes(cell.mesh_size, interface, interface)
+    tip = interface if cell.tip_size is None or not marks else cell.tip_size
+    return MeshSizes(cell.mesh_size, interface, tip)
 
 
 def _scale(cell: Cell, arrangement: Arrangement) -> float:
@@ -100,19 +99,17 @@ def _scale(cell: Cell, arrangement: Arrangement) -> float:
     return cell.width or 1.0
 
 
-def _refuse_extremes(cell: Cell) -> None:
+def _refuse_extremes(cell: Cell, sizes: MeshSizes, tips: int) -> None:
     """Raise MeshError for a cell that would take hours to mesh, before it is begun."""
-    height = math.sqrt(3.0) if cell.geometry == "hexagonal" else 1.0
-    count = height / (TRIANGLE_AREA * cell.mesh_size**2) + TRIANGLES_OF_A_FIBRE * (cell.fibres or 0)
-    given = f"mesh_size = {cell.mesh_size}" + ("" if cell.fibres is None else f", fibres = {cell.fibres}")
-    if cell.interface_size is not None and cell.fibre_fraction is not None:
-        # On both sides of circles of this length the triangles / length are int dx / (A (h + g x)^2).
-        around = 2 * math.sqrt(math.pi * cell.fibre_fraction * height * (cell.fibres or FIBRES_OF[cell.geometry]))
-        count += 2 * around / (TRIANGLE_AREA * MAX_GROWTH * cell.interface_size)
-        given += f", interface_size = {cell.interface_size}"
+    around = min(sizes.interface, element_estimate.interface_size(cell))
+    at_tips = tips * element_estimate.triangles_of_a_tip(max(1.0, around / sizes.tip))
+    count = element_estimate.triangles(cell) + at_tips
     if count > MAX_TRIANGLES:
+        keys = ("mesh_size", "interface_size", "tip_size") if at_tips else ("mesh_size", "interface_size")
+        given = [f"{name} = {value:.3g}" for name in keys if (value := getattr(cell, name)) is not None]
+        given += [] if cell.fibres is None else [f"fibres = {cell.fibres}"]
         raise MeshError(
-            f"[cell] {given}: about {count:.2g} elements before refine; expected at most {MAX_TRIANGLES}; "
+            f"[cell] {', '.join(given)}: about {count:.2g} elements before refine; expected at most {MAX_TRIANGLES}; "
             "refine splits them on the ranks"
         )
 

@@ -55,8 +55,8 @@ class SizeField:
 
 
 def size_field(arrangement: Arrangement, sizes: MeshSizes, vertices: Float, tips: Float) -> SizeField:
-    """`line_size`, but at most h_i + g d at the distance d from a circle and h_t + g d from one of the `tips` (t, 2),
-    with the growth g = MAX_GROWTH."""
+    """`line_size`, but at most h_i + g d at the distance d from a circle, and h_t + g max(0, d - h_t) from one of the
+    `tips` (t, 2), so that the edges at a tip have the size h_t; the growth g is MAX_GROWTH."""
     base = line_size(arrangement, sizes.largest, vertices)
     if not sizes.is_graded:
         return SizeField(base)
@@ -66,7 +66,7 @@ def size_field(arrangement: Arrangement, sizes: MeshSizes, vertices: Float, tips
 
     def at(points: Float) -> Float:
         # Without tips the distance is infinite.
-        at_tips = sizes.tip + MAX_GROWTH * tree.query(wrap(points, size))[0]
+        at_tips = sizes.tip + MAX_GROWTH * np.maximum(0.0, tree.query(wrap(points, size))[0] - sizes.tip)
         on_circles = sizes.interface + MAX_GROWTH * to_circle(points)
         return np.asarray(np.minimum(base(points), np.minimum(on_circles, at_tips)))
 

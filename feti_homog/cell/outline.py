@@ -165,9 +165,10 @@ def _arcs(circles: Float, angles: list[Float], size: Float) -> tuple[Int, Float,
 
 
 def _tips(arrangement: Arrangement, marks: Mapping[int, Sequence[float]], vertices: Float) -> Float:
-    """The vertices (t, 2) that the marks have become."""
-    fibre = np.repeat(list(marks), [len(own) for own in marks.values()]).astype(int)
-    angle = np.radians([mark for own in marks.values() for mark in own])
+    """The vertices (t, 2) that the marks have become; those of fibres that are not there are none."""
+    known = {fibre: own for fibre, own in marks.items() if fibre < len(arrangement.radii)}
+    fibre = np.repeat(list(known), [len(own) for own in known.values()]).astype(int)
+    angle = np.radians([mark for own in known.values() for mark in own])
     size = np.array([arrangement.width, arrangement.height])
     places = _on_circle(np.column_stack([arrangement.centres, arrangement.radii])[fibre], angle)
     return np.asarray(vertices[cKDTree(vertices % size, boxsize=size).query(places % size)[1]])

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from feti_homog.config.cell_section import GEOMETRY, TOUCHING, Cell
+from feti_homog.config.cell_section import GEOMETRY, TOUCHING, Cell, size_faults
 from feti_homog.config.document import read_document, to_document
 from feti_homog.config.interface_sections import misplaced_sections, read_angle, read_interface, read_path
 from feti_homog.config.material_sections import phase_faults, provider, read_materials
@@ -214,10 +214,7 @@ def _checked_cell(cell: Cell, folder: Path, faults: list[str]) -> Cell:
                 f"{limit_in_words(limit, cell.fibre_fraction, 4)} for "
                 f"geometry = {toml_value(cell.geometry)}: {reason}"
             )
-    if cell.interface_size is not None and cell.interface_size > cell.mesh_size:
-        faults.append(
-            f"[cell] interface_size = {cell.interface_size}: expected at most mesh_size, which is {cell.mesh_size}"
-        )
+    faults += size_faults(cell)
     if cell.width is not None and cell.fibre_radius is not None:
         faults.append("[cell] width, fibre_radius: exclude each other; give one")
     if cell.file is None:

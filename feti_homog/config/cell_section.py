@@ -55,6 +55,14 @@ class Cell:
         default_words="mesh_size",
         only=ALL_CIRCULAR,
     )
+    tip_size: float | None = key(
+        real(least=1e-6, most=0.5),
+        "Size of the elements at the tips of debonded arcs, before refine, / width of the cell; from there they grow "
+        "like those on interfaces. At most interface_size.",
+        default=None,
+        default_words="such that tips err no more than the rest; on paths interface_size",
+        only=ALL_CIRCULAR,
+    )
     refine: int = key(
         integer(least=0, most=8),
         "How many times every element is split in four, on the ranks; new nodes of round interfaces lie on the circle.",
@@ -94,3 +102,14 @@ class Cell:
         '"matrix", "fibre", "fibre:2", ...; the nodes on opposite sides match. Fibres may have any shape.',
         only=MESH,
     )
+
+
+def size_faults(cell: Cell) -> list[str]:
+    """Faults of sizes of elements that are larger than those around."""
+    faults, largest = [], ("mesh_size", cell.mesh_size)
+    for name, size in (("interface_size", cell.interface_size), ("tip_size", cell.tip_size)):
+        if size is not None and size > largest[1]:
+            faults.append(f"[cell] {name} = {size}: expected at most {largest[0]}, which is {largest[1]}")
+        elif size is not None:
+            largest = name, size
+    return faults

@@ -13,6 +13,7 @@ from feti_homog.config.section_values import ARCS
 from feti_homog.config.sections import (
     ANALYSIS_TYPE,
     SECTIONS_OF_AN_ANALYSIS,
+    STIFFNESSES,
     Angle,
     Arc,
     InterfaceSection,
@@ -52,10 +53,9 @@ def read_interface(table: Any, reader: TableReader) -> InterfaceSection | None:
 
 def _energy_faults(interface: InterfaceSection) -> list[str]:
     """Faults of a criterion of energy: springs have some, glue has none; and strengths belong to the others."""
-    stiffnesses = ("normal_stiffness", "tangential_stiffness")
     faults = [
         f'[interface] {name}: missing; criterion = "energy" needs it'
-        for name in stiffnesses
+        for name in STIFFNESSES
         if getattr(interface, name) is None
     ]
     return faults + [
@@ -66,12 +66,12 @@ def _energy_faults(interface: InterfaceSection) -> list[str]:
 
 
 def _missing_arcs(table: Any, selected: Selected) -> list[str]:
-    """The fault that nothing can debond."""
+    """The fault that nothing can debond, nor give way."""
     analysis, debonded = selected[ANALYSIS_TYPE], table.get("debonded") if isinstance(table, dict) else None
     if analysis == "angle" and debonded in (None, []):
         return [f'[interface] debonded: missing; [analysis] type = "angle" needs {ARCS.expected}']
     # An empty list says that it is meant; of a user's mesh a curve may be debonded.
-    is_bare = isinstance(table, dict) and "debonded" not in table
+    is_bare = isinstance(table, dict) and not table.keys() & {"debonded", *STIFFNESSES}
     if analysis == "stiffness" and selected[GEOMETRY] in CIRCULAR and is_bare:
         return [f"[interface] debonded: missing; expected {ARCS.expected}, or []: nothing else can open"]
     return []

@@ -11,9 +11,12 @@ from feti_homog.config.schema import Condition, Key, Selector, defaults_of, keys
 from feti_homog.config.sections import (
     ANALYSIS_TYPE,
     ANGLE_ANALYSIS,
+    BY_ENERGY,
+    CRITERION,
     METHOD,
     SECTIONS,
     SECTIONS_OF_AN_ANALYSIS,
+    STIFFNESSES,
     Arc,
 )
 from feti_homog.config.tables import REQUIRED
@@ -26,7 +29,7 @@ ITEMS = "items"  # on the way to a table: of a list
 def rules_of_one_case() -> Schema:
     """What must be given, by conditions that are independent of each other."""
     required = [_required(path, contents) for path, contents in _tables()]
-    selectors = (GEOMETRY, ANALYSIS_TYPE, METHOD)
+    selectors = (GEOMETRY, ANALYSIS_TYPE, METHOD, CRITERION)
     conditional = [_rule(selector, value) for selector in selectors for value in _values(selector)]
     return {
         "required": list(REQUIRED),
@@ -35,6 +38,7 @@ def rules_of_one_case() -> Schema:
             *conditional,
             *_material_rules(),
             *_arc_rules(),
+            *_energy_rules(),
             _at(("cell",), {"not": {"required": ["width", "fibre_radius"]}}),
             _at(("decomposition",), {"not": {"required": ["subdomains", "max_dofs"]}}),
             _at(("path",), {"oneOf": [{"required": ["strain"]}, {"required": ["waypoints"]}]}),
@@ -120,6 +124,13 @@ def _arc_rules() -> list[Schema]:
         {"if": _if(ANGLE_ANALYSIS), "then": {"required": ["interface"], **_at(("interface",), some_arc)}},
         {
             "if": {"allOf": [_if(stiffness), _if(ALL_CIRCULAR)]},
-            "then": _at(("interface",), {"required": ["debonded"]}),
+            "then": _at(("interface",), {"anyOf": [{"required": [name]} for name in ("debonded", *STIFFNESSES)]}),
         },
     ]
+
+
+def _energy_rules() -> list[Schema]:
+    """Bonds that break by energy have springs, and no strengths."""
+    strengths = {"normal_strength": False, "tangential_strength": False}
+    springs = _at(("interface",), {"required": [*STIFFNESSES], "properties": strengths})
+    return [{"if": _if(BY_ENERGY), "then": springs}]

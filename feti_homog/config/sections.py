@@ -28,6 +28,8 @@ CRITERION = Selector("interface", "criterion")
 
 ANGLE_ANALYSIS, PATH_ANALYSIS = ANALYSIS_TYPE.among("angle"), ANALYSIS_TYPE.among("path")
 BY_ENERGY = CRITERION.among("energy")
+
+STIFFNESSES = ("normal_stiffness", "tangential_stiffness")
 BY_EVENTS, BY_INCREMENTS = METHOD.among("events"), METHOD.among("increments")
 
 

@@ -12,25 +12,25 @@ from feti_homog.cell.periodic_topology import Torus
 from feti_homog.cell.refinement import ReferenceLattice
 from feti_homog.config.case import Case
 from feti_homog.config.sections import Arc
+from feti_homog.homogenization import tips
 from feti_homog.interface import debonded_arcs
-from feti_homog.typing import Float, Int
+from feti_homog.interface.debonded_arcs import MovedTips
+from feti_homog.typing import Bool, Float, Int
 
 
 @dataclass(frozen=True)
 class InterfaceNodes:
     """Nodes of interfaces on rank 0, before the refinement: (k,) numbers of fibres from 1, directions in degrees about
-    their centres, and how near to a tip, in degrees, a node is the tip.
+    their centres, and whether they are vertices of the coarse mesh.
     """
 
     fibre: Int
     direction: Float
-    tolerance: Float
+    is_vertex: Bool
 
     @classmethod
-    def of(
-        cls, torus: Torus, lattice: ReferenceLattice, first_fibre: int, centres: Float, moved: bool
-    ) -> InterfaceNodes:
-        """Those on edges between constituents, on their chords; `moved`: vertices were moved to tips near them."""
+    def of(cls, torus: Torus, lattice: ReferenceLattice, first_fibre: int, centres: Float) -> InterfaceNodes:
+        """Those on edges between constituents, on their chords."""
         body = np.repeat(torus.constituent, 3)
         edge = torus.triangle_torus_edges.ravel()
         count = int(edge.max()) + 1
@@ -47,16 +47,23 @@ class InterfaceNodes:
         return cls(
             fibre - first_fibre + 1,
             debonded_arcs.angles(points, fibre, centres, torus.mesh.period),
-            np.where(is_vertex & moved, np.degrees(MERGED), debonded_arcs.TIP_TOLERANCE_DEGREES),
+            is_vertex,
         )
 
-    def selects(self, arc: Arc, opening: float | None, fibre: int | None) -> bool:
+    def moved_tips(self, case: Case) -> MovedTips:
+        """Tips that the mesher has put into a vertex near them; a user's mesh has its vertices where they are."""
+        if case.cell.file is not None:
+            return debonded_arcs.NOT_MOVED
+        vertices = self.fibre[self.is_vertex], self.direction[self.is_vertex]
+        return debonded_arcs.moved_tips(tips.directions(case), *vertices, float(np.degrees(MERGED)))
+
+    def selects(self, arc: Arc, opening: float | None, fibre: int | None, moved: MovedTips) -> bool:
         """Whether any node, of that fibre if it is given, is within the arc."""
-        inside = debonded_arcs.debonded([arc], opening, self.fibre, self.direction, self.tolerance)
+        inside = debonded_arcs.debonded([arc], opening, self.fibre, self.direction, moved)
         return bool((inside if fibre is None else inside[self.fibre == fibre]).any())
 
 
-def faults(case: Case, nodes: InterfaceNodes) -> list[str]:
+def faults(case: Case, nodes: InterfaceNodes, moved: MovedTips) -> list[str]:
     """Faults of arcs, and of openings of [angle], other than 0 that select no node of a fibre."""
     openings: Sequence[float | None] = [None] if case.angle is None else case.angle.values
     found = []
@@ -64,7 +71,7 @@ def faults(case: Case, nodes: InterfaceNodes) -> list[str]:
         for opening in openings:
             whole = opening if arc.angle is None else arc.angle
             fibres = [None] if isinstance(arc.fibre, str) else list(arc.fibre)
-            empty = [fibre for fibre in fibres if whole and not nodes.selects(arc, opening, fibre)]
+            empty = [fibre for fibre in fibres if whole and not nodes.selects(arc, opening, fibre, moved)]
             found += [_fault(place, whole, fibre, nodes) for fibre in empty]
     return list(dict.fromkeys(found))
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from feti_homog.cell.arrangement import FIBRES_OF
 from feti_homog.cell.coarse_mesh import CoarseMesh
 from feti_homog.cell.fibre_centres import fibre_circles
 from feti_homog.cell.periodic_topology import Torus, edge_pairs
@@ -17,9 +16,10 @@ from feti_homog.config.case import Case
 from feti_homog.errors import CaseError
 from feti_homog.feti.decomposition.partition import decompose, pieces_for_count, pieces_for_size
 from feti_homog.feti.decomposition.shared_entities import SharedEntities, share_entities
-from feti_homog.homogenization import arc_selection, process_zone
+from feti_homog.homogenization import arc_selection, process_zone, tips
 from feti_homog.homogenization.arc_selection import InterfaceNodes
 from feti_homog.interface import debonded_arcs
+from feti_homog.interface.debonded_arcs import MovedTips
 from feti_homog.typing import Float, Int
 
 ROUNDING = 1e-9  # of coordinates, relative to the cell
@@ -84,6 +84,7 @@ class CellSummary:
     constituent_phase: Int
     centres: Float
     radii: Float
+    moved_tips: MovedTips
 
     @property
     def fibres(self) -> int:
@@ -129,8 +130,7 @@ def coarse_mesh(case: Case) -> CoarseMesh:
     else:
         from feti_homog.cell.gmsh_mesher import generate
 
-        fibres = case.cell.fibres or FIBRES_OF[case.cell.geometry]
-        mesh = generate(case.cell, debonded_arcs.tips(case.arcs, case.angle.values if case.angle else (), fibres))
+        mesh = generate(replace(case.cell, tip_size=tips.size(case)), tips.directions(case))
     cases.check_phases(case, mesh.phases)
     return mesh
 
@@ -148,9 +148,11 @@ def distribute(
     circles = fibre_circles(torus)
     centres = _in_cell(circles[:, :2], mesh.period)
     faults = debonded_arcs.faults(case.arcs, centres[first_fibre:])
+    moved = debonded_arcs.NOT_MOVED
     if case.arcs and not faults:
-        moved = case.cell.file is None
-        faults = arc_selection.faults(case, InterfaceNodes.of(torus, lattice, first_fibre, centres, moved))
+        nodes = InterfaceNodes.of(torus, lattice, first_fibre, centres)
+        moved = nodes.moved_tips(case)
+        faults = arc_selection.faults(case, nodes, moved)
     if faults:
         raise CaseError(*faults)
     parts = torus.constituent if case.cell.bodies == "torus" else torus.plane_parts()
@@ -170,6 +172,7 @@ def distribute(
         constituent_phase=torus.constituent_phase,
         centres=centres,
         radii=circles[:, 2],
+        moved_tips=dict(moved),
     )
     own: list[list[Submesh]] = [[] for _ in range(n_ranks)]
     for submesh, rank in zip(submeshes, decomposition.rank, strict=True):

@@ -9,7 +9,6 @@ from functools import cached_property
 import numpy as np
 from mpi4py import MPI
 
-from feti_homog.cell.outline import MERGED
 from feti_homog.cell.refinement import ReferenceLattice
 from feti_homog.cell.submesh import Submesh
 from feti_homog.common.mpi_errors import agree, on_root_only
@@ -74,12 +73,9 @@ class TornCell:
         Arcs without an angle have that `opening`; None if there are none.
         """
         nodes = self.solver.jump_operator.nodes
-        # The mesher moves a tip to a vertex that is as near as this.
-        moved = nodes.vertex & (self.case.cell.file is None)
-        near = np.where(moved, np.degrees(MERGED), debonded_arcs.TIP_TOLERANCE_DEGREES)
-        number = self.summary.fibre_number(nodes.fibre)
+        number, moved = self.summary.fibre_number(nodes.fibre), self.summary.moved_tips
         cracks = nodes.precracked & (self.case.interface is not None)
-        return cracks | debonded_arcs.debonded(self.case.arcs, opening, number, self.directions, near)
+        return cracks | debonded_arcs.debonded(self.case.arcs, opening, number, self.directions, moved)
 
     def areas(self) -> dict[str, float]:
         """Meshed area of each phase; collective."""

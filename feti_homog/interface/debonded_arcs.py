@@ -5,7 +5,8 @@ Directions are degrees about the centre of a fibre, from x1 towards x2.  The tip
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
 
@@ -16,6 +17,10 @@ from feti_homog.typing import Bool, Float, Int
 # A node this near to a tip, in degrees, is the tip: coordinates in files and of circles are rounded.
 TIP_TOLERANCE_DEGREES = 1e-6
 
+# Number of a fibre and direction of a tip, as `tips` has it -> where the mesh has it.
+MovedTips = Mapping[tuple[int, float], float]
+NOT_MOVED: MovedTips = MappingProxyType({})
+
 
 def tips(arcs: Sequence[Arc], values: Sequence[float], fibres: int) -> dict[int, list[float]]:
     """Directions in [0, 360) of the tips of arcs on each of so many fibres, which are here numbered from 0.
@@ -25,7 +30,7 @@ def tips(arcs: Sequence[Arc], values: Sequence[float], fibres: int) -> dict[int,
     marks: dict[int, set[float]] = {}
     for arc in arcs:
         halves = [opening / 2 for opening in (values if arc.angle is None else (arc.angle,)) if 0 < opening < 360]
-        ends = {round(arc.centre + side * half, 9) % 360.0 for half in halves for side in (-1, 1)}
+        ends = {_end(arc, side * half) for half in halves for side in (-1, 1)}
         for fibre in range(1, fibres + 1) if isinstance(arc.fibre, str) else arc.fibre:
             marks.setdefault(fibre - 1, set()).update(ends)
     return {fibre: sorted(marks[fibre]) for fibre in sorted(marks) if marks[fibre]}
@@ -41,26 +46,52 @@ def angles(points: Float, fibre: Int, centres: Float, period: Float) -> Float:
     return np.asarray(np.degrees(np.arctan2(offset[:, 1], offset[:, 0])))
 
 
+def moved_tips(marks: Mapping[int, Sequence[float]], fibre: Int, direction: Float, most: float) -> MovedTips:
+    """Tips of `tips` that a mesh has elsewhere, by `most` degrees at most: at the nearest of its vertices, which lie on
+    the fibres `fibre` (k,), numbered from 1, in the directions (k,)."""
+    moved = {}
+    for number, ends in marks.items():
+        own = direction[fibre == number + 1]
+        for end in ends:
+            away = (own - end + 180.0) % 360.0 - 180.0
+            nearest = away[np.argmin(np.abs(away))] if len(away) else np.inf
+            if TIP_TOLERANCE_DEGREES < abs(nearest) <= most:
+                moved[number + 1, end] = end + float(nearest)
+    return moved
+
+
 def debonded(
-    arcs: Sequence[Arc],
-    opening: float | None,
-    fibre: Int,
-    angle: Float,
-    tolerance: float | Float = TIP_TOLERANCE_DEGREES,
+    arcs: Sequence[Arc], opening: float | None, fibre: Int, angle: Float, moved: MovedTips = NOT_MOVED
 ) -> Bool:
     """Whether nodes are within an arc of their fibre: (k,) for the fibres' numbers from 1 and directions (k,).
 
-    `opening` is that of arcs without an angle; `tolerance`, one or (k,), how near a tip a node is the tip itself.
+    `opening` is that of arcs without an angle; `moved` says which tips the mesh has elsewhere.
     """
     inside = np.zeros(len(fibre), bool)
     for arc in arcs:
         whole = opening if arc.angle is None else arc.angle
         if whole is None:
             raise ValueError("an arc without an angle needs an opening")
-        away = np.abs((angle - arc.centre + 180.0) % 360.0 - 180.0)
-        within = (away < whole / 2 - tolerance) | (whole >= 360.0)
+        start, stop = (_ends(arc, side * whole / 2, fibre, moved) for side in (-1, 1))
+        away = (angle - start) % 360.0
+        within = (away > TIP_TOLERANCE_DEGREES) & (away < stop - start - TIP_TOLERANCE_DEGREES)
+        within = (within & (0 < whole < 360)) | (whole >= 360.0)
         inside |= within & (np.isin(fibre, arc.fibre) if isinstance(arc.fibre, tuple) else True)
     return inside
+
+
+def _end(arc: Arc, half: float) -> float:
+    """Direction in [0, 360) of the tip of an arc that is `half` away from its centre."""
+    return round(arc.centre + half, 9) % 360.0
+
+
+def _ends(arc: Arc, half: float, fibre: Int, moved: MovedTips) -> Float:
+    """(k,) directions of that tip on the fibres (k,), without the turn that brings it to [0, 360)."""
+    ends, key = np.full(len(fibre), arc.centre + half), _end(arc, half)
+    for (number, end), actual in moved.items():
+        if end == key:
+            ends[fibre == number] += actual - end
+    return ends
 
 
 def faults(arcs: Sequence[Arc], centres: Float) -> list[str]:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from reference.references import ARC_OF_120_DEGREES, VOID
+from reference.references import ARC_OF_120_DEGREES, ARC_OF_120_DEGREES_FINE, VOID
 from support import torn_cells
 from support.cases import relative_error
 from support.random_cells import random_bonded, random_cell, random_strain
@@ -116,16 +116,50 @@ def test_debonded_fibres_without_contact_are_voids(comm, geometry):
     assert np.abs([L[0, 0] / expected[0], L[0, 1] / expected[1], L[2, 2] / expected[2]] - np.ones(3)).max() < 1e-4
 
 
+def arc_of_120_degrees(comm, **case):
+    """(6,) C11, C22, C12, C33 with faces free, and S11, S22 with contact under E11 = -1; degrees of freedom."""
+    cell = torn_cells.tear(comm, [Arc(fibre="all", angle=120.0)], geometry="square", **case)
+    status = np.where(np.abs(directions(cell)) < 60 - 1e-6, OPEN, BONDED).astype(np.int8)
+    L, pressed = stiffness(cell, status), response(cell, True, [-1, 0, 0], status)[0]
+    return np.array([L[0, 0], L[1, 1], L[0, 1], L[2, 2], pressed[0], pressed[1]]), cell.sum_over_ranks(
+        len(cell.solver.Q)
+    )
+
+
 def test_an_arc_of_120_degrees_has_the_reference_stiffness(comm):
-    """The tips are singular, so the error falls with the element size: extrapolated from two meshes."""
-    results = []
-    for refine in (1, 2):
-        arc = [Arc(fibre="all", angle=120.0)]
-        cell = torn_cells.tear(comm, arc, geometry="square", order=2, mesh_size=0.1, refine=refine)
-        status = np.where(np.abs(directions(cell)) < 60 - 1e-6, OPEN, BONDED).astype(np.int8)
-        L, pressed = stiffness(cell, status), response(cell, True, [-1, 0, 0], status)[0]
-        results.append(np.array([L[0, 0], L[1, 1], L[0, 1], L[2, 2], pressed[0], pressed[1]]))
-    assert np.abs((2 * results[1] - results[0]) / ARC_OF_120_DEGREES.value - 1).max() < 1e-3
+    found, _ = arc_of_120_degrees(comm, order=2, mesh_size=0.1, refine=1)
+    assert np.abs(found / ARC_OF_120_DEGREES.value - 1).max() < 2e-4
+    assert np.abs(np.array(ARC_OF_120_DEGREES_FINE.value) / ARC_OF_120_DEGREES.value - 1).max() < 5e-4
+
+
+@pytest.mark.parametrize(
+    ("mesh", "dofs", "error"),
+    [
+        ({"order": 2, "mesh_size": 0.05}, 13_500, 2.5e-4),
+        ({"order": 2, "mesh_size": 0.07, "refine": 1}, 28_500, 3e-5),
+        ({"order": 1, "mesh_size": 0.05, "refine": 2}, 28_500, 2e-3),
+    ],
+)
+def test_meshes_are_graded_at_tips(comm, mesh, dofs, error):
+    found, taken = arc_of_120_degrees(comm, **mesh)
+    assert np.abs(found / ARC_OF_120_DEGREES_FINE.value - 1).max() < error and taken < dofs
+
+
+@pytest.mark.parametrize(("order", "rate"), [(1, 1.7), (2, 3.0)])
+def test_arcs_converge_as_bonded_cells_do(comm, order, rate):
+    """Without grading the rate is 1, whatever the order."""
+    errors = [
+        np.abs(
+            arc_of_120_degrees(comm, order=order, mesh_size=0.1, refine=refine)[0] / ARC_OF_120_DEGREES_FINE.value - 1
+        )
+        for refine in (0, 1)
+    ]
+    assert np.log2(errors[0].max() / errors[1].max()) > rate
+    of_one_size = [
+        arc_of_120_degrees(comm, order=order, mesh_size=0.1, tip_size=0.1, refine=refine)[0] for refine in (0, 1)
+    ]
+    errors = [np.abs(found / ARC_OF_120_DEGREES_FINE.value - 1).max() for found in of_one_size]
+    assert 0.8 < np.log2(errors[0] / errors[1]) < 1.3
 
 
 @pytest.mark.parametrize("order", [1, 2])

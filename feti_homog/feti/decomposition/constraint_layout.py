@@ -25,7 +25,6 @@ class InterfaceNodes:
         length: (k,) tributary interface length: traction = nodal force / length.
         fibre: (k,) constituent.
         bodies: (k, 2) the body around the fibre, and the fibre's own.
-        vertex: (k,) whether the node is one of the coarse mesh.
         precracked: (k,) whether the mesh has it debonded from the start.
         fibre_node: (k,) the fibre's copy among the fine nodes of this rank.
     """
@@ -36,7 +35,6 @@ class InterfaceNodes:
     length: Float
     fibre: Int
     bodies: Int
-    vertex: Bool
     precracked: Bool
     fibre_node: Int
 
@@ -159,7 +157,6 @@ class ConstraintLayout:
             length=share * shared.length[entity] / m,
             fibre=shared.fibre[entity],
             bodies=shared.body[np.stack([shared.pointer[entity], shared.pointer[entity + 1] - 1], axis=1)],
-            vertex=~shared.is_edge[entity],
             precracked=shared.precracked[entity],
             fibre_node=copy,
         )

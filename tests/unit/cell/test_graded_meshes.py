@@ -1,4 +1,5 @@
-"""Meshes that are finer on interfaces: sizes as asked for, bounded growth, and no more elements than that takes.
+"""Meshes that are finer on interfaces and at tips: sizes as asked for, bounded growth, no more elements than that
+takes.
 
 That they are meshes at all, periodic and of good triangles, `test_gmsh_mesher.py` holds for them too.
 """
@@ -10,7 +11,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support.circular_cells import cell
+from unit.cell.test_gmsh_mesher import least_angle
 
+from feti_homog.cell import element_estimate
 from feti_homog.cell.arrangement import arrange
 from feti_homog.cell.gmsh_mesher import generate
 from feti_homog.cell.size_field import MAX_GROWTH
@@ -85,5 +88,74 @@ def test_the_size_of_the_mesh_asks_for_no_grading():
 
 @pytest.mark.parametrize("geometry", ["square", "random"])
 def test_what_would_take_hours_is_refused(geometry):
-    with pytest.raises(MeshError, match=r"interface_size = 1e-05: about .* elements before refine; expected at most"):
+    with pytest.raises(
+        MeshError, match=r"interface_size = 1e-05, fibres = 16: about .* elements before refine; expected at most"
+    ):
         generate(cell(geometry, interface_size=1e-5))
+
+
+MARKS = {0: (30.0, 150.0, 170.0), 1: (-170.0, 45.0), 4: (90.0,)}
+
+
+def at_marks(mesh, arrangement, marks):
+    """For each mark its place (2,) and the lengths of the edges on the circle that meet in its vertex on the torus."""
+    lengths, size = edge_lengths(mesh), mesh.period
+    for fibre, own in marks.items():
+        for angle in np.radians(own):
+            place = arrangement.centres[fibre] + arrangement.radii[fibre] * np.array([np.cos(angle), np.sin(angle)])
+            away = (mesh.points - place + size / 2) % size - size / 2
+            vertex = np.argmin(np.linalg.norm(away, axis=1))
+            assert np.linalg.norm(away[vertex]) < 1e-12
+            same = np.flatnonzero(mesh.representative == mesh.representative[vertex])
+            yield place, lengths[np.isin(mesh.arc_edges, same).any(axis=1)]
+
+
+@pytest.mark.parametrize("interface", [None, 0.01])
+@pytest.mark.parametrize("size", [5e-3, 5e-4, 1e-5])
+def test_edges_at_tips_are_as_long_as_asked(interface, size):
+    case = replace(WIDE_GAPS, tip_size=size, interface_size=interface)
+    mesh, arrangement = generate(case, MARKS), arrange(case)
+    lengths = [own for _, own in at_marks(mesh, arrangement, MARKS)]
+    assert all(len(own) == 2 and 0.85 * size < own.min() <= own.max() <= size * (1 + 1e-6) for own in lengths)
+    assert np.mean(lengths) > 0.93 * size
+    # The same behind a tip as before it.
+    assert max(own.max() / own.min() for own in lengths) < 1.15
+
+
+@pytest.mark.parametrize("case", [replace(SQUARE, tip_size=1e-5), replace(WIDE_GAPS, tip_size=1e-4)])
+def test_elements_grow_with_the_distance_from_the_tip(case):
+    marks = {0: (30.0, 150.0)}
+    mesh, arrangement = generate(case, marks), arrange(case)
+    centroids, mean = mesh.points[mesh.triangles].mean(axis=1), sides(mesh).mean(axis=1)
+    away = [
+        np.linalg.norm((centroids - place + 0.5) % 1.0 - 0.5, axis=1) for place, _ in at_marks(mesh, arrangement, marks)
+    ]
+    asked = np.minimum(case.mesh_size, case.tip_size + MAX_GROWTH * np.min(away, axis=0))
+    assert (mean < 1.8 * asked).all() and (mean[asked < case.mesh_size] > 0.4 * asked[asked < case.mesh_size]).all()
+    assert least_angle(mesh.points, mesh.triangles).min() > 18
+
+
+def test_a_tip_takes_as_many_elements_as_is_estimated():
+    """Logarithmically few: a tenth of the size, 2 pi ln(10) / (A g^2) triangles more at each."""
+    marks, sizes = {0: (0.0, 120.0)}, (5e-3, 5e-4, 5e-5, 5e-6)
+    counts = np.array([len(generate(replace(SQUARE, tip_size=size), marks).triangles) for size in sizes])
+    estimates = [element_estimate.triangles_of_a_tip(0.05 / size) for size in sizes]
+    per_tip = (counts - len(generate(SQUARE, marks).triangles)) / 2
+    assert np.all((per_tip > 0.7 * np.array(estimates)) & (per_tip < 2 * np.array(estimates)))
+    ratios = [element_estimate.ratio_at_a_tip(estimate) for estimate in estimates]
+    assert ratios == pytest.approx([0.05 / size for size in sizes], rel=0.02)
+
+
+@pytest.mark.parametrize("geometry", ["square", "random"])
+def test_without_arcs_tips_have_no_size(geometry):
+    plain, same = (generate(cell(geometry, tip_size=size)) for size in (None, 1e-5))
+    assert np.array_equal(plain.points, same.points) and np.array_equal(plain.triangles, same.triangles)
+
+
+def test_tips_that_would_take_hours_are_refused():
+    case, marks = (
+        cell(fibres=1000, tip_size=1e-6, size=0.01),
+        {fibre: tuple(range(0, 360, 30)) for fibre in range(1000)},
+    )
+    with pytest.raises(MeshError, match=r"tip_size = 1e-06, fibres = 1000: about .* elements before refine; expected"):
+        generate(case, marks)

@@ -41,6 +41,8 @@ def cells(draw: st.DrawFn) -> dict[str, Any]:
         )
     )
     cell |= draw(optional(interface_size=st.floats(1e-5, cell.get("mesh_size", 0.05))))
+    around = cell.get("interface_size", cell.get("mesh_size", 0.05))
+    cell |= draw(optional(tip_size=st.floats(1e-6, around)))
     limit = TOUCHING[geometry]
     if geometry == "random":
         cell |= draw(optional(seed=st.integers(0, 2**40), radius_spread=numbers(0.0, 0.5)))

@@ -21,6 +21,8 @@ BARE_ARC = "[interface]\ndebonded = [{fibre = 1}]"
 
 
 # name: (content of the file, words that must stand in its faults)
+SPRINGS = "normal_stiffness = 10.0\ntangential_stiffness = 5.0"
+
 FAULTY_BONDINGS: dict[str, tuple[str, tuple[str, ...]]] = {
     # [interface]
     "interface_is_a_number": (
@@ -58,6 +60,41 @@ FAULTY_BONDINGS: dict[str, tuple[str, tuple[str, ...]]] = {
     "unknown_criterion": (
         of_type("path", PATH, "[interface]", 'criterion = "mohr"'),
         ('[interface] criterion = "mohr": expected one of "max", "quadratic"',),
+    ),
+    "energy_of_glue": (
+        of_type("path", PATH, "[interface]", 'criterion = "energy"', "toughness = 1.0"),
+        (
+            '[interface] normal_stiffness: missing; criterion = "energy" needs it',
+            '[interface] tangential_stiffness: missing; criterion = "energy" needs it',
+        ),
+    ),
+    "energy_and_a_strength": (
+        of_type(
+            "path", PATH, "[interface]", SPRINGS, 'criterion = "energy"', "toughness = 1.0", "normal_strength = 1.0"
+        ),
+        ('[interface] normal_strength: belongs to criterion = "max" or "quadratic", not "energy"',),
+    ),
+    "energy_without_toughness": (
+        of_type("path", PATH, "[interface]", SPRINGS, 'criterion = "energy"'),
+        ("[interface] toughness: missing; expected",),
+    ),
+    "toughness_of_a_strength": (
+        of_type("path", PATH, "[interface]", SPRINGS, "toughness = 1.0"),
+        ("[interface] toughness = 1.0: belongs to ",),
+    ),
+    "growth_of_a_strength": (
+        of_type("path", PATH, "[interface]", 'growth = "springs"'),
+        ('[interface] growth = "springs": belongs to ',),
+    ),
+    "mode_sensitivity_above_one": (
+        of_type(
+            "path", PATH, "[interface]", SPRINGS, 'criterion = "energy"', "toughness = 1", "mode_sensitivity = 1.5"
+        ),
+        ("[interface] mode_sensitivity = 1.5: expected",),
+    ),
+    "stiffness_zero": (
+        of_type("path", PATH, "[interface]", "normal_stiffness = 0.0"),
+        ("[interface] normal_stiffness = 0.0: expected",),
     ),
     "strength_mistyped": (
         of_type("path", PATH, "[interface]", "normal_strenght = 1.0"),

@@ -102,6 +102,14 @@ FAULTY_CASES: dict[str, tuple[str, tuple[str, ...]]] = {
         changed((MESH_CELL[0], MESH_CELL[1] + "\ninterface_size = 0.01")),
         ('[cell] interface_size = 0.01: belongs to geometry = "square" or "hexagonal" or "random", not "mesh"',),
     ),
+    "tip_size_above_mesh_size": (
+        cell("= 0.05", "= 0.05\ntip_size = 0.06"),
+        ("[cell] tip_size = 0.06: expected at most mesh_size, which is 0.05",),
+    ),
+    "tip_size_above_interface_size": (
+        cell("= 0.05", "= 0.05\ninterface_size = 0.02\ntip_size = 0.03"),
+        ("[cell] tip_size = 0.03: expected at most interface_size, which is 0.02",),
+    ),
     "refine_negative": (
         cell("mesh_size", "refine = -1\nmesh_size"),
         ("[cell] refine = -1: expected an integer at least 0",),

@@ -32,9 +32,9 @@ def test_keys_that_are_left_out_have_their_defaults(tmp_path):
     case = case_of(tmp_path, BASE.replace("mesh_size = 0.05\n", ""))
     assert case.name == "cell"
     assert dataclasses.asdict(case.cell) == {
-        "geometry": "hexagonal", "fibre_fraction": 0.4, "mesh_size": 0.05, "interface_size": None, "refine": 0,
-        "order": 1, "bodies": "torus", "fibres": None, "width": None, "fibre_radius": None, "min_gap": 0.05, "seed": 0,
-        "radius_spread": 0.0, "file": None,
+        "geometry": "hexagonal", "fibre_fraction": 0.4, "mesh_size": 0.05, "interface_size": None, "tip_size": None,
+        "refine": 0, "order": 1, "bodies": "torus", "fibres": None, "width": None, "fibre_radius": None,
+        "min_gap": 0.05, "seed": 0, "radius_spread": 0.0, "file": None,
     }  # fmt: skip
     assert list(case.materials.items()) == [
         ("matrix", Isotropic(88.0, 0.299)),

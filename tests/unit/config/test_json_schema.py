@@ -27,6 +27,7 @@ BETWEEN_NUMBERS = {
     "orthotropic_unstable", "orthotropic_unstable_third", "stiffness_not_symmetric", "stiffness_indefinite",
     "angle_strain_zero", "path_to_zero", "waypoints_begin_at_zero", "waypoints_repeated", "increments_too_few",
     "interface_size_above_mesh_size", "interface_size_above_the_default_mesh_size",
+    "tip_size_above_mesh_size", "tip_size_above_interface_size",
 }  # fmt: skip
 NOT_IN_JSON = {"fraction_is_nan", "strength_is_nan", "path_strain_nan"}
 INTEGER_TO_JSON = {"refine_is_real"}

@@ -13,12 +13,19 @@ VALID_CASES = {
     + BASE
     + "[decomposition]\nmax_dofs = 5000\n[petsc]\nfeti_ksp_rtol = 1e-8\nfeti_view = true\n",
     "random": changed(('geometry = "hexagonal"\n', RANDOM + "seed = 7\nradius_spread = 0.2\n")),
-    "fine interfaces": changed(("mesh_size = 0.05", "mesh_size = 0.05\ninterface_size = 0.05")),
+    "fine interfaces": changed(("mesh_size = 0.05", "mesh_size = 0.05\ninterface_size = 0.05\ntip_size = 1e-5")),
     "mesh of three phases": MESH + '[material."fibre:2"]\nstiffness = [[3, 1, 0], [1, 3, 0], [0, 0, 1]]\n',
     "orthotropic": fibre("E1 = 10.0\nE2 = 5.0\nE3 = 5.0\nnu12 = 0.3\nnu13 = 0.3\nnu23 = 0.2\nG12 = 2.0\nangle = 30\n"),
     "output": BASE + '[output]\nfields = false\nstress = "S12"\ndeformation_scale = 2\nlength_unit = "µm"\n',
     "arc": BASE + f"[interface]\ndebonded = [{ARC}]\n",
     "no arc": BASE + "[interface]\ncontact = false\ndebonded = []\n",
+    "springs": BASE + "[interface]\nnormal_stiffness = 10.0\n",
+    "energy": of_type(
+        "path",
+        PATH,
+        "[interface]\nnormal_stiffness = 10\ntangential_stiffness = 5",
+        'criterion = "energy"\ntoughness = 2\ngrowth = "springs"\nmode_sensitivity = 0',
+    ),
     "curve of a mesh": MESH + "[interface]\n",
     "angle": of_type("angle", ANGLE, BARE_ARC, "contact = false"),
     "angle under a strain": of_type(

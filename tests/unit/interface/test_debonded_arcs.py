@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from feti_homog.config.sections import Arc
-from feti_homog.interface.debonded_arcs import angles, debonded, tips
+from feti_homog.interface.debonded_arcs import angles, debonded, moved_tips, tips
 
 ROUND = np.arange(0.0, 360.0, 10.0)
 
@@ -73,8 +73,18 @@ def test_a_node_near_a_tip_is_the_tip():
     near = 30.0 + np.array([-1e-3, -1e-7, 0.0, 1e-7])
     arcs, fibre = [Arc(fibre="all", angle=60.0)], np.ones(4, int)
     assert debonded(arcs, None, fibre, near).tolist() == [True, False, False, False]
-    wider = debonded(arcs, None, fibre, near, np.array([1e-2, 0.0, 0.0, 0.0]))
-    assert wider.tolist() == [False, True, False, False]
+
+
+def test_an_arc_ends_where_the_mesh_has_its_tips():
+    """Vertices at 29.99 and -30.02 in place of 30 and -30 of fibre 1; those of fibre 2 are where they should be."""
+    fibre = np.array([1, 1, 1, 1, 2, 2])
+    direction = np.array([29.99, -30.02, 29.98, -30.01, 30.0, 330.0])
+    marks = tips([Arc(fibre="all", angle=60.0)], (), 2)
+    moved = moved_tips(marks, fibre, direction, 0.05)
+    assert moved == {(1, 30.0): pytest.approx(29.99), (1, 330.0): pytest.approx(329.99)}
+    inside = debonded([Arc(fibre="all", angle=60.0)], None, fibre, direction, moved)
+    assert inside.tolist() == [False, False, True, False, False, False]
+    assert moved_tips(marks, fibre, direction, 0.005) == {}
 
 
 def test_no_arcs_no_debonding():

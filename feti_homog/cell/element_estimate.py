@@ -1,0 +1,69 @@
+"""About how many triangles a mesh of round fibres will have, before it is made."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from feti_homog.cell.arrangement import FIBRES_OF
+from feti_homog.cell.size_field import MAX_GROWTH, MIN_EDGES_AROUND
+
+if TYPE_CHECKING:
+    from feti_homog.config.cell_section import Cell
+
+# Area of an equilateral triangle / its side squared.
+TRIANGLE_AREA = math.sqrt(3.0) / 4.0
+# Triangles about a fibre of a random cell, whose gaps are narrow.
+TRIANGLES_OF_A_FIBRE = 160
+# Ratios of sizes beyond those that a case can ask for.
+RATIOS = np.geomspace(1.0, 1e7, 400)
+
+
+def fibres_of(cell: Cell) -> int:
+    """Number of fibres."""
+    return cell.fibres or FIBRES_OF[cell.geometry]
+
+
+def mean_radius(cell: Cell) -> float:
+    """Mean radius of the fibres / width of the cell."""
+    assert cell.fibre_fraction is not None
+    return math.sqrt(cell.fibre_fraction * _height(cell) / (math.pi * fibres_of(cell)))
+
+
+def interface_size(cell: Cell) -> float:
+    """Size of elements on interfaces / width of the cell."""
+    return min(cell.interface_size or cell.mesh_size, 2 * math.pi * mean_radius(cell) / MIN_EDGES_AROUND)
+
+
+def triangles(cell: Cell) -> float:
+    """Those of a cell without debonded arcs: of one size, about fibres, and beside fine interfaces.
+
+    On both sides of circles of the length P there are 2 P int dx / (A (h + g x)^2) = 2 P / (A g h) triangles.
+    """
+    count = _height(cell) / (TRIANGLE_AREA * cell.mesh_size**2) + TRIANGLES_OF_A_FIBRE * (cell.fibres or 0)
+    if cell.interface_size is None:
+        return count
+    length = 2 * math.pi * mean_radius(cell) * fibres_of(cell)
+    return count + 2 * length / (TRIANGLE_AREA * MAX_GROWTH * cell.interface_size)
+
+
+def triangles_of_a_tip(ratio: np.float64 | float) -> float:
+    """Those that a tip adds where elements are smaller by `ratio` than around.
+
+    int 2 pi r dr / (A (h + g r)^2) up to the radius at which h + g r is the size of the others, less those of this.
+    """
+    within = 2 * (np.log(ratio) + 1 / ratio - 1) - (1 - 1 / ratio) ** 2
+    return float(math.pi / (TRIANGLE_AREA * MAX_GROWTH**2) * within)
+
+
+def ratio_at_a_tip(count: float) -> float:
+    """How much smaller elements at a tip may be than around, if it is to add no more triangles than `count`."""
+    counts = [triangles_of_a_tip(ratio) for ratio in RATIOS]
+    return float(np.interp(count, counts, RATIOS))
+
+
+def _height(cell: Cell) -> float:
+    """Height / width of the cell."""
+    return math.sqrt(3.0) if cell.geometry == "hexagonal" else 1.0

@@ -1,0 +1,43 @@
+"""The tips of debonded arcs in the cells that the program meshes: where they are, and how fine the mesh is there."""
+
+from __future__ import annotations
+
+from feti_homog.cell import element_estimate
+from feti_homog.config.case import Case
+from feti_homog.interface import debonded_arcs
+
+# The stress at a tip is singular, so that the energy errs by about the size of the elements there, elsewhere by
+# h^(2 order). At this share of a balance the tips err no more than the rest (`scripts/measure_tips.py`).
+TIP_SHARE = 0.5
+# Where one mesh has the tips of many openings, of which one at a time is there: triangles that all tips together add by
+# default / those of the mesh without them, at most.
+TIP_TRIANGLES = 2.0
+# Size at tips / width of the cell by default, at least.
+LEAST_SIZE = 1e-5
+
+
+def directions(case: Case) -> dict[int, list[float]]:
+    """Directions in [0, 360) of the tips of all arcs, at all their openings, by the fibre's number from 0."""
+    openings = case.angle.values if case.angle else ()
+    return debonded_arcs.tips(case.arcs, openings, element_estimate.fibres_of(case.cell))
+
+
+def size(case: Case) -> float | None:
+    """Element size at tips / width of the cell, None for that of the interface: what the case says, or by default
+
+        h_t = 2^refine R (h / R)^(2 order) / 2,  h = interface_size / 2^refine,
+
+    with R the mean radius / width; but with several openings not so small that their tips took more than TIP_TRIANGLES.
+    Along paths tips move, and only what the case says counts.
+    """
+    cell, tips = case.cell, sum(len(own) for own in directions(case).values())
+    if cell.tip_size is not None or case.analysis.type == "path" or not tips:
+        return cell.tip_size
+    radius, around = element_estimate.mean_radius(cell), element_estimate.interface_size(cell)
+    fine = around / 2**cell.refine
+    balanced: float = TIP_SHARE * 2**cell.refine * radius * (fine / radius) ** (2 * cell.order)
+    wanted = max(balanced, LEAST_SIZE)
+    if case.angle is not None and len(case.angle.values) > 1:
+        share = TIP_TRIANGLES * element_estimate.triangles(cell) / tips
+        wanted = max(wanted, around / element_estimate.ratio_at_a_tip(share))
+    return min(around, wanted)

@@ -1,0 +1,56 @@
+"""The drivers of debonding by energy run, draw, and meet what is known exactly."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.image import imread
+from support.jobs import mpirun
+
+# MPa: onset of the square cell of `mesh_objectivity`, the spectral solution of tests/parallel/test_energy.py.
+ONSET_STRESS = 66.83636
+
+
+def driven(name: str, folder: Path) -> list[dict[str, str]]:
+    """Run a driver and return its table."""
+    job = mpirun(2, f"drivers/{name}.py", "--quick", "--out", folder)
+    assert job.returncode == 0, job.stderr
+    assert job.stdout.split()[-2:] == [str(folder / f"{name}.csv"), str(folder / f"{name}.png")]
+    picture = imread(folder / f"{name}.png")
+    assert min(picture.shape[:2]) > 500 and picture[..., :3].std() > 0.05
+    with (folder / f"{name}.csv").open(encoding="utf-8") as stream:
+        return list(csv.DictReader(stream))
+
+
+def column(rows: list[dict[str, str]], name: str) -> np.ndarray:
+    return np.array([float(row[name]) for row in rows])
+
+
+def test_small_fibres_are_stronger_by_energy(tmp_path):
+    rows = driven("energy_debonding", tmp_path)
+    onset, exact = column(rows, "onset"), column(rows, "exact onset")
+    assert np.abs(onset / exact - 1.0).max() < 0.01
+    assert onset[0] > 1.1 * onset[1]
+    angle = column(rows, "debonding angle")
+    assert (angle > 20.0).all() and (angle < 80.0).all() and angle[0] < angle[1]
+
+
+def test_curves_by_energy_that_is_released_depend_little_on_the_mesh(tmp_path):
+    rows = driven("mesh_objectivity", tmp_path)
+    coarse, fine = ({row["bonds"]: row for row in rows[start::2]} for start in (0, 1))
+    for bonds in ("springs", "released"):
+        assert float(fine[bonds]["onset S11"]) == pytest.approx(ONSET_STRESS, rel=2e-3)
+    spread = {b: abs(float(coarse[b]["S11 at 1.5"]) / float(fine[b]["S11 at 1.5"]) - 1.0) for b in fine}
+    assert spread["released"] < 0.05 < spread["springs"] < spread["strength"]
+
+
+def test_cells_of_random_fibres_scatter(tmp_path):
+    rows = driven("transverse_strength", tmp_path)
+    peak, first = column(rows, "peak S11"), column(rows, "first break S11")
+    assert (peak >= first).all() and (peak > 40.0).all() and (peak < 100.0).all() and peak[0] != peak[1]
+    results = [json.loads(path.read_text()) for path in tmp_path.glob("seed_*/result.json")]
+    assert len(results) == 2 and all(result["status"] == "done" for result in results)

@@ -1,0 +1,64 @@
+"""How fine meshes are at tips by default: as fine as the rest is accurate, and no finer than many tips allow."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from feti_homog.cell import element_estimate
+from feti_homog.config import case as cases
+from feti_homog.homogenization import tips
+
+CELL = {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.05}
+RADIUS = np.sqrt(0.4 / np.pi)
+
+
+def case_of(kind="stiffness", values=None, arcs=({"fibre": "all", "angle": 120.0},), **cell):
+    arcs = [{name: value for name, value in arc.items() if values is None or name != "angle"} for arc in arcs]
+    document = {
+        "cell": CELL | cell,
+        "material": {"matrix": {"young": 88.0, "poisson": 0.3}, "fibre": {"young": 200.0, "poisson": 0.2}},
+        "analysis": {"type": kind, "plane": "strain"},
+        "interface": {"debonded": arcs},
+    }
+    given = {"angle": {"angle": {"values": values}}, "path": {"path": {"strain": [1.0, 0.0, 0.0]}}}
+    return cases.parse(document | given.get(kind, {}), Path())
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("refine", [0, 1, 2])
+def test_the_size_falls_as_the_error_of_the_rest(order, refine):
+    found = tips.size(case_of(order=order, refine=refine))
+    expected = 2**refine * RADIUS * (0.05 / 2**refine / RADIUS) ** (2 * order) / 2
+    assert found == pytest.approx(max(expected, 1e-5))
+
+
+def test_small_fibres_have_coarser_tips():
+    found = tips.size(case_of(geometry="random", fibres=16, order=2))
+    radius = RADIUS / 4
+    edge = 2 * np.pi * radius / 16
+    assert found == pytest.approx(radius * (edge / radius) ** 4 / 2) and found > 8 * tips.size(case_of(order=2))
+
+
+def test_a_fine_interface_has_finer_tips():
+    assert tips.size(case_of(interface_size=0.01)) == pytest.approx(tips.size(case_of(mesh_size=0.01)))
+
+
+def test_what_the_case_says_counts():
+    assert tips.size(case_of(tip_size=0.02)) == 0.02 and tips.size(case_of("path", tip_size=0.02)) == 0.02
+
+
+def test_tips_that_move_and_arcs_without_tips_are_not_graded():
+    assert tips.size(case_of("path")) is None and tips.size(case_of(arcs=())) is None
+    assert tips.size(case_of(arcs=({"fibre": 1, "angle": 360.0},))) is None
+
+
+def test_many_openings_share_twice_the_elements_of_the_rest():
+    """One opening of an angle has the tips of a stiffness; with 36 of them the mesh is three times as large."""
+    assert tips.size(case_of("angle", values=[120.0], order=2)) == tips.size(case_of(order=2))
+    case = case_of("angle", values=list(range(5, 181, 5)), order=2)
+    size = tips.size(case)
+    added = 72 * element_estimate.triangles_of_a_tip(0.05 / size)
+    assert added == pytest.approx(2 * element_estimate.triangles(case.cell), rel=0.01) and size > 0.005
