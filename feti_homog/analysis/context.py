@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from feti_homog.common.progress import Progress
 from feti_homog.homogenization import process_zone
 from feti_homog.homogenization.averaging import Homogenization, Response
+from feti_homog.homogenization.fibre_debonding import FibreInterfaces
 from feti_homog.interface.contact import OPEN, Status
 from feti_homog.typing import Float
 
@@ -38,7 +40,8 @@ class AnalysisContext:
         iterations, reasons: of every dual solve so far.
         checks: largest error of each law so far.
         faults: what did not converge or hold, in words.
-        states: which points of a path to record, `kept_points.kept`; None: none.
+        states: which points of a path to keep, `kept_points.kept`.
+        keeps_fields: whether states are to be recorded.
         log: called with a line about each event of a path.
     """
 
@@ -50,7 +53,8 @@ class AnalysisContext:
     reasons: list[int] = field(default_factory=list)
     checks: dict[str, float] = field(default_factory=dict)
     faults: list[str] = field(default_factory=list)
-    states: int | str | None = None
+    states: int | str = "all"
+    keeps_fields: bool = False
     log: Callable[[str], object] = lambda line: None
 
     def status(self, opening: float | None) -> Status:
@@ -117,6 +121,17 @@ class AnalysisContext:
         return np.stack([sign * r.stress for r in responses], axis=1), responses
 
     def point(self, responses: Sequence[Response]) -> dict[str, Any]:
-        """The numbers of a point of a list in result.json: states of its last response, all iterations."""
-        counts = responses[-1].counts if responses else {}
-        return counts | {"iterations": sum(r.state.iterations for r in responses)}
+        """The numbers of a point of a list in result.json: states of its last response, all iterations.  Collective."""
+        last = responses[-1]
+        length = self.fibre_interfaces.debonded_length(last.state.status)
+        debonding = {
+            "debonded_share": self.fibre_interfaces.share(length),
+            "debonded_length": length,
+            "debonding_angle": self.fibre_interfaces.angle(length),
+        }
+        return debonding | last.counts | {"iterations": sum(r.state.iterations for r in responses)}
+
+    @cached_property
+    def fibre_interfaces(self) -> FibreInterfaces:
+        """Those of the cell.  Collective."""
+        return FibreInterfaces(self.homogenization.cell)

@@ -97,11 +97,12 @@ class Result:
     def points(self) -> dict[str, NDArray[Any]]:
         """Arrays over the n points of an angle or a path by name, empty for other analyses.
 
-        `angle` or `load_factor` (n,), `strain` and `stress` (n, 3), `stiffness` (n, 3, 3), `bonded`, `open`,
-        `closed`, ... (n,).
+        `angle` or `load_factor` (n,), `strain` and `stress` (n, 3), `stiffness` (n, 3, 3), `debonded_length` (n, f),
+        `bonded`, `open`, `closed`, ... (n,); NaN where a point has no such number.  The tips are in the points alone.
         """
         documents = [plain(point) for point in (*(self.angle or ()), *(self.path or ()))]
-        return {name: np.array([point[name] for point in documents]) for name in (documents[0] if documents else ())}
+        names = dict.fromkeys(name for point in documents for name in point if name != "tips")
+        return {name: np.array([point.get(name, np.nan) for point in documents]) for name in names}
 
     def rising_strain(self) -> Float:
         """(v, 4) corners S11, S22, S12 and size of the leading strain along a path of one leg, as a test with rising

@@ -13,6 +13,12 @@ from feti_homog.mechanics.bounds import Bounds
 from feti_homog.mechanics.voigt import STIFFNESSES, STRAINS, STRESSES
 from feti_homog.typing import Float
 
+ENERGY = f"{STRESS} times that of the cell"
+DEBONDED_ANGLE = (
+    "the same in degrees of arc, `debonded_length` / radius; of a fibre that is not round 360 times the share of its "
+    "interface"
+)
+
 
 @dataclass(frozen=True)
 class CellInfo:
@@ -91,6 +97,23 @@ class StiffnessBounds:
     hashin_shtrikman: Bounds | None = described("bounds of isotropic composites; null if a phase is not isotropic")
 
 
+@dataclass(frozen=True, eq=False)  # arrays have no single answer to "equal"
+class Tips:
+    """The t tips of debonding at a point, bonds that hold beside broken ones, by fibre and direction.
+
+    What drives them is an energy per area, compared with G_c(psi): that of their spring or, where `growth` is
+    "released", what their break would release.
+    """
+
+    fibre: tuple[int, ...] = described("number of the fibre of each tip")
+    angle: Float = described(
+        "direction from the fibre's centre; of a fibre without centre that of its normal", DEGREES, "(t,)"
+    )
+    G_I: Float = described("what drives each tip by opening, with G_II / G_I = tan^2 psi", ENERGY, "(t,)")
+    G_II: Float = described("what drives it by shear", ENERGY, "(t,)")
+    psi: Float = described("mode of its traction: 0 opens, 90 shears", DEGREES, "(t,)")
+
+
 @dataclass(frozen=True, kw_only=True)
 class AnglePoint:
     """The response at one debonding angle."""
@@ -99,6 +122,11 @@ class AnglePoint:
     stiffness: Float | None = described("L^ef, if no strain is given", STRESS, "(3, 3)", STIFFNESSES, default=None)
     strain: Float | None = described("macroscopic strain that is given", "", "(3,)", STRAINS, default=None)
     stress: Float | None = described("macroscopic stress under it", STRESS, "(3,)", STRESSES, default=None)
+    stored: float | None = described("energy stored under it per area of the cell", STRESS, default=None)
+    stored_in_springs: float | None = described("the share of elastic interfaces in it", STRESS, default=None)
+    debonded_share: float = described("debonded share of the length of all interfaces")
+    debonded_length: Float = described("debonded length of each fibre's interface", LENGTH, "(f,)")
+    debonding_angle: Float = described(DEBONDED_ANGLE, DEGREES, "(f,)")
     bonded: int = described("bonded interface nodes")
     open: int = described("debonded interface nodes without contact")
     closed: int = described("debonded interface nodes in contact")
@@ -119,8 +147,25 @@ class PathPoint:
     )
     broke: int = described("bonds that break at this event, or broke in the step to this increment")
     free_motions: int = described("rigid motions of fibres that no interface force resists")
+    stored: float = described("energy stored per area of the cell, E.Sigma / 2", STRESS)
+    stored_in_springs: float = described("the share of elastic interfaces in it", STRESS)
     dissipated: float = described("energy lost to breaks so far per area of the cell, along all equilibria", STRESS)
     dissipated_strain_controlled: float = described("the same if the strain only rises on the first leg", STRESS)
+    fracture_energy: float | None = described(
+        "toughness of the bonds that the load broke so far, each in the mode in which it broke, times their lengths, "
+        "per area of the cell; of bonds that break by energy",
+        STRESS,
+        default=None,
+    )
+    dissipation_ratio: float | None = described(
+        "`dissipated` / `fracture_energy`, once there is any; 1 of bonds that lose their toughness alone", default=None
+    )
+    debonded_share: float = described("debonded share of the length of all interfaces")
+    debonded_length: Float = described("debonded length of each fibre's interface", LENGTH, "(f,)")
+    debonding_angle: Float = described(DEBONDED_ANGLE, DEGREES, "(f,)")
+    tips: Tips | None = described(
+        "of bonds that break by energy, at the points that `states` in [output] chooses", default=None
+    )
     bonded: int = described("bonded interface nodes")
     open: int = described("debonded interface nodes without contact")
     closed: int = described("debonded interface nodes in contact")

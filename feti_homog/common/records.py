@@ -122,6 +122,11 @@ def keys(kind: type, above: str = "") -> Iterator[Key]:
             yield from keys(item, f"{path}[].")
 
 
+def is_record(hint: Any) -> bool:
+    """Whether a field of this type holds a record, or may."""
+    return dataclasses.is_dataclass(_without_none(hint))
+
+
 def _restored_value(hint: Any, value: Any) -> Any:
     hint = _without_none(hint)
     if value is None:

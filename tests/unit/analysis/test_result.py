@@ -10,13 +10,26 @@ import pytest
 
 from feti_homog import Result
 from feti_homog.analysis.result import schema_keys
-from feti_homog.analysis.result_records import AnglePoint, CellInfo, Checks, PathPoint, SolverInfo, StiffnessBounds
+from feti_homog.analysis.result_records import (
+    AnglePoint,
+    CellInfo,
+    Checks,
+    PathPoint,
+    SolverInfo,
+    StiffnessBounds,
+    Tips,
+)
 from feti_homog.mechanics.bounds import Bounds, engineering_moduli
 from feti_homog.output.files import csv_tables, result_json
 
 STIFFNESS = np.array([[9.0, 2.0, 0.0], [2.0, 8.0, 0.0], [0.0, 0.0, 3.0]])
 CELL = CellInfo(1.0, 2.0, 2.0, 0.4, {"matrix": 0.6, "fibre": 0.4}, 10, 20)
 SOLVER = SolverInfo(1, 2, 3, 40, 50, 6, 7, 8, 3, 1, 1e-8, 3, (5, 6, 7), (2, 2, 2))
+DEBONDING = {
+    "debonded_share": 0.5,
+    "debonded_length": np.array([0.5, 0.0]),
+    "debonding_angle": np.array([90.0, 0.0]),
+}
 COUNTS = {"bonded": 5, "open": 3, "closed": 1, "iterations": 7}
 
 
@@ -30,6 +43,12 @@ def path_point(load: float) -> PathPoint:
         free_motions=0,
         dissipated=0.5,
         dissipated_strain_controlled=0.6,
+        stored=0.4,
+        stored_in_springs=0.1,
+        fracture_energy=0.4 * load,
+        dissipation_ratio=None if load < 1 else 1.25,
+        tips=None if load < 1 else Tips((1, 2), *np.arange(8.0).reshape(4, 2)),
+        **DEBONDING,
         **COUNTS,
     )
 
@@ -54,7 +73,9 @@ RESULTS = {
         "stiffness", effective_stiffness=STIFFNESS, moduli=engineering_moduli(STIFFNESS),
         bounds=StiffnessBounds(voigt=2 * STIFFNESS, reuss=0.5 * STIFFNESS, hashin_shtrikman=None),
     ),
-    "angle": made("angle", angle=tuple(AnglePoint(angle=a, stiffness=STIFFNESS, **COUNTS) for a in (0.0, 90.0))),
+    "angle": made(
+        "angle", angle=tuple(AnglePoint(angle=a, stiffness=STIFFNESS, **DEBONDING, **COUNTS) for a in (0.0, 90.0)),
+    ),
     "path": made("path", path=(path_point(0.5), path_point(1.0)), resumed=0),
 }  # fmt: skip
 
@@ -100,15 +121,20 @@ def test_columns_are_those_of_the_table(tmp_path, kind, points):
     described = [column.name for column in csv_tables.columns(kind)]
     written = header.split(",")
     assert [name for name in described if name in written] == written and len(rows) == len(points)
+    assert not {"tips", "debonded_length", "fibre"} & {*written, *described}
     if kind is PathPoint:
         assert written[1:7] == ["E11", "E22", "gamma12", "S11", "S22", "S12"] and "free_motions" in written
+        column = written.index("dissipation_ratio")
+        assert [row.split(",")[column] for row in rows] == ["", "1.25"]
 
 
 def test_points_are_arrays():
     points = RESULTS["path"].points
     assert points["strain"].shape == (2, 3) and points["load_factor"].tolist() == [0.5, 1.0]
     assert RESULTS["angle"].points["stiffness"].shape == (2, 3, 3) and "strain" not in RESULTS["angle"].points
-    assert not RESULTS["stiffness"].points
+    assert not RESULTS["stiffness"].points and "tips" not in points
+    np.testing.assert_array_equal(points["dissipation_ratio"], [np.nan, 1.25])
+    assert points["debonded_length"].shape == (2, 2)
 
 
 def test_results_can_be_told_apart():

@@ -134,7 +134,8 @@ def test_an_angle_is_a_table_of_stiffnesses() -> None:
 def test_a_path_is_a_table_of_chosen_points() -> None:
     points = [
         counted(100 - k, load_factor=0.01 * k, strain=[0, -2e-3 * k, 1e-5], stress=[1e-15, -3.5 * k, -2.0], broke=1,
-                dissipated=0.5 * k, dissipated_strain_controlled=0.6 * k)
+                dissipated=0.5 * k, dissipated_strain_controlled=0.6 * k, stored=0.7 * k, stored_in_springs=0.1 * k,
+                fracture_energy=0.4 * k, dissipation_ratio=1.25, debonded_share=0.005 * k)
         for k in range(101)
     ]  # fmt: skip
     document = changed(path=points, kkt_tolerance=1e-6)
@@ -146,6 +147,9 @@ def test_a_path_is_a_table_of_chosen_points() -> None:
     assert max(map(len, text.splitlines())) < 80
     assert "101 points, 15 shown; 101 bonds broke" in text
     assert line(text, "Dissipated").endswith("per area (GPa): 50 along all equilibria, 60 if the strain only rises")
+    assert line(text, "Stored").endswith("per area (GPa): 70, 10 of it in springs")
+    assert line(text, "Toughness").endswith("per area (GPa): 40; 1.2500 times it was dissipated")
+    assert line(text, "Debonded") == "Debonded: 50.0 % of the interfaces"
     rows = [words.split() for words in text.splitlines() if words[:5].strip().isdigit()]
     assert len(rows) == 15
     assert rows[0] == ["0", "0.000000", "0", "0", "0", "-2", "100", "9", "1"]
