@@ -10,16 +10,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from feti_homog.analysis.result_records import TipInfo
+from feti_homog.analysis.result_records import TipRates
 from feti_homog.common.progress import Progress
 from feti_homog.homogenization import process_zone
 from feti_homog.homogenization.averaging import Homogenization, Response
-from feti_homog.homogenization.energy_release import TipEnergies
+from feti_homog.homogenization.energy_release import EnergyReleaseRates
+from feti_homog.homogenization.fibre_debonding import FibreInterfaces
 from feti_homog.interface.contact import OPEN, Status
 from feti_homog.typing import Float
 
 UNIT_CASES = ("E11", "E22", "gamma12")
-TIP_COLUMNS = ("fibre", "direction", "G", "G_I", "G_II", "mode_angle", "length")
+EMPTY = np.zeros(0)
 
 # Largest relative error of a check that passes, in relative tolerances of the Krylov method: sums over the cell and
 # jumps of stiffness make so much of the solver's error.
@@ -42,7 +43,8 @@ class AnalysisContext:
         iterations, reasons: of every dual solve so far.
         checks: largest error of each law so far.
         faults: what did not converge or hold, in words.
-        states: which points of a path to record, `kept_points.kept`; None: none.
+        states: which points of a path to keep, `kept_points.kept`.
+        keeps_fields: whether states are to be recorded.
         log: called with a line about each event of a path.
     """
 
@@ -54,7 +56,8 @@ class AnalysisContext:
     reasons: list[int] = field(default_factory=list)
     checks: dict[str, float] = field(default_factory=dict)
     faults: list[str] = field(default_factory=list)
-    states: int | str | None = None
+    states: int | str = "all"
+    keeps_fields: bool = False
     log: Callable[[str], object] = lambda line: None
 
     def status(self, opening: float | None) -> Status:
@@ -121,22 +124,42 @@ class AnalysisContext:
         return np.stack([sign * r.stress for r in responses], axis=1), responses
 
     @cached_property
-    def _tip_energies(self) -> TipEnergies:
+    def _release_rates(self) -> EnergyReleaseRates:
         """Collective when first used."""
-        return TipEnergies(self.homogenization.cell, self.homogenization.interface)
+        return EnergyReleaseRates(self.homogenization.cell, self.homogenization.interface)
 
-    def tips(self, responses: Sequence[Response], loads: Sequence[str]) -> tuple[TipInfo, ...]:
+    def tips(self, responses: Sequence[Response], loads: Sequence[str]) -> TipRates:
         """Energy release rates at all tips under each load; none while all is bonded.  Collective."""
-        found = []
-        for response, load in zip(responses, loads, strict=True):
-            if response.counts["open"] + response.counts["closed"]:
-                at = self._tip_energies.of(response)
-                columns = (at.fibre, at.direction, at.total, *at.modes.T, at.mode_angle, at.length)
-                rows = zip(*(column.tolist() for column in columns), strict=True)
-                found += [TipInfo(load=load, **dict(zip(TIP_COLUMNS, row, strict=True))) for row in rows]
-        return tuple(found)
+        pairs = zip(responses, loads, strict=True)
+        debonded = [(r, load) for r, load in pairs if r.counts["open"] + r.counts["closed"]]
+        found = [(self._release_rates.of(response), load) for response, load in debonded]
+        columns = [(at.fibre, at.direction, at.total, *at.modes.T, at.mode_angle, at.length) for at, _ in found]
+        fibre, angle, G, G_I, G_II, psi, length = (
+            map(np.concatenate, zip(*columns, strict=True)) if found else [EMPTY] * 7
+        )
+        return TipRates(
+            load=tuple(load for at, load in found for _ in at.fibre),
+            fibre=tuple(int(number) for number in fibre),
+            angle=angle,
+            G=G,
+            G_I=G_I,
+            G_II=G_II,
+            psi=psi,
+            length=length,
+        )
 
     def point(self, responses: Sequence[Response]) -> dict[str, Any]:
-        """The numbers of a point of a list in result.json: states of its last response, all iterations."""
-        counts = responses[-1].counts if responses else {}
-        return counts | {"iterations": sum(r.state.iterations for r in responses)}
+        """The numbers of a point of a list in result.json: states of its last response, all iterations.  Collective."""
+        last = responses[-1]
+        length = self.fibre_interfaces.debonded_length(last.state.status)
+        debonding = {
+            "debonded_share": self.fibre_interfaces.share(length),
+            "debonded_length": length,
+            "debonding_angle": self.fibre_interfaces.angle(length),
+        }
+        return debonding | last.counts | {"iterations": sum(r.state.iterations for r in responses)}
+
+    @cached_property
+    def fibre_interfaces(self) -> FibreInterfaces:
+        """Those of the cell.  Collective."""
+        return FibreInterfaces(self.homogenization.cell)

@@ -34,6 +34,7 @@ def run(context: AnalysisContext, values: Sequence[float], strain: Float | None)
             responses = context.homogenization.respond(np.array([strain]), status, starts)
             context.progress.say(context.record_checks(label, responses[0]))
             point |= {"strain": responses[0].strain, "stress": responses[0].stress}
+            point |= {"stored": responses[0].stored, "stored_in_springs": responses[0].in_springs}
         for name, response in zip(UNIT_CASES if unit else ("",), responses, strict=True):
             context.record(response, 1.0, f"{label} {name}".strip(), number)
         starts = [r.state.solution.lam for r in responses]

@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 
 from feti_homog.analysis.context import AnalysisContext
-from feti_homog.analysis.path_events import Dissipation, Losses, restored, stored
+from feti_homog.analysis.path_events import Dissipation, Energies, restored, stored
+from feti_homog.analysis.tip_records import TipRecorder
 from feti_homog.common.event_progress import EVENTS_BAR, STEPS_BAR, EventProgress
 from feti_homog.config.sections import LoadPath
 from feti_homog.homogenization.averaging import Response
-from feti_homog.interface.bond_criterion import BondCriterion
+from feti_homog.interface.bond_criterion import BondCriterion, spring_criterion
 from feti_homog.interface.path_following import events, increments
 from feti_homog.interface.path_points import Point, unloaded
 from feti_homog.mechanics.kept_points import kept
@@ -27,26 +28,27 @@ def run(
 ) -> dict[str, Any]:
     """`path`, a list of points, one an event (or increment); each is checkpointed before the next is sought.
 
-    `states` has the numbers of the points whose fields are recorded, which are chosen when all are known.
+    `states` has the numbers of the points whose fields are recorded; which, is chosen when all are known.
     """
     known = _known(context, checkpoint, resume)
     dissipation, entries, last = Dissipation(), list[dict[str, Any]](), None
     with EventProgress(context.progress, BARS[path.method], event_log.NAME) as shown:
-        for number, (point, losses) in enumerate(_points(context, path, criterion, checkpoint, known)):
-            response, source = _response(context, point), "" if losses is None else ", from the checkpoint"
-            if losses is not None:
-                dissipation.recall(*losses, point)
+        for number, (point, energies) in enumerate(_points(context, path, criterion, checkpoint, known)):
+            response = context.homogenization.response(point.state, point.scale)
+            source = "" if energies is None else ", from the checkpoint"
+            if energies is not None:
+                dissipation.recall(energies, point)
             else:
                 dissipation.arrive(point)
                 if point.state.solution.reason > 0:
                     checkpoint.write(number, *stored(point, dissipation))
             _tell(context, shown, f"{_label(path, number)} at {point.load_factor:.6f}{source}", response)
-            entries.append(_entry(context, point, response, dissipation))
+            entries.append(_entry(context, criterion, point, response, dissipation))
             shown.advance(point.load_factor, f"{len(entries)} {path.method}, {_counts(entries[-1])}")
             last = point
             if not _goes_on(context, path, point, number + 1):
                 break
-    return {"path": entries, "resumed": known} | _recorded(context, path, checkpoint, entries, last)
+    return {"path": entries, "resumed": known} | _kept(context, path, criterion, checkpoint, entries, last)
 
 
 def _known(context: AnalysisContext, checkpoint: Checkpoint, resume: bool) -> int:
@@ -70,26 +72,19 @@ def _known(context: AnalysisContext, checkpoint: Checkpoint, resume: bool) -> in
 
 def _points(
     context: AnalysisContext, path: LoadPath, criterion: BondCriterion, checkpoint: Checkpoint, known: int
-) -> Iterator[tuple[Point, Losses | None]]:
-    """The points of the checkpoint with what was lost up to each, then those still to be found."""
+) -> Iterator[tuple[Point, Energies | None]]:
+    """The points of the checkpoint with the energies up to each, then those still to be found."""
     interface, waypoints = context.homogenization.interface, np.array(path.targets)
     begin = unloaded(interface, context.status(None))
     for number in range(known):
-        point, losses = restored(checkpoint.read(number))
+        point, energies = restored(checkpoint.read(number))
         begin = point.after
-        yield point, losses
+        yield point, energies
     if path.method == "events":
         found = events(interface, criterion, waypoints, begin)
     else:
         found = increments(interface, criterion, waypoints, path.increments or 1, path.release == "worst", begin)
     yield from ((point, None) for point in found)
-
-
-def _response(context: AnalysisContext, point: Point) -> Response:
-    """The averages of a point's state.  Collective."""
-    interface = context.homogenization.interface
-    interface.solver.activate(interface.active(point.state.status))
-    return context.homogenization.response(point.state, point.scale)
 
 
 def _tell(context: AnalysisContext, shown: EventProgress, name: str, response: Response) -> None:
@@ -104,7 +99,9 @@ def _label(path: LoadPath, number: int) -> str:
     return f"{'event' if path.method == 'events' else 'increment'} {number}"
 
 
-def _entry(context: AnalysisContext, point: Point, response: Response, dissipation: Dissipation) -> dict[str, Any]:
+def _entry(
+    context: AnalysisContext, criterion: BondCriterion, point: Point, response: Response, dissipation: Dissipation
+) -> dict[str, Any]:
     """What result.json says of a point."""
     return {
         "load_factor": point.load_factor,
@@ -112,9 +109,18 @@ def _entry(context: AnalysisContext, point: Point, response: Response, dissipati
         "stress": response.stress,
         "broke": point.broke,
         "free_motions": point.state.free_motions,
+        "stored": response.stored,
+        "stored_in_springs": response.in_springs,
         "dissipated": dissipation.followed,
         "dissipated_strain_controlled": dissipation.strain_controlled,
+        **({} if spring_criterion(criterion) is None else _fracture(dissipation)),
     } | context.point([response])
+
+
+def _fracture(dissipation: Dissipation) -> dict[str, float]:
+    """What bonds that break by energy have lost beside their toughness."""
+    energy = dissipation.fracture
+    return {"fracture_energy": energy} | ({"dissipation_ratio": dissipation.followed / energy} if energy else {})
 
 
 def _counts(entry: Mapping[str, Any]) -> str:
@@ -135,21 +141,28 @@ def _goes_on(context: AnalysisContext, path: LoadPath, point: Point, count: int)
     return True
 
 
-def _recorded(
+def _kept(
     context: AnalysisContext,
     path: LoadPath,
+    criterion: BondCriterion,
     checkpoint: Checkpoint,
     entries: Sequence[dict[str, Any]],
     last: Point | None,
 ) -> dict[str, Any]:
-    """`states`, the points whose fields are wanted, recorded from the checkpoint; the last one may not be in it."""
-    if context.states is None or last is None:
+    """Tips and fields of the points that are kept, from the checkpoint, in which the last one may not be; `states`, the
+    numbers of those whose fields are recorded."""
+    springs = spring_criterion(criterion)
+    if last is None or (springs is None and not context.keeps_fields):
         return {}
-    legs = len(path.targets) if path.method == "events" else 0
-    numbers = kept(entries, context.states, legs)
-    with context.progress.stage("fields") as words:
-        for number in context.progress.bar(numbers, "fields"):
+    numbers = kept(entries, context.states, len(path.targets) if path.method == "events" else 0)
+    tips = None if springs is None else TipRecorder(context.homogenization, springs)
+    with context.progress.stage("states") as words:
+        for number in context.progress.bar(numbers, "states"):
             point = last if number == len(entries) - 1 else restored(checkpoint.read(number))[0]
-            context.record(_response(context, point), point.load_factor, _label(path, number), number)
+            if tips is not None:
+                entries[number]["tips"] = tips.of(point)
+            if context.keeps_fields:
+                response = context.homogenization.response(point.state, point.scale)
+                context.record(response, point.load_factor, _label(path, number), number)
         words.append(f"{len(numbers)} of {len(entries)} points")
-    return {"states": numbers}
+    return {"states": numbers} if context.keeps_fields else {}

@@ -19,9 +19,9 @@ from feti_homog.analysis.result_records import (
     PathPoint,
     SolverInfo,
     StiffnessBounds,
-    TipInfo,
+    TipRates,
 )
-from feti_homog.common.records import BYTES, SECONDS, STRESS, Key, cells, described, keys, plain, restored
+from feti_homog.common.records import BYTES, SECONDS, STRESS, Key, described, keys, plain, restored
 from feti_homog.mechanics import response
 from feti_homog.mechanics.bounds import Moduli
 from feti_homog.output.files.file_seal import FileSeal
@@ -67,9 +67,7 @@ class Result:
     effective_stiffness_compression: Float | None = described(
         "the same under minus the unit strains, with contact", STRESS, "(3, 3)", default=None
     )
-    tips: tuple[TipInfo, ...] | None = described(
-        "of a stiffness with debonded arcs on round fibres: each tip under each load", default=None
-    )
+    tips: TipRates | None = described("energy release rates at the tips of debonded arcs, of a stiffness", default=None)
     angle: tuple[AnglePoint, ...] | None = described("points of analysis `angle`, as in angle.csv", default=None)
     path: tuple[PathPoint, ...] | None = described("points of analysis `path`, as in path.csv", default=None)
     states: tuple[int, ...] | None = described(
@@ -102,13 +100,12 @@ class Result:
     def points(self) -> dict[str, NDArray[Any]]:
         """Arrays over the n points of an angle or a path by name, empty for other analyses.
 
-        `angle` or `load_factor` (n,), `strain` and `stress` (n, 3), `stiffness` (n, 3, 3), `bonded`, `open`,
-        `closed`, ... (n,).
+        `angle` or `load_factor` (n,), `strain` and `stress` (n, 3), `stiffness` (n, 3, 3), `debonded_length` (n, f),
+        `bonded`, `open`, `closed`, ... (n,); NaN where a point has no such number.  The tips are in the points alone.
         """
-        points = (*(self.angle or ()), *(self.path or ()))
-        documents = [plain(point) for point in points]
-        names = [name for point in points[:1] for name in cells(type(point)) if name in documents[0]]
-        return {name: np.array([point[name] for point in documents]) for name in names}
+        documents = [plain(point) for point in (*(self.angle or ()), *(self.path or ()))]
+        names = dict.fromkeys(name for point in documents for name in point if name != "tips")
+        return {name: np.array([point.get(name, np.nan) for point in documents]) for name in names}
 
     def rising_strain(self) -> Float:
         """(v, 4) corners S11, S22, S12 and size of the leading strain along a path of one leg, as a test with rising

@@ -13,7 +13,11 @@ from feti_homog.mechanics.bounds import Bounds
 from feti_homog.mechanics.voigt import STIFFNESSES, STRAINS, STRESSES
 from feti_homog.typing import Float
 
-TOUGHNESS = f"{STRESS} times {LENGTH}"
+ENERGY = f"{STRESS} times that of the cell"
+DEBONDED_ANGLE = (
+    "the same in degrees of arc, `debonded_length` / radius; of a fibre that is not round 360 times the share of its "
+    "interface"
+)
 
 
 @dataclass(frozen=True)
@@ -93,18 +97,40 @@ class StiffnessBounds:
     hashin_shtrikman: Bounds | None = described("bounds of isotropic composites; null if a phase is not isotropic")
 
 
-@dataclass(frozen=True, kw_only=True)
-class TipInfo:
-    """The energy release rate at a tip of a debonded arc, at constant macroscopic strain."""
+@dataclass(frozen=True, eq=False)  # arrays have no single answer to "equal"
+class Tips:
+    """The t tips of debonding at a point, bonds that hold beside broken ones, by fibre and direction.
 
-    load: str = described("`E11`, `E22`, `gamma12`: under that unit strain; `-E11`, ... under minus it; else `strain`")
-    fibre: int = described("number of the fibre")
-    direction: float = described("direction of the tip about the centre of the fibre, 0 to 360", DEGREES)
-    G: float = described("energy released per length of debonding along the interface, and per depth", TOUGHNESS)
-    G_I: float = described("its part in opening", TOUGHNESS)
-    G_II: float = described("its part in shear", TOUGHNESS)
-    mode_angle: float = described("psi, tan^2 psi = G_II / G_I: 0 is opening, 90 shear", DEGREES)
-    length: float = described("length behind the tip at which the modes of rigid bonds are told apart", LENGTH)
+    What drives them is an energy per area, compared with G_c(psi): that of their spring or, where `growth` is
+    "released", what their break would release.
+    """
+
+    fibre: tuple[int, ...] = described("number of the fibre of each tip")
+    angle: Float = described(
+        "direction from the fibre's centre; of a fibre without centre that of its normal", DEGREES, "(t,)"
+    )
+    G_I: Float = described("what drives each tip by opening, with G_II / G_I = tan^2 psi", ENERGY, "(t,)")
+    G_II: Float = described("what drives it by shear", ENERGY, "(t,)")
+    psi: Float = described("mode of its traction: 0 opens, 90 shears", DEGREES, "(t,)")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TipRates:
+    """Energy release rates at the tips of debonded arcs on round fibres, at constant macroscopic strain.
+
+    Of t pairs of a load and a tip, by load, fibre and direction.
+    """
+
+    load: tuple[str, ...] = described(
+        "under which unit strain: `E11`, `E22`, `gamma12`, `-E11` of minus it, ...; `strain`: the strain that is given"
+    )
+    fibre: tuple[int, ...] = described("number of the fibre")
+    angle: Float = described("direction of the tip from the fibre's centre", DEGREES, "(t,)")
+    G: Float = described("energy released per area of growing debonding", ENERGY, "(t,)")
+    G_I: Float = described("its part in opening", ENERGY, "(t,)")
+    G_II: Float = described("its part in shear", ENERGY, "(t,)")
+    psi: Float = described("its mode, tan^2 psi = G_II / G_I: 0 opens, 90 shears", DEGREES, "(t,)")
+    length: Float = described("length behind the tip at which the modes of rigid bonds are told apart", LENGTH, "(t,)")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -115,11 +141,16 @@ class AnglePoint:
     stiffness: Float | None = described("L^ef, if no strain is given", STRESS, "(3, 3)", STIFFNESSES, default=None)
     strain: Float | None = described("macroscopic strain that is given", "", "(3,)", STRAINS, default=None)
     stress: Float | None = described("macroscopic stress under it", STRESS, "(3,)", STRESSES, default=None)
+    stored: float | None = described("energy stored under it per area of the cell", STRESS, default=None)
+    stored_in_springs: float | None = described("the share of elastic interfaces in it", STRESS, default=None)
+    debonded_share: float = described("debonded share of the length of all interfaces")
+    debonded_length: Float = described("debonded length of each fibre's interface", LENGTH, "(f,)")
+    debonding_angle: Float = described(DEBONDED_ANGLE, DEGREES, "(f,)")
+    tips: TipRates | None = described("energy release rates at the tips of its arcs", default=None)
     bonded: int = described("bonded interface nodes")
     open: int = described("debonded interface nodes without contact")
     closed: int = described("debonded interface nodes in contact")
     iterations: int = described("Krylov iterations")
-    tips: tuple[TipInfo, ...] | None = described("each tip on a round fibre under each load", default=None)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,8 +167,25 @@ class PathPoint:
     )
     broke: int = described("bonds that break at this event, or broke in the step to this increment")
     free_motions: int = described("rigid motions of fibres that no interface force resists")
+    stored: float = described("energy stored per area of the cell, E.Sigma / 2", STRESS)
+    stored_in_springs: float = described("the share of elastic interfaces in it", STRESS)
     dissipated: float = described("energy lost to breaks so far per area of the cell, along all equilibria", STRESS)
     dissipated_strain_controlled: float = described("the same if the strain only rises on the first leg", STRESS)
+    fracture_energy: float | None = described(
+        "toughness of the bonds that the load broke so far, each in the mode in which it broke, times their lengths, "
+        "per area of the cell; of bonds that break by energy",
+        STRESS,
+        default=None,
+    )
+    dissipation_ratio: float | None = described(
+        "`dissipated` / `fracture_energy`, once there is any; 1 of bonds that lose their toughness alone", default=None
+    )
+    debonded_share: float = described("debonded share of the length of all interfaces")
+    debonded_length: Float = described("debonded length of each fibre's interface", LENGTH, "(f,)")
+    debonding_angle: Float = described(DEBONDED_ANGLE, DEGREES, "(f,)")
+    tips: Tips | None = described(
+        "of bonds that break by energy, at the points that `states` in [output] chooses", default=None
+    )
     bonded: int = described("bonded interface nodes")
     open: int = described("debonded interface nodes without contact")
     closed: int = described("debonded interface nodes in contact")

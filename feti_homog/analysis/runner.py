@@ -89,7 +89,8 @@ def compute(case: Case, comm: MPI.Intracomm, keep_fields: bool = False) -> Resul
     with _torn(case, comm, progress) as cell:
         states = _States(cell, None, keep_fields, progress.say)
         context = _context(cell, progress, states)
-        checkpoint = EventsInMemory(comm) if keep_fields else NoCheckpoint(comm)
+        by_energy = case.interface is not None and case.interface.criterion == "energy"
+        checkpoint = EventsInMemory(comm) if keep_fields or by_energy else NoCheckpoint(comm)
         analysis = _analyse(context, checkpoint, resume=False)
         result = result_builder.result(context, analysis, states.kept())
     if result.faults:
@@ -118,14 +119,14 @@ class _States:
     """Where the states of a run go: to the file if there is one, and to memory if they are to be kept.
 
     Attributes:
-        wanted: which points of a path to record, None if there is no place for any.
+        has_place: whether states go anywhere.
         error: why the file was given up; the numbers are computed without it.
     """
 
     def __init__(self, cell: TornCell, file: FieldFile | None, keep: bool, say: Callable[[str], object]) -> None:
         self._cell, self._file, self._keep = cell, file, keep
-        self.wanted = cell.case.output.states if keep or file is not None else None
         self._number, self._states, self._say = count(), list[StatePart](), say
+        self.has_place = keep or file is not None
         self.error: FetiHomogError | None = None
 
     def record(self, response: Response, load_factor: float, label: str, point: int) -> None:
@@ -205,7 +206,14 @@ def _field_file(cell: TornCell, directory: Path, progress: Progress) -> FieldFil
 def _context(cell: TornCell, progress: Progress, states: _States) -> AnalysisContext:
     """The analysis of a cell."""
     contact = cell.case.interface is not None and cell.case.interface.contact
-    return AnalysisContext(Homogenization(cell, contact), cell.debonded, progress, states.record, states=states.wanted)
+    return AnalysisContext(
+        Homogenization(cell, contact),
+        cell.debonded,
+        progress,
+        states.record,
+        states=cell.case.output.states,
+        keeps_fields=states.has_place,
+    )
 
 
 def _analyse(context: AnalysisContext, checkpoint: Checkpoint, resume: bool) -> dict[str, Any]:

@@ -18,13 +18,15 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     for name, response in zip(UNIT_CASES, responses, strict=True):
         context.record(response, 1.0, name, 0)
     document: dict[str, Any] = {"effective_stiffness": L}
-    tips = context.tips(responses, UNIT_CASES)
+    under, loads = list(responses), list(UNIT_CASES)
     if one_sided:
         minus, responses = context.unit_responses("", status, starts, -1.0)
         for name, response in zip(UNIT_CASES, responses, strict=True):
             context.record(response, -1.0, f"-{name}", 0)
         document["effective_stiffness_compression"] = minus
-        tips += context.tips(responses, [f"-{name}" for name in UNIT_CASES])
+        under, loads = [*under, *responses], [*loads, *(f"-{name}" for name in UNIT_CASES)]
     else:
         context.check("L^ef", {"symmetry": asymmetry(L)})
-    return document | ({} if context.homogenization.cell.case.interface is None else {"tips": tips})
+    if context.homogenization.cell.case.interface is not None:
+        document["tips"] = context.tips(under, loads)
+    return document

@@ -75,12 +75,6 @@ def descriptions(record: type | Any) -> dict[str, Description]:
     return {f.name: f.metadata[DESCRIPTION] for f in dataclasses.fields(record) if DESCRIPTION in f.metadata}
 
 
-def cells(record: type) -> dict[str, Description]:
-    """The described fields of a record's class that fill cells of a row: all but lists of records."""
-    hints = typing.get_type_hints(record)
-    return {n: d for n, d in descriptions(record).items() if _record_of_tuple(_without_none(hints[n])) is None}
-
-
 def plain(value: Any) -> Any:
     """The value with records as mappings of their described fields.
 
@@ -126,6 +120,11 @@ def keys(kind: type, above: str = "") -> Iterator[Key]:
             yield from keys(typing.cast(type, hint), f"{path}.")
         elif (item := _record_of_tuple(hint)) is not None:
             yield from keys(item, f"{path}[].")
+
+
+def is_record(hint: Any) -> bool:
+    """Whether a field of this type holds a record, or may."""
+    return dataclasses.is_dataclass(_without_none(hint))
 
 
 def _restored_value(hint: Any, value: Any) -> Any:

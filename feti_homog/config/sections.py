@@ -230,9 +230,9 @@ class Output:
     fields: bool = key(boolean, "Write result.h5 and result.xdmf.", default=True)
     states: int | str = key(
         STATES,
-        "The points of a path whose fields are written: at most so many, the first, the last and those around drops of "
-        'the stress, the others between them; "peaks": none of these others; "all". A drop is by more than 1 % of the '
-        "largest stress. The curve has every point.",
+        "The points of a path whose fields are written: at most so many, the first, the last, those around the deepest "
+        'drops of the stress, up to half, the others evenly between; "peaks": the ends and those around all drops of '
+        'more than 1 % of the largest stress; "all". The curve has every point.',
         default=100,
         only=PATH_ANALYSIS,
     )

@@ -30,6 +30,8 @@ class Response:
         strain: (3,) E.
         stress: (3,) Sigma = <sigma>.
         scale: the response is `scale` times `state`.
+        stored: energy per area of the cell, 1/2 <sigma:eps> from the displacements and what the springs store.
+        in_springs: the latter, 1/2 sum lam^2 C / |UC|.
         state: interface states, multipliers, jumps and amplitudes.
         u: (boundary dofs,) fluctuating displacement u* on the boundaries of this rank's subdomains.
         checks: relative errors of the laws: `strain` <eps> = E, Eq. (3), with the opening of debonded faces as
@@ -43,6 +45,8 @@ class Response:
     strain: Float
     stress: Float
     scale: float
+    stored: float
+    in_springs: float
     state: Equilibrium
     u: Float
     checks: dict[str, float]
@@ -84,18 +88,21 @@ class Homogenization:
         strain, u = state.solution.strain, solver.boundary_displacement(state.solution)
         stress, star, energy = self._averages(strain, u)
         springs = solver.operator.compliance * state.solution.lam
-        opened = state.solution.jump * (1 - solver.active.mask) + springs
-        opening, stretched = allreduce_sum(cell.comm, self._strain_of_jumps.T @ opened), state.solution.lam @ springs
-        energy += float(cell.comm.allreduce(stretched)) / cell.summary.area
+        active = self.interface.active(state.status)
+        opened = state.solution.jump * (1 - active) + springs
+        opening = allreduce_sum(cell.comm, self._strain_of_jumps.T @ opened)
+        stretched = float(cell.comm.allreduce(float(state.solution.lam @ springs))) / cell.summary.area
+        energy += stretched
         least = float(strain @ self.interface.least_bonded_stiffness @ strain)
         largest = (self._largest(u) + self.interface.imposed(strain)) or 1.0
         checks = {
             "strain": float(np.abs(star - opening / cell.summary.area).max() / (np.abs(strain).max() or 1.0)),
             "hill": float(abs(energy - stress @ strain) / (max(abs(energy), least) or 1.0)),
-            "jump": self._largest(solver.active.mask * state.solution.jump) / largest,
+            "jump": self._largest(active * state.solution.jump) / largest,
         }
         counts = self.counts(state.status)
-        return Response(scale * strain, scale * stress, scale, state, scale * u, checks | state.certificate, counts)
+        means, energies = (scale * strain, scale * stress), (scale**2 * energy / 2, scale**2 * stretched / 2)
+        return Response(*means, scale, *energies, state, scale * u, checks | state.certificate, counts)
 
     def counts(self, status: Status) -> dict[str, int]:
         """Interface nodes in each state; collective."""

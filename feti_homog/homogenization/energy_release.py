@@ -27,6 +27,7 @@ from feti_homog.typing import Bool, Float, Int
 
 Array = TypeVar("Array", Float, Int, Status)
 
+DIRECTION_DIGITS = 9
 # Length at which the modes are told apart, at least one element / radius of the fibre.
 MODE_LENGTH = 1e-3
 
@@ -37,7 +38,7 @@ class EnergyRelease:
 
     Attributes:
         fibre: (t,) numbers from 1.
-        direction: (t,) degrees in [0, 360) about the centre of the fibre.
+        direction: (t,) degrees in (-180, 180] about the centre of the fibre.
         modes: (t, 2) G_I and G_II.
         length: (t,) at which rigid bonds have these modes.
     """
@@ -59,7 +60,7 @@ class EnergyRelease:
         return np.asarray(np.degrees(np.arctan2(roots[:, 1], roots[:, 0])))
 
 
-class TipEnergies:
+class EnergyReleaseRates:
     """Energy release rates of a torn cell, response by response.
 
     Attributes:
@@ -76,7 +77,9 @@ class TipEnergies:
         self._chains = InterfaceChains(neighbours.adjacency)
         self._extension = CrackExtension(cell.subdomains, matrix, self._period)
         self.points, self.fibre = self._gathered(nodes.points), self._gathered(nodes.fibre)
-        self.direction, self.length = self._gathered(cell.directions), self._gathered(nodes.length)
+        # Rounded, lest rounding decide their order.
+        direction = np.round(self._gathered(cell.directions), DIRECTION_DIGITS)
+        self.direction, self.length = np.where(direction <= -180.0, 180.0, direction), self._gathered(nodes.length)
         self._tree = cKDTree(wrapped(self.points, self._period), boxsize=self._period)
 
     def of(self, response: Response) -> EnergyRelease:
@@ -91,7 +94,7 @@ class TipEnergies:
         modes = self._modes(tips, response, force, closing)
         return EnergyRelease(
             fibre=self.cell.summary.fibre_number(self.fibre[tips.node]),
-            direction=self.direction[tips.node] % 360.0,
+            direction=self.direction[tips.node],
             modes=response.scale**2 * modes,
             length=length,
         )
@@ -99,7 +102,7 @@ class TipEnergies:
     def _tips(self, status: Status) -> CrackTips:
         """The tips on round fibres, in the order of fibres and directions."""
         found = self._chains.tips(status)
-        order = np.lexsort((self.direction[found.node] % 360.0, self.fibre[found.node]))
+        order = np.lexsort((self.direction[found.node], self.fibre[found.node]))
         return found.chosen(order[np.isfinite(self.cell.summary.radii[self.fibre[found.node[order]]])])
 
     def _modes(self, tips: CrackTips, response: Response, force: Float, closing: Float) -> Float:

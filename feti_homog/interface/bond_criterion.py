@@ -8,3 +8,10 @@ from feti_homog.interface.tip_criterion import TipCriterion
 
 BondCriterion = StrengthCriterion | EnergyCriterion | TipCriterion
 """Its `law` tells how much of their strength tractions use: homogeneous of degree one in them."""
+
+
+def spring_criterion(criterion: BondCriterion) -> EnergyCriterion | None:
+    """The toughness and its modes, where bonds break by energy."""
+    if isinstance(criterion, TipCriterion):
+        return criterion.springs
+    return criterion if isinstance(criterion, EnergyCriterion) else None

@@ -38,9 +38,8 @@ class EnergyCriterion:
 
     def mode_factor(self, traction: Float) -> Float:
         """(k,) sqrt(G_Ic / G_c) of the modes of tractions (k, 2)."""
-        opening, shear = self._roots(traction)
         # 1 / (1 + tan^2 x) = cos^2 x
-        return np.asarray(np.cos((1.0 - self.mode_sensitivity) * np.arctan2(shear, opening)))
+        return np.asarray(np.cos((1.0 - self.mode_sensitivity) * self.mode_angle(traction)))
 
     def utilisation(self, traction: Float) -> Float:
         """(k,) sqrt((G_I + G_II) / G_c) of tractions (k, 2), normal and tangential: 1 breaks.
@@ -48,6 +47,15 @@ class EnergyCriterion:
         Homogeneous of degree one in the traction, for psi does not depend on its size, and convex.
         """
         return np.asarray(np.hypot(*self._roots(traction)) * self.mode_factor(traction) / np.sqrt(self.toughness))
+
+    def fracture_toughness(self, traction: Float) -> Float:
+        """(k,) G_c of the modes of tractions (k, 2), energy per area."""
+        return np.asarray(self.toughness / self.mode_factor(traction) ** 2)
+
+    def mode_angle(self, traction: Float) -> Float:
+        """(k,) psi of tractions (k, 2), in radians: 0 opens, pi/2 shears, under pressure too."""
+        opening, shear = self._roots(traction)
+        return np.asarray(np.arctan2(shear, opening))
 
     def _roots(self, traction: Float) -> tuple[Float, Float]:
         """(k,) sqrt(G_I) and sqrt(G_II)."""

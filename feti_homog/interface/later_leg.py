@@ -13,10 +13,12 @@ from feti_homog.interface.contact import Equilibrium, Interface
 from feti_homog.interface.leg_prediction import first_break, first_change
 from feti_homog.interface.path_points import (
     UTILISATION_TIE,
+    Break,
     PathState,
     Point,
     count_on_all_ranks,
-    energy_released,
+    energies_of,
+    fracture_energy,
     most_utilised,
 )
 from feti_homog.typing import Float
@@ -69,7 +71,7 @@ class LaterLeg:
         self.leg, self.legs = number
         # Where the last point is, up to where the line is known to bend, and whether a predicted change did not come.
         self._reported, self._bends_before, self._false_alarm = begin.position, np.inf, False
-        self._before_break, self._released = begin.stress_before_break, 0.0
+        self._broken, self._energies = begin.broken, (0.0, 0.0)
         strain = strain_between(*strains, begin.position)
         self._stand(begin.position, interface.equilibrium(strain, begin.status, begin.lam))
 
@@ -137,7 +139,7 @@ class LaterLeg:
 
     def _continues(self, ahead: DualSolution, way: float, state: Equilibrium) -> bool:
         """Whether no bond is overloaded in a state, and its stress is on the line from here to `ahead`; collective."""
-        load, _ = most_utilised(self.interface, self.criterion, state)
+        _, load, _ = most_utilised(self.interface, self.criterion, state)
         stress = self.interface.stress
         ends = np.stack([stress(self._state.solution), stress(ahead)])
         off = np.abs((1.0 - way) * ends[0] + way * ends[1] - stress(state.solution)).max()
@@ -172,25 +174,26 @@ class LaterLeg:
         """Break the worst bonds here, and find the state after it."""
         solution, broke = self._state.solution, count_on_all_ranks(self.interface, self._worst)
         status = self.interface.debond(self._state.status, self._worst, solution.lam)
-        stress = self.interface.stress(solution)
-        yield self._point(broke, PathState(self.leg, self._share, status, solution.lam, stress))
-        self._bends_before, self._false_alarm, self._before_break = np.inf, False, stress
+        fracture = fracture_energy(self.interface, self.criterion, self._worst, self.interface.traction(solution))
+        broken = Break(self.interface.stress(solution), fracture)
+        yield self._point(broke, PathState(self.leg, self._share, status, solution.lam, broken))
+        self._bends_before, self._false_alarm, self._broken = np.inf, False, broken
         self._stand(self._share, self.interface.equilibrium(solution.strain, status, solution.lam))
 
     def _point(self, broke: int, after: PathState) -> Point:
-        released, self._released, self._reported = self._released, 0.0, self._share
+        energies, self._energies, self._reported = self._energies, (0.0, 0.0), self._share
         load_factor = (self.leg + self._share) / self.legs
-        return Point(load_factor, 1.0, self._state, broke, released, after)
+        return Point(load_factor, 1.0, self._state, broke, *energies, self._used, after)
 
     def _stand(self, share: float, state: Equilibrium) -> None:
         """Stand at a share of the leg, where this state was found."""
         self._share, self._state = share, state
         if share >= self._bends_before:
             self._bends_before = np.inf
-        self._load, self._worst = most_utilised(self.interface, self.criterion, state)
+        self._used, self._load, self._worst = most_utilised(self.interface, self.criterion, state)
         after = self.interface.stress(state.solution)
-        self._released += energy_released(state.solution.strain, self._before_break, after)
-        self._before_break = None
+        released, fracture = energies_of(self._broken, state.solution.strain, after)
+        self._energies, self._broken = (self._energies[0] + released, self._energies[1] + fracture), None
 
     def _differs(self, before: Equilibrium) -> bool:
         """Whether contact states are other than before; collective."""

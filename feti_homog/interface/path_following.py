@@ -12,6 +12,7 @@ breaks nothing is lost.  A point's `released` is what breaks lost on the way fro
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -20,12 +21,13 @@ from feti_homog.interface.contact import Interface
 from feti_homog.interface.later_leg import LaterLeg, strain_between
 from feti_homog.interface.path_points import (
     UTILISATION_TIE,
+    Break,
     PathState,
     Point,
     count_on_all_ranks,
-    energy_released,
+    energies_of,
+    fracture_energy,
     most_utilised,
-    utilisation,
 )
 from feti_homog.typing import Float
 
@@ -62,21 +64,24 @@ def increments(
     for step in range(begin.leg + 1, steps + 1):
         leg = (step * len(waypoints) - 1) // steps
         strain = strain_between(corners[leg], corners[leg + 1], step * len(waypoints) / steps - leg)
-        broke, before = 0, None
+        broke, broken = 0, None
         while True:
             state = interface.equilibrium(strain, status, lam)
             status, lam = state.status, state.solution.lam
-            load, which = most_utilised(interface, criterion, state)
+            used, load, which = most_utilised(interface, criterion, state)
             if load <= 1.0 + UTILISATION_TIE or state.solution.reason < 0:
                 break
             if not worst_only:
-                which = utilisation(interface, criterion, state) > 1.0
-            if before is None:
-                before = interface.stress(state.solution)
+                which = used > 1.0
+            fracture = fracture_energy(interface, criterion, which, interface.traction(state.solution))
+            if broken is None:
+                broken = Break(interface.stress(state.solution), fracture)
+            else:
+                broken = replace(broken, fracture_energy=broken.fracture_energy + fracture)
             broke += count_on_all_ranks(interface, which)
             status = interface.debond(status, which, lam)
-        released = energy_released(strain, before, interface.stress(state.solution))
-        yield Point(step / steps, 1.0, state, broke, released, PathState(step, 0.0, status, lam))
+        energies = energies_of(broken, strain, interface.stress(state.solution))
+        yield Point(step / steps, 1.0, state, broke, *energies, used, PathState(step, 0.0, status, lam))
         if state.solution.reason < 0:
             return
 
@@ -98,15 +103,17 @@ def _first_leg(
     interface: Interface, criterion: BondCriterion, strain: Float, legs: int, begin: PathState
 ) -> Iterator[Point]:
     """From zero to `strain` through all equilibria; with the bonds of now, Sigma(t E) = t Sigma(E) for t >= 0."""
-    status, lam, factor, before = begin.status, begin.lam, begin.position, begin.stress_before_break
+    status, lam, factor, broken = begin.status, begin.lam, begin.position, begin.broken
     while True:
         state = interface.equilibrium(strain, status, lam)
         lam, stress = state.solution.lam, interface.stress(state.solution)
-        released = energy_released(factor * strain, before, factor * stress)
-        load, worst = most_utilised(interface, criterion, state)
+        energies = energies_of(broken, factor * strain, factor * stress)
+        used, load, worst = most_utilised(interface, criterion, state)
         if load <= 1.0:
-            yield Point(1.0 / legs, 1.0, state, 0, released, PathState(1, 0.0, state.status, lam))
+            yield Point(1.0 / legs, 1.0, state, 0, *energies, used, PathState(1, 0.0, state.status, lam))
             return
-        factor, before = 1.0 / load, stress / load
+        factor, traction = 1.0 / load, interface.traction(state.solution)
+        broken = Break(stress / load, fracture_energy(interface, criterion, worst, traction))
         broke, status = count_on_all_ranks(interface, worst), interface.debond(state.status, worst, lam)
-        yield Point(factor / legs, factor, state, broke, released, PathState(0, factor, status, lam, before))
+        after = PathState(0, factor, status, lam, broken)
+        yield Point(factor / legs, factor, state, broke, *energies, used / load, after)

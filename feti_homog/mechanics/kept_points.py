@@ -24,8 +24,8 @@ Drop = tuple[float, int, int]
 def kept(points: Sequence[Point], states: int | str, legs: int) -> list[int]:
     """Numbers of the points to keep, rising.
 
-    `states` is "all", "peaks": the ends and the points around every drop, or how many at most: the ends, the points
-    around drops as long as there is room, the deepest first, and between them the others as evenly as they can be.
+    `states` is "all", "peaks": the ends and the points around every drop, or how many at most: the ends, of the other
+    places half for the points around drops, the deepest first, and the rest as evenly between as they can be.
     Of `legs` legs the first goes through all equilibria; 0 of increments.
     """
     if states == "all" or not points:
@@ -35,9 +35,9 @@ def kept(points: Sequence[Point], states: int | str, legs: int) -> list[int]:
         return sorted(ends.union(*(drop[1:] for drop in around)))
     if len(points) <= states:
         return list(range(len(points)))
-    chosen = ends
+    chosen, room = ends, 2 + (states - 2) // 2
     for _, *pair in sorted(around, key=lambda drop: -drop[0]):
-        if len(chosen.union(pair)) <= states:
+        if len(chosen.union(pair)) <= room:
             chosen = chosen.union(pair)
     return _filled(sorted(chosen), states)
 

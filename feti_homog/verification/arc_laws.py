@@ -40,7 +40,7 @@ def check_arcs(ledger: Ledger, cell: DiscreteCell, states: Sequence[StateNumbers
 
 def _sides(cell: DiscreteCell, arcs: Sequence[Mapping[str, Any]], opening: float | None) -> tuple[Bool, Bool]:
     """Which interface nodes (k,) are inside of an arc, and which are outside of all of them."""
-    rows, angle = cell.files.interface, _directions(cell)
+    rows, angle = cell.files.interface, directions(cell)
     inside, outside = np.zeros(len(angle), bool), np.ones(len(angle), bool)
     for arc in arcs:
         own = np.ones(len(angle), bool) if arc["fibre"] == "all" else np.isin(rows.fibre, arc["fibre"])
@@ -51,7 +51,7 @@ def _sides(cell: DiscreteCell, arcs: Sequence[Mapping[str, Any]], opening: float
     return inside, outside
 
 
-def _directions(cell: DiscreteCell) -> Float:
+def directions(cell: DiscreteCell) -> Float:
     """(k,) directions in degrees of the interface nodes from the centres of their fibres."""
     rows = cell.files.interface
     away = from_centre(rows.points, cell.files.fibres.centre[rows.fibre - 1], cell.files.size)

@@ -21,6 +21,7 @@ from feti_homog.verification.load_laws import StateNumbers, check_load
 from feti_homog.verification.mesh_laws import check_interface, check_mesh
 from feti_homog.verification.own_process import in_own_process
 from feti_homog.verification.path_laws import check_path
+from feti_homog.verification.point_laws import check_points
 from feti_homog.verification.reading import ResultFiles, altered, opened
 from feti_homog.verification.summary_laws import check_summary
 
@@ -96,6 +97,7 @@ def _verified(files: ResultFiles) -> Certificate:
         states.append(StateNumbers.of(cell, state, fields))
     check_load(ledger, cell, states)
     check_arcs(ledger, cell, states)
+    check_points(ledger, cell, states)
     if "path" in files.document:
         check_path(ledger, cell, states)
     check_summary(ledger, cell)

@@ -49,17 +49,29 @@ def utilisation(section: Mapping[str, Any], traction: Float) -> Float:
     )
 
 
+def spring_energies(section: Mapping[str, Any], traction: Float) -> Float:
+    """(k, 2) G_I = <t_n>^2 / (2 k_n) and G_II = t_t^2 / (2 k_t) of tractions (k, 2)."""
+    pulls = np.stack([np.maximum(traction[:, 0], 0.0), np.abs(traction[:, 1])], axis=1)
+    return np.asarray(pulls**2 / (2 * np.array([section["normal_stiffness"], section["tangential_stiffness"]], float)))
+
+
+def mode(section: Mapping[str, Any], traction: Float) -> Float:
+    """(k,) psi of tractions (k, 2), tan^2 psi = G_II / G_I."""
+    first, second = np.sqrt(spring_energies(section, traction)).T
+    return np.asarray(np.arctan2(second, first))
+
+
+def toughness(section: Mapping[str, Any], psi: Float) -> Float:
+    """(k,) G_c = G_Ic [1 + tan^2((1 - lambda) psi)]."""
+    turned = (1 - float(section["mode_sensitivity"])) * psi
+    return np.asarray(float(section["toughness"]) * (1 + np.tan(turned) ** 2))
+
+
 def _energy_share(section: Mapping[str, Any], traction: Float) -> Float:
-    """(k,) sqrt(G / G_c) of the springs' energies G = G_I + G_II and G_c = G_Ic [1 + tan^2((1 - lambda) psi)]."""
-    first, second = (
-        pull**2 / (2 * float(section[name]))
-        for pull, name in (
-            (np.maximum(traction[:, 0], 0.0), "normal_stiffness"),
-            (traction[:, 1], "tangential_stiffness"),
-        )
+    """(k,) sqrt(G / G_c) of the springs' energies G = G_I + G_II."""
+    return np.asarray(
+        np.sqrt(spring_energies(section, traction).sum(axis=1) / toughness(section, mode(section, traction)))
     )
-    turned = (1 - float(section["mode_sensitivity"])) * np.arctan2(np.sqrt(second), np.sqrt(first))
-    return np.asarray(np.sqrt((first + second) / (float(section["toughness"]) * (1 + np.tan(turned) ** 2))))
 
 
 def _check_contact(ledger: Ledger, cell: DiscreteCell, state: State) -> None:

@@ -27,6 +27,8 @@ class StateNumbers:
     Attributes:
         point: number of its point in `path` or `angle` of result.json.
         stored: energy per area of the cell, from the fields.
+        in_springs: that of the springs in it.
+        traction: (k, 2) normal and tangential.
         used: (k,) share of the strength that the bonded nodes use, 0 elsewhere; NaN at tips of which the energy counts
             that their break would release, for it is not in the files.
     """
@@ -37,6 +39,8 @@ class StateNumbers:
     strain: Float
     stress: Float
     stored: float
+    in_springs: float
+    traction: Float
     status: AnyInt
     used: Float
 
@@ -46,16 +50,19 @@ class StateNumbers:
         section = cell.files.case.get("interface", {})
         used = np.where(state.status == BONDED, utilisation(section, state.traction), 0.0)
         if section.get("growth") == "released":
-            used[_tips(cell, state)] = np.nan
+            used[tips(cell, state.status)] = np.nan
         stretched = state.traction * spring_jumps(cell, state) * cell.files.interface.length[:, None]
-        stored = (fields.energy + float(stretched.sum())) / (2 * cell.area)
+        in_springs = float(stretched.sum()) / (2 * cell.area)
+        energies = fields.energy / (2 * cell.area) + in_springs, in_springs
         means = state.strain, state.mean_stress
-        return cls(state.name, state.load_factor, state.point, *means, stored, state.status, used)
+        return cls(
+            state.name, state.load_factor, state.point, *means, *energies, state.traction, state.status, used
+        )  # fmt: skip
 
 
-def _tips(cell: DiscreteCell, state: State) -> Bool:
+def tips(cell: DiscreteCell, status: AnyInt) -> Bool:
     """(k,) which bonds lie beside a broken one."""
-    broken, beside = state.status != BONDED, cell.beside
+    broken, beside = status != BONDED, cell.beside
     tips = np.zeros(len(broken), bool)
     for here, there in (beside.T, beside.T[::-1]):
         tips[here[broken[there]]] = True

@@ -14,7 +14,7 @@ Fields may be kept of some points only; what result.json says of the others obey
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
@@ -25,6 +25,7 @@ from feti_homog.verification.discrete_cell import DiscreteCell
 from feti_homog.verification.interface_laws import BONDED
 from feti_homog.verification.ledger import Ledger
 from feti_homog.verification.load_laws import StateNumbers
+from feti_homog.verification.point_laws import tip_shares
 
 SAME_LOAD = 1e-12
 Point = Mapping[str, Any]
@@ -49,12 +50,22 @@ def check_path(ledger: Ledger, cell: DiscreteCell, states: Sequence[StateNumbers
     by_events = path["method"] == "events"
     _check_counts(ledger, points, by_events)
     _check_breaks(ledger, states, points, by_events)
-    _check_strength(ledger, states, points, by_events)
+    _check_strength(ledger, [_with_tips(cell, state, points[state.point]) for state in states], points, by_events)
     numbers = _numbers(points, states)
     if by_events:
         _check_energy(ledger, numbers, points, len(path["waypoints"]) if path.get("waypoints") else 1)
     else:
         _check_energy_of_increments(ledger, cell, numbers, points)
+
+
+def _with_tips(cell: DiscreteCell, state: StateNumbers, point: Point) -> StateNumbers:
+    """The state with what its point says of tips whose strength is not in the fields."""
+    if "tips" not in point:
+        return state
+    node, shares = tip_shares(cell, state, point["tips"])
+    used = state.used.copy()
+    used[node] = np.where(np.isnan(used[node]), shares, used[node])
+    return replace(state, used=used)
 
 
 def _numbers(points: Sequence[Point], states: Sequence[StateNumbers]) -> list[PointNumbers]:

@@ -38,8 +38,8 @@ def command(words, comm):
 
 sys.exit(api.start(command))
 """
-# In the order in which a run comes to them, and how many events are kept then.
-MOMENTS = {"000001.h5": 1, "state 2": 3, "result.h5": None, "result.json": None, "path.csv": None}
+# In the order in which a run comes to them, and how many events are kept then: all (None) when fields are written.
+MOMENTS = {"000001.h5": 1, "000003.h5": 3, "state 2": None, "result.h5": None, "result.json": None, "path.csv": None}
 
 
 def test_a_run_that_is_killed_while_it_writes_goes_on(tmp_path):

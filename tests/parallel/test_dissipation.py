@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from support import torn_cells
 
-from feti_homog.analysis.load_path import Dissipation
+from feti_homog.analysis.path_events import Dissipation
 from feti_homog.interface.contact import BONDED
 from feti_homog.interface.path_following import events, increments
 from feti_homog.interface.path_points import unloaded

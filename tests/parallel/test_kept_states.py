@@ -25,7 +25,10 @@ PATHS: dict[str, dict[str, Any]] = {
     "straight": {"strain": [0.2, 0.0, 0.05]},
     "legs": {"waypoints": [[0.1, 0.0, 0.0], [-0.05, 0.02, 0.0], [0.1, 0.0, 0.1]]},
     "increments": {"waypoints": [[0.1, 0.0, 0.0], [-0.05, 0.02, 0.0]], "method": "increments", "increments": 12},
+    "energy": {"waypoints": [[0.1, 0.0, 0.0], [-0.05, 0.02, 0.0]]},
 }
+STRENGTHS = {"normal_strength": 4.0, "tangential_strength": 3.0}
+ENERGY = {"normal_stiffness": 2000.0, "tangential_stiffness": 500.0, "criterion": "energy", "toughness": 0.01}
 STATES = (2, 5, "peaks")
 
 
@@ -36,7 +39,7 @@ def case(kind: str, states: int | str, **path: Any) -> Case:
             "cell": {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.3},
             "material": {"matrix": {"young": 100.0, "poisson": 0.4}, "fibre": {"young": 500.0, "poisson": 0.2}},
             "analysis": {"type": "path", "plane": "stress"},
-            "interface": {"normal_strength": 4.0, "tangential_strength": 3.0},
+            "interface": ENERGY if kind == "energy" else STRENGTHS,
             "path": PATHS[kind] | path,
             "output": {"pictures": False, "states": states},
         }
@@ -72,9 +75,15 @@ def assert_kept_of(folder: Path, whole: Path) -> None:
             else:
                 scale = np.nanmax(np.abs(expected[name]), initial=0.0)
                 np.testing.assert_allclose(values, expected[name], rtol=0, atol=EXACT * scale, err_msg=name)
-    curves = [[point | {"iterations": 0} for point in document(each)["path"]] for each in (folder, whole)]
-    assert curves[0] == curves[1]
-    assert (folder / "path.csv").read_text() == (whole / "path.csv").read_text()
+    curves = [document(each)["path"] for each in (folder, whole)]
+    for number, (point, expected) in enumerate(zip(*curves, strict=True)):
+        assert point.keys() - {"tips"} == expected.keys() - {"tips"}
+        assert ("tips" in point) == ("tips" in expected and number in numbers)
+        tips = [(point["tips"][name], values) for name, values in expected["tips"].items()] if "tips" in point else []
+        numbers_of = point.keys() - {"tips", "iterations"}
+        for value, wanted in [*tips, *((point[name], expected[name]) for name in numbers_of)]:
+            # After an interruption influence columns are found in another order, which changes rounding.
+            assert value == pytest.approx(wanted, rel=1e-9, abs=EXACT)
     assert len((folder / "events.log").read_text().splitlines()) == 1 + len(curves[0])
 
 
@@ -102,7 +111,7 @@ def test_kept_states_are_those_of_a_run_that_keeps_all(comm, shared_path, whole,
     parallel_assert(comm, verify(shared_path).holds if comm.rank == 0 else True)
 
 
-@pytest.mark.parametrize("kind", ["straight", "legs"])
+@pytest.mark.parametrize("kind", ["straight", "legs", "energy"])
 def test_an_interrupted_path_keeps_the_same_states(comm, shared_path, whole, kind):
     """Ended by max_events twice; each time the fields of what there is are written."""
     for events, resume in ((6, False), (9, True)):

@@ -53,9 +53,24 @@ def test_whole_paths_are_those_of_brute_force(comm, built, growth):
         assert (case.cell.solver.preconditioner.factorizations > 2) == (columns < 100)
 
 
-def follow(cell, growth):
-    """The points of the path."""
+def test_a_path_goes_on_from_its_middle_as_if_it_had_not_stopped(comm):
+    petsc = {"feti_pc_type": "influence", "feti_influence_columns": 40}
+    cells = [torn_cells.tear(comm, **FOUR, petsc=petsc) for _ in range(2)]
+    whole = follow(cells[0], "released")
+    # The second cell has no columns, and another reference cell than the first one has there.
+    rest = follow(cells[1], "released", whole[len(whole) // 2].after)
+    expected = whole[len(whole) // 2 + 1 :]
+    assert [p.broke for p in rest] == [p.broke for p in expected]
+    assert relative_error(np.array([p.load_factor for p in rest]), [p.load_factor for p in expected]) < 1e-9
+    for found, point in zip(rest, expected, strict=True):
+        np.testing.assert_array_equal(found.after.status, point.after.status)
+    for cell in cells:
+        cell.solver.destroy()
+
+
+def follow(cell, growth, begin=None):
+    """The points of the path, or of what is left of it."""
     interface, springs = torn_cells.interface(cell, True), EnergyCriterion(*SPRINGS, TOUGHNESS, SENSITIVITY)
     law = TipCriterion(springs, cell.solver.preconditioner) if growth == "released" else springs
     bonded = np.full(len(interface.nodes.row), BONDED, np.int8)
-    return list(events(interface, law, STRAIN[None], unloaded(interface, bonded)))
+    return list(events(interface, law, STRAIN[None], begin or unloaded(interface, bonded)))

@@ -1,15 +1,18 @@
 """Load paths of bonds that break by energy, by brute force: every state anew by `quadratic_programme`, and what a break
-releases from the dense compliance of the cell in displacements."""
+releases from the compliance of the cell in displacements."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import diags
+from scipy.sparse import diags, identity
+from scipy.sparse.linalg import splu
 
 from reference.load_path import SlowLoadPath
 from reference.quadratic_programme import QuadraticProgramme
+
+SLIGHT = 1e-14  # share of the largest stiffness that makes that of free fibres definite
 
 
 @dataclass(frozen=True)
@@ -60,12 +63,13 @@ class SlowEnergyPath:
             J.T @ diags(np.where(h, k, 0.0)) @ J for J, k, h in zip(rows, stiff.T, holds, strict=True)
         )
         T = programme._together(np.zeros(len(bonded), bool))
-        # Free fibres as a whole have no stiffness, and the springs of tips no part in that.
-        compliance = np.linalg.pinv((T.T @ K @ T).toarray(), rcond=1e-11, hermitian=True)
+        K = (T.T @ K @ T).tocsc()
+        # Free fibres as a whole have no stiffness, and the springs of tips no part in their motions.
+        factor = splu(K + SLIGHT * K.diagonal().max() * identity(K.shape[0], format="csc"))
         energies = []
         for i in tips:
             J = np.stack([(R[i] @ T).toarray().ravel() for R in rows])
-            A, k, j = J @ compliance @ J.T, np.diag(stiff[i]), state.jump[i]
+            A, k, j = J @ factor.solve(J.T), np.diag(stiff[i]), state.jump[i]
             parted = np.linalg.solve(np.eye(2) - A @ k, j)
             sheared = j[1] / (1 - A[1, 1] * stiff[i, 1])
             energies.append((k @ j @ parted if parted[0] >= 0 else stiff[i, 1] * j[1] * sheared) / 2)

@@ -16,6 +16,7 @@ HEXAGONAL = {"geometry": "hexagonal", "fibre_fraction": 0.4, "mesh_size": 0.2}
 SQUARE = {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.15}
 RANDOM = {"geometry": "random", "fibres": 4, "fibre_fraction": 0.3, "mesh_size": 0.15, "radius_spread": 0.3}
 ARC = {"fibre": "all", "centre": 20.0}
+SPRINGS = {"normal_stiffness": 900.0, "tangential_stiffness": 300.0}
 STRENGTHS = {"normal_strength": 5.0, "tangential_strength": 5.0}
 WAYPOINTS = [[0.2, 0.0, 0.0], [0.1, 0.05, 0.05], [0.0, 0.0, 0.0], [-0.1, 0.0, 0.1]]
 
@@ -41,6 +42,16 @@ CASES: dict[str, dict[str, Any]] = {
             "toughness": 0.02,
         },
         "path": {"waypoints": WAYPOINTS},
+    },
+    "springs' energy": {
+        "cell": RANDOM | {"order": 2},
+        "interface": SPRINGS | {"criterion": "energy", "toughness": 0.02, "growth": "springs"},
+        "path": {"strain": [0.1, 0.0, 0.05], "method": "increments", "increments": 10},
+    },
+    "loaded angle": {
+        "cell": SQUARE,
+        "interface": SPRINGS | {"debonded": [ARC]},
+        "angle": {"values": [0, 120], "strain": [0.01, 0.0, 0.0]},
     },
     "increments": {
         "cell": SQUARE,

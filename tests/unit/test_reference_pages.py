@@ -52,6 +52,12 @@ CASES = {
         "interface": HALF_OPEN | {"normal_strength": 1.0},
         "path": {"strain": STRAIN},
     },
+    "path by energy": {
+        "analysis": {"type": "path", "plane": "strain"},
+        "interface": HALF_OPEN
+        | {"normal_stiffness": 900.0, "tangential_stiffness": 300.0, "criterion": "energy", "toughness": 0.005},
+        "path": {"strain": STRAIN},
+    },
 }
 SWEEP = {"sweep": {"cell.mesh_size": [0.25, 0.3]}}
 
@@ -129,7 +135,8 @@ def test_datasets_and_attributes_of_result_h5(folders):
 
 
 @pytest.mark.parametrize(
-    ("name", "kind"), [("angle", AnglePoint), ("angle of a strain", AnglePoint), ("path", PathPoint)]
+    ("name", "kind"),
+    [("angle", AnglePoint), ("angle of a strain", AnglePoint), ("path", PathPoint), ("path by energy", PathPoint)],
 )
 def test_columns_of_the_tables_of_points(folders, name, kind):
     with (folders[name] / f"{name.split()[0]}.csv").open() as stream:

@@ -68,8 +68,7 @@ class Influence:
             self._refer(active)
             changed = self._changed()
             new, self._tied = changed, len(changed)
-        if len(new):
-            self._columns.add(self._with_next(new))
+        self._find(new)
         self._follow(self._columns.positions(changed))
 
     def apply(self, r: Float) -> Float:
@@ -88,7 +87,8 @@ class Influence:
 
         Rows that leave together change the multipliers of their own by all of them, and open by H_ii^-1 lam_i.
         """
-        self._columns.add(pairs.ravel())
+        rows = pairs.ravel()
+        self._find(rows[self._columns.positions(rows) < 0])
         at, members = self._columns.positions(pairs.ravel()), self._inverse.members
         block = self._columns.block
         # The rows of U, and of the identity on A.
@@ -120,14 +120,17 @@ class Influence:
         self._inverse, self._dependent = BorderedInverse(), np.zeros(0, np.int64)
         self._answer, self._tied = None, 0
 
-    def _with_next(self, rows: Int) -> Int:
-        """The rows, and those of the bonds near them: they break next, and columns are cheaper together."""
+    def _find(self, rows: Int) -> None:
+        """Find the columns of these rows, and those of the bonds near them: they break next, and columns are cheaper
+        together.  Collective."""
+        if not len(rows):
+            return
         normal = self.neighbours.rows
         at = np.searchsorted(normal, rows, side="right") - 1
         near = np.unique(self._near[at].indices)
         beside = (normal[near][:, None] + np.arange(2)).ravel()
         still = gather_rows(self.comm, self._active, self._first, beside) > 0
-        return np.concatenate([rows, beside[still]])
+        self._columns.add(np.concatenate([rows, beside[still]]))
 
     def _follow(self, changed: Int) -> None:
         """Let N be that of the columns `changed`.  Collective."""

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
 import numpy as np
 
-from feti_homog.common.records import cells, plain
+from feti_homog.common.records import Description, descriptions, is_record, plain
 from feti_homog.output.files import atomic
 
 
@@ -25,7 +25,7 @@ class Column:
 
 def columns(kind: type) -> Iterator[Column]:
     """The columns that a record of this class fills: the reference table of its file."""
-    for name, description in cells(kind).items():
+    for name, description in _in_columns(kind).items():
         for component in description.components or (name,):
             words = f"{component}, {description.meaning}" if description.components else description.meaning
             yield Column(component, description.unit, words)
@@ -34,26 +34,36 @@ def columns(kind: type) -> Iterator[Column]:
 def write(path: Path, points: Sequence[Any]) -> Path:
     """Write records of one class, each in a row: numbers under their names, arrays under those of their components.
 
-    What the first record leaves out has no column.  Call on one rank.
+    What no record has, arrays without components and records in records have no column.  Call on one rank.
 
     Raises:
         FetiHomogError: the table cannot be written.
     """
-    rows = [_row(point) for point in points]
+    described = _in_columns(type(points[0])) if points else {}
+    rows = [_row(point, described) for point in points]
+    there = {name for row in rows for name in row}
+    names = [column.name for column in columns(type(points[0])) if column.name in there] if rows else []
 
     def write_rows(part: Path) -> None:
         with part.open("w", newline="", encoding="utf-8") as stream:
-            writer = csv.DictWriter(stream, list(rows[0]) if rows else [])
+            writer = csv.DictWriter(stream, names)
             writer.writeheader()
             writer.writerows(rows)
 
     return atomic.replace(path, write_rows)
 
 
-def _row(point: Any) -> dict[str, Any]:
+def _row(point: Any, described: Mapping[str, Description]) -> dict[str, Any]:
     row: dict[str, Any] = {}
-    values = plain(point)
-    for name, described in cells(type(point)).items():
-        if name in values:
-            row |= dict(zip(described.components or (name,), np.ravel(values[name]).tolist(), strict=True))
+    for name, value in plain(point).items():
+        if name in described:
+            components = described[name].components or (name,)
+            row |= dict(zip(components, np.ravel(value).tolist(), strict=True))
     return row
+
+
+def _in_columns(kind: type) -> dict[str, Description]:
+    """The fields of a record that fill columns: numbers, and arrays whose components have names."""
+    hints = get_type_hints(kind)
+    found = {name: d for name, d in descriptions(kind).items() if d.components or not d.shape}
+    return {name: d for name, d in found.items() if not is_record(hints[name])}

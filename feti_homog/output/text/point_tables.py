@@ -62,7 +62,7 @@ def path_table(points: Sequence[Point], stress: str) -> list[str]:
     some = "" if len(numbers) == len(points) else f", {len(numbers)} shown"
     lines = [
         f"Path{stress}: {len(points)} points{some}; {broke} bonds broke",
-        f"Dissipated per area{stress}: {_dissipated(points[-1])}",
+        *_energies(points[-1], stress),
         f"{'point':>5}{'load':>9}{STRAINS[component]:>11}" + "".join(f"{name:>11}" for name in STRESSES) + _heads(),
     ]
     for number in numbers:
@@ -72,10 +72,18 @@ def path_table(points: Sequence[Point], stress: str) -> list[str]:
     return lines
 
 
-def _dissipated(last: Point) -> str:
-    """What breaks have lost at the end of a path, also if the strain only rose."""
-    rising = last["dissipated_strain_controlled"]
-    return f"{last['dissipated']:.6g} along all equilibria, {rising:.6g} if the strain only rises"
+def _energies(last: Point, stress: str) -> list[str]:
+    """What is stored at the end of a path, what breaks have lost, also if the strain only rose, and what debonded."""
+    springs = f", {last['stored_in_springs']:.6g} of it in springs" if last["stored_in_springs"] else ""
+    rising = f"{last['dissipated_strain_controlled']:.6g} if the strain only rises"
+    lines = [
+        f"Stored per area{stress}: {last['stored']:.6g}{springs}",
+        f"Dissipated per area{stress}: {last['dissipated']:.6g} along all equilibria, {rising}",
+    ]
+    if "dissipation_ratio" in last:
+        ratio = f"{last['dissipation_ratio']:.4f} times it was dissipated"
+        lines.append(f"Toughness of what broke per area{stress}: {last['fracture_energy']:.6g}; {ratio}")
+    return [*lines, f"Debonded: {100 * last['debonded_share']:.1f} % of the interfaces"]
 
 
 def sweep_table(rows: Sequence[tuple[str, str, str]]) -> list[str]:

@@ -82,7 +82,7 @@ def _answer(document: Document) -> list[list[str]]:
     if "effective_stiffness_compression" in document:
         blocks.append(_matrix(f"Under minus E{stress}", document["effective_stiffness_compression"]))
     if document["case"].get("interface"):  # moduli and bounds are of bonded, linear composites
-        return [*blocks, tip_table(document.get("tips", ()), toughness)]
+        return [*blocks, tip_table(document.get("tips"), toughness)]
     return [
         *blocks,
         _moduli(f"Engineering moduli{stress}", document["moduli"]),

@@ -17,7 +17,8 @@ from feti_homog.analysis.result_records import (
     PathPoint,
     SolverInfo,
     StiffnessBounds,
-    TipInfo,
+    TipRates,
+    Tips,
 )
 from feti_homog.mechanics.bounds import Bounds, engineering_moduli
 from feti_homog.output.files import csv_tables, result_json
@@ -25,10 +26,15 @@ from feti_homog.output.files import csv_tables, result_json
 STIFFNESS = np.array([[9.0, 2.0, 0.0], [2.0, 8.0, 0.0], [0.0, 0.0, 3.0]])
 CELL = CellInfo(1.0, 2.0, 2.0, 0.4, {"matrix": 0.6, "fibre": 0.4}, 10, 20)
 SOLVER = SolverInfo(1, 2, 3, 40, 50, 6, 7, 8, 3, 1, 1e-8, 3, (5, 6, 7), (2, 2, 2))
-TIPS = tuple(
-    TipInfo(load="E11", fibre=1, direction=d, G=3.0, G_I=1.0, G_II=2.0, mode_angle=54.7, length=1e-3)
-    for d in (45.0, 315.0)
-)
+TIPS = TipRates(
+    load=("E11", "E11"), fibre=(1, 1), angle=np.array([-45.0, 45.0]), G=np.array([3.0, 3.0]), G_I=np.array([1.0, 1.0]),
+    G_II=np.array([2.0, 2.0]), psi=np.array([54.7, 54.7]), length=np.array([1e-3, 1e-3]),
+)  # fmt: skip
+DEBONDING = {
+    "debonded_share": 0.5,
+    "debonded_length": np.array([0.5, 0.0]),
+    "debonding_angle": np.array([90.0, 0.0]),
+}
 COUNTS = {"bonded": 5, "open": 3, "closed": 1, "iterations": 7}
 
 
@@ -42,6 +48,12 @@ def path_point(load: float) -> PathPoint:
         free_motions=0,
         dissipated=0.5,
         dissipated_strain_controlled=0.6,
+        stored=0.4,
+        stored_in_springs=0.1,
+        fracture_energy=0.4 * load,
+        dissipation_ratio=None if load < 1 else 1.25,
+        tips=None if load < 1 else Tips((1, 2), *np.arange(8.0).reshape(4, 2)),
+        **DEBONDING,
         **COUNTS,
     )
 
@@ -70,10 +82,10 @@ RESULTS = {
     ),
     "debonded": made("stiffness", effective_stiffness=STIFFNESS, tips=TIPS),
     "angle": made(
-        "angle",
-        angle=tuple(
-            AnglePoint(angle=a, stiffness=STIFFNESS, tips=tips, **COUNTS) for a, tips in ((0.0, ()), (90.0, TIPS))
-        ),
+        "angle", angle=tuple(AnglePoint(angle=a, stiffness=STIFFNESS, **DEBONDING, **COUNTS) for a in (0.0, 90.0)),
+    ),
+    "angle with tips": made(
+        "angle", angle=(AnglePoint(angle=90.0, stiffness=STIFFNESS, tips=TIPS, **DEBONDING, **COUNTS),),
     ),
     "path": made("path", path=(path_point(0.5), path_point(1.0)), resumed=0),
 }  # fmt: skip
@@ -120,24 +132,30 @@ def test_columns_are_those_of_the_table(tmp_path, kind, points):
     described = [column.name for column in csv_tables.columns(kind)]
     written = header.split(",")
     assert [name for name in described if name in written] == written and len(rows) == len(points)
+    assert not {"tips", "debonded_length", "fibre"} & {*written, *described}
     if kind is PathPoint:
         assert written[1:7] == ["E11", "E22", "gamma12", "S11", "S22", "S12"] and "free_motions" in written
+        column = written.index("dissipation_ratio")
+        assert [row.split(",")[column] for row in rows] == ["", "1.25"]
 
 
 def test_points_are_arrays():
     points = RESULTS["path"].points
     assert points["strain"].shape == (2, 3) and points["load_factor"].tolist() == [0.5, 1.0]
     assert RESULTS["angle"].points["stiffness"].shape == (2, 3, 3) and "strain" not in RESULTS["angle"].points
-    assert "tips" not in RESULTS["angle"].points and not RESULTS["stiffness"].points
+    assert not RESULTS["stiffness"].points and "tips" not in points
+    np.testing.assert_array_equal(points["dissipation_ratio"], [np.nan, 1.25])
+    assert points["debonded_length"].shape == (2, 2)
 
 
 def test_tips_are_records_and_no_cells_of_a_table(tmp_path):
-    result_json.write(tmp_path, RESULTS["angle"].document)
-    again = Result.of(result_json.read(tmp_path))
-    assert again.angle[1].tips == TIPS and again.angle[0].tips == () and RESULTS["stiffness"].tips is None
-    assert "tips" not in [column.name for column in csv_tables.columns(AnglePoint)]
+    result_json.write(tmp_path, RESULTS["angle with tips"].document)
+    (point,) = Result.of(result_json.read(tmp_path)).angle
+    assert point.tips.load == TIPS.load and point.tips.fibre == TIPS.fibre and np.array_equal(point.tips.G, TIPS.G)
+    assert RESULTS["angle"].angle[0].tips is None and "tips" not in RESULTS["angle with tips"].points
+    assert "tips" not in csv_tables.write(tmp_path / "table.csv", RESULTS["angle with tips"].angle).read_text()
     by_path = {key.path: key for key in schema_keys()}
-    assert by_path["tips[].G"].unit == by_path["angle[].tips[].G"].unit == "unit of the moduli times unit of the cell"
+    assert by_path["tips.G"].unit == by_path["angle[].tips.G"].unit == "unit of the moduli times that of the cell"
 
 
 def test_results_can_be_told_apart():

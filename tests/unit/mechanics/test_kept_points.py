@@ -73,7 +73,7 @@ def test_the_deepest_drops_come_first() -> None:
         stress[number:] -= depth
     points = path(stress)
     assert kept(points, "peaks", 0) == [0, 19, 20, 49, 50, 79, 80, 100]
-    assert {49, 50, 79, 80} <= set(kept(points, 6, 0)) and {49, 50} <= set(kept(points, 4, 0))
+    assert {49, 50, 79, 80} <= set(kept(points, 10, 0)) and {49, 50} <= set(kept(points, 6, 0))
     assert {19, 20, 49, 50, 79, 80} <= set(kept(points, 20, 0))
     gaps = np.diff(kept(points, 20, 0))
     assert gaps.max() <= 10

@@ -134,7 +134,8 @@ def test_an_angle_is_a_table_of_stiffnesses() -> None:
 def test_a_path_is_a_table_of_chosen_points() -> None:
     points = [
         counted(100 - k, load_factor=0.01 * k, strain=[0, -2e-3 * k, 1e-5], stress=[1e-15, -3.5 * k, -2.0], broke=1,
-                dissipated=0.5 * k, dissipated_strain_controlled=0.6 * k)
+                dissipated=0.5 * k, dissipated_strain_controlled=0.6 * k, stored=0.7 * k, stored_in_springs=0.1 * k,
+                fracture_energy=0.4 * k, dissipation_ratio=1.25, debonded_share=0.005 * k)
         for k in range(101)
     ]  # fmt: skip
     document = changed(path=points, kkt_tolerance=1e-6)
@@ -146,6 +147,9 @@ def test_a_path_is_a_table_of_chosen_points() -> None:
     assert max(map(len, text.splitlines())) < 80
     assert "101 points, 15 shown; 101 bonds broke" in text
     assert line(text, "Dissipated").endswith("per area (GPa): 50 along all equilibria, 60 if the strain only rises")
+    assert line(text, "Stored").endswith("per area (GPa): 70, 10 of it in springs")
+    assert line(text, "Toughness").endswith("per area (GPa): 40; 1.2500 times it was dissipated")
+    assert line(text, "Debonded") == "Debonded: 50.0 % of the interfaces"
     rows = [words.split() for words in text.splitlines() if words[:5].strip().isdigit()]
     assert len(rows) == 15
     assert rows[0] == ["0", "0.000000", "0", "0", "0", "-2", "100", "9", "1"]
@@ -163,10 +167,11 @@ def test_bounds_are_those_of_bonded_cells_only() -> None:
     assert "Under minus E (GPa)" in text and "Bounds" not in text and "moduli" not in text
 
 
-def tip(load: str, G: float, fibre: int = 1, direction: float = 60.0) -> dict[str, Any]:
-    """A tip of a third opening."""
-    rest = {"G_I": G / 3, "G_II": 2 * G / 3, "mode_angle": 54.7356, "length": 1e-3}
-    return {"load": load, "fibre": fibre, "direction": direction, "G": G} | rest
+def tips_of(*tips: tuple[Any, ...]) -> dict[str, Any]:
+    """Tips of a third opening: load, G, fibre and direction of each."""
+    load, G, fibre, angle = (list(column) for column in zip(*tips, strict=True)) if tips else ([], [], [], [])
+    thirds = {"G_I": [g / 3 for g in G], "G_II": [2 * g / 3 for g in G], "psi": [54.7356] * len(G)}
+    return {"load": load, "G": G, "fibre": fibre, "angle": angle, "length": [1e-3] * len(G)} | thirds
 
 
 def bonding(**top: Any) -> dict[str, Any]:
@@ -176,22 +181,26 @@ def bonding(**top: Any) -> dict[str, Any]:
 
 
 def test_the_largest_energy_release_rate_of_each_load_is_told() -> None:
-    tips = [tip("E11", 3.0), tip("E11", 6.0, 12, 300.0), tip("-E11", 0.0), tip("-E11", 1e-12, 2)]
-    text = summary(bonding(tips=tips))
+    tips = [("E11", 3.0, 1, 60.0), ("E11", 6.0, 12, -60.0), ("-E11", 0.0, 1, 60.0), ("-E11", 1e-12, 2, 60.0)]
+    text = summary(bonding(tips=tips_of(*tips)))
     assert "Largest energy release rate (GPa mm)" in text
-    assert line(text, "E11 ").split() == ["E11", "6", "2", "4", "54.7", "12", "300"]
+    assert line(text, "E11 ").split() == ["E11", "6", "2", "4", "54.7", "12", "-60"]
     assert line(text, "-E11").split()[-2:] == ["2", "60"] and max(map(len, text.splitlines())) < 80
-    assert "energy release" not in summary(bonding(tips=[])) and "energy release" not in summary(bonding())
+    assert "energy release" not in summary(bonding(tips=tips_of())) and "energy release" not in summary(bonding())
 
 
 def test_energy_release_rates_against_the_angle() -> None:
     states = {"bonded": 5, "open": 3, "closed": 1, "iterations": 4}
     stiff = {"stiffness": DOCUMENT["effective_stiffness"]} | states
-    points = [{"angle": 0.0, "tips": []} | stiff, {"angle": 60.0, "tips": [tip("E11", 3.0), tip("E22", 6.0)]} | stiff]
+    tips = tips_of(("E11", 3.0, 1, 60.0), ("E22", 6.0, 1, 60.0))
+    points = [{"angle": 0.0, "tips": tips_of()} | stiff, {"angle": 60.0, "tips": tips} | stiff]
     lines = summary(bonding(angle=points)).splitlines()
     where = lines.index("Largest energy release rate (GPa mm) under each load")
     assert [text.split() for text in lines[where + 1 : where + 4]] == [["angle", "E11", "E22"], ["60", "3", "6"], []]
-    given = [{"angle": 60.0, "stress": [1.0, 0.0, 0.0], "tips": [tip("strain", 3.0), tip("strain", 5.0, 2)]} | states]
+    given = [
+        {"angle": 60.0, "stress": [1.0, 0.0, 0.0], "tips": tips_of(("strain", 3.0, 1, 60.0), ("strain", 5.0, 2, 60.0))}
+        | states
+    ]
     lines = summary(bonding(angle=given)).splitlines()
     where = lines.index("Largest energy release rate (GPa mm)")
     assert lines[where + 2].split() == ["60", "5", "1.6667", "3.3333", "54.7", "2", "60"]

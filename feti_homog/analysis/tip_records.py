@@ -1,0 +1,41 @@
+"""What result.json says of the tips of debonding."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from feti_homog.analysis.result_records import Tips
+from feti_homog.feti.decomposition.interface_neighbours import InterfaceNeighbours
+from feti_homog.homogenization.averaging import Homogenization
+from feti_homog.interface.energy_criterion import EnergyCriterion
+from feti_homog.interface.path_points import Point
+from feti_homog.interface.tip_energies import tip_energies
+
+# Directions of nodes differ by rounding from rank to rank, and so would their order.
+DIRECTION_DIGITS = 9
+
+
+class TipRecorder:
+    """Makes the records of points whose bonds break by energy."""
+
+    def __init__(self, homogenization: Homogenization, springs: EnergyCriterion) -> None:
+        """Collective."""
+        self._cell, self._interface, self._springs = homogenization.cell, homogenization.interface, springs
+        cell = self._cell
+        self._neighbours = InterfaceNeighbours(
+            cell.comm, cell.solver.jump_operator, cell.subdomains, cell.summary.phases[0]
+        )
+
+    def of(self, point: Point) -> Tips:
+        """The tips of a point on every rank, by fibre and direction.  Collective."""
+        cell, nodes = self._cell, self._interface.nodes
+        traction = point.scale * self._interface.traction(point.state.solution)
+        own = tip_energies(self._springs, self._neighbours, point.state.status, traction, point.used)
+        normal = np.degrees(np.arctan2(nodes.normal[own.node, 1], nodes.normal[own.node, 0]))
+        direction = np.where(np.isnan(cell.directions[own.node]), normal, cell.directions[own.node])
+        direction += 360.0 * (np.round(direction, DIRECTION_DIGITS) <= -180.0)
+        fibre = cell.summary.fibre_number(nodes.fibre[own.node])
+        table = np.column_stack([fibre, direction, own.opening, own.shear, own.mode])
+        table = np.concatenate(cell.comm.allgather(table))
+        table = table[np.lexsort((np.round(table[:, 1], DIRECTION_DIGITS), table[:, 0]))]
+        return Tips(tuple(table[:, 0].astype(int).tolist()), *table.T[1:])

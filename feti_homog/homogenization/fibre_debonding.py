@@ -1,0 +1,43 @@
+"""How much of the fibres' interfaces has debonded."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from feti_homog.common.distributed_arrays import allreduce_sum
+from feti_homog.homogenization.unit_cell import TornCell
+from feti_homog.interface.contact import BONDED, Status
+from feti_homog.typing import Float
+
+
+class FibreInterfaces:
+    """The interfaces of the f fibres of a cell with the matrix, in the order of their numbers.
+
+    A node stands for its tributary length; so does a debonded one.
+    """
+
+    def __init__(self, cell: TornCell) -> None:
+        """Collective."""
+        self._comm, self._nodes = cell.comm, cell.solver.jump_operator.nodes
+        self._fibres = cell.summary.fibres
+        self._fibre = cell.summary.fibre_number(self._nodes.fibre) - 1
+        radius = cell.summary.radii[cell.summary.first_fibre :]
+        self._length = self._sums(self._nodes.length)
+        round_fibre = np.degrees(1.0 / np.where(np.isnan(radius), 1.0, radius))
+        self._degrees = np.where(np.isnan(radius), 360.0 / np.where(self._length > 0, self._length, 1.0), round_fibre)
+
+    def debonded_length(self, status: Status) -> Float:
+        """(f,) debonded length of each fibre's interface, for the states (k,) of this rank's nodes.  Collective."""
+        return self._sums(self._nodes.length * (status != BONDED))
+
+    def angle(self, length: Float) -> Float:
+        """(f,) degrees of arc of lengths (f,); of a fibre that is not round 360 times the share of its interface."""
+        return np.asarray(length * self._degrees)
+
+    def share(self, length: Float) -> float:
+        """What lengths (f,) are of all interfaces."""
+        return float(length.sum() / (self._length.sum() or 1.0))
+
+    def _sums(self, values: Float) -> Float:
+        sums: Float = np.bincount(self._fibre, values, self._fibres).astype(float)
+        return allreduce_sum(self._comm, sums)

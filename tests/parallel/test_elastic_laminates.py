@@ -1,0 +1,90 @@
+"""Strips on springs, exact in closed form: stiffness, and a path that breaks all bonds at once.
+
+1 / C11 = <1 / M> + 2 / (k_n W), M = lambda + 2 mu, and 1 / C33 = <1 / mu> + 2 / (k_t W) for a strip normal to x1 in a
+cell of width W; under E11 the stress rises in a straight line to sqrt(2 k_n G_Ic), and is none from there on.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from reference.closed_forms import lame
+from support import torn_cells
+from support.cases import FIBRE, MATRIX
+from unit.cell.faulty_meshes import grid
+
+from feti_homog.homogenization.averaging import Homogenization
+from feti_homog.interface.contact import BONDED
+from feti_homog.interface.energy_criterion import EnergyCriterion
+from feti_homog.interface.path_following import events
+from feti_homog.interface.path_points import unloaded
+from feti_homog.interface.tip_criterion import TipCriterion
+
+pytestmark = pytest.mark.parallel
+
+NORMAL, TANGENTIAL, TOUGHNESS = 700.0, 150.0, 0.02
+FRACTION = 0.25
+
+
+@pytest.fixture
+def strip(comm, shared_path):
+    """A cell with a strip of fibre normal to x1, a quarter of it, at either order."""
+    if comm.rank == 0:
+        grid(lambda x, y: 0.25 < x < 0.5).write(shared_path / "strip.msh")
+    comm.barrier()
+    petsc = {"feti_pc_type": "influence"}
+    cells = [
+        torn_cells.tear(
+            comm,
+            geometry="mesh",
+            file="strip.msh",
+            folder=shared_path,
+            order=order,
+            springs=(NORMAL, TANGENTIAL),
+            petsc=petsc,
+        )
+        for order in (1, 2)
+    ]
+    yield cells
+    for cell in cells:
+        cell.solver.destroy()
+
+
+def series(matrix, fibre, stiffness):
+    """The modulus of matrix, fibre and two interfaces of a cell of width 1 in a row."""
+    return 1.0 / ((1 - FRACTION) / matrix + FRACTION / fibre + 2.0 / stiffness)
+
+
+def moduli():
+    """C11 and C33 in closed form."""
+    (la_m, mu_m), (la_f, mu_f) = (lame(phase) for phase in (MATRIX, FIBRE))
+    return series(la_m + 2 * mu_m, la_f + 2 * mu_f, NORMAL), series(mu_m, mu_f, TANGENTIAL)
+
+
+def bonded(cell):
+    return np.full(len(cell.solver.jump_operator.nodes.row), BONDED, np.int8)
+
+
+def test_the_stiffness_is_exact(strip):
+    for cell in strip:
+        status, starts = bonded(cell), [np.zeros(cell.solver.rows)] * 3
+        L = np.array([r.stress for r in Homogenization(cell, True).respond(np.eye(3), status, starts)]).T
+        C11, C33 = moduli()
+        assert L[0, 0] == pytest.approx(C11, rel=1e-9) and L[2, 2] == pytest.approx(C33, rel=1e-9)
+
+
+@pytest.mark.parametrize("growth", ["released", "springs"])
+def test_all_bonds_break_at_once_and_nothing_is_left(comm, strip, growth):
+    C11, peak = moduli()[0], np.sqrt(2 * NORMAL * TOUGHNESS)
+    for cell in strip:
+        interface = torn_cells.interface(cell, True)
+        springs = EnergyCriterion(NORMAL, TANGENTIAL, TOUGHNESS, 0.25)
+        law = springs if growth == "springs" else TipCriterion(springs, cell.solver.preconditioner)
+        strain = np.array([[2 * peak / C11, 0.0, 0.0]])
+        first, last = events(interface, law, strain, unloaded(interface, bonded(cell)))
+        assert first.load_factor == pytest.approx(0.5, rel=1e-8)
+        assert first.scale * interface.stress(first.state.solution)[0] == pytest.approx(peak, rel=1e-8)
+        assert first.broke == comm.allreduce(len(interface.nodes.row))
+        assert last.load_factor == 1.0 and abs(interface.stress(last.state.solution)[0]) < 1e-9 * peak
+        # All that was stored is lost.
+        assert last.released == pytest.approx(0.5 * 0.5 * strain[0, 0] * peak, rel=1e-8)
