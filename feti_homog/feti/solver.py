@@ -185,7 +185,7 @@ class FetiSolver:
         if is_seen.any():
             found, iterations, reason = self._solve_with_restarts(krylov, lam, right)
             if self._view:
-                PETSc.Sys.Print(view.describe_solve(krylov.ksp, k), comm=self.comm)
+                PETSc.Sys.Print(view.describe_solve(krylov.ksp, k, iterations), comm=self.comm)
         lam, jump_left = found.lam * scale, torn_jump - found.applied * scale
         return self._solutions(strains, lam, jump_left, iterations, reason, np.maximum(jump, rounding))
 

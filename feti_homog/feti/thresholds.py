@@ -123,7 +123,7 @@ ZERO_JUMP = 1e-13
 
 # Influence columns found at once: bounds the memory of their right-hand sides, (boundary dofs, this).
 INFLUENCE_CHUNK = 32
-# Columns after which the cell as it stands is factored in place of them: the default of `-feti_influence_columns`
+# Changed rows after which the cell as it stands is factored in place of them: the default of `-feti_influence_columns`
 # (`scripts/benchmark_path --to-the-end`).
 INFLUENCE_COLUMNS = 700
 # Bonds on each side of one that breaks whose columns are found with its own: fewer and larger batches, but columns that
@@ -132,6 +132,8 @@ NEXT_BONDS = 6
 # Stiffness of the fibres over that of the matrix, as the diagonals of K have them, above which influence columns take
 # the forces of the matrix: those of the fibres lose as many digits as this has.
 STIFF_FIBRES = 1e3
+# Relative error of the bordered inverse above which it is made anew: borders that pass by a singular block lose digits.
+INVERSE_ERROR = 1e-7
 # Steps of the power method for the norm of the inverse of the dual operator, which find it to some per cent, and what
 # they find is taken so many times.
 NORM_ITERATIONS, NORM_MARGIN = 20, 2.0

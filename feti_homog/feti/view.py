@@ -41,9 +41,8 @@ def describe_setup(comm: MPI.Intracomm, parts: SolverParts) -> str:
     return "\n".join(lines)
 
 
-def describe_solve(ksp: PETSc.KSP, load_cases: int) -> str:
+def describe_solve(ksp: PETSc.KSP, load_cases: int, iterations: int) -> str:
     """Iterations and condition number of a solve, as the Krylov method estimates it."""
-    iterations = ksp.getIterationNumber()
     words = f"FETI: {load_cases} load case{'s' * (load_cases > 1)}, {iterations} iterations"
     if not iterations or ksp.getType() not in ESTIMATES_SINGULAR_VALUES:
         return words

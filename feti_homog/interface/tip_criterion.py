@@ -48,28 +48,29 @@ class TipCriterion:
         mine = (own >= 0) & (own < len(status))
         own, H = own[mine], H[mine]
         length = interface.nodes.length[own]
-        stiffness = length[:, None] * [self.springs.normal_stiffness, self.springs.tangential_stiffness]
+        springs = length[:, None] * [self.springs.normal_stiffness, self.springs.tangential_stiffness]
+        stiffness = np.minimum(springs, self.influence.norm)
 
         def utilisation(traction: Float) -> Float:
             used = self.springs.utilisation(traction)
-            released = released_energy(H, traction[own] * length[:, None], stiffness)
+            released = released_energy(H, traction[own] * length[:, None], stiffness, interface.contact)
             used[own] = np.sqrt(released / (self.springs.toughness * length)) * self.springs.mode_factor(traction[own])
             return used
 
         return utilisation
 
 
-def released_energy(H: Float, lam: Float, stiffness: Float) -> Float:
+def released_energy(H: Float, lam: Float, stiffness: Float, contact: bool) -> Float:
     """(m,) energies that the breaks of single bonds release, for their blocks H (m, 2, 2) and forces lam (m, 2).
 
-    `stiffness` (m, 2) is that of their springs, the most that H can be: where H is rounding beside it, as at the last
-    bond of a fibre, no force can act.
+    `stiffness` (m, 2) is the most that H can be, of a spring its own: where H is rounding beside it, as at the last
+    bond of a fibre, no force can act.  With `contact` faces that would overlap keep their normal force.
     """
     root = np.sqrt(stiffness)
     share, vectors = np.linalg.eigh(H / (root[:, :, None] * root[:, None, :]))
     along = np.einsum("mij,mi->mj", vectors, lam / root)
     inverse = np.where(share > RIGID, 1.0 / np.where(share > RIGID, share, 1.0), 0.0)
-    opens = np.einsum("mj,mj->m", vectors[:, 0], inverse * along) >= 0.0
+    opens = (np.einsum("mj,mj->m", vectors[:, 0], inverse * along) >= 0.0) | (not contact)
     both, tangential = (inverse * along**2).sum(axis=1), H[:, 1, 1] / stiffness[:, 1]
     slides = tangential > RIGID
     shear = np.where(slides, lam[:, 1] ** 2 / stiffness[:, 1] / np.where(slides, tangential, 1.0), 0.0)

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 from reference.dense_feti import DenseDual, gathered, matrix
 from scipy.linalg import null_space
 from support import torn_cells
-from support.cases import relative_error
 from support.coarse_space_cells import BREAKING, NARROW, solve_many
 
 from feti_homog.errors import CaseError
@@ -50,15 +50,21 @@ def activate(cell, status):
 
 
 def states(cell):
-    """Statuses that open, close, bond again and loosen a whole fibre."""
+    """Statuses that open, close, bond again and loosen a whole fibre, which is pressed here and there and let go."""
     nodes = cell.solver.jump_operator.nodes
     angle = np.degrees(np.arctan2(nodes.normal[:, 1], nodes.normal[:, 0]))
     bonded = np.full(len(nodes.row), BONDED, np.int8)
     arc = np.where(np.abs(angle) < 40, OPEN, bonded)
     closed = np.where(np.abs(angle) < 15, CLOSED, arc)
     longer = np.where(np.abs(angle) < 70, OPEN, bonded)
-    loose = np.where(nodes.fibre == 0, OPEN, longer)
-    return [bonded, arc, closed, longer, loose, arc, bonded]
+    first = nodes.fibre == cell.comm.allreduce(nodes.fibre.min(initial=10**9), MPI.MIN)
+    loose = np.where(first, OPEN, longer)
+    pressed = [
+        np.where(first & np.any([np.abs(angle - a) < 25 for a in at], axis=0), CLOSED, loose)
+        for at in ((-120, 0, 120), (0,), (-120, 0, 120), (90,), (-60, 60))
+    ]
+    assert cell.comm.allreduce(bool((loose != longer).any()), MPI.LOR)
+    return [bonded, arc, closed, longer, loose, *pressed, loose, arc, bonded]
 
 
 @CELLS
@@ -71,33 +77,39 @@ def test_influence_columns_give_the_inverse_for_any_active_rows(comm, case, colu
         active = activate(cell, status)
         expected = inverse(dense, active)
         found = matrix(cell, influence.apply)
-        assert relative_error(found, expected) < 1e-8
+        # A single fibre that is loose leaves nothing of it.
+        tolerance = 1e-8 * influence.norm
+        assert np.abs(found - expected).max() < tolerance
         assert np.abs(found[~active]).max(initial=0.0) == 0.0
         alone = gathered(cell, influence.apply(np.ones(cell.solver.rows)))
-        assert relative_error(alone, expected @ np.ones(dense.total)) < 1e-8
+        assert np.abs(alone - expected @ np.ones(dense.total)).max() < 10 * tolerance
         d, E = cell.solver.d, np.array([[1.0, 0.2], [-0.5, 0.0], [0.3, 1.0]])
-        assert relative_error(gathered(cell, influence.close(d @ E, d, E)), expected @ gathered(cell, d) @ E) < 1e-8
+        assert np.abs(gathered(cell, influence.close(d @ E, d, E)) - expected @ gathered(cell, d) @ E).max() < tolerance
         rows = influence.neighbours.rows
         bonded = rows[active[rows] & active[rows + 1]]
         blocks = influence.inverse_blocks(bonded[:, None] + np.arange(2))
         for row, block in zip(bonded, blocks, strict=True):
-            assert relative_error(block, expected[row : row + 2, row : row + 2]) < 1e-8
+            assert np.abs(block - expected[row : row + 2, row : row + 2]).max() < tolerance
         assert np.linalg.eigvalsh(expected).max() <= influence.norm
-    assert (influence.factorizations > 1) == (columns < 700)
+    assert influence.factorizations == 1 if columns == 700 else influence.factorizations > (columns == 1)
 
 
 @CELLS
 def test_influence_columns_leave_nothing_to_iterate(comm, case):
     cell = torn_cells.tear(comm, **case, petsc=INFLUENCE)
     other = torn_cells.tear(comm, **case, petsc={"feti_pc_type": "dirichlet"})
+    largest, iterations = 0.0, 0
     for status in states(cell):
         activate(cell, status)
         activate(other, status)
         for found, expected in zip(solve_many(cell), solve_many(other), strict=True):
             assert found.reason > 0 and found.iterations <= 1
-            assert expected.iterations > 1
+            iterations = max(iterations, expected.iterations)
             lam = [gathered(c, s.lam) for c, s in ((cell, found), (other, expected))]
-            assert relative_error(*lam) < 1e-5
+            # A single fibre that is loose has no multipliers.
+            largest = max(largest, np.abs(lam[1]).max())
+            assert np.abs(lam[0] - lam[1]).max() < 1e-5 * largest
+    assert iterations > 1
 
 
 def test_influence_columns_stay_exact_at_narrow_gaps_and_contrasts(comm):
@@ -128,6 +140,19 @@ def test_influence_columns_are_chosen_for_many_applications(comm, thresholds, pe
 def test_influence_columns_are_not_chosen_where_the_bonded_cell_is_too_large(comm):
     cell = torn_cells.tear(comm, thresholds=replace(WORTH_WHILE, assembled_schur_dofs=10), **BREAKING)
     assert not isinstance(cell.solver.preconditioner, Influence)
+
+
+def test_more_ranks_than_subdomains(comm):
+    cell = torn_cells.tear(comm, geometry="square", decomposition={"subdomains": 2}, petsc=INFLUENCE)
+    for status in states(cell):
+        activate(cell, status)
+        for solution in solve_many(cell):
+            assert solution.reason > 0 and solution.iterations == 0 and solution.residual < 1e-8
+
+
+def test_a_number_of_columns_that_is_none_is_refused(comm):
+    with pytest.raises(CaseError, match="-feti_influence_columns 0: expected a whole number above 0"):
+        torn_cells.tear(comm, **BREAKING, petsc=INFLUENCE | {"feti_influence_columns": 0})
 
 
 def test_influence_columns_need_explicit_operators(comm):

@@ -20,7 +20,7 @@ from feti_homog.feti.operators.explicit import ExplicitInterfaceOperator
 from feti_homog.feti.operators.implicit import ImplicitInterfaceOperator, Interior
 from feti_homog.feti.operators.soft_skin import compliance_root, soft_skin
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
-from feti_homog.typing import Float, Int
+from feti_homog.typing import Bool, Float, Int
 
 MATRIX = "matrix"
 InterfaceOperator = ExplicitInterfaceOperator | ImplicitInterfaceOperator
@@ -104,6 +104,12 @@ class InterfaceOperators:
     def slices(self) -> list[slice]:
         """The dofs of each subdomain among the n."""
         return [slice(a, b) for a, b in pairwise(self.offsets.tolist())]
+
+    @property
+    def of_fibre(self) -> Bool:
+        """(n,) whether each boundary dof is a fibre's."""
+        is_fibre = np.array([s.submesh.phase != MATRIX for s in self.subdomains], bool)
+        return np.repeat(is_fibre, np.diff(self.offsets))
 
     def apply_schur(self, x: Float) -> Float:
         """S x for x (n,) or (n, k)."""

@@ -11,7 +11,7 @@ from feti_homog.feti.linalg.collectives import allreduce_sparse
 from feti_homog.feti.linalg.dense_block_sum import DenseBlockSum
 from feti_homog.feti.linalg.sparse_direct import DirectSolver
 from feti_homog.feti.operators.explicit import ExplicitInterfaceOperator
-from feti_homog.feti.operators.interface_operators import MATRIX, InterfaceOperators
+from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.typing import Float
 
 # Entries of Z, which are cosines of angles or their products, that rounding leaves of zero.
@@ -57,6 +57,10 @@ class AssembledSchur:
         self.comm.Allreduce(MPI.IN_PLACE, right)
         return np.asarray(self._Z @ self._solver.solve(right))
 
+    def destroy(self) -> None:
+        """Free the factor."""
+        self._solver.destroy()
+
 
 def shared_dofs(comm: MPI.Intracomm, jump_operator: JumpOperator) -> int:
     """Dofs on the shared nodes of all ranks; collective."""
@@ -90,9 +94,12 @@ def _released(
     number = np.where(released, sum(counts[: comm.rank]) + np.cumsum(released), 0)
     number = jump_operator.gather(number.astype(float)).astype(np.int64) - 1
     rows = np.flatnonzero(number >= 0)
-    of_fibre = np.repeat([s.submesh.phase != MATRIX for s in operators.subdomains], np.diff(operators.offsets))
     # A row takes the mean of the fibre's copies, with the sign of minus.
-    e = -diags(jump_operator.copies[rows, 1].astype(float)) @ operators.B[rows] @ diags(of_fibre.astype(float))
+    e = (
+        -diags(jump_operator.copies[rows, 1].astype(float))
+        @ operators.B[rows]
+        @ diags(operators.of_fibre.astype(float))
+    )
     here = np.asarray(e.multiply(e).sum(axis=1)).ravel()
     rows, e, here = rows[here > 0], e.tocsr()[here > 0], here[here > 0]
     own = csr_matrix((np.ones(len(rows)), (np.arange(len(rows)), number[rows])), shape=(len(rows), sum(counts)))

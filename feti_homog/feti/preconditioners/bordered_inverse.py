@@ -3,32 +3,36 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import solve_triangular
+from mpi4py import MPI
 from scipy.linalg.lapack import dpstrf
 
-from feti_homog.feti.thresholds import SINGULAR_PIVOT
+from feti_homog.feti.thresholds import INVERSE_ERROR, SINGULAR_PIVOT
 from feti_homog.typing import Float, Int
 
 
 class BorderedInverse:
-    """N = M[C, C]^-1 for members C of a quasi-definite matrix M.
+    """N = M[C, C]^-1 for members C of a quasi-definite matrix M, the same on all ranks.
 
     Attributes:
         members: (k,) C, in the order of the rows of N.
         N: (k, k).
     """
 
-    def __init__(self) -> None:
+    def __init__(self, comm: MPI.Intracomm) -> None:
+        """No members yet."""
+        self._comm = comm
         self.members: Int = np.zeros(0, np.int64)
         self.N = np.zeros((0, 0))
 
     def append(self, M: Float, new: Int, sign: int) -> None:
         """Border with the members `new`, on which `sign` M, Schur's complement of the others, is semi-definite.
 
-        Those that depend on others are left out: with s the pivots, b = M[C, new], w = N b,
+        Those that depend on others, as rank 0 finds, are left out.  With s the pivots, b = M[C, new], w = N b,
 
             N <- [ N + w s^-1 w^T    -w s^-1 ]
                  [ -s^-1 w^T          s^-1   ].
+
+        Collective.
         """
         if not len(new):
             return
@@ -39,10 +43,11 @@ class BorderedInverse:
         factor, order, rank, _ = dpstrf(pivots, tol=rounding, lower=1)
         # The first pivot is taken whatever it is.
         rank = min(rank, int((factor.diagonal() ** 2 > rounding).sum()))
-        kept = order[:rank] - 1
-        half = solve_triangular(factor[:rank, :rank], np.eye(rank), lower=True)
+        # Other processors may round another way, and pivot in another order.
+        kept = self._comm.bcast(order[:rank] - 1)
+        half = np.linalg.inv(np.linalg.cholesky(pivots[np.ix_(kept, kept)]))
         inverse, w = sign * half.T @ half, w[:, kept]
-        k, scaled = len(self.members), w @ inverse
+        k, rank, scaled = len(self.members), len(kept), w @ inverse
         N = np.empty((k + rank, k + rank))
         np.matmul(scaled, w.T, out=N[:k, :k])
         N[:k, :k] += self.N
@@ -58,3 +63,9 @@ class BorderedInverse:
         coupling = self.N[c[:, None], g]
         self.N = self.N[c[:, None], c] - coupling @ np.linalg.solve(self.N[g[:, None], g], coupling.T)
         self.members = self.members[c]
+
+    def holds(self, M: Float) -> bool:
+        """Whether M[C, C] N x = x for a vector x, but for rounding, as rank 0 finds.  Collective."""
+        x = np.cos(np.arange(float(len(self.members))))
+        off = M[self.members[:, None], self.members] @ (self.N @ x) - x
+        return bool(self._comm.bcast(bool(np.abs(off).max(initial=0.0) <= INVERSE_ERROR)))

@@ -6,7 +6,7 @@ here or there: D of A have left, R beside A have come.  The multipliers that clo
     y = Gamma_:A g_A,  c = N (y_C + g_R),  lam_A = y_A - Gamma_AC c,  lam_R = -c_R,  N = Gamma_CC^-1.
 
 A bond that breaks costs two columns and two borders of N, a face that closes or opens one border; no factor is made
-anew.  After as many columns as an option says, the cell as it stands becomes the reference.
+anew.  After as many changes as an option says, the cell as it stands becomes the reference.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from petsc4py import PETSc
 from scipy.sparse import csr_matrix, identity
 
 from feti_homog.common.distributed_arrays import allreduce_sum, gather_rows, scale_rows
+from feti_homog.errors import CaseError
 from feti_homog.feti.decomposition.interface_neighbours import InterfaceNeighbours
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.operators.interface_operators import MATRIX, InterfaceOperators
@@ -24,7 +25,7 @@ from feti_homog.feti.preconditioners.body_ties import BodyTies
 from feti_homog.feti.preconditioners.bordered_inverse import BorderedInverse
 from feti_homog.feti.preconditioners.reference_cell import ReferenceCell, one_sided_jumps
 from feti_homog.feti.preconditioners.response_columns import ResponseColumns
-from feti_homog.feti.thresholds import INFLUENCE_COLUMNS, NEXT_BONDS, NORM_ITERATIONS, NORM_MARGIN
+from feti_homog.feti.thresholds import INFLUENCE_CHUNK, INFLUENCE_COLUMNS, NEXT_BONDS, NORM_ITERATIONS, NORM_MARGIN
 from feti_homog.typing import Float, Int
 
 
@@ -42,11 +43,16 @@ class Influence:
         """Factor the cell with all bonds intact; all boundary operators must be dense.  Collective.
 
         Options: `feti_influence_columns`.
+
+        Raises:
+            CaseError: the option has no such value.
         """
         self.comm, self._jump_operator, self._operators = comm, jump_operator, operators
         self._first = jump_operator.owned[0]
         self._rows = jump_operator.owned[1] - self._first
         self._most_columns = PETSc.Options("feti_").getInt("influence_columns", INFLUENCE_COLUMNS)
+        if self._most_columns < 1:
+            raise CaseError(f"-feti_influence_columns {self._most_columns}: expected a whole number above 0")
         self._BD = one_sided_jumps(comm, jump_operator, operators)
         self._ties = BodyTies(comm, jump_operator)
         self.neighbours = InterfaceNeighbours(comm, jump_operator, operators.subdomains, MATRIX)
@@ -63,12 +69,14 @@ class Influence:
         """Restrict to the rows where `active` is 1.  Collective."""
         self._active = active
         changed = self._changed()
-        new = changed[self._columns.positions(changed) < 0]
-        if len(self._columns.rows) + len(new) > self._tied + self._most_columns:
+        if len(changed) > self._tied + self._most_columns:
+            # The memory of the old cell goes before the new one takes its own.
+            self.reference.destroy()
+            self._columns.clear()
             self._refer(active)
             changed = self._changed()
-            new, self._tied = changed, len(changed)
-        self._find(new)
+            self._tied = len(changed)
+        self._find(changed)
         self._follow(self._columns.positions(changed))
 
     def apply(self, r: Float) -> Float:
@@ -87,8 +95,7 @@ class Influence:
 
         Rows that leave together change the multipliers of their own by all of them, and open by H_ii^-1 lam_i.
         """
-        rows = pairs.ravel()
-        self._find(rows[self._columns.positions(rows) < 0])
+        self._find(pairs.ravel())
         at, members = self._columns.positions(pairs.ravel()), self._inverse.members
         block = self._columns.block
         # The rows of U, and of the identity on A.
@@ -117,13 +124,17 @@ class Influence:
         self.factorizations += 1
         owned = self._jump_operator.owned
         self._columns = ResponseColumns(self.comm, self.reference, owned, self._jump_operator.global_rows)
-        self._inverse, self._dependent = BorderedInverse(), np.zeros(0, np.int64)
+        self._inverse, self._dependent = BorderedInverse(self.comm), np.zeros(0, np.int64)
         self._answer, self._tied = None, 0
 
     def _find(self, rows: Int) -> None:
-        """Find the columns of these rows, and those of the bonds near them: they break next, and columns are cheaper
-        together.  Collective."""
+        """Find the columns that these rows lack; with few also those of bonds near them, which break next, for columns
+        are cheaper together.  Collective."""
+        rows = rows[self._columns.positions(rows) < 0]
         if not len(rows):
+            return
+        if len(rows) > INFLUENCE_CHUNK:
+            self._columns.add(rows)
             return
         normal = self.neighbours.rows
         at = np.searchsorted(normal, rows, side="right") - 1
@@ -134,6 +145,13 @@ class Influence:
 
     def _follow(self, changed: Int) -> None:
         """Let N be that of the columns `changed`.  Collective."""
+        self._border(changed)
+        if not self._inverse.holds(self._columns.block):
+            self._inverse, self._dependent = BorderedInverse(self.comm), np.zeros(0, np.int64)
+            self._border(changed)
+
+    def _border(self, changed: Int) -> None:
+        """Take the columns that are not `changed` out of N, and the others in.  Collective."""
         inverse, M = self._inverse, self._columns.block
         returned = gather_rows(self.comm, self.reference.active, self._first, self._columns.rows[changed]) == 0
         gone = np.setdiff1d(inverse.members, changed)
@@ -161,7 +179,7 @@ class Influence:
     def _restricted(self, y: Float, g: Float) -> Float:
         """H g for y = Gamma g_A.  Collective."""
         members = self._inverse.members
-        z = y
+        z = scale_rows(self.reference.active, y)
         if len(members):
             rows = self._columns.rows[members]
             outside = 1.0 - self.reference.active
@@ -169,7 +187,7 @@ class Influence:
             c = self._inverse.N @ jumps
             whole = np.zeros((len(self._columns.rows), *y.shape[1:]))
             whole[members] = c
-            z = y - self._columns.owned @ whole
+            z = z - scale_rows(self.reference.active, self._columns.owned @ whole)
             mine = np.flatnonzero((rows >= self._first) & (rows < self._first + self._rows))
             taken_in = mine[outside[rows[mine] - self._first] > 0]
             z[rows[taken_in] - self._first] = -c[taken_in]

@@ -17,7 +17,7 @@ from scipy.sparse import csr_matrix, diags
 
 from feti_homog.common.distributed_arrays import allreduce_sum, scale_rows
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
-from feti_homog.feti.operators.interface_operators import MATRIX, InterfaceOperators
+from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.preconditioners.assembled_schur import AssembledSchur
 from feti_homog.feti.preconditioners.spring_update import SpringUpdate
 from feti_homog.feti.thresholds import STIFF_FIBRES
@@ -51,6 +51,10 @@ class ReferenceCell:
         first = jump_operator.owned[0]
         self._springs = SpringUpdate(comm, first, active * operators.compliance, self._without_springs)
 
+    def destroy(self) -> None:
+        """Free the factor."""
+        self.assembled.destroy()
+
     def respond(self, x: Float) -> Float:
         """Gamma x for x (owned rows,) or (owned rows, k).  Collective."""
         return self._springs.apply(self._without_springs(x))
@@ -76,7 +80,7 @@ class ReferenceCell:
 def one_sided_jumps(comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators) -> csr_matrix:
     """(local rows, boundary dofs) B_D with B B_D^T = I that leaves one side of the interfaces at rest, so that forces
     are wanted of the other alone: of the fibres, if they are not so stiff that rounding would tell.  Collective."""
-    of_fibre = np.repeat([s.submesh.phase != MATRIX for s in operators.subdomains], np.diff(operators.offsets))
+    of_fibre = operators.of_fibre
     side = [operators.diagonal[of_fibre], operators.diagonal[~of_fibre]]
     sums = allreduce_sum(comm, np.array([[x.sum(), len(x)] for x in side]))
     fibre, matrix = sums[:, 0] / np.maximum(sums[:, 1], 1.0)

@@ -41,6 +41,10 @@ class ResponseColumns:
         """Where rows are in K; -1 if they are not."""
         return self._position[rows]
 
+    def clear(self) -> None:
+        """Give the memory back; no columns are left."""
+        self.rows, self._columns, self._block = self.rows[:0], self._columns[:, :0].copy(), self._block[:0, :0].copy()
+
     def add(self, rows: Int) -> None:
         """Find the columns of those rows that have none.  Collective."""
         new = np.unique(rows[self._position[rows] < 0])

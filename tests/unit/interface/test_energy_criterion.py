@@ -48,14 +48,20 @@ def test_what_a_break_releases_is_continuous_where_its_faces_begin_to_overlap():
     H = np.array([[[2.0, 0.7], [0.7, 1.5]]])
     # The normal part of H^-1 lam vanishes for lam = (0.7, 1.5).
     at = np.array([[0.7, 1.5]])
-    below, above = (released_energy(H, at + np.array([[e, 0.0]]), STIFF) for e in (-1e-9, 1e-9))
+    below, above = (released_energy(H, at + np.array([[e, 0.0]]), STIFF, True) for e in (-1e-9, 1e-9))
     assert below == pytest.approx(above, rel=1e-8) and above == pytest.approx(1.5**2 / 1.5 / 2)
-    assert released_energy(H, np.array([[-5.0, 1.5]]), STIFF) == pytest.approx(1.5**2 / 1.5 / 2)
-    assert released_energy(H, np.array([[3.0, 0.0]]), STIFF) == pytest.approx(9.0 * np.linalg.inv(H[0])[0, 0] / 2)
+    assert released_energy(H, np.array([[-5.0, 1.5]]), STIFF, True) == pytest.approx(1.5**2 / 1.5 / 2)
+    assert released_energy(H, np.array([[3.0, 0.0]]), STIFF, True) == pytest.approx(9.0 * np.linalg.inv(H[0])[0, 0] / 2)
 
 
 def test_the_last_bond_of_a_fibre_releases_nothing():
     forces = np.array([[1e-12, -1e-12]])
-    assert released_energy(np.zeros((1, 2, 2)), forces, STIFF) == 0.0
+    assert released_energy(np.zeros((1, 2, 2)), forces, STIFF, True) == 0.0
     rigid_across = np.array([[[1e-17, 0.0], [0.0, 2.0]]])
-    assert released_energy(rigid_across, np.array([[1e-12, 3.0]]), STIFF) == pytest.approx(9.0 / 2.0 / 2)
+    assert released_energy(rigid_across, np.array([[1e-12, 3.0]]), STIFF, True) == pytest.approx(9.0 / 2.0 / 2)
+
+
+def test_without_contact_a_break_under_compression_releases_both_parts():
+    H, lam = np.array([[[2.0, 0.7], [0.7, 1.5]]]), np.array([[-5.0, 1.5]])
+    expected = lam[0] @ np.linalg.solve(H[0], lam[0]) / 2
+    assert released_energy(H, lam, STIFF, False) == pytest.approx(expected)

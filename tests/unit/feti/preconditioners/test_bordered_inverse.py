@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
 from feti_homog.feti.preconditioners.bordered_inverse import BorderedInverse
 
@@ -22,7 +23,7 @@ def quasi_definite(n, negative, rank, seed=0):
 
 
 def test_rows_come_and_go():
-    M, found = quasi_definite(12, 4, 8), BorderedInverse()
+    M, found = quasi_definite(12, 4, 8), BorderedInverse(MPI.COMM_SELF)
     steps = [([0, 3], [], 1), ([9], [], -1), ([1, 2, 7], [3], 1), ([8, 11], [9, 1], -1), ([3], [0, 8], 1)]
     for new, gone, sign in steps:
         found.remove(np.array(gone, int))
@@ -34,7 +35,7 @@ def test_rows_come_and_go():
 
 @pytest.mark.parametrize("at_once", [1, 2, 6], ids=["one by one", "in pairs", "all together"])
 def test_rows_that_depend_on_others_are_left_out(at_once):
-    M, found = quasi_definite(6, 0, 4), BorderedInverse()
+    M, found = quasi_definite(6, 0, 4), BorderedInverse(MPI.COMM_SELF)
     for first in range(0, 6, at_once):
         found.append(M, np.arange(first, first + at_once), 1)
     assert len(found.members) == 4
@@ -44,9 +45,23 @@ def test_rows_that_depend_on_others_are_left_out(at_once):
 
 
 def test_a_row_of_nothing_is_left_out_though_it_comes_first():
-    found = BorderedInverse()
+    found = BorderedInverse(MPI.COMM_SELF)
     M = np.diag([1e-14, 1.0])
     found.append(M, np.array([0]), 1)
     assert len(found.members) == 0
     found.append(M, np.array([0, 1]), 1)
     assert found.members.tolist() == [1]
+
+
+def test_borders_that_pass_by_a_singular_block_are_noticed():
+    """One row is positive semi-definite only with the negative one beside it."""
+    M = np.array([[1.0, 1.0, 0.5], [1.0, 1.0, 0.2], [0.5, 0.2, -1.0]])
+    found = BorderedInverse(MPI.COMM_SELF)
+    found.append(M, np.array([2]), -1)
+    found.append(M, np.array([0, 1]), 1)
+    assert len(found.members) == 3 and found.holds(M)
+    found.remove(np.array([2]))
+    assert not found.holds(M)
+    anew = BorderedInverse(MPI.COMM_SELF)
+    anew.append(M, np.array([0, 1]), 1)
+    assert len(anew.members) == 1 and anew.holds(M)
