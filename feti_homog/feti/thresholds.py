@@ -125,7 +125,7 @@ ZERO_JUMP = 1e-13
 INFLUENCE_CHUNK = 32
 # Changed rows after which the cell as it stands is factored in place of them: the default of `-feti_influence_columns`
 # (`scripts/benchmark_path --to-the-end`).
-INFLUENCE_COLUMNS = 700
+INFLUENCE_COLUMNS = 400
 # Bonds on each side of one that breaks whose columns are found with its own: fewer and larger batches, but columns that
 # may not be needed.
 NEXT_BONDS = 6
@@ -136,7 +136,7 @@ STIFF_FIBRES = 1e3
 INVERSE_ERROR = 1e-7
 # Steps of the power method for the norm of the inverse of the dual operator, which find it to some per cent, and what
 # they find is taken so many times.
-NORM_ITERATIONS, NORM_MARGIN = 20, 2.0
+NORM_ITERATIONS, NORM_MARGIN = 30, 1.2
 # Pivots of H on inactive rows, relative to its largest diagonal entry, that are rounding: forces on a free fibre as a
 # whole have none.
 SINGULAR_PIVOT = 1e-10
