@@ -118,3 +118,12 @@ def test_one_stiffness_alone_may_be_finite(comm):
     stiff, *_ = stiffness(comm, springs=(1e12, 1e-6), **case)
     assert relative_error(sliding, stiff) < 1e-7
     assert VOID["square"].value[0] < sliding[0, 0] < glued[0] and sliding[2, 2] < glued[2]
+
+
+@pytest.mark.parametrize("pieces", PIECES, ids=["whole", "cut"])
+def test_very_stiff_springs_are_glue(comm, pieces):
+    cell = {"geometry": "square", "mesh_size": 0.15, "order": 2} | ({"decomposition": pieces} if pieces else {})
+    stiff = 1e10 * FIBRE["young"]
+    L, worst, _ = stiffness(comm, **cell, springs=(stiff, stiff))
+    glued, _, _ = stiffness(comm, **cell)
+    assert relative_error(L, glued) < 1e-8 and worst < 1e-5
