@@ -25,7 +25,6 @@ from feti_homog import Case, Result, launch, run
 
 MATERIAL = {"matrix": {"young": 2790.0, "poisson": 0.33}, "fibre": {"young": 70800.0, "poisson": 0.22}}  # MPa
 NORMAL, TANGENTIAL, TOUGHNESS, SENSITIVITY = 2025.0, 506.25, 2.0, 0.25  # MPa/um, MPa/um, J/m2, 1
-STRENGTH = np.sqrt(2 * NORMAL * TOUGHNESS)  # MPa, in pure opening
 RADII = [1.5, 3.0, 7.5, 15.0, 30.0, 75.0]  # um
 CELL_PER_RADIUS = 60.0
 LENGTH = 0.77  # um, E' G / sigma_c^2, along which bonds break
@@ -153,8 +152,5 @@ def write(folder: Path, found: dict[float, Onset]) -> list[Path]:
 
 
 if __name__ == "__main__":
-    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    options.add_argument("--out", type=Path, default=Path("results") / "energy_debonding", metavar="DIR")
-    options.add_argument("--quick", action="store_true", help="two radii, longer elements")
-    figures.add_output_options(options)
+    options = figures.quick_parser(__doc__ or "", "energy_debonding", "two radii, longer elements")
     sys.exit(launch(main, options))

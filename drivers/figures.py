@@ -20,14 +20,20 @@ INK = ("#1f4e9c", "#c44e00", "#2a7f3f", "#7a3e9d")
 
 def parser(description: str, name: str, mesh_size: float, refine: int, order: int) -> argparse.ArgumentParser:
     """The options that they all have; results go to results/`name` by default."""
-    options = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
-    options.add_argument("--out", type=Path, default=Path("results") / name, metavar="DIR")
+    options = quick_parser(description, name, "a coarse mesh and few points")
     options.add_argument("--mesh-size", type=float, default=mesh_size, help="coarse element size / cell width")
     options.add_argument("--refine", type=int, default=refine, help="times that every element is cut in four")
     options.add_argument("--order", type=int, default=order, choices=(1, 2), help="of the elements; 2 are curved")
     options.add_argument("--fibre-fraction", type=float, default=0.4)
+    return options
+
+
+def quick_parser(description: str, name: str, quick: str) -> argparse.ArgumentParser:
+    """Where results go, by default to results/`name`, what is written, and --quick, of which `quick` is the help."""
+    options = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options.add_argument("--out", type=Path, default=Path("results") / name, metavar="DIR")
     add_output_options(options)
-    options.add_argument("--quick", action="store_true", help="a coarse mesh and few points")
+    options.add_argument("--quick", action="store_true", help=quick)
     return options
 
 

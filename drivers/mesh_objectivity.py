@@ -123,8 +123,5 @@ def write(folder: Path, found: dict[tuple[str, int], Result]) -> list[Path]:
 
 
 if __name__ == "__main__":
-    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    options.add_argument("--out", type=Path, default=Path("results") / "mesh_objectivity", metavar="DIR")
-    options.add_argument("--quick", action="store_true", help="two meshes")
-    figures.add_output_options(options)
+    options = figures.quick_parser(__doc__ or "", "mesh_objectivity", "two meshes")
     sys.exit(launch(main, options))

@@ -100,13 +100,10 @@ def write(folder: Path, found: dict[int, Result]) -> list[Path]:
 
 
 if __name__ == "__main__":
-    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    options.add_argument("--out", type=Path, default=Path("results") / "transverse_strength", metavar="DIR")
+    options = figures.quick_parser(__doc__ or "", "transverse_strength", "two cells of four fibres, long elements")
     options.add_argument("--seeds", type=int, default=10, help="arrangements: 0, 1, ...")
     options.add_argument("--fibres", type=int, default=50)
     options.add_argument("--fibre-fraction", type=float, default=0.5)
     options.add_argument("--refine", type=int, default=2)
     options.add_argument("--strain", type=float, default=0.02, help="E11 at the end")
-    options.add_argument("--quick", action="store_true", help="two cells of four fibres, long elements")
-    figures.add_output_options(options)
     sys.exit(launch(main, options))

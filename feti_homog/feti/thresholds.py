@@ -134,8 +134,8 @@ NEXT_BONDS = 6
 STIFF_FIBRES = 1e3
 # Relative error of the bordered inverse above which it is made anew: borders that pass by a singular block lose digits.
 INVERSE_ERROR = 1e-7
-# Steps of the power method for the norm of the inverse of the dual operator, which find it to some per cent, and what
-# they find is taken so many times.
+# Steps of the power method for the norm of the inverse of the dual operator, which find it from below, and by how much
+# what they find is multiplied.
 NORM_ITERATIONS, NORM_MARGIN = 30, 1.2
 # Pivots of H on inactive rows, relative to its largest diagonal entry, that are rounding: forces on a free fibre as a
 # whole have none.

@@ -2,32 +2,14 @@
 
 from __future__ import annotations
 
-import csv
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.image import imread
-from support.jobs import mpirun
+from support.drivers import column, driven
 
 # MPa: onset of the square cell of `mesh_objectivity`, the spectral solution of tests/parallel/test_energy.py.
 ONSET_STRESS = 66.83636
-
-
-def driven(name: str, folder: Path) -> list[dict[str, str]]:
-    """Run a driver and return its table."""
-    job = mpirun(2, f"drivers/{name}.py", "--quick", "--out", folder)
-    assert job.returncode == 0, job.stderr
-    assert job.stdout.split()[-2:] == [str(folder / f"{name}.csv"), str(folder / f"{name}.png")]
-    picture = imread(folder / f"{name}.png")
-    assert min(picture.shape[:2]) > 500 and picture[..., :3].std() > 0.05
-    with (folder / f"{name}.csv").open(encoding="utf-8") as stream:
-        return list(csv.DictReader(stream))
-
-
-def column(rows: list[dict[str, str]], name: str) -> np.ndarray:
-    return np.array([float(row[name]) for row in rows])
 
 
 def test_small_fibres_are_stronger_by_energy(tmp_path):

@@ -35,7 +35,7 @@ class Influence:
     Attributes:
         neighbours: which bonds lie beside each other.
         reference: the reference cell.
-        norm: a bound of |H|, for any active rows.
+        norm: |H| with all bonds intact, which is the largest, as the power method finds it, with a margin.
         factorizations: reference cells so far.
     """
 

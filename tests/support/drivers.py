@@ -1,0 +1,26 @@
+"""Drivers as tests run them."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+from matplotlib.image import imread
+
+from support.jobs import mpirun
+
+
+def driven(name: str, folder: Path, *options: str) -> list[dict[str, str]]:
+    """Run a driver and return its table."""
+    job = mpirun(2, f"drivers/{name}.py", "--quick", "--out", folder, *options)
+    assert job.returncode == 0, job.stderr
+    assert job.stdout.split()[-2:] == [str(folder / f"{name}.csv"), str(folder / f"{name}.png")]
+    picture = imread(folder / f"{name}.png")
+    assert min(picture.shape[:2]) > 500 and picture[..., :3].std() > 0.05
+    with (folder / f"{name}.csv").open(encoding="utf-8") as stream:
+        return list(csv.DictReader(stream))
+
+
+def column(rows: list[dict[str, str]], name: str) -> np.ndarray:
+    return np.array([float(row[name]) for row in rows])
