@@ -126,9 +126,9 @@ INFLUENCE_CHUNK = 32
 # Changed rows after which the cell as it stands is factored in place of them: the default of `-feti_influence_columns`
 # (`scripts/benchmark_path --to-the-end`).
 INFLUENCE_COLUMNS = 400
-# Bonds on each side of one that breaks whose columns are found with its own: fewer and larger batches, but columns that
-# may not be needed.
-NEXT_BONDS = 6
+# Influence columns that each rank finds together at least, with those of bonds near the one that breaks: fewer and
+# larger batches, but columns that may not be needed.
+INFLUENCE_BATCH = 32
 # Stiffness of the fibres over that of the matrix, as the diagonals of K have them, above which influence columns take
 # the forces of the matrix: those of the fibres lose as many digits as this has.
 STIFF_FIBRES = 1e3

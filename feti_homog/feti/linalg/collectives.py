@@ -1,6 +1,8 @@
-"""Rows of all ranks and sums of small sparse matrices, on every rank."""
+"""Rows of all ranks, sums of small sparse matrices, and solves that ranks share, on every rank."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
 from mpi4py import MPI
@@ -32,3 +34,14 @@ def allreduce_sparse(comm: MPI.Intracomm, part: csr_matrix) -> csr_matrix:
     parts = comm.allgather((entries.data, entries.row, entries.col))
     data, rows, columns = (np.concatenate(p) for p in zip(*parts, strict=True))
     return csr_matrix((data, (rows, columns)), shape=part.shape)
+
+
+def share_columns(comm: MPI.Intracomm, solve: Callable[[Float], Float], B: Float) -> Float:
+    """solve(B) for B (n,) or (n, k), the same on every rank: each rank solves for some of the columns.  Collective."""
+    columns = B.shape[1] if B.ndim == 2 else 1
+    if comm.size == 1 or columns == 1:
+        return solve(B)
+    ends = np.arange(comm.size + 1) * columns // comm.size
+    own = slice(*ends[comm.rank : comm.rank + 2])
+    part = solve(B[:, own]).T if own.start < own.stop else np.zeros((0, len(B)))
+    return allgather_rows(comm, part, np.diff(ends)).T

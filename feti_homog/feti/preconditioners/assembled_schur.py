@@ -7,7 +7,7 @@ from mpi4py import MPI
 from scipy.sparse import csr_matrix, diags, hstack
 
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
-from feti_homog.feti.linalg.collectives import allreduce_sparse
+from feti_homog.feti.linalg.collectives import allreduce_sparse, share_columns
 from feti_homog.feti.linalg.dense_block_sum import DenseBlockSum
 from feti_homog.feti.linalg.sparse_direct import DirectSolver
 from feti_homog.feti.operators.explicit import ExplicitInterfaceOperator
@@ -55,7 +55,7 @@ class AssembledSchur:
         Collective."""
         right = -self._ZT @ forces
         self.comm.Allreduce(MPI.IN_PLACE, right)
-        return np.asarray(self._Z @ self._solver.solve(right))
+        return np.asarray(self._Z @ share_columns(self.comm, self._solver.solve, right))
 
     def destroy(self) -> None:
         """Free the factor."""

@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
-from scipy.sparse import csr_matrix, identity
+from scipy.sparse import identity
 
 from feti_homog.common.distributed_arrays import allreduce_sum, gather_rows, scale_rows
 from feti_homog.errors import CaseError
@@ -25,7 +25,7 @@ from feti_homog.feti.preconditioners.body_ties import BodyTies
 from feti_homog.feti.preconditioners.bordered_inverse import BorderedInverse
 from feti_homog.feti.preconditioners.reference_cell import ReferenceCell, one_sided_jumps
 from feti_homog.feti.preconditioners.response_columns import ResponseColumns
-from feti_homog.feti.thresholds import INFLUENCE_CHUNK, INFLUENCE_COLUMNS, NEXT_BONDS, NORM_ITERATIONS, NORM_MARGIN
+from feti_homog.feti.thresholds import INFLUENCE_BATCH, INFLUENCE_COLUMNS, NORM_ITERATIONS, NORM_MARGIN
 from feti_homog.typing import Float, Int
 
 
@@ -56,7 +56,8 @@ class Influence:
         self._BD = one_sided_jumps(comm, jump_operator, operators)
         self._ties = BodyTies(comm, jump_operator)
         self.neighbours = InterfaceNeighbours(comm, jump_operator, operators.subdomains, MATRIX)
-        self._near = within(self.neighbours.adjacency, NEXT_BONDS)
+        self._adjacency = self.neighbours.adjacency + identity(self.neighbours.adjacency.shape[0], format="csr")
+        self._batch = INFLUENCE_BATCH * comm.size
         # Columns without which the reference cell is not the one at hand.
         self.factorizations = self._tied = 0
         self._answer: Float | None = None
@@ -133,15 +134,17 @@ class Influence:
         rows = rows[self._columns.positions(rows) < 0]
         if not len(rows):
             return
-        if len(rows) > INFLUENCE_CHUNK:
-            self._columns.add(rows)
-            return
         normal = self.neighbours.rows
-        at = np.searchsorted(normal, rows, side="right") - 1
-        near = np.unique(self._near[at].indices)
-        beside = (normal[near][:, None] + np.arange(2)).ravel()
-        still = gather_rows(self.comm, self._active, self._first, beside) > 0
-        self._columns.add(np.concatenate([rows, beside[still]]))
+        bonds = np.unique(np.searchsorted(normal, rows, side="right") - 1)
+        active = np.concatenate(self.comm.allgather(self._active)) > 0
+        while True:
+            beside = (normal[bonds][:, None] + np.arange(2)).ravel()
+            beside = np.union1d(rows, beside[active[beside] & (self._columns.positions(beside) < 0)])
+            reached = np.unique(self._adjacency[bonds].indices)
+            if len(beside) >= self._batch or len(reached) == len(bonds):
+                break
+            bonds = reached
+        self._columns.add(beside)
 
     def _follow(self, changed: Int) -> None:
         """Let N be that of the columns `changed`.  Collective."""
@@ -193,11 +196,3 @@ class Influence:
             z[rows[taken_in] - self._first] = -c[taken_in]
         return scale_rows(self._active, z)
 
-
-def within(adjacency: csr_matrix, steps: int) -> csr_matrix:
-    """(n, n) whose entries are the pairs of nodes that are at most so many steps apart."""
-    one = adjacency + identity(adjacency.shape[0], format="csr")
-    reach = one
-    for _ in range(steps - 1):
-        reach = reach @ one
-    return reach
