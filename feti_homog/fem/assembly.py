@@ -1,11 +1,12 @@
 """Assembly of one body of uniform material: stiffness, load of the unit strains, averages.
 
-Voigt order [11, 22, 12] with engineering shear; degrees of freedom are (node, direction), node-major.  Elements
+Engineering shears; degrees of freedom are (node, displacement), node-major.  Elements
 are summed triangle by coarse triangle first, and an affine one needs no integration of its own.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -14,11 +15,10 @@ from scipy.sparse import coo_matrix, csr_matrix
 
 from feti_homog.cell.refinement import FineMesh
 from feti_homog.fem.macro_element import MacroElement, integrals, products
+from feti_homog.fem.problem import PLANE, Problem
 from feti_homog.fem.shape_functions import gradients
 from feti_homog.typing import Float, Int, Int32
 
-# Voigt number of the strain or stress component (i, k).
-VOIGT = np.array([[0, 2], [2, 1]])
 # Elements that are integrated at once: bounds the memory of their gradients, about 100 MB of quadratic ones.
 ELEMENTS_AT_ONCE = 1 << 16
 
@@ -28,8 +28,8 @@ class Assembly:
     """What a body of area |Omega| made of the material L contributes.
 
     Attributes:
-        K: (2c, 2c) stiffness, Eq. (28), force per length.
-        Q: (2c, 3) int B^T L, so that the load of the macroscopic strain E is f = -Q E, Eq. (29), and the
+        K: (dofs, dofs) stiffness, Eq. (28), force per length.
+        Q: (dofs, v) int B^T L, so that the load of the macroscopic strain E is f = -Q E, Eq. (29), and the
             integral of the stress is |Omega| L E + Q^T u*.
         area: |Omega|.
     """
@@ -39,10 +39,11 @@ class Assembly:
     area: float
 
 
-def assemble(mesh: FineMesh, L: Float) -> Assembly:
-    """Assemble the subdomain `mesh` of material `L` (3, 3)."""
-    macro, tensor = MacroElement.of(mesh.lattice), _tensor(L)
-    couples, loads = np.empty((len(mesh.nodes), len(macro.rows), 4)), np.empty((*mesh.nodes.shape, 2))
+def assemble(mesh: FineMesh, L: Float, problem: Problem = PLANE) -> Assembly:
+    """Assemble the subdomain `mesh` of the stiffness L (v, v): its first rows and columns are those of the strains that
+    displacements make, the others of uniform ones."""
+    macro, tensor, c = MacroElement.of(mesh.lattice), _tensor(L, problem), problem.components
+    couples, loads = np.empty((len(mesh.nodes), len(macro.rows), c * c)), np.empty((*mesh.nodes.shape, 2))
     area = 0.0
     for part in _parts(mesh):
         integrate = _curved if mesh.curved[part[0]] else _affine
@@ -51,7 +52,7 @@ def assemble(mesh: FineMesh, L: Float) -> Assembly:
     classes, n = mesh.node_class[mesh.nodes], mesh.n_classes
     load = np.stack([np.bincount(classes.ravel(), loads[..., k].ravel(), n) for k in range(2)], axis=1)
     # sum_k int dN/dx_k L[(i,k), :]
-    Q = np.einsum("ck,ikv->civ", load, L[VOIGT]).reshape(-1, 3)
+    Q = np.einsum("ck,ikv->civ", load, L[problem.voigt]).reshape(-1, L.shape[1])
     return Assembly(_sparse(couples, classes[:, macro.rows], classes[:, macro.columns], n), Q, area)
 
 
@@ -82,7 +83,7 @@ def _parts(mesh: FineMesh) -> Iterator[Int]:
 
 
 def _affine(macro: MacroElement, mesh: FineMesh, part: Int, tensor: Float) -> tuple[Float, Float, float]:
-    """Couples (t, p, 4), loads (t, q, 2) and area of affine coarse triangles: pulled back to the unit triangle."""
+    """Couples (t, p, c^2), loads (t, q, 2) and area of affine coarse triangles: pulled back to the unit triangle."""
     g, w = gradients(mesh.points[mesh.nodes[part, :3]])
     # The last two of the three linear functions are the reference coordinates: inverse_rk = dr_r / dx_k.
     inverse, determinant = g[:, 0, 1:], 2 * w[..., None]
@@ -97,17 +98,19 @@ def _curved(macro: MacroElement, mesh: FineMesh, part: Int, tensor: Float) -> tu
     return macro.couples(products(g, w)) @ tensor, macro.nodes(integrals(g, w)), float(w.sum())
 
 
-def _tensor(L: Float) -> Float:
-    """(4, 4) that turns int dN_a/dx_k dN_b/dx_l into K_(a i)(b j), with (k, l) and (i, j) flat."""
-    tensor: Float = L[VOIGT[:, :, None, None], VOIGT[None, None]].transpose(1, 3, 0, 2).reshape(4, 4)
+def _tensor(L: Float, problem: Problem) -> Float:
+    """(4, c^2) that turns int dN_a/dx_k dN_b/dx_l into K_(a i)(b j), with (k, l) and (i, j) flat."""
+    voigt, c = problem.voigt, problem.components
+    tensor: Float = L[voigt[:, :, None, None], voigt[None, None]].transpose(1, 3, 0, 2).reshape(4, c * c)
     return tensor
 
 
 def _sparse(couples: Float, rows: Int32, columns: Int32, n_classes: int) -> csr_matrix:
-    """(2c, 2c) sum of the couples (t, p, 4) of classes `rows` and `columns` (t, p)."""
-    i, j = np.empty((2, *rows.shape, 2, 2), np.int32)
-    for k in range(2):
-        i[..., k, :] = (2 * rows + k)[..., None]
-        j[..., k] = (2 * columns + k)[..., None]
-    n = 2 * n_classes
+    """(c n, c n) sum of the couples (t, p, c^2) of classes `rows` and `columns` (t, p)."""
+    c = math.isqrt(couples.shape[-1])
+    i, j = np.empty((2, *rows.shape, c, c), np.int32)
+    for k in range(c):
+        i[..., k, :] = (c * rows + k)[..., None]
+        j[..., k] = (c * columns + k)[..., None]
+    n = c * n_classes
     return coo_matrix((couples.ravel(), (i.ravel(), j.ravel())), shape=(n, n)).tocsr()

@@ -12,7 +12,7 @@ class DualSolution:
     """The multipliers under one macroscopic strain and what follows from them on the interface.
 
     Attributes:
-        strain: (3,) E.
+        strain: (v,) E, of plane strain (3,); with the other loads of the problem.
         lam: (owned rows,) multipliers, nodal forces between the faces; 0 on inactive rows.
         jump: (owned rows,) B u* - C lam, 0 up to tolerance on active rows, gap and slip on the others.
         alpha: (kernel dimension,) rigid-body amplitudes.

@@ -1,6 +1,6 @@
 """The FETI solver: set up once for a mesh, then one projected Krylov solve a load and a set of active rows.
 
-With f = -Q E for the macroscopic strain E, Eqs. (34), (36), (37) read on the active rows
+With f = -Q E for the v unit loads E, the macroscopic strain first, Eqs. (34), (36), (37) read on the active rows
 
     (F + C) lam - G alpha = d E,  G^T lam = 0,  u* = K+ (-Q E - B^T lam) + R alpha,  d = -B K+ Q.
 
@@ -21,6 +21,7 @@ from petsc4py import PETSc
 from feti_homog.cell.refinement import ReferenceLattice
 from feti_homog.common import process_memory
 from feti_homog.common.distributed_arrays import allreduce_sum
+from feti_homog.fem.problem import PLANE, Problem
 from feti_homog.feti import factory, view
 from feti_homog.feti.decomposition.interface_springs import GLUE, InterfaceSprings
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
@@ -54,6 +55,7 @@ class FetiSolver:
     Options have the prefix `feti_`.
 
     Attributes:
+        problem: the displacements and the unit loads.
         jump_operator: B and the layout of the multipliers.
         interface_operators: S and S+ of this rank's subdomains.
         operator: F + C.
@@ -73,14 +75,15 @@ class FetiSolver:
         applications: int,
         thresholds: Thresholds = DEFAULTS,
         springs: InterfaceSprings = GLUE,
+        problem: Problem = PLANE,
     ) -> None:
         """Set up; `applications` is how many times the dual operator is expected to be applied.  Collective.
 
         Raises:
             CaseError: an option has no such value, or two exclude each other.
         """
-        self.comm, self.subdomains = comm, subdomains
-        self.jump_operator = JumpOperator(comm, shared, subdomains, lattice)
+        self.comm, self.subdomains, self.problem = comm, subdomains, problem
+        self.jump_operator = JumpOperator(comm, shared, subdomains, lattice, problem)
         compliance = springs.compliance(self.jump_operator)
         parts = factory.build(comm, self.jump_operator, subdomains, applications, compliance, thresholds)
         self.interface_operators, self.preconditioner = parts.operators, parts.preconditioner
@@ -115,33 +118,33 @@ class FetiSolver:
 
     @property
     def Q(self) -> Float:
-        """(local dofs, 3) loads of the unit strains, f = -Q E."""
-        return np.concatenate([np.zeros((0, 3)), *(s.Q for s in self.subdomains)])
+        """(local dofs, v) unit loads, f = -Q E."""
+        return np.concatenate([np.zeros((0, len(self.problem.loads))), *(s.Q for s in self.subdomains)])
 
     @cached_property
     def loads(self) -> Float:
-        """(boundary dofs, 3) Q there; inside the uniform bodies it vanishes."""
+        """(boundary dofs, v) Q there; inside the uniform bodies it vanishes."""
         loads: Float = self.Q[self.interface_operators.local_dofs]
         return loads
 
     @cached_property
     def _torn_displacement(self) -> Float:
-        """(boundary dofs, 3) K+ (-Q), of the torn cell under the unit strains."""
+        """(boundary dofs, v) K+ (-Q), of the torn cell under the unit loads."""
         return self.interface_operators.apply_flexibility(-self.loads)
 
     @cached_property
     def d(self) -> Float:
-        """(owned rows, 3) jumps -B K+ Q of the torn cell under the unit strains."""
+        """(owned rows, v) jumps -B K+ Q of the torn cell under the unit loads."""
         return self.operator.jump(self._torn_displacement)
 
     @cached_property
     def torn_stiffness(self) -> Float:
-        """(3, 3) sum |Omega_s| L_s - Q^T K+ Q: the stress integral of the torn cell under the unit strains."""
+        """(v, v) sum |Omega_s| L_s - Q^T K+ Q: the stress integral of the torn cell under the unit loads."""
         local = sum((s.area * s.L for s in self.subdomains), self.loads.T @ self._torn_displacement)
         return np.asarray(self.comm.allreduce(local))
 
     def stress_integral(self, solution: DualSolution) -> Float:
-        """(3,) |UC| Sigma = int sigma, from the multipliers alone: the torn cell's plus d^T lam.  Collective."""
+        """(v,) |UC| Sigma = int sigma, from the multipliers alone: the torn cell's plus d^T lam.  Collective."""
         forces = self.comm.allreduce(self.d.T @ solution.lam)
         return np.asarray(self.torn_stiffness @ solution.strain + forces)
 
@@ -154,14 +157,14 @@ class FetiSolver:
             self.preconditioner.activate(active)
 
     def solve(self, strain: Float, start: Float) -> DualSolution:
-        """Solve for the strain (3,), beginning with the multipliers `start` (owned rows,).  Collective.
+        """Solve for the loads (v,), beginning with the multipliers `start` (owned rows,).  Collective.
 
         Not to converge is no error here: the solution says so in its `reason`.
         """
         return self.solve_many(strain[None], start[:, None])[0]
 
     def solve_many(self, strains: Float, starts: Float) -> list[DualSolution]:
-        """Solve for k strains (k, 3) at once, beginning with the multipliers `starts` (owned rows, k).  Collective.
+        """Solve for k loads (k, v) at once, beginning with the multipliers `starts` (owned rows, k).  Collective.
 
         One Krylov method works on all of them side by side, each scaled by the jump of its torn cell.
         """

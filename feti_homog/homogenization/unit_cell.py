@@ -116,7 +116,7 @@ def _springs(case: Case) -> InterfaceSprings:
     bond = case.interface
     if bond is None:
         return GLUE
-    return InterfaceSprings(bond.normal_stiffness or math.inf, bond.tangential_stiffness or math.inf)
+    return InterfaceSprings((bond.normal_stiffness or math.inf, bond.tangential_stiffness or math.inf))
 
 
 def assemble_subdomains(
@@ -154,7 +154,7 @@ def describe(case: Case, n_ranks: int) -> str:
     """What a run of the case on `n_ranks` ranks would do, in words; on rank 0."""
     lattice = ReferenceLattice.of(case.cell.refine, case.cell.order)
     shares = distribute(case, coarse_mesh(case), lattice, n_ranks)
-    summary, multipliers = shares[0].summary, shares[0].shared.global_rows
+    summary, multipliers = shares[0].summary, 2 * shares[0].shared.constraints
     triangles = [sum(len(s.triangles) for s in share.submeshes) for share in shares]
     nodes = [t * lattice.intervals**2 // 2 for t in triangles]
     own = [len(share.submeshes) for share in shares]

@@ -1,4 +1,4 @@
-"""Laws of the fields of one state: kinematics, stresses, equilibrium, averages."""
+"""Laws of the fields of one state: problem, stresses, equilibrium, averages."""
 
 from __future__ import annotations
 

@@ -13,7 +13,6 @@ from support.coarse_space_cells import NARROW, agree, masks, of_all, solve_many
 from feti_homog.feti.coarse.adaptive import AdaptiveCoarseSpace
 from feti_homog.feti.coarse.face_neighbourhoods import face_neighbourhoods
 from feti_homog.feti.decomposition.neighbours import Neighbours
-from feti_homog.feti.decomposition.subdomain import both_directions
 from feti_homog.feti.thresholds import MIN_FACE_NODES, Thresholds
 
 pytestmark = pytest.mark.parallel
@@ -41,8 +40,8 @@ def faces(request, comm):
         S = dense_feti.schur(s.assemble_stiffness().toarray(), dofs)
         for other, common in neighbours.common[i].items():
             if other != s.submesh.index:
-                nodes = np.unique(B[neighbours.rows[i][common]].indices // 2)
-                found.append((s, dofs, S, both_directions(nodes)))
+                nodes = np.unique(B[neighbours.rows[i][common]].indices // s.problem.components)
+                found.append((s, dofs, S, s.problem.dofs(nodes)))
     return found
 
 

@@ -29,7 +29,7 @@ def test_traces_are_piecewise_linear_along_the_coarse_edges(torn, enough, order)
     cell = torn(**traced(0, order=order, refine=3 - order))
     for s, dofs in zip(cell.subdomains, cell.solver.interface_operators.dofs, strict=True):
         nodes, M = dofs[::2] // 2, s.mesh.lattice.intervals
-        P = trace_space(s.submesh, s.mesh.lattice, nodes, enough)
+        P = trace_space(s.submesh, s.mesh.lattice, s.problem, nodes, enough)
         assert P.shape[0] == len(dofs)
         assert P.shape[1] >= min(enough, len(dofs))
         u = np.full((s.mesh.n_classes, 2), np.nan)
@@ -50,7 +50,7 @@ def test_traces_are_piecewise_linear_along_the_coarse_edges(torn, enough, order)
 def test_traces_of_few_dofs_keep_them_all(torn):
     cell = torn(**traced(0, order=1, refine=2))
     for s, dofs in zip(cell.subdomains, cell.solver.interface_operators.dofs, strict=True):
-        P = trace_space(s.submesh, s.mesh.lattice, dofs[::2] // 2, ALL)
+        P = trace_space(s.submesh, s.mesh.lattice, s.problem, dofs[::2] // 2, ALL)
         assert P.shape == (len(dofs),) * 2
         assert np.array_equal(P.toarray(), np.eye(len(dofs)))
 

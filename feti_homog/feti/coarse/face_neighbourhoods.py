@@ -19,7 +19,7 @@ from scipy.sparse import csr_matrix
 from feti_homog.cell.periodic_topology import components, edge_pairs
 from feti_homog.cell.submesh import part
 from feti_homog.feti.coarse.trace_spaces import trace_space
-from feti_homog.feti.decomposition.subdomain import Subdomain, both_directions
+from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.operators.explicit import ExplicitInterfaceOperator, schur_complement
 from feti_homog.feti.thresholds import DEFAULTS, MIN_FACE_NODES, Thresholds
 from feti_homog.typing import Bool, Float, Int
@@ -51,12 +51,13 @@ def face_neighbourhoods(
 
     Args:
         dofs: (n,) boundary dofs of the body, sorted.
-        face: positions among `dofs` of the face's, both directions of each node.
+        face: positions among `dofs` of the face's, all of each node.
     """
     on_face = np.zeros(body.mesh.n_classes, bool)
-    on_face[dofs[face] // 2] = True
+    nodes = body.problem.nodes(dofs)
+    on_face[nodes[face]] = True
     on_others = np.zeros_like(on_face)
-    on_others[dofs // 2] = ~on_face[dofs // 2]
+    on_others[nodes] = ~on_face[nodes]
     near = _near(body, on_face, thresholds.face_layers)
     edges = body.submesh.edge_class[body.submesh.triangle_edges[near]]
     label = components(len(near), *edge_pairs(edges))
@@ -73,17 +74,18 @@ def _neighbourhood(
     """That of some coarse triangles, if it has enough of the face."""
     outside = np.zeros_like(on_face)
     outside[body.mesh.node_class[np.delete(body.mesh.nodes, triangles, axis=0)]] = True
-    own = Subdomain.build(part(body.submesh, triangles), body.mesh.lattice, body.L)
+    own = Subdomain.build(part(body.submesh, triangles), body.mesh.lattice, body.L, body.problem)
     of_body = np.empty(own.mesh.n_classes, np.int64)
     of_body[own.mesh.node_class[own.mesh.nodes]] = body.mesh.node_class[body.mesh.nodes[triangles]]
     nodes = np.flatnonzero(on_face[of_body])
     if len(nodes) < MIN_FACE_NODES:
         return None
-    face, at = both_directions(nodes), np.searchsorted(dofs, both_directions(of_body[nodes]))
-    movable = both_directions(np.flatnonzero(on_face[of_body] | ~(outside | on_others)[of_body]))
+    all_of = body.problem.dofs
+    face, at = all_of(nodes), np.searchsorted(dofs, all_of(of_body[nodes]))
+    movable = all_of(np.flatnonzero(on_face[of_body] | ~(outside | on_others)[of_body]))
     K = own.take_stiffness()
     S_fixed = schur_complement(K[movable][:, movable].tocsr(), np.searchsorted(movable, face))
-    P = trace_space(own.submesh, own.mesh.lattice, nodes, min_trace_dofs)
+    P = trace_space(own.submesh, own.mesh.lattice, own.problem, nodes, min_trace_dofs)
     return FaceNeighbourhood(at, ExplicitInterfaceOperator(own, K, face), own.R[face], P, S_fixed)
 
 

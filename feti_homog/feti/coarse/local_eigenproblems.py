@@ -23,7 +23,7 @@ from scipy.sparse import csr_matrix
 
 from feti_homog.feti.coarse.face_neighbourhoods import face_neighbourhoods
 from feti_homog.feti.coarse.trace_spaces import trace_space
-from feti_homog.feti.decomposition.subdomain import Subdomain, both_directions
+from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.operators.explicit import ExplicitInterfaceOperator
 from feti_homog.feti.operators.implicit import ImplicitInterfaceOperator
 from feti_homog.feti.thresholds import DEFAULTS, SINGLE_PRECISION_NULL, Thresholds
@@ -68,7 +68,8 @@ class SubdomainEigenproblem:
         """`common` names the rows that it has in common with each subdomain, itself among them."""
         self.block, self.common = block, common
         subdomain, S = block.subdomain, operator.S
-        self._P = trace_space(subdomain.submesh, subdomain.mesh.lattice, block.dofs[::2] // 2, min_trace_dofs)
+        nodes = np.unique(subdomain.problem.nodes(block.dofs))
+        self._P = trace_space(subdomain.submesh, subdomain.mesh.lattice, subdomain.problem, nodes, min_trace_dofs)
         self._regular_S = congruent(self._P, S) + operator.regularisation(self._P)
         # (rows, rows) its share W^-1 B D^-1 S D^-1 B^T W^-1 of M^-1; this precision tells soft from stiff.
         BW = block.BW.astype(np.float32)
@@ -95,9 +96,10 @@ class FaceEigenproblems:
 
     def __init__(self, block: SubdomainBlocks, common: Mapping[int, Int], thresholds: Thresholds = DEFAULTS) -> None:
         self.block, self.common, self._factor = block, common, thresholds.face_factor
-        faces = {s: np.unique(block.B[rows].indices // 2) for s, rows in common.items()}
+        problem = block.subdomain.problem
+        faces = {s: np.unique(problem.nodes(block.B[rows].indices)) for s, rows in common.items()}
         self._neighbourhoods = {
-            s: face_neighbourhoods(block.subdomain, block.dofs, both_directions(nodes), thresholds)
+            s: face_neighbourhoods(block.subdomain, block.dofs, problem.dofs(nodes), thresholds)
             for s, nodes in faces.items()
             if s != block.subdomain.submesh.index
         }

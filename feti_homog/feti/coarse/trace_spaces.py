@@ -12,19 +12,23 @@ from scipy.sparse import csr_matrix
 
 from feti_homog.cell.refinement import ReferenceLattice
 from feti_homog.cell.submesh import Submesh
-from feti_homog.feti.decomposition.subdomain import both_directions
+from feti_homog.fem.problem import Problem
 from feti_homog.feti.thresholds import DEFAULTS
 from feti_homog.typing import Int
 
 
 def trace_space(
-    submesh: Submesh, lattice: ReferenceLattice, nodes: Int, min_dofs: int = DEFAULTS.min_trace_dofs
+    submesh: Submesh,
+    lattice: ReferenceLattice,
+    problem: Problem,
+    nodes: Int,
+    min_dofs: int = DEFAULTS.min_trace_dofs,
 ) -> csr_matrix:
-    """(2n, 2m) P for n boundary nodes, sorted classes of the refined piece, with at least `min_dofs` columns if 2n is.
+    """(cn, cm) P for n boundary nodes, sorted classes of the refined piece, with at least `min_dofs` columns if cn is.
 
     Displacements vanish at ends of edges that are not among the nodes.
     """
-    vertices, inner = len(submesh.class_keys), lattice.intervals - 1
+    vertices, inner, c = len(submesh.class_keys), lattice.intervals - 1, problem.components
     on_edge = nodes >= vertices
     edge, position = np.divmod(nodes - vertices, max(inner, 1))
     position += 1
@@ -33,7 +37,7 @@ def trace_space(
         return np.asarray(~on_edge | (position % k == 0))
 
     k = 1
-    while lattice.intervals % (2 * k) == 0 and 2 * is_kept(2 * k).sum() >= min_dofs:
+    while lattice.intervals % (2 * k) == 0 and c * is_kept(2 * k).sum() >= min_dofs:
         k *= 2
     keep = is_kept(k)
     m = int(keep.sum())
@@ -52,5 +56,5 @@ def trace_space(
     values = np.concatenate([np.ones(m), 1 - weight, weight])
     known = columns >= 0
     rows, columns, values = rows[known], columns[known], values[known]
-    entries = np.repeat(values, 2), (both_directions(rows), both_directions(columns))
-    return csr_matrix(entries, shape=(2 * len(nodes), 2 * m))
+    entries = np.repeat(values, c), (problem.dofs(rows), problem.dofs(columns))
+    return csr_matrix(entries, shape=(c * len(nodes), c * m))

@@ -19,7 +19,8 @@ class InterfaceNodes:
     """The breakable nodes of which a rank owns the multipliers, i = 0..k-1.
 
     Attributes:
-        row: (k,) local row of the normal constraint; the tangential one follows it.
+        row: (k,) local row of the bond; of displacements in the plane that along the normal, and the tangential one
+            follows.
         points: (k, 2) position on the fibre.
         normal: (k, 2) from fibre to matrix; the tangent is (-n_y, n_x).
         length: (k,) tributary interface length: traction = nodal force / length.
@@ -43,6 +44,7 @@ class ConstraintLayout:
     """Rows and columns of B of one rank, entity by entity.
 
     Attributes:
+        components: c, rows of a vector constraint.
         count: (n,) rows of each shared entity.
         first: (n,) the first of them among the local rows.
         rows: (local rows,) their global numbers.
@@ -51,22 +53,41 @@ class ConstraintLayout:
             sharer is on another rank.
     """
 
-    def __init__(self, shared: SharedEntities, subdomains: Sequence[Subdomain], lattice: ReferenceLattice) -> None:
+    def __init__(
+        self, shared: SharedEntities, subdomains: Sequence[Subdomain], lattice: ReferenceLattice, components: int
+    ) -> None:
         self.shared, self.subdomains, self.lattice = shared, subdomains, lattice
+        self.components = components
         copies = shared.copies
-        self.count = shared.nodes * 2 * (copies - 1)
+        self.count = components * shared.nodes * (copies - 1)
         self.first = np.cumsum(self.count) - self.count
-        shift: Int = np.repeat(shared.first_row - self.first, self.count)
+        shift: Int = np.repeat(components * shared.first - self.first, self.count)
         self.rows: Int = shift + np.arange(self.count.sum(), dtype=np.int64)
-        self.dofs = np.cumsum([0, *(2 * s.mesh.n_classes for s in subdomains)])
+        self.dofs = np.cumsum([0, *(components * s.mesh.n_classes for s in subdomains)])
         self.base = self._first_nodes()
+
+    @property
+    def owned(self) -> tuple[int, int]:
+        """First global row of this rank and the one after its last."""
+        return self.components * self.shared.owned[0], self.components * self.shared.owned[1]
+
+    @property
+    def _owned(self) -> Bool:
+        """(n,) whether this rank owns the rows of each entity."""
+        first, last = self.shared.owned
+        return (self.shared.first >= first) & (self.shared.first < last)
+
+    @property
+    def _owned_row(self) -> Int:
+        """(n,) first row of each entity, counted from this rank's first."""
+        return self.components * (self.shared.first - self.shared.owned[0])
 
     def _first_nodes(self) -> Int:
         """For each sharer: rank-wide number of its first fine node on the entity, or -1 if it is elsewhere."""
         shared = self.shared
         base = np.full(len(shared.sharer), -1)
         entity = np.repeat(np.arange(len(shared.key)), shared.copies)
-        for subdomain, offset in zip(self.subdomains, self.dofs // 2, strict=False):
+        for subdomain, offset in zip(self.subdomains, self.dofs // self.components, strict=False):
             submesh = subdomain.submesh
             mine = np.flatnonzero(shared.sharer == submesh.index)
             key, is_edge = shared.key[entity[mine]], shared.is_edge[entity[mine]]
@@ -100,23 +121,22 @@ class ConstraintLayout:
     def _entries(self, entities: Int, sizes: Int, breakable: bool) -> tuple[Int, Int, Float]:
         """Rows, columns and values of B on some entities whose bodies have `sizes` copies each."""
         shared = self.shared
-        contrasts = _contrasts(sizes)
-        k = len(contrasts) + 1
+        contrasts, c = _contrasts(sizes), self.components
+        k, each = len(contrasts) + 1, np.arange(c)
         entity, p = expand(entities, shared.nodes[entities])
-        first = self.first[entity] + p * 2 * (k - 1)
-        identity = np.broadcast_to(np.eye(2), (len(entity), 2, 2))
-        frame = _frames(self._normals(entity, p)) if breakable else identity
+        first = self.first[entity] + p * c * (k - 1)
+        identity = np.broadcast_to(np.eye(c), (len(entity), c, c))
+        frame = _frames(self._normals(entity, p)) if breakable and c == 2 else identity
         rows, columns, values = [], [], []
         for j in range(k):
             base = self.base[shared.pointer[entity] + j]
             local = base >= 0
-            dof = 2 * (base + p)[local]
+            dof = c * (base + p)[local]
             for r in np.flatnonzero(contrasts[:, j]):
                 turn = frame if r == k - 2 else identity
-                rows.append(
-                    np.broadcast_to((first[local] + 2 * r)[:, None, None] + [[0], [1]], (len(dof), 2, 2)).ravel()
-                )
-                columns.append(np.broadcast_to(dof[:, None, None] + [[0, 1]], (len(dof), 2, 2)).ravel())
+                shape = len(dof), c, c
+                rows.append(np.broadcast_to((first[local] + c * r)[:, None, None] + each[:, None], shape).ravel())
+                columns.append(np.broadcast_to(dof[:, None, None] + each, shape).ravel())
                 values.append((contrasts[r, j] * turn[local]).ravel())
         return np.concatenate(rows), np.concatenate(columns), np.concatenate(values)
 
@@ -129,19 +149,19 @@ class ConstraintLayout:
         cos, sin = np.cos(angle), np.sin(angle)
         return np.stack([cos * a[:, 0] - sin * a[:, 1], sin * a[:, 0] + cos * a[:, 1]], axis=1)
 
-    def node_rows(self, owned: tuple[int, int]) -> tuple[Int, Int]:
+    def node_rows(self) -> tuple[Int, Int]:
         """First owned row and number of rows of each fine node whose rows are owned."""
         shared = self.shared
-        mine = np.flatnonzero((shared.first_row >= owned[0]) & (shared.first_row < owned[1]))
-        size = 2 * (shared.copies[mine] - 1)
+        mine = np.flatnonzero(self._owned)
+        size = self.components * (shared.copies[mine] - 1)
         entity, p = expand(np.arange(len(mine)), shared.nodes[mine])
-        return shared.first_row[mine][entity] - owned[0] + p * size[entity], size[entity]
+        return self._owned_row[mine][entity] + p * size[entity], size[entity]
 
-    def interface_nodes(self, owned: tuple[int, int]) -> InterfaceNodes:
+    def interface_nodes(self) -> InterfaceNodes:
         """The breakable nodes whose rows are owned."""
         shared, m = self.shared, self.lattice.intervals
-        mine = (shared.first_row >= owned[0]) & (shared.first_row < owned[1])
-        entity, p = expand(np.flatnonzero(mine & (shared.fibre >= 0)), shared.nodes[mine & (shared.fibre >= 0)])
+        breakable = np.flatnonzero(self._owned & (shared.fibre >= 0))
+        entity, p = expand(breakable, shared.nodes[breakable])
         k = shared.copies[entity]
         # Row sums of the interface mass matrix: halves for linear, Simpson's rule for quadratic elements.
         quadratic = self.lattice.triangles.shape[1] == 6
@@ -151,7 +171,7 @@ class ConstraintLayout:
         # Sharers are sorted by body, so the last one is the fibre's, and it is this rank's, which owns the rows.
         copy = self.base[shared.pointer[entity + 1] - 1] + p
         return InterfaceNodes(
-            row=shared.first_row[entity] - owned[0] + (p + 1) * 2 * (k - 1) - 2,
+            row=self._owned_row[entity] + self.components * ((p + 1) * (k - 1) - 1),
             points=positions[copy],
             normal=self._normals(entity, p),
             length=share * shared.length[entity] / m,
@@ -170,19 +190,21 @@ class ConstraintLayout:
         of_matrix = np.bincount(entity[is_matrix], minlength=len(shared.key))
         breakable = np.flatnonzero(shared.fibre >= 0)
         e, p = expand(breakable, shared.nodes[breakable])
-        row = self.first[e] + (p + 1) * 2 * (shared.copies[e] - 1) - 2
+        row = self.first[e] + self.components * ((p + 1) * (shared.copies[e] - 1) - 1)
         found = np.zeros((len(self.rows), 2), np.int64)
-        found[row] = found[row + 1] = np.stack([of_matrix[e], shared.copies[e] - of_matrix[e]], axis=1)
+        copies = np.stack([of_matrix[e], shared.copies[e] - of_matrix[e]], axis=1)
+        for component in range(self.components):
+            found[row + component] = copies
         return found
 
     def matrix_copies(self) -> tuple[Int, Int]:
-        """The breakable nodes of which this rank has the matrix's first copy: the local row of the normal constraint
-        of each, and that copy among the fine nodes of this rank."""
+        """The breakable nodes of which this rank has the matrix's first copy: the local row of the bond of each, and
+        that copy among the fine nodes of this rank."""
         shared = self.shared
         first = self.base[shared.pointer[:-1]]
         here = np.flatnonzero((shared.fibre >= 0) & (first >= 0))
         entity, p = expand(here, shared.nodes[here])
-        return self.first[entity] + (p + 1) * 2 * (shared.copies[entity] - 1) - 2, first[entity] + p
+        return self.first[entity] + self.components * ((p + 1) * (shared.copies[entity] - 1) - 1), first[entity] + p
 
 
 def _class_points(subdomain: Subdomain) -> Float:

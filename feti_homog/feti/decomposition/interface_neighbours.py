@@ -20,7 +20,7 @@ class InterfaceNeighbours:
     """The interface nodes of all ranks in the order of their rows, and their neighbours.
 
     Attributes:
-        rows: (n,) global rows of the normal constraints.
+        rows: (n,) global rows of their bonds, the first of each.
         first: number of this rank's first node.
         adjacency: (n, n) 1 between neighbours.
     """
@@ -59,10 +59,10 @@ class InterfaceNeighbours:
 
     def _node_numbers(self, jump_operator: JumpOperator) -> Int:
         """(fine nodes of this rank,) number of the interface node that each is a copy of, or -1."""
-        number = np.full(jump_operator.B.shape[1] // 2, -1)
+        number = np.full(jump_operator.B.shape[1] // jump_operator.components, -1)
         normal = np.searchsorted(jump_operator.rows, self.rows)
         normal = np.minimum(normal, max(len(jump_operator.rows) - 1, 0))
         here = np.flatnonzero(jump_operator.rows[normal] == self.rows) if len(jump_operator.rows) else np.zeros(0, int)
         B = jump_operator.B[normal[here]].tocoo()
-        number[B.col // 2] = here[B.row]
+        number[B.col // jump_operator.components] = here[B.row]
         return number

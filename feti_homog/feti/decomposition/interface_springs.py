@@ -15,18 +15,17 @@ class InterfaceSprings:
     """Traction = stiffness x jump at every node that holds, in tension and compression.
 
     Attributes:
-        normal, tangential: stress per opening and per slip; infinite ones are glue.
+        stiffness: stress per opening and per slip, or per slip along the fibre; infinite ones are glue.
     """
 
-    normal: float = np.inf
-    tangential: float = np.inf
+    stiffness: tuple[float, ...]
 
     def compliance(self, jump_operator: JumpOperator) -> Float:
         """(owned rows,) C = 1 / (k l) of the rows of interface nodes with the tributary lengths l, 0 of all others."""
         nodes, C = jump_operator.nodes, np.zeros(jump_operator.owned[1] - jump_operator.owned[0])
-        C[nodes.row] = 1.0 / (self.normal * nodes.length)
-        C[nodes.row + 1] = 1.0 / (self.tangential * nodes.length)
+        for component, stiffness in enumerate(self.stiffness):
+            C[nodes.row + component] = 1.0 / (stiffness * nodes.length)
         return C
 
 
-GLUE = InterfaceSprings()
+GLUE = InterfaceSprings(())

@@ -15,6 +15,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from feti_homog.cell.refinement import ReferenceLattice
+from feti_homog.fem.problem import PLANE, Problem
 from feti_homog.feti.decomposition.constraint_layout import ConstraintLayout, expand
 from feti_homog.feti.decomposition.shared_entities import SharedEntities
 from feti_homog.feti.decomposition.subdomain import Subdomain
@@ -25,6 +26,7 @@ class JumpOperator:
     """B of this rank's subdomains and the layout of the multipliers.
 
     Attributes:
+        components: rows of a vector constraint.
         B: (local rows, local dofs) signed, rotated entries; a local row is one that a local dof takes part in.
         rows: global number of each local row.
         node_rows: first owned row and number of rows of each fine node that this rank owns.
@@ -40,20 +42,26 @@ class JumpOperator:
     """
 
     def __init__(
-        self, comm: MPI.Intracomm, shared: SharedEntities, subdomains: Sequence[Subdomain], lattice: ReferenceLattice
+        self,
+        comm: MPI.Intracomm,
+        shared: SharedEntities,
+        subdomains: Sequence[Subdomain],
+        lattice: ReferenceLattice,
+        problem: Problem = PLANE,
     ) -> None:
-        layout = ConstraintLayout(shared, subdomains, lattice)
+        layout = ConstraintLayout(shared, subdomains, lattice, problem.components)
+        self.components = layout.components
         self.shared, self._first, self._count = shared, layout.first, layout.count
         elsewhere = np.bincount(np.repeat(np.arange(len(shared.key)), shared.copies), layout.base < 0, len(shared.key))
         self.is_shared_row = np.repeat(elsewhere > 0, layout.count)
-        self.owned = shared.owned
-        self.global_rows = shared.global_rows
+        self.owned = layout.owned
+        self.global_rows = layout.components * shared.constraints
         self.rows, self.B = layout.rows, layout.matrix()
-        self.node_rows = layout.node_rows(shared.owned)
-        self.nodes = layout.interface_nodes(shared.owned)
+        self.node_rows = layout.node_rows()
+        self.nodes = layout.interface_nodes()
         self.matrix_copies = layout.matrix_copies()
         self.copies = layout.copies()
-        self.vector = PETSc.Vec().createMPI((shared.owned[1] - shared.owned[0], shared.global_rows), comm=comm)
+        self.vector = PETSc.Vec().createMPI((self.owned[1] - self.owned[0], self.global_rows), comm=comm)
         self._exchanges: dict[int, _Exchange] = {}
 
     def rows_of(self, entities: Int) -> Int:

@@ -1,7 +1,7 @@
 """Which subdomains share which coarse vertices and edges: found on rank 0, and sent to the ranks concerned.
 
 An entity is a vertex class or a torus edge that belongs to several subdomains.  Each fine node on an entity of k
-subdomains needs k - 1 vector constraints, so rows are numbered by arithmetic and no rank asks another.
+subdomains needs k - 1 vector constraints, so these are numbered by arithmetic and no rank asks another.
 """
 
 from __future__ import annotations
@@ -19,27 +19,27 @@ from feti_homog.typing import Bool, Float, Int
 
 @dataclass(frozen=True)
 class SharedEntities:
-    """The n entities that one rank's subdomains take part in, in the order of their rows.
+    """The n entities that one rank's subdomains take part in, in the order of their constraints.
 
     Attributes:
         key: (n,) class or torus edge.
         is_edge: (n,) bool.
         nodes: (n,) fine nodes on the entity: 1, or the inner lattice nodes of an edge.
-        first_row: (n,) first row in the multiplier vector.
+        first: (n,) number of its first vector constraint.
         pointer, sharer: the subdomains that share entity i are sharer[pointer[i]:pointer[i + 1]], sorted by body.
         body: constituent of each sharer.
         fibre: (n,) the fibre that may debond here from the matrix, or -1 where nothing can break.
         normal: (n, 2, 2) unit normals from fibre to matrix at the start and the end of the entity.
         length: (n,) interface length of the edge, or of all edges that meet in the vertex.
         precracked: (n,) whether the mesh has the edge, or all edges that meet in the vertex, debonded.
-        owned: (2,) first row of this rank and the one after its last.
-        global_rows: number of rows on all ranks.
+        owned: (2,) first vector constraint of this rank and the one after its last.
+        constraints: number of vector constraints on all ranks.
     """
 
     key: Int
     is_edge: Bool
     nodes: Int
-    first_row: Int
+    first: Int
     pointer: Int
     sharer: Int
     body: Int
@@ -48,7 +48,7 @@ class SharedEntities:
     length: Float
     precracked: Bool
     owned: tuple[int, int]
-    global_rows: int
+    constraints: int
 
     @property
     def copies(self) -> Int:
@@ -56,14 +56,14 @@ class SharedEntities:
         return np.diff(self.pointer)
 
     def restricted(self, mask: Bool, owned: tuple[int, int]) -> SharedEntities:
-        """The entities where `mask` (n,) is true, for a rank that owns the rows from owned[0] up to owned[1]."""
+        """The entities where `mask` (n,) is true, for a rank that owns the constraints from owned[0] up to owned[1]."""
         sharers = _ranges(self.pointer[:-1][mask], self.copies[mask])
         return replace(
             self,
             key=self.key[mask],
             is_edge=self.is_edge[mask],
             nodes=self.nodes[mask],
-            first_row=self.first_row[mask],
+            first=self.first[mask],
             pointer=np.r_[0, np.cumsum(self.copies[mask])],
             sharer=self.sharer[sharers],
             body=self.body[sharers],
@@ -96,7 +96,7 @@ def share_entities(
 ) -> list[SharedEntities]:
     """The shared entities of each rank, in the order of ranks.
 
-    An entity belongs to the rank of its last sharer; rows are numbered rank by rank.
+    An entity belongs to the rank of its last sharer; constraints are numbered rank by rank.
 
     Args:
         rank: (s,) rank of each submesh.
@@ -108,14 +108,14 @@ def share_entities(
     found, owner = found.reordered(order), owner[order]
     copies = np.diff(found.pointer)
     nodes = np.where(found.is_edge, nodes_on_edge, 1)
-    ends = np.r_[0, np.cumsum(nodes * 2 * (copies - 1))]
+    ends = np.r_[0, np.cumsum(nodes * (copies - 1))]
     body = np.array([s.body for s in submeshes])[found.sharer]
     interface = interface_geometry(torus, found.key, found.is_edge, found.pointer, body)
     whole = SharedEntities(
         key=found.key,
         is_edge=found.is_edge,
         nodes=nodes,
-        first_row=ends[:-1],
+        first=ends[:-1],
         pointer=found.pointer,
         sharer=found.sharer,
         body=body,
@@ -124,7 +124,7 @@ def share_entities(
         length=interface.length,
         precracked=interface.precracked,
         owned=(0, int(ends[-1])),
-        global_rows=int(ends[-1]),
+        constraints=int(ends[-1]),
     )
     limits = ends[np.searchsorted(owner, np.arange(n_ranks + 1))].tolist()
     entity = np.repeat(np.arange(len(found.key)), copies)

@@ -12,13 +12,14 @@ from feti_homog.cell.submesh import Submesh
 from feti_homog.cell.unwrap import unwrap
 from feti_homog.errors import MeshError
 from feti_homog.fem.assembly import assemble
+from feti_homog.fem.problem import PLANE, Problem
 from feti_homog.feti.thresholds import KERNEL_TOLERANCE
 from feti_homog.typing import Float, Int
 
 
 @dataclass(eq=False)
 class Subdomain:
-    """A body or a piece of it, with c node classes and kernel dimension k.
+    """A body or a piece of it, with n node classes of c displacements each, and kernel dimension k.
 
     All but K stays as it is made.  K is by far the largest: the one that `build` makes stays until the first call of
     `take_stiffness`, whose caller then owns it.  Later calls assemble it anew.
@@ -26,16 +27,18 @@ class Subdomain:
     Attributes:
         submesh: the coarse share.
         mesh: the refined mesh.
-        L: (3, 3) stiffness of the material.
-        Q: (2c, 3) load of the unit strains: f = -Q E.
+        problem: the displacements of the problem.
+        L: (v, v) stiffness of the material, see `assemble`.
+        Q: (cn, v) load of the unit strains: f = -Q E.
         area: of the subdomain.
-        R: (2c, k) orthonormal kernel of K: two translations, and a rotation if the piece can turn,
+        R: (cn, k) orthonormal kernel of K: translations, and a rotation in the plane if the piece can turn,
             less what the pinned class stops.
-        positions: (c, 2) unwrapped positions of the classes.
+        positions: (n, 2) unwrapped positions of the classes.
     """
 
     submesh: Submesh
     mesh: FineMesh
+    problem: Problem
     L: Float
     Q: Float
     area: float
@@ -44,7 +47,7 @@ class Subdomain:
     _built_stiffness: csr_matrix | None = field(repr=False)
 
     @classmethod
-    def build(cls, submesh: Submesh, lattice: ReferenceLattice, L: Float) -> Subdomain:
+    def build(cls, submesh: Submesh, lattice: ReferenceLattice, L: Float, problem: Problem = PLANE) -> Subdomain:
         """Refine and assemble, without communication.
 
         Raises:
@@ -52,31 +55,36 @@ class Subdomain:
         """
         mesh = refine(submesh, lattice)
         _check_corners(submesh, mesh)
-        body = assemble(mesh, L)
+        return cls.on(submesh, mesh, L, problem)
+
+    @classmethod
+    def on(cls, submesh: Submesh, mesh: FineMesh, L: Float, problem: Problem) -> Subdomain:
+        """Assemble on a refined mesh, without communication.  Raises MeshError as `build`."""
+        body = assemble(mesh, L, problem)
         shift, closes = unwrap(submesh)
         positions = np.empty((mesh.n_classes, 2))
         positions[mesh.node_class[mesh.nodes]] = mesh.points[mesh.nodes] + shift[:, None]
-        R = kernel(positions, closes, submesh.pinned)
-        K = _pinned(body.K, submesh.pinned)
+        R = kernel(problem, positions, closes, submesh.pinned)
+        K = _pinned(body.K, problem, submesh.pinned)
         _check_kernel(submesh, K, R)
         Q = body.Q
         if submesh.pinned >= 0:
-            Q[2 * submesh.pinned : 2 * submesh.pinned + 2] = 0.0
-        return cls(submesh, mesh, L, Q, body.area, R, positions, K)
+            Q[problem.dofs(np.array([submesh.pinned]))] = 0.0
+        return cls(submesh, mesh, problem, L, Q, body.area, R, positions, K)
 
     @property
     def n_dofs(self) -> int:
-        """2c."""
+        """cn."""
         return len(self.Q)
 
     def take_stiffness(self) -> csr_matrix:
-        """(2c, 2c) K, which belongs to the caller: that of `build` the first time, then one assembled anew."""
+        """(cn, cn) K, which belongs to the caller: that of `build` the first time, then one assembled anew."""
         K, self._built_stiffness = self._built_stiffness, None
         return self.assemble_stiffness() if K is None else K
 
     def assemble_stiffness(self) -> csr_matrix:
-        """(2c, 2c) K, Eq. (28), the pinned class (15) eliminated by a unit row scaled like the others."""
-        return _pinned(assemble(self.mesh, self.L).K, self.submesh.pinned)
+        """(cn, cn) K, Eq. (28), the pinned class (15) eliminated by a unit row scaled like the others."""
+        return _pinned(assemble(self.mesh, self.L, self.problem).K, self.problem, self.submesh.pinned)
 
     def fixing(self, K: csr_matrix, candidates: Int) -> tuple[Int, Float]:
         """Degrees of freedom and dense block rho Rf Rf^T that make K + block an SPD matrix.
@@ -89,7 +97,7 @@ class Subdomain:
             return np.zeros(0, np.int64), np.zeros((0, 0))
         # On a straight line two are enough, and the third is one of them.
         nodes = np.unique(self._far_apart(candidates))
-        dofs = both_directions(nodes)
+        dofs = self.problem.dofs(nodes)
         Rf = np.linalg.qr(self.R[dofs])[0]
         return dofs, K.diagonal()[dofs].mean() * Rf @ Rf.T
 
@@ -111,34 +119,30 @@ class Subdomain:
         return candidates[[a, b, np.argmax(np.abs(dx * ey - dy * ex))]]
 
 
-def both_directions(nodes: Int) -> Int:
-    """(2n,) degrees of freedom of the nodes (n,)."""
-    return np.asarray((2 * nodes[:, None] + np.arange(2)).ravel())
-
-
-def kernel(positions: Float, rotates: bool, pinned: int) -> Float:
-    """Orthonormal rigid-body modes (2c, k) of nodes at `positions` (c, 2); `pinned` is a node or -1."""
-    free = np.zeros((len(positions), 2, 0)) if pinned >= 0 else np.tile(np.eye(2), (len(positions), 1, 1))
-    if rotates:
+def kernel(problem: Problem, positions: Float, rotates: bool, pinned: int) -> Float:
+    """Orthonormal rigid-body modes (cn, k) of nodes at `positions` (n, 2); `pinned` is a node or -1."""
+    n, c = len(positions), problem.components
+    free = np.zeros((n, c, 0)) if pinned >= 0 else np.tile(np.eye(c), (n, 1, 1))
+    if rotates and problem.turns:
         centre = positions[pinned] if pinned >= 0 else positions.mean(axis=0)
         x, y = (positions - centre).T
         turn = np.stack([-y, x], axis=1)[..., None] / max(np.ptp(x), np.ptp(y))
         free = np.concatenate([free, turn], axis=2)
-    return np.linalg.qr(free.reshape(2 * len(positions), -1))[0]
+    return np.linalg.qr(free.reshape(c * n, free.shape[2]))[0]
 
 
-def _pinned(K: csr_matrix, pinned: int) -> csr_matrix:
+def _pinned(K: csr_matrix, problem: Problem, pinned: int) -> csr_matrix:
     """K with the rows and columns of the node `pinned` those of a multiple of the identity; K itself for -1."""
     if pinned < 0:
         return K
     keep = np.ones(K.shape[0])
-    keep[2 * pinned : 2 * pinned + 2] = 0.0
+    keep[problem.dofs(np.array([pinned]))] = 0.0
     mask = diags(keep)
     return (mask @ K @ mask + diags((1 - keep) * K.diagonal().max())).tocsr()
 
 
 def _check_kernel(submesh: Submesh, K: csr_matrix, R: Float) -> None:
-    """Refuse a subdomain whose rigid-body modes R (2c, k) are not in the kernel of K (2c, 2c)."""
+    """Refuse a subdomain whose rigid-body modes R (cn, k) are not in the kernel of K (cn, cn)."""
     residual = abs(K @ R).max(initial=0.0) / abs(K.data).max()
     if residual > KERNEL_TOLERANCE:
         raise MeshError(

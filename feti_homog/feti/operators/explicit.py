@@ -31,7 +31,7 @@ class ExplicitInterfaceOperator:
         Raises:
             LinAlgError: the Schur complement is not positive definite on the complement of the kernel.
         """
-        fixed, self._term = subdomain.fixing(K, np.unique(dofs // 2))
+        fixed, self._term = subdomain.fixing(K, np.unique(subdomain.problem.nodes(dofs)))
         self._fixed = np.searchsorted(dofs, fixed)
         self.n = len(dofs)
         both = schur_complement(K, dofs)

@@ -21,7 +21,8 @@ class ImplicitInterfaceOperator:
         """Factor K + rho Rf Rf^T; `dofs` (n,) are sorted local numbers.  Options under `feti_sub_`."""
         self.n, self.dofs, self._subdomain = len(dofs), dofs, subdomain
         # A single subdomain has no boundary: any of its nodes can be fixed.
-        nodes = np.unique(dofs // 2) if len(dofs) else np.arange(subdomain.mesh.n_classes)
+        own = subdomain.problem.nodes(dofs)
+        nodes = np.unique(own) if len(dofs) else np.arange(subdomain.mesh.n_classes)
         self._solver = DirectSolver(subdomain.regularised(K, nodes), "feti_sub_")
 
     @cached_property

@@ -14,7 +14,7 @@ from scipy.sparse import block_diag, csr_matrix
 
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.shared_entities import SharedEntities
-from feti_homog.feti.decomposition.subdomain import Subdomain, both_directions
+from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.operators.choice import SubdomainSize, choose
 from feti_homog.feti.operators.explicit import ExplicitInterfaceOperator
 from feti_homog.feti.operators.implicit import ImplicitInterfaceOperator, Interior
@@ -186,10 +186,10 @@ def _of_cut_nodes(jump_operator: JumpOperator, compliance: Float | None) -> Floa
 
 
 def _constrained_dofs(B: csr_matrix, subdomains: Sequence[Subdomain]) -> list[Int]:
-    """Local numbers of the dofs of each subdomain that constraints act on, both directions of a node."""
-    constrained = B.getnnz(axis=0).reshape(-1, 2).any(axis=1)
-    nodes = np.split(constrained, np.cumsum([s.mesh.n_classes for s in subdomains]))[:-1]
-    return [both_directions(np.flatnonzero(n)) for n in nodes]
+    """Local numbers of the dofs of each subdomain that constraints act on, all of a node."""
+    constrained = np.split(B.getnnz(axis=0) > 0, np.cumsum([s.n_dofs for s in subdomains]))[:-1]
+    pairs = zip(subdomains, constrained, strict=True)
+    return [s.problem.dofs(np.unique(s.problem.nodes(np.flatnonzero(own)))) for s, own in pairs]
 
 
 def _sizes(shared: SharedEntities, subdomains: Sequence[Subdomain], dofs: Sequence[Int]) -> list[SubdomainSize]:

@@ -64,7 +64,7 @@ class AssembledSchur:
 
 def shared_dofs(comm: MPI.Intracomm, jump_operator: JumpOperator) -> int:
     """Dofs on the shared nodes of all ranks; collective."""
-    return int(comm.allreduce(2 * len(jump_operator.node_rows[0])))
+    return int(comm.allreduce(jump_operator.components * len(jump_operator.node_rows[0])))
 
 
 def _copies_together(comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators) -> csr_matrix:
@@ -73,10 +73,10 @@ def _copies_together(comm: MPI.Intracomm, jump_operator: JumpOperator, operators
     order = np.argsort(starts)
     first = comm.exscan(len(starts)) or 0
     node = jump_operator.gather(np.repeat(first + np.arange(len(starts)), sizes[order]).astype(float))
-    # Each copy of a node takes part in some row of it, and its two dofs are neighbours.
+    # Each copy of a node takes part in some row of it, and its dofs are neighbours.
     row = operators.BT.indices[operators.BT.indptr[:-1]]
-    n = len(row)
-    shared = 2 * node[row].astype(np.int64) + np.arange(n) % 2
+    n, c = len(row), jump_operator.components
+    shared = c * node[row].astype(np.int64) + np.arange(n) % c
     return csr_matrix((np.ones(n), (np.arange(n), shared)), shape=(n, shared_dofs(comm, jump_operator)))
 
 

@@ -9,7 +9,7 @@ from feti_homog.common.distributed_arrays import allreduce_sum
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.typing import Float
 
-# Bonds, each in both directions, that let no rigid-body motion pass between two bodies.
+# Bonds, each in all directions, that let no rigid-body motion pass between two bodies.
 HOLDING_BONDS = 2
 
 
@@ -19,7 +19,8 @@ class BodyTies:
     def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator) -> None:
         """Collective."""
         nodes = jump_operator.nodes
-        self._comm, self._row = comm, nodes.row
+        self._comm = comm
+        self._rows = nodes.row[:, None] + np.arange(jump_operator.components)
         bodies, points = (np.concatenate(comm.allgather(x)) for x in (nodes.bodies, nodes.points))
         _, first, pair = np.unique(bodies, axis=0, return_index=True, return_inverse=True)
         pair = pair.ravel()
@@ -31,11 +32,11 @@ class BodyTies:
         self._pair = pair[begin : begin + len(nodes.row)]
 
     def tied(self, active: Float) -> Float:
-        """`active` (owned rows,) with both rows of the ties where fewer than two bonds hold two bodies.  Collective."""
-        bonded = active[self._row] * active[self._row + 1]
+        """`active` (owned rows,) with all rows of the ties where fewer than two bonds hold two bodies.  Collective."""
+        bonded = active[self._rows].prod(axis=1)
         holding = allreduce_sum(self._comm, np.bincount(self._pair, bonded, len(self._ties)).astype(float))
         ties = self._ties[holding < HOLDING_BONDS].ravel()
-        own = self._row[ties[(ties >= 0) & (ties < len(self._row))]]
+        own = self._rows[ties[(ties >= 0) & (ties < len(self._rows))]]
         tied = active.copy()
-        tied[own] = tied[own + 1] = 1.0
+        tied[own] = 1.0
         return tied

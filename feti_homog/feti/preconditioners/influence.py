@@ -85,7 +85,7 @@ class Influence:
         return self._restricted(self.reference.respond(scale_rows(self.reference.active, r)), r)
 
     def close(self, right: Float, d: Float, E: Float) -> Float:
-        """H d E for d (owned rows, 3), the same at every call, and E (3, k), from the reference cell's answer to d.
+        """H d E for d (owned rows, v), the same at every call, and E (v, k), from the reference cell's answer to d.
         Collective."""
         if self._answer is None:
             self._answer = self.reference.respond(scale_rows(self.reference.active, d))
@@ -138,7 +138,7 @@ class Influence:
         bonds = np.unique(np.searchsorted(normal, rows, side="right") - 1)
         active = np.concatenate(self.comm.allgather(self._active)) > 0
         while True:
-            beside = (normal[bonds][:, None] + np.arange(2)).ravel()
+            beside = (normal[bonds][:, None] + np.arange(self._jump_operator.components)).ravel()
             beside = np.union1d(rows, beside[active[beside] & (self._columns.positions(beside) < 0)])
             reached = np.unique(self._adjacency[bonds].indices)
             if len(beside) >= self._batch or len(reached) == len(bonds):
@@ -195,4 +195,3 @@ class Influence:
             taken_in = mine[outside[rows[mine] - self._first] > 0]
             z[rows[taken_in] - self._first] = -c[taken_in]
         return scale_rows(self._active, z)
-

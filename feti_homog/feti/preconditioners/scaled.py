@@ -82,8 +82,9 @@ class StiffnessScaled:
     ) -> None:
         """`stiffness` is x -> S x for x (boundary dofs,) or (boundary dofs, k).  Collective."""
         self.jump_operator, self.stiffness = jump_operator, stiffness
-        # Both directions of a node are on the boundary.
-        flexibility = diags(np.repeat(2.0 / operators.diagonal.reshape(-1, 2).sum(axis=1), 2))
+        # All dofs of a node are on the boundary.
+        c = jump_operator.components
+        flexibility = diags(np.repeat(1.0 / operators.diagonal.reshape(-1, c).mean(axis=1), c))
         self.BD: csr_matrix = (operators.B @ flexibility).tocsr()
         self.DBT = self.BD.T.tocsr()
         self.W = NodeBlocks(comm, jump_operator, self.BD @ operators.B.T)

@@ -11,6 +11,7 @@ from reference.dense_feti import boundary_of, kernel, schur
 from scipy.sparse import csr_matrix, diags, identity
 from support import torn_cells
 
+from feti_homog.fem.problem import PLANE
 from feti_homog.feti.operators.explicit import ExplicitInterfaceOperator, schur_complement
 from feti_homog.feti.operators.implicit import ImplicitInterfaceOperator
 
@@ -130,6 +131,6 @@ def test_schur_complement_of_any_definite_matrix_is_the_dense_one():
 
 def test_indefinite_subdomain_is_refused():
     K = csr_matrix(np.diag([1.0, 1.0, -1.0, 1.0]))
-    subdomain = SimpleNamespace(fixing=lambda K, nodes: (np.zeros(0, np.int64), np.zeros((0, 0))))
+    subdomain = SimpleNamespace(problem=PLANE, fixing=lambda K, nodes: (np.zeros(0, np.int64), np.zeros((0, 0))))
     with pytest.raises(np.linalg.LinAlgError, match="not positive definite"):
         ExplicitInterfaceOperator(subdomain, K, np.arange(4))

@@ -1,0 +1,62 @@
+"""What is solved for on the plane mesh: the displacements, the strains that they make, and the unit loads.
+
+For long fibres strains do not vary along x3, and x3 is a plane of symmetry of every phase.  Then the displacements in
+the plane and the one along x3 have a problem each: generalized plane strain and axial shear.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from feti_homog.typing import Int
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Displacements u_i, i = 0..c-1, and strains: du_i/dx_k is part of the strain number `strain`[i][k].
+
+    Attributes:
+        strain: c rows of two numbers.
+        turns: whether a rigid body can turn without strain.
+        loads: v names of the unit loads, those of the m strains first; the others are uniform in the cell.
+    """
+
+    strain: tuple[tuple[int, int], ...]
+    turns: bool
+    loads: tuple[str, ...]
+
+    @property
+    def components(self) -> int:
+        """c, displacements of a node."""
+        return len(self.strain)
+
+    @property
+    def strains(self) -> int:
+        """m, strains that displacements make."""
+        return int(self.voigt.max()) + 1
+
+    @cached_property
+    def voigt(self) -> Int:
+        """(c, 2) `strain`."""
+        return np.array(self.strain)
+
+    def dofs(self, nodes: Int) -> Int:
+        """(cn,) degrees of freedom of the nodes (n,)."""
+        return np.asarray((self.components * nodes[:, None] + np.arange(self.components)).ravel())
+
+    def nodes(self, dofs: Int) -> Int:
+        """(n,) the node of each degree of freedom (n,)."""
+        return np.asarray(dofs // self.components)
+
+
+PLANE = Problem(((0, 2), (2, 1)), turns=True, loads=("E11", "E22", "gamma12"))
+"""Plane strain and plane stress."""
+
+GENERALIZED = replace(PLANE, loads=(*PLANE.loads, "E33", "temperature"))
+"""Generalized plane strain: the same displacements, under a uniform strain along x3 and a change of temperature too."""
+
+AXIAL = Problem(((0, 1),), turns=False, loads=("gamma13", "gamma23"))
+"""Axial shear: the displacement along x3."""
