@@ -14,8 +14,8 @@ from typing import Any
 from feti_homog.config.cell_section import GEOMETRY, TOUCHING, Cell, size_faults
 from feti_homog.config.document import read_document, to_document
 from feti_homog.config.interface_sections import misplaced_sections, read_angle, read_interface, read_path
+from feti_homog.config.material_forms import Isotropic, Material
 from feti_homog.config.material_sections import phase_faults, provider, read_materials
-from feti_homog.config.materials import Isotropic, Material
 from feti_homog.config.petsc_section import Scalar, read_petsc
 from feti_homog.config.schema import Selected, TableReader, selected_value, to_table
 from feti_homog.config.sections import (

@@ -11,8 +11,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from feti_homog.config.json_schema_rules import Schema, rules_of_one_case
+from feti_homog.config.material_forms import MATERIAL_FORMS
 from feti_homog.config.material_sections import PHASE
-from feti_homog.config.materials import MATERIAL_FORMS
 from feti_homog.config.petsc_section import PREFIXED
 from feti_homog.config.schema import Key, defaults_of, keys_of
 from feti_homog.config.sections import SECTIONS, Arc

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from feti_homog.config.cell_section import ALL_CIRCULAR, GEOMETRY
-from feti_homog.config.materials import MATERIAL_FORMS
+from feti_homog.config.material_forms import MATERIAL_FORMS
 from feti_homog.config.schema import Condition, Key, Selector, defaults_of, keys_of
 from feti_homog.config.sections import (
     ANALYSIS_TYPE,

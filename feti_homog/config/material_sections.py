@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Mapping
 
 from feti_homog.config.cell_section import CIRCULAR, GEOMETRY
-from feti_homog.config.materials import MATERIAL_FORMS, Material, plane_stiffness
+from feti_homog.config.material_forms import MATERIAL_FORMS, Material
+from feti_homog.config.materials import expansion, plane_stiffness, spatial_stiffness
 from feti_homog.config.schema import TableReader, keys_of
 from feti_homog.config.wording import suggestion, toml_key, toml_value
 
@@ -52,18 +54,36 @@ def _read_material(table: object, section: str, plane: str | None, reader: Table
         reader.faults.append(f"[{section}] {groups}: exclude each other; a material is of one kind")
         return None
     material: Material | None = reader.read(MATERIAL_FORMS[forms[0]], table, section)
-    if material is not None and plane is not None:
-        try:
-            plane_stiffness(material, plane)
-        except ValueError as error:
-            reader.faults.append(f"[{section}] {error}")
+    if material is not None:
+        reader.faults += [f"[{section}] {fault}" for fault in _law_faults(material, plane)]
     return material
 
 
+def _law_faults(material: Material, plane: str | None) -> list[str]:
+    """What is wrong with the constants of a material together; of the stiffness only if the plane state is known."""
+    faults = []
+    try:
+        if plane == "generalized":
+            spatial_stiffness(material)
+        elif plane is not None:
+            plane_stiffness(material, plane)
+    except ValueError as error:
+        faults.append(str(error))
+    try:
+        expansion(material)
+    except ValueError as error:
+        faults.append(str(error))
+    return faults
+
+
 def _keys_by_form(table: object) -> dict[str, list[str]]:
-    """The keys of a table that belong to each form of a material, without the forms that have none."""
+    """The keys of a table that belong to one form of a material alone, without the forms that have none."""
     names = table if isinstance(table, dict) else {}
-    given = {form: [name for name in keys_of(cls) if name in names] for form, cls in MATERIAL_FORMS.items()}
+    forms_of = Counter(name for cls in MATERIAL_FORMS.values() for name in keys_of(cls))
+    given = {
+        form: [name for name in keys_of(cls) if name in names and forms_of[name] == 1]
+        for form, cls in MATERIAL_FORMS.items()
+    }
     return {form: names for form, names in given.items() if names}
 
 

@@ -1,109 +1,73 @@
-"""Linear elastic phases and their plane stiffness in Voigt order [11, 22, 12] with engineering shear."""
+"""The law of each phase: its stiffness in the plane and in space, and its thermal expansion.
+
+Voigt order [11, 22, 12] in the plane, [11, 22, 33, 23, 13, 12] in space, with engineering shears. x3 is normal to a
+plane of symmetry of every phase, so that [23, 13] are coupled to each other alone.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
-
 import numpy as np
 
-from feti_homog.config.schema import key
-from feti_homog.config.values import ValueType, is_number, real
-from feti_homog.config.wording import limit_in_words, toml_value
+from feti_homog.config.engineering_constants import PLANE_IN_WORDS, known_compliance, stable_compliance
+from feti_homog.config.material_forms import General, Isotropic, Material, Orthotropic, TransverselyIsotropic
+from feti_homog.config.voigt_matrices import IN_PLANE, IN_PLANE_BLOCK, is_positive_definite, rotated, strain_rotation
+from feti_homog.config.wording import toml_value
 from feti_homog.typing import Float
 
-Matrix3 = tuple[tuple[float, float, float], ...]
-
-POSITIVE = real(above=0.0)
-
-
-def _is_triple(row: object) -> bool:
-    return isinstance(row, list | tuple) and len(row) == 3 and all(map(is_number, row))
-
-
-def _is_matrix(value: object) -> bool:
-    return isinstance(value, list | tuple) and len(value) == 3 and all(map(_is_triple, value))
-
-
-def _to_matrix(value: Any) -> Matrix3:
-    return tuple(tuple(float(entry) for entry in row) for row in value)  # type: ignore[misc]
-
-
-def _three(items: Mapping[str, Any]) -> dict[str, Any]:
-    return {"type": "array", "items": items, "minItems": 3, "maxItems": 3}
-
-
-MATRIX = ValueType(
-    "a symmetric 3x3 array of numbers in the order 11, 22, 12",
-    _is_matrix,
-    _to_matrix,
-    _three(_three(real().json_schema)),
-)
-
-
-@dataclass(frozen=True)
-class Isotropic:
-    """Young's modulus and Poisson's ratio."""
-
-    young: float = key(POSITIVE, "Young's modulus.", unit="stress")
-    poisson: float = key(real(above=-1.0, most=0.5), "Poisson's ratio; in plane strain below 0.5.")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Orthotropic:
-    """Engineering constants along the material axes; nu_ij = -eps_j/eps_i under stress along i.
-
-    So nu_ij/E_i = nu_ji/E_j. The constants out of the plane (E3, nu13, nu23) are needed for plane strain only.
-    """
-
-    E1: float = key(POSITIVE, "Young's modulus along axis 1.", unit="stress")
-    E2: float = key(POSITIVE, "Young's modulus along axis 2.", unit="stress")
-    E3: float | None = key(
-        POSITIVE, "Young's modulus out of the plane; plane strain needs it.", unit="stress", default=None
-    )
-    nu12: float = key(real(), "Poisson's ratio in the plane; nu12^2 < E1/E2.")
-    nu13: float | None = key(real(), "Poisson's ratio out of the plane; plane strain needs it.", default=None)
-    nu23: float | None = key(real(), "Poisson's ratio out of the plane; plane strain needs it.", default=None)
-    G12: float = key(POSITIVE, "Shear modulus in the plane.", unit="stress")
-    angle: float = key(real(), "Direction of axis 1, from x1 towards x2.", unit="degrees", default=0.0)
-
-
-@dataclass(frozen=True)
-class General:
-    """The plane stiffness itself, for whichever plane state the case asks for."""
-
-    stiffness: Matrix3 = key(MATRIX, "The plane stiffness, symmetric and positive definite.", unit="stress")
-
-
-Material = Isotropic | Orthotropic | General
-MATERIAL_FORMS: dict[str, type[Isotropic] | type[Orthotropic] | type[General]] = {
-    "isotropic": Isotropic,
-    "orthotropic": Orthotropic,
-    "general": General,
-}
+COUPLINGS = ((0, 3), (0, 4), (1, 3), (1, 4), (2, 3), (2, 4), (3, 5), (4, 5))
+"""Entries of a spatial stiffness that vanish where x3 is normal to a plane of symmetry."""
 
 
 def plane_stiffness(material: Material, plane: str) -> Float:
     """C with [S11, S22, S12] = C [E11, E22, gamma12], (3, 3), symmetric positive definite, unit of stress.
 
-    `plane` is "strain" or "stress". Raises ValueError, with the keys at fault, if the constants are those of
-    no stable material.
+    `plane` is "stress" (S33 = 0), "strain" (E33 = 0), or "generalized", where C is that at E33 = 0. Raises ValueError,
+    with the keys at fault, if the constants do not say C or are those of no stable material.
     """
     if isinstance(material, Isotropic):
-        return _isotropic(material, plane)
-    if isinstance(material, Orthotropic):
-        return rotated(np.asarray(np.linalg.inv(_orthotropic_compliance(material, plane)), float), material.angle)
-    stiffness = np.array(material.stiffness)
-    if not np.allclose(stiffness, stiffness.T, rtol=0.0, atol=1e-9 * np.abs(stiffness).max()):
-        raise ValueError(f"stiffness = {toml_value(material.stiffness)}: expected a symmetric matrix")
-    if not is_positive_definite(stiffness):
-        raise ValueError(f"stiffness = {toml_value(material.stiffness)}: expected a positive definite matrix")
-    return np.asarray((stiffness + stiffness.T) / 2.0)
+        lame, shear = _lame(material, plane)
+        return np.array([[lame + 2 * shear, lame, 0.0], [lame, lame + 2 * shear, 0.0], [0.0, 0.0, shear]])
+    if isinstance(material, General):
+        return _general_in_plane(_given_stiffness(material), plane)
+    compliance = stable_compliance(material, plane)
+    reduced = compliance[IN_PLANE_BLOCK]
+    if plane != "stress":
+        out = compliance[IN_PLANE, 2]
+        reduced = reduced - np.outer(out, out) / compliance[2, 2]
+    return rotated(np.asarray(np.linalg.inv(reduced), float), _angle(material))
+
+
+def spatial_stiffness(material: Material) -> Float:
+    """C with S = C E in the axes of the cell, (6, 6), symmetric positive definite, unit of stress.
+
+    Raises ValueError as `plane_stiffness` does.
+    """
+    if isinstance(material, Isotropic):
+        lame, shear = _lame(material, "generalized")
+        stiffness = np.diag([2 * shear] * 3 + [shear] * 3)
+        stiffness[:3, :3] += lame
+        return stiffness
+    if isinstance(material, General):
+        stiffness = _given_stiffness(material)
+        if len(stiffness) == 3:
+            raise ValueError("stiffness: expected 6x6 in generalized plane strain; 3x3 is that of one plane state")
+        return stiffness
+    return rotated(np.asarray(np.linalg.inv(stable_compliance(material, "generalized")), float), _angle(material))
+
+
+def expansion(material: Material) -> Float | None:
+    """Strains per unit of temperature of the free material, in the axes of the cell, (6,); None if not given.
+
+    Raises ValueError, with the keys at fault, if they are given twice or by half.
+    """
+    along_axes = _expansion_along_axes(material)
+    if along_axes is None:
+        return None
+    return np.asarray(strain_rotation(-_angle(material)) @ [*along_axes, 0.0, 0.0, 0.0])
 
 
 def out_of_plane(material: Material, plane: str) -> tuple[Float, Float]:
-    """s and e, (3,) each, with S33 = s . [S11, S22, S12] and E33 = e . [S11, S22, S12].
+    """s and e, (3,) each, with S33 = s . [S11, S22, S12] and E33 = e . [S11, S22, S12], in plane strain and stress.
 
     S33 vanishes in plane stress, E33 in plane strain. NaN if the constants of the material do not say it.
     """
@@ -117,56 +81,76 @@ def _compliance_33(material: Material) -> tuple[Float, float]:
         ratio = -material.poisson / material.young
         return np.array([ratio, ratio, 0.0]), material.young
     if isinstance(material, General):
-        return np.full(3, np.nan), np.nan
-    E3, nu13, nu23 = (np.nan if c is None else c for c in (material.E3, material.nu13, material.nu23))
-    c, s = np.cos(np.radians(material.angle)), np.sin(np.radians(material.angle))
-    along_axes = np.array([[c * c, s * s, 2 * c * s], [s * s, c * c, -2 * c * s]])
-    return np.array([-nu13 / material.E1, -nu23 / material.E2]) @ along_axes, E3
+        stiffness = _given_stiffness(material)
+        compliance = np.full((6, 6), np.nan) if len(stiffness) == 3 else np.linalg.inv(stiffness)
+        return np.asarray(compliance[2, IN_PLANE]), 1.0 / compliance[2, 2]
+    compliance = known_compliance(material)
+    # Stresses turn as the transpose of strains that turn the other way.
+    to_axes = strain_rotation(-_angle(material)).T[IN_PLANE_BLOCK]
+    row = np.array([compliance[2, 0], compliance[2, 1], 0.0]) @ to_axes
+    return np.asarray(row), 1.0 / compliance[2, 2]
 
 
-def _isotropic(material: Isotropic, plane: str) -> Float:
-    if plane == "strain" and material.poisson >= 0.5:
-        raise ValueError(f"poisson = {material.poisson}: expected less than 0.5 in plane strain")
+def _lame(material: Isotropic, plane: str) -> tuple[float, float]:
+    """Lame's constant, in plane stress the reduced one, and the shear modulus."""
+    if plane != "stress" and material.poisson >= 0.5:
+        raise ValueError(f"poisson = {material.poisson}: expected less than 0.5 in {PLANE_IN_WORDS[plane]}")
     shear = material.young / (2.0 * (1.0 + material.poisson))
-    thickness = 1.0 - 2.0 * material.poisson if plane == "strain" else 1.0 - material.poisson
-    lame = 2.0 * shear * material.poisson / thickness  # plane stress: the reduced Lame constant
-    return np.array([[lame + 2 * shear, lame, 0.0], [lame, lame + 2 * shear, 0.0], [0.0, 0.0, shear]])
+    thickness = 1.0 - material.poisson if plane == "stress" else 1.0 - 2.0 * material.poisson
+    return 2.0 * shear * material.poisson / thickness, shear
 
 
-def _orthotropic_compliance(material: Orthotropic, plane: str) -> Float:
-    """Compliance (3, 3) in the material axes; in plane strain S_ij - S_i3 S_j3 / S_33."""
-    E1, E2, G12, nu12 = material.E1, material.E2, material.G12, material.nu12
-    compliance = np.array([[1 / E1, -nu12 / E1, 0.0], [-nu12 / E1, 1 / E2, 0.0], [0.0, 0.0, 1 / G12]])
-    if not is_positive_definite(compliance):
-        limit = limit_in_words(E1 / E2, nu12**2, 6)
-        raise ValueError(f"nu12 = {nu12}: expected nu12^2 < E1/E2 = {limit}; no material is stable otherwise")
-    if plane == "stress":
-        return compliance
-    E3, nu13, nu23 = material.E3, material.nu13, material.nu23
-    if E3 is None or nu13 is None or nu23 is None:
-        absent = [name for name in ("E3", "nu13", "nu23") if getattr(material, name) is None]
-        raise ValueError(f"{', '.join(absent)}: missing; plane strain needs them")
-    out = np.array([-nu13 / E1, -nu23 / E2, 0.0])
-    compliance -= E3 * np.outer(out, out)
-    if not is_positive_definite(compliance):
-        raise ValueError("E1, E2, E3, nu12, nu13, nu23: expected a positive definite compliance")
-    return compliance
+def _angle(material: Material) -> float:
+    """Direction of the first material axis, degrees from x1 towards x2."""
+    return material.angle if isinstance(material, Orthotropic) else 0.0
 
 
-def rotated(stiffness: Float, angle: float) -> Float:
-    """Stiffness (3, 3) in axes x1, x2 of a material whose axis 1 is turned by `angle` degrees from x1.
-
-    C = T^T C' T, where T takes strains [E11, E22, gamma12] to the material axes.
-    """
-    c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
-    strain_to_axes = np.array([[c * c, s * s, c * s], [s * s, c * c, -c * s], [-2 * c * s, 2 * c * s, c * c - s * s]])
-    return np.asarray(strain_to_axes.T @ stiffness @ strain_to_axes)
+def _general_in_plane(stiffness: Float, plane: str) -> Float:
+    """Of a stiffness in space the block of plane strain, or what is left in plane stress."""
+    if len(stiffness) == 3:
+        return stiffness
+    block, out = stiffness[IN_PLANE_BLOCK], stiffness[IN_PLANE, 2]
+    return np.asarray(block - np.outer(out, out) / stiffness[2, 2]) if plane == "stress" else block
 
 
-def is_positive_definite(matrix: Float) -> bool:
-    """Whether a symmetric matrix, scaled to a unit diagonal, has no eigenvalue below 1e-12."""
-    diagonal = np.diag(matrix)
-    if diagonal.min() <= 0.0:
-        return False
-    scaled = matrix / np.sqrt(np.outer(diagonal, diagonal))
-    return bool(np.linalg.eigvalsh(scaled).min() > 1e-12)
+def _given_stiffness(material: General) -> Float:
+    """The stiffness of a phase that gives it, (3, 3) or (6, 6), checked."""
+    given = np.array(material.stiffness)
+    noise = 1e-9 * np.abs(given).max()
+    if not np.allclose(given, given.T, rtol=0.0, atol=noise):
+        raise ValueError(f"stiffness = {toml_value(material.stiffness)}: expected a symmetric matrix")
+    stiffness = np.asarray((given + given.T) / 2.0)
+    if len(stiffness) == 6:
+        stiffness = _uncoupled(stiffness, noise)
+    if not is_positive_definite(stiffness):
+        raise ValueError(f"stiffness = {toml_value(material.stiffness)}: expected a positive definite matrix")
+    return stiffness
+
+
+def _uncoupled(stiffness: Float, noise: float) -> Float:
+    """The stiffness (6, 6) with zeros in place of couplings that are noise; ValueError if one is more."""
+    i, j = max(COUPLINGS, key=lambda entry: float(abs(stiffness[entry])))
+    if abs(stiffness[i, j]) > noise:
+        entry = f"C{i + 1}{j + 1} = {float(stiffness[i, j])}"
+        raise ValueError(f"stiffness: {entry}: expected 0; x3 must be normal to a plane of symmetry")
+    uncoupled = stiffness.copy()
+    rows, columns = np.transpose(COUPLINGS)
+    uncoupled[rows, columns] = uncoupled[columns, rows] = 0.0
+    return uncoupled
+
+
+def _expansion_along_axes(material: Material) -> tuple[float, ...] | None:
+    """Strains along the three material axes; None if they are not given."""
+    if isinstance(material, TransverselyIsotropic):
+        pair = {name: getattr(material, name) for name in ("expansion_transverse", "expansion_axial")}
+        given = [name for name, value in pair.items() if value is not None]
+        if given and material.expansion is not None:
+            raise ValueError(f"expansion, {', '.join(given)}: exclude each other")
+        if len(given) == 1:
+            (absent,) = pair.keys() - given
+            raise ValueError(f"{absent}: missing; {given[0]} needs it")
+        if given:
+            return pair["expansion_transverse"], pair["expansion_transverse"], pair["expansion_axial"]
+    if material.expansion is None or isinstance(material.expansion, tuple):
+        return material.expansion
+    return (material.expansion,) * 3

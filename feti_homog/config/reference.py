@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from feti_homog.config.materials import Isotropic
+from feti_homog.config.material_forms import Isotropic
 from feti_homog.config.petsc_section import OPTION_EXPECTED
 from feti_homog.config.schema import Key, keys_of
 from feti_homog.config.sections import SECTIONS_OF_AN_ANALYSIS

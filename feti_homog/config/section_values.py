@@ -1,8 +1,9 @@
-"""Types of values that stand in the sections of a case file: fibres, arcs, strengths, openings, strains."""
+"""Types of values that stand in the sections of a case file: fibres, arcs, strengths, strains, stiffnesses."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,8 @@ from feti_homog.config.values import SMALLEST, ValueType, integer, is_number, is
 STRAIN_COMPONENTS = "[E11, E22, gamma12]"
 FIBRE = integer(least=1)
 SEED = integer(least=0, most=10**15)
+
+Matrix = tuple[tuple[float, ...], ...]
 
 
 def _is_mesh_file(value: Any) -> bool:
@@ -32,8 +35,16 @@ def _is_strength(value: Any) -> bool:
     return (is_number(value) and value > 0) or (isinstance(value, float) and value == math.inf)
 
 
+def _is_stiffness(value: Any) -> bool:
+    return isinstance(value, list) and len(value) in (3, 6) and all(is_number_list(row, len(value)) for row in value)
+
+
+def _list_of(count: int, items: Mapping[str, Any]) -> dict[str, Any]:
+    return {"type": "array", "items": items, "minItems": count, "maxItems": count}
+
+
 def _numbers(count: int) -> dict[str, Any]:
-    return {"type": "array", "items": real().json_schema, "minItems": count, "maxItems": count}
+    return _list_of(count, real().json_schema)
 
 
 def _positive_or_inf(what: str) -> ValueType:
@@ -95,4 +106,16 @@ WAYPOINTS = ValueType(
     lambda v: isinstance(v, list) and v != [] and all(is_number_list(strain, 3) for strain in v),
     lambda v: tuple(map(to_floats, v)),
     {"type": "array", "items": _numbers(3), "minItems": 1},
+)
+MATRIX = ValueType(
+    "a symmetric 3x3 array of numbers in the order 11, 22, 12, or 6x6 in the order 11, 22, 33, 23, 13, 12",
+    _is_stiffness,
+    lambda v: tuple(map(to_floats, v)),
+    {"anyOf": [_list_of(3, _numbers(3)), _list_of(6, _numbers(6))]},
+)
+EXPANSION = ValueType(
+    "a number or a list of three numbers",
+    lambda v: is_number(v) or is_number_list(v, 3),
+    lambda v: to_floats(v) if isinstance(v, list) else float(v),
+    {"anyOf": [real().json_schema, _numbers(3)]},
 )

@@ -43,8 +43,9 @@ class Analysis:
         '"path": debonding by the load, see [path].',
     )
     plane: str = key(
-        choice("strain", "stress"),
-        'Plane state: "strain" is that of long fibres along x3, "stress" that of a thin sheet.',
+        choice("strain", "stress", "generalized"),
+        'Plane state: "strain" is that of long fibres along x3, "stress" that of a thin sheet; "generalized" is '
+        "generalized plane strain: long fibres under all six strains, also along x3.",
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from feti_homog.config.materials import MATERIAL_FORMS
+from feti_homog.config.material_forms import MATERIAL_FORMS
 from feti_homog.config.schema import keys_of
 from feti_homog.config.sections import SECTIONS, Arc
 

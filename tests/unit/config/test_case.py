@@ -14,7 +14,7 @@ from unit.config.faulty_cases import FAULTY_CASES
 from unit.config.valid_cases import MESH, VALID_CASES
 
 from feti_homog.config.case import check_phases, load, parse
-from feti_homog.config.materials import General, Isotropic, Orthotropic
+from feti_homog.config.material_forms import General, Isotropic, Orthotropic
 from feti_homog.config.sections import Angle, Arc, InterfaceSection, LoadPath
 from feti_homog.errors import CaseError
 

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from reference.references import HASHIN_SHTRIKMAN_BULK, HASHIN_SHTRIKMAN_SHEAR, REUSS_MODULI, VOIGT_MODULI
 
-from feti_homog.config.materials import Isotropic, Orthotropic, plane_stiffness, rotated
+from feti_homog.config.material_forms import Isotropic, Orthotropic
+from feti_homog.config.materials import plane_stiffness
+from feti_homog.config.voigt_matrices import rotated
 from feti_homog.mechanics.bounds import (
     anisotropy,
     engineering_moduli,

@@ -1,0 +1,39 @@
+"""Matrices in Voigt order with engineering shears: [11, 22, 12] in the plane, [11, 22, 33, 23, 13, 12] in space."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from feti_homog.typing import Float
+
+IN_PLANE = [0, 1, 5]
+"""Where [11, 22, 12] stand in the order of space."""
+IN_PLANE_BLOCK = np.ix_(IN_PLANE, IN_PLANE)
+
+
+def rotated(stiffness: Float, angle: float) -> Float:
+    """Stiffness, (3, 3) or (6, 6), in the axes of the cell of a material whose axis 1 is turned by `angle` degrees.
+
+    C = T^T C' T, where T takes strains to the material axes.
+    """
+    rotation = strain_rotation(angle)
+    to_axes = rotation if len(stiffness) == 6 else rotation[IN_PLANE_BLOCK]
+    return np.asarray(to_axes.T @ stiffness @ to_axes)
+
+
+def strain_rotation(angle: float) -> Float:
+    """T (6, 6) that takes strains to axes turned about x3 by `angle` degrees, from x1 towards x2."""
+    c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+    rotation = np.eye(6)
+    rotation[IN_PLANE_BLOCK] = [[c * c, s * s, c * s], [s * s, c * c, -c * s], [-2 * c * s, 2 * c * s, c * c - s * s]]
+    rotation[3:5, 3:5] = [[c, -s], [s, c]]  # of [gamma23, gamma13]
+    return rotation
+
+
+def is_positive_definite(matrix: Float) -> bool:
+    """Whether a symmetric matrix, scaled to a unit diagonal, has no eigenvalue below 1e-12."""
+    diagonal = np.diag(matrix)
+    if diagonal.min() <= 0.0:
+        return False
+    scaled = matrix / np.sqrt(np.outer(diagonal, diagonal))
+    return bool(np.linalg.eigvalsh(scaled).min() > 1e-12)
