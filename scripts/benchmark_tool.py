@@ -69,7 +69,7 @@ def feti(case: Case, progress: Progress, loads: int, rtol: float) -> dict[str, A
         with progress.stage("set-up"):
             context = AnalysisContext(Homogenization(cell, contact=False), cell.debonded, progress, lambda *_: None)
         with progress.stage("solve"):
-            starts = [context.zero_multipliers()] * loads
+            starts = context.zero_multipliers()[:loads]
             responses = context.homogenization.respond(np.eye(3)[:loads], context.status(None), starts)
             for response in responses:
                 context.record_checks("", response)

@@ -12,15 +12,17 @@ from numpy.typing import NDArray
 
 from feti_homog.analysis.result_records import TipRates
 from feti_homog.common.progress import Progress
-from feti_homog.homogenization import process_zone
+from feti_homog.homogenization import phase_laws, process_zone
 from feti_homog.homogenization.averaging import Homogenization, Response
 from feti_homog.homogenization.energy_release import EnergyReleaseRates
 from feti_homog.homogenization.fibre_debonding import FibreInterfaces
 from feti_homog.interface.contact import OPEN, Status
+from feti_homog.mechanics.voigt import STRAINS
 from feti_homog.typing import Float
 
-UNIT_CASES = ("E11", "E22", "gamma12")
 EMPTY = np.zeros(0)
+# Loads under which energy release rates are known; "strain" is a given one.
+IN_PLANE_LOADS = (*STRAINS, "strain")
 
 # Largest relative error of a check that passes, in relative tolerances of the Krylov method: sums over the cell and
 # jumps of stiffness make so much of the solver's error.
@@ -37,9 +39,10 @@ class AnalysisContext:
 
     Attributes:
         homogenization: the cell and its interfaces.
+        axial: the same with the displacement along the fibres, of generalized plane strain.
         debonded: opening angle (or None for the arcs' own) -> (k,) prescribed debonded nodes of this rank.
-        record: called with each response that is to be kept as a state, its load factor, its name and the number of its
-            point; collective.
+        record: called with each response that is to be kept as a state, that along the fibres, one of them None, its
+            load factor, its name and the number of its point; collective.
         iterations, reasons: of every dual solve so far.
         checks: largest error of each law so far.
         faults: what did not converge or hold, in words.
@@ -51,12 +54,13 @@ class AnalysisContext:
     homogenization: Homogenization
     debonded: Callable[[float | None], NDArray[np.bool_]]
     progress: Progress
-    record: Callable[[Response, float, str, int], None]
+    record: Callable[[Response | None, Response | None, float, str, int], None]
     iterations: list[int] = field(default_factory=list)
     reasons: list[int] = field(default_factory=list)
     checks: dict[str, float] = field(default_factory=dict)
     faults: list[str] = field(default_factory=list)
     states: int | str = "all"
+    axial: Homogenization | None = None
     keeps_fields: bool = False
     log: Callable[[str], object] = lambda line: None
 
@@ -64,9 +68,18 @@ class AnalysisContext:
         """Interface states before any load: prescribed debonded nodes are open."""
         return np.where(self.debonded(opening), OPEN, 0).astype(np.int8)
 
-    def zero_multipliers(self) -> Float:
-        """First multipliers when there are no better ones."""
-        return np.zeros(self.homogenization.cell.solver.rows)
+    @property
+    def _problems(self) -> tuple[Homogenization, ...]:
+        return (self.homogenization,) if self.axial is None else (self.homogenization, self.axial)
+
+    @property
+    def unit_loads(self) -> list[str]:
+        """Names of the unit loads of all problems."""
+        return [name for problem in self._problems for name in problem.loads]
+
+    def zero_multipliers(self) -> list[Float]:
+        """First multipliers of each unit load when there are no better ones."""
+        return [np.zeros(problem.cell.solver.rows) for problem in self._problems for _ in problem.loads]
 
     def record_checks(self, name: str, response: Response) -> str:
         """Keep the numbers of a response, with a fault if it breaks a law; returns a line that tells of it."""
@@ -116,12 +129,28 @@ class AnalysisContext:
 
     def unit_responses(
         self, label: str, status: Status, starts: Sequence[Float], sign: float
-    ) -> tuple[Float, list[Response]]:
-        """Secant stiffness (3, 3) to plus or minus each unit strain (39), and the responses."""
-        responses = self.homogenization.respond(sign * np.eye(3), status, starts)
-        for name, response in zip(UNIT_CASES, responses, strict=True):
-            self.progress.say(self.record_checks(f"{label}{'-' if sign < 0 else ''}{name}", response))
-        return np.stack([sign * r.stress for r in responses], axis=1), responses
+    ) -> tuple[dict[str, Float], list[Response]]:
+        """Under plus or minus each unit load (39): the secant stiffness as `stiffness`, (3, 3) or (6, 6), and if a
+        temperature is a load `thermal_stress` (6,); and the responses."""
+        responses, matrices = list[Response](), list[Float]()
+        for problem in self._problems:
+            own = starts[len(responses) : len(responses) + len(problem.loads)]
+            found = problem.respond(sign * np.eye(len(problem.loads)), status, own)
+            for name, response in zip(problem.loads, found, strict=True):
+                self.progress.say(self.record_checks(f"{label}{'-' if sign < 0 else ''}{name}", response))
+            responses += found
+            matrices.append(np.stack([sign * r.stress for r in found], axis=1))
+        if len(matrices) == 1:
+            return {"stiffness": matrices[0]}, responses
+        C, thermal = phase_laws.spatial(*matrices)
+        return {"stiffness": C} | ({} if thermal is None else {"thermal_stress": thermal}), responses
+
+    def record_unit_states(self, responses: Sequence[Response], load_factor: float, label: str, point: int) -> None:
+        """Keep the states of all unit loads."""
+        plane = len(self.homogenization.loads)
+        for number, (name, response) in enumerate(zip(self.unit_loads, responses, strict=True)):
+            in_plane, axial = (response, None) if number < plane else (None, response)
+            self.record(in_plane, axial, load_factor, f"{label}{name}", point)
 
     @cached_property
     def _release_rates(self) -> EnergyReleaseRates:
@@ -129,8 +158,9 @@ class AnalysisContext:
         return EnergyReleaseRates(self.homogenization.cell, self.homogenization.interface)
 
     def tips(self, responses: Sequence[Response], loads: Sequence[str]) -> TipRates:
-        """Energy release rates at all tips under each load; none while all is bonded.  Collective."""
-        pairs = zip(responses, loads, strict=True)
+        """Energy release rates at all tips under each load that strains the plane; none while all is bonded.
+        Collective."""
+        pairs = [(r, load) for r, load in zip(responses, loads, strict=True) if load.lstrip("-") in IN_PLANE_LOADS]
         debonded = [(r, load) for r, load in pairs if r.counts["open"] + r.counts["closed"]]
         found = [(self._release_rates.of(response), load) for response, load in debonded]
         columns = [(at.fibre, at.direction, at.total, *at.modes.T, at.mode_angle, at.length) for at, _ in found]

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.analysis.context import UNIT_CASES, AnalysisContext
+from feti_homog.analysis.context import AnalysisContext
 from feti_homog.homogenization.averaging import Response, asymmetry
 from feti_homog.typing import Float
 
@@ -18,26 +18,26 @@ def run(context: AnalysisContext, values: Sequence[float], strain: Float | None)
     Each angle begins with the multipliers of the one before it.
     """
     unit = strain is None
-    starts = [context.zero_multipliers()] * (3 if unit else 1)
+    starts = context.zero_multipliers() if unit else context.zero_multipliers()[:1]
     points = []
     for number, value in enumerate(context.progress.bar(values, "angles")):
         status, label = context.status(value), f"{value:g} deg"
         point: dict[str, Any] = {"angle": value}
         responses: list[Response]
         if unit:
-            L, responses = context.unit_responses(f"{label} ", status, starts, 1.0)
-            point["stiffness"] = L
+            columns, responses = context.unit_responses(f"{label} ", status, starts, 1.0)
+            point |= columns
             debonded = responses[0].counts["open"] + responses[0].counts["closed"]
             if not (context.homogenization.interface.contact and debonded):
-                context.check(label, {"symmetry": asymmetry(L)})
+                context.check(label, {"symmetry": asymmetry(columns["stiffness"])})
+            context.record_unit_states(responses, 1.0, f"{label} ", number)
         else:
             responses = context.homogenization.respond(np.array([strain]), status, starts)
             context.progress.say(context.record_checks(label, responses[0]))
             point |= {"strain": responses[0].strain, "stress": responses[0].stress}
             point |= {"stored": responses[0].stored, "stored_in_springs": responses[0].in_springs}
-        for name, response in zip(UNIT_CASES if unit else ("",), responses, strict=True):
-            context.record(response, 1.0, f"{label} {name}".strip(), number)
+            context.record(responses[0], None, 1.0, label, number)
         starts = [r.state.solution.lam for r in responses]
-        tips = context.tips(responses, UNIT_CASES if unit else ("strain",))
+        tips = context.tips(responses, context.unit_loads if unit else ("strain",))
         points.append(point | context.point(responses) | {"tips": tips})
     return {"angle": points}

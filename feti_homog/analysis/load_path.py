@@ -163,6 +163,6 @@ def _kept(
                 entries[number]["tips"] = tips.of(point)
             if context.keeps_fields:
                 response = context.homogenization.response(point.state, point.scale)
-                context.record(response, point.load_factor, _label(path, number), number)
+                context.record(response, None, point.load_factor, _label(path, number), number)
         words.append(f"{len(numbers)} of {len(entries)} points")
     return {"states": numbers} if context.keeps_fields else {}

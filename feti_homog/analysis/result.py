@@ -67,6 +67,24 @@ class Result:
     effective_stiffness_compression: Float | None = described(
         "the same under minus the unit strains, with contact", STRESS, "(3, 3)", default=None
     )
+    compliance: Float | None = described(
+        "of generalized plane strain: inverse of L^ef", f"1 / {STRESS}", "(6, 6)", default=None
+    )
+    thermal_stress: Float | None = described(
+        "stress under a unit of temperature at no strain, of phases whose expansion is given",
+        f"{STRESS} per unit of temperature",
+        "(6,)",
+        default=None,
+    )
+    thermal_stress_compression: Float | None = described(
+        "minus the stress under minus a unit of temperature, with contact",
+        f"{STRESS} per unit of temperature",
+        "(6,)",
+        default=None,
+    )
+    thermal_expansion: Float | None = described(
+        "strains under a unit of temperature at no stress, without contact", "1 / temperature", "(6,)", default=None
+    )
     tips: TipRates | None = described("energy release rates at the tips of debonded arcs, of a stiffness", default=None)
     angle: tuple[AnglePoint, ...] | None = described("points of analysis `angle`, as in angle.csv", default=None)
     path: tuple[PathPoint, ...] | None = described("points of analysis `path`, as in path.csv", default=None)

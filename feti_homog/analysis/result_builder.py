@@ -39,7 +39,9 @@ def result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Fields
         for name, kind in (("angle", AnglePoint), ("path", PathPoint))
         if name in analysis
     }
-    if "effective_stiffness" in analysis and cell.case.interface is None:
+    if "effective_stiffness" in analysis and cell.axial is not None:
+        points |= _spatial(analysis)
+    elif "effective_stiffness" in analysis and cell.case.interface is None:
         points |= _moduli_and_bounds(cell, analysis["effective_stiffness"], fractions)
     return Result(
         version=__version__,
@@ -123,3 +125,12 @@ def _moduli_and_bounds(cell: TornCell, L: Float, fractions: dict[str, float]) ->
             hashin_shtrikman=bounds.hashin_shtrikman(shares, phases) if isotropic else None,
         ),
     }
+
+
+def _spatial(analysis: Mapping[str, Any]) -> dict[str, Any]:
+    """What follows from a stiffness (6, 6), and from `thermal_stress` if it is known."""
+    compliance = np.linalg.inv(analysis["effective_stiffness"])
+    found: dict[str, Any] = {"compliance": compliance}
+    if "thermal_stress" in analysis and "thermal_stress_compression" not in analysis:
+        found["thermal_expansion"] = -compliance @ analysis["thermal_stress"]
+    return found

@@ -110,9 +110,9 @@ def _torn(case: Case, comm: MPI.Intracomm, progress: Progress) -> Iterator[TornC
             yield cell
         except BaseException as error:
             if all_raise(comm, error):  # else the ranks that go on would not come to destroy it
-                cell.solver.destroy()
+                cell.destroy()
             raise
-        cell.solver.destroy()
+        cell.destroy()
 
 
 class _States:
@@ -129,11 +129,13 @@ class _States:
         self.has_place = keep or file is not None
         self.error: FetiHomogError | None = None
 
-    def record(self, response: Response, load_factor: float, label: str, point: int) -> None:
-        """Take a response as the next state; collective."""
+    def record(
+        self, plane: Response | None, axial: Response | None, load_factor: float, label: str, point: int
+    ) -> None:
+        """Take responses, one of which may be None, as the next state; collective."""
         if self._file is None and not self._keep:
             return
-        state = field_parts.state_part(self._cell, response, load_factor, label, point)
+        state = field_parts.state_part(self._cell, plane, axial, load_factor, label, point)
         self._write(lambda file: file.write_state(next(self._number), state))
         if self._keep:
             self._states.append(state)
@@ -212,6 +214,7 @@ def _context(cell: TornCell, progress: Progress, states: _States) -> AnalysisCon
         progress,
         states.record,
         states=cell.case.output.states,
+        axial=None if cell.axial is None else Homogenization(cell.axial, contact=False),
         keeps_fields=states.has_place,
     )
 

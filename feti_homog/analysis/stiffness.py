@@ -1,32 +1,33 @@
-"""`analysis.type = "stiffness"`: L^ef, with debonding and contact the secants to plus and minus each unit strain."""
+"""`analysis.type = "stiffness"`: L^ef, with debonding and contact the secants to plus and minus each unit load."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from feti_homog.analysis.context import UNIT_CASES, AnalysisContext
+from feti_homog.analysis.context import AnalysisContext
 from feti_homog.homogenization.averaging import asymmetry
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:
     """`effective_stiffness`, whose columns are the stresses under the unit strains; with contact between debonded
-    faces also `effective_stiffness_compression`, its columns -Sigma(-E); `tips` of debonded arcs under each of them."""
+    faces also `effective_stiffness_compression`, its columns -Sigma(-E); `tips` of debonded arcs under each of them.
+
+    If a temperature is a load, `thermal_stress` under a unit of it, and `thermal_stress_compression`."""
     status = context.status(None)
-    starts = [context.zero_multipliers()] * 3
+    starts = context.zero_multipliers()
     one_sided = context.homogenization.interface.contact and context.homogenization.counts(status)["open"] > 0
-    L, responses = context.unit_responses("", status, starts, 1.0)
-    for name, response in zip(UNIT_CASES, responses, strict=True):
-        context.record(response, 1.0, name, 0)
-    document: dict[str, Any] = {"effective_stiffness": L}
-    under, loads = list(responses), list(UNIT_CASES)
+    columns, responses = context.unit_responses("", status, starts, 1.0)
+    context.record_unit_states(responses, 1.0, "", 0)
+    document: dict[str, Any] = {"effective_stiffness": columns.pop("stiffness")} | columns
+    under, loads = list(responses), context.unit_loads
     if one_sided:
         minus, responses = context.unit_responses("", status, starts, -1.0)
-        for name, response in zip(UNIT_CASES, responses, strict=True):
-            context.record(response, -1.0, f"-{name}", 0)
-        document["effective_stiffness_compression"] = minus
-        under, loads = [*under, *responses], [*loads, *(f"-{name}" for name in UNIT_CASES)]
+        context.record_unit_states(responses, -1.0, "-", 0)
+        document["effective_stiffness_compression"] = minus.pop("stiffness")
+        document |= {f"{name}_compression": column for name, column in minus.items()}
+        under, loads = [*under, *responses], [*loads, *(f"-{name}" for name in loads)]
     else:
-        context.check("L^ef", {"symmetry": asymmetry(L)})
+        context.check("L^ef", {"symmetry": asymmetry(document["effective_stiffness"])})
     if context.homogenization.cell.case.interface is not None:
         document["tips"] = context.tips(under, loads)
     return document

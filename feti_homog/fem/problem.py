@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from feti_homog.typing import Int
+from feti_homog.typing import Float, Int
 
 
 @dataclass(frozen=True)
@@ -42,6 +42,11 @@ class Problem:
     def voigt(self) -> Int:
         """(c, 2) `strain`."""
         return np.array(self.strain)
+
+    def gradient(self, strain: Float) -> Float:
+        """(c, 2) H of the displacements u = H y, without rotation, that make the strains (m,)."""
+        shared = np.bincount(self.voigt.ravel())
+        return np.asarray(strain[self.voigt] / shared[self.voigt])
 
     def dofs(self, nodes: Int) -> Int:
         """(cn,) degrees of freedom of the nodes (n,)."""

@@ -1,6 +1,6 @@
 """Macroscopic response of the torn cell, and the laws that every response must obey.
 
-Voigt order [11, 22, 12] with engineering shear; stresses in the unit of the moduli.
+The strain E is that of the problem, in the plane [E11, E22, gamma12], with its other loads behind; so is the stress.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ class Response:
     """The cell under one macroscopic strain.
 
     Attributes:
-        strain: (3,) E.
-        stress: (3,) Sigma = <sigma>.
+        strain: (v,) E.
+        stress: (v,) Sigma = <sigma>, what works on E.
         scale: the response is `scale` times `state`.
         stored: energy per area of the cell, 1/2 <sigma:eps> from the displacements and what the springs store.
         in_springs: the latter, 1/2 sum lam^2 C / |UC|.
@@ -60,8 +60,13 @@ class Homogenization:
         self.cell = cell
         self.interface = Interface(cell.solver, contact, np.array([cell.summary.width, cell.summary.height]))
 
+    @property
+    def loads(self) -> tuple[str, ...]:
+        """Names of the unit loads."""
+        return self.cell.solver.problem.loads
+
     def respond(self, strains: Float, status: Status, starts: Sequence[Float]) -> list[Response]:
-        """Solve the unit-cell problem under every strain of (k, 3) and average.  Collective.
+        """Solve the unit-cell problem under every strain of (k, v) and average.  Collective.
 
         `status` says which nodes are debonded and guesses who is in contact; `starts` are first multipliers.
 
@@ -95,8 +100,9 @@ class Homogenization:
         energy += stretched
         least = float(strain @ self.interface.least_bonded_stiffness @ strain)
         largest = (self._largest(u) + self.interface.imposed(strain)) or 1.0
+        imposed = self.interface.imposed_strain(strain).max() or 1.0
         checks = {
-            "strain": float(np.abs(star - opening / cell.summary.area).max() / (np.abs(strain).max() or 1.0)),
+            "strain": float(np.abs(star - opening / cell.summary.area).max() / imposed),
             "hill": float(abs(energy - stress @ strain) / (max(abs(energy), least) or 1.0)),
             "jump": self._largest(active * state.solution.jump) / largest,
         }
@@ -112,25 +118,26 @@ class Homogenization:
 
     @cached_property
     def _strain_of_jumps(self) -> Float:
-        """(owned rows, 3) nu with int eps* = nu^T B u for every displacement u: nu = (B B^T)^-1 B int B_e."""
+        """(owned rows, m) nu with int eps* = nu^T B u for every displacement u: nu = (B B^T)^-1 B int B_e."""
         solver = self.cell.solver
-        B = solver.interface_operators.B
-        unit = [np.linalg.solve(s.L, Q.T).T for s, Q in self._loads()]
-        integrals = solver.jump_operator.sum(B @ np.concatenate([np.zeros((0, 3)), *unit]))
+        B, m = solver.interface_operators.B, solver.problem.strains
+        unit = [np.linalg.solve(s.L[:m, :m], Q[:, :m].T).T for s, Q in self._loads()]
+        integrals = solver.jump_operator.sum(B @ np.concatenate([np.zeros((0, m)), *unit]))
         gram = NodeBlocks(self.cell.comm, self.cell.solver.jump_operator, B @ B.T)
         return np.asarray(gram.inverse(np.ones(gram.rows)) @ integrals)
 
     def _averages(self, E: Float, u: Float) -> tuple[Float, Float, float]:
         """<sigma>, <eps*> over the bodies, and <sigma:eps>; collective."""
-        cell, sums = self.cell, np.zeros(7)
+        cell, v, m = self.cell, len(E), self.cell.solver.problem.strains
+        sums = np.zeros(v + m + 1)
         for (s, Q), span in zip(self._loads(), cell.solver.interface_operators.slices, strict=True):
             from_u = Q.T @ u[span]
-            sums[:3] += s.area * s.L @ E + from_u
-            sums[3:6] += np.linalg.solve(s.L, from_u)
-            sums[6] += s.area * E @ s.L @ E + 2 * E @ from_u
-        sums[6] += u @ cell.solver.interface_operators.apply_schur(u)
+            sums[:v] += s.area * s.L @ E + from_u
+            sums[v : v + m] += np.linalg.solve(s.L[:m, :m], from_u[:m])
+            sums[-1] += s.area * E @ s.L @ E + 2 * E @ from_u
+        sums[-1] += u @ cell.solver.interface_operators.apply_schur(u)
         sums = allreduce_sum(cell.comm, sums) / cell.summary.area
-        return sums[:3], sums[3:6], float(sums[6])
+        return sums[:v], sums[v : v + m], float(sums[-1])
 
     def _loads(self) -> list[tuple[Subdomain, Float]]:
         """The subdomains and their Q on the boundary dofs; inside a uniform body it vanishes."""

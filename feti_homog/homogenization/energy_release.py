@@ -127,7 +127,7 @@ class EnergyReleaseRates:
         place, radius = self.points[tips.node], summary.radii[fibre]
         spokes = nearest_image(place - summary.centres[fibre], self._period)
         reach = reach_of_tips(tips.node, spokes, radius, self.points, self.fibre, self._tree, self._period)
-        u, E = self.cell.solver.displacement(solution), strain_tensor(solution.strain)
+        u, E = self.cell.solver.displacement(solution), strain_tensor(solution.strain[:3])
         change = self._extension.energy_changes(fibre, place, spokes, reach, u, E)
         turn = self.direction[tips.node] - self.direction[tips.behind]
         outward = np.sign((turn + 180.0) % 360.0 - 180.0)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -14,13 +15,13 @@ from feti_homog.cell.submesh import Submesh
 from feti_homog.common.mpi_errors import agree, on_root_only
 from feti_homog.common.progress import Progress
 from feti_homog.config.case import Case
-from feti_homog.config.materials import plane_stiffness
+from feti_homog.fem.problem import AXIAL
 from feti_homog.feti.decomposition.interface_springs import GLUE, InterfaceSprings
 from feti_homog.feti.decomposition.shared_entities import SharedEntities
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.solver import FetiSolver
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
-from feti_homog.homogenization import cost_model, process_zone
+from feti_homog.homogenization import cost_model, phase_laws, process_zone
 from feti_homog.homogenization.domain_partition import (
     DEFAULT_POLICY,
     CellSummary,
@@ -35,7 +36,11 @@ from feti_homog.typing import Bool, Float, Int
 
 @dataclass(frozen=True)
 class TornCell:
-    """The cell on all ranks; `subdomains` are this rank's, and `lattice` refines each coarse triangle of them."""
+    """The cell on all ranks; `subdomains` are this rank's, and `lattice` refines each coarse triangle of them.
+
+    `axial` is the same cell with the displacement along the fibres, on the same meshes and interface nodes; None unless
+    the case is one of generalized plane strain.
+    """
 
     comm: MPI.Intracomm
     case: Case
@@ -43,6 +48,7 @@ class TornCell:
     lattice: ReferenceLattice
     subdomains: list[Subdomain]
     solver: FetiSolver
+    axial: TornCell | None = None
 
     @cached_property
     def offsets(self) -> Int:
@@ -88,6 +94,12 @@ class TornCell:
         """Sum of a number over ranks; collective."""
         return int(self.comm.allreduce(number))
 
+    def destroy(self) -> None:
+        """Free the solvers; collective."""
+        self.solver.destroy()
+        if self.axial is not None:
+            self.axial.destroy()
+
 
 def tear(
     case: Case,
@@ -104,11 +116,38 @@ def tear(
     summary, shared, lattice, subdomains = assemble_subdomains(case, comm, progress, policy)
     with progress.stage("factor") as words:
         solver = FetiSolver(
-            comm, shared, subdomains, lattice, cost_model.applications(case), thresholds, _springs(case)
+            comm,
+            shared,
+            subdomains,
+            lattice,
+            cost_model.applications(case),
+            thresholds,
+            _springs(case),
+            phase_laws.plane_problem(case),
         )
         multipliers, dimension = solver.jump_operator.global_rows, solver.coarse.coarse_dimension
         words.append(f"{multipliers} multipliers, coarse dimension {dimension}")
-    return TornCell(comm, case, summary, lattice, subdomains, solver)
+    cell = TornCell(comm, case, summary, lattice, subdomains, solver)
+    if not phase_laws.is_generalized(case):
+        return cell
+    with progress.stage("axial"):
+        return replace(cell, axial=_axial(cell, shared, thresholds))
+
+
+def _axial(cell: TornCell, shared: SharedEntities, thresholds: Thresholds) -> TornCell:
+    """The same cell with the displacement along the fibres.  Collective."""
+    case = cell.case
+    subdomains = agree(cell.comm, _assemble_axial, case, cell.subdomains)
+    bond = case.interface
+    springs = GLUE if bond is None else InterfaceSprings((bond.tangential_stiffness or math.inf,))
+    applications = cost_model.applications(case)
+    solver = FetiSolver(cell.comm, shared, subdomains, cell.lattice, applications, thresholds, springs, AXIAL)
+    return TornCell(cell.comm, case, cell.summary, cell.lattice, subdomains, solver)
+
+
+def _assemble_axial(case: Case, subdomains: Sequence[Subdomain]) -> list[Subdomain]:
+    """The subdomains of this rank with the displacement along the fibres, on the meshes that they have."""
+    return [Subdomain.on(s.submesh, s.mesh, phase_laws.axial_law(case, s.submesh.phase), AXIAL) for s in subdomains]
 
 
 def _springs(case: Case) -> InterfaceSprings:
@@ -146,8 +185,8 @@ def assemble_subdomains(
 
 def _assemble(case: Case, submeshes: list[Submesh], lattice: ReferenceLattice) -> list[Subdomain]:
     """The subdomains of this rank, refined and assembled."""
-    plane = case.analysis.plane
-    return [Subdomain.build(s, lattice, plane_stiffness(case.material_of(s.phase), plane)) for s in submeshes]
+    problem = phase_laws.plane_problem(case)
+    return [Subdomain.build(s, lattice, phase_laws.plane_law(case, s.phase), problem) for s in submeshes]
 
 
 def describe(case: Case, n_ranks: int) -> str:

@@ -20,9 +20,8 @@ from feti_homog.feti.solver import FetiSolver
 from feti_homog.interface.block_pivoting import BlockPivoting
 from feti_homog.interface.contact_certificate import kkt_errors
 from feti_homog.interface.rigid_placement import place
-from feti_homog.mechanics.bounds import reuss
-from feti_homog.mechanics.voigt import strain_tensor
-from feti_homog.typing import Bool, Float
+from feti_homog.mechanics.bounds import reuss, voigt
+from feti_homog.typing import Bool, Float, Int
 
 Status = NDArray[np.int8]
 
@@ -87,10 +86,11 @@ class Interface:
         return SIGN_NOISE_PER_RTOL * self.solver.rtol
 
     def active(self, status: Status) -> Float:
-        """(owned rows,) 1 for the multipliers that act: both of a bonded node, the normal one of a closed node."""
+        """(owned rows,) 1 for the multipliers that act: all of a bonded node, the normal one of a closed node."""
         mask = np.ones(self.solver.rows)
-        mask[self.nodes.row] = status != OPEN
-        mask[self.nodes.row + 1] = status == BONDED
+        mask[self._pairs] = (status == BONDED)[:, None]
+        if self.contact:
+            mask[self.nodes.row] = status != OPEN
         return mask
 
     def debond(self, status: Status, which: Bool, lam: Float) -> Status:
@@ -100,24 +100,45 @@ class Interface:
         return np.where(which & (status == BONDED), released, status)
 
     def traction(self, solution: DualSolution) -> Float:
-        """(k, 2) normal and tangential traction, tension positive."""
-        pair = self.nodes.row[:, None] + np.arange(2)
-        return np.asarray(solution.lam[pair] / self.nodes.length[:, None])
+        """(k, c) traction, in the plane normal and tangential, tension positive; or along the fibre."""
+        return np.asarray(solution.lam[self._pairs] / self.nodes.length[:, None])
 
     def jump(self, solution: DualSolution) -> Float:
-        """(k, 2) gap and slip, matrix minus fibre."""
-        return np.asarray(self.solver.opening(solution)[self.nodes.row[:, None] + np.arange(2)])
+        """(k, c) gap and slip, matrix minus fibre; or slip along the fibre."""
+        return np.asarray(self.solver.opening(solution)[self._pairs])
 
     def stress(self, solution: DualSolution) -> Float:
-        """(3,) Sigma from the multipliers alone; collective."""
+        """(v,) Sigma from the multipliers alone, and what works on the other loads; collective."""
         return np.asarray(self.solver.stress_integral(solution) / self.size.prod())
 
     @cached_property
     def least_bonded_stiffness(self) -> Float:
-        """(3, 3) Reuss' bound <L^-1>^-1, collective: a scale of stress and energy that debonding does not make zero."""
+        """(v, v) Reuss' bound <L^-1>^-1 of the strains, and <L> of the other loads, collective: a scale of stress and
+        energy that debonding does not make zero."""
+        shares, stiffnesses = self._phases
+        m, least = self.solver.problem.strains, voigt(shares, stiffnesses)
+        least[:m, m:] = least[m:, :m] = 0.0
+        least[:m, :m] = reuss(shares, stiffnesses[:, :m, :m])
+        return least
+
+    @cached_property
+    def _phases(self) -> tuple[Float, Float]:
+        """Shares (n,) and stiffnesses (n, v, v) of all subdomains.  Collective."""
         parts = self.solver.comm.allgather([(s.area, s.L) for s in self.solver.subdomains])
         areas, stiffnesses = zip(*(part for own in parts for part in own), strict=True)
-        return reuss(np.array(areas) / sum(areas), np.stack(stiffnesses))
+        return np.array(areas) / sum(areas), np.stack(stiffnesses)
+
+    @cached_property
+    def _free_strains(self) -> Float:
+        """(m, v) strains that the loads make: their own, and of the others those of a free body of mean stiffness.
+        Collective."""
+        m, mean = self.solver.problem.strains, voigt(*self._phases)
+        return np.hstack([np.eye(m), -np.linalg.solve(mean[:m, :m], mean[:m, m:])])
+
+    @property
+    def _pairs(self) -> Int:
+        """(k, c) rows of the bonds."""
+        return self.nodes.row[:, None] + np.arange(self.solver.jump_operator.components)
 
     def linear(self, strain: Float, status: Status, start: Float) -> DualSolution:
         """The dual problem with the states as they are; `start` are first multipliers (owned rows,)."""
@@ -158,10 +179,14 @@ class Interface:
         largest = self.solver.comm.allreduce(np.abs(solution.lam).max(initial=0.0), MPI.MAX)
         return self.sign_noise * float(largest)
 
-    def imposed(self, strain: Float) -> float:
-        """Largest displacement E y that the strain imposes on the cell."""
+    def imposed(self, loads: Float) -> float:
+        """Largest displacement E y that the loads (v,) impose on the cell, or would on a free one.  Collective."""
         corners = self.size * np.array([[1, 0], [0, 1], [1, 1]])
-        return float(np.abs(corners @ strain_tensor(strain)).max())
+        return float(np.abs(corners @ self.solver.problem.gradient(self.imposed_strain(loads)).T).max())
+
+    def imposed_strain(self, loads: Float) -> Float:
+        """(m,) sizes of the strains that the loads (v,) make.  Collective."""
+        return np.asarray(np.abs(self._free_strains) @ np.abs(loads))
 
     def _placed(self, status: Status, solution: DualSolution) -> tuple[DualSolution, Bool]:
         """The solution with free fibres where they have room, and which nodes (k,) break the KKT conditions."""

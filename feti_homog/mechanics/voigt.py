@@ -1,4 +1,7 @@
-"""Voigt order [11, 22, 12], with engineering shear strain: names of the components, and the tensor of a strain."""
+"""Voigt orders with engineering shear strains: names of the components, and the tensor of a strain.
+
+[11, 22, 12] in the plane, [11, 22, 33, 23, 13, 12] in space.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,8 @@ from feti_homog.typing import Float
 
 STRAINS = ("E11", "E22", "gamma12")
 STRESSES = ("S11", "S22", "S12")
+SPATIAL_STRAINS = ("E11", "E22", "E33", "gamma23", "gamma13", "gamma12")
+SPATIAL_STRESSES = ("S11", "S22", "S33", "S23", "S13", "S12")
 STIFFNESSES = tuple(f"C{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3))
 
 

@@ -87,7 +87,9 @@ def interface_part(cell: TornCell) -> InterfacePart:
     )
 
 
-def state_part(cell: TornCell, response: Response, load_factor: float, label: str, point: int) -> StatePart:
+def state_part(
+    cell: TornCell, response: Response, axial: Response | None, load_factor: float, label: str, point: int
+) -> StatePart:
     """The fields of a response; tractions and jumps are scaled like it."""
     nodes, solution = cell.solver.jump_operator.nodes, response.state.solution
     u = response.scale * cell.solver.displacement(solution)

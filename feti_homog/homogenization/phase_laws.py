@@ -1,0 +1,69 @@
+"""The problems that a case asks for on the plane mesh, and the stiffness of its phases in them.
+
+In generalized plane strain the loads of the plane problem are e = [E11, E22, gamma12, E33, T], T a change of
+temperature, and A = N^T C N with N e = [E11, E22, gamma12, E33] - alpha T.  So A e is [S11, S22, S12, S33] and what
+works on T, and 1/2 e.A e the energy that is stored.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from feti_homog.config.case import Case
+from feti_homog.config.materials import expansion, plane_stiffness, spatial_stiffness
+from feti_homog.fem.problem import AXIAL, GENERALIZED, PLANE, Problem
+from feti_homog.typing import Float
+
+IN_PLANE, AXIAL_SHEAR = [0, 1, 5, 2], [4, 3]
+"""Where the strains of the plane problem, E33 among them, and of the axial one stand in the order of space."""
+
+
+def is_generalized(case: Case) -> bool:
+    """Whether strains along the fibres are loads too."""
+    return case.analysis.plane == "generalized"
+
+
+def plane_problem(case: Case) -> Problem:
+    """That of the displacements in the plane; a temperature is a load if the phases say how they expand."""
+    if not is_generalized(case):
+        return PLANE
+    if any(expansion(material) is None for material in case.materials.values()):
+        return replace(GENERALIZED, loads=GENERALIZED.loads[:4])
+    return GENERALIZED
+
+
+def plane_law(case: Case, phase: str) -> Float:
+    """(v, v) stiffness A of a phase in the plane problem."""
+    material, problem = case.material_of(phase), plane_problem(case)
+    if problem == PLANE:
+        return plane_stiffness(material, case.analysis.plane)
+    C = spatial_stiffness(material)[np.ix_(IN_PLANE, IN_PLANE)]
+    alpha = expansion(material)
+    if problem != GENERALIZED or alpha is None:
+        return C
+    N = np.column_stack([np.eye(4), -alpha[IN_PLANE]])
+    return np.asarray(N.T @ C @ N)
+
+
+def axial_law(case: Case, phase: str) -> Float:
+    """(2, 2) stiffness of a phase in the axial problem."""
+    return spatial_stiffness(case.material_of(phase))[np.ix_(AXIAL_SHEAR, AXIAL_SHEAR)]
+
+
+def axial_problem(case: Case) -> Problem | None:
+    """That of the displacement along the fibres, if it is asked for."""
+    return AXIAL if is_generalized(case) else None
+
+
+def spatial(plane: Float, axial: Float) -> tuple[Float, Float | None]:
+    """The stiffness (6, 6), and the stress under a unit of temperature (6,), or None if that is no load; from stresses
+    under unit loads, (v, v) of the plane problem and (2, 2) of the axial one."""
+    C, place = np.zeros((6, 6)), np.ix_(IN_PLANE, IN_PLANE)
+    C[place], C[np.ix_(AXIAL_SHEAR, AXIAL_SHEAR)] = plane[:4, :4], axial
+    if len(plane) == 4:
+        return C, None
+    thermal = np.zeros(6)
+    thermal[IN_PLANE] = plane[:4, 4]
+    return C, thermal
