@@ -10,6 +10,8 @@ from feti_homog.config.values import real
 
 POSITIVE = real(above=0.0)
 PER_TEMPERATURE = "1 / temperature"
+EXPANSION_PAIR = ("expansion_axial", "expansion_transverse")
+"""Keys that are given together, in place of one expansion."""
 
 
 @dataclass(frozen=True)
