@@ -89,24 +89,27 @@ def _compliance(constants: Mapping[str, Any]) -> Float:
     """(6, 6) in the material axes; out of plane constants that plane stress does not need are any that are stable."""
     if "stiffness" in constants:
         return np.asarray(np.linalg.inv(_given(constants)), float)
-    if "young" in constants:
-        e, nu = float(constants["young"]), float(constants["poisson"])
-        moduli, ratios, shear = [e, e, e], [nu, nu, nu], e / (2 * (1 + nu))
-    elif "E_transverse" in constants:
-        e, nu = float(constants["E_transverse"]), float(constants["nu_transverse"])
-        along = float(constants.get("E_axial") or e)
-        # Under stress along x1 the fibre contracts by nu_axial e / along: compliances are symmetric.
-        minor = float(constants.get("nu_axial") or 0.0) * e / along
-        moduli, ratios, shear = [e, e, along], [nu, minor, minor], e / (2 * (1 + nu))
-    else:
-        moduli = [float(constants[name] or 1.0) for name in ("E1", "E2", "E3")] if constants.get("E3") else []
-        moduli = moduli or [float(constants["E1"]), float(constants["E2"]), float(constants["E1"])]
-        ratios = [float(constants.get(name) or 0.0) for name in ("nu12", "nu13", "nu23")]
-        shear = float(constants["G12"])
+    moduli, ratios, shear = _engineering_constants(constants)
     compliance = np.diag([1 / moduli[0], 1 / moduli[1], 1 / moduli[2], 1 / shear, 1 / shear, 1 / shear])
     for (i, j), ratio in zip(((0, 1), (0, 2), (1, 2)), ratios, strict=True):
         compliance[i, j] = compliance[j, i] = -ratio / moduli[i]
     return compliance
+
+
+def _engineering_constants(constants: Mapping[str, Any]) -> tuple[list[float], list[float], float]:
+    """Young's moduli along three axes, the ratios 12, 13, 23, and the shear modulus of the plane."""
+    if "young" in constants:
+        e, nu = float(constants["young"]), float(constants["poisson"])
+        return [e, e, e], [nu, nu, nu], e / (2 * (1 + nu))
+    if "E_transverse" in constants:
+        e, nu = float(constants["E_transverse"]), float(constants["nu_transverse"])
+        along = float(constants.get("E_axial") or e)
+        # Under stress along x1 the phase contracts along x3 by nu_axial e / along: compliances are symmetric.
+        minor = float(constants.get("nu_axial") or 0.0) * e / along
+        return [e, e, along], [nu, minor, minor], e / (2 * (1 + nu))
+    moduli = [float(constants[name]) for name in ("E1", "E2")]
+    ratios = [float(constants.get(name) or 0.0) for name in ("nu12", "nu13", "nu23")]
+    return [*moduli, float(constants.get("E3") or moduli[0])], ratios, float(constants["G12"])
 
 
 def _turned(stiffness: Float, degrees: float) -> Float:
