@@ -10,7 +10,7 @@ import argparse
 import json
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
@@ -90,12 +90,9 @@ def command_parser() -> Parser:
     check = actions.add_parser("check", help="validate a case file, mesh its cell and print what would run")
     check.add_argument("case", type=Path, metavar="CASE.toml")
     check.set_defaults(action=_check)
-    plot = actions.add_parser("plot", help="make the pictures of a results folder again")
-    plot.add_argument("directory", type=folder, metavar="DIR")
-    plot.set_defaults(action=_plot)
-    report = actions.add_parser("report", help="write report.html of a results folder: one page with all there is")
-    report.add_argument("directory", type=folder, metavar="DIR")
-    report.set_defaults(action=_report)
+    _of_results(actions.add_parser("plot", help="make the pictures of a results folder again"), _plot)
+    words = "write report.html of a results folder: one page with all there is"
+    _of_results(actions.add_parser("report", help=words), _report)
     verify = actions.add_parser("verify", help="check from its files alone that a result obeys its laws",
                                 description=VERIFY_HELP)  # fmt: skip
     verify.add_argument("directory", type=folder, metavar="DIR")
@@ -112,6 +109,11 @@ def command_parser() -> Parser:
     collect.set_defaults(action=_collect)
     _add_reference(actions)
     return parser
+
+
+def _of_results(parser: argparse.ArgumentParser, action: Callable[[argparse.Namespace, Intracomm], None]) -> None:
+    parser.add_argument("directory", type=folder, metavar="DIR")
+    parser.set_defaults(action=action)
 
 
 def _add_reference(actions: argparse._SubParsersAction[Parser]) -> None:
@@ -155,26 +157,9 @@ def _run(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def _check(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    from feti_homog.common.mpi_errors import on_root, on_root_only
-    from feti_homog.common.petsc_options import case_options
-    from feti_homog.config import case as cases
-    from feti_homog.config.document import read_document
-    from feti_homog.config.sweep_section import SWEEP
-    from feti_homog.homogenization.unit_cell import describe
-    from feti_homog.sweep import plan
-    from feti_homog.sweep.option_checks import check_options
+    from feti_homog.sweep import description
 
-    document = on_root(comm, read_document, arguments.case)
-    if SWEEP in document:
-        sweep = on_root(comm, plan.load, arguments.case)
-        check_options(sweep)
-        case, points = sweep.cases[0], len({entry.point for entry in sweep.entries})
-        words = f"sweep      {len(sweep.cases)} cases, {points} points, all of them valid; the first:\n"
-    else:
-        case, words = on_root(comm, cases.load, arguments.case), ""
-    with case_options(case.petsc):
-        text = on_root_only(comm, describe, case, comm.size)
-    _print_product(comm, f"{words}{text}")
+    _print_product(comm, description.of_file(arguments.case, comm))
 
 
 def _plot(arguments: argparse.Namespace, comm: Intracomm) -> None:
