@@ -3,12 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 
+from feti_homog.common.records import described
 from feti_homog.mechanics.estimates.constituents import NOTHING, Estimate, Fibres
 from feti_homog.mechanics.estimates.cylinders import composite_cylinders, mori_tanaka
 from feti_homog.mechanics.estimates.mixtures import chamis, halpin_tsai, rule_of_mixtures
 from feti_homog.mechanics.estimates.self_consistent import self_consistent
 from feti_homog.mechanics.spatial_constants import TransverselyIsotropic, is_transversely_isotropic
+
+
+@dataclass(frozen=True)
+class Estimates:
+    """What each method says."""
+
+    rule_of_mixtures: Estimate = described("rule of mixtures: Voigt along the fibres, Reuss across them")
+    chamis: Estimate = described("Chamis 1984")
+    halpin_tsai: Estimate = described("Halpin and Tsai 1969")
+    mori_tanaka: Estimate = described("Mori and Tanaka 1973, of aligned cylinders")
+    composite_cylinders: Estimate = described("Hashin and Rosen 1964: exact of composite cylinders")
+    self_consistent: Estimate = described("Christensen and Lo 1979, generalized self-consistent")
+
 
 METHODS: Mapping[str, Callable[[TransverselyIsotropic, Sequence[Fibres]], Estimate]] = {
     "rule_of_mixtures": rule_of_mixtures,
@@ -20,7 +35,7 @@ METHODS: Mapping[str, Callable[[TransverselyIsotropic, Sequence[Fibres]], Estima
 }
 
 
-def estimates(matrix: TransverselyIsotropic, fibres: Sequence[Fibres]) -> dict[str, Estimate]:
+def estimates(matrix: TransverselyIsotropic, fibres: Sequence[Fibres]) -> Estimates:
     """What each method says of fibres in a matrix.
 
     The rule of mixtures and Mori and Tanaka's estimate are defined for any kinds of fibres, the others for one; on
@@ -28,5 +43,5 @@ def estimates(matrix: TransverselyIsotropic, fibres: Sequence[Fibres]) -> dict[s
     anything of expansions if a phase has none.
     """
     if not all(map(is_transversely_isotropic, [matrix, *(family.constants for family in fibres)])):
-        return dict.fromkeys(METHODS, NOTHING)
-    return {name: method(matrix, fibres) for name, method in METHODS.items()}
+        return Estimates(**dict.fromkeys(METHODS, NOTHING))
+    return Estimates(**{name: method(matrix, fibres) for name, method in METHODS.items()})

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.config.materials import is_positive_definite
+from feti_homog.config.voigt_matrices import is_positive_definite
 from feti_homog.errors import CaseError
 from feti_homog.typing import Float
 
