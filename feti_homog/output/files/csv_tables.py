@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_type_hints
@@ -26,7 +26,7 @@ class Column:
 def columns(kind: type) -> Iterator[Column]:
     """The columns that a record of this class fills: the reference table of its file."""
     for name, description in _in_columns(kind).items():
-        for component in description.components or (name,):
+        for component in dict.fromkeys((*_names(name, description), *description.spatial_components)):
             words = f"{component}, {description.meaning}" if description.components else description.meaning
             yield Column(component, description.unit, words)
 
@@ -42,7 +42,7 @@ def write(path: Path, points: Sequence[Any]) -> Path:
     described = _in_columns(type(points[0])) if points else {}
     rows = [_row(point, described) for point in points]
     there = {name for row in rows for name in row}
-    names = [column.name for column in columns(type(points[0])) if column.name in there] if rows else []
+    names = [column for name, d in described.items() for column in _in_order(_names(name, d), d, there)]
 
     def write_rows(part: Path) -> None:
         with part.open("w", newline="", encoding="utf-8") as stream:
@@ -53,12 +53,25 @@ def write(path: Path, points: Sequence[Any]) -> Path:
     return atomic.replace(path, write_rows)
 
 
+def _names(name: str, description: Description) -> tuple[str, ...]:
+    """The columns of a field, of an array those of its components in the plane."""
+    return description.components or (name,)
+
+
+def _in_order(names: Sequence[str], description: Description, there: Set[str]) -> list[str]:
+    """Those of a field that have numbers."""
+    spatial = description.spatial_components
+    return [name for name in (spatial if spatial and there >= set(spatial) else names) if name in there]
+
+
 def _row(point: Any, described: Mapping[str, Description]) -> dict[str, Any]:
     row: dict[str, Any] = {}
     for name, value in plain(point).items():
         if name in described:
-            components = described[name].components or (name,)
-            row |= dict(zip(components, np.ravel(value).tolist(), strict=True))
+            values, components = np.ravel(value).tolist(), _names(name, described[name])
+            if len(values) > len(components):
+                components = described[name].spatial_components
+            row |= dict(zip(components, values, strict=True))
     return row
 
 

@@ -1,6 +1,7 @@
 """What the tables of a sweep hold: the columns of sweep.csv and the datasets of sweep.h5, with unit and meaning.
 
-In names, i and j stand for 1, 2 or 3, and words in capitals for what varies between sweeps.
+In names, i and j stand for 1, 2 or 3, in stiffnesses of generalized plane strain for 1 to 6, and words in capitals for
+what varies between sweeps.
 """
 
 from __future__ import annotations
@@ -29,8 +30,10 @@ OUTPUT_COLUMNS = (
     Column("iterations", "", "Krylov iterations of all states"),
     Column("Cij", STRESS, "entry of L^ef"),
     Column("Cij_compression", STRESS, "the same under minus the unit strains, with contact"),
+    Column("thermal_Sij", f"{STRESS} per unit of temperature", "stress per unit of temperature at no strain"),
+    Column("expansion_Eij", "1 / temperature", "strain Eij or gammaij per unit of temperature at no stress"),
     Column("anisotropy_axial", STRESS, "C11 - C22"),
-    Column("anisotropy_shear", STRESS, "C33 - (C11 + C22 - 2 C12) / 4"),
+    Column("anisotropy_shear", STRESS, "C33 - (C11 + C22 - 2 C12) / 4; of generalized plane strain C66 - ..."),
     *columns(Moduli),
     Column("Cii_reuss", STRESS, "lower bound of Cii"),
     Column("Cii_voigt", STRESS, "upper bound of Cii"),
