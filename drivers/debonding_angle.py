@@ -2,7 +2,8 @@
 
     mpirun -n 2 .venv/bin/python drivers/debonding_angle.py --out results/debonding_angle
 
-a: L^ef in plane strain and plane stress, debonded faces overlapping freely.
+a: L^ef in plane strain, plane stress, and of long fibres that are free along x3, mean S33 = 0 (the paper has it from a
+three-dimensional cell); debonded faces overlapping freely.
 b: Sigma in plane strain under E = [0, 0, 0.2] (40), with and without contact.
 
 Convention: every fibre has one debonded arc, centred on the positive x1 axis through its own centre; the angle is the
@@ -14,6 +15,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +23,7 @@ import figures
 import numpy as np
 from figures import INK
 from mpi4py.MPI import Intracomm
+from numpy.typing import NDArray
 
 from feti_homog import launch
 
@@ -28,6 +31,7 @@ SHEAR = [0.0, 0.0, 0.2]
 STIFFNESSES = {"11": (0, 0), "22": (1, 1), "12": (0, 1), "33": (2, 2)}
 STRESSES = ("11", "22", "12")
 PLANES = {"strain": "--", "stress": "-."}
+CURVES = {"plane strain": "--", "long fibres": "-", "plane stress": "-."}
 CONTACT = {"with contact": "-", "without contact": "--"}
 
 
@@ -44,25 +48,42 @@ def main(given: argparse.Namespace, comm: Intracomm) -> None:
         ).points  # fmt: skip
 
     i, j = np.array(list(STIFFNESSES.values())).T
-    free = {plane: points(f"plane {plane}", plane, False)["stiffness"][:, i, j] for plane in PLANES}
+    free = {f"plane {plane}": points(f"plane {plane}", plane, False)["stiffness"] for plane in PLANES}
+    free["long fibres"] = without_S33(points("long fibres", "generalized", False)["stiffness"])
+    assert_between(free["plane stress"], free["long fibres"], free["plane strain"])
+    entries = {name: free[name][:, i, j] for name in CURVES}
     shear = {
         word: points(f"shear {word}", "strain", word == "with contact", strain=SHEAR)["stress"] for word in CONTACT
     }
-    figures.finish(comm, write, given.out, angles, free, shear)
+    figures.finish(comm, write, given.out, angles, entries, shear)
+
+
+def without_S33(stiffness: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n, 3, 3) C_ij - C_i3 C_3j / C_33 on [11, 22, 12] of stiffnesses (n, 6, 6): no mean stress along the fibres."""
+    condensed = stiffness - stiffness[:, :, 2:3] * stiffness[:, 2:3, :] / stiffness[:, 2:3, 2:3]
+    return np.asarray(condensed[np.ix_(range(len(stiffness)), [0, 1, 5], [0, 1, 5])])
+
+
+def assert_between(*stiffnesses: NDArray[np.float64]) -> None:
+    """Each stiffness (n, 3, 3) is nowhere above the next: the difference has no eigenvalue below zero but rounding."""
+    for lower, upper in pairwise(stiffnesses):
+        least = np.linalg.eigvalsh(upper - lower)[:, 0] / np.abs(upper).max(axis=(1, 2))
+        if least.min() < -1e-7:
+            raise AssertionError(f"the order of the stiffnesses does not hold: {least.min():.1e}")
 
 
 def write(folder: Path, angles: list[float], free: dict[str, Any], shear: dict[str, Any]) -> list[Path]:
     """debonding_angle.csv and debonding_angle.png."""
     from matplotlib.figure import Figure
 
-    header = ["angle", *(f"C{e} plane {plane}" for plane in free for e in STIFFNESSES)]
+    header = ["angle", *(f"C{e} {name}" for name in free for e in STIFFNESSES)]
     header += [f"S{e} {word}" for word in shear for e in STRESSES]
     rows = np.column_stack([angles, *free.values(), *shear.values()]).tolist()
     figure = Figure(figsize=(9.6, 4.2), layout="constrained")
     left, right = figure.subplots(1, 2)
-    _curves(left, angles, free, PLANES, "C", list(STIFFNESSES), "plane ")
+    _curves(left, angles, free, CURVES, "C", list(STIFFNESSES))
     left.set(title="a. effective stiffness, no contact", ylabel="effective stiffness (GPa)", ylim=(0, None))
-    _curves(right, angles, shear, CONTACT, r"\Sigma", STRESSES, "")
+    _curves(right, angles, shear, CONTACT, r"\Sigma", STRESSES)
     right.set(title=r"b. $E = [0, 0, 0.2]$, plane strain", ylabel="macroscopic stress (GPa)")
     figure.savefig(folder / "debonding_angle.png")
     return [figures.tabulate(folder / "debonding_angle.csv", header, rows), folder / "debonding_angle.png"]
@@ -70,7 +91,7 @@ def write(folder: Path, angles: list[float], free: dict[str, Any], shear: dict[s
 
 def _curves(
     axes: Any, angles: list[float], values: dict[str, Any], styles: dict[str, str], letter: str,
-    entries: Sequence[str], prefix: str,
+    entries: Sequence[str],
 ) -> None:  # fmt: skip
     """A colour an entry, a line style a case."""
     for entry, ink in zip(entries, INK, strict=False):
@@ -78,7 +99,7 @@ def _curves(
     for name, style in styles.items():
         for column, ink in zip(values[name].T, INK, strict=False):
             axes.plot(angles, column, style, color=ink, linewidth=1.6)
-        axes.plot([], [], style, color="0.3", label=f"{prefix}{name}")
+        axes.plot([], [], style, color="0.3", label=name)
     axes.set(xlabel="debonding angle (degrees)", xlim=(0, 360), xticks=range(0, 361, 60))
     axes.grid(color="0.92", linewidth=0.6)
     axes.legend(frameon=False, fontsize=9)

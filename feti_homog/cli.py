@@ -1,5 +1,5 @@
-"""The command line: `feti-homog run CASE.toml --out DIR`, `check CASE.toml`, `plot DIR`, `report DIR`, `verify DIR`,
-`sweep`, `collect`, `keys`, `schema`, `options`.
+"""The command line: `feti-homog run CASE.toml --out DIR`, `check CASE.toml`, `plot DIR`, `report DIR`, `export DIR`,
+`verify DIR`, `sweep`, `collect`, `keys`, `schema`, `options`.
 
 Options with a double dash are ours, with a single dash PETSc's.
 """
@@ -10,7 +10,7 @@ import argparse
 import json
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
@@ -36,6 +36,10 @@ VERIFY_HELP = (
     "Recompute stresses, equilibrium, periodicity, averages, contact, strengths and energies from result.json and "
     "result.h5, with elements of its own: one line a law, with its largest violation and the limit. Exit code 3 if a "
     "law is broken. Needs neither MPI nor PETSc; of several ranks each does all of it, and the first one prints."
+)
+EXPORT_HELP = (
+    'Print the effective constants of analysis.type = "stiffness", plane = "generalized", as a card of a material. Its '
+    "axis 1 is the fibre, x3 of the cell; axes 2 and 3 are x1 and x2 of the cell. No unit is converted."
 )
 
 
@@ -90,12 +94,10 @@ def command_parser() -> Parser:
     check = actions.add_parser("check", help="validate a case file, mesh its cell and print what would run")
     check.add_argument("case", type=Path, metavar="CASE.toml")
     check.set_defaults(action=_check)
-    plot = actions.add_parser("plot", help="make the pictures of a results folder again")
-    plot.add_argument("directory", type=folder, metavar="DIR")
-    plot.set_defaults(action=_plot)
-    report = actions.add_parser("report", help="write report.html of a results folder: one page with all there is")
-    report.add_argument("directory", type=folder, metavar="DIR")
-    report.set_defaults(action=_report)
+    _of_results(actions.add_parser("plot", help="make the pictures of a results folder again"), _plot)
+    words = "write report.html of a results folder: one page with all there is"
+    _of_results(actions.add_parser("report", help=words), _report)
+    _add_export(actions.add_parser("export", help="print a result as a material card", description=EXPORT_HELP))
     verify = actions.add_parser("verify", help="check from its files alone that a result obeys its laws",
                                 description=VERIFY_HELP)  # fmt: skip
     verify.add_argument("directory", type=folder, metavar="DIR")
@@ -112,6 +114,26 @@ def command_parser() -> Parser:
     collect.set_defaults(action=_collect)
     _add_reference(actions)
     return parser
+
+
+def _add_export(export: argparse.ArgumentParser) -> None:
+    _of_results(export, _export)
+    programs = ("abaqus", "calculix", "ansys", "moose", "csv")
+    export.add_argument("--format", choices=programs, required=True, help="what is to read the card")
+    export.add_argument("--out", type=Path, metavar="FILE", help="write the card to a file instead of printing it")
+    export.add_argument(
+        "--transversely-isotropic",
+        dest="symmetry",
+        action="store_const",
+        const="transversely isotropic",
+        default="orthotropic",
+        help="the nearest transversely isotropic material, not the one in the axes of the cell",
+    )
+
+
+def _of_results(parser: argparse.ArgumentParser, action: Callable[[argparse.Namespace, Intracomm], None]) -> None:
+    parser.add_argument("directory", type=folder, metavar="DIR")
+    parser.set_defaults(action=action)
 
 
 def _add_reference(actions: argparse._SubParsersAction[Parser]) -> None:
@@ -155,26 +177,9 @@ def _run(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def _check(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    from feti_homog.common.mpi_errors import on_root, on_root_only
-    from feti_homog.common.petsc_options import case_options
-    from feti_homog.config import case as cases
-    from feti_homog.config.document import read_document
-    from feti_homog.config.sweep_section import SWEEP
-    from feti_homog.homogenization.unit_cell import describe
-    from feti_homog.sweep import plan
-    from feti_homog.sweep.option_checks import check_options
+    from feti_homog.sweep import description
 
-    document = on_root(comm, read_document, arguments.case)
-    if SWEEP in document:
-        sweep = on_root(comm, plan.load, arguments.case)
-        check_options(sweep)
-        case, points = sweep.cases[0], len({entry.point for entry in sweep.entries})
-        words = f"sweep      {len(sweep.cases)} cases, {points} points, all of them valid; the first:\n"
-    else:
-        case, words = on_root(comm, cases.load, arguments.case), ""
-    with case_options(case.petsc):
-        text = on_root_only(comm, describe, case, comm.size)
-    _print_product(comm, f"{words}{text}")
+    _print_product(comm, description.of_file(arguments.case, comm))
 
 
 def _plot(arguments: argparse.Namespace, comm: Intracomm) -> None:
@@ -205,6 +210,16 @@ def _written_report(directory: Path) -> Path:
     from feti_homog.output.report import page
 
     return page.write(directory)
+
+
+def _export(arguments: argparse.Namespace, comm: Intracomm) -> None:
+    from feti_homog.common.mpi_errors import on_root
+    from feti_homog.output.cards import export
+
+    text = on_root(comm, export.card, arguments.directory, arguments.format, arguments.symmetry)
+    if arguments.out is not None:
+        text = str(on_root(comm, export.write, arguments.out, text))
+    _print_product(comm, text)
 
 
 def _verify(words: Sequence[str]) -> int:

@@ -24,6 +24,9 @@ from feti_homog.analysis.result_records import (
 from feti_homog.common.records import BYTES, SECONDS, STRESS, Key, described, keys, plain, restored
 from feti_homog.mechanics import response
 from feti_homog.mechanics.bounds import Moduli
+from feti_homog.mechanics.estimates.fibre_bounds import FibreBounds
+from feti_homog.mechanics.estimates.methods import Estimates
+from feti_homog.mechanics.spatial_constants import EngineeringConstants, TransverselyIsotropic
 from feti_homog.output.files.file_seal import FileSeal
 from feti_homog.output.files.result_json import SCHEMA
 from feti_homog.output.text.summary import short_summary
@@ -85,6 +88,14 @@ class Result:
     thermal_expansion: Float | None = described(
         "strains under a unit of temperature at no stress, without contact", "1 / temperature", "(6,)", default=None
     )
+    constants: EngineeringConstants | None = described(
+        "of generalized plane strain: constants in the axes of the cell", default=None
+    )
+    transversely_isotropic: TransverselyIsotropic | None = described(
+        "constants of the nearest transversely isotropic stiffness about x3", default=None
+    )
+    estimates: Estimates | None = described("closed estimates of the same, of a cell without debonding", default=None)
+    fibre_bounds: FibreBounds | None = described("bounds of the same, of rigid bonds", default=None)
     tips: TipRates | None = described("energy release rates at the tips of debonded arcs, of a stiffness", default=None)
     angle: tuple[AnglePoint, ...] | None = described("points of analysis `angle`, as in angle.csv", default=None)
     path: tuple[PathPoint, ...] | None = described("points of analysis `path`, as in path.csv", default=None)

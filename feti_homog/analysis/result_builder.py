@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog import __version__
+from feti_homog.analysis import spatial_constants
 from feti_homog.analysis.context import CONTACT_TOLERANCE, AnalysisContext
 from feti_homog.analysis.result import Result
 from feti_homog.analysis.result_fields import Fields
@@ -40,7 +41,7 @@ def result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Fields
         if name in analysis
     }
     if "effective_stiffness" in analysis and cell.axial is not None:
-        points |= _spatial(analysis)
+        points |= spatial_constants.constants(cell, analysis, fractions)
     elif "effective_stiffness" in analysis and cell.case.interface is None:
         points |= _moduli_and_bounds(cell, analysis["effective_stiffness"], fractions)
     return Result(
@@ -125,12 +126,3 @@ def _moduli_and_bounds(cell: TornCell, L: Float, fractions: dict[str, float]) ->
             hashin_shtrikman=bounds.hashin_shtrikman(shares, phases) if isotropic else None,
         ),
     }
-
-
-def _spatial(analysis: Mapping[str, Any]) -> dict[str, Any]:
-    """What follows from a stiffness (6, 6), and from `thermal_stress` if it is known."""
-    compliance = np.linalg.inv(analysis["effective_stiffness"])
-    found: dict[str, Any] = {"compliance": compliance}
-    if "thermal_stress" in analysis and "thermal_stress_compression" not in analysis:
-        found["thermal_expansion"] = -compliance @ analysis["thermal_stress"]
-    return found

@@ -13,6 +13,7 @@ from typing import Any
 
 from feti_homog.config.cell_section import GEOMETRY, TOUCHING, Cell, size_faults
 from feti_homog.config.document import read_document, to_document
+from feti_homog.config.generalized_plane import generalized_faults
 from feti_homog.config.interface_sections import misplaced_sections, read_angle, read_interface, read_path
 from feti_homog.config.material_forms import Isotropic, Material
 from feti_homog.config.material_sections import phase_faults, provider, read_materials
@@ -22,6 +23,7 @@ from feti_homog.config.sections import (
     ANALYSIS_TYPE,
     CRITERION,
     METHOD,
+    PLANE,
     SECTIONS,
     Analysis,
     Angle,
@@ -83,7 +85,7 @@ class Case:
 
     def warnings(self) -> tuple[str, ...]:
         """What is allowed but probably not wanted, one line each."""
-        if self.analysis.plane != "strain":
+        if self.analysis.plane == "stress":
             return ()
         solids = {phase: material for phase, material in self.materials.items() if isinstance(material, Isotropic)}
         lines = {
@@ -107,6 +109,7 @@ class Case:
         selected: Selected = {
             GEOMETRY: self.cell.geometry,
             ANALYSIS_TYPE: self.analysis.type,
+            PLANE: self.analysis.plane,
             METHOD: None if self.path is None else self.path.method,
             CRITERION: None if self.interface is None else self.interface.criterion,
         }
@@ -149,11 +152,12 @@ def parse(values: Mapping[str, Any], folder: Path) -> Case:
         faults.append("[decomposition] subdomains, max_dofs: exclude each other; give one")
     sections = {
         "cell": cell and _checked_cell(cell, folder, faults),
-        "materials": read_materials(document.get("material"), _selected_plane(document), reader),
+        "materials": read_materials(document.get("material"), reader.selected[PLANE], reader),
         "analysis": _read_section(document, "analysis", reader),
         "decomposition": decomposition,
     }
     faults += misplaced_sections(document, analysis)
+    faults += generalized_faults(reader.selected)
     sections |= {
         "interface": read_interface(document.get("interface"), reader),
         "angle": read_angle(document.get("angle"), reader),
@@ -168,13 +172,8 @@ def parse(values: Mapping[str, Any], folder: Path) -> Case:
 
 def _selected(document: Mapping[str, Any]) -> Selected:
     """The values that decide which keys belong to the case."""
-    selectors = (GEOMETRY, ANALYSIS_TYPE, METHOD, CRITERION)
+    selectors = (GEOMETRY, ANALYSIS_TYPE, PLANE, METHOD, CRITERION)
     return {s: selected_value(SECTIONS[s.section], document.get(s.section), s.key) for s in selectors}
-
-
-def _selected_plane(document: Mapping[str, Any]) -> str | None:
-    plane: str | None = selected_value(Analysis, document.get("analysis"), "plane")
-    return plane
 
 
 def _top_level_faults(document: Mapping[str, Any]) -> list[str]:

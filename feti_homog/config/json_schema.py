@@ -39,7 +39,7 @@ def json_schema() -> Schema:
         "additionalProperties": False,
         "$defs": {
             **{section: _table(contents) for section, contents in SECTIONS.items()},
-            **{form: _table(contents) for form, contents in MATERIAL_FORMS.items()},
+            **{_definition(form): _table(contents) for form, contents in MATERIAL_FORMS.items()},
             "arc": _table(Arc),
             "axis": _axis(),
             "range": _object({name: _key(entry) for name, entry in RANGE_KEYS.items()}) | {"required": ["from", "to"]},
@@ -51,6 +51,11 @@ def json_schema() -> Schema:
 
 def _reference(name: str) -> Schema:
     return {"$ref": f"#/$defs/{name}"}
+
+
+def _definition(form: str) -> str:
+    """The name of a form as references, which have no spaces, take it."""
+    return form.replace(" ", "_")
 
 
 def _object(properties: Mapping[str, Any]) -> Schema:
@@ -69,7 +74,7 @@ def _key(entry: Key) -> Schema:
 
 
 def _materials() -> Schema:
-    forms = {"anyOf": [_reference(form) for form in MATERIAL_FORMS]}
+    forms = {"anyOf": [_reference(_definition(form)) for form in MATERIAL_FORMS]}
     phases = {f"^({PHASE.pattern})$": forms}
     return {"type": "object", "patternProperties": phases, "additionalProperties": False}
 

@@ -6,14 +6,17 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from feti_homog.config.cell_section import ALL_CIRCULAR, GEOMETRY
-from feti_homog.config.material_forms import MATERIAL_FORMS
+from feti_homog.config.material_forms import EXPANSION_PAIR, MATERIAL_FORMS
 from feti_homog.config.schema import Condition, Key, Selector, defaults_of, keys_of
 from feti_homog.config.sections import (
     ANALYSIS_TYPE,
     ANGLE_ANALYSIS,
     BY_ENERGY,
     CRITERION,
+    GENERALIZED,
+    GENERALIZED_ANALYSES,
     METHOD,
+    PLANE,
     SECTIONS,
     SECTIONS_OF_AN_ANALYSIS,
     STIFFNESSES,
@@ -29,7 +32,7 @@ ITEMS = "items"  # on the way to a table: of a list
 def rules_of_one_case() -> Schema:
     """What must be given, by conditions that are independent of each other."""
     required = [_required(path, contents) for path, contents in _tables()]
-    selectors = (GEOMETRY, ANALYSIS_TYPE, METHOD, CRITERION)
+    selectors = (GEOMETRY, ANALYSIS_TYPE, PLANE, METHOD, CRITERION)
     conditional = [_rule(selector, value) for selector in selectors for value in _values(selector)]
     return {
         "required": list(REQUIRED),
@@ -39,6 +42,7 @@ def rules_of_one_case() -> Schema:
             *_material_rules(),
             *_arc_rules(),
             *_energy_rules(),
+            _generalized_rule(),
             _at(("cell",), {"not": {"required": ["width", "fibre_radius"]}}),
             _at(("decomposition",), {"not": {"required": ["subdomains", "max_dofs"]}}),
             _at(("path",), {"oneOf": [{"required": ["strain"]}, {"required": ["waypoints"]}]}),
@@ -109,9 +113,14 @@ def _material_rules() -> list[Schema]:
         {"required": [name for name, entry in keys_of(contents).items() if entry.required]}
         for contents in MATERIAL_FORMS.values()
     ]
+    axial, transverse = EXPANSION_PAIR
+    expansions = {
+        "dependentRequired": {axial: [transverse], transverse: [axial]},
+        "not": {"required": ["expansion", axial]},
+    }
     of_circles = {"required": ["fibre"], "patternProperties": {"^fibre:": False}}
     return [
-        _at(("material",), {"required": ["matrix"], "additionalProperties": {"anyOf": complete}}),
+        _at(("material",), {"required": ["matrix"], "additionalProperties": {"anyOf": complete} | expansions}),
         {"if": _if(ALL_CIRCULAR), "then": _at(("material",), of_circles)},
     ]
 
@@ -134,3 +143,8 @@ def _energy_rules() -> list[Schema]:
     strengths = {"normal_strength": False, "tangential_strength": False}
     springs = _at(("interface",), {"required": [*STIFFNESSES], "properties": strengths})
     return [{"if": _if(BY_ENERGY), "then": springs}]
+
+
+def _generalized_rule() -> Schema:
+    """Generalized plane strain is that of some types of analysis."""
+    return {"if": _if(GENERALIZED), "then": _at(("analysis", "type"), {"enum": list(GENERALIZED_ANALYSES)})}

@@ -10,6 +10,8 @@ from feti_homog.config.values import real
 
 POSITIVE = real(above=0.0)
 PER_TEMPERATURE = "1 / temperature"
+EXPANSION_PAIR = ("expansion_axial", "expansion_transverse")
+"""Keys that are given together, in place of one expansion."""
 
 
 @dataclass(frozen=True)
@@ -100,7 +102,11 @@ class General:
     x3 is normal to a plane of symmetry: of a 6x6 stiffness, 23 and 13 are coupled to each other alone.
     """
 
-    stiffness: Matrix = key(MATRIX, "The stiffness, symmetric and positive definite.", unit="stress")
+    stiffness: Matrix = key(
+        MATRIX,
+        "The stiffness, symmetric and positive definite; of 6x6, 23 and 13 are coupled to each other alone.",
+        unit="stress",
+    )
     expansion: float | tuple[float, ...] | None = key(
         EXPANSION, "Thermal expansion, the same in all directions or along x1, x2, x3.", unit=PER_TEMPERATURE,
         default=None,

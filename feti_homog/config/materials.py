@@ -9,7 +9,14 @@ from __future__ import annotations
 import numpy as np
 
 from feti_homog.config.engineering_constants import PLANE_IN_WORDS, known_compliance, stable_compliance
-from feti_homog.config.material_forms import General, Isotropic, Material, Orthotropic, TransverselyIsotropic
+from feti_homog.config.material_forms import (
+    EXPANSION_PAIR,
+    General,
+    Isotropic,
+    Material,
+    Orthotropic,
+    TransverselyIsotropic,
+)
 from feti_homog.config.voigt_matrices import IN_PLANE, IN_PLANE_BLOCK, is_positive_definite, rotated, strain_rotation
 from feti_homog.config.wording import toml_value
 from feti_homog.typing import Float
@@ -142,15 +149,20 @@ def _uncoupled(stiffness: Float, noise: float) -> Float:
 def _expansion_along_axes(material: Material) -> tuple[float, ...] | None:
     """Strains along the three material axes; None if they are not given."""
     if isinstance(material, TransverselyIsotropic):
-        pair = {name: getattr(material, name) for name in ("expansion_transverse", "expansion_axial")}
-        given = [name for name, value in pair.items() if value is not None]
-        if given and material.expansion is not None:
-            raise ValueError(f"expansion, {', '.join(given)}: exclude each other")
-        if len(given) == 1:
-            (absent,) = pair.keys() - given
-            raise ValueError(f"{absent}: missing; {given[0]} needs it")
-        if given:
-            return pair["expansion_transverse"], pair["expansion_transverse"], pair["expansion_axial"]
+        _check_expansions(material)
+        axial, transverse = material.expansion_axial, material.expansion_transverse
+        if axial is not None and transverse is not None:
+            return transverse, transverse, axial
     if material.expansion is None or isinstance(material.expansion, tuple):
         return material.expansion
     return (material.expansion,) * 3
+
+
+def _check_expansions(material: TransverselyIsotropic) -> None:
+    """ValueError if the expansion is given twice or by half."""
+    given = [name for name in EXPANSION_PAIR if getattr(material, name) is not None]
+    if given and material.expansion is not None:
+        raise ValueError(f"expansion, {', '.join(given)}: exclude each other; give one or a pair")
+    if len(given) == 1:
+        (absent,) = set(EXPANSION_PAIR).difference(given)
+        raise ValueError(f"{absent}: missing; {given[0]} needs it")

@@ -37,7 +37,7 @@ INDENT: dict[str, Any] = {"initial_indent": "      ", "subsequent_indent": "    
 
 MATERIAL_MEANING = (
     'One section for each phase: [material.matrix], [material.fibre] and, for a phase of a mesh, [material."fibre:2"], '
-    "which otherwise has the constants of fibre; each in one of three forms."
+    "which otherwise has the constants of fibre; each in one of four forms."
 )
 
 

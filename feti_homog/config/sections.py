@@ -23,6 +23,7 @@ from feti_homog.config.values import boolean, choice, integer, real, text
 Strain = tuple[float, ...]
 
 ANALYSIS_TYPE = Selector("analysis", "type")
+PLANE = Selector("analysis", "plane")
 METHOD = Selector("path", "method")
 CRITERION = Selector("interface", "criterion")
 
@@ -30,6 +31,7 @@ ANGLE_ANALYSIS, PATH_ANALYSIS = ANALYSIS_TYPE.among("angle"), ANALYSIS_TYPE.amon
 BY_ENERGY = CRITERION.among("energy")
 
 STIFFNESSES = ("normal_stiffness", "tangential_stiffness")
+IN_THE_PLANE, GENERALIZED = PLANE.among("strain", "stress"), PLANE.among("generalized")
 BY_EVENTS, BY_INCREMENTS = METHOD.among("events"), METHOD.among("increments")
 
 
@@ -164,6 +166,7 @@ class Angle:
         "Macroscopic strain, other than zero; by default the three unit strains, which give the effective stiffness.",
         default=None,
         default_words="unit strains",
+        only=IN_THE_PLANE,
     )
 
 
@@ -264,6 +267,9 @@ SECTIONS: dict[str, type[Any]] = {
     "decomposition": Decomposition,
     "output": Output,
 }
+
+GENERALIZED_ANALYSES = ("stiffness", "angle")
+"""The types of analysis in generalized plane strain."""
 
 SECTIONS_OF_AN_ANALYSIS = {"angle": ANGLE_ANALYSIS, "path": PATH_ANALYSIS}
 """Sections that must be given for one type of analysis, and belong to no other."""

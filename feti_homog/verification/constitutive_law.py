@@ -41,49 +41,75 @@ def _constants(case: Mapping[str, Any], phase: str) -> Mapping[str, Any]:
 
 
 def _out_of_plane(constants: Mapping[str, Any], plane: str) -> Float:
-    """E33 = s13 S11' + s23 S22' + s33 S33 with the stresses in the material axes; one of S33 and E33 is 0."""
-    wanted = {"young": ("poisson",), "E1": ("nu13", "nu23", *(["E3"] if plane == "strain" else []))}
-    form = next((name for name in wanted if name in constants), None)
-    if form is None or any(constants.get(name) is None for name in wanted[form]):
-        rule = np.full(3, np.nan)
-    else:
+    """E33 = s13 S11' + s23 S22' + s36 S12' + s33 S33 with the stresses in the material axes; one of S33, E33 is 0."""
+    nothing = np.zeros(3)
+    if _says_out_of_plane(constants, plane):
         compliance = _compliance(constants)
         share = compliance[2, 2] if plane == "strain" else -1.0
         angle = np.radians(float(constants.get("angle", 0.0)))
-        axes = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
-        # S11' = a S a with a the first axis; [S11, S22, S12] has S12 once.
-        rule = -np.array([[a[0] ** 2, a[1] ** 2, 2 * a[0] * a[1]] for a in axes]).T @ compliance[2, :2] / share
-    nothing = np.zeros(3)
+        a, b = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+        # S11' = a S a and S12' = a S b with the axes a and b; [S11, S22, S12] has S12 once.
+        stresses = [[p[0] * q[0], p[1] * q[1], p[0] * q[1] + p[1] * q[0]] for p, q in ((a, a), (b, b), (a, b))]
+        rule = -np.array(stresses).T @ compliance[2, PLANE] / share
+    else:
+        rule = np.full(3, np.nan)
     return np.stack([rule, nothing] if plane == "strain" else [nothing, rule])
+
+
+def _says_out_of_plane(constants: Mapping[str, Any], plane: str) -> bool:
+    """Whether the constants say what S33 or E33 is."""
+    if "stiffness" in constants:
+        return len(constants["stiffness"]) == 6
+    wanted = {"young": ("poisson",), "E_transverse": ("E_axial", "nu_axial"), "E1": ("nu13", "nu23")}
+    form = next(name for name in wanted if name in constants)
+    third = ("E3",) if form == "E1" and plane == "strain" else ()
+    return all(constants.get(name) is not None for name in (*wanted[form], *third))
 
 
 def _plane_stiffness(constants: Mapping[str, Any], plane: str) -> Float:
     """In plane stress S33 = S13 = S23 = 0; in plane strain E33 = gamma13 = gamma23 = 0."""
-    if "stiffness" in constants:
-        given = np.array(constants["stiffness"], float)
-        return np.asarray((given + given.T) / 2)
-    compliance = _compliance(constants)
+    given = _given(constants)
+    if len(given) == 3:
+        return given
     if plane == "stress":
-        own = np.linalg.inv(compliance[np.ix_(PLANE, PLANE)])
+        own = np.linalg.inv(_compliance(constants)[np.ix_(PLANE, PLANE)])
     else:
-        own = np.linalg.inv(compliance)[np.ix_(PLANE, PLANE)]
+        law = given if len(given) else np.linalg.inv(_compliance(constants))
+        own = law[np.ix_(PLANE, PLANE)]
     return _turned(np.asarray(own, float), float(constants.get("angle", 0.0)))
+
+
+def _given(constants: Mapping[str, Any]) -> Float:
+    """The stiffness that the constants give themselves, (3, 3) or (6, 6); (0, 0) if they do not."""
+    given = np.array(constants.get("stiffness", np.zeros((0, 0))), float)
+    return np.asarray((given + given.T) / 2)
 
 
 def _compliance(constants: Mapping[str, Any]) -> Float:
     """(6, 6) in the material axes; out of plane constants that plane stress does not need are any that are stable."""
-    if "young" in constants:
-        e, nu = float(constants["young"]), float(constants["poisson"])
-        moduli, ratios, shear = [e, e, e], [nu, nu, nu], e / (2 * (1 + nu))
-    else:
-        moduli = [float(constants[name] or 1.0) for name in ("E1", "E2", "E3")] if constants.get("E3") else []
-        moduli = moduli or [float(constants["E1"]), float(constants["E2"]), float(constants["E1"])]
-        ratios = [float(constants.get(name) or 0.0) for name in ("nu12", "nu13", "nu23")]
-        shear = float(constants["G12"])
+    if "stiffness" in constants:
+        return np.asarray(np.linalg.inv(_given(constants)), float)
+    moduli, ratios, shear = _engineering_constants(constants)
     compliance = np.diag([1 / moduli[0], 1 / moduli[1], 1 / moduli[2], 1 / shear, 1 / shear, 1 / shear])
     for (i, j), ratio in zip(((0, 1), (0, 2), (1, 2)), ratios, strict=True):
         compliance[i, j] = compliance[j, i] = -ratio / moduli[i]
     return compliance
+
+
+def _engineering_constants(constants: Mapping[str, Any]) -> tuple[list[float], list[float], float]:
+    """Young's moduli along three axes, the ratios 12, 13, 23, and the shear modulus of the plane."""
+    if "young" in constants:
+        e, nu = float(constants["young"]), float(constants["poisson"])
+        return [e, e, e], [nu, nu, nu], e / (2 * (1 + nu))
+    if "E_transverse" in constants:
+        e, nu = float(constants["E_transverse"]), float(constants["nu_transverse"])
+        along = float(constants.get("E_axial") or e)
+        # Under stress along x1 the phase contracts along x3 by nu_axial e / along: compliances are symmetric.
+        minor = float(constants.get("nu_axial") or 0.0) * e / along
+        return [e, e, along], [nu, minor, minor], e / (2 * (1 + nu))
+    moduli = [float(constants[name]) for name in ("E1", "E2")]
+    ratios = [float(constants.get(name) or 0.0) for name in ("nu12", "nu13", "nu23")]
+    return [*moduli, float(constants.get("E3") or moduli[0])], ratios, float(constants["G12"])
 
 
 def _turned(stiffness: Float, degrees: float) -> Float:

@@ -24,6 +24,12 @@ plane = "strain"
 RANDOM = 'geometry = "random"\nfibres = 20\n'
 FIBRE = "[material.fibre]\nyoung = 200.0\npoisson = 0.222\n"
 ORTHOTROPIC = "E1 = 10.0\nE2 = 5.0\nnu12 = 0.3\nG12 = 2.0\n"
+TRANSVERSE = "E_transverse = 14.0\nnu_transverse = 0.25\n"
+AXIAL = "E_axial = 235.0\nnu_axial = 0.2\n"
+SPATIAL = (
+    "stiffness = [[9, 3, 2, 0, 0, 0.5], [3, 8, 2, 0, 0, 0], [2, 2, 7, 0, 0, 0], "
+    "[0, 0, 0, 3, 0.5, 0], [0, 0, 0, 0.5, 2, 0], [0.5, 0, 0, 0, 0, 4]]\n"
+)
 OUT_OF_PLANE = "E3 = 5.0\nnu13 = 0.3\nnu23 = 0.3\n"
 
 MESH_CELL = (

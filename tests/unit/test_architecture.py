@@ -40,6 +40,7 @@ FLOORS = (
     ("output.text",),
     ("output.plots",),
     ("output.report",),
+    ("output.cards",),
     ("output",),
     ("analysis",),
     ("sweep.report",),

@@ -19,7 +19,7 @@ from feti_homog.output.files import output_folder
 def test_only_ranks_that_all_come_destroy_the_solver(monkeypatch, error, destroyed):
     """After a defect, which may be one rank's own, the others would not come to the collective call."""
     calls = []
-    cell = SimpleNamespace(solver=SimpleNamespace(destroy=lambda: calls.append("destroy")))
+    cell = SimpleNamespace(destroy=lambda: calls.append("destroy"))
     monkeypatch.setattr(runner, "tear", lambda case, comm, progress: cell)
     comm = MPI.COMM_SELF
     try:

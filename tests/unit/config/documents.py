@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -51,17 +52,39 @@ def cells(draw: st.DrawFn) -> dict[str, Any]:
     return {"geometry": geometry, "fibre_fraction": draw(st.floats(1e-3, 0.99 * limit))} | cell
 
 
+EXPANSIONS = numbers(-1.0, 1.0)
+EXPANSIONS_BY_AXES = st.one_of(EXPANSIONS, st.lists(EXPANSIONS, min_size=3, max_size=3))
+
+
 @st.composite
 def materials(draw: st.DrawFn) -> dict[str, Any]:
-    form = draw(st.sampled_from(["isotropic", "orthotropic", "general"]))
+    """A material that serves in all plane states, or a 3x3 stiffness."""
+    form = draw(st.sampled_from(["isotropic", "orthotropic", "transversely isotropic", "general"]))
     if form == "isotropic":
-        return {"young": draw(POSITIVE), "poisson": draw(numbers(-0.9, 0.49))}
+        constants = {"young": draw(POSITIVE), "poisson": draw(numbers(-0.9, 0.49))}
+        return constants | draw(optional(expansion=EXPANSIONS))
     if form == "orthotropic":
         young = draw(st.lists(st.floats(1.0, 2.0), min_size=3, max_size=3))
         constants = dict(zip(("E1", "E2", "E3"), young, strict=True)) | {"nu12": 0.3, "nu13": 0.2, "nu23": 0.1}
-        return constants | {"G12": draw(POSITIVE)} | draw(optional(angle=numbers(-360, 360)))
-    root = np.array(draw(st.lists(st.integers(-9, 9), min_size=9, max_size=9))).reshape(3, 3)
-    return {"stiffness": (root @ root.T + 10 * np.eye(3)).tolist()}
+        shears = {name: draw(POSITIVE) for name in ("G12", "G13", "G23")}
+        return constants | shears | draw(optional(angle=numbers(-360, 360), expansion=EXPANSIONS_BY_AXES))
+    if form == "transversely isotropic":
+        moduli = {name: draw(st.floats(1.0, 2.0)) for name in ("E_axial", "E_transverse", "G_axial")}
+        pair = {"expansion_axial": draw(EXPANSIONS), "expansion_transverse": draw(EXPANSIONS)}
+        expansions = draw(st.sampled_from([{}, {"expansion": 1e-6}, pair]))
+        return moduli | {"nu_axial": draw(numbers(-0.3, 0.3)), "nu_transverse": draw(numbers(-0.6, 0.6))} | expansions
+    return {"stiffness": draw(stiffnesses())} | draw(optional(expansion=EXPANSIONS_BY_AXES))
+
+
+@st.composite
+def stiffnesses(draw: st.DrawFn) -> list[list[float]]:
+    size = draw(st.sampled_from([3, 6]))
+    root = np.array(draw(st.lists(st.integers(-9, 9), min_size=size**2, max_size=size**2))).reshape(size, size)
+    stiffness = root @ root.T + 10 * np.eye(size)
+    if size == 6:
+        stiffness[np.ix_([0, 1, 2, 5], [3, 4])] = stiffness[np.ix_([3, 4], [0, 1, 2, 5])] = 0.0
+    entries: list[list[float]] = stiffness.tolist()
+    return entries
 
 
 FIBRES = st.one_of(st.just("all"), st.integers(1, 99), st.lists(st.integers(1, 99), min_size=1, max_size=4))
@@ -90,6 +113,12 @@ def paths(draw: st.DrawFn) -> dict[str, Any]:
     return targets | draw(optional(method=st.just("events"), max_events=st.integers(1, 10**9)))
 
 
+def planes_of(analysis: str, phases: Iterable[dict[str, Any]]) -> list[str]:
+    """The plane states in which phases can be and an analysis made."""
+    in_space = analysis != "path" and all(len(constants.get("stiffness", ())) != 3 for constants in phases)
+    return ["strain", "stress", "generalized"] if in_space else ["strain", "stress"]
+
+
 @st.composite
 def documents(draw: st.DrawFn) -> dict[str, Any]:
     """The document of a valid case, with round fibres."""
@@ -97,13 +126,16 @@ def documents(draw: st.DrawFn) -> dict[str, Any]:
     own_arcs = draw(st.lists(arcs(with_angle=analysis != "angle"), min_size=analysis == "angle", max_size=3))
     interface: dict[str, Any] = {"debonded": own_arcs} | draw(optional(contact=st.booleans()))
     strength = st.one_of(POSITIVE, st.just(math.inf))
+    phases = {"matrix": draw(materials()), "fibre": draw(materials())}
+    plane = draw(st.sampled_from(planes_of(analysis, phases.values())))
     document: dict[str, Any] = {
         "cell": draw(cells()),
-        "material": {"matrix": draw(materials()), "fibre": draw(materials())},
-        "analysis": {"type": analysis, "plane": draw(st.sampled_from(["strain", "stress"]))},
+        "material": phases,
+        "analysis": {"type": analysis, "plane": plane},
     }
     if analysis == "angle":
-        document["angle"] = {"values": draw(OPENINGS)} | draw(optional(strain=NONZERO_STRAINS))
+        strain = {} if plane == "generalized" else draw(optional(strain=NONZERO_STRAINS))
+        document["angle"] = {"values": draw(OPENINGS)} | strain
     if analysis == "path":
         document["path"] = draw(paths())
         criterion = st.sampled_from(["max", "quadratic"])

@@ -177,7 +177,15 @@ FAULTY_BONDINGS: dict[str, tuple[str, tuple[str, ...]]] = {
         of_type("angle", BARE_ARC, ANGLE, "strain = [0, 0, 0]"),
         ("[angle] strain: expected a strain other than zero",),
     ),
+    "angle_strain_in_space": (
+        of_type("angle", BARE_ARC, ANGLE, "strain = [0, 0, 1]").replace('"strain"', '"generalized"'),
+        ('[angle] strain = [0, 0, 1]: belongs to [analysis] plane = "strain" or "stress", not "generalized"',),
+    ),
     # [path]
+    "path_in_space": (
+        of_type("path", PATH).replace('"strain"', '"generalized"'),
+        ('[analysis] plane = "generalized": works with type = "stiffness" or "angle", not "path"',),
+    ),
     "no_path": (of_type("path"), ('[path]: missing section; [analysis] type = "path" needs it',)),
     "path_of_angle": (
         of_type("angle", BARE_ARC, ANGLE, PATH),

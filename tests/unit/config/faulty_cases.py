@@ -178,7 +178,7 @@ FAULTY_CASES: dict[str, tuple[str, tuple[str, ...]]] = {
     ),
     "unknown_plane": (
         cell('"strain"', '"plane strain"'),
-        ('[analysis] plane = "plane strain": expected one of "strain", "stress"',),
+        ('[analysis] plane = "plane strain": expected one of "strain", "stress", "generalized"',),
     ),
     "no_plane": (
         cell('plane = "strain"\n', ""),

@@ -2,7 +2,21 @@
 
 from __future__ import annotations
 
-from support.base_case import BASE, FIBRE, ORTHOTROPIC, OUT_OF_PLANE, cell, changed, ended, fibre
+from support.base_case import (
+    AXIAL,
+    BASE,
+    FIBRE,
+    ORTHOTROPIC,
+    OUT_OF_PLANE,
+    SPATIAL,
+    TRANSVERSE,
+    cell,
+    changed,
+    ended,
+    fibre,
+)
+
+GIVEN = "young = 1.0\npoisson = 0.2\n"
 
 # name: (content of the file, words that must stand in its faults)
 FAULTY_MATERIALS: dict[str, tuple[str, tuple[str, ...]]] = {
@@ -93,5 +107,99 @@ FAULTY_MATERIALS: dict[str, tuple[str, tuple[str, ...]]] = {
     "stiffness_indefinite": (
         fibre("stiffness = [[1, 2, 0], [2, 1, 0], [0, 0, 1]]\n"),
         ("[material.fibre] stiffness = ", "expected a positive definite matrix"),
+    ),
+    "poisson_half_in_space": (
+        changed(("0.299", "0.5"), ('"strain"', '"generalized"')),
+        ("[material.matrix] poisson = 0.5: expected less than 0.5 in generalized plane strain",),
+    ),
+    "orthotropic_no_axial_shear": (
+        fibre(ORTHOTROPIC + OUT_OF_PLANE, "generalized"),
+        ("[material.fibre] G13, G23: missing; generalized plane strain needs them",),
+    ),
+    "orthotropic_unstable_in_space": (
+        fibre(ORTHOTROPIC + OUT_OF_PLANE.replace("nu13 = 0.3", "nu13 = 1.4") + "G13 = 1\nG23 = 1\n", "generalized"),
+        ("[material.fibre] E1, E2, E3, nu12, nu13, nu23: expected a positive definite compliance",),
+    ),
+    "transverse_incomplete": (
+        fibre("E_transverse = 14.0\n", "stress"),
+        ("[material.fibre] nu_transverse: missing; expected a number above -1 and below 1",),
+    ),
+    "transverse_no_axial": (
+        fibre(TRANSVERSE),
+        ("[material.fibre] E_axial, nu_axial: missing; plane strain needs them",),
+    ),
+    "transverse_no_shear": (
+        fibre(TRANSVERSE + AXIAL, "generalized"),
+        ("[material.fibre] G_axial: missing; generalized plane strain needs it",),
+    ),
+    "transverse_ratio_one": (
+        fibre(TRANSVERSE.replace("0.25", "1"), "stress"),
+        ("[material.fibre] nu_transverse = 1: expected a number above -1 and below 1",),
+    ),
+    "transverse_ratio_nearly_one": (
+        fibre(TRANSVERSE.replace("0.25", "0.99999999999999"), "stress"),
+        ("[material.fibre] nu_transverse = 0.99999999999999: expected a number above -1 and below 1; no material",),
+    ),
+    "transverse_unstable": (
+        fibre(TRANSVERSE + AXIAL.replace("0.2", "2.6")),
+        ("nu_axial = 2.6: expected nu_axial^2 < (1 - nu_transverse) E_axial/(2 E_transverse) = 6.29464",),
+    ),
+    "transverse_and_orthotropic": (
+        fibre(TRANSVERSE + "E1 = 1.0\n"),
+        ("[material.fibre] E1 (orthotropic) and E_transverse, nu_transverse (transversely isotropic): exclude each",),
+    ),
+    "angle_of_transverse": (
+        fibre(TRANSVERSE + AXIAL + "angle = 30\n"),
+        ("[material.fibre] angle (orthotropic) and E_axial, E_transverse, nu_axial, nu_transverse (transversely iso",),
+    ),
+    "stiffness_of_four": (
+        fibre("stiffness = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n"),
+        ("or 6x6 in the order 11, 22, 33, 23, 13, 12",),
+    ),
+    "stiffness_of_the_plane_in_space": (
+        fibre("stiffness = [[3, 1, 0], [1, 3, 0], [0, 0, 1]]\n", "generalized"),
+        ("[material.fibre] stiffness: expected 6x6 in generalized plane strain; 3x3 is that of one plane state",),
+    ),
+    "stiffness_not_symmetric_in_space": (
+        fibre(SPATIAL.replace("[9, 3,", "[9, 4,"), "generalized"),
+        ("[material.fibre] stiffness = ", "expected a symmetric matrix"),
+    ),
+    "stiffness_indefinite_in_space": (
+        fibre(SPATIAL.replace("[0, 0, 0, 3,", "[0, 0, 0, -3,"), "stress"),
+        ("[material.fibre] stiffness = ", "expected a positive definite matrix"),
+    ),
+    "stiffness_couples_shears": (
+        fibre(
+            SPATIAL.replace("0, 0, 0, 4]", "0, 0.25, 0, 4]").replace("[0, 0, 0, 3, 0.5, 0]", "[0, 0, 0, 3, 0.5, 0.25]")
+        ),
+        ("[material.fibre] stiffness: C46 = 0.25: expected 0; x3 must be normal to a plane of symmetry",),
+    ),
+    "expansion_by_half": (
+        fibre(TRANSVERSE + AXIAL + "expansion_axial = 1e-6\n"),
+        ("[material.fibre] expansion_transverse: missing; expansion_axial needs it",),
+    ),
+    "expansion_across_alone": (
+        fibre(TRANSVERSE + AXIAL + "expansion_transverse = 1e-6\n"),
+        ("[material.fibre] expansion_axial: missing; expansion_transverse needs it",),
+    ),
+    "expansion_twice": (
+        fibre(TRANSVERSE + AXIAL + "expansion = 1e-6\nexpansion_axial = 1e-6\nexpansion_transverse = 1e-6\n"),
+        ("[material.fibre] expansion, expansion_axial, expansion_transverse: exclude each other",),
+    ),
+    "expansion_of_a_form_without_axis": (
+        fibre(GIVEN + "expansion_axial = 1e-6\nexpansion_transverse = 1e-6\n"),
+        ("[material.fibre] young, poisson (isotropic) and expansion_axial, expansion_transverse (transversely isotr",),
+    ),
+    "expansion_of_isotropic_by_axes": (
+        fibre(GIVEN + "expansion = [1e-6, 1e-6, 2e-6]\n"),
+        ("[material.fibre] expansion = [1e-06, 1e-06, 2e-06]: expected a number",),
+    ),
+    "expansion_of_two_axes": (
+        fibre(ORTHOTROPIC + OUT_OF_PLANE + "expansion = [1e-6, 2e-6]\n"),
+        ("[material.fibre] expansion = [1e-06, 2e-06]: expected a number or a list of three numbers",),
+    ),
+    "expansion_alone": (
+        fibre("expansion = 1e-6\n"),
+        ("[material.fibre] young: missing", "[material.fibre] poisson: missing"),
     ),
 }

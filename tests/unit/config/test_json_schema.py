@@ -26,6 +26,9 @@ BETWEEN_NUMBERS = {
     "fibres_touch", "fibres_touch_in_square", "random_too_dense", "poisson_half", "orthotropic_no_third",
     "orthotropic_unstable", "orthotropic_unstable_third", "stiffness_not_symmetric", "stiffness_indefinite",
     "angle_strain_zero", "path_to_zero", "waypoints_begin_at_zero", "waypoints_repeated", "increments_too_few",
+    "poisson_half_in_space", "orthotropic_no_axial_shear", "orthotropic_unstable_in_space", "transverse_no_axial",
+    "transverse_no_shear", "transverse_ratio_nearly_one", "transverse_unstable", "stiffness_of_the_plane_in_space",
+    "stiffness_not_symmetric_in_space", "stiffness_indefinite_in_space", "stiffness_couples_shears",
     "interface_size_above_mesh_size", "interface_size_above_the_default_mesh_size",
     "tip_size_above_mesh_size", "tip_size_above_interface_size",
 }  # fmt: skip

@@ -36,6 +36,8 @@ def test_every_key_says_in_a_sentence_what_it_means(row):
         ("cell", "mesh_size", ("a number at least 0.0001 and at most 0.5", "", "0.05")),
         ("cell", "geometry", ('one of "square", "hexagonal", "random", "mesh"', "", "required")),
         ("material", "young", ("a number above 0", "stress", "required")),
+        ("material", "E_transverse", ("a number above 0", "stress", "required")),
+        ("material", "expansion_axial", ("a number", "1 / temperature", "")),
         ("interface", "normal_strength", ("a traction above 0, or inf", "stress", "inf")),
         ("interface", "debonded", ("a list of arcs {fibre, centre, angle}", "", "[]")),
         ("angle", "values", ("a rising list of numbers from 0 to 360", "degrees", "required")),
@@ -54,6 +56,7 @@ def test_where_keys_apply():
     assert rows("interface")["criterion"].applies == '[analysis] type = "path"'
     assert rows("path")["release"].applies == '[analysis] type = "path", method = "increments"'
     assert rows("cell")["refine"].applies == ""
+    assert rows("angle")["strain"].applies == '[analysis] type = "angle", [analysis] plane = "strain" or "stress"'
 
 
 def test_the_text_has_every_key_and_no_long_line():

@@ -2,7 +2,18 @@
 
 from __future__ import annotations
 
-from support.base_case import BASE, MESH_CELL, RANDOM, changed, fibre
+from support.base_case import (
+    AXIAL,
+    BASE,
+    MESH_CELL,
+    ORTHOTROPIC,
+    OUT_OF_PLANE,
+    RANDOM,
+    SPATIAL,
+    TRANSVERSE,
+    changed,
+    fibre,
+)
 from unit.config.faulty_bonding import ANGLE, ARC, BARE_ARC, PATH, debonded, of_type
 
 MESH = changed(MESH_CELL)
@@ -16,6 +27,19 @@ VALID_CASES = {
     "fine interfaces": changed(("mesh_size = 0.05", "mesh_size = 0.05\ninterface_size = 0.05\ntip_size = 1e-5")),
     "mesh of three phases": MESH + '[material."fibre:2"]\nstiffness = [[3, 1, 0], [1, 3, 0], [0, 0, 1]]\n',
     "orthotropic": fibre("E1 = 10.0\nE2 = 5.0\nE3 = 5.0\nnu12 = 0.3\nnu13 = 0.3\nnu23 = 0.2\nG12 = 2.0\nangle = 30\n"),
+    "orthotropic in space": fibre(
+        ORTHOTROPIC + OUT_OF_PLANE + "G13 = 2.0\nG23 = 1.5\nangle = 30\nexpansion = [1e-6, 2e-6, 3e-6]\n",
+        "generalized",
+    ),
+    "transversely isotropic": fibre(
+        TRANSVERSE + AXIAL + "G_axial = 28.0\nexpansion_axial = -0.9e-6\nexpansion_transverse = 9e-6\n", "generalized"
+    ),
+    "transversely isotropic, plane strain": fibre(TRANSVERSE + AXIAL + "expansion = 0\n"),
+    "transversely isotropic, plane stress": fibre(TRANSVERSE, "stress"),
+    "stiffness in space": fibre(SPATIAL + "expansion = 1e-6\n", "generalized"),
+    "stiffness in space, plane stress": fibre(SPATIAL + "expansion = [1, 2, 3]\n", "stress"),
+    "expansion": fibre("young = 3\npoisson = 0.3\nexpansion = 2e-5\n"),
+    "angle in space": of_type("angle", ANGLE, BARE_ARC).replace('"strain"', '"generalized"'),
     "output": BASE + '[output]\nfields = false\nstress = "S12"\ndeformation_scale = 2\nlength_unit = "µm"\n',
     "arc": BASE + f"[interface]\ndebonded = [{ARC}]\n",
     "no arc": BASE + "[interface]\ncontact = false\ndebonded = []\n",

@@ -151,6 +151,8 @@ def test_what_varies_along_is_no_other_series():
 
 def test_outputs_have_their_units():
     assert unit("material.fibre.young", "GPa") == "GPa" == unit("C11_compression", "GPa") == unit("onset_S11", "GPa")
+    assert unit("material.fibre.E_axial", "GPa") == "GPa" == unit("material.fibre.G13", "GPa")
+    assert not unit("material.fibre.nu_axial", "GPa") and not unit("material.fibre.expansion_axial", "GPa")
     assert with_unit("angle_60_C11", "MPa") == "angle_60_C11 (MPa)" and with_unit("bulk", "") == "bulk"
     assert unit("seconds_solve", "GPa") == "s" and unit("material.fibre.angle", "GPa") == "degrees"
     assert not unit("cell.fibre_fraction", "GPa") and not unit("nu12", "GPa") and not unit("check_hill", "GPa")

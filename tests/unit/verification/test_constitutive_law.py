@@ -7,19 +7,28 @@ import pytest
 from support.verified_results import FIBRE, MATRIX, TURNED
 
 from feti_homog.config.case import parse
-from feti_homog.config.materials import plane_stiffness
+from feti_homog.config.material_forms import Orthotropic
+from feti_homog.config.materials import out_of_plane, plane_stiffness, spatial_stiffness
 from feti_homog.errors import CaseError
+from feti_homog.verification import constitutive_law
 from feti_homog.verification.constitutive_law import plane_stiffnesses
 
 GENERAL = {"stiffness": [[10.0, 2.0, 0.5], [2.0, 8.0, 0.1], [0.5, 0.1, 3.0]]}
 IN_PLANE = {"E1": 15.0, "E2": 230.0, "nu12": 0.013, "G12": 25.0, "angle": 30.0}
+CARBON = {"E_axial": 235.0, "E_transverse": 14.0, "nu_axial": 0.2, "nu_transverse": 0.25}
+SHEET = {"E_transverse": 14.0, "nu_transverse": -0.25}
 STIFF = {"E1": 2.0, "E2": 9.0, "E3": 4.0, "nu12": -0.2, "nu13": 0.4, "nu23": 0.3, "G12": 1.0, "angle": -73.0}
 
 
+IN_SPACE = {
+    "stiffness": spatial_stiffness(Orthotropic(**STIFF, G13=2.0, G23=1.5)).tolist()  # turned: 12 is coupled to all
+}
+
+
 @pytest.mark.parametrize("plane", ["strain", "stress"])
-@pytest.mark.parametrize("fibre", [FIBRE, TURNED, STIFF, GENERAL, IN_PLANE], ids=str)
-def test_both_ways_to_a_plane_stiffness_agree(tmp_path, fibre, plane):
-    if plane == "strain" and fibre is IN_PLANE:
+@pytest.mark.parametrize("fibre", [FIBRE, TURNED, STIFF, GENERAL, IN_SPACE, CARBON, IN_PLANE, SHEET], ids=str)
+def test_both_ways_to_the_law_of_a_plane_state_agree(tmp_path, fibre, plane):
+    if plane == "strain" and fibre in (IN_PLANE, SHEET):
         pytest.skip("plane strain needs constants out of the plane")
     document = {
         "cell": {"geometry": "square", "fibre_fraction": 0.3},
@@ -27,10 +36,13 @@ def test_both_ways_to_a_plane_stiffness_agree(tmp_path, fibre, plane):
         "analysis": {"type": "stiffness", "plane": plane},
     }
     case = parse(document, tmp_path)
-    own = plane_stiffnesses(case.resolved(), ["matrix", "fibre", "fibre:2"])
-    for stiffness, phase in zip(own, ("matrix", "fibre", "fibre"), strict=True):
+    phases = ["matrix", "fibre", "fibre:2"]
+    own = plane_stiffnesses(case.resolved(), phases)
+    rules = constitutive_law.out_of_plane(case.resolved(), phases)
+    for stiffness, rule, phase in zip(own, rules, ("matrix", "fibre", "fibre"), strict=True):
         expected = plane_stiffness(case.material_of(phase), plane)
         assert np.abs(stiffness - expected).max() < 1e-13 * np.abs(expected).max()
+        np.testing.assert_allclose(rule, out_of_plane(case.material_of(phase), plane), rtol=1e-12, atol=1e-14)
 
 
 def test_a_phase_without_material_is_told():

@@ -1,0 +1,61 @@
+"""`feti-homog export`: the material card of a folder of results."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from feti_homog.errors import CaseError
+from feti_homog.output.cards import abaqus, ansys, calculix, csv_table, moose
+from feti_homog.output.cards.effective_material import (
+    EffectiveMaterial,
+    in_axes_of_the_cell,
+    nearest_transversely_isotropic,
+)
+from feti_homog.output.files import atomic, output_folder, result_json
+
+FORMATS: dict[str, Callable[[EffectiveMaterial], str]] = {
+    "abaqus": abaqus.text,
+    "calculix": calculix.text,
+    "ansys": ansys.text,
+    "moose": moose.text,
+    "csv": csv_table.text,
+}
+SYMMETRIES: dict[str, Callable[[Mapping[str, Any]], EffectiveMaterial]] = {
+    "orthotropic": in_axes_of_the_cell,
+    "transversely isotropic": nearest_transversely_isotropic,
+}
+
+
+def card(directory: Path, form: str, symmetry: str) -> str:
+    """The card, in one of `FORMATS`, of the material of one of `SYMMETRIES` of the result in a folder.
+
+    Raises:
+        CaseError: there is no result, it is damaged, or it has no material that the format can carry; one line.
+    """
+    document = result_json.read(directory)
+    path = directory / result_json.NAME
+    try:
+        return FORMATS[form](SYMMETRIES[symmetry](document))
+    except CaseError as error:
+        raise CaseError(*(f"cannot export {path}: {fault}" for fault in error.faults)) from error
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
+        place = f"{type(error).__name__}: {error}"
+        raise CaseError(f"{path}: it is damaged, or no result of this program ({place})") from error
+
+
+def write(path: Path, text: str) -> Path:
+    """Write a card to a file, whole or not at all; returns its path.
+
+    Raises:
+        CaseError: `path` cannot be a card's: it is a folder, in no folder, or a file of a result.
+        FetiHomogError: it cannot be written.
+    """
+    if path.is_dir():
+        raise CaseError(f"--out {path}: expected a file, but it is a folder")
+    if not path.parent.is_dir():
+        raise CaseError(f"--out {path}: expected a file in a folder that there is")
+    if output_folder.RESULT_FILE.fullmatch(path.name):
+        raise CaseError(f"--out {path}: expected another name; results have files of that name")
+    return atomic.replace_text(path, f"{text}\n")

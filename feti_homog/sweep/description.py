@@ -1,0 +1,37 @@
+"""What `feti-homog check` says of a file: that of a case, or of a sweep."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from feti_homog.common.mpi_errors import on_root, on_root_only
+from feti_homog.common.petsc_options import case_options
+from feti_homog.config import case as cases
+from feti_homog.config.document import read_document
+from feti_homog.config.sweep_section import SWEEP
+from feti_homog.homogenization.unit_cell import describe
+from feti_homog.sweep import plan
+from feti_homog.sweep.option_checks import check_options
+
+if TYPE_CHECKING:
+    from mpi4py.MPI import Intracomm
+
+
+def of_file(path: Path, comm: Intracomm) -> str:
+    """What would run: the case, or the number of cases of a sweep and the first one; empty but on rank 0.  Collective.
+
+    Raises:
+        CaseError, MeshError: the file is faulty, or the cell of its first case.
+    """
+    document = on_root(comm, read_document, path)
+    if SWEEP in document:
+        sweep = on_root(comm, plan.load, path)
+        check_options(sweep)
+        case, points = sweep.cases[0], len({entry.point for entry in sweep.entries})
+        words = f"sweep      {len(sweep.cases)} cases, {points} points, all of them valid; the first:\n"
+    else:
+        case, words = on_root(comm, cases.load, path), ""
+    with case_options(case.petsc):
+        text = on_root_only(comm, describe, case, comm.size)
+    return f"{words}{text}" if comm.rank == 0 else ""
