@@ -10,7 +10,13 @@ from dataclasses import dataclass
 
 from feti_homog.common.records import DEGREES, LENGTH, STRESS, described, plain
 from feti_homog.mechanics.bounds import Bounds
-from feti_homog.mechanics.voigt import STIFFNESSES, STRAINS, STRESSES
+from feti_homog.mechanics.voigt import (
+    SPATIAL_STIFFNESSES,
+    SPATIAL_THERMAL_STRESSES,
+    STIFFNESSES,
+    STRAINS,
+    STRESSES,
+)
 from feti_homog.typing import Float
 
 ENERGY = f"{STRESS} times that of the cell"
@@ -138,7 +144,22 @@ class AnglePoint:
     """The response at one debonding angle."""
 
     angle: float = described("opening of the arcs without an angle of their own", DEGREES)
-    stiffness: Float | None = described("L^ef, if no strain is given", STRESS, "(3, 3)", STIFFNESSES, default=None)
+    stiffness: Float | None = described(
+        "L^ef, if no strain is given; (6, 6) in generalized plane strain",
+        STRESS,
+        "(3, 3)",
+        STIFFNESSES,
+        spatial=SPATIAL_STIFFNESSES,
+        default=None,
+    )
+    thermal_stress: Float | None = described(
+        "in generalized plane strain the stress under a unit of temperature at no strain, of phases whose expansion is "
+        "given",
+        f"{STRESS} per unit of temperature",
+        "(6,)",
+        SPATIAL_THERMAL_STRESSES,
+        default=None,
+    )
     strain: Float | None = described("macroscopic strain that is given", "", "(3,)", STRAINS, default=None)
     stress: Float | None = described("macroscopic stress under it", STRESS, "(3,)", STRESSES, default=None)
     stored: float | None = described("energy stored under it per area of the cell", STRESS, default=None)

@@ -68,7 +68,9 @@ class SpatialProgramme:
             k, q, area = elements(part.points[part.triangles], part.C, part.alpha)
             dofs = (3 * nodes[:, :, None] + np.arange(3)).reshape(len(nodes), -1)
             np.add.at(self.Q, dofs, q)
-            entries.append((k.ravel(), np.repeat(dofs, dofs.shape[1], axis=1).ravel(), np.tile(dofs, dofs.shape[1]).ravel()))
+            entries.append(
+                (k.ravel(), np.repeat(dofs, dofs.shape[1], axis=1).ravel(), np.tile(dofs, dofs.shape[1]).ravel())
+            )
             imposed = np.column_stack([np.eye(6), -part.alpha])
             self.mean += area.sum() * imposed.T @ part.C @ imposed
         values, rows, columns = (np.concatenate(x) for x in zip(*entries, strict=True))

@@ -26,9 +26,10 @@ class Column:
 def columns(kind: type) -> Iterator[Column]:
     """The columns that a record of this class fills: the reference table of its file."""
     for name, description in _in_columns(kind).items():
-        for component in description.components or (name,):
-            words = f"{component}, {description.meaning}" if description.components else description.meaning
-            yield Column(component, description.unit, words)
+        if not description.components:
+            yield Column(name, description.unit, description.meaning)
+        for component in dict.fromkeys((*description.components, *description.spatial)):
+            yield Column(component, description.unit, f"{component}, {description.meaning}")
 
 
 def write(path: Path, points: Sequence[Any]) -> Path:
@@ -41,25 +42,31 @@ def write(path: Path, points: Sequence[Any]) -> Path:
     """
     described = _in_columns(type(points[0])) if points else {}
     rows = [_row(point, described) for point in points]
-    there = {name for row in rows for name in row}
-    names = [column.name for column in columns(type(points[0])) if column.name in there] if rows else []
+    filled = (next((row[name] for row in rows if name in row), {}) for name in described)
+    names = [column for cells in filled for column in cells]
 
     def write_rows(part: Path) -> None:
         with part.open("w", newline="", encoding="utf-8") as stream:
             writer = csv.DictWriter(stream, names)
             writer.writeheader()
-            writer.writerows(rows)
+            writer.writerows(
+                {column: value for cells in row.values() for column, value in cells.items()} for row in rows
+            )
 
     return atomic.replace(path, write_rows)
 
 
-def _row(point: Any, described: Mapping[str, Description]) -> dict[str, Any]:
-    row: dict[str, Any] = {}
-    for name, value in plain(point).items():
-        if name in described:
-            components = described[name].components or (name,)
-            row |= dict(zip(components, np.ravel(value).tolist(), strict=True))
-    return row
+def _row(point: Any, described: Mapping[str, Description]) -> dict[str, dict[str, Any]]:
+    """The cells of each field of a record by their columns."""
+    values = ((name, np.ravel(value).tolist()) for name, value in plain(point).items() if name in described)
+    return {name: dict(zip(_names(name, described[name], len(row)), row, strict=True)) for name, row in values}
+
+
+def _names(name: str, description: Description, size: int) -> tuple[str, ...]:
+    """The columns of a field with so many numbers."""
+    if size == len(description.spatial):
+        return description.spatial
+    return description.components or (name,)
 
 
 def _in_columns(kind: type) -> dict[str, Description]:
