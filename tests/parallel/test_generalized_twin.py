@@ -5,28 +5,19 @@ All of the stiffness (6, 6) and of the thermal stress, at any number of ranks: b
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
+from support.generalized_phases import CARBON, CRYSTAL, WOOD
 from support.random_cells import random_cell
 from support.spatial_cells import Twin, error, solved
 
 pytestmark = pytest.mark.parallel
 
 TIGHT = 1e-9
+MESHES = Path(__file__).parents[2] / "meshes"
 
-# Of different axes, so that nothing but x3 is normal to a plane of symmetry of the cell.
-WOOD = {
-    "E1": 12.0, "E2": 5.0, "E3": 8.0, "nu12": 0.3, "nu13": 0.25, "nu23": 0.2, "G12": 2.5, "G13": 3.1, "G23": 1.7,
-    "angle": 30.0, "expansion": [40.0, 60.0, 20.0],
-}  # fmt: skip
-CRYSTAL = {
-    "E1": 90.0, "E2": 60.0, "E3": 210.0, "nu12": 0.25, "nu13": 0.1, "nu23": 0.08, "G12": 20.0, "G13": 30.0, "G23": 11.0,
-    "angle": -20.0, "expansion": [4.0, 6.0, -2.0],
-}  # fmt: skip
-CARBON = {
-    "E_axial": 235.0, "E_transverse": 14.0, "nu_axial": 0.2, "nu_transverse": 0.25, "G_axial": 28.0,
-    "expansion_axial": -0.9, "expansion_transverse": 9.0,
-}  # fmt: skip
 CORDIERITE = {"young": 1.0, "poisson": 0.3, "expansion": 1e-7}
 ORTHOTROPIC = {"matrix": WOOD, "fibre": CRYSTAL}
 SPRINGS = {"normal_stiffness": 100.0, "tangential_stiffness": 30.0}
@@ -77,6 +68,12 @@ def test_bonded_cell_has_the_stiffness_of_its_twin(comm, case, sections):
     # The axes of the phases are not those of the cell: nothing vanishes but what has to.
     assert (np.abs(C[np.ix_([0, 1, 2], [5])]) > 1e-3).all() and abs(C[3, 4]) > 1e-3
     assert (C[np.ix_([0, 1, 2, 5], [3, 4])] == 0).all()
+
+
+def test_three_phases_of_a_users_mesh(comm):
+    phases = {"matrix": WOOD, "fibre": CRYSTAL, "fibre:2": CARBON}
+    cell = {"geometry": "mesh", "file": "two_fibres.msh", "folder": MESHES, "order": 2}
+    compare(comm, sections={"material": phases}, **cell)
 
 
 @pytest.mark.parametrize("contrast", [1e-6, 1e-3, 1e3, 1e6])
