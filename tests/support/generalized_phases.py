@@ -15,3 +15,6 @@ CARBON = {
     "E_axial": 235.0, "E_transverse": 14.0, "nu_axial": 0.2, "nu_transverse": 0.25, "G_axial": 28.0,
     "expansion_axial": -0.9, "expansion_transverse": 9.0,
 }  # fmt: skip
+CARBON_EPOXY = {"young": 4.8, "poisson": 0.34, "expansion": 54.0}
+ALUMINIUM = {"young": 68.3, "poisson": 0.3, "expansion": 23.0}
+BORON = {"young": 379.3, "poisson": 0.1, "expansion": 8.1}
