@@ -37,26 +37,34 @@ def _constants(constants: Document | None, unit: str) -> list[str]:
 
 
 def _estimates(document: Document, unit: str) -> list[str]:
-    """A row for this cell, each method and the bounds; a column for each constant that one of them tells."""
+    """A row for each source that tells a constant, a column for each constant that one of them tells."""
     cell = document.get("transversely_isotropic")
     if cell is None:
         return []
-    bounds = document.get("fibre_bounds") or {}
-    pairs = {name: pair for name, pair in bounds.items() if pair is not None}
-    rows = {THIS_CELL: cell} | {name.replace("_", " "): row for name, row in (document.get("estimates") or {}).items()}
-    if pairs:
-        rows |= {word: {name: pair[k] for name, pair in pairs.items()} for k, word in enumerate((LOWER, UPPER))}
-    names = [name for name in SHORT if any(row.get(name) is not None for row in rows.values())]
+    rows = {title: _known(row) for title, row in _sources(document).items()}
+    names = [name for name in SHORT if any(name in row for row in rows.values())]
     lines = [
         f"Along the fibres and across them{unit}; {100 * cell['deviation']:.2g} % from transversely isotropic",
         " " * NAME + "".join(f"{SHORT[name]:>{COLUMN + 1}}" for name in names),
     ]
     for title, row in rows.items():
-        if any(row.get(name) is not None for name in names):
+        if row:
             lines.append(
                 f"  {title:<{NAME - 2}}" + "".join(f"{_number(row.get(name)):>{COLUMN + 1}}" for name in names)
             )
     return lines
+
+
+def _sources(document: Document) -> dict[str, Document]:
+    """The constants of this cell, by each method, and the bounds."""
+    bounds = _known(document.get("fibre_bounds") or {})
+    sources = {THIS_CELL: document["transversely_isotropic"]}
+    sources |= {name.replace("_", " "): row for name, row in (document.get("estimates") or {}).items()}
+    return sources | {word: {name: bounds[name][k] for name in bounds} for k, word in enumerate((LOWER, UPPER))}
+
+
+def _known(row: Document) -> dict[str, Any]:
+    return {name: value for name, value in row.items() if value is not None}
 
 
 def _number(value: float | None) -> str:
