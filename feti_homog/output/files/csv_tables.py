@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterator, Mapping, Sequence, Set
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_type_hints
@@ -26,7 +26,8 @@ class Column:
 def columns(kind: type) -> Iterator[Column]:
     """The columns that a record of this class fills: the reference table of its file."""
     for name, description in _in_columns(kind).items():
-        for component in dict.fromkeys((*_names(name, description), *description.spatial_components)):
+        # Those in the plane are among those in space, in the same order.
+        for component in description.spatial_components or _names(name, description):
             words = f"{component}, {description.meaning}" if description.components else description.meaning
             yield Column(component, description.unit, words)
 
@@ -42,7 +43,7 @@ def write(path: Path, points: Sequence[Any]) -> Path:
     described = _in_columns(type(points[0])) if points else {}
     rows = [_row(point, described) for point in points]
     there = {name for row in rows for name in row}
-    names = [column for name, d in described.items() for column in _in_order(_names(name, d), d, there)]
+    names = [column.name for column in columns(type(points[0])) if column.name in there] if rows else []
 
     def write_rows(part: Path) -> None:
         with part.open("w", newline="", encoding="utf-8") as stream:
@@ -56,12 +57,6 @@ def write(path: Path, points: Sequence[Any]) -> Path:
 def _names(name: str, description: Description) -> tuple[str, ...]:
     """The columns of a field, of an array those of its components in the plane."""
     return description.components or (name,)
-
-
-def _in_order(names: Sequence[str], description: Description, there: Set[str]) -> list[str]:
-    """Those of a field that have numbers."""
-    spatial = description.spatial_components
-    return [name for name in (spatial if spatial and there >= set(spatial) else names) if name in there]
 
 
 def _row(point: Any, described: Mapping[str, Description]) -> dict[str, Any]:

@@ -23,7 +23,9 @@ def outputs(document: Document) -> dict[str, float]:
         found |= {f"{entry}{suffix}": value for entry, value in _entries(document.get(name, ())).items()}
     found |= _thermal(document)
     found |= _anisotropy(document.get("effective_stiffness"))
-    found |= document.get("moduli", {}) | _bounds(document.get("bounds", {}))
+    for section in ("moduli", "constants", "transversely_isotropic"):
+        found |= {name: value for name, value in document.get(section, {}).items() if value is not None}
+    found |= _bounds(document.get("bounds", {}))
     found |= _angles(document.get("angle", ())) | _path(document.get("path", ()))
     found |= {f"check_{name}": error for name, error in document["checks"].items()}
     found |= {f"seconds_{stage}": took for stage, took in document["timings"].items()}
