@@ -3,7 +3,7 @@
     mpirun -n 2 .venv/bin/python drivers/micromechanics.py --out results/micromechanics
 
 The comparison that the paper's conclusion asks for.  Long fibres (plane = "generalized") in square, hexagonal and
-random cells; each cell's constants are those of the nearest transversely isotropic material, random ones the mean over seeds.
+random cells; constants are those of the nearest transversely isotropic material, of random cells the mean over seeds.
 Every result has the estimates beside its own constants; nothing but the phases and their fractions enters them.
 """
 

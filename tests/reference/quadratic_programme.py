@@ -77,7 +77,7 @@ class QuadraticProgramme:
         self.matrix, self.fibre_node = on_matrix, on_fibre
         self.key, self.middle = classes[on_fibre, 1], middle[on_fibre]
         self.pinned = int(np.setdiff1d(np.flatnonzero(matrix), on_matrix)[0])
-        fibre, arm = _nearest(self.points, np.asarray(centres), np.asarray(radii), self.size)
+        fibre, arm = nearest(self.points, np.asarray(centres), np.asarray(radii), self.size)
         self.fibre, self.radius = fibre[on_fibre], np.asarray(radii)[fibre[on_fibre]]
         self.normal = arm[on_fibre] / np.hypot(*arm[on_fibre].T)[:, None]
         self.angle = np.degrees(np.arctan2(*arm[on_fibre].T[::-1]))
@@ -106,7 +106,7 @@ class QuadraticProgramme:
         free = np.flatnonzero(~bonded) if contact else np.zeros(0, int)
         K, f = (T.T @ self.K @ T).tocsc() / self.scale, -T.T @ (self.Q @ strain) / self.scale
         C = (self._gaps(free) @ T).tocsr()
-        v, pressure = _minimise(K, f, C, lambda active: self._free_motions(T, bonded, C[active]), reach)
+        v, pressure = minimise(K, f, C, lambda active: self._free_motions(T, bonded, C[active]), reach)
         u = T @ v
         residual = self.K @ u + self.Q @ strain
         energy = strain @ self.mean @ strain / 2 + strain @ self.Q.T @ u + u @ (self.K @ u) / 2
@@ -138,7 +138,7 @@ class QuadraticProgramme:
             rigid = self._free_motions(T, bonded, gaps[active])
             return np.concatenate([rigid, np.zeros((len(free), rigid.shape[1]))])
 
-        v, pressure = _minimise(K, f, C, motions, reach)
+        v, pressure = minimise(K, f, C, motions, reach)
         u, give = T @ v[: T.shape[1]], v[T.shape[1] :]
         energy = strain @ self.mean @ strain / 2 + strain @ self.Q.T @ u + u @ (whole @ u) / 2
         energy += springs[0] * lengths[free] @ give**2 / 2
@@ -187,7 +187,7 @@ class QuadraticProgramme:
         return csr_matrix((values.ravel(), (rows, columns.ravel())), shape=(k, 2 * self.n))
 
 
-def _nearest(points, centres, radii, size):
+def nearest(points, centres, radii, size):
     """The circle to which each point is nearest, and the arm from its centre."""
     arm = points[:, None] - centres
     arm -= np.round(arm / size) * size
@@ -195,7 +195,7 @@ def _nearest(points, centres, radii, size):
     return fibre, arm[np.arange(len(arm)), fibre]
 
 
-def _minimise(K, f, C, free_motions, reach):
+def minimise(K, f, C, free_motions, reach):
     """min v.K.v / 2 - f.v, C v >= 0: v and the forces of the constraints; gaps up to EXACT * reach are zero.
 
     `free_motions` gives the null vectors of K on the active constraints.

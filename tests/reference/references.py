@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 
 @dataclass(frozen=True)
 class Reference:
@@ -87,4 +89,32 @@ DEBONDED_FIBRE_TOTAL = {
     60: Reference((0.6860,), 4e-4, "the same"),
     80: Reference((0.6085,), 4e-4, "the same"),
     100: Reference((0.3563,), 4e-4, "the same"),
+}
+
+# Long fibres in space, axis 1 the fibre: E1, E2, G12, G23, nu12, nu23 in GPa, and expansions along 1 and 2 in 1e-6 / K.
+# (composite, cell, fibre fraction).
+ENGINEERING_CONSTANTS = {
+    ("boron/aluminium", "square", 0.47): Reference(
+        (215.334687, 143.955632, 54.3778718, 45.8243281, 0.194557155, 0.255133319, 10.9936815, 16.694874), 5e-7, SERIES
+    ),
+    ("boron/aluminium", "hexagonal", 0.47): Reference(
+        (215.307177, 133.069989, 54.0482814, 50.7902548, 0.194921198, 0.309995291, 10.981677, 16.7314181), 5e-7, SERIES
+    ),
+    ("AS4/3501-6", "hexagonal", 0.60): Reference(
+        (142.94677, 9.1812952, 5.8190872, 3.3297852, 0.25254888, 0.37866177, -0.077455915, 32.689245), 5e-7, SERIES
+    ),
+    ("glass/epoxy", "hexagonal", 0.55): Reference(
+        (41.720812, 10.536603, 3.8936826, 3.7134324, 0.27089118, 0.41871477, 7.0467124, 30.341346), 5e-7, SERIES
+    ),
+}
+
+# (cell, fibre fraction): axial shear modulus over that of the matrix at the contrasts 2, 10, 50 and infinity.
+AXIAL_SHEAR_CONTRASTS = (2.0, 10.0, 50.0, np.inf)
+AXIAL_SHEAR = {
+    ("square", 0.1): Reference((1.068966, 1.178222, 1.212588, 1.222230), 1e-6, SERIES),
+    ("square", 0.5): Reference((1.401025, 2.415467, 2.914594, 3.080198), 1e-6, SERIES),
+    ("square", 0.7): Reference((1.615384, 4.061707, 6.335921, 7.432709), 1e-6, SERIES),
+    ("hexagonal", 0.3): Reference((1.222224, 1.650634, 1.809975, 1.857210), 1e-6, SERIES),
+    ("hexagonal", 0.5): Reference((1.400063, 2.386467, 2.852937, 3.004726), 1e-6, SERIES),
+    ("hexagonal", 0.8): Reference((1.729477, 4.948865, 8.260013, 9.958625), 1e-6, SERIES),
 }

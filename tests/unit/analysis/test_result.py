@@ -139,6 +139,17 @@ def test_columns_are_those_of_the_table(tmp_path, kind, points):
         assert [row.split(",")[column] for row in rows] == ["", "1.25"]
 
 
+def test_columns_of_long_fibres(tmp_path):
+    C = np.arange(36.0).reshape(6, 6)
+    point = AnglePoint(angle=0.0, stiffness=C, thermal_stress=-np.arange(6.0), **DEBONDING, **COUNTS)
+    header, row = csv_tables.write(tmp_path / "table.csv", [point]).read_text().splitlines()
+    written = dict(zip(header.split(","), row.split(","), strict=True))
+    assert len(written) == len(header.split(","))
+    assert [float(written[f"C{i}{j}"]) for i in range(1, 7) for j in range(1, 7)] == C.ravel().tolist()
+    assert written["thermal_S11"] == "-0.0" and float(written["thermal_S12"]) == -5.0
+    assert written.keys() <= {column.name for column in csv_tables.columns(AnglePoint)}
+
+
 def test_points_are_arrays():
     points = RESULTS["path"].points
     assert points["strain"].shape == (2, 3) and points["load_factor"].tolist() == [0.5, 1.0]

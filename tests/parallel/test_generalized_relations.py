@@ -1,0 +1,187 @@
+"""Generalized plane strain against exact relations, on coarse meshes and at any number of ranks.
+
+Where the fields of two phases are uniform, or those of layers, finite elements of any size have no error.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from reference.spatial_forms import (
+    IN_PLANE,
+    ONES,
+    axial_constants,
+    axial_shear_modulus,
+    hill,
+    laminate,
+    law,
+    levin,
+    rotated,
+    rotated_strain,
+)
+from support.generalized_phases import CARBON, CRYSTAL, WOOD
+from support.spatial_cells import EPOXY, GLASS, error, solved
+from unit.cell.faulty_meshes import FIBRE, MATRIX, N, grid
+
+pytestmark = pytest.mark.parallel
+
+EXACT = 1e-9
+MESHES = Path(__file__).parents[2] / "meshes"
+ARRANGEMENTS = {
+    "square": {"geometry": "square"},
+    "hexagonal": {"geometry": "hexagonal", "order": 2, "mesh_size": 0.3},
+    "random": {"geometry": "random", "fibres": 3, "min_gap": 0.1, "seed": 5, "bodies": "plane"},
+    "file": {"geometry": "mesh", "file": "two_fibres.msh", "folder": MESHES},
+}
+
+
+def fractions(result):
+    """(2,) shares of matrix and fibres in the meshed area."""
+    return np.array([1.0 - result.cell.fibre_fraction, result.cell.fibre_fraction])
+
+
+def bulk_modulus(C):
+    """K23: mean stress over twice the strain across under hydrostatic stress, without strain along x3."""
+    return 1 / np.linalg.inv(C[np.ix_(IN_PLANE, IN_PLANE)])[:2, :2].sum()
+
+
+@pytest.mark.quick
+@pytest.mark.parametrize("cell", ARRANGEMENTS.values(), ids=ARRANGEMENTS)
+@pytest.mark.parametrize("fibre", [GLASS, CARBON], ids=["glass", "carbon"])
+def test_axial_constants_follow_from_the_bulk_modulus(comm, cell, fibre):
+    result = solved(comm, fibre=fibre, **cell)
+    S, c = result.compliance, fractions(result)
+    E, nu = hill(EPOXY, fibre, c, bulk_modulus(result.effective_stiffness))
+    assert 1 / S[2, 2] == pytest.approx(E, rel=EXACT)
+    # The mean of both directions, if the arrangement has no axis.
+    assert -(S[0, 2] + S[1, 2]) / (2 * S[2, 2]) == pytest.approx(nu, rel=EXACT)
+
+
+@pytest.mark.parametrize("cell", ARRANGEMENTS.values(), ids=ARRANGEMENTS)
+@pytest.mark.parametrize("fibre", [GLASS, CARBON], ids=["glass", "carbon"])
+def test_a_stress_that_all_phases_share_is_found_exactly(comm, cell, fibre):
+    """Strains [e, e, E33] that make the same stress across in both phases are uniform."""
+    result = solved(comm, fibre=fibre, **cell)
+    _, nu, k = np.transpose([axial_constants(EPOXY), axial_constants(fibre)])
+    across = -(k[1] * nu[1] - k[0] * nu[0]) / (k[1] - k[0])
+    E = np.array([across, across, 1.0, 0, 0, 0])
+    stresses = [law(phase)[0] @ E for phase in (EPOXY, fibre)]
+    assert stresses[0][:2] == pytest.approx(stresses[1][:2], rel=1e-12)
+    expected = fractions(result) @ stresses
+    assert error(result.effective_stiffness @ E, expected) < EXACT
+
+
+@pytest.mark.parametrize("cell", ARRANGEMENTS.values(), ids=ARRANGEMENTS)
+@pytest.mark.parametrize(
+    "phases", [(EPOXY, GLASS), (EPOXY, CARBON), (WOOD, CRYSTAL)], ids=["isotropic", "carbon", "orthotropic"]
+)
+def test_expansion_follows_from_the_compliance(comm, cell, phases):
+    result = solved(comm, matrix=phases[0], fibre=phases[1], **cell)
+    expected = levin(*phases, fractions(result), result.compliance)
+    assert error(result.thermal_expansion, expected) < EXACT
+    # The definition: no stress under these strains and a unit of temperature.
+    free = result.effective_stiffness @ result.thermal_expansion + result.thermal_stress
+    assert np.abs(free).max() < EXACT * np.abs(result.thermal_stress).max()
+
+
+@pytest.mark.parametrize("phase", [EPOXY, CARBON, WOOD, CRYSTAL], ids=["epoxy", "carbon", "wood", "crystal"])
+@pytest.mark.parametrize("cell", [ARRANGEMENTS["square"], ARRANGEMENTS["hexagonal"]], ids=["square", "hexagonal"])
+def test_homogeneous_cell_is_its_phase(comm, cell, phase):
+    result = solved(comm, matrix=phase, fibre=phase, **cell)
+    C, alpha = law(phase)
+    assert error(result.effective_stiffness, C) < EXACT and error(result.thermal_expansion, alpha) < EXACT
+    assert error(result.compliance, np.linalg.inv(C)) < EXACT
+    # Nothing but what has to vanishes, so that no entry can stand for another.
+    if "E1" in phase:
+        entries = np.abs(C[np.triu_indices(6)])
+        assert len(np.unique(entries[entries > 0].round(9))) == 13
+
+
+def test_homogeneous_cell_without_a_plane_of_symmetry_across(comm):
+    C = np.diag([30.0, 20.0, 25.0, 4.0, 6.0, 9.0])
+    C[np.triu_indices(6, 1)] = [11.0, 7.0, 0, 0, 1.5, 8.0, 0, 0, -2.0, 0, 0, 0.7, 1.1, 0, 0]
+    C = np.triu(C) + np.triu(C, 1).T
+    phase = {"stiffness": C.tolist(), "expansion": [1.0, -2.0, 3.0]}
+    result = solved(comm, matrix=phase, fibre=phase, mesh_size=0.3)
+    assert error(result.effective_stiffness, C) < EXACT
+    assert error(result.thermal_expansion, np.array([1.0, -2.0, 3.0, 0, 0, 0])) < EXACT
+
+
+def strips(where):
+    """A mesh of a 4 x 4 grid with a quarter of fibre: straight strips, or strips along the diagonal."""
+    if where == "diagonal":
+        mesh = grid(lambda x, y: int(N * x) == int(N * y))
+        # The upper halves beside the strip take the place of those in it.
+        upper = {2 * (i + N * j) + 2: (j - i) % N for i in range(N) for j in range(N)}
+        phase = {tag: FIBRE if across == N - 1 else MATRIX for tag, across in upper.items()}
+        elements = {tag: (e[0], phase.get(tag, e[1]), phase.get(tag, e[2]), e[3]) for tag, e in mesh.elements.items()}
+        return replace(mesh, elements=elements)
+    return grid((lambda x, y: 0.25 < x < 0.5) if where == 0 else (lambda x, y: 0.25 < y < 0.5))
+
+
+def written(comm, folder, where):
+    """The mesh file of `strips`, as keys of a cell.  Collective."""
+    if comm.rank == 0:
+        strips(where).write(folder / "strips.msh")
+    comm.barrier()
+    return {"geometry": "mesh", "file": "strips.msh", "folder": folder}
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("across", [0, 1])
+@pytest.mark.parametrize("springs", [None, (700.0, 150.0), (3.0, 0.2)], ids=str)
+def test_laminate_is_exact(comm, shared_path, across, order, springs):
+    keys = ("normal_stiffness", "tangential_stiffness")
+    sections = {"interface": dict(zip(keys, springs, strict=True))} if springs else {}
+    cell = written(comm, shared_path, across)
+    result = solved(comm, matrix=WOOD, fibre=CRYSTAL, order=order, sections=sections, **cell)
+    C, thermal = laminate([law(WOOD), law(CRYSTAL)], [0.75, 0.25], across, springs or (np.inf, np.inf))
+    assert error(result.effective_stiffness, C) < EXACT and error(result.thermal_stress, thermal) < EXACT
+
+
+def test_laminate_along_a_diagonal_is_exact(comm, shared_path):
+    result = solved(comm, matrix=WOOD, fibre=CRYSTAL, **written(comm, shared_path, "diagonal"))
+    # Normal to (1, -1): a laminate normal to x1 of phases that are turned back, turned by -45 degrees.
+    turn = -np.pi / 4
+    phases = [(rotated(C, -turn), rotated_strain(alpha, -turn)) for C, alpha in (law(WOOD), law(CRYSTAL))]
+    C, thermal = laminate(phases, fractions(result), 0)
+    expansion = rotated_strain(-np.linalg.solve(C, thermal), turn)
+    assert fractions(result) == pytest.approx([0.75, 0.25])
+    assert error(result.effective_stiffness, rotated(C, turn)) < EXACT
+    assert error(result.thermal_expansion, expansion) < EXACT
+
+
+def test_phases_of_one_expansion_expand_alike(comm):
+    result = solved(comm, matrix=EPOXY | {"expansion": 7.0}, fibre=GLASS | {"expansion": 7.0}, geometry="hexagonal")
+    assert error(result.thermal_expansion, 7.0 * ONES) < EXACT
+
+
+@pytest.mark.parametrize("springs", [1e-3, 1.0, 1e3])
+def test_expansion_on_springs_is_that_of_any_phases_of_one_expansion(comm, springs):
+    """Every stretch of the same size in all directions leaves springs alone."""
+    sections = {"interface": {"normal_stiffness": springs, "tangential_stiffness": springs / 3}}
+    phases = {"matrix": EPOXY | {"expansion": 7.0}, "fibre": GLASS | {"expansion": 7.0}}
+    result = solved(comm, **phases, sections=sections, geometry="hexagonal")
+    assert error(result.thermal_expansion, 7.0 * ONES) < 1e-8
+
+
+@pytest.mark.parametrize("geometry", ["square", "hexagonal"])
+@pytest.mark.parametrize(("order", "rate"), [(1, 1.8), (2, 3.5)])
+def test_axial_shear_obeys_duality(comm, geometry, order, rate):
+    """G(e) G(1/e) = G_m^2 of matrix and fibre with contrast e and 1/e (Keller 1964), in the limit."""
+    errors = []
+    for refine in (0, 1):
+        G = []
+        for contrast in (12.0, 1 / 12.0):
+            fibre = {"young": contrast, "poisson": 0.25}
+            cell = {"mesh_size": 0.15 * order, "refine": refine, "order": order, "geometry": geometry}
+            C = solved(comm, matrix={"young": 1.0, "poisson": 0.25}, fibre=fibre, **cell).effective_stiffness
+            G.append(C[3:5, 3:5])
+        # In any arrangement G(1/e) = G_m^2 R^T G(e)^-1 R with a quarter turn R.
+        product = G[0] @ [[0, -1], [1, 0]] @ G[1] @ [[0, 1], [-1, 0]]
+        errors.append(np.abs(product * (2 * 1.25) ** 2 - np.eye(2)).max())
+    assert errors[1] < 1e-2 and np.log2(errors[0] / errors[1]) > rate
+    assert axial_shear_modulus(geometry, 0.4, 12.0) * axial_shear_modulus(geometry, 0.4, 1 / 12) == pytest.approx(1.0)
