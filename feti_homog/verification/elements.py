@@ -32,8 +32,8 @@ class ElementFields:
 
     Attributes:
         strain, stress: (m, v) means.
-        strain_size: (m,) sum t_a |dN_a/dx| with the terms t of u, and the other strains, of whose rounding the strain
-            has its share.
+        strain_size: (m,) sum t_a |dN_a/dx| with the terms t of u, du/dx times the same of places, and the other
+            strains, of whose rounding the strain has its share.
         force: (n, c) int B^T sigma, what the elements of a node resist with.
         force_size: the largest sum of |dN/dx| |L| strain_size over the elements of a node, of whose rounding the forces
             have their share: large where a phase is far stiffer than it is strained.
@@ -94,7 +94,7 @@ class Elements:
             answer = np.einsum("eij,eqj->eqi", self._stiffnesses[self._mesh.phase[part]], local - own_free[:, None])
             strain[part], stress[part] = (np.einsum("eqi,eq->ei", field, share) for field in (local, answer))
             size[part] = np.einsum("eqad,eai->eq", np.abs(gradients), terms_of_u[nodes]).max(axis=1)
-            size[part] += abs(along) + np.abs(own_free).max(axis=1)
+            size[part] += self._rounded_places(part, gradients, slope) + abs(along) + np.abs(own_free).max(axis=1)
             tensor = answer[..., PLACES[v]]
             own = np.einsum("eqad,eqid,eq->eai", gradients, tensor, weights, optimize=True)
             _add(force, nodes, own)
@@ -103,6 +103,12 @@ class Elements:
             largest = max(largest, float(np.abs(own).max()))
             energy += float(np.einsum("eqi,eqi,eq->", answer, local, weights, optimize=True))
         return ElementFields(strain, stress, size, force, float(terms.max()), largest, energy)
+
+    def _rounded_places(self, part: slice, gradients: Float, slope: Float) -> Float:
+        """(e,) |du/dx| sum |x_a| |dN_a/dx|: gradients are off by the rounding of places, in small elements most."""
+        places = np.abs(self._mesh.points)[self._mesh.triangles[part]]
+        lengths = np.einsum("eqad,ead->eq", np.abs(gradients), places)
+        return np.asarray((np.abs(slope).max(axis=(2, 3)) * lengths).max(axis=1))
 
     def _parts(self) -> Iterator[tuple[slice, Float, Float]]:
         """Elements in portions, with gradients (e, q, a, 2) and weights (e, q) at their quadrature points."""
