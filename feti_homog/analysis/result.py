@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from feti_homog.analysis.result_fields import Fields
 from feti_homog.analysis.result_html import tables
 from feti_homog.analysis.result_records import (
+    EITHER_STIFFNESS,
     AnglePoint,
     CellInfo,
     Checks,
@@ -40,9 +41,11 @@ class Result:
     Printed, it is a short summary; in a notebook, tables.  `schema_keys` lists all that is written.
 
     Attributes:
-        effective_stiffness: (3, 3) L^ef, its columns the stresses under the unit strains; of analysis "stiffness".
-        effective_stiffness_compression: (3, 3) the same under minus the unit strains, where debonded faces touch
-            without tension.
+        effective_stiffness: (3, 3), of generalized plane strain (6, 6), L^ef, its columns the stresses under the unit
+            strains; of analysis "stiffness".
+        effective_stiffness_compression: the same under minus the unit strains, where debonded faces touch without
+            tension.
+        compliance, thermal_stress, thermal_expansion: of generalized plane strain, (6, 6) and (6,), else None.
         moduli, bounds: of perfectly bonded cells, else None.
         tips: energy release rates of a stiffness with debonded arcs, else None; those of an angle are in its points.
         angle, path: the points of these analyses, else None; `points` has them as arrays.
@@ -65,10 +68,10 @@ class Result:
     moduli: Moduli | None = described("engineering moduli of a perfectly bonded cell", default=None)
     bounds: StiffnessBounds | None = described("bounds of a perfectly bonded cell", default=None)
     effective_stiffness: Float | None = described(
-        "L^ef: columns are the stresses under the unit strains", STRESS, "(3, 3)", default=None
+        "L^ef: columns are the stresses under the unit strains", STRESS, EITHER_STIFFNESS, default=None
     )
     effective_stiffness_compression: Float | None = described(
-        "the same under minus the unit strains, with contact", STRESS, "(3, 3)", default=None
+        "the same under minus the unit strains, with contact", STRESS, EITHER_STIFFNESS, default=None
     )
     compliance: Float | None = described(
         "of generalized plane strain: inverse of L^ef", f"1 / {STRESS}", "(6, 6)", default=None
@@ -129,8 +132,9 @@ class Result:
     def points(self) -> dict[str, NDArray[Any]]:
         """Arrays over the n points of an angle or a path by name, empty for other analyses.
 
-        `angle` or `load_factor` (n,), `strain` and `stress` (n, 3), `stiffness` (n, 3, 3), `debonded_length` (n, f),
-        `bonded`, `open`, `closed`, ... (n,); NaN where a point has no such number.  The tips are in the points alone.
+        `angle` or `load_factor` (n,), `strain` and `stress` (n, 3), `stiffness` (n, 3, 3) or (n, 6, 6),
+        `debonded_length` (n, f), `bonded`, `open`, `closed`, ... (n,); NaN where a point has no such number.  The tips
+        are in the points alone.
         """
         documents = [plain(point) for point in (*(self.angle or ()), *(self.path or ()))]
         names = dict.fromkeys(name for point in documents for name in point if name != "tips")

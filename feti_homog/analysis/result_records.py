@@ -1,6 +1,7 @@
 """The records that result.json consists of; `result.Result` has them all.
 
-Strains are [E11, E22, gamma12], stresses [S11, S22, S12], in the unit of the moduli, per unit of depth.
+Strains are [E11, E22, gamma12], stresses [S11, S22, S12], in the unit of the moduli, per unit of depth; of generalized
+plane strain [E11, E22, E33, gamma23, gamma13, gamma12] and [S11, S22, S33, S23, S13, S12].
 """
 
 from __future__ import annotations
@@ -10,15 +11,10 @@ from dataclasses import dataclass
 
 from feti_homog.common.records import DEGREES, LENGTH, STRESS, described, plain
 from feti_homog.mechanics.bounds import Bounds
-from feti_homog.mechanics.voigt import (
-    SPATIAL_STIFFNESSES,
-    SPATIAL_THERMAL_STRESSES,
-    STIFFNESSES,
-    STRAINS,
-    STRESSES,
-)
+from feti_homog.mechanics.voigt import SPATIAL_STIFFNESSES, SPATIAL_STRESSES, STIFFNESSES, STRAINS, STRESSES
 from feti_homog.typing import Float
 
+EITHER_STIFFNESS = "(3, 3) or (6, 6)"
 ENERGY = f"{STRESS} times that of the cell"
 DEBONDED_ANGLE = (
     "the same in degrees of arc, `debonded_length` / radius; of a fibre that is not round 360 times the share of its "
@@ -145,19 +141,18 @@ class AnglePoint:
 
     angle: float = described("opening of the arcs without an angle of their own", DEGREES)
     stiffness: Float | None = described(
-        "L^ef, if no strain is given; (6, 6) in generalized plane strain",
+        "L^ef, if no strain is given",
         STRESS,
-        "(3, 3)",
+        EITHER_STIFFNESS,
         STIFFNESSES,
-        spatial=SPATIAL_STIFFNESSES,
+        spatial_components=SPATIAL_STIFFNESSES,
         default=None,
     )
     thermal_stress: Float | None = described(
-        "in generalized plane strain the stress under a unit of temperature at no strain, of phases whose expansion is "
-        "given",
+        "stress under a unit of temperature at no strain, of generalized plane strain",
         f"{STRESS} per unit of temperature",
         "(6,)",
-        SPATIAL_THERMAL_STRESSES,
+        tuple(f"thermal_{name}" for name in SPATIAL_STRESSES),
         default=None,
     )
     strain: Float | None = described("macroscopic strain that is given", "", "(3,)", STRAINS, default=None)

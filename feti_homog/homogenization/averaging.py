@@ -14,11 +14,9 @@ from mpi4py import MPI
 
 from feti_homog.common.distributed_arrays import allreduce_sum
 from feti_homog.errors import ConvergenceError
-from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.operators.node_blocks import NodeBlocks
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface.contact import BONDED, CLOSED, OPEN, Equilibrium, Interface, Status
-from feti_homog.mechanics.voigt import strain_tensor
 from feti_homog.typing import Float
 
 
@@ -120,32 +118,35 @@ class Homogenization:
     def _strain_of_jumps(self) -> Float:
         """(owned rows, m) nu with int eps* = nu^T B u for every displacement u: nu = (B B^T)^-1 B int B_e."""
         solver = self.cell.solver
-        B, m = solver.interface_operators.B, solver.problem.strains
-        unit = [np.linalg.solve(s.L[:m, :m], Q[:, :m].T).T for s, Q in self._loads()]
-        integrals = solver.jump_operator.sum(B @ np.concatenate([np.zeros((0, m)), *unit]))
-        gram = NodeBlocks(self.cell.comm, self.cell.solver.jump_operator, B @ B.T)
+        B = solver.interface_operators.B
+        integrals = solver.jump_operator.sum(B @ self._strain_of_displacements)
+        gram = NodeBlocks(self.cell.comm, solver.jump_operator, B @ B.T)
         return np.asarray(gram.inverse(np.ones(gram.rows)) @ integrals)
+
+    @cached_property
+    def _strain_of_displacements(self) -> Float:
+        """(boundary dofs, m) Q L^-1 of the uniform bodies: int eps* is its transpose times u."""
+        solver = self.cell.solver
+        m, slices = solver.problem.strains, solver.interface_operators.slices
+        pairs = zip(self.cell.subdomains, slices, strict=True)
+        return np.concatenate(
+            [np.zeros((0, m)), *(np.linalg.solve(s.L[:m, :m], solver.loads[own, :m].T).T for s, own in pairs)]
+        )
+
+    @cached_property
+    def _stiffness_of_bodies(self) -> Float:
+        """(v, v) sum |Omega_s| L_s of this rank's subdomains."""
+        v = len(self.loads)
+        return sum((s.area * s.L for s in self.cell.subdomains), np.zeros((v, v)))
 
     def _averages(self, E: Float, u: Float) -> tuple[Float, Float, float]:
         """<sigma>, <eps*> over the bodies, and <sigma:eps>; collective."""
-        cell, v, m = self.cell, len(E), self.cell.solver.problem.strains
-        sums = np.zeros(v + m + 1)
-        for (s, Q), span in zip(self._loads(), cell.solver.interface_operators.slices, strict=True):
-            from_u = Q.T @ u[span]
-            sums[:v] += s.area * s.L @ E + from_u
-            sums[v : v + m] += np.linalg.solve(s.L[:m, :m], from_u[:m])
-            sums[-1] += s.area * E @ s.L @ E + 2 * E @ from_u
-        sums[-1] += u @ cell.solver.interface_operators.apply_schur(u)
+        cell, v = self.cell, len(E)
+        without_u, from_u = self._stiffness_of_bodies @ E, cell.solver.loads.T @ u
+        energy = E @ without_u + 2 * E @ from_u + u @ cell.solver.interface_operators.apply_schur(u)
+        sums = np.concatenate([without_u + from_u, self._strain_of_displacements.T @ u, [energy]])
         sums = allreduce_sum(cell.comm, sums) / cell.summary.area
-        return sums[:v], sums[v : v + m], float(sums[-1])
-
-    def _loads(self) -> list[tuple[Subdomain, Float]]:
-        """The subdomains and their Q on the boundary dofs; inside a uniform body it vanishes."""
-        solver = self.cell.solver
-        return [
-            (s, solver.loads[span])
-            for s, span in zip(solver.subdomains, solver.interface_operators.slices, strict=True)
-        ]
+        return sums[:v], sums[v:-1], float(sums[-1])
 
     def _largest(self, values: Float) -> float:
         """max |values| over all ranks."""
@@ -158,13 +159,15 @@ def asymmetry(L: Float) -> float:
 
 
 def displacement(cell: TornCell, strain: Float, u: Float) -> Float:
-    """(nodes, 2) total displacement E y + u*, Eq. (14), at this rank's plane nodes."""
+    """(nodes, c) total displacement H y + u*, Eq. (14), at this rank's plane nodes; H y of the strains in the loads."""
     points = np.concatenate([s.mesh.points for s in cell.subdomains] or [np.zeros((0, 2))])
-    return np.asarray(points @ strain_tensor(strain) + fluctuation(cell, u))
+    problem = cell.solver.problem
+    imposed = points @ problem.gradient(strain[: problem.strains]).T
+    return np.asarray(imposed + fluctuation(cell, u))
 
 
 def fluctuation(cell: TornCell, u: Float) -> Float:
-    """(nodes, 2) u* at this rank's plane nodes."""
-    parts = zip(cell.subdomains, cell.offsets, strict=False)
-    own = [u[o : o + len(s.Q)].reshape(-1, 2)[s.mesh.node_class] for s, o in parts]
-    return np.concatenate(own or [np.zeros((0, 2))])
+    """(nodes, c) u* at this rank's plane nodes."""
+    parts, c = zip(cell.subdomains, cell.offsets, strict=False), cell.solver.problem.components
+    own = [u[o : o + len(s.Q)].reshape(-1, c)[s.mesh.node_class] for s, o in parts]
+    return np.concatenate(own or [np.zeros((0, c))])

@@ -16,13 +16,14 @@ class BorderedInverse:
     Attributes:
         members: (k,) C, in the order of the rows of N.
         N: (k, k).
+        M: (k, k) M[C, C].
     """
 
     def __init__(self, comm: MPI.Intracomm) -> None:
         """No members yet."""
         self._comm = comm
         self.members: Int = np.zeros(0, np.int64)
-        self.N = np.zeros((0, 0))
+        self.N = self.M = np.zeros((0, 0))
 
     def append(self, M: Float, new: Int, sign: int) -> None:
         """Border with the members `new`, on which `sign` M, Schur's complement of the others, is semi-definite.
@@ -53,6 +54,7 @@ class BorderedInverse:
         N[:k, :k] += self.N
         N[:k, k:], N[k:, :k], N[k:, k:] = -scaled, -scaled.T, inverse
         self.N, self.members = N, np.concatenate([self.members, new[kept]])
+        self.M = M[self.members[:, None], self.members]
 
     def remove(self, gone: Int) -> None:
         """Take members out: N <- N_cc - N_cg N_gg^-1 N_gc."""
@@ -62,10 +64,15 @@ class BorderedInverse:
         c, g = np.flatnonzero(~leaves), np.flatnonzero(leaves)
         coupling = self.N[c[:, None], g]
         self.N = self.N[c[:, None], c] - coupling @ np.linalg.solve(self.N[g[:, None], g], coupling.T)
-        self.members = self.members[c]
+        self.members, self.M = self.members[c], self.M[c[:, None], c]
 
-    def holds(self, M: Float) -> bool:
+    def solve(self, b: Float) -> Float:
+        """M[C, C]^-1 b for b (k,) or (k, n), with one step of iterative refinement: borders add up rounding."""
+        x = self.N @ b
+        return np.asarray(x + self.N @ (b - self.M @ x))
+
+    def holds(self) -> bool:
         """Whether M[C, C] N x = x for a vector x, but for rounding, as rank 0 finds.  Collective."""
         x = np.cos(np.arange(float(len(self.members))))
-        off = M[self.members[:, None], self.members] @ (self.N @ x) - x
+        off = self.M @ (self.N @ x) - x
         return bool(self._comm.bcast(bool(np.abs(off).max(initial=0.0) <= INVERSE_ERROR)))

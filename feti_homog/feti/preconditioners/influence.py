@@ -149,7 +149,7 @@ class Influence:
     def _follow(self, changed: Int) -> None:
         """Let N be that of the columns `changed`.  Collective."""
         self._border(changed)
-        if not self._inverse.holds(self._columns.block):
+        if not self._inverse.holds():
             self._inverse, self._dependent = BorderedInverse(self.comm), np.zeros(0, np.int64)
             self._border(changed)
 
@@ -187,7 +187,7 @@ class Influence:
             rows = self._columns.rows[members]
             outside = 1.0 - self.reference.active
             jumps = gather_rows(self.comm, y + scale_rows(outside, g), self._first, rows)
-            c = self._inverse.N @ jumps
+            c = self._inverse.solve(jumps)
             whole = np.zeros((len(self._columns.rows), *y.shape[1:]))
             whole[members] = c
             z = z - scale_rows(self.reference.active, self._columns.owned @ whole)

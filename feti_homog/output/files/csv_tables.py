@@ -26,10 +26,10 @@ class Column:
 def columns(kind: type) -> Iterator[Column]:
     """The columns that a record of this class fills: the reference table of its file."""
     for name, description in _in_columns(kind).items():
-        if not description.components:
-            yield Column(name, description.unit, description.meaning)
-        for component in dict.fromkeys((*description.components, *description.spatial)):
-            yield Column(component, description.unit, f"{component}, {description.meaning}")
+        # Those in the plane are among those in space, in the same order.
+        for component in description.spatial_components or _names(name, description):
+            words = f"{component}, {description.meaning}" if description.components else description.meaning
+            yield Column(component, description.unit, words)
 
 
 def write(path: Path, points: Sequence[Any]) -> Path:
@@ -42,31 +42,32 @@ def write(path: Path, points: Sequence[Any]) -> Path:
     """
     described = _in_columns(type(points[0])) if points else {}
     rows = [_row(point, described) for point in points]
-    filled = (next((row[name] for row in rows if name in row), {}) for name in described)
-    names = [column for cells in filled for column in cells]
+    there = {name for row in rows for name in row}
+    names = [column.name for column in columns(type(points[0])) if column.name in there] if rows else []
 
     def write_rows(part: Path) -> None:
         with part.open("w", newline="", encoding="utf-8") as stream:
             writer = csv.DictWriter(stream, names)
             writer.writeheader()
-            writer.writerows(
-                {column: value for cells in row.values() for column, value in cells.items()} for row in rows
-            )
+            writer.writerows(rows)
 
     return atomic.replace(path, write_rows)
 
 
-def _row(point: Any, described: Mapping[str, Description]) -> dict[str, dict[str, Any]]:
-    """The cells of each field of a record by their columns."""
-    values = ((name, np.ravel(value).tolist()) for name, value in plain(point).items() if name in described)
-    return {name: dict(zip(_names(name, described[name], len(row)), row, strict=True)) for name, row in values}
-
-
-def _names(name: str, description: Description, size: int) -> tuple[str, ...]:
-    """The columns of a field with so many numbers."""
-    if size == len(description.spatial):
-        return description.spatial
+def _names(name: str, description: Description) -> tuple[str, ...]:
+    """The columns of a field, of an array those of its components in the plane."""
     return description.components or (name,)
+
+
+def _row(point: Any, described: Mapping[str, Description]) -> dict[str, Any]:
+    row: dict[str, Any] = {}
+    for name, value in plain(point).items():
+        if name in described:
+            values, components = np.ravel(value).tolist(), _names(name, described[name])
+            if len(values) > len(components):
+                components = described[name].spatial_components
+            row |= dict(zip(components, values, strict=True))
+    return row
 
 
 def _in_columns(kind: type) -> dict[str, Description]:

@@ -1,0 +1,71 @@
+"""Constants of a material in space, and what closed estimates say of them, as blocks of lines for the summary."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+NAME, COLUMN = 22, 12
+THIS_CELL, LOWER, UPPER = "this cell", "lower bound", "upper bound"
+SHORT = {
+    "E_axial": "E axial",
+    "E_transverse": "E transv.",
+    "nu_axial": "nu axial",
+    "nu_transverse": "nu transv.",
+    "G_axial": "G axial",
+    "G_transverse": "G transv.",
+    "K_transverse": "K transv.",
+    "expansion_axial": "exp. axial",
+    "expansion_transverse": "exp. transv.",
+}
+Document = Mapping[str, Any]
+
+
+def constants_blocks(document: Document, unit: str) -> list[list[str]]:
+    """Engineering constants in the axes of the cell; those of the nearest transversely isotropic material beside
+    estimates and bounds; `unit` is that of stresses in brackets, or empty.  Nothing where they are not told."""
+    return [_constants(document.get("constants"), unit), _estimates(document, unit)]
+
+
+def _constants(constants: Document | None, unit: str) -> list[str]:
+    if constants is None:
+        return []
+    lines = [f"Engineering constants in the axes of the cell{unit}"]
+    for names in (("E1", "E2", "E3"), ("G12", "G13", "G23"), ("nu12", "nu13", "nu23")):
+        lines.append("  " + "    ".join(f"{name:<5}{constants[name]:>13.7g}" for name in names))
+    return lines
+
+
+def _estimates(document: Document, unit: str) -> list[str]:
+    """A row for each source that tells a constant, a column for each constant that one of them tells."""
+    cell = document.get("transversely_isotropic")
+    if cell is None:
+        return []
+    rows = {title: _known(row) for title, row in _sources(document).items()}
+    names = [name for name in SHORT if any(name in row for row in rows.values())]
+    lines = [
+        f"Along the fibres and across them{unit}; {100 * cell['deviation']:.2g} % from transversely isotropic",
+        " " * NAME + "".join(f"{SHORT[name]:>{COLUMN + 1}}" for name in names),
+    ]
+    for title, row in rows.items():
+        if row:
+            lines.append(
+                f"  {title:<{NAME - 2}}" + "".join(f"{_number(row.get(name)):>{COLUMN + 1}}" for name in names)
+            )
+    return lines
+
+
+def _sources(document: Document) -> dict[str, Document]:
+    """The constants of this cell, by each method, and the bounds."""
+    bounds = _known(document.get("fibre_bounds") or {})
+    sources = {THIS_CELL: document["transversely_isotropic"]}
+    sources |= {name.replace("_", " "): row for name, row in (document.get("estimates") or {}).items()}
+    return sources | {word: {name: bounds[name][k] for name in bounds} for k, word in enumerate((LOWER, UPPER))}
+
+
+def _known(row: Document) -> dict[str, Any]:
+    return {name: value for name, value in row.items() if value is not None}
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.5g}"
