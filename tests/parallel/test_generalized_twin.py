@@ -129,7 +129,7 @@ def test_contact(comm, given, springs):
     assert error(C[3:5, 3:5], compression[3:5, 3:5]) < TIGHT
 
 
-@pytest.mark.parametrize("pc", ["none", "lumped", "influence"])
+@pytest.mark.parametrize("pc", ["lumped", "influence"])
 def test_contact_by_any_preconditioner(comm, pc):
     compare(comm, mesh_size=0.25, tip_size=0.1, petsc={"feti_pc_type": pc}, sections=arcs(("all", 0.0, 90.0)) | CUT)
 
@@ -145,7 +145,13 @@ def test_contact_under_a_temperature(comm, expansions, angle):
     compare(comm, **phases, mesh_size=0.25, tip_size=0.1, sections=arcs((1, 20.0, angle)))
 
 
-@pytest.mark.parametrize("sections", [CUT, arcs((1, 20.0, 150.0)), arcs((1, 0.0, 360.0))], ids=["cut", "arc", "whole"])
+# A matrix in one piece: forces between pieces of a stiff one would hide those of a soft fibre at this tolerance.
+WHOLE = {"decomposition": {"subdomains": 2}}
+
+
+@pytest.mark.parametrize(
+    "sections", [CUT, arcs((1, 20.0, 150.0)) | WHOLE, arcs((1, 0.0, 360.0)) | WHOLE], ids=["cut", "arc", "whole"]
+)
 @pytest.mark.parametrize("soft", ["matrix", "fibre"])
 def test_a_soft_phase_alone_expands(comm, soft, sections):
     """At the default tolerance: what it would do alone is what errors are small parts of."""
