@@ -15,7 +15,7 @@ from support.small_path import PATH
 
 from feti_homog import cli
 
-pytestmark = pytest.mark.parallel
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 
 
 @pytest.fixture(autouse=True)

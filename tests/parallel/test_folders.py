@@ -13,7 +13,7 @@ from support.ranks import parallel_assert
 from feti_homog import cli
 from feti_homog.output.files import folder_contents
 
-pytestmark = pytest.mark.parallel
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 
 
 @pytest.fixture(autouse=True)

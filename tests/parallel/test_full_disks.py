@@ -20,7 +20,7 @@ from feti_homog.errors import FetiHomogError
 from feti_homog.output.files import atomic
 from feti_homog.output.files.field_file import RESERVE, FieldFile
 
-pytestmark = pytest.mark.parallel
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 
 
 @pytest.fixture(autouse=True)
