@@ -18,13 +18,6 @@ from feti_homog import cli
 pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 
 
-@pytest.fixture(autouse=True)
-def few_ranks(comm):
-    """More than two ranks meet nothing else, and take longer."""
-    if comm.size > 2:
-        pytest.skip("at one and two ranks")
-
-
 def path_run(comm, folder, text, *words):
     """The exit code of `run` of a path on all ranks; its results are in folder/out."""
     if comm.rank == 0:

@@ -23,7 +23,7 @@ from feti_homog.interface.path_points import unloaded
 from feti_homog.interface.strength_criterion import StrengthCriterion
 from feti_homog.interface.tip_criterion import TipCriterion
 
-pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
+pytestmark = pytest.mark.parallel
 
 EXACT = 1e-9
 PHASES = {"matrix": {"young": 2790.0, "poisson": 0.33}, "fibre": {"young": 70800.0, "poisson": 0.22}}
@@ -146,6 +146,7 @@ def test_a_laminate_loses_all_that_it_stores_at_once(comm, shared_path, growth):
 PUBLISHED = {"released": ((1.042, 1.013, 1.004), 0.02), "springs": ((1.85, 1.51, 1.29), 0.03)}
 
 
+@pytest.mark.few_ranks
 @pytest.mark.parametrize("growth", PUBLISHED)
 def test_along_the_snap_back_toughness_times_length_is_dissipated_on_fine_meshes(comm, growth):
     """Growth by the energy that is released dissipates little more on any; by springs it takes fine elements."""

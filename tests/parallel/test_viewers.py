@@ -20,7 +20,7 @@ from feti_homog import Case, run
 from feti_homog.output.files import xdmf
 from feti_homog.output.files.field_file import FieldFile
 
-pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
+pytestmark = pytest.mark.parallel
 
 POLY_VERTEX, TRIANGLE, QUADRATIC_TRIANGLE = 2, 5, 22  # VTK's numbers of elements
 STRAIN = [0.1, 0.0, 0.02]
