@@ -22,6 +22,7 @@ from feti_homog.config.schema import Selected, TableReader, selected_value, to_t
 from feti_homog.config.sections import (
     ANALYSIS_TYPE,
     CRITERION,
+    DRAWN_STRESS,
     METHOD,
     PLANE,
     SECTIONS,
@@ -172,7 +173,7 @@ def parse(values: Mapping[str, Any], folder: Path) -> Case:
 
 def _selected(document: Mapping[str, Any]) -> Selected:
     """The values that decide which keys belong to the case."""
-    selectors = (GEOMETRY, ANALYSIS_TYPE, PLANE, METHOD, CRITERION)
+    selectors = (GEOMETRY, ANALYSIS_TYPE, PLANE, METHOD, CRITERION, DRAWN_STRESS)
     return {s: selected_value(SECTIONS[s.section], document.get(s.section), s.key) for s in selectors}
 
 

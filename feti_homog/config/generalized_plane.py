@@ -3,13 +3,25 @@
 from __future__ import annotations
 
 from feti_homog.config.schema import Selected
-from feti_homog.config.sections import ANALYSIS_TYPE, GENERALIZED, GENERALIZED_ANALYSES, PLANE
+from feti_homog.config.sections import (
+    ANALYSIS_TYPE,
+    DRAWN_STRESS,
+    GENERALIZED,
+    GENERALIZED_ANALYSES,
+    IN_THE_PLANE,
+    OUT_OF_PLANE_STRESSES,
+    PLANE,
+)
 from feti_homog.config.wording import toml_value
 
 
 def generalized_faults(selected: Selected) -> list[str]:
-    """Faults of what is asked for in generalized plane strain; none in another plane state."""
-    analysis = selected[ANALYSIS_TYPE]
+    """Faults of what is asked for in generalized plane strain, and of what only that has in another plane state."""
+    analysis, stress = selected[ANALYSIS_TYPE], selected[DRAWN_STRESS]
+    if selected[PLANE] in IN_THE_PLANE.values and stress in OUT_OF_PLANE_STRESSES:
+        planes = " or ".join(map(toml_value, GENERALIZED.values))
+        owner = f"[analysis] plane = {planes}, not {toml_value(selected[PLANE])}"
+        return [f"[output] stress = {toml_value(stress)}: belongs to {owner}"]
     if selected[PLANE] not in GENERALIZED.values or analysis in (*GENERALIZED_ANALYSES, None):
         return []
     offered = " or ".join(map(toml_value, GENERALIZED_ANALYSES))

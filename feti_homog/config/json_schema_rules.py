@@ -15,7 +15,9 @@ from feti_homog.config.sections import (
     CRITERION,
     GENERALIZED,
     GENERALIZED_ANALYSES,
+    IN_THE_PLANE,
     METHOD,
+    OUT_OF_PLANE_STRESSES,
     PLANE,
     SECTIONS,
     SECTIONS_OF_AN_ANALYSIS,
@@ -42,7 +44,7 @@ def rules_of_one_case() -> Schema:
             *_material_rules(),
             *_arc_rules(),
             *_energy_rules(),
-            _generalized_rule(),
+            *_generalized_rules(),
             _at(("cell",), {"not": {"required": ["width", "fibre_radius"]}}),
             _at(("decomposition",), {"not": {"required": ["subdomains", "max_dofs"]}}),
             _at(("path",), {"oneOf": [{"required": ["strain"]}, {"required": ["waypoints"]}]}),
@@ -145,6 +147,10 @@ def _energy_rules() -> list[Schema]:
     return [{"if": _if(BY_ENERGY), "then": springs}]
 
 
-def _generalized_rule() -> Schema:
-    """Generalized plane strain is that of some types of analysis."""
-    return {"if": _if(GENERALIZED), "then": _at(("analysis", "type"), {"enum": list(GENERALIZED_ANALYSES)})}
+def _generalized_rules() -> list[Schema]:
+    """Generalized plane strain is that of some types of analysis, and alone has stresses out of the plane."""
+    only_there = {"not": {"enum": list(OUT_OF_PLANE_STRESSES)}}
+    return [
+        {"if": _if(GENERALIZED), "then": _at(("analysis", "type"), {"enum": list(GENERALIZED_ANALYSES)})},
+        {"if": _if(IN_THE_PLANE), "then": _at(("output", "stress"), only_there)},
+    ]

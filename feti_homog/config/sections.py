@@ -30,6 +30,9 @@ CRITERION = Selector("interface", "criterion")
 ANGLE_ANALYSIS, PATH_ANALYSIS = ANALYSIS_TYPE.among("angle"), ANALYSIS_TYPE.among("path")
 BY_ENERGY = CRITERION.among("energy")
 
+OUT_OF_PLANE_STRESSES = ("S33", "S23", "S13")
+DRAWN_STRESS = Selector("output", "stress")
+
 STIFFNESSES = ("normal_stiffness", "tangential_stiffness")
 IN_THE_PLANE, GENERALIZED = PLANE.among("strain", "stress"), PLANE.among("generalized")
 BY_EVENTS, BY_INCREMENTS = METHOD.among("events"), METHOD.among("increments")
@@ -243,8 +246,9 @@ class Output:
     pictures: bool = key(boolean, "Draw the PNG files; without fields, the curves alone.", default=True)
     report: bool = key(boolean, "Write report.html: numbers, pictures, curves and states on one page.", default=False)
     stress: str = key(
-        choice("auto", "S11", "S22", "S12"),
-        'The component drawn; "auto": that of the unit strain.',
+        choice("auto", "S11", "S22", "S12", *OUT_OF_PLANE_STRESSES),
+        'The component drawn; "auto": that of the unit strain. "S33", "S23" and "S13" are drawn in generalized plane '
+        "strain.",
         default="auto",
     )
     deformation_scale: float | None = key(

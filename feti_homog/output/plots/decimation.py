@@ -56,9 +56,10 @@ def nodal_values(table: Any, drawn: DrawnMesh) -> Array:
     return _picked(table, drawn.nodes, drawn.block)
 
 
-def triangle_means(table: Any, column: int, drawn: DrawnMesh) -> Array:
-    """The means (q,) of a column of a table on elements over each triangle drawn."""
-    means = _blocks(table, drawn.group, drawn.block, lambda rows: rows[..., column].mean(axis=1))
+def triangle_means(table: Any, column: int | None, drawn: DrawnMesh) -> Array:
+    """The means (q,) of a column of a table on elements, or of one that has none, over each triangle drawn."""
+    own = ... if column is None else (..., column)
+    means = _blocks(table, drawn.group, drawn.block, lambda rows: rows[own].mean(axis=1))
     return np.repeat(means, drawn.pieces)
 
 

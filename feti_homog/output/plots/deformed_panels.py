@@ -23,18 +23,19 @@ from feti_homog.output.plots.decimation import (
     drawn_mesh,
     nodal_values,
     outline_edges,
-    triangle_means,
 )
 from feti_homog.output.plots.interface_marks import STATE_NAMES, InterfaceEdges, state_legend
 from feti_homog.output.plots.plot_helpers import (
     STRESS_SYMBOLS,
     draw_segments,
+    drawn_stress,
     fill_triangles,
     load_label,
     magnification,
     pixels_of,
     plain,
     save,
+    stress_component,
     unit_label,
     value_range,
 )
@@ -63,10 +64,8 @@ class DeformedCell:
         """The stress that `output` chooses, or that suits all these states."""
         drawn = drawn_mesh(file, limit)
         borders = outline_edges(drawn, drawn.body)
-        strain = np.abs([file[f"state/{n}"].attrs["strain"] for n in numbers]).max(axis=0)
-        component = output.get("stress", "auto")
-        if component not in STRESS_SYMBOLS:
-            component = list(STRESS_SYMBOLS)[int(np.argmax(strain))]
+        strains = np.array([file[f"state/{n}"].attrs["strain"] for n in numbers])
+        component = stress_component(output.get("stress", "auto"), strains)
         return cls(file, drawn, borders, InterfaceEdges.of(file, drawn, borders), component, scale)
 
     def moved(self, number: int) -> Array:
@@ -78,7 +77,7 @@ class DeformedCell:
     def draw(self, axes: Axes, number: int, moved: Array) -> None:
         """The cell of a state, drawn nodes at `moved`, in its own range of colours: stresses grow along a path."""
         state = self.file[f"state/{number}"]
-        stress = triangle_means(state["stress"], list(STRESS_SYMBOLS).index(self.component), self.drawn)
+        stress = drawn_stress(state, self.component, self.drawn)
         norm, extend = value_range(stress)
         shapes = fill_triangles(axes, self.drawn, moved, stress, edges=False, norm=norm, cmap="viridis")
         draw_segments(axes, moved[self.borders], "black", 0.5)
@@ -87,7 +86,7 @@ class DeformedCell:
         axes.set(xticks=(), yticks=())
         axes.set_axis_off()
         attributes = state.attrs
-        axes.set_title(f"{attributes['label']}\n{load_label(attributes['strain'])}", fontsize=9, y=1.0)
+        axes.set_title(f"{attributes['label']}\n{load_label(attributes)}", fontsize=9, y=1.0)
         figure: Any = axes.figure
         bar = figure.colorbar(shapes, cax=axes.inset_axes((1.02, 0.1, 0.035, 0.8)), extend=extend)
         bar.ax.tick_params(labelsize=7, pad=1, length=2)

@@ -9,15 +9,16 @@ from typing import Any
 import h5py
 import matplotlib as mpl
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from feti_homog.errors import FetiHomogError
-from feti_homog.mechanics.voigt import STRAINS
+from feti_homog.mechanics.voigt import voigt_names
 from feti_homog.output.files import field_file, result_json
-from feti_homog.output.plots import deformed_panels, response_curves, traction_plots
-from feti_homog.output.plots.decimation import DrawnMesh, drawn_mesh, nodal_values, outline_edges, triangle_means
+from feti_homog.output.plots import axial_shear, deformed_panels, response_curves, traction_plots
+from feti_homog.output.plots.decimation import DrawnMesh, drawn_mesh, nodal_values, outline_edges
 from feti_homog.output.plots.fibre_numbers import write_fibre_numbers
 from feti_homog.output.plots.interface_marks import InterfaceEdges
 from feti_homog.output.plots.plot_helpers import (
@@ -26,6 +27,7 @@ from feti_homog.output.plots.plot_helpers import (
     cell_scale,
     colour_range,
     draw_segments,
+    drawn_stress,
     figure_of,
     fill_triangles,
     label_cell_axes,
@@ -34,6 +36,7 @@ from feti_homog.output.plots.plot_helpers import (
     magnification,
     plain,
     save,
+    stress_component,
     unit_label,
 )
 from feti_homog.typing import Array
@@ -49,7 +52,7 @@ def plot(directory: Path) -> list[Path]:
     """Draws the pictures of `directory`/result.h5 and result.json beside them and returns their paths.
 
     - cell.png: bodies and subdomains;
-    - of each load case case_E11.png, case_minus_E11.png, ... (unit strains) or state_K.png;
+    - of each load case case_E11.png, case_minus_E11.png, ... (unit strains), case_temperature.png or state_K.png;
     - of `angle` angle.png and angle_states.png, of `path` path.png, path_states.png and path.gif;
     - interface.png, if some interface is debonded.
 
@@ -82,22 +85,20 @@ def _pictures(directory: Path, document: Mapping[str, Any], output: Mapping[str,
         else:
             for number in sorted(file.get("state", ()), key=int):
                 state = file[f"state/{number}"]
-                figure = _deformed(file, state, drawn, borders, interface_edges, output)
-                paths.append(save(figure, directory / f"{_name(number, state.attrs['strain'])}.png"))
+                draw = _sheared if axial_shear.is_axial(state) else _deformed
+                figure = draw(file, state, drawn, borders, interface_edges, output)
+                paths.append(save(figure, directory / f"{_name(number, state.attrs)}.png"))
         return paths + traction_plots.plot(directory, file, interface_edges, "path" in document)
 
 
-def _name(number: str, strain: Array) -> str:
-    unit = _unit_case(strain)
-    if unit is None:
+def _name(number: str, attributes: Any) -> str:
+    strain = attributes["strain"]
+    loads = dict(zip(voigt_names(len(strain))[0], strain, strict=True))
+    loads["temperature"] = attributes.get("temperature", 0.0)
+    name, value = max(loads.items(), key=lambda load: abs(load[1]))
+    if abs(value) != 1.0 or np.count_nonzero(list(loads.values())) != 1:
         return f"state_{number}"
-    return f"case_{'minus_' if strain[unit] < 0 else ''}{STRAINS[unit]}"
-
-
-def _unit_case(strain: Array) -> int | None:
-    """Which of E11, E22, gamma12 is 1 or -1 while the others are 0."""
-    cases = [i for i in range(3) if np.array_equal(np.abs(strain), np.eye(3)[i])]
-    return cases[0] if cases else None
+    return f"case_{'minus_' if value < 0 else ''}{name}"
 
 
 def _cell(file: Any, drawn: DrawnMesh, borders: Array) -> Figure:
@@ -130,30 +131,67 @@ def _deformed(
     output: Mapping[str, Any],
 ) -> Figure:
     """The magnified deformed cell with a stress component in colour, and the outline it has left."""
-    attributes, strain = file.attrs, state.attrs["strain"]
-    figure, (axes,) = figure_of(attributes, panels=1, beside=BAR_INCHES)
     displacement = nodal_values(state["displacement"], drawn)
     seen = magnification(largest_length(displacement), float(np.ptp(drawn.points, axis=0).min()))
     chosen = output.get("deformation_scale")
     scale = seen if chosen is None else chosen
-    component = output.get("stress", "auto")
-    if component not in STRESS_SYMBOLS:
-        component = list(STRESS_SYMBOLS)[_unit_case(strain) or 0]
-    stress = triangle_means(state["stress"], list(STRESS_SYMBOLS).index(component), drawn)
-    norm, colours, extend = colour_range(stress)
     moved = drawn.points + scale * displacement
+    figure, axes = _coloured(file, state, drawn, moved, output)
+    draw_segments(axes, _left(file.attrs, drawn, borders), UNDEFORMED, 0.7)
+    undeformed = Line2D([], [], color=UNDEFORMED, linewidth=0.7, label="undeformed")
+    _outlined(figure, axes, state, moved, borders, interface_edges, [undeformed])
+    axes.set_title(f"{plain(file.attrs['title'])}\n{load_label(state.attrs)}, displacement × {scale:g}".lstrip())
+    return figure
+
+
+def _sheared(
+    file: Any,
+    state: Any,
+    drawn: DrawnMesh,
+    borders: Array,
+    interface_edges: InterfaceEdges,
+    output: Mapping[str, Any],
+) -> Figure:
+    """The cell with an axial stress in colour and lines of equal displacement along the fibres, which moves nothing in
+    the plane."""
+    figure, axes = _coloured(file, state, drawn, drawn.points, output)
+    step = axial_shear.draw_levels(axes, state, drawn)
+    length = plain(file.attrs["length_unit"])
+    words = f"$u_3$ every {step:g} {length}".rstrip()
+    levels = Line2D([], [], color=axial_shear.INK, linewidth=axial_shear.WIDTH, label=words)
+    _outlined(figure, axes, state, drawn.points, borders, interface_edges, [levels])
+    axes.set_title(f"{plain(file.attrs['title'])}\n{load_label(state.attrs)}".lstrip())
+    return figure
+
+
+def _coloured(file: Any, state: Any, drawn: DrawnMesh, moved: Array, output: Mapping[str, Any]) -> tuple[Figure, Axes]:
+    """The cell, its nodes at `moved`, in the colours of a stress."""
+    attributes = file.attrs
+    figure, (axes,) = figure_of(attributes, panels=1, beside=BAR_INCHES)
+    component = stress_component(output.get("stress", "auto"), state.attrs["strain"][None])
+    stress = drawn_stress(state, component, drawn)
+    norm, colours, extend = colour_range(stress)
     picture = fill_triangles(axes, drawn, moved, stress, edges=False, norm=norm, cmap=colours)
-    draw_segments(axes, _left(attributes, drawn, borders), UNDEFORMED, 0.7)
-    draw_segments(axes, moved[borders], "black", 0.8)
-    marks = interface_edges.mark(axes, moved, state["status"][:])
-    label_cell_axes(axes, attributes)
     bar = figure.colorbar(picture, cax=axes.inset_axes((1.03, 0.0, 0.04, 1.0)), extend=extend)
     bar.set_label(f"${STRESS_SYMBOLS[component]}$ " + (unit_label(attributes["stress_unit"]) or "(unit of the moduli)"))
-    axes.set_title(f"{plain(attributes['title'])}\n{load_label(strain)}, displacement × {scale:g}".lstrip())
-    undeformed = Line2D([], [], color=UNDEFORMED, linewidth=0.7, label="undeformed")
-    handles = [*(marks if len(marks) > 1 else ()), undeformed]
+    return figure, axes
+
+
+def _outlined(
+    figure: Figure,
+    axes: Axes,
+    state: Any,
+    moved: Array,
+    borders: Array,
+    interface_edges: InterfaceEdges,
+    lines: list[Line2D],
+) -> None:
+    """Outlines of the bodies and the states of the interfaces, and a legend of them and of other lines."""
+    draw_segments(axes, moved[borders], "black", 0.8)
+    marks = interface_edges.mark(axes, moved, state["status"][:])
+    label_cell_axes(axes, state.file.attrs)
+    handles = [*(marks if len(marks) > 1 else ()), *lines]
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), frameon=False)
-    return figure
 
 
 def _left(attributes: Any, drawn: DrawnMesh, borders: Array) -> Array:

@@ -18,12 +18,20 @@ from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Path2D
 from PIL import Image
 
+from feti_homog.mechanics.voigt import AXIAL_STRESSES, SPATIAL_STRESSES, STRESSES, voigt_names
 from feti_homog.output.files import atomic
-from feti_homog.output.plots.decimation import DrawnMesh
+from feti_homog.output.plots.decimation import DrawnMesh, triangle_means
 from feti_homog.typing import Array
 
 STRAIN_SYMBOLS = (r"E_{11}", r"E_{22}", r"\gamma_{12}")
-STRESS_SYMBOLS = {"S11": r"\sigma_{11}", "S22": r"\sigma_{22}", "S12": r"\sigma_{12}"}
+SPATIAL_STRAIN_SYMBOLS = (r"E_{11}", r"E_{22}", r"E_{33}", r"\gamma_{23}", r"\gamma_{13}", r"\gamma_{12}")
+STRESS_SYMBOLS = {name: rf"\sigma_{{{name[1:]}}}" for name in SPATIAL_STRESSES}
+# Where a state of result.h5 has the stresses: the table, and its column if it has more than one.
+STRESS_TABLES: dict[str, tuple[str, int | None]] = {
+    **{name: ("stress", column) for column, name in enumerate(STRESSES)},
+    "S33": ("stress_33", None),
+    **{name: ("axial_stress", column) for column, name in enumerate(AXIAL_STRESSES)},
+}
 SAME_VALUE = 1e-6  # values that differ by less, relatively, are one
 CELL_INCHES = 4.8  # inches, the longer side of a drawn cell
 STYLE = {"font.size": 10, "axes.titlesize": 11, "axes.linewidth": 0.8}
@@ -158,10 +166,27 @@ def largest_length(vectors: Array) -> float:
     return float(np.linalg.norm(vectors, axis=1).max(initial=0.0))
 
 
-def load_label(strain: Array) -> str:
-    return (
-        ", ".join(f"${STRAIN_SYMBOLS[i]} = {{{strain[i]:.4g}}}$" for i in range(3) if strain[i] != 0.0) or "no strain"
-    )
+def load_label(attributes: Any) -> str:
+    """The strain, and the temperature, of a state with these attributes."""
+    strain, temperature = attributes["strain"], attributes.get("temperature", 0.0)
+    symbols = STRAIN_SYMBOLS if len(strain) == len(STRAIN_SYMBOLS) else SPATIAL_STRAIN_SYMBOLS
+    loads = [(name, value) for name, value in zip(symbols, strain, strict=True) if value != 0.0]
+    loads += [(r"\Delta T", temperature)] * (temperature != 0.0)
+    return ", ".join(f"${name} = {{{value:.4g}}}$" for name, value in loads) or "no strain"
+
+
+def stress_component(chosen: str, strains: Array) -> str:
+    """The stress that is chosen, else that of the largest strain of (k, 3) or (k, 6)."""
+    if chosen in STRESS_SYMBOLS:
+        return chosen
+    stresses = voigt_names(strains.shape[1])[1]
+    return stresses[int(np.argmax(np.abs(strains).max(axis=0)))]
+
+
+def drawn_stress(state: Any, component: str, drawn: DrawnMesh) -> Array:
+    """The stress (q,) of a state in each triangle drawn."""
+    table, column = STRESS_TABLES[component]
+    return triangle_means(state[table], column, drawn)
 
 
 def plain(text: str) -> str:

@@ -24,8 +24,8 @@ from feti_homog.output.plots.plot_helpers import load_label, save, unit_label
 from feti_homog.typing import Array
 
 MAX_FIBRES = 4
-INK = ("#1f4e9c", "#2a7f3f")
-NAMES = {"traction": (r"$t_\mathrm{n}$", r"$t_\mathrm{t}$"), "jump": ("gap", "slip")}
+INK = ("#1f4e9c", "#2a7f3f", "#c44e00")
+NAMES = {"traction": (r"$t_\mathrm{n}$", r"$t_\mathrm{t}$", r"$t_\mathrm{a}$"), "jump": ("gap", "slip", "axial slip")}
 
 
 def plot(directory: Path, file: Any, edges: InterfaceEdges, is_path: bool) -> list[Path]:
@@ -58,7 +58,7 @@ def _figure(file: Any, edges: InterfaceEdges, names: list[str]) -> Figure:
         for axes, quantity in zip(row, NAMES, strict=True):
             _shade(axes, place, status[place.nodes])
             for name in names:
-                values = file[f"state/{name}/{quantity}"][:][place.nodes]
+                values = _values(file[f"state/{name}"], quantity)[place.nodes]
                 _curves(axes, quantity, place.values, values, name == names[-1])
             _finish(axes, place)
         row[0].set_title(f"fibre {number}", fontsize=10, loc="left")
@@ -66,8 +66,16 @@ def _figure(file: Any, edges: InterfaceEdges, names: list[str]) -> Figure:
     return figure
 
 
+def _values(state: Any, quantity: str) -> Array:
+    """(k, 2) tractions or jumps, or (k, 3) if there are any along the fibres."""
+    values: Array = state[quantity][:]
+    if f"axial_{quantity}" not in state or not (axial := state[f"axial_{quantity}"][:]).any():
+        return values
+    return np.column_stack([values, axial])
+
+
 def _curves(axes: Axes, quantity: str, place: Array, values: Array, last: bool) -> None:
-    for label, column, ink in zip(NAMES[quantity], values.T, INK, strict=True):
+    for label, column, ink in zip(NAMES[quantity], values.T, INK, strict=False):
         width, style = (1.5, "-") if last else (0.9, "--")
         axes.plot(place, column, style, color=ink, linewidth=width, label=label if last else None)
 
@@ -105,7 +113,7 @@ def _labels(file: Any, figure: Figure, grid: Any, names: list[str], shaded: Arra
     ]
     figure.legend(handles=patches, loc="outside lower center", ncols=2, frameon=False)
     first, last = (file[f"state/{name}"].attrs for name in (names[0], names[-1]))
-    title = f"{last['label']}: {load_label(last['strain'])}"
+    title = f"{last['label']}: {load_label(last)}"
     if len(names) > 1:
-        title += f"   (dashed: {first['label']}: {load_label(first['strain'])})"
+        title += f"   (dashed: {first['label']}: {load_label(first)})"
     figure.suptitle(title, fontsize=10)

@@ -16,19 +16,17 @@ from markupsafe import Markup
 
 from feti_homog import __version__
 from feti_homog.errors import CaseError
+from feti_homog.mechanics.voigt import SPATIAL_STRAINS, STRAINS
 from feti_homog.output.files import atomic, field_file, result_json
 from feti_homog.output.report import curves, states, tables
 from feti_homog.output.text.summary import title_of
 
 NAME, SWEEP = "report.html", "sweep.json"
+UNIT_LOADS = dict.fromkeys((*STRAINS, *SPATIAL_STRAINS, "temperature"))
 PICTURES = {
     "cell": "The cell: phases, numbers of the fibres, subdomains",
-    "case_E11": "Deformed cell under E11",
-    "case_E22": "Deformed cell under E22",
-    "case_gamma12": "Deformed cell under gamma12",
-    "case_minus_E11": "Deformed cell under minus E11",
-    "case_minus_E22": "Deformed cell under minus E22",
-    "case_minus_gamma12": "Deformed cell under minus gamma12",
+    **{f"case_{load}": f"Deformed cell under {load}" for load in UNIT_LOADS},
+    **{f"case_minus_{load}": f"Deformed cell under minus {load}" for load in UNIT_LOADS},
     "angle": "Response against the debonding angle",
     "angle_states": "Deformed cell at several angles",
     "path": "Response along the path of load",

@@ -10,11 +10,11 @@ import matplotlib as mpl
 import numpy as np
 from numpy.typing import NDArray
 
-from feti_homog.mechanics.voigt import STRAINS, STRESSES
-from feti_homog.output.plots.decimation import DrawnMesh, drawn_mesh, nodal_values, outline_edges, triangle_means
+from feti_homog.mechanics.voigt import voigt_names
+from feti_homog.output.plots.decimation import DrawnMesh, drawn_mesh, nodal_values, outline_edges
 from feti_homog.output.plots.deformed_panels import shown_scale
 from feti_homog.output.plots.interface_marks import STATE_COLOURS, STATE_NAMES, STATE_WIDTHS, InterfaceEdges
-from feti_homog.output.plots.plot_helpers import value_range
+from feti_homog.output.plots.plot_helpers import drawn_stress, stress_component, value_range
 from feti_homog.output.text import point_tables
 
 MOST_STATES, TRIANGLES = 48, 8000  # of the viewer, which keep a page below some megabytes
@@ -33,8 +33,9 @@ def viewer_data(file: Any, document: Document) -> dict[str, Any]:
     borders = outline_edges(drawn, drawn.body)
     edges = InterfaceEdges.of(file, drawn, borders)
     numbers = _numbers(file, document)
-    component = document["case"]["output"].get("stress", "auto")
-    strain = np.abs([file[f"state/{number}"].attrs["strain"] for number in numbers]).max(axis=0)
+    strains = np.array([file[f"state/{number}"].attrs["strain"] for number in numbers])
+    stresses = voigt_names(strains.shape[1])[1]
+    component = stress_component(document["case"]["output"].get("stress", "auto"), strains)
     return {
         "points": _base64(drawn.points, "<f4"),
         "triangles": _base64(drawn.triangles, "<u4"),
@@ -42,8 +43,8 @@ def viewer_data(file: Any, document: Document) -> dict[str, Any]:
         "edges": _base64(edges.edges, "<u4"),
         "colours": _base64(mpl.colormaps["viridis"](np.arange(256))[:, :3] * LARGEST_BYTE, "u1"),
         "scale": shown_scale(file, document),
-        "components": list(STRESSES),
-        "component": STRESSES.index(component) if component in STRESSES else int(np.argmax(strain)),
+        "components": list(stresses),
+        "component": stresses.index(component),
         "unit": str(file.attrs["stress_unit"]),
         "kinds": [{"name": STATE_NAMES[k], "colour": STATE_COLOURS[k], "width": STATE_WIDTHS[k]} for k in range(3)],
         "states": [_state(file, number, drawn, edges, document) for number in numbers],
@@ -64,17 +65,19 @@ def _state(file: Any, number: int, drawn: DrawnMesh, edges: InterfaceEdges, docu
     unit = float(np.abs(displacement).max()) / LARGEST_SHORT or 1.0
     status = state["status"][:]
     attributes = state.attrs
-    strain = [f"{name} = {value:.4g}" for name, value in zip(STRAINS, attributes["strain"], strict=True) if value]
+    strains, stresses = voigt_names(len(attributes["strain"]))
+    loads = [*zip(strains, attributes["strain"], strict=True), ("temperature", attributes.get("temperature", 0.0))]
+    words = [f"{name} = {value:.4g}" for name, value in loads if value]
     return {
         "number": number,
         "point": int(attributes["point"]) if document.get("angle") or document.get("path") else None,
         "label": str(attributes["label"]),
-        "load": ", ".join(strain) or "no strain",
+        "load": ", ".join(words) or "no strain",
         "stress": [float(value) for value in attributes["stress"]],
         "nodes": [int((status == kind).sum()) for kind in range(3)],
         "unit": unit,
         "displacement": _base64(np.round(displacement / unit), "<i2"),
-        "fields": [_field(triangle_means(state["stress"], column, drawn)) for column in range(3)],
+        "fields": [_field(drawn_stress(state, name, drawn)) for name in stresses],
         "status": _base64(edges.state(status), "u1"),
     }
 

@@ -201,8 +201,12 @@ FAULTY_CASES: dict[str, tuple[str, tuple[str, ...]]] = {
         ("[output] pictures = 1: expected true or false",),
     ),
     "unknown_stress": (
+        ended('[output]\nstress = "S21"\n'),
+        ('[output] stress = "S21": expected one of "auto", "S11", "S22", "S12", "S33", "S23", "S13"',),
+    ),
+    "a_stress_out_of_the_plane": (
         ended('[output]\nstress = "S33"\n'),
-        ('[output] stress = "S33": expected one of "auto", "S11", "S22", "S12"',),
+        ('[output] stress = "S33": belongs to [analysis] plane = "generalized", not "strain"',),
     ),
     "unit_of_two_lines": (
         ended('[output]\nstress_unit = "G\\nPa"\n'),

@@ -1,0 +1,64 @@
+"""Fields of generalized plane strain at any number of ranks: averages, third components, and every law on the files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from support.ranks import parallel_assert
+from support.verified_results import document
+
+from feti_homog import Case, run
+from feti_homog.verification.certificate import verify
+
+pytestmark = pytest.mark.parallel
+
+KINDS = ("spatial", "spatial contact", "spatial springs")
+VOIGT = ("S11", "S22", "S33", "S23", "S13", "S12")
+
+
+@pytest.fixture(scope="module", params=KINDS)
+def case(request: Any) -> Case:
+    return Case.parse(document(request.param))
+
+
+def test_the_files_of_any_number_of_ranks_obey_every_law(comm: Any, shared_path: Path, case: Case) -> None:
+    run(case, comm, out=shared_path / "out")
+    certificate = verify(shared_path / "out") if comm.rank == 0 else None
+    parallel_assert(comm, certificate is None or certificate.holds, certificate and certificate.text)
+
+
+def test_states_have_all_six_components(comm: Any, case: Case) -> None:
+    result = run(case, comm, fields=True)
+    whole = result.fields.gathered()
+    parallel_assert(comm, whole is None or _fits(whole))
+
+
+def _fits(whole: Any) -> bool:
+    mesh, states = whole.mesh, whole.states
+    for state in states:
+        means = np.column_stack([state.stress, state.stress_33, state.axial_stress])[:, [0, 1, 3, 4, 5, 2]]
+        areas = _areas(mesh)
+        if mesh.triangles.shape[1] == 3:  # of curved elements the areas are others
+            expected = areas @ means / areas.sum()
+            np.testing.assert_allclose(expected, state.stress_mean, atol=1e-10 * np.abs(state.stress_mean).max())
+        np.testing.assert_allclose(state.element_strain[:, 3], state.strain[2], rtol=1e-7)
+        E13, E23 = state.strain[[4, 3]]
+        imposed = mesh.points @ [E13, E23]
+        np.testing.assert_allclose(state.axial_displacement - state.axial_fluctuation, imposed, atol=1e-12)
+        np.testing.assert_array_equal(state.traction_vector[:, 2], state.axial_traction)
+        np.testing.assert_array_equal(state.jump_vector[:, 2], state.axial_jump)
+        fibre = state.axial_displacement[whole.interface.fibre_node]
+        np.testing.assert_array_equal(state.displacement_fibre[:, 2], fibre)
+        np.testing.assert_array_equal(state.displacement_matrix[:, 2], fibre + state.axial_jump)
+        assert not state.axial_traction[state.status > 0].any()
+    sheared = [state for state in states if "gamma13" in state.label or "gamma23" in state.label]
+    assert len(sheared) * 2 < len(states) and all(not state.displacement.any() for state in sheared)
+    return all(np.abs(state.axial_stress).max() > 1.0 for state in sheared)
+
+
+def _areas(mesh: Any) -> np.ndarray:
+    a, b, c = np.moveaxis(mesh.points[mesh.triangles[:, :3]], 1, 0)
+    return np.asarray(np.cross(b - a, c - a) / 2)
