@@ -7,6 +7,7 @@ from html import escape
 from typing import Any
 
 from feti_homog.mechanics.voigt import SPATIAL_STRESSES, voigt_names
+from feti_homog.output.text.constants_tables import SHORT, comparison
 from feti_homog.output.text.spatial_tables import THERMAL
 from feti_homog.output.text.summary import title_of
 from feti_homog.output.text.units import with_unit
@@ -28,15 +29,28 @@ def tables(document: Document) -> str:
             blocks.append(_table(f"{words}{escape(label)}", ["", *strains], rows))
     if "thermal_stress" in document:
         blocks.append(_thermal(document, label))
-    if "moduli" in document:
-        moduli = document["moduli"].items()
-        blocks.append(_table("moduli", None, ([with_unit(name, unit), _number(value)] for name, value in moduli)))
+    blocks += _constants(document, unit, label)
     for key in ("angle", "path"):
         if key in document:
             blocks.append(_points(key, document[key]))
     checks = document["checks"].items()
     blocks.append(_table("largest relative errors", None, ([law, f"{error:.1e}"] for law, error in checks)))
     return "\n".join([*blocks, f"<p>{escape(document['status'])}</p>"])
+
+
+def _constants(document: Document, unit: str, label: str) -> list[str]:
+    """Moduli of the plane state; constants in space, with what closed estimates and bounds say of them."""
+    blocks = [
+        _table(key, None, ([with_unit(name, unit), _number(value)] for name, value in document[key].items()))
+        for key in ("moduli", "constants")
+        if key in document
+    ]
+    if "transversely_isotropic" in document:
+        names, sources = comparison(document)
+        head = ["", *(SHORT[name] for name in names)]
+        rows = ([title, *numbers] for title, numbers in sources)
+        blocks.append(_table(f"along the fibres and across them{escape(label)}", head, rows))
+    return blocks
 
 
 def _thermal(document: Document, label: str) -> str:

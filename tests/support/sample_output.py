@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.output.files.field_layout import FibrePart, Header, InterfacePart, MeshPart, StatePart, rows_of, tables
+from feti_homog.output.files.spatial_layout import SpatialStatePart
 
 GRADIENTS = tuple(np.array([[a, b], [b, c]]) for a, b, c in ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.5, 0.0)))
 
@@ -72,6 +73,33 @@ def without_interface(whole: Sample) -> Sample:
     none = InterfacePart(**{name: table[:0] for name, table in vars(whole.interface).items()})
     states = (_cut(state, slice(None), slice(None), slice(0)) for state in whole.states)
     return replace(whole, interface=none, states=tuple(states))
+
+
+def in_space(whole: Sample) -> Sample:
+    """The same as states of generalized plane strain under E33 = 1, a temperature, and gamma13 = -1."""
+    return replace(whole, states=tuple(_in_space(whole.mesh, state) for state in whole.states))
+
+
+def _in_space(mesh: MeshPart, state: StatePart) -> SpatialStatePart:
+    strain, place = np.zeros((3, 6)), state.stress[:, 0]
+    strain[0, 2], strain[2, 4] = 1.0, -1.0
+    plane, k = 0.0 if state.point == 2 else 1.0, np.arange(10.0)
+    fields = vars(state) | {
+        "strain": strain[state.point],
+        "stress_mean": np.arange(6.0),
+        "displacement": plane * state.displacement,
+        "fluctuation": plane * state.fluctuation,
+    }
+    return SpatialStatePart(
+        **fields,
+        temperature=float(state.point == 1),
+        axial_displacement=(plane - 1) * mesh.points[:, 0] + 0.1 * state.fluctuation[:, 0],
+        axial_fluctuation=0.1 * state.fluctuation[:, 0],
+        axial_stress=np.stack([place, -place], axis=1),
+        axial_strain=np.stack([0.1 * place, -0.2 * place], axis=1).astype(np.float32),
+        axial_traction=k,
+        axial_jump=-k,
+    )
 
 
 def _coarse(cells: int) -> tuple[np.ndarray, np.ndarray]:

@@ -27,7 +27,7 @@ def draw_levels(axes: Axes, state: Any, drawn: DrawnMesh) -> float:
     """Draw lines of equal displacement along the fibres; returns the step between them."""
     displacement: Array = nodal_values(state["axial_displacement"], drawn)
     least, most = float(displacement.min()), float(displacement.max())
-    step = _round_step((most - least) / LEVELS)
+    step = round_step((most - least) / LEVELS)
     levels = step * np.arange(math.ceil(least / step), math.floor(most / step) + 1)
     x, y = drawn.points.T
     mesh = Triangulation(x, y, drawn.triangles)
@@ -35,7 +35,7 @@ def draw_levels(axes: Axes, state: Any, drawn: DrawnMesh) -> float:
     return step
 
 
-def _round_step(wanted: float) -> float:
+def round_step(wanted: float) -> float:
     """1, 2 or 5 times a power of ten, not less than wanted."""
     if wanted <= 0.0:
         return 1.0

@@ -168,7 +168,7 @@ def largest_length(vectors: Array) -> float:
 
 def load_label(attributes: Any) -> str:
     """The strain, and the temperature, of a state with these attributes."""
-    strain, temperature = attributes["strain"], attributes.get("temperature", 0.0)
+    strain, temperature = attributes["strain"], float(attributes.get("temperature", 0.0))
     symbols = STRAIN_SYMBOLS if len(strain) == len(STRAIN_SYMBOLS) else SPATIAL_STRAIN_SYMBOLS
     loads = [(name, value) for name, value in zip(symbols, strain, strict=True) if value != 0.0]
     loads += [(r"\Delta T", temperature)] * (temperature != 0.0)

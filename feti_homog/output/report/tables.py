@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from feti_homog.mechanics.voigt import SPATIAL_STRESSES, STRESSES, voigt_names
+from feti_homog.output.text.constants_tables import SHORT, comparison
 from feti_homog.output.text.point_tables import chosen, shown_entries
 from feti_homog.output.text.spatial_tables import THERMAL
 from feti_homog.output.text.units import with_unit
@@ -74,6 +75,7 @@ def answers(document: Document) -> list[Table]:
             found.append(Table(f"{words}{label}", ["", *strains], rows))
     if document.get("thermal_stress") is not None:
         found.append(_thermal(document, label))
+    found += _constants(document, label)
     if document.get("moduli") is not None:
         rows = [[with_unit(name, unit), _number(value)] for name, value in document["moduli"].items()]
         found.append(Table("Engineering moduli", ["", "computed"], rows))
@@ -98,6 +100,21 @@ def _bounds(document: Document) -> Iterator[list[str]]:
         yield [f"{name} (Reuss, Voigt)", *map(_number, values)]
     for name, (lower, upper) in (bounds["hashin_shtrikman"] or {}).items():
         yield [f"{name} (Hashin-Shtrikman)", *map(_number, (lower, document["moduli"][name], upper))]
+
+
+def _constants(document: Document, label: str) -> list[Table]:
+    """Engineering constants in space, and what closed estimates and bounds say of them."""
+    found = []
+    if (constants := document.get("constants")) is not None:
+        rows = [[name, _number(value)] for name, value in constants.items()]
+        found.append(Table(f"Engineering constants in the axes of the cell{label}", ["", "computed"], rows))
+    if document.get("transversely_isotropic") is not None:
+        names, sources = comparison(document)
+        compared = [[title, *numbers] for title, numbers in sources]
+        found.append(
+            Table(f"Along the fibres and across them{label}", ["", *(SHORT[name] for name in names)], compared)
+        )
+    return found
 
 
 def _thermal(document: Document, label: str) -> Table:

@@ -41,18 +41,21 @@ def _estimates(document: Document, unit: str) -> list[str]:
     cell = document.get("transversely_isotropic")
     if cell is None:
         return []
-    rows = {title: _known(row) for title, row in _sources(document).items()}
-    names = [name for name in SHORT if any(name in row for row in rows.values())]
+    names, rows = comparison(document)
     lines = [
         f"Along the fibres and across them{unit}; {100 * cell['deviation']:.2g} % from transversely isotropic",
         " " * NAME + "".join(f"{SHORT[name]:>{COLUMN + 1}}" for name in names),
     ]
-    for title, row in rows.items():
-        if row:
-            lines.append(
-                f"  {title:<{NAME - 2}}" + "".join(f"{_number(row.get(name)):>{COLUMN + 1}}" for name in names)
-            )
+    for title, numbers in rows:
+        lines.append(f"  {title:<{NAME - 2}}" + "".join(f"{number:>{COLUMN + 1}}" for number in numbers))
     return lines
+
+
+def comparison(document: Document) -> tuple[list[str], list[tuple[str, list[str]]]]:
+    """The constants that some source tells, and each source with its numbers."""
+    rows = {title: _known(row) for title, row in _sources(document).items()}
+    names = [name for name in SHORT if any(name in row for row in rows.values())]
+    return names, [(title, [_number(row.get(name)) for name in names]) for title, row in rows.items() if row]
 
 
 def _sources(document: Document) -> dict[str, Document]:

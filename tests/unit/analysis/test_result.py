@@ -21,6 +21,7 @@ from feti_homog.analysis.result_records import (
     Tips,
 )
 from feti_homog.mechanics.bounds import Bounds, engineering_moduli
+from feti_homog.mechanics.spatial_constants import engineering_constants, transversely_isotropic_part
 from feti_homog.output.files import csv_tables, result_json
 
 STIFFNESS = np.array([[9.0, 2.0, 0.0], [2.0, 8.0, 0.0], [0.0, 0.0, 3.0]])
@@ -36,6 +37,9 @@ DEBONDING = {
     "debonding_angle": np.array([90.0, 0.0]),
 }
 COUNTS = {"bonded": 5, "open": 3, "closed": 1, "iterations": 7}
+
+
+SPATIAL = np.diag([160.0, 150.0, 230.0, 54.0, 53.0, 46.0]) + np.outer(np.arange(6.0), np.arange(6.0))
 
 
 def path_point(load: float) -> PathPoint:
@@ -79,6 +83,15 @@ RESULTS = {
     "anisotropic": made(
         "stiffness", effective_stiffness=STIFFNESS, moduli=engineering_moduli(STIFFNESS),
         bounds=StiffnessBounds(voigt=2 * STIFFNESS, reuss=0.5 * STIFFNESS, hashin_shtrikman=None),
+    ),
+    "space": made(
+        "stiffness", effective_stiffness=SPATIAL, compliance=np.linalg.inv(SPATIAL), thermal_stress=np.arange(6.0),
+        thermal_expansion=-np.linalg.solve(SPATIAL, np.arange(6.0)), constants=engineering_constants(SPATIAL),
+        transversely_isotropic=transversely_isotropic_part(SPATIAL),
+    ),
+    "angle in space": made(
+        "angle",
+        angle=(AnglePoint(angle=9.0, stiffness=SPATIAL, thermal_stress=np.arange(6.0), **DEBONDING, **COUNTS),),
     ),
     "debonded": made("stiffness", effective_stiffness=STIFFNESS, tips=TIPS),
     "angle": made(
@@ -178,7 +191,7 @@ def test_results_can_be_told_apart():
 @pytest.mark.parametrize("name", RESULTS)
 def test_what_is_printed_is_short(name):
     text = str(RESULTS[name])
-    assert len(text.splitlines()) < 25 and "largest relative error 3.0e-09 (jump)" in text
+    assert len(text.splitlines()) < 35 and "largest relative error 3.0e-09 (jump)" in text
     assert text.splitlines()[-1].split() == ["Status", "done"]
 
 

@@ -33,6 +33,19 @@ def test_von_mises_is_the_norm_of_the_deviator():
     np.testing.assert_allclose(stress_measures.von_mises(stress, out_of_plane), expected, rtol=1e-14)
 
 
+def test_all_six_components_are_taken():
+    stress, out_of_plane = random(3)
+    axial = np.random.default_rng(4).normal(size=(50, 2))
+    whole = tensors(stress, out_of_plane)
+    whole[:, 1, 2] = whole[:, 2, 1] = axial[:, 0]
+    whole[:, 0, 2] = whole[:, 2, 0] = axial[:, 1]
+    principal = np.linalg.eigvalsh(whole)[:, ::-1]
+    np.testing.assert_allclose(stress_measures.spatial_principal(stress, out_of_plane, axial), principal, atol=1e-14)
+    shears = ((principal - np.roll(principal, 1, axis=1)) ** 2).sum(axis=1)
+    mises = stress_measures.spatial_von_mises(stress, out_of_plane, axial)
+    np.testing.assert_allclose(mises, np.sqrt(shears / 2), rtol=1e-13)
+
+
 def test_of_tension_it_is_the_tension_however_large():
     stress = np.array([[1e300, 0.0, 0.0], [0.0, 1e-300, 0.0]])
     np.testing.assert_allclose(stress_measures.von_mises(stress, np.zeros(2)), [1e300, 1e-300], rtol=1e-14)

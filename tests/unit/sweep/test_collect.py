@@ -140,6 +140,36 @@ def assert_drawn(folder, table, names):
         assert min(picture.shape[:2]) > 500 and picture[..., :3].std() > 0.03
 
 
+def spatial_document(fraction, shift):
+    """What a run of generalized plane strain leaves."""
+    found = document(fraction, 1, 0.0)
+    C = np.diag([150.0 + shift, 150.0, 210.0, 50.0, 50.0, 45.0]) + 1e-3 * np.arange(36).reshape(6, 6)
+    thermal = {"thermal_stress": [-1.0] * 6, "thermal_expansion": [1e-5] * 6}
+    case = found["case"] | {"analysis": {"type": "stiffness", "plane": "generalized"}}
+    constants = {"constants": {"E3": 200.0}, "transversely_isotropic": {"G_axial": 50.0, "expansion_axial": None}}
+    del found["moduli"]
+    return found | {"case": case, "effective_stiffness": C} | thermal | constants
+
+
+def test_stiffnesses_in_space_fill_columns_and_are_drawn(tmp_path):
+    documents = [spatial_document(c, shift) for shift in (0.0, 1.0) for c in (0.2, 0.4)]
+    table = collected({"cell.fibre_fraction": [0.2, 0.4] * 2, "cell.seed": [0, 0, 1, 1]}, documents, [1, 2] * 2, [1, 2])
+    stiffness = documents[0]["effective_stiffness"]
+    assert [table.outputs[f"C{i}{j}"][0] for i in range(1, 7) for j in range(1, 7)] == stiffness.ravel().tolist()
+    assert table.outputs["anisotropy_shear"][0] == pytest.approx(45.035 - (150.0 + 150.007 - 2 * 0.001) / 4)
+    assert table.outputs["thermal_S33"].tolist() == [-1.0] * 4 and table.outputs["expansion_gamma12"][0] == 1e-5
+    assert (table.outputs["E3"][0], table.outputs["G_axial"][0]) == (200.0, 50.0)
+    assert "expansion_axial" not in table.outputs and "bulk" not in table.outputs
+    assert_drawn(tmp_path, table, ["moduli.png"])
+
+
+def test_angles_in_space_have_all_entries():
+    point = {"angle": 60.0, "stiffness": np.arange(36.0).reshape(6, 6)}
+    base = {name: part for name, part in document(0.4, 8, 0).items() if name != "effective_stiffness"}
+    found = outputs(base | {"angle": [point]})
+    assert (found["angle_60_C11"], found["angle_60_C33"], found["angle_60_C66"]) == (0.0, 14.0, 35.0)
+
+
 def test_what_varies_along_is_no_other_series():
     documents = [document(0.4, fibres, 0.0) for fibres in (4, 8, 4, 8)]
     inputs = {"cell.fibres": [4, 8, 4, 8], "cell.mesh_size": [0.3, 0.2, 0.3, 0.2], "material.fibre.young": [1, 1, 2, 2]}

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import h5py
+import pytest
 from mpi4py import MPI
-from support.sample_output import sample
+from support.sample_output import in_space, sample
 
 from feti_homog.common.records import LENGTH, STRESS
 from feti_homog.output.files.field_file import FieldFile
 from feti_homog.output.files.field_layout import items
+from feti_homog.output.files.spatial_layout import spatial_items
 
-UNITS = {LENGTH: "mm", STRESS: "GPa", "": "1"}  # of the sample
+UNITS = {LENGTH: "mm", STRESS: "GPa", "": "1", "temperature": "temperature"}  # of the sample
 
 
 def words_of(described):
@@ -18,8 +20,13 @@ def words_of(described):
     return {"meaning": described.meaning, "unit": UNITS[described.unit]}
 
 
-def test_all_that_the_file_holds_is_described(tmp_path):
-    whole = sample(4)
+PLANE = {(item.path, item.kind): item for item in items()}
+SPACE = PLANE | {(item.path, item.kind): item for item in spatial_items()}
+
+
+@pytest.mark.parametrize("reference", [PLANE, SPACE], ids=["plane", "space"])
+def test_all_that_the_file_holds_is_described(tmp_path, reference):
+    whole = sample(4) if reference is PLANE else in_space(sample(4))
     with FieldFile(tmp_path, MPI.COMM_SELF, whole.header, whole.mesh, whole.fibres, whole.interface) as file:
         file.write_state(0, whole.states[0])
     found = set()
@@ -30,7 +37,7 @@ def test_all_that_the_file_holds_is_described(tmp_path):
             path = f"/{name}".replace("/state/0", "/state/K")
             if isinstance(item, h5py.Dataset):
                 found.add((path, "dataset"))
-                described = next(i for i in items() if i.path == path and i.kind == "dataset")
+                described = reference[path, "dataset"]
                 assert dict(item.attrs) == words_of(described), path
                 assert item.dtype == described.dtype and item.ndim == described.shape.count(",") + (
                     0 if described.shape.endswith(",)") else 1
@@ -39,5 +46,5 @@ def test_all_that_the_file_holds_is_described(tmp_path):
                 found.update((path, f"attribute {key}") for key in item.attrs)
 
         reader.visititems(visit)
-    assert found == {(item.path, item.kind) for item in items()}
-    assert all(item.meaning for item in items())
+    assert found == set(reference)
+    assert all(item.meaning for item in reference.values())

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 from PIL import Image
-from support.sample_output import Sample, sample
+from support.sample_output import Sample, in_space, sample
 
 from feti_homog.errors import CaseError, FetiHomogError
 from feti_homog.output.files.field_file import FieldFile
 from feti_homog.output.files.result_json import SCHEMA
-from feti_homog.output.plots import decimation, figures, plot_helpers
+from feti_homog.output.plots import axial_shear, decimation, figures, plot_helpers
 from feti_homog.output.plots.interface_marks import InterfaceEdges
 
 
@@ -155,6 +155,28 @@ def test_faces_are_as_their_worst_node(tmp_path: Path) -> None:
     middle = ends.mean(axis=1)
     assert len(states) == 2 * len(expected)
     assert [expected[y, round(16 * x)] for x, y in middle] == states.tolist()
+
+
+@pytest.mark.slow
+def test_loads_in_space_have_their_pictures(tmp_path: Path) -> None:
+    """Strain along the fibres and a temperature deform the cell; axial shear has lines of its displacement."""
+    write(tmp_path, in_space(sample(4)))
+    paths = figures.plot(tmp_path)
+    names = ["case_E33.png", "case_temperature.png", "case_minus_gamma13.png"]
+    assert [path.name for path in paths] == ["cell.png", *names, "interface.png"]
+    for path in paths:
+        picture = imread(path)
+        assert min(picture.shape[:2]) > 500 and picture[..., :3].std() > 0.1
+    before = [path.read_bytes() for path in paths]
+    output = {"stress": "S23"}
+    (tmp_path / "result.json").write_text(json.dumps({"schema": SCHEMA, "case": {"output": output}}))
+    after = [path.read_bytes() for path in figures.plot(tmp_path)]
+    assert before[0] == after[0] and all(a != b for a, b in zip(before[1:4], after[1:4], strict=True))
+
+
+@pytest.mark.parametrize(("wanted", "step"), [(0.083, 0.1), (0.1, 0.1), (0.11, 0.2), (3.0, 5.0), (6e4, 1e5), (0, 1)])
+def test_lines_of_displacement_are_at_round_steps(wanted: float, step: float) -> None:
+    assert axial_shear.round_step(wanted) == pytest.approx(step)
 
 
 @pytest.mark.slow

@@ -13,7 +13,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-from support.sample_output import sample
+from support.sample_output import in_space, sample
 
 from feti_homog.errors import CaseError
 from feti_homog.output.files import result_json
@@ -61,10 +61,22 @@ def bonded() -> dict[str, Any]:
     return document("stiffness", effective_stiffness=stiffness, moduli=moduli, bounds=bounds)
 
 
-def written(directory: Path, result: dict[str, Any], points: Sequence[int] = (0, 1, 2)) -> Path:
+def space() -> dict[str, Any]:
+    stiffness, thermal = np.diag(np.arange(1.0, 7.0)), np.arange(6.0)
+    about = {"E_axial": 3.0, "expansion_axial": None, "deviation": 0.1}
+    found = {"effective_stiffness": stiffness, "thermal_stress": thermal, "constants": {"E1": 1.0}}
+    return document("stiffness", **found, transversely_isotropic=about, estimates={"mori_tanaka": {"E_axial": 3.1}})
+
+
+def angle_in_space() -> dict[str, Any]:
+    rows = [COUNTS | {"angle": a, "stiffness": np.diag(np.arange(1.0, 7.0)).tolist()} for a in (0, 90, 180)]
+    return document("angle", angle=rows)
+
+
+def written(directory: Path, result: dict[str, Any], points: Sequence[int] = (0, 1, 2), spatial: bool = False) -> Path:
     from mpi4py import MPI
 
-    whole = sample(4)
+    whole = in_space(sample(4)) if spatial else sample(4)
     *parts, _ = vars(whole).values()
     with FieldFile(directory, MPI.COMM_SELF, *parts) as file:
         for k, state in enumerate(whole.states):
@@ -114,6 +126,17 @@ def test_the_page_has_what_there_is(tmp_path: Path, result: Callable[[], dict[st
     assert {"hill", "holds", "kkt_tension", "fails", "a fault", "done"} <= set(words.text)
     assert words.tags.count("img") == 1 and "svg" not in words.tags
     assert [state["label"] for state in json.loads(words.data)["states"]] == [state.label for state in sample(4).states]
+
+
+@pytest.mark.parametrize("result", [space, angle_in_space])
+def test_the_page_of_a_cell_in_space(tmp_path: Path, result: Callable[[], dict[str, Any]]) -> None:
+    words = Words(page.write(written(tmp_path, result(), spatial=True)).read_text(encoding="utf-8"))
+    assert {"S33", "gamma23", "mori tanaka", "3.1", "E axial"} <= set(words.text) or result is angle_in_space
+    assert {"C66", "C44"} <= set(words.text) or result is space
+    shown = json.loads(words.data)
+    assert shown["components"] == ["S11", "S22", "S33", "S23", "S13", "S12"] and shown["component"] == 2
+    assert [state["load"] for state in shown["states"]] == ["E33 = 1", "temperature = 1", "gamma13 = -1"]
+    assert all(len(state["fields"]) == len(state["stress"]) == 6 for state in shown["states"])
 
 
 def test_a_case_without_fields_has_its_curves(tmp_path: Path) -> None:
