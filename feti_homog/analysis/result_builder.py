@@ -16,9 +16,11 @@ from feti_homog.analysis.result_records import (
     AnglePoint,
     CellInfo,
     Checks,
+    EnvelopePoint,
     FibreInfo,
     PathPoint,
     SolverInfo,
+    SpatialEnvelopePoint,
     StiffnessBounds,
 )
 from feti_homog.common.mpi_errors import on_root
@@ -35,9 +37,10 @@ def result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Fields
     cell, progress = context.homogenization.cell, context.progress
     areas = cell.areas()
     fractions = {phase: area / sum(areas.values()) for phase, area in areas.items()}
+    in_envelope = EnvelopePoint if cell.axial is None else SpatialEnvelopePoint
     points: dict[str, Any] = {
         name: tuple(kind(**point) for point in analysis[name])
-        for name, kind in (("angle", AnglePoint), ("path", PathPoint))
+        for name, kind in (("angle", AnglePoint), ("path", PathPoint), ("envelope", in_envelope))
         if name in analysis
     }
     if "effective_stiffness" in analysis and cell.axial is not None:

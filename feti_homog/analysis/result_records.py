@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from feti_homog.common.records import DEGREES, LENGTH, STRESS, described, plain
 from feti_homog.mechanics.bounds import Bounds
-from feti_homog.mechanics.voigt import STIFFNESSES, STRAINS, STRESSES
+from feti_homog.mechanics.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES, STIFFNESSES, STRAINS, STRESSES
 from feti_homog.typing import Float
 
 ENERGY = f"{STRESS} times that of the cell"
@@ -190,3 +190,44 @@ class PathPoint:
     open: int = described("debonded interface nodes without contact")
     closed: int = described("debonded interface nodes in contact")
     iterations: int = described("Krylov iterations")
+
+
+ONSET_STRAIN = "macroscopic strain at onset"
+ONSET_STRESS = "macroscopic stress at onset"
+
+
+@dataclass(frozen=True, kw_only=True)
+class EnvelopePoint:
+    """The onset of debonding along one direction of a plane of macroscopic stresses or strains.
+
+    All but the direction is absent where no load along it breaks a bond.
+    """
+
+    angle: float = described("direction of the load in the plane, from the first axis towards the second", DEGREES)
+    factor: float | None = described(
+        "load at onset, in the unit of the axes: their values are `factor` times cosine and sine of `angle`; 0 if the "
+        "change of temperature alone breaks a bond",
+        default=None,
+    )
+    strain: Float | None = described(ONSET_STRAIN, "", "(3,)", STRAINS, default=None)
+    stress: Float | None = described(ONSET_STRESS, STRESS, "(3,)", STRESSES, default=None)
+    fibre: int | None = described("number of the fibre whose bond breaks first", default=None)
+    bond_angle: float | None = described(
+        "direction of that bond from the fibre's centre; of a fibre without centre that of its normal",
+        DEGREES,
+        default=None,
+    )
+    normal: float | None = described("share of the normal strength that the bond uses", default=None)
+    tangential: float | None = described("share of the tangential strength", default=None)
+    axial: float | None = described("share of the strength along the fibre", default=None)
+    psi: float | None = described(
+        "mode of a bond that breaks by energy: 0 opens, 90 shears, along the fibre too", DEGREES, default=None
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpatialEnvelopePoint(EnvelopePoint):
+    """The same in generalized plane strain."""
+
+    strain: Float | None = described(ONSET_STRAIN, "", "(6,)", SPATIAL_STRAINS, default=None)
+    stress: Float | None = described(ONSET_STRESS, STRESS, "(6,)", SPATIAL_STRESSES, default=None)

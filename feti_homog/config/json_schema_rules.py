@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from feti_homog.config.cell_section import ALL_CIRCULAR, GEOMETRY
+from feti_homog.config.envelope_section import STRAINS, STRESSES, pairs_of
 from feti_homog.config.material_forms import EXPANSION_PAIR, MATERIAL_FORMS
 from feti_homog.config.schema import Condition, Key, Selector, defaults_of, keys_of
 from feti_homog.config.sections import (
@@ -13,13 +14,16 @@ from feti_homog.config.sections import (
     ANGLE_ANALYSIS,
     BY_ENERGY,
     CRITERION,
+    ENVELOPE_ANALYSIS,
     GENERALIZED,
     GENERALIZED_ANALYSES,
+    IN_THE_PLANE,
     METHOD,
     PLANE,
     SECTIONS,
     SECTIONS_OF_AN_ANALYSIS,
     STIFFNESSES,
+    STRENGTHS,
     Arc,
 )
 from feti_homog.config.tables import REQUIRED
@@ -43,6 +47,7 @@ def rules_of_one_case() -> Schema:
             *_arc_rules(),
             *_energy_rules(),
             _generalized_rule(),
+            *_envelope_rules(),
             _at(("cell",), {"not": {"required": ["width", "fibre_radius"]}}),
             _at(("decomposition",), {"not": {"required": ["subdomains", "max_dofs"]}}),
             _at(("path",), {"oneOf": [{"required": ["strain"]}, {"required": ["waypoints"]}]}),
@@ -133,14 +138,17 @@ def _arc_rules() -> list[Schema]:
         {"if": _if(ANGLE_ANALYSIS), "then": {"required": ["interface"], **_at(("interface",), some_arc)}},
         {
             "if": {"allOf": [_if(stiffness), _if(ALL_CIRCULAR)]},
-            "then": _at(("interface",), {"anyOf": [{"required": [name]} for name in ("debonded", *STIFFNESSES)]}),
+            "then": _at(
+                ("interface",),
+                {"anyOf": [{"required": [name]} for name in ("debonded", *STIFFNESSES, "axial_stiffness")]},
+            ),
         },
     ]
 
 
 def _energy_rules() -> list[Schema]:
     """Bonds that break by energy have springs, and no strengths."""
-    strengths = {"normal_strength": False, "tangential_strength": False}
+    strengths = dict.fromkeys(STRENGTHS, False)
     springs = _at(("interface",), {"required": [*STIFFNESSES], "properties": strengths})
     return [{"if": _if(BY_ENERGY), "then": springs}]
 
@@ -148,3 +156,18 @@ def _energy_rules() -> list[Schema]:
 def _generalized_rule() -> Schema:
     """Generalized plane strain is that of some types of analysis."""
     return {"if": _if(GENERALIZED), "then": _at(("analysis", "type"), {"enum": list(GENERALIZED_ANALYSES)})}
+
+
+def _envelope_rules() -> list[Schema]:
+    """An envelope needs bonds that break and debonded faces without contact; its plane is that of the case."""
+    strong = {"anyOf": [{"required": [name]} for name in STRENGTHS]}
+    by_energy = {"properties": {"criterion": {"const": "energy"}}, "required": ["criterion"]}
+    some_arc = {"required": ["debonded"], "properties": {"debonded": {"minItems": 1}}}
+    free = {"if": some_arc, "then": {"required": ["contact"], "properties": {"contact": {"const": False}}}}
+    bonding = {"allOf": [{"anyOf": [by_energy, strong]}, free]}
+    in_the_plane = {"envelope": {"properties": {"plane": pairs_of(STRESSES, STRAINS)}}}
+    no_axial_strength = {"interface": {"properties": {"axial_strength": False}}}
+    return [
+        {"if": _if(ENVELOPE_ANALYSIS), "then": {"required": ["interface"], **_at(("interface",), bonding)}},
+        {"if": _if(IN_THE_PLANE), "then": {"properties": in_the_plane | no_axial_strength}},
+    ]

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from markdown_text import code, page, table
 
 from feti_homog.analysis.result import schema_keys
-from feti_homog.analysis.result_records import AnglePoint, PathPoint
+from feti_homog.analysis.result_records import AnglePoint, PathPoint, SpatialEnvelopePoint
 from feti_homog.output.files.csv_tables import Column, columns
 from feti_homog.output.files.field_layout import items
 from feti_homog.sweep.report.columns import COLUMNS, DATASETS
@@ -43,6 +43,7 @@ def results() -> str:
     )
     parts = ["# Results", INTRODUCTION, "## result.json", JSON, keys, "## result.h5", HDF5, fields]
     parts += ["## angle.csv", _columns(columns(AnglePoint)), "## path.csv", _columns(columns(PathPoint))]
+    parts += ["## envelope.csv", _columns(columns(SpatialEnvelopePoint))]
     parts += ["## sweep.csv", SWEEP_CSV, _columns(COLUMNS), "## sweep.h5", _columns(DATASETS, "dataset")]
     return page(*parts)
 

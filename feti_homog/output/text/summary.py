@@ -17,7 +17,12 @@ NAME = 28  # columns of the names of table rows
 GLUE = "\N{NO-BREAK SPACE}"  # at which no line is broken
 STIFF = ("C11", "C22", "C33")
 LISTED = 12  # numbers of iterations that are reported one by one
-TITLES = {"stiffness": "effective stiffness", "angle": "debonding angle", "path": "load path"}
+TITLES = {
+    "stiffness": "effective stiffness",
+    "angle": "debonding angle",
+    "path": "load path",
+    "envelope": "onset of debonding",
+}
 MODULI = ("E1", "E2", "G12", "bulk", "shear")  # in the unit of the stresses; the others are ratios
 
 Document = Mapping[str, Any]
