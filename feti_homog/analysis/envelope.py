@@ -46,6 +46,11 @@ class Rays:
     stress_before: Float
     temperature: float
 
+    def at(self, number: int, factor: float) -> dict[str, Any]:
+        """The factor, strain (m,) and stress (m,) on a ray."""
+        strain = self.strain_before + factor * self.strain[number]
+        return {"factor": factor, "strain": strain, "stress": self.stress_before + factor * self.stress[number]}
+
 
 def run(context: AnalysisContext, section: Envelope, criterion: BondCriterion) -> dict[str, Any]:
     """`envelope`, a list of directions with the load at which the first bond breaks, and `effective_stiffness` from
@@ -123,11 +128,8 @@ class _Finder:
                 factors = self._onset.factors(ahead, self._least(rays.stress[rows], ahead.shape[2]), before)
             else:
                 factors = np.tile(np.where(used >= most * (1.0 - UTILISATION_TIE), 0.0, np.inf), (len(ahead), 1))
-            first_bonds = self._first(factors, at_start, ahead)
-            for strain, stress, bond in zip(rays.strain[rows], rays.stress[rows], first_bonds, strict=True):
-                factor = float(bond[0])
-                loads = {"strain": rays.strain_before + factor * strain, "stress": rays.stress_before + factor * stress}
-                yield {} if np.isinf(factor) else {"factor": factor} | loads | self._of_bond(bond)
+            for row, bond in enumerate(self._first(factors, at_start, ahead), first):
+                yield {} if np.isinf(bond[0]) else rays.at(row, float(bond[0])) | self._of_bond(bond)
 
     def _tractions(self, strain: Float, temperature: float, names: Sequence[str]) -> Float:
         """(n, k, c) under strains (n, m) of these names and a change of temperature."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -36,7 +37,8 @@ def document(plane: str, interface: dict[str, Any], **sections: dict[str, Any]) 
         "output": {"fields": False, "pictures": False},
         "petsc": TIGHT,
     }
-    return base | {name: {**base.get(name, {}), **contents} for name, contents in sections.items()}
+    own = {"analysis", "output", "petsc"}  # the others are replaced as a whole
+    return base | {name: ({**base[name], **c} if name in own else c) for name, c in sections.items()}
 
 
 def envelope(
@@ -45,18 +47,22 @@ def envelope(
     interface: dict[str, Any],
     axes: Sequence[str],
     sections: dict[str, Any] | None = None,
+    folder: Path = Path(),
     **own: Any,
 ) -> Any:
     """The result of an envelope.  Collective."""
     both = (sections or {}) | {"analysis": {"type": "envelope"}, "envelope": {"plane": list(axes)} | own}
-    return run(Case.parse(document(plane, interface, **both)), comm)
+    return run(Case.parse(document(plane, interface, **both), folder), comm)
 
 
 @contextmanager
 def torn(comm: Any, plane: str, interface: dict[str, Any], **sections: Any) -> Iterator[Any]:
-    """The torn cell of a path in the cell of `envelope`.  Collective."""
+    """The torn cell of a path, in generalized plane strain of an envelope, in the cell of `envelope`.  Collective."""
     PETSc.garbage_cleanup(comm)
-    more = {"analysis": {"type": "path"}, "path": {"strain": [1.0, 0.0, 0.0]}}
+    if plane == "generalized":
+        more = {"analysis": {"type": "envelope"}, "envelope": {"plane": ["E11", "E22"]}}
+    else:
+        more = {"analysis": {"type": "path"}, "path": {"strain": [1.0, 0.0, 0.0]}}
     case = Case.parse(document(plane, interface, **more, **sections))
     with case_options(case.petsc):
         cell = unit_cell.tear(case, comm, Progress(comm, quiet=True))
