@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from feti_homog.analysis.result_fields import Fields
 from feti_homog.analysis.result_html import tables
 from feti_homog.analysis.result_records import (
+    EITHER_STIFFNESS,
     AnglePoint,
     CellInfo,
     Checks,
@@ -41,9 +42,11 @@ class Result:
     Printed, it is a short summary; in a notebook, tables.  `schema_keys` lists all that is written.
 
     Attributes:
-        effective_stiffness: (3, 3) L^ef, its columns the stresses under the unit strains; of analysis "stiffness".
-        effective_stiffness_compression: (3, 3) the same under minus the unit strains, where debonded faces touch
-            without tension.
+        effective_stiffness: (3, 3), of generalized plane strain (6, 6), L^ef, its columns the stresses under the unit
+            strains; of analysis "stiffness".
+        effective_stiffness_compression: the same under minus the unit strains, where debonded faces touch without
+            tension.
+        compliance, thermal_stress, thermal_expansion: of generalized plane strain, (6, 6) and (6,), else None.
         moduli, bounds: of perfectly bonded cells, else None.
         tips: energy release rates of a stiffness with debonded arcs, else None; those of an angle are in its points.
         angle, path, envelope: the points of these analyses, else None; `points` has those of the first two as arrays.
@@ -66,10 +69,10 @@ class Result:
     moduli: Moduli | None = described("engineering moduli of a perfectly bonded cell", default=None)
     bounds: StiffnessBounds | None = described("bounds of a perfectly bonded cell", default=None)
     effective_stiffness: Float | None = described(
-        "L^ef: columns are the stresses under the unit strains", STRESS, "(3, 3)", default=None
+        "L^ef: columns are the stresses under the unit strains", STRESS, EITHER_STIFFNESS, default=None
     )
     effective_stiffness_compression: Float | None = described(
-        "the same under minus the unit strains, with contact", STRESS, "(3, 3)", default=None
+        "the same under minus the unit strains, with contact", STRESS, EITHER_STIFFNESS, default=None
     )
     compliance: Float | None = described(
         "of generalized plane strain: inverse of L^ef", f"1 / {STRESS}", "(6, 6)", default=None
@@ -101,7 +104,7 @@ class Result:
     angle: tuple[AnglePoint, ...] | None = described("points of analysis `angle`, as in angle.csv", default=None)
     path: tuple[PathPoint, ...] | None = described("points of analysis `path`, as in path.csv", default=None)
     envelope: tuple[EnvelopePoint, ...] | None = described(
-        "directions of analysis `envelope`, as in envelope.csv; in generalized plane strain with (6,) components",
+        "directions of analysis `envelope`, as in envelope.csv",
         default=None,
     )
     states: tuple[int, ...] | None = described(
@@ -134,8 +137,9 @@ class Result:
     def points(self) -> dict[str, NDArray[Any]]:
         """Arrays over the n points of an angle or a path by name, empty for other analyses.
 
-        `angle` or `load_factor` (n,), `strain` and `stress` (n, 3), `stiffness` (n, 3, 3), `debonded_length` (n, f),
-        `bonded`, `open`, `closed`, ... (n,); NaN where a point has no such number.  The tips are in the points alone.
+        `angle` or `load_factor` (n,), `strain` and `stress` (n, 3), `stiffness` (n, 3, 3) or (n, 6, 6),
+        `debonded_length` (n, f), `bonded`, `open`, `closed`, ... (n,); NaN where a point has no such number.  The tips
+        are in the points alone.
         """
         documents = [plain(point) for point in (*(self.angle or ()), *(self.path or ()))]
         names = dict.fromkeys(name for point in documents for name in point if name != "tips")

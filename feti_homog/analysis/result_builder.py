@@ -20,7 +20,6 @@ from feti_homog.analysis.result_records import (
     FibreInfo,
     PathPoint,
     SolverInfo,
-    SpatialEnvelopePoint,
     StiffnessBounds,
 )
 from feti_homog.common.mpi_errors import on_root
@@ -37,10 +36,9 @@ def result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Fields
     cell, progress = context.homogenization.cell, context.progress
     areas = cell.areas()
     fractions = {phase: area / sum(areas.values()) for phase, area in areas.items()}
-    in_envelope = EnvelopePoint if cell.axial is None else SpatialEnvelopePoint
     points: dict[str, Any] = {
         name: tuple(kind(**point) for point in analysis[name])
-        for name, kind in (("angle", AnglePoint), ("path", PathPoint), ("envelope", in_envelope))
+        for name, kind in (("angle", AnglePoint), ("path", PathPoint), ("envelope", EnvelopePoint))
         if name in analysis
     }
     if "effective_stiffness" in analysis and cell.axial is not None:

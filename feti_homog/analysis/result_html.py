@@ -6,7 +6,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from typing import Any
 
-from feti_homog.mechanics.voigt import STRAINS, STRESSES
+from feti_homog.mechanics.voigt import SPATIAL_STRESSES, voigt_names
+from feti_homog.output.text.spatial_tables import THERMAL
 from feti_homog.output.text.summary import title_of
 from feti_homog.output.text.units import with_unit
 
@@ -22,8 +23,11 @@ def tables(document: Document) -> str:
     blocks = [f"<h4>{escape(title_of(document))}</h4>"]
     for key, words in (("effective_stiffness", "L<sup>ef</sup>"), ("effective_stiffness_compression", "under minus E")):
         if key in document:
-            rows = ([name, *map(_number, row)] for name, row in zip(STRESSES, document[key], strict=True))
-            blocks.append(_table(f"{words}{escape(label)}", ["", *STRAINS], rows))
+            strains, stresses = voigt_names(len(document[key]))
+            rows = ([name, *map(_number, row)] for name, row in zip(stresses, document[key], strict=True))
+            blocks.append(_table(f"{words}{escape(label)}", ["", *strains], rows))
+    if "thermal_stress" in document:
+        blocks.append(_thermal(document, label))
     if "moduli" in document:
         moduli = document["moduli"].items()
         blocks.append(_table("moduli", None, ([with_unit(name, unit), _number(value)] for name, value in moduli)))
@@ -33,6 +37,14 @@ def tables(document: Document) -> str:
     checks = document["checks"].items()
     blocks.append(_table("largest relative errors", None, ([law, f"{error:.1e}"] for law, error in checks)))
     return "\n".join([*blocks, f"<p>{escape(document['status'])}</p>"])
+
+
+def _thermal(document: Document, label: str) -> str:
+    """What a unit of temperature does, a row for each component."""
+    known = {words: document[key] for key, words in THERMAL.items() if key in document}
+    rows = zip(SPATIAL_STRESSES, *known.values(), strict=True)
+    words = ([stress[1:], *map("{:.7g}".format, numbers)] for stress, *numbers in rows)
+    return _table(f"per unit of temperature{escape(label)}", ["", *known], words)
 
 
 def _points(key: str, points: Sequence[Document]) -> str:

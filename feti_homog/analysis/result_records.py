@@ -1,6 +1,7 @@
 """The records that result.json consists of; `result.Result` has them all.
 
-Strains are [E11, E22, gamma12], stresses [S11, S22, S12], in the unit of the moduli, per unit of depth.
+Strains are [E11, E22, gamma12], stresses [S11, S22, S12], in the unit of the moduli, per unit of depth; of generalized
+plane strain [E11, E22, E33, gamma23, gamma13, gamma12] and [S11, S22, S33, S23, S13, S12].
 """
 
 from __future__ import annotations
@@ -10,9 +11,17 @@ from dataclasses import dataclass
 
 from feti_homog.common.records import DEGREES, LENGTH, STRESS, described, plain
 from feti_homog.mechanics.bounds import Bounds
-from feti_homog.mechanics.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES, STIFFNESSES, STRAINS, STRESSES
+from feti_homog.mechanics.voigt import (
+    SPATIAL_STIFFNESSES,
+    SPATIAL_STRAINS,
+    SPATIAL_STRESSES,
+    STIFFNESSES,
+    STRAINS,
+    STRESSES,
+)
 from feti_homog.typing import Float
 
+EITHER, EITHER_STIFFNESS = "(3,) or (6,)", "(3, 3) or (6, 6)"
 ENERGY = f"{STRESS} times that of the cell"
 DEBONDED_ANGLE = (
     "the same in degrees of arc, `debonded_length` / radius; of a fibre that is not round 360 times the share of its "
@@ -138,7 +147,21 @@ class AnglePoint:
     """The response at one debonding angle."""
 
     angle: float = described("opening of the arcs without an angle of their own", DEGREES)
-    stiffness: Float | None = described("L^ef, if no strain is given", STRESS, "(3, 3)", STIFFNESSES, default=None)
+    stiffness: Float | None = described(
+        "L^ef, if no strain is given",
+        STRESS,
+        EITHER_STIFFNESS,
+        STIFFNESSES,
+        spatial_components=SPATIAL_STIFFNESSES,
+        default=None,
+    )
+    thermal_stress: Float | None = described(
+        "stress under a unit of temperature at no strain, of generalized plane strain",
+        f"{STRESS} per unit of temperature",
+        "(6,)",
+        tuple(f"thermal_{name}" for name in SPATIAL_STRESSES),
+        default=None,
+    )
     strain: Float | None = described("macroscopic strain that is given", "", "(3,)", STRAINS, default=None)
     stress: Float | None = described("macroscopic stress under it", STRESS, "(3,)", STRESSES, default=None)
     stored: float | None = described("energy stored under it per area of the cell", STRESS, default=None)
@@ -192,10 +215,6 @@ class PathPoint:
     iterations: int = described("Krylov iterations")
 
 
-ONSET_STRAIN = "macroscopic strain at onset"
-ONSET_STRESS = "macroscopic stress at onset"
-
-
 @dataclass(frozen=True, kw_only=True)
 class EnvelopePoint:
     """The onset of debonding along one direction of a plane of macroscopic stresses or strains.
@@ -209,8 +228,12 @@ class EnvelopePoint:
         "change of temperature alone breaks a bond",
         default=None,
     )
-    strain: Float | None = described(ONSET_STRAIN, "", "(3,)", STRAINS, default=None)
-    stress: Float | None = described(ONSET_STRESS, STRESS, "(3,)", STRESSES, default=None)
+    strain: Float | None = described(
+        "macroscopic strain at onset", "", EITHER, STRAINS, spatial_components=SPATIAL_STRAINS, default=None
+    )
+    stress: Float | None = described(
+        "macroscopic stress at onset", STRESS, EITHER, STRESSES, spatial_components=SPATIAL_STRESSES, default=None
+    )
     fibre: int | None = described("number of the fibre whose bond breaks first", default=None)
     bond_angle: float | None = described(
         "direction of that bond from the fibre's centre; of a fibre without centre that of its normal",
@@ -223,11 +246,3 @@ class EnvelopePoint:
     psi: float | None = described(
         "mode of a bond that breaks by energy: 0 opens, 90 shears, along the fibre too", DEGREES, default=None
     )
-
-
-@dataclass(frozen=True, kw_only=True)
-class SpatialEnvelopePoint(EnvelopePoint):
-    """The same in generalized plane strain."""
-
-    strain: Float | None = described(ONSET_STRAIN, "", "(6,)", SPATIAL_STRAINS, default=None)
-    stress: Float | None = described(ONSET_STRESS, STRESS, "(6,)", SPATIAL_STRESSES, default=None)

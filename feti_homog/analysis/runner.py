@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import closing, contextmanager, nullcontext
 from dataclasses import replace
-from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -17,21 +16,20 @@ from feti_homog.analysis import debonding_angle, envelope, load_path, result_bui
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.criteria import criterion_of
 from feti_homog.analysis.result import Result
-from feti_homog.analysis.result_fields import Fields
+from feti_homog.analysis.state_recorder import StateRecorder
 from feti_homog.common import process_memory
 from feti_homog.common.mpi_errors import all_raise, on_root, on_root_only
 from feti_homog.common.petsc_options import case_options, refuse_unused
 from feti_homog.common.progress import Progress
 from feti_homog.config.case import Case
-from feti_homog.errors import ConvergenceError, FetiHomogError
-from feti_homog.homogenization.averaging import Homogenization, Response
+from feti_homog.errors import ConvergenceError
+from feti_homog.homogenization.averaging import Homogenization
 from feti_homog.homogenization.unit_cell import TornCell, tear
 from feti_homog.output.files import (
     csv_tables,
     event_log,
     field_file,
     field_parts,
-    file_seal,
     folder_contents,
     output_folder,
     result_json,
@@ -40,8 +38,6 @@ from feti_homog.output.files import (
 from feti_homog.output.files.checkpoint import Checkpoint, EventsInMemory, NoCheckpoint
 from feti_homog.output.files.event_log import EventLog
 from feti_homog.output.files.field_file import FieldFile
-from feti_homog.output.files.field_layout import StatePart
-from feti_homog.output.files.file_seal import FileSeal
 from feti_homog.output.text.summary import summary
 
 
@@ -82,7 +78,7 @@ def compute(case: Case, comm: MPI.Intracomm, keep_fields: bool = False) -> Resul
     """
     progress = Progress(comm, quiet=True)
     with _torn(case, comm, progress) as cell:
-        states = _States(cell, None, keep_fields, progress.say)
+        states = StateRecorder(cell, None, keep_fields, progress.say)
         context = _context(cell, progress, states)
         by_energy = case.interface is not None and case.interface.criterion == "energy"
         checkpoint = EventsInMemory(comm) if keep_fields or by_energy else NoCheckpoint(comm)
@@ -110,61 +106,12 @@ def _torn(case: Case, comm: MPI.Intracomm, progress: Progress) -> Iterator[TornC
         cell.destroy()
 
 
-class _States:
-    """Where the states of a run go: to the file if there is one, and to memory if they are to be kept.
-
-    Attributes:
-        has_place: whether states go anywhere.
-        error: why the file was given up; the numbers are computed without it.
-    """
-
-    def __init__(self, cell: TornCell, file: FieldFile | None, keep: bool, say: Callable[[str], object]) -> None:
-        self._cell, self._file, self._keep = cell, file, keep
-        self._number, self._states, self._say = count(), list[StatePart](), say
-        self.has_place = keep or file is not None
-        self.error: FetiHomogError | None = None
-
-    def record(
-        self, plane: Response | None, axial: Response | None, load_factor: float, label: str, point: int
-    ) -> None:
-        """Take responses, one of which may be None, as the next state; collective."""
-        if self._file is None and not self._keep:
-            return
-        state = field_parts.state_part(self._cell, plane, axial, load_factor, label, point)
-        self._write(lambda file: file.write_state(next(self._number), state))
-        if self._keep:
-            self._states.append(state)
-
-    def seal(self) -> FileSeal | None:
-        """Complete the file; returns its seal, None without a file.  Collective."""
-        self._write(FieldFile.close)
-        return None if self._file is None else on_root(self._cell.comm, file_seal.seal, self._file.path)
-
-    def _write(self, write: Callable[[FieldFile], object]) -> None:
-        """Do it to the file if there is one; if it cannot be written, which all ranks hear, there is none any more."""
-        if self._file is not None:
-            try:
-                write(self._file)
-            except FetiHomogError as error:
-                self._file, self.error = None, error
-                self._say(f"warning: {error}; what follows is computed without it")
-
-    def kept(self) -> Fields | None:
-        """This rank's fields, if they were to be kept."""
-        if not self._keep:
-            return None
-        cell = self._cell
-        mesh, interface = field_parts.mesh_part(cell), field_parts.interface_part(cell)
-        fibres = field_parts.fibre_part(cell)
-        return Fields(cell.comm, field_parts.header(cell), mesh, fibres, interface, tuple(self._states))
-
-
 def _run_and_write(cell: TornCell, directory: Path, progress: Progress, resume: bool, keep_fields: bool) -> Result:
     """Analyse and write; the result may have faults."""
     output = cell.case.output
     file = _field_file(cell, directory, progress) if output.fields else None
     with file or nullcontext(), closing(EventLog(directory, cell.comm, cell.case.name, progress.say)) as log:
-        states = _States(cell, file, keep_fields, progress.say)
+        states = StateRecorder(cell, file, keep_fields, progress.say)
         context = replace(_context(cell, progress, states), log=log.write)
         for warning in context.warnings():
             progress.say(f"warning: {warning}")
@@ -200,7 +147,7 @@ def _field_file(cell: TornCell, directory: Path, progress: Progress) -> FieldFil
         )
 
 
-def _context(cell: TornCell, progress: Progress, states: _States) -> AnalysisContext:
+def _context(cell: TornCell, progress: Progress, states: StateRecorder) -> AnalysisContext:
     """The analysis of a cell."""
     contact = cell.case.interface is not None and cell.case.interface.contact
     return AnalysisContext(

@@ -31,6 +31,7 @@ class Description:
         unit: empty for pure numbers, counts and texts.
         shape: of an array, as "(3, 3)" or "(n, 2)".
         components: the names of the columns that an array fills in a table.
+        spatial_components: the same of generalized plane strain, if it has more of them there.
         entries: the keys of a mapping and their meanings; a single key in capitals stands for any.
         dtype: of an array in an HDF5 file.
         name: under which an HDF5 file has it, if not that of the field.
@@ -43,6 +44,7 @@ class Description:
     entries: Mapping[str, str] = dataclasses.field(default_factory=dict)
     dtype: str = "float64"
     name: str = ""
+    spatial_components: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -63,10 +65,11 @@ def described(
     entries: Mapping[str, str] | None = None,
     dtype: str = "float64",
     name: str = "",
+    spatial_components: tuple[str, ...] = (),
     **options: Any,
 ) -> Any:
     """A dataclass field with a description; `options` are those of `dataclasses.field`."""
-    description = Description(meaning, unit, shape, components, entries or {}, dtype, name)
+    description = Description(meaning, unit, shape, components, entries or {}, dtype, name, spatial_components)
     return dataclasses.field(metadata={DESCRIPTION: description}, **options)
 
 

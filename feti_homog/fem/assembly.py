@@ -63,14 +63,17 @@ def element_gradients(points: Float, triangles: Int32) -> Iterator[tuple[slice, 
         yield part, *gradients(points[triangles[part]])
 
 
-def element_strain(points: Float, triangles: Int32, node_class: Int32, u: Float) -> tuple[Float, Float]:
-    """Mean strains (m, 3) of the elements under nodal displacements u (c, 2), and their areas (m,)."""
-    strain, area = np.empty((len(triangles), 3)), np.empty(len(triangles))
+def element_strain(
+    points: Float, triangles: Int32, node_class: Int32, u: Float, problem: Problem = PLANE
+) -> tuple[Float, Float]:
+    """Mean strains (e, m) of the elements under nodal displacements u (classes, c), and their areas (e,)."""
+    strain, area = np.empty((len(triangles), problem.strains)), np.empty(len(triangles))
+    parts_of = [np.nonzero(problem.voigt == number) for number in range(problem.strains)]
     for part, g, w in element_gradients(points, triangles):
         area[part] = w.sum(axis=1)
         mean = np.einsum("eqad,eq->ead", g, w) / area[part, None, None]
         gradient = np.einsum("eai,ead->eid", u[node_class[triangles[part]]], mean)
-        strain[part] = np.stack([gradient[:, 0, 0], gradient[:, 1, 1], gradient[:, 0, 1] + gradient[:, 1, 0]], axis=1)
+        strain[part] = np.stack([gradient[:, i, d].sum(axis=1) for i, d in parts_of], axis=1)
     return strain, area
 
 

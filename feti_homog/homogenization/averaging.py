@@ -18,7 +18,6 @@ from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.operators.node_blocks import NodeBlocks
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface.contact import BONDED, CLOSED, OPEN, Equilibrium, Interface, Status
-from feti_homog.mechanics.voigt import strain_tensor
 from feti_homog.typing import Float
 
 
@@ -158,13 +157,15 @@ def asymmetry(L: Float) -> float:
 
 
 def displacement(cell: TornCell, strain: Float, u: Float) -> Float:
-    """(nodes, 2) total displacement E y + u*, Eq. (14), at this rank's plane nodes."""
+    """(nodes, c) total displacement H y + u*, Eq. (14), at this rank's plane nodes; H y of the strains in the loads."""
     points = np.concatenate([s.mesh.points for s in cell.subdomains] or [np.zeros((0, 2))])
-    return np.asarray(points @ strain_tensor(strain) + fluctuation(cell, u))
+    problem = cell.solver.problem
+    imposed = points @ problem.gradient(strain[: problem.strains]).T
+    return np.asarray(imposed + fluctuation(cell, u))
 
 
 def fluctuation(cell: TornCell, u: Float) -> Float:
-    """(nodes, 2) u* at this rank's plane nodes."""
-    parts = zip(cell.subdomains, cell.offsets, strict=False)
-    own = [u[o : o + len(s.Q)].reshape(-1, 2)[s.mesh.node_class] for s, o in parts]
-    return np.concatenate(own or [np.zeros((0, 2))])
+    """(nodes, c) u* at this rank's plane nodes."""
+    parts, c = zip(cell.subdomains, cell.offsets, strict=False), cell.solver.problem.components
+    own = [u[o : o + len(s.Q)].reshape(-1, c)[s.mesh.node_class] for s, o in parts]
+    return np.concatenate(own or [np.zeros((0, c))])

@@ -67,3 +67,13 @@ def spatial(plane: Float, axial: Float) -> tuple[Float, Float | None]:
     thermal = np.zeros(6)
     thermal[IN_PLANE] = plane[:4, 4]
     return C, thermal
+
+
+def spatial_vector(plane: Float | None, axial: Float | None) -> Float:
+    """(6,) from numbers [11, 22, 12, 33, ...] of the plane problem and [13, 23] of the axial one; None is zero."""
+    whole = np.zeros(6)
+    if plane is not None:
+        whole[IN_PLANE] = plane[:4]
+    if axial is not None:
+        whole[AXIAL_SHEAR] = axial
+    return whole

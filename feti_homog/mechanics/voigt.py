@@ -13,7 +13,14 @@ STRAINS = ("E11", "E22", "gamma12")
 STRESSES = ("S11", "S22", "S12")
 SPATIAL_STRAINS = ("E11", "E22", "E33", "gamma23", "gamma13", "gamma12")
 SPATIAL_STRESSES = ("S11", "S22", "S33", "S23", "S13", "S12")
+AXIAL_STRESSES = ("S23", "S13")
 STIFFNESSES = tuple(f"C{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3))
+SPATIAL_STIFFNESSES = tuple(f"C{i}{j}" for i in range(1, 7) for j in range(1, 7))
+
+
+def voigt_names(count: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Names of the strains and of the stresses, 3 in the plane or 6 in space."""
+    return (STRAINS, STRESSES) if count == len(STRAINS) else (SPATIAL_STRAINS, SPATIAL_STRESSES)
 
 
 def strain_tensor(strain: Float) -> Float:

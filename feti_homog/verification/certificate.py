@@ -23,6 +23,7 @@ from feti_homog.verification.own_process import in_own_process
 from feti_homog.verification.path_laws import check_path
 from feti_homog.verification.point_laws import check_points
 from feti_homog.verification.reading import ResultFiles, altered, opened
+from feti_homog.verification.spatial_laws import check_spatial
 from feti_homog.verification.summary_laws import check_summary
 
 
@@ -90,7 +91,8 @@ def _verified(files: ResultFiles) -> Certificate:
     for state in files.states():
         arrays = (state.displacement, state.fluctuation, state.stress, state.traction, state.jump, state.strain)
         ledger.record("numbers", [np.count_nonzero(~np.isfinite(array)) for array in arrays], state.name)
-        fields = cell.elements.fields(state.displacement, np.abs(state.displacement) + np.abs(state.fluctuation))
+        terms = np.abs(state.displacement) + np.abs(state.fluctuation)
+        fields = cell.elements.fields(state.displacement, terms, state.along, cell.free_strains(state))
         check_fields(ledger, cell, state, fields)
         check_derived(ledger, cell, state, fields)
         check_interface_state(ledger, cell, state)
@@ -101,6 +103,8 @@ def _verified(files: ResultFiles) -> Certificate:
     if "path" in files.document:
         check_path(ledger, cell, states)
     check_summary(ledger, cell)
+    if files.is_spatial:
+        check_spatial(ledger, cell, states)
     return Certificate(ledger.findings(), _title(files, states), _status(files))
 
 

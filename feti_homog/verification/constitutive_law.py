@@ -11,6 +11,28 @@ from feti_homog.errors import CaseError
 from feti_homog.typing import Float
 
 PLANE = [0, 1, 5]  # of the order [11, 22, 33, 23, 13, 12]
+# Places of the components of a tensor in the orders [11, 22, 12] and [11, 22, 33, 23, 13, 12].
+VOIGT = {3: np.array([[0, 2], [2, 1]]), 6: np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])}
+
+
+def spatial_stiffnesses(case: Mapping[str, Any], phases: Sequence[str]) -> Float:
+    """(phases, 6, 6) matrices that turn [E11, E22, E33, gamma23, gamma13, gamma12] into stresses.
+
+    Raises:
+        CaseError: a phase of the mesh has no material in the case.
+    """
+    return np.stack([_spatial_stiffness(_constants(case, phase)) for phase in phases])
+
+
+def expansions(case: Mapping[str, Any], phases: Sequence[str]) -> Float | None:
+    """(phases, 6) strains per unit of temperature in the same order; None if a phase does not give them.
+
+    Raises:
+        CaseError: a phase of the mesh has no material in the case.
+    """
+    found = [_expansion(_constants(case, phase)) for phase in phases]
+    known = [strain for strain in found if strain is not None]
+    return np.stack(known) if len(known) == len(found) else None
 
 
 def plane_stiffnesses(case: Mapping[str, Any], phases: Sequence[str]) -> Float:
@@ -79,6 +101,24 @@ def _plane_stiffness(constants: Mapping[str, Any], plane: str) -> Float:
     return _turned(np.asarray(own, float), float(constants.get("angle", 0.0)))
 
 
+def _spatial_stiffness(constants: Mapping[str, Any]) -> Float:
+    """In the axes of the cell; x3 is one of the material's."""
+    given = _given(constants)
+    law = given if len(given) else np.linalg.inv(_compliance(constants))
+    return _turned(np.asarray(law, float), float(constants.get("angle", 0.0)))
+
+
+def _expansion(constants: Mapping[str, Any]) -> Float | None:
+    """R_ip R_jq alpha_pq of the strains along the material axes."""
+    across, along = (constants.get(f"expansion_{name}") for name in ("transverse", "axial"))
+    given = constants.get("expansion") if across is None or along is None else [across, across, along]
+    if given is None:
+        return None
+    turn = _turn(float(constants.get("angle", 0.0)), 3)
+    tensor = turn @ np.diag(np.broadcast_to(np.array(given, float), 3)) @ turn.T
+    return np.array([*np.diag(tensor), 2 * tensor[1, 2], 2 * tensor[0, 2], 2 * tensor[0, 1]])
+
+
 def _given(constants: Mapping[str, Any]) -> Float:
     """The stiffness that the constants give themselves, (3, 3) or (6, 6); (0, 0) if they do not."""
     given = np.array(constants.get("stiffness", np.zeros((0, 0))), float)
@@ -89,35 +129,45 @@ def _compliance(constants: Mapping[str, Any]) -> Float:
     """(6, 6) in the material axes; out of plane constants that plane stress does not need are any that are stable."""
     if "stiffness" in constants:
         return np.asarray(np.linalg.inv(_given(constants)), float)
-    moduli, ratios, shear = _engineering_constants(constants)
-    compliance = np.diag([1 / moduli[0], 1 / moduli[1], 1 / moduli[2], 1 / shear, 1 / shear, 1 / shear])
+    moduli, ratios, shears = _engineering_constants(constants)
+    compliance = np.diag(1 / np.array([*moduli, *shears]))
     for (i, j), ratio in zip(((0, 1), (0, 2), (1, 2)), ratios, strict=True):
         compliance[i, j] = compliance[j, i] = -ratio / moduli[i]
     return compliance
 
 
-def _engineering_constants(constants: Mapping[str, Any]) -> tuple[list[float], list[float], float]:
-    """Young's moduli along three axes, the ratios 12, 13, 23, and the shear modulus of the plane."""
+def _engineering_constants(constants: Mapping[str, Any]) -> tuple[list[float], list[float], list[float]]:
+    """Young's moduli along three axes, the ratios 12, 13, 23, and the shear moduli 23, 13, 12."""
     if "young" in constants:
         e, nu = float(constants["young"]), float(constants["poisson"])
-        return [e, e, e], [nu, nu, nu], e / (2 * (1 + nu))
+        return [e, e, e], [nu, nu, nu], [e / (2 * (1 + nu))] * 3
     if "E_transverse" in constants:
         e, nu = float(constants["E_transverse"]), float(constants["nu_transverse"])
         along = float(constants.get("E_axial") or e)
         # Under stress along x1 the phase contracts along x3 by nu_axial e / along: compliances are symmetric.
         minor = float(constants.get("nu_axial") or 0.0) * e / along
-        return [e, e, along], [nu, minor, minor], e / (2 * (1 + nu))
+        shear = e / (2 * (1 + nu))
+        axial = float(constants.get("G_axial") or shear)
+        return [e, e, along], [nu, minor, minor], [axial, axial, shear]
     moduli = [float(constants[name]) for name in ("E1", "E2")]
     ratios = [float(constants.get(name) or 0.0) for name in ("nu12", "nu13", "nu23")]
-    return [*moduli, float(constants.get("E3") or moduli[0])], ratios, float(constants["G12"])
+    shears = [float(constants.get(name) or constants["G12"]) for name in ("G23", "G13", "G12")]
+    return [*moduli, float(constants.get("E3") or moduli[0])], ratios, shears
 
 
 def _turned(stiffness: Float, degrees: float) -> Float:
-    """C_ijkl = R_ip R_jq R_kr R_ls C'_pqrs in axes x1, x2 of a material whose axis 1 is `degrees` from x1 to x2."""
-    angle = np.radians(degrees)
-    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    voigt = np.array([[0, 2], [2, 1]])
+    """C_ijkl = R_ip R_jq R_kr R_ls C'_pqrs in axes x1, x2, (x3) of a material whose axis 1 is `degrees` from x1 to
+    x2."""
+    voigt = VOIGT[len(stiffness)]
+    turn = _turn(degrees, len(voigt))
     tensor = stiffness[voigt[:, :, None, None], voigt[None, None]]
-    tensor = np.einsum("ip,jq,kr,ls,pqrs->ijkl", turn, turn, turn, turn, tensor)
-    i, j = np.array([0, 1, 0]), np.array([0, 1, 1])
+    tensor = np.einsum("ip,jq,kr,ls,pqrs->ijkl", turn, turn, turn, turn, tensor, optimize=True)
+    i, j = np.transpose([np.argwhere(voigt == number)[0] for number in range(len(stiffness))])
     return np.asarray(tensor[i[:, None], j[:, None], i[None], j[None]])
+
+
+def _turn(degrees: float, axes: int) -> Float:
+    """(axes, axes) R of a turn from x1 to x2."""
+    angle, turn = np.radians(degrees), np.eye(axes)
+    turn[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+    return turn

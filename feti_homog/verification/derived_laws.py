@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from feti_homog.typing import Float
-from feti_homog.verification.constitutive_law import out_of_plane
+from feti_homog.verification.constitutive_law import VOIGT, out_of_plane
 from feti_homog.verification.discrete_cell import DiscreteCell
 from feti_homog.verification.elements import ElementFields
-from feti_homog.verification.field_laws import ROUNDED_TERMS, in_plane, largest_displacement
+from feti_homog.verification.field_laws import ROUNDED_TERMS, in_axes, largest_displacement
 from feti_homog.verification.ledger import Ledger, relative
 from feti_homog.verification.reading import State
 
@@ -21,43 +21,57 @@ def check_derived(ledger: Ledger, cell: DiscreteCell, state: State, fields: Elem
 
 def _check_elements(ledger: Ledger, cell: DiscreteCell, state: State, fields: ElementFields) -> None:
     element = f"{state.name}, element {{}}".format
-    phase, shown = cell.files.mesh.phase, state.derived
-    rules = out_of_plane(cell.files.case, cell.files.phases)[phase]
-    (S33, E33), (S33_terms, E33_terms) = (
-        np.einsum("eci,ei->ce", rule, stress)
-        for rule, stress in ((rules, state.stress), (np.abs(rules), np.abs(state.stress)))
-    )
-    ledger.record("stress 33", _off(shown["stress_33"], S33, S33_terms), element)
-    tensors = np.zeros((len(S33), 3, 3))
-    tensors[:, :2, :2] = state.stress[:, [[0, 2], [2, 1]]]
-    tensors[:, 2, 2] = np.nan_to_num(S33)
+    scale = np.abs(fields.strain).max(axis=1) + ROUNDED_TERMS * fields.strain_size
+    shown = {"element_strain": fields.strain[:, [0, 1, -1]] * [1.0, 1.0, 0.5]}
+    terms = {"element_strain": np.column_stack([scale] * 3)}
+    if cell.files.is_spatial:
+        tensors = state.stress[:, VOIGT[6]]
+        shown["axial_strain"], terms["axial_strain"] = fields.strain[:, [3, 4]] / 2, np.column_stack([scale] * 2)
+        E33, E33_terms = fields.strain[:, 2], scale
+    else:
+        tensors, E33, E33_terms = _out_of_plane(ledger, cell, state)
+    shown["element_strain"] = np.column_stack([shown["element_strain"], E33])
+    terms["element_strain"] = np.column_stack([terms["element_strain"], E33_terms])
+    for name, strains in shown.items():
+        for column, (strain, own) in enumerate(zip(strains.T, terms[name].T, strict=True)):
+            ledger.record("shown", _off(state.derived[name][:, column], strain, own), element)
+    unknown = np.where(np.isnan(tensors[:, 2, 2]), np.nan, 0.0)
+    tensors[:, 2, 2] = np.nan_to_num(tensors[:, 2, 2])
     principal = np.linalg.eigvalsh(tensors)
     deviator = tensors - np.trace(tensors, axis1=1, axis2=2)[:, None, None] / 3 * np.eye(3)
     mises = np.sqrt(1.5 * (deviator**2).sum(axis=(1, 2)))
     size = np.abs(tensors).max(axis=(1, 2))
-    unknown = np.where(np.isnan(S33), np.nan, 0.0)
     for name, values in (("von_mises", mises), *((f"principal_{3 - i}", principal[:, i]) for i in range(3))):
-        ledger.record("shown", _off(shown[name], values + unknown, size), element)
-    strain = np.column_stack([fields.strain * [1.0, 1.0, 0.5], E33])
-    scale = np.abs(strain[:, :3]).max(axis=1) + ROUNDED_TERMS * fields.strain_size
-    terms = np.column_stack([scale, scale, scale, E33_terms])
-    for column in range(4):
-        ledger.record("shown", _off(shown["element_strain"][:, column], strain[:, column], terms[:, column]), element)
+        ledger.record("shown", _off(state.derived[name], values + unknown, size), element)
+
+
+def _out_of_plane(ledger: Ledger, cell: DiscreteCell, state: State) -> tuple[Float, Float, Float]:
+    """Stresses (m, 3, 3), strains 33 (m,) and the sizes of their terms (m,), in plane strain and stress."""
+    rules = out_of_plane(cell.files.case, cell.files.phases)[cell.files.mesh.phase]
+    (S33, E33), (S33_terms, E33_terms) = (
+        np.einsum("eci,ei->ce", rule, stress)
+        for rule, stress in ((rules, state.stress), (np.abs(rules), np.abs(state.stress)))
+    )
+    off = _off(state.derived["stress_33"], S33, S33_terms)
+    ledger.record("stress 33", off, f"{state.name}, element {{}}".format)
+    tensors = np.zeros((len(S33), 3, 3))
+    tensors[:, :2, :2], tensors[:, 2, 2] = state.stress[:, VOIGT[3]], S33
+    return tensors, E33, E33_terms
 
 
 def _check_interface(ledger: Ledger, cell: DiscreteCell, state: State) -> None:
     node = f"{state.name}, interface node {{}}".format
-    shown, opening = state.derived, in_plane(cell, state.jump)
+    shown, opening = state.derived, in_axes(cell, state.jump)
     fibre = state.displacement[cell.files.faces[:, 0]]
     moved = largest_displacement(cell, state) + float(np.abs(fibre).max(initial=0.0))
     pulled = float(np.abs(state.traction).max(initial=0.0))
     for name, vectors, scale in (
-        ("traction_vector", in_plane(cell, state.traction), pulled),
+        ("traction_vector", in_axes(cell, state.traction), pulled),
         ("jump_vector", opening, moved),
         ("displacement_fibre", fibre, moved),
         ("displacement_matrix", fibre + opening, moved),
     ):
-        off = shown[name] - np.pad(vectors, [(0, 0), (0, 1)])
+        off = shown[name] - np.pad(vectors, [(0, 0), (0, 3 - vectors.shape[1])])
         ledger.record("vectors", relative(np.abs(off).max(axis=1), scale), node)
 
 

@@ -9,9 +9,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from feti_homog.typing import Bool, Float, Int
-from feti_homog.verification.constitutive_law import plane_stiffnesses
+from feti_homog.verification.constitutive_law import expansions, plane_stiffnesses, spatial_stiffnesses
 from feti_homog.verification.elements import Elements
-from feti_homog.verification.reading import ResultFiles
+from feti_homog.verification.reading import ResultFiles, State
 from feti_homog.verification.torus import TornNodes, TornSides, constituents, torn, wrapped
 
 # Scales of a state are no less than this share of those of the run: a path may come back to zero strain.
@@ -39,13 +39,13 @@ class Faces:
     place: Int
 
     def sums(self, values: Float, of_fibre: bool) -> Float:
-        """(k, 2) sums of values (b, 2) over the copies on one of the faces."""
+        """(k, c) sums of values (b, c) over the copies on one of the faces."""
         own = (self.row >= 0) & (self.is_fibre == of_fibre)
         k = len(self.place)
-        return np.stack([np.bincount(self.row[own], values[own, i], k) for i in range(2)], axis=1)
+        return np.stack([np.bincount(self.row[own], column, k) for column in values[own].T], axis=1)
 
     def means(self, values: Float, of_fibre: bool) -> Float:
-        """(k, 2) means of values (b, 2) over the subdomains on one of the faces; NaN where there is none."""
+        """(k, c) means of values (b, c) over the subdomains on one of the faces; NaN where there is none."""
         share = 1.0 / self.copies[:, None]
         with np.errstate(invalid="ignore"):
             return self.sums(values * share, of_fibre) / self.sums(np.ones_like(values) * share, of_fibre)
@@ -56,7 +56,8 @@ class DiscreteCell:
     """Mesh, materials and interface of a result.
 
     Attributes:
-        stiffnesses: (phases, 3, 3).
+        stiffnesses: (phases, v, v), v = 3 or in generalized plane strain 6.
+        expansions: (phases, v) strains per unit of temperature, or None if they are not known.
         constituent: (subdomains,) part of a phase that each subdomain belongs to.
         fractions: (phases,) shares of the meshed area.
         radius: how near copies of a node are.
@@ -65,6 +66,7 @@ class DiscreteCell:
 
     files: ResultFiles
     stiffnesses: Float
+    expansions: Float | None
     elements: Elements
     sides: TornSides
     nodes: TornNodes
@@ -78,7 +80,8 @@ class DiscreteCell:
     def of(cls, files: ResultFiles) -> DiscreteCell:
         """The cell of a result.  Raises CaseError if a phase has no material."""
         mesh = files.mesh
-        stiffnesses = plane_stiffnesses(files.case, files.phases)
+        stiffnesses = (spatial_stiffnesses if files.is_spatial else plane_stiffnesses)(files.case, files.phases)
+        free = expansions(files.case, files.phases) if files.is_spatial else None
         elements = Elements(mesh, stiffnesses)
         sides, nodes, radius = torn(mesh, files.size)
         parts = constituents(mesh, sides)
@@ -87,7 +90,7 @@ class DiscreteCell:
         strains = [np.abs(state.attrs["strain"]).max() for state in files.file.get("state", {}).values()]
         largest = float(np.max(strains, initial=0.0))
         return cls(
-            files, stiffnesses, elements, sides, nodes, parts, faces, areas / areas.sum(), radius, largest
+            files, stiffnesses, free, elements, sides, nodes, parts, faces, areas / areas.sum(), radius, largest
         )  # fmt: skip
 
     @cached_property
@@ -109,25 +112,42 @@ class DiscreteCell:
 
     @property
     def reuss(self) -> Float:
-        """(3, 3) <L^-1>^-1, the least stiffness of the bonded cell."""
+        """(v, v) <L^-1>^-1, the least stiffness of the bonded cell."""
         return np.asarray(np.linalg.inv(np.einsum("p,pij->ij", self.fractions, np.linalg.inv(self.stiffnesses))))
 
-    def imposed(self, strain: Float) -> float:
-        """Largest displacement E x that a strain imposes across the cell, at least that of a faint one."""
+    def free_strains(self, state: State) -> Float | None:
+        """(phases, v) strains of the phases without stress at the temperature of a state."""
+        return None if self.expansions is None else self.expansions * state.temperature
+
+    def loads(self, state: State) -> Float:
+        """(v,) strains that the loads of a state make, for scales: E, and the largest that temperature makes."""
+        free = self.free_strains(state)
+        return state.strain if free is None else np.asarray(state.strain + np.abs(free).max(axis=0))
+
+    def imposed(self, state: State) -> float:
+        """Largest displacement E x that a state imposes across the cell, at least that of a faint strain."""
         width, height = self.files.size
-        corners = np.array([[width, 0.0], [0.0, height], [width, height]])
-        own = float(np.abs(corners @ tensor(strain)).max())
+        corners, loads = np.array([[width, 0.0], [0.0, height], [width, height]]), self.loads(state)
+        own = float(np.abs(corners @ gradient(loads).T).max())
+        if len(loads) > 3:  # as much as E33 may contract
+            own += abs(float(loads[2])) * float(self.files.size.max())
         return max(own, LEAST_SHARE * self.largest_strain * float(self.files.size.max()))
 
-    def least_stress(self, strain: Float) -> float:
-        """A stress that the strain makes in the bonded cell at least, for scales that debonding does not make zero."""
-        own, most = np.abs(self.reuss @ strain).max(), np.abs(self.reuss).max() * self.largest_strain
+    def least_stress(self, state: State) -> float:
+        """A stress that a state makes in the bonded cell at least, for scales that debonding does not make zero."""
+        own, most = np.abs(self.reuss @ self.loads(state)).max(), np.abs(self.reuss).max() * self.largest_strain
         return float(max(own, LEAST_SHARE * most))
 
+    def strain_size(self, state: State) -> float:
+        """The largest of the strains that the loads of a state make."""
+        return max(float(np.abs(self.loads(state)).max()), LEAST_SHARE * self.largest_strain)
 
-def tensor(strain: Float) -> Float:
-    """(2, 2) of [E11, E22, gamma12]."""
-    return np.array([[strain[0], strain[2] / 2], [strain[2] / 2, strain[1]]])
+
+def gradient(strain: Float) -> Float:
+    """(c, 2) H of the displacements H x, without rotation in the plane, that make a strain (v,)."""
+    E11, E22, gamma12 = strain[[0, 1, -1]]
+    plane = [[E11, gamma12 / 2], [gamma12 / 2, E22]]
+    return np.array(plane if len(strain) == 3 else [*plane, strain[[4, 3]]])
 
 
 def _faces(files: ResultFiles, nodes: TornNodes, parts: Int, radius: float) -> Faces:

@@ -1,5 +1,8 @@
 """Plane triangles of three and six nodes: strains, stresses, nodal forces and energies of given displacements.
 
+Displacements have two components, or in generalized plane strain three, c of them; strains and stresses have three or
+six, v, in the orders [11, 22, 12] and [11, 22, 33, 23, 13, 12].
+
 Written for the certificate alone, from barycentric coordinates r: N_a = r_a, or r_a (2 r_a - 1) and 4 r_a r_b on curved
 (isoparametric) sides.
 """
@@ -19,16 +22,19 @@ ELEMENTS_AT_ONCE = 1 << 15
 # Gradients of so many numbers are kept from state to state: 400 MB.
 MOST_KEPT = 50_000_000
 SIDES = ((0, 1), (1, 2), (2, 0))
+# (c, 2) for each number of strains: du_i/dx_d is part of which.
+PLACES = {3: np.array([[0, 2], [2, 1]]), 6: np.array([[0, 5], [5, 1], [4, 3]])}
 
 
 @dataclass(frozen=True)
 class ElementFields:
-    """What displacements (n, 2) make in the elements.
+    """What displacements (n, c) make in the elements.
 
     Attributes:
-        strain, stress: (m, 3) means.
-        strain_size: (m,) sum t_a |dN_a/dx| with the terms t of u, of whose rounding the strain has its share.
-        force: (n, 2) int B^T sigma, what the elements of a node resist with.
+        strain, stress: (m, v) means.
+        strain_size: (m,) sum t_a |dN_a/dx| with the terms t of u, and the other strains, of whose rounding the strain
+            has its share.
+        force: (n, c) int B^T sigma, what the elements of a node resist with.
         force_size: the largest sum of |dN/dx| |L| strain_size over the elements of a node, of whose rounding the forces
             have their share: large where a phase is far stiffer than it is strained.
         largest_force: the largest that a single element exerts on a node.
@@ -45,7 +51,7 @@ class ElementFields:
 
 
 class Elements:
-    """The elements of a mesh whose phases have the stiffnesses (phases, 3, 3)."""
+    """The elements of a mesh whose phases have the stiffnesses (phases, v, v)."""
 
     def __init__(self, mesh: Mesh, stiffnesses: Float) -> None:
         self._mesh, self._stiffnesses = mesh, stiffnesses
@@ -69,20 +75,27 @@ class Elements:
             _add(sums, self._mesh.triangles[part], np.einsum("eqad,eq->ead", gradients, weights))
         return sums
 
-    def fields(self, displacement: Float, terms_of_u: Float) -> ElementFields:
-        """Strains, stresses, forces and energy of the displacements (n, 2), sums of terms of these sizes (n, 2)."""
-        m = len(self._mesh.triangles)
-        strain, stress, size = np.empty((m, 3)), np.empty((m, 3)), np.empty(m)
-        force, terms, largest, energy = np.zeros_like(displacement), np.zeros_like(displacement), 0.0, 0.0
+    def fields(
+        self, displacement: Float, terms_of_u: Float, along: float = 0.0, free: Float | None = None
+    ) -> ElementFields:
+        """Strains, stresses, forces and energy of the displacements (n, c), sums of terms of these sizes (n, c).
+
+        `along` is E33, and `free` are the strains (phases, v) that the phases have without stress.
+        """
+        m, v = len(self._mesh.triangles), self._stiffnesses.shape[1]
+        strain, stress, size = np.empty((m, v)), np.empty((m, v)), np.empty(m)
+        force, terms, largest, energy = np.zeros_like(displacement), np.zeros_like(self._mesh.points), 0.0, 0.0
+        free = np.zeros((len(self._stiffnesses), v)) if free is None else free
         for part, gradients, weights in self._parts():
             nodes = self._mesh.triangles[part]
             u, share = displacement[nodes], weights / weights.sum(axis=1)[:, None]
             slope = np.einsum("eqad,eai->eqid", gradients, u)
-            local = np.stack([slope[..., 0, 0], slope[..., 1, 1], slope[..., 0, 1] + slope[..., 1, 0]], axis=2)
-            answer = np.einsum("eij,eqj->eqi", self._stiffnesses[self._mesh.phase[part]], local)
+            local, own_free = _strains(slope, v, along), free[self._mesh.phase[part]]
+            answer = np.einsum("eij,eqj->eqi", self._stiffnesses[self._mesh.phase[part]], local - own_free[:, None])
             strain[part], stress[part] = (np.einsum("eqi,eq->ei", field, share) for field in (local, answer))
             size[part] = np.einsum("eqad,eai->eq", np.abs(gradients), terms_of_u[nodes]).max(axis=1)
-            tensor = answer[..., [0, 2, 2, 1]].reshape(*answer.shape[:2], 2, 2)
+            size[part] += abs(along) + np.abs(own_free).max(axis=1)
+            tensor = answer[..., PLACES[v]]
             own = np.einsum("eqad,eqid,eq->eai", gradients, tensor, weights, optimize=True)
             _add(force, nodes, own)
             rounded = np.abs(self._stiffnesses).max(axis=(1, 2))[self._mesh.phase[part]] * size[part]
@@ -142,7 +155,17 @@ def _rule(nodes: int) -> tuple[Float, Float]:
     return slopes, np.array(weights)
 
 
+def _strains(slope: Float, v: int, along: float) -> Float:
+    """(e, q, v) from du_i/dx_d (e, q, c, 2) and E33."""
+    local = np.zeros((*slope.shape[:2], v))
+    for (i, d), place in np.ndenumerate(PLACES[v]):
+        local[..., place] += slope[..., i, d]
+    if along:
+        local[..., 2] = along
+    return local
+
+
 def _add(sums: Float, nodes: Int, values: Float) -> None:
-    """Add values (e, a, 2) to sums (n, 2) at the nodes (e, a)."""
-    for direction in range(2):
+    """Add values (e, a, c) to sums (n, c) at the nodes (e, a)."""
+    for direction in range(values.shape[2]):
         sums[:, direction] += np.bincount(nodes.ravel(), values[..., direction].ravel(), len(sums))

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from feti_homog.typing import Float, Int
-from feti_homog.verification.discrete_cell import LEAST_SHARE, DiscreteCell, tensor
-from feti_homog.verification.elements import ElementFields
+from feti_homog.verification.discrete_cell import DiscreteCell, gradient
+from feti_homog.verification.elements import PLACES, ElementFields
 from feti_homog.verification.ledger import Ledger, relative
 from feti_homog.verification.reading import State
 
@@ -17,7 +17,7 @@ ROUNDED_TERMS = 1e-5
 def check_fields(ledger: Ledger, cell: DiscreteCell, state: State, fields: ElementFields) -> None:
     """Everything that the fields of a state obey by themselves; `fields` are what its displacements make."""
     node, element = (f"{state.name}, {kind} {{}}".format for kind in ("mesh node", "element"))
-    imposed = cell.files.mesh.points @ tensor(state.strain)
+    imposed = cell.files.mesh.points @ gradient(state.strain).T
     terms = np.abs(state.displacement) + np.abs(state.fluctuation) + np.abs(imposed)
     off = np.abs(state.displacement - state.fluctuation - imposed).max(axis=1)
     ledger.record("displacement", relative(off, terms.max(axis=1)), node)
@@ -30,20 +30,20 @@ def check_fields(ledger: Ledger, cell: DiscreteCell, state: State, fields: Eleme
 
 
 def interface_forces(cell: DiscreteCell, state: State) -> Float:
-    """(k, 2) forces on the fibre at the interface nodes, in x1 and x2: traction times tributary length."""
-    return in_plane(cell, state.traction * cell.files.interface.length[:, None])
+    """(k, c) forces on the fibre at the interface nodes, in x1, x2 and x3: traction times tributary length."""
+    return in_axes(cell, state.traction * cell.files.interface.length[:, None])
 
 
-def in_plane(cell: DiscreteCell, pairs: Float) -> Float:
-    """(k, 2) components in x1 and x2 of normal and tangential ones (k, 2); the tangent is (-n2, n1)."""
+def in_axes(cell: DiscreteCell, vectors: Float) -> Float:
+    """(k, c) components in x1, x2 and x3 of normal, tangential and axial ones; the tangent is (-n2, n1)."""
     n1, n2 = cell.files.interface.normal.T
-    normal, tangential = pairs.T
-    return np.stack([n1 * normal - n2 * tangential, n2 * normal + n1 * tangential], axis=1)
+    normal, tangential, *axial = vectors.T
+    return np.stack([n1 * normal - n2 * tangential, n2 * normal + n1 * tangential, *axial], axis=1)
 
 
 def largest_displacement(cell: DiscreteCell, state: State) -> float:
     """A scale of displacements that does not vanish where the fluctuation does."""
-    return float(np.abs(state.fluctuation).max()) + cell.imposed(state.strain)
+    return float(np.abs(state.fluctuation).max()) + cell.imposed(state)
 
 
 def _check_copies(ledger: Ledger, cell: DiscreteCell, state: State) -> None:
@@ -63,7 +63,7 @@ def _sides(cell: DiscreteCell) -> Int:
 
 
 def _group_means(group: Int, values: Float) -> Float:
-    """(b, 2) mean of each value's group."""
+    """(b, c) mean of each value's group."""
     _, inverse, count = np.unique(group, return_inverse=True, return_counts=True)
     inverse = inverse.ravel()
     return np.stack([(np.bincount(inverse, column) / count)[inverse] for column in values.T], axis=1)
@@ -74,7 +74,7 @@ def _check_equilibrium(ledger: Ledger, cell: DiscreteCell, state: State, fields:
     nodes, faces = cell.nodes, cell.faces
     traction = interface_forces(cell, state)
     scale = max(fields.largest_force, float(np.abs(traction).max(initial=0.0)))
-    scale = max(scale, cell.least_stress(state.strain) * float(np.sqrt(cell.elements.area.min())) * 1e-3)
+    scale = max(scale, cell.least_stress(state) * float(np.sqrt(cell.elements.area.min())) * 1e-3)
     rest = fields.force.copy()
     rest[nodes.node] = 0.0
     scale += ROUNDED_TERMS * fields.force_size  # of all nodes: the one that is held collects what is left of the others
@@ -104,16 +104,14 @@ def _check_averages(ledger: Ledger, cell: DiscreteCell, state: State, fields: El
     size = float(((weights * np.abs(fields.stress)).sum(axis=0) / area).max())
     stiffest = np.abs(cell.stiffnesses).max(axis=(1, 2))[cell.files.mesh.phase]
     size += ROUNDED_TERMS * float((weights[:, 0] * stiffest * fields.strain_size).sum() / area)
-    ledger.record(
-        "mean stress", relative(mean - state.mean_stress, max(size, cell.least_stress(state.strain))), state.name
-    )
-    jump = in_plane(cell, state.jump)
+    ledger.record("mean stress", relative(mean - state.mean_stress, max(size, cell.least_stress(state))), state.name)
+    jump = in_axes(cell, state.jump)
     integral = cell.faces.sums(cell.elements.node_integrals[cell.nodes.node], of_fibre=False)
     opening = np.einsum("ki,kj->ij", jump, integral)
-    opened = np.array([opening[0, 0], opening[1, 1], opening[0, 1] + opening[1, 0]]) / area
+    opened = np.bincount(PLACES[len(mean)].ravel(), opening.ravel(), len(mean)) / area
     off = (weights * fields.strain).sum(axis=0) / area - state.strain - opened
-    scale = max(float(np.abs(state.strain).max()), LEAST_SHARE * cell.largest_strain)
+    scale = cell.strain_size(state)
     ledger.record("mean strain", relative(off, scale), state.name)
     work = area * float(state.mean_stress @ state.strain) - float((interface_forces(cell, state) * jump).sum())
-    scale = max(abs(fields.energy), area * cell.least_stress(state.strain) * scale)
+    scale = max(abs(fields.energy), area * cell.least_stress(state) * scale)
     ledger.record("Hill", relative(np.array(fields.energy - work), scale), state.name)

@@ -9,7 +9,7 @@ import numpy as np
 
 from feti_homog.typing import Float
 from feti_homog.verification.discrete_cell import DiscreteCell
-from feti_homog.verification.field_laws import in_plane, largest_displacement
+from feti_homog.verification.field_laws import in_axes, largest_displacement
 from feti_homog.verification.ledger import Ledger, relative
 from feti_homog.verification.reading import State
 
@@ -22,19 +22,21 @@ def check_interface_state(ledger: Ledger, cell: DiscreteCell, state: State) -> N
     values = state.fluctuation[cell.nodes.node]
     parted = cell.faces.means(values, of_fibre=False) - cell.faces.means(values, of_fibre=True)
     largest = largest_displacement(cell, state)
-    ledger.record("jump", relative(np.abs(in_plane(cell, state.jump) - parted).max(axis=1, initial=0.0), largest), at)
+    ledger.record("jump", relative(np.abs(in_axes(cell, state.jump) - parted).max(axis=1, initial=0.0), largest), at)
     slack = state.jump - spring_jumps(cell, state)
     ledger.record("bond", relative(np.where(state.status != OPEN, np.abs(slack[:, 0]), 0.0), largest), at)
-    ledger.record("bond", relative(np.where(state.status == BONDED, np.abs(slack[:, 1]), 0.0), largest), at)
+    ledger.record(
+        "bond", relative(np.where(state.status == BONDED, np.abs(slack[:, 1:]).max(axis=1), 0.0), largest), at
+    )
     if (state.status != BONDED).any():
         _check_contact(ledger, cell, state)
 
 
 def spring_jumps(cell: DiscreteCell, state: State) -> Float:
-    """(k, 2) what elastic bonds give way: traction / stiffness."""
+    """(k, c) what elastic bonds give way: traction / stiffness, along the fibres that of the other slip."""
     section = cell.files.case.get("interface", {})
-    stiffness = [section.get(name) or np.inf for name in ("normal_stiffness", "tangential_stiffness")]
-    return np.asarray(state.traction / np.array(stiffness, float))
+    normal, slip = (section.get(name) or np.inf for name in ("normal_stiffness", "tangential_stiffness"))
+    return np.asarray(state.traction / np.array([normal, slip, slip], float)[: state.traction.shape[1]])
 
 
 def utilisation(section: Mapping[str, Any], traction: Float) -> Float:
@@ -79,11 +81,11 @@ def _check_contact(ledger: Ledger, cell: DiscreteCell, state: State) -> None:
     at = f"{state.name}, interface node {{}}".format
     debonded, closed = state.status != BONDED, state.status == CLOSED
     gap = (state.jump - spring_jumps(cell, state))[:, 0]
-    (normal, shear), length = state.traction.T, cell.files.interface.length
-    imposed, least = cell.imposed(state.strain), cell.least_stress(state.strain)
+    normal, shear = state.traction[:, 0], np.abs(state.traction[:, 1:]).max(axis=1)
+    length, imposed, least = cell.files.interface.length, cell.imposed(state), cell.least_stress(state)
     pull, force = max(float(np.abs(state.traction).max()), least), np.abs(normal) * length
     push = max(float(force.max()), least * float(length.max()))
-    free = np.where(debonded, np.abs(shear), 0.0) + np.where(state.status == OPEN, np.abs(normal), 0.0)
+    free = np.where(debonded, shear, 0.0) + np.where(state.status == OPEN, np.abs(normal), 0.0)
     ledger.record("free faces", relative(free, pull), at)
     if cell.files.contact:
         ledger.record("penetration", relative(np.where(debonded, np.maximum(-gap, 0.0), 0.0), imposed), at)

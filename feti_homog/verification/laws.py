@@ -65,5 +65,7 @@ def laws(rtol: float, users_mesh: bool) -> tuple[Law, ...]:
         Law("energy", "work = stored + dissipated along the path, relative to the largest energy", solver),
         Law("cell", "areas, fractions and counts in result.json are those of the mesh", 1e-10),
         Law("moduli", "moduli follow from the stiffness, relative to each", 1e-10),
+        Law("compliance", "compliance and expansion follow from stiffness and thermal stress, relative to each", 1e-10),
+        Law("Levin", "thermal stress = - mean of expansion : stiffness : strain under unit strains, relative", solver),
         Law("bounds", "bounds follow from fractions and materials, and the stiffness is between them", 1e-10),
     )

@@ -18,6 +18,21 @@ from feti_homog.verification.ledger import Ledger, relative
 from feti_homog.verification.reading import State
 
 COUNTS = {"bonded": BONDED, "closed": CLOSED, "open": OPEN}
+SPATIAL_ORDER = [0, 1, 5, 2, 4, 3]  # of the unit strains of generalized plane strain; the fifth load is a temperature
+
+
+@dataclass(frozen=True)
+class UnitLoad:
+    """A unit strain (v,), or a unit of temperature."""
+
+    strain: Float
+    temperature: float
+
+    def entries(self, told: Mapping[str, Any], stiffness: str, suffix: str, sign: float) -> dict[str, Float]:
+        """The stress under it, or under minus it, that is told in a column of a stiffness or in `thermal_stress`."""
+        if self.temperature:
+            return {"stress": sign * np.array(told[f"thermal_stress{suffix}"])}
+        return {"stress": sign * np.array(told[f"{stiffness}{suffix}"]) @ self.strain}
 
 
 @dataclass(frozen=True)
@@ -25,12 +40,15 @@ class StateNumbers:
     """What the laws of paths and tables need of a state.
 
     Attributes:
+        strain, stress: (v,) macroscopic.
         point: number of its point in `path` or `angle` of result.json.
         stored: energy per area of the cell, from the fields.
         in_springs: that of the springs in it.
-        traction: (k, 2) normal and tangential.
+        traction: (k, c) normal, tangential and along the fibres.
         used: (k,) share of the strength that the bonded nodes use, 0 elsewhere; NaN at tips of which the energy counts
             that their break would release, for it is not in the files.
+        temperature: its change.
+        expanding: mean of alpha : L : strain, 0 if the expansions alpha of the phases are not known.
     """
 
     name: str
@@ -43,12 +61,14 @@ class StateNumbers:
     traction: Float
     status: AnyInt
     used: Float
+    temperature: float
+    expanding: float
 
     @classmethod
     def of(cls, cell: DiscreteCell, state: State, fields: ElementFields) -> StateNumbers:
         """Those of a state of a cell."""
         section = cell.files.case.get("interface", {})
-        used = np.where(state.status == BONDED, utilisation(section, state.traction), 0.0)
+        used = np.where(state.status == BONDED, utilisation(section, state.traction[:, :2]), 0.0)
         if section.get("growth") == "released":
             used[tips(cell, state.status)] = np.nan
         stretched = state.traction * spring_jumps(cell, state) * cell.files.interface.length[:, None]
@@ -56,8 +76,17 @@ class StateNumbers:
         energies = fields.energy / (2 * cell.area) + in_springs, in_springs
         means = state.strain, state.mean_stress
         return cls(
-            state.name, state.load_factor, state.point, *means, *energies, state.traction, state.status, used
+            state.name, state.load_factor, state.point, *means, *energies, state.traction, state.status, used,
+            state.temperature, _expanding(cell, fields),
         )  # fmt: skip
+
+
+def _expanding(cell: DiscreteCell, fields: ElementFields) -> float:
+    """Mean of alpha : L : strain over the cell."""
+    if cell.expansions is None:
+        return 0.0
+    thermal = np.einsum("pij,pj->pi", cell.stiffnesses, cell.expansions)[cell.files.mesh.phase]
+    return float(cell.elements.area @ (thermal * fields.strain).sum(axis=1)) / cell.area
 
 
 def tips(cell: DiscreteCell, status: AnyInt) -> Bool:
@@ -74,19 +103,21 @@ def check_load(ledger: Ledger, cell: DiscreteCell, states: Sequence[StateNumbers
     document, case = cell.files.document, cell.files.case
     same = json.loads(str(cell.files.file.attrs["case"])) == case
     ledger.record("tables", 0.0 if same else np.inf, "the case, which the two files tell otherwise")
-    rows = list(zip(_expected_strains(document, case), _entries(document), strict=False))
+    unit = _unit_loads(cell)
+    rows = list(zip(_expected_loads(document, case, unit), _entries(document, unit), strict=False))
     largest = cell.largest_strain or 1.0
     stress = max((float(np.abs(s.stress).max()) for s in states), default=0.0) or 1.0
     if "path" in document:
         _check_kept(ledger, document, case, [state.point for state in states])
-        for number, (strain, entries) in enumerate(rows):
+        for number, ((strain, _), entries) in enumerate(rows):
             ledger.record("load", np.abs(np.array(entries["strain"]) - strain) / largest, f"path[{number}].strain")
         pairs = [(state, rows[state.point]) for state in states if 0 <= state.point < len(rows)]
     else:
         _check_all(ledger, document, states, len(rows))
         pairs = list(zip(states, rows, strict=False))
-    for state, (strain, entries) in pairs:
+    for state, ((strain, temperature), entries) in pairs:
         ledger.record("load", np.abs(state.strain - strain) / largest, state.name)
+        ledger.record("load", abs(state.temperature - temperature), state.name)
         _check_entries(ledger, state, entries, (largest, stress))
     for place, matrix in _linear_stiffnesses(document, cell.files.contact):
         ledger.record("symmetry", relative(matrix - matrix.T, float(np.abs(matrix).max())), place)
@@ -127,8 +158,19 @@ def _check_entries(
         ledger.record("tables", abs(entries[name] - counted), f"{state.name}, {name}")
 
 
-def _expected_strains(document: Mapping[str, Any], case: Mapping[str, Any]) -> Iterator[Float]:
-    """The strains of the points of a path, or of the states of another case, in their order."""
+def _unit_loads(cell: DiscreteCell) -> list[UnitLoad]:
+    """The unit loads in the order of their states."""
+    if not cell.files.is_spatial:
+        return [UnitLoad(strain, 0.0) for strain in np.eye(3)]
+    unit = [UnitLoad(strain, 0.0) for strain in np.eye(6)[SPATIAL_ORDER]]
+    thermal = [] if cell.expansions is None else [UnitLoad(np.zeros(6), 1.0)]
+    return [*unit[:4], *thermal, *unit[4:]]
+
+
+def _expected_loads(
+    document: Mapping[str, Any], case: Mapping[str, Any], unit: Sequence[UnitLoad]
+) -> Iterator[tuple[Float, float]]:
+    """Strain and temperature of the points of a path, or of the states of another case, in their order."""
     if "path" in document:
         path = case["path"]
         corners = np.array([[0.0] * 3, *(path["waypoints"] if path.get("waypoints") else [path["strain"]])])
@@ -137,32 +179,32 @@ def _expected_strains(document: Mapping[str, Any], case: Mapping[str, Any]) -> I
             along = float(point["load_factor"]) * legs
             leg = min(int(np.ceil(along - 1e-12)), legs) if along > 0 else 1
             share = along - (leg - 1)
-            yield (1 - share) * corners[leg - 1] + share * corners[leg]
+            yield (1 - share) * corners[leg - 1] + share * corners[leg], 0.0
     elif "angle" in document:
         given = case["angle"].get("strain")
         for _ in document["angle"]:
-            yield from np.eye(3) if given is None else np.array([given])
+            yield from [(load.strain, load.temperature) for load in unit] if given is None else [(np.array(given), 0.0)]
     else:
-        yield from np.eye(3)
-        if "effective_stiffness_compression" in document:
-            yield from -np.eye(3)
+        signs = (1.0, -1.0) if "effective_stiffness_compression" in document else (1.0,)
+        yield from ((sign * load.strain, sign * load.temperature) for sign in signs for load in unit)
 
 
-def _entries(document: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
+def _entries(document: Mapping[str, Any], unit: Sequence[UnitLoad]) -> Iterator[Mapping[str, Any]]:
     """What result.json says of each point of a path, or of each state of another case."""
     if "path" in document:
         yield from document["path"]
     elif "angle" in document:
         for point in document["angle"]:
             if "stiffness" in point:
-                columns = [{"stress": column} for column in np.array(point["stiffness"]).T]
-                yield from columns[:2]
-                yield columns[2] | {name: point[name] for name in COUNTS}
+                *others, last = (load.entries(point, "stiffness", "", 1.0) for load in unit)
+                yield from others
+                yield last | {name: point[name] for name in COUNTS}
             else:
                 yield point
     else:
-        for name, sign in (("effective_stiffness", 1.0), ("effective_stiffness_compression", -1.0)):
-            yield from ({"stress": sign * column} for column in np.array(document.get(name, np.zeros((3, 0)))).T)
+        for suffix, sign in (("", 1.0), ("_compression", -1.0)):
+            if f"effective_stiffness{suffix}" in document:
+                yield from (load.entries(document, "effective_stiffness", suffix, sign) for load in unit)
 
 
 def _linear_stiffnesses(document: Mapping[str, Any], contact: bool) -> Iterator[tuple[str, Float]]:

@@ -25,6 +25,8 @@ DERIVED: dict[str, tuple[Any, ...]] = {
     "traction_vector": ("k", 3), "jump_vector": ("k", 3),
     "displacement_fibre": ("k", 3), "displacement_matrix": ("k", 3),
 }  # fmt: skip
+# In generalized plane strain stresses 33 are among the stresses, and there are strains along the fibres.
+SPATIAL_DERIVED = {name: shape for name, shape in DERIVED.items() if name != "stress_33"} | {"axial_strain": ("m", 2)}
 MISSING_FIELDS = "only a run with `fields = true` in [output] leaves what there is to verify"
 
 
@@ -75,14 +77,18 @@ class Fibres:
 class State:
     """A state: what /state/K holds, and `name`, under which a violation is reported.
 
+    Strains and stresses have v = 3 components [11, 22, 12], displacements c = 2; of generalized plane strain 6, in the
+    order [11, 22, 33, 23, 13, 12], and 3.
+
     Attributes:
-        strain, mean_stress: (3,) macroscopic.
+        strain, mean_stress: (v,) macroscopic.
         point: number of its point in `path` or `angle` of result.json.
-        displacement, fluctuation: (n, 2).
-        stress: (m, 3) means over the elements.
-        traction, jump: (k, 2) normal and tangential.
+        displacement, fluctuation: (n, c).
+        stress: (m, v) means over the elements.
+        traction, jump: (k, c) normal, tangential and along the fibres.
         status: (k,) 0 bonded, 1 closed, 2 open.
-        derived: the tables of `DERIVED`, which follow from those above.
+        derived: the tables of `DERIVED` or `SPATIAL_DERIVED`, which follow from those above.
+        temperature: its change.
     """
 
     name: str
@@ -97,6 +103,12 @@ class State:
     jump: Float
     status: AnyInt
     derived: Mapping[str, Float]
+    temperature: float = 0.0
+
+    @property
+    def along(self) -> float:
+        """E33, of generalized plane strain."""
+        return float(self.strain[2]) if len(self.strain) > 3 else 0.0
 
 
 @dataclass(frozen=True)
@@ -128,6 +140,11 @@ class ResultFiles:
         return case
 
     @property
+    def is_spatial(self) -> bool:
+        """Whether it is one of generalized plane strain."""
+        return bool(self.case["analysis"]["plane"] == "generalized")
+
+    @property
     def contact(self) -> bool:
         """Whether debonded faces must not overlap."""
         return bool(self.case.get("interface", {}).get("contact", False))
@@ -145,13 +162,35 @@ class ResultFiles:
             "displacement": (n, 2), "fluctuation": (n, 2), "stress": (m, 3),
             "traction": (k, 2), "jump": (k, 2), "status": (k,),
         }  # fmt: skip
-        derived = {name: (m if of == "m" else k, *columns) for name, (of, *columns) in DERIVED.items()}
+        shown = SPATIAL_DERIVED if self.is_spatial else DERIVED
+        derived = {name: (m if of == "m" else k, *columns) for name, (of, *columns) in shown.items()}
         arrays, others = (
             {name: self._table(number, name, shape) for name, shape in shapes.items()} for shapes in (basic, derived)
         )
+        if self.is_spatial:
+            arrays |= self._spatial(number, arrays)
         strain, mean = (np.array(group.attrs[name], float) for name in ("strain", "stress"))
+        v = 6 if self.is_spatial else 3
+        _expect(
+            strain.shape == mean.shape == (v,), f"/state/{number} has a strain or a stress of another size than {v}"
+        )
         label, factor, point = str(group.attrs["label"]), float(group.attrs["load_factor"]), int(group.attrs["point"])
-        return State(f"state {number} ({label})", strain, mean, factor, point, **arrays, derived=others)
+        warmer = float(group.attrs["temperature"]) if self.is_spatial else 0.0
+        name = f"state {number} ({label})"
+        return State(name, strain, mean, factor, point, **arrays, derived=others, temperature=warmer)
+
+    def _spatial(self, number: int, plane: Mapping[str, Float]) -> dict[str, Float]:
+        """The tables of a state with what is along the fibres."""
+        rows = {"displacement": "n", "fluctuation": "n", "traction": "k", "jump": "k"}
+        count = {"n": len(self.mesh.points), "k": len(self.interface.points)}
+        whole = {
+            name: np.column_stack([plane[name], self._table(number, f"axial_{name}", (count[of],))])
+            for name, of in rows.items()
+        }
+        m = len(self.mesh.triangles)
+        S33, (S23, S13) = self._table(number, "stress_33", (m,)), self._table(number, "axial_stress", (m, 2)).T
+        S11, S22, S12 = plane["stress"].T
+        return whole | {"stress": np.column_stack([S11, S22, S33, S23, S13, S12])}
 
     def _table(self, number: int, name: str, shape: tuple[int, ...]) -> Any:
         """A table of a state, of the shape that it must have."""

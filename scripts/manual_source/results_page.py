@@ -7,9 +7,10 @@ from collections.abc import Iterable
 from markdown_text import code, page, table
 
 from feti_homog.analysis.result import schema_keys
-from feti_homog.analysis.result_records import AnglePoint, PathPoint, SpatialEnvelopePoint
+from feti_homog.analysis.result_records import AnglePoint, EnvelopePoint, PathPoint
 from feti_homog.output.files.csv_tables import Column, columns
-from feti_homog.output.files.field_layout import items
+from feti_homog.output.files.field_layout import Item, items
+from feti_homog.output.files.spatial_layout import spatial_items
 from feti_homog.sweep.report.columns import COLUMNS, DATASETS
 
 INTRODUCTION = """\
@@ -31,21 +32,28 @@ face. The filter Python Annotation, of the field data, shows a state's label by
 
 SWEEP_CSV = """\
 A row for each case, then four for each point: the statistics of its realisations. Names have their units in brackets; i
-and j stand for 1, 2 or 3."""
+and j stand for 1, 2 or 3, in stiffnesses of generalized plane strain for 1 to 6."""
+
+SPATIAL = """\
+Of generalized plane strain, result.h5 has all of the above but for what stands here again or is new. Fields do not vary
+along x3, but for the displacement E33 x3."""
 
 
 def results() -> str:
     """result.json, result.h5 and the tables."""
     keys = table(["key", "type", "unit", "meaning"], [(code(k.path), k.type, k.unit, k.meaning) for k in schema_keys()])
-    fields = table(
-        ["place", "name", "shape", "type", "unit", "meaning"],
-        [(code(i.path), i.kind, i.shape, i.dtype, i.unit, i.meaning) for i in items()],
-    )
-    parts = ["# Results", INTRODUCTION, "## result.json", JSON, keys, "## result.h5", HDF5, fields]
+    fields = _fields(items())
+    spatial = _fields(spatial_items())
+    parts = ["# Results", INTRODUCTION, "## result.json", JSON, keys, "## result.h5", HDF5, fields, SPATIAL, spatial]
     parts += ["## angle.csv", _columns(columns(AnglePoint)), "## path.csv", _columns(columns(PathPoint))]
-    parts += ["## envelope.csv", _columns(columns(SpatialEnvelopePoint))]
+    parts += ["## envelope.csv", _columns(columns(EnvelopePoint))]
     parts += ["## sweep.csv", SWEEP_CSV, _columns(COLUMNS), "## sweep.h5", _columns(DATASETS, "dataset")]
     return page(*parts)
+
+
+def _fields(described: Iterable[Item]) -> str:
+    rows = [(code(i.path), i.kind, i.shape, i.dtype, i.unit, i.meaning) for i in described]
+    return table(["place", "name", "shape", "type", "unit", "meaning"], rows)
 
 
 def _columns(described: Iterable[Column], head: str = "column") -> str:

@@ -12,6 +12,13 @@ MATRIX, FIBRE = {"young": 88.0, "poisson": 0.299}, {"young": 200.0, "poisson": 0
 TURNED = {
     "E1": 15.0, "E2": 20.0, "E3": 200.0, "nu12": 0.3, "nu13": 0.02, "nu23": 0.03, "G12": 7.0, "angle": 30.0,
 }  # fmt: skip
+# A phase in space, and how it expands: along its axes, and along the fibres and across.
+TURNED_IN_SPACE = TURNED | {"G13": 4.0, "G23": 5.0, "expansion": [30e-6, 20e-6, -1e-6]}
+CARBON = {
+    "E_axial": 235.0, "E_transverse": 14.0, "nu_axial": 0.2, "nu_transverse": 0.25, "G_axial": 28.0,
+    "expansion_axial": -0.9e-6, "expansion_transverse": 9e-6,
+}  # fmt: skip
+WARM = MATRIX | {"expansion": 23e-6}
 HEXAGONAL = {"geometry": "hexagonal", "fibre_fraction": 0.4, "mesh_size": 0.2}
 SQUARE = {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.15}
 RANDOM = {"geometry": "random", "fibres": 4, "fibre_fraction": 0.3, "mesh_size": 0.15, "radius_spread": 0.3}
@@ -53,6 +60,28 @@ CASES: dict[str, dict[str, Any]] = {
         "interface": SPRINGS | {"debonded": [ARC]},
         "angle": {"values": [0, 120], "strain": [0.01, 0.0, 0.0]},
     },
+    "spatial": {
+        "cell": HEXAGONAL | {"order": 2},
+        "matrix": WARM,
+        "fibre": TURNED_IN_SPACE,
+        "plane": "generalized",
+        "decomposition": {"subdomains": 6},
+    },
+    "spatial contact": {
+        "cell": SQUARE,
+        "matrix": WARM,
+        "fibre": CARBON,
+        "plane": "generalized",
+        "interface": {"debonded": [ARC | {"angle": 110.0}]},
+    },
+    "spatial springs": {
+        "cell": SQUARE | {"order": 2, "width": 2.0},
+        "matrix": WARM,
+        "fibre": CARBON,
+        "plane": "generalized",
+        "interface": SPRINGS | {"contact": False, "debonded": [ARC]},
+        "angle": {"values": [0, 120]},
+    },
     "increments": {
         "cell": SQUARE,
         "interface": STRENGTHS | {"criterion": "quadratic"},
@@ -65,7 +94,7 @@ def document(kind: str) -> dict[str, Any]:
     """The case of a kind of result."""
     parts = dict(CASES[kind])
     analysis = next((name for name in ("angle", "path") if name in parts), "stiffness")
-    material = {"matrix": MATRIX, "fibre": parts.pop("fibre", FIBRE)}
+    material = {"matrix": parts.pop("matrix", MATRIX), "fibre": parts.pop("fibre", FIBRE)}
     plane = {"type": analysis, "plane": parts.pop("plane", "strain")}
     output = {"pictures": False} | ({"states": parts.pop("states")} if "states" in parts else {})
     return {"name": kind, "material": material, "analysis": plane, "output": output} | parts

@@ -20,6 +20,7 @@ from feti_homog.analysis.runner import run
 from feti_homog.config.case import Case
 from feti_homog.output.files.csv_tables import columns
 from feti_homog.output.files.field_layout import items
+from feti_homog.output.files.spatial_layout import spatial_items
 from feti_homog.sweep import collect, execute, plan
 from feti_homog.sweep.report.columns import COLUMNS, DATASETS, OUTPUT_COLUMNS
 from feti_homog.sweep.report.outputs import outputs
@@ -35,6 +36,8 @@ ARC = {"fibre": "all", "centre": 0.0}
 HALF_OPEN = {"debonded": [ARC | {"angle": 60.0}]}
 STRAIN = [0.1, 0.0, 0.0]
 ENERGY = {"normal_stiffness": 900.0, "tangential_stiffness": 300.0, "criterion": "energy", "toughness": 0.005}
+SPACE = {"plane": "generalized"}
+WARM = {name: phase | {"expansion": 1e-5} for name, phase in BASE["material"].items()}
 CASES = {
     "bonded": {"analysis": {"type": "stiffness", "plane": "strain"}},
     "debonded": {"analysis": {"type": "stiffness", "plane": "strain"}, "interface": HALF_OPEN},
@@ -47,6 +50,19 @@ CASES = {
         "analysis": {"type": "angle", "plane": "strain"},
         "interface": {"debonded": [ARC]},
         "angle": {"values": [0, 60], "strain": STRAIN},
+    },
+    "generalized": {"analysis": SPACE | {"type": "stiffness"}, "material": WARM},
+    "debonded in space": {
+        "analysis": SPACE | {"type": "stiffness"},
+        "material": WARM,
+        "interface": HALF_OPEN | {"contact": False},
+    },
+    "touching in space": {"analysis": SPACE | {"type": "stiffness"}, "material": WARM, "interface": HALF_OPEN},
+    "angle in space": {
+        "analysis": SPACE | {"type": "angle"},
+        "material": WARM,
+        "interface": {"debonded": [ARC]},
+        "angle": {"values": [0, 60]},
     },
     "path": {
         "analysis": {"type": "path", "plane": "strain"},
@@ -62,6 +78,11 @@ CASES = {
         "analysis": {"type": "envelope", "plane": "strain"},
         "interface": {"normal_strength": 1.0, "tangential_strength": 1.0},
         "envelope": {"plane": ["S22", "S12"], "directions": 4},
+    },
+    "envelope in space": {
+        "analysis": {"type": "envelope"} | SPACE,
+        "interface": {"axial_strength": 1.0},
+        "envelope": {"plane": ["S22", "S13"], "directions": 4},
     },
     "envelope by energy": {
         "analysis": {"type": "envelope", "plane": "strain"},
@@ -116,7 +137,7 @@ def unmatched(names: Iterable[str], patterns: Iterable[str]) -> tuple[set[str], 
 
 def expression(pattern: str) -> re.Pattern[str]:
     words = re.escape(pattern)
-    words = re.sub(r"(?<=[CS])(ij|ii)", r"[1-3][1-3]", words)
+    words = re.sub(r"(?<=[CS])(ij|ii)", r"[1-6][1-6]", words)
     return re.compile(re.sub(r"(?<![A-Za-z])([A-Z]{2,}|K)(?![a-z])", ".+", words))
 
 
@@ -126,7 +147,10 @@ def test_keys_of_result_json(documents):
     assert (unknown, unused) == (set(), {"case.KEY"})
 
 
-def test_datasets_and_attributes_of_result_h5(folders):
+@pytest.mark.parametrize(
+    ("name", "described"), [("debonded", set(items())), ("debonded in space", {*items(), *spatial_items()})]
+)
+def test_datasets_and_attributes_of_result_h5(folders, name, described):
     found = set()
 
     def note(name: str, item: Any) -> None:
@@ -137,22 +161,24 @@ def test_datasets_and_attributes_of_result_h5(folders):
         else:
             found.update((place or "/", f"attribute {attribute}") for attribute in item.attrs)
 
-    with h5py.File(folders["debonded"] / "result.h5") as file:
+    with h5py.File(folders[name] / "result.h5") as file:
         note("", file)
         file.visititems(note)
     states = {(re.sub(r"^((?:/(?:vector|tensor|column))?/state)/\d+", r"\1/K", place), kind) for place, kind in found}
-    assert states == {(item.path, item.kind) for item in items()}
+    assert states == {(item.path, item.kind) for item in described}
 
 
 @pytest.mark.parametrize(
     ("name", "kind"),
     [
         ("angle", AnglePoint),
+        ("angle in space", AnglePoint),
         ("angle of a strain", AnglePoint),
         ("path", PathPoint),
         ("path by energy", PathPoint),
         ("envelope", EnvelopePoint),
         ("envelope by energy", EnvelopePoint),
+        ("envelope in space", EnvelopePoint),
     ],
 )
 def test_columns_of_the_tables_of_points(folders, name, kind):

@@ -26,7 +26,8 @@ class Column:
 def columns(kind: type) -> Iterator[Column]:
     """The columns that a record of this class fills: the reference table of its file."""
     for name, description in _in_columns(kind).items():
-        for component in description.components or (name,):
+        # Those in the plane are among those in space, in the same order.
+        for component in description.spatial_components or _names(name, description):
             words = f"{component}, {description.meaning}" if description.components else description.meaning
             yield Column(component, description.unit, words)
 
@@ -53,12 +54,19 @@ def write(path: Path, points: Sequence[Any]) -> Path:
     return atomic.replace(path, write_rows)
 
 
+def _names(name: str, description: Description) -> tuple[str, ...]:
+    """The columns of a field, of an array those of its components in the plane."""
+    return description.components or (name,)
+
+
 def _row(point: Any, described: Mapping[str, Description]) -> dict[str, Any]:
     row: dict[str, Any] = {}
     for name, value in plain(point).items():
         if name in described:
-            components = described[name].components or (name,)
-            row |= dict(zip(components, np.ravel(value).tolist(), strict=True))
+            values, components = np.ravel(value).tolist(), _names(name, described[name])
+            if len(values) > len(components):
+                components = described[name].spatial_components
+            row |= dict(zip(components, values, strict=True))
     return row
 
 

@@ -7,13 +7,13 @@ are all of the file's, of which each rank has a part; nodes are torn, so that ea
 from __future__ import annotations
 
 import typing
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
 from feti_homog.common.records import LENGTH, STRESS, Description, described, descriptions, type_words
 from feti_homog.mechanics.voigt import STRAINS, STRESSES
-from feti_homog.output.files.field_views import GROUP_OF_STATES, VIEWS
+from feti_homog.output.files.field_views import GROUP_OF_STATES, VIEWS, View
 from feti_homog.typing import AnyInt, Float, Float32
 
 PROGRAM = "feti_homog"
@@ -144,11 +144,11 @@ class Item:
 
 
 def items() -> Iterator[Item]:
-    """All that result.h5 holds, with unit and meaning: the reference table of the file."""
-    yield from _items_of(Header, "")
+    """All that result.h5 holds in plane strain and stress, with unit and meaning: the reference table of the file."""
+    yield from items_of(Header, "", ())
     yield Item("/", "attribute created_by", "", "text", "", f"`{PROGRAM}`")
     for group, part in GROUPS.items():
-        yield from _items_of(part, group)
+        yield from items_of(part, group, VIEWS.get(group, ()))
 
 
 def tables(part: Any) -> dict[str, Description]:
@@ -167,7 +167,8 @@ def rows_of(description: Description) -> str:
     return first if first in ("n", "m", "k", "f") else ""
 
 
-def _items_of(part: type, group: str) -> Iterator[Item]:
+def items_of(part: type, group: str, views: Iterable[View]) -> Iterator[Item]:
+    """What a group holds, with these views of it."""
     hints = typing.get_type_hints(part)
     for name, d in descriptions(part).items():
         if rows_of(d):
@@ -175,7 +176,7 @@ def _items_of(part: type, group: str) -> Iterator[Item]:
         else:
             words = type_words(hints[name], d)
             yield Item(f"/{group}", f"attribute {d.name or name}", d.shape, words, d.unit, d.meaning)
-    for view in VIEWS.get(group, ()):
+    for view in views:
         d = descriptions(part)[view.source]
         shape = f"({rows_of(d)}, {view.components})" if view.components else f"({rows_of(d)},)"
         yield Item(f"/{view.path(group)}", "dataset", shape, d.dtype, d.unit, view.words)

@@ -1,4 +1,4 @@
-"""The torn cell and its responses as the parts of result.h5 that this rank writes."""
+"""The torn cell as the parts of result.h5 that this rank writes; `state_parts` has those of its responses."""
 
 from __future__ import annotations
 
@@ -8,13 +8,8 @@ import os
 import numpy as np
 
 from feti_homog import __version__
-from feti_homog.config import materials
-from feti_homog.fem.assembly import element_strain
-from feti_homog.homogenization.averaging import Response, displacement, fluctuation
 from feti_homog.homogenization.unit_cell import TornCell
-from feti_homog.mechanics import stress_measures
-from feti_homog.output.files.field_layout import FibrePart, Header, InterfacePart, MeshPart, StatePart
-from feti_homog.typing import Float, Float32
+from feti_homog.output.files.field_layout import FibrePart, Header, InterfacePart, MeshPart
 
 
 def header(cell: TornCell) -> Header:
@@ -85,76 +80,3 @@ def interface_part(cell: TornCell) -> InterfacePart:
         vertex=(cell.comm.exscan(len(nodes.row)) or 0) + np.arange(len(nodes.row))[:, None],
         matrix_node=jumps.from_matrix(numbers),
     )
-
-
-def state_part(
-    cell: TornCell, response: Response, axial: Response | None, load_factor: float, label: str, point: int
-) -> StatePart:
-    """The fields of a response; tractions and jumps are scaled like it."""
-    nodes, solution = cell.solver.jump_operator.nodes, response.state.solution
-    u = response.scale * cell.solver.displacement(solution)
-    pair = nodes.row[:, None] + np.arange(2)
-    total = displacement(cell, response.strain, u)
-    fibre = total[cell.class_nodes[nodes.fibre_node]]
-    traction, jump = (
-        response.scale * solution.lam[pair] / nodes.length[:, None],
-        response.scale * cell.solver.opening(solution)[pair],
-    )
-    opening = _in_axes(nodes.normal, jump)
-    strain, stress, stress_33 = _element_fields(cell, response.strain, u)
-    first, second, third = stress_measures.principal(stress, stress_33).T
-    return StatePart(
-        strain=response.strain,
-        stress_mean=response.stress,
-        load_factor=load_factor,
-        point=point,
-        label=label,
-        displacement=total,
-        fluctuation=fluctuation(cell, u),
-        stress=stress,
-        stress_33=stress_33,
-        element_strain=strain,
-        von_mises=_single(stress_measures.von_mises(stress, stress_33)),
-        principal_1=_single(first),
-        principal_2=_single(second),
-        principal_3=_single(third),
-        traction=traction,
-        jump=jump,
-        traction_vector=_with_third(_in_axes(nodes.normal, traction)),
-        jump_vector=_with_third(opening),
-        displacement_fibre=_with_third(fibre),
-        displacement_matrix=_with_third(fibre + opening),
-        status=response.state.status,
-    )
-
-
-def _element_fields(cell: TornCell, E: Float, u: Float) -> tuple[Float32, Float, Float]:
-    """Means over the elements: strains [11, 22, 12, 33] (m, 4), components of the tensor; stresses [11, 22, 12] (m, 3);
-    stresses 33 (m,)."""
-    strains, stresses, out_of_plane = [np.zeros((0, 4), np.float32)], [np.zeros((0, 3))], [np.zeros(0)]
-    for s, offset in zip(cell.subdomains, cell.offsets, strict=False):
-        own = u[offset : offset + len(s.Q)].reshape(-1, 2)
-        strain = E + element_strain(s.mesh.points, s.mesh.triangles, s.mesh.node_class, own)[0]
-        stress = strain @ s.L
-        to_S33, to_E33 = materials.out_of_plane(cell.case.material_of(s.submesh.phase), cell.case.analysis.plane)
-        strains.append(_single(np.column_stack([strain * [1.0, 1.0, 0.5], stress @ to_E33])))
-        stresses.append(stress)
-        out_of_plane.append(stress @ to_S33)
-    return np.concatenate(strains), np.concatenate(stresses), np.concatenate(out_of_plane)
-
-
-def _in_axes(normal: Float, pairs: Float) -> Float:
-    """(k, 2) components along x and y of vectors (k, 2) that are normal and tangential; normals (k, 2)."""
-    tangent = np.column_stack([-normal[:, 1], normal[:, 0]])
-    return np.asarray(pairs[:, :1] * normal + pairs[:, 1:] * tangent)
-
-
-def _with_third(vectors: Float) -> Float:
-    """(k, 3) vectors (k, 2) with a third component 0."""
-    return np.pad(vectors, [(0, 0), (0, 1)])
-
-
-def _single(values: Float) -> Float32:
-    """In single precision: these follow from displacements and stresses, and are made to be looked at."""
-    with np.errstate(over="ignore"):  # to infinity
-        return values.astype(np.float32)

@@ -12,7 +12,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from feti_homog.mechanics.voigt import STRESSES
+from feti_homog.mechanics.voigt import AXIAL_STRESSES, STRESSES
 
 GROUP_OF_STATES = "state/K"
 WHOLE = -1  # instead of a column: all of a dataset that has none
@@ -46,9 +46,10 @@ class View:
         return f"{self.kind}/{group}/{self.name}"
 
 
-def _vector(name: str) -> View:
-    words = f"`{name}` with a third component 0"
-    return View("vector", name, 3, name, {0: (name, 0), 1: (name, 1)}, words)
+def _vector(name: str, third: str = "") -> View:
+    columns = {0: (name, 0), 1: (name, 1)} | ({2: (third, WHOLE)} if third else {})
+    words = f"`{name}` with `{third}` as third component" if third else f"`{name}` with a third component 0"
+    return View("vector", name, 3, name, columns, words)
 
 
 def _tensor(name: str, source: str, entries: Mapping[tuple[int, int], tuple[str, int]]) -> View:
@@ -68,6 +69,13 @@ STRESS_TENSOR = dict(zip(PLACES, (("stress", 0), ("stress", 1), ("stress", 2), (
 STRAIN_TENSOR = {place: ("element_strain", column) for column, place in enumerate(PLACES)}
 PAIRS = [(f"{source}_{name}", source, column) for source in ("traction", "jump") for column, name in enumerate("nt")]
 
+COLUMNS = (
+    *(_column(name, "stress", column) for column, name in enumerate(STRESSES)),
+    *(_column(*pair) for pair in PAIRS),
+)
+AXIAL = "axial_displacement"  # that states of generalized plane strain have, and only they
+AXIAL_PLACES = ((1, 2), (0, 2))  # of 23, 13
+
 # The views of each group; those of /state/K are made for every state.
 VIEWS: dict[str, tuple[View, ...]] = {
     "interface": (_vector("normal"),),
@@ -76,10 +84,19 @@ VIEWS: dict[str, tuple[View, ...]] = {
         _vector("fluctuation"),
         _tensor("stress", "stress", STRESS_TENSOR),
         _tensor("strain", "element_strain", STRAIN_TENSOR),
-        *(_column(name, "stress", column) for column, name in enumerate(STRESSES)),
-        *(_column(*pair) for pair in PAIRS),
+        *COLUMNS,
     ),
 }
+
+# The same of a state of generalized plane strain.
+SPATIAL_VIEWS: tuple[View, ...] = (
+    _vector("displacement", AXIAL),
+    _vector("fluctuation", "axial_fluctuation"),
+    _tensor("stress", "stress", STRESS_TENSOR | {at: ("axial_stress", k) for k, at in enumerate(AXIAL_PLACES)}),
+    _tensor("strain", "element_strain", STRAIN_TENSOR | {at: ("axial_strain", k) for k, at in enumerate(AXIAL_PLACES)}),
+    *COLUMNS,
+    *(_column(name, "axial_stress", column) for column, name in enumerate(AXIAL_STRESSES)),
+)
 
 BYTES = 1 << 12  # that a view takes at most; 0.9 KB in the mean were measured
 
@@ -97,9 +114,9 @@ def bytes_of_views(file: Any) -> int:
 
 def _views_of(file: Any) -> list[tuple[str, View]]:
     """Group and view of all that the tables of the file allow."""
-    groups = {"interface": VIEWS["interface"]} | {
-        f"state/{number}": VIEWS[GROUP_OF_STATES] for number in sorted(file.get("state", ()), key=int)
-    }
+    groups = {"interface": VIEWS["interface"]}
+    for group in (f"state/{number}" for number in sorted(file.get("state", ()), key=int)):
+        groups[group] = SPATIAL_VIEWS if AXIAL in file[group] else VIEWS[GROUP_OF_STATES]
     return [(group, view) for group, views in groups.items() for view in views if _has_rows(file[group], view)]
 
 

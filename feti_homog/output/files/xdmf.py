@@ -15,10 +15,12 @@ from xml.etree import ElementTree as ET
 import h5py
 import numpy as np
 
-from feti_homog.mechanics.voigt import STRESSES
+from feti_homog.mechanics.voigt import AXIAL_STRESSES, STRESSES
 from feti_homog.output.files import atomic, field_file
+from feti_homog.output.files.field_views import AXIAL
 
 CELL, INTERFACE = "result.xdmf", "interface.xdmf"
+TENSOR = np.array([0, 5, 4, 5, 1, 3, 4, 3, 2])  # places of the tensor's rows in [11, 22, 33, 23, 13, 12]
 NUMBERS = {"f": "Float", "i": "Int"}
 SHAPES = {1: "Scalar", 3: "Vector", 9: "Tensor"}  # by the number of components
 # The arrays of the cell and of the interface, and the datasets of result.h5, or of one of its states, that they are.
@@ -40,6 +42,9 @@ INTERFACE_POINTS = {
     "normal": "vector/interface/normal",
     **{name: f"interface/{name}" for name in ("length", "fibre", "fibre_number")},
 }
+# Of generalized plane strain there are these too.
+SPATIAL_ELEMENTS = {name: f"column/state/K/{name}" for name in AXIAL_STRESSES}
+SPATIAL_POINTS = {f"{name}_a": f"state/K/axial_{name}" for name in ("traction", "jump")}
 
 
 def write(directory: Path) -> list[Path]:
@@ -88,13 +93,19 @@ def _grid(collection: ET.Element, state: str, label: str) -> ET.Element:
 def _means(grid: ET.Element, attributes: Mapping[str, Any]) -> None:
     """The cell's own numbers in a state."""
     _numbers(grid, "load_factor", "Scalar", [float(attributes["load_factor"])])
-    _numbers(grid, "mean_strain", "Vector", attributes["strain"].tolist())
-    _numbers(grid, "mean_stress", "Vector", attributes["stress"].tolist())
+    strain, stress = attributes["strain"], attributes["stress"]
+    if "temperature" not in attributes:
+        _numbers(grid, "mean_strain", "Vector", strain.tolist())
+        _numbers(grid, "mean_stress", "Vector", stress.tolist())
+        return
+    _numbers(grid, "temperature", "Scalar", [float(attributes["temperature"])])
+    _numbers(grid, "mean_strain", "Tensor", (strain[TENSOR] * np.where(TENSOR < 3, 1.0, 0.5)).tolist())
+    _numbers(grid, "mean_stress", "Tensor", stress[TENSOR].tolist())
 
 
 def _numbers(grid: ET.Element, name: str, kind: str, values: Sequence[float]) -> None:
     """Numbers of the state as a whole, written out."""
-    size = f"1 {len(values)}" if kind == "Vector" else str(len(values))
+    size = f"1 {len(values)}" if kind != "Scalar" else str(len(values))
     number, precision = ("Float", "8") if isinstance(values[0], float) else ("Int", "4")
     item = ET.Element("DataItem", Dimensions=size, Format="XML", NumberType=number, Precision=precision)
     item.text = " ".join(map(repr, values))
@@ -107,13 +118,15 @@ def _cell(grid: ET.Element, file: h5py.File, state: str) -> None:
     kind = "Triangle_6" if triangles.shape[1] == 6 else "Triangle"
     _mesh(grid, {"TopologyType": kind}, triangles, file["mesh/points"])
     _attributes(grid, file, state, CELL_NODES.items(), "Node")
-    _attributes(grid, file, state, CELL_ELEMENTS.items(), "Cell")
+    more = SPATIAL_ELEMENTS if AXIAL in file[f"state/{state}"] else {}
+    _attributes(grid, file, state, (CELL_ELEMENTS | more).items(), "Cell")
 
 
 def _interface(grid: ET.Element, file: h5py.File, state: str) -> None:
     vertices = {"TopologyType": "Polyvertex", "NodesPerElement": "1"}
     _mesh(grid, vertices, file["interface/vertex"], file["interface/points"])
-    _attributes(grid, file, state, INTERFACE_POINTS.items(), "Node")
+    more = SPATIAL_POINTS if AXIAL in file[f"state/{state}"] else {}
+    _attributes(grid, file, state, (INTERFACE_POINTS | more).items(), "Node")
 
 
 def _mesh(grid: ET.Element, kind: dict[str, str], connectivity: Any, points: Any) -> None:

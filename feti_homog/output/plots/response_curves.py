@@ -20,8 +20,8 @@ from feti_homog.typing import Array
 Document = Mapping[str, Any]
 
 MACROSCOPIC = (r"\Sigma_{11}", r"\Sigma_{22}", r"\Sigma_{12}")
-INK = ("#1f4e9c", "#c44e00", "#2a7f3f", "#7a3e9d")
-MARKS = ("o", "s", "^", "D")
+INK = ("#1f4e9c", "#c44e00", "#2a7f3f", "#7a3e9d", "#8a6d00", "#0f7c8c", "#8c1d40")
+MARKS = ("o", "s", "^", "D", "v", "P", "X")
 NUMBERED_POINTS = 6  # of a path
 ARROWS, SHORTEST_ARROW = 6, 0.06  # that show its direction: how many, and on steps of which share of the picture
 MARKED_POINTS = 60  # points of a path up to which each has a mark
@@ -63,7 +63,7 @@ def _angle_columns(points: Sequence[Mapping[str, Any]], stiff: bool) -> list[tup
     if not stiff:
         return list(zip(MACROSCOPIC, np.array([point["stress"] for point in points]).T, strict=True))
     stiffness = np.array([point["stiffness"] for point in points])
-    return [(f"C_{{{i + 1}{j + 1}}}", stiffness[:, i, j]) for i, j in point_tables.ENTRIES.values()]
+    return [(f"C_{{{i + 1}{j + 1}}}", stiffness[:, i, j]) for i, j in point_tables.shown_entries(points).values()]
 
 
 def _path(document: Document) -> Figure:

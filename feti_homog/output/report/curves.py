@@ -13,7 +13,7 @@ from feti_homog.mechanics import response
 from feti_homog.mechanics.voigt import STRAINS, STRESSES
 from feti_homog.output.plots.interface_marks import BONDED, CLOSED, OPEN, STATE_COLOURS, STATE_NAMES
 from feti_homog.output.plots.response_curves import INK
-from feti_homog.output.text.point_tables import ENTRIES
+from feti_homog.output.text.point_tables import shown_entries
 from feti_homog.typing import Array
 
 COUNTS = {BONDED: "bonded", OPEN: "open", CLOSED: "closed"}
@@ -58,7 +58,8 @@ def _angle(points: Sequence[Document], unit: str) -> dict[str, Any]:
     angles, number = np.array([point["angle"] for point in points]), np.arange(len(points))
     if points[0].get("stiffness") is not None:
         stiffness = np.array([point["stiffness"] for point in points])
-        curves, what = {name: stiffness[:, i, j] for name, (i, j) in ENTRIES.items()}, "effective stiffness"
+        curves = {name: stiffness[:, i, j] for name, (i, j) in shown_entries(points).items()}
+        what = "effective stiffness"
     else:
         stress = np.array([point["stress"] for point in points])
         curves, what = dict(zip(STRESSES, stress.T, strict=True)), "macroscopic stress"

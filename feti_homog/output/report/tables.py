@@ -6,8 +6,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from feti_homog.mechanics.voigt import STRAINS, STRESSES
-from feti_homog.output.text.point_tables import chosen
+from feti_homog.mechanics.voigt import SPATIAL_STRESSES, STRESSES, voigt_names
+from feti_homog.output.text.point_tables import chosen, shown_entries
+from feti_homog.output.text.spatial_tables import THERMAL
 from feti_homog.output.text.units import with_unit
 
 MOST_ROWS = 60  # of a table of points
@@ -68,8 +69,11 @@ def answers(document: Document) -> list[Table]:
         ("effective_stiffness_compression", "Effective stiffness under minus the unit strains"),
     ):
         if document.get(key) is not None:
-            rows = [[name, *map(_number, row)] for name, row in zip(STRESSES, document[key], strict=True)]
-            found.append(Table(f"{words}{label}", ["", *STRAINS], rows))
+            strains, stresses = voigt_names(len(document[key]))
+            rows = [[name, *map(_number, row)] for name, row in zip(stresses, document[key], strict=True)]
+            found.append(Table(f"{words}{label}", ["", *strains], rows))
+    if document.get("thermal_stress") is not None:
+        found.append(_thermal(document, label))
     if document.get("moduli") is not None:
         rows = [[with_unit(name, unit), _number(value)] for name, value in document["moduli"].items()]
         found.append(Table("Engineering moduli", ["", "computed"], rows))
@@ -96,17 +100,28 @@ def _bounds(document: Document) -> Iterator[list[str]]:
         yield [f"{name} (Hashin-Shtrikman)", *map(_number, (lower, document["moduli"][name], upper))]
 
 
+def _thermal(document: Document, label: str) -> Table:
+    """What a unit of temperature does, a row for each component."""
+    known = {words: document[key] for key, words in THERMAL.items() if document.get(key) is not None}
+    rows = [
+        [stress[1:], *map("{:.7g}".format, numbers)]
+        for stress, *numbers in zip(SPATIAL_STRESSES, *known.values(), strict=True)
+    ]
+    return Table(f"Per unit of temperature{label}", ["", *known], rows)
+
+
 def _points(key: str, points: Sequence[Document], label: str) -> Table:
     """The points of an angle or path, of many some."""
     numbers = chosen(points, MOST_ROWS) if key == "path" else range(min(len(points), MOST_ROWS))
     some = "" if len(numbers) == len(points) else f", {len(numbers)} of {len(points)}"
     names = [name for name, value in points[0].items() if isinstance(value, int | float)]
-    head = ["point", *names, *(STRESSES if "stress" in points[0] else ("C11", "C22", "C12", "C33"))]
+    entries = shown_entries(points) if points[0].get("stiffness") is not None else {}
+    head = ["point", *names, *(entries or STRESSES)]
     rows = []
     for number in numbers:
         point = points[number]
         stiff = point.get("stiffness")
-        values = point["stress"] if stiff is None else (stiff[0][0], stiff[1][1], stiff[0][1], stiff[2][2])
+        values = point["stress"] if stiff is None else [stiff[i][j] for i, j in entries.values()]
         rows.append([str(number), *(_number(point[name]) for name in names), *map(_number, values)])
     return Table(f"Points of the {key}{some}; stress{label}", head, rows)
 

@@ -12,6 +12,7 @@ from feti_homog.mechanics.voigt import STRAINS, STRESSES
 
 ROWS = 15  # of a path's table
 ENTRIES = {"C11": (0, 0), "C22": (1, 1), "C12": (0, 1), "C33": (2, 2)}
+SPATIAL_ENTRIES = {f"C{i}{i}": (i - 1, i - 1) for i in range(1, 7)} | {"C12": (0, 1)}
 STATES = ("bonded", "open", "closed")
 
 Point = Mapping[str, Any]
@@ -40,17 +41,25 @@ def chosen_states(document: Mapping[str, Any], rows: int, count: int) -> list[in
     return [among.index(number) for number in chosen(document["path"], rows, among)]
 
 
+def shown_entries(points: Sequence[Point]) -> dict[str, tuple[int, int]]:
+    """Names and places of the entries of the stiffnesses of an angle's points that are shown."""
+    return ENTRIES if len(points[0]["stiffness"]) == len(STRAINS) else SPATIAL_ENTRIES
+
+
 def angle_table(points: Sequence[Point], stress: str) -> list[str]:
     """A row for each angle: stiffnesses or stresses, and the states of the interface nodes."""
     stiff = "stiffness" in points[0]
-    names = tuple(ENTRIES) if stiff else STRESSES
+    entries = shown_entries(points) if stiff else {}
+    names, counted = tuple(entries) or STRESSES, len(entries) <= len(ENTRIES)
+    width = 12 if counted else 10
     lines = [
         f"{'Stiffness' if stiff else 'Stress'}{stress} against the debonding angle (degrees)",
-        f"{'angle':>9}" + "".join(f"{name:>12}" for name in names) + _heads(),
+        f"{'angle':>9}" + "".join(f"{name:>{width}}" for name in names) + _heads() * counted,
     ]
     for point in points:
-        values = [point["stiffness"][i][j] for i, j in ENTRIES.values()] if stiff else point["stress"]
-        lines.append(f"{point['angle']:>9.5g}" + "".join(map(_number, values)) + _counts(point))
+        values = [point["stiffness"][i][j] for i, j in entries.values()] if stiff else point["stress"]
+        numbers = "".join(_number(value, width) for value in values)
+        lines.append(f"{point['angle']:>9.5g}{numbers}" + _counts(point) * counted)
     return lines
 
 

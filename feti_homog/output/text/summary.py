@@ -7,8 +7,9 @@ from math import floor, log10
 from textwrap import wrap
 from typing import Any
 
-from feti_homog.mechanics.voigt import STRAINS, STRESSES
+from feti_homog.mechanics.voigt import SPATIAL_STRESSES, STRAINS, STRESSES
 from feti_homog.output.text.point_tables import angle_table, path_table
+from feti_homog.output.text.spatial_tables import spatial_blocks
 from feti_homog.output.text.tip_tables import angle_tip_table, tip_table
 
 WIDTH = 79
@@ -83,6 +84,8 @@ def _answer(document: Document) -> list[list[str]]:
         return [angle_table(document["angle"], stress), angle_tip_table(document["angle"], toughness)]
     if "path" in document:
         return [path_table(document["path"], stress)]
+    if len(document["effective_stiffness"]) == len(SPATIAL_STRESSES):
+        return [*spatial_blocks(document, stress), tip_table(document.get("tips"), toughness)]
     blocks = [_matrix(f"Effective stiffness{stress}", document["effective_stiffness"])]
     if "effective_stiffness_compression" in document:
         blocks.append(_matrix(f"Under minus E{stress}", document["effective_stiffness_compression"]))

@@ -13,7 +13,7 @@ from feti_homog.sweep.report.style import COLOURS, MARKERS, label_axes, legend, 
 from feti_homog.sweep.report.sweep_table import SweepTable
 
 X_FACTOR, MARGIN = 0.94, 1.3  # factors on a logarithmic axis
-CHOICES = (("C11", "bulk", "shear"), ("onset_S11", "peak_S11"))
+CHOICES = (("C11", "bulk", "shear"), ("C11", "C33", "C44", "C66"), ("onset_S11", "peak_S11"))
 
 
 def names(table: SweepTable) -> tuple[str, ...]:

@@ -1,12 +1,14 @@
 """What the tables of a sweep hold: the columns of sweep.csv and the datasets of sweep.h5, with unit and meaning.
 
-In names, i and j stand for 1, 2 or 3, and words in capitals for what varies between sweeps.
+In names, i and j stand for 1, 2 or 3, in stiffnesses of generalized plane strain for 1 to 6, and words in capitals for
+what varies between sweeps.
 """
 
 from __future__ import annotations
 
 from feti_homog.common.records import STRESS
 from feti_homog.mechanics.bounds import Moduli
+from feti_homog.mechanics.spatial_constants import EngineeringConstants, TransverselyIsotropic
 from feti_homog.output.files.csv_tables import Column, columns
 
 CASE_COLUMNS = (
@@ -18,6 +20,7 @@ CASE_COLUMNS = (
     Column("reason", "", "why there is no result"),
 )
 INPUT_COLUMNS = (Column("SECTION.KEY", "that of the key", "value of a key that varies"),)
+MODULI = {column.name for column in columns(Moduli)}
 OUTPUT_COLUMNS = (
     Column("fraction_meshed", "", "share of all fibres in the meshed area"),
     Column("elements", "", "triangles of the refined mesh"),
@@ -29,9 +32,13 @@ OUTPUT_COLUMNS = (
     Column("iterations", "", "Krylov iterations of all states"),
     Column("Cij", STRESS, "entry of L^ef"),
     Column("Cij_compression", STRESS, "the same under minus the unit strains, with contact"),
+    Column("thermal_Sij", f"{STRESS} per unit of temperature", "stress per unit of temperature at no strain"),
+    Column("expansion_STRAIN", "1 / temperature", "strain per unit of temperature at no stress"),
     Column("anisotropy_axial", STRESS, "C11 - C22"),
-    Column("anisotropy_shear", STRESS, "C33 - (C11 + C22 - 2 C12) / 4"),
+    Column("anisotropy_shear", STRESS, "C33 - (C11 + C22 - 2 C12) / 4; of generalized plane strain C66 - ..."),
     *columns(Moduli),
+    *(column for column in columns(EngineeringConstants) if column.name not in MODULI),
+    *columns(TransverselyIsotropic),
     Column("Cii_reuss", STRESS, "lower bound of Cii"),
     Column("Cii_voigt", STRESS, "upper bound of Cii"),
     Column("bulk_lower", STRESS, "lower bound of bulk, by Hashin and Shtrikman"),

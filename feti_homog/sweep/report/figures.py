@@ -19,7 +19,7 @@ def plot(directory: Path, table: SweepTable) -> list[Path]:
     paths; returns the files.  On one rank."""
     with mpl.rc_context(STYLE):
         paths = []
-        if varies(table, moduli.FRACTION) and "bulk" in table.outputs:
+        if varies(table, moduli.FRACTION) and moduli.panels_of(table):
             paths.append(save(moduli.figure(table), directory / "moduli.png"))
         if varies(table, FIBRES) and cell_size.names(table):
             paths.append(save(cell_size.figure(table, FIBRES), directory / "cell_size.png"))

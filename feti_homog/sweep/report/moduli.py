@@ -9,10 +9,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from feti_homog.config.cell_section import GEOMETRY
+from feti_homog.config.material_forms import Material
 from feti_homog.config.material_sections import read_materials
-from feti_homog.config.materials import plane_stiffness
+from feti_homog.config.materials import plane_stiffness, spatial_stiffness
 from feti_homog.config.schema import TableReader
 from feti_homog.mechanics import bounds as mechanics
+from feti_homog.mechanics.voigt import SPATIAL_STRESSES
 from feti_homog.output.plots.plot_helpers import plain
 from feti_homog.sweep.report.series import Series, series_over
 from feti_homog.sweep.report.style import COLOURS, label_axes, legend, plot_series
@@ -21,6 +23,7 @@ from feti_homog.typing import Float
 
 FRACTION = "cell.fibre_fraction"
 PANELS = ("C11", "C33", "bulk", "shear")
+SPATIAL_PANELS = ("C11", "C33", "C44", "C66")  # of generalized plane strain
 FRACTIONS, MARGIN = 201, 1.05  # of the bounds: points, and how far they go beyond the largest fibre fraction
 X_FACTOR = 0.98
 
@@ -34,12 +37,20 @@ class PanelBounds:
     rows: dict[str, Float]
 
 
+def panels_of(table: SweepTable) -> tuple[str, ...]:
+    """The outputs that are drawn; none if the cases have no moduli."""
+    planes = {document["case"]["analysis"]["plane"] for document in table.finished}
+    names = SPATIAL_PANELS if planes == {"generalized"} else PANELS
+    return names if all(name in table.outputs for name in names) else ()
+
+
 def figure(table: SweepTable) -> Figure:
     """Moduli above; below, where there are bounds, how far they are above that of Reuss, which tells them apart."""
     bounds, series = _bounds(table), series_over(table, FRACTION)[: len(COLOURS)]
+    names = panels_of(table)
     picture = Figure(figsize=(14.4, 6.6 if bounds else 3.8), layout="constrained")
-    panels = picture.subplots(2 if bounds else 1, len(PANELS), sharex=True, squeeze=False)
-    for k, name in enumerate(PANELS):
+    panels = picture.subplots(2 if bounds else 1, len(names), sharex=True, squeeze=False)
+    for k, name in enumerate(names):
         if bounds is not None:
             _draw_bounds(panels[0, k], bounds.fractions, bounds.rows[name])
         for style, each in enumerate(series):
@@ -70,15 +81,23 @@ def _bounds(table: SweepTable) -> PanelBounds | None:
         return None
     plane = case["analysis"]["plane"]
     materials = read_materials(case["material"], plane, TableReader({GEOMETRY: case["cell"]["geometry"]}))
-    phases = [plane_stiffness(materials[phase], plane) for phase in ("matrix", "fibre")]
+    phases = [_stiffness(materials[phase], plane) for phase in ("matrix", "fibre")]
     largest = max(float(document["cell"]["fibre_fraction"]) for document in table.finished)
     c = np.linspace(0.0, min(1.0, MARGIN * largest), FRACTIONS)
     columns = [_bounds_at([1 - share, share], phases) for share in c]
-    return PanelBounds(c, {name: np.array([column[name] for column in columns]).T for name in PANELS})
+    return PanelBounds(c, {name: np.array([column[name] for column in columns]).T for name in columns[0]})
+
+
+def _stiffness(material: Material, plane: str) -> Float:
+    """Of a phase, (6, 6) in generalized plane strain."""
+    return spatial_stiffness(material) if plane == "generalized" else plane_stiffness(material, plane)
 
 
 def _bounds_at(shares: list[float], phases: list[Float]) -> dict[str, list[float]]:
-    """Of each panel Reuss, Voigt, and the two of Hashin and Shtrikman for isotropic phases."""
+    """Of each panel Reuss, Voigt, and in the plane the two of Hashin and Shtrikman for isotropic phases."""
+    if len(phases[0]) == len(SPATIAL_STRESSES):
+        pair = np.stack([bound(shares, phases).diagonal() for bound in (mechanics.reuss, mechanics.voigt)])
+        return {name: pair[:, int(name[1]) - 1].tolist() for name in SPATIAL_PANELS}
     found: dict[str, list[float]] = {name: [] for name in PANELS}
     for stiffness in (mechanics.reuss(shares, phases), mechanics.voigt(shares, phases)):
         bulk, shear = mechanics.isotropic_part(stiffness)

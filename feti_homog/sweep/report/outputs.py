@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.mechanics.voigt import STIFFNESSES, STRESSES
+from feti_homog.mechanics.voigt import SPATIAL_STIFFNESSES, SPATIAL_STRAINS, SPATIAL_STRESSES, STIFFNESSES, STRESSES
 from feti_homog.output.text import point_tables
 
 Document = Mapping[str, Any]
@@ -20,14 +20,31 @@ def outputs(document: Document) -> dict[str, float]:
     found |= {name: solver[name] for name in ("ranks", "subdomains", "dofs", "multipliers")}
     found |= {"iterations": sum(solver["iterations"])}
     for name, suffix in (("effective_stiffness", ""), ("effective_stiffness_compression", "_compression")):
-        entries = np.ravel(document.get(name, [])).tolist()
-        found |= {f"{entry}{suffix}": value for entry, value in zip(STIFFNESSES, entries, strict=False)}
+        found |= {f"{entry}{suffix}": value for entry, value in _entries(document.get(name, ())).items()}
+    found |= _thermal(document)
     found |= _anisotropy(document.get("effective_stiffness"))
-    found |= document.get("moduli", {}) | _bounds(document.get("bounds", {}))
+    for section in ("moduli", "constants", "transversely_isotropic"):
+        found |= {name: value for name, value in document.get(section, {}).items() if value is not None}
+    found |= _bounds(document.get("bounds", {}))
     found |= _angles(document.get("angle", ())) | _path(document.get("path", ()))
     found |= {f"check_{name}": error for name, error in document["checks"].items()}
     found |= {f"seconds_{stage}": took for stage, took in document["timings"].items()}
     return {name: float(value) for name, value in (found | {"memory": document["memory"]}).items()}
+
+
+def _entries(stiffness: Any) -> dict[str, float]:
+    """C11, C12, ... of a stiffness (3, 3) or (6, 6); none of an empty one."""
+    names = SPATIAL_STIFFNESSES if len(stiffness) == len(SPATIAL_STRESSES) else STIFFNESSES
+    return dict(zip(names, np.ravel(stiffness).tolist(), strict=False))
+
+
+def _thermal(document: Document) -> dict[str, float]:
+    """Stress and strain per unit of temperature, if they are known."""
+    found = {
+        f"thermal_{name}": v for name, v in zip(SPATIAL_STRESSES, document.get("thermal_stress", ()), strict=False)
+    }
+    named = zip(SPATIAL_STRAINS, document.get("thermal_expansion", ()), strict=False)
+    return found | {f"expansion_{name}": value for name, value in named}
 
 
 def _anisotropy(stiffness: Any) -> dict[str, float]:
@@ -37,7 +54,7 @@ def _anisotropy(stiffness: Any) -> dict[str, float]:
     C = np.asarray(stiffness)
     return {
         "anisotropy_axial": float(C[0, 0] - C[1, 1]),
-        "anisotropy_shear": float(C[2, 2] - (C[0, 0] + C[1, 1] - 2 * C[0, 1]) / 4),
+        "anisotropy_shear": float(C[-1, -1] - (C[0, 0] + C[1, 1] - 2 * C[0, 1]) / 4),
     }
 
 
@@ -51,9 +68,10 @@ def _bounds(bounds: Document) -> dict[str, float]:
 def _angles(points: Sequence[Document]) -> dict[str, float]:
     found: dict[str, float] = {}
     for point in points:
-        names, key = (STIFFNESSES, "stiffness") if "stiffness" in point else (STRESSES, "stress")
-        values = np.ravel(point[key]).tolist()
-        found |= {f"angle_{point['angle']:g}_{name}": v for name, v in zip(names, values, strict=True)}
+        values = (
+            _entries(point["stiffness"]) if "stiffness" in point else dict(zip(STRESSES, point["stress"], strict=True))
+        )
+        found |= {f"angle_{point['angle']:g}_{name}": value for name, value in values.items()}
     return found
 
 

@@ -18,7 +18,7 @@ MARKERS = ("o", "s", "^", "D", "v", "P")
 REALISATION_STYLE: dict[str, Any] = {"markersize": 3.5, "alpha": 0.4, "markeredgewidth": 0}
 NAMES = {
     "C11": "$C_{11}$",
-    "C33": "$C_{33}$",
+    **{name: f"$C_{{{name[1:]}}}$" for name in ("C33", "C44", "C66")},
     "bulk": "plane bulk modulus $k$",
     "shear": "shear modulus $\\mu$",
     "onset_S11": "$\\Sigma_{11}$ at the first break",

@@ -1,0 +1,74 @@
+"""A copy of a result of generalized plane strain in which one thing is false breaks the laws that it must break."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from support.falsifications import MATRIX, attribute, broken, document, scale, shift
+from support.verified_results import falsified
+
+MATERIAL = {"stress", "equilibrium", "mean stress", "Hill"}
+
+
+def free_traction(_, file):
+    """A debonded face is pulled along the fibre."""
+    state = file["state/5"]
+    node = int(np.flatnonzero(state["status"][()] == 2)[0])
+    state["axial_traction"][node] = 1e-3 * np.abs(state["axial_traction"][()]).max()
+
+
+def warmer(_, file):
+    file["state/0"].attrs["temperature"] = 1e-2
+
+
+FALSE = {
+    "a stress along the fibres": ("spatial", scale("stress_33", state=3), {"stress", "shown"}),
+    "an axial stress": ("spatial", scale("axial_stress", state=5), {"stress", "shown"}),
+    "an axial stress that there is none of": ("spatial", shift("axial_stress"), {"stress"}),
+    "an axial strain": ("spatial contact", scale("axial_strain", state=13), {"shown"}),
+    "a strain along the fibres": ("spatial", shift("element_strain", state=4), {"shown"}),
+    "a von Mises stress of axial shear": ("spatial springs", scale("von_mises", state=4), {"shown"}),
+    "an axial displacement": (
+        "spatial", shift("axial_displacement", state=5),
+        {"displacement", "stress", "shown", "equilibrium", "mean stress"},
+    ),
+    "an axial fluctuation": ("spatial contact", shift("axial_fluctuation", state=6), {"displacement", "periodicity"}),
+    "an axial traction": ("spatial", scale("axial_traction", state=6), {"equilibrium", "vectors"}),
+    "an axial traction of springs": ("spatial springs", scale("axial_traction", state=5), {"equilibrium", "vectors"}),
+    "an axial traction on a free face": (
+        "spatial contact", free_traction, {"equilibrium", "vectors", "free faces", "Hill"},
+    ),
+    "an axial jump": ("spatial contact", scale("axial_jump", state=5), {"jump", "vectors"}),
+    "a third component": ("spatial springs", scale("displacement_fibre", state=5), {"vectors"}),
+    "an expansion": (
+        "spatial", document("case", *MATRIX, "expansion", factor=1.01),
+        {"stress", "equilibrium", "mean stress", "Hill", "Levin"},
+    ),
+    "an axial shear modulus": (
+        "spatial", document("case", "material", "fibre", "G13", factor=1.01), MATERIAL,
+    ),
+    "axial springs": ("spatial springs", document("case", "interface", "tangential_stiffness", factor=1.01), {"bond"}),
+    "a temperature": (
+        "spatial", attribute("temperature", state=4), {"load", "stress", "equilibrium", "mean stress"},
+    ),
+    "a temperature that there is none of": ("spatial", warmer, {"load", "stress", "equilibrium", "mean stress"}),
+    "an entry of a spatial stiffness": (
+        "spatial", document("effective_stiffness", 3, 3), {"tables", "moduli", "compliance"},
+    ),
+    "an axial entry of an angle": ("spatial springs", document("angle", 1, "stiffness", 4, 4), {"tables"}),
+    "a compliance": ("spatial", document("compliance", 2, 2), {"compliance"}),
+    "a thermal stress": ("spatial", document("thermal_stress", 2), {"tables", "compliance", "moduli"}),
+    "a thermal stress of an angle": (
+        "spatial springs", document("angle", 1, "thermal_stress", 0), {"tables"},
+    ),
+    "a thermal stress under minus one": ("spatial contact", document("thermal_stress_compression", 1), {"tables"}),
+    "a thermal expansion": ("spatial", document("thermal_expansion", 0), {"compliance"}),
+    "a constant of space": ("spatial", document("constants", "nu13"), {"moduli"}),
+    "a constant about the fibres": ("spatial", document("transversely_isotropic", "G_axial"), {"moduli"}),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", FALSE)
+def test_a_falsified_copy_breaks_its_laws(results, tmp_path, name):
+    kind, edit, laws = FALSE[name]
+    assert broken(falsified(results(kind), tmp_path / "copy", edit)) == laws | {"files"}
