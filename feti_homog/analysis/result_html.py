@@ -31,7 +31,7 @@ def tables(document: Document) -> str:
     if "moduli" in document:
         moduli = document["moduli"].items()
         blocks.append(_table("moduli", None, ([with_unit(name, unit), _number(value)] for name, value in moduli)))
-    for key in ("angle", "path"):
+    for key in ("angle", "path", "envelope"):
         if key in document:
             blocks.append(_points(key, document[key]))
     checks = document["checks"].items()
@@ -49,8 +49,9 @@ def _thermal(document: Document, label: str) -> str:
 
 def _points(key: str, points: Sequence[Document]) -> str:
     """The numbers, not the arrays, of the first points."""
-    names = [name for name, value in points[0].items() if isinstance(value, int | float)]
-    rows = ([_number(point[name]) for name in names] for point in points[:LONGEST])
+    numbers = [{name: value for name, value in p.items() if isinstance(value, int | float)} for p in points[:LONGEST]]
+    names = list(dict.fromkeys(name for point in numbers for name in point))
+    rows = ([_number(point[name]) if name in point else "" for name in names] for point in numbers)
     more = f", the first {LONGEST} of {len(points)} points" if len(points) > LONGEST else ""
     return _table(f"{key}{more}", names, rows)
 
