@@ -16,6 +16,7 @@ from feti_homog.analysis.result_records import (
     AnglePoint,
     CellInfo,
     Checks,
+    EnvelopePoint,
     FibreInfo,
     PathPoint,
     SolverInfo,
@@ -48,7 +49,7 @@ class Result:
         compliance, thermal_stress, thermal_expansion: of generalized plane strain, (6, 6) and (6,), else None.
         moduli, bounds: of perfectly bonded cells, else None.
         tips: energy release rates of a stiffness with debonded arcs, else None; those of an angle are in its points.
-        angle, path: the points of these analyses, else None; `points` has them as arrays.
+        angle, path, envelope: the points of these analyses, else None; `points` has those of the first two as arrays.
         fields: mesh, interface and states on this rank if they were asked for, else None; not written to result.json.
     """
 
@@ -102,6 +103,10 @@ class Result:
     tips: TipRates | None = described("energy release rates at the tips of debonded arcs, of a stiffness", default=None)
     angle: tuple[AnglePoint, ...] | None = described("points of analysis `angle`, as in angle.csv", default=None)
     path: tuple[PathPoint, ...] | None = described("points of analysis `path`, as in path.csv", default=None)
+    envelope: tuple[EnvelopePoint, ...] | None = described(
+        "directions of analysis `envelope`, as in envelope.csv",
+        default=None,
+    )
     states: tuple[int, ...] | None = described(
         "of a path: the numbers, from 0, of the points whose fields are kept; /state/K is that of entry K", default=None
     )

@@ -16,6 +16,7 @@ from feti_homog.analysis.result_records import (
     AnglePoint,
     CellInfo,
     Checks,
+    EnvelopePoint,
     FibreInfo,
     PathPoint,
     SolverInfo,
@@ -37,7 +38,7 @@ def result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Fields
     fractions = {phase: area / sum(areas.values()) for phase, area in areas.items()}
     points: dict[str, Any] = {
         name: tuple(kind(**point) for point in analysis[name])
-        for name, kind in (("angle", AnglePoint), ("path", PathPoint))
+        for name, kind in (("angle", AnglePoint), ("path", PathPoint), ("envelope", EnvelopePoint))
         if name in analysis
     }
     if "effective_stiffness" in analysis and cell.axial is not None:

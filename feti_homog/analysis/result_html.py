@@ -30,7 +30,7 @@ def tables(document: Document) -> str:
     if "thermal_stress" in document:
         blocks.append(_thermal(document, label))
     blocks += _constants(document, unit, label)
-    for key in ("angle", "path"):
+    for key in ("angle", "path", "envelope"):
         if key in document:
             blocks.append(_points(key, document[key]))
     checks = document["checks"].items()
@@ -63,8 +63,9 @@ def _thermal(document: Document, label: str) -> str:
 
 def _points(key: str, points: Sequence[Document]) -> str:
     """The numbers, not the arrays, of the first points."""
-    names = [name for name, value in points[0].items() if isinstance(value, int | float)]
-    rows = ([_number(point[name]) for name in names] for point in points[:LONGEST])
+    numbers = [{name: value for name, value in p.items() if isinstance(value, int | float)} for p in points[:LONGEST]]
+    names = list(dict.fromkeys(name for point in numbers for name in point))
+    rows = ([_number(point[name]) if name in point else "" for name in names] for point in numbers)
     more = f", the first {LONGEST} of {len(points)} points" if len(points) > LONGEST else ""
     return _table(f"{key}{more}", names, rows)
 

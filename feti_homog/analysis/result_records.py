@@ -11,10 +11,17 @@ from dataclasses import dataclass
 
 from feti_homog.common.records import DEGREES, LENGTH, STRESS, described, plain
 from feti_homog.mechanics.bounds import Bounds
-from feti_homog.mechanics.voigt import SPATIAL_STIFFNESSES, SPATIAL_STRESSES, STIFFNESSES, STRAINS, STRESSES
+from feti_homog.mechanics.voigt import (
+    SPATIAL_STIFFNESSES,
+    SPATIAL_STRAINS,
+    SPATIAL_STRESSES,
+    STIFFNESSES,
+    STRAINS,
+    STRESSES,
+)
 from feti_homog.typing import Float
 
-EITHER_STIFFNESS = "(3, 3) or (6, 6)"
+EITHER, EITHER_STIFFNESS = "(3,) or (6,)", "(3, 3) or (6, 6)"
 ENERGY = f"{STRESS} times that of the cell"
 DEBONDED_ANGLE = (
     "the same in degrees of arc, `debonded_length` / radius; of a fibre that is not round 360 times the share of its "
@@ -206,3 +213,36 @@ class PathPoint:
     open: int = described("debonded interface nodes without contact")
     closed: int = described("debonded interface nodes in contact")
     iterations: int = described("Krylov iterations")
+
+
+@dataclass(frozen=True, kw_only=True)
+class EnvelopePoint:
+    """The onset of debonding along one direction of a plane of macroscopic stresses or strains.
+
+    All but the direction is absent where no load along it breaks a bond.
+    """
+
+    angle: float = described("direction of the load in the plane, from the first axis towards the second", DEGREES)
+    factor: float | None = described(
+        "load at onset, in the unit of the axes: their values are `factor` times cosine and sine of `angle`; 0 if the "
+        "change of temperature alone breaks a bond",
+        default=None,
+    )
+    strain: Float | None = described(
+        "macroscopic strain at onset", "", EITHER, STRAINS, spatial_components=SPATIAL_STRAINS, default=None
+    )
+    stress: Float | None = described(
+        "macroscopic stress at onset", STRESS, EITHER, STRESSES, spatial_components=SPATIAL_STRESSES, default=None
+    )
+    fibre: int | None = described("number of the fibre whose bond breaks first", default=None)
+    bond_angle: float | None = described(
+        "direction of that bond from the fibre's centre; of a fibre without centre that of its normal",
+        DEGREES,
+        default=None,
+    )
+    normal: float | None = described("share of the normal strength that the bond uses", default=None)
+    tangential: float | None = described("share of the tangential strength", default=None)
+    axial: float | None = described("share of the strength along the fibre", default=None)
+    psi: float | None = described(
+        "mode of a bond that breaks by energy: 0 opens, 90 shears, along the fibre too", DEGREES, default=None
+    )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from contextlib import closing, contextmanager, nullcontext
 from dataclasses import replace
@@ -13,8 +12,9 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from feti_homog.analysis import debonding_angle, load_path, result_builder, stiffness, stored_result
+from feti_homog.analysis import debonding_angle, envelope, load_path, result_builder, stiffness, stored_result
 from feti_homog.analysis.context import AnalysisContext
+from feti_homog.analysis.criteria import criterion_of
 from feti_homog.analysis.result import Result
 from feti_homog.analysis.state_recorder import StateRecorder
 from feti_homog.common import process_memory
@@ -22,14 +22,9 @@ from feti_homog.common.mpi_errors import all_raise, on_root, on_root_only
 from feti_homog.common.petsc_options import case_options, refuse_unused
 from feti_homog.common.progress import Progress
 from feti_homog.config.case import Case
-from feti_homog.errors import CaseError, ConvergenceError
-from feti_homog.feti.preconditioners.influence import Influence
+from feti_homog.errors import ConvergenceError
 from feti_homog.homogenization.averaging import Homogenization
 from feti_homog.homogenization.unit_cell import TornCell, tear
-from feti_homog.interface.bond_criterion import BondCriterion
-from feti_homog.interface.energy_criterion import EnergyCriterion
-from feti_homog.interface.strength_criterion import StrengthCriterion
-from feti_homog.interface.tip_criterion import TipCriterion
 from feti_homog.output.files import (
     csv_tables,
     event_log,
@@ -175,9 +170,12 @@ def _analyse(context: AnalysisContext, checkpoint: Checkpoint, resume: bool) -> 
 
 
 def _analysis(context: AnalysisContext, checkpoint: Checkpoint, resume: bool) -> dict[str, Any]:
-    case = context.homogenization.cell.case
+    cell = context.homogenization.cell
+    case = cell.case
     if case.path is not None:
-        return load_path.run(context, case.path, _law(context.homogenization.cell), checkpoint, resume)
+        return load_path.run(context, case.path, criterion_of(cell), checkpoint, resume)
+    if case.envelope is not None:
+        return envelope.run(context, case.envelope, criterion_of(cell))
     if case.angle is not None:
         strain = None if case.angle.strain is None else np.array(case.angle.strain)
         return debonding_angle.run(context, case.angle.values, strain)
@@ -190,37 +188,16 @@ def _checkpoint(cell: TornCell, directory: Path) -> Checkpoint:
     return Checkpoint(directory, cell.comm, f"case {on_root(cell.comm, cell.case.digest)}, {parts}")
 
 
-def _law(cell: TornCell) -> BondCriterion:
-    """What breaks the bonds of a cell.  Collective."""
-    case = cell.case
-    bond = case.interface
-    if bond is None:
-        return StrengthCriterion(math.inf, math.inf, "max")
-    if bond.criterion == "energy":
-        stiffnesses = bond.normal_stiffness or math.inf, bond.tangential_stiffness or math.inf
-        springs = EnergyCriterion(*stiffnesses, bond.toughness or math.inf, bond.mode_sensitivity)
-        return _at_tips(cell, springs) if bond.growth == "released" else springs
-    return StrengthCriterion(bond.normal_strength or math.inf, bond.tangential_strength or math.inf, bond.criterion)
-
-
-def _at_tips(cell: TornCell, springs: EnergyCriterion) -> TipCriterion:
-    """Raises CaseError if the solver has no inverse of the dual operator."""
-    influence = cell.solver.preconditioner
-    if not isinstance(influence, Influence):
-        raise CaseError('[interface] growth = "released": needs -feti_pc_type influence; or growth = "springs"')
-    return TipCriterion(springs, influence)
-
-
 def _write(result: Result, directory: Path, cell: TornCell) -> None:
     """result.json, then what can be made of it again; files of an earlier result do not stay beside them."""
     on_root_only(cell.comm, result_json.write, directory, result.document)
     written = {result_json.NAME}
     if result.result_h5 is not None:
         written |= {field_file.NAME, *(path.name for path in on_root(cell.comm, xdmf.write, directory))}
-    for name, points in (("angle.csv", result.angle), ("path.csv", result.path)):
-        if points is not None:
-            on_root_only(cell.comm, csv_tables.write, directory / name, points)
-            written.add(name)
+    for name in ("angle", "path", "envelope"):
+        if (points := getattr(result, name)) is not None:
+            on_root_only(cell.comm, csv_tables.write, directory / f"{name}.csv", points)
+            written.add(f"{name}.csv")
     written |= {event_log.NAME} if result.path is not None else set()
     on_root_only(cell.comm, output_folder.remove_other_results, directory, written)
 

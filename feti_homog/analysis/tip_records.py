@@ -7,12 +7,23 @@ import numpy as np
 from feti_homog.analysis.result_records import Tips
 from feti_homog.feti.decomposition.interface_neighbours import InterfaceNeighbours
 from feti_homog.homogenization.averaging import Homogenization
+from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface.energy_criterion import EnergyCriterion
 from feti_homog.interface.path_points import Point
 from feti_homog.interface.tip_energies import tip_energies
+from feti_homog.typing import Float
 
 # Directions of nodes differ by rounding from rank to rank, and so would their order.
 DIRECTION_DIGITS = 9
+
+
+def bond_directions(cell: TornCell) -> Float:
+    """(k,) directions in degrees, above -180, of this rank's interface nodes about the centres of their fibres; of a
+    fibre without centre those of their normals."""
+    normal = cell.solver.jump_operator.nodes.normal
+    own = np.degrees(np.arctan2(normal[:, 1], normal[:, 0]))
+    direction = np.where(np.isnan(cell.directions), own, cell.directions)
+    return np.asarray(direction + 360.0 * (np.round(direction, DIRECTION_DIGITS) <= -180.0))
 
 
 class TipRecorder:
@@ -31,9 +42,7 @@ class TipRecorder:
         cell, nodes = self._cell, self._interface.nodes
         traction = point.scale * self._interface.traction(point.state.solution)
         own = tip_energies(self._springs, self._neighbours, point.state.status, traction, point.used)
-        normal = np.degrees(np.arctan2(nodes.normal[own.node, 1], nodes.normal[own.node, 0]))
-        direction = np.where(np.isnan(cell.directions[own.node]), normal, cell.directions[own.node])
-        direction += 360.0 * (np.round(direction, DIRECTION_DIGITS) <= -180.0)
+        direction = bond_directions(cell)[own.node]
         fibre = cell.summary.fibre_number(nodes.fibre[own.node])
         table = np.column_stack([fibre, direction, own.opening, own.shear, own.mode])
         table = np.concatenate(cell.comm.allgather(table))

@@ -13,6 +13,8 @@ from typing import Any
 
 from feti_homog.config.cell_section import GEOMETRY, TOUCHING, Cell, size_faults
 from feti_homog.config.document import read_document, to_document
+from feti_homog.config.envelope_rules import envelope_faults, read_envelope
+from feti_homog.config.envelope_section import Envelope
 from feti_homog.config.generalized_plane import generalized_faults
 from feti_homog.config.interface_sections import misplaced_sections, read_angle, read_interface, read_path
 from feti_homog.config.material_forms import Isotropic, Material
@@ -50,7 +52,7 @@ class Case:
     Attributes:
         materials: by phase, in the file's order.
         interface: None if the bonding is perfect.
-        angle, path: there if the analysis is of that type.
+        angle, path, envelope: there if the analysis is of that type.
         petsc: options without dash.
     """
 
@@ -61,6 +63,7 @@ class Case:
     interface: InterfaceSection | None
     angle: Angle | None
     path: LoadPath | None
+    envelope: Envelope | None
     decomposition: Decomposition
     output: Output
     petsc: dict[str, Scalar]
@@ -163,9 +166,12 @@ def parse(values: Mapping[str, Any], folder: Path) -> Case:
         "interface": read_interface(document.get("interface"), reader),
         "angle": read_angle(document.get("angle"), reader),
         "path": read_path(document.get("path"), reader),
+        "envelope": read_envelope(document.get("envelope"), reader),
         "output": _read_section(document, "output", reader),
         "petsc": read_petsc(document.get("petsc", {}), faults),
     }
+    bonding = sections["envelope"], sections["interface"], sections["materials"]
+    faults += envelope_faults(*bonding, document, reader.selected)
     if faults:
         raise CaseError(*faults)
     return Case(name=document.get("name", "case"), **sections)

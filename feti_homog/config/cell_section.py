@@ -60,7 +60,7 @@ class Cell:
         "Size of the elements at the tips of debonded arcs, before refine, / width of the cell; from there they grow "
         "like those on interfaces. At most interface_size.",
         default=None,
-        default_words="such that tips err no more than the rest; on paths interface_size",
+        default_words="such that tips err no more than the rest; of paths and envelopes interface_size",
         only=ALL_CIRCULAR,
     )
     refine: int = key(

@@ -12,8 +12,11 @@ from feti_homog.config.schema import Selected, TableReader
 from feti_homog.config.section_values import ARCS
 from feti_homog.config.sections import (
     ANALYSIS_TYPE,
+    GENERALIZED,
+    PLANE,
     SECTIONS_OF_AN_ANALYSIS,
     STIFFNESSES,
+    STRENGTHS,
     Angle,
     Arc,
     InterfaceSection,
@@ -26,7 +29,7 @@ ZERO: Strain = (0.0, 0.0, 0.0)
 
 
 def misplaced_sections(document: Mapping[str, Any], analysis: str | None) -> list[str]:
-    """Faults of [angle] and [path] that are missing or belong to another type of analysis (None: faulty)."""
+    """Faults of sections that are missing or belong to another type of analysis (None: faulty)."""
     faults = []
     for section, condition in SECTIONS_OF_AN_ANALYSIS.items():
         words = condition.in_words(section)
@@ -48,6 +51,8 @@ def read_interface(table: Any, reader: TableReader) -> InterfaceSection | None:
     arcs = [reader.read(Arc, arc, "interface", f"debonded[{k}].") for k, arc in enumerate(given)]
     if interface is not None and interface.criterion == "energy":
         reader.faults += _energy_faults(interface)
+    if interface is not None:
+        reader.faults += _axial_faults(interface, reader.selected[PLANE])
     return interface and dataclasses.replace(interface, debonded=tuple(arc for arc in arcs if arc is not None))
 
 
@@ -60,9 +65,17 @@ def _energy_faults(interface: InterfaceSection) -> list[str]:
     ]
     return faults + [
         f'[interface] {name}: belongs to criterion = "max" or "quadratic", not "energy"'
-        for name in ("normal_strength", "tangential_strength")
+        for name in STRENGTHS
         if getattr(interface, name) is not None
     ]
+
+
+def _axial_faults(interface: InterfaceSection, plane: str | None) -> list[str]:
+    """The fault of a strength along the fibre where there is no traction along it."""
+    if interface.axial_strength is None or plane in (*GENERALIZED.values, None):
+        return []
+    belongs = f"belongs to {GENERALIZED.in_words('interface')}, not {toml_value(plane)}"
+    return [f"[interface] axial_strength = {toml_value(interface.axial_strength)}: {belongs}"]
 
 
 def _missing_arcs(table: Any, selected: Selected) -> list[str]:
@@ -71,7 +84,7 @@ def _missing_arcs(table: Any, selected: Selected) -> list[str]:
     if analysis == "angle" and debonded in (None, []):
         return [f'[interface] debonded: missing; [analysis] type = "angle" needs {ARCS.expected}']
     # An empty list says that it is meant; of a user's mesh a curve may be debonded.
-    is_bare = isinstance(table, dict) and not table.keys() & {"debonded", *STIFFNESSES}
+    is_bare = isinstance(table, dict) and not table.keys() & {"debonded", *STIFFNESSES, "axial_stiffness"}
     if analysis == "stiffness" and selected[GEOMETRY] in CIRCULAR and is_bare:
         return [f"[interface] debonded: missing; expected {ARCS.expected}, or []: nothing else can open"]
     return []

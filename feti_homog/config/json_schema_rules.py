@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from feti_homog.config.cell_section import ALL_CIRCULAR, GEOMETRY
+from feti_homog.config.envelope_section import STRAINS, STRESSES, pairs_of
 from feti_homog.config.material_forms import EXPANSION_PAIR, MATERIAL_FORMS
 from feti_homog.config.schema import Condition, Key, Selector, defaults_of, keys_of
 from feti_homog.config.sections import (
@@ -13,6 +14,7 @@ from feti_homog.config.sections import (
     ANGLE_ANALYSIS,
     BY_ENERGY,
     CRITERION,
+    ENVELOPE_ANALYSIS,
     GENERALIZED,
     GENERALIZED_ANALYSES,
     IN_THE_PLANE,
@@ -22,6 +24,7 @@ from feti_homog.config.sections import (
     SECTIONS,
     SECTIONS_OF_AN_ANALYSIS,
     STIFFNESSES,
+    STRENGTHS,
     Arc,
 )
 from feti_homog.config.tables import REQUIRED
@@ -45,6 +48,7 @@ def rules_of_one_case() -> Schema:
             *_arc_rules(),
             *_energy_rules(),
             *_generalized_rules(),
+            *_envelope_rules(),
             _at(("cell",), {"not": {"required": ["width", "fibre_radius"]}}),
             _at(("decomposition",), {"not": {"required": ["subdomains", "max_dofs"]}}),
             _at(("path",), {"oneOf": [{"required": ["strain"]}, {"required": ["waypoints"]}]}),
@@ -135,14 +139,17 @@ def _arc_rules() -> list[Schema]:
         {"if": _if(ANGLE_ANALYSIS), "then": {"required": ["interface"], **_at(("interface",), some_arc)}},
         {
             "if": {"allOf": [_if(stiffness), _if(ALL_CIRCULAR)]},
-            "then": _at(("interface",), {"anyOf": [{"required": [name]} for name in ("debonded", *STIFFNESSES)]}),
+            "then": _at(
+                ("interface",),
+                {"anyOf": [{"required": [name]} for name in ("debonded", *STIFFNESSES, "axial_stiffness")]},
+            ),
         },
     ]
 
 
 def _energy_rules() -> list[Schema]:
     """Bonds that break by energy have springs, and no strengths."""
-    strengths = {"normal_strength": False, "tangential_strength": False}
+    strengths = dict.fromkeys(STRENGTHS, False)
     springs = _at(("interface",), {"required": [*STIFFNESSES], "properties": strengths})
     return [{"if": _if(BY_ENERGY), "then": springs}]
 
@@ -153,4 +160,19 @@ def _generalized_rules() -> list[Schema]:
     return [
         {"if": _if(GENERALIZED), "then": _at(("analysis", "type"), {"enum": list(GENERALIZED_ANALYSES)})},
         {"if": _if(IN_THE_PLANE), "then": _at(("output", "stress"), only_there)},
+    ]
+
+
+def _envelope_rules() -> list[Schema]:
+    """An envelope needs bonds that break and debonded faces without contact; its plane is that of the case."""
+    strong = {"anyOf": [{"required": [name]} for name in STRENGTHS]}
+    by_energy = {"properties": {"criterion": {"const": "energy"}}, "required": ["criterion"]}
+    some_arc = {"required": ["debonded"], "properties": {"debonded": {"minItems": 1}}}
+    free = {"if": some_arc, "then": {"required": ["contact"], "properties": {"contact": {"const": False}}}}
+    bonding = {"allOf": [{"anyOf": [by_energy, strong]}, free]}
+    in_the_plane = {"envelope": {"properties": {"plane": pairs_of(STRESSES, STRAINS)}}}
+    no_axial_strength = {"interface": {"properties": {"axial_strength": False}}}
+    return [
+        {"if": _if(ENVELOPE_ANALYSIS), "then": {"required": ["interface"], **_at(("interface",), bonding)}},
+        {"if": _if(IN_THE_PLANE), "then": {"properties": in_the_plane | no_axial_strength}},
     ]

@@ -25,6 +25,7 @@ ORDER = (
     "interface",
     "angle",
     "path",
+    "envelope",
     "decomposition",
     "output",
     "petsc",

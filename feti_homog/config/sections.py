@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from feti_homog.config.cell_section import Cell
+from feti_homog.config.envelope_section import Envelope
 from feti_homog.config.schema import Selector, key
 from feti_homog.config.section_values import (
     ARCS,
@@ -28,12 +29,14 @@ METHOD = Selector("path", "method")
 CRITERION = Selector("interface", "criterion")
 
 ANGLE_ANALYSIS, PATH_ANALYSIS = ANALYSIS_TYPE.among("angle"), ANALYSIS_TYPE.among("path")
+ENVELOPE_ANALYSIS, BREAKING = ANALYSIS_TYPE.among("envelope"), ANALYSIS_TYPE.among("path", "envelope")
 BY_ENERGY = CRITERION.among("energy")
 
 OUT_OF_PLANE_STRESSES = ("S33", "S23", "S13")
 DRAWN_STRESS = Selector("output", "stress")
 
 STIFFNESSES = ("normal_stiffness", "tangential_stiffness")
+STRENGTHS = ("normal_strength", "tangential_strength", "axial_strength")
 IN_THE_PLANE, GENERALIZED = PLANE.among("strain", "stress"), PLANE.among("generalized")
 BY_EVENTS, BY_INCREMENTS = METHOD.among("events"), METHOD.among("increments")
 
@@ -43,9 +46,9 @@ class Analysis:
     """What is computed, and in which plane state."""
 
     type: str = key(
-        choice("stiffness", "angle", "path"),
+        choice("stiffness", "angle", "path", "envelope"),
         '"stiffness": the effective stiffness; "angle": the response against the debonding angle, see [angle]; '
-        '"path": debonding by the load, see [path].',
+        '"path": debonding by the load, see [path]; "envelope": the loads at which debonding begins, see [envelope].',
     )
     plane: str = key(
         choice("strain", "stress", "generalized"),
@@ -76,7 +79,7 @@ class Arc:
         "Whole opening of the arc, measured at the centre of the fibre. 0 is perfect bonding; at 360 nothing holds the "
         "fibre, and its rigid motions are left out.",
         unit="degrees",
-        only=ANALYSIS_TYPE.among("stiffness", "path"),
+        only=ANALYSIS_TYPE.among("stiffness", "path", "envelope"),
     )
 
 
@@ -113,13 +116,21 @@ class InterfaceSection:
         default=None,
         default_words="inf",
     )
+    axial_stiffness: float | None = key(
+        real(above=0.0),
+        "Traction along the fibre / slip along it, k_a, of the bonds that hold.",
+        unit="stress / length",
+        default=None,
+        default_words="tangential_stiffness",
+        only=GENERALIZED,
+    )
     normal_strength: float | None = key(
         STRENGTH,
         "R^n: the normal traction at which a bond breaks. A force per area: it does not depend on the mesh.",
         unit="stress",
         default=None,
         default_words="inf",
-        only=PATH_ANALYSIS,
+        only=BREAKING,
     )
     tangential_strength: float | None = key(
         STRENGTH,
@@ -127,20 +138,29 @@ class InterfaceSection:
         unit="stress",
         default=None,
         default_words="inf",
-        only=PATH_ANALYSIS,
+        only=BREAKING,
+    )
+    axial_strength: float | None = key(
+        real(above=0.0),
+        'R^a: the traction along the fibre at which a bond breaks; in plane = "generalized".',
+        unit="stress",
+        default=None,
+        default_words="tangential_strength",
+        only=ENVELOPE_ANALYSIS,
     )
     criterion: str = key(
         choice("max", "quadratic", "energy"),
-        'A bond breaks when this reaches 1: "max": the larger of t_n / R^n and |t_t| / R^t; "quadratic": the root of '
-        'the sum of their squares; "energy": the energy of its spring / G_c, see toughness. Compression never breaks a '
-        "bond.",
+        'A bond breaks when this reaches 1: "max": the largest of t_n / R^n, |t_t| / R^t and along the fibre '
+        '|t_a| / R^a; "quadratic": the root of the sum of their squares; "energy": the energy of its spring / G_c, '
+        "see toughness. Compression never breaks a bond.",
         default="max",
-        only=PATH_ANALYSIS,
+        only=BREAKING,
     )
     toughness: float | None = key(
         TOUGHNESS,
         "G_Ic, energy per area. A bond breaks when G_I + G_II = <t_n>^2 / (2 k_n) + t_t^2 / (2 k_t) reaches "
-        "G_c = G_Ic (1 + tan^2((1 - mode_sensitivity) psi)), tan^2 psi = G_II / G_I.",
+        "G_c = G_Ic (1 + tan^2((1 - mode_sensitivity) psi)), tan^2 psi = G_II / G_I; along the fibre "
+        "G_III = t_a^2 / (2 k_a) adds to G_II.",
         unit="stress * length",
         only=BY_ENERGY,
     )
@@ -268,12 +288,13 @@ SECTIONS: dict[str, type[Any]] = {
     "interface": InterfaceSection,
     "angle": Angle,
     "path": LoadPath,
+    "envelope": Envelope,
     "decomposition": Decomposition,
     "output": Output,
 }
 
-GENERALIZED_ANALYSES = ("stiffness", "angle")
+GENERALIZED_ANALYSES = ("stiffness", "angle", "envelope")
 """The types of analysis in generalized plane strain."""
 
-SECTIONS_OF_AN_ANALYSIS = {"angle": ANGLE_ANALYSIS, "path": PATH_ANALYSIS}
+SECTIONS_OF_AN_ANALYSIS = {"angle": ANGLE_ANALYSIS, "path": PATH_ANALYSIS, "envelope": ENVELOPE_ANALYSIS}
 """Sections that must be given for one type of analysis, and belong to no other."""

@@ -38,6 +38,11 @@ class Problem:
         """m, strains that displacements make."""
         return int(self.voigt.max()) + 1
 
+    @property
+    def stresses(self) -> int:
+        """Loads that work on stresses: strains, those of displacements first."""
+        return len(self.loads) - ("temperature" in self.loads)
+
     @cached_property
     def voigt(self) -> Int:
         """(c, 2) `strain`."""

@@ -44,10 +44,17 @@ def applications(case: Case) -> int:
     solves = 3
     if case.angle is not None:
         solves = len(case.angle.values) * (3 if case.angle.strain is None else 1)
-    if case.path is not None:
+    if case.path is not None or _asks_for_tips(case):
         solves = SOLVES_OF_A_PATH
     contact = case.interface is not None and case.interface.contact
     return ITERATIONS_OF_A_SOLVE * solves * (SOLVES_OF_A_CONTACT if contact else 1)
+
+
+def _asks_for_tips(case: Case) -> bool:
+    """Whether an envelope needs the inverse of the dual operator, which many solves call for."""
+    bond = case.interface
+    by_energy = bond is not None and bond.criterion == "energy" and bond.growth == "released"
+    return case.envelope is not None and by_energy and bool(case.arcs)
 
 
 def estimate(

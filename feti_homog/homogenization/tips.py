@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from feti_homog.cell import element_estimate
 from feti_homog.config.case import Case
+from feti_homog.config.sections import BREAKING
 from feti_homog.interface import debonded_arcs
 
 # The stress at a tip is singular, so that the energy errs by about the size of the elements there, elsewhere by
@@ -28,10 +29,10 @@ def size(case: Case) -> float | None:
         h_t = 2^refine R (h / R)^(2 order) / 2,  h = interface_size / 2^refine,
 
     with R the mean radius / width; but with several openings not so small that their tips took more than TIP_TRIANGLES.
-    Along paths tips move, and only what the case says counts.
+    Along paths tips move, and only what the case says counts; so it is with envelopes, for they begin paths.
     """
     cell, tips = case.cell, sum(len(own) for own in directions(case).values())
-    if cell.tip_size is not None or case.analysis.type == "path" or not tips:
+    if cell.tip_size is not None or case.analysis.type in BREAKING.values or not tips:
         return cell.tip_size
     radius, around = element_estimate.mean_radius(cell), element_estimate.interface_size(cell)
     fine = around / 2**cell.refine

@@ -139,7 +139,8 @@ def _axial(cell: TornCell, shared: SharedEntities, thresholds: Thresholds) -> To
     case = cell.case
     subdomains = agree(cell.comm, _assemble_axial, case, cell.subdomains)
     bond = case.interface
-    springs = GLUE if bond is None else InterfaceSprings((bond.tangential_stiffness or math.inf,))
+    stiffness = None if bond is None else bond.axial_stiffness or bond.tangential_stiffness
+    springs = GLUE if stiffness is None else InterfaceSprings((stiffness,))
     applications = cost_model.applications(case)
     solver = FetiSolver(cell.comm, shared, subdomains, cell.lattice, applications, thresholds, springs, AXIAL)
     return TornCell(cell.comm, case, cell.summary, cell.lattice, subdomains, solver)

@@ -130,10 +130,21 @@ class Interface:
 
     @cached_property
     def _free_strains(self) -> Float:
-        """(m, v) strains that the loads make: their own, and of the others those of a free body of mean stiffness.
+        """(m, v) sizes of the strains that the loads make: their own, and of the others the largest of free bodies.
+
+        A soft body that expands hardly moves a stiff one, but its free motion is what the dual problem has to close.
         Collective."""
-        m, mean = self.solver.problem.strains, voigt(*self._phases)
-        return np.hstack([np.eye(m), -np.linalg.solve(mean[:m, :m], mean[:m, m:])])
+        m, stiffnesses = self.solver.problem.strains, self._phases[1]
+        free = np.linalg.solve(stiffnesses[:, :m, :m], stiffnesses[:, :m, m:])
+        return np.hstack([np.eye(m), np.abs(free).max(axis=0)])
+
+    def _caused_stress(self, loads: Float) -> float:
+        """A stress that the loads (v,) cause at least if all is bonded.  Collective."""
+        problem = self.solver.problem
+        mean, caused = voigt(*self._phases), self.least_bonded_stiffness.copy()
+        caused[:, problem.strains :] = mean[:, problem.strains :]
+        # What works on a temperature is no stress.
+        return float(np.abs(caused[: problem.stresses] @ loads).max())
 
     @property
     def _pairs(self) -> Int:
@@ -186,7 +197,7 @@ class Interface:
 
     def imposed_strain(self, loads: Float) -> Float:
         """(m,) sizes of the strains that the loads (v,) make.  Collective."""
-        return np.asarray(np.abs(self._free_strains) @ np.abs(loads))
+        return np.asarray(self._free_strains @ np.abs(loads))
 
     def _placed(self, status: Status, solution: DualSolution) -> tuple[DualSolution, Bool]:
         """The solution with free fibres where they have room, and which nodes (k,) break the KKT conditions."""
@@ -205,7 +216,6 @@ class Interface:
 
     def _equilibrium(self, status: Status, solution: DualSolution, iterations: int, solves: int) -> Equilibrium:
         """The state that a search ended with, its free motions and its certificate."""
-        stress = float(np.abs(self.least_bonded_stiffness @ solution.strain).max())
         certificate = kkt_errors(
             self.solver.comm,
             self.traction(solution),
@@ -213,7 +223,7 @@ class Interface:
             solution.jump[self.nodes.row],
             (status != BONDED) & self.contact,
             status == CLOSED,
-            (self.imposed(solution.strain), stress),
+            (self.imposed(solution.strain), self._caused_stress(solution.strain)),
         )
         status, motions = self._without_idle(status, solution)
         return Equilibrium(status, solution, iterations, solves, motions, certificate)

@@ -5,6 +5,7 @@ Tavara, Mantic, Graciani, Paris, Eng. Anal. Bound. Elem. 35 (2011) 207; the mode
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -21,16 +22,20 @@ class EnergyCriterion:
     G_I = <t_n>^2 / (2 k_n), G_II = t_t^2 / (2 k_t), tan^2 psi = G_II / G_I;
     G_I + G_II = G_c = G_Ic [1 + tan^2((1 - lambda) psi)].
 
+    A traction along the fibre adds G_III = t_a^2 / (2 k_a) to G_II: all shear counts alike.
+
     Attributes:
         normal_stiffness, tangential_stiffness: k_n and k_t, stress per length.
         toughness: G_Ic, energy per area.
         mode_sensitivity: lambda; 1 lets G_c not depend on the mode, 0 lets shear alone break nothing.
+        axial_stiffness: k_a, along the fibre.
     """
 
     normal_stiffness: float
     tangential_stiffness: float
     toughness: float
     mode_sensitivity: float
+    axial_stiffness: float = math.inf
 
     def law(self, interface: Interface, status: Status) -> Callable[[Float], Float]:
         """`utilisation`, whatever is debonded."""
@@ -42,7 +47,8 @@ class EnergyCriterion:
         return np.asarray(np.cos((1.0 - self.mode_sensitivity) * self.mode_angle(traction)))
 
     def utilisation(self, traction: Float) -> Float:
-        """(k,) sqrt((G_I + G_II) / G_c) of tractions (k, 2), normal and tangential: 1 breaks.
+        """(k,) sqrt((G_I + G_II) / G_c) of tractions (k, 2), normal and tangential, or (k, 3), also along the fibre: 1
+        breaks.
 
         Homogeneous of degree one in the traction, for psi does not depend on its size, and convex.
         """
@@ -58,6 +64,9 @@ class EnergyCriterion:
         return np.asarray(np.arctan2(shear, opening))
 
     def _roots(self, traction: Float) -> tuple[Float, Float]:
-        """(k,) sqrt(G_I) and sqrt(G_II)."""
+        """(k,) sqrt(G_I) and sqrt(G_II), with G_III in the latter."""
         opening = np.maximum(traction[:, 0], 0.0) / np.sqrt(2.0 * self.normal_stiffness)
-        return opening, np.abs(traction[:, 1]) / np.sqrt(2.0 * self.tangential_stiffness)
+        shear = np.abs(traction[:, 1]) / np.sqrt(2.0 * self.tangential_stiffness)
+        if traction.shape[1] == 3:
+            shear = np.hypot(shear, traction[:, 2] / np.sqrt(2.0 * self.axial_stiffness))
+        return opening, shear

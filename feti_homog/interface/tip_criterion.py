@@ -17,10 +17,27 @@ import numpy as np
 from feti_homog.feti.preconditioners.influence import Influence
 from feti_homog.interface.contact import BONDED, Interface, Status
 from feti_homog.interface.energy_criterion import EnergyCriterion
-from feti_homog.typing import Float
+from feti_homog.typing import Bool, Float, Int
 
 # Share of a spring's stiffness that the inverse of the dual operator is where only rounding is left of it.
 RIGID = 1e-9
+
+
+@dataclass(frozen=True)
+class Tips:
+    """The bonds of this rank beside broken ones.
+
+    Attributes:
+        node: (t,) their numbers.
+        H: (t, 2, 2) their blocks of the inverse of the dual operator.
+        length: (t,) that they stand for.
+        stiffness: (t, 2) the most that H can be, of a spring its own.
+    """
+
+    node: Int
+    H: Float
+    length: Float
+    stiffness: Float
 
 
 @dataclass(frozen=True)
@@ -31,33 +48,52 @@ class TipCriterion:
     Attributes:
         springs: the criterion of the others, and the toughness.
         influence: the inverse of the dual operator, which knows the bonds beside each other.
+        axial: that of slip along the fibres, where it counts.
     """
 
     springs: EnergyCriterion
     influence: Influence
+    axial: Influence | None = None
 
     def law(self, interface: Interface, status: Status) -> Callable[[Float], Float]:
         """The utilisation (k,) of tractions (k, 2) on the interface nodes of this rank, with these bonds.  Collective;
         what it returns is not."""
-        interface.solver.activate(interface.active(status))
-        neighbours = self.influence.neighbours
-        everywhere = np.concatenate(neighbours.comm.allgather(status))
-        tips = np.flatnonzero((everywhere == BONDED) & (neighbours.adjacency @ (everywhere != BONDED) > 0))
-        H = self.influence.inverse_blocks(neighbours.rows[tips][:, None] + np.arange(2))
-        own = tips - neighbours.first
-        mine = (own >= 0) & (own < len(status))
-        own, H = own[mine], H[mine]
-        length = interface.nodes.length[own]
-        springs = length[:, None] * [self.springs.normal_stiffness, self.springs.tangential_stiffness]
-        stiffness = np.minimum(springs, self.influence.norm)
+        tips = self.tips(interface, status)
+        own, length = tips.node, tips.length
 
         def utilisation(traction: Float) -> Float:
             used = self.springs.utilisation(traction)
-            released = released_energy(H, traction[own] * length[:, None], stiffness, interface.contact)
+            released = released_energy(tips.H, traction[own] * length[:, None], tips.stiffness, interface.contact)
             used[own] = np.sqrt(released / (self.springs.toughness * length)) * self.springs.mode_factor(traction[own])
             return used
 
         return utilisation
+
+    def tips(self, interface: Interface, status: Status) -> Tips:
+        """The tips that this rank owns.  Collective."""
+        interface.solver.activate(interface.active(status))
+        numbers, mine = self._own(status)
+        H = self.influence.inverse_blocks(self.influence.neighbours.rows[numbers][:, None] + np.arange(2))
+        own, H = numbers[mine] - self.influence.neighbours.first, H[mine]
+        length = interface.nodes.length[own]
+        springs = length[:, None] * [self.springs.normal_stiffness, self.springs.tangential_stiffness]
+        return Tips(own, H, length, np.minimum(springs, self.influence.norm))
+
+    def axial_flexibility(self, axial: Interface | None, status: Status) -> Float:
+        """(t,) H_aa of the tips of `tips`, for slip along the fibres; empty without it.  Collective."""
+        if axial is None or self.axial is None:
+            return np.zeros(0)
+        axial.solver.activate(axial.active(status))
+        numbers, mine = self._own(status)
+        rows = self.axial.neighbours.rows[numbers]
+        return np.asarray(self.axial.inverse_blocks(np.stack([rows, rows], axis=1))[mine, 0, 0])
+
+    def _own(self, status: Status) -> tuple[Int, Bool]:
+        """(n,) numbers of the tips of all ranks, and which are this rank's.  Collective."""
+        neighbours = self.influence.neighbours
+        everywhere = np.concatenate(neighbours.comm.allgather(status))
+        tips = np.flatnonzero((everywhere == BONDED) & (neighbours.adjacency @ (everywhere != BONDED) > 0))
+        return tips, (tips >= neighbours.first) & (tips < neighbours.first + len(status))
 
 
 def released_energy(H: Float, lam: Float, stiffness: Float, contact: bool) -> Float:

@@ -13,6 +13,7 @@ from feti_homog.errors import CaseError
 from feti_homog.verification.arc_laws import check_arcs
 from feti_homog.verification.derived_laws import check_derived
 from feti_homog.verification.discrete_cell import DiscreteCell
+from feti_homog.verification.envelope_laws import check_envelope
 from feti_homog.verification.field_laws import check_fields
 from feti_homog.verification.interface_laws import check_interface_state
 from feti_homog.verification.laws import laws
@@ -102,6 +103,8 @@ def _verified(files: ResultFiles) -> Certificate:
     check_points(ledger, cell, states)
     if "path" in files.document:
         check_path(ledger, cell, states)
+    if "envelope" in files.document:
+        check_envelope(ledger, cell, states)
     check_summary(ledger, cell)
     if files.is_spatial:
         check_spatial(ledger, cell, states)

@@ -33,28 +33,43 @@ def check_interface_state(ledger: Ledger, cell: DiscreteCell, state: State) -> N
 
 
 def spring_jumps(cell: DiscreteCell, state: State) -> Float:
-    """(k, c) what elastic bonds give way: traction / stiffness, along the fibres that of the other slip."""
+    """(k, c) what elastic bonds give way: traction / stiffness."""
     section = cell.files.case.get("interface", {})
-    normal, slip = (section.get(name) or np.inf for name in ("normal_stiffness", "tangential_stiffness"))
-    return np.asarray(state.traction / np.array([normal, slip, slip], float)[: state.traction.shape[1]])
+    return np.asarray(state.traction / _along_fibres(section, "stiffness")[: state.traction.shape[1]])
+
+
+def _along_fibres(section: Mapping[str, Any], what: str) -> Float:
+    """(3,) normal, tangential and axial stiffness or strength; the last is by default the second."""
+    normal, tangential = (section.get(f"{name}_{what}") or np.inf for name in ("normal", "tangential"))
+    return np.array([normal, tangential, section.get(f"axial_{what}") or tangential], float)
 
 
 def utilisation(section: Mapping[str, Any], traction: Float) -> Float:
-    """(k,) share of their strength that tractions (k, 2) use; compression uses none."""
+    """(k,) share of their strength that tractions (k, 2), or with that along the fibre (k, 3), use; compression uses
+    none."""
     if section.get("criterion") == "energy":
         return _energy_share(section, traction)
-    strengths = np.array([section.get(name) or np.inf for name in ("normal_strength", "tangential_strength")], float)
-    pulls = np.stack([np.maximum(traction[:, 0], 0.0), np.abs(traction[:, 1])], axis=1)
-    shares = pulls / strengths
-    return np.asarray(
-        np.hypot(*shares.T) if section.get("criterion") == "quadratic" else shares.max(axis=1, initial=0.0)
-    )
+    used = shares(section, traction)
+    if section.get("criterion") == "quadratic":
+        return np.asarray(np.sqrt(np.square(used).sum(axis=1)))
+    return np.asarray(used.max(axis=1, initial=0.0))
+
+
+def shares(section: Mapping[str, Any], traction: Float) -> Float:
+    """(k, c) what each component uses of its strength."""
+    return np.asarray(_pulls(traction) / _along_fibres(section, "strength")[: traction.shape[1]])
+
+
+def _pulls(traction: Float) -> Float:
+    """(k, c) sizes of the components that count: not of compression."""
+    return np.column_stack([np.maximum(traction[:, 0], 0.0), np.abs(traction[:, 1:])])
 
 
 def spring_energies(section: Mapping[str, Any], traction: Float) -> Float:
-    """(k, 2) G_I = <t_n>^2 / (2 k_n) and G_II = t_t^2 / (2 k_t) of tractions (k, 2)."""
-    pulls = np.stack([np.maximum(traction[:, 0], 0.0), np.abs(traction[:, 1])], axis=1)
-    return np.asarray(pulls**2 / (2 * np.array([section["normal_stiffness"], section["tangential_stiffness"]], float)))
+    """(k, 2) G_I = <t_n>^2 / (2 k_n) and G_II = t_t^2 / (2 k_t) of tractions (k, 2); t_a^2 / (2 k_a) adds to the
+    latter."""
+    energies = _pulls(traction) ** 2 / (2 * _along_fibres(section, "stiffness")[: traction.shape[1]])
+    return np.column_stack([energies[:, 0], energies[:, 1:].sum(axis=1)])
 
 
 def mode(section: Mapping[str, Any], traction: Float) -> Float:

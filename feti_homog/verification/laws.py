@@ -19,6 +19,8 @@ CHECK_PER_RTOL, LARGEST_CHECK = 1e3, 1e-4
 CONTACT_PER_RTOL, LEAST_CONTACT = 100.0, 1e-6
 # Bonds whose utilisation differs by 1e-6 break together.
 STRENGTH = 2e-6
+# Utilisations at onset, from the same tractions as the onset.
+ONSET = 1e-9
 # Coordinates of a user's mesh are rounded: sides match to 1e-7 of the cell, circles are round to 1e-6 of their radius.
 OWN_MESH, USERS_MESH = 1e-9, 1e-5
 
@@ -62,6 +64,7 @@ def laws(rtol: float, users_mesh: bool) -> tuple[Law, ...]:
         Law("symmetry", "stiffnesses of bonded or free faces are symmetric, relative to the largest entry", solver),
         Law("breaks", "bonds break as the points say and never heal, in numbers of bonds", 0.0),
         Law("strength", "bonds that hold are within their strength, those that break are at it", STRENGTH),
+        Law("onset", "the load of every direction of an envelope is that at which the first bond breaks", ONSET),
         Law("energy", "work = stored + dissipated along the path, relative to the largest energy", solver),
         Law("cell", "areas, fractions and counts in result.json are those of the mesh", 1e-10),
         Law("moduli", "moduli follow from the stiffness, relative to each", 1e-10),

@@ -13,7 +13,7 @@ from reference.references import BONDED
 from support.cases import FIBRE, MATRIX, make_case, monolithic_stiffness, relative_error, solve
 from unit.cell.faulty_meshes import grid
 
-pytestmark = pytest.mark.parallel
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 
 MESHES = Path(__file__).parents[2] / "meshes"
 

@@ -15,14 +15,7 @@ from support.small_path import PATH
 
 from feti_homog import cli
 
-pytestmark = pytest.mark.parallel
-
-
-@pytest.fixture(autouse=True)
-def few_ranks(comm):
-    """More than two ranks meet nothing else, and take longer."""
-    if comm.size > 2:
-        pytest.skip("at one and two ranks")
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 
 
 def path_run(comm, folder, text, *words):

@@ -191,6 +191,7 @@ def test_fibres_that_are_not_round_have_no_tips(comm, shared_path):
     comm.barrier()
 
 
+@pytest.mark.few_ranks
 def test_one_fibre_in_a_large_matrix_has_the_published_rates(comm):
     """In a cell 40 radii wide, whose strain is that of the matrix under uniaxial stress."""
     young, poisson, widths = 3.5, 0.4, 40

@@ -8,12 +8,13 @@ from support.ranks import parallel_assert
 from unit.cell.faulty_meshes import FAULTY_MESHES
 from unit.config.faulty_bonding import FAULTY_BONDINGS
 from unit.config.faulty_cases import FAULTY_CASES
+from unit.config.faulty_envelopes import FAULTY_ENVELOPES
 
 from feti_homog import cli
 
 pytestmark = pytest.mark.parallel
 
-FAULTY = FAULTY_CASES | FAULTY_BONDINGS
+FAULTY = FAULTY_CASES | FAULTY_BONDINGS | FAULTY_ENVELOPES
 CELL = 'geometry = "hexagonal"\nfibre_fraction = 0.4\nmesh_size = 0.05'
 MESH_CASE = BASE.replace(CELL, 'geometry = "mesh"\nfile = "faulty.msh"')
 RANDOM = 'geometry = "random"\nfibres = 30\n'

@@ -20,14 +20,7 @@ from feti_homog.errors import FetiHomogError
 from feti_homog.output.files import atomic
 from feti_homog.output.files.field_file import RESERVE, FieldFile
 
-pytestmark = pytest.mark.parallel
-
-
-@pytest.fixture(autouse=True)
-def few_ranks(comm):
-    """More than two ranks meet nothing else, and take longer."""
-    if comm.size > 2:
-        pytest.skip("at one and two ranks")
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 
 
 CASE = BASE.replace("mesh_size = 0.05", "mesh_size = 0.3") + "[output]\npictures = false\n"

@@ -11,7 +11,7 @@ from reference.spatial_forms import axial_shear_modulus, stiffness_of_constants
 from support.generalized_phases import ALUMINIUM, BORON, CARBON, CARBON_EPOXY
 from support.spatial_cells import EPOXY, GLASS, solved
 
-pytestmark = pytest.mark.parallel
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 
 PHASES = {
     "boron/aluminium": (ALUMINIUM, BORON),
@@ -68,15 +68,14 @@ def test_the_series_gives_the_table(key):
 
 
 @pytest.mark.parametrize(
-    ("key", "contrasts"),
-    list(zip(AXIAL_SHEAR, [[10.0], [1e-6], [1e6], [2.0], [50.0, 1e6], [1e-3]], strict=True)),
+    ("key", "contrast"),
+    list(zip(AXIAL_SHEAR, [10.0, 1e-6, 1e6, 2.0, 50.0, 1e-3], strict=True)),
     ids=str,
 )
-def test_axial_shear_moduli(comm, key, contrasts):
+def test_axial_shear_moduli(comm, key, contrast):
     geometry, fraction = key
-    for contrast in contrasts:
-        phases = {"matrix": {"young": 1.0, "poisson": POISSON}, "fibre": {"young": contrast, "poisson": POISSON}}
-        C = solved(comm, **phases, geometry=geometry, fibre_fraction=fraction, **FINE).effective_stiffness
-        G = C[3:5, 3:5] * 2 * (1 + POISSON)
-        expected = axial_shear_modulus(geometry, fraction, contrast)
-        assert np.abs(G - expected * np.eye(2)).max() < 2e-6 * expected
+    phases = {"matrix": {"young": 1.0, "poisson": POISSON}, "fibre": {"young": contrast, "poisson": POISSON}}
+    C = solved(comm, **phases, geometry=geometry, fibre_fraction=fraction, **FINE).effective_stiffness
+    G = C[3:5, 3:5] * 2 * (1 + POISSON)
+    expected = axial_shear_modulus(geometry, fraction, contrast)
+    assert np.abs(G - expected * np.eye(2)).max() < 2e-6 * expected

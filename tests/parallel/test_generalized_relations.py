@@ -51,37 +51,27 @@ def bulk_modulus(C):
 @pytest.mark.quick
 @pytest.mark.parametrize("cell", ARRANGEMENTS.values(), ids=ARRANGEMENTS)
 @pytest.mark.parametrize("fibre", [GLASS, CARBON], ids=["glass", "carbon"])
-def test_axial_constants_follow_from_the_bulk_modulus(comm, cell, fibre):
+def test_axial_constants_and_expansion_follow_from_the_rest(comm, cell, fibre):
     result = solved(comm, fibre=fibre, **cell)
-    S, c = result.compliance, fractions(result)
-    E, nu = hill(EPOXY, fibre, c, bulk_modulus(result.effective_stiffness))
+    C, S, c = result.effective_stiffness, result.compliance, fractions(result)
+    E, nu = hill(EPOXY, fibre, c, bulk_modulus(C))
     assert 1 / S[2, 2] == pytest.approx(E, rel=EXACT)
     # The mean of both directions, if the arrangement has no axis.
     assert -(S[0, 2] + S[1, 2]) / (2 * S[2, 2]) == pytest.approx(nu, rel=EXACT)
-
-
-@pytest.mark.parametrize("cell", ARRANGEMENTS.values(), ids=ARRANGEMENTS)
-@pytest.mark.parametrize("fibre", [GLASS, CARBON], ids=["glass", "carbon"])
-def test_a_stress_that_all_phases_share_is_found_exactly(comm, cell, fibre):
-    """Strains [e, e, E33] that make the same stress across in both phases are uniform."""
-    result = solved(comm, fibre=fibre, **cell)
+    # Strains [e, e, E33] that make the same stress across in both phases are uniform.
     _, nu, k = np.transpose([axial_constants(EPOXY), axial_constants(fibre)])
     across = -(k[1] * nu[1] - k[0] * nu[0]) / (k[1] - k[0])
-    E = np.array([across, across, 1.0, 0, 0, 0])
-    stresses = [law(phase)[0] @ E for phase in (EPOXY, fibre)]
+    uniform = np.array([across, across, 1.0, 0, 0, 0])
+    stresses = [law(phase)[0] @ uniform for phase in (EPOXY, fibre)]
     assert stresses[0][:2] == pytest.approx(stresses[1][:2], rel=1e-12)
-    expected = fractions(result) @ stresses
-    assert error(result.effective_stiffness @ E, expected) < EXACT
+    assert error(C @ uniform, c @ stresses) < EXACT
+    assert error(result.thermal_expansion, levin(EPOXY, fibre, c, S)) < EXACT
 
 
 @pytest.mark.parametrize("cell", ARRANGEMENTS.values(), ids=ARRANGEMENTS)
-@pytest.mark.parametrize(
-    "phases", [(EPOXY, GLASS), (EPOXY, CARBON), (WOOD, CRYSTAL)], ids=["isotropic", "carbon", "orthotropic"]
-)
-def test_expansion_follows_from_the_compliance(comm, cell, phases):
-    result = solved(comm, matrix=phases[0], fibre=phases[1], **cell)
-    expected = levin(*phases, fractions(result), result.compliance)
-    assert error(result.thermal_expansion, expected) < EXACT
+def test_expansion_of_orthotropic_phases_follows_from_the_compliance(comm, cell):
+    result = solved(comm, matrix=WOOD, fibre=CRYSTAL, **cell)
+    assert error(result.thermal_expansion, levin(WOOD, CRYSTAL, fractions(result), result.compliance)) < EXACT
     # The definition: no stress under these strains and a unit of temperature.
     free = result.effective_stiffness @ result.thermal_expansion + result.thermal_stress
     assert np.abs(free).max() < EXACT * np.abs(result.thermal_stress).max()
@@ -130,8 +120,7 @@ def written(comm, folder, where):
     return {"geometry": "mesh", "file": "strips.msh", "folder": folder}
 
 
-@pytest.mark.parametrize("order", [1, 2])
-@pytest.mark.parametrize("across", [0, 1])
+@pytest.mark.parametrize(("order", "across"), [(1, 0), (2, 1)])
 @pytest.mark.parametrize("springs", [None, (700.0, 150.0), (3.0, 0.2)], ids=str)
 def test_laminate_is_exact(comm, shared_path, across, order, springs):
     keys = ("normal_stiffness", "tangential_stiffness")
@@ -177,7 +166,7 @@ def test_axial_shear_obeys_duality(comm, geometry, order, rate):
         G = []
         for contrast in (12.0, 1 / 12.0):
             fibre = {"young": contrast, "poisson": 0.25}
-            cell = {"mesh_size": 0.15 * order, "refine": refine, "order": order, "geometry": geometry}
+            cell = {"mesh_size": 0.2 * order, "refine": refine, "order": order, "geometry": geometry}
             C = solved(comm, matrix={"young": 1.0, "poisson": 0.25}, fibre=fibre, **cell).effective_stiffness
             G.append(C[3:5, 3:5])
         # In any arrangement G(1/e) = G_m^2 R^T G(e)^-1 R with a quarter turn R.

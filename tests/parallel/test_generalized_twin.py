@@ -36,7 +36,7 @@ def springs_of(section):
     return None if None in stiffnesses else stiffnesses
 
 
-def compare(comm, **case):
+def compare(comm, tolerance=TIGHT, **case):
     """The result of a case, whose secants are those of the twin.  Collective."""
     result, twin = solved(comm, **case), Twin(comm, **case)
     section = case.get("sections", {}).get("interface", {})
@@ -46,7 +46,7 @@ def compare(comm, **case):
         signs[-1.0] = result.effective_stiffness_compression, result.thermal_stress_compression
     for sign, found in signs.items():
         for own, expected in zip(found, twin.secants(sign=sign, **how), strict=True):
-            assert own is None or error(own, expected) < TIGHT
+            assert own is None or error(own, expected) < tolerance
     twin.destroy()
     return result
 
@@ -55,10 +55,10 @@ def compare(comm, **case):
 @pytest.mark.parametrize(
     "case",
     [
-        {"geometry": "square"},
-        {"geometry": "hexagonal", "order": 2, "refine": 1, "mesh_size": 0.3},
+        {"geometry": "square", "refine": 1, "mesh_size": 0.3},
+        {"geometry": "hexagonal", "order": 2, "mesh_size": 0.4},
         {"geometry": "hexagonal", "bodies": "plane"},
-        {"geometry": "random", "fibres": 3, "min_gap": 0.15, "seed": 3, "order": 2},
+        {"geometry": "random", "fibres": 3, "min_gap": 0.15, "seed": 3},
     ],
     ids=lambda case: case["geometry"],
 )
@@ -118,20 +118,20 @@ def test_elastic_interfaces_of_curved_elements(comm):
     compare(comm, **ORTHOTROPIC, order=2, mesh_size=0.3, sections=arcs(**SPRINGS) | CUT)
 
 
-@pytest.mark.parametrize("given", [OPEN[0], OPEN[2]], ids=str)
+@pytest.mark.parametrize("given", [OPEN[0], OPEN[2]], ids=["arc", "whole"])
 @pytest.mark.parametrize("springs", [{}, SPRINGS], ids=["glue", "springs"])
 def test_contact(comm, given, springs):
     sections = arcs(*given, **springs)
-    result = compare(comm, **ORTHOTROPIC, geometry="hexagonal", mesh_size=0.25, sections=sections)
+    result = compare(comm, **ORTHOTROPIC, mesh_size=0.25, tip_size=0.1, sections=sections)
     C, compression = result.effective_stiffness, result.effective_stiffness_compression
     assert error(C, compression) > 1e-3
     # Along the fibres nothing opens or closes.
     assert error(C[3:5, 3:5], compression[3:5, 3:5]) < TIGHT
 
 
-@pytest.mark.parametrize("pc", ["none", "lumped", "influence"])
+@pytest.mark.parametrize("pc", ["lumped", "influence"])
 def test_contact_by_any_preconditioner(comm, pc):
-    compare(comm, mesh_size=0.25, petsc={"feti_pc_type": pc}, sections=arcs(("all", 0.0, 90.0)) | CUT)
+    compare(comm, mesh_size=0.25, tip_size=0.1, petsc={"feti_pc_type": pc}, sections=arcs(("all", 0.0, 90.0)) | CUT)
 
 
 @pytest.mark.parametrize(
@@ -142,7 +142,24 @@ def test_contact_under_a_temperature(comm, expansions, angle):
     phases = {"matrix": {"young": 1.0, "poisson": 0.3}, "fibre": {"young": 10.0, "poisson": 0.2}}
     for phase, expansion in zip(phases.values(), expansions, strict=True):
         phase["expansion"] = expansion
-    compare(comm, **phases, sections=arcs((1, 20.0, angle)))
+    compare(comm, **phases, mesh_size=0.25, tip_size=0.1, sections=arcs((1, 20.0, angle)))
+
+
+# A matrix in one piece: forces between pieces of a stiff one would hide those of a soft fibre at this tolerance.
+WHOLE = {"decomposition": {"subdomains": 2}}
+
+
+@pytest.mark.parametrize(
+    "sections", [CUT, arcs((1, 20.0, 150.0)) | WHOLE, arcs((1, 0.0, 360.0)) | WHOLE], ids=["cut", "arc", "whole"]
+)
+@pytest.mark.parametrize("soft", ["matrix", "fibre"])
+def test_a_soft_phase_alone_expands(comm, soft, sections):
+    """At the default tolerance: what it would do alone is what errors are small parts of."""
+    phases = {name: {"young": 450.0, "poisson": 0.0, "expansion": 0.0} for name in ORTHOTROPIC}
+    phases[soft] = {"young": 8e-5, "poisson": 0.4, "expansion": 30.0}
+    compare(
+        comm, tolerance=1e-7, **phases, petsc={"feti_ksp_rtol": 1e-8}, mesh_size=0.25, tip_size=0.1, sections=sections
+    )
 
 
 def test_what_strains_no_phase_across_closes_nothing(comm):
@@ -154,16 +171,17 @@ def test_what_strains_no_phase_across_closes_nothing(comm):
     assert result.thermal_stress is None and result.thermal_expansion is None
 
 
-@pytest.mark.parametrize("number", range(4))
+@pytest.mark.parametrize("number", range(3))
 def test_random_cells(comm, number):
     # Other cells on other numbers of ranks.
     rng = np.random.default_rng([comm.size, number, 3])
-    cell = {k: v for k, v in random_cell(rng).items() if k not in ("plane", "matrix", "fibre", "order")}
-    sections, phases = {"decomposition": cell.pop("decomposition")}, {name: random_phase(rng) for name in ORTHOTROPIC}
+    cell = {k: v for k, v in random_cell(rng).items() if k in ("geometry", "fibre_fraction", "bodies", "seed")}
+    cell |= {"fibres": 3, "min_gap": 0.15} if cell["geometry"] == "random" else {}
+    sections, phases = dict(CUT), {name: random_phase(rng) for name in ORTHOTROPIC}
     sections |= arcs(("all", rng.uniform(-180, 180), rng.uniform(20, 200)), contact=bool(number % 2))
     if number > 1:
         sections["interface"] |= dict(zip(SPRINGS, (10.0 ** rng.uniform(-1, 2, size=2)).tolist(), strict=True))
-    compare(comm, **phases, sections=sections, **cell | {"mesh_size": 0.2, "tip_size": 0.1})
+    compare(comm, **phases, sections=sections, **cell | {"mesh_size": 0.25, "tip_size": 0.1})
 
 
 def random_phase(rng):

@@ -12,7 +12,7 @@ from feti_homog.interface.path_following import events
 from feti_homog.interface.path_points import unloaded
 from feti_homog.interface.strength_criterion import StrengthCriterion
 
-pytestmark = pytest.mark.parallel
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 
 THREE = {"geometry": "random", "fibres": 3, "min_gap": 0.1, "seed": 4, "mesh_size": 0.25, "radius_spread": 0.3}
 TIGHT = {"petsc": {"feti_pc_type": "influence", "feti_ksp_rtol": 1e-11}}

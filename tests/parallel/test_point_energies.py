@@ -146,6 +146,7 @@ def test_a_laminate_loses_all_that_it_stores_at_once(comm, shared_path, growth):
 PUBLISHED = {"released": ((1.042, 1.013, 1.004), 0.02), "springs": ((1.85, 1.51, 1.29), 0.03)}
 
 
+@pytest.mark.few_ranks
 @pytest.mark.parametrize("growth", PUBLISHED)
 def test_along_the_snap_back_toughness_times_length_is_dissipated_on_fine_meshes(comm, growth):
     """Growth by the energy that is released dissipates little more on any; by springs it takes fine elements."""

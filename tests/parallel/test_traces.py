@@ -11,7 +11,7 @@ from feti_homog.cell.refinement import edge_node
 from feti_homog.feti.coarse.trace_spaces import trace_space
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 
-pytestmark = pytest.mark.parallel
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 
 REFINED = NARROW | {"refine": 2}
 ADAPTIVE = {"feti_coarse_space": "adaptive"}

@@ -60,6 +60,25 @@ CASES: dict[str, dict[str, Any]] = {
         "interface": SPRINGS | {"debonded": [ARC]},
         "angle": {"values": [0, 120], "strain": [0.01, 0.0, 0.0]},
     },
+    "envelope": {
+        "cell": RANDOM,
+        "interface": STRENGTHS | {"criterion": "quadratic"},
+        "envelope": {"plane": ["S22", "S12"], "directions": 8},
+    },
+    "envelope by energy": {
+        "cell": SQUARE,
+        "interface": SPRINGS
+        | {"criterion": "energy", "toughness": 0.02, "contact": False, "debonded": [ARC | {"angle": 60}]},
+        "envelope": {"plane": ["E22", "E11"], "directions": 6},
+    },
+    "envelope in space": {
+        "cell": RANDOM,
+        "matrix": WARM,
+        "fibre": CARBON,
+        "plane": "generalized",
+        "interface": STRENGTHS | {"axial_strength": 3.0},
+        "envelope": {"plane": ["S33", "S13"], "directions": 8, "temperature": -100.0},
+    },
     "spatial": {
         "cell": HEXAGONAL | {"order": 2},
         "matrix": WARM,
@@ -93,7 +112,7 @@ CASES: dict[str, dict[str, Any]] = {
 def document(kind: str) -> dict[str, Any]:
     """The case of a kind of result."""
     parts = dict(CASES[kind])
-    analysis = next((name for name in ("angle", "path") if name in parts), "stiffness")
+    analysis = next((name for name in ("angle", "path", "envelope") if name in parts), "stiffness")
     material = {"matrix": parts.pop("matrix", MATRIX), "fibre": parts.pop("fibre", FIBRE)}
     plane = {"type": analysis, "plane": parts.pop("plane", "strain")}
     output = {"pictures": False} | ({"states": parts.pop("states")} if "states" in parts else {})

@@ -15,7 +15,7 @@ import tomli_w
 from mpi4py import MPI
 
 from feti_homog.analysis.result import schema_keys
-from feti_homog.analysis.result_records import AnglePoint, PathPoint
+from feti_homog.analysis.result_records import AnglePoint, EnvelopePoint, PathPoint
 from feti_homog.analysis.runner import run
 from feti_homog.config.case import Case
 from feti_homog.output.files.csv_tables import columns
@@ -35,6 +35,7 @@ BASE = {
 ARC = {"fibre": "all", "centre": 0.0}
 HALF_OPEN = {"debonded": [ARC | {"angle": 60.0}]}
 STRAIN = [0.1, 0.0, 0.0]
+ENERGY = {"normal_stiffness": 900.0, "tangential_stiffness": 300.0, "criterion": "energy", "toughness": 0.005}
 SPACE = {"plane": "generalized"}
 WARM = {name: phase | {"expansion": 1e-5} for name, phase in BASE["material"].items()}
 CASES = {
@@ -70,9 +71,23 @@ CASES = {
     },
     "path by energy": {
         "analysis": {"type": "path", "plane": "strain"},
-        "interface": HALF_OPEN
-        | {"normal_stiffness": 900.0, "tangential_stiffness": 300.0, "criterion": "energy", "toughness": 0.005},
+        "interface": HALF_OPEN | ENERGY,
         "path": {"strain": STRAIN},
+    },
+    "envelope": {
+        "analysis": {"type": "envelope", "plane": "strain"},
+        "interface": {"normal_strength": 1.0, "tangential_strength": 1.0},
+        "envelope": {"plane": ["S22", "S12"], "directions": 4},
+    },
+    "envelope in space": {
+        "analysis": {"type": "envelope"} | SPACE,
+        "interface": {"axial_strength": 1.0},
+        "envelope": {"plane": ["S22", "S13"], "directions": 4},
+    },
+    "envelope by energy": {
+        "analysis": {"type": "envelope", "plane": "strain"},
+        "interface": ENERGY,
+        "envelope": {"plane": ["E11", "E22"], "directions": 4},
     },
 }
 SWEEP = {"sweep": {"cell.mesh_size": [0.25, 0.3]}}
@@ -161,6 +176,9 @@ def test_datasets_and_attributes_of_result_h5(folders, name, described):
         ("angle of a strain", AnglePoint),
         ("path", PathPoint),
         ("path by energy", PathPoint),
+        ("envelope", EnvelopePoint),
+        ("envelope by energy", EnvelopePoint),
+        ("envelope in space", EnvelopePoint),
     ],
 )
 def test_columns_of_the_tables_of_points(folders, name, kind):

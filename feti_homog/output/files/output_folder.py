@@ -23,7 +23,7 @@ LONGEST = "case_minus_gamma12.png"  # of a run's files the one of the longest na
 # The files of a result, those of all analyses and of what `plot` draws.
 RESULT_FILE = re.compile(
     r"report\.html|events\.log|result\.(json|h5|xdmf)|interface\.xdmf"
-    r"|(angle|path)\.csv|(cell|interface|(angle|path)(_states)?)\.png|path\.gif"
+    r"|(angle|path|envelope)\.csv|(cell|interface|envelope|(angle|path)(_states)?)\.png|path\.gif"
     r"|case_(minus_)?(E11|E22|gamma12)\.png|state_\d+\.png"
 )
 

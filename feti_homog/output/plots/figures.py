@@ -54,6 +54,7 @@ def plot(directory: Path) -> list[Path]:
     - cell.png: bodies and subdomains;
     - of each load case case_E11.png, case_minus_E11.png, ... (unit strains), case_temperature.png or state_K.png;
     - of `angle` angle.png and angle_states.png, of `path` path.png, path_states.png and path.gif;
+    - of `envelope` envelope.png;
     - interface.png, if some interface is debonded.
 
     If there is a result.json, its case.output chooses the stress component (else that of the unit strain) and the

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, MultipleLocator
 
 from feti_homog.mechanics import response
+from feti_homog.output.plots import envelope_plot
 from feti_homog.output.plots.interface_marks import BONDED, CLOSED, OPEN, STATE_COLOURS, STATE_NAMES
 from feti_homog.output.plots.plot_helpers import STRAIN_SYMBOLS, save, unit_label
 from feti_homog.output.text import point_tables
@@ -29,7 +30,9 @@ STATES = {BONDED: "bonded", OPEN: "open", CLOSED: "closed"}
 
 
 def plot(directory: Path, document: Document) -> list[Path]:
-    """angle.png or path.png beside result.json, if the document has such points."""
+    """angle.png, path.png or envelope.png beside result.json, if the document has such points."""
+    if document.get("envelope"):
+        return [save(envelope_plot.figure(document), directory / "envelope.png")]
     if document.get("angle"):
         return [save(_angle(document), directory / "angle.png")]
     if document.get("path"):

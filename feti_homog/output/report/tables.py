@@ -8,10 +8,12 @@ from typing import Any
 
 from feti_homog.mechanics.voigt import SPATIAL_STRESSES, STRESSES, voigt_names
 from feti_homog.output.text.constants_tables import SHORT, comparison
+from feti_homog.output.text.envelope_table import components
 from feti_homog.output.text.point_tables import chosen, shown_entries
 from feti_homog.output.text.spatial_tables import THERMAL
 from feti_homog.output.text.units import with_unit
 
+ENVELOPE_NUMBERS = ("fibre", "bond_angle", "normal", "tangential", "axial", "psi")
 MOST_ROWS = 60  # of a table of points
 NOISE = 1e-12  # what the solver leaves of a zero
 
@@ -61,10 +63,10 @@ def facts(document: Document) -> list[tuple[str, str]]:
 
 
 def answers(document: Document) -> list[Table]:
-    """What was asked for: stiffness with moduli and bounds, or points of an angle or path."""
+    """What was asked for: stiffness with moduli and bounds, or points of an angle or path, or onsets."""
     unit = document["case"]["output"].get("stress_unit", "")
     label = f" ({unit})" if unit else ""
-    found = []
+    found = [_envelope(document, label)] if document.get("envelope") else []
     for key, words in (
         ("effective_stiffness", "Effective stiffness"),
         ("effective_stiffness_compression", "Effective stiffness under minus the unit strains"),
@@ -83,6 +85,22 @@ def answers(document: Document) -> list[Table]:
         found.append(Table(f"Bounds{label}", ["", "lower", "computed", "upper"], list(_bounds(document))))
     found += [_points(key, document[key], label) for key in ("angle", "path") if document.get(key)]
     return found
+
+
+def _envelope(document: Document, label: str) -> Table:
+    """The two components at onset, where the bond is, and how it breaks; of many directions some."""
+    axes, points = document["case"]["envelope"]["plane"], document["envelope"]
+    step = -(-len(points) // MOST_ROWS)
+    names = [name for name in ENVELOPE_NUMBERS if any(name in point for point in points)]
+    rows = [
+        [f"{point['angle']:g}", *map(_number, components(point)), *(_number(point[name]) for name in names)]
+        if "factor" in point
+        else [f"{point['angle']:g}", *["none"] * 2, *[""] * len(names)]
+        for point in points[::step]
+    ]
+    some = "" if step == 1 else f", {len(rows)} of {len(points)} directions"
+    unit = label if axes[0].startswith("S") else ""
+    return Table(f"Onset of debonding{some}; load{unit}", ["angle", *axes, *names], rows)
 
 
 def checks(document: Document) -> list[Check]:

@@ -9,6 +9,7 @@ from typing import Any
 
 from feti_homog.mechanics.voigt import SPATIAL_STRESSES, STRAINS, STRESSES
 from feti_homog.output.text.constants_tables import constants_blocks
+from feti_homog.output.text.envelope_table import envelope_table
 from feti_homog.output.text.point_tables import angle_table, path_table
 from feti_homog.output.text.spatial_tables import spatial_blocks
 from feti_homog.output.text.tip_tables import angle_tip_table, tip_table
@@ -19,7 +20,12 @@ NAME = 28  # columns of the names of table rows
 GLUE = "\N{NO-BREAK SPACE}"  # at which no line is broken
 STIFF = ("C11", "C22", "C33")
 LISTED = 12  # numbers of iterations that are reported one by one
-TITLES = {"stiffness": "effective stiffness", "angle": "debonding angle", "path": "load path"}
+TITLES = {
+    "stiffness": "effective stiffness",
+    "angle": "debonding angle",
+    "path": "load path",
+    "envelope": "onset of debonding",
+}
 MODULI = ("E1", "E2", "G12", "bulk", "shear")  # in the unit of the stresses; the others are ratios
 
 Document = Mapping[str, Any]
@@ -28,7 +34,7 @@ Document = Mapping[str, Any]
 def summary(document: Document) -> str:
     """The document in lines of at most 79 columns (but for long names), without a newline at the end.
 
-    Cell, solver, effective stiffness with moduli and bounds or else the points of `angle` or `path`, checks,
+    Cell, solver, effective stiffness with moduli and bounds or else the points of `angle` or `path`, onsets, checks,
     timings, memory, warnings and status.
     Keys that it does not know are left out. Raises KeyError if one that it prints is missing.
     """
@@ -80,6 +86,12 @@ def _answer(document: Document) -> list[list[str]]:
         return [angle_table(document["angle"], stress), angle_tip_table(document["angle"], toughness)]
     if "path" in document:
         return [path_table(document["path"], stress)]
+    onsets = [envelope_table(document, stress)] if "envelope" in document else []
+    return onsets + _stiffness_blocks(document, stress, toughness)
+
+
+def _stiffness_blocks(document: Document, stress: str, toughness: str) -> list[list[str]]:
+    """The effective stiffness with what follows from it; units in brackets."""
     if len(document["effective_stiffness"]) == len(SPATIAL_STRESSES):
         tables = [*spatial_blocks(document, stress), *constants_blocks(document, stress)]
         return [*tables, tip_table(document.get("tips"), toughness)]

@@ -27,6 +27,7 @@ def outputs(document: Document) -> dict[str, float]:
         found |= {name: value for name, value in document.get(section, {}).items() if value is not None}
     found |= _bounds(document.get("bounds", {}))
     found |= _angles(document.get("angle", ())) | _path(document.get("path", ()))
+    found |= _envelope(document)
     found |= {f"check_{name}": error for name, error in document["checks"].items()}
     found |= {f"seconds_{stage}": took for stage, took in document["timings"].items()}
     return {name: float(value) for name, value in (found | {"memory": document["memory"]}).items()}
@@ -45,6 +46,18 @@ def _thermal(document: Document) -> dict[str, float]:
     }
     named = zip(SPATIAL_STRAINS, document.get("thermal_expansion", ()), strict=False)
     return found | {f"expansion_{name}": value for name, value in named}
+
+
+def _envelope(document: Document) -> dict[str, float]:
+    """The load at onset along the first axis of an envelope, the least, and the largest if every direction has one."""
+    if not document.get("envelope"):
+        return {}
+    first, second = document["case"]["envelope"]["plane"]
+    factors = [point["factor"] for point in document["envelope"] if "factor" in point]
+    along = {f"envelope_{first}": point["factor"] for point in document["envelope"][:1] if "factor" in point}
+    least = {f"envelope_least_{first}_{second}": min(factors)} if factors else {}
+    is_closed = len(factors) == len(document["envelope"])
+    return along | least | ({f"envelope_largest_{first}_{second}": max(factors)} if is_closed else {})
 
 
 def _anisotropy(stiffness: Any) -> dict[str, float]:

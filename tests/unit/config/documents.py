@@ -10,6 +10,9 @@ import numpy as np
 from hypothesis import strategies as st
 
 from feti_homog.config.cell_section import CIRCULAR, TOUCHING
+from feti_homog.config.envelope_section import FAMILIES
+from feti_homog.config.envelope_section import STRAINS as STRAIN_NAMES
+from feti_homog.config.envelope_section import STRESSES as STRESS_NAMES
 
 TINY = 1e-90  # smaller magnitudes are refused
 
@@ -120,9 +123,18 @@ def planes_of(analysis: str, phases: Iterable[dict[str, Any]]) -> list[str]:
 
 
 @st.composite
+def envelopes(draw: st.DrawFn, plane: str, expand: bool) -> dict[str, Any]:
+    """A plane of stresses or of strains, in the plane or in space."""
+    families = FAMILIES if plane == "generalized" else (STRESS_NAMES, STRAIN_NAMES)
+    names = draw(st.lists(st.sampled_from(draw(st.sampled_from(families))), min_size=2, max_size=2, unique=True))
+    own = {"temperature": numbers(-1e3, 1e3)} if plane == "generalized" and expand else {}
+    return {"plane": names} | draw(optional(directions=st.integers(4, 360), **own))
+
+
+@st.composite
 def documents(draw: st.DrawFn) -> dict[str, Any]:
     """The document of a valid case, with round fibres."""
-    analysis = draw(st.sampled_from(["stiffness", "angle", "path"]))
+    analysis = draw(st.sampled_from(["stiffness", "angle", "path", "envelope"]))
     own_arcs = draw(st.lists(arcs(with_angle=analysis != "angle"), min_size=analysis == "angle", max_size=3))
     interface: dict[str, Any] = {"debonded": own_arcs} | draw(optional(contact=st.booleans()))
     strength = st.one_of(POSITIVE, st.just(math.inf))
@@ -136,11 +148,17 @@ def documents(draw: st.DrawFn) -> dict[str, Any]:
     if analysis == "angle":
         strain = {} if plane == "generalized" else draw(optional(strain=NONZERO_STRAINS))
         document["angle"] = {"values": draw(OPENINGS)} | strain
+    if analysis == "envelope":
+        expand = all(not {"expansion", "expansion_axial"}.isdisjoint(constants) for constants in phases.values())
+        document["envelope"] = draw(envelopes(plane, expand))
+        interface |= {"contact": False, "normal_strength": draw(POSITIVE)}
+        along = {"axial_strength": POSITIVE, "axial_stiffness": POSITIVE} if plane == "generalized" else {}
+        interface |= draw(optional(**along))
     if analysis == "path":
         document["path"] = draw(paths())
         criterion = st.sampled_from(["max", "quadratic"])
         interface |= draw(optional(normal_strength=strength, tangential_strength=strength, criterion=criterion))
-    if analysis == "angle" or draw(st.booleans()):
+    if analysis in ("angle", "envelope") or draw(st.booleans()):
         document["interface"] = interface
     sizes = [{}, {"subdomains": draw(st.integers(1, 1_000_000))}, {"max_dofs": draw(st.integers(100, 10**9))}]
     rest = {

@@ -39,11 +39,11 @@ FAULTY_BONDINGS: dict[str, tuple[str, tuple[str, ...]]] = {
     ),
     "strength_of_stiffness": (
         ended(f"[interface]\ndebonded = [{ARC}]\nnormal_strength = 10.0\n"),
-        ('[interface] normal_strength = 10.0: belongs to [analysis] type = "path", not "stiffness"',),
+        ('[interface] normal_strength = 10.0: belongs to [analysis] type = "path" or "envelope", not "stiffness"',),
     ),
     "criterion_of_angle": (
         of_type("angle", ANGLE, BARE_ARC, 'criterion = "max"'),
-        ('[interface] criterion = "max": belongs to [analysis] type = "path", not "angle"',),
+        ('[interface] criterion = "max": belongs to [analysis] type = "path" or "envelope", not "angle"',),
     ),
     "strength_zero": (
         of_type("path", PATH, "[interface]", "normal_strength = 0.0"),
@@ -140,7 +140,7 @@ FAULTY_BONDINGS: dict[str, tuple[str, tuple[str, ...]]] = {
     ),
     "arc_with_angle_of_angle": (
         of_type("angle", ANGLE, "[interface]", f"debonded = [{ARC}]"),
-        ('[interface] debonded[0].angle = 60: belongs to [analysis] type = "stiffness" or "path", not "angle"',),
+        ('debonded[0].angle = 60: belongs to [analysis] type = "stiffness" or "path" or "envelope", not "angle"',),
     ),
     # [angle]
     "no_angle": (of_type("angle", BARE_ARC), ('[angle]: missing section; [analysis] type = "angle" needs it',)),
@@ -184,7 +184,7 @@ FAULTY_BONDINGS: dict[str, tuple[str, tuple[str, ...]]] = {
     # [path]
     "path_in_space": (
         of_type("path", PATH).replace('"strain"', '"generalized"'),
-        ('[analysis] plane = "generalized": works with type = "stiffness" or "angle", not "path"',),
+        ('[analysis] plane = "generalized": works with type = "stiffness" or "angle" or "envelope", not "path"',),
     ),
     "no_path": (of_type("path"), ('[path]: missing section; [analysis] type = "path" needs it',)),
     "path_of_angle": (

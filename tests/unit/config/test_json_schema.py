@@ -13,13 +13,14 @@ from support.jobs import ROOT
 from unit.config.documents import documents
 from unit.config.faulty_bonding import FAULTY_BONDINGS
 from unit.config.faulty_cases import FAULTY_CASES
+from unit.config.faulty_envelopes import FAULTY_ENVELOPES
 from unit.config.valid_cases import VALID_CASES, VALID_SWEEPS
 
 from feti_homog.config.json_schema import json_schema
 
 VALIDATOR = Draft202012Validator(json_schema())
 FILES = [path for folder in ("drivers", "scripts/cases") for path in sorted((ROOT / folder).glob("*.toml"))]
-FAULTY = FAULTY_CASES | FAULTY_BONDINGS
+FAULTY = FAULTY_CASES | FAULTY_BONDINGS | FAULTY_ENVELOPES
 
 NO_TOML = {"syntax", "syntax_unclosed", "key_twice", "section_twice", "number_too_long"}
 BETWEEN_NUMBERS = {
@@ -30,7 +31,7 @@ BETWEEN_NUMBERS = {
     "transverse_no_shear", "transverse_ratio_nearly_one", "transverse_unstable", "stiffness_of_the_plane_in_space",
     "stiffness_not_symmetric_in_space", "stiffness_indefinite_in_space", "stiffness_couples_shears",
     "interface_size_above_mesh_size", "interface_size_above_the_default_mesh_size",
-    "tip_size_above_mesh_size", "tip_size_above_interface_size",
+    "tip_size_above_mesh_size", "tip_size_above_interface_size", "envelope_temperature_without_expansion",
 }  # fmt: skip
 NOT_IN_JSON = {"fraction_is_nan", "strength_is_nan", "path_strain_nan"}
 INTEGER_TO_JSON = {"refine_is_real"}

@@ -53,7 +53,7 @@ def test_rows_are_those_of_the_keys(section, key, expected):
 
 def test_where_keys_apply():
     assert rows("cell")["fibres"].applies == 'geometry = "random"'
-    assert rows("interface")["criterion"].applies == '[analysis] type = "path"'
+    assert rows("interface")["criterion"].applies == '[analysis] type = "path" or "envelope"'
     assert rows("path")["release"].applies == '[analysis] type = "path", method = "increments"'
     assert rows("cell")["refine"].applies == ""
     assert rows("angle")["strain"].applies == '[analysis] type = "angle", [analysis] plane = "strain" or "stress"'

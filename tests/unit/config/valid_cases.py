@@ -15,6 +15,7 @@ from support.base_case import (
     fibre,
 )
 from unit.config.faulty_bonding import ANGLE, ARC, BARE_ARC, PATH, debonded, of_type
+from unit.config.faulty_envelopes import BONDS, envelope
 
 MESH = changed(MESH_CELL)
 
@@ -56,6 +57,19 @@ VALID_CASES = {
         "angle", ANGLE, "strain = [0, 0, 0.2]", '[[interface.debonded]]\nfibre = "all"\ncentre = 90'
     ),
     "path": of_type("path", PATH),
+    "envelope": envelope('["S22", "S12"]'),
+    "envelope of a cracked cell": envelope('["E11", "E22"]', bonds=f"{BONDS}\ncontact = false\ndebonded = [{ARC}]"),
+    "envelope in space": envelope(
+        '["S33", "S13"]',
+        "directions = 8",
+        state="generalized",
+        bonds="[interface]\naxial_strength = 3.0\naxial_stiffness = 2.0",
+    ),
+    "envelope after cooling": fibre("young = 3\npoisson = 0.3\nexpansion = 2e-5\n")
+    .replace("poisson = 0.299", "poisson = 0.299\nexpansion = 1e-5")
+    .replace('"strain"', '"generalized"')
+    .replace('"stiffness"', '"envelope"')
+    + f'{BONDS}\n[envelope]\nplane = ["S22", "S12"]\ntemperature = -100\n',
     "path, few states": of_type("path", PATH, "[output]\nstates = 7"),
     "path, its peaks": of_type("path", PATH, '[output]\nstates = "peaks"'),
     "path there and back": of_type("path", "[path]\nwaypoints = [[1, 0, 0], [0, 0, 0]]\nmax_events = 7"),

@@ -54,6 +54,21 @@ def angle() -> dict[str, Any]:
     return document("angle", angle=rows)
 
 
+def envelope() -> dict[str, Any]:
+    rows = [
+        {"angle": a, "factor": 4.0, "fibre": 1, "bond_angle": 30.0, "normal": 1.0, "tangential": 0.0} for a in (0, 90)
+    ]
+    case = document("envelope")["case"] | {"envelope": {"plane": ["S22", "S12"]}}
+    return document("envelope", case=case, envelope=[*rows, {"angle": 180}])
+
+
+def test_the_table_of_an_envelope() -> None:
+    (table,) = tables.answers(envelope())
+    assert table.caption == "Onset of debonding; load (GPa)"
+    assert table.head == ["angle", "S22", "S12", "fibre", "bond_angle", "normal", "tangential"]
+    assert table.rows[1] == ["90", "0", "4", "1", "30", "1", "0"] and table.rows[2][:3] == ["180", "none", "none"]
+
+
 def bonded() -> dict[str, Any]:
     stiffness = [[9.0, 2.0, 0.0], [2.0, 8.0, 0.0], [0.0, 0.0, 3.0]]
     bounds = {"voigt": stiffness, "reuss": stiffness, "hashin_shtrikman": {"bulk": [1.0, 2.0]}}

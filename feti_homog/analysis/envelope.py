@@ -1,0 +1,182 @@
+"""`analysis.type = "envelope"`: the onset of debonding in a plane of macroscopic stresses or strains.
+
+The cell is linear, so tractions of all loads are superposed from those of the unit loads: no direction costs a solve.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from feti_homog.analysis.context import AnalysisContext
+from feti_homog.analysis.tip_records import DIRECTION_DIGITS, bond_directions
+from feti_homog.config.envelope_section import Envelope
+from feti_homog.errors import CaseError
+from feti_homog.homogenization.averaging import Response, asymmetry
+from feti_homog.interface.bond_criterion import BondCriterion
+from feti_homog.interface.energy_criterion import EnergyCriterion
+from feti_homog.interface.onset import OnsetCriterion
+from feti_homog.interface.path_points import UTILISATION_TIE
+from feti_homog.mechanics.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES, STRAINS, STRESSES
+from feti_homog.typing import Float, Int
+
+# Bonds times directions that are looked at together.
+CHUNK = 500_000
+# A cosine that is smaller than this is what rounding leaves of zero.
+COSINE_ROUNDING = 1e-15
+
+
+@dataclass(frozen=True)
+class Rays:
+    """Macroscopic states before + f ahead, f >= 0, on each of n rays.
+
+    Attributes:
+        strain, stress: (n, m) for f = 1, without `before`.
+        strain_before, stress_before: (m,) after the change of temperature.
+        temperature: that change.
+    """
+
+    strain: Float
+    stress: Float
+    strain_before: Float
+    stress_before: Float
+    temperature: float
+
+    def at(self, number: int, factor: float) -> dict[str, Any]:
+        """The factor, strain (m,) and stress (m,) on a ray."""
+        strain = self.strain_before + factor * self.strain[number]
+        return {"factor": factor, "strain": strain, "stress": self.stress_before + factor * self.stress[number]}
+
+
+def run(context: AnalysisContext, section: Envelope, criterion: BondCriterion) -> dict[str, Any]:
+    """`envelope`, a list of directions with the load at which the first bond breaks, and `effective_stiffness` from
+    the unit loads; if a temperature is a load, `thermal_stress`.
+
+    Raises:
+        CaseError: faces of the mesh are debonded and may touch.
+    """
+    status, interface = context.status(None), context.homogenization.interface
+    if not interface.is_linear(status):
+        raise CaseError(
+            '[interface] contact: expected false with a debonded curve of the mesh; [analysis] type = "envelope" '
+            "superposes loads, which contact forbids"
+        )
+    columns, responses = context.unit_responses("", status, context.zero_multipliers(), 1.0)
+    context.record_unit_states(responses, 1.0, "", 0)
+    stiffness = columns.pop("stiffness")
+    context.check("L^ef", {"symmetry": asymmetry(stiffness)})
+    angles = 360.0 * np.arange(section.directions) / section.directions
+    rays = rays_of(section.plane, angles, stiffness, columns.get("thermal_stress"), section.temperature or 0.0)
+    axial = None if context.axial is None else context.axial.interface
+    onset = OnsetCriterion.of(criterion, interface, axial, status)
+    finder = _Finder(context, responses, onset)
+    points = [{"angle": float(angle)} | point for angle, point in zip(angles, finder.points(rays), strict=True)]
+    return {"effective_stiffness": stiffness, "envelope": points} | columns
+
+
+def rays_of(
+    plane: Sequence[str], angles: Float, stiffness: Float, thermal_stress: Float | None, temperature: float
+) -> Rays:
+    """The rays in directions (n,), degrees, of a plane whose axes have these names: of stresses at E = C^-1 S, with no
+    other stresses, or of strains; after a change of temperature at zero stress, or strain."""
+    spatial = len(stiffness) == len(SPATIAL_STRAINS)
+    strains, stresses = (SPATIAL_STRAINS, SPATIAL_STRESSES) if spatial else (STRAINS, STRESSES)
+    of_stresses = plane[0] in stresses
+    names = stresses if of_stresses else strains
+    unit = np.stack([np.cos(np.radians(angles)), np.sin(np.radians(angles))], axis=1)
+    loads = np.zeros((len(angles), len(names)))
+    loads[:, [names.index(name) for name in plane]] = np.where(np.abs(unit) < COSINE_ROUNDING, 0.0, unit)
+    of_temperature = np.zeros(len(names)) if thermal_stress is None else temperature * thermal_stress
+    nothing = np.zeros(len(names))
+    if of_stresses:
+        by_cooling = -np.linalg.solve(stiffness, of_temperature)
+        return Rays(np.linalg.solve(stiffness, loads.T).T, loads, by_cooling, nothing, temperature)
+    return Rays(loads, loads @ stiffness.T, nothing, of_temperature, temperature)
+
+
+class _Finder:
+    """Finds the first bond that breaks on each ray."""
+
+    def __init__(self, context: AnalysisContext, responses: Sequence[Response], onset: OnsetCriterion) -> None:
+        """`responses` are those to the unit loads.  Collective."""
+        cell = context.homogenization.cell
+        self._comm, self._onset, self._loads = cell.comm, onset, context.unit_loads
+        self._noise = context.homogenization.interface.sign_noise
+        self._unit = _tractions(context, responses)
+        self._most = max(1, self._comm.allreduce(self._unit.shape[1], MPI.MAX))
+        nodes = cell.solver.jump_operator.nodes
+        self._direction, self._fibre = bond_directions(cell), cell.summary.fibre_number(nodes.fibre)
+        self._order = np.lexsort((np.round(self._direction, DIRECTION_DIGITS), self._fibre))
+
+    def points(self, rays: Rays) -> Iterator[dict[str, Any]]:
+        """What result.json says of each ray, but its direction.  Collective."""
+        names = STRAINS if rays.strain.shape[1] == len(STRAINS) else SPATIAL_STRAINS
+        at_start = self._tractions(rays.strain_before[None], rays.temperature, names)[0]
+        before = at_start if rays.temperature else None
+        node = np.arange(len(at_start))
+        used = self._onset.utilisation(at_start, node)
+        most = float(self._comm.allreduce(used.max(initial=0.0), MPI.MAX))
+        size = max(1, CHUNK // self._most)
+        for first in range(0, len(rays.strain), size):
+            rows = slice(first, first + size)
+            ahead = self._tractions(rays.strain[rows], 0.0, names)
+            if most < 1.0:
+                factors = self._onset.factors(ahead, self._least(rays.stress[rows], ahead.shape[2]), before)
+            else:
+                factors = np.tile(np.where(used >= most * (1.0 - UTILISATION_TIE), 0.0, np.inf), (len(ahead), 1))
+            for row, bond in enumerate(self._first(factors, at_start, ahead), first):
+                yield {} if np.isinf(bond[0]) else rays.at(row, float(bond[0])) | self._of_bond(bond)
+
+    def _tractions(self, strain: Float, temperature: float, names: Sequence[str]) -> Float:
+        """(n, k, c) under strains (n, m) of these names and a change of temperature."""
+        column = {name: strain[:, number] for number, name in enumerate(names)}
+        column["temperature"] = np.full(len(strain), temperature)
+        return np.tensordot(np.stack([column[load] for load in self._loads], axis=1), self._unit, axes=1)
+
+    def _least(self, stress: Float, components: int) -> Float:
+        """(n,) utilisations that the solver's error makes under stresses (n, m)."""
+        noise = self._noise * np.abs(stress).max(axis=1)
+        return self._onset.bonds.utilisation(np.repeat(noise[:, None], components, axis=1))
+
+    def _first(self, factors: Float, before: Float, ahead: Float) -> Float:
+        """(n, 3 + c) least factor of each ray, fibre and direction of its bond, and tractions there; of those that
+        break together the one of the first fibre and the least direction.  Collective."""
+        n, c = len(factors), ahead.shape[2]
+        least = factors.min(axis=1, initial=np.inf)
+        self._comm.Allreduce(MPI.IN_PLACE, least, MPI.MIN)
+        own = np.full((n, 3 + c), np.inf)
+        own[:, 0] = least
+        together = factors[:, self._order] <= least[:, None] * (1.0 + UTILISATION_TIE)
+        rays = np.flatnonzero(together.any(axis=1) & np.isfinite(least))
+        node: Int = self._order[together[rays].argmax(axis=1)] if len(rays) else np.zeros(0, np.int64)
+        own[rays, 1], own[rays, 2] = self._fibre[node], self._direction[node]
+        own[rays, 3:] = before[node] + least[rays, None] * ahead[rays, node]
+        table = np.stack(self._comm.allgather(own))
+        first = np.lexsort((np.round(table[:, :, 2], DIRECTION_DIGITS), table[:, :, 1]), axis=0)[0]
+        return np.asarray(table[first, np.arange(n)])
+
+    def _of_bond(self, bond: Float) -> dict[str, Any]:
+        """Where a bond is, and how it breaks."""
+        place = {"fibre": int(bond[1]), "bond_angle": float(bond[2])}
+        law = self._onset.bonds
+        if isinstance(law, EnergyCriterion):
+            return place | {"psi": float(np.degrees(law.mode_angle(bond[None, 3:]))[0])}
+        return place | dict(
+            zip(("normal", "tangential", "axial"), law.shares(bond[None, 3:])[0].tolist(), strict=False)
+        )
+
+
+def _tractions(context: AnalysisContext, responses: Sequence[Response]) -> Float:
+    """(l, k, c) tractions of this rank's nodes under each unit load: normal and tangential, and along the fibres if
+    there is such a problem."""
+    plane = len(context.homogenization.loads)
+    pairs = [context.homogenization.interface.traction(r.state.solution) for r in responses[:plane]]
+    if context.axial is None:
+        return np.stack(pairs)
+    along = [context.axial.interface.traction(r.state.solution) for r in responses[plane:]]
+    of_plane = [np.pad(pair, [(0, 0), (0, 1)]) for pair in pairs]
+    return np.stack([*of_plane, *(np.pad(one, [(0, 0), (2, 0)]) for one in along)])

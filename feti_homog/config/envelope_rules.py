@@ -1,0 +1,74 @@
+"""Reading the section [envelope], and what the rest of the case must say for it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from feti_homog.config.envelope_section import STRAINS, STRESSES, Envelope
+from feti_homog.config.material_forms import Material
+from feti_homog.config.materials import expansion
+from feti_homog.config.schema import Selected, TableReader
+from feti_homog.config.sections import ENVELOPE_ANALYSIS, GENERALIZED, PLANE, STRENGTHS, InterfaceSection
+from feti_homog.config.wording import toml_key, toml_value
+
+TYPE = ENVELOPE_ANALYSIS.in_words("")
+
+
+def read_envelope(table: Any, reader: TableReader) -> Envelope | None:
+    """The section [envelope]; None if it is absent or faulty."""
+    if table is None:
+        return None
+    envelope = reader.read(Envelope, table, "envelope")
+    plane = reader.selected[PLANE]
+    if envelope is not None and plane is not None and plane not in GENERALIZED.values:
+        reader.faults += [
+            f"[envelope] plane = {toml_value(list(envelope.plane))}: {name} belongs to "
+            f"{GENERALIZED.in_words('envelope')}, not {toml_value(plane)}"
+            for name in envelope.plane
+            if name not in (*STRESSES, *STRAINS)
+        ]
+    return envelope
+
+
+def envelope_faults(
+    envelope: Envelope | None,
+    interface: InterfaceSection | None,
+    materials: Mapping[str, Material] | None,
+    document: Mapping[str, Any],
+    selected: Selected,
+) -> list[str]:
+    """Faults of what an envelope needs; none of another analysis, nor of sections that are faulty themselves."""
+    if selected[ENVELOPE_ANALYSIS.selector] not in ENVELOPE_ANALYSIS.values:
+        return []
+    faults = [] if "interface" in document else [f"[interface]: missing section; {TYPE} needs it"]
+    if interface is not None:
+        faults += _bonding_faults(interface, selected)
+    if envelope is not None and envelope.temperature is not None:
+        faults += [
+            f"[material.{toml_key(phase)}] expansion: missing; [envelope] temperature needs it"
+            for phase, material in (materials or {}).items()
+            if _expands_unknown(material)
+        ]
+    return faults
+
+
+def _bonding_faults(interface: InterfaceSection, selected: Selected) -> list[str]:
+    """Faults of bonds that nothing breaks, and of faces that may touch."""
+    faults = []
+    names = STRENGTHS if selected[PLANE] in GENERALIZED.values else STRENGTHS[:2]
+    if interface.criterion != "energy" and all(getattr(interface, name) is None for name in names):
+        faults.append(f"[interface] {', '.join(names)}: missing; {TYPE} needs one")
+    if interface.contact and interface.debonded:
+        faults.append(
+            f"[interface] contact: expected false with debonded arcs; {TYPE} superposes loads, which contact forbids"
+        )
+    return faults
+
+
+def _expands_unknown(material: Material) -> bool:
+    """Whether a material does not say how it expands; what it says wrongly is told elsewhere."""
+    try:
+        return expansion(material) is None
+    except ValueError:
+        return False

@@ -1,0 +1,263 @@
+"""Onsets of debonding in a plane of loads, against paths, closed forms and laws, at any number of ranks."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from support.envelopes import ENERGY, MAX, QUADRATIC, envelope, path_onset, torn
+from support.ranks import parallel_assert
+from unit.cell.faulty_meshes import RIGHT_SIDE, grid
+
+from feti_homog.analysis.criteria import criterion_of
+from feti_homog.errors import CaseError
+from feti_homog.homogenization.averaging import Homogenization
+from feti_homog.interface.contact import OPEN
+from feti_homog.interface.onset import OnsetCriterion
+
+pytestmark = pytest.mark.parallel
+
+BONDS = {"max": MAX, "quadratic": QUADRATIC, "energy": ENERGY}
+RANDOM = {
+    "cell": {"geometry": "random", "fibres": 3, "min_gap": 0.1, "seed": 4, "fibre_fraction": 0.4, "mesh_size": 0.2}
+}
+SQUARE = {"cell": {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.1, "order": 2}}
+ARC = {"contact": False, "debonded": [{"fibre": 1, "centre": 20.0, "angle": 50.0}]}
+
+
+def factors(result):
+    return np.array([np.inf if point.factor is None else point.factor for point in result.envelope])
+
+
+def unit(point, axes, names):
+    """The load of a direction, with zeros for what is not named."""
+    angle, load = np.radians(point.angle), np.zeros(len(names))
+    load[[names.index(name) for name in axes]] = np.cos(angle), np.sin(angle)
+    return load
+
+
+@pytest.mark.parametrize("plane", ["strain", "stress"])
+@pytest.mark.parametrize("bonds", BONDS.values(), ids=BONDS)
+def test_onsets_are_the_first_events_of_paths(comm, plane, bonds):
+    result = envelope(comm, plane, bonds, ["E11", "gamma12"], RANDOM, directions=12)
+    with torn(comm, plane, bonds, **RANDOM) as cell:
+        for point in result.envelope:
+            load = unit(point, ["E11", "gamma12"], ["E11", "E22", "gamma12"])
+            factor, stress = path_onset(cell, load)
+            parallel_assert(comm, abs(point.factor / factor - 1) < 1e-9, f"{point.angle}")
+            parallel_assert(comm, np.abs(point.strain - factor * load).max() < 1e-9 * factor)
+            parallel_assert(comm, np.abs(point.stress - stress).max() < 1e-9 * np.abs(stress).max())
+
+
+@pytest.mark.parametrize(
+    "bonds", [MAX, ENERGY, ENERGY | {"growth": "springs"}], ids=["strength", "released", "springs"]
+)
+def test_onsets_beside_an_arc_are_those_of_paths(comm, bonds):
+    bonds = bonds | ARC
+    result = envelope(comm, "strain", bonds, ["E22", "E11"], RANDOM, directions=8)
+    with torn(comm, "strain", bonds, **RANDOM) as cell:
+        for point in result.envelope:
+            factor, _ = path_onset(cell, unit(point, ["E22", "E11"], ["E11", "E22", "gamma12"]))
+            parallel_assert(comm, abs(point.factor / factor - 1) < 1e-9, f"{point.angle}")
+
+
+def test_in_a_plane_of_stresses_the_other_stress_is_none(comm):
+    result = envelope(comm, "stress", QUADRATIC, ["S22", "S12"], RANDOM, directions=8)
+    with torn(comm, "stress", QUADRATIC, **RANDOM) as cell:
+        for point in result.envelope:
+            load = unit(point, ["S22", "S12"], ["S11", "S22", "S12"])
+            parallel_assert(comm, np.abs(point.stress - point.factor * load).max() < 1e-12 * point.factor)
+            factor, stress = path_onset(cell, point.strain)
+            parallel_assert(comm, abs(factor - 1) < 1e-9)
+            parallel_assert(comm, np.abs(stress - point.stress).max() < 1e-9 * point.factor)
+
+
+def test_any_number_of_ranks_finds_the_same_bonds(comm):
+    here, alone = (
+        envelope(each, "strain", MAX, ["S11", "S22"], RANDOM, directions=24) for each in (comm, comm.Split(comm.rank))
+    )
+    parallel_assert(comm, np.abs(factors(here) / factors(alone) - 1).max() < 1e-10)
+    for one, other in zip(here.envelope, alone.envelope, strict=True):
+        parallel_assert(comm, one.fibre == other.fibre and abs(one.bond_angle - other.bond_angle) < 1e-9)
+
+
+@pytest.mark.parametrize("name", BONDS)
+def test_onsets_grow_with_the_strength(comm, name):
+    stronger = {
+        "max": {key: 2.5 * MAX[key] for key in MAX},
+        "quadratic": QUADRATIC | {key: 2.5 * MAX[key] for key in MAX},
+        "energy": ENERGY | {"toughness": 2.5**2 * ENERGY["toughness"]},
+    }[name]
+    results = [envelope(comm, "strain", bonds, ["S11", "S22"], directions=10) for bonds in (BONDS[name], stronger)]
+    weak, strong = map(factors, results)
+    parallel_assert(comm, np.abs(strong / weak - 2.5).max() < 1e-10)
+    for one, other in zip(results[0].envelope, results[1].envelope, strict=True):
+        parallel_assert(comm, (one.fibre, one.bond_angle) == (other.fibre, other.bond_angle))
+
+
+def test_a_square_cell_is_as_strong_along_both_axes_and_in_both_shears(comm):
+    """As far as its mesh is symmetric."""
+    of_axes = factors(envelope(comm, "strain", MAX, ["S11", "S22"], SQUARE, directions=16))
+    parallel_assert(comm, np.abs(of_axes / of_axes[(4 - np.arange(16)) % 16] - 1).max() < 2e-3)
+    with_shear = factors(envelope(comm, "strain", QUADRATIC, ["S11", "S12"], SQUARE, directions=16))
+    parallel_assert(comm, np.abs(with_shear / with_shear[-np.arange(16)] - 1).max() < 2e-3)
+
+
+def test_compression_breaks_no_bond_that_only_tension_breaks(comm):
+    result = envelope(comm, "strain", {"normal_strength": 1.0}, ["E11", "E22"], directions=8)
+    squeezed = [point for point in result.envelope if point.angle == 225.0]
+    parallel_assert(comm, [point.factor for point in squeezed] == [None] and squeezed[0].fibre is None)
+    parallel_assert(comm, all(point.normal == pytest.approx(1.0) for point in result.envelope if point.factor))
+
+
+@pytest.fixture
+def strip(comm, shared_path):
+    """A folder with the mesh of a strip of fibre normal to x1."""
+    if comm.rank == 0:
+        grid(lambda x, y: 0.25 < x < 0.5).write(shared_path / "strip.msh")
+    comm.barrier()
+    return shared_path
+
+
+STRIP = {"cell": {"geometry": "mesh", "file": "strip.msh"}}
+ALONG = {"axial_strength": 1.5}
+EXPANDING = {
+    "material": {
+        "matrix": {"young": 3.0, "poisson": 0.35, "expansion": 6e-5},
+        "fibre": {
+            "E_axial": 200.0, "E_transverse": 15.0, "nu_axial": 0.25, "nu_transverse": 0.3, "G_axial": 20.0,
+            "expansion_axial": -1e-6, "expansion_transverse": 1e-5,
+        },
+    }
+}  # fmt: skip
+
+
+def share(bonds, stress):
+    """Utilisation of a plane normal to x1 under [S11, S12, S13]."""
+    pull, shear, along = max(stress[0], 0.0), abs(stress[1]), abs(stress[2])
+    if bonds.get("criterion") != "energy":
+        limits = bonds["normal_strength"], bonds["tangential_strength"], bonds["axial_strength"]
+        shares = np.array([pull, shear, along]) / limits
+        return np.sqrt(shares @ shares) if bonds.get("criterion") == "quadratic" else shares.max()
+    stiffnesses = bonds["normal_stiffness"], bonds["tangential_stiffness"], bonds["axial_stiffness"]
+    energies = np.array([pull, shear, along]) ** 2 / (2 * np.array(stiffnesses))
+    psi = np.arctan2(np.sqrt(energies[1] + energies[2]), np.sqrt(energies[0]))
+    return np.sqrt(energies.sum() / (bonds["toughness"] * (1 + np.tan(0.75 * psi) ** 2)))
+
+
+@pytest.mark.parametrize("axes", [["S11", "S13"], ["S12", "S13"], ["gamma13", "E33"]], ids=" ".join)
+@pytest.mark.parametrize("temperature", [None, -3.0])
+@pytest.mark.parametrize(
+    "bonds", [MAX | ALONG, QUADRATIC | ALONG, ENERGY | {"axial_stiffness": 200.0}], ids=["max", "quadratic", "energy"]
+)
+def test_bonds_of_a_laminate_bear_the_macroscopic_stress(comm, strip, bonds, temperature, axes):
+    own = {} if temperature is None else {"temperature": temperature}
+    result = envelope(comm, "generalized", bonds, axes, STRIP | EXPANDING, strip, directions=12, **own)
+    for point in result.envelope:
+        load, stress = unit(point, axes, [*(SPATIAL[0]), *SPATIAL[1]]), point.stress
+        if point.factor is None:
+            parallel_assert(comm, axes[0] != "S12" and share(bonds, load[[6, 11, 10]]) < 1e-6)
+            continue
+        named = np.concatenate([point.strain, point.stress])[load != 0]
+        parallel_assert(comm, np.abs(named - point.factor * load[load != 0]).max() < 1e-9 * point.factor)
+        parallel_assert(comm, abs(share(bonds, stress[[0, 5, 4]]) - 1) < 1e-9, f"{point}")
+
+
+SPATIAL = (
+    ["E11", "E22", "E33", "gamma23", "gamma13", "gamma12"],
+    ["S11", "S22", "S33", "S23", "S13", "S12"],
+)
+
+
+@pytest.mark.parametrize("stiffness", [None, 40.0])
+def test_a_single_fibre_in_axial_shear(comm, stiffness):
+    """t_a = 2 S13 cos / (1 + G_m / G_f + G_m / (k_a a)) on a fibre of radius a in much matrix."""
+    sections = {
+        "cell": {"geometry": "square", "fibre_fraction": 0.002, "mesh_size": 0.1, "interface_size": 0.004, "order": 2}
+    }
+    bonds = {"normal_strength": 5.0, "tangential_strength": 4.0, "axial_strength": 3.0}
+    springs = {} if stiffness is None else {"tangential_stiffness": 7.0, "axial_stiffness": stiffness}
+    result = envelope(comm, "generalized", bonds | springs, ["S13", "S23"], sections, directions=4)
+    radius, matrix, fibre = np.sqrt(0.002 / np.pi), 88.0 / 2.598, 200.0 / 2.444
+    soft = 0.0 if stiffness is None else matrix / (stiffness * radius)
+    expected = 3.0 * (1 + matrix / fibre + soft) / 2
+    parallel_assert(comm, np.abs(factors(result) / expected - 1).max() < 5e-3, f"{factors(result)} {expected}")
+    parallel_assert(comm, all(point.axial == pytest.approx(1.0) for point in result.envelope))
+
+
+@pytest.mark.parametrize("axes", [["S22", "S33"], ["E11", "gamma23"]], ids=" ".join)
+@pytest.mark.parametrize(
+    "bonds", [MAX | ALONG, QUADRATIC | ALONG, ENERGY | {"axial_stiffness": 200.0}], ids=["max", "quadratic", "energy"]
+)
+def test_cooled_cells_are_at_their_strength_at_onset(comm, bonds, axes):
+    """A solve under the strain and temperature at onset has the utilisation 1, and less before."""
+    cooling = -2000.0
+    sections = RANDOM | EXPANDING
+    result = envelope(comm, "generalized", bonds, axes, sections, directions=6, temperature=cooling)
+    with torn(comm, "generalized", bonds, **sections) as cell:
+        largest = [direct_utilisation(cell, point.strain, cooling) for point in result.envelope if point.factor]
+        parallel_assert(comm, len(largest) == 6 and np.abs(np.array(largest) - 1).max() < 1e-9, f"{largest}")
+        at_rest = np.zeros(6) if axes[0] == "E11" else cooling * result.thermal_expansion
+        parallel_assert(comm, 0.02 < direct_utilisation(cell, at_rest, cooling) < 1)
+
+
+def test_a_tip_in_space_releases_what_its_break_does(comm):
+    """u^2 G_c l is what the energy of the cell falls by at constant strain, in the plane and along the fibres."""
+    bonds, strain = ENERGY | ARC | {"axial_stiffness": 200.0}, np.array([0.7, 0.4, 0.2, 0.9, -1.1, 0.5])
+    with torn(comm, "generalized", bonds, **RANDOM) as cell:
+        plane, axial = Homogenization(cell, False), Homogenization(cell.axial, False)
+        status = np.where(cell.debonded(None), OPEN, 0).astype(np.int8)
+        criterion = criterion_of(cell)
+        onset = OnsetCriterion.of(criterion, plane.interface, axial.interface, status)
+        energy, traction = cell_energy(plane, axial, strain, status)
+        tips = onset.tips.tips
+        foretold = (
+            onset.utilisation(traction[tips.node], tips.node) ** 2
+            * criterion.springs.fracture_toughness(traction[tips.node])
+            * tips.length
+        )
+        owned = [(rank, k) for rank, count in enumerate(comm.allgather(len(tips.node))) for k in range(count)]
+        parallel_assert(comm, len(owned) >= 2)
+        for rank, k in owned:
+            broken = status.copy()
+            broken[tips.node[k : k + 1] if comm.rank == rank else []] = OPEN
+            lost = energy - cell_energy(plane, axial, strain, broken)[0]
+            parallel_assert(comm, comm.rank != rank or abs(foretold[k] / lost - 1) < 1e-8)
+
+
+def cell_energy(plane, axial, strain, status):
+    """The energy of the cell under a strain (6,), and the tractions (k, 3)."""
+    pairs = ((plane, strain[[0, 1, 5, 2]]), (axial, strain[[4, 3]]))
+    found = [each.respond(loads[None], status, [np.zeros(each.cell.solver.rows)])[0] for each, loads in pairs]
+    traction = np.hstack([each.interface.traction(r.state.solution) for (each, _), r in zip(pairs, found, strict=True)])
+    return sum(r.stored for r in found) * plane.cell.summary.area, traction
+
+
+def direct_utilisation(cell, strain, temperature):
+    """The largest utilisation of all bonds, from solves under a strain and a change of temperature."""
+    plane, axial = Homogenization(cell, False), Homogenization(cell.axial, False)
+    status = np.zeros(len(plane.interface.nodes.row), np.int8)
+    pairs = ((plane, [*strain[[0, 1, 5, 2]], temperature]), (axial, strain[[4, 3]]))
+    found = [
+        each.interface.traction(
+            each.respond(np.array([loads]), status, [np.zeros(each.cell.solver.rows)])[0].state.solution
+        )
+        for each, loads in pairs
+    ]
+    used = criterion_of(cell).law(plane.interface, status)(np.hstack(found))
+    return max(cell.comm.allgather(float(used.max(initial=0.0))))
+
+
+def test_cooling_alone_may_break_bonds(comm):
+    result = envelope(comm, "generalized", MAX, ["S22", "S12"], EXPANDING, directions=5, temperature=-1e5)
+    parallel_assert(comm, (factors(result) == 0.0).all())
+    parallel_assert(comm, all(not point.stress.any() for point in result.envelope))
+    places = {(point.fibre, point.bond_angle) for point in result.envelope}
+    parallel_assert(comm, len(places) == 1)
+
+
+def test_a_curve_of_the_mesh_that_may_close_is_refused(comm, shared_path):
+    if comm.rank == 0:
+        grid().with_curve(RIGHT_SIDE).write(shared_path / "strip.msh")
+    comm.barrier()
+    with pytest.raises(CaseError, match="contact: expected false with a debonded curve"):
+        envelope(comm, "strain", MAX, ["S11", "S12"], STRIP, shared_path, directions=4)

@@ -1,0 +1,81 @@
+"""Envelopes of small cells, and the onsets of paths in the same cells."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from petsc4py import PETSc
+
+from feti_homog import Case, run
+from feti_homog.analysis.criteria import criterion_of
+from feti_homog.common.petsc_options import case_options
+from feti_homog.common.progress import Progress
+from feti_homog.homogenization import unit_cell
+from feti_homog.interface.contact import OPEN
+from feti_homog.interface.path_following import events
+from feti_homog.interface.path_points import unloaded
+from support import torn_cells
+
+TIGHT = {"feti_ksp_rtol": 1e-12}
+MAX = {"normal_strength": 3.0, "tangential_strength": 2.0}
+QUADRATIC = MAX | {"criterion": "quadratic"}
+ENERGY = {"normal_stiffness": 900.0, "tangential_stiffness": 300.0, "criterion": "energy", "toughness": 0.005}
+ISOTROPIC = {"matrix": {"young": 88.0, "poisson": 0.299}, "fibre": {"young": 200.0, "poisson": 0.222}}
+
+
+def document(plane: str, interface: dict[str, Any], **sections: dict[str, Any]) -> dict[str, Any]:
+    """A small cell with these bonds; what `sections` say replaces what is here."""
+    base = {
+        "cell": {"geometry": "hexagonal", "fibre_fraction": 0.4, "mesh_size": 0.2},
+        "material": ISOTROPIC,
+        "analysis": {"plane": plane},
+        "interface": interface,
+        "output": {"fields": False, "pictures": False},
+        "petsc": TIGHT,
+    }
+    own = {"analysis", "output", "petsc"}  # the others are replaced as a whole
+    return base | {name: ({**base[name], **c} if name in own else c) for name, c in sections.items()}
+
+
+def envelope(
+    comm: Any,
+    plane: str,
+    interface: dict[str, Any],
+    axes: Sequence[str],
+    sections: dict[str, Any] | None = None,
+    folder: Path = Path(),
+    **own: Any,
+) -> Any:
+    """The result of an envelope.  Collective."""
+    both = (sections or {}) | {"analysis": {"type": "envelope"}, "envelope": {"plane": list(axes)} | own}
+    return run(Case.parse(document(plane, interface, **both), folder), comm)
+
+
+@contextmanager
+def torn(comm: Any, plane: str, interface: dict[str, Any], **sections: Any) -> Iterator[Any]:
+    """The torn cell of a path, in generalized plane strain of an envelope, in the cell of `envelope`.  Collective."""
+    PETSc.garbage_cleanup(comm)
+    if plane == "generalized":
+        more = {"analysis": {"type": "envelope"}, "envelope": {"plane": ["E11", "E22"]}}
+    else:
+        more = {"analysis": {"type": "path"}, "path": {"strain": [1.0, 0.0, 0.0]}}
+    case = Case.parse(document(plane, interface, **more, **sections))
+    with case_options(case.petsc):
+        cell = unit_cell.tear(case, comm, Progress(comm, quiet=True))
+        yield cell
+        cell.destroy()
+
+
+def path_onset(cell: Any, strain: np.ndarray) -> tuple[float, np.ndarray]:
+    """How many times `strain` the first bond breaks at on a path from zero, and the stress there.  Collective."""
+    contact = cell.case.interface.contact
+    interface = torn_cells.interface(cell, contact)
+    status = np.where(cell.debonded(None), OPEN, 0).astype(np.int8)
+    far = 1e6 * strain
+    point = next(events(interface, criterion_of(cell), far[None], unloaded(interface, status)))
+    assert point.broke or cell.comm.allreduce(point.broke)
+    return 1e6 * point.load_factor, point.scale * interface.stress(point.state.solution)

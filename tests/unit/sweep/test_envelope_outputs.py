@@ -1,0 +1,37 @@
+"""What a sweep's table has of an envelope."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from feti_homog.output.text.units import unit
+from feti_homog.sweep.report.outputs import outputs
+
+
+def document(factors: list[float | None], plane: tuple[str, str]) -> dict[str, Any]:
+    points = [{"angle": 90.0 * k} | ({} if f is None else {"factor": f}) for k, f in enumerate(factors)]
+    solver = dict.fromkeys(("ranks", "subdomains", "dofs", "multipliers"), 1) | {"iterations": [1]}
+    return {
+        "case": {"envelope": {"plane": list(plane)}}, "envelope": points, "solver": solver,
+        "cell": {"fibre_fraction": 0.4, "elements": 1, "nodes": 1}, "checks": {}, "timings": {}, "memory": 1,
+    }  # fmt: skip
+
+
+def of_envelope(factors: list[float | None], plane: tuple[str, str] = ("S22", "S12")) -> dict[str, float]:
+    return {name: value for name, value in outputs(document(factors, plane)).items() if name.startswith("envelope")}
+
+
+def test_the_first_axis_the_least_and_the_largest():
+    found = of_envelope([5.0, 2.0, 9.0, 3.0])
+    assert found == {"envelope_S22": 5.0, "envelope_least_S22_S12": 2.0, "envelope_largest_S22_S12": 9.0}
+    assert {unit(name, "MPa") for name in found} == {"MPa"}
+
+
+def test_strains_have_no_unit():
+    found = of_envelope([5.0, 2.0, 9.0, 3.0], ("E11", "gamma12"))
+    assert len(found) == 3 and {unit(name, "MPa") for name in found} == {""}
+
+
+def test_without_an_onset_there_is_no_largest():
+    assert of_envelope([None, 2.0, 9.0, 3.0]) == {"envelope_least_S22_S12": 2.0}
+    assert of_envelope([None] * 4) == {}
