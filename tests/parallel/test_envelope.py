@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import csv
+
 import numpy as np
 import pytest
-from support.envelopes import ENERGY, MAX, QUADRATIC, envelope, path_onset, torn
+from support.envelopes import ENERGY, MAX, QUADRATIC, document, envelope, path_onset, torn
 from support.ranks import parallel_assert
 from unit.cell.faulty_meshes import RIGHT_SIDE, grid
 
+from feti_homog import Case, run
 from feti_homog.analysis.criteria import criterion_of
 from feti_homog.errors import CaseError
 from feti_homog.homogenization.averaging import Homogenization
 from feti_homog.interface.contact import OPEN
 from feti_homog.interface.onset import OnsetCriterion
+from feti_homog.output.files import result_json
+from feti_homog.output.plots import response_curves
+from feti_homog.verification.certificate import verify
 
 pytestmark = pytest.mark.parallel
 
@@ -120,6 +126,7 @@ def strip(comm, shared_path):
 
 STRIP = {"cell": {"geometry": "mesh", "file": "strip.msh"}}
 ALONG = {"axial_strength": 1.5}
+IN_SPACE = {"max": MAX | ALONG, "quadratic": QUADRATIC | ALONG, "energy": ENERGY | {"axial_stiffness": 200.0}}
 EXPANDING = {
     "material": {
         "matrix": {"young": 3.0, "poisson": 0.35, "expansion": 6e-5},
@@ -146,9 +153,7 @@ def share(bonds, stress):
 
 @pytest.mark.parametrize("axes", [["S11", "S13"], ["S12", "S13"], ["gamma13", "E33"]], ids=" ".join)
 @pytest.mark.parametrize("temperature", [None, -3.0])
-@pytest.mark.parametrize(
-    "bonds", [MAX | ALONG, QUADRATIC | ALONG, ENERGY | {"axial_stiffness": 200.0}], ids=["max", "quadratic", "energy"]
-)
+@pytest.mark.parametrize("bonds", IN_SPACE.values(), ids=IN_SPACE)
 def test_bonds_of_a_laminate_bear_the_macroscopic_stress(comm, strip, bonds, temperature, axes):
     own = {} if temperature is None else {"temperature": temperature}
     result = envelope(comm, "generalized", bonds, axes, STRIP | EXPANDING, strip, directions=12, **own)
@@ -185,12 +190,10 @@ def test_a_single_fibre_in_axial_shear(comm, stiffness):
 
 
 @pytest.mark.parametrize("axes", [["S22", "S33"], ["E11", "gamma23"]], ids=" ".join)
-@pytest.mark.parametrize(
-    "bonds", [MAX | ALONG, QUADRATIC | ALONG, ENERGY | {"axial_stiffness": 200.0}], ids=["max", "quadratic", "energy"]
-)
+@pytest.mark.parametrize("bonds", [*IN_SPACE.values(), IN_SPACE["energy"] | ARC], ids=[*IN_SPACE, "tips"])
 def test_cooled_cells_are_at_their_strength_at_onset(comm, bonds, axes):
     """A solve under the strain and temperature at onset has the utilisation 1, and less before."""
-    cooling = -2000.0
+    cooling = -300.0 if "debonded" in bonds else -2000.0
     sections = RANDOM | EXPANDING
     result = envelope(comm, "generalized", bonds, axes, sections, directions=6, temperature=cooling)
     with torn(comm, "generalized", bonds, **sections) as cell:
@@ -235,7 +238,7 @@ def cell_energy(plane, axial, strain, status):
 def direct_utilisation(cell, strain, temperature):
     """The largest utilisation of all bonds, from solves under a strain and a change of temperature."""
     plane, axial = Homogenization(cell, False), Homogenization(cell.axial, False)
-    status = np.zeros(len(plane.interface.nodes.row), np.int8)
+    status = np.where(cell.debonded(None), OPEN, 0).astype(np.int8)
     pairs = ((plane, [*strain[[0, 1, 5, 2]], temperature]), (axial, strain[[4, 3]]))
     found = [
         each.interface.traction(
@@ -243,7 +246,8 @@ def direct_utilisation(cell, strain, temperature):
         )
         for each, loads in pairs
     ]
-    used = criterion_of(cell).law(plane.interface, status)(np.hstack(found))
+    onset = OnsetCriterion.of(criterion_of(cell), plane.interface, axial.interface, status)
+    used = onset.utilisation(np.hstack(found), np.arange(len(status)))
     return max(cell.comm.allgather(float(used.max(initial=0.0))))
 
 
@@ -253,6 +257,25 @@ def test_cooling_alone_may_break_bonds(comm):
     parallel_assert(comm, all(not point.stress.any() for point in result.envelope))
     places = {(point.fibre, point.bond_angle) for point in result.envelope}
     parallel_assert(comm, len(places) == 1)
+
+
+def test_its_files_are_written_and_hold_what_they_say(comm, shared_path):
+    case = document(
+        "generalized", MAX | ALONG, analysis={"type": "envelope"}, envelope={"plane": ["S22", "S13"], "directions": 8},
+        output={"fields": True, "pictures": False, "report": False},
+    )  # fmt: skip
+    result = run(Case.parse(case), comm, out=shared_path)
+    if comm.rank == 0:
+        with (shared_path / "envelope.csv").open() as stream:
+            rows = list(csv.DictReader(stream))
+        assert [float(row["factor"]) for row in rows] == [point.factor for point in result.envelope]
+        assert [float(row["S13"]) for row in rows] == [point.stress[4] for point in result.envelope]
+        assert [path.name for path in response_curves.plot(shared_path, result_json.read(shared_path))] == [
+            "envelope.png"
+        ]
+        certificate = verify(shared_path)
+        assert certificate.holds and "onset" in certificate.text, certificate.text
+    comm.barrier()
 
 
 def test_a_curve_of_the_mesh_that_may_close_is_refused(comm, shared_path):
