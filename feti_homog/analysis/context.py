@@ -179,8 +179,9 @@ class AnalysisContext:
         )
 
     def point(self, responses: Sequence[Response]) -> dict[str, Any]:
-        """The numbers of a point of a list in result.json: states of its last response, all iterations.  Collective."""
-        last = responses[-1]
+        """The numbers of a point of a list in result.json: states under its last strain of the plane, all iterations.
+        Collective."""
+        last = responses[: len(STRAINS)][-1]
         length = self.fibre_interfaces.debonded_length(last.state.status)
         debonding = {
             "debonded_share": self.fibre_interfaces.share(length),

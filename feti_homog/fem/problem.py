@@ -16,7 +16,7 @@ from feti_homog.typing import Float, Int
 
 @dataclass(frozen=True)
 class Problem:
-    """Displacements u_i, i = 0..c-1, and strains: du_i/dx_k is part of the strain number `strain`[i][k].
+    """Displacements u_i, i = 0..c-1, and strains: du_i/dx_k is part of the strain number `strain[i][k]`.
 
     Attributes:
         strain: c rows of two numbers.
