@@ -38,7 +38,7 @@ VERIFY_HELP = (
     "law is broken. Needs neither MPI nor PETSc; of several ranks each does all of it, and the first one prints."
 )
 EXPORT_HELP = (
-    'Print the effective constants of analysis.type = "stiffness", plane = "generalized", as a card of a material. Its '
+    'Print the effective constants of a stiffness or an envelope in plane = "generalized" as a card of a material. Its '
     "axis 1 is the fibre, x3 of the cell; axes 2 and 3 are x1 and x2 of the cell. No unit is converted."
 )
 
@@ -190,7 +190,7 @@ def _plot(arguments: argparse.Namespace, comm: Intracomm) -> None:
     on_root_only(comm, stored_result.check_to_draw, arguments.directory)
     paths = on_root_only(comm, figures.plot, arguments.directory)
     if paths == []:
-        say(f"{arguments.directory}: nothing to draw: its case has no fields, and no points of an angle or path")
+        say(f"{arguments.directory}: nothing to draw: its case has no fields, and no points that make a curve")
     for path in paths or []:
         say(str(path))
 

@@ -7,6 +7,7 @@ import math
 from feti_homog.config.sections import InterfaceSection
 from feti_homog.errors import CaseError
 from feti_homog.feti.preconditioners.influence import Influence
+from feti_homog.homogenization import bonds
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface.bond_criterion import BondCriterion
 from feti_homog.interface.energy_criterion import EnergyCriterion
@@ -44,7 +45,7 @@ def _springs(bond: InterfaceSection) -> EnergyCriterion:
         bond.tangential_stiffness or math.inf,
         bond.toughness or math.inf,
         bond.mode_sensitivity,
-        bond.axial_stiffness or bond.tangential_stiffness or math.inf,
+        bonds.axial_stiffness(bond),
     )
 
 

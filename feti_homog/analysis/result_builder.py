@@ -93,22 +93,23 @@ def _fibres(summary: CellSummary) -> tuple[FibreInfo, ...]:
 
 
 def _solver_info(context: AnalysisContext) -> SolverInfo:
-    """Collective."""
+    """Of all problems together.  Collective."""
     cell = context.homogenization.cell
     plan, solver = cell.summary, cell.solver
+    solvers = [solver] if cell.axial is None else [solver, cell.axial.solver]
     return SolverInfo(
         ranks=cell.comm.size,
         bodies=plan.bodies,
         subdomains=plan.subdomains,
-        dofs=cell.sum_over_ranks(len(solver.Q)),
-        multipliers=solver.jump_operator.global_rows,
+        dofs=cell.sum_over_ranks(sum(len(s.Q) for s in solvers)),
+        multipliers=sum(s.jump_operator.global_rows for s in solvers),
         interface_nodes=cell.sum_over_ranks(len(solver.jump_operator.nodes.row)),
-        kernel_dim=solver.natural.kernel_dimension,
-        coarse_dim=solver.coarse.coarse_dimension,
-        factorizations=cell.sum_over_ranks(len(solver.interface_operators.operators)),
-        coarse_factorizations=solver.natural.factorizations,
+        kernel_dim=sum(s.natural.kernel_dimension for s in solvers),
+        coarse_dim=sum(s.coarse.coarse_dimension for s in solvers),
+        factorizations=cell.sum_over_ranks(sum(len(s.interface_operators.operators) for s in solvers)),
+        coarse_factorizations=sum(s.natural.factorizations for s in solvers),
         rtol=solver.rtol,
-        solves=solver.solves,
+        solves=sum(s.solves for s in solvers),
         iterations=tuple(context.iterations),
         converged_reason=tuple(context.reasons),
     )

@@ -131,7 +131,8 @@ class TipRates:
     """
 
     load: tuple[str, ...] = described(
-        "under which unit strain: `E11`, `E22`, `gamma12`, `-E11` of minus it, ...; `strain`: the strain that is given"
+        "under which unit strain: `E11`, `E22`, `gamma12`, `-E11` of minus it, ...; of other loads none; "
+        "`strain`: the strain that is given"
     )
     fibre: tuple[int, ...] = described("number of the fibre")
     angle: Float = described("direction of the tip from the fibre's centre", DEGREES, "(t,)")

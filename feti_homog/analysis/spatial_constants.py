@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from feti_homog.config.materials import expansion, spatial_stiffness
+from feti_homog.homogenization import bonds
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.mechanics.estimates.constituents import Fibres, Springs
 from feti_homog.mechanics.estimates.fibre_bounds import fibre_bounds
@@ -19,41 +19,61 @@ from feti_homog.mechanics.spatial_constants import (
     is_transversely_isotropic,
     transversely_isotropic_part,
 )
+from feti_homog.typing import Bool, Float
+
+# Radii of fibres that differ by less, relatively, are one: those of users' meshes are fitted to nodes.
+SAME_RADIUS = 1e-6
 
 
 def constants(cell: TornCell, analysis: Mapping[str, Any], fractions: Mapping[str, float]) -> dict[str, Any]:
     """The keys of result.json that follow from `effective_stiffness` and `thermal_stress`.  Collective.
 
-    Where faces touch without tension the stiffness is a secant that need not be symmetric, and has its inverse alone.
-    Estimates and bounds are of cells without debonding.
+    Nothing follows where faces touch without tension: each column is a secant of its own load.  Estimates and bounds
+    are of cells with fibres and without debonding, estimates of round fibres.
     """
+    if "effective_stiffness_compression" in analysis:
+        return {}
     stiffness, thermal = analysis["effective_stiffness"], analysis.get("thermal_stress")
     compliance = np.linalg.inv(stiffness)
-    found: dict[str, Any] = {"compliance": compliance}
-    if "effective_stiffness_compression" in analysis:
-        return found
     strains = None if thermal is None else -compliance @ thermal
-    found["constants"] = engineering_constants(stiffness)
-    found["transversely_isotropic"] = transversely_isotropic_part(stiffness, strains)
+    found: dict[str, Any] = {
+        "compliance": compliance,
+        "constants": engineering_constants(stiffness),
+        "transversely_isotropic": transversely_isotropic_part(stiffness, strains),
+    }
     if strains is not None:
         found["thermal_expansion"] = strains
-    if not cell.sum_over_ranks(int(cell.debonded(None).sum())):
-        found |= _comparisons(cell, fractions)
-    return found
+    is_debonded = cell.sum_over_ranks(int(cell.debonded(None).sum())) > 0
+    return found if is_debonded or len(fractions) < 2 else found | _comparisons(cell, fractions)
 
 
 def _comparisons(cell: TornCell, fractions: Mapping[str, float]) -> dict[str, Any]:
-    """Estimates, and bounds of rigidly bonded phases: both of transversely isotropic ones."""
+    """Estimates of round fibres, and bounds of rigidly bonded ones of any section: of transversely isotropic phases."""
     phases = {phase: _constants_of(cell, phase) for phase in fractions}
     matrix, *others = cell.summary.phases
+    has_springs = bonds.has_springs(cell.case)
     found: dict[str, Any] = {}
-    springs = {phase: _springs(cell, phase) for phase in others}
-    if None not in springs.values() or not _has_springs(cell):
+    radii = {phase: cell.summary.radii[_of_phase(cell, phase)] for phase in others}
+    if not any(_no_estimate(own, has_springs) for own in radii.values()):
+        springs = {phase: _springs(cell, float(own[0])) if has_springs else None for phase, own in radii.items()}
         fibres = [Fibres(fractions[phase], phases[phase], springs[phase]) for phase in others]
         found["estimates"] = estimates(phases[matrix], fibres)
-    if not _has_springs(cell) and all(map(is_transversely_isotropic, phases.values())):
+    if not has_springs and all(map(is_transversely_isotropic, phases.values())):
         found["fibre_bounds"] = fibre_bounds(list(fractions.values()), list(phases.values()))
     return found
+
+
+def _of_phase(cell: TornCell, phase: str) -> Bool:
+    """(constituents,) which fibres are of a phase."""
+    summary = cell.summary
+    fibres = np.arange(len(summary.radii)) >= summary.first_fibre
+    return np.asarray(fibres & (summary.constituent_phase == summary.phases.index(phase)))
+
+
+def _no_estimate(radii: Float, has_springs: bool) -> bool:
+    """Whether estimates say nothing of fibres of these radii, NaN where they are not round: of springs they ask for
+    one."""
+    return bool(np.isnan(radii).any() or (has_springs and np.ptp(radii) > SAME_RADIUS * radii.max()))
 
 
 def _constants_of(cell: TornCell, phase: str) -> TransverselyIsotropic:
@@ -61,16 +81,8 @@ def _constants_of(cell: TornCell, phase: str) -> TransverselyIsotropic:
     return transversely_isotropic_part(spatial_stiffness(material), expansion(material))
 
 
-def _has_springs(cell: TornCell) -> bool:
-    bond = cell.case.interface
-    return bond is not None and not (bond.normal_stiffness is None and bond.tangential_stiffness is None)
-
-
-def _springs(cell: TornCell, phase: str) -> Springs | None:
-    """Those of the fibres of a phase; None without any, or if its fibres have no common radius."""
-    bond, summary = cell.case.interface, cell.summary
-    radii = summary.radii[summary.constituent_phase == summary.phases.index(phase)]
-    if bond is None or not _has_springs(cell) or np.ptp(radii) != 0.0:
-        return None
-    tangential = bond.tangential_stiffness or math.inf
-    return Springs(bond.normal_stiffness or math.inf, tangential, tangential, float(radii[0]))
+def _springs(cell: TornCell, radius: float) -> Springs:
+    """Those of the interfaces of fibres with this radius."""
+    normal, tangential = bonds.springs(cell.case).stiffness
+    (axial,) = bonds.axial_springs(cell.case).stiffness
+    return Springs(normal, tangential, axial, radius)

@@ -24,7 +24,8 @@ def generalized_faults(selected: Selected) -> list[str]:
         return [f"[output] stress = {toml_value(stress)}: belongs to {owner}"]
     if selected[PLANE] not in GENERALIZED.values or analysis in (*GENERALIZED_ANALYSES, None):
         return []
-    offered = " or ".join(map(toml_value, GENERALIZED_ANALYSES))
+    *some, last = map(toml_value, GENERALIZED_ANALYSES)
+    offered = f"{', '.join(some)} or {last}"
     return [
         f"[analysis] plane = {toml_value(selected[PLANE])}: works with type = {offered}, not {toml_value(analysis)}"
     ]

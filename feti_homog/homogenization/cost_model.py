@@ -54,7 +54,8 @@ def _asks_for_tips(case: Case) -> bool:
     """Whether an envelope needs the inverse of the dual operator, which many solves call for."""
     bond = case.interface
     by_energy = bond is not None and bond.criterion == "energy" and bond.growth == "released"
-    return case.envelope is not None and by_energy and bool(case.arcs)
+    # A mesh may have a curve "debonded".
+    return case.envelope is not None and by_energy and (bool(case.arcs) or case.cell.file is not None)
 
 
 def estimate(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -16,12 +15,11 @@ from feti_homog.common.mpi_errors import agree, on_root_only
 from feti_homog.common.progress import Progress
 from feti_homog.config.case import Case
 from feti_homog.fem.problem import AXIAL
-from feti_homog.feti.decomposition.interface_springs import GLUE, InterfaceSprings
 from feti_homog.feti.decomposition.shared_entities import SharedEntities
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.solver import FetiSolver
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
-from feti_homog.homogenization import cost_model, phase_laws, process_zone
+from feti_homog.homogenization import bonds, cost_model, phase_laws, process_zone
 from feti_homog.homogenization.domain_partition import (
     DEFAULT_POLICY,
     CellSummary,
@@ -122,7 +120,7 @@ def tear(
             lattice,
             cost_model.applications(case),
             thresholds,
-            _springs(case),
+            bonds.springs(case),
             phase_laws.plane_problem(case),
         )
         multipliers, dimension = solver.jump_operator.global_rows, solver.coarse.coarse_dimension
@@ -138,10 +136,7 @@ def _axial(cell: TornCell, shared: SharedEntities, thresholds: Thresholds) -> To
     """The same cell with the displacement along the fibres.  Collective."""
     case = cell.case
     subdomains = agree(cell.comm, _assemble_axial, case, cell.subdomains)
-    bond = case.interface
-    stiffness = None if bond is None else bond.axial_stiffness or bond.tangential_stiffness
-    springs = GLUE if stiffness is None else InterfaceSprings((stiffness,))
-    applications = cost_model.applications(case)
+    applications, springs = cost_model.applications(case), bonds.axial_springs(case)
     solver = FetiSolver(cell.comm, shared, subdomains, cell.lattice, applications, thresholds, springs, AXIAL)
     return TornCell(cell.comm, case, cell.summary, cell.lattice, subdomains, solver)
 
@@ -149,14 +144,6 @@ def _axial(cell: TornCell, shared: SharedEntities, thresholds: Thresholds) -> To
 def _assemble_axial(case: Case, subdomains: Sequence[Subdomain]) -> list[Subdomain]:
     """The subdomains of this rank with the displacement along the fibres, on the meshes that they have."""
     return [Subdomain.on(s.submesh, s.mesh, phase_laws.axial_law(case, s.submesh.phase), AXIAL) for s in subdomains]
-
-
-def _springs(case: Case) -> InterfaceSprings:
-    """Those of the section [interface]; without it, or without stiffnesses, bonds are rigid."""
-    bond = case.interface
-    if bond is None:
-        return GLUE
-    return InterfaceSprings((bond.normal_stiffness or math.inf, bond.tangential_stiffness or math.inf))
 
 
 def assemble_subdomains(

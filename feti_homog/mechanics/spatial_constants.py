@@ -1,7 +1,7 @@
 """Engineering constants of a spatial stiffness, and the nearest transversely isotropic one about the fibres.
 
 Stiffnesses are (6, 6) in Voigt order [11, 22, 33, 23, 13, 12] with engineering shear, in any unit of stress; x3 is the
-direction of the fibres.  Expansions are strains per kelvin, (6,) in the same order.
+direction of the fibres.  Expansions are strains per unit of temperature, (6,) in the same order.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from feti_homog.common.records import STRESS, described
 from feti_homog.typing import Float
 
-PER_KELVIN = "1/K"
+PER_TEMPERATURE = "1 / temperature"
 TRANSVERSELY_ISOTROPIC = 1e-9  # relative distance to the nearest transversely isotropic stiffness, from rounding
 
 # Turns a (6, 6) matrix of the components of a stiffness into one of the same Frobenius norm as the tensor.
@@ -48,9 +48,9 @@ class TransverselyIsotropic:
     G_transverse: float = described("shear modulus across the fibres", STRESS)
     K_transverse: float = described("bulk modulus across the fibres in plane strain", STRESS)
     expansion_axial: float | None = described(
-        "expansion along the fibres; null if a phase does not give its own", PER_KELVIN
+        "expansion along the fibres; null if a phase does not give its own", PER_TEMPERATURE
     )
-    expansion_transverse: float | None = described("expansion across the fibres; null likewise", PER_KELVIN)
+    expansion_transverse: float | None = described("expansion across the fibres; null likewise", PER_TEMPERATURE)
     deviation: float = described(
         "relative distance of the stiffness, as a fourth-order tensor, to the nearest transversely isotropic one"
     )

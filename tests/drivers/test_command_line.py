@@ -135,7 +135,7 @@ def test_without_fields_only_the_json_is_written_and_nothing_drawn(tmp_path):
     job = command_line(1, "plot", out)
     assert job.returncode == 0, job.stderr
     assert {path.name for path in out.iterdir()} == {"result.json"}
-    assert job.stdout == f"{out}: nothing to draw: its case has no fields, and no points of an angle or path\n"
+    assert job.stdout == f"{out}: nothing to draw: its case has no fields, and no points that make a curve\n"
 
 
 @pytest.mark.parametrize("ranks", [1, 2, 4])

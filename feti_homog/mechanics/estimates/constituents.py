@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from feti_homog.common.records import STRESS, described
-from feti_homog.mechanics.spatial_constants import PER_KELVIN, TransverselyIsotropic, transverse_constants
+from feti_homog.mechanics.spatial_constants import PER_TEMPERATURE, TransverselyIsotropic, transverse_constants
 
 
 @dataclass(frozen=True)
@@ -47,8 +47,8 @@ class Estimate:
     G_axial: float | None = described("shear modulus along the fibres", STRESS)
     G_transverse: float | None = described("shear modulus across the fibres", STRESS)
     K_transverse: float | None = described("bulk modulus across the fibres in plane strain", STRESS)
-    expansion_axial: float | None = described("expansion along the fibres", PER_KELVIN)
-    expansion_transverse: float | None = described("expansion across the fibres", PER_KELVIN)
+    expansion_axial: float | None = described("expansion along the fibres", PER_TEMPERATURE)
+    expansion_transverse: float | None = described("expansion across the fibres", PER_TEMPERATURE)
 
 
 CONSTANTS = tuple(field.name for field in dataclasses.fields(Estimate))

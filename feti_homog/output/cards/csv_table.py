@@ -30,7 +30,12 @@ def _rows(material: EffectiveMaterial) -> Iterator[tuple[str, float, str, str]]:
         yield name, value, "" if name.startswith("nu") else material.stress_unit, _meaning(name, axes)
     if material.expansion is not None:
         for component, value in zip(COMPONENTS, material.expansion, strict=True):
-            yield f"expansion_{component}", float(value), "1/K", f"thermal strain {component} per kelvin"
+            yield (
+                f"expansion_{component}",
+                float(value),
+                "1 / temperature",
+                f"thermal strain {component} per unit of temperature",
+            )
     C = material.stiffness
     for i, j in combinations_with_replacement(range(6), 2):
         words = f"stress {_digits(i)} under the unit strain {COMPONENTS[j]}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -38,7 +38,7 @@ class EffectiveMaterial:
         symmetry: in words.
         compliance: (6, 6) in Voigt's order [11, 22, 33, 23, 13, 12] with engineering shears, symmetric
             positive definite.
-        expansion: (6,) strains per kelvin in the same order, or None.
+        expansion: (6,) strains per unit of temperature in the same order, or None.
     """
 
     name: str
@@ -139,11 +139,14 @@ def _stiffness(document: Mapping[str, Any]) -> Float:
     """(6, 6) in the axes of the cell, symmetric positive definite."""
     analysis = document["case"]["analysis"]
     if document["status"] != "done":
-        raise CaseError(f'its status is "{document["status"]}": {"; ".join(document["faults"])}; run the case again')
+        raise CaseError(f'its status is "{document["status"]}": {_first(document["faults"])}; run the case again')
     if document.get("effective_stiffness") is None:
-        raise CaseError(f'analysis.type = "{analysis["type"]}" has no effective stiffness; cards need "stiffness"')
+        raise CaseError(
+            f'analysis.type = "{analysis["type"]}" has no effective stiffness; cards need "stiffness" or "envelope"'
+        )
     if analysis["plane"] != "generalized":
-        raise CaseError(f'plane = "{analysis["plane"]}" gives constants of the plane; cards need plane = "generalized"')
+        words = f'plane = "{analysis["plane"]}" gives constants of the plane; cards need plane = "generalized"'
+        raise CaseError(words)
     if document.get("effective_stiffness_compression") is not None:
         raise CaseError("its debonded faces touch under some loads alone; cards are of linear materials")
     C = _numbers(document["effective_stiffness"], (6, 6))
@@ -159,3 +162,9 @@ def _numbers(value: Any, shape: tuple[int, ...]) -> Float:
     if array.shape != shape or not np.isfinite(array).all():
         raise ValueError(f"expected {' x '.join(map(str, shape))} finite numbers")
     return array
+
+
+def _first(faults: Sequence[str]) -> str:
+    """The first of some faults, and how many more there are."""
+    more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
+    return f"{faults[0] if faults else 'it was not finished'}{more}"

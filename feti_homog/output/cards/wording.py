@@ -21,7 +21,7 @@ def comments(material: EffectiveMaterial, mark: str) -> list[str]:
     paragraphs = [
         f"Effective material of {material.name}, by feti_homog {material.version}.",
         AXES,
-        f"Stresses in {stress}, expansions per kelvin; nothing is converted.",
+        f"Stresses in {stress}, expansions per unit of temperature; nothing is converted.",
         material.symmetry,
     ]
     if material.expansion is None:

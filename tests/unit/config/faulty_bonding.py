@@ -184,7 +184,7 @@ FAULTY_BONDINGS: dict[str, tuple[str, tuple[str, ...]]] = {
     # [path]
     "path_in_space": (
         of_type("path", PATH).replace('"strain"', '"generalized"'),
-        ('[analysis] plane = "generalized": works with type = "stiffness" or "angle" or "envelope", not "path"',),
+        ('[analysis] plane = "generalized": works with type = "stiffness", "angle" or "envelope", not "path"',),
     ),
     "no_path": (of_type("path"), ('[path]: missing section; [analysis] type = "path" needs it',)),
     "path_of_angle": (

@@ -91,7 +91,7 @@ def test_table_has_the_constants_of_its_stiffness():
     C, _ = READERS["csv"](FORMATS["csv"](in_axes_of_the_cell(document(DISTINCT))))
     assert_same(compliance(C), compliance(stiffness_of_constants(values)))
     units = {row["name"]: row["unit"] for row in rows}
-    assert (units["E1"], units["nu12"], units["C44"], units["expansion_11"]) == ("GPa", "", "GPa", "1/K")
+    assert (units["E1"], units["nu12"], units["C44"], units["expansion_11"]) == ("GPa", "", "GPa", "1 / temperature")
     assert all(row["meaning"] for row in rows)
 
 
@@ -103,7 +103,7 @@ def test_comments_say_what_the_axes_and_units_are(form, mark):
     )
     said = " ".join(line.removeprefix(mark).strip() for line in text.splitlines() if line.startswith(mark))
     assert text.isascii() and max(map(len, text.splitlines())) < 256 and "\\xe9poxy" in said
-    for words in ("Axis 1 is the fibre, x3 of the cell", "axes 2 and 3 are x1 and x2", "Stresses in GPa", "per kelvin",
+    for words in ("Axis 1 is the fibre, x3 of the cell", "axes 2 and 3 are x1 and x2", "Stresses in GPa", "per unit of",
                   "nu_ij = -eps_j/eps_i", "Orthotropic; "):  # fmt: skip
         assert words in said
 

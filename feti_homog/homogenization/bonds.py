@@ -1,0 +1,32 @@
+"""The springs of the bonds of a case, in the plane and along the fibres; without a stiffness bonds are rigid."""
+
+from __future__ import annotations
+
+import math
+
+from feti_homog.config.case import Case
+from feti_homog.config.sections import InterfaceSection
+from feti_homog.feti.decomposition.interface_springs import GLUE, InterfaceSprings
+
+
+def springs(case: Case) -> InterfaceSprings:
+    """Those of the problem in the plane: normal and tangential."""
+    bond = case.interface
+    if bond is None:
+        return GLUE
+    return InterfaceSprings((bond.normal_stiffness or math.inf, bond.tangential_stiffness or math.inf))
+
+
+def axial_springs(case: Case) -> InterfaceSprings:
+    """Those of the problem along the fibres."""
+    return GLUE if case.interface is None else InterfaceSprings((axial_stiffness(case.interface),))
+
+
+def axial_stiffness(bond: InterfaceSection) -> float:
+    """k_a, that around the fibre where it is not given."""
+    return bond.axial_stiffness or bond.tangential_stiffness or math.inf
+
+
+def has_springs(case: Case) -> bool:
+    """Whether any bond gives way."""
+    return any(map(math.isfinite, (*springs(case).stiffness, *axial_springs(case).stiffness)))
