@@ -23,7 +23,8 @@ def test_stiffness_falls_with_the_angle_from_bonded_to_void(tmp_path):
             column(rows, f"{entry} {case}") for case in ("plane strain", "long fibres", "plane stress")
         )
         assert all((np.diff(values) < 1e-9).all() for values in (strain, fibres, stress))
-        assert (strain > stress).all() and (fibres >= stress - 1e-9).all() and (strain >= fibres - 1e-9).all()
+        # Of the shear, which makes no S33, both are the same to the solver's tolerance.
+        assert (strain > stress).all() and (fibres > stress).all() and (strain >= fibres - 1e-6).all()
     for k, entry in enumerate(("C11", "C12", "C33")):
         values = column(rows, f"{entry} plane strain")
         assert values[[0, -1]] == pytest.approx([BONDED[k], VOID[k]], rel=0.02)

