@@ -127,7 +127,7 @@ INFLUENCE_CHUNK = 32
 # (`scripts/benchmark_path --to-the-end`).
 INFLUENCE_COLUMNS = 400
 # Influence columns that each rank finds together at least, with those of bonds near the one that breaks: fewer and
-# larger batches, but columns that may not be needed.
+# larger batches, but columns that may not be needed (`scripts/benchmark_path --to-the-end`).
 INFLUENCE_BATCH = 32
 # Stiffness of the fibres over that of the matrix, as the diagonals of K have them, above which influence columns take
 # the forces of the matrix: those of the fibres lose as many digits as this has.

@@ -13,7 +13,7 @@ import numpy as np
 
 from feti_homog.config.case import Case
 from feti_homog.config.materials import expansion, plane_stiffness, spatial_stiffness
-from feti_homog.fem.problem import AXIAL, GENERALIZED, PLANE, Problem
+from feti_homog.fem.problem import GENERALIZED, PLANE, Problem
 from feti_homog.typing import Float
 
 IN_PLANE, AXIAL_SHEAR = [0, 1, 5, 2], [4, 3]
@@ -50,11 +50,6 @@ def plane_law(case: Case, phase: str) -> Float:
 def axial_law(case: Case, phase: str) -> Float:
     """(2, 2) stiffness of a phase in the axial problem."""
     return spatial_stiffness(case.material_of(phase))[np.ix_(AXIAL_SHEAR, AXIAL_SHEAR)]
-
-
-def axial_problem(case: Case) -> Problem | None:
-    """That of the displacement along the fibres, if it is asked for."""
-    return AXIAL if is_generalized(case) else None
 
 
 def spatial(plane: Float, axial: Float) -> tuple[Float, Float | None]:
