@@ -44,9 +44,9 @@ class BorderedInverse:
         factor, order, rank, _ = dpstrf(pivots, tol=rounding, lower=1)
         # The first pivot is taken whatever it is.
         rank = min(rank, int((factor.diagonal() ** 2 > rounding).sum()))
-        # Other processors may round another way, and pivot in another order.
-        kept = self._comm.bcast(order[:rank] - 1)
-        half = np.linalg.inv(np.linalg.cholesky(pivots[np.ix_(kept, kept)]))
+        # Other ranks may round another way, pivot in another order, or find no root where one is nearly singular.
+        kept, root = self._comm.bcast((order[:rank] - 1, np.tril(factor[:rank, :rank])))
+        half = np.linalg.inv(root)
         inverse, w = sign * half.T @ half, w[:, kept]
         k, rank, scaled = len(self.members), len(kept), w @ inverse
         N = np.empty((k + rank, k + rank))
