@@ -30,6 +30,8 @@ from feti_homog.feti.preconditioners.influence import Influence  # noqa: E402
 from feti_homog.homogenization.averaging import Homogenization  # noqa: E402
 from feti_homog.homogenization.unit_cell import tear  # noqa: E402
 from feti_homog.interface.contact import BONDED  # noqa: E402
+from feti_homog.interface.load import Load  # noqa: E402
+from feti_homog.interface.loaded_cell import LoadedCell  # noqa: E402
 from feti_homog.interface.path_following import events  # noqa: E402
 from feti_homog.interface.path_points import unloaded  # noqa: E402
 from feti_homog.interface.strength_criterion import StrengthCriterion  # noqa: E402
@@ -100,7 +102,10 @@ def run_events(homogenization: Homogenization, count: int | None) -> tuple[list[
     interface = homogenization.interface
     bonded = np.full(len(interface.nodes.row), BONDED, np.int8)
     found = events(
-        interface, StrengthCriterion(STRENGTH, STRENGTH, "max"), np.array([STRAIN]), unloaded(interface, bonded)
+        LoadedCell(interface),
+        StrengthCriterion(STRENGTH, STRENGTH, "max"),
+        [Load.strain(np.array(STRAIN))],
+        unloaded(LoadedCell(interface), bonded),
     )
     seconds, iterations, solves = [], [], []
     start = time.perf_counter()

@@ -12,12 +12,15 @@ from numpy.typing import NDArray
 
 from feti_homog.analysis.result_records import TipRates
 from feti_homog.common.progress import Progress
+from feti_homog.config.case import Case
 from feti_homog.homogenization import phase_laws, process_zone
 from feti_homog.homogenization.averaging import Homogenization, Response
 from feti_homog.homogenization.energy_release import EnergyReleaseRates
 from feti_homog.homogenization.fibre_debonding import FibreInterfaces
-from feti_homog.interface.contact import OPEN, Status
-from feti_homog.mechanics.voigt import STRAINS
+from feti_homog.interface.contact import OPEN, Equilibrium, Status
+from feti_homog.interface.load import Load
+from feti_homog.interface.loaded_cell import LoadedCell
+from feti_homog.mechanics.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES, STRAINS
 from feti_homog.typing import Float
 
 EMPTY = np.zeros(0)
@@ -71,6 +74,52 @@ class AnalysisContext:
     @property
     def _problems(self) -> tuple[Homogenization, ...]:
         return (self.homogenization,) if self.axial is None else (self.homogenization, self.axial)
+
+    @property
+    def loaded_cell(self) -> LoadedCell:
+        """The interfaces of all problems."""
+        return LoadedCell(*(problem.interface for problem in self._problems))
+
+    @property
+    def case(self) -> Case:
+        """What is analysed."""
+        return self.homogenization.cell.case
+
+    def load(self, target: Mapping[str, float]) -> Load:
+        """The load that a waypoint names, of all problems."""
+        strains = self.loaded_cell.loads
+        stress = dict(zip((*SPATIAL_STRAINS, "temperature"), (*SPATIAL_STRESSES, "temperature"), strict=True))
+        values = [target.get(name, target.get(stress[name], 0.0)) for name in strains]
+        return Load(np.array(values), np.array([name not in target for name in strains]))
+
+    def responses(self, state: Equilibrium, scale: float) -> list[Response]:
+        """The averages of `scale` times the equilibrium of all problems.  Collective; raises as
+        `Homogenization.response`."""
+        states = [state] if state.axial is None else [state, state.axial]
+        return [problem.response(own, scale) for problem, own in zip(self._problems, states, strict=True)]
+
+    def loaded_point(self, responses: Sequence[Response]) -> dict[str, Any]:
+        """What result.json says of a state under one load, whose responses these are.  Collective."""
+        plane, *others = responses
+        strain, stress = plane.strain, plane.stress
+        spatial = {}
+        if others:
+            strain = phase_laws.spatial_vector(plane.strain, others[0].strain)
+            stress = phase_laws.spatial_vector(plane.stress, others[0].stress)
+            if "temperature" in self.homogenization.loads:
+                spatial = {"temperature": float(plane.strain[-1])}
+        numbers = {"strain": strain, "stress": stress} | spatial
+        energies = {
+            "stored": sum(response.stored for response in responses),
+            "stored_in_springs": sum(response.in_springs for response in responses),
+        }
+        iterations = sum(response.state.iterations for response in responses)
+        return numbers | energies | self.point([plane]) | {"iterations": iterations}
+
+    def record_state(self, responses: Sequence[Response], load_factor: float, label: str, point: int) -> None:
+        """Keep the state that these are the responses of."""
+        plane, *others = responses
+        self.record(plane, others[0] if others else None, load_factor, label, point)
 
     @property
     def unit_loads(self) -> list[str]:

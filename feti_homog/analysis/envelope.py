@@ -71,8 +71,7 @@ def run(context: AnalysisContext, section: Envelope, criterion: BondCriterion) -
     context.check("L^ef", {"symmetry": asymmetry(stiffness)})
     angles = 360.0 * np.arange(section.directions) / section.directions
     rays = rays_of(section.plane, angles, stiffness, columns.get("thermal_stress"), section.temperature or 0.0)
-    axial = None if context.axial is None else context.axial.interface
-    onset = OnsetCriterion.of(criterion, interface, axial, status)
+    onset = OnsetCriterion.of(criterion, context.loaded_cell, status)
     finder = _Finder(context, responses, onset)
     points = [{"angle": float(angle)} | point for angle, point in zip(angles, finder.points(rays), strict=True)]
     return {"effective_stiffness": stiffness, "envelope": points} | columns

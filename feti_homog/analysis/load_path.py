@@ -5,17 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-import numpy as np
-
 from feti_homog.analysis.context import AnalysisContext
-from feti_homog.analysis.path_events import Dissipation, Energies, restored, stored
+from feti_homog.analysis.path_events import Work, restored, stored
 from feti_homog.analysis.tip_records import TipRecorder
 from feti_homog.common.event_progress import EVENTS_BAR, STEPS_BAR, EventProgress
 from feti_homog.config.sections import LoadPath
 from feti_homog.homogenization.averaging import Response
 from feti_homog.interface.bond_criterion import BondCriterion, spring_criterion
 from feti_homog.interface.path_following import events, increments
-from feti_homog.interface.path_points import Point, unloaded
+from feti_homog.interface.path_points import Energies, Point, unloaded
 from feti_homog.mechanics.kept_points import kept
 from feti_homog.output.files import event_log
 from feti_homog.output.files.checkpoint import Checkpoint
@@ -31,19 +29,19 @@ def run(
     `states` has the numbers of the points whose fields are recorded; which, is chosen when all are known.
     """
     known = _known(context, checkpoint, resume)
-    dissipation, entries, last = Dissipation(), list[dict[str, Any]](), None
+    work, entries, last = Work(), list[dict[str, Any]](), None
     with EventProgress(context.progress, BARS[path.method], event_log.NAME) as shown:
         for number, (point, energies) in enumerate(_points(context, path, criterion, checkpoint, known)):
-            response = context.homogenization.response(point.state, point.scale)
+            responses = context.responses(point.state, point.scale)
             source = "" if energies is None else ", from the checkpoint"
             if energies is not None:
-                dissipation.recall(energies, point)
+                work.recall(*energies, point)
             else:
-                dissipation.arrive(point)
-                if point.state.solution.reason > 0:
-                    checkpoint.write(number, *stored(point, dissipation))
-            _tell(context, shown, f"{_label(path, number)} at {point.load_factor:.6f}{source}", response)
-            entries.append(_entry(context, criterion, point, response, dissipation))
+                work.arrive(point)
+                if point.state.converged:
+                    checkpoint.write(number, *stored(point, work))
+            _tell(context, shown, f"{_label(path, number)} at {point.load_factor:.6f}{source}", responses)
+            entries.append(_entry(context, criterion, point, responses, work))
             shown.advance(point.load_factor, f"{len(entries)} {path.method}, {_counts(entries[-1])}")
             last = point
             if not _goes_on(context, path, point, number + 1):
@@ -72,27 +70,28 @@ def _known(context: AnalysisContext, checkpoint: Checkpoint, resume: bool) -> in
 
 def _points(
     context: AnalysisContext, path: LoadPath, criterion: BondCriterion, checkpoint: Checkpoint, known: int
-) -> Iterator[tuple[Point, Energies | None]]:
+) -> Iterator[tuple[Point, tuple[Energies, float] | None]]:
     """The points of the checkpoint with the energies up to each, then those still to be found."""
-    interface, waypoints = context.homogenization.interface, np.array(path.targets)
-    begin = unloaded(interface, context.status(None))
+    cell, waypoints = context.loaded_cell, [context.load(target) for target in context.case.targets]
+    begin = unloaded(cell, context.status(None))
     for number in range(known):
         point, energies = restored(checkpoint.read(number))
         begin = point.after
         yield point, energies
     if path.method == "events":
-        found = events(interface, criterion, waypoints, begin)
+        found = events(cell, criterion, waypoints, begin)
     else:
-        found = increments(interface, criterion, waypoints, path.increments or 1, path.release == "worst", begin)
+        found = increments(cell, criterion, waypoints, path.increments or 1, path.release == "worst", begin)
     yield from ((point, None) for point in found)
 
 
-def _tell(context: AnalysisContext, shown: EventProgress, name: str, response: Response) -> None:
-    """Check a response; its line goes to the log and, if it is due or tells of a fault, to the terminal."""
-    faults = len(context.faults)
-    line = context.record_checks(name, response)
-    context.log(line)
-    shown.tell(line, urgent=len(context.faults) > faults)
+def _tell(context: AnalysisContext, shown: EventProgress, name: str, responses: Sequence[Response]) -> None:
+    """Check the responses of a point; their lines go to the log and, if due or telling of a fault, to the terminal."""
+    for response, problem in zip(responses, ("", ", along the fibres"), strict=False):
+        faults = len(context.faults)
+        line = context.record_checks(f"{name}{problem}", response)
+        context.log(line)
+        shown.tell(line, urgent=len(context.faults) > faults)
 
 
 def _label(path: LoadPath, number: int) -> str:
@@ -100,27 +99,24 @@ def _label(path: LoadPath, number: int) -> str:
 
 
 def _entry(
-    context: AnalysisContext, criterion: BondCriterion, point: Point, response: Response, dissipation: Dissipation
+    context: AnalysisContext, criterion: BondCriterion, point: Point, responses: Sequence[Response], work: Work
 ) -> dict[str, Any]:
     """What result.json says of a point."""
     return {
         "load_factor": point.load_factor,
-        "strain": response.strain,
-        "stress": response.stress,
         "broke": point.broke,
         "free_motions": point.state.free_motions,
-        "stored": response.stored,
-        "stored_in_springs": response.in_springs,
-        "dissipated": dissipation.followed,
-        "dissipated_strain_controlled": dissipation.strain_controlled,
-        **({} if spring_criterion(criterion) is None else _fracture(dissipation)),
-    } | context.point([response])
+        "work": work.followed.work,
+        "dissipated": work.followed.released,
+        "dissipated_strain_controlled": work.load_controlled,
+        **({} if spring_criterion(criterion) is None else _fracture(work.followed)),
+    } | context.loaded_point(responses)
 
 
-def _fracture(dissipation: Dissipation) -> dict[str, float]:
+def _fracture(followed: Energies) -> dict[str, float]:
     """What bonds that break by energy have lost beside their toughness."""
-    energy = dissipation.fracture
-    return {"fracture_energy": energy} | ({"dissipation_ratio": dissipation.followed / energy} if energy else {})
+    energy = followed.fracture
+    return {"fracture_energy": energy} | ({"dissipation_ratio": followed.released / energy} if energy else {})
 
 
 def _counts(entry: Mapping[str, Any]) -> str:
@@ -129,7 +125,7 @@ def _counts(entry: Mapping[str, Any]) -> str:
 
 def _goes_on(context: AnalysisContext, path: LoadPath, point: Point, count: int) -> bool:
     """Whether the path goes on after the last of so many points."""
-    if point.state.solution.reason < 0:
+    if not point.state.converged:
         # What broke next was decided on a state that does not hold.
         return False
     if count == path.max_events and point.load_factor < 1.0:
@@ -154,15 +150,15 @@ def _kept(
     springs = spring_criterion(criterion)
     if last is None or (springs is None and not context.keeps_fields):
         return {}
-    numbers = kept(entries, context.states, len(path.targets) if path.method == "events" else 0)
-    tips = None if springs is None else TipRecorder(context.homogenization, springs)
+    numbers = kept(entries, context.states, len(context.case.targets) if path.method == "events" else 0)
+    tips = None if springs is None else TipRecorder(context.homogenization.cell, context.loaded_cell, springs)
     with context.progress.stage("states") as words:
         for number in context.progress.bar(numbers, "states"):
             point = last if number == len(entries) - 1 else restored(checkpoint.read(number))[0]
             if tips is not None:
                 entries[number]["tips"] = tips.of(point)
             if context.keeps_fields:
-                response = context.homogenization.response(point.state, point.scale)
-                context.record(response, None, point.load_factor, _label(path, number), number)
+                responses = context.responses(point.state, point.scale)
+                context.record_state(responses, point.load_factor, _label(path, number), number)
         words.append(f"{len(numbers)} of {len(entries)} points")
     return {"states": numbers} if context.keeps_fields else {}

@@ -1,97 +1,114 @@
-"""An event of a path with what was lost up to it, and the form in which the checkpoint keeps it."""
+"""An event of a path with the energies up to it, and the form in which the checkpoint keeps it."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.interface.contact import Equilibrium
-from feti_homog.interface.path_points import Break, PathState, Point
+from feti_homog.interface.macroscopic import Macroscopic
+from feti_homog.interface.path_points import NO_ENERGIES, Energies, PathState, Point
 from feti_homog.output.files.checkpoint import Arrays
 
-Energies = tuple[float, float, float]
-"""The three of a `Dissipation`."""
-
 KKT_LAWS = ("kkt_complementarity", "kkt_penetration", "kkt_tension")
+# Behind the names of what belongs to the problem along the fibres.
+AXIAL = "_axial"
 
 
 @dataclass
-class Dissipation:
-    """Energies of the breaks per area of the cell up to a point's state.
+class Work:
+    """Energies per area of the cell up to a point's state.
 
-    What is lost is W - 1/2 E.Sigma with the work W = int Sigma.dE.
+    What is lost to breaks is the work of the loads less what is stored.
 
     Attributes:
         followed: where every bond broke at its own load, the first leg with its snap-back.
-        strain_controlled: where the strain only rose on the first leg, as in a test: a bond of a snap-back breaks at
-            the largest load t so far, and loses (t / own load)^2 times as much, for all is of degree one in the load.
-        fracture: toughness times length of the bonds that broke.
+        load_controlled: what is lost where the load only rose on the first leg, as in a test: a bond of a snap-back
+            breaks at the largest load t so far, and loses (t / own load)^2 times as much, for all is of degree one in
+            the load.
     """
 
-    followed: float = 0.0
-    strain_controlled: float = 0.0
-    fracture: float = 0.0
+    followed: Energies = NO_ENERGIES
+    load_controlled: float = 0.0
     _load: float = 0.0
     _largest_load: float = 0.0
 
     def arrive(self, point: Point) -> None:
-        """Add what breaks lost on the way from the last point to this one."""
+        """Add the energies of the way from the last point to this one."""
         # Beyond the first leg loads do not fall.
         rise = self._largest_load / self._load if self._load else 1.0
-        controlled = self.strain_controlled + rise**2 * point.released
-        self.recall((self.followed + point.released, controlled, self.fracture + point.fracture_energy), point)
+        controlled = self.load_controlled + rise**2 * point.energies.released
+        self.recall(self.followed.plus(point.energies), controlled, point)
 
-    def recall(self, energies: Energies, point: Point) -> None:
+    def recall(self, followed: Energies, load_controlled: float, point: Point) -> None:
         """Go on from a point up to which there were these."""
-        self.followed, self.strain_controlled, self.fracture = energies
+        self.followed, self.load_controlled = followed, load_controlled
         self._load, self._largest_load = point.load_factor, max(point.load_factor, self._largest_load)
 
 
-def stored(point: Point, dissipation: Dissipation) -> tuple[dict[str, Any], Arrays]:
+def stored(point: Point, work: Work) -> tuple[dict[str, Any], Arrays]:
     """A point as plain numbers and distributed arrays, for the checkpoint.
 
     A path goes on from the multipliers of its last state.
     """
-    state, solution, after = point.state, point.state.solution, point.after
-    counts = [point.broke, state.iterations, state.solves, state.free_motions, solution.iterations, solution.reason]
-    broken = [np.nan] * 4 if after.broken is None else [*after.broken.stress, after.broken.fracture_energy]
+    after = point.after
     whole: dict[str, Any] = {
-        "path": [point.load_factor, point.scale, float(after.leg), after.position],
-        "energy": [point.released, point.fracture_energy],
-        "energies": [dissipation.followed, dissipation.strain_controlled, dissipation.fracture],
-        "numbers": counts,
-        "broken": broken,
+        "path": [point.load_factor, point.scale, float(after.leg), after.position, float(point.broke)],
+        "energies": [*point.energies, *work.followed, work.load_controlled],
+        "macroscopic": np.stack([after.origin.strain, after.origin.stress, after.last.strain, after.last.stress]),
+        "broken": np.nan if after.broken is None else after.broken,
+    }
+    distributed: Arrays = {"used": point.used, "status_after": after.status}
+    for suffix, state in (("", point.state), (AXIAL, point.state.axial)):
+        if state is not None:
+            numbers, arrays = _taken_apart(state)
+            whole |= {f"{name}{suffix}": value for name, value in numbers.items()}
+            distributed |= {f"{name}{suffix}": value for name, value in arrays.items()}
+    return whole, distributed
+
+
+def restored(event: Arrays) -> tuple[Point, tuple[Energies, float]]:
+    """What `stored` took apart: the point, and `followed` and `load_controlled` of the energies up to it."""
+    load_factor, scale, leg, position, broke = event["path"].tolist()
+    energies = event["energies"].tolist()
+    state = _put_together(event, "")
+    if f"lam{AXIAL}" in event:
+        state = replace(state, axial=_put_together(event, AXIAL))
+    origin_strain, origin_stress, strain, stress = event["macroscopic"]
+    broken = float(event["broken"])
+    after = PathState(
+        int(leg),
+        position,
+        event["status_after"],
+        state.multipliers,
+        Macroscopic(origin_strain, origin_stress),
+        Macroscopic(strain, stress),
+        None if np.isnan(broken) else broken,
+    )
+    point = Point(load_factor, scale, state, int(broke), Energies(*energies[:3]), event["used"], after)
+    return point, (Energies(*energies[3:6]), energies[6])
+
+
+def _taken_apart(state: Equilibrium) -> tuple[dict[str, Any], Arrays]:
+    """The equilibrium of one problem."""
+    solution = state.solution
+    whole: dict[str, Any] = {
+        "numbers": [state.iterations, state.solves, state.free_motions, solution.iterations, solution.reason],
         "strain": solution.strain,
         "alpha": solution.alpha,
         "residual": solution.residual,
         "certificate": [state.certificate[law] for law in KKT_LAWS],
     }
-    distributed: Arrays = {
-        "status": state.status,
-        "lam": solution.lam,
-        "jump": solution.jump,
-        "used": point.used,
-        "status_after": after.status,
-    }
-    return whole, distributed
+    return whole, {"status": state.status, "lam": solution.lam, "jump": solution.jump}
 
 
-def restored(event: Arrays) -> tuple[Point, Energies]:
-    """What `stored` took apart."""
-    load_factor, scale, leg, position = event["path"].tolist()
-    followed, strain_controlled, fracture = event["energies"].tolist()
-    broke, iterations, solves, free_motions, last, reason = event["numbers"].tolist()
-    solution = DualSolution(
-        event["strain"], event["lam"], event["jump"], event["alpha"], last, reason, float(event["residual"])
-    )
-    certificate = dict(zip(KKT_LAWS, event["certificate"].tolist(), strict=True))
-    state = Equilibrium(event["status"], solution, iterations, solves, free_motions, certificate)
-    *stress, broken = event["broken"].tolist()
-    of_break = None if np.isnan(broken) else Break(np.array(stress), broken)
-    after = PathState(int(leg), position, event["status_after"], event["lam"], of_break)
-    released, of_bonds = event["energy"].tolist()
-    point = Point(load_factor, scale, state, broke, released, of_bonds, event["used"], after)
-    return point, (followed, strain_controlled, fracture)
+def _put_together(event: Arrays, suffix: str) -> Equilibrium:
+    """What `_taken_apart` took apart."""
+    strain, lam, jump, alpha = (event[f"{name}{suffix}"] for name in ("strain", "lam", "jump", "alpha"))
+    iterations, solves, free_motions, last, reason = event[f"numbers{suffix}"].tolist()
+    solution = DualSolution(strain, lam, jump, alpha, last, reason, float(event[f"residual{suffix}"]))
+    certificate = dict(zip(KKT_LAWS, event[f"certificate{suffix}"].tolist(), strict=True))
+    return Equilibrium(event[f"status{suffix}"], solution, iterations, solves, free_motions, certificate)

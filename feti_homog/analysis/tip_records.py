@@ -6,9 +6,9 @@ import numpy as np
 
 from feti_homog.analysis.result_records import Tips
 from feti_homog.feti.decomposition.interface_neighbours import InterfaceNeighbours
-from feti_homog.homogenization.averaging import Homogenization
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface.energy_criterion import EnergyCriterion
+from feti_homog.interface.loaded_cell import LoadedCell
 from feti_homog.interface.path_points import Point
 from feti_homog.interface.tip_energies import tip_energies
 from feti_homog.typing import Float
@@ -29,18 +29,17 @@ def bond_directions(cell: TornCell) -> Float:
 class TipRecorder:
     """Makes the records of points whose bonds break by energy."""
 
-    def __init__(self, homogenization: Homogenization, springs: EnergyCriterion) -> None:
-        """Collective."""
-        self._cell, self._interface, self._springs = homogenization.cell, homogenization.interface, springs
-        cell = self._cell
+    def __init__(self, cell: TornCell, loaded: LoadedCell, springs: EnergyCriterion) -> None:
+        """`loaded` are the interfaces of the cell.  Collective."""
+        self._cell, self._loaded, self._springs = cell, loaded, springs
         self._neighbours = InterfaceNeighbours(
             cell.comm, cell.solver.jump_operator, cell.subdomains, cell.summary.phases[0]
         )
 
     def of(self, point: Point) -> Tips:
         """The tips of a point on every rank, by fibre and direction.  Collective."""
-        cell, nodes = self._cell, self._interface.nodes
-        traction = point.scale * self._interface.traction(point.state.solution)
+        cell, nodes = self._cell, self._loaded.nodes
+        traction = point.scale * self._loaded.traction(point.state.solutions)
         own = tip_energies(self._springs, self._neighbours, point.state.status, traction, point.used)
         direction = bond_directions(cell)[own.node]
         fibre = cell.summary.fibre_number(nodes.fibre[own.node])

@@ -83,6 +83,11 @@ class Case:
         """What is debonded from the start; none if the bonding is perfect."""
         return () if self.interface is None else self.interface.debonded
 
+    @property
+    def targets(self) -> tuple[Mapping[str, float], ...]:
+        waypoints = () if self.path is None else self.path.targets
+        return tuple(dict(zip(("E11", "E22", "gamma12"), each, strict=True)) for each in waypoints)
+
     def material_of(self, phase: str) -> Material:
         """The material of a phase; "fibre:2" without its own has that of "fibre". Raises KeyError."""
         return self.materials[provider(phase, self.materials)]

@@ -17,6 +17,7 @@ from feti_homog.errors import ConvergenceError
 from feti_homog.feti.operators.node_blocks import NodeBlocks
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface.contact import BONDED, CLOSED, OPEN, Equilibrium, Interface, Status
+from feti_homog.interface.load import Load
 from feti_homog.typing import Float
 
 
@@ -74,7 +75,7 @@ class Homogenization:
         if self.interface.is_linear(status):
             return [self.response(state, 1.0) for state in self.interface.equilibria(strains, status, starts)]
         pairs = zip(strains, starts, strict=True)
-        return [self.response(self.interface.equilibrium(strain, status, start), 1.0) for strain, start in pairs]
+        return [self.response(self.interface.equilibrium(Load.strain(E), status, start), 1.0) for E, start in pairs]
 
     def response(self, state: Equilibrium, scale: float) -> Response:
         """The averages of `scale` times an equilibrium.  Collective.

@@ -17,9 +17,12 @@ from numpy.typing import NDArray
 from feti_homog.feti.decomposition.constraint_layout import InterfaceNodes
 from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.feti.solver import FetiSolver
+from feti_homog.interface import mixed_load
 from feti_homog.interface.block_pivoting import BlockPivoting
 from feti_homog.interface.contact_certificate import kkt_errors
+from feti_homog.interface.load import Load
 from feti_homog.interface.rigid_placement import place
+from feti_homog.interface.solutions import Multipliers, Solutions
 from feti_homog.mechanics.bounds import reuss, voigt
 from feti_homog.typing import Bool, Float, Int
 
@@ -40,7 +43,7 @@ MAX_CONTACT_SOLVES = 500
 
 @dataclass(frozen=True)
 class Equilibrium:
-    """The cell under one macroscopic strain with the contact states that hold there.
+    """The cell under one load with the contact states that hold there.
 
     Attributes:
         status: (k,) BONDED, CLOSED or OPEN of the interface nodes that this rank owns.
@@ -49,6 +52,7 @@ class Equilibrium:
         free_motions: number of rigid motions of bodies that no interface force resists; a face that touches without
             a force resists none.
         certificate: errors of the KKT conditions, `contact_certificate.kkt_errors`.
+        axial: the same of the displacement along the fibres with these bonds, where that is a problem.
     """
 
     status: Status
@@ -57,6 +61,22 @@ class Equilibrium:
     solves: int
     free_motions: int
     certificate: dict[str, float]
+    axial: Equilibrium | None = None
+
+    @property
+    def solutions(self) -> Solutions:
+        """Of all problems."""
+        return Solutions(self.solution, None if self.axial is None else self.axial.solution)
+
+    @property
+    def multipliers(self) -> Multipliers:
+        """Of all problems."""
+        return self.solutions.lam
+
+    @property
+    def converged(self) -> bool:
+        """Whether the Krylov method found all."""
+        return self.solutions.converged
 
 
 @dataclass(frozen=True)
@@ -129,6 +149,12 @@ class Interface:
         return np.array(areas) / sum(areas), np.stack(stiffnesses)
 
     @cached_property
+    def largest_stiffness(self) -> float:
+        """The largest entry of Reuss' bound.  Collective."""
+        m = self.solver.problem.strains
+        return float(np.abs(self.least_bonded_stiffness[:m, :m]).max())
+
+    @cached_property
     def _free_strains(self) -> Float:
         """(m, v) sizes of the strains that the loads make: their own, and of the others the largest of free bodies.
 
@@ -151,10 +177,15 @@ class Interface:
         """(k, c) rows of the bonds."""
         return self.nodes.row[:, None] + np.arange(self.solver.jump_operator.components)
 
-    def linear(self, strain: Float, status: Status, start: Float) -> DualSolution:
-        """The dual problem with the states as they are; `start` are first multipliers (owned rows,)."""
+    def linear(self, load: Load, status: Status, start: Float) -> DualSolution:
+        """The dual problem with the states as they are; `start` are first multipliers (owned rows,).  Collective.
+
+        Raises:
+            ConvergenceError: nothing carries the stresses of the load.
+        """
         self.solver.activate(self.active(status))
-        return self.solver.solve(strain, start)
+        least = self.sign_noise * self.largest_stiffness
+        return mixed_load.solve(self.solver, load, start, float(self.size.prod()), least)
 
     def is_linear(self, status: Status) -> bool:
         """Whether no face can come to touch another; collective."""
@@ -166,12 +197,12 @@ class Interface:
         solutions = self.solver.solve_many(strains, np.stack(starts, axis=1))
         return [self._equilibrium(status, solution, solution.iterations, 1) for solution in solutions]
 
-    def equilibrium(self, strain: Float, status: Status, start: Float) -> Equilibrium:
-        """Solve for the strain (3,), with `status` a first guess of who is in contact.  Collective."""
+    def equilibrium(self, load: Load, status: Status, start: Float) -> Equilibrium:
+        """Solve for the load, with `status` a first guess of who is in contact.  Collective; raises as `linear`."""
         pivoting = BlockPivoting(self.solver.comm, self.block_pivots)
         iterations = solves = 0
         while True:
-            solution = self.linear(strain, status, start)
+            solution = self.linear(load, status, start)
             iterations, solves = iterations + solution.iterations, solves + 1
             solution, wrong = self._placed(status, solution)
             count = self.solver.comm.allreduce(int(wrong.sum()))

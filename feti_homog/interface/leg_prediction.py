@@ -8,26 +8,28 @@ from mpi4py import MPI
 from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.interface.bond_criterion import BondCriterion
 from feti_homog.interface.contact import BONDED, CLOSED, OPEN, Equilibrium, Interface
+from feti_homog.interface.loaded_cell import LoadedCell
 from feti_homog.interface.rigid_placement import room_ahead, shares_to_zero
+from feti_homog.interface.solutions import Solutions
 
 # Halvings of an interval of length one, after which double precision tells no more.
 BISECTIONS = 60
 
 
-def first_break(interface: Interface, criterion: BondCriterion, state: Equilibrium, ahead: DualSolution) -> float:
+def first_break(cell: LoadedCell, criterion: BondCriterion, state: Equilibrium, ahead: Solutions) -> float:
     """Share of the way to `ahead` at which the first bond reaches its strength, or inf.  Collective.
 
     Utilisation is convex along a straight way, so below 1 here and above 1 there it passes 1 once: bisection.
     """
-    here, there = interface.traction(state.solution), interface.traction(ahead)
-    utilisation = criterion.law(interface, state.status)
+    here, there = cell.traction(state.solutions), cell.traction(ahead)
+    utilisation = criterion.law(cell, state.status)
     over = (state.status == BONDED) & (utilisation(there) > 1.0)
     step, low, high = there - here, np.zeros(len(here)), np.ones(len(here))
     for _ in range(BISECTIONS if over.any() else 0):
         middle = (low + high) / 2
         broken = utilisation(here + middle[:, None] * step) > 1.0
         low, high = np.where(broken, low, middle), np.where(broken, middle, high)
-    return float(interface.solver.comm.allreduce(high[over].min(initial=np.inf), MPI.MIN))
+    return float(cell.comm.allreduce(high[over].min(initial=np.inf), MPI.MIN))
 
 
 def first_change(interface: Interface, state: Equilibrium, ahead: DualSolution) -> tuple[float, float]:

@@ -15,12 +15,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from feti_homog.interface.bond_criterion import BondCriterion
-from feti_homog.interface.contact import BONDED, Interface, Status
+from feti_homog.interface.contact import BONDED, Status
 from feti_homog.interface.energy_criterion import EnergyCriterion
 from feti_homog.interface.leg_prediction import BISECTIONS
+from feti_homog.interface.loaded_cell import LoadedCell
 from feti_homog.interface.path_points import UTILISATION_TIE
 from feti_homog.interface.strength_criterion import StrengthCriterion
-from feti_homog.interface.tip_criterion import TipCriterion, Tips, released_energy
+from feti_homog.interface.tip_criterion import TipCriterion, Tips
 from feti_homog.typing import Bool, Float, Int
 
 
@@ -30,22 +31,17 @@ class TipEnergies:
 
     Attributes:
         number: (k,) of the tip that a node is, or -1.
-        tips: in the plane.
-        axial: (t,) the same of slip along the fibre, H_aa; empty where there is none.
+        tips: they.
     """
 
     number: Int
     tips: Tips
-    axial: Float
 
     def utilisation(self, springs: EnergyCriterion, traction: Float, tip: Int) -> Float:
         """(p,) sqrt of what the breaks of bonds release / (G_c l), for tractions (p, c) at the tips (p,)."""
-        tips, length = self.tips, self.tips.length[tip]
-        lam = traction * length[:, None]
-        released = released_energy(tips.H[tip], lam[:, :2], tips.stiffness[tip], contact=False)
-        if traction.shape[1] == 3:
-            released = released + lam[:, 2] ** 2 / (2.0 * self.axial[tip])
-        return np.asarray(np.sqrt(released / (springs.toughness * length)) * springs.mode_factor(traction))
+        tips = self.tips.chosen(tip)
+        released = tips.released(traction, contact=False)
+        return np.asarray(np.sqrt(released / (springs.toughness * tips.length)) * springs.mode_factor(traction))
 
 
 @dataclass(frozen=True)
@@ -63,17 +59,15 @@ class OnsetCriterion:
     tips: TipEnergies | None
 
     @classmethod
-    def of(
-        cls, criterion: BondCriterion, interface: Interface, axial: Interface | None, status: Status
-    ) -> OnsetCriterion:
-        """That of a criterion with these bonds; `axial` has the slip along the fibres.  Collective."""
+    def of(cls, criterion: BondCriterion, cell: LoadedCell, status: Status) -> OnsetCriterion:
+        """That of a criterion with these bonds.  Collective."""
         bonded = np.asarray(status == BONDED)
         if not isinstance(criterion, TipCriterion):
             return cls(criterion, bonded, None)
-        tips = criterion.tips(interface, status)
+        tips = criterion.tips(cell, status)
         number = np.full(len(status), -1)
         number[tips.node] = np.arange(len(tips.node))
-        return cls(criterion.springs, bonded, TipEnergies(number, tips, criterion.axial_flexibility(axial, status)))
+        return cls(criterion.springs, bonded, TipEnergies(number, tips))
 
     def utilisation(self, traction: Float, node: Int) -> Float:
         """(p,) share of what breaks them that tractions (p, c) at the nodes (p,) use; 0 of debonded ones."""

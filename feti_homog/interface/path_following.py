@@ -1,54 +1,52 @@
-"""Load-induced debonding, Section III.F: the macroscopic strain follows a path, bonds over their strength break.
+"""Load-induced debonding, Section III.F: the load follows a path, bonds over their strength break.
 
 `events` finds every break exactly.  The first leg of the path starts at zero, where for zero initial gaps the
 response is homogeneous of degree one: one solve gives the load at which the next bond breaks, be it lower than
-the last (snap-back).  On later legs it is the strain that is controlled, see `later_leg`.  `increments` is the paper's
+the last (snap-back).  On later legs it is the load that is controlled, see `later_leg`.  `increments` is the paper's
 loop.
 
-Energy.  A break happens at constant strain E and loses 1/2 E.(Sigma before - Sigma after) per area of the cell; between
-breaks nothing is lost.  A point's `released` is what breaks lost on the way from the last point's state to its own.
+Energy.  A break happens at constant load, at which stresses or strains jump, and loses work less stored energy; between
+breaks nothing is lost.  A point's `energies` are those of the way from the last point's state to its own.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import replace
-
-import numpy as np
+from collections.abc import Iterator, Sequence
 
 from feti_homog.interface.bond_criterion import BondCriterion
-from feti_homog.interface.contact import Interface
-from feti_homog.interface.later_leg import LaterLeg, strain_between
+from feti_homog.interface.later_leg import LaterLeg
+from feti_homog.interface.load import Load
+from feti_homog.interface.loaded_cell import LoadedCell
 from feti_homog.interface.path_points import (
+    NO_ENERGIES,
     UTILISATION_TIE,
-    Break,
+    Energies,
     PathState,
     Point,
     count_on_all_ranks,
-    energies_of,
     fracture_energy,
     most_utilised,
 )
-from feti_homog.typing import Float
 
 
-def events(interface: Interface, criterion: BondCriterion, waypoints: Float, begin: PathState) -> Iterator[Point]:
-    """Every break along zero -> waypoints[0] -> ... (n, 3), and the end of each leg.  Collective.
+def events(cell: LoadedCell, criterion: BondCriterion, waypoints: Sequence[Load], begin: PathState) -> Iterator[Point]:
+    """Every break along zero -> waypoints[0] -> ..., and the end of each leg.  Collective.
 
-    A point's state is the one before its bonds break.  On later legs the changes of contact are points too, with
-    `broke` = 0: between points the response is straight.  The last point is one that did not converge, if there is one.
+    A leg begins with what the state has of the components that its waypoint gives, strain or stress.  A point's state
+    is the one before its bonds break.  On later legs the changes of contact are points too, with `broke` = 0: between
+    points the response is straight.  The last point is one that did not converge, if there is one.
     """
-    for point in _legs(interface, criterion, waypoints, begin):
+    for point in _legs(cell, criterion, waypoints, begin):
         yield point
-        if point.state.solution.reason < 0:
+        if not point.state.converged:
             # What breaks next cannot be decided on a state that does not hold.
             return
 
 
 def increments(
-    interface: Interface,
+    cell: LoadedCell,
     criterion: BondCriterion,
-    waypoints: Float,
+    waypoints: Sequence[Load],
     steps: int,
     worst_only: bool,
     begin: PathState,
@@ -59,61 +57,69 @@ def increments(
     just the most overloaded bonds are released at a time.  The last point is one that did not converge, if there is
     one.
     """
-    corners = np.vstack([np.zeros(3), waypoints])
-    status, lam = begin.status, begin.lam
     for step in range(begin.leg + 1, steps + 1):
         leg = (step * len(waypoints) - 1) // steps
-        strain = strain_between(corners[leg], corners[leg + 1], step * len(waypoints) / steps - leg)
-        broke, broken = 0, None
-        while True:
-            state = interface.equilibrium(strain, status, lam)
-            status, lam = state.status, state.solution.lam
-            used, load, which = most_utilised(interface, criterion, state)
-            if load <= 1.0 + UTILISATION_TIE or state.solution.reason < 0:
-                break
-            if not worst_only:
-                which = used > 1.0
-            fracture = fracture_energy(interface, criterion, which, interface.traction(state.solution))
-            if broken is None:
-                broken = Break(interface.stress(state.solution), fracture)
-            else:
-                broken = replace(broken, fracture_energy=broken.fracture_energy + fracture)
-            broke += count_on_all_ranks(interface, which)
-            status = interface.debond(status, which, lam)
-        energies = energies_of(broken, strain, interface.stress(state.solution))
-        yield Point(step / steps, 1.0, state, broke, *energies, used, PathState(step, 0.0, status, lam))
-        if state.solution.reason < 0:
+        begins_here = ((step - 1) * len(waypoints) - 1) // steps < leg
+        origin, end = begin.last if begins_here else begin.origin, waypoints[leg]
+        load = origin.load(end.by_stress).after(step * len(waypoints) / steps - leg, end)
+        point = _increment(cell, criterion, load, worst_only, begin)
+        after = PathState(step, 0.0, point.state.status, point.state.multipliers, origin, point.after.last)
+        begin = after
+        yield Point(step / steps, 1.0, point.state, point.broke, point.energies, point.used, after)
+        if not point.state.converged:
             return
 
 
-def _legs(interface: Interface, criterion: BondCriterion, waypoints: Float, begin: PathState) -> Iterator[Point]:
+def _increment(cell: LoadedCell, criterion: BondCriterion, load: Load, worst_only: bool, begin: PathState) -> Point:
+    """The state under a load after all overloaded bonds have broken."""
+    status, lam, here, broke = begin.status, begin.lam, begin, 0
+    energies = NO_ENERGIES
+    while True:
+        state = cell.equilibrium(load, status, lam)
+        status, lam, reached = state.status, state.multipliers, cell.macroscopic(state.solutions)
+        energies = energies.plus(here.energies_to(reached))
+        used, largest, which = most_utilised(cell, criterion, state)
+        here = PathState(begin.leg, 0.0, status, lam, begin.origin, reached)
+        if largest <= 1.0 + UTILISATION_TIE or not state.converged:
+            return Point(0.0, 1.0, state, broke, energies, used, here)
+        if not worst_only:
+            which = used > 1.0
+        fracture = fracture_energy(cell, criterion, which, cell.traction(state.solutions))
+        broke += count_on_all_ranks(cell, which)
+        status = cell.plane.debond(status, which, lam.plane)
+        here = PathState(begin.leg, 0.0, status, lam, begin.origin, reached, fracture)
+
+
+def _legs(cell: LoadedCell, criterion: BondCriterion, waypoints: Sequence[Load], begin: PathState) -> Iterator[Point]:
     legs = len(waypoints)
     if begin.leg == 0:
-        for point in _first_leg(interface, criterion, waypoints[0], legs, begin):
+        for point in _first_leg(cell, criterion, waypoints[0], legs, begin):
             yield point
             begin = point.after
     for leg in range(max(begin.leg, 1), legs):
-        strains = (waypoints[leg - 1], waypoints[leg])
-        for point in LaterLeg(interface, criterion, strains, (leg, legs), begin).points():
+        for point in LaterLeg(cell, criterion, waypoints[leg], (leg, legs), begin).points():
             yield point
             begin = point.after
 
 
-def _first_leg(
-    interface: Interface, criterion: BondCriterion, strain: Float, legs: int, begin: PathState
-) -> Iterator[Point]:
-    """From zero to `strain` through all equilibria; with the bonds of now, Sigma(t E) = t Sigma(E) for t >= 0."""
-    status, lam, factor, broken = begin.status, begin.lam, begin.position, begin.broken
+def _first_leg(cell: LoadedCell, criterion: BondCriterion, load: Load, legs: int, begin: PathState) -> Iterator[Point]:
+    """From zero to the load through all equilibria; with the bonds of now, a state under t times the load is t times
+    the state, for t >= 0."""
+    factor = begin.position
     while True:
-        state = interface.equilibrium(strain, status, lam)
-        lam, stress = state.solution.lam, interface.stress(state.solution)
-        energies = energies_of(broken, factor * strain, factor * stress)
-        used, load, worst = most_utilised(interface, criterion, state)
-        if load <= 1.0:
-            yield Point(1.0 / legs, 1.0, state, 0, *energies, used, PathState(1, 0.0, state.status, lam))
+        state = cell.equilibrium(load, begin.status, begin.lam)
+        whole, lam = cell.macroscopic(state.solutions), state.multipliers
+        here = whole.scaled(factor)
+        energies = begin.energies_to(here)
+        used, largest, worst = most_utilised(cell, criterion, state)
+        factor = 1.0 / max(largest, 1.0)
+        reached = whole.scaled(factor)
+        energies = energies.plus(Energies(here.work_to(reached), 0.0, 0.0))
+        if largest <= 1.0:
+            after = PathState(1, 0.0, state.status, lam, reached, reached)
+            yield Point(1.0 / legs, 1.0, state, 0, energies, used, after)
             return
-        factor, traction = 1.0 / load, interface.traction(state.solution)
-        broken = Break(stress / load, fracture_energy(interface, criterion, worst, traction))
-        broke, status = count_on_all_ranks(interface, worst), interface.debond(state.status, worst, lam)
-        after = PathState(0, factor, status, lam, broken)
-        yield Point(factor / legs, factor, state, broke, *energies, used / load, after)
+        fracture = fracture_energy(cell, criterion, worst, cell.traction(state.solutions))
+        broke, status = count_on_all_ranks(cell, worst), cell.plane.debond(state.status, worst, lam.plane)
+        begin = PathState(0, factor, status, lam, begin.origin, reached, fracture)
+        yield Point(factor / legs, factor, state, broke, energies, used / largest, begin)

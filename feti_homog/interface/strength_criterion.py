@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from feti_homog.interface.contact import Interface, Status
+from feti_homog.interface.contact import Status
+from feti_homog.interface.loaded_cell import LoadedCell
 from feti_homog.typing import Float
 
 
@@ -28,7 +29,7 @@ class StrengthCriterion:
     criterion: str
     axial: float = math.inf
 
-    def law(self, interface: Interface, status: Status) -> Callable[[Float], Float]:
+    def law(self, cell: LoadedCell, status: Status) -> Callable[[Float], Float]:
         """`utilisation`, whatever is debonded."""
         return self.utilisation
 

@@ -15,8 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from feti_homog.feti.preconditioners.influence import Influence
-from feti_homog.interface.contact import BONDED, Interface, Status
+from feti_homog.interface.contact import BONDED, Status
 from feti_homog.interface.energy_criterion import EnergyCriterion
+from feti_homog.interface.loaded_cell import LoadedCell
 from feti_homog.typing import Bool, Float, Int
 
 # Share of a spring's stiffness that the inverse of the dual operator is where only rounding is left of it.
@@ -31,13 +32,30 @@ class Tips:
         node: (t,) their numbers.
         H: (t, 2, 2) their blocks of the inverse of the dual operator.
         length: (t,) that they stand for.
-        stiffness: (t, 2) the most that H can be, of a spring its own.
+        stiffness: (t, c) the most that H can be, of a spring its own.
+        axial: (t,) the same blocks for slip along the fibres; empty where there is none.
     """
 
     node: Int
     H: Float
     length: Float
     stiffness: Float
+    axial: Float
+
+    def chosen(self, which: Int) -> Tips:
+        """Some of them."""
+        axial = self.axial[which] if len(self.axial) else self.axial
+        return Tips(self.node[which], self.H[which], self.length[which], self.stiffness[which], axial)
+
+    def released(self, traction: Float, contact: bool) -> Float:
+        """(t,) energies that breaks release under tractions (t, c); with `contact` faces do not overlap."""
+        lam = traction * self.length[:, None]
+        released = released_energy(self.H, lam[:, :2], self.stiffness[:, :2], contact)
+        if len(self.axial) == 0:
+            return released
+        gives_way = self.axial > RIGID * self.stiffness[:, 2]
+        along = np.where(gives_way, lam[:, 2] ** 2 / np.where(gives_way, 2.0 * self.axial, 1.0), 0.0)
+        return np.asarray(released + along)
 
 
 @dataclass(frozen=True)
@@ -55,38 +73,36 @@ class TipCriterion:
     influence: Influence
     axial: Influence | None = None
 
-    def law(self, interface: Interface, status: Status) -> Callable[[Float], Float]:
-        """The utilisation (k,) of tractions (k, 2) on the interface nodes of this rank, with these bonds.  Collective;
+    def law(self, cell: LoadedCell, status: Status) -> Callable[[Float], Float]:
+        """The utilisation (k,) of tractions (k, c) on the interface nodes of this rank, with these bonds.  Collective;
         what it returns is not."""
-        tips = self.tips(interface, status)
-        own, length = tips.node, tips.length
+        tips = self.tips(cell, status)
+        own, whole = tips.node, self.springs.toughness * tips.length
 
         def utilisation(traction: Float) -> Float:
             used = self.springs.utilisation(traction)
-            released = released_energy(tips.H, traction[own] * length[:, None], tips.stiffness, interface.contact)
-            used[own] = np.sqrt(released / (self.springs.toughness * length)) * self.springs.mode_factor(traction[own])
+            released = tips.released(traction[own], cell.plane.contact)
+            used[own] = np.sqrt(released / whole) * self.springs.mode_factor(traction[own])
             return used
 
         return utilisation
 
-    def tips(self, interface: Interface, status: Status) -> Tips:
+    def tips(self, cell: LoadedCell, status: Status) -> Tips:
         """The tips that this rank owns.  Collective."""
-        interface.solver.activate(interface.active(status))
+        cell.plane.solver.activate(cell.plane.active(status))
         numbers, mine = self._own(status)
         H = self.influence.inverse_blocks(self.influence.neighbours.rows[numbers][:, None] + np.arange(2))
         own, H = numbers[mine] - self.influence.neighbours.first, H[mine]
-        length = interface.nodes.length[own]
-        springs = length[:, None] * [self.springs.normal_stiffness, self.springs.tangential_stiffness]
-        return Tips(own, H, length, np.minimum(springs, self.influence.norm))
-
-    def axial_flexibility(self, axial: Interface | None, status: Status) -> Float:
-        """(t,) H_aa of the tips of `tips`, for slip along the fibres; empty without it.  Collective."""
-        if axial is None or self.axial is None:
-            return np.zeros(0)
-        axial.solver.activate(axial.active(status))
-        numbers, mine = self._own(status)
-        rows = self.axial.neighbours.rows[numbers]
-        return np.asarray(self.axial.inverse_blocks(np.stack([rows, rows], axis=1))[mine, 0, 0])
+        length, springs = cell.nodes.length[own], self.springs
+        stiffness = length[:, None] * [springs.normal_stiffness, springs.tangential_stiffness]
+        stiffness, axial = np.minimum(stiffness, self.influence.norm), np.zeros(0)
+        if self.axial is not None and cell.axial is not None:
+            cell.axial.solver.activate(cell.axial.active(status))
+            rows = self.axial.neighbours.rows[numbers]
+            axial = self.axial.inverse_blocks(np.stack([rows, rows], axis=1))[mine, 0, 0]
+            most = np.minimum(length * springs.axial_stiffness, self.axial.norm)
+            stiffness = np.column_stack([stiffness, most])
+        return Tips(own, H, length, stiffness, axial)
 
     def _own(self, status: Status) -> tuple[Int, Bool]:
         """(n,) numbers of the tips of all ranks, and which are this rank's.  Collective."""

@@ -14,6 +14,7 @@ from support.ranks import parallel_assert
 
 from feti_homog.config.sections import Arc
 from feti_homog.interface.contact import BONDED, CLOSED, OPEN
+from feti_homog.interface.load import Load
 
 pytestmark = pytest.mark.parallel
 
@@ -32,7 +33,9 @@ def directions(cell):
 
 def response(cell, contact, strain, status):
     """Sigma and the equilibrium from the multipliers zero."""
-    state = torn_cells.interface(cell, contact).equilibrium(np.array(strain, float), status, np.zeros(cell.solver.rows))
+    state = torn_cells.interface(cell, contact).equilibrium(
+        Load.strain(np.array(strain, float)), status, np.zeros(cell.solver.rows)
+    )
     return torn_cells.stress(cell, state.solution), state
 
 
@@ -236,7 +239,7 @@ def test_single_pivots_find_the_same_state(comm, half):
     strain = [0.3, -0.6, 0.5]
     expected, block = response(cell, True, strain, status)
     interface = replace(torn_cells.interface(cell, True), block_pivots=0)
-    single = interface.equilibrium(np.array(strain), status, np.zeros(cell.solver.rows))
+    single = interface.equilibrium(Load.strain(np.array(strain)), status, np.zeros(cell.solver.rows))
     stress = torn_cells.stress(cell, single.solution)
     assert 1 < single.solves < 10 * MOST_SOLVES
     assert comm.allreduce(int((single.status != block.status).sum())) == 0

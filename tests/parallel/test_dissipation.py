@@ -8,9 +8,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from support import torn_cells
+from support.loads import strains
 
-from feti_homog.analysis.path_events import Dissipation
+from feti_homog.analysis.path_events import Work
 from feti_homog.interface.contact import BONDED
+from feti_homog.interface.load import Load
+from feti_homog.interface.loaded_cell import LoadedCell
 from feti_homog.interface.path_following import events, increments
 from feti_homog.interface.path_points import unloaded
 from feti_homog.interface.strength_criterion import StrengthCriterion
@@ -28,12 +31,12 @@ CRITERION = StrengthCriterion(20.0, 30.0, "max")
 
 def start(cell, contact):
     interface = torn_cells.interface(cell, contact)
-    return interface, unloaded(interface, np.full(len(interface.nodes.row), BONDED, np.int8))
+    return interface, unloaded(LoadedCell(interface), np.full(len(interface.nodes.row), BONDED, np.int8))
 
 
 def follow(cell, waypoints, contact=True):
     interface, begin = start(cell, contact)
-    return list(events(interface, CRITERION, np.array(waypoints), begin))
+    return list(events(LoadedCell(interface), CRITERION, strains(np.array(waypoints)), begin))
 
 
 @pytest.fixture(scope="module")
@@ -50,10 +53,10 @@ def straight(torn):
 
 def dissipated(points):
     """(points, 2) along the snap-back, and at rising strain."""
-    dissipation, rows = Dissipation(), []
+    energies, rows = Work(), []
     for point in points:
-        dissipation.arrive(point)
-        rows.append((dissipation.followed, dissipation.strain_controlled))
+        energies.arrive(point)
+        rows.append((energies.followed.released, energies.load_controlled))
     return np.array(rows)
 
 
@@ -72,7 +75,9 @@ def stored(cell, point):
 
 def stress_under(interface, cell, strain, point):
     """Sigma under a strain with the bonds that a point leaves."""
-    return torn_cells.stress(cell, interface.equilibrium(strain, point.after.status, point.after.lam).solution)
+    return torn_cells.stress(
+        cell, interface.equilibrium(Load.strain(strain), point.after.status, point.after.lam.plane).solution
+    )
 
 
 @pytest.mark.parametrize("contact", [True, False])
@@ -117,7 +122,7 @@ def test_rising_strain_dissipates_the_area_under_its_curve(straight, case, conta
 def test_increments_dissipate_the_work_that_is_not_stored(torn, worst_only):
     cell = torn(**THREE)
     interface, begin = start(cell, True)
-    points = list(increments(interface, CRITERION, STRAIGHT[None], 12, worst_only, begin))
+    points = list(increments(LoadedCell(interface), CRITERION, strains(STRAIGHT[None]), 12, worst_only, begin))
     found = dissipated(points)
     work = 0.5 * strain(points[0]) @ stress(cell, points[0])
     for before, now, lost in zip(points, points[1:], found[1:, 0], strict=False):

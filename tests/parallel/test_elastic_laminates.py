@@ -11,11 +11,13 @@ import pytest
 from reference.closed_forms import lame
 from support import torn_cells
 from support.cases import FIBRE, MATRIX
+from support.loads import strains
 from unit.cell.faulty_meshes import grid
 
 from feti_homog.homogenization.averaging import Homogenization
 from feti_homog.interface.contact import BONDED
 from feti_homog.interface.energy_criterion import EnergyCriterion
+from feti_homog.interface.loaded_cell import LoadedCell
 from feti_homog.interface.path_following import events
 from feti_homog.interface.path_points import unloaded
 from feti_homog.interface.tip_criterion import TipCriterion
@@ -81,10 +83,10 @@ def test_all_bonds_break_at_once_and_nothing_is_left(comm, strip, growth):
         springs = EnergyCriterion(NORMAL, TANGENTIAL, TOUGHNESS, 0.25)
         law = springs if growth == "springs" else TipCriterion(springs, cell.solver.preconditioner)
         strain = np.array([[2 * peak / C11, 0.0, 0.0]])
-        first, last = events(interface, law, strain, unloaded(interface, bonded(cell)))
+        first, last = events(LoadedCell(interface), law, strains(strain), unloaded(LoadedCell(interface), bonded(cell)))
         assert first.load_factor == pytest.approx(0.5, rel=1e-8)
         assert first.scale * interface.stress(first.state.solution)[0] == pytest.approx(peak, rel=1e-8)
         assert first.broke == comm.allreduce(len(interface.nodes.row))
         assert last.load_factor == 1.0 and abs(interface.stress(last.state.solution)[0]) < 1e-9 * peak
         # All that was stored is lost.
-        assert last.released == pytest.approx(0.5 * 0.5 * strain[0, 0] * peak, rel=1e-8)
+        assert last.energies.released == pytest.approx(0.5 * 0.5 * strain[0, 0] * peak, rel=1e-8)

@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from support import torn_cells
+from support.loads import strains
 
-from feti_homog.analysis.path_events import Dissipation
+from feti_homog.analysis.path_events import Work
 from feti_homog.interface.contact import BONDED
+from feti_homog.interface.loaded_cell import LoadedCell
 from feti_homog.interface.path_following import events
 from feti_homog.interface.path_points import unloaded
 from feti_homog.interface.strength_criterion import StrengthCriterion
@@ -23,12 +25,12 @@ def followed(comm, **size):
     """Load factors, stresses and dissipated energies of a path, and the width of the cell."""
     cell = torn_cells.tear(comm, **THREE, **TIGHT, **size)
     interface = torn_cells.interface(cell, True)
-    begin = unloaded(interface, np.full(len(interface.nodes.row), BONDED, np.int8))
-    dissipation, rows = Dissipation(), []
-    for point in events(interface, StrengthCriterion(20.0, 30.0, "max"), WAYPOINTS, begin):
-        dissipation.arrive(point)
+    begin = unloaded(LoadedCell(interface), np.full(len(interface.nodes.row), BONDED, np.int8))
+    energies, rows = Work(), []
+    for point in events(LoadedCell(interface), StrengthCriterion(20.0, 30.0, "max"), strains(WAYPOINTS), begin):
+        energies.arrive(point)
         stress = point.scale * interface.stress(point.state.solution)
-        rows.append([point.load_factor, *stress, dissipation.followed])
+        rows.append([point.load_factor, *stress, energies.followed.released])
     return np.array(rows), cell.summary.width
 
 

@@ -10,10 +10,12 @@ from reference.load_path import SlowLoadPath
 from reference.references import LARGEST_TRACTIONS, ONSET
 from support import torn_cells
 from support.cases import relative_error
+from support.loads import strains
 from support.ranks import parallel_assert
 
 from feti_homog.common.mpi_errors import on_root
 from feti_homog.interface.contact import BONDED, OPEN
+from feti_homog.interface.loaded_cell import LoadedCell
 from feti_homog.interface.path_following import events, increments
 from feti_homog.interface.path_points import unloaded
 from feti_homog.interface.strength_criterion import StrengthCriterion
@@ -41,7 +43,14 @@ def bonded_status(cell):
 def follow(cell, contact, law, waypoints, begin=None):
     """All points of an events path from the wholly bonded cell."""
     interface = torn_cells.interface(cell, contact)
-    return list(events(interface, law, np.array(waypoints), begin or unloaded(interface, bonded_status(cell))))
+    return list(
+        events(
+            LoadedCell(interface),
+            law,
+            strains(np.array(waypoints)),
+            begin or unloaded(LoadedCell(interface), bonded_status(cell)),
+        )
+    )
 
 
 def curve(cell, points):
@@ -105,7 +114,12 @@ def test_debonding_begins_at_the_load_of_the_series_solution(comm):
     cell = torn_cells.tear(comm, geometry="square", order=2, mesh_size=0.07, refine=1)
     interface = torn_cells.interface(cell, True)
     first = next(
-        events(interface, StrengthCriterion(0.1, 0.1, "max"), np.eye(3)[:1], unloaded(interface, bonded_status(cell)))
+        events(
+            LoadedCell(interface),
+            StrengthCriterion(0.1, 0.1, "max"),
+            strains(np.eye(3)[:1]),
+            unloaded(LoadedCell(interface), bonded_status(cell)),
+        )
     )
     stress = first.scale * torn_cells.stress(cell, first.state.solution)
     assert np.abs(np.r_[first.load_factor, stress[:2]] / ONSET.value - 1).max() < 1e-3
@@ -135,9 +149,9 @@ def test_increments_meet_events_and_the_curve_between_them_converges_with_first_
     law, strain = StrengthCriterion(0.05, 0.05, "max"), np.array([[1e-3, 0.0, 0.0]])
     exact = curve(cell, follow(cell, True, law, strain))[:, :2]
     interface, loads, errors = torn_cells.interface(cell, True), np.linspace(0, 1, 20001), []
-    begin = unloaded(interface, bonded_status(cell))
+    begin = unloaded(LoadedCell(interface), bonded_status(cell))
     for steps in (10, 40, 160):
-        found = curve(cell, list(increments(interface, law, strain, steps, True, begin)))[:, :2]
+        found = curve(cell, list(increments(LoadedCell(interface), law, strains(strain), steps, True, begin)))[:, :2]
         assert relative_error(found[:, 1], rising(exact, found[:, 0])) < 1e-7
         errors.append(np.abs(np.interp(loads, *np.vstack([[0, 0], found]).T) - rising(exact, loads)).mean())
     # A drop within a step h is smeared over it: an error of between a quarter and a half of the drop times h.
@@ -150,7 +164,16 @@ def test_onset_by_increments_is_late_by_less_than_one_increment(torn):
     law, strain = StrengthCriterion(0.05, 0.05, "max"), np.array([[1e-3, 0.0, 0.0]])
     interface, exact = torn_cells.interface(cell, True), follow(cell, True, law, strain)[0].load_factor
     for steps in (10, 40):
-        points = list(increments(interface, law, strain, steps, False, unloaded(interface, bonded_status(cell))))
+        points = list(
+            increments(
+                LoadedCell(interface),
+                law,
+                strains(strain),
+                steps,
+                False,
+                unloaded(LoadedCell(interface), bonded_status(cell)),
+            )
+        )
         onset = next(p.load_factor for p in points if p.broke)
         assert 0 <= onset - exact < 1 / steps
         assert [p.load_factor for p in points] == pytest.approx(np.arange(1, steps + 1) / steps)
@@ -189,8 +212,8 @@ def test_increments_stop_at_a_solve_that_does_not_converge(comm, worst_only):
     loose = {"petsc": {"feti_ksp_max_it": 1, "feti_pc_type": "none"}}
     cell = torn_cells.tear(comm, **SQUARE, **loose)
     interface, law = torn_cells.interface(cell, True), StrengthCriterion(1e-3, 1e-3, "max")
-    begin = unloaded(interface, bonded_status(cell))
-    (point,) = increments(interface, law, np.array([MIXED]), 4, worst_only, begin)
+    begin = unloaded(LoadedCell(interface), bonded_status(cell))
+    (point,) = increments(LoadedCell(interface), law, strains(np.array([MIXED])), 4, worst_only, begin)
     assert point.state.solution.reason < 0 and point.broke == 0
 
 
@@ -201,7 +224,12 @@ def test_infinite_strengths_never_break(torn):
     status = np.full(len(bonded_status(cell)), OPEN, np.int8)
     interface = torn_cells.interface(cell, True)
     points = list(
-        events(interface, StrengthCriterion(1.0, 1.0, "max"), np.array([SHEAR, MIXED]), unloaded(interface, status))
+        events(
+            LoadedCell(interface),
+            StrengthCriterion(1.0, 1.0, "max"),
+            strains(np.array([SHEAR, MIXED])),
+            unloaded(LoadedCell(interface), status),
+        )
     )
     points = [p for p in points if p.after.position == 0]
     assert [(p.load_factor, p.broke) for p in points] == [(0.5, 0), (1.0, 0)]

@@ -12,6 +12,7 @@ from support.random_cells import random_bonded, random_cell, random_strain
 
 from feti_homog.homogenization.averaging import Homogenization
 from feti_homog.interface.contact import BONDED, CLOSED, OPEN
+from feti_homog.interface.load import Load
 
 pytestmark = pytest.mark.parallel
 
@@ -96,7 +97,7 @@ def test_random_cells_equal_the_quadratic_programme(comm, number):
         bonded, strain = comm.bcast((bonded, random_strain(rng)))
         contact = bool(comm.bcast(rng.random() < 0.85))
         interface = case.interface(contact)
-        state = interface.equilibrium(strain, case.status(bonded), case.start())
+        state = interface.equilibrium(Load.strain(strain), case.status(bonded), case.start())
         assert state.solution.reason > 0 and max(state.certificate.values()) < 1e-9
         expected = comm.bcast(case.reference and case.reference.solve_elastic(strain, bonded, contact, springs))
         assert relative_error(torn_cells.stress(case.cell, state.solution), expected.stress) < 1e-7

@@ -7,10 +7,12 @@ import pytest
 from reference.energy_path import SlowEnergyPath
 from support import torn_cells
 from support.cases import relative_error
+from support.loads import strains
 
 from feti_homog.common.mpi_errors import on_root
 from feti_homog.interface.contact import BONDED
 from feti_homog.interface.energy_criterion import EnergyCriterion
+from feti_homog.interface.loaded_cell import LoadedCell
 from feti_homog.interface.path_following import events
 from feti_homog.interface.path_points import unloaded
 from feti_homog.interface.tip_criterion import TipCriterion
@@ -73,4 +75,6 @@ def follow(cell, growth, begin=None):
     interface, springs = torn_cells.interface(cell, True), EnergyCriterion(*SPRINGS, TOUGHNESS, SENSITIVITY)
     law = TipCriterion(springs, cell.solver.preconditioner) if growth == "released" else springs
     bonded = np.full(len(interface.nodes.row), BONDED, np.int8)
-    return list(events(interface, law, STRAIN[None], begin or unloaded(interface, bonded)))
+    return list(
+        events(LoadedCell(interface), law, strains(STRAIN[None]), begin or unloaded(LoadedCell(interface), bonded))
+    )

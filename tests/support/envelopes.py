@@ -16,9 +16,11 @@ from feti_homog.common.petsc_options import case_options
 from feti_homog.common.progress import Progress
 from feti_homog.homogenization import unit_cell
 from feti_homog.interface.contact import OPEN
+from feti_homog.interface.loaded_cell import LoadedCell
 from feti_homog.interface.path_following import events
 from feti_homog.interface.path_points import unloaded
 from support import torn_cells
+from support.loads import strains
 
 TIGHT = {"feti_ksp_rtol": 1e-12}
 MAX = {"normal_strength": 3.0, "tangential_strength": 2.0}
@@ -76,6 +78,8 @@ def path_onset(cell: Any, strain: np.ndarray) -> tuple[float, np.ndarray]:
     interface = torn_cells.interface(cell, contact)
     status = np.where(cell.debonded(None), OPEN, 0).astype(np.int8)
     far = 1e6 * strain
-    point = next(events(interface, criterion_of(cell), far[None], unloaded(interface, status)))
+    point = next(
+        events(LoadedCell(interface), criterion_of(cell), strains(far[None]), unloaded(LoadedCell(interface), status))
+    )
     assert point.broke or cell.comm.allreduce(point.broke)
     return 1e6 * point.load_factor, point.scale * interface.stress(point.state.solution)

@@ -1,0 +1,47 @@
+"""What is imposed on a cell: strains, or the stresses that work on them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from feti_homog.typing import Bool, Float
+
+# What is smaller than this, relative to the values at the ends of its leg, is what rounding leaves of zero.
+LOAD_ROUNDING = 1e-13
+
+
+@dataclass(frozen=True)
+class Load:
+    """Of each of n macroscopic strains, a change of temperature among them, its value or that of its stress.
+
+    Attributes:
+        values: (n,) strains and stresses.
+        by_stress: (n,) which are stresses.
+    """
+
+    values: Float
+    by_stress: Bool
+
+    @classmethod
+    def strain(cls, values: Float) -> Load:
+        """The strains (n,)."""
+        return cls(values, np.zeros(len(values), bool))
+
+    def parts(self, first: int) -> tuple[Load, Load]:
+        """The first of the components, and the others."""
+        return (
+            Load(self.values[:first], self.by_stress[:first]),
+            Load(self.values[first:], self.by_stress[first:]),
+        )
+
+    def after(self, share: float, end: Load) -> Load:
+        """The load after a share of the way to another one of the same kinds; what is left of zero by rounding is
+        zero."""
+        values = (1.0 - share) * self.values + share * end.values
+        for kind in (self.by_stress, ~self.by_stress):
+            largest = np.abs([self.values[kind], end.values[kind]]).max(initial=0.0)
+            if np.abs(values[kind]).max(initial=0.0) <= LOAD_ROUNDING * largest:
+                values[kind] = 0.0
+        return Load(values, self.by_stress)

@@ -1,0 +1,73 @@
+"""The dual problem under strains of which some follow from given stresses.
+
+With the active rows as they are the response is linear: the answer to the given strains and one to each unit of the
+others are superposed such that the stresses are met.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from feti_homog.common.distributed_arrays import allreduce_sum
+from feti_homog.errors import ConvergenceError
+from feti_homog.feti.dual_solution import DualSolution
+from feti_homog.feti.solver import FetiSolver
+from feti_homog.interface.load import Load
+from feti_homog.typing import Float
+
+# Share of the stresses that may act on what resists nothing: rounding of directions.
+UNCARRIED_SHARE = 1e-6
+
+
+def solve(solver: FetiSolver, load: Load, start: Float, area: float, least: float) -> DualSolution:
+    """The solution under a load on the cell of this area, beginning with the multipliers `start` (owned rows,).
+
+    Strains that meet a stiffness below `least`, which is zero up to the solver's error, stay zero.  Collective.
+
+    Raises:
+        ConvergenceError: nothing carries the stresses.
+    """
+    if not (load.by_stress.any() and load.values.any()):
+        return solver.solve(load.values, start)
+    unknown = np.flatnonzero(load.by_stress)
+    strains = np.vstack([np.where(load.by_stress, 0.0, load.values), np.eye(len(load.values))[unknown]])
+    starts = np.column_stack([start, np.zeros((len(start), len(unknown)))])
+    needed = slice(0 if strains[0].any() else 1, None)
+    found = solver.solve_many(strains[needed], starts[:, needed])
+    stresses = np.stack([solver.stress_integral(each)[unknown] / area for each in found])
+    missing = load.values[unknown]
+    if strains[0].any():
+        missing = missing - stresses[0]
+    factors = _strains(stresses[-len(unknown) :], missing, least)
+    return superposed(solver, found, np.concatenate([np.ones(len(found) - len(unknown)), factors]))
+
+
+def _strains(stiffness: Float, stress: Float, least: float) -> Float:
+    """(u,) the strains that make the stresses (u,) by a stiffness (u, u) that may be singular."""
+    eigenvalues, vectors = np.linalg.eigh((stiffness + stiffness.T) / 2)
+    along, resists = vectors.T @ stress, eigenvalues > least
+    if np.abs(along[~resists]).max(initial=0.0) > UNCARRIED_SHARE * np.abs(stress).max():
+        raise ConvergenceError("nothing in the cell carries the stresses of the load any more; prescribe strains")
+    return np.asarray(vectors[:, resists] @ (along[resists] / eigenvalues[resists]))
+
+
+def superposed(solver: FetiSolver, solutions: Sequence[DualSolution], factors: Float) -> DualSolution:
+    """The sum of solutions with the same active rows, each times its factor.  Collective."""
+    strain, lam, jump, alpha = (
+        np.stack([getattr(each, name) for each in solutions], axis=1) @ factors
+        for name in ("strain", "lam", "jump", "alpha")
+    )
+    torn = solver.natural.project(solver.active.restrict(solver.d @ strain))
+    pairs = np.stack([torn, solver.active.restrict(jump)])
+    scale, left = np.sqrt(allreduce_sum(solver.comm, np.einsum("ij,ij->i", pairs, pairs)))
+    return DualSolution(
+        strain,
+        lam,
+        jump,
+        alpha,
+        max(each.iterations for each in solutions),
+        min(each.reason for each in solutions),
+        float(left / (scale or 1.0)),
+    )

@@ -1,0 +1,11 @@
+"""Loads of paths."""
+
+from __future__ import annotations
+
+from feti_homog.interface.load import Load
+from feti_homog.typing import Float
+
+
+def strains(waypoints: Float) -> list[Load]:
+    """Waypoints (n, v) that are strains."""
+    return [Load.strain(each) for each in waypoints]
