@@ -15,6 +15,7 @@ from feti_homog.analysis.criteria import criterion_of
 from feti_homog.errors import CaseError
 from feti_homog.homogenization.averaging import Homogenization
 from feti_homog.interface.contact import OPEN
+from feti_homog.interface.loaded_cell import LoadedCell
 from feti_homog.interface.onset import OnsetCriterion
 from feti_homog.output.files import result_json
 from feti_homog.output.plots import response_curves
@@ -210,7 +211,7 @@ def test_a_tip_in_space_releases_what_its_break_does(comm):
         plane, axial = Homogenization(cell, False), Homogenization(cell.axial, False)
         status = np.where(cell.debonded(None), OPEN, 0).astype(np.int8)
         criterion = criterion_of(cell)
-        onset = OnsetCriterion.of(criterion, plane.interface, axial.interface, status)
+        onset = OnsetCriterion.of(criterion, LoadedCell(plane.interface, axial.interface), status)
         energy, traction = cell_energy(plane, axial, strain, status)
         tips = onset.tips.tips
         foretold = (
@@ -246,7 +247,7 @@ def direct_utilisation(cell, strain, temperature):
         )
         for each, loads in pairs
     ]
-    onset = OnsetCriterion.of(criterion_of(cell), plane.interface, axial.interface, status)
+    onset = OnsetCriterion.of(criterion_of(cell), LoadedCell(plane.interface, axial.interface), status)
     used = onset.utilisation(np.hstack(found), np.arange(len(status)))
     return max(cell.comm.allgather(float(used.max(initial=0.0))))
 
