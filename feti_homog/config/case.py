@@ -16,26 +16,16 @@ from feti_homog.config.document import read_document, to_document
 from feti_homog.config.envelope_rules import envelope_faults, read_envelope
 from feti_homog.config.envelope_section import Envelope
 from feti_homog.config.generalized_plane import generalized_faults
-from feti_homog.config.interface_sections import misplaced_sections, read_angle, read_interface, read_path
+from feti_homog.config.interface_rules import misplaced_sections, read_angle, read_interface
+from feti_homog.config.interface_section import Arc, InterfaceSection
+from feti_homog.config.load_rules import read_path
+from feti_homog.config.load_section import LoadPath
 from feti_homog.config.material_forms import Isotropic, Material
 from feti_homog.config.material_sections import phase_faults, provider, read_materials
 from feti_homog.config.petsc_section import Scalar, read_petsc
 from feti_homog.config.schema import Selected, TableReader, selected_value, to_table
-from feti_homog.config.sections import (
-    ANALYSIS_TYPE,
-    CRITERION,
-    DRAWN_STRESS,
-    METHOD,
-    PLANE,
-    SECTIONS,
-    Analysis,
-    Angle,
-    Arc,
-    Decomposition,
-    InterfaceSection,
-    LoadPath,
-    Output,
-)
+from feti_homog.config.sections import SECTIONS, Analysis, Angle, Decomposition, Output
+from feti_homog.config.selectors import ANALYSIS_TYPE, CRITERION, DRAWN_STRESS, METHOD, PLANE
 from feti_homog.config.sweep_section import SWEEP
 from feti_homog.config.tables import KEY_OWNERS, REQUIRED, TOP_LEVEL
 from feti_homog.config.values import text

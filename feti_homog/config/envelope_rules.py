@@ -6,10 +6,11 @@ from collections.abc import Mapping
 from typing import Any
 
 from feti_homog.config.envelope_section import STRAINS, STRESSES, Envelope
+from feti_homog.config.interface_section import STRENGTHS, InterfaceSection
 from feti_homog.config.material_forms import Material
 from feti_homog.config.materials import expansion
 from feti_homog.config.schema import Selected, TableReader
-from feti_homog.config.sections import ENVELOPE_ANALYSIS, GENERALIZED, PLANE, STRENGTHS, InterfaceSection
+from feti_homog.config.selectors import ENVELOPE_ANALYSIS, GENERALIZED, PLANE
 from feti_homog.config.wording import toml_key, toml_value
 
 TYPE = ENVELOPE_ANALYSIS.in_words("")

@@ -3,15 +3,8 @@
 from __future__ import annotations
 
 from feti_homog.config.schema import Selected
-from feti_homog.config.sections import (
-    ANALYSIS_TYPE,
-    DRAWN_STRESS,
-    GENERALIZED,
-    GENERALIZED_ANALYSES,
-    IN_THE_PLANE,
-    OUT_OF_PLANE_STRESSES,
-    PLANE,
-)
+from feti_homog.config.sections import GENERALIZED_ANALYSES, OUT_OF_PLANE_STRESSES
+from feti_homog.config.selectors import ANALYSIS_TYPE, DRAWN_STRESS, GENERALIZED, IN_THE_PLANE, PLANE
 from feti_homog.config.wording import toml_value
 
 

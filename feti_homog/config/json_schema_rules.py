@@ -7,25 +7,20 @@ from typing import Any
 
 from feti_homog.config.cell_section import ALL_CIRCULAR, GEOMETRY
 from feti_homog.config.envelope_section import STRAINS, STRESSES, pairs_of
+from feti_homog.config.interface_section import STIFFNESSES, STRENGTHS, Arc
 from feti_homog.config.material_forms import EXPANSION_PAIR, MATERIAL_FORMS
 from feti_homog.config.schema import Condition, Key, Selector, defaults_of, keys_of
-from feti_homog.config.sections import (
+from feti_homog.config.sections import GENERALIZED_ANALYSES, OUT_OF_PLANE_STRESSES, SECTIONS, SECTIONS_OF_AN_ANALYSIS
+from feti_homog.config.selectors import (
     ANALYSIS_TYPE,
     ANGLE_ANALYSIS,
     BY_ENERGY,
     CRITERION,
     ENVELOPE_ANALYSIS,
     GENERALIZED,
-    GENERALIZED_ANALYSES,
     IN_THE_PLANE,
     METHOD,
-    OUT_OF_PLANE_STRESSES,
     PLANE,
-    SECTIONS,
-    SECTIONS_OF_AN_ANALYSIS,
-    STIFFNESSES,
-    STRENGTHS,
-    Arc,
 )
 from feti_homog.config.tables import REQUIRED
 

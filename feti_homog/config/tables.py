@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from feti_homog.config.interface_section import Arc
 from feti_homog.config.material_forms import MATERIAL_FORMS
 from feti_homog.config.schema import keys_of
-from feti_homog.config.sections import SECTIONS, Arc
+from feti_homog.config.sections import SECTIONS
 
 REQUIRED = ("cell", "material", "analysis")
 TOP_LEVEL = (*SECTIONS, "material", "petsc", "name")

@@ -15,8 +15,10 @@ from unit.config.faulty_envelopes import FAULTY_ENVELOPES
 from unit.config.valid_cases import MESH, VALID_CASES
 
 from feti_homog.config.case import check_phases, load, parse
+from feti_homog.config.interface_section import Arc, InterfaceSection
+from feti_homog.config.load_section import LoadPath
 from feti_homog.config.material_forms import General, Isotropic, Orthotropic
-from feti_homog.config.sections import Angle, Arc, InterfaceSection, LoadPath
+from feti_homog.config.sections import Angle
 from feti_homog.errors import CaseError
 
 FAULTY = FAULTY_CASES | FAULTY_BONDINGS | FAULTY_ENVELOPES
