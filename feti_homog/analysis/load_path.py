@@ -12,6 +12,8 @@ from feti_homog.analysis.path_events import Dissipation, Energies, restored, sto
 from feti_homog.analysis.tip_records import TipRecorder
 from feti_homog.common.event_progress import EVENTS_BAR, STEPS_BAR, EventProgress
 from feti_homog.config.load_section import LoadPath
+from feti_homog.config.mixed_load import MixedLoad, Strain
+from feti_homog.errors import CaseError
 from feti_homog.homogenization.averaging import Response
 from feti_homog.interface.bond_criterion import BondCriterion, spring_criterion
 from feti_homog.interface.path_following import events, increments
@@ -74,7 +76,7 @@ def _points(
     context: AnalysisContext, path: LoadPath, criterion: BondCriterion, checkpoint: Checkpoint, known: int
 ) -> Iterator[tuple[Point, Energies | None]]:
     """The points of the checkpoint with the energies up to each, then those still to be found."""
-    interface, waypoints = context.homogenization.interface, np.array(path.targets)
+    interface, waypoints = context.homogenization.interface, np.array([_strain(load) for load in path.targets])
     begin = unloaded(interface, context.status(None))
     for number in range(known):
         point, energies = restored(checkpoint.read(number))
@@ -85,6 +87,13 @@ def _points(
     else:
         found = increments(interface, criterion, waypoints, path.increments or 1, path.release == "worst", begin)
     yield from ((point, None) for point in found)
+
+
+def _strain(load: Strain | MixedLoad) -> Strain:
+    """The strain, which is all that is followed. Raises CaseError."""
+    if isinstance(load, MixedLoad):
+        raise CaseError("[path]: loads by name are not followed; give strain, or waypoints of three strains")
+    return load
 
 
 def _tell(context: AnalysisContext, shown: EventProgress, name: str, response: Response) -> None:

@@ -22,7 +22,7 @@ from feti_homog.common.mpi_errors import all_raise, on_root, on_root_only
 from feti_homog.common.petsc_options import case_options, refuse_unused
 from feti_homog.common.progress import Progress
 from feti_homog.config.case import Case
-from feti_homog.errors import ConvergenceError
+from feti_homog.errors import CaseError, ConvergenceError
 from feti_homog.homogenization.averaging import Homogenization
 from feti_homog.homogenization.unit_cell import TornCell, tear
 from feti_homog.output.files import (
@@ -55,8 +55,9 @@ def run(
         ConvergenceError: after what was computed has been written, marked as such.
     """
     progress = Progress(comm, quiet)
-    for warning in case.warnings():
-        progress.say(f"warning: {warning}")
+    for label, lines in (("warning", case.warnings()), ("remark", case.remarks())):
+        for line in lines:
+            progress.say(f"{label}: {line}")
     if resume and on_root(comm, stored_result.finished, directory, case):
         progress.say(f"{directory} holds the finished result of this case: nothing to do")
         return Result.of(on_root(comm, result_json.read, directory))
@@ -172,6 +173,8 @@ def _analyse(context: AnalysisContext, checkpoint: Checkpoint, resume: bool) -> 
 def _analysis(context: AnalysisContext, checkpoint: Checkpoint, resume: bool) -> dict[str, Any]:
     cell = context.homogenization.cell
     case = cell.case
+    if case.single_load is not None:
+        raise CaseError('[analysis] type = "load": nothing computes it')
     if case.path is not None:
         return load_path.run(context, case.path, criterion_of(cell), checkpoint, resume)
     if case.envelope is not None:

@@ -72,7 +72,7 @@ def _missing_arcs(table: Any, selected: Selected) -> list[str]:
         return [f'[interface] debonded: missing; [analysis] type = "angle" needs {ARCS.expected}']
     # An empty list says that it is meant; of a user's mesh a curve may be debonded.
     is_bare = isinstance(table, dict) and not table.keys() & {"debonded", *STIFFNESSES, "axial_stiffness"}
-    if analysis == "stiffness" and selected[GEOMETRY] in CIRCULAR and is_bare:
+    if analysis in ("stiffness", "load") and selected[GEOMETRY] in CIRCULAR and is_bare:
         return [f"[interface] debonded: missing; expected {ARCS.expected}, or []: nothing else can open"]
     return []
 

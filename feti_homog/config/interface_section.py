@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from feti_homog.config.schema import key
 from feti_homog.config.section_values import ARCS, FIBRES, STIFFNESS, STRENGTH, TOUGHNESS
-from feti_homog.config.selectors import ANALYSIS_TYPE, BREAKING, BY_ENERGY, ENVELOPE_ANALYSIS, GENERALIZED
+from feti_homog.config.selectors import ANALYSIS_TYPE, BREAKING, BY_ENERGY, GENERALIZED
 from feti_homog.config.values import boolean, choice, real
 
 STIFFNESSES = ("normal_stiffness", "tangential_stiffness")
@@ -35,7 +35,7 @@ class Arc:
         "Whole opening of the arc, measured at the centre of the fibre. 0 is perfect bonding; at 360 nothing holds the "
         "fibre, and its rigid motions are left out.",
         unit="degrees",
-        only=ANALYSIS_TYPE.among("stiffness", "path", "envelope"),
+        only=ANALYSIS_TYPE.among("stiffness", "path", "load", "envelope"),
     )
 
 
@@ -102,7 +102,7 @@ class InterfaceSection:
         unit="stress",
         default=None,
         default_words="tangential_strength",
-        only=ENVELOPE_ANALYSIS,
+        only=BREAKING,
     )
     criterion: str = key(
         choice("max", "quadratic", "energy"),

@@ -1,24 +1,38 @@
-"""The section [path]: the loads that are gone through."""
+"""The sections [path] and [load]: the loads that are gone through, and a single one."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
+from feti_homog.config.mixed_load import MixedLoad, Strain
 from feti_homog.config.schema import key
-from feti_homog.config.section_values import STRAIN, WAYPOINTS
-from feti_homog.config.selectors import BY_EVENTS, BY_INCREMENTS
+from feti_homog.config.section_values import LOAD, STRAIN, WAYPOINTS
+from feti_homog.config.selectors import BY_EVENTS, BY_INCREMENTS, IN_THE_PLANE
 from feti_homog.config.values import choice, integer
-
-Strain = tuple[float, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
 class LoadPath:
-    """Macroscopic strains that are gone through, straight from zero to each waypoint. Give strain or waypoints."""
+    """Macroscopic loads that are gone through, straight from zero to each waypoint. Give strain, to or waypoints."""
 
-    strain: Strain | None = key(STRAIN, "The strain at the end, other than zero: a single waypoint.", default=None)
-    waypoints: tuple[Strain, ...] | None = key(
-        WAYPOINTS, "Strains that are gone through one after the other; each differs from the one before.", default=None
+    strain: Strain | None = key(
+        STRAIN,
+        "The strain at the end, other than zero: a single waypoint.",
+        default=None,
+        only=IN_THE_PLANE,
+        instead="to = {E11 = ...}",
+    )
+    to: MixedLoad | None = key(
+        LOAD,
+        "The load at the end, strains and stresses by name, other than zero: a single waypoint. Components that it "
+        "does not name are free of stress.",
+        default=None,
+    )
+    waypoints: tuple[Strain | MixedLoad, ...] | None = key(
+        WAYPOINTS,
+        "Loads that are gone through one after the other, each a strain or a table as in to; each differs from the one "
+        "before. What a table does not name stays as it was prescribed last, at first free of stress.",
+        default=None,
     )
     method: str = key(
         choice("events", "increments"),
@@ -44,8 +58,23 @@ class LoadPath:
     )
 
     @property
-    def targets(self) -> tuple[Strain, ...]:
-        """The waypoints after the unstrained start."""
+    def targets(self) -> tuple[Strain | MixedLoad, ...]:
+        """The waypoints after the unloaded start, as they are given."""
+        return tuple(self.placed.values())
+
+    @property
+    def placed(self) -> dict[str, Strain | MixedLoad]:
+        """The waypoints by their places in the section."""
         if self.waypoints is not None:
-            return self.waypoints
-        return () if self.strain is None else (self.strain,)
+            return {f"waypoints[{k}]": load for k, load in enumerate(self.waypoints)}
+        return {name: load for name, load in (("strain", self.strain), ("to", self.to)) if load is not None}
+
+
+@dataclass(frozen=True, kw_only=True)
+class SingleLoad:
+    """The one macroscopic load under which the cell is in equilibrium; nothing breaks."""
+
+    to: MixedLoad = key(
+        LOAD,
+        "The load, strains and stresses by name, other than zero. Components that it does not name are free of stress.",
+    )

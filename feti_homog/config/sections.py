@@ -8,10 +8,11 @@ from typing import Any
 from feti_homog.config.cell_section import Cell
 from feti_homog.config.envelope_section import Envelope
 from feti_homog.config.interface_section import InterfaceSection
-from feti_homog.config.load_section import LoadPath, Strain
+from feti_homog.config.load_section import LoadPath, SingleLoad
+from feti_homog.config.mixed_load import Strain
 from feti_homog.config.schema import key
 from feti_homog.config.section_values import OPENINGS, STATES, STRAIN
-from feti_homog.config.selectors import ANGLE_ANALYSIS, ENVELOPE_ANALYSIS, IN_THE_PLANE, PATH_ANALYSIS
+from feti_homog.config.selectors import ANGLE_ANALYSIS, ENVELOPE_ANALYSIS, IN_THE_PLANE, LOAD_ANALYSIS, PATH_ANALYSIS
 from feti_homog.config.values import boolean, choice, integer, real, text
 
 OUT_OF_PLANE_STRESSES = ("S33", "S23", "S13")
@@ -22,9 +23,10 @@ class Analysis:
     """What is computed, and in which plane state."""
 
     type: str = key(
-        choice("stiffness", "angle", "path", "envelope"),
+        choice("stiffness", "angle", "path", "load", "envelope"),
         '"stiffness": the effective stiffness; "angle": the response against the debonding angle, see [angle]; '
-        '"path": debonding by the load, see [path]; "envelope": the loads at which debonding begins, see [envelope].',
+        '"path": debonding by the load, see [path]; "load": the response to one load, under which nothing breaks, see '
+        '[load]; "envelope": the loads at which debonding begins, see [envelope].',
     )
     plane: str = key(
         choice("strain", "stress", "generalized"),
@@ -103,13 +105,16 @@ SECTIONS: dict[str, type[Any]] = {
     "interface": InterfaceSection,
     "angle": Angle,
     "path": LoadPath,
+    "load": SingleLoad,
     "envelope": Envelope,
     "decomposition": Decomposition,
     "output": Output,
 }
 
-GENERALIZED_ANALYSES = ("stiffness", "angle", "envelope")
-"""The types of analysis in generalized plane strain."""
-
-SECTIONS_OF_AN_ANALYSIS = {"angle": ANGLE_ANALYSIS, "path": PATH_ANALYSIS, "envelope": ENVELOPE_ANALYSIS}
+SECTIONS_OF_AN_ANALYSIS = {
+    "angle": ANGLE_ANALYSIS,
+    "path": PATH_ANALYSIS,
+    "load": LOAD_ANALYSIS,
+    "envelope": ENVELOPE_ANALYSIS,
+}
 """Sections that must be given for one type of analysis, and belong to no other."""
