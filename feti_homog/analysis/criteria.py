@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from feti_homog.config.sections import InterfaceSection
+from feti_homog.config.interface_section import InterfaceSection
 from feti_homog.errors import CaseError
 from feti_homog.feti.preconditioners.influence import Influence
 from feti_homog.homogenization import bonds

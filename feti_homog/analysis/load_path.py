@@ -9,7 +9,7 @@ from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.path_events import Work, restored, stored
 from feti_homog.analysis.tip_records import TipRecorder
 from feti_homog.common.event_progress import EVENTS_BAR, STEPS_BAR, EventProgress
-from feti_homog.config.sections import LoadPath
+from feti_homog.config.load_section import LoadPath
 from feti_homog.homogenization.averaging import Response
 from feti_homog.interface.bond_criterion import BondCriterion, spring_criterion
 from feti_homog.interface.path_following import events, increments

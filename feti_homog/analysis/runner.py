@@ -55,8 +55,9 @@ def run(
         ConvergenceError: after what was computed has been written, marked as such.
     """
     progress = Progress(comm, quiet)
-    for warning in case.warnings():
-        progress.say(f"warning: {warning}")
+    for label, lines in (("warning", case.warnings()), ("remark", case.remarks())):
+        for line in lines:
+            progress.say(f"{label}: {line}")
     if resume and on_root(comm, stored_result.finished, directory, case):
         progress.say(f"{directory} holds the finished result of this case: nothing to do")
         return Result.of(on_root(comm, result_json.read, directory))
@@ -172,6 +173,8 @@ def _analyse(context: AnalysisContext, checkpoint: Checkpoint, resume: bool) -> 
 def _analysis(context: AnalysisContext, checkpoint: Checkpoint, resume: bool) -> dict[str, Any]:
     cell = context.homogenization.cell
     case = cell.case
+    if case.single_load is not None:
+        return load.run(context)
     if case.path is not None:
         return load_path.run(context, case.path, criterion_of(cell), checkpoint, resume)
     if case.envelope is not None:

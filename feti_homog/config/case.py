@@ -16,32 +16,24 @@ from feti_homog.config.document import read_document, to_document
 from feti_homog.config.envelope_rules import envelope_faults, read_envelope
 from feti_homog.config.envelope_section import Envelope
 from feti_homog.config.generalized_plane import generalized_faults
-from feti_homog.config.interface_sections import misplaced_sections, read_angle, read_interface, read_path
+from feti_homog.config.interface_rules import misplaced_sections, read_angle, read_interface
+from feti_homog.config.interface_section import Arc, InterfaceSection
+from feti_homog.config.load_rules import expansion_faults, read_load, read_path, stress_free
+from feti_homog.config.load_section import LoadPath, SingleLoad
 from feti_homog.config.material_forms import Isotropic, Material
 from feti_homog.config.material_sections import phase_faults, provider, read_materials
+from feti_homog.config.mixed_load import MixedLoad, Strain, completed
 from feti_homog.config.petsc_section import Scalar, read_petsc
 from feti_homog.config.schema import Selected, TableReader, selected_value, to_table
-from feti_homog.config.sections import (
-    ANALYSIS_TYPE,
-    CRITERION,
-    DRAWN_STRESS,
-    METHOD,
-    PLANE,
-    SECTIONS,
-    Analysis,
-    Angle,
-    Arc,
-    Decomposition,
-    InterfaceSection,
-    LoadPath,
-    Output,
-)
+from feti_homog.config.sections import SECTIONS, Analysis, Angle, Decomposition, Output
+from feti_homog.config.selectors import ANALYSIS_TYPE, CRITERION, DRAWN_STRESS, METHOD, PLANE
 from feti_homog.config.sweep_section import SWEEP
 from feti_homog.config.tables import KEY_OWNERS, REQUIRED, TOP_LEVEL
 from feti_homog.config.values import text
 from feti_homog.config.wording import limit_in_words, suggestion, toml_key, toml_value
 from feti_homog.errors import CaseError
 
+FIELDS = {"load": "single_load"}  # of a section whose name is that of a method
 LOCKING_POISSON, ROUNDING_POISSON = 0.49, 0.49999
 
 
@@ -52,7 +44,7 @@ class Case:
     Attributes:
         materials: by phase, in the file's order.
         interface: None if the bonding is perfect.
-        angle, path, envelope: there if the analysis is of that type.
+        angle, path, single_load, envelope: there if the analysis is of that type; single_load is the section [load].
         petsc: options without dash.
     """
 
@@ -63,6 +55,7 @@ class Case:
     interface: InterfaceSection | None
     angle: Angle | None
     path: LoadPath | None
+    single_load: SingleLoad | None
     envelope: Envelope | None
     decomposition: Decomposition
     output: Output
@@ -85,8 +78,19 @@ class Case:
 
     @property
     def targets(self) -> tuple[Mapping[str, float], ...]:
-        waypoints = () if self.path is None else self.path.targets
-        return tuple(dict(zip(("E11", "E22", "gamma12"), each, strict=True)) for each in waypoints)
+        """The loads of a path after its unloaded start, or the one load of the case, in full.
+
+        By name: of each component, in the order of the plane state's strains, its strain or its stress; in generalized
+        plane strain then the temperature.
+        """
+        return completed(tuple(self._placed_loads.values()), self.analysis.plane)
+
+    @property
+    def _placed_loads(self) -> Mapping[str, Strain | MixedLoad]:
+        """The loads as they are given, by their places in their section."""
+        if self.single_load is not None:
+            return {"to": self.single_load.to}
+        return {} if self.path is None else self.path.placed
 
     def material_of(self, phase: str) -> Material:
         """The material of a phase; "fibre:2" without its own has that of "fibre". Raises KeyError."""
@@ -113,6 +117,10 @@ class Case:
         ]
         return (*locking, *rounding)
 
+    def remarks(self) -> tuple[str, ...]:
+        """What is not said but assumed, one line each."""
+        return stress_free(self.analysis.type, self._placed_loads, self.analysis.plane)
+
     def resolved(self) -> dict[str, Any]:
         """The case with its defaults as a plain document, of which `parse` makes an equal case."""
         selected: Selected = {
@@ -124,7 +132,7 @@ class Case:
         }
         document: dict[str, Any] = {"name": self.name, "cell": to_table(self.cell, selected)}
         document["material"] = {phase: to_table(material, selected) for phase, material in self.materials.items()}
-        sections = {section: getattr(self, section) for section in SECTIONS if section != "cell"}
+        sections = {section: getattr(self, FIELDS.get(section, section)) for section in SECTIONS if section != "cell"}
         given = {section: contents for section, contents in sections.items() if contents is not None}
         document |= {section: to_table(contents, selected) for section, contents in given.items()}
         return document | {"petsc": dict(self.petsc)}
@@ -171,12 +179,14 @@ def parse(values: Mapping[str, Any], folder: Path) -> Case:
         "interface": read_interface(document.get("interface"), reader),
         "angle": read_angle(document.get("angle"), reader),
         "path": read_path(document.get("path"), reader),
+        "single_load": read_load(document.get("load"), reader),
         "envelope": read_envelope(document.get("envelope"), reader),
         "output": _read_section(document, "output", reader),
         "petsc": read_petsc(document.get("petsc", {}), faults),
     }
     bonding = sections["envelope"], sections["interface"], sections["materials"]
     faults += envelope_faults(*bonding, document, reader.selected)
+    faults += expansion_faults(sections["path"], sections["single_load"], sections["materials"])
     if faults:
         raise CaseError(*faults)
     return Case(name=document.get("name", "case"), **sections)

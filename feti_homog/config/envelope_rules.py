@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from feti_homog.config.envelope_section import STRAINS, STRESSES, Envelope
+from feti_homog.config.envelope_section import Envelope
+from feti_homog.config.interface_section import STRENGTHS, InterfaceSection
+from feti_homog.config.load_names import STRAINS, STRESSES
 from feti_homog.config.material_forms import Material
-from feti_homog.config.materials import expansion
+from feti_homog.config.material_sections import missing_expansions
 from feti_homog.config.schema import Selected, TableReader
-from feti_homog.config.sections import ENVELOPE_ANALYSIS, GENERALIZED, PLANE, STRENGTHS, InterfaceSection
-from feti_homog.config.wording import toml_key, toml_value
+from feti_homog.config.selectors import ENVELOPE_ANALYSIS, GENERALIZED, PLANE
+from feti_homog.config.wording import toml_value
 
 TYPE = ENVELOPE_ANALYSIS.in_words("")
 
@@ -45,11 +47,7 @@ def envelope_faults(
     if interface is not None:
         faults += _bonding_faults(interface, selected)
     if envelope is not None and envelope.temperature is not None:
-        faults += [
-            f"[material.{toml_key(phase)}] expansion: missing; [envelope] temperature needs it"
-            for phase, material in (materials or {}).items()
-            if _expands_unknown(material)
-        ]
+        faults += missing_expansions(materials or {}, "[envelope] temperature")
     return faults
 
 
@@ -64,11 +62,3 @@ def _bonding_faults(interface: InterfaceSection, selected: Selected) -> list[str
             f"[interface] contact: expected false with debonded arcs; {TYPE} superposes loads, which contact forbids"
         )
     return faults
-
-
-def _expands_unknown(material: Material) -> bool:
-    """Whether a material does not say how it expands; what it says wrongly is told elsewhere."""
-    try:
-        return expansion(material) is None
-    except ValueError:
-        return False

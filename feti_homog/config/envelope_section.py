@@ -6,12 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from feti_homog.config.schema import Selector, key
+from feti_homog.config.load_names import SPATIAL_STRAINS, SPATIAL_STRESSES
+from feti_homog.config.schema import key
+from feti_homog.config.selectors import GENERALIZED
 from feti_homog.config.values import ValueType, integer, real
 
-STRESSES, STRAINS = ("S11", "S22", "S12"), ("E11", "E22", "gamma12")
-SPATIAL_STRESSES = ("S11", "S22", "S33", "S23", "S13", "S12")
-SPATIAL_STRAINS = ("E11", "E22", "E33", "gamma23", "gamma13", "gamma12")
 FAMILIES = (SPATIAL_STRESSES, SPATIAL_STRAINS)
 
 
@@ -57,5 +56,5 @@ class Envelope:
         "strains. Every phase must give its expansion.",
         unit="temperature",
         default=None,
-        only=Selector("analysis", "plane").among("generalized"),
+        only=GENERALIZED,
     )

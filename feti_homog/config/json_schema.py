@@ -10,16 +10,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from feti_homog.config.interface_section import Arc
 from feti_homog.config.json_schema_rules import Schema, rules_of_one_case
 from feti_homog.config.material_forms import MATERIAL_FORMS
 from feti_homog.config.material_sections import PHASE
+from feti_homog.config.mixed_load import MixedLoad
 from feti_homog.config.petsc_section import PREFIXED
 from feti_homog.config.schema import Key, defaults_of, keys_of
-from feti_homog.config.sections import SECTIONS, Arc
+from feti_homog.config.sections import SECTIONS
 from feti_homog.config.sweep_section import AXIS_MEANING, RANGE_KEYS, SWEEP, SweepSection
 from feti_homog.config.tables import TOP_LEVEL
 from feti_homog.config.values import text
 
+AXIS_VALUES = {"type": "array", "minItems": 1}
+AXIS_TABLE = {"type": "object", "minProperties": 1, "additionalProperties": {"$ref": "#/$defs/axis"}}
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
@@ -41,7 +45,9 @@ def json_schema() -> Schema:
             **{section: _table(contents) for section, contents in SECTIONS.items()},
             **{_definition(form): _table(contents) for form, contents in MATERIAL_FORMS.items()},
             "arc": _table(Arc),
+            "mixed_load": _table(MixedLoad),
             "axis": _axis(),
+            "axes": _axes(),
             "range": _object({name: _key(entry) for name, entry in RANGE_KEYS.items()}) | {"required": ["from", "to"]},
         },
         "if": {"not": {"required": [SWEEP]}},
@@ -88,17 +94,16 @@ def _petsc() -> Schema:
 def _sweep() -> Schema:
     sections = [name for name in TOP_LEVEL if name != "name"]
     table = _table(SweepSection)
-    table["properties"] |= {name: _reference("axis") for name in sections}
+    table["properties"] |= {name: _reference("axes") for name in sections}
     return table | {"patternProperties": {rf"^({'|'.join(sections)})\.": _reference("axis")}}
+
+
+def _axes() -> Schema:
+    """The axes of a section: a list of values, or a table of axes."""
+    return {"description": AXIS_MEANING, "anyOf": [AXIS_VALUES, AXIS_TABLE]}
 
 
 def _axis() -> Schema:
     """A list of values, a range, or a table of axes."""
-    nested = {
-        "type": "object",
-        "minProperties": 1,
-        "not": {"anyOf": [{"required": ["from"]}, {"required": ["to"]}]},
-        "additionalProperties": _reference("axis"),
-    }
-    values = {"type": "array", "minItems": 1}
-    return {"description": AXIS_MEANING, "anyOf": [values, _reference("range"), nested]}
+    no_range = {"not": {"anyOf": [{"required": ["from"]}, {"required": ["to"]}]}}
+    return {"description": AXIS_MEANING, "anyOf": [AXIS_VALUES, _reference("range"), AXIS_TABLE | no_range]}

@@ -6,32 +6,30 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from feti_homog.config.cell_section import ALL_CIRCULAR, GEOMETRY
-from feti_homog.config.envelope_section import STRAINS, STRESSES, pairs_of
+from feti_homog.config.envelope_section import pairs_of
+from feti_homog.config.interface_section import STIFFNESSES, STRENGTHS, Arc
+from feti_homog.config.load_names import STRAINS, STRESSES
 from feti_homog.config.material_forms import EXPANSION_PAIR, MATERIAL_FORMS
+from feti_homog.config.mixed_load import MixedLoad, components
 from feti_homog.config.schema import Condition, Key, Selector, defaults_of, keys_of
-from feti_homog.config.sections import (
+from feti_homog.config.sections import OUT_OF_PLANE_STRESSES, SECTIONS, SECTIONS_OF_AN_ANALYSIS
+from feti_homog.config.selectors import (
     ANALYSIS_TYPE,
     ANGLE_ANALYSIS,
     BY_ENERGY,
     CRITERION,
     ENVELOPE_ANALYSIS,
     GENERALIZED,
-    GENERALIZED_ANALYSES,
     IN_THE_PLANE,
     METHOD,
-    OUT_OF_PLANE_STRESSES,
     PLANE,
-    SECTIONS,
-    SECTIONS_OF_AN_ANALYSIS,
-    STIFFNESSES,
-    STRENGTHS,
-    Arc,
 )
 from feti_homog.config.tables import REQUIRED
 
 Schema = dict[str, Any]
 
 ITEMS = "items"  # on the way to a table: of a list
+PLACES_OF_LOADS = (("path", "to"), ("path", "waypoints", ITEMS), ("load", "to"))
 
 
 def rules_of_one_case() -> Schema:
@@ -51,7 +49,8 @@ def rules_of_one_case() -> Schema:
             *_envelope_rules(),
             _at(("cell",), {"not": {"required": ["width", "fibre_radius"]}}),
             _at(("decomposition",), {"not": {"required": ["subdomains", "max_dofs"]}}),
-            _at(("path",), {"oneOf": [{"required": ["strain"]}, {"required": ["waypoints"]}]}),
+            _at(("path",), {"oneOf": [{"required": [name]} for name in ("strain", "to", "waypoints")]}),
+            *_mixed_load_rules(),
         ],
     }
 
@@ -61,6 +60,8 @@ def _tables() -> Iterator[tuple[tuple[str, ...], type[Any]]]:
     for section, contents in SECTIONS.items():
         yield (section,), contents
     yield ("interface", "debonded", ITEMS), Arc
+    for place in PLACES_OF_LOADS:
+        yield place, MixedLoad
 
 
 def _at(path: Sequence[str], schema: Schema) -> Schema:
@@ -134,11 +135,11 @@ def _material_rules() -> list[Schema]:
 def _arc_rules() -> list[Schema]:
     """Arcs must be given where nothing else can debond."""
     some_arc = {"required": ["debonded"], "properties": {"debonded": {"minItems": 1}}}
-    stiffness = ANALYSIS_TYPE.among("stiffness")
+    unbroken = ANALYSIS_TYPE.among("stiffness", "load")
     return [
         {"if": _if(ANGLE_ANALYSIS), "then": {"required": ["interface"], **_at(("interface",), some_arc)}},
         {
-            "if": {"allOf": [_if(stiffness), _if(ALL_CIRCULAR)]},
+            "if": {"allOf": [_if(unbroken), _if(ALL_CIRCULAR)]},
             "then": _at(
                 ("interface",),
                 {"anyOf": [{"required": [name]} for name in ("debonded", *STIFFNESSES, "axial_stiffness")]},
@@ -155,12 +156,18 @@ def _energy_rules() -> list[Schema]:
 
 
 def _generalized_rules() -> list[Schema]:
-    """Generalized plane strain is that of some types of analysis, and alone has stresses out of the plane."""
+    """Generalized plane strain alone has stresses out of the plane, and no strains of three components."""
     only_there = {"not": {"enum": list(OUT_OF_PLANE_STRESSES)}}
     return [
-        {"if": _if(GENERALIZED), "then": _at(("analysis", "type"), {"enum": list(GENERALIZED_ANALYSES)})},
         {"if": _if(IN_THE_PLANE), "then": _at(("output", "stress"), only_there)},
+        {"if": _if(GENERALIZED), "then": _at(("path", "waypoints", ITEMS), {"type": "object"})},
     ]
+
+
+def _mixed_load_rules() -> list[Schema]:
+    """A component has a strain or a stress, never both."""
+    both = {"type": "object", "anyOf": [{"required": list(names)} for names in components(*GENERALIZED.values)]}
+    return [_at(place, {"not": both}) for place in PLACES_OF_LOADS]
 
 
 def _envelope_rules() -> list[Schema]:

@@ -76,6 +76,24 @@ def _law_faults(material: Material, plane: str | None) -> list[str]:
     return faults
 
 
+def missing_expansions(materials: Mapping[str, Material], needed_by: str) -> list[str]:
+    """Faults of materials that do not say how they expand, which something needs; what they say wrongly is told
+    elsewhere.
+    """
+    return [
+        f"[material.{toml_key(phase)}] expansion: missing; {needed_by} needs it"
+        for phase, material in materials.items()
+        if _expands_unknown(material)
+    ]
+
+
+def _expands_unknown(material: Material) -> bool:
+    try:
+        return expansion(material) is None
+    except ValueError:
+        return False
+
+
 def _keys_by_form(table: object) -> dict[str, list[str]]:
     """The keys of a table that belong to one form of a material alone, without the forms that have none."""
     names = table if isinstance(table, dict) else {}

@@ -25,6 +25,7 @@ ORDER = (
     "interface",
     "angle",
     "path",
+    "load",
     "envelope",
     "decomposition",
     "output",

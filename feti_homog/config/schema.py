@@ -57,6 +57,7 @@ class Key:
         default: in words; empty if there is none.
         only: when it belongs to the table; always, if None.
         required: whether it must be there where it belongs.
+        instead: what to write where it does not belong; empty if there is nothing like it.
     """
 
     type: ValueType
@@ -65,6 +66,7 @@ class Key:
     default: str
     only: Condition | None
     required: bool
+    instead: str = ""
 
     def belongs(self, selected: Selected) -> bool:
         """Whether the key belongs to the table; not, if that depends on a faulty selector."""
@@ -79,6 +81,7 @@ def key(
     default: Any = dataclasses.MISSING,
     default_words: str = "",
     only: Condition | None = None,
+    instead: str = "",
 ) -> Any:
     """A dataclass field read from the key of its name; required where it belongs if it has no default.
 
@@ -86,7 +89,7 @@ def key(
     """
     required = default is dataclasses.MISSING
     words = default_words or ("" if required or default is None else _default_in_words(default))
-    metadata = {"key": Key(type_, meaning, unit, words, only, required)}
+    metadata = {"key": Key(type_, meaning, unit, words, only, required, instead)}
     if required and only is None:
         return dataclasses.field(metadata=metadata)
     return dataclasses.field(default=None if required else default, metadata=metadata)
@@ -156,7 +159,8 @@ class TableReader:
         if entry.only is not None and not entry.belongs(self.selected):
             found = self.selected.get(entry.only.selector)
             if found is not None:
-                return f"{line}belongs to {entry.only.in_words(section)}, not {toml_value(found)}"
+                instead = f"; use {entry.instead}" if entry.instead else ""
+                return f"{line}belongs to {entry.only.in_words(section)}, not {toml_value(found)}{instead}"
         complaint = entry.type.complaint(table[name])
         return f"{line}{complaint}" if complaint else ""
 

@@ -101,11 +101,17 @@ OPENINGS = ValueType(
 STRAIN = ValueType(
     f"a list of three numbers {STRAIN_COMPONENTS}", lambda v: is_number_list(v, 3), to_floats, _numbers(3)
 )
+LOAD = ValueType(
+    "a table of strains and stresses such as {S11 = 60.0, S22 = 0.0}",
+    lambda v: isinstance(v, dict) and v != {},
+    lambda v: v,
+    {"$ref": "#/$defs/mixed_load", "minProperties": 1},
+)
 WAYPOINTS = ValueType(
-    f"a list of strains {STRAIN_COMPONENTS}",
-    lambda v: isinstance(v, list) and v != [] and all(is_number_list(strain, 3) for strain in v),
-    lambda v: tuple(map(to_floats, v)),
-    {"type": "array", "items": _numbers(3), "minItems": 1},
+    f"a list of strains {STRAIN_COMPONENTS} or of tables such as {{S11 = 60.0}}",
+    lambda v: isinstance(v, list) and v != [] and all(is_number_list(load, 3) or LOAD.accepts(load) for load in v),
+    tuple,
+    {"type": "array", "items": {"anyOf": [_numbers(3), LOAD.json_schema]}, "minItems": 1},
 )
 MATRIX = ValueType(
     "a symmetric 3x3 array of numbers in the order 11, 22, 12, or 6x6 in the order 11, 22, 33, 23, 13, 12",

@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from feti_homog.config.interface_section import Arc
 from feti_homog.config.material_forms import MATERIAL_FORMS
+from feti_homog.config.mixed_load import MixedLoad
 from feti_homog.config.schema import keys_of
-from feti_homog.config.sections import SECTIONS, Arc
+from feti_homog.config.sections import SECTIONS
 
 REQUIRED = ("cell", "material", "analysis")
 TOP_LEVEL = (*SECTIONS, "material", "petsc", "name")
@@ -34,6 +36,7 @@ TABLES = (
     *(Table(section, f"[{section}]", contents) for section, contents in SECTIONS.items()),
     *(Table("material", "[material.PHASE]", contents, form) for form, contents in MATERIAL_FORMS.items()),
     Table("interface", "an arc of [interface] debonded", Arc),
+    Table("path", "a load of [path] to, [path] waypoints or [load] to", MixedLoad),
 )
 
 

@@ -12,10 +12,18 @@ LONGEST_VALUE = 60  # characters of a value in a message
 
 def toml_value(value: object) -> str:
     """The value nearly as TOML writes it, in one short line."""
+    line = _line(value)
+    return line if len(line) <= LONGEST_VALUE else line[: LONGEST_VALUE - 3] + "..."
+
+
+def _line(value: object) -> str:
+    if isinstance(value, dict):
+        return f"{{{', '.join(f'{toml_key(str(name))} = {_line(entry)}' for name, entry in value.items())}}}"
+    if isinstance(value, list) and any(isinstance(entry, dict) for entry in value):
+        return f"[{', '.join(map(_line, value))}]"
     if isinstance(value, float):
         return repr(value)
-    line = json.dumps(value, default=str, ensure_ascii=not str(value).isprintable())
-    return line if len(line) <= LONGEST_VALUE else line[: LONGEST_VALUE - 3] + "..."
+    return json.dumps(value, default=str, ensure_ascii=not str(value).isprintable())
 
 
 def toml_key(name: str) -> str:

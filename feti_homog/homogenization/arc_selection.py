@@ -11,7 +11,7 @@ from feti_homog.cell.outline import MERGED
 from feti_homog.cell.periodic_topology import Torus
 from feti_homog.cell.refinement import ReferenceLattice
 from feti_homog.config.case import Case
-from feti_homog.config.sections import Arc
+from feti_homog.config.interface_section import Arc
 from feti_homog.homogenization import tips
 from feti_homog.interface import debonded_arcs
 from feti_homog.interface.debonded_arcs import MovedTips

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from feti_homog.config.case import Case
-from feti_homog.config.sections import InterfaceSection
+from feti_homog.config.interface_section import InterfaceSection
 from feti_homog.feti.decomposition.interface_springs import GLUE, InterfaceSprings
 
 

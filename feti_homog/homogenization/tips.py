@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from feti_homog.cell import element_estimate
 from feti_homog.config.case import Case
-from feti_homog.config.sections import BREAKING
+from feti_homog.config.selectors import BREAKING
 from feti_homog.interface import debonded_arcs
 
 # The stress at a tip is singular, so that the energy errs by about the size of the elements there, elsewhere by

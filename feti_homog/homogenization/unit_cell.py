@@ -202,6 +202,7 @@ def describe(case: Case, n_ranks: int) -> str:
         ),
         *cost_model.estimate_lines(taken, n_ranks),
         *(f"warning    {warning}" for warning in (*case.warnings(), *unresolved)),
+        *(f"remark     {remark}" for remark in case.remarks()),
         "the case is valid",
     ]
     return "\n".join(lines)

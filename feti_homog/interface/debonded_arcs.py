@@ -10,7 +10,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from feti_homog.config.sections import Arc
+from feti_homog.config.interface_section import Arc
 from feti_homog.config.wording import toml_value
 from feti_homog.typing import Bool, Float, Int
 

@@ -86,7 +86,7 @@ class AxisReader:
             return f"unknown key; {suggestion(path[0], known, {})}"
         if isinstance(value, list):
             return "" if value else "expected at least one value"
-        return range_fault(value, self.is_sampled) if _is_range(value) else f"expected {AXIS_EXPECTED}"
+        return range_fault(value, self.is_sampled) if _is_range(path, value) else f"expected {AXIS_EXPECTED}"
 
 
 def _leaves(table: Mapping[str, Any], above: TomlPath = ()) -> Iterator[tuple[TomlPath, Any]]:
@@ -94,14 +94,15 @@ def _leaves(table: Mapping[str, Any], above: TomlPath = ()) -> Iterator[tuple[To
     for name, value in table.items():
         path = (*above, *name.split("."))
         is_known = path[0] in TOP_LEVEL and path[0] not in ("name", SWEEP)
-        if is_known and isinstance(value, dict) and value and not _is_range(value):
+        if is_known and isinstance(value, dict) and value and not _is_range(path, value):
             yield from _leaves(value, path)
         else:
             yield path, value
 
 
-def _is_range(value: Any) -> bool:
-    return isinstance(value, dict) and bool(value.keys() & {"from", "to"})
+def _is_range(path: TomlPath, value: Any) -> bool:
+    """Whether the value of a key is meant as a range; a section, which may have a key "to", is none."""
+    return len(path) > 1 and isinstance(value, dict) and bool(value.keys() & {"from", "to"})
 
 
 def _axis(path: TomlPath, value: Any) -> Axis:

@@ -15,7 +15,7 @@ from feti_homog.analysis import load_path
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.common.petsc_options import case_options
 from feti_homog.common.progress import Progress
-from feti_homog.config.sections import LoadPath
+from feti_homog.config.load_section import LoadPath
 from feti_homog.errors import CaseError, ConvergenceError
 from feti_homog.homogenization.averaging import Homogenization
 from feti_homog.interface.contact import OPEN

@@ -12,7 +12,7 @@ from support.cases import relative_error
 from support.random_cells import random_bonded, random_cell, random_strain
 from support.ranks import parallel_assert
 
-from feti_homog.config.sections import Arc
+from feti_homog.config.interface_section import Arc
 from feti_homog.interface.contact import BONDED, CLOSED, OPEN
 from feti_homog.interface.load import Load
 

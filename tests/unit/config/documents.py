@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 
 from feti_homog.config.cell_section import CIRCULAR, TOUCHING
 from feti_homog.config.envelope_section import FAMILIES
-from feti_homog.config.envelope_section import STRAINS as STRAIN_NAMES
-from feti_homog.config.envelope_section import STRESSES as STRESS_NAMES
+from feti_homog.config.load_names import SPATIAL_STRAINS, SPATIAL_STRESSES
+from feti_homog.config.load_names import STRAINS as STRAIN_NAMES
+from feti_homog.config.load_names import STRESSES as STRESS_NAMES
 
 TINY = 1e-90  # smaller magnitudes are refused
 
@@ -102,13 +103,24 @@ def arcs(draw: st.DrawFn, with_angle: bool) -> dict[str, Any]:
 
 
 @st.composite
-def paths(draw: st.DrawFn) -> dict[str, Any]:
-    """From zero to a strain, or to waypoints each of which differs from the last."""
-    waypoints = [draw(NONZERO_STRAINS)]
+def loads(draw: st.DrawFn, plane: str, expand: bool) -> dict[str, float]:
+    """A load by name: of some components, in any order, the strain or the stress, and perhaps a temperature."""
+    names = (SPATIAL_STRAINS, SPATIAL_STRESSES) if plane == "generalized" else (STRAIN_NAMES, STRESS_NAMES)
+    pairs = draw(st.lists(st.sampled_from(list(zip(*names, strict=True))), min_size=1, unique=True))
+    load = {draw(st.sampled_from(pair)): draw(numbers(-1.0, 1.0)) for pair in pairs}
+    return load | (draw(optional(temperature=numbers(-1e3, 1e3))) if plane == "generalized" and expand else {})
+
+
+@st.composite
+def paths(draw: st.DrawFn, plane: str, expand: bool) -> dict[str, Any]:
+    """From zero to a strain or a load, or to waypoints each of which differs from the last."""
+    load = loads(plane, expand).filter(lambda load: any(load.values()))
+    first: st.SearchStrategy[Any] = load if plane == "generalized" else st.one_of(load, NONZERO_STRAINS)
+    waypoints = [draw(first)]
     for _ in range(draw(st.integers(0, 3))):
-        last = waypoints[-1]
-        waypoints.append(draw(STRAINS.filter(lambda strain, last=last: strain != last)))
-    targets: dict[str, Any] = {"waypoints": waypoints} if draw(st.booleans()) else {"strain": waypoints[0]}
+        waypoints.append(draw(first.filter(lambda load, before=tuple(waypoints): is_new(load, before))))
+    name = "to" if isinstance(waypoints[0], dict) else "strain"
+    targets: dict[str, Any] = {"waypoints": waypoints} if draw(st.booleans()) else {name: waypoints[0]}
     if draw(st.booleans()):
         steps = draw(st.integers(len(waypoints), 1_000_000))
         own = draw(optional(release=st.sampled_from(["all", "worst"])))
@@ -116,9 +128,16 @@ def paths(draw: st.DrawFn) -> dict[str, Any]:
     return targets | draw(optional(method=st.just("events"), max_events=st.integers(1, 10**9)))
 
 
-def planes_of(analysis: str, phases: Iterable[dict[str, Any]]) -> list[str]:
-    """The plane states in which phases can be and an analysis made."""
-    in_space = analysis != "path" and all(len(constants.get("stiffness", ())) != 3 for constants in phases)
+def is_new(load: Any, before: Sequence[Any]) -> bool:
+    """Whether a load surely differs from the last: it has a value that none has had yet."""
+    values = load.values() if isinstance(load, dict) else load
+    had = {value for each in before for value in (each.values() if isinstance(each, dict) else each)}
+    return not had.issuperset({*values} - {0.0})
+
+
+def planes_of(phases: Iterable[dict[str, Any]]) -> list[str]:
+    """The plane states in which phases can be."""
+    in_space = all(len(constants.get("stiffness", ())) != 3 for constants in phases)
     return ["strain", "stress", "generalized"] if in_space else ["strain", "stress"]
 
 
@@ -134,12 +153,12 @@ def envelopes(draw: st.DrawFn, plane: str, expand: bool) -> dict[str, Any]:
 @st.composite
 def documents(draw: st.DrawFn) -> dict[str, Any]:
     """The document of a valid case, with round fibres."""
-    analysis = draw(st.sampled_from(["stiffness", "angle", "path", "envelope"]))
+    analysis = draw(st.sampled_from(["stiffness", "angle", "path", "load", "envelope"]))
     own_arcs = draw(st.lists(arcs(with_angle=analysis != "angle"), min_size=analysis == "angle", max_size=3))
     interface: dict[str, Any] = {"debonded": own_arcs} | draw(optional(contact=st.booleans()))
     strength = st.one_of(POSITIVE, st.just(math.inf))
     phases = {"matrix": draw(materials()), "fibre": draw(materials())}
-    plane = draw(st.sampled_from(planes_of(analysis, phases.values())))
+    plane = draw(st.sampled_from(planes_of(phases.values())))
     document: dict[str, Any] = {
         "cell": draw(cells()),
         "material": phases,
@@ -148,16 +167,20 @@ def documents(draw: st.DrawFn) -> dict[str, Any]:
     if analysis == "angle":
         strain = {} if plane == "generalized" else draw(optional(strain=NONZERO_STRAINS))
         document["angle"] = {"values": draw(OPENINGS)} | strain
+    expand = all(not {"expansion", "expansion_axial"}.isdisjoint(constants) for constants in phases.values())
+    along = {"axial_strength": POSITIVE, "axial_stiffness": POSITIVE} if plane == "generalized" else {}
     if analysis == "envelope":
-        expand = all(not {"expansion", "expansion_axial"}.isdisjoint(constants) for constants in phases.values())
         document["envelope"] = draw(envelopes(plane, expand))
         interface |= {"contact": False, "normal_strength": draw(POSITIVE)}
-        along = {"axial_strength": POSITIVE, "axial_stiffness": POSITIVE} if plane == "generalized" else {}
         interface |= draw(optional(**along))
+    if analysis == "load":
+        document["load"] = {"to": draw(loads(plane, expand).filter(lambda load: any(load.values())))}
     if analysis == "path":
-        document["path"] = draw(paths())
+        document["path"] = draw(paths(plane, expand))
         criterion = st.sampled_from(["max", "quadratic"])
-        interface |= draw(optional(normal_strength=strength, tangential_strength=strength, criterion=criterion))
+        interface |= draw(
+            optional(normal_strength=strength, tangential_strength=strength, criterion=criterion, **along)
+        )
     if analysis in ("angle", "envelope") or draw(st.booleans()):
         document["interface"] = interface
     sizes = [{}, {"subdomains": draw(st.integers(1, 1_000_000))}, {"max_dofs": draw(st.integers(100, 10**9))}]

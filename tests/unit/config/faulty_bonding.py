@@ -140,7 +140,7 @@ FAULTY_BONDINGS: dict[str, tuple[str, tuple[str, ...]]] = {
     ),
     "arc_with_angle_of_angle": (
         of_type("angle", ANGLE, "[interface]", f"debonded = [{ARC}]"),
-        ('debonded[0].angle = 60: belongs to [analysis] type = "stiffness" or "path" or "envelope", not "angle"',),
+        ('debonded[0].angle = 60: belongs to [analysis] type = "stiffness" or "path" or "load" or "envelope", ',),
     ),
     # [angle]
     "no_angle": (of_type("angle", BARE_ARC), ('[angle]: missing section; [analysis] type = "angle" needs it',)),
@@ -182,23 +182,19 @@ FAULTY_BONDINGS: dict[str, tuple[str, tuple[str, ...]]] = {
         ('[angle] strain = [0, 0, 1]: belongs to [analysis] plane = "strain" or "stress", not "generalized"',),
     ),
     # [path]
-    "path_in_space": (
-        of_type("path", PATH).replace('"strain"', '"generalized"'),
-        ('[analysis] plane = "generalized": works with type = "stiffness", "angle" or "envelope", not "path"',),
-    ),
     "no_path": (of_type("path"), ('[path]: missing section; [analysis] type = "path" needs it',)),
     "path_of_angle": (
         of_type("angle", BARE_ARC, ANGLE, PATH),
         ('[path]: belongs to [analysis] type = "path", not "angle"',),
     ),
-    "path_of_nothing": (of_type("path", "[path]"), ("[path] strain, waypoints: missing; give one",)),
+    "path_of_nothing": (of_type("path", "[path]"), ("[path] strain, to, waypoints: missing; give one",)),
     "path_of_both": (
         of_type("path", PATH, "waypoints = [[1, 0, 0]]"),
         ("[path] strain, waypoints: exclude each other; give one",),
     ),
     "path_to_zero": (
         of_type("path", "[path]\nstrain = [0, 0.0, 0]"),
-        ("[path] strain: expected a strain other than zero",),
+        ("[path] strain = [0.0, 0.0, 0.0]: expected a strain other than zero",),
     ),
     "path_strain_nan": (
         of_type("path", "[path]\nstrain = [nan, 0, 0]"),

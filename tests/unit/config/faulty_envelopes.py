@@ -82,7 +82,7 @@ FAULTY_ENVELOPES: dict[str, tuple[str, tuple[str, ...]]] = {
     ),
     "axial_strength_of_stiffness": (
         ended(f"[interface]\ndebonded = [{ARC}]\naxial_strength = 3.0\n"),
-        ('[interface] axial_strength = 3.0: belongs to [analysis] type = "envelope", not "stiffness"',),
+        ('[interface] axial_strength = 3.0: belongs to [analysis] type = "path" or "envelope", not "stiffness"',),
     ),
     "axial_strength_infinite": (
         envelope('["S11", "S33"]', bonds=f"{BONDS}\naxial_strength = inf", state="generalized"),

@@ -12,14 +12,17 @@ from support.base_case import BASE, FIBRE, changed, fibre
 from unit.config.faulty_bonding import BARE_ARC, FAULTY_BONDINGS, PATH, debonded, of_type
 from unit.config.faulty_cases import FAULTY_CASES
 from unit.config.faulty_envelopes import FAULTY_ENVELOPES
+from unit.config.faulty_loads import FAULTY_LOADS
 from unit.config.valid_cases import MESH, VALID_CASES
 
 from feti_homog.config.case import check_phases, load, parse
+from feti_homog.config.interface_section import Arc, InterfaceSection
+from feti_homog.config.load_section import LoadPath
 from feti_homog.config.material_forms import General, Isotropic, Orthotropic
-from feti_homog.config.sections import Angle, Arc, InterfaceSection, LoadPath
+from feti_homog.config.sections import Angle
 from feti_homog.errors import CaseError
 
-FAULTY = FAULTY_CASES | FAULTY_BONDINGS | FAULTY_ENVELOPES
+FAULTY = FAULTY_CASES | FAULTY_BONDINGS | FAULTY_ENVELOPES | FAULTY_LOADS
 
 
 def case_of(tmp_path: Path, content: str, name: str = "cell.toml"):
@@ -71,7 +74,8 @@ def test_one_fault_is_one_line(tmp_path, name):
 
 
 def test_there_are_enough_faulty_cases():
-    assert len(FAULTY) == len(FAULTY_CASES) + len(FAULTY_BONDINGS) + len(FAULTY_ENVELOPES) >= 100
+    parts = (FAULTY_CASES, FAULTY_BONDINGS, FAULTY_ENVELOPES, FAULTY_LOADS)
+    assert len(FAULTY) == sum(map(len, parts)) >= 100
 
 
 def test_a_missing_file_is_told(tmp_path):

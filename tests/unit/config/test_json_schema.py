@@ -14,13 +14,14 @@ from unit.config.documents import documents
 from unit.config.faulty_bonding import FAULTY_BONDINGS
 from unit.config.faulty_cases import FAULTY_CASES
 from unit.config.faulty_envelopes import FAULTY_ENVELOPES
+from unit.config.faulty_loads import FAULTY_LOADS
 from unit.config.valid_cases import VALID_CASES, VALID_SWEEPS
 
 from feti_homog.config.json_schema import json_schema
 
 VALIDATOR = Draft202012Validator(json_schema())
 FILES = [path for folder in ("drivers", "scripts/cases") for path in sorted((ROOT / folder).glob("*.toml"))]
-FAULTY = FAULTY_CASES | FAULTY_BONDINGS | FAULTY_ENVELOPES
+FAULTY = FAULTY_CASES | FAULTY_BONDINGS | FAULTY_ENVELOPES | FAULTY_LOADS
 
 NO_TOML = {"syntax", "syntax_unclosed", "key_twice", "section_twice", "number_too_long"}
 BETWEEN_NUMBERS = {
@@ -32,8 +33,11 @@ BETWEEN_NUMBERS = {
     "stiffness_not_symmetric_in_space", "stiffness_indefinite_in_space", "stiffness_couples_shears",
     "interface_size_above_mesh_size", "interface_size_above_the_default_mesh_size",
     "tip_size_above_mesh_size", "tip_size_above_interface_size", "envelope_temperature_without_expansion",
+    "temperature_without_expansion", "temperature_of_a_load_without_one_expansion", "load_of_zero",
+    "path_to_a_load_of_zero", "waypoint_of_a_load_of_zero", "waypoint_that_names_what_it_is",
+    "waypoint_of_the_strain_that_a_load_is", "increments_too_few_for_loads",
 }  # fmt: skip
-NOT_IN_JSON = {"fraction_is_nan", "strength_is_nan", "path_strain_nan"}
+NOT_IN_JSON = {"fraction_is_nan", "strength_is_nan", "path_strain_nan", "load_nan"}
 INTEGER_TO_JSON = {"refine_is_real"}
 OUTSIDE_THE_FILE = {"mesh_not_there"}
 BEYOND_A_SCHEMA = NO_TOML | BETWEEN_NUMBERS | NOT_IN_JSON | INTEGER_TO_JSON | OUTSIDE_THE_FILE

@@ -19,6 +19,15 @@ from unit.config.faulty_envelopes import BONDS, envelope
 
 MESH = changed(MESH_CELL)
 
+
+def in_space(case: str, bonds: str = "") -> str:
+    """A case in generalized plane strain, whose phases expand."""
+    expands = case.replace("poisson = 0.299", "poisson = 0.299\nexpansion = 1e-5").replace(
+        "poisson = 0.222", "poisson = 0.222\nexpansion = 2e-5"
+    )
+    return expands.replace('"strain"', '"generalized"') + bonds + "\n"
+
+
 VALID_CASES = {
     "base": BASE,
     "named, with options": "name = 'Zelle'\n"
@@ -72,6 +81,21 @@ VALID_CASES = {
     + f'{BONDS}\n[envelope]\nplane = ["S22", "S12"]\ntemperature = -100\n',
     "path, few states": of_type("path", PATH, "[output]\nstates = 7"),
     "path, its peaks": of_type("path", PATH, '[output]\nstates = "peaks"'),
+    "path to a load": of_type("path", "[path]\nto = {S11 = 60, E22 = 0.0}"),
+    "path of loads and strains": of_type(
+        "path", "[path]\nwaypoints = [{S11 = 60}, [1, 0, 0], {gamma12 = 1}, {S12 = 1}, {S12 = 0}]"
+    ),
+    "path in space": in_space(
+        of_type("path", "[path]\nwaypoints = [{temperature = -100}, {S11 = 60, gamma13 = 0.1}, {S11 = 0, S13 = 0}]"),
+        bonds="[interface]\naxial_strength = 3.0\naxial_stiffness = 2.0",
+    ),
+    "increments in space": in_space(
+        of_type("path", "[path]\nto = {E33 = 0.1}", 'method = "increments"', "increments = 5")
+    ),
+    "load": of_type("load", "[load]\nto = {E11 = 0.02, S22 = 0.0, S12 = 1}"),
+    "load on a sheet": of_type("load", "[load.to]\nS12 = 1").replace('"strain"', '"stress"'),
+    "load in space": in_space(of_type("load", "[load.to]\nS33 = 1.0\nS23 = -2.0\ntemperature = 20")),
+    "load on debonded fibres": of_type("load", "[load]\nto = {S22 = 1.0}", f"[interface]\ndebonded = [{ARC}]"),
     "path there and back": of_type("path", "[path]\nwaypoints = [[1, 0, 0], [0, 0, 0]]\nmax_events = 7"),
     "increments": of_type("path", PATH, 'method = "increments"\nincrements = 50\nrelease = "worst"'),
     "strengths": debonded("{fibre = [1, 2], angle = 360}", "normal_strength = inf\ntangential_strength = 3"),
@@ -85,6 +109,8 @@ VALID_SWEEPS = {
     "zip": f"{BASE}[sweep]\nmode = 'zip'\ncell.order = [1, 2]\ncell.refine = [0, 1]\n",
     "step": f"{BASE}[sweep]\ncell.fibre_fraction = {{from = 0.1, to = 0.3, step = 0.1}}\n",
     "count": f"{BASE}[sweep]\ncell.fibre_fraction = {{from = 0.01, to = 0.16, count = 3, scale = 'log'}}\n",
+    "loads": f"{BASE}[sweep]\npath.to.S11 = [1, 2]\npath.to.S22 = {{from = 1, to = 2, count = 2}}\n"
+    "'load.to.E11' = [1]\n'load.to' = {S22 = [1]}\n",
     "samples": f"{BASE}[sweep]\nsamples = 3\nsampling = 'random'\nseed = 1\n"
     "cell.fibre_fraction = {from = 0.1, to = 0.3}\n",
     "tables": f"{WITHOUT_GEOMETRY}[sweep]\ncell = [{{geometry = 'square'}}, {{geometry = 'random', fibres = 3}}]\n"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from feti_homog.config.sections import Arc
+from feti_homog.config.interface_section import Arc
 from feti_homog.interface.debonded_arcs import angles, debonded, moved_tips, tips
 
 ROUND = np.arange(0.0, 360.0, 10.0)

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from feti_homog.config.sections import Arc
+from feti_homog.config.interface_section import Arc
 from feti_homog.interface.debonded_arcs import angles, debonded, tips
 
 FIBRES = 3

@@ -56,6 +56,20 @@ def test_constants_in_space_are_varied_as_any_others():
     assert [case.materials["fibre"].expansion for case in by_axes.cases] == [1e-6, (1e-6, 2e-6, 3e-6)]
 
 
+def test_loads_by_name_are_varied_as_any_keys():
+    case = CASE.replace('"stiffness"', '"load"')
+    table = "load.to.S11 = {from = 10, to = 30, step = 10}\n'load.to.E22' = [0.0, 0.1]\n"
+    sweep = expanded(f"{table}mode = 'grid'\n", case)
+    assert [(full["S11"], full["E22"]) for case in sweep.cases for full in case.targets] == [
+        (S11, E22) for S11 in (10.0, 20.0, 30.0) for E22 in (0.0, 0.1)
+    ]
+    assert [entry.inputs["load.to.S11"] for entry in sweep.entries] == [10, 10, 20, 20, 30, 30]
+    path = expanded("path.to = [{S11 = 60.0}, {S12 = 1.0}]", CASE.replace('"stiffness"', '"path"'))
+    assert [case.path.to.named for case in path.cases] == [{"S11": 60.0}, {"S12": 1.0}]
+    waypoints = "path.waypoints = [[{S11 = 1.0}], [{S11 = 1.0}, [0.0, 0.0, 0.0]]]"
+    assert [len(case.targets) for case in expanded(waypoints, CASE.replace('"stiffness"', '"path"')).cases] == [1, 2]
+
+
 @pytest.mark.parametrize(
     ("range_", "expected"),
     [

@@ -1,31 +1,18 @@
-"""Reading the sections of imperfect bonding, [interface], [angle] and [path], and what must hold between their keys."""
+"""Reading the sections of imperfect bonding, [interface] and [angle], and what must hold between their keys."""
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from itertools import pairwise
 from typing import Any
 
 from feti_homog.config.cell_section import CIRCULAR, GEOMETRY
+from feti_homog.config.interface_section import STIFFNESSES, STRENGTHS, Arc, InterfaceSection
 from feti_homog.config.schema import Selected, TableReader
 from feti_homog.config.section_values import ARCS
-from feti_homog.config.sections import (
-    ANALYSIS_TYPE,
-    GENERALIZED,
-    PLANE,
-    SECTIONS_OF_AN_ANALYSIS,
-    STIFFNESSES,
-    STRENGTHS,
-    Angle,
-    Arc,
-    InterfaceSection,
-    LoadPath,
-    Strain,
-)
+from feti_homog.config.sections import SECTIONS_OF_AN_ANALYSIS, Angle
+from feti_homog.config.selectors import ANALYSIS_TYPE, GENERALIZED, PLANE
 from feti_homog.config.wording import toml_value
-
-ZERO: Strain = (0.0, 0.0, 0.0)
 
 
 def misplaced_sections(document: Mapping[str, Any], analysis: str | None) -> list[str]:
@@ -85,7 +72,7 @@ def _missing_arcs(table: Any, selected: Selected) -> list[str]:
         return [f'[interface] debonded: missing; [analysis] type = "angle" needs {ARCS.expected}']
     # An empty list says that it is meant; of a user's mesh a curve may be debonded.
     is_bare = isinstance(table, dict) and not table.keys() & {"debonded", *STIFFNESSES, "axial_stiffness"}
-    if analysis == "stiffness" and selected[GEOMETRY] in CIRCULAR and is_bare:
+    if analysis in ("stiffness", "load") and selected[GEOMETRY] in CIRCULAR and is_bare:
         return [f"[interface] debonded: missing; expected {ARCS.expected}, or []: nothing else can open"]
     return []
 
@@ -98,37 +85,3 @@ def read_angle(table: Any, reader: TableReader) -> Angle | None:
     if angle is not None and angle.strain is not None and not any(angle.strain):
         reader.faults.append("[angle] strain: expected a strain other than zero")
     return angle
-
-
-def read_path(table: Any, reader: TableReader) -> LoadPath | None:
-    """The section [path]; None if it is absent or faulty."""
-    if table is None:
-        return None
-    path = reader.read(LoadPath, table, "path")
-    if path is not None:
-        reader.faults += _path_faults(path)
-    return path
-
-
-def _path_faults(path: LoadPath) -> list[str]:
-    faults = []
-    if (path.strain is None) == (path.waypoints is None):
-        state = "missing; give one" if path.strain is None else "exclude each other; give one"
-        faults.append(f"[path] strain, waypoints: {state}")
-    elif path.strain is not None and not any(path.strain):
-        faults.append("[path] strain: expected a strain other than zero, where the path begins")
-    elif path.waypoints is not None:
-        faults += _repeated_waypoints(path.waypoints)
-    if path.increments is not None and path.increments < len(path.targets):
-        faults.append(f"[path] increments = {path.increments}: expected at least one for each waypoint")
-    return faults
-
-
-def _repeated_waypoints(waypoints: tuple[Strain, ...]) -> list[str]:
-    """Faults of waypoints at which the path already is."""
-    repeated = [k for k, (before, after) in enumerate(pairwise([ZERO, *waypoints])) if before == after]
-    return [
-        f"[path] waypoints[{k}] = {toml_value(list(waypoints[k]))}: expected a strain other than "
-        + (f"waypoints[{k - 1}]" if k else "zero, where the path begins")
-        for k in repeated
-    ]
