@@ -18,6 +18,7 @@ from feti_homog.analysis.result_records import (
     Checks,
     EnvelopePoint,
     FibreInfo,
+    LoadPoint,
     PathPoint,
     SolverInfo,
     StiffnessBounds,
@@ -103,6 +104,7 @@ class Result:
     tips: TipRates | None = described("energy release rates at the tips of debonded arcs, of a stiffness", default=None)
     angle: tuple[AnglePoint, ...] | None = described("points of analysis `angle`, as in angle.csv", default=None)
     path: tuple[PathPoint, ...] | None = described("points of analysis `path`, as in path.csv", default=None)
+    load: LoadPoint | None = described("state of analysis `load`, as in load.csv", default=None)
     envelope: tuple[EnvelopePoint, ...] | None = described(
         "directions of analysis `envelope`, as in envelope.csv",
         default=None,

@@ -18,6 +18,7 @@ from feti_homog.analysis.result_records import (
     Checks,
     EnvelopePoint,
     FibreInfo,
+    LoadPoint,
     PathPoint,
     SolverInfo,
     StiffnessBounds,
@@ -41,6 +42,8 @@ def result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Fields
         for name, kind in (("angle", AnglePoint), ("path", PathPoint), ("envelope", EnvelopePoint))
         if name in analysis
     }
+    if "load" in analysis:
+        points["load"] = LoadPoint(**analysis["load"])
     if "effective_stiffness" in analysis and cell.axial is not None:
         points |= spatial_constants.constants(cell, analysis, fractions)
     elif "effective_stiffness" in analysis and cell.case.interface is None:

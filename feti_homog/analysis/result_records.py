@@ -23,6 +23,7 @@ from feti_homog.typing import Float
 
 EITHER, EITHER_STIFFNESS = "(3,) or (6,)", "(3, 3) or (6, 6)"
 ENERGY = f"{STRESS} times that of the cell"
+TEMPERATURE = "change of temperature, of generalized plane strain whose phases expand"
 DEBONDED_ANGLE = (
     "the same in degrees of arc, `debonded_length` / radius; of a fibre that is not round 360 times the share of its "
     "interface"
@@ -182,19 +183,25 @@ class PathPoint:
     """A point of a path: a break, a change of contact, the end of a leg, or of an increment."""
 
     load_factor: float = described("position on the whole path, 0 to 1, every leg taking the same share")
-    strain: Float = described("macroscopic strain", "", "(3,)", STRAINS)
+    strain: Float = described("macroscopic strain", "", EITHER, STRAINS, spatial_components=SPATIAL_STRAINS)
     stress: Float = described(
         "macroscopic stress: of events before the bonds that `broke` break, of increments after them",
         STRESS,
-        "(3,)",
+        EITHER,
         STRESSES,
+        spatial_components=SPATIAL_STRESSES,
     )
+    temperature: float | None = described(TEMPERATURE, default=None)
     broke: int = described("bonds that break at this event, or broke in the step to this increment")
     free_motions: int = described("rigid motions of fibres that no interface force resists")
-    stored: float = described("energy stored per area of the cell, E.Sigma / 2", STRESS)
+    stored: float = described("elastic energy stored per area of the cell", STRESS)
     stored_in_springs: float = described("the share of elastic interfaces in it", STRESS)
+    work: float = described(
+        "work of the loads so far per area of the cell, of a temperature too: `stored` and `dissipated` together",
+        STRESS,
+    )
     dissipated: float = described("energy lost to breaks so far per area of the cell, along all equilibria", STRESS)
-    dissipated_strain_controlled: float = described("the same if the strain only rises on the first leg", STRESS)
+    dissipated_strain_controlled: float = described("the same if the load only rises on the first leg", STRESS)
     fracture_energy: float | None = described(
         "toughness of the bonds that the load broke so far, each in the mode in which it broke, times their lengths, "
         "per area of the cell; of bonds that break by energy",
@@ -209,6 +216,28 @@ class PathPoint:
     debonding_angle: Float = described(DEBONDED_ANGLE, DEGREES, "(f,)")
     tips: Tips | None = described(
         "of bonds that break by energy, at the points that `states` in [output] chooses", default=None
+    )
+    bonded: int = described("bonded interface nodes")
+    open: int = described("debonded interface nodes without contact")
+    closed: int = described("debonded interface nodes in contact")
+    iterations: int = described("Krylov iterations")
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoadPoint:
+    """The equilibrium under one load, with what is debonded from the start."""
+
+    strain: Float = described("macroscopic strain", "", EITHER, STRAINS, spatial_components=SPATIAL_STRAINS)
+    stress: Float = described("macroscopic stress", STRESS, EITHER, STRESSES, spatial_components=SPATIAL_STRESSES)
+    temperature: float | None = described(TEMPERATURE, default=None)
+    free_motions: int = described("rigid motions of fibres that no interface force resists")
+    stored: float = described("elastic energy stored per area of the cell", STRESS)
+    stored_in_springs: float = described("the share of elastic interfaces in it", STRESS)
+    debonded_share: float = described("debonded share of the length of all interfaces")
+    debonded_length: Float = described("debonded length of each fibre's interface", LENGTH, "(f,)")
+    debonding_angle: Float = described(DEBONDED_ANGLE, DEGREES, "(f,)")
+    tips: TipRates | None = described(
+        "energy release rates at the tips of its arcs; absent under loads other than strains of the plane", default=None
     )
     bonded: int = described("bonded interface nodes")
     open: int = described("debonded interface nodes without contact")

@@ -12,7 +12,7 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from feti_homog.analysis import debonding_angle, envelope, load_path, result_builder, stiffness, stored_result
+from feti_homog.analysis import debonding_angle, envelope, load, load_path, result_builder, stiffness, stored_result
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.criteria import criterion_of
 from feti_homog.analysis.result import Result
@@ -197,8 +197,10 @@ def _write(result: Result, directory: Path, cell: TornCell) -> None:
     written = {result_json.NAME}
     if result.result_h5 is not None:
         written |= {field_file.NAME, *(path.name for path in on_root(cell.comm, xdmf.write, directory))}
-    for name in ("angle", "path", "envelope"):
-        if (points := getattr(result, name)) is not None:
+    lists = {name: getattr(result, name) for name in ("angle", "path", "envelope")}
+    lists["load"] = None if result.load is None else (result.load,)
+    for name, points in lists.items():
+        if points is not None:
             on_root_only(cell.comm, csv_tables.write, directory / f"{name}.csv", points)
             written.add(f"{name}.csv")
     written |= {event_log.NAME} if result.path is not None else set()
