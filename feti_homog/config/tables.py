@@ -36,7 +36,8 @@ TABLES = (
     *(Table(section, f"[{section}]", contents) for section, contents in SECTIONS.items()),
     *(Table("material", "[material.PHASE]", contents, form) for form, contents in MATERIAL_FORMS.items()),
     Table("interface", "an arc of [interface] debonded", Arc),
-    Table("path", "a load of [path] to, [path] waypoints or [load] to", MixedLoad),
+    Table("path", "a load of [path] to or waypoints", MixedLoad),
+    Table("load", "[load] to", MixedLoad),
 )
 
 
