@@ -19,7 +19,7 @@ from feti_homog.config.section_values import (
     TOUGHNESS,
     WAYPOINTS,
 )
-from feti_homog.config.values import boolean, choice, integer, real, text
+from feti_homog.config.values import POSITIVE_OR_INF, boolean, choice, integer, real, text
 
 Strain = tuple[float, ...]
 
@@ -117,8 +117,8 @@ class InterfaceSection:
         default_words="inf",
     )
     axial_stiffness: float | None = key(
-        real(above=0.0),
-        "Traction along the fibre / slip along it, k_a, of the bonds that hold.",
+        POSITIVE_OR_INF,
+        "Traction along the fibre / slip along it, k_a, of the bonds that hold; inf: no slip along it.",
         unit="stress / length",
         default=None,
         default_words="tangential_stiffness",
@@ -141,8 +141,8 @@ class InterfaceSection:
         only=BREAKING,
     )
     axial_strength: float | None = key(
-        real(above=0.0),
-        'R^a: the traction along the fibre at which a bond breaks; in plane = "generalized".',
+        POSITIVE_OR_INF,
+        'R^a: the traction along the fibre at which a bond breaks; inf: it breaks none; in plane = "generalized".',
         unit="stress",
         default=None,
         default_words="tangential_strength",

@@ -152,7 +152,7 @@ def documents(draw: st.DrawFn) -> dict[str, Any]:
         expand = all(not {"expansion", "expansion_axial"}.isdisjoint(constants) for constants in phases.values())
         document["envelope"] = draw(envelopes(plane, expand))
         interface |= {"contact": False, "normal_strength": draw(POSITIVE)}
-        along = {"axial_strength": POSITIVE, "axial_stiffness": POSITIVE} if plane == "generalized" else {}
+        along = dict.fromkeys(("axial_strength", "axial_stiffness"), strength) if plane == "generalized" else {}
         interface |= draw(optional(**along))
     if analysis == "path":
         document["path"] = draw(paths())
