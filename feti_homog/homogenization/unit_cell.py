@@ -128,20 +128,16 @@ def tear(
     cell = TornCell(comm, case, summary, lattice, subdomains, solver)
     if not phase_laws.is_generalized(case):
         return cell
+    with progress.stage("assemble") as words:
+        own = agree(comm, assemble_axial, case, subdomains)
+        words.append(f"{comm.allreduce(sum(s.n_dofs for s in own))} degrees of freedom along the fibres")
     with progress.stage("axial"):
-        return replace(cell, axial=_axial(cell, shared, thresholds))
+        applications, springs = cost_model.applications(case), bonds.axial_springs(case)
+        solver = FetiSolver(comm, shared, own, lattice, applications, thresholds, springs, AXIAL)
+    return replace(cell, axial=TornCell(comm, case, summary, lattice, own, solver))
 
 
-def _axial(cell: TornCell, shared: SharedEntities, thresholds: Thresholds) -> TornCell:
-    """The same cell with the displacement along the fibres.  Collective."""
-    case = cell.case
-    subdomains = agree(cell.comm, _assemble_axial, case, cell.subdomains)
-    applications, springs = cost_model.applications(case), bonds.axial_springs(case)
-    solver = FetiSolver(cell.comm, shared, subdomains, cell.lattice, applications, thresholds, springs, AXIAL)
-    return TornCell(cell.comm, case, cell.summary, cell.lattice, subdomains, solver)
-
-
-def _assemble_axial(case: Case, subdomains: Sequence[Subdomain]) -> list[Subdomain]:
+def assemble_axial(case: Case, subdomains: Sequence[Subdomain]) -> list[Subdomain]:
     """The subdomains of this rank with the displacement along the fibres, on the meshes that they have."""
     return [Subdomain.on(s.submesh, s.mesh, phase_laws.axial_law(case, s.submesh.phase), AXIAL) for s in subdomains]
 

@@ -172,6 +172,10 @@ def documents(draw: st.DrawFn) -> dict[str, Any]:
     if analysis == "envelope":
         document["envelope"] = draw(envelopes(plane, expand))
         interface |= {"contact": False, "normal_strength": draw(POSITIVE)}
+<<<<<<< HEAD
+=======
+        along = dict.fromkeys(("axial_strength", "axial_stiffness"), strength) if plane == "generalized" else {}
+>>>>>>> leftovers
         interface |= draw(optional(**along))
     if analysis == "load":
         document["load"] = {"to": draw(loads(plane, expand).filter(lambda load: any(load.values())))}
