@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from math import inf
 from typing import Any
 
-from feti_homog.config.envelope_section import STRAINS, STRESSES, Envelope
+from feti_homog.config.envelope_section import Envelope
+from feti_homog.config.load_names import STRAINS, STRESSES
 from feti_homog.config.material_forms import Material
 from feti_homog.config.materials import expansion
 from feti_homog.config.schema import Selected, TableReader

@@ -6,12 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from feti_homog.config.load_names import SPATIAL_STRAINS, SPATIAL_STRESSES
 from feti_homog.config.schema import Selector, key
 from feti_homog.config.values import ValueType, integer, real
 
-STRESSES, STRAINS = ("S11", "S22", "S12"), ("E11", "E22", "gamma12")
-SPATIAL_STRESSES = ("S11", "S22", "S33", "S23", "S13", "S12")
-SPATIAL_STRAINS = ("E11", "E22", "E33", "gamma23", "gamma13", "gamma12")
 FAMILIES = (SPATIAL_STRESSES, SPATIAL_STRAINS)
 
 

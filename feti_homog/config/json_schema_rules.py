@@ -6,7 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from feti_homog.config.cell_section import ALL_CIRCULAR, GEOMETRY
-from feti_homog.config.envelope_section import STRAINS, STRESSES, pairs_of
+from feti_homog.config.envelope_section import pairs_of
+from feti_homog.config.load_names import STRAINS, STRESSES
 from feti_homog.config.material_forms import EXPANSION_PAIR, MATERIAL_FORMS
 from feti_homog.config.schema import Condition, Key, Selector, defaults_of, keys_of
 from feti_homog.config.sections import (

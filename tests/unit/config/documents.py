@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from feti_homog.config.cell_section import CIRCULAR, TOUCHING
 from feti_homog.config.envelope_section import FAMILIES
-from feti_homog.config.envelope_section import STRAINS as STRAIN_NAMES
-from feti_homog.config.envelope_section import STRESSES as STRESS_NAMES
+from feti_homog.config.load_names import STRAINS as STRAIN_NAMES
+from feti_homog.config.load_names import STRESSES as STRESS_NAMES
 
 TINY = 1e-90  # smaller magnitudes are refused
 
