@@ -112,17 +112,10 @@ def tear(
         CaseError, MeshError: on every rank.
     """
     summary, shared, lattice, subdomains = assemble_subdomains(case, comm, progress, policy)
+    problem = phase_laws.plane_problem(case)
     with progress.stage("factor") as words:
-        solver = FetiSolver(
-            comm,
-            shared,
-            subdomains,
-            lattice,
-            cost_model.applications(case),
-            thresholds,
-            bonds.springs(case),
-            phase_laws.plane_problem(case),
-        )
+        applications, springs = cost_model.applications(case, problem), bonds.springs(case)
+        solver = FetiSolver(comm, shared, subdomains, lattice, applications, thresholds, springs, problem)
         multipliers, dimension = solver.jump_operator.global_rows, solver.coarse.coarse_dimension
         words.append(f"{multipliers} multipliers, coarse dimension {dimension}")
     cell = TornCell(comm, case, summary, lattice, subdomains, solver)
@@ -132,7 +125,7 @@ def tear(
         own = agree(comm, assemble_axial, case, subdomains)
         words.append(f"{comm.allreduce(sum(s.n_dofs for s in own))} degrees of freedom along the fibres")
     with progress.stage("axial"):
-        applications, springs = cost_model.applications(case), bonds.axial_springs(case)
+        applications, springs = cost_model.applications(case, AXIAL), bonds.axial_springs(case)
         solver = FetiSolver(comm, shared, own, lattice, applications, thresholds, springs, AXIAL)
     return replace(cell, axial=TornCell(comm, case, summary, lattice, own, solver))
 
@@ -181,9 +174,8 @@ def describe(case: Case, n_ranks: int) -> str:
     triangles = [sum(len(s.triangles) for s in share.submeshes) for share in shares]
     nodes = [t * lattice.intervals**2 // 2 for t in triangles]
     own = [len(share.submeshes) for share in shares]
-    taken = cost_model.estimate(
-        [2 * n for n in nodes], own, summary.coarse_triangles, summary.bodies, cost_model.applications(case)
-    )
+    problems = {problem.components: cost_model.applications(case, problem) for problem in phase_laws.problems(case)}
+    taken = cost_model.estimate(nodes, own, summary.coarse_triangles, summary.bodies, problems)
     unresolved = process_zone.warnings(case, summary.width, summary.interface_edge)
     lines = [
         f"case       {case.name}: {case.analysis.type}, plane {case.analysis.plane}",
