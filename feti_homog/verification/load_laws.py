@@ -1,4 +1,4 @@
-"""Laws of the states as a whole: their strains are those that the case asks for, their numbers those of result.json."""
+"""Laws of the states as a whole: their loads are those that the case asks for, their numbers those of result.json."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from feti_homog.verification.discrete_cell import DiscreteCell
 from feti_homog.verification.elements import ElementFields
 from feti_homog.verification.interface_laws import BONDED, CLOSED, OPEN, spring_jumps, utilisation
 from feti_homog.verification.ledger import Ledger, relative
+from feti_homog.verification.prescribed import TEMPERATURE, Prescribed, at_points, targets
 from feti_homog.verification.reading import State
 
 COUNTS = {"bonded": BONDED, "closed": CLOSED, "open": OPEN}
@@ -42,13 +43,14 @@ class StateNumbers:
     Attributes:
         strain, stress: (v,) macroscopic.
         point: number of its point in `path` or `angle` of result.json.
-        stored: energy per area of the cell, from the fields.
+        stored: energy per area of the cell, <sigma : (eps - alpha T)> / 2 and that of the springs, from the fields.
         in_springs: that of the springs in it.
         traction: (k, c) normal, tangential and along the fibres.
         used: (k,) share of the strength that the bonded nodes use, 0 elsewhere; NaN at tips of which the energy counts
             that their break would release, for it is not in the files.
         temperature: its change.
-        expanding: mean of alpha : L : strain, 0 if the expansions alpha of the phases are not known.
+        heat: what works on it, - <alpha : sigma>; 0 if the expansions alpha of the phases are not known.
+        expanding: mean of alpha : L : strain, likewise.
     """
 
     name: str
@@ -62,23 +64,33 @@ class StateNumbers:
     status: AnyInt
     used: Float
     temperature: float
+    heat: float
     expanding: float
 
     @classmethod
     def of(cls, cell: DiscreteCell, state: State, fields: ElementFields) -> StateNumbers:
         """Those of a state of a cell."""
         section = cell.files.case.get("interface", {})
-        used = np.where(state.status == BONDED, utilisation(section, state.traction[:, :2]), 0.0)
+        used = np.where(state.status == BONDED, utilisation(section, state.traction), 0.0)
         if section.get("growth") == "released":
             used[tips(cell, state.status)] = np.nan
         stretched = state.traction * spring_jumps(cell, state) * cell.files.interface.length[:, None]
         in_springs = float(stretched.sum()) / (2 * cell.area)
-        energies = fields.energy / (2 * cell.area) + in_springs, in_springs
+        heat = _heat(cell, state)
+        energies = fields.energy / (2 * cell.area) + state.temperature * heat / 2 + in_springs, in_springs
         means = state.strain, state.mean_stress
         return cls(
             state.name, state.load_factor, state.point, *means, *energies, state.traction, state.status, used,
-            state.temperature, _expanding(cell, fields),
+            state.temperature, heat, _expanding(cell, fields),
         )  # fmt: skip
+
+
+def _heat(cell: DiscreteCell, state: State) -> float:
+    """- <alpha : sigma>, the derivative of the energy by the temperature."""
+    if cell.expansions is None:
+        return 0.0
+    own = (cell.expansions[cell.files.mesh.phase] * state.stress).sum(axis=1)
+    return -float(cell.elements.area @ own) / cell.area
 
 
 def _expanding(cell: DiscreteCell, fields: ElementFields) -> float:
@@ -99,28 +111,54 @@ def tips(cell: DiscreteCell, status: AnyInt) -> Bool:
 
 
 def check_load(ledger: Ledger, cell: DiscreteCell, states: Sequence[StateNumbers]) -> None:
-    """Strains against the case, and points or columns of result.json against the states."""
+    """Loads against the case, and points or columns of result.json against the states."""
     document, case = cell.files.document, cell.files.case
     same = json.loads(str(cell.files.file.attrs["case"])) == case
     ledger.record("tables", 0.0 if same else np.inf, "the case, which the two files tell otherwise")
     unit = _unit_loads(cell)
     rows = list(zip(_expected_loads(document, case, unit), _entries(document, unit), strict=False))
-    largest = cell.largest_strain or 1.0
-    stress = max((float(np.abs(s.stress).max()) for s in states), default=0.0) or 1.0
+    scales = _Scales.of(cell, states)
     if "path" in document:
         _check_kept(ledger, document, case, [state.point for state in states])
-        for number, ((strain, _), entries) in enumerate(rows):
-            ledger.record("load", np.abs(np.array(entries["strain"]) - strain) / largest, f"path[{number}].strain")
+        for number, (load, entries) in enumerate(rows):
+            strain, stress = np.array(entries["strain"]), np.array(entries["stress"])
+            warmer = float(entries.get(TEMPERATURE, 0.0))
+            _check_prescribed(ledger, load, strain, stress, warmer, scales, f"path[{number}]")
         pairs = [(state, rows[state.point]) for state in states if 0 <= state.point < len(rows)]
     else:
         _check_all(ledger, document, states, len(rows))
         pairs = list(zip(states, rows, strict=False))
-    for state, ((strain, temperature), entries) in pairs:
-        ledger.record("load", np.abs(state.strain - strain) / largest, state.name)
-        ledger.record("load", abs(state.temperature - temperature), state.name)
-        _check_entries(ledger, state, entries, (largest, stress))
+    for state, (load, entries) in pairs:
+        _check_prescribed(ledger, load, state.strain, state.stress, state.temperature, scales, state.name)
+        _check_entries(ledger, state, entries, scales)
     for place, matrix in _linear_stiffnesses(document, cell.files.contact):
         ledger.record("symmetry", relative(matrix - matrix.T, float(np.abs(matrix).max())), place)
+
+
+@dataclass(frozen=True)
+class _Scales:
+    """Sizes of the strains and stresses of all states, and of stresses that loads make where Sigma is none."""
+
+    strain: float
+    stress: float
+    imposed: float
+
+    @classmethod
+    def of(cls, cell: DiscreteCell, states: Sequence[StateNumbers]) -> _Scales:
+        largest = max((float(np.abs(state.stress).max()) for state in states), default=0.0)
+        imposed = max((cell.least_stress(state) for state in states), default=0.0)
+        return cls(cell.largest_strain or 1.0, largest or 1.0, max(largest, imposed) or 1.0)
+
+
+def _check_prescribed(
+    ledger: Ledger, load: Prescribed, strain: Float, stress: Float, temperature: float, scales: _Scales, place: str
+) -> None:
+    """Strains, stresses and the temperature that a load prescribes."""
+    given, by_stress = load.values[: len(strain)], load.by_stress[: len(strain)]
+    ledger.record("load", np.abs(strain - given)[~by_stress] / scales.strain, f"{place}, strain")
+    ledger.record("stress load", np.abs(stress - given)[by_stress] / scales.imposed, f"{place}, stress")
+    warmer = float(load.values[-1]) if len(load.values) > len(given) else 0.0
+    ledger.record("load", abs(temperature - warmer) / max(abs(warmer), 1.0), f"{place}, temperature")
 
 
 def _check_kept(ledger: Ledger, document: Mapping[str, Any], case: Mapping[str, Any], numbers: Sequence[int]) -> None:
@@ -144,13 +182,13 @@ def _check_all(ledger: Ledger, document: Mapping[str, Any], states: Sequence[Sta
     ledger.record("tables", off, lambda i: f"{states[i].name}, point")
 
 
-def _check_entries(
-    ledger: Ledger, state: StateNumbers, entries: Mapping[str, Any], scales: tuple[float, float]
-) -> None:
-    """What result.json says of a state; `scales` are of strain and stress."""
-    for name, value, scale in (("strain", state.strain, scales[0]), ("stress", state.stress, scales[1])):
-        if name in entries:
-            ledger.record("tables", relative(np.array(entries[name]) - value, scale), f"{state.name}, {name}")
+def _check_entries(ledger: Ledger, state: StateNumbers, entries: Mapping[str, Any], scales: _Scales) -> None:
+    """What result.json says of a state."""
+    told = {"strain": (state.strain, scales.strain), "stress": (state.stress, scales.stress)}
+    told |= {TEMPERATURE: (np.array(state.temperature), max(abs(state.temperature), 1.0))}
+    for name in told.keys() & entries.keys():
+        value, scale = told[name]
+        ledger.record("tables", relative(np.array(entries[name]) - value, scale), f"{state.name}, {name}")
     if "load_factor" in entries:
         ledger.record("tables", abs(entries["load_factor"] - state.load_factor), f"{state.name}, load_factor")
     for name in COUNTS.keys() & entries.keys():
@@ -169,30 +207,32 @@ def _unit_loads(cell: DiscreteCell) -> list[UnitLoad]:
 
 def _expected_loads(
     document: Mapping[str, Any], case: Mapping[str, Any], unit: Sequence[UnitLoad]
-) -> Iterator[tuple[Float, float]]:
-    """Strain and temperature of the points of a path, or of the states of another case, in their order."""
+) -> Iterator[Prescribed]:
+    """The loads of the points of a path, or of the states of another case, in their order."""
     if "path" in document:
-        path = case["path"]
-        corners = np.array([[0.0] * 3, *(path["waypoints"] if path.get("waypoints") else [path["strain"]])])
-        legs = len(corners) - 1
-        for point in document["path"]:
-            along = float(point["load_factor"]) * legs
-            leg = min(int(np.ceil(along - 1e-12)), legs) if along > 0 else 1
-            share = along - (leg - 1)
-            yield (1 - share) * corners[leg - 1] + share * corners[leg], 0.0
+        yield from at_points(case, document["path"])
+    elif "load" in document:
+        yield from targets(case)
     elif "angle" in document:
         given = case["angle"].get("strain")
+        own = [Prescribed.strain(np.array(given), 0.0)] if given is not None else _prescribed(unit, 1.0)
         for _ in document["angle"]:
-            yield from [(load.strain, load.temperature) for load in unit] if given is None else [(np.array(given), 0.0)]
+            yield from own
     else:
-        signs = (1.0, -1.0) if "effective_stiffness_compression" in document else (1.0,)
-        yield from ((sign * load.strain, sign * load.temperature) for sign in signs for load in unit)
+        for sign in (1.0, -1.0) if "effective_stiffness_compression" in document else (1.0,):
+            yield from _prescribed(unit, sign)
+
+
+def _prescribed(unit: Sequence[UnitLoad], sign: float) -> list[Prescribed]:
+    return [Prescribed.strain(sign * load.strain, sign * load.temperature) for load in unit]
 
 
 def _entries(document: Mapping[str, Any], unit: Sequence[UnitLoad]) -> Iterator[Mapping[str, Any]]:
     """What result.json says of each point of a path, or of each state of another case."""
     if "path" in document:
         yield from document["path"]
+    elif "load" in document:
+        yield document["load"]
     elif "angle" in document:
         for point in document["angle"]:
             if "stiffness" in point:
