@@ -17,7 +17,8 @@ from feti_homog.config.mixed_load import MixedLoad, completed, components
 from feti_homog.typing import Float
 
 SAME_LOAD = 1e-9  # load factors that differ by less, relatively, are one
-ZERO = 1e-7  # of the largest component: what the solver leaves of zero is less
+# Of the largest component: what the solver leaves of zero is less, and what would not be seen beside it.
+ZERO, FAINT = 1e-7, 1e-4
 
 Point = Mapping[str, Any]
 Document = Mapping[str, Any]
@@ -52,15 +53,15 @@ def leading_component(document: Document) -> int:
     return named[int(largest[named].argmax())]
 
 
-def nonzero(values: Float) -> list[int]:
-    """Columns of (n, c) with more than the solver leaves of zero."""
+def components_above(share: float, values: Float) -> list[int]:
+    """Columns of (n, c) with entries above this share of the largest of all."""
     largest = np.abs(values).max(axis=0, initial=0.0)
-    return [int(column) for column in np.flatnonzero(largest > ZERO * largest.max(initial=0.0))]
+    return [int(column) for column in np.flatnonzero(largest > share * largest.max(initial=0.0))]
 
 
 def shown_stresses(document: Document) -> list[int]:
-    """The components whose stress a path has; the leading one if there is no stress."""
-    found = nonzero(np.array([point["stress"] for point in document["path"]], float))
+    """The components whose stress is seen on a path; the leading one if there is no stress."""
+    found = components_above(FAINT, np.array([point["stress"] for point in document["path"]], float))
     return found or [leading_component(document)]
 
 
@@ -83,6 +84,13 @@ def first_leg(document: Document) -> int:
         return len(points)
     end = (1.0 + SAME_LOAD) / legs(document)
     return next((n for n, point in enumerate(points) if point["load_factor"] > end), len(points))
+
+
+def ends_of_legs(document: Document) -> list[int]:
+    """Numbers of the points at the waypoints of a path."""
+    position = np.array([point["load_factor"] for point in document["path"]]) * (count := legs(document))
+    found = (np.flatnonzero(np.abs(position - leg) <= SAME_LOAD * count) for leg in range(1, count + 1))
+    return [int(numbers[-1]) for numbers in found if len(numbers)]
 
 
 def is_proportional(document: Document) -> bool:

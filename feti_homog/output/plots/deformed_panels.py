@@ -46,6 +46,7 @@ MAX_PANELS = 6
 MAX_FRAMES, FRAME_TIME = 24, 250  # of the animation; milliseconds
 FRAME_LIMIT, PANEL_LIMIT, STATE_LIMIT = 8000, 30_000, 60_000  # triangles in a frame, a panel, a picture of one state
 INCHES, BAR = 8.0, 0.55  # of all panels of a row, and of the colour bar in each
+LOADS_IN_PANEL, LINE = 2, 0.15  # in a line of its title; inches of a line
 
 
 @dataclass(frozen=True)
@@ -85,11 +86,15 @@ class DeformedCell:
         axes.set(xticks=(), yticks=())
         axes.set_axis_off()
         attributes = state.attrs
-        axes.set_title(f"{attributes['label']}\n{load_label(attributes)}", fontsize=9, y=1.0)
+        axes.set_title(f"{attributes['label']}\n{load_label(attributes, LOADS_IN_PANEL)}", fontsize=9, y=1.0)
         figure: Any = axes.figure
         bar = figure.colorbar(shapes, cax=axes.inset_axes((1.02, 0.1, 0.035, 0.8)), extend=extend)
         bar.ax.tick_params(labelsize=7, pad=1, length=2)
         bar.locator = MaxNLocator(5)
+
+    def lines(self, number: int) -> int:
+        """Lines of the words for the load of a state."""
+        return 1 + load_label(self.file[f"state/{number}"].attrs, LOADS_IN_PANEL).count("\n")
 
     @property
     def caption(self) -> str:
@@ -172,7 +177,8 @@ def _side_by_side(file: Any, numbers: Sequence[int], output: Mapping[str, Any], 
     rows = max(1, round(math.sqrt(0.7 * len(numbers) * size[0] / size[1])))
     columns = -(-len(numbers) // rows)
     panel = (INCHES - BAR * columns) / columns
-    figure = Figure(figsize=(INCHES, rows * (panel * size[1] / size[0] + 0.5) + 0.7), layout="constrained")
+    title = 0.2 + LINE * (1 + max(cell.lines(number) for number in numbers))
+    figure = Figure(figsize=(INCHES, rows * (panel * size[1] / size[0] + title) + 0.7), layout="constrained")
     grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
     for axes, number, moved in zip(grid, numbers, places, strict=False):
         cell.draw(axes, number, moved)
@@ -194,7 +200,8 @@ def _animation(file: Any, numbers: Sequence[int], output: Mapping[str, Any], sca
     places = [cell.moved(number) for number in numbers]
     low, high = _corners(places)
     size = high - low
-    figure = Figure(figsize=(3.6 + BAR, 3.6 * size[1] / size[0] + 0.9), dpi=100, layout="constrained")
+    title = 0.75 + LINE * max(cell.lines(number) for number in numbers)
+    figure = Figure(figsize=(3.6 + BAR, 3.6 * size[1] / size[0] + title), dpi=100, layout="constrained")
     axes = figure.subplots()
     figure.suptitle(cell.caption, fontsize=10)
     frames: list[Image.Image] = []

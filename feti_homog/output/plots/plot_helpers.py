@@ -18,7 +18,7 @@ from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Path2D
 from PIL import Image
 
-from feti_homog.mechanics.response import nonzero
+from feti_homog.mechanics.response import FAINT, components_above
 from feti_homog.mechanics.voigt import AXIAL_STRESSES, SPATIAL_STRESSES, STRESSES, voigt_names
 from feti_homog.output.files import atomic
 from feti_homog.output.plots.decimation import DrawnMesh, triangle_means
@@ -33,7 +33,7 @@ STRESS_TABLES: dict[str, tuple[str, int | None]] = {
     "S33": ("stress_33", None),
     **{name: ("axial_stress", column) for column, name in enumerate(AXIAL_STRESSES)},
 }
-LOADS_IN_LINE = 4  # of the words for a load
+LOADS_IN_LINE = 3  # of the words for a load
 SAME_VALUE = 1e-6  # values that differ by less, relatively, are one
 CELL_INCHES = 4.8  # inches, the longer side of a drawn cell
 STYLE = {"font.size": 10, "axes.titlesize": 11, "axes.linewidth": 0.8}
@@ -168,15 +168,15 @@ def largest_length(vectors: Array) -> float:
     return float(np.linalg.norm(vectors, axis=1).max(initial=0.0))
 
 
-def load_label(attributes: Any) -> str:
-    """The strain, and the temperature, of a state with these attributes."""
+def load_label(attributes: Any, in_line: int = LOADS_IN_LINE) -> str:
+    """The strains that are seen, and the temperature, of a state with these attributes; so many in a line."""
     strain, temperature = np.asarray(attributes["strain"]), float(attributes.get("temperature", 0.0))
     symbols = strain_symbols(len(strain))
-    loads = [(symbols[k], float(strain[k])) for k in nonzero(strain[None])]
+    loads = [(symbols[k], float(strain[k])) for k in components_above(FAINT, strain[None])]
     loads += [(r"\Delta T", temperature)] * (temperature != 0.0)
     words = [f"${name} = {{{value:.4g}}}$" for name, value in loads]
-    lines = [", ".join(words[k : k + LOADS_IN_LINE]) for k in range(0, len(words), LOADS_IN_LINE)]
-    return "\n".join(lines) or "no strain"
+    lines = [", ".join(words[k : k + in_line]) for k in range(0, len(words), in_line)]
+    return ",\n".join(lines) or "no strain"
 
 
 def strain_symbols(count: int) -> tuple[str, ...]:
@@ -190,7 +190,7 @@ def stress_component(chosen: str, states: Sequence[Any]) -> str:
     if chosen in STRESS_SYMBOLS:
         return chosen
     strains, stresses = (np.array([state.attrs[name] for state in states]) for name in ("strain", "stress"))
-    loaded = nonzero(stresses) or list(range(strains.shape[1]))
+    loaded = components_above(FAINT, stresses) or list(range(strains.shape[1]))
     return voigt_names(strains.shape[1])[1][loaded[int(np.abs(strains[:, loaded]).max(axis=0).argmax())]]
 
 

@@ -102,7 +102,7 @@ def _path(document: Document) -> Figure:
     for axes in (upper, middle, lower):
         _finish(axes)
     # The panels of path_states.png show the same points.
-    numbers = point_tables.chosen(points, NUMBERED_POINTS, point_tables.kept_points(document))
+    numbers = point_tables.chosen(document, NUMBERED_POINTS, point_tables.kept_points(document))
     _number_points(upper, (middle, lower), np.stack([strain, stress[:, component]], axis=1), numbers)
     return figure
 
@@ -139,6 +139,7 @@ def _temperature(axes: Axes, points: Sequence[Mapping[str, Any]], style: Mapping
         beside = axes.twinx()
         label = r"change of temperature $\Delta T$"
         beside.plot([point["temperature"] for point in points], color="0.5", linestyle="--", linewidth=1.0, **style)
+        beside.axhline(0.0, linestyle="none")  # from which the change is
         beside.set_ylabel(label, color="0.4", fontsize=8)
         beside.tick_params(colors="0.4", labelsize=8)
         beside.spines["top"].set_visible(False)

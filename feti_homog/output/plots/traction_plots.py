@@ -105,7 +105,7 @@ def _labels(file: Any, figure: Figure, grid: Any, names: list[str], shaded: Arra
         row[0].set_ylabel(f"traction {stress}")
         row[1].set_ylabel(f"jump {length}")
     for axes in grid[0]:
-        axes.legend(frameon=False, fontsize=9, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.1, ncols=2)
+        axes.legend(frameon=False, fontsize=9, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.1, ncols=3)
     patches = [
         Patch(color=STATE_COLOURS[kind], alpha=0.18, linewidth=0, label=STATE_NAMES[kind])
         for kind in (OPEN, CLOSED)
@@ -113,7 +113,7 @@ def _labels(file: Any, figure: Figure, grid: Any, names: list[str], shaded: Arra
     ]
     figure.legend(handles=patches, loc="outside lower center", ncols=2, frameon=False)
     first, last = (file[f"state/{name}"].attrs for name in (names[0], names[-1]))
-    title = f"{last['label']}: {load_label(last)}"
+    title = f"{last['label']}: {load_label(last, in_line=7)}"
     if len(names) > 1:
-        title += f"   (dashed: {first['label']}: {load_label(first)})"
+        title += f"   (dashed: {first['label']}: {load_label(first, in_line=7)})"
     figure.suptitle(title, fontsize=10)

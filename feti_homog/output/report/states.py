@@ -10,7 +10,7 @@ import matplotlib as mpl
 import numpy as np
 from numpy.typing import NDArray
 
-from feti_homog.mechanics.response import nonzero
+from feti_homog.mechanics.response import FAINT, components_above
 from feti_homog.mechanics.voigt import voigt_names
 from feti_homog.output.plots.decimation import DrawnMesh, drawn_mesh, nodal_values, outline_edges
 from feti_homog.output.plots.deformed_panels import shown_scale
@@ -67,7 +67,7 @@ def _state(file: Any, number: int, drawn: DrawnMesh, edges: InterfaceEdges, docu
     status = state["status"][:]
     attributes = state.attrs
     strains, stresses = voigt_names(len(attributes["strain"]))
-    loads = [(strains[k], attributes["strain"][k]) for k in nonzero(attributes["strain"][None])]
+    loads = [(strains[k], attributes["strain"][k]) for k in components_above(FAINT, attributes["strain"][None])]
     loads += [("temperature", value)] if (value := attributes.get("temperature", 0.0)) else []
     words = [f"{name} = {value:.4g}" for name, value in loads]
     return {

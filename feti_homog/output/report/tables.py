@@ -83,7 +83,7 @@ def answers(document: Document) -> list[Table]:
         found.append(Table("Engineering moduli", ["", "computed"], rows))
     if document.get("bounds") is not None:
         found.append(Table(f"Bounds{label}", ["", "lower", "computed", "upper"], list(_bounds(document))))
-    found += [_points(key, document[key], label) for key in ("angle", "path") if document.get(key)]
+    found += [_points(key, document, label) for key in ("angle", "path") if document.get(key)]
     return found + ([_load(document["load"], label)] if document.get("load") else [])
 
 
@@ -158,9 +158,10 @@ def _thermal(document: Document, label: str) -> Table:
     return Table(f"Per unit of temperature{label}", ["", *known], rows)
 
 
-def _points(key: str, points: Sequence[Document], label: str) -> Table:
+def _points(key: str, document: Document, label: str) -> Table:
     """The points of an angle or path, of many some."""
-    numbers = chosen(points, MOST_ROWS) if key == "path" else range(min(len(points), MOST_ROWS))
+    points = document[key]
+    numbers = chosen(document, MOST_ROWS) if key == "path" else range(min(len(points), MOST_ROWS))
     some = "" if len(numbers) == len(points) else f", {len(numbers)} of {len(points)}"
     names = [name for name, value in points[0].items() if isinstance(value, int | float)]
     entries = shown_entries(points) if points[0].get("stiffness") is not None else {}

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from feti_homog.config.load_names import TEMPERATURE
 from feti_homog.mechanics import response
 from feti_homog.mechanics.voigt import STRAINS, STRESSES, voigt_names
 
@@ -19,15 +20,20 @@ STATES = ("bonded", "open", "closed")
 Point = Mapping[str, Any]
 
 
-def chosen(points: Sequence[Point], rows: int, among: Sequence[int] | None = None) -> list[int]:
-    """Numbers of at most `rows` points of a path: the first, the last, and between them as evenly as bonds broke;
-    with `among`, rising, of these points."""
+def chosen(document: Mapping[str, Any], rows: int, among: Sequence[int] | None = None) -> list[int]:
+    """Numbers of at most `rows` points of a path: the first, the last, the ends of its legs if they are not too many,
+    and between them as evenly as bonds broke; with `among`, rising, of these points."""
+    points = document["path"]
     numbers = np.arange(len(points)) if among is None else np.asarray(among, int)
     if len(numbers) <= rows:
         return [int(number) for number in numbers]
+    fixed = {0, len(numbers) - 1}
+    ends = np.flatnonzero(np.isin(numbers, response.ends_of_legs(document))).tolist()
+    if len(fixed.union(ends)) <= rows:
+        fixed = fixed.union(ends)
     broken = np.cumsum([point["broke"] for point in points])[numbers]
-    wanted = np.linspace(broken[0], broken[-1], rows)[1:-1]
-    places = {int(np.abs(broken - w).argmin()) for w in wanted} | {0, len(numbers) - 1}
+    wanted = np.linspace(broken[0], broken[-1], rows - len(fixed) + 2)[1:-1]
+    places = {int(np.abs(broken - w).argmin()) for w in wanted} | fixed
     return [int(numbers[place]) for place in sorted(places)]
 
 
@@ -39,7 +45,7 @@ def kept_points(document: Mapping[str, Any]) -> list[int]:
 def chosen_states(document: Mapping[str, Any], rows: int, count: int) -> list[int]:
     """Numbers of at most `rows` of the first `count` states of a path, chosen as `chosen` chooses points."""
     among = kept_points(document)[:count]
-    return [among.index(number) for number in chosen(document["path"], rows, among)]
+    return [among.index(number) for number in chosen(document, rows, among)]
 
 
 def shown_entries(points: Sequence[Point]) -> dict[str, tuple[int, int]]:
@@ -67,7 +73,7 @@ def angle_table(points: Sequence[Point], stress: str) -> list[str]:
 def path_table(document: Mapping[str, Any], stress: str) -> list[str]:
     """Totals of the path, and rows of some of its points."""
     points = document["path"]
-    numbers = chosen(points, ROWS)
+    numbers = chosen(document, ROWS)
     columns = _path_columns(document)
     shown = dict(list(columns.items())[:COLUMNS])
     broke = sum(point["broke"] for point in points)
@@ -77,10 +83,10 @@ def path_table(document: Mapping[str, Any], stress: str) -> list[str]:
         f"Path{stress}: {len(points)} points{some}; {broke} bonds broke",
         *_path_energies(document, stress),
         *([f"Also in path.csv: {', '.join(rest)}"] if rest else []),
-        f"{'point':>5}{'load':>9}" + "".join(f"{name:>11}" for name in shown) + _heads(),
+        f"{'point':>5}{'load':>9}" + "".join(f"{name:>{_width(name)}}" for name in shown) + _heads(),
     ]
     for number in numbers:
-        values = "".join(_number(column[number], 11) for column in shown.values())
+        values = "".join(_number(column[number], _width(name)) for name, column in shown.items())
         lines.append(f"{number:>5}{points[number]['load_factor']:>9.6f}{values}{_counts(points[number])}")
     return lines
 
@@ -93,19 +99,24 @@ def _path_columns(document: Mapping[str, Any]) -> dict[str, Any]:
     strains, stresses = voigt_names(strain.shape[1])
     named, leading = response.named_components(document), response.leading_component(document)
     found = {strains[leading]: strain[:, leading]}
-    found |= {name: stress[:, k] for k, name in enumerate(stresses) if k in named or stress[:, k].any()}
+    seen = response.components_above(response.FAINT, stress)
+    found |= {name: stress[:, k] for k, name in enumerate(stresses) if k in named or k in seen}
     if any(point.get("temperature") for point in points):
-        found["temperature"] = np.array([point["temperature"] for point in points])
+        found[TEMPERATURE] = np.array([point["temperature"] for point in points])
     by_stress = {name for target in response.targets(document) for name in target if name in stresses}
-    return found | {
-        strains[k]: strain[:, k] for k, name in enumerate(stresses) if name in by_stress and strain[:, k].any()
-    }
+    others = response.components_above(response.FAINT, strain)
+    return found | {strains[k]: strain[:, k] for k in others if stresses[k] in by_stress}
+
+
+def _width(name: str) -> int:
+    """Columns of the text of a number of this name."""
+    return max(11, len(name) + 1)
 
 
 def _without_noise(values: Sequence[Sequence[float]]) -> Any:
     """(n, c) with zeros in the columns that have no more than the solver leaves of zero."""
     columns = np.array(values, float)
-    is_there = np.isin(np.arange(columns.shape[1]), response.nonzero(columns))
+    is_there = np.isin(np.arange(columns.shape[1]), response.components_above(response.ZERO, columns))
     return np.where(is_there, columns, 0.0)
 
 
@@ -113,14 +124,14 @@ def load_table(document: Mapping[str, Any], stress: str) -> list[str]:
     """The equilibrium under one load: strains, stresses, energies, and the states of the interface nodes."""
     point = document["load"]
     strain, sigma = (_without_noise([point[name]])[0] for name in ("strain", "stress"))
+    strains, stresses = voigt_names(len(strain))
     target = response.targets(document)[0]
-    given = ", ".join(f"{name} = {value:g}" for name, value in target.items() if value)
+    given = ", ".join(f"{name} = {value:g}" for name, value in target.items() if value or name in strains)
     rows = [("strain", strain), (f"stress{stress}", sigma)]
-    names = [name[1:] for name in voigt_names(len(strain))[1]]
     motions = point["free_motions"]
     return [
         f"Equilibrium under {given}",
-        f"{'':<14}" + "".join(f"{name:>12}" for name in names),
+        f"{'':<14}" + "".join(f"{name[1:]:>12}" for name in stresses),
         *(f"{label:<14}" + "".join(_number(value) for value in values) for label, values in rows),
         *_energies(point, stress),
         _debonded(point),

@@ -7,7 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.mechanics.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES, STRESSES
+from feti_homog.mechanics.voigt import (
+    SPATIAL_STRAINS,
+    SPATIAL_STRESSES,
+    STRESSES,
+    voigt_names,
+)
 from feti_homog.output.text import point_tables
 
 Document = Mapping[str, Any]
@@ -36,6 +41,7 @@ def outputs(document: Document, numbers: Sequence[int] = IN_THE_PLANE) -> dict[s
         found |= {name: value for name, value in document.get(section, {}).items() if value is not None}
     found |= _bounds(document.get("bounds", {}), numbers)
     found |= _angles(document.get("angle", ()), numbers) | _path(document.get("path", ()))
+    found |= _load(document.get("load"))
     found |= _envelope(document)
     found |= {f"check_{name}": error for name, error in document["checks"].items()}
     found |= {f"seconds_{stage}": took for stage, took in document["timings"].items()}
@@ -106,8 +112,22 @@ def _path(points: Sequence[Document]) -> dict[str, float]:
     if not points:
         return {}
     stress = np.array([point["stress"] for point in points])
-    peak = stress[np.abs(stress).argmax(axis=0), range(3)]
-    found = {"onset_load_factor": points[0]["load_factor"], "dissipated": points[-1]["dissipated"]}
+    strains, stresses = voigt_names(stress.shape[1])
+    peak = stress[np.abs(stress).argmax(axis=0), range(len(stresses))]
+    found = {"onset_load_factor": points[0]["load_factor"]}
+    found |= {name: points[-1][name] for name in ("dissipated", "work")}
     for place, values in (("onset", stress[0]), ("peak", peak), ("end", stress[-1])):
-        found |= {f"{place}_{name}": value for name, value in zip(STRESSES, values.tolist(), strict=True)}
+        found |= {f"{place}_{name}": value for name, value in zip(stresses, values.tolist(), strict=True)}
+    for place, point in (("onset", points[0]), ("end", points[-1])):
+        found |= {f"{place}_{name}": value for name, value in zip(strains, point["strain"], strict=True)}
     return found | {f"end_{state}": points[-1][state] for state in point_tables.STATES}
+
+
+def _load(point: Document | None) -> dict[str, float]:
+    """Strains, stresses and energy of the equilibrium under one load, and the interface nodes."""
+    if point is None:
+        return {}
+    names = zip(voigt_names(len(point["strain"])), (point["strain"], point["stress"]), strict=True)
+    values = {name: value for keys, found in names for name, value in zip(keys, found, strict=True)}
+    values |= {name: point[name] for name in ("stored", *point_tables.STATES)}
+    return {f"load_{name}": value for name, value in values.items()}
