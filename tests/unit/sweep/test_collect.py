@@ -54,7 +54,7 @@ def document(fraction, fibres, shift):
 def path_document(fibres, shift):
     points = [
         {"load_factor": f, "strain": [0.2 * f, 0, 0], "stress": [s + shift, s / 3, 0.0], "broke": 1,
-         "dissipated": 0.1 * f, "bonded": 9, "open": 1, "closed": 0}
+         "dissipated": 0.1, "work": 0.2 * f, "bonded": 9, "open": 1, "closed": 0}
         for f, s in ((0.1, 4.0), (0.08, 2.0), (0.5, 5.0), (1.0, 8.0))
     ]  # fmt: skip
     base = document(0.4, fibres, 0.0)
