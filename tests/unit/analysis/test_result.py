@@ -165,6 +165,13 @@ def test_columns_are_those_of_the_table(tmp_path, kind, points):
         assert [row.split(",")[column] for row in rows] == ["", "1.25"]
 
 
+def test_columns_of_the_state_under_a_load(tmp_path):
+    header, row = csv_tables.write(tmp_path / "load.csv", [load_point()]).read_text().splitlines()
+    written = dict(zip(header.split(","), row.split(","), strict=True))
+    assert written["gamma13"] == "4.0" and written["S33"] == "4.0" and written["temperature"] == "-100.0"
+    assert "tips" not in written and written["open"] == "3"
+
+
 def test_columns_of_long_fibres(tmp_path):
     C = np.arange(36.0).reshape(6, 6)
     point = AnglePoint(angle=0.0, stiffness=C, thermal_stress=-np.arange(6.0), **DEBONDING, **COUNTS)
