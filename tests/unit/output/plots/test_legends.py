@@ -169,14 +169,14 @@ def test_a_change_of_temperature_has_an_axis_of_its_own() -> None:
     )
     labels = [axes.get_ylabel() for axes in figure.axes]
     assert any("temperature" in label for label in labels) and "later legs" in entries(figure)
-    low, high = figure.axes[[k for k, label in enumerate(labels) if "temperature" in label][0]].get_ylim()
+    low, high = figure.axes[next(k for k, label in enumerate(labels) if "temperature" in label)].get_ylim()
     assert low < -9.0 < 0.0 < high
 
 
 def test_words_of_a_load_leave_out_what_is_not_seen() -> None:
     strain = np.array([0.02, -0.007, 3e-8, 0.0, 0.01, 6e-5])
     lines = plot_helpers.load_label({"strain": strain, "temperature": -100.0}, 2).splitlines()
-    assert len(lines) == 3 and "33" not in "".join(lines) and r"6 \cdot 10^{-5}" in lines[1] and "-100" in lines[2]
+    assert len(lines) == 3 and "33" not in "".join(lines) and r"{6} \cdot 10^{-5}" in lines[1] and "-100" in lines[2]
 
 
 def test_points_of_a_path_are_numbered_where_its_curve_folds_back(tmp_path: Path, monkeypatch: Any) -> None:
