@@ -36,6 +36,10 @@ class ConvergenceError(FetiHomogError):
     exit_code = EXIT_UNCONVERGED
 
 
+class NotCarriedError(ConvergenceError):
+    """Stresses are prescribed that nothing in the cell carries."""
+
+
 class LibraryError(FetiHomogError):
     """A library that pip does not bring is missing or does not fit; each fault says what to do."""
 

@@ -10,6 +10,7 @@ from feti_homog.analysis.path_events import Work, restored, stored
 from feti_homog.analysis.tip_records import TipRecorder
 from feti_homog.common.event_progress import EVENTS_BAR, STEPS_BAR, EventProgress
 from feti_homog.config.load_section import LoadPath
+from feti_homog.errors import NotCarriedError
 from feti_homog.homogenization.averaging import Response
 from feti_homog.interface.bond_criterion import BondCriterion, spring_criterion
 from feti_homog.interface.path_following import events, increments
@@ -71,7 +72,13 @@ def _known(context: AnalysisContext, checkpoint: Checkpoint, resume: bool) -> in
 def _points(
     context: AnalysisContext, path: LoadPath, criterion: BondCriterion, checkpoint: Checkpoint, known: int
 ) -> Iterator[tuple[Point, tuple[Energies, float] | None]]:
-    """The points of the checkpoint with the energies up to each, then those still to be found."""
+    """The points of the checkpoint with the energies up to each, then those still to be found.
+
+    Where nothing carries the stresses any more the path ends with a fault.
+
+    Raises:
+        NotCarriedError: nothing carries them from the beginning.
+    """
     cell, waypoints = context.loaded_cell, [context.load(target) for target in context.case.targets]
     begin = unloaded(cell, context.status(None))
     for number in range(known):
@@ -82,7 +89,14 @@ def _points(
         found = events(cell, criterion, waypoints, begin)
     else:
         found = increments(cell, criterion, waypoints, path.increments or 1, path.release == "worst", begin)
-    yield from ((point, None) for point in found)
+    point = None
+    try:
+        for point in found:
+            yield point, None
+    except NotCarriedError as error:
+        if point is None:
+            raise
+        context.faults.append(f"[path]: {error} beyond the last point; prescribe strains there")
 
 
 def _tell(context: AnalysisContext, shown: EventProgress, name: str, responses: Sequence[Response]) -> None:

@@ -14,6 +14,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from feti_homog.errors import NotCarriedError
 from feti_homog.feti.decomposition.constraint_layout import InterfaceNodes
 from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.feti.solver import FetiSolver
@@ -181,11 +182,12 @@ class Interface:
         """The dual problem with the states as they are; `start` are first multipliers (owned rows,).  Collective.
 
         Raises:
-            ConvergenceError: nothing carries the stresses of the load.
+            NotCarriedError: nothing carries the stresses of the load.
         """
         self.solver.activate(self.active(status))
         least = self.sign_noise * self.largest_stiffness
-        return mixed_load.solve(self.solver, load, start, float(self.size.prod()), least)
+        given = self.imposed_strain(np.where(load.by_stress, 0.0, load.values)).max()
+        return mixed_load.solve(self.solver, load, start, float(self.size.prod()), (least, least * given))
 
     def is_linear(self, status: Status) -> bool:
         """Whether no face can come to touch another; collective."""
@@ -199,6 +201,17 @@ class Interface:
 
     def equilibrium(self, load: Load, status: Status, start: Float) -> Equilibrium:
         """Solve for the load, with `status` a first guess of who is in contact.  Collective; raises as `linear`."""
+        try:
+            return self._searched(load, status, start)
+        except NotCarriedError:
+            closed = np.where(status == OPEN, CLOSED, status).astype(np.int8)
+            if not self.contact or not self.solver.comm.allreduce(bool((closed != status).any()), MPI.LOR):
+                raise
+        # Faces that come to touch may carry what open ones do not.
+        return self._searched(load, closed, start)
+
+    def _searched(self, load: Load, status: Status, start: Float) -> Equilibrium:
+        """The equilibrium, from these states on.  Collective; raises as `linear`."""
         pivoting = BlockPivoting(self.solver.comm, self.block_pivots)
         iterations = solves = 0
         while True:

@@ -32,10 +32,10 @@ class Macroscopic:
         """The load that holds the state, with these (n,) components given by their stress."""
         return Load(np.where(by_stress, self.stress, self.strain), by_stress)
 
-    def work_to(self, after: Macroscopic) -> float:
-        """int Sigma.dE of a straight way to another state, also one at constant load that stresses or strains jump
-        along."""
-        return 0.5 * float((self.stress + after.stress) @ (after.strain - self.strain))
+    @property
+    def stored(self) -> float:
+        """E.Sigma / 2."""
+        return 0.5 * float(self.strain @ self.stress)
 
     def released_to(self, after: Macroscopic) -> float:
         """What a break at constant load loses, work - change of stored energy = 1/2 (E'.Sigma - E.Sigma'), with ' after

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from feti_homog.common.distributed_arrays import allreduce_sum
-from feti_homog.errors import ConvergenceError
+from feti_homog.errors import NotCarriedError
 from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.feti.solver import FetiSolver
 from feti_homog.interface.load import Load
@@ -21,13 +21,14 @@ from feti_homog.typing import Float
 UNCARRIED_SHARE = 1e-6
 
 
-def solve(solver: FetiSolver, load: Load, start: Float, area: float, least: float) -> DualSolution:
+def solve(solver: FetiSolver, load: Load, start: Float, area: float, noise: tuple[float, float]) -> DualSolution:
     """The solution under a load on the cell of this area, beginning with the multipliers `start` (owned rows,).
 
-    Strains that meet a stiffness below `least`, which is zero up to the solver's error, stay zero.  Collective.
+    `noise` are a stiffness and a stress below which there is only the solver's error: strains that meet no more stay
+    zero.  Collective.
 
     Raises:
-        ConvergenceError: nothing carries the stresses.
+        NotCarriedError: nothing carries the stresses.
     """
     if not (load.by_stress.any() and load.values.any()):
         return solver.solve(load.values, start)
@@ -40,16 +41,16 @@ def solve(solver: FetiSolver, load: Load, start: Float, area: float, least: floa
     missing = load.values[unknown]
     if strains[0].any():
         missing = missing - stresses[0]
-    factors = _strains(stresses[-len(unknown) :], missing, least)
+    factors = _strains(stresses[-len(unknown) :], missing, *noise)
     return superposed(solver, found, np.concatenate([np.ones(len(found) - len(unknown)), factors]))
 
 
-def _strains(stiffness: Float, stress: Float, least: float) -> Float:
+def _strains(stiffness: Float, stress: Float, least: float, rounding: float) -> Float:
     """(u,) the strains that make the stresses (u,) by a stiffness (u, u) that may be singular."""
     eigenvalues, vectors = np.linalg.eigh((stiffness + stiffness.T) / 2)
     along, resists = vectors.T @ stress, eigenvalues > least
-    if np.abs(along[~resists]).max(initial=0.0) > UNCARRIED_SHARE * np.abs(stress).max():
-        raise ConvergenceError("nothing in the cell carries the stresses of the load any more; prescribe strains")
+    if np.abs(along[~resists]).max(initial=0.0) > max(UNCARRIED_SHARE * np.abs(stress).max(), rounding):
+        raise NotCarriedError("nothing in the cell carries the stresses of the load")
     return np.asarray(vectors[:, resists] @ (along[resists] / eigenvalues[resists]))
 
 

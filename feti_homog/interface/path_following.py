@@ -114,7 +114,7 @@ def _first_leg(cell: LoadedCell, criterion: BondCriterion, load: Load, legs: int
         used, largest, worst = most_utilised(cell, criterion, state)
         factor = 1.0 / max(largest, 1.0)
         reached = whole.scaled(factor)
-        energies = energies.plus(Energies(here.work_to(reached), 0.0, 0.0))
+        energies = energies.plus(Energies(reached.stored - here.stored, 0.0, 0.0))
         if largest <= 1.0:
             after = PathState(1, 0.0, state.status, lam, reached, reached)
             yield Point(1.0 / legs, 1.0, state, 0, energies, used, after)
