@@ -18,7 +18,7 @@ LONGEST = 20  # rows of a table of points
 
 
 def tables(document: Document) -> str:
-    """L^ef, moduli, or the points of an angle or path; then checks and status."""
+    """L^ef, moduli, or the points of an angle or path, or the state under a load; then checks and status."""
     unit = document["case"].get("output", {}).get("stress_unit", "")
     label = f" ({unit})" if unit else ""
     blocks = [f"<h4>{escape(title_of(document))}</h4>"]
@@ -33,6 +33,8 @@ def tables(document: Document) -> str:
     for key in ("angle", "path", "envelope"):
         if key in document:
             blocks.append(_points(key, document[key]))
+    if "load" in document:
+        blocks.append(_load(document["load"], label))
     checks = document["checks"].items()
     blocks.append(_table("largest relative errors", None, ([law, f"{error:.1e}"] for law, error in checks)))
     return "\n".join([*blocks, f"<p>{escape(document['status'])}</p>"])
@@ -59,6 +61,15 @@ def _thermal(document: Document, label: str) -> str:
     rows = zip(SPATIAL_STRESSES, *known.values(), strict=True)
     words = ([stress[1:], *map("{:.7g}".format, numbers)] for stress, *numbers in rows)
     return _table(f"per unit of temperature{escape(label)}", ["", *known], words)
+
+
+def _load(point: Document, label: str) -> str:
+    """Strains and stresses of the state under a load, and its numbers."""
+    strains, stresses = voigt_names(len(point["strain"]))
+    components = [*zip(strains, point["strain"], strict=True), *zip(stresses, point["stress"], strict=True)]
+    numbers = [(name, value) for name, value in point.items() if isinstance(value, int | float)]
+    rows = ([name, _number(value)] for name, value in [*components, *numbers])
+    return _table(f"equilibrium under the load{escape(label)}", None, rows)
 
 
 def _points(key: str, points: Sequence[Document]) -> str:

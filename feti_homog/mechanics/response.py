@@ -1,7 +1,7 @@
-"""Numbers of stress-strain paths: what a rising strain follows, the first leg, the strain that leads.
+"""Numbers of stress-strain paths: what a rising load follows, the first leg, the components that are shown.
 
-Points are those of `path` in result.json: mappings with `load_factor`, `strain` [E11, E22, gamma12] and `stress`
-[S11, S22, S12], the latter in the unit of the moduli.
+Points are those of `path` in result.json: mappings with `load_factor`, `strain` and `stress`, of c components in Voigt
+order: [11, 22, 12], or [11, 22, 33, 23, 13, 12] of generalized plane strain; stresses in the unit of the moduli.
 """
 
 from __future__ import annotations
@@ -12,17 +12,63 @@ from typing import Any
 
 import numpy as np
 
+from feti_homog.config.load_names import TEMPERATURE
+from feti_homog.config.mixed_load import MixedLoad, completed, components
 from feti_homog.typing import Float
 
 SAME_LOAD = 1e-9  # load factors that differ by less, relatively, are one
+ZERO = 1e-7  # of the largest component: what the solver leaves of zero is less
 
 Point = Mapping[str, Any]
 Document = Mapping[str, Any]
 
 
-def leading_component(points: Sequence[Point]) -> int:
-    """Which component of strain is the largest on a path: 0, 1 or 2."""
-    return int(np.abs([point["strain"] for point in points]).max(axis=0).argmax())
+def targets(document: Document) -> tuple[dict[str, float], ...]:
+    """The waypoints of a path, or the one load, in full: by name the strain or the stress of each component."""
+    case = document["case"]
+    section = case.get("path") or case["load"]
+    given = section.get("waypoints") or [section[name] for name in ("strain", "to") if name in section]
+    loads = [MixedLoad(**load) if isinstance(load, Mapping) else tuple(load) for load in given]
+    return completed(loads, case["analysis"]["plane"])
+
+
+def named_components(document: Document) -> list[int]:
+    """The components that the waypoints change, in Voigt order."""
+    pairs, found = components(document["case"]["analysis"]["plane"]), set[int]()
+    before: Mapping[str, float] = {stress: 0.0 for _, stress in pairs}
+    for target in targets(document):
+        for component, names in enumerate(pairs):
+            values = [{name: load[name] for name in names if load.get(name)} for load in (before, target)]
+            found |= {component} if values[0] != values[1] else set()
+        before = target
+    return sorted(found)
+
+
+def leading_component(document: Document) -> int:
+    """Of the components that the waypoints of a path change the one of the largest strain; of all if they change but
+    the temperature."""
+    largest = np.abs([point["strain"] for point in document["path"]]).max(axis=0)
+    named = named_components(document) or list(range(len(largest)))
+    return named[int(largest[named].argmax())]
+
+
+def nonzero(values: Float) -> list[int]:
+    """Columns of (n, c) with more than the solver leaves of zero."""
+    largest = np.abs(values).max(axis=0, initial=0.0)
+    return [int(column) for column in np.flatnonzero(largest > ZERO * largest.max(initial=0.0))]
+
+
+def shown_stresses(document: Document) -> list[int]:
+    """The components whose stress a path has; the leading one if there is no stress."""
+    found = nonzero(np.array([point["stress"] for point in document["path"]], float))
+    return found or [leading_component(document)]
+
+
+def what_rises(document: Document) -> str:
+    """What rises on the first leg of a path, in words: "strain" if there is nothing else, or "load"."""
+    first = targets(document)[0]
+    others = {stress for _, stress in components(document["case"]["analysis"]["plane"])} | {TEMPERATURE}
+    return "load" if any(first[name] for name in others & first.keys()) else "strain"
 
 
 def legs(document: Document) -> int:
@@ -44,39 +90,45 @@ def is_proportional(document: Document) -> bool:
     return document["case"]["path"]["method"] == "events" and legs(document) == 1
 
 
-def strain_controlled(points: Sequence[Point], component: int) -> Float:
-    """(v, 4) S11, S22, S12 and a component of strain at the corners of a proportional path when the strain only rises.
+def load_controlled(points: Sequence[Point]) -> Float:
+    """(v, 2 c) stresses and strains at the corners of a proportional path when the load only rises.
 
-    At a load t where bonds break, all break whose load is lower once the first are gone: the stress falls at constant
-    strain to the next branch that holds, each branch being a ray through zero: Sigma(t) = Sigma(t') t / t'.
+    At a load t where bonds break, all break whose load is lower once the first are gone: at that load the cell comes to
+    the next branch that holds, each branch being a ray through zero: Sigma(t) = Sigma(t') t / t', and so the strains.
+    Where a strain is given its stress falls, where a stress is given its strain jumps.
     """
     load = np.array([point["load_factor"] for point in points])
-    values = np.array([[*point["stress"], point["strain"][component]] for point in points])
+    values = np.array([[*point["stress"], *point["strain"]] for point in points])
     records = np.flatnonzero(load >= np.maximum.accumulate(load))
-    corners = [np.zeros(4), values[records[0]]]
+    corners = [np.zeros(values.shape[1]), values[records[0]]]
     for before, after in pairwise(records):
         corners += [values[after] * load[before] / load[after], values[after]]
     return np.array(corners)
 
 
 def rising_strain(document: Document) -> Float | None:
-    """(v, 4) S11, S22, S12 and the size of the leading strain along a path of one leg, the strain only rising.
+    """(v, c + 1) stresses and the size of the leading strain along a path of one leg, the load only rising.
 
-    None of any other result.
+    None of any other result, and where that strain does not rise with the load.
     """
     points = document.get("path")
     if not points or legs(document) != 1:
         return None
-    component = leading_component(points)
     if is_proportional(document):
-        curve = strain_controlled(points, component)
+        curve = load_controlled(points)
     else:
-        curve = np.array([[0.0] * 4, *([*point["stress"], point["strain"][component]] for point in points)])
-    return np.asarray(curve * [1.0, 1.0, 1.0, np.sign(curve[-1, 3])])
+        values = np.array([[*point["stress"], *point["strain"]] for point in points])
+        curve = np.vstack([np.zeros(values.shape[1]), values])
+    count = curve.shape[1] // 2
+    stress, strain = curve[:, :count], curve[:, count + leading_component(document)]
+    strain = strain * np.sign(strain[-1])
+    if np.any(np.diff(strain) < -ZERO * strain[-1]):
+        return None
+    return np.column_stack([stress, np.maximum.accumulate(strain)])
 
 
 def first_drop(points: Sequence[Point]) -> tuple[Float, int]:
-    """(3,) stress left when the bonds that break at the first point of a proportional path are gone, the strain being
+    """(c,) stress left when the bonds that break at the first point of a proportional path are gone, the load being
     held there, and the number of the point whose branch it is on."""
     load = points[0]["load_factor"]
     number = next((n for n, point in enumerate(points) if n and point["load_factor"] >= load), len(points) - 1)

@@ -64,8 +64,7 @@ class DeformedCell:
         """The stress that `output` chooses, or that suits all these states."""
         drawn = drawn_mesh(file, limit)
         borders = outline_edges(drawn, drawn.body)
-        strains = np.array([file[f"state/{n}"].attrs["strain"] for n in numbers])
-        component = stress_component(output.get("stress", "auto"), strains)
+        component = stress_component(output.get("stress", "auto"), [file[f"state/{n}"] for n in numbers])
         return cls(file, drawn, borders, InterfaceEdges.of(file, drawn, borders), component, scale)
 
     def moved(self, number: int) -> Array:

@@ -169,7 +169,7 @@ def _coloured(file: Any, state: Any, drawn: DrawnMesh, moved: Array, output: Map
     """The cell, its nodes at `moved`, in the colours of a stress."""
     attributes = file.attrs
     figure, (axes,) = figure_of(attributes, panels=1, beside=BAR_INCHES)
-    component = stress_component(output.get("stress", "auto"), state.attrs["strain"][None])
+    component = stress_component(output.get("stress", "auto"), [state])
     stress = drawn_stress(state, component, drawn)
     norm, colours, extend = colour_range(stress)
     picture = fill_triangles(axes, drawn, moved, stress, edges=False, norm=norm, cmap=colours)

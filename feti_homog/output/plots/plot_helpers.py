@@ -18,6 +18,7 @@ from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Path2D
 from PIL import Image
 
+from feti_homog.mechanics.response import nonzero
 from feti_homog.mechanics.voigt import AXIAL_STRESSES, SPATIAL_STRESSES, STRESSES, voigt_names
 from feti_homog.output.files import atomic
 from feti_homog.output.plots.decimation import DrawnMesh, triangle_means
@@ -32,6 +33,7 @@ STRESS_TABLES: dict[str, tuple[str, int | None]] = {
     "S33": ("stress_33", None),
     **{name: ("axial_stress", column) for column, name in enumerate(AXIAL_STRESSES)},
 }
+LOADS_IN_LINE = 4  # of the words for a load
 SAME_VALUE = 1e-6  # values that differ by less, relatively, are one
 CELL_INCHES = 4.8  # inches, the longer side of a drawn cell
 STYLE = {"font.size": 10, "axes.titlesize": 11, "axes.linewidth": 0.8}
@@ -168,19 +170,28 @@ def largest_length(vectors: Array) -> float:
 
 def load_label(attributes: Any) -> str:
     """The strain, and the temperature, of a state with these attributes."""
-    strain, temperature = attributes["strain"], float(attributes.get("temperature", 0.0))
-    symbols = STRAIN_SYMBOLS if len(strain) == len(STRAIN_SYMBOLS) else SPATIAL_STRAIN_SYMBOLS
-    loads = [(name, value) for name, value in zip(symbols, strain, strict=True) if value != 0.0]
+    strain, temperature = np.asarray(attributes["strain"]), float(attributes.get("temperature", 0.0))
+    symbols = strain_symbols(len(strain))
+    loads = [(symbols[k], float(strain[k])) for k in nonzero(strain[None])]
     loads += [(r"\Delta T", temperature)] * (temperature != 0.0)
-    return ", ".join(f"${name} = {{{value:.4g}}}$" for name, value in loads) or "no strain"
+    words = [f"${name} = {{{value:.4g}}}$" for name, value in loads]
+    lines = [", ".join(words[k : k + LOADS_IN_LINE]) for k in range(0, len(words), LOADS_IN_LINE)]
+    return "\n".join(lines) or "no strain"
 
 
-def stress_component(chosen: str, strains: Array) -> str:
-    """The stress that is chosen, else that of the largest strain of (k, 3) or (k, 6)."""
+def strain_symbols(count: int) -> tuple[str, ...]:
+    """Those of the strains, 3 in the plane or 6 in space."""
+    return STRAIN_SYMBOLS if count == len(STRAIN_SYMBOLS) else SPATIAL_STRAIN_SYMBOLS
+
+
+def stress_component(chosen: str, states: Sequence[Any]) -> str:
+    """The stress that is chosen, else that of the largest strain of these states on which a macroscopic stress works;
+    of all strains if there is no stress."""
     if chosen in STRESS_SYMBOLS:
         return chosen
-    stresses = voigt_names(strains.shape[1])[1]
-    return stresses[int(np.argmax(np.abs(strains).max(axis=0)))]
+    strains, stresses = (np.array([state.attrs[name] for state in states]) for name in ("strain", "stress"))
+    loaded = nonzero(stresses) or list(range(strains.shape[1]))
+    return voigt_names(strains.shape[1])[1][loaded[int(np.abs(strains[:, loaded]).max(axis=0).argmax())]]
 
 
 def drawn_stress(state: Any, component: str, drawn: DrawnMesh) -> Array:

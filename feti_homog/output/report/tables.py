@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from feti_homog.mechanics.voigt import SPATIAL_STRESSES, STRESSES, voigt_names
+from feti_homog.mechanics.voigt import SPATIAL_STRESSES, voigt_names
 from feti_homog.output.text.constants_tables import SHORT, comparison
 from feti_homog.output.text.envelope_table import components
 from feti_homog.output.text.point_tables import chosen, shown_entries
@@ -84,7 +84,7 @@ def answers(document: Document) -> list[Table]:
     if document.get("bounds") is not None:
         found.append(Table(f"Bounds{label}", ["", "lower", "computed", "upper"], list(_bounds(document))))
     found += [_points(key, document[key], label) for key in ("angle", "path") if document.get(key)]
-    return found
+    return found + ([_load(document["load"], label)] if document.get("load") else [])
 
 
 def _envelope(document: Document, label: str) -> Table:
@@ -101,6 +101,19 @@ def _envelope(document: Document, label: str) -> Table:
     some = "" if step == 1 else f", {len(rows)} of {len(points)} directions"
     unit = label if axes[0].startswith("S") else ""
     return Table(f"Onset of debonding{some}; load{unit}", ["angle", *axes, *names], rows)
+
+
+def _load(point: Document, label: str) -> Table:
+    """The equilibrium under one load: strains, stresses and its numbers."""
+    names = zip(*voigt_names(len(point["strain"])), strict=True)
+    values = zip(point["strain"], point["stress"], strict=True)
+    rows = [
+        [name, _number(value)]
+        for pair, found in zip(names, values, strict=True)
+        for name, value in zip(pair, found, strict=True)
+    ]
+    numbers = [[name, _number(value)] for name, value in point.items() if isinstance(value, int | float)]
+    return Table(f"Equilibrium under the load; stress{label}", ["", "computed"], rows + numbers)
 
 
 def checks(document: Document) -> list[Check]:
@@ -151,7 +164,7 @@ def _points(key: str, points: Sequence[Document], label: str) -> Table:
     some = "" if len(numbers) == len(points) else f", {len(numbers)} of {len(points)}"
     names = [name for name, value in points[0].items() if isinstance(value, int | float)]
     entries = shown_entries(points) if points[0].get("stiffness") is not None else {}
-    head = ["point", *names, *(entries or STRESSES)]
+    head = ["point", *names, *(entries or voigt_names(len(points[0]["stress"]))[1])]
     rows = []
     for number in numbers:
         point = points[number]

@@ -1,4 +1,4 @@
-"""The lists of points of result.json, `angle` and `path`, as short tables for the printed summary."""
+"""The points of result.json, `angle`, `path` and `load`, as short tables for the printed summary."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.mechanics.response import leading_component
-from feti_homog.mechanics.voigt import STRAINS, STRESSES
+from feti_homog.mechanics import response
+from feti_homog.mechanics.voigt import STRAINS, STRESSES, voigt_names
 
 ROWS = 15  # of a path's table
+COLUMNS = 5  # of its strains, stresses and the temperature
 ENTRIES = {"C11": (0, 0), "C22": (1, 1), "C12": (0, 1), "C33": (2, 2)}
 SPATIAL_ENTRIES = {f"C{i}{i}": (i - 1, i - 1) for i in range(1, 7)} | {"C12": (0, 1)}
 STATES = ("bonded", "open", "closed")
@@ -63,36 +64,95 @@ def angle_table(points: Sequence[Point], stress: str) -> list[str]:
     return lines
 
 
-def path_table(points: Sequence[Point], stress: str) -> list[str]:
+def path_table(document: Mapping[str, Any], stress: str) -> list[str]:
     """Totals of the path, and rows of some of its points."""
-    component = leading_component(points)
+    points = document["path"]
     numbers = chosen(points, ROWS)
+    columns = _path_columns(document)
+    shown = dict(list(columns.items())[:COLUMNS])
     broke = sum(point["broke"] for point in points)
     some = "" if len(numbers) == len(points) else f", {len(numbers)} shown"
+    rest = [name for name in columns if name not in shown]
     lines = [
         f"Path{stress}: {len(points)} points{some}; {broke} bonds broke",
-        *_energies(points[-1], stress),
-        f"{'point':>5}{'load':>9}{STRAINS[component]:>11}" + "".join(f"{name:>11}" for name in STRESSES) + _heads(),
+        *_path_energies(document, stress),
+        *([f"Also in path.csv: {', '.join(rest)}"] if rest else []),
+        f"{'point':>5}{'load':>9}" + "".join(f"{name:>11}" for name in shown) + _heads(),
     ]
     for number in numbers:
-        point = points[number]
-        values = "".join(_number(value, 11) for value in (point["strain"][component], *point["stress"]))
-        lines.append(f"{number:>5}{point['load_factor']:>9.6f}{values}{_counts(point)}")
+        values = "".join(_number(column[number], 11) for column in shown.values())
+        lines.append(f"{number:>5}{points[number]['load_factor']:>9.6f}{values}{_counts(points[number])}")
     return lines
 
 
-def _energies(last: Point, stress: str) -> list[str]:
-    """What is stored at the end of a path, what breaks have lost, also if the strain only rose, and what debonded."""
-    springs = f", {last['stored_in_springs']:.6g} of it in springs" if last["stored_in_springs"] else ""
-    rising = f"{last['dissipated_strain_controlled']:.6g} if the strain only rises"
+def _path_columns(document: Mapping[str, Any]) -> dict[str, Any]:
+    """What varies along a path: the leading strain, stresses that are named or there, the temperature, other strains
+    under given stresses."""
+    points = document["path"]
+    strain, stress = (_without_noise([point[name] for point in points]) for name in ("strain", "stress"))
+    strains, stresses = voigt_names(strain.shape[1])
+    named, leading = response.named_components(document), response.leading_component(document)
+    found = {strains[leading]: strain[:, leading]}
+    found |= {name: stress[:, k] for k, name in enumerate(stresses) if k in named or stress[:, k].any()}
+    if any(point.get("temperature") for point in points):
+        found["temperature"] = np.array([point["temperature"] for point in points])
+    by_stress = {name for target in response.targets(document) for name in target if name in stresses}
+    return found | {
+        strains[k]: strain[:, k] for k, name in enumerate(stresses) if name in by_stress and strain[:, k].any()
+    }
+
+
+def _without_noise(values: Sequence[Sequence[float]]) -> Any:
+    """(n, c) with zeros in the columns that have no more than the solver leaves of zero."""
+    columns = np.array(values, float)
+    is_there = np.isin(np.arange(columns.shape[1]), response.nonzero(columns))
+    return np.where(is_there, columns, 0.0)
+
+
+def load_table(document: Mapping[str, Any], stress: str) -> list[str]:
+    """The equilibrium under one load: strains, stresses, energies, and the states of the interface nodes."""
+    point = document["load"]
+    strain, sigma = (_without_noise([point[name]])[0] for name in ("strain", "stress"))
+    target = response.targets(document)[0]
+    given = ", ".join(f"{name} = {value:g}" for name, value in target.items() if value)
+    rows = [("strain", strain), (f"stress{stress}", sigma)]
+    names = [name[1:] for name in voigt_names(len(strain))[1]]
+    motions = point["free_motions"]
+    return [
+        f"Equilibrium under {given}",
+        f"{'':<14}" + "".join(f"{name:>12}" for name in names),
+        *(f"{label:<14}" + "".join(_number(value) for value in values) for label, values in rows),
+        *_energies(point, stress),
+        _debonded(point),
+        ", ".join(f"{point[state]} {state}" for state in STATES) + " interface nodes",
+        *([f"Free motions of fibres: {motions}"] if motions else []),
+    ]
+
+
+def _path_energies(document: Mapping[str, Any], stress: str) -> list[str]:
+    """What the loads have done along a path, what is stored at its end, what breaks have lost, also if the load only
+    rose, and what debonded."""
+    last = document["path"][-1]
+    rising = f"{last['dissipated_strain_controlled']:.6g} if the {response.what_rises(document)} only rises"
     lines = [
-        f"Stored per area{stress}: {last['stored']:.6g}{springs}",
+        f"Work per area{stress}: {last['work']:.6g}",
+        *_energies(last, stress),
         f"Dissipated per area{stress}: {last['dissipated']:.6g} along all equilibria, {rising}",
     ]
     if "dissipation_ratio" in last:
         ratio = f"{last['dissipation_ratio']:.4f} times it was dissipated"
         lines.append(f"Toughness of what broke per area{stress}: {last['fracture_energy']:.6g}; {ratio}")
-    return [*lines, f"Debonded: {100 * last['debonded_share']:.1f} % of the interfaces"]
+    return [*lines, _debonded(last)]
+
+
+def _energies(point: Point, stress: str) -> list[str]:
+    """What is stored."""
+    springs = f", {point['stored_in_springs']:.6g} of it in springs" if point["stored_in_springs"] else ""
+    return [f"Stored per area{stress}: {point['stored']:.6g}{springs}"]
+
+
+def _debonded(point: Point) -> str:
+    return f"Debonded: {100 * point['debonded_share']:.1f} % of the interfaces"
 
 
 def sweep_table(rows: Sequence[tuple[str, str, str]]) -> list[str]:

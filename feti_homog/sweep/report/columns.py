@@ -1,7 +1,8 @@
 """What the tables of a sweep hold: the columns of sweep.csv and the datasets of sweep.h5, with unit and meaning.
 
 In names, i and j stand for 1, 2 or 3, in stiffnesses of generalized plane strain for 1 to 6, and words in capitals for
-what varies between sweeps.
+what varies between sweeps.  If cases of a sweep are in generalized plane strain and others in a plane state, i and j of
+these are 1, 2 or 6, so that Cij is the same entry of all: the shear modulus in the plane is C66.
 """
 
 from __future__ import annotations
@@ -30,12 +31,12 @@ OUTPUT_COLUMNS = (
     Column("dofs", "", "degrees of freedom of all subdomains"),
     Column("multipliers", "", "Lagrange multipliers of the dual problem"),
     Column("iterations", "", "Krylov iterations of all states"),
-    Column("Cij", STRESS, "entry of L^ef"),
+    Column("Cij", STRESS, "entry of L^ef; beside generalized plane strain C66 is the shear modulus of all"),
     Column("Cij_compression", STRESS, "the same under minus the unit strains, with contact"),
     Column("thermal_Sij", f"{STRESS} per unit of temperature", "stress per unit of temperature at no strain"),
     Column("expansion_STRAIN", "1 / temperature", "strain per unit of temperature at no stress"),
     Column("anisotropy_axial", STRESS, "C11 - C22"),
-    Column("anisotropy_shear", STRESS, "C33 - (C11 + C22 - 2 C12) / 4; of generalized plane strain C66 - ..."),
+    Column("anisotropy_shear", STRESS, "C33 - (C11 + C22 - 2 C12) / 4; with generalized plane strain C66 - ..."),
     *columns(Moduli),
     *(column for column in columns(EngineeringConstants) if column.name not in MODULI),
     *columns(TransverselyIsotropic),

@@ -1,0 +1,130 @@
+"""Tests of a glass/epoxy ply: tension across the fibres and shear along them, as it is and after cooling.
+
+    mpirun -n 2 .venv/bin/python drivers/ply_strength.py --out results/ply_strength
+
+A random cell of long fibres that debond by energy.  Tension is a uniaxial test, E22 rising, no other stress; shear is
+gamma23, along the fibres, rising.  Cooling comes first, free of stress: the matrix shrinks on the fibres.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+import figures
+import numpy as np
+from figures import INK
+from mpi4py.MPI import Intracomm
+
+from feti_homog import Case, Result, launch, run
+
+MATERIAL = {  # MPa, 1/K
+    "matrix": {"young": 2790.0, "poisson": 0.33, "expansion": 60e-6},
+    "fibre": {"young": 70800.0, "poisson": 0.22, "expansion": 5e-6},
+}
+INTERFACE = {  # MPa/um, J/m2
+    "normal_stiffness": 2025.0,
+    "tangential_stiffness": 506.25,
+    "criterion": "energy",
+    "toughness": 2.0,
+}
+RADIUS = 7.5  # um
+TESTS = {"tension": ("E22", 1, "S22"), "shear": ("gamma23", 3, "S23")}
+COLUMNS = ("test", "temperature", "modulus", "first break", "peak", "strain at peak", "points")
+
+
+def main(given: argparse.Namespace, comm: Intracomm) -> None:
+    """Follow each test after each change of temperature; print, write and draw."""
+    if given.quick:
+        given.fibres, given.refine, given.temperatures = 2, 0, [0.0, -100.0]
+    found = {
+        (test, temperature): solved(given, comm, test, temperature)
+        for test in TESTS
+        for temperature in given.temperatures
+    }
+    figures.finish(comm, write, given.out, found)
+
+
+def solved(given: argparse.Namespace, comm: Intracomm, test: str, temperature: float) -> Result:
+    """The path of one test."""
+    strain, _, _ = TESTS[test]
+    cooling = [{"temperature": temperature}] if temperature else []
+    document = {
+        "name": f"{test} {temperature:g} K",
+        "cell": {
+            "geometry": "random",
+            "fibres": given.fibres,
+            "fibre_radius": RADIUS,
+            "fibre_fraction": 0.5,
+            "min_gap": 0.06,
+            "mesh_size": 3.3 / RADIUS * np.sqrt(0.5 / np.pi / given.fibres),
+            "refine": given.refine,
+        },
+        "material": MATERIAL,
+        "analysis": {"type": "path", "plane": "generalized"},
+        "interface": INTERFACE,
+        "path": {"waypoints": [*cooling, {strain: given.strain}]},
+        "output": figures.written(given) | {"stress_unit": "MPa", "length_unit": "um"},
+    }
+    return run(Case.parse(document), comm, out=given.out / f"{test}_{abs(temperature):g}K")
+
+
+def curve(result: Result, component: int) -> np.ndarray:
+    """(n, 2) strain since the load began and stress of the points that a test with rising strain sees."""
+    points = result.points
+    strain, stress = points["strain"][:, component], points["stress"][:, component]
+    legs = len(result.case["path"]["waypoints"])
+    pulled = points["load_factor"] > (legs - 1) / legs
+    origin = strain[~pulled][-1] if (~pulled).any() else 0.0
+    strain, stress = strain[pulled] - origin, stress[pulled]
+    sees = strain >= np.maximum.accumulate(strain)
+    return np.column_stack([strain[sees], stress[sees]])
+
+
+def row(result: Result, component: int) -> list[float]:
+    """Modulus, stress of the first break, peak, its strain, and points of the path."""
+    found = curve(result, component)
+    broken = [point.stress[component] for point in result.path or () if point.broke]
+    peak = int(found[:, 1].argmax())
+    return [found[0, 1] / found[0, 0], broken[0], found[peak, 1], found[peak, 0], len(result.path or ())]
+
+
+def write(folder: Path, found: dict[tuple[str, float], Result]) -> list[Path]:
+    """ply_strength.csv and ply_strength.png."""
+    from matplotlib.figure import Figure
+
+    rows = [[test, temperature, *row(result, TESTS[test][1])] for (test, temperature), result in found.items()]
+    print("test     temperature K  modulus MPa  first break MPa  peak MPa  at strain  points")
+    for test, temperature, modulus, first, peak, strain, points in rows:
+        print(f"{test:<9}{temperature:>13g}{modulus:>13.0f}{first:>17.2f}{peak:>10.2f}{strain:>11.5f}{points:>8}")
+    figure = Figure(figsize=(9.0, 4.0), layout="constrained")
+    for axes, (test, (strain, component, stress)) in zip(figure.subplots(1, 2), TESTS.items(), strict=True):
+        own = {temperature: result for (name, temperature), result in found.items() if name == test}
+        for colour, (temperature, result) in zip(INK, own.items(), strict=False):
+            points = np.vstack([np.zeros(2), curve(result, component)])
+            label = f"cooled by {-temperature:g} K" if temperature else "not cooled"
+            axes.plot(100 * points[:, 0], points[:, 1], color=colour, linewidth=1.2, label=label)
+        axes.set(xlabel=f"${symbol(strain)}$ (%)", ylabel=f"${symbol(stress)}$ (MPa)")
+        axes.set_title({"tension": "Tension across the fibres", "shear": "Shear along the fibres"}[test], fontsize=11)
+        axes.set_xlim(left=0.0)
+        axes.set_ylim(bottom=0.0)
+        axes.grid(color="0.92", linewidth=0.6)
+        axes.legend(frameon=False, fontsize=9, loc="lower right")
+    figure.savefig(folder / "ply_strength.png")
+    return [figures.tabulate(folder / "ply_strength.csv", COLUMNS, rows), folder / "ply_strength.png"]
+
+
+def symbol(component: str) -> str:
+    """A component as LaTeX."""
+    letter = {"E": "E", "S": "\\Sigma", "g": "\\gamma"}[component[0]]
+    return f"{letter}_{{{component[-2:]}}}"
+
+
+if __name__ == "__main__":
+    options = figures.quick_parser(__doc__ or "", "ply_strength", "two fibres, long elements")
+    options.add_argument("--fibres", type=int, default=20)
+    options.add_argument("--refine", type=int, default=2)
+    options.add_argument("--strain", type=float, default=0.02, help="of each test at its end")
+    options.add_argument("--temperatures", type=float, nargs="+", default=[0.0, -50.0, -100.0], help="changes, K")
+    sys.exit(launch(main, options))
