@@ -144,30 +144,28 @@ class CondensedCell:
             _, size, modes = np.linalg.svd(np.vstack([resisted, np.zeros((null.shape[1],) * 2)]), full_matrices=False)
             return null @ modes[size < 1e-9].T
 
-        if not null.shape[1]:
-            near = self._near(K, f, C, self._closed[touching], reach)
-            if near is not None:
-                self._closed[touching] = near[1] > 0
-                return near
-        x, pressure = minimise(csc_matrix(K), f, csr_matrix(C), lambda active: csr_matrix(motions(active)), reach)
-        self._closed[touching] = pressure > 0
-        return x, pressure
+        found = self._near(K, f, C, self._closed[touching], reach, motions)
+        if found is None:
+            found = minimise(csc_matrix(K), f, csr_matrix(C), lambda active: csr_matrix(motions(active)), reach)
+        self._closed[touching] = found[1] > 0
+        return found
 
     @staticmethod
-    def _near(K, f, C, active, reach):
-        """The same by exchanging who touches, without free motions; None if that does not end soon."""
+    def _near(K, f, C, active, reach, motions):
+        """The same by exchanging who touches, free motions left out; None if that does not end soon."""
         for _ in range(12):
-            m = int(active.sum())
-            matrix = np.block([[K, -C[active].T], [-C[active], np.zeros((m, m))]])
+            border = np.hstack([-C[active].T, motions(active)])
+            m, n = border.shape[1], len(f)
+            matrix = np.block([[K, border], [border.T, np.zeros((m, m))]])
             b = np.r_[f, np.zeros(m)]
             x = np.linalg.solve(matrix, b)
             x += np.linalg.solve(matrix, b - matrix @ x)
             force = np.zeros(len(C))
-            force[active] = x[len(f) :]
+            force[active] = x[n : n + int(active.sum())]
             pulled = force < -EXACT * max(np.abs(force).max(initial=0.0), EXACT * np.abs(f).max())
-            overlap = ~active & (C @ x[: len(f)] < -EXACT * reach)
+            overlap = ~active & (C @ x[:n] < -EXACT * reach)
             if not (pulled | overlap).any():
-                return x[: len(f)], np.maximum(force, 0.0)
+                return x[:n], np.maximum(force, 0.0)
             active = (active & ~pulled) | overlap
         return None
 
