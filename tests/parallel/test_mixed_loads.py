@@ -162,6 +162,11 @@ def test_what_nothing_carries_is_told(comm, cut, plane, contact, to):
         solved(comm, cut, **LAMINATE, plane=plane, interface={"contact": contact}, load={"to": to})
 
 
+def test_a_cut_laminate_carries_no_shear_along_the_fibres(comm, cut):
+    with pytest.raises(ConvergenceError, match="carries"):
+        solved(comm, cut, **LAMINATE, plane="generalized", interface={"contact": True}, load={"to": {"S13": 1.0}})
+
+
 @pytest.mark.parametrize("to", [{"S11": -1.0}, {"S22": 1.0}, {"S11": -0.2, "E22": 0.01}], ids=str)
 def test_a_cut_laminate_carries_pressure_and_pull_along_its_layers(comm, cut, to):
     case = LAMINATE | {"plane": "strain", "load": {"to": to}}
