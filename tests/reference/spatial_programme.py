@@ -113,7 +113,7 @@ class SpatialProgramme:
     def secants(self, sign=1.0, bonded=None, contact=False, springs=None):
         """(7, 7) columns: sign times what works on each load under sign times each unit load.
 
-        The nodes where `bonded` (k,) is true are glued, or tied by the `springs` (normal, tangential)."""
+        The nodes where `bonded` (k,) is true are glued, or tied by the `springs` (normal, tangential[, axial])."""
         bonded = np.ones(len(self.key), bool) if bonded is None else bonded
         columns = [sign * self.stress(sign * load, bonded, contact, springs) for load in np.eye(LOADS)]
         return np.array(columns).T
@@ -123,7 +123,7 @@ class SpatialProgramme:
         closing = np.flatnonzero(~bonded) if contact else np.zeros(0, int)
         T, K = self._together(bonded if springs is None else np.zeros_like(bonded)), self.K
         if springs is not None:
-            for stiffness, jump in zip((springs[0], springs[1], springs[1]), self._jumps(bonded), strict=True):
+            for stiffness, jump in zip((springs[0], springs[1], springs[-1]), self._jumps(bonded), strict=True):
                 K = K + jump.T @ diags(stiffness * self.lengths[bonded]) @ jump
         own, f = (T.T @ K @ T).tocsc() / self.scale, -T.T @ (self.Q @ load) / self.scale
         gaps = (self._jumps(~bonded)[0] @ T).tocsr()[: len(closing)]
