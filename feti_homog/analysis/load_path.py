@@ -89,7 +89,7 @@ def _points(
         found = events(cell, criterion, waypoints, begin)
     else:
         found = increments(cell, criterion, waypoints, path.increments or 1, path.release == "worst", begin)
-    point = None
+    point: Point | None = None
     try:
         for point in found:
             yield point, None
