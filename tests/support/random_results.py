@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from support.random_cells import random_cell, random_strain
-
 from feti_homog.verification.prescribed import NAMES
+from support.random_cells import random_cell, random_strain
 
 SECTIONS = ("plane", "matrix", "fibre", "decomposition")
 
