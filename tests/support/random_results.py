@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from feti_homog.verification.prescribed import NAMES
 from support.random_cells import random_cell, random_strain
 
 SECTIONS = ("plane", "matrix", "fibre", "decomposition")
@@ -50,3 +51,39 @@ def random_document(rng: np.random.Generator) -> dict[str, Any]:
             release = str(rng.choice(["all", "worst"]))
             document["path"] |= {"method": "increments", "increments": 6, "release": release}
     return document | {"interface": interface | {"debonded": arcs}}
+
+
+def random_mixed_document(rng: np.random.Generator) -> dict[str, Any]:
+    """A path of one or two legs in any plane state, of strains, stresses and temperatures, events or increments."""
+    order = int(rng.integers(1, 3))
+    cell = {"geometry": str(rng.choice(["square", "hexagonal"])), "fibre_fraction": rng.uniform(0.2, 0.45)}
+    plane = str(rng.choice(["strain", "stress", "generalized"], p=[0.25, 0.25, 0.5]))
+    path: dict[str, Any] = {"waypoints": [_random_load(rng, plane) for _ in range(rng.integers(1, 3))]}
+    if rng.random() < 0.3:
+        path |= {"method": "increments", "increments": 4}
+    return {
+        "cell": cell | {"mesh_size": 0.25 * order, "order": order},
+        "material": {
+            "matrix": {"young": 1.0, "poisson": 0.35, "expansion": 6e-5},
+            "fibre": {"young": rng.uniform(2.0, 50.0), "poisson": 0.2, "expansion": 5e-6},
+        },
+        "analysis": {"type": "path", "plane": plane},
+        "interface": {
+            "normal_strength": rng.uniform(0.004, 0.02),
+            "tangential_strength": rng.uniform(0.004, 0.02),
+            "criterion": str(rng.choice(["max", "quadratic"])),
+        },
+        "path": path,
+        "output": {"pictures": False, "states": ["all", "peaks", 5][rng.integers(3)]},
+    }
+
+
+def _random_load(rng: np.random.Generator, plane: str) -> dict[str, float]:
+    """Of some components a strain or a stress, of a temperature its change."""
+    v = 6 if plane == "generalized" else 3
+    kinds = rng.choice(3, size=v, p=[0.3, 0.3, 0.4])
+    sizes = {name: 0.02 for name in NAMES[v][0]} | {name: 0.015 for name in NAMES[v][1]}
+    chosen = [NAMES[v][kind][k] for k, kind in enumerate(kinds) if kind < 2] or ["E11"]
+    if v == 6 and rng.random() < 0.5:
+        chosen, sizes = [*chosen, "temperature"], sizes | {"temperature": 200.0}
+    return {name: sizes[name] * float(rng.normal()) for name in chosen}
