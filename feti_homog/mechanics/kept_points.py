@@ -1,4 +1,4 @@
-"""Which points of a path are kept with their fields: the ends, those around drops of the stress, the rest evenly.
+"""Which points of a path are kept with their fields: the ends, those around drops, the rest evenly.
 
 Points are those of `response`.  A path does not know its future, so the choice is made at its end.
 """
@@ -12,13 +12,15 @@ from itertools import pairwise
 import numpy as np
 
 from feti_homog.mechanics.response import SAME_LOAD, Point
+from feti_homog.mechanics.voigt import STRAINS
 from feti_homog.typing import Float
 
-# A drop is a fall of the stress by more than this share of the largest: saw teeth of single nodes are none.
+# A drop is a fall of the stress, or a jump of the strain, by more than this share of the largest: saw teeth of single
+# nodes are none.
 LEAST_DROP = 0.01
 
 Drop = tuple[float, int, int]
-"""How far the stress falls, and the numbers of the points before and after."""
+"""How far the stress falls, of a jump of the strain as much of the largest, and the points before and after."""
 
 
 def kept(points: Sequence[Point], states: int | str, legs: int) -> list[int]:
@@ -44,12 +46,25 @@ def kept(points: Sequence[Point], states: int | str, legs: int) -> list[int]:
 
 def drops(points: Sequence[Point], legs: int) -> list[Drop]:
     """The drops of the stress: from each peak to the valley after it, and on a first leg of events also from each load
-    at which bonds break to the next point that a rising strain comes to."""
-    stress = np.array([point["stress"] for point in points], float)
-    size = np.sqrt((np.square(stress) * [1.0, 1.0, 2.0]).sum(axis=1))
-    least = LEAST_DROP * float(size.max())
+    at which bonds break to the next point that a rising load comes to; and the jumps of the strain at a load that is
+    held, where a stress is given that cannot drop."""
+    stress, strain = (np.array([point[name] for point in points], float) for name in ("stress", "strain"))
+    size, length = _norm(stress, 2.0), _norm(strain, 0.5)
+    largest = float(size.max())
+    least = LEAST_DROP * largest
     found = [(float(size[a] - size[b]), a, b) for a, b in pairwise(turning_points(size, least)) if size[a] > size[b]]
-    return found + _drops_of_rising_strain(points, size, least, legs)
+    per_strain = largest / (float(length.max()) or 1.0)
+    load = np.array([point["load_factor"] for point in points])
+    of_first_leg = int((load * legs <= 1.0 + SAME_LOAD).sum()) if legs else 0
+    found += _of_rising_load(load[:of_first_leg], size, per_strain * strain, least)
+    return found + _jumps(load, of_first_leg, per_strain * strain, least)
+
+
+def _norm(values: Float, shear: float) -> Float:
+    """(n,) size of the tensors of (n, 3) or (n, 6), whose shears count as so much."""
+    tensions = 2 if values.shape[1] == len(STRAINS) else 3
+    square = np.square(values)
+    return np.asarray(np.sqrt(square[:, :tensions].sum(axis=1) + shear * square[:, tensions:].sum(axis=1)))
 
 
 def turning_points(values: Float, least: float) -> list[int]:
@@ -70,13 +85,25 @@ def turning_points(values: Float, least: float) -> list[int]:
     return [*found, high if rises else low] if found else []
 
 
-def _drops_of_rising_strain(points: Sequence[Point], size: Float, least: float, legs: int) -> list[Drop]:
-    """On rays through zero: the point after a drop is at another load, to which the stress is scaled."""
-    load = np.array([point["load_factor"] for point in points])
-    load = load[load * legs <= 1.0 + SAME_LOAD] if legs else load[:0]
+def _of_rising_load(load: Float, size: Float, strain: Float, least: float) -> list[Drop]:
+    """On rays through zero: the point after a drop is at another load, to which stress and strain are scaled."""
     records = np.flatnonzero(load >= np.maximum.accumulate(load)).tolist() if len(load) else []
-    falls = ((float(size[a] - size[b] * load[a] / load[b]), a, b) for a, b in pairwise(records) if b > a + 1)
-    return [drop for drop in falls if drop[0] > least]
+    found = []
+    for a, b in pairwise(records):
+        scale = load[a] / load[b]
+        jump = _norm((strain[b] * scale - strain[a])[None], 0.5)[0]
+        found.append((max(float(size[a] - size[b] * scale), float(jump)), a, b))
+    return [drop for drop in found if drop[0] > least and drop[2] > drop[1] + 1]
+
+
+def _jumps(load: Float, first: int, strain: Float, least: float) -> list[Drop]:
+    """From point `first` on: to the point behind those at one load, between which bonds break at that load alone."""
+    starts = first + np.flatnonzero(np.abs(np.diff(load[first:], prepend=-1.0)) > SAME_LOAD)
+    found = []
+    for a, b in pairwise([*starts.tolist(), len(load)]):
+        jump = float(_norm((strain[b - 1] - strain[a])[None], 0.5)[0])
+        found.append((jump, a, min(b, len(load) - 1)))
+    return [drop for drop in found if drop[0] > least]
 
 
 def _filled(numbers: list[int], count: int) -> list[int]:
