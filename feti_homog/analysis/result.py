@@ -51,6 +51,7 @@ class Result:
         moduli, bounds: of perfectly bonded cells, else None.
         tips: energy release rates of a stiffness with debonded arcs, else None; those of an angle are in its points.
         angle, path, envelope: the points of these analyses, else None; `points` has those of the first two as arrays.
+        load: the state of analysis "load", else None.
         fields: mesh, interface and states on this rank if they were asked for, else None; not written to result.json.
     """
 
@@ -139,7 +140,7 @@ class Result:
     def points(self) -> dict[str, NDArray[Any]]:
         """Arrays over the n points of an angle or a path by name, empty for other analyses.
 
-        `angle` or `load_factor` (n,), `strain` and `stress` (n, 3), `stiffness` (n, 3, 3) or (n, 6, 6),
+        `angle` or `load_factor` (n,), `strain` and `stress` (n, 3) or (n, 6), `stiffness` (n, 3, 3) or (n, 6, 6),
         `debonded_length` (n, f), `bonded`, `open`, `closed`, ... (n,); NaN where a point has no such number.  The tips
         are in the points alone.
         """
@@ -149,18 +150,19 @@ class Result:
 
     def rising_strain(self) -> Float:
         """(v, 4) corners S11, S22, S12 and size of the leading strain along a path of one leg, as a test with rising
-        strain follows it: where bonds break the stress drops to the next branch that holds.
+        load follows it: where bonds break the state jumps, at that load, to the next branch that holds; under given
+        strains the stress drops.  (v, 7) of generalized plane strain.
 
-        Raises ValueError for any other result.
+        Raises ValueError for any other result, and where the leading strain does not rise with the load.
         """
         curve = response.rising_strain(self.document)
         if curve is None:
-            raise ValueError("only a path of one leg has a response to a rising strain")
+            raise ValueError("only a path of one leg whose leading strain rises has a response to a rising strain")
         return curve
 
     def first_drop(self) -> tuple[Float, int]:
-        """(3,) stress left after the first break of a path of one leg, the strain being held there, and the number of
-        the point whose branch it is on.  Raises ValueError for any other result."""
+        """(3,) or (6,) stress left after the first break of a path of one leg, the load being held there, and the
+        number of the point whose branch it is on.  Raises ValueError for any other result."""
         document = self.document
         if not self.path or not response.is_proportional(document):
             raise ValueError("only a path of one leg, followed by events, has a first drop")

@@ -18,7 +18,7 @@ LONGEST = 20  # rows of a table of points
 
 
 def tables(document: Document) -> str:
-    """L^ef, moduli, or the points of an angle or path; then checks and status."""
+    """L^ef, moduli, the points of an angle or path, or the state under a load; then checks and status."""
     unit = document["case"].get("output", {}).get("stress_unit", "")
     label = f" ({unit})" if unit else ""
     blocks = [f"<h4>{escape(title_of(document))}</h4>"]
@@ -33,6 +33,8 @@ def tables(document: Document) -> str:
     for key in ("angle", "path", "envelope"):
         if key in document:
             blocks.append(_points(key, document[key]))
+    if "load" in document:
+        blocks.append(_load(document["load"], label))
     checks = document["checks"].items()
     blocks.append(_table("largest relative errors", None, ([law, f"{error:.1e}"] for law, error in checks)))
     return "\n".join([*blocks, f"<p>{escape(document['status'])}</p>"])
@@ -68,6 +70,16 @@ def _points(key: str, points: Sequence[Document]) -> str:
     rows = ([_number(point[name]) if name in point else "" for name in names] for point in numbers)
     more = f", the first {LONGEST} of {len(points)} points" if len(points) > LONGEST else ""
     return _table(f"{key}{more}", names, rows)
+
+
+def _load(state: Document, label: str) -> str:
+    """Strains and stresses under one load."""
+    stresses = voigt_names(len(state["strain"]))[1]
+    rows = (
+        [name[1:], _number(strain), _number(stress)]
+        for name, strain, stress in zip(stresses, state["strain"], state["stress"], strict=True)
+    )
+    return _table(f"state under the load{escape(label)}", ["", "strain", "stress"], rows)
 
 
 def _table(caption: str, head: Sequence[str] | None, rows: Iterable[Sequence[str]]) -> str:

@@ -16,6 +16,7 @@ from matplotlib.ticker import MaxNLocator
 from PIL import Image
 
 from feti_homog.errors import FetiHomogError
+from feti_homog.mechanics.response import leading_component
 from feti_homog.output.files import atomic, field_file
 from feti_homog.output.plots.decimation import (
     BLOCK_ROWS,
@@ -58,15 +59,19 @@ class DeformedCell:
     interface_edges: InterfaceEdges
     component: str
     scale: float
+    leading: int | None
 
     @classmethod
-    def of(cls, file: Any, numbers: Sequence[int], output: Mapping[str, Any], scale: float, limit: int) -> DeformedCell:
-        """The stress that `output` chooses, or that suits all these states."""
+    def of(
+        cls, file: Any, numbers: Sequence[int], output: Mapping[str, Any], scale: float, limit: int,
+        leading: int | None = None,
+    ) -> DeformedCell:  # fmt: skip
+        """The stress that `output` chooses, or that suits all these states; `leading` is that of their path."""
         drawn = drawn_mesh(file, limit)
         borders = outline_edges(drawn, drawn.body)
         strains = np.array([file[f"state/{n}"].attrs["strain"] for n in numbers])
-        component = stress_component(output.get("stress", "auto"), strains)
-        return cls(file, drawn, borders, InterfaceEdges.of(file, drawn, borders), component, scale)
+        component = stress_component(output.get("stress", "auto"), strains, leading)
+        return cls(file, drawn, borders, InterfaceEdges.of(file, drawn, borders), component, scale, leading)
 
     def moved(self, number: int) -> Array:
         """(p, 2) places of the drawn nodes."""
@@ -86,7 +91,7 @@ class DeformedCell:
         axes.set(xticks=(), yticks=())
         axes.set_axis_off()
         attributes = state.attrs
-        axes.set_title(f"{attributes['label']}\n{load_label(attributes)}", fontsize=9, y=1.0)
+        axes.set_title(f"{attributes['label']}\n{load_label(attributes, self.leading)}", fontsize=9, y=1.0)
         figure: Any = axes.figure
         bar = figure.colorbar(shapes, cax=axes.inset_axes((1.02, 0.1, 0.035, 0.8)), extend=extend)
         bar.ax.tick_params(labelsize=7, pad=1, length=2)
@@ -132,11 +137,13 @@ def plot(directory: Path, file: Any, document: Mapping[str, Any]) -> list[Path]:
         # The first of the unit cases, if there are three an angle.
         every = range(0, count, count // len(document["angle"]) or 1)
         numbers = [every[round(k)] for k in np.linspace(0, len(every) - 1, min(MAX_PANELS, len(every)))]
-        return [save(_side_by_side(file, numbers, output, scale), directory / "angle_states.png")]
-    panels = _side_by_side(file, point_tables.chosen_states(document, MAX_PANELS, count), output, scale)
+        return [save(_side_by_side(file, numbers, output, scale, None), directory / "angle_states.png")]
+    leading = leading_component(document)
+    panels = _side_by_side(file, point_tables.chosen_states(document, MAX_PANELS, count), output, scale, leading)
     paths = [save(panels, directory / "path_states.png")]
     frames = point_tables.chosen_states(document, MAX_FRAMES, count)
-    return [*paths, _animation(file, frames, output, scale, directory / "path.gif")]
+    cell = DeformedCell.of(file, frames, output, scale, FRAME_LIMIT, leading)
+    return [*paths, _animation(cell, frames, directory / "path.gif")]
 
 
 def shown_scale(file: Any, document: Mapping[str, Any]) -> float:
@@ -149,7 +156,9 @@ def shown_scale(file: Any, document: Mapping[str, Any]) -> float:
     displacement = max(_largest_length(state["displacement"]) for state in states)
     opening = max(float(state["jump"][:, 0].max(initial=0.0)) for state in states)
     scale = magnification(displacement, float(min(file.attrs["width"], file.attrs["height"])), opening)
-    given = "path" in document or document.get("case", {}).get("angle", {}).get("strain") is not None
+    given = (
+        "path" in document or "load" in document or document.get("case", {}).get("angle", {}).get("strain") is not None
+    )
     return max(scale, 1.0) if given else scale
 
 
@@ -166,8 +175,10 @@ def _largest_length(table: Any) -> float:
     return max((float(np.linalg.norm(rows, axis=1).max()) for rows in blocks), default=0.0)
 
 
-def _side_by_side(file: Any, numbers: Sequence[int], output: Mapping[str, Any], scale: float) -> Figure:
-    cell = DeformedCell.of(file, numbers, output, scale, limit=PANEL_LIMIT)
+def _side_by_side(
+    file: Any, numbers: Sequence[int], output: Mapping[str, Any], scale: float, leading: int | None
+) -> Figure:
+    cell = DeformedCell.of(file, numbers, output, scale, PANEL_LIMIT, leading)
     places = [cell.moved(number) for number in numbers]
     size = np.subtract(*_corners(places)[::-1])
     rows = max(1, round(math.sqrt(0.7 * len(numbers) * size[0] / size[1])))
@@ -189,9 +200,8 @@ def _side_by_side(file: Any, numbers: Sequence[int], output: Mapping[str, Any], 
     return figure
 
 
-def _animation(file: Any, numbers: Sequence[int], output: Mapping[str, Any], scale: float, path: Path) -> Path:
+def _animation(cell: DeformedCell, numbers: Sequence[int], path: Path) -> Path:
     """Frames of one layout, that of the last state."""
-    cell = DeformedCell.of(file, numbers, output, scale, limit=FRAME_LIMIT)
     places = [cell.moved(number) for number in numbers]
     low, high = _corners(places)
     size = high - low

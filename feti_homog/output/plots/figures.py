@@ -54,7 +54,7 @@ def plot(directory: Path) -> list[Path]:
     - cell.png: bodies and subdomains;
     - of each load case case_E11.png, case_minus_E11.png, ... (unit strains), case_temperature.png or state_K.png;
     - of `angle` angle.png and angle_states.png, of `path` path.png, path_states.png and path.gif;
-    - of `envelope` envelope.png;
+    - of `load` load.png, of `envelope` envelope.png;
     - interface.png, if some interface is debonded.
 
     If there is a result.json, its case.output chooses the stress component (else that of the unit strain) and the
@@ -88,8 +88,9 @@ def _pictures(directory: Path, document: Mapping[str, Any], output: Mapping[str,
                 state = file[f"state/{number}"]
                 draw = _sheared if axial_shear.is_axial(state) else _deformed
                 figure = draw(file, state, drawn, borders, interface_edges, output)
-                paths.append(save(figure, directory / f"{_name(number, state.attrs)}.png"))
-        return paths + traction_plots.plot(directory, file, interface_edges, "path" in document)
+                name = "load" if "load" in document else _name(number, state.attrs)
+                paths.append(save(figure, directory / f"{name}.png"))
+        return paths + traction_plots.plot(directory, file, interface_edges, document)
 
 
 def _name(number: str, attributes: Any) -> str:

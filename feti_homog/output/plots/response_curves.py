@@ -12,15 +12,17 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, MultipleLocator
 
 from feti_homog.mechanics import response
+from feti_homog.mechanics.voigt import SPATIAL_STRESSES, STRESSES
 from feti_homog.output.plots import envelope_plot
 from feti_homog.output.plots.interface_marks import BONDED, CLOSED, OPEN, STATE_COLOURS, STATE_NAMES
-from feti_homog.output.plots.plot_helpers import STRAIN_SYMBOLS, save, unit_label
+from feti_homog.output.plots.plot_helpers import save, strain_symbols, unit_label
 from feti_homog.output.text import point_tables
 from feti_homog.typing import Array
 
 Document = Mapping[str, Any]
 
-MACROSCOPIC = (r"\Sigma_{11}", r"\Sigma_{22}", r"\Sigma_{12}")
+MACROSCOPIC = tuple(rf"\Sigma_{{{name[1:]}}}" for name in STRESSES)
+SPATIAL = tuple(rf"\Sigma_{{{name[1:]}}}" for name in SPATIAL_STRESSES)
 INK = ("#1f4e9c", "#c44e00", "#2a7f3f", "#7a3e9d", "#8a6d00", "#0f7c8c", "#8c1d40")
 MARKS = ("o", "s", "^", "D", "v", "P", "X")
 NUMBERED_POINTS = 6  # of a path
@@ -73,19 +75,20 @@ def _path(document: Document) -> Figure:
     """Stresses against the leading strain; below, they and the numbers of bonded, open and closed nodes against the
     number of the point, for the first folds back. Some points are numbered in all three."""
     points, case = document["path"], document["case"]
-    component, first = response.leading_component(points), response.first_leg(document)
-    strain = np.array([point["strain"] for point in points])[:, component]
+    component, first = response.leading_component(document), response.first_leg(document)
+    strains = np.array([point["strain"] for point in points])
+    strain = strains[:, component]
     style: dict[str, Any] = {"marker": "o", "markersize": 2.5} if len(points) <= MARKED_POINTS else {}
     figure = Figure(figsize=(7.2, 8.0), layout="constrained")
     upper, middle, lower = figure.subplots(3, 1, height_ratios=(2.2, 1, 1))
     middle.sharex(lower)
     _stress_curves(upper, document, strain, component, first, style)
     upper.set_ylabel(f"macroscopic stress {_stress_unit(case)}")
-    upper.set_xlabel(f"macroscopic strain ${STRAIN_SYMBOLS[component]}$")
+    upper.set_xlabel(f"macroscopic strain ${strain_symbols(strains.shape[1])[component]}$")
     upper.set_title(f"{case.get('name', '')}: plane {case['analysis']['plane']}, {_strengths(case)}".lstrip(": "))
     stress = np.array([point["stress"] for point in points])
-    for column, ink in zip(stress.T, INK, strict=False):
-        middle.plot(column, color=ink, linewidth=1.2, **style)
+    for ink, k in zip(INK, response.shown_stresses(points, component), strict=False):
+        middle.plot(stress[:, k], color=ink, linewidth=1.2, **style)
     middle.set_ylabel(f"stress {_stress_unit(case)}")
     middle.tick_params(labelbottom=False)
     _count_curves(lower, points, style)
@@ -105,17 +108,19 @@ def _stress_curves(
     points = document["path"]
     stress = np.array([point["stress"] for point in points])
     rising = response.strain_controlled(points, component) if response.is_proportional(document) else None
-    for i, (name, ink) in enumerate(zip(MACROSCOPIC, INK, strict=False)):
+    names = MACROSCOPIC if stress.shape[1] == len(MACROSCOPIC) else SPATIAL
+    for ink, i in zip(INK, response.shown_stresses(points, component), strict=False):
+        name = names[i]
         thin: dict[str, Any] = {"label": f"${name}$", "linewidth": 1.4} if rising is None else {"linewidth": 0.8}
         from_zero = np.append(0.0, strain[:first]), np.append(0.0, stress[:first, i])
         axes.plot(*from_zero, color=ink, alpha=0.8, **thin, **style)
         if first < len(points):
             axes.plot(strain[first - 1 :], stress[first - 1 :, i], color=ink, linewidth=0.8, marker="o", ms=2)
         if rising is not None:
-            axes.plot(rising[:, 3], rising[:, i], color=ink, linewidth=2.0, label=f"${name}$")
+            axes.plot(rising[:, -1], rising[:, i], color=ink, linewidth=2.0, label=f"${name}$")
     if rising is not None:
         axes.plot([], [], color="0.3", linewidth=0.8, **style, label="all equilibria")
-        axes.plot([], [], color="0.3", linewidth=2.0, label="rising strain")
+        axes.plot([], [], color="0.3", linewidth=2.0, label="rising load")
     if first < len(points):
         axes.plot([], [], color="0.3", linewidth=0.8, marker="o", ms=2, label="later legs")
 

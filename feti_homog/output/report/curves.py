@@ -10,7 +10,7 @@ from bokeh.models import ColumnDataSource, HoverTool
 from bokeh.plotting import figure
 
 from feti_homog.mechanics import response
-from feti_homog.mechanics.voigt import STRAINS, STRESSES
+from feti_homog.mechanics.voigt import STRESSES, voigt_names
 from feti_homog.output.plots.interface_marks import BONDED, CLOSED, OPEN, STATE_COLOURS, STATE_NAMES
 from feti_homog.output.plots.response_curves import INK
 from feti_homog.output.text.point_tables import shown_entries
@@ -38,17 +38,19 @@ def figures(document: Document) -> dict[str, Any]:
 
 def _path(document: Document, unit: str) -> dict[str, Any]:
     points = document["path"]
-    component = response.leading_component(points)
-    strain = np.array([point["strain"] for point in points])[:, component]
-    stress = dict(zip(STRESSES, np.array([point["stress"] for point in points]).T, strict=True))
+    component = response.leading_component(document)
+    strains, stresses = (np.array([point[name] for point in points]) for name in ("strain", "stress"))
+    names, stress_names = voigt_names(strains.shape[1])
+    shown = response.shown_stresses(points, component)
+    strain, stress = strains[:, component], {stress_names[k]: stresses[:, k] for k in shown}
     number = np.arange(len(points))
-    first = _figure("Stress against strain", f"macroscopic strain {STRAINS[component]}", f"macroscopic stress ({unit})")
+    first = _figure("Stress against strain", f"macroscopic strain {names[component]}", f"macroscopic stress ({unit})")
     _draw(first, strain, stress, number)
     if response.is_proportional(document):
         rising = response.strain_controlled(points, component)
-        for column, (name, ink) in enumerate(zip(STRESSES, INK, strict=False)):
-            label = f"{name}, rising strain"
-            first.line(rising[:, 3], rising[:, column], color=ink, line_width=3, alpha=0.35, legend_label=label)
+        for column, ink in zip(shown, INK, strict=False):
+            label = f"{stress_names[column]}, rising load"
+            first.line(rising[:, -1], rising[:, column], color=ink, line_width=3, alpha=0.35, legend_label=label)
     second = _figure("Stress along the path", "number of the point", f"macroscopic stress ({unit})")
     _draw(second, number, stress, number)
     return {"curve": _finished(first), "along": _finished(second), "counts": _counts(points, number, second.x_range)}

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from feti_homog.mechanics.response import leading_component, shown_stresses
 from feti_homog.mechanics.voigt import SPATIAL_STRESSES, STRESSES, voigt_names
 from feti_homog.output.text.constants_tables import SHORT, comparison
 from feti_homog.output.text.envelope_table import components
@@ -63,7 +64,7 @@ def facts(document: Document) -> list[tuple[str, str]]:
 
 
 def answers(document: Document) -> list[Table]:
-    """What was asked for: stiffness with moduli and bounds, or points of an angle or path, or onsets."""
+    """What was asked for: stiffness with moduli and bounds, or points of an angle or path, a state, or onsets."""
     unit = document["case"]["output"].get("stress_unit", "")
     label = f" ({unit})" if unit else ""
     found = [_envelope(document, label)] if document.get("envelope") else []
@@ -83,8 +84,9 @@ def answers(document: Document) -> list[Table]:
         found.append(Table("Engineering moduli", ["", "computed"], rows))
     if document.get("bounds") is not None:
         found.append(Table(f"Bounds{label}", ["", "lower", "computed", "upper"], list(_bounds(document))))
-    found += [_points(key, document[key], label) for key in ("angle", "path") if document.get(key)]
-    return found
+    if document.get("load") is not None:
+        found += _load(document["load"], label)
+    return found + [_points(key, document, label) for key in ("angle", "path") if document.get(key)]
 
 
 def _envelope(document: Document, label: str) -> Table:
@@ -145,20 +147,46 @@ def _thermal(document: Document, label: str) -> Table:
     return Table(f"Per unit of temperature{label}", ["", *known], rows)
 
 
-def _points(key: str, points: Sequence[Document], label: str) -> Table:
+def _load(state: Document, label: str) -> list[Table]:
+    """Strains and stresses under one load, and its numbers."""
+    names = voigt_names(len(state["strain"]))
+    rows = [[stress[1:], _number(state["strain"][k]), _number(state["stress"][k])] for k, stress in enumerate(names[1])]
+    numbers = [[name, _number(value)] for name, value in state.items() if isinstance(value, int | float)]
+    return [
+        Table(f"State under the load; stress{label}", ["", "strain", "stress"], rows),
+        Table(f"Its numbers; energies{label}", ["", "computed"], numbers),
+    ]
+
+
+def _points(key: str, document: Document, label: str) -> Table:
     """The points of an angle or path, of many some."""
+    points = document[key]
     numbers = chosen(points, MOST_ROWS) if key == "path" else range(min(len(points), MOST_ROWS))
     some = "" if len(numbers) == len(points) else f", {len(numbers)} of {len(points)}"
     names = [name for name, value in points[0].items() if isinstance(value, int | float)]
     entries = shown_entries(points) if points[0].get("stiffness") is not None else {}
-    head = ["point", *names, *(entries or STRESSES)]
+    strain, stresses = _columns(document) if key == "path" else ({}, dict(zip(STRESSES, range(3), strict=True)))
+    head = ["point", *names, *strain, *(entries or stresses)]
     rows = []
     for number in numbers:
         point = points[number]
         stiff = point.get("stiffness")
-        values = point["stress"] if stiff is None else [stiff[i][j] for i, j in entries.values()]
+        values = [point["strain"][k] for k in strain.values()]
+        values += (
+            [point["stress"][k] for k in stresses.values()]
+            if stiff is None
+            else [stiff[i][j] for i, j in entries.values()]
+        )
         rows.append([str(number), *(_number(point[name]) for name in names), *map(_number, values)])
     return Table(f"Points of the {key}{some}; stress{label}", head, rows)
+
+
+def _columns(document: Document) -> tuple[dict[str, int], dict[str, int]]:
+    """Names and places of the leading strain of a path, and of its stresses that are not zero."""
+    leading = leading_component(document)
+    strains, stresses = voigt_names(len(document["path"][0]["strain"]))
+    shown = shown_stresses(document["path"], leading)
+    return {strains[leading]: leading}, {stresses[k]: k for k in shown}
 
 
 def _number(value: float) -> str:

@@ -1,4 +1,4 @@
-"""The lists of points of result.json, `angle` and `path`, as short tables for the printed summary."""
+"""Points of result.json in the printed summary: the table of an angle, what is shown of a path, and columns."""
 
 from __future__ import annotations
 
@@ -7,10 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.mechanics.response import leading_component
 from feti_homog.mechanics.voigt import STRAINS, STRESSES
 
-ROWS = 15  # of a path's table
 ENTRIES = {"C11": (0, 0), "C22": (1, 1), "C12": (0, 1), "C33": (2, 2)}
 SPATIAL_ENTRIES = {f"C{i}{i}": (i - 1, i - 1) for i in range(1, 7)} | {"C12": (0, 1)}
 STATES = ("bonded", "open", "closed")
@@ -54,45 +52,13 @@ def angle_table(points: Sequence[Point], stress: str) -> list[str]:
     width = 12 if counted else 10
     lines = [
         f"{'Stiffness' if stiff else 'Stress'}{stress} against the debonding angle (degrees)",
-        f"{'angle':>9}" + "".join(f"{name:>{width}}" for name in names) + _heads() * counted,
+        f"{'angle':>9}" + "".join(f"{name:>{width}}" for name in names) + count_heads() * counted,
     ]
     for point in points:
         values = [point["stiffness"][i][j] for i, j in entries.values()] if stiff else point["stress"]
-        numbers = "".join(_number(value, width) for value in values)
-        lines.append(f"{point['angle']:>9.5g}{numbers}" + _counts(point) * counted)
+        numbers = "".join(number(value, width) for value in values)
+        lines.append(f"{point['angle']:>9.5g}{numbers}" + counts(point) * counted)
     return lines
-
-
-def path_table(points: Sequence[Point], stress: str) -> list[str]:
-    """Totals of the path, and rows of some of its points."""
-    component = leading_component(points)
-    numbers = chosen(points, ROWS)
-    broke = sum(point["broke"] for point in points)
-    some = "" if len(numbers) == len(points) else f", {len(numbers)} shown"
-    lines = [
-        f"Path{stress}: {len(points)} points{some}; {broke} bonds broke",
-        *_energies(points[-1], stress),
-        f"{'point':>5}{'load':>9}{STRAINS[component]:>11}" + "".join(f"{name:>11}" for name in STRESSES) + _heads(),
-    ]
-    for number in numbers:
-        point = points[number]
-        values = "".join(_number(value, 11) for value in (point["strain"][component], *point["stress"]))
-        lines.append(f"{number:>5}{point['load_factor']:>9.6f}{values}{_counts(point)}")
-    return lines
-
-
-def _energies(last: Point, stress: str) -> list[str]:
-    """What is stored at the end of a path, what breaks have lost, also if the strain only rose, and what debonded."""
-    springs = f", {last['stored_in_springs']:.6g} of it in springs" if last["stored_in_springs"] else ""
-    rising = f"{last['dissipated_strain_controlled']:.6g} if the strain only rises"
-    lines = [
-        f"Stored per area{stress}: {last['stored']:.6g}{springs}",
-        f"Dissipated per area{stress}: {last['dissipated']:.6g} along all equilibria, {rising}",
-    ]
-    if "dissipation_ratio" in last:
-        ratio = f"{last['dissipation_ratio']:.4f} times it was dissipated"
-        lines.append(f"Toughness of what broke per area{stress}: {last['fracture_energy']:.6g}; {ratio}")
-    return [*lines, f"Debonded: {100 * last['debonded_share']:.1f} % of the interfaces"]
 
 
 def sweep_table(rows: Sequence[tuple[str, str, str]]) -> list[str]:
@@ -108,14 +74,16 @@ def sweep_failures(rows: Sequence[tuple[str, str, str]]) -> list[str]:
     ]
 
 
-def _heads() -> str:
+def count_heads() -> str:
+    """Heads of the columns of `counts`."""
     return "".join(f"{state:>7}" for state in STATES)
 
 
-def _counts(point: Point) -> str:
+def counts(point: Point) -> str:
+    """How many interface nodes are bonded, open and closed."""
     return "".join(f"{point[state]:>7}" for state in STATES)
 
 
-def _number(value: float, width: int = 12) -> str:
+def number(value: float, width: int = 12) -> str:
     """The number; what the solver leaves of a zero is one."""
     return f" {value:>{width - 1}.5g}" if abs(value) > 1e-12 else f"{0:>{width}}"

@@ -10,7 +10,9 @@ from typing import Any
 from feti_homog.mechanics.voigt import SPATIAL_STRESSES, STRAINS, STRESSES
 from feti_homog.output.text.constants_tables import constants_blocks
 from feti_homog.output.text.envelope_table import envelope_table
-from feti_homog.output.text.point_tables import angle_table, path_table
+from feti_homog.output.text.load_table import load_table
+from feti_homog.output.text.path_table import path_table
+from feti_homog.output.text.point_tables import angle_table
 from feti_homog.output.text.spatial_tables import spatial_blocks
 from feti_homog.output.text.tip_tables import angle_tip_table, tip_table
 
@@ -24,6 +26,7 @@ TITLES = {
     "stiffness": "effective stiffness",
     "angle": "debonding angle",
     "path": "load path",
+    "load": "state under a load",
     "envelope": "onset of debonding",
 }
 MODULI = ("E1", "E2", "G12", "bulk", "shear")  # in the unit of the stresses; the others are ratios
@@ -32,10 +35,11 @@ Document = Mapping[str, Any]
 
 
 def summary(document: Document) -> str:
-    """The document in lines of at most 79 columns (but for long names), without a newline at the end.
+    """The document in lines of at most 79 columns (100 of tables in space; but for long names), without a newline at
+    the end.
 
-    Cell, solver, effective stiffness with moduli and bounds or else the points of `angle` or `path`, onsets, checks,
-    timings, memory, warnings and status.
+    Cell, solver, effective stiffness with moduli and bounds or else the points of `angle` or `path`, the state of
+    `load`, onsets, checks, timings, memory, warnings and status.
     Keys that it does not know are left out. Raises KeyError if one that it prints is missing.
     """
     blocks = [
@@ -85,7 +89,9 @@ def _answer(document: Document) -> list[list[str]]:
     if "angle" in document:
         return [angle_table(document["angle"], stress), angle_tip_table(document["angle"], toughness)]
     if "path" in document:
-        return [path_table(document["path"], stress)]
+        return [path_table(document, stress)]
+    if "load" in document:
+        return [load_table(document, stress), tip_table(document["load"].get("tips"), toughness)]
     onsets = [envelope_table(document, stress)] if "envelope" in document else []
     return onsets + _stiffness_blocks(document, stress, toughness)
 

@@ -2,33 +2,37 @@
 
 from __future__ import annotations
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from feti_homog.mechanics import response
-from feti_homog.output.plots.plot_helpers import STRAIN_SYMBOLS, plain
+from feti_homog.mechanics.response import NOISE
+from feti_homog.mechanics.voigt import voigt_names
+from feti_homog.output.plots.plot_helpers import plain, strain_symbols
 from feti_homog.sweep.report.statistics import Statistics
 from feti_homog.sweep.report.style import COLOURS, label_axes, legend
 from feti_homog.sweep.report.sweep_table import SweepTable
 
-COMPONENTS = ("11", "22", "12")
-
 
 def figure(table: SweepTable) -> Figure:
-    """Two panels: the stress along the strain, and the largest of the others."""
-    points = [point for point in table.points if len(table.curves(point)[0])][: len(COLOURS)]
-    document = next(d for d in table.finished if d.get("path"))
-    along = response.leading_component(document["path"])
-    across = 1 if along == 0 else 0
-    picture = Figure(figsize=(9.6, 4.6), layout="constrained")
-    panels = picture.subplots(1, 2, sharex=True)
-    for axes, component in zip(panels, (along, across), strict=True):
+    """The stress along the strain and, if there is any, the largest of the others; of points along the same strain."""
+    curves = {point: table.curves(point)[1] for point in table.points}
+    points = [point for point, stress in curves.items() if len(stress)]
+    along, count = table.leading(points[0]), curves[points[0]].shape[2]
+    points = [p for p in points if table.leading(p) == along and curves[p].shape[2] == count][: len(COLOURS)]
+    largest = np.max([np.abs(curves[point]).max(axis=(0, 1)) for point in points], axis=0)
+    others = [k for k in np.argsort(-largest, kind="stable") if k != along and largest[k] > NOISE * largest[along]]
+    shown = [along, *map(int, others[:1])]
+    picture = Figure(figsize=(4.8 * len(shown), 4.6), layout="constrained")
+    panels = picture.subplots(1, len(shown), sharex=True, squeeze=False)[0]
+    names = voigt_names(count)[1]
+    for axes, component in zip(panels, shown, strict=True):
         for style, point in enumerate(points):
             _bundle(axes, table, point, component, COLOURS[style])
         axes.xaxis.set_major_locator(MaxNLocator(5))
         axes.axhline(0.0, color="0.6", linewidth=0.6, zorder=0)
-        label_axes(axes, f"$\\Sigma_{{{COMPONENTS[component]}}}$", table, f"${STRAIN_SYMBOLS[along]}$")
+        label_axes(axes, f"$\\Sigma_{{{names[component][1:]}}}$", table, f"${strain_symbols(count)[along]}$")
     picture.suptitle(f"{plain(table.name)}: realisations, means and their 95 % confidence intervals", fontsize=12)
     legend(picture, list(panels))
     return picture

@@ -7,7 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.mechanics.voigt import SPATIAL_STIFFNESSES, SPATIAL_STRAINS, SPATIAL_STRESSES, STIFFNESSES, STRESSES
+from feti_homog.mechanics.voigt import (
+    SPATIAL_STIFFNESSES,
+    SPATIAL_STRAINS,
+    SPATIAL_STRESSES,
+    STIFFNESSES,
+    STRESSES,
+    voigt_names,
+)
 from feti_homog.output.text import point_tables
 
 Document = Mapping[str, Any]
@@ -26,7 +33,7 @@ def outputs(document: Document) -> dict[str, float]:
     for section in ("moduli", "constants", "transversely_isotropic"):
         found |= {name: value for name, value in document.get(section, {}).items() if value is not None}
     found |= _bounds(document.get("bounds", {}))
-    found |= _angles(document.get("angle", ())) | _path(document.get("path", ()))
+    found |= _angles(document.get("angle", ())) | _path(document.get("path", ())) | _load(document.get("load", {}))
     found |= _envelope(document)
     found |= {f"check_{name}": error for name, error in document["checks"].items()}
     found |= {f"seconds_{stage}": took for stage, took in document["timings"].items()}
@@ -93,8 +100,21 @@ def _path(points: Sequence[Document]) -> dict[str, float]:
     if not points:
         return {}
     stress = np.array([point["stress"] for point in points])
-    peak = stress[np.abs(stress).argmax(axis=0), range(3)]
+    names = voigt_names(stress.shape[1])[1]
+    peak = stress[np.abs(stress).argmax(axis=0), range(len(names))]
     found = {"onset_load_factor": points[0]["load_factor"], "dissipated": points[-1]["dissipated"]}
     for place, values in (("onset", stress[0]), ("peak", peak), ("end", stress[-1])):
-        found |= {f"{place}_{name}": value for name, value in zip(STRESSES, values.tolist(), strict=True)}
+        found |= {f"{place}_{name}": value for name, value in zip(names, values.tolist(), strict=True)}
+    strains = voigt_names(stress.shape[1])[0]
+    found |= {f"end_{name}": value for name, value in zip(strains, points[-1]["strain"], strict=True)}
     return found | {f"end_{state}": points[-1][state] for state in point_tables.STATES}
+
+
+def _load(state: Document) -> dict[str, float]:
+    """Strains, stresses and energy under a single load, and what is debonded."""
+    if not state:
+        return {}
+    strains, stresses = voigt_names(len(state["strain"]))
+    found = dict(zip(strains, state["strain"], strict=True)) | dict(zip(stresses, state["stress"], strict=True))
+    found |= {name: state[name] for name in ("stored", "debonded_share", *point_tables.STATES)}
+    return {f"load_{name}": value for name, value in found.items()}

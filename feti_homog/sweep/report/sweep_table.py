@@ -79,15 +79,21 @@ class SweepTable:
         return ", ".join(_in_words(name.replace("_", " "), value) for name, value in values if value is not None)
 
     def curves(self, point: int) -> tuple[Float, Float]:
-        """Strains (g,), g = CURVE_POINTS, and S11, S22, S12 of each finished realisation there, (n, g, 3).
+        """Strains (g,), g = CURVE_POINTS, and stresses of each finished realisation there, (n, g, 3), of generalized
+        plane strain (n, g, 6).
 
-        Both are empty if the cases are no straight paths.
+        Both are empty if the cases are no straight paths whose leading strain rises with the load.
         """
         paths = [path for path in map(response.rising_strain, self.results_of(point)) if path is not None]
         if not paths:
             return np.zeros(0), np.zeros((0, 0, 3))
-        strain = np.linspace(0.0, min(path[-1, 3] for path in paths), CURVE_POINTS)
-        return strain, np.array([[np.interp(strain, p[:, 3], p[:, k]) for k in range(3)] for p in paths]).swapaxes(1, 2)
+        strain = np.linspace(0.0, min(path[-1, -1] for path in paths), CURVE_POINTS)
+        curves = [[np.interp(strain, path[:, -1], stress) for stress in path[:, :-1].T] for path in paths]
+        return strain, np.array(curves).swapaxes(1, 2)
+
+    def leading(self, point: int) -> int:
+        """The component that the paths of a point are about."""
+        return response.leading_component(next(d for d in self.results_of(point) if d.get("path")))
 
 
 def _in_words(name: str, value: Any) -> str:

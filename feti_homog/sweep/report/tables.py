@@ -13,7 +13,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from feti_homog.mechanics.voigt import STRESSES
+from feti_homog.mechanics.voigt import voigt_names
 from feti_homog.output.files import atomic
 from feti_homog.output.text.units import unit, with_unit
 from feti_homog.sweep.report.statistics import Statistics
@@ -68,7 +68,7 @@ def _cell(value: Any) -> Any:
 def _hdf5(table: SweepTable, path: Path) -> None:
     """/cases, /inputs, /outputs: a row a case; /statistics/mean, ...: a row a point, as /points/number and inputs.
 
-    /curves/point-K of straight paths: strain (g,), S11, S22, S12 (realisations, g) and of each mean, std, ci95 (g,).
+    /curves/point-K of straight paths: strain (g,), S11, S22, ... (realisations, g) and of each mean, std, ci95 (g,).
     """
     with h5py.File(path, "w") as file:
         file.attrs.update(name=table.name, stress_unit=table.stress_unit)
@@ -102,7 +102,7 @@ def _put_curves(file: Any, table: SweepTable, point: int) -> None:
         return
     group = f"curves/point-{point}"
     _put(file, f"{group}/strain", strain, "")
-    for k, name in enumerate(STRESSES):
+    for k, name in enumerate(voigt_names(stress.shape[2])[1]):
         statistics = Statistics.of(stress[:, :, k])
         _put(file, f"{group}/{name}", stress[:, :, k], table.stress_unit)
         for part in PARTS[1:]:
