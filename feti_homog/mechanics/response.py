@@ -23,16 +23,18 @@ Document = Mapping[str, Any]
 
 
 def waypoints(document: Document) -> list[dict[str, float]]:
-    """What each waypoint of the path of a case names, strains, stresses and a temperature."""
-    path = document["case"]["path"]
+    """What each waypoint of a path names, or a single load: strains, stresses and a temperature."""
+    path = document["case"]["path" if "path" in document else "load"]
     given = path.get("waypoints") or [path[name] for name in ("to", "strain") if path.get(name) is not None]
     return [dict(load) if isinstance(load, Mapping) else dict(zip(STRAINS, load, strict=True)) for load in given]
 
 
 def leading_component(document: Document) -> int:
-    """The place of the component that a path is about: of those that a waypoint names with a strain or a stress other
-    than zero the largest of its kind, of two that of the larger strain; of a temperature alone the largest strain."""
-    largest = np.abs([point["strain"] for point in document["path"]]).max(axis=0)
+    """The place of the component that a path or a single load is about: of those that a waypoint names with a strain or
+    a stress other than zero the largest of its kind, of two that of the larger strain; of a temperature alone the
+    largest strain."""
+    points = document.get("path") or [document["load"]]
+    largest = np.abs([point["strain"] for point in points]).max(axis=0)
     named: dict[str, float] = {}
     for load in waypoints(document):
         named |= {name: max(abs(value), named.get(name, 0.0)) for name, value in load.items()}

@@ -11,14 +11,11 @@ import numpy as np
 from feti_homog.typing import Float
 from feti_homog.verification.arc_laws import directions
 from feti_homog.verification.discrete_cell import DiscreteCell
+from feti_homog.verification.given_loads import NAMES
 from feti_homog.verification.interface_laws import BONDED, mode, shares, utilisation
 from feti_homog.verification.ledger import Ledger, relative
 from feti_homog.verification.load_laws import StateNumbers, tips
 
-NAMES = {
-    3: (("E11", "E22", "gamma12"), ("S11", "S22", "S12")),
-    6: (("E11", "E22", "E33", "gamma23", "gamma13", "gamma12"), ("S11", "S22", "S33", "S23", "S13", "S12")),
-}
 # Utilisations by tractions below 10 rtol of the stress are none to the program; twice as many are here.
 NOISE_PER_RTOL = 20.0
 # Directions of bonds are told apart to so many degrees.

@@ -59,7 +59,12 @@ def laws(rtol: float, users_mesh: bool) -> tuple[Law, ...]:
         Law("mean stress", "the mean of the stresses is the state's, relative to the largest component", 1e-10),
         Law("mean strain", "the mean of the strains is E and the opening of the faces, relative to E", solver),
         Law("Hill", "mean of stress : strain = mean stress : E less the interface's work, relative to it", solver),
-        Law("load", "the states have the strains that the case asks for, relative to the largest", 1e-12),
+        Law(
+            "load",
+            "the states have the strains and temperatures that the case asks for, relative to the largest",
+            1e-12,
+        ),
+        Law("load stress", "the states have the stresses that the case asks for, relative to the largest", solver),
         Law("tables", "points and columns in result.json are the states in result.h5, relative to the largest", 1e-12),
         Law("symmetry", "stiffnesses of bonded or free faces are symmetric, relative to the largest entry", solver),
         Law("breaks", "bonds break as the points say and never heal, in numbers of bonds", 0.0),

@@ -13,11 +13,14 @@ import numpy as np
 from feti_homog.typing import AnyInt, Bool, Float
 from feti_homog.verification.discrete_cell import DiscreteCell
 from feti_homog.verification.elements import ElementFields
+from feti_homog.verification.given_loads import GivenLoad, given_loads
 from feti_homog.verification.interface_laws import BONDED, CLOSED, OPEN, spring_jumps, utilisation
 from feti_homog.verification.ledger import Ledger, relative
 from feti_homog.verification.reading import State
 
 COUNTS = {"bonded": BONDED, "closed": CLOSED, "open": OPEN}
+# The least scale of stresses: this share of what the largest strain makes in the bonded cell.
+LEAST_STRESS = 1e-3
 SPATIAL_ORDER = [0, 1, 5, 2, 4, 3]  # of the unit strains of generalized plane strain; the fifth load is a temperature
 
 
@@ -28,11 +31,39 @@ class UnitLoad:
     strain: Float
     temperature: float
 
+    def given(self, sign: float) -> GivenLoad:
+        """The load, or minus it, as it is given."""
+        return GivenLoad(sign * self.strain, np.zeros(len(self.strain), bool), sign * self.temperature)
+
     def entries(self, told: Mapping[str, Any], stiffness: str, suffix: str, sign: float) -> dict[str, Float]:
         """The stress under it, or under minus it, that is told in a column of a stiffness or in `thermal_stress`."""
         if self.temperature:
             return {"stress": sign * np.array(told[f"thermal_stress{suffix}"])}
         return {"stress": sign * np.array(told[f"{stiffness}{suffix}"]) @ self.strain}
+
+
+@dataclass(frozen=True)
+class Scales:
+    """The largest strain, stress and change of temperature of a result."""
+
+    strain: float
+    stress: float
+    temperature: float
+
+    @property
+    def triple(self) -> tuple[float, float, float]:
+        """The three."""
+        return self.strain, self.stress, self.temperature
+
+    @classmethod
+    def of(cls, cell: DiscreteCell, states: Sequence[StateNumbers], entries: Sequence[Mapping[str, Any]]) -> Scales:
+        """Those of the states and of what result.json says."""
+        strain = cell.largest_strain or 1.0
+        stress = max((float(np.abs(state.stress).max()) for state in states), default=0.0)
+        told = [np.abs(entry["stress"]).max() for entry in entries if "stress" in entry]
+        stress = max(float(np.max(told, initial=stress)), LEAST_STRESS * float(np.abs(cell.reuss).max()) * strain)
+        warmest = max((abs(state.temperature) for state in states), default=0.0)
+        return cls(strain, stress, warmest or 1.0)
 
 
 @dataclass(frozen=True)
@@ -49,6 +80,7 @@ class StateNumbers:
             that their break would release, for it is not in the files.
         temperature: its change.
         expanding: mean of alpha : L : strain, 0 if the expansions alpha of the phases are not known.
+        thermal: minus the mean of alpha : stress, on which a change of temperature works; 0 likewise.
     """
 
     name: str
@@ -63,21 +95,24 @@ class StateNumbers:
     used: Float
     temperature: float
     expanding: float
+    thermal: float
 
     @classmethod
     def of(cls, cell: DiscreteCell, state: State, fields: ElementFields) -> StateNumbers:
         """Those of a state of a cell."""
         section = cell.files.case.get("interface", {})
-        used = np.where(state.status == BONDED, utilisation(section, state.traction[:, :2]), 0.0)
+        used = np.where(state.status == BONDED, utilisation(section, state.traction), 0.0)
         if section.get("growth") == "released":
             used[tips(cell, state.status)] = np.nan
         stretched = state.traction * spring_jumps(cell, state) * cell.files.interface.length[:, None]
         in_springs = float(stretched.sum()) / (2 * cell.area)
-        energies = fields.energy / (2 * cell.area) + in_springs, in_springs
+        thermal = _thermal(cell, state)
+        stored = (fields.energy / cell.area + thermal * state.temperature) / 2
+        energies = stored + in_springs, in_springs
         means = state.strain, state.mean_stress
         return cls(
             state.name, state.load_factor, state.point, *means, *energies, state.traction, state.status, used,
-            state.temperature, _expanding(cell, fields),
+            state.temperature, _expanding(cell, fields), thermal,
         )  # fmt: skip
 
 
@@ -87,6 +122,14 @@ def _expanding(cell: DiscreteCell, fields: ElementFields) -> float:
         return 0.0
     thermal = np.einsum("pij,pj->pi", cell.stiffnesses, cell.expansions)[cell.files.mesh.phase]
     return float(cell.elements.area @ (thermal * fields.strain).sum(axis=1)) / cell.area
+
+
+def _thermal(cell: DiscreteCell, state: State) -> float:
+    """Minus the mean of alpha : stress over the cell."""
+    if cell.expansions is None:
+        return 0.0
+    alpha = cell.expansions[cell.files.mesh.phase]
+    return -float(cell.elements.area @ (alpha * state.stress).sum(axis=1)) / cell.area
 
 
 def tips(cell: DiscreteCell, status: AnyInt) -> Bool:
@@ -99,28 +142,37 @@ def tips(cell: DiscreteCell, status: AnyInt) -> Bool:
 
 
 def check_load(ledger: Ledger, cell: DiscreteCell, states: Sequence[StateNumbers]) -> None:
-    """Strains against the case, and points or columns of result.json against the states."""
+    """Loads against the case, and points or columns of result.json against the states."""
     document, case = cell.files.document, cell.files.case
     same = json.loads(str(cell.files.file.attrs["case"])) == case
     ledger.record("tables", 0.0 if same else np.inf, "the case, which the two files tell otherwise")
     unit = _unit_loads(cell)
-    rows = list(zip(_expected_loads(document, case, unit), _entries(document, unit), strict=False))
-    largest = cell.largest_strain or 1.0
-    stress = max((float(np.abs(s.stress).max()) for s in states), default=0.0) or 1.0
+    loads, entries = list(_expected_loads(document, case, unit)), list(_entries(document, unit))
+    scales = Scales.of(cell, states, entries)
     if "path" in document:
         _check_kept(ledger, document, case, [state.point for state in states])
-        for number, ((strain, _), entries) in enumerate(rows):
-            ledger.record("load", np.abs(np.array(entries["strain"]) - strain) / largest, f"path[{number}].strain")
-        pairs = [(state, rows[state.point]) for state in states if 0 <= state.point < len(rows)]
+        pairs = [(state, state.point) for state in states if 0 <= state.point < len(entries)]
     else:
-        _check_all(ledger, document, states, len(rows))
-        pairs = list(zip(states, rows, strict=False))
-    for state, ((strain, temperature), entries) in pairs:
-        ledger.record("load", np.abs(state.strain - strain) / largest, state.name)
-        ledger.record("load", abs(state.temperature - temperature), state.name)
-        _check_entries(ledger, state, entries, (largest, stress))
+        _check_all(ledger, document, states, len(loads))
+        pairs = [(state, number) for number, state in enumerate(states[: len(loads)])]
+    for number, (load, entry) in enumerate(zip(loads, entries, strict=False)):
+        if "strain" in entry and "stress" in entry:
+            told = [np.array(entry[name], float) for name in ("strain", "stress")]
+            _check_given(ledger, load, (*told, entry.get("temperature", 0.0)), scales, f"point {number}")
+    for state, number in pairs:
+        _check_given(ledger, loads[number], (state.strain, state.stress, state.temperature), scales, state.name)
+        _check_entries(ledger, state, entries[number], scales)
     for place, matrix in _linear_stiffnesses(document, cell.files.contact):
         ledger.record("symmetry", relative(matrix - matrix.T, float(np.abs(matrix).max())), place)
+
+
+def _check_given(ledger: Ledger, load: GivenLoad, has: tuple[Float, Float, float], scales: Scales, where: str) -> None:
+    """What is given is what strain, stress and temperature are."""
+    strain, stress, temperature = has
+    off = np.abs(strain - load.values)[~load.by_stress] / scales.strain
+    ledger.record("load", off, where)
+    ledger.record("load", abs(temperature - load.temperature) / scales.temperature, where)
+    ledger.record("load stress", np.abs(stress - load.values)[load.by_stress] / scales.stress, where)
 
 
 def _check_kept(ledger: Ledger, document: Mapping[str, Any], case: Mapping[str, Any], numbers: Sequence[int]) -> None:
@@ -144,11 +196,13 @@ def _check_all(ledger: Ledger, document: Mapping[str, Any], states: Sequence[Sta
     ledger.record("tables", off, lambda i: f"{states[i].name}, point")
 
 
-def _check_entries(
-    ledger: Ledger, state: StateNumbers, entries: Mapping[str, Any], scales: tuple[float, float]
-) -> None:
-    """What result.json says of a state; `scales` are of strain and stress."""
-    for name, value, scale in (("strain", state.strain, scales[0]), ("stress", state.stress, scales[1])):
+def _check_entries(ledger: Ledger, state: StateNumbers, entries: Mapping[str, Any], scales: Scales) -> None:
+    """What result.json says of a state."""
+    for name, value, scale in (
+        ("strain", state.strain, scales.strain),
+        ("stress", state.stress, scales.stress),
+        ("temperature", state.temperature, scales.temperature),
+    ):
         if name in entries:
             ledger.record("tables", relative(np.array(entries[name]) - value, scale), f"{state.name}, {name}")
     if "load_factor" in entries:
@@ -169,30 +223,27 @@ def _unit_loads(cell: DiscreteCell) -> list[UnitLoad]:
 
 def _expected_loads(
     document: Mapping[str, Any], case: Mapping[str, Any], unit: Sequence[UnitLoad]
-) -> Iterator[tuple[Float, float]]:
-    """Strain and temperature of the points of a path, or of the states of another case, in their order."""
-    if "path" in document:
-        path = case["path"]
-        corners = np.array([[0.0] * 3, *(path["waypoints"] if path.get("waypoints") else [path["strain"]])])
-        legs = len(corners) - 1
-        for point in document["path"]:
-            along = float(point["load_factor"]) * legs
-            leg = min(int(np.ceil(along - 1e-12)), legs) if along > 0 else 1
-            share = along - (leg - 1)
-            yield (1 - share) * corners[leg - 1] + share * corners[leg], 0.0
+) -> Iterator[GivenLoad]:
+    """Those of the points of a path or a single load, or of the states of another case, in their order."""
+    if "path" in document or "load" in document:
+        yield from given_loads(case, document.get("path", ()))
     elif "angle" in document:
         given = case["angle"].get("strain")
         for _ in document["angle"]:
-            yield from [(load.strain, load.temperature) for load in unit] if given is None else [(np.array(given), 0.0)]
+            yield from (
+                [load.given(1.0) for load in unit] if given is None else [UnitLoad(np.array(given), 0.0).given(1.0)]
+            )
     else:
         signs = (1.0, -1.0) if "effective_stiffness_compression" in document else (1.0,)
-        yield from ((sign * load.strain, sign * load.temperature) for sign in signs for load in unit)
+        yield from (load.given(sign) for sign in signs for load in unit)
 
 
 def _entries(document: Mapping[str, Any], unit: Sequence[UnitLoad]) -> Iterator[Mapping[str, Any]]:
     """What result.json says of each point of a path, or of each state of another case."""
     if "path" in document:
         yield from document["path"]
+    elif "load" in document:
+        yield document["load"]
     elif "angle" in document:
         for point in document["angle"]:
             if "stiffness" in point:

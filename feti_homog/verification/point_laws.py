@@ -24,6 +24,7 @@ def check_points(ledger: Ledger, cell: DiscreteCell, states: Sequence[StateNumbe
     """The numbers of points beside their strains, stresses and counts."""
     document = cell.files.document
     points: Sequence[Point] = document.get("path") or document.get("angle") or ()
+    points = [document["load"]] if "load" in document else points
     known = [state for state in states if 0 <= state.point < len(points)]
     scale = max([state.stored for state in known], default=0.0)
     for state in known:
@@ -41,8 +42,9 @@ def _check_path(
 ) -> None:
     """The energies of all points of a path, and the tips of those whose fields are kept."""
     for number, point in enumerate(points):
-        off = point["stored"] - float(np.dot(point["strain"], point["stress"])) / 2
-        ledger.record("energy", relative(np.array(off), scale), f"path[{number}].stored")
+        if not point.get("temperature"):
+            off = point["stored"] - float(np.dot(point["strain"], point["stress"])) / 2
+            ledger.record("energy", relative(np.array(off), scale), f"path[{number}].stored")
     if cell.files.case.get("interface", {}).get("criterion") == "energy":
         _check_ratios(ledger, points)
         _check_toughness(ledger, cell, known, points, cell.files.case["path"]["method"] == "events")

@@ -16,7 +16,6 @@ from matplotlib.ticker import MaxNLocator
 from PIL import Image
 
 from feti_homog.errors import FetiHomogError
-from feti_homog.mechanics.response import leading_component
 from feti_homog.output.files import atomic, field_file
 from feti_homog.output.plots.decimation import (
     BLOCK_ROWS,
@@ -26,17 +25,16 @@ from feti_homog.output.plots.decimation import (
     outline_edges,
 )
 from feti_homog.output.plots.interface_marks import STATE_NAMES, InterfaceEdges, state_legend
+from feti_homog.output.plots.load_labels import Labels
 from feti_homog.output.plots.plot_helpers import (
     STRESS_SYMBOLS,
     draw_segments,
     drawn_stress,
     fill_triangles,
-    load_label,
     magnification,
     pixels_of,
     plain,
     save,
-    stress_component,
     unit_label,
     value_range,
 )
@@ -59,19 +57,20 @@ class DeformedCell:
     interface_edges: InterfaceEdges
     component: str
     scale: float
-    leading: int | None
+    labels: Labels
 
     @classmethod
     def of(
         cls, file: Any, numbers: Sequence[int], output: Mapping[str, Any], scale: float, limit: int,
-        leading: int | None = None,
+        labels: Labels | None = None,
     ) -> DeformedCell:  # fmt: skip
-        """The stress that `output` chooses, or that suits all these states; `leading` is that of their path."""
+        """The stress that `output` chooses, or that suits all these states; `labels` are those of their path."""
         drawn = drawn_mesh(file, limit)
         borders = outline_edges(drawn, drawn.body)
         strains = np.array([file[f"state/{n}"].attrs["strain"] for n in numbers])
-        component = stress_component(output.get("stress", "auto"), strains, leading)
-        return cls(file, drawn, borders, InterfaceEdges.of(file, drawn, borders), component, scale, leading)
+        labels = labels or Labels()
+        component = labels.stress_component(output.get("stress", "auto"), strains)
+        return cls(file, drawn, borders, InterfaceEdges.of(file, drawn, borders), component, scale, labels)
 
     def moved(self, number: int) -> Array:
         """(p, 2) places of the drawn nodes."""
@@ -91,7 +90,7 @@ class DeformedCell:
         axes.set(xticks=(), yticks=())
         axes.set_axis_off()
         attributes = state.attrs
-        axes.set_title(f"{attributes['label']}\n{load_label(attributes, self.leading)}", fontsize=9, y=1.0)
+        axes.set_title(f"{attributes['label']}\n{self.labels.label(attributes)}", fontsize=9, y=1.0)
         figure: Any = axes.figure
         bar = figure.colorbar(shapes, cax=axes.inset_axes((1.02, 0.1, 0.035, 0.8)), extend=extend)
         bar.ax.tick_params(labelsize=7, pad=1, length=2)
@@ -137,12 +136,12 @@ def plot(directory: Path, file: Any, document: Mapping[str, Any]) -> list[Path]:
         # The first of the unit cases, if there are three an angle.
         every = range(0, count, count // len(document["angle"]) or 1)
         numbers = [every[round(k)] for k in np.linspace(0, len(every) - 1, min(MAX_PANELS, len(every)))]
-        return [save(_side_by_side(file, numbers, output, scale, None), directory / "angle_states.png")]
-    leading = leading_component(document)
-    panels = _side_by_side(file, point_tables.chosen_states(document, MAX_PANELS, count), output, scale, leading)
+        return [save(_side_by_side(file, numbers, output, scale, Labels()), directory / "angle_states.png")]
+    labels = Labels.of(document)
+    panels = _side_by_side(file, point_tables.chosen_states(document, MAX_PANELS, count), output, scale, labels)
     paths = [save(panels, directory / "path_states.png")]
     frames = point_tables.chosen_states(document, MAX_FRAMES, count)
-    cell = DeformedCell.of(file, frames, output, scale, FRAME_LIMIT, leading)
+    cell = DeformedCell.of(file, frames, output, scale, FRAME_LIMIT, labels)
     return [*paths, _animation(cell, frames, directory / "path.gif")]
 
 
@@ -175,10 +174,8 @@ def _largest_length(table: Any) -> float:
     return max((float(np.linalg.norm(rows, axis=1).max()) for rows in blocks), default=0.0)
 
 
-def _side_by_side(
-    file: Any, numbers: Sequence[int], output: Mapping[str, Any], scale: float, leading: int | None
-) -> Figure:
-    cell = DeformedCell.of(file, numbers, output, scale, PANEL_LIMIT, leading)
+def _side_by_side(file: Any, numbers: Sequence[int], output: Mapping[str, Any], scale: float, labels: Labels) -> Figure:
+    cell = DeformedCell.of(file, numbers, output, scale, PANEL_LIMIT, labels)
     places = [cell.moved(number) for number in numbers]
     size = np.subtract(*_corners(places)[::-1])
     rows = max(1, round(math.sqrt(0.7 * len(numbers) * size[0] / size[1])))

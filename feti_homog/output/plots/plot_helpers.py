@@ -18,13 +18,11 @@ from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Path2D
 from PIL import Image
 
-from feti_homog.mechanics.voigt import AXIAL_STRESSES, SPATIAL_STRESSES, STRESSES, voigt_names
+from feti_homog.mechanics.voigt import AXIAL_STRESSES, SPATIAL_STRESSES, STRESSES
 from feti_homog.output.files import atomic
 from feti_homog.output.plots.decimation import DrawnMesh, triangle_means
 from feti_homog.typing import Array
 
-STRAIN_SYMBOLS = (r"E_{11}", r"E_{22}", r"\gamma_{12}")
-SPATIAL_STRAIN_SYMBOLS = (r"E_{11}", r"E_{22}", r"E_{33}", r"\gamma_{23}", r"\gamma_{13}", r"\gamma_{12}")
 STRESS_SYMBOLS = {name: rf"\sigma_{{{name[1:]}}}" for name in SPATIAL_STRESSES}
 # Where a state of result.h5 has the stresses: the table, and its column if it has more than one.
 STRESS_TABLES: dict[str, tuple[str, int | None]] = {
@@ -164,32 +162,6 @@ def magnification(displacement: float, size: float, opening: float = 0.0) -> flo
 def largest_length(vectors: Array) -> float:
     """The largest length of vectors (n, 2)."""
     return float(np.linalg.norm(vectors, axis=1).max(initial=0.0))
-
-
-def strain_symbols(count: int) -> tuple[str, ...]:
-    """The strains, 3 in the plane or 6 in space, in formulas."""
-    return STRAIN_SYMBOLS if count == len(STRAIN_SYMBOLS) else SPATIAL_STRAIN_SYMBOLS
-
-
-def load_label(attributes: Any, leading: int | None = None) -> str:
-    """The strain, and the temperature, of a state with these attributes; of more than two strains only the `leading`
-    one, if it is given, with its stress."""
-    strain, temperature = attributes["strain"], float(attributes.get("temperature", 0.0))
-    symbols, least = strain_symbols(len(strain)), SAME_VALUE * np.abs(strain).max()
-    loads = [(name, value) for name, value in zip(symbols, strain, strict=True) if abs(value) > least]
-    if leading is not None and len(loads) > 2:
-        name = voigt_names(len(strain))[1][leading][1:]
-        loads = [(symbols[leading], strain[leading]), (rf"\Sigma_{{{name}}}", attributes["stress"][leading])]
-    loads += [(r"\Delta T", temperature)] * (temperature != 0.0)
-    return ", ".join(f"${name} = {{{value:.4g}}}$" for name, value in loads) or "no strain"
-
-
-def stress_component(chosen: str, strains: Array, leading: int | None = None) -> str:
-    """The stress that is chosen, else the leading one, if there is one, or that of the largest strain of (k, 3 or 6)."""
-    if chosen in STRESS_SYMBOLS:
-        return chosen
-    stresses = voigt_names(strains.shape[1])[1]
-    return stresses[int(np.argmax(np.abs(strains).max(axis=0))) if leading is None else leading]
 
 
 def drawn_stress(state: Any, component: str, drawn: DrawnMesh) -> Array:

@@ -12,17 +12,16 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, MultipleLocator
 
 from feti_homog.mechanics import response
-from feti_homog.mechanics.voigt import SPATIAL_STRESSES, STRESSES
+from feti_homog.mechanics.voigt import STRESSES, voigt_names
 from feti_homog.output.plots import envelope_plot
 from feti_homog.output.plots.interface_marks import BONDED, CLOSED, OPEN, STATE_COLOURS, STATE_NAMES
-from feti_homog.output.plots.plot_helpers import save, strain_symbols, unit_label
+from feti_homog.output.plots.load_labels import SYMBOLS
+from feti_homog.output.plots.plot_helpers import save, unit_label
 from feti_homog.output.text import point_tables
 from feti_homog.typing import Array
 
 Document = Mapping[str, Any]
 
-MACROSCOPIC = tuple(rf"\Sigma_{{{name[1:]}}}" for name in STRESSES)
-SPATIAL = tuple(rf"\Sigma_{{{name[1:]}}}" for name in SPATIAL_STRESSES)
 INK = ("#1f4e9c", "#c44e00", "#2a7f3f", "#7a3e9d", "#8a6d00", "#0f7c8c", "#8c1d40")
 MARKS = ("o", "s", "^", "D", "v", "P", "X")
 NUMBERED_POINTS = 6  # of a path
@@ -66,7 +65,9 @@ def _angle(document: Document) -> Figure:
 def _angle_columns(points: Sequence[Mapping[str, Any]], stiff: bool) -> list[tuple[str, Array]]:
     """Each curve's name and its values (points,)."""
     if not stiff:
-        return list(zip(MACROSCOPIC, np.array([point["stress"] for point in points]).T, strict=True))
+        return list(
+            zip([SYMBOLS[name] for name in STRESSES], np.array([point["stress"] for point in points]).T, strict=True)
+        )
     stiffness = np.array([point["stiffness"] for point in points])
     return [(f"C_{{{i + 1}{j + 1}}}", stiffness[:, i, j]) for i, j in point_tables.shown_entries(points).values()]
 
@@ -84,7 +85,7 @@ def _path(document: Document) -> Figure:
     middle.sharex(lower)
     _stress_curves(upper, document, strain, component, first, style)
     upper.set_ylabel(f"macroscopic stress {_stress_unit(case)}")
-    upper.set_xlabel(f"macroscopic strain ${strain_symbols(strains.shape[1])[component]}$")
+    upper.set_xlabel(f"macroscopic strain ${SYMBOLS[voigt_names(strains.shape[1])[0][component]]}$")
     upper.set_title(f"{case.get('name', '')}: plane {case['analysis']['plane']}, {_strengths(case)}".lstrip(": "))
     stress = np.array([point["stress"] for point in points])
     for ink, k in zip(INK, response.shown_stresses(points, component), strict=False):
@@ -108,9 +109,9 @@ def _stress_curves(
     points = document["path"]
     stress = np.array([point["stress"] for point in points])
     rising = response.strain_controlled(points, component) if response.is_proportional(document) else None
-    names = MACROSCOPIC if stress.shape[1] == len(MACROSCOPIC) else SPATIAL
+    names = voigt_names(stress.shape[1])[1]
     for ink, i in zip(INK, response.shown_stresses(points, component), strict=False):
-        name = names[i]
+        name = SYMBOLS[names[i]]
         thin: dict[str, Any] = {"label": f"${name}$", "linewidth": 1.4} if rising is None else {"linewidth": 0.8}
         from_zero = np.append(0.0, strain[:first]), np.append(0.0, stress[:first, i])
         axes.plot(*from_zero, color=ink, alpha=0.8, **thin, **style)

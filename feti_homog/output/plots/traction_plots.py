@@ -12,7 +12,6 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import MultipleLocator
 
-from feti_homog.mechanics.response import leading_component
 from feti_homog.output.plots.interface_coordinate import DEGREES, Coordinate, coordinate
 from feti_homog.output.plots.interface_marks import (
     BONDED,
@@ -22,7 +21,8 @@ from feti_homog.output.plots.interface_marks import (
     STATE_NAMES,
     InterfaceEdges,
 )
-from feti_homog.output.plots.plot_helpers import load_label, save, unit_label
+from feti_homog.output.plots.load_labels import Labels
+from feti_homog.output.plots.plot_helpers import save, unit_label
 from feti_homog.typing import Array
 
 MAX_FIBRES = 4
@@ -41,15 +41,14 @@ def plot(directory: Path, file: Any, edges: InterfaceEdges, document: Mapping[st
     last = next((n for n in reversed(names) if 0 < debonded[n] < total or _touching(file, n)), names[-1])
     partly = [name for name in names if 0 < debonded[name] < total]
     shown = list(dict.fromkeys([names[0], last])) if "path" in document else [(partly or [last])[len(partly) // 2]]
-    leading = leading_component(document) if "path" in document else None
-    return [save(_figure(file, edges, shown, leading), directory / "interface.png")]
+    return [save(_figure(file, edges, shown, Labels.of(document)), directory / "interface.png")]
 
 
 def _touching(file: Any, name: str) -> bool:
     return bool((file[f"state/{name}/status"][:] == CLOSED).any())
 
 
-def _figure(file: Any, edges: InterfaceEdges, names: list[str], leading: int | None) -> Figure:
+def _figure(file: Any, edges: InterfaceEdges, names: list[str], labels: Labels) -> Figure:
     """A row for each of the fibres that are most debonded: tractions, and jumps."""
     fibre, status = file["interface/fibre_number"][:], file[f"state/{names[-1]}/status"][:]
     numbers, count = np.unique(fibre[status != BONDED], return_counts=True)
@@ -66,7 +65,7 @@ def _figure(file: Any, edges: InterfaceEdges, names: list[str], leading: int | N
             _finish(axes, place)
         row[0].set_title(f"fibre {number}", fontsize=10, loc="left")
     _labels(file, grid, status[np.isin(fibre, chosen)])
-    figure.suptitle(_title(file, names, leading), fontsize=10)
+    figure.suptitle(_title(file, names, labels), fontsize=10)
     return figure
 
 
@@ -118,10 +117,10 @@ def _labels(file: Any, grid: Any, shaded: Array) -> None:
     grid[0][0].figure.legend(handles=patches, loc="outside lower center", ncols=2, frameon=False)
 
 
-def _title(file: Any, names: list[str], leading: int | None) -> str:
+def _title(file: Any, names: list[str], labels: Labels) -> str:
     """The last state and, of more, the first."""
     first, last = (file[f"state/{name}"].attrs for name in (names[0], names[-1]))
-    title = f"{last['label']}: {load_label(last, leading)}"
+    title = f"{last['label']}: {labels.label(last)}"
     if len(names) > 1:
-        title += f"   (dashed: {first['label']}: {load_label(first, leading)})"
+        title += f"   (dashed: {first['label']}: {labels.label(first)})"
     return title

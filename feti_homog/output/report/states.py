@@ -10,12 +10,12 @@ import matplotlib as mpl
 import numpy as np
 from numpy.typing import NDArray
 
-from feti_homog.mechanics.response import leading_component
 from feti_homog.mechanics.voigt import voigt_names
 from feti_homog.output.plots.decimation import DrawnMesh, drawn_mesh, nodal_values, outline_edges
 from feti_homog.output.plots.deformed_panels import shown_scale
 from feti_homog.output.plots.interface_marks import STATE_COLOURS, STATE_NAMES, STATE_WIDTHS, InterfaceEdges
-from feti_homog.output.plots.plot_helpers import SAME_VALUE, drawn_stress, stress_component, value_range
+from feti_homog.output.plots.load_labels import SAME_VALUE, Labels
+from feti_homog.output.plots.plot_helpers import drawn_stress, value_range
 from feti_homog.output.text import point_tables
 
 MOST_STATES, TRIANGLES = 48, 8000  # of the viewer, which keep a page below some megabytes
@@ -36,8 +36,7 @@ def viewer_data(file: Any, document: Document) -> dict[str, Any]:
     numbers = _numbers(file, document)
     strains = np.array([file[f"state/{number}"].attrs["strain"] for number in numbers])
     stresses = voigt_names(strains.shape[1])[1]
-    leading = leading_component(document) if document.get("path") else None
-    component = stress_component(document["case"]["output"].get("stress", "auto"), strains, leading)
+    component = Labels.of(document).stress_component(document["case"]["output"].get("stress", "auto"), strains)
     return {
         "points": _base64(drawn.points, "<f4"),
         "triangles": _base64(drawn.triangles, "<u4"),

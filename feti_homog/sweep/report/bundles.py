@@ -9,7 +9,8 @@ from matplotlib.ticker import MaxNLocator
 
 from feti_homog.mechanics.response import NOISE
 from feti_homog.mechanics.voigt import voigt_names
-from feti_homog.output.plots.plot_helpers import plain, strain_symbols
+from feti_homog.output.plots.load_labels import SYMBOLS
+from feti_homog.output.plots.plot_helpers import plain
 from feti_homog.sweep.report.statistics import Statistics
 from feti_homog.sweep.report.style import COLOURS, label_axes, legend
 from feti_homog.sweep.report.sweep_table import SweepTable
@@ -26,13 +27,13 @@ def figure(table: SweepTable) -> Figure:
     shown = [along, *map(int, others[:1])]
     picture = Figure(figsize=(4.8 * len(shown), 4.6), layout="constrained")
     panels = picture.subplots(1, len(shown), sharex=True, squeeze=False)[0]
-    names = voigt_names(count)[1]
+    strains, stresses = voigt_names(count)
     for axes, component in zip(panels, shown, strict=True):
         for style, point in enumerate(points):
             _bundle(axes, table, point, component, COLOURS[style])
         axes.xaxis.set_major_locator(MaxNLocator(5))
         axes.axhline(0.0, color="0.6", linewidth=0.6, zorder=0)
-        label_axes(axes, f"$\\Sigma_{{{names[component][1:]}}}$", table, f"${strain_symbols(count)[along]}$")
+        label_axes(axes, f"${SYMBOLS[stresses[component]]}$", table, f"${SYMBOLS[strains[along]]}$")
     picture.suptitle(f"{plain(table.name)}: realisations, means and their 95 % confidence intervals", fontsize=12)
     legend(picture, list(panels))
     return picture
