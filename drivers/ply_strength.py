@@ -30,7 +30,8 @@ INTERFACE = {  # MPa/um, J/m2
     "toughness": 2.0,
 }
 RADIUS = 7.5  # um
-TESTS = {"tension": ("E22", 1, "S22"), "shear": ("gamma23", 3, "S23")}
+# Strain that rises, its end, its place, and its stress.
+TESTS = {"tension": ("E22", 0.02, 1, "S22"), "shear": ("gamma23", 0.08, 3, "S23")}
 COLUMNS = ("test", "temperature", "modulus", "first break", "peak", "strain at peak", "points")
 
 
@@ -48,7 +49,7 @@ def main(given: argparse.Namespace, comm: Intracomm) -> None:
 
 def solved(given: argparse.Namespace, comm: Intracomm, test: str, temperature: float) -> Result:
     """The path of one test."""
-    strain, _, _ = TESTS[test]
+    strain, end, _, _ = TESTS[test]
     cooling = [{"temperature": temperature}] if temperature else []
     document = {
         "name": f"{test} {temperature:g} K",
@@ -64,7 +65,7 @@ def solved(given: argparse.Namespace, comm: Intracomm, test: str, temperature: f
         "material": MATERIAL,
         "analysis": {"type": "path", "plane": "generalized"},
         "interface": INTERFACE,
-        "path": {"waypoints": [*cooling, {strain: given.strain}]},
+        "path": {"waypoints": [*cooling, {strain: end}]},
         "output": figures.written(given) | {"stress_unit": "MPa", "length_unit": "um"},
     }
     return run(Case.parse(document), comm, out=given.out / f"{test}_{abs(temperature):g}K")
@@ -94,12 +95,12 @@ def write(folder: Path, found: dict[tuple[str, float], Result]) -> list[Path]:
     """ply_strength.csv and ply_strength.png."""
     from matplotlib.figure import Figure
 
-    rows = [[test, temperature, *row(result, TESTS[test][1])] for (test, temperature), result in found.items()]
+    rows = [[test, temperature, *row(result, TESTS[test][2])] for (test, temperature), result in found.items()]
     print("test     temperature K  modulus MPa  first break MPa  peak MPa  at strain  points")
     for test, temperature, modulus, first, peak, strain, points in rows:
         print(f"{test:<9}{temperature:>13g}{modulus:>13.0f}{first:>17.2f}{peak:>10.2f}{strain:>11.5f}{points:>8}")
     figure = Figure(figsize=(9.0, 4.0), layout="constrained")
-    for axes, (test, (strain, component, stress)) in zip(figure.subplots(1, 2), TESTS.items(), strict=True):
+    for axes, (test, (strain, _, component, stress)) in zip(figure.subplots(1, 2), TESTS.items(), strict=True):
         own = {temperature: result for (name, temperature), result in found.items() if name == test}
         for colour, (temperature, result) in zip(INK, own.items(), strict=False):
             points = np.vstack([np.zeros(2), curve(result, component)])
@@ -125,6 +126,5 @@ if __name__ == "__main__":
     options = figures.quick_parser(__doc__ or "", "ply_strength", "two fibres, long elements")
     options.add_argument("--fibres", type=int, default=20)
     options.add_argument("--refine", type=int, default=2)
-    options.add_argument("--strain", type=float, default=0.02, help="of each test at its end")
     options.add_argument("--temperatures", type=float, nargs="+", default=[0.0, -50.0, -100.0], help="changes, K")
     sys.exit(launch(main, options))

@@ -23,17 +23,24 @@ WRONG = 1e-4
 
 @dataclass
 class Row:
-    """What a tool took: seconds of each stage, iterations of each load, MB; `difference` of L^ef, relative."""
+    """What a tool took: seconds of each stage, iterations of each load (none of a direct solver), MB.
+
+    Attributes:
+        plane: the plane state.
+        stresses: a column for each unit strain and, behind them, for a unit of temperature.
+        difference: of these columns, the largest of one relative to the largest entry of it.
+    """
 
     tool: str
     ranks: int
+    plane: str
     status: str
     dofs: int = 0
     subdomains: int = 0
     seconds: dict[str, float] = field(default_factory=dict)
     iterations: tuple[int, ...] = ()
     memory: float = 0.0
-    stiffness: tuple[tuple[float, ...], ...] = ()
+    stresses: tuple[tuple[float, ...], ...] = ()
     difference: float = float("nan")
 
     @property
@@ -51,38 +58,52 @@ class Row:
         """The tool and its ranks."""
         return f"{self.tool}@{self.ranks}"
 
+    @property
+    def loads(self) -> int:
+        """Unit loads that were solved for."""
+        return len(self.stresses[0]) if self.stresses else 0
+
 
 def compare(rows: Sequence[Row]) -> None:
-    """Fill in `difference` to the first direct solver that is done, or else to the first tool; mark wrong results."""
+    """Fill in `difference` to the first direct solver of the same plane state that is done, or else to the first tool;
+    mark wrong results."""
     done = [row for row in rows if row.status == "done"]
-    direct = [row for row in done if row.tool in PEERS and PEERS[row.tool].direct]
-    for row in rows:
-        if row.stiffness and done:
-            exact = np.array((direct or done)[0].stiffness)
-            row.difference = float(np.abs(np.array(row.stiffness) - exact).max() / np.abs(exact).max())
-            if row.status == "done" and not row.difference <= WRONG:
-                row.status = "wrong"
+    for row in done:
+        of_plane = [other for other in done if other.plane == row.plane]
+        direct = [other for other in of_plane if other.tool in PEERS and PEERS[other.tool].direct]
+        exact = np.array((direct or of_plane)[0].stresses)
+        apart = np.abs(np.array(row.stresses) - exact).max(axis=0)
+        row.difference = float((apart / np.abs(exact).max(axis=0)).max())
+    for row in done:
+        if not row.difference <= WRONG:
+            row.status = "wrong"
 
 
 def table(rows: Sequence[Row]) -> list[str]:
-    """Aligned lines; the ratios are this program's to each tool's."""
+    """Aligned lines; the ratios are this program's to each tool's, of the same plane state."""
     lines = [
-        f"{'':34}{'seconds':^50}{'':14}{'':9}  feti / tool",
-        f"{'tool@ranks':14}{'dofs':>9}{'domains':>9}  " + "".join(f"{s:>9}" for s in STAGES)
+        f"{'':47}{'seconds':^50}{'':14}{'':9}  feti / tool",
+        f"{'tool@ranks':14}{'dofs':>9}{'domains':>9}  {'plane':<12}{'loads':>5}" + "".join(f"{s:>9}" for s in STAGES)
         + f"{'iterations':>14}{'MB':>8}{'solver':>9}{'total':>7}{'MB':>7}{'difference':>12}  status",
     ]  # fmt: skip
-    ours = next((row for row in rows if row.tool == "feti" and row.status == "done"), None)
     for row in rows:
         times = "".join(f"{row.seconds[s]:9.2f}" if s in row.seconds else f"{'-':>9}" for s in STAGES)
+        ours = _ours(rows, row)
         ratios = f"{'-':>9}{'-':>7}{'-':>7}"
         if ours and row.seconds:
             pairs = [(ours.solver, row.solver), (ours.total, row.total), (ours.memory, row.memory)]
             ratios = "  " + "".join(f"{a / b:7.2f}" for a, b in pairs)
+        iterations = "-".join(map(str, sorted({min(row.iterations), max(row.iterations)}))) if row.iterations else ""
         lines.append(
-            f"{row.name:14}{row.dofs:9}{row.subdomains:9}  {times}{'/'.join(map(str, row.iterations)):>14}"
+            f"{row.name:14}{row.dofs:9}{row.subdomains:9}  {row.plane:<12}{row.loads:5}{times}{iterations:>14}"
             f"{row.memory:8.0f}{ratios}{row.difference:12.0e}  {row.status}"
         )
     return lines
+
+
+def _ours(rows: Sequence[Row], row: Row) -> Row | None:
+    """This program's first row that is done of the plane state of `row`."""
+    return next((r for r in rows if r.tool == "feti" and r.plane == row.plane and r.status == "done"), None)
 
 
 def notes(rows: Sequence[Row]) -> list[str]:
@@ -94,12 +115,26 @@ def notes(rows: Sequence[Row]) -> list[str]:
         "solver: set-up and solves; total: all stages; dofs: feti of the torn cell, the others of the glued one",
         f"largest difference of L^ef between tools that are done: {largest:.1e}; wrong from {WRONG:g}",
         *(f"{tool}: {PEERS[tool].note}" for tool in peers),
+        *pairs(rows),
     ]
+
+
+def pairs(rows: Sequence[Row]) -> list[str]:
+    """For each tool that two plane states have: this program's time over its own in both, set-up and solves."""
+    lines = []
+    for name in dict.fromkeys(row.name for row in rows if row.tool in PEERS):
+        found = [
+            (row, ours) for row in rows if row.name == name and row.status == "done" and (ours := _ours(rows, row))
+        ]
+        if len(found) > 1:
+            ratios = (f"{ours.solver / row.solver:.2f} under {row.loads} loads ({row.plane})" for row, ours in found)
+            lines.append(f"feti / {name}: {', '.join(ratios)}")
+    return lines
 
 
 def write(path: Path, rows: Sequence[Row]) -> None:
     """The rows as CSV, a column for each stage."""
-    names = [f.name for f in fields(Row) if f.name not in ("seconds", "stiffness")]
+    names = [f.name for f in fields(Row) if f.name not in ("seconds", "stresses")]
     with path.open("w", newline="") as stream:
         writer = csv.DictWriter(stream, [*names, *STAGES, "solver", "total"], extrasaction="ignore")
         writer.writeheader()
@@ -112,7 +147,7 @@ def write(path: Path, rows: Sequence[Row]) -> None:
 
 def plot(path: Path, rows: Sequence[Row], title: str) -> None:
     """Write the bars of all tools, from top to bottom in their order."""
-    names = [row.name for row in rows]
+    names = [f"{row.name}, {row.plane}" for row in rows]
     height = 1.7 + 0.36 * len(rows)
     figure, (times, memory) = plt.subplots(1, 2, figsize=(9.5, height), sharey=True, width_ratios=(5, 3))
     start = [0.0] * len(rows)

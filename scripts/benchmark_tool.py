@@ -1,7 +1,8 @@
 """One tool of the benchmark in an MPI job of its own: mesh, assemble, set up, solve, and report.
 
-Every tool begins with the same meshing, tearing, refining and assembling.  Options with the prefix `peer_` in the
-environment's PETSC_OPTIONS go before those of the peer.
+Every tool begins with the same meshing, tearing, refining and assembling.  In generalized plane strain each solves the
+problem of the plane and the one along the fibres, which share nothing, for all their loads.  Options with the prefix
+`peer_` in the environment's PETSC_OPTIONS go before those of the peer.
 """
 
 from __future__ import annotations
@@ -12,26 +13,26 @@ import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import petsc4py
 
 petsc4py.init(sys.argv[:1])
 
-from glued import Glued, glue  # noqa: E402
+from glued import Glued, Nodes, glue  # noqa: E402
 from mpi4py import MPI  # noqa: E402
 from peers import PEERS, Peer  # noqa: E402
 from petsc4py import PETSc  # noqa: E402
 
 from feti_homog.analysis.context import AnalysisContext  # noqa: E402
 from feti_homog.common import process_memory  # noqa: E402
-from feti_homog.common.mpi_errors import run_main  # noqa: E402
+from feti_homog.common.mpi_errors import agree, run_main  # noqa: E402
 from feti_homog.common.petsc_options import case_options  # noqa: E402
 from feti_homog.common.progress import Progress  # noqa: E402
 from feti_homog.config import case as cases  # noqa: E402
 from feti_homog.config.case import Case  # noqa: E402
-from feti_homog.homogenization import unit_cell  # noqa: E402
+from feti_homog.homogenization import phase_laws, unit_cell  # noqa: E402
 from feti_homog.homogenization.averaging import Homogenization  # noqa: E402
 from feti_homog.typing import Float  # noqa: E402
 
@@ -45,11 +46,13 @@ def main() -> int:
     parser.add_argument("tool", choices=["feti", *PEERS])
     parser.add_argument("case", type=Path)
     parser.add_argument("report", type=Path)
-    parser.add_argument("--loads", type=int, required=True)
+    parser.add_argument("--plane", required=True, help="the plane state, whatever the case says")
+    parser.add_argument("--loads", type=int, help="solve for the first loads only; all by default")
     parser.add_argument("--rtol", type=float, required=True)
     arguments = parser.parse_args()
     progress = Progress(MPI.COMM_WORLD, quiet=True)
-    case = dataclasses.replace(cases.load(arguments.case), interface=None)
+    case = cases.load(arguments.case)
+    case = dataclasses.replace(case, interface=None, analysis=dataclasses.replace(case.analysis, plane=arguments.plane))
     if arguments.tool == "feti":
         report = feti(case, progress, arguments.loads, arguments.rtol)
     else:
@@ -60,43 +63,56 @@ def main() -> int:
     return 0
 
 
-def feti(case: Case, progress: Progress, loads: int, rtol: float) -> dict[str, Any]:
+def feti(case: Case, progress: Progress, loads: int | None, rtol: float) -> dict[str, Any]:
     """This program."""
     comm = progress.comm
     with case_options(case.petsc | {"feti_ksp_rtol": rtol}):
         cell = unit_cell.tear(case, comm, progress)
-        progress.seconds["set-up"] = progress.seconds.pop("factor")
+        progress.seconds["set-up"] = progress.seconds.pop("factor") + progress.seconds.pop("axial", 0.0)
         with progress.stage("set-up"):
-            context = AnalysisContext(Homogenization(cell, contact=False), cell.debonded, progress, lambda *_: None)
+            problems = [Homogenization(own, contact=False) for own in (cell, cell.axial) if own is not None]
+            context = AnalysisContext(problems[0], cell.debonded, progress, lambda *_: None)
+            status = context.status(None)
+        columns = []
         with progress.stage("solve"):
-            starts = context.zero_multipliers()[:loads]
-            responses = context.homogenization.respond(np.eye(3)[:loads], context.status(None), starts)
-            for response in responses:
-                context.record_checks("", response)
-    dofs = cell.sum_over_ranks(sum(len(s.Q) for s in cell.subdomains))
-    cell.solver.destroy()
-    columns = [response.stress for response in responses]
+            for problem in problems:
+                E = np.eye(len(problem.loads))[:loads]
+                responses = problem.respond(E, status, [np.zeros(problem.cell.solver.rows)] * len(E))
+                columns.append(np.stack([response.stress for response in responses], axis=1))
+                for response in responses:
+                    context.record_checks("", response)
+    dofs = cell.sum_over_ranks(sum(s.n_dofs for problem in problems for s in problem.cell.subdomains))
+    cell.destroy()
     return _report(dofs, cell.summary.subdomains, columns, context.iterations, context.reasons)
 
 
-def peer(tool: Peer, case: Case, progress: Progress, loads: int, rtol: float) -> dict[str, Any]:
-    """One of the others."""
+def peer(tool: Peer, case: Case, progress: Progress, loads: int | None, rtol: float) -> dict[str, Any]:
+    """One of the others, whose second problem begins when the first one is done and its matrices are gone."""
     comm = progress.comm
     plan, _, lattice, subdomains = unit_cell.assemble_subdomains(case, comm, progress)
     with progress.stage("glue"):
-        cell = glue(comm, subdomains, lattice)
-        A = _operator(tool, cell)
-    with progress.stage("set-up"):
-        ksp = _solver(tool, A, rtol)
-    columns, iterations, reasons = [], [], []
-    with progress.stage("solve"):
-        for strain, load in zip(np.eye(3)[:loads], cell.Q, strict=False):
-            u = load.duplicate()
-            ksp.solve(-load, u)
-            columns.append((cell.stiffness @ strain + cell.stress(u)) / plan.area)
-            iterations.append(ksp.getIterationNumber())
-            reasons.append(int(ksp.getConvergedReason()))
-    return _report(A.getSize()[0], plan.subdomains, columns, iterations, reasons)
+        nodes = Nodes.of(comm, subdomains, lattice)
+    meshed, dofs = list(subdomains), 0
+    columns, iterations, reasons = list[Float](), list[int](), list[int]()
+    for problem in ("plane", "axial") if phase_laws.is_generalized(case) else ("plane",):
+        if problem == "axial":
+            with progress.stage("assemble"):
+                subdomains = agree(comm, unit_cell.assemble_axial, case, meshed)
+        with progress.stage("glue"):
+            cell = glue(comm, subdomains, nodes)
+            A = _operator(tool, cell)
+            dofs += A.getSize()[0]
+        with progress.stage("set-up"):
+            ksp = _solver(tool, A, rtol)
+        with progress.stage("solve"):
+            solved = (_solved_together if tool.direct else _solved_in_turn)(ksp, cell.Q[:loads])
+            stresses = [cell.stress(u) for u in solved.solutions]
+            columns.append((cell.stiffness[:, :loads] - np.stack(stresses, axis=1)) / plan.area)
+        iterations += solved.iterations
+        reasons += solved.reasons
+        ksp.destroy()
+        A.destroy()
+    return _report(dofs, plan.subdomains, columns, iterations, reasons)
 
 
 def _operator(tool: Peer, cell: Glued) -> PETSc.Mat:
@@ -126,14 +142,56 @@ def _solver(tool: Peer, A: PETSc.Mat, rtol: float) -> PETSc.KSP:
     return ksp
 
 
+class _Solved(NamedTuple):
+    """The solutions of A u = Q for each load, with iterations and KSPConvergedReasons."""
+
+    solutions: list[PETSc.Vec]
+    iterations: list[int]
+    reasons: list[int]
+
+
+def _solved_in_turn(ksp: PETSc.KSP, loads: Sequence[PETSc.Vec]) -> _Solved:
+    """Each load by itself."""
+    solved = _Solved([], [], [])
+    for load in loads:
+        u = load.duplicate()
+        ksp.solve(load, u)
+        solved.solutions.append(u)
+        solved.iterations.append(ksp.getIterationNumber())
+        solved.reasons.append(int(ksp.getConvergedReason()))
+    return solved
+
+
+def _solved_together(ksp: PETSc.KSP, loads: Sequence[PETSc.Vec]) -> _Solved:
+    """All loads at once, as a factor solves for them fastest; there are no iterations."""
+    size = ((loads[0].getLocalSize(), None), (None, len(loads)))
+    right = PETSc.Mat().createDense(size, comm=ksp.comm)
+    right.setUp()
+    right.getDenseArray()[:] = np.stack([load.getArray() for load in loads], axis=1)
+    right.assemble()
+    found = right.duplicate()
+    ksp.getPC().getFactorMatrix().matSolve(right, found)
+    solutions = [load.duplicate() for load in loads]
+    for u, column in zip(solutions, found.getDenseArray().T, strict=True):
+        u.setArray(column)
+    right.destroy()
+    found.destroy()
+    return _Solved(solutions, [], [1])
+
+
 def _report(
-    dofs: int, subdomains: int, columns: Sequence[Float], iterations: list[int], reasons: list[int]
+    dofs: int, subdomains: int, problems: Sequence[Float], iterations: list[int], reasons: list[int]
 ) -> dict[str, Any]:
-    """What is compared; `columns` of L^ef are the stresses under the unit strains."""
+    """What is compared; `problems` are the stresses (v, k) under the loads of each problem."""
+    if len(problems) == 1:
+        stresses = problems[0]
+    else:
+        stiffness, thermal = phase_laws.spatial(*problems)
+        stresses = stiffness if thermal is None else np.column_stack([stiffness, thermal])
     return {
         "dofs": dofs,
         "subdomains": subdomains,
-        "stiffness": np.stack(columns, axis=1).tolist(),
+        "stresses": stresses.tolist(),
         "iterations": iterations,
         "converged": min(reasons) > 0,
     }

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from feti_homog.cell.refinement import ReferenceLattice
+from feti_homog.fem.problem import Problem
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.typing import Float, Int
 
@@ -87,22 +88,26 @@ class Glued:
 
     Attributes:
         A: MATIS, with the sum of a rank's subdomains as its local matrix.
-        Q: for each unit strain its load.
-        stiffness: (3, 3) sum |Omega_s| L_s of all subdomains.
+        Q: for each of the v unit loads its vector.
+        stiffness: (v, v) sum |Omega_s| L_s of all subdomains.
         points: (owned nodes, 2) where they are in the plane.
+        problem: the displacements and the unit loads.
     """
 
     A: PETSc.Mat
     Q: list[PETSc.Vec]
     stiffness: Float
     points: Float
+    problem: Problem
 
     def rigid(self) -> PETSc.NullSpace:
-        """Two translations and a rotation, which leaps where the cell's sides meet; orthonormal."""
-        x, y = (self.points - 0.5).T
-        modes = [self.A.createVecLeft() for _ in range(3)]
-        for mode, values in zip(modes, ([1 + 0 * x, 0 * y], [0 * x, 1 + 0 * y], [-y, x]), strict=True):
-            mode.setArray(np.stack(values, axis=1).ravel())
+        """The translations, and in the plane a rotation, which leaps where the cell's sides meet; orthonormal."""
+        values = [np.tile(translation, (len(self.points), 1)) for translation in np.eye(self.problem.components)]
+        if self.problem.turns:
+            values.append((self.points - 0.5) @ np.array([[0.0, 1.0], [-1.0, 0.0]]))
+        modes = [self.A.createVecLeft() for _ in values]
+        for mode, own in zip(modes, values, strict=True):
+            mode.setArray(own.ravel())
         for i, mode in enumerate(modes):
             for before in modes[:i]:
                 mode.axpy(-before.dot(mode), before)
@@ -110,44 +115,40 @@ class Glued:
         return PETSc.NullSpace().create(vectors=modes, comm=self.A.comm)
 
     def stress(self, u: PETSc.Vec) -> Float:
-        """(3,) int sigma of the fluctuation alone, to which `stiffness` times the strain adds."""
+        """(v,) int sigma of the fluctuation alone, to which `stiffness` times the unit load adds."""
         return np.array([q.dot(u) for q in self.Q])
 
 
-def glue(comm: MPI.Intracomm, subdomains: list[Subdomain], lattice: ReferenceLattice) -> Glued:
+def glue(comm: MPI.Intracomm, subdomains: list[Subdomain], nodes: Nodes) -> Glued:
     """Glue the subdomains, which are taken from the list one by one to save memory.  Collective."""
-    nodes = Nodes.of(comm, subdomains, lattice)
-    n = len(nodes.number)
-    entries, Q, x = np.zeros(2 * n, np.int32), np.zeros((2 * n, 3)), np.zeros((n, 2))
+    problem, n = subdomains[0].problem, len(nodes.number)
+    c, loads = problem.components, range(len(problem.loads))
+    entries, Q, x = np.zeros(c * n, np.int32), np.zeros((c * n, len(loads))), np.zeros((n, 2))
     stiffness = np.asarray(comm.allreduce(sum(s.area * s.L for s in subdomains)))
     matrices = [s.take_stiffness() for s in subdomains]
-    for s, matrix, local in zip(subdomains, matrices, nodes.local, strict=True):
-        own = _dofs(local)
+    dofs = [problem.dofs(local).astype(np.int32) for local in nodes.local]
+    for s, matrix, local, own in zip(subdomains, matrices, nodes.local, dofs, strict=True):
         entries[own] += np.diff(matrix.indptr)
         Q[own] += s.Q
         x[local[s.mesh.node_class]] = s.mesh.points
-    K = PETSc.Mat().createAIJ((2 * n, 2 * n), nnz=entries, comm=PETSc.COMM_SELF)
-    K.setBlockSize(2)
+    K = PETSc.Mat().createAIJ((c * n, c * n), nnz=entries, comm=PETSc.COMM_SELF)
+    K.setBlockSize(c)
     while subdomains:
         subdomains.pop()
-        matrix, own = matrices.pop(), _dofs(nodes.local.pop())
+        matrix, own = matrices.pop(), dofs.pop()
         K.setValuesIJV(matrix.indptr, own[matrix.indices], matrix.data, ADD, own)
     K.assemble()
-    lgmap = PETSc.LGMap().create(nodes.number.astype(np.int32), 2, comm)
-    size = (2 * int(nodes.owned.sum()), None)
+    lgmap = PETSc.LGMap().create(nodes.number.astype(np.int32), c, comm)
+    size = (c * int(nodes.owned.sum()), None)
     A = PETSc.Mat().create(comm)
-    A.setSizes((size, size), 2)
+    A.setSizes((size, size), c)
     A.setType(PETSc.Mat.Type.IS)
     A.setLGMap(lgmap, lgmap)
     A.setISLocalMat(K)
     A.assemble()
     A.setOption(PETSc.Mat.Option.SPD, True)
-    loads = [A.createVecLeft() for _ in range(3)]
-    for load, q in zip(loads, Q.T, strict=True):
-        load.setValuesBlocked(nodes.number.astype(np.int32), q, ADD)
-        load.assemble()
-    return Glued(A, loads, stiffness, x[nodes.owned])
-
-
-def _dofs(nodes: Int) -> NDArray[np.int32]:
-    return (2 * nodes[:, None] + np.arange(2)).ravel().astype(np.int32)
+    vectors = [A.createVecLeft() for _ in loads]
+    for vector, q in zip(vectors, Q.T, strict=True):
+        vector.setValuesBlocked(nodes.number.astype(np.int32), q, ADD)
+        vector.assemble()
+    return Glued(A, vectors, stiffness, x[nodes.owned], problem)

@@ -51,7 +51,6 @@ class Result:
         moduli, bounds: of perfectly bonded cells, else None.
         tips: energy release rates of a stiffness with debonded arcs, else None; those of an angle are in its points.
         angle, path, envelope: the points of these analyses, else None; `points` has those of the first two as arrays.
-        load: the state of analysis "load", else None.
         fields: mesh, interface and states on this rank if they were asked for, else None; not written to result.json.
     """
 
@@ -150,10 +149,10 @@ class Result:
 
     def rising_strain(self) -> Float:
         """(v, 4) corners S11, S22, S12 and size of the leading strain along a path of one leg, as a test with rising
-        load follows it: where bonds break the state jumps, at that load, to the next branch that holds; under given
-        strains the stress drops.  (v, 7) of generalized plane strain.
+        load follows it: where bonds break the stress drops, or under a given stress the strain jumps, to the next
+        branch that holds.  Of generalized plane strain (v, 7), all six stresses before the strain.
 
-        Raises ValueError for any other result, and where the leading strain does not rise with the load.
+        Raises ValueError for any other result, and where that strain does not rise with the load.
         """
         curve = response.rising_strain(self.document)
         if curve is None:

@@ -18,7 +18,7 @@ LONGEST = 20  # rows of a table of points
 
 
 def tables(document: Document) -> str:
-    """L^ef, moduli, the points of an angle or path, or the state under a load; then checks and status."""
+    """L^ef, moduli, or the points of an angle or path, or the state under a load; then checks and status."""
     unit = document["case"].get("output", {}).get("stress_unit", "")
     label = f" ({unit})" if unit else ""
     blocks = [f"<h4>{escape(title_of(document))}</h4>"]
@@ -63,6 +63,15 @@ def _thermal(document: Document, label: str) -> str:
     return _table(f"per unit of temperature{escape(label)}", ["", *known], words)
 
 
+def _load(point: Document, label: str) -> str:
+    """Strains and stresses of the state under a load, and its numbers."""
+    strains, stresses = voigt_names(len(point["strain"]))
+    components = [*zip(strains, point["strain"], strict=True), *zip(stresses, point["stress"], strict=True)]
+    numbers = [(name, value) for name, value in point.items() if isinstance(value, int | float)]
+    rows = ([name, _number(value)] for name, value in [*components, *numbers])
+    return _table(f"equilibrium under the load{escape(label)}", None, rows)
+
+
 def _points(key: str, points: Sequence[Document]) -> str:
     """The numbers, not the arrays, of the first points."""
     numbers = [{name: value for name, value in p.items() if isinstance(value, int | float)} for p in points[:LONGEST]]
@@ -70,16 +79,6 @@ def _points(key: str, points: Sequence[Document]) -> str:
     rows = ([_number(point[name]) if name in point else "" for name in names] for point in numbers)
     more = f", the first {LONGEST} of {len(points)} points" if len(points) > LONGEST else ""
     return _table(f"{key}{more}", names, rows)
-
-
-def _load(state: Document, label: str) -> str:
-    """Strains and stresses under one load."""
-    stresses = voigt_names(len(state["strain"]))[1]
-    rows = (
-        [name[1:], _number(strain), _number(stress)]
-        for name, strain, stress in zip(stresses, state["strain"], state["stress"], strict=True)
-    )
-    return _table(f"state under the load{escape(label)}", ["", "strain", "stress"], rows)
 
 
 def _table(caption: str, head: Sequence[str] | None, rows: Iterable[Sequence[str]]) -> str:

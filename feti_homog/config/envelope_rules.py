@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import inf
 from typing import Any
 
 from feti_homog.config.envelope_section import Envelope
@@ -55,7 +56,7 @@ def _bonding_faults(interface: InterfaceSection, selected: Selected) -> list[str
     """Faults of bonds that nothing breaks, and of faces that may touch."""
     faults = []
     names = STRENGTHS if selected[PLANE] in GENERALIZED.values else STRENGTHS[:2]
-    if interface.criterion != "energy" and all(getattr(interface, name) is None for name in names):
+    if interface.criterion != "energy" and all(getattr(interface, name) in (None, inf) for name in names):
         faults.append(f"[interface] {', '.join(names)}: missing; {TYPE} needs one")
     if interface.contact and interface.debonded:
         faults.append(

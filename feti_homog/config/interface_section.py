@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from feti_homog.config.schema import key
 from feti_homog.config.section_values import ARCS, FIBRES, STIFFNESS, STRENGTH, TOUGHNESS
 from feti_homog.config.selectors import ANALYSIS_TYPE, BREAKING, BY_ENERGY, GENERALIZED
-from feti_homog.config.values import boolean, choice, real
+from feti_homog.config.values import POSITIVE_OR_INF, boolean, choice, real
 
 STIFFNESSES = ("normal_stiffness", "tangential_stiffness")
 STRENGTHS = ("normal_strength", "tangential_strength", "axial_strength")
@@ -73,8 +73,8 @@ class InterfaceSection:
         default_words="inf",
     )
     axial_stiffness: float | None = key(
-        real(above=0.0),
-        "Traction along the fibre / slip along it, k_a, of the bonds that hold.",
+        POSITIVE_OR_INF,
+        "Traction along the fibre / slip along it, k_a, of the bonds that hold; inf: no slip along it.",
         unit="stress / length",
         default=None,
         default_words="tangential_stiffness",
@@ -97,8 +97,8 @@ class InterfaceSection:
         only=BREAKING,
     )
     axial_strength: float | None = key(
-        real(above=0.0),
-        'R^a: the traction along the fibre at which a bond breaks; in plane = "generalized".',
+        POSITIVE_OR_INF,
+        'R^a: the traction along the fibre at which a bond breaks; inf: it breaks none; in plane = "generalized".',
         unit="stress",
         default=None,
         default_words="tangential_strength",

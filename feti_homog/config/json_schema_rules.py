@@ -25,6 +25,7 @@ from feti_homog.config.selectors import (
     PLANE,
 )
 from feti_homog.config.tables import REQUIRED
+from feti_homog.config.values import LARGEST
 
 Schema = dict[str, Any]
 
@@ -172,7 +173,8 @@ def _mixed_load_rules() -> list[Schema]:
 
 def _envelope_rules() -> list[Schema]:
     """An envelope needs bonds that break and debonded faces without contact; its plane is that of the case."""
-    strong = {"anyOf": [{"required": [name]} for name in STRENGTHS]}
+    finite = {"type": "number", "maximum": LARGEST}
+    strong = {"anyOf": [{"required": [name], "properties": {name: finite}} for name in STRENGTHS]}
     by_energy = {"properties": {"criterion": {"const": "energy"}}, "required": ["criterion"]}
     some_arc = {"required": ["debonded"], "properties": {"debonded": {"minItems": 1}}}
     free = {"if": some_arc, "then": {"required": ["contact"], "properties": {"contact": {"const": False}}}}

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
-from feti_homog.config.values import ValueType
+from feti_homog.config.values import INF, ValueType
 from feti_homog.config.wording import suggestion, toml_key, toml_value
 
 T = TypeVar("T")
@@ -183,4 +184,6 @@ def _to_toml(value: Any, selected: Selected) -> Any:
         return [_to_toml(entry, selected) for entry in value]
     if isinstance(value, Path):
         return str(value)
+    if value == math.inf:
+        return INF
     return to_table(value, selected) if dataclasses.is_dataclass(value) else value

@@ -11,6 +11,8 @@ from feti_homog.config.wording import toml_value
 
 SMALLEST, LARGEST = 1e-100, 1e100
 """Magnitudes of numbers other than 0: no product of a few over- or underflows."""
+INF = "inf"
+"""An infinite number in resolved cases, which are written as JSON."""
 MAGNITUDES = f"; numbers other than 0 have magnitudes from {SMALLEST:g} to {LARGEST:g}"
 
 
@@ -114,6 +116,13 @@ def choice(*options: str) -> ValueType:
     return ValueType(words, lambda value: value in options, str, {"enum": list(options)})
 
 
+POSITIVE_OR_INF = ValueType(
+    "a positive number, or inf",
+    lambda value: value in (math.inf, INF) or (is_number(value) and value > 0),
+    float,
+    {"anyOf": [{"type": "number", "minimum": SMALLEST}, {"const": INF}]},
+)
+"""Where inf is another thing than no value."""
 boolean = ValueType("true or false", lambda value: isinstance(value, bool), bool, {"type": "boolean"})
 text = ValueType(
     "a text in one line",

@@ -8,11 +8,12 @@ should leave room for that.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil
 
 from feti_homog.config.case import Case
+from feti_homog.fem.problem import AXIAL, Problem
 
 # Seconds to start Python, MPI, PETSc and gmsh.
 START_SECONDS = 1.2
@@ -39,14 +40,18 @@ class Estimate:
     ranks: int
 
 
-def applications(case: Case) -> int:
-    """About how many times the analysis applies the dual operator."""
-    solves = 3
+def applications(case: Case, problem: Problem) -> int:
+    """About how many times the analysis applies the dual operator of a problem."""
+    # A mesh may have a curve "debonded"; along the fibres nothing touches.
+    may_open = bool(case.arcs) or case.cell.file is not None or case.path is not None
+    contact = case.interface is not None and case.interface.contact and may_open and problem != AXIAL
+    solves = len(problem.loads)
     if case.angle is not None:
-        solves = len(case.angle.values) * (3 if case.angle.strain is None else 1)
+        solves = len(case.angle.values) * (solves if case.angle.strain is None else 1)
+    elif contact:
+        solves *= 2  # under plus and minus each unit load
     if case.path is not None or _asks_for_tips(case):
         solves = SOLVES_OF_A_PATH
-    contact = case.interface is not None and case.interface.contact
     return ITERATIONS_OF_A_SOLVE * solves * (SOLVES_OF_A_CONTACT if contact else 1)
 
 
@@ -54,19 +59,21 @@ def _asks_for_tips(case: Case) -> bool:
     """Whether an envelope needs the inverse of the dual operator, which many solves call for."""
     bond = case.interface
     by_energy = bond is not None and bond.criterion == "energy" and bond.growth == "released"
-    # A mesh may have a curve "debonded".
     return case.envelope is not None and by_energy and (bool(case.arcs) or case.cell.file is not None)
 
 
 def estimate(
-    dofs: Sequence[int], subdomains: Sequence[int], coarse_triangles: int, bodies: int, applications: int
+    nodes: Sequence[int], subdomains: Sequence[int], coarse_triangles: int, bodies: int, problems: Mapping[int, int]
 ) -> Estimate:
-    """What a case takes with `dofs` and `subdomains` on each rank, which applies its dual operator so many times.
+    """What a case takes with `nodes` and `subdomains` on each rank; `problems` has for each problem, by its
+    displacements of a node, how many times it applies its dual operator.
 
     As many ranks are suggested as there are bodies at most, for more would cut bodies, which costs iterations.
     """
-    own = zip(dofs, subdomains, strict=True)
-    slowest = max(n * (SETUP_SECONDS + applications * APPLY_SECONDS) + k * SUBDOMAIN_SECONDS for n, k in own)
+    of_node = sum(c * (SETUP_SECONDS + applications * APPLY_SECONDS) for c, applications in problems.items())
+    of_subdomain = len(problems) * SUBDOMAIN_SECONDS
+    slowest = max(n * of_node + k * of_subdomain for n, k in zip(nodes, subdomains, strict=True))
+    dofs = [sum(problems) * n for n in nodes]
     return Estimate(
         seconds=START_SECONDS + coarse_triangles * MESH_SECONDS + slowest,
         memory=BASE_BYTES + max(dofs) * DOF_BYTES,

@@ -13,7 +13,7 @@ import numpy as np
 
 from feti_homog.config.case import Case
 from feti_homog.config.materials import expansion, plane_stiffness, spatial_stiffness
-from feti_homog.fem.problem import GENERALIZED, PLANE, Problem
+from feti_homog.fem.problem import AXIAL, GENERALIZED, PLANE, Problem
 from feti_homog.typing import Float
 
 IN_PLANE, AXIAL_SHEAR = [0, 1, 5, 2], [4, 3]
@@ -32,6 +32,11 @@ def plane_problem(case: Case) -> Problem:
     if any(expansion(material) is None for material in case.materials.values()):
         return replace(GENERALIZED, loads=GENERALIZED.loads[:4])
     return GENERALIZED
+
+
+def problems(case: Case) -> tuple[Problem, ...]:
+    """Those that are solved: that of the plane, and if strains along the fibres are loads the axial one."""
+    return (plane_problem(case), AXIAL) if is_generalized(case) else (plane_problem(case),)
 
 
 def plane_law(case: Case, phase: str) -> Float:

@@ -112,36 +112,25 @@ def tear(
         CaseError, MeshError: on every rank.
     """
     summary, shared, lattice, subdomains = assemble_subdomains(case, comm, progress, policy)
+    problem = phase_laws.plane_problem(case)
     with progress.stage("factor") as words:
-        solver = FetiSolver(
-            comm,
-            shared,
-            subdomains,
-            lattice,
-            cost_model.applications(case),
-            thresholds,
-            bonds.springs(case),
-            phase_laws.plane_problem(case),
-        )
+        applications, springs = cost_model.applications(case, problem), bonds.springs(case)
+        solver = FetiSolver(comm, shared, subdomains, lattice, applications, thresholds, springs, problem)
         multipliers, dimension = solver.jump_operator.global_rows, solver.coarse.coarse_dimension
         words.append(f"{multipliers} multipliers, coarse dimension {dimension}")
     cell = TornCell(comm, case, summary, lattice, subdomains, solver)
     if not phase_laws.is_generalized(case):
         return cell
+    with progress.stage("assemble") as words:
+        own = agree(comm, assemble_axial, case, subdomains)
+        words.append(f"{comm.allreduce(sum(s.n_dofs for s in own))} degrees of freedom along the fibres")
     with progress.stage("axial"):
-        return replace(cell, axial=_axial(cell, shared, thresholds))
+        applications, springs = cost_model.applications(case, AXIAL), bonds.axial_springs(case)
+        solver = FetiSolver(comm, shared, own, lattice, applications, thresholds, springs, AXIAL)
+    return replace(cell, axial=TornCell(comm, case, summary, lattice, own, solver))
 
 
-def _axial(cell: TornCell, shared: SharedEntities, thresholds: Thresholds) -> TornCell:
-    """The same cell with the displacement along the fibres.  Collective."""
-    case = cell.case
-    subdomains = agree(cell.comm, _assemble_axial, case, cell.subdomains)
-    applications, springs = cost_model.applications(case), bonds.axial_springs(case)
-    solver = FetiSolver(cell.comm, shared, subdomains, cell.lattice, applications, thresholds, springs, AXIAL)
-    return TornCell(cell.comm, case, cell.summary, cell.lattice, subdomains, solver)
-
-
-def _assemble_axial(case: Case, subdomains: Sequence[Subdomain]) -> list[Subdomain]:
+def assemble_axial(case: Case, subdomains: Sequence[Subdomain]) -> list[Subdomain]:
     """The subdomains of this rank with the displacement along the fibres, on the meshes that they have."""
     return [Subdomain.on(s.submesh, s.mesh, phase_laws.axial_law(case, s.submesh.phase), AXIAL) for s in subdomains]
 
@@ -185,9 +174,8 @@ def describe(case: Case, n_ranks: int) -> str:
     triangles = [sum(len(s.triangles) for s in share.submeshes) for share in shares]
     nodes = [t * lattice.intervals**2 // 2 for t in triangles]
     own = [len(share.submeshes) for share in shares]
-    taken = cost_model.estimate(
-        [2 * n for n in nodes], own, summary.coarse_triangles, summary.bodies, cost_model.applications(case)
-    )
+    problems = {problem.components: cost_model.applications(case, problem) for problem in phase_laws.problems(case)}
+    taken = cost_model.estimate(nodes, own, summary.coarse_triangles, summary.bodies, problems)
     unresolved = process_zone.warnings(case, summary.width, summary.interface_edge)
     lines = [
         f"case       {case.name}: {case.analysis.type}, plane {case.analysis.plane}",

@@ -217,9 +217,14 @@ class Interface:
         return self.sign_noise * self.imposed(strain)
 
     def force_noise(self, solution: DualSolution) -> float:
-        """Nodal forces smaller than this may be the solver's error; collective."""
-        largest = self.solver.comm.allreduce(np.abs(solution.lam).max(initial=0.0), MPI.MAX)
-        return self.sign_noise * float(largest)
+        """Nodal forces of the interface smaller than this may be the solver's error; collective.
+
+        It is a share of the largest of them, or of what the imposed stress makes: an error of the jumps moves forces by
+        the stiffness of the softer side.  Forces between the pieces of a cut body say nothing here, however large."""
+        forces, lengths = np.abs(solution.lam[self._pairs]), self.nodes.length
+        largest = np.array([forces.max(initial=0.0), lengths.max(initial=0.0)])
+        self.solver.comm.Allreduce(MPI.IN_PLACE, largest, MPI.MAX)
+        return self.sign_noise * float(max(largest[0], self._caused_stress(solution.strain) * largest[1]))
 
     def imposed(self, loads: Float) -> float:
         """Largest displacement E y that the loads (v,) impose on the cell, or would on a free one.  Collective."""

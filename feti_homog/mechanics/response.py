@@ -1,7 +1,7 @@
-"""Numbers of stress-strain paths: what a rising load follows, the first leg, the component that leads.
+"""Numbers of stress-strain paths: what a rising load follows, the first leg, the components that are shown.
 
-Points are those of `path` in result.json: mappings with `load_factor`, `strain` (n,) and `stress` (n,), the latter in
-the unit of the moduli; n = 3, of generalized plane strain 6, in the orders of `voigt`.
+Points are those of `path` in result.json: mappings with `load_factor`, `strain` and `stress`, of c components in Voigt
+order: [11, 22, 12], or [11, 22, 33, 23, 13, 12] of generalized plane strain; stresses in the unit of the moduli.
 """
 
 from __future__ import annotations
@@ -12,47 +12,64 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.mechanics.voigt import STRAINS, voigt_names
+from feti_homog.config.load_names import TEMPERATURE
+from feti_homog.config.mixed_load import MixedLoad, completed, components
 from feti_homog.typing import Float
 
 SAME_LOAD = 1e-9  # load factors that differ by less, relatively, are one
-NOISE = 1e-6  # shares of the largest stress of a path up to which a component in space is what is left of zero
+# Of the largest component: what the solver leaves of zero is less, and what would not be seen beside it.
+ZERO, FAINT = 1e-7, 1e-4
 
 Point = Mapping[str, Any]
 Document = Mapping[str, Any]
 
 
-def waypoints(document: Document) -> list[dict[str, float]]:
-    """What each waypoint of a path names, or a single load: strains, stresses and a temperature."""
-    path = document["case"]["path" if "path" in document else "load"]
-    given = path.get("waypoints") or [path[name] for name in ("to", "strain") if path.get(name) is not None]
-    return [dict(load) if isinstance(load, Mapping) else dict(zip(STRAINS, load, strict=True)) for load in given]
+def targets(document: Document) -> tuple[dict[str, float], ...]:
+    """The waypoints of a path, or the one load, in full: by name the strain or the stress of each component."""
+    case = document["case"]
+    section = case.get("path") or case["load"]
+    given = section.get("waypoints") or [section[name] for name in ("strain", "to") if name in section]
+    loads = [MixedLoad(**load) if isinstance(load, Mapping) else tuple(load) for load in given]
+    return completed(loads, case["analysis"]["plane"])
+
+
+def named_components(document: Document) -> list[int]:
+    """The components that the waypoints change, in Voigt order."""
+    pairs, found = components(document["case"]["analysis"]["plane"]), set[int]()
+    before: Mapping[str, float] = {stress: 0.0 for _, stress in pairs}
+    for target in targets(document):
+        for component, names in enumerate(pairs):
+            values = [{name: load[name] for name in names if load.get(name)} for load in (before, target)]
+            found |= {component} if values[0] != values[1] else set()
+        before = target
+    return sorted(found)
 
 
 def leading_component(document: Document) -> int:
-    """The place of the component that a path or a single load is about: of those that a waypoint names with a strain or
-    a stress other than zero the largest of its kind, of two that of the larger strain; of a temperature alone the
-    largest strain."""
-    points = document.get("path") or [document["load"]]
-    largest = np.abs([point["strain"] for point in points]).max(axis=0)
-    named: dict[str, float] = {}
-    for load in waypoints(document):
-        named |= {name: max(abs(value), named.get(name, 0.0)) for name, value in load.items()}
-    leading = [
-        max(range(len(family)), key=[named.get(name, 0.0) for name in family].__getitem__)
-        for family in voigt_names(len(largest))
-        if any(named.get(name) for name in family)
-    ]
-    return int(max(leading or range(len(largest)), key=largest.__getitem__))
+    """Of the components that the waypoints of a path change the one of the largest strain; of all if they change but
+    the temperature."""
+    largest = np.abs([point["strain"] for point in document["path"]]).max(axis=0)
+    named = named_components(document) or list(range(len(largest)))
+    return named[int(largest[named].argmax())]
 
 
-def shown_stresses(points: Sequence[Point], leading: int) -> list[int]:
-    """Places of the stresses that are worth a curve or a column: in the plane all, in space those that are not zero,
-    and the leading one."""
-    largest = np.abs([point["stress"] for point in points]).max(axis=0)
-    if len(largest) == len(STRAINS):
-        return list(range(len(largest)))
-    return [k for k, size in enumerate(largest) if k == leading or size > NOISE * largest.max()]
+def components_above(share: float, values: Float) -> list[int]:
+    """Columns of (n, c) with entries above this share of the largest of all."""
+    largest = np.abs(values).max(axis=0, initial=0.0)
+    return [int(column) for column in np.flatnonzero(largest > share * largest.max(initial=0.0))]
+
+
+def shown_stresses(document: Document) -> list[int]:
+    """The components whose stress is seen on a path; the leading one if there is no stress."""
+    found = components_above(FAINT, np.array([point["stress"] for point in document["path"]], float))
+    return found or [leading_component(document)]
+
+
+def what_rises(document: Document) -> str:
+    """What rises on the first leg of a path, in words: "strain" if there is nothing else, or "load"."""
+    first = targets(document)[0]
+    others = {stress for _, stress in components(document["case"]["analysis"]["plane"])} | {TEMPERATURE}
+    return "load" if any(first[name] for name in others & first.keys()) else "strain"
 
 
 def legs(document: Document) -> int:
@@ -69,20 +86,27 @@ def first_leg(document: Document) -> int:
     return next((n for n, point in enumerate(points) if point["load_factor"] > end), len(points))
 
 
+def ends_of_legs(document: Document) -> list[int]:
+    """Numbers of the points at the waypoints of a path."""
+    position = np.array([point["load_factor"] for point in document["path"]]) * (count := legs(document))
+    found = (np.flatnonzero(np.abs(position - leg) <= SAME_LOAD * count) for leg in range(1, count + 1))
+    return [int(numbers[-1]) for numbers in found if len(numbers)]
+
+
 def is_proportional(document: Document) -> bool:
     """Whether every point is on a ray of its own from zero: events along one leg, where the response is homogeneous."""
     return document["case"]["path"]["method"] == "events" and legs(document) == 1
 
 
-def strain_controlled(points: Sequence[Point], component: int) -> Float:
-    """(v, n + 1) stresses and a component of strain at the corners of a proportional path when the load only rises.
+def load_controlled(points: Sequence[Point]) -> Float:
+    """(v, 2 c) stresses and strains at the corners of a proportional path when the load only rises.
 
-    At a load t where bonds break, all break whose load is lower once the first are gone: at constant load the state
-    jumps to the next branch that holds, each branch being a ray through zero: Sigma(t) = Sigma(t') t / t', and so E.
-    Where strains are given the stress falls, where stresses are given the strain grows.
+    At a load t where bonds break, all break whose load is lower once the first are gone: at that load the cell comes to
+    the next branch that holds, each branch being a ray through zero: Sigma(t) = Sigma(t') t / t', and so the strains.
+    Where a strain is given its stress falls, where a stress is given its strain jumps.
     """
     load = np.array([point["load_factor"] for point in points])
-    values = np.array([[*point["stress"], point["strain"][component]] for point in points])
+    values = np.array([[*point["stress"], *point["strain"]] for point in points])
     records = np.flatnonzero(load >= np.maximum.accumulate(load))
     corners = [np.zeros(values.shape[1]), values[records[0]]]
     for before, after in pairwise(records):
@@ -91,26 +115,28 @@ def strain_controlled(points: Sequence[Point], component: int) -> Float:
 
 
 def rising_strain(document: Document) -> Float | None:
-    """(v, n + 1) stresses and the size of the leading strain along a path of one leg, the load only rising.
+    """(v, c + 1) stresses and the size of the leading strain along a path of one leg, the load only rising.
 
-    None of any other result, and where the leading strain does not rise with the load.
+    None of any other result, and where that strain does not rise with the load.
     """
     points = document.get("path")
     if not points or legs(document) != 1:
         return None
-    component = leading_component(document)
     if is_proportional(document):
-        curve = strain_controlled(points, component)
+        curve = load_controlled(points)
     else:
-        values = np.array([[*point["stress"], point["strain"][component]] for point in points])
+        values = np.array([[*point["stress"], *point["strain"]] for point in points])
         curve = np.vstack([np.zeros(values.shape[1]), values])
-    curve[:, -1] *= np.sign(curve[-1, -1])
-    rises = np.diff(curve[:, -1]) >= -SAME_LOAD * np.abs(curve[:, -1]).max()
-    return np.asarray(curve) if rises.all() else None
+    count = curve.shape[1] // 2
+    stress, strain = curve[:, :count], curve[:, count + leading_component(document)]
+    strain = strain * np.sign(strain[-1])
+    if np.any(np.diff(strain) < -ZERO * strain[-1]):
+        return None
+    return np.column_stack([stress, np.maximum.accumulate(strain)])
 
 
 def first_drop(points: Sequence[Point]) -> tuple[Float, int]:
-    """(n,) stress left when the bonds that break at the first point of a proportional path are gone, the load being
+    """(c,) stress left when the bonds that break at the first point of a proportional path are gone, the load being
     held there, and the number of the point whose branch it is on."""
     load = points[0]["load_factor"]
     number = next((n for n, point in enumerate(points) if n and point["load_factor"] >= load), len(points) - 1)

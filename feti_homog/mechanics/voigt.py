@@ -7,12 +7,21 @@ from __future__ import annotations
 
 import numpy as np
 
+from feti_homog.config.load_names import SPATIAL_STRAINS, SPATIAL_STRESSES, STRAINS, STRESSES
 from feti_homog.typing import Float
 
-STRAINS = ("E11", "E22", "gamma12")
-STRESSES = ("S11", "S22", "S12")
-SPATIAL_STRAINS = ("E11", "E22", "E33", "gamma23", "gamma13", "gamma12")
-SPATIAL_STRESSES = ("S11", "S22", "S33", "S23", "S13", "S12")
+__all__ = [
+    "AXIAL_STRESSES",
+    "SPATIAL_STIFFNESSES",
+    "SPATIAL_STRAINS",
+    "SPATIAL_STRESSES",
+    "STIFFNESSES",
+    "STRAINS",
+    "STRESSES",
+    "strain_tensor",
+    "voigt_names",
+]
+
 AXIAL_STRESSES = ("S23", "S13")
 STIFFNESSES = tuple(f"C{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3))
 SPATIAL_STIFFNESSES = tuple(f"C{i}{j}" for i in range(1, 7) for j in range(1, 7))

@@ -13,7 +13,7 @@ from feti_homog.output.text.point_tables import sweep_failures
 from feti_homog.sweep import store
 from feti_homog.sweep.plan import SweepCase
 from feti_homog.sweep.report import figures, tables
-from feti_homog.sweep.report.outputs import outputs
+from feti_homog.sweep.report.outputs import numbers, outputs
 from feti_homog.sweep.report.sweep_table import SweepTable
 from feti_homog.sweep.store import CaseState, Status, SweepIndex
 from feti_homog.typing import Float
@@ -57,6 +57,7 @@ def _index_and_states(directory: Path) -> tuple[SweepIndex, list[CaseState]]:
 
 def _table(index: SweepIndex, states: Sequence[CaseState]) -> SweepTable:
     documents = [state.document if state.status is Status.DONE else None for state in states]
+    own = numbers(entry.inputs.get("analysis.plane") for entry in index.entries)
     return SweepTable(
         name=index.name,
         stress_unit=index.stress_unit,
@@ -66,7 +67,7 @@ def _table(index: SweepIndex, states: Sequence[CaseState]) -> SweepTable:
         status=[state.status for state in states],
         reason=[state.reason for state in states],
         inputs=_inputs(index.entries),
-        outputs=_columns([{} if document is None else outputs(document) for document in documents]),
+        outputs=_columns([{} if document is None else outputs(document, own) for document in documents]),
         documents=documents,
     )
 

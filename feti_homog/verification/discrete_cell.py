@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -11,11 +12,21 @@ from scipy.spatial import cKDTree
 from feti_homog.typing import Bool, Float, Int
 from feti_homog.verification.constitutive_law import expansions, plane_stiffnesses, spatial_stiffnesses
 from feti_homog.verification.elements import Elements
-from feti_homog.verification.reading import ResultFiles, State
+from feti_homog.verification.reading import ResultFiles
 from feti_homog.verification.torus import TornNodes, TornSides, constituents, torn, wrapped
 
 # Scales of a state are no less than this share of those of the run: a path may come back to zero strain.
 LEAST_SHARE = 1e-9
+
+
+class Loaded(Protocol):
+    """What has a macroscopic strain (v,) and a change of temperature."""
+
+    @property
+    def strain(self) -> Float: ...
+
+    @property
+    def temperature(self) -> float: ...
 
 
 @dataclass(frozen=True)
@@ -115,16 +126,16 @@ class DiscreteCell:
         """(v, v) <L^-1>^-1, the least stiffness of the bonded cell."""
         return np.asarray(np.linalg.inv(np.einsum("p,pij->ij", self.fractions, np.linalg.inv(self.stiffnesses))))
 
-    def free_strains(self, state: State) -> Float | None:
+    def free_strains(self, state: Loaded) -> Float | None:
         """(phases, v) strains of the phases without stress at the temperature of a state."""
         return None if self.expansions is None else self.expansions * state.temperature
 
-    def loads(self, state: State) -> Float:
+    def loads(self, state: Loaded) -> Float:
         """(v,) strains that the loads of a state make, for scales: E, and the largest that temperature makes."""
         free = self.free_strains(state)
         return state.strain if free is None else np.asarray(state.strain + np.abs(free).max(axis=0))
 
-    def imposed(self, state: State) -> float:
+    def imposed(self, state: Loaded) -> float:
         """Largest displacement E x that a state imposes across the cell, at least that of a faint strain."""
         width, height = self.files.size
         corners, loads = np.array([[width, 0.0], [0.0, height], [width, height]]), self.loads(state)
@@ -133,12 +144,12 @@ class DiscreteCell:
             own += abs(float(loads[2])) * float(self.files.size.max())
         return max(own, LEAST_SHARE * self.largest_strain * float(self.files.size.max()))
 
-    def least_stress(self, state: State) -> float:
+    def least_stress(self, state: Loaded) -> float:
         """A stress that a state makes in the bonded cell at least, for scales that debonding does not make zero."""
         own, most = np.abs(self.reuss @ self.loads(state)).max(), np.abs(self.reuss).max() * self.largest_strain
         return float(max(own, LEAST_SHARE * most))
 
-    def strain_size(self, state: State) -> float:
+    def strain_size(self, state: Loaded) -> float:
         """The largest of the strains that the loads of a state make."""
         return max(float(np.abs(self.loads(state)).max()), LEAST_SHARE * self.largest_strain)
 

@@ -11,10 +11,10 @@ import numpy as np
 from feti_homog.typing import Float
 from feti_homog.verification.arc_laws import directions
 from feti_homog.verification.discrete_cell import DiscreteCell
-from feti_homog.verification.given_loads import NAMES
 from feti_homog.verification.interface_laws import BONDED, mode, shares, utilisation
 from feti_homog.verification.ledger import Ledger, relative
 from feti_homog.verification.load_laws import StateNumbers, tips
+from feti_homog.verification.prescribed import NAMES
 
 # Utilisations by tractions below 10 rtol of the stress are none to the program; twice as many are here.
 NOISE_PER_RTOL = 20.0

@@ -1,4 +1,4 @@
-"""Laws of the states as a whole: their strains are those that the case asks for, their numbers those of result.json."""
+"""Laws of the states as a whole: their loads are those that the case asks for, their numbers those of result.json."""
 
 from __future__ import annotations
 
@@ -13,14 +13,12 @@ import numpy as np
 from feti_homog.typing import AnyInt, Bool, Float
 from feti_homog.verification.discrete_cell import DiscreteCell
 from feti_homog.verification.elements import ElementFields
-from feti_homog.verification.given_loads import GivenLoad, given_loads
 from feti_homog.verification.interface_laws import BONDED, CLOSED, OPEN, spring_jumps, utilisation
 from feti_homog.verification.ledger import Ledger, relative
+from feti_homog.verification.prescribed import TEMPERATURE, Prescribed, at_points, targets
 from feti_homog.verification.reading import State
 
 COUNTS = {"bonded": BONDED, "closed": CLOSED, "open": OPEN}
-# The least scale of stresses: this share of what the largest strain makes in the bonded cell.
-LEAST_STRESS = 1e-3
 SPATIAL_ORDER = [0, 1, 5, 2, 4, 3]  # of the unit strains of generalized plane strain; the fifth load is a temperature
 
 
@@ -31,39 +29,11 @@ class UnitLoad:
     strain: Float
     temperature: float
 
-    def given(self, sign: float) -> GivenLoad:
-        """The load, or minus it, as it is given."""
-        return GivenLoad(sign * self.strain, np.zeros(len(self.strain), bool), sign * self.temperature)
-
     def entries(self, told: Mapping[str, Any], stiffness: str, suffix: str, sign: float) -> dict[str, Float]:
         """The stress under it, or under minus it, that is told in a column of a stiffness or in `thermal_stress`."""
         if self.temperature:
             return {"stress": sign * np.array(told[f"thermal_stress{suffix}"])}
         return {"stress": sign * np.array(told[f"{stiffness}{suffix}"]) @ self.strain}
-
-
-@dataclass(frozen=True)
-class Scales:
-    """The largest strain, stress and change of temperature of a result."""
-
-    strain: float
-    stress: float
-    temperature: float
-
-    @property
-    def triple(self) -> tuple[float, float, float]:
-        """The three."""
-        return self.strain, self.stress, self.temperature
-
-    @classmethod
-    def of(cls, cell: DiscreteCell, states: Sequence[StateNumbers], entries: Sequence[Mapping[str, Any]]) -> Scales:
-        """Those of the states and of what result.json says."""
-        strain = cell.largest_strain or 1.0
-        stress = max((float(np.abs(state.stress).max()) for state in states), default=0.0)
-        told = [np.abs(entry["stress"]).max() for entry in entries if "stress" in entry]
-        stress = max(float(np.max(told, initial=stress)), LEAST_STRESS * float(np.abs(cell.reuss).max()) * strain)
-        warmest = max((abs(state.temperature) for state in states), default=0.0)
-        return cls(strain, stress, warmest or 1.0)
 
 
 @dataclass(frozen=True)
@@ -73,14 +43,14 @@ class StateNumbers:
     Attributes:
         strain, stress: (v,) macroscopic.
         point: number of its point in `path` or `angle` of result.json.
-        stored: energy per area of the cell, from the fields.
+        stored: energy per area of the cell, <sigma : (eps - alpha T)> / 2 and that of the springs, from the fields.
         in_springs: that of the springs in it.
         traction: (k, c) normal, tangential and along the fibres.
         used: (k,) share of the strength that the bonded nodes use, 0 elsewhere; NaN at tips of which the energy counts
             that their break would release, for it is not in the files.
         temperature: its change.
-        expanding: mean of alpha : L : strain, 0 if the expansions alpha of the phases are not known.
-        thermal: minus the mean of alpha : stress, on which a change of temperature works; 0 likewise.
+        heat: what works on it, - <alpha : sigma>; 0 if the expansions alpha of the phases are not known.
+        expanding: mean of alpha : L : strain, likewise.
     """
 
     name: str
@@ -94,8 +64,8 @@ class StateNumbers:
     status: AnyInt
     used: Float
     temperature: float
+    heat: float
     expanding: float
-    thermal: float
 
     @classmethod
     def of(cls, cell: DiscreteCell, state: State, fields: ElementFields) -> StateNumbers:
@@ -106,14 +76,21 @@ class StateNumbers:
             used[tips(cell, state.status)] = np.nan
         stretched = state.traction * spring_jumps(cell, state) * cell.files.interface.length[:, None]
         in_springs = float(stretched.sum()) / (2 * cell.area)
-        thermal = _thermal(cell, state)
-        stored = (fields.energy / cell.area + thermal * state.temperature) / 2
-        energies = stored + in_springs, in_springs
+        heat = _heat(cell, state)
+        energies = fields.energy / (2 * cell.area) + state.temperature * heat / 2 + in_springs, in_springs
         means = state.strain, state.mean_stress
         return cls(
             state.name, state.load_factor, state.point, *means, *energies, state.traction, state.status, used,
-            state.temperature, _expanding(cell, fields), thermal,
+            state.temperature, heat, _expanding(cell, fields),
         )  # fmt: skip
+
+
+def _heat(cell: DiscreteCell, state: State) -> float:
+    """- <alpha : sigma>, the derivative of the energy by the temperature."""
+    if cell.expansions is None:
+        return 0.0
+    own = (cell.expansions[cell.files.mesh.phase] * state.stress).sum(axis=1)
+    return -float(cell.elements.area @ own) / cell.area
 
 
 def _expanding(cell: DiscreteCell, fields: ElementFields) -> float:
@@ -122,14 +99,6 @@ def _expanding(cell: DiscreteCell, fields: ElementFields) -> float:
         return 0.0
     thermal = np.einsum("pij,pj->pi", cell.stiffnesses, cell.expansions)[cell.files.mesh.phase]
     return float(cell.elements.area @ (thermal * fields.strain).sum(axis=1)) / cell.area
-
-
-def _thermal(cell: DiscreteCell, state: State) -> float:
-    """Minus the mean of alpha : stress over the cell."""
-    if cell.expansions is None:
-        return 0.0
-    alpha = cell.expansions[cell.files.mesh.phase]
-    return -float(cell.elements.area @ (alpha * state.stress).sum(axis=1)) / cell.area
 
 
 def tips(cell: DiscreteCell, status: AnyInt) -> Bool:
@@ -147,32 +116,49 @@ def check_load(ledger: Ledger, cell: DiscreteCell, states: Sequence[StateNumbers
     same = json.loads(str(cell.files.file.attrs["case"])) == case
     ledger.record("tables", 0.0 if same else np.inf, "the case, which the two files tell otherwise")
     unit = _unit_loads(cell)
-    loads, entries = list(_expected_loads(document, case, unit)), list(_entries(document, unit))
-    scales = Scales.of(cell, states, entries)
+    rows = list(zip(_expected_loads(document, case, unit), _entries(document, unit), strict=False))
+    scales = _Scales.of(cell, states)
     if "path" in document:
         _check_kept(ledger, document, case, [state.point for state in states])
-        pairs = [(state, state.point) for state in states if 0 <= state.point < len(entries)]
+        for number, (load, entries) in enumerate(rows):
+            strain, stress = np.array(entries["strain"]), np.array(entries["stress"])
+            warmer = float(entries.get(TEMPERATURE, 0.0))
+            _check_prescribed(ledger, load, strain, stress, warmer, scales, f"path[{number}]")
+        pairs = [(state, rows[state.point]) for state in states if 0 <= state.point < len(rows)]
     else:
-        _check_all(ledger, document, states, len(loads))
-        pairs = [(state, number) for number, state in enumerate(states[: len(loads)])]
-    for number, (load, entry) in enumerate(zip(loads, entries, strict=False)):
-        if "strain" in entry and "stress" in entry:
-            told = [np.array(entry[name], float) for name in ("strain", "stress")]
-            _check_given(ledger, load, (*told, entry.get("temperature", 0.0)), scales, f"point {number}")
-    for state, number in pairs:
-        _check_given(ledger, loads[number], (state.strain, state.stress, state.temperature), scales, state.name)
-        _check_entries(ledger, state, entries[number], scales)
+        _check_all(ledger, document, states, len(rows))
+        pairs = list(zip(states, rows, strict=False))
+    for state, (load, entries) in pairs:
+        _check_prescribed(ledger, load, state.strain, state.stress, state.temperature, scales, state.name)
+        _check_entries(ledger, state, entries, scales)
     for place, matrix in _linear_stiffnesses(document, cell.files.contact):
         ledger.record("symmetry", relative(matrix - matrix.T, float(np.abs(matrix).max())), place)
 
 
-def _check_given(ledger: Ledger, load: GivenLoad, has: tuple[Float, Float, float], scales: Scales, where: str) -> None:
-    """What is given is what strain, stress and temperature are."""
-    strain, stress, temperature = has
-    off = np.abs(strain - load.values)[~load.by_stress] / scales.strain
-    ledger.record("load", off, where)
-    ledger.record("load", abs(temperature - load.temperature) / scales.temperature, where)
-    ledger.record("load stress", np.abs(stress - load.values)[load.by_stress] / scales.stress, where)
+@dataclass(frozen=True)
+class _Scales:
+    """Sizes of the strains and stresses of all states, and of stresses that loads make where Sigma is none."""
+
+    strain: float
+    stress: float
+    imposed: float
+
+    @classmethod
+    def of(cls, cell: DiscreteCell, states: Sequence[StateNumbers]) -> _Scales:
+        largest = max((float(np.abs(state.stress).max()) for state in states), default=0.0)
+        imposed = max((cell.least_stress(state) for state in states), default=0.0)
+        return cls(cell.largest_strain or 1.0, largest or 1.0, max(largest, imposed) or 1.0)
+
+
+def _check_prescribed(
+    ledger: Ledger, load: Prescribed, strain: Float, stress: Float, temperature: float, scales: _Scales, place: str
+) -> None:
+    """Strains, stresses and the temperature that a load prescribes."""
+    given, by_stress = load.values[: len(strain)], load.by_stress[: len(strain)]
+    ledger.record("load", np.abs(strain - given)[~by_stress] / scales.strain, f"{place}, strain")
+    ledger.record("stress load", np.abs(stress - given)[by_stress] / scales.imposed, f"{place}, stress")
+    warmer = float(load.values[-1]) if len(load.values) > len(given) else 0.0
+    ledger.record("load", abs(temperature - warmer) / max(abs(warmer), 1.0), f"{place}, temperature")
 
 
 def _check_kept(ledger: Ledger, document: Mapping[str, Any], case: Mapping[str, Any], numbers: Sequence[int]) -> None:
@@ -196,15 +182,13 @@ def _check_all(ledger: Ledger, document: Mapping[str, Any], states: Sequence[Sta
     ledger.record("tables", off, lambda i: f"{states[i].name}, point")
 
 
-def _check_entries(ledger: Ledger, state: StateNumbers, entries: Mapping[str, Any], scales: Scales) -> None:
+def _check_entries(ledger: Ledger, state: StateNumbers, entries: Mapping[str, Any], scales: _Scales) -> None:
     """What result.json says of a state."""
-    for name, value, scale in (
-        ("strain", state.strain, scales.strain),
-        ("stress", state.stress, scales.stress),
-        ("temperature", state.temperature, scales.temperature),
-    ):
-        if name in entries:
-            ledger.record("tables", relative(np.array(entries[name]) - value, scale), f"{state.name}, {name}")
+    told = {"strain": (state.strain, scales.strain), "stress": (state.stress, scales.stress)}
+    told |= {TEMPERATURE: (np.array(state.temperature), max(abs(state.temperature), 1.0))}
+    for name in told.keys() & entries.keys():
+        value, scale = told[name]
+        ledger.record("tables", relative(np.array(entries[name]) - value, scale), f"{state.name}, {name}")
     if "load_factor" in entries:
         ledger.record("tables", abs(entries["load_factor"] - state.load_factor), f"{state.name}, load_factor")
     for name in COUNTS.keys() & entries.keys():
@@ -223,19 +207,24 @@ def _unit_loads(cell: DiscreteCell) -> list[UnitLoad]:
 
 def _expected_loads(
     document: Mapping[str, Any], case: Mapping[str, Any], unit: Sequence[UnitLoad]
-) -> Iterator[GivenLoad]:
-    """Those of the points of a path or a single load, or of the states of another case, in their order."""
-    if "path" in document or "load" in document:
-        yield from given_loads(case, document.get("path", ()))
+) -> Iterator[Prescribed]:
+    """The loads of the points of a path, or of the states of another case, in their order."""
+    if "path" in document:
+        yield from at_points(case, document["path"])
+    elif "load" in document:
+        yield from targets(case)
     elif "angle" in document:
         given = case["angle"].get("strain")
+        own = [Prescribed.strain(np.array(given), 0.0)] if given is not None else _prescribed(unit, 1.0)
         for _ in document["angle"]:
-            yield from (
-                [load.given(1.0) for load in unit] if given is None else [UnitLoad(np.array(given), 0.0).given(1.0)]
-            )
+            yield from own
     else:
-        signs = (1.0, -1.0) if "effective_stiffness_compression" in document else (1.0,)
-        yield from (load.given(sign) for sign in signs for load in unit)
+        for sign in (1.0, -1.0) if "effective_stiffness_compression" in document else (1.0,):
+            yield from _prescribed(unit, sign)
+
+
+def _prescribed(unit: Sequence[UnitLoad], sign: float) -> list[Prescribed]:
+    return [Prescribed.strain(sign * load.strain, sign * load.temperature) for load in unit]
 
 
 def _entries(document: Mapping[str, Any], unit: Sequence[UnitLoad]) -> Iterator[Mapping[str, Any]]:

@@ -1,24 +1,20 @@
-"""Laws of a path of load: what becomes of the work.
+"""Laws of the energies of a path: the work of the loads is stored, or lost where bonds break.
 
-Notation: E and Sigma are strains and stresses of a point, a change of temperature T and what it works on, minus the
-mean of alpha : sigma, among them; W = 1/2 E.Sigma is its stored energy, t its load factor.  At every point
+Notation: E and Sigma are all strains of a point, a temperature among them, and what works on each; W = E.Sigma / 2 is
+the stored energy.  With the bonds as they are W is a convex function of E, homogeneous of degree two.  A load gives the
+strains E_s and the stresses Sigma_f; its potential is
 
-    work = stored + dissipated.                                                                              (W)
+    P(E_s, Sigma_f) = min over E_f of W - Sigma_f.E_f = 1/2 (E_s.Sigma_s - Sigma_f.E_f),
 
-With the bonds and the contact as they are E.Sigma' = E'.Sigma of two states (Betti).  So where nothing breaks between
-two points the work grows by 1/2 (Sigma + Sigma').(E' - E).  Bonds that break at constant load, between the states b and
-a, lose
+convex in E_s and concave in Sigma_f, so that the state ' of another load on the same bonds bounds it: for any t >= 0
 
-    1/2 (E_a.Sigma_b - E_b.Sigma_a).                                                                         (R)
+    P >= t Sigma'_s.E_s - t^2 W'   if Sigma_f = t Sigma'_f,
+    P <= t^2 W' - t E'_f.Sigma_f   if E_s = t E'_s.                                                         (P)
 
-b is a point.  a is the next point where that is at the same load; where the load there is r > 0 times as large the
-response is homogeneous and a is 1 / r times that point: so on the whole first leg, and on others on which the load is
-proportional.  Elsewhere the loss is not known from the files.  It is not negative; and where only strains are given
-the energy is a convex function of E, homogeneous of degree two, so that a stores at least
-
-    W(E) >= (Sigma'.E)^2 / (4 W')   if Sigma'.E > 0                                                          (C)
-
-with ' the next point.
+Bonds break at constant load and lose P before - P after.  Of these one is that of a state in the files; (P) bounds the
+other one by the state beyond, on both sides the same where the loads are in proportion: on the whole first leg, in a
+cascade, and where a later leg is on a ray.  There what is lost is an equation; elsewhere it lies between bounds.
+Between points of events at which nothing breaks the response is straight, so the work is (Sigma + Sigma').(E' - E) / 2.
 """
 
 from __future__ import annotations
@@ -32,11 +28,12 @@ import numpy as np
 
 from feti_homog.typing import Float
 from feti_homog.verification.discrete_cell import DiscreteCell
-from feti_homog.verification.given_loads import GivenLoad, given_loads, same_load
 from feti_homog.verification.ledger import Ledger
-from feti_homog.verification.load_laws import Scales, StateNumbers
+from feti_homog.verification.load_laws import StateNumbers
+from feti_homog.verification.prescribed import SAME_SHARE, TEMPERATURE, Prescribed, at_points, targets
 
-SAME_LOAD = 1e-12
+# Loads whose components differ by so much, relatively, are in proportion.
+SAME_RATIO = 1e-9
 Point = Mapping[str, Any]
 
 
@@ -45,137 +42,151 @@ class PointNumbers:
     """What the laws of energy need of a point.
 
     Attributes:
-        strain, stress: (v,) macroscopic.
-        temperature: its change.
-        thermal: what it works on; NaN where neither fields nor the energy tell.
-        stored: energy per area.
-        load: what is given.
+        strain, stress: (n,) with the temperature and what works on it, which is NaN where no file tells of it.
+        stored: per area.
+        load: what is prescribed.
     """
 
     name: str
     strain: Float
     stress: Float
-    temperature: float
-    thermal: float
     stored: float
-    load: GivenLoad
+    load: Prescribed
 
     @property
-    def of_strains_alone(self) -> bool:
-        """Whether no stress is given."""
-        return not self.load.by_stress.any()
+    def potential(self) -> float:
+        """Per area, of the load."""
+        return _work(*self.given) / 2 - _work(*self.answered) / 2
 
-    def work_to(self, after: PointNumbers) -> float:
-        """1/2 (Sigma + Sigma').(E' - E); NaN if it is not known."""
-        warmer = after.temperature - self.temperature
-        thermal = (self.thermal + after.thermal) * warmer if warmer else 0.0
-        return (float((self.stress + after.stress) @ (after.strain - self.strain)) + thermal) / 2
+    @property
+    def given(self) -> tuple[Float, Float]:
+        """(s,) the strains that are given, and what works on them."""
+        own = ~self.load.by_stress
+        return self.load.values[own], self.stress[own]
 
-    def released_to(self, after: PointNumbers, ratio: float) -> float:
-        """(R), the state after the breaks being 1 / ratio times another point."""
-        thermal = self.temperature * (self.thermal - after.thermal / ratio) if self.temperature else 0.0
-        return (float(after.strain @ self.stress - self.strain @ after.stress) / ratio + thermal) / 2
-
-    def least_at(self, strain: Float) -> float:
-        """The least energy at a strain with the bonds of this point, by (C)."""
-        power = float(self.stress @ strain)
-        return power**2 / (4 * self.stored) if power > 0 and self.stored > 0 else 0.0
+    @property
+    def answered(self) -> tuple[Float, Float]:
+        """(f,) the stresses that are given, and the strains on which they work."""
+        own = self.load.by_stress
+        return self.load.values[own], self.strain[own]
 
 
-def check_energies(ledger: Ledger, cell: DiscreteCell, states: Sequence[StateNumbers]) -> None:
-    """The energies of all points of a path."""
-    points, path = cell.files.document["path"], cell.files.case["path"]
-    numbers = _numbers(cell, points, states)
-    scale = max(*(point.stored for point in numbers), 1e-300)
-    for point, own in zip(points, numbers, strict=True):
-        off = point["work"] - point["stored"] - point["dissipated"]
-        ledger.record("energy", abs(off) / scale, f"{own.name}, work")
-    if path["method"] == "events":
-        legs = len(path["waypoints"]) if path.get("waypoints") else 1
-        _check_events(ledger, numbers, points, legs, Scales.of(cell, states, points))
+def check_path_energies(
+    ledger: Ledger, cell: DiscreteCell, states: Sequence[StateNumbers], points: Sequence[Point]
+) -> None:
+    """`work`, `stored` and what was dissipated at all points; fields are kept of those of `states`."""
+    numbers = _numbers(cell, states, points)
+    scale = max(*(each.stored for each in numbers), 1e-300)
+    for each, point in zip(numbers, points, strict=True):
+        off = point["work"] - each.stored - point["dissipated"]
+        ledger.record("energy", abs(off) / scale, f"{each.name}, work less stored and dissipated")
+    if cell.files.case["path"]["method"] == "events":
+        _check_events(ledger, numbers, points, 1.0 / len(targets(cell.files.case)), scale)
     else:
-        _check_increments(ledger, cell, numbers, points)
+        _check_increments(ledger, _stiffest(cell), numbers, points, scale)
 
 
-def _numbers(cell: DiscreteCell, points: Sequence[Point], states: Sequence[StateNumbers]) -> list[PointNumbers]:
-    """Those of every point, the energy from the fields where they are kept."""
+def _numbers(cell: DiscreteCell, states: Sequence[StateNumbers], points: Sequence[Point]) -> list[PointNumbers]:
+    """Those of every point, the energy from the fields where they are kept, else by Hill E.Sigma / 2; what works on a
+    temperature follows from what is stored."""
     kept, found = {state.point: state for state in states}, []
-    for number, (point, load) in enumerate(zip(points, given_loads(cell.files.case, points), strict=True)):
+    for number, (point, load) in enumerate(zip(points, at_points(cell.files.case, points), strict=True)):
+        strain, stress = np.array(point["strain"]), np.array(point["stress"])
+        warmer, name = float(point.get(TEMPERATURE, 0.0)), f"path[{number}]"
         if (state := kept.get(number)) is not None:
-            own = state.strain, state.stress, state.temperature, state.thermal, state.stored
-            found.append(PointNumbers(state.name, *own, load))
-            continue
-        strain, stress, warmer = np.array(point["strain"]), np.array(point["stress"]), point.get("temperature", 0.0)
-        mechanical = float(strain @ stress)
-        thermal = (2 * point["stored"] - mechanical) / warmer if warmer else np.nan
-        stored = point["stored"] if warmer else mechanical / 2
-        found.append(PointNumbers(f"path[{number}]", strain, stress, warmer, thermal, stored, load))
+            name, strain, stress, warmer = state.name, state.strain, state.stress, state.temperature
+            stored, heat = state.stored, state.heat
+        elif warmer:
+            stored = float(point["stored"])
+            heat = (2 * stored - float(strain @ stress)) / warmer
+        else:
+            stored, heat = float(strain @ stress) / 2, 0.0 if cell.expansions is None else np.nan
+        n = len(load.values)
+        found.append(PointNumbers(name, np.array([*strain, warmer][:n]), np.array([*stress, heat][:n]), stored, load))
     return found
 
 
 def _check_events(
-    ledger: Ledger, numbers: Sequence[PointNumbers], points: Sequence[Point], legs: int, scales: Scales
+    ledger: Ledger, numbers: Sequence[PointNumbers], points: Sequence[Point], first_leg: float, scale: float
 ) -> None:
-    """What is lost between two points is what the breaks at the first one lose."""
-    scale = max(*(point.stored for point in numbers), 1e-300)
-    for name in ("dissipated", "dissipated_strain_controlled"):
-        ledger.record("energy", abs(points[0][name]) / scale, f"{numbers[0].name}, {name}")
+    """What is lost between two points is lost by the bonds that break at the first of them; the first leg ends at the
+    load factor `first_leg`."""
+    ledger.record("energy", abs(points[0]["dissipated"]) / scale, f"{numbers[0].name}, dissipated")
+    ledger.record("energy", abs(points[0]["dissipated_strain_controlled"]) / scale, f"{numbers[0].name}, dissipated")
     largest = 0.0
-    for number, (before, now) in enumerate(pairwise(points)):
-        state, after = numbers[number : number + 2]
-        lost = now["dissipated"] - before["dissipated"]
-        if before["broke"] == 0:
-            ledger.record("energy", abs(lost) / scale, f"{after.name}, dissipated")
-            work = state.work_to(after)
-            if np.isfinite(work):
-                off = now["work"] - before["work"] - work
-                ledger.record("energy", abs(off) / scale, f"{after.name}, work")
-        else:
-            _check_loss(ledger, (state, after), (before, now), lost / scale, (scales, scale))
-        on_first = legs * before["load_factor"] < 1.0 - SAME_LOAD
+    for (state, before), (after, now) in pairwise(zip(numbers, points, strict=True)):
         largest = max(largest, before["load_factor"])
-        rise = largest / before["load_factor"] if on_first and before["load_factor"] > 0 else 1.0
+        low, high = (0.0, 0.0) if before["broke"] == 0 else _losses(state, after)
+        lost = now["dissipated"] - before["dissipated"]
+        ledger.record("energy", max(low - lost, lost - high, 0.0) / scale, f"{after.name}, dissipated")
+        if before["broke"] == 0:
+            straight = _work(after.strain - state.strain, state.stress + after.stress) / 2
+            off = np.nan_to_num(now["work"] - before["work"] - straight)
+            ledger.record("energy", abs(off) / scale, f"{after.name}, work")
+        rise = largest / before["load_factor"] if 0.0 < before["load_factor"] < first_leg - SAME_SHARE else 1.0
         off = now["dissipated_strain_controlled"] - before["dissipated_strain_controlled"] - rise**2 * lost
         ledger.record("energy", abs(off) / scale, f"{after.name}, dissipated_strain_controlled")
 
 
-def _check_loss(
-    ledger: Ledger,
-    pair: tuple[PointNumbers, PointNumbers],
-    points: tuple[Point, Point],
-    lost: float,
-    scales: tuple[Scales, float],
-) -> None:
-    """What breaks between two points lose, as a share of the largest energy: (R), or bounds."""
-    (state, after), (loads, scale), where = pair, scales, f"{pair[1].name}, dissipated"
-    ratio = 1.0 if same_load(*points) else state.load.times(after.load, loads.triple)
-    if ratio is None:
-        ledger.record("energy", max(-lost, 0.0), where)
-        if state.of_strains_alone and not state.temperature:
-            most = state.stored - after.least_at(state.strain)
-            ledger.record("energy", max(lost - most / scale, 0.0), where)
-        return
-    released = state.released_to(after, ratio) / scale
-    if np.isfinite(released):  # errors of the next point are as much larger as the load is less there
-        ledger.record("energy", abs(lost - released) * min(ratio, 1.0), where)
+def _losses(state: PointNumbers, after: PointNumbers) -> tuple[float, float]:
+    """Least and largest energy that the breaks at a point can have lost, with the next point in the same leg."""
+    least, most = potentials(state.load, after)
+    return max(state.potential - most, 0.0), state.potential - least
+
+
+def potentials(load: Prescribed, other: PointNumbers) -> tuple[float, float]:
+    """The least and the largest potential at a load with the bonds of another state, by (P)."""
+    if (load.by_stress != other.load.by_stress).any():
+        return -np.inf, np.inf
+    (strains, stresses), (forces, answers) = other.given, other.answered
+    own_strains, own_forces = load.values[~load.by_stress], load.values[load.by_stress]
+    least = _largest(_work(own_strains, stresses), other.stored, own_forces, forces)
+    return least, -_largest(_work(own_forces, answers), other.stored, own_strains, strains)
+
+
+def _largest(power: float, energy: float, one: Float, other: Float) -> float:
+    """max t power - t^2 energy over the t >= 0 with one = t other; -inf if there is none, or power is not known."""
+    if not (one.any() or other.any()):
+        t = max(power / (2 * energy), 0.0) if energy > 0 else 0.0
+    else:
+        k = int(np.abs(other).argmax())
+        t = float(one[k] / other[k]) if other[k] else -1.0
+        if t < 0 or not np.allclose(one, t * other, rtol=SAME_RATIO, atol=0.0):
+            return -np.inf
+    value = t * power - t**2 * energy
+    return -np.inf if np.isnan(value) else value
+
+
+def _work(one: Float, other: Float) -> float:
+    """one.other, where what is not known counts only if it works."""
+    return float(one[one != 0.0] @ other[one != 0.0])
 
 
 def _check_increments(
-    ledger: Ledger, cell: DiscreteCell, numbers: Sequence[PointNumbers], points: Sequence[Point]
+    ledger: Ledger, stiffest: Float, numbers: Sequence[PointNumbers], points: Sequence[Point], scale: float
 ) -> None:
-    """At the load of a step: what was lost is not negative and, of given strains, the energy of the old bonds, which
-    (C) bounds, less that of the new."""
-    scale = max(*(point.stored for point in numbers), 1e-300)
-    stiffest = np.einsum("p,pij->ij", cell.fractions, cell.stiffnesses)
+    """At the load of a step: what was lost is the potential of the old bonds, which (P) bounds by the step before, less
+    that of the new; the strain of the new ones in bonded phases stores no less than the old bonds would have."""
     total = 0.0
-    for number, (point, now) in enumerate(zip(points, numbers, strict=False)):
+    for number, (point, now) in enumerate(zip(points, numbers, strict=True)):
         lost, low, high = point["dissipated"] - total, 0.0, 0.0
-        if point["broke"] and now.of_strains_alone and not now.temperature:
-            high = float(now.strain @ stiffest @ now.strain) / 2 - now.stored
-            low = max(numbers[number - 1].least_at(now.strain) - now.stored, 0.0) if number else 0.0
-        elif point["broke"]:
-            high = np.inf
+        if point["broke"]:
+            n = len(now.strain)
+            high = float(now.strain @ stiffest[:n, :n] @ now.strain) / 2 - now.stored
+            least, most = potentials(now.load, numbers[number - 1]) if number else (-np.inf, np.inf)
+            low, high = max(least - now.potential, 0.0), min(high, most - now.potential)
         ledger.record("energy", max(low - lost, lost - high, 0.0) / scale, f"{now.name}, dissipated")
         off = point["dissipated_strain_controlled"] - point["dissipated"]
         ledger.record("energy", abs(off) / scale, f"{now.name}, dissipated_strain_controlled")
         total = point["dissipated"]
+
+
+def _stiffest(cell: DiscreteCell) -> Float:
+    """Voigt's mean stiffness of strains and temperature, (3, 3) or (7, 7)."""
+    C: Float = np.einsum("p,pij->ij", cell.fractions, cell.stiffnesses)
+    if not cell.files.is_spatial:
+        return C
+    alpha = np.zeros((len(cell.fractions), len(C))) if cell.expansions is None else cell.expansions
+    thermal = np.einsum("p,pij,pj->i", cell.fractions, cell.stiffnesses, alpha)
+    square = np.einsum("p,pi,pij,pj->", cell.fractions, alpha, cell.stiffnesses, alpha)
+    return np.asarray(np.block([[C, -thermal[:, None]], [-thermal[None], square]]))

@@ -1,6 +1,6 @@
-"""Laws of a path of load: which bonds break and when.  What becomes of the work: `path_energies`.
+"""Laws of a path of load: which bonds break and when.
 
-Fields may be kept of some points only; what result.json says of the others obeys the same laws of counts and energy.
+Fields may be kept of some points only; what result.json says of the others obeys the same laws of counts.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ import numpy as np
 
 from feti_homog.typing import Bool
 from feti_homog.verification.discrete_cell import DiscreteCell
-from feti_homog.verification.given_loads import same_load
 from feti_homog.verification.interface_laws import BONDED
 from feti_homog.verification.ledger import Ledger
 from feti_homog.verification.load_laws import StateNumbers
-from feti_homog.verification.path_energies import check_energies
+from feti_homog.verification.path_energies import check_path_energies
 from feti_homog.verification.point_laws import tip_shares
+from feti_homog.verification.prescribed import SAME_SHARE
 
 Point = Mapping[str, Any]
 
@@ -27,14 +27,13 @@ Point = Mapping[str, Any]
 def check_path(ledger: Ledger, cell: DiscreteCell, states: Sequence[StateNumbers]) -> None:
     """All laws of a path on its points in result.json, and on the states of those whose fields are kept."""
     points = cell.files.document["path"]
-    path = cell.files.case["path"]
     if any(not 0 <= state.point < len(points) for state in states):  # which breaks the law of the load
         return
-    by_events = path["method"] == "events"
+    by_events = cell.files.case["path"]["method"] == "events"
     _check_counts(ledger, points, by_events)
     _check_breaks(ledger, states, points, by_events)
     _check_strength(ledger, [_with_tips(cell, state, points[state.point]) for state in states], points, by_events)
-    check_energies(ledger, cell, states)
+    check_path_energies(ledger, cell, states, points)
 
 
 def _with_tips(cell: DiscreteCell, state: StateNumbers, point: Point) -> StateNumbers:
@@ -86,9 +85,13 @@ def _check_strength(ledger: Ledger, states: Sequence[StateNumbers], points: Sequ
 
 
 def _in_cascade(points: Sequence[Point], number: int) -> bool:
-    """Whether bonds broke at the same strain just before."""
+    """Whether bonds broke at the same load just before."""
     before = points[number - 1] if number else None
-    return before is not None and before["broke"] > 0 and same_load(before, points[number])
+    return before is not None and before["broke"] > 0 and _same_load(before, points[number])
+
+
+def _same_load(one: Point, other: Point) -> bool:
+    return bool(abs(one["load_factor"] - other["load_factor"]) <= SAME_SHARE)
 
 
 def _broken(state: StateNumbers, after: StateNumbers) -> Bool:

@@ -23,8 +23,8 @@ DIRECTION_DIGITS = 9
 def check_points(ledger: Ledger, cell: DiscreteCell, states: Sequence[StateNumbers]) -> None:
     """The numbers of points beside their strains, stresses and counts."""
     document = cell.files.document
-    points: Sequence[Point] = document.get("path") or document.get("angle") or ()
-    points = [document["load"]] if "load" in document else points
+    single = [document["load"]] if "load" in document else []
+    points: Sequence[Point] = document.get("path") or document.get("angle") or single
     known = [state for state in states if 0 <= state.point < len(points)]
     scale = max([state.stored for state in known], default=0.0)
     for state in known:

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 from reference.references import ARC_OF_120_DEGREES, ARC_OF_120_DEGREES_FINE, VOID
 from support import torn_cells
 from support.cases import relative_error
@@ -244,3 +245,21 @@ def test_single_pivots_find_the_same_state(comm, half):
     assert 1 < single.solves < 10 * MOST_SOLVES
     assert comm.allreduce(int((single.status != block.status).sum())) == 0
     assert relative_error(stress, expected) < 1e-9
+
+
+@pytest.mark.parametrize("strain", [(0, -1, 0), (0, 0, 1)], ids=["E22", "gamma12"])
+def test_forces_between_pieces_of_a_stiff_matrix_hide_no_tension(comm, strain):
+    """They are 10 000 times those on a soft fibre, and who is in contact does not depend on them."""
+    arc, fibre = Arc(fibre="all", centre=20.0, angle=140.0), {"young": 88e-4, "poisson": 0.222}
+    cell = {"fibre": fibre, "mesh_size": 0.1, "refine": 2, "petsc": {"feti_ksp_rtol": 1e-8}}
+    found = []
+    for pieces in ({"subdomains": 40}, {}):
+        torn = torn_cells.tear(comm, [arc], decomposition=pieces, **cell)
+        stress, state = response(torn, True, strain, np.where(torn.debonded(None), OPEN, BONDED).astype(np.int8))
+        forces = state.solution.lam[torn.solver.jump_operator.nodes.row]
+        largest = [comm.allreduce(np.abs(all_of).max(initial=0.0), MPI.MAX) for all_of in (state.solution.lam, forces)]
+        parallel_assert(comm, max(state.certificate.values()) < 1e-7, f"{state.certificate}")
+        found.append((stress, comm.allreduce(int((state.status == CLOSED).sum())), largest[0] / largest[1]))
+    (cut, closed, ratio), (whole, expected, _) = found
+    parallel_assert(comm, ratio > 1000 and closed == expected > 0, f"{ratio}, {closed} closed, expected {expected}")
+    assert relative_error(cut, whole) < 1e-6

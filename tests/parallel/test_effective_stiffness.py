@@ -7,6 +7,8 @@ import pytest
 from reference.closed_forms import hill_bulk, homogeneous
 from support.cases import FIBRE, MATRIX, make_case, monolithic_stiffness, relative_error, solve
 
+from feti_homog.homogenization import cost_model
+
 pytestmark = pytest.mark.parallel
 
 TIGHT = 1e-9
@@ -151,3 +153,10 @@ def test_swapped_phases_lie_within_voigt_and_reuss(comm):
         L = (L + L.T) / 2
         assert np.linalg.eigvalsh(bounds.voigt(c, phases) - L).min() > 0
         assert np.linalg.eigvalsh(L - bounds.reuss(c, phases)).min() > 0
+
+
+@pytest.mark.parametrize("plane", ["strain", "generalized"])
+def test_estimates_count_the_solves_that_are_done(comm, plane):
+    case = make_case(plane=plane)
+    cell, *_ = solve(case, comm)
+    assert cost_model.applications(case, cell.solver.problem) == cell.solver.solves * cost_model.ITERATIONS_OF_A_SOLVE

@@ -174,7 +174,7 @@ SPATIAL = (
 )
 
 
-@pytest.mark.parametrize("stiffness", [None, 40.0])
+@pytest.mark.parametrize("stiffness", [None, np.inf, 40.0])
 def test_a_single_fibre_in_axial_shear(comm, stiffness):
     """t_a = 2 S13 cos / (1 + G_m / G_f + G_m / (k_a a)) on a fibre of radius a in much matrix."""
     sections = {
@@ -184,10 +184,17 @@ def test_a_single_fibre_in_axial_shear(comm, stiffness):
     springs = {} if stiffness is None else {"tangential_stiffness": 7.0, "axial_stiffness": stiffness}
     result = envelope(comm, "generalized", bonds | springs, ["S13", "S23"], sections, directions=4)
     radius, matrix, fibre = np.sqrt(0.002 / np.pi), 88.0 / 2.598, 200.0 / 2.444
-    soft = 0.0 if stiffness is None else matrix / (stiffness * radius)
+    soft = matrix / ((stiffness or np.inf) * radius)
     expected = 3.0 * (1 + matrix / fibre + soft) / 2
     parallel_assert(comm, np.abs(factors(result) / expected - 1).max() < 5e-3, f"{factors(result)} {expected}")
     parallel_assert(comm, all(point.axial == pytest.approx(1.0) for point in result.envelope))
+
+
+def test_bonds_that_nothing_along_the_fibres_breaks(comm):
+    """Axial shear has no other traction; the strength around the fibres is not that along them."""
+    strengths = {"normal_strength": 5.0, "tangential_strength": 4.0, "axial_strength": np.inf}
+    result = envelope(comm, "generalized", strengths, ["S13", "S23"], {}, directions=4)
+    parallel_assert(comm, all(point.factor is None for point in result.envelope))
 
 
 @pytest.mark.parametrize("axes", [["S22", "S33"], ["E11", "gamma23"]], ids=" ".join)

@@ -106,7 +106,9 @@ class QuadraticProgramme:
         free = np.flatnonzero(~bonded) if contact else np.zeros(0, int)
         K, f = (T.T @ self.K @ T).tocsc() / self.scale, -T.T @ (self.Q @ strain) / self.scale
         C = (self._gaps(free) @ T).tocsr()
-        v, pressure = minimise(K, f, C, lambda active: self._free_motions(T, bonded, C[active]), reach)
+        v, pressure = minimise(
+            K, f, C, lambda active: rigid_motions(self.rigid, T, self.fibre_node[bonded], C[active]), reach
+        )
         u = T @ v
         residual = self.K @ u + self.Q @ strain
         energy = strain @ self.mean @ strain / 2 + strain @ self.Q.T @ u + u @ (self.K @ u) / 2
@@ -135,7 +137,7 @@ class QuadraticProgramme:
         C = hstack([gaps, identity(len(free))]).tocsr()
 
         def motions(active):
-            rigid = self._free_motions(T, bonded, gaps[active])
+            rigid = rigid_motions(self.rigid, T, self.fibre_node[bonded], gaps[active])
             return np.concatenate([rigid, np.zeros((len(free), rigid.shape[1]))])
 
         v, pressure = minimise(K, f, C, motions, reach)
@@ -160,17 +162,6 @@ class QuadraticProgramme:
         columns = (2 * np.searchsorted(kept, number[node])[:, None] + [0, 1]).ravel()
         return csr_matrix((np.ones(len(rows)), (rows, columns)), shape=(2 * self.n, 2 * len(kept)))
 
-    def _free_motions(self, T, bonded, C):
-        """(free dofs, z) rigid motions of the fibres that no bonded node nor a row of C resists."""
-        motions = []
-        for f in range(self.rigid.shape[2]):
-            rigid = self.rigid[:, :, f].reshape(2 * self.n, 3)
-            v = (T.T @ rigid) / np.maximum(T.T @ np.ones(2 * self.n), 1.0)[:, None]
-            held = [self.rigid[self.fibre_node[bonded], :, f].reshape(-1, 3), C @ v]
-            _, size, modes = np.linalg.svd(np.concatenate([*held, np.zeros((3, 3))]), full_matrices=False)
-            motions.append(v @ modes[size < 1e-9].T)
-        return np.concatenate(motions, axis=1)
-
     def _slips(self):
         """Rows t.(u_matrix - u_fibre) of all interface nodes."""
         turned = copy(self)
@@ -193,6 +184,19 @@ def nearest(points, centres, radii, size):
     arm -= np.round(arm / size) * size
     fibre = np.argmin(np.hypot(*np.moveaxis(arm, 2, 0)) - radii, axis=1)
     return fibre, arm[np.arange(len(arm)), fibre]
+
+
+def rigid_motions(rigid, T, held, C):
+    """(free dofs, z) motions of the fibres, of those `rigid` (n, c, fibres, m), that neither one of the nodes `held`
+    nor a row of C resists; T (cn, free dofs) are the displacements of all nodes."""
+    n, c, fibres, m = rigid.shape
+    motions = [np.zeros((T.shape[1], 0))]
+    for f in range(fibres):
+        v = (T.T @ rigid[:, :, f].reshape(c * n, m)) / np.maximum(T.T @ np.ones(c * n), 1.0)[:, None]
+        resisted = np.concatenate([rigid[held, :, f].reshape(-1, m), C @ v, np.zeros((m, m))])
+        _, size, modes = np.linalg.svd(resisted, full_matrices=False)
+        motions.append(v @ modes[size < 1e-9].T)
+    return np.concatenate(motions, axis=1)
 
 
 def minimise(K, f, C, free_motions, reach):

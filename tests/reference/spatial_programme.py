@@ -13,7 +13,7 @@ import numpy as np
 from scipy.sparse import block_diag, coo_matrix, csr_matrix, diags, hstack, identity
 
 from reference import monolithic
-from reference.quadratic_programme import minimise, nearest, torus_keys
+from reference.quadratic_programme import minimise, nearest, rigid_motions, torus_keys
 
 LOADS = 7  # six strains and a temperature
 
@@ -81,6 +81,7 @@ class SpatialProgramme:
         )
         self.key, self.middle = classes[self.fibre_node, 1], middle[self.fibre_node]
         self.pinned = int(np.setdiff1d(np.flatnonzero(matrix), self.matrix)[0])
+        self.rigid = np.zeros((self.n, 3, 0, 4))
         if len(radii):
             self._place(np.asarray(centres), np.asarray(radii), np.flatnonzero(~matrix))
 
@@ -134,7 +135,7 @@ class SpatialProgramme:
             f, C = np.r_[f, np.zeros(give)], hstack([gaps, identity(give)]).tocsr()
 
         def motions(active):
-            rigid = self._free_motions(T, bonded, gaps[active])
+            rigid = rigid_motions(self.rigid, T, self.fibre_node[bonded], gaps[active])
             return np.concatenate([rigid, np.zeros((give, rigid.shape[1]))])
 
         imposed = np.abs(np.linalg.solve(self.mean[:6, :6], self.mean[:6] @ load)).max()
@@ -164,16 +165,3 @@ class SpatialProgramme:
             csr_matrix((np.hstack([d, -d]).ravel(), (rows, columns.ravel())), shape=(k, 3 * self.n))
             for d in (normal, np.cross(axial, normal), axial)
         ]
-
-    def _free_motions(self, T, bonded, C):
-        """(free dofs, z) rigid motions of the fibres that no bonded node nor a row of C resists."""
-        if bonded.all():
-            return np.zeros((T.shape[1], 0))
-        motions = []
-        for f in range(self.rigid.shape[2]):
-            rigid = self.rigid[:, :, f].reshape(3 * self.n, 4)
-            v = (T.T @ rigid) / np.maximum(T.T @ np.ones(3 * self.n), 1.0)[:, None]
-            held = [self.rigid[self.fibre_node[bonded], :, f].reshape(-1, 4), C @ v]
-            _, size, modes = np.linalg.svd(np.concatenate([*held, np.zeros((4, 4))]), full_matrices=False)
-            motions.append(v @ modes[size < 1e-9].T)
-        return np.concatenate(motions, axis=1)

@@ -78,3 +78,37 @@ def attribute(name, factor=1 + SMALL, state=0):
         attributes[name] = attributes[name] * factor
 
     return edit
+
+
+def entry(name, row, to, state=0):
+    """Set a number of an attribute of a state."""
+
+    def edit(_, file):
+        attributes = file[f"state/{state}"].attrs
+        values = attributes[name]
+        values[row] = to
+        attributes[name] = values
+
+    return edit
+
+
+def raised(point, by, *names):
+    """Raise numbers of a point and of all points after it."""
+
+    def edit(content, _):
+        for each in content["path"][point:]:
+            for name in names:
+                each[name] += by
+
+    return edit
+
+
+def free_axial_traction(state):
+    """An open face of a state is pulled along the fibre."""
+
+    def edit(_, file):
+        group = file[f"state/{state}"]
+        node = int(np.flatnonzero(group["status"][()] == 2)[0])
+        group["axial_traction"][node] = 1e-3 * np.abs(group["axial_traction"][()]).max()
+
+    return edit

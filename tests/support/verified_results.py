@@ -18,7 +18,7 @@ CARBON = {
     "E_axial": 235.0, "E_transverse": 14.0, "nu_axial": 0.2, "nu_transverse": 0.25, "G_axial": 28.0,
     "expansion_axial": -0.9e-6, "expansion_transverse": 9e-6,
 }  # fmt: skip
-WARM = MATRIX | {"expansion": 23e-6}
+WARM, WARM_FIBRE = MATRIX | {"expansion": 23e-6}, FIBRE | {"expansion": 5e-6}
 HEXAGONAL = {"geometry": "hexagonal", "fibre_fraction": 0.4, "mesh_size": 0.2}
 SQUARE = {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.15}
 RANDOM = {"geometry": "random", "fibres": 4, "fibre_fraction": 0.3, "mesh_size": 0.15, "radius_spread": 0.3}
@@ -108,11 +108,47 @@ CASES: dict[str, dict[str, Any]] = {
     },
 }
 
+IN_SPACE = {"cell": SQUARE, "matrix": WARM, "fibre": WARM_FIBRE, "plane": "generalized"}
+COOLED = [{"temperature": -1000.0}, {"S22": 6.0}, {"S22": -1.0}, {"temperature": 0.0, "S22": 1.0}]
+BY_ENERGY = {"criterion": "energy", "toughness": 0.002}
+MIXED_PATHS: dict[str, dict[str, Any]] = {
+    "mixed": {
+        "cell": SQUARE,
+        "interface": STRENGTHS,
+        "path": {"waypoints": [{"S11": 6.0}, {"S11": -3.0}, {"S11": 7.5, "E22": 0.02}]},
+    },
+    "cooled": IN_SPACE | {"interface": STRENGTHS, "path": {"waypoints": COOLED}},
+    "cooled, thinned": IN_SPACE | {"interface": STRENGTHS, "path": {"waypoints": COOLED}, "states": 7},
+    "cooled by steps": IN_SPACE
+    | {"interface": STRENGTHS, "path": {"waypoints": COOLED[:2], "method": "increments", "increments": 8}},
+    "axial": IN_SPACE
+    | {
+        "interface": STRENGTHS | {"axial_strength": 2.0, "criterion": "quadratic"},
+        "path": {"to": {"S13": 3.0, "S11": 2.0}},
+    },
+    "axial energy": IN_SPACE
+    | {"interface": SPRINGS | BY_ENERGY, "path": {"waypoints": [{"S13": 3.0, "S22": 1.0}, {"S13": -1.0}]}},
+    "axial springs": IN_SPACE
+    | {
+        "interface": SPRINGS | BY_ENERGY | {"growth": "springs"},
+        "path": {"to": {"S13": 3.0, "S22": 1.0}, "method": "increments", "increments": 8, "release": "worst"},
+    },
+}
+LOADS: dict[str, dict[str, Any]] = {
+    "load": IN_SPACE | {"load": {"to": {"E11": 0.02, "S13": 0.1, "temperature": -50.0}}},
+    "load with contact": {
+        "cell": SQUARE,
+        "interface": {"debonded": [ARC | {"angle": 110.0}]},
+        "load": {"to": {"E11": -0.02, "S22": 0.5}},
+    },
+}
+CASES |= MIXED_PATHS | LOADS
+
 
 def document(kind: str) -> dict[str, Any]:
     """The case of a kind of result."""
     parts = dict(CASES[kind])
-    analysis = next((name for name in ("angle", "path", "envelope") if name in parts), "stiffness")
+    analysis = next((name for name in ("angle", "path", "envelope", "load") if name in parts), "stiffness")
     material = {"matrix": parts.pop("matrix", MATRIX), "fibre": parts.pop("fibre", FIBRE)}
     plane = {"type": analysis, "plane": parts.pop("plane", "strain")}
     output = {"pictures": False} | ({"states": parts.pop("states")} if "states" in parts else {})

@@ -25,16 +25,17 @@ from feti_homog.output.plots.decimation import (
     outline_edges,
 )
 from feti_homog.output.plots.interface_marks import STATE_NAMES, InterfaceEdges, state_legend
-from feti_homog.output.plots.load_labels import Labels
 from feti_homog.output.plots.plot_helpers import (
     STRESS_SYMBOLS,
     draw_segments,
     drawn_stress,
     fill_triangles,
+    load_label,
     magnification,
     pixels_of,
     plain,
     save,
+    stress_component,
     unit_label,
     value_range,
 )
@@ -45,6 +46,7 @@ MAX_PANELS = 6
 MAX_FRAMES, FRAME_TIME = 24, 250  # of the animation; milliseconds
 FRAME_LIMIT, PANEL_LIMIT, STATE_LIMIT = 8000, 30_000, 60_000  # triangles in a frame, a panel, a picture of one state
 INCHES, BAR = 8.0, 0.55  # of all panels of a row, and of the colour bar in each
+LOADS_IN_PANEL, LINE = 2, 0.15  # in a line of its title; inches of a line
 
 
 @dataclass(frozen=True)
@@ -57,20 +59,14 @@ class DeformedCell:
     interface_edges: InterfaceEdges
     component: str
     scale: float
-    labels: Labels
 
     @classmethod
-    def of(
-        cls, file: Any, numbers: Sequence[int], output: Mapping[str, Any], scale: float, limit: int,
-        labels: Labels | None = None,
-    ) -> DeformedCell:  # fmt: skip
-        """The stress that `output` chooses, or that suits all these states; `labels` are those of their path."""
+    def of(cls, file: Any, numbers: Sequence[int], output: Mapping[str, Any], scale: float, limit: int) -> DeformedCell:
+        """The stress that `output` chooses, or that suits all these states."""
         drawn = drawn_mesh(file, limit)
         borders = outline_edges(drawn, drawn.body)
-        strains = np.array([file[f"state/{n}"].attrs["strain"] for n in numbers])
-        labels = labels or Labels()
-        component = labels.stress_component(output.get("stress", "auto"), strains)
-        return cls(file, drawn, borders, InterfaceEdges.of(file, drawn, borders), component, scale, labels)
+        component = stress_component(output.get("stress", "auto"), [file[f"state/{n}"] for n in numbers])
+        return cls(file, drawn, borders, InterfaceEdges.of(file, drawn, borders), component, scale)
 
     def moved(self, number: int) -> Array:
         """(p, 2) places of the drawn nodes."""
@@ -90,11 +86,15 @@ class DeformedCell:
         axes.set(xticks=(), yticks=())
         axes.set_axis_off()
         attributes = state.attrs
-        axes.set_title(f"{attributes['label']}\n{self.labels.label(attributes)}", fontsize=9, y=1.0)
+        axes.set_title(f"{attributes['label']}\n{load_label(attributes, LOADS_IN_PANEL)}", fontsize=9, y=1.0)
         figure: Any = axes.figure
         bar = figure.colorbar(shapes, cax=axes.inset_axes((1.02, 0.1, 0.035, 0.8)), extend=extend)
         bar.ax.tick_params(labelsize=7, pad=1, length=2)
         bar.locator = MaxNLocator(5)
+
+    def lines(self, number: int) -> int:
+        """Lines of the words for the load of a state."""
+        return 1 + load_label(self.file[f"state/{number}"].attrs, LOADS_IN_PANEL).count("\n")
 
     @property
     def caption(self) -> str:
@@ -136,13 +136,11 @@ def plot(directory: Path, file: Any, document: Mapping[str, Any]) -> list[Path]:
         # The first of the unit cases, if there are three an angle.
         every = range(0, count, count // len(document["angle"]) or 1)
         numbers = [every[round(k)] for k in np.linspace(0, len(every) - 1, min(MAX_PANELS, len(every)))]
-        return [save(_side_by_side(file, numbers, output, scale, Labels()), directory / "angle_states.png")]
-    labels = Labels.of(document)
-    panels = _side_by_side(file, point_tables.chosen_states(document, MAX_PANELS, count), output, scale, labels)
+        return [save(_side_by_side(file, numbers, output, scale), directory / "angle_states.png")]
+    panels = _side_by_side(file, point_tables.chosen_states(document, MAX_PANELS, count), output, scale)
     paths = [save(panels, directory / "path_states.png")]
     frames = point_tables.chosen_states(document, MAX_FRAMES, count)
-    cell = DeformedCell.of(file, frames, output, scale, FRAME_LIMIT, labels)
-    return [*paths, _animation(cell, frames, directory / "path.gif")]
+    return [*paths, _animation(file, frames, output, scale, directory / "path.gif")]
 
 
 def shown_scale(file: Any, document: Mapping[str, Any]) -> float:
@@ -155,9 +153,7 @@ def shown_scale(file: Any, document: Mapping[str, Any]) -> float:
     displacement = max(_largest_length(state["displacement"]) for state in states)
     opening = max(float(state["jump"][:, 0].max(initial=0.0)) for state in states)
     scale = magnification(displacement, float(min(file.attrs["width"], file.attrs["height"])), opening)
-    given = (
-        "path" in document or "load" in document or document.get("case", {}).get("angle", {}).get("strain") is not None
-    )
+    given = "path" in document or document.get("case", {}).get("angle", {}).get("strain") is not None
     return max(scale, 1.0) if given else scale
 
 
@@ -174,14 +170,15 @@ def _largest_length(table: Any) -> float:
     return max((float(np.linalg.norm(rows, axis=1).max()) for rows in blocks), default=0.0)
 
 
-def _side_by_side(file: Any, numbers: Sequence[int], output: Mapping[str, Any], scale: float, labels: Labels) -> Figure:
-    cell = DeformedCell.of(file, numbers, output, scale, PANEL_LIMIT, labels)
+def _side_by_side(file: Any, numbers: Sequence[int], output: Mapping[str, Any], scale: float) -> Figure:
+    cell = DeformedCell.of(file, numbers, output, scale, limit=PANEL_LIMIT)
     places = [cell.moved(number) for number in numbers]
     size = np.subtract(*_corners(places)[::-1])
     rows = max(1, round(math.sqrt(0.7 * len(numbers) * size[0] / size[1])))
     columns = -(-len(numbers) // rows)
     panel = (INCHES - BAR * columns) / columns
-    figure = Figure(figsize=(INCHES, rows * (panel * size[1] / size[0] + 0.5) + 0.7), layout="constrained")
+    title = 0.2 + LINE * (1 + max(cell.lines(number) for number in numbers))
+    figure = Figure(figsize=(INCHES, rows * (panel * size[1] / size[0] + title) + 0.7), layout="constrained")
     grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
     for axes, number, moved in zip(grid, numbers, places, strict=False):
         cell.draw(axes, number, moved)
@@ -197,12 +194,14 @@ def _side_by_side(file: Any, numbers: Sequence[int], output: Mapping[str, Any], 
     return figure
 
 
-def _animation(cell: DeformedCell, numbers: Sequence[int], path: Path) -> Path:
+def _animation(file: Any, numbers: Sequence[int], output: Mapping[str, Any], scale: float, path: Path) -> Path:
     """Frames of one layout, that of the last state."""
+    cell = DeformedCell.of(file, numbers, output, scale, limit=FRAME_LIMIT)
     places = [cell.moved(number) for number in numbers]
     low, high = _corners(places)
     size = high - low
-    figure = Figure(figsize=(3.6 + BAR, 3.6 * size[1] / size[0] + 0.9), dpi=100, layout="constrained")
+    title = 0.75 + LINE * max(cell.lines(number) for number in numbers)
+    figure = Figure(figsize=(3.6 + BAR, 3.6 * size[1] / size[0] + title), dpi=100, layout="constrained")
     axes = figure.subplots()
     figure.suptitle(cell.caption, fontsize=10)
     frames: list[Image.Image] = []

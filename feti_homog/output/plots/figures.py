@@ -21,7 +21,6 @@ from feti_homog.output.plots import axial_shear, deformed_panels, response_curve
 from feti_homog.output.plots.decimation import DrawnMesh, drawn_mesh, nodal_values, outline_edges
 from feti_homog.output.plots.fibre_numbers import write_fibre_numbers
 from feti_homog.output.plots.interface_marks import InterfaceEdges
-from feti_homog.output.plots.load_labels import Labels
 from feti_homog.output.plots.plot_helpers import (
     STRESS_SYMBOLS,
     STYLE,
@@ -33,9 +32,11 @@ from feti_homog.output.plots.plot_helpers import (
     fill_triangles,
     label_cell_axes,
     largest_length,
+    load_label,
     magnification,
     plain,
     save,
+    stress_component,
     unit_label,
 )
 from feti_homog.typing import Array
@@ -53,7 +54,7 @@ def plot(directory: Path) -> list[Path]:
     - cell.png: bodies and subdomains;
     - of each load case case_E11.png, case_minus_E11.png, ... (unit strains), case_temperature.png or state_K.png;
     - of `angle` angle.png and angle_states.png, of `path` path.png, path_states.png and path.gif;
-    - of `load` load.png, of `envelope` envelope.png;
+    - of `envelope` envelope.png;
     - interface.png, if some interface is debonded.
 
     If there is a result.json, its case.output chooses the stress component (else that of the unit strain) and the
@@ -67,13 +68,13 @@ def plot(directory: Path) -> list[Path]:
     output: Mapping[str, Any] = document.get("case", {}).get("output", {})
     with mpl.rc_context(STYLE):
         try:
-            paths = _pictures(directory, document) if output.get("fields", True) else []
+            paths = _pictures(directory, document, output) if output.get("fields", True) else []
             return paths + response_curves.plot(directory, document)
         except OSError as error:
             raise FetiHomogError(f"cannot draw {directory / field_file.NAME}: {error.strerror or error}") from error
 
 
-def _pictures(directory: Path, document: Mapping[str, Any]) -> list[Path]:
+def _pictures(directory: Path, document: Mapping[str, Any], output: Mapping[str, Any]) -> list[Path]:
     """The pictures of result.h5."""
     with h5py.File(directory / field_file.NAME, "r") as file:
         drawn = drawn_mesh(file)
@@ -86,10 +87,9 @@ def _pictures(directory: Path, document: Mapping[str, Any]) -> list[Path]:
             for number in sorted(file.get("state", ()), key=int):
                 state = file[f"state/{number}"]
                 draw = _sheared if axial_shear.is_axial(state) else _deformed
-                figure = draw(file, state, drawn, borders, interface_edges, document)
-                name = "load" if "load" in document else _name(number, state.attrs)
-                paths.append(save(figure, directory / f"{name}.png"))
-        return paths + traction_plots.plot(directory, file, interface_edges, document)
+                figure = draw(file, state, drawn, borders, interface_edges, output)
+                paths.append(save(figure, directory / f"{_name(number, state.attrs)}.png"))
+        return paths + traction_plots.plot(directory, file, interface_edges, "path" in document)
 
 
 def _name(number: str, attributes: Any) -> str:
@@ -129,21 +129,19 @@ def _deformed(
     drawn: DrawnMesh,
     borders: Array,
     interface_edges: InterfaceEdges,
-    document: Mapping[str, Any],
+    output: Mapping[str, Any],
 ) -> Figure:
     """The magnified deformed cell with a stress component in colour, and the outline it has left."""
     displacement = nodal_values(state["displacement"], drawn)
     seen = magnification(largest_length(displacement), float(np.ptp(drawn.points, axis=0).min()))
-    chosen = document.get("case", {}).get("output", {}).get("deformation_scale")
+    chosen = output.get("deformation_scale")
     scale = seen if chosen is None else chosen
     moved = drawn.points + scale * displacement
-    figure, axes = _coloured(file, state, drawn, moved, document)
+    figure, axes = _coloured(file, state, drawn, moved, output)
     draw_segments(axes, _left(file.attrs, drawn, borders), UNDEFORMED, 0.7)
     undeformed = Line2D([], [], color=UNDEFORMED, linewidth=0.7, label="undeformed")
     _outlined(figure, axes, state, moved, borders, interface_edges, [undeformed])
-    axes.set_title(
-        f"{plain(file.attrs['title'])}\n{Labels.of(document).label(state.attrs)}, displacement × {scale:g}".lstrip()
-    )
+    axes.set_title(f"{plain(file.attrs['title'])}\n{load_label(state.attrs)}, displacement × {scale:g}".lstrip())
     return figure
 
 
@@ -153,28 +151,25 @@ def _sheared(
     drawn: DrawnMesh,
     borders: Array,
     interface_edges: InterfaceEdges,
-    document: Mapping[str, Any],
+    output: Mapping[str, Any],
 ) -> Figure:
     """The cell with an axial stress in colour and lines of equal displacement along the fibres, which moves nothing in
     the plane."""
-    figure, axes = _coloured(file, state, drawn, drawn.points, document)
+    figure, axes = _coloured(file, state, drawn, drawn.points, output)
     step = axial_shear.draw_levels(axes, state, drawn)
     length = plain(file.attrs["length_unit"])
     words = f"$u_3$ every {step:g} {length}".rstrip()
     levels = Line2D([], [], color=axial_shear.INK, linewidth=axial_shear.WIDTH, label=words)
     _outlined(figure, axes, state, drawn.points, borders, interface_edges, [levels])
-    axes.set_title(f"{plain(file.attrs['title'])}\n{Labels.of(document).label(state.attrs)}".lstrip())
+    axes.set_title(f"{plain(file.attrs['title'])}\n{load_label(state.attrs)}".lstrip())
     return figure
 
 
-def _coloured(
-    file: Any, state: Any, drawn: DrawnMesh, moved: Array, document: Mapping[str, Any]
-) -> tuple[Figure, Axes]:
+def _coloured(file: Any, state: Any, drawn: DrawnMesh, moved: Array, output: Mapping[str, Any]) -> tuple[Figure, Axes]:
     """The cell, its nodes at `moved`, in the colours of a stress."""
     attributes = file.attrs
     figure, (axes,) = figure_of(attributes, panels=1, beside=BAR_INCHES)
-    chosen = document.get("case", {}).get("output", {}).get("stress", "auto")
-    component = Labels.of(document).stress_component(chosen, state.attrs["strain"][None])
+    component = stress_component(output.get("stress", "auto"), [state])
     stress = drawn_stress(state, component, drawn)
     norm, colours, extend = colour_range(stress)
     picture = fill_triangles(axes, drawn, moved, stress, edges=False, norm=norm, cmap=colours)

@@ -18,11 +18,14 @@ from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Path2D
 from PIL import Image
 
-from feti_homog.mechanics.voigt import AXIAL_STRESSES, SPATIAL_STRESSES, STRESSES
+from feti_homog.mechanics.response import FAINT, components_above
+from feti_homog.mechanics.voigt import AXIAL_STRESSES, SPATIAL_STRESSES, STRESSES, voigt_names
 from feti_homog.output.files import atomic
 from feti_homog.output.plots.decimation import DrawnMesh, triangle_means
 from feti_homog.typing import Array
 
+STRAIN_SYMBOLS = (r"E_{11}", r"E_{22}", r"\gamma_{12}")
+SPATIAL_STRAIN_SYMBOLS = (r"E_{11}", r"E_{22}", r"E_{33}", r"\gamma_{23}", r"\gamma_{13}", r"\gamma_{12}")
 STRESS_SYMBOLS = {name: rf"\sigma_{{{name[1:]}}}" for name in SPATIAL_STRESSES}
 # Where a state of result.h5 has the stresses: the table, and its column if it has more than one.
 STRESS_TABLES: dict[str, tuple[str, int | None]] = {
@@ -30,6 +33,7 @@ STRESS_TABLES: dict[str, tuple[str, int | None]] = {
     "S33": ("stress_33", None),
     **{name: ("axial_stress", column) for column, name in enumerate(AXIAL_STRESSES)},
 }
+LOADS_IN_LINE = 3  # of the words for a load
 SAME_VALUE = 1e-6  # values that differ by less, relatively, are one
 CELL_INCHES = 4.8  # inches, the longer side of a drawn cell
 STYLE = {"font.size": 10, "axes.titlesize": 11, "axes.linewidth": 0.8}
@@ -162,6 +166,32 @@ def magnification(displacement: float, size: float, opening: float = 0.0) -> flo
 def largest_length(vectors: Array) -> float:
     """The largest length of vectors (n, 2)."""
     return float(np.linalg.norm(vectors, axis=1).max(initial=0.0))
+
+
+def load_label(attributes: Any, in_line: int = LOADS_IN_LINE) -> str:
+    """The strains that are seen, and the temperature, of a state with these attributes; so many in a line."""
+    strain, temperature = np.asarray(attributes["strain"]), float(attributes.get("temperature", 0.0))
+    symbols = strain_symbols(len(strain))
+    loads = [(symbols[k], float(strain[k])) for k in components_above(FAINT, strain[None])]
+    loads += [(r"\Delta T", temperature)] * (temperature != 0.0)
+    words = [f"${name} = {{{value:.4g}}}$" for name, value in loads]
+    lines = [", ".join(words[k : k + in_line]) for k in range(0, len(words), in_line)]
+    return ",\n".join(lines) or "no strain"
+
+
+def strain_symbols(count: int) -> tuple[str, ...]:
+    """Those of the strains, 3 in the plane or 6 in space."""
+    return STRAIN_SYMBOLS if count == len(STRAIN_SYMBOLS) else SPATIAL_STRAIN_SYMBOLS
+
+
+def stress_component(chosen: str, states: Sequence[Any]) -> str:
+    """The stress that is chosen, else that of the largest strain of these states on which a macroscopic stress works;
+    of all strains if there is no stress."""
+    if chosen in STRESS_SYMBOLS:
+        return chosen
+    strains, stresses = (np.array([state.attrs[name] for state in states]) for name in ("strain", "stress"))
+    loaded = components_above(FAINT, stresses) or list(range(strains.shape[1]))
+    return voigt_names(strains.shape[1])[1][loaded[int(np.abs(strains[:, loaded]).max(axis=0).argmax())]]
 
 
 def drawn_stress(state: Any, component: str, drawn: DrawnMesh) -> Array:

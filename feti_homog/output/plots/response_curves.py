@@ -15,8 +15,7 @@ from feti_homog.mechanics import response
 from feti_homog.mechanics.voigt import STRESSES, voigt_names
 from feti_homog.output.plots import envelope_plot
 from feti_homog.output.plots.interface_marks import BONDED, CLOSED, OPEN, STATE_COLOURS, STATE_NAMES
-from feti_homog.output.plots.load_labels import SYMBOLS
-from feti_homog.output.plots.plot_helpers import save, unit_label
+from feti_homog.output.plots.plot_helpers import plain, save, strain_symbols, unit_label
 from feti_homog.output.text import point_tables
 from feti_homog.typing import Array
 
@@ -55,7 +54,7 @@ def _angle(document: Document) -> Figure:
     axes.xaxis.set_major_locator(MultipleLocator(60 if angles[-1] > 180 else 30))
     contact = "contact" if case["interface"]["contact"] else "no contact"
     load = "" if stiff else f", $E = [{', '.join(f'{e:g}' for e in points[0]['strain'])}]$"
-    axes.set_title(f"{case.get('name', '')}: plane {case['analysis']['plane']}, {contact}{load}".lstrip(": "))
+    axes.set_title(f"{plain(case.get('name', ''))}: plane {case['analysis']['plane']}, {contact}{load}".lstrip(": "))
     _finish(axes)
     if stiff:
         axes.set_ylim(bottom=0.0)
@@ -65,31 +64,37 @@ def _angle(document: Document) -> Figure:
 def _angle_columns(points: Sequence[Mapping[str, Any]], stiff: bool) -> list[tuple[str, Array]]:
     """Each curve's name and its values (points,)."""
     if not stiff:
-        return list(
-            zip([SYMBOLS[name] for name in STRESSES], np.array([point["stress"] for point in points]).T, strict=True)
-        )
+        stress = np.array([point["stress"] for point in points])
+        return list(zip(map(_symbol, STRESSES), stress.T, strict=True))
     stiffness = np.array([point["stiffness"] for point in points])
     return [(f"C_{{{i + 1}{j + 1}}}", stiffness[:, i, j]) for i, j in point_tables.shown_entries(points).values()]
+
+
+def _symbol(stress: str) -> str:
+    """The macroscopic stress of this name."""
+    return rf"\Sigma_{{{stress[1:]}}}"
 
 
 def _path(document: Document) -> Figure:
     """Stresses against the leading strain; below, they and the numbers of bonded, open and closed nodes against the
     number of the point, for the first folds back. Some points are numbered in all three."""
     points, case = document["path"], document["case"]
-    component, first = response.leading_component(document), response.first_leg(document)
-    strains = np.array([point["strain"] for point in points])
+    component, shown = response.leading_component(document), response.shown_stresses(document)
+    strains, stress = (np.array([point[name] for point in points]) for name in ("strain", "stress"))
     strain = strains[:, component]
     style: dict[str, Any] = {"marker": "o", "markersize": 2.5} if len(points) <= MARKED_POINTS else {}
     figure = Figure(figsize=(7.2, 8.0), layout="constrained")
     upper, middle, lower = figure.subplots(3, 1, height_ratios=(2.2, 1, 1))
     middle.sharex(lower)
-    _stress_curves(upper, document, strain, component, first, style)
+    _stress_curves(upper, document, strain, shown, style)
     upper.set_ylabel(f"macroscopic stress {_stress_unit(case)}")
-    upper.set_xlabel(f"macroscopic strain ${SYMBOLS[voigt_names(strains.shape[1])[0][component]]}$")
-    upper.set_title(f"{case.get('name', '')}: plane {case['analysis']['plane']}, {_strengths(case)}".lstrip(": "))
-    stress = np.array([point["stress"] for point in points])
-    for ink, k in zip(INK, response.shown_stresses(points, component), strict=False):
-        middle.plot(stress[:, k], color=ink, linewidth=1.2, **style)
+    upper.set_xlabel(f"macroscopic strain ${strain_symbols(strains.shape[1])[component]}$")
+    upper.set_title(
+        f"{plain(case.get('name', ''))}: plane {case['analysis']['plane']}, {_strengths(case)}".lstrip(": ")
+    )
+    for number in shown:
+        middle.plot(stress[:, number], color=INK[number], linewidth=1.2, **style)
+    _temperature(middle, points, style)
     middle.set_ylabel(f"stress {_stress_unit(case)}")
     middle.tick_params(labelbottom=False)
     _count_curves(lower, points, style)
@@ -97,33 +102,47 @@ def _path(document: Document) -> Figure:
     for axes in (upper, middle, lower):
         _finish(axes)
     # The panels of path_states.png show the same points.
-    numbers = point_tables.chosen(points, NUMBERED_POINTS, point_tables.kept_points(document))
+    numbers = point_tables.chosen(document, NUMBERED_POINTS, point_tables.kept_points(document))
     _number_points(upper, (middle, lower), np.stack([strain, stress[:, component]], axis=1), numbers)
     return figure
 
 
 def _stress_curves(
-    axes: Axes, document: Document, strain: Array, component: int, first: int, style: Mapping[str, Any]
+    axes: Axes, document: Document, strain: Array, shown: Sequence[int], style: Mapping[str, Any]
 ) -> None:
-    """The first leg with its snap-back, thick what a rising strain follows, and the later legs."""
-    points = document["path"]
+    """The first leg with its snap-back, thick what a rising load follows, and the later legs."""
+    points, first = document["path"], response.first_leg(document)
     stress = np.array([point["stress"] for point in points])
-    rising = response.strain_controlled(points, component) if response.is_proportional(document) else None
     names = voigt_names(stress.shape[1])[1]
-    for ink, i in zip(INK, response.shown_stresses(points, component), strict=False):
-        name = SYMBOLS[names[i]]
+    rising = response.load_controlled(points) if response.is_proportional(document) else None
+    along = stress.shape[1] + response.leading_component(document)
+    for i in shown:
+        name, ink = _symbol(names[i]), INK[i]
         thin: dict[str, Any] = {"label": f"${name}$", "linewidth": 1.4} if rising is None else {"linewidth": 0.8}
         from_zero = np.append(0.0, strain[:first]), np.append(0.0, stress[:first, i])
         axes.plot(*from_zero, color=ink, alpha=0.8, **thin, **style)
         if first < len(points):
             axes.plot(strain[first - 1 :], stress[first - 1 :, i], color=ink, linewidth=0.8, marker="o", ms=2)
         if rising is not None:
-            axes.plot(rising[:, -1], rising[:, i], color=ink, linewidth=2.0, label=f"${name}$")
+            axes.plot(rising[:, along], rising[:, i], color=ink, linewidth=2.0, label=f"${name}$")
     if rising is not None:
         axes.plot([], [], color="0.3", linewidth=0.8, **style, label="all equilibria")
-        axes.plot([], [], color="0.3", linewidth=2.0, label="rising load")
+        axes.plot([], [], color="0.3", linewidth=2.0, label=f"rising {response.what_rises(document)}")
     if first < len(points):
         axes.plot([], [], color="0.3", linewidth=0.8, marker="o", ms=2, label="later legs")
+    axes.xaxis.set_major_locator(MaxNLocator(7))
+
+
+def _temperature(axes: Axes, points: Sequence[Mapping[str, Any]], style: Mapping[str, Any]) -> None:
+    """The change of temperature along a path, on an axis of its own, if there is any."""
+    if any(point.get("temperature") for point in points):
+        beside = axes.twinx()
+        label = r"change of temperature $\Delta T$"
+        beside.plot([point["temperature"] for point in points], color="0.5", linestyle="--", linewidth=1.0, **style)
+        beside.axhline(0.0, linestyle="none")  # from which the change is
+        beside.set_ylabel(label, color="0.4", fontsize=8)
+        beside.tick_params(colors="0.4", labelsize=8)
+        beside.spines["top"].set_visible(False)
 
 
 def _count_curves(axes: Axes, points: Sequence[Mapping[str, Any]], style: Mapping[str, Any]) -> None:

@@ -38,19 +38,21 @@ def figures(document: Document) -> dict[str, Any]:
 
 def _path(document: Document, unit: str) -> dict[str, Any]:
     points = document["path"]
-    component = response.leading_component(document)
+    component, shown = response.leading_component(document), response.shown_stresses(document)
     strains, stresses = (np.array([point[name] for point in points]) for name in ("strain", "stress"))
-    names, stress_names = voigt_names(strains.shape[1])
-    shown = response.shown_stresses(points, component)
-    strain, stress = strains[:, component], {stress_names[k]: stresses[:, k] for k in shown}
+    strain, (strain_names, names) = strains[:, component], voigt_names(strains.shape[1])
+    stress = {names[k]: stresses[:, k] for k in shown}
     number = np.arange(len(points))
-    first = _figure("Stress against strain", f"macroscopic strain {names[component]}", f"macroscopic stress ({unit})")
+    first = _figure(
+        "Stress against strain", f"macroscopic strain {strain_names[component]}", f"macroscopic stress ({unit})"
+    )
     _draw(first, strain, stress, number)
     if response.is_proportional(document):
-        rising = response.strain_controlled(points, component)
-        for column, ink in zip(shown, INK, strict=False):
-            label = f"{stress_names[column]}, rising load"
-            first.line(rising[:, -1], rising[:, column], color=ink, line_width=3, alpha=0.35, legend_label=label)
+        rising = response.load_controlled(points)
+        for k, ink in zip(shown, INK, strict=False):
+            label = f"{names[k]}, rising {response.what_rises(document)}"
+            x, y = rising[:, len(names) + component], rising[:, k]
+            first.line(x, y, color=ink, line_width=3, alpha=0.35, legend_label=label)
     second = _figure("Stress along the path", "number of the point", f"macroscopic stress ({unit})")
     _draw(second, number, stress, number)
     return {"curve": _finished(first), "along": _finished(second), "counts": _counts(points, number, second.x_range)}

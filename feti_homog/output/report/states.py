@@ -10,12 +10,12 @@ import matplotlib as mpl
 import numpy as np
 from numpy.typing import NDArray
 
+from feti_homog.mechanics.response import FAINT, components_above
 from feti_homog.mechanics.voigt import voigt_names
 from feti_homog.output.plots.decimation import DrawnMesh, drawn_mesh, nodal_values, outline_edges
 from feti_homog.output.plots.deformed_panels import shown_scale
 from feti_homog.output.plots.interface_marks import STATE_COLOURS, STATE_NAMES, STATE_WIDTHS, InterfaceEdges
-from feti_homog.output.plots.load_labels import SAME_VALUE, Labels
-from feti_homog.output.plots.plot_helpers import drawn_stress, value_range
+from feti_homog.output.plots.plot_helpers import drawn_stress, stress_component, value_range
 from feti_homog.output.text import point_tables
 
 MOST_STATES, TRIANGLES = 48, 8000  # of the viewer, which keep a page below some megabytes
@@ -34,9 +34,9 @@ def viewer_data(file: Any, document: Document) -> dict[str, Any]:
     borders = outline_edges(drawn, drawn.body)
     edges = InterfaceEdges.of(file, drawn, borders)
     numbers = _numbers(file, document)
-    strains = np.array([file[f"state/{number}"].attrs["strain"] for number in numbers])
-    stresses = voigt_names(strains.shape[1])[1]
-    component = Labels.of(document).stress_component(document["case"]["output"].get("stress", "auto"), strains)
+    shown = [file[f"state/{number}"] for number in numbers]
+    stresses = voigt_names(len(shown[0].attrs["strain"]))[1]
+    component = stress_component(document["case"]["output"].get("stress", "auto"), shown)
     return {
         "points": _base64(drawn.points, "<f4"),
         "triangles": _base64(drawn.triangles, "<u4"),
@@ -67,9 +67,9 @@ def _state(file: Any, number: int, drawn: DrawnMesh, edges: InterfaceEdges, docu
     status = state["status"][:]
     attributes = state.attrs
     strains, stresses = voigt_names(len(attributes["strain"]))
-    loads = [*zip(strains, attributes["strain"], strict=True), ("temperature", attributes.get("temperature", 0.0))]
-    least = SAME_VALUE * float(np.abs(attributes["strain"]).max())
-    words = [f"{name} = {value:.4g}" for name, value in loads if abs(value) > least]
+    loads = [(strains[k], attributes["strain"][k]) for k in components_above(FAINT, attributes["strain"][None])]
+    loads += [("temperature", value)] if (value := attributes.get("temperature", 0.0)) else []
+    words = [f"{name} = {value:.4g}" for name, value in loads]
     return {
         "number": number,
         "point": int(attributes["point"]) if document.get("angle") or document.get("path") else None,

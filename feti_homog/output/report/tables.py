@@ -6,8 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from feti_homog.mechanics.response import leading_component, shown_stresses
-from feti_homog.mechanics.voigt import SPATIAL_STRESSES, STRESSES, voigt_names
+from feti_homog.mechanics.voigt import SPATIAL_STRESSES, voigt_names
 from feti_homog.output.text.constants_tables import SHORT, comparison
 from feti_homog.output.text.envelope_table import components
 from feti_homog.output.text.point_tables import chosen, shown_entries
@@ -64,7 +63,7 @@ def facts(document: Document) -> list[tuple[str, str]]:
 
 
 def answers(document: Document) -> list[Table]:
-    """What was asked for: stiffness with moduli and bounds, or points of an angle or path, a state, or onsets."""
+    """What was asked for: stiffness with moduli and bounds, or points of an angle or path, or onsets."""
     unit = document["case"]["output"].get("stress_unit", "")
     label = f" ({unit})" if unit else ""
     found = [_envelope(document, label)] if document.get("envelope") else []
@@ -84,9 +83,8 @@ def answers(document: Document) -> list[Table]:
         found.append(Table("Engineering moduli", ["", "computed"], rows))
     if document.get("bounds") is not None:
         found.append(Table(f"Bounds{label}", ["", "lower", "computed", "upper"], list(_bounds(document))))
-    if document.get("load") is not None:
-        found += _load(document["load"], label)
-    return found + [_points(key, document, label) for key in ("angle", "path") if document.get(key)]
+    found += [_points(key, document, label) for key in ("angle", "path") if document.get(key)]
+    return found + ([_load(document["load"], label)] if document.get("load") else [])
 
 
 def _envelope(document: Document, label: str) -> Table:
@@ -103,6 +101,19 @@ def _envelope(document: Document, label: str) -> Table:
     some = "" if step == 1 else f", {len(rows)} of {len(points)} directions"
     unit = label if axes[0].startswith("S") else ""
     return Table(f"Onset of debonding{some}; load{unit}", ["angle", *axes, *names], rows)
+
+
+def _load(point: Document, label: str) -> Table:
+    """The equilibrium under one load: strains, stresses and its numbers."""
+    names = zip(*voigt_names(len(point["strain"])), strict=True)
+    values = zip(point["strain"], point["stress"], strict=True)
+    rows = [
+        [name, _number(value)]
+        for pair, found in zip(names, values, strict=True)
+        for name, value in zip(pair, found, strict=True)
+    ]
+    numbers = [[name, _number(value)] for name, value in point.items() if isinstance(value, int | float)]
+    return Table(f"Equilibrium under the load; stress{label}", ["", "computed"], rows + numbers)
 
 
 def checks(document: Document) -> list[Check]:
@@ -147,46 +158,21 @@ def _thermal(document: Document, label: str) -> Table:
     return Table(f"Per unit of temperature{label}", ["", *known], rows)
 
 
-def _load(state: Document, label: str) -> list[Table]:
-    """Strains and stresses under one load, and its numbers."""
-    names = voigt_names(len(state["strain"]))
-    rows = [[stress[1:], _number(state["strain"][k]), _number(state["stress"][k])] for k, stress in enumerate(names[1])]
-    numbers = [[name, _number(value)] for name, value in state.items() if isinstance(value, int | float)]
-    return [
-        Table(f"State under the load; stress{label}", ["", "strain", "stress"], rows),
-        Table(f"Its numbers; energies{label}", ["", "computed"], numbers),
-    ]
-
-
 def _points(key: str, document: Document, label: str) -> Table:
     """The points of an angle or path, of many some."""
     points = document[key]
-    numbers = chosen(points, MOST_ROWS) if key == "path" else range(min(len(points), MOST_ROWS))
+    numbers = chosen(document, MOST_ROWS) if key == "path" else range(min(len(points), MOST_ROWS))
     some = "" if len(numbers) == len(points) else f", {len(numbers)} of {len(points)}"
     names = [name for name, value in points[0].items() if isinstance(value, int | float)]
     entries = shown_entries(points) if points[0].get("stiffness") is not None else {}
-    strain, stresses = _columns(document) if key == "path" else ({}, dict(zip(STRESSES, range(3), strict=True)))
-    head = ["point", *names, *strain, *(entries or stresses)]
+    head = ["point", *names, *(entries or voigt_names(len(points[0]["stress"]))[1])]
     rows = []
     for number in numbers:
         point = points[number]
         stiff = point.get("stiffness")
-        values = [point["strain"][k] for k in strain.values()]
-        values += (
-            [point["stress"][k] for k in stresses.values()]
-            if stiff is None
-            else [stiff[i][j] for i, j in entries.values()]
-        )
+        values = point["stress"] if stiff is None else [stiff[i][j] for i, j in entries.values()]
         rows.append([str(number), *(_number(point[name]) for name in names), *map(_number, values)])
     return Table(f"Points of the {key}{some}; stress{label}", head, rows)
-
-
-def _columns(document: Document) -> tuple[dict[str, int], dict[str, int]]:
-    """Names and places of the leading strain of a path, and of its stresses that are not zero."""
-    leading = leading_component(document)
-    strains, stresses = voigt_names(len(document["path"][0]["strain"]))
-    shown = shown_stresses(document["path"], leading)
-    return {strains[leading]: leading}, {stresses[k]: k for k in shown}
 
 
 def _number(value: float) -> str:

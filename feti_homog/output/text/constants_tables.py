@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-NAME, COLUMN, UNKNOWN = 22, 12, "-"
+NAME, COLUMN = 22, 12
 THIS_CELL, LOWER, UPPER = "this cell", "lower bound", "upper bound"
 SHORT = {
     "E_axial": "E axial",
@@ -18,8 +18,6 @@ SHORT = {
     "expansion_axial": "exp. axial",
     "expansion_transverse": "exp. transv.",
 }
-# The columns of the two tables that the constants fill.
-HALVES = (("E_axial", "E_transverse", "nu_axial", "nu_transverse"), tuple(SHORT)[4:])
 Document = Mapping[str, Any]
 
 
@@ -39,19 +37,17 @@ def _constants(constants: Document | None, unit: str) -> list[str]:
 
 
 def _estimates(document: Document, unit: str) -> list[str]:
-    """Two tables: a row for each source that tells a constant, a column for each constant that one of them tells."""
+    """A row for each source that tells a constant, a column for each constant that one of them tells."""
     cell = document.get("transversely_isotropic")
     if cell is None:
         return []
     names, rows = comparison(document)
-    lines = [f"Along the fibres and across them{unit}; {100 * cell['deviation']:.2g} % from transversely isotropic"]
-    for half in HALVES:
-        own = [k for k, name in enumerate(names) if name in half]
-        if own:
-            lines.append(" " * NAME + "".join(f"{SHORT[names[k]]:>{COLUMN + 1}}" for k in own))
-        for title, numbers in rows:
-            if any(numbers[k] != UNKNOWN for k in own):
-                lines.append(f"  {title:<{NAME - 2}}" + "".join(f"{numbers[k]:>{COLUMN + 1}}" for k in own))
+    lines = [
+        f"Along the fibres and across them{unit}; {100 * cell['deviation']:.2g} % from transversely isotropic",
+        " " * NAME + "".join(f"{SHORT[name]:>{COLUMN + 1}}" for name in names),
+    ]
+    for title, numbers in rows:
+        lines.append(f"  {title:<{NAME - 2}}" + "".join(f"{number:>{COLUMN + 1}}" for number in numbers))
     return lines
 
 
@@ -75,4 +71,4 @@ def _known(row: Document) -> dict[str, Any]:
 
 
 def _number(value: float | None) -> str:
-    return UNKNOWN if value is None else f"{value:.5g}"
+    return "-" if value is None else f"{value:.5g}"

@@ -10,9 +10,7 @@ from typing import Any
 from feti_homog.mechanics.voigt import SPATIAL_STRESSES, STRAINS, STRESSES
 from feti_homog.output.text.constants_tables import constants_blocks
 from feti_homog.output.text.envelope_table import envelope_table
-from feti_homog.output.text.load_table import load_table
-from feti_homog.output.text.path_table import path_table
-from feti_homog.output.text.point_tables import angle_table
+from feti_homog.output.text.point_tables import angle_table, load_table, path_table
 from feti_homog.output.text.spatial_tables import spatial_blocks
 from feti_homog.output.text.tip_tables import angle_tip_table, tip_table
 
@@ -26,7 +24,7 @@ TITLES = {
     "stiffness": "effective stiffness",
     "angle": "debonding angle",
     "path": "load path",
-    "load": "state under a load",
+    "load": "equilibrium under a load",
     "envelope": "onset of debonding",
 }
 MODULI = ("E1", "E2", "G12", "bulk", "shear")  # in the unit of the stresses; the others are ratios
@@ -35,8 +33,8 @@ Document = Mapping[str, Any]
 
 
 def summary(document: Document) -> str:
-    """The document in lines of at most 79 columns (100 of tables in space; but for long names), without a newline at
-    the end.
+    """The document in lines of at most 79 columns, tables of at most 100 (but for long names), without a newline at the
+    end.
 
     Cell, solver, effective stiffness with moduli and bounds or else the points of `angle` or `path`, the state of
     `load`, onsets, checks, timings, memory, warnings and status.

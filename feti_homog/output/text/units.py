@@ -6,8 +6,8 @@ import re
 
 STRESSES = ("young", "E1", "E2", "E3", "E_axial", "E_transverse", "G12", "G13", "G23", "G_axial",
            "G_transverse", "K_transverse", "stiffness", "normal_strength", "tangential_strength",
-           "dissipated", "dissipated_strain_controlled")  # fmt: skip
-MODULI = re.compile(r"(C\d\d|S\d\d|bulk|shear)(_\w+)?|anisotropy_\w+|\w+_(C|S)\d\d|load_stored")
+           "dissipated", "dissipated_strain_controlled", "work", "load_stored")  # fmt: skip
+MODULI = re.compile(r"(C\d\d|S\d\d|bulk|shear)(_\w+)?|anisotropy_\w+|\w+_(C|S)\d\d")
 FIXED = {"angle": "degrees", "centre": "degrees", "values": "degrees", "memory": "bytes"}
 
 

@@ -2,41 +2,56 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from feti_homog.mechanics.response import NOISE
+from feti_homog.mechanics import response
 from feti_homog.mechanics.voigt import voigt_names
-from feti_homog.output.plots.load_labels import SYMBOLS
-from feti_homog.output.plots.plot_helpers import plain
+from feti_homog.output.plots.plot_helpers import plain, strain_symbols
 from feti_homog.sweep.report.statistics import Statistics
 from feti_homog.sweep.report.style import COLOURS, label_axes, legend
 from feti_homog.sweep.report.sweep_table import SweepTable
 
 
 def figure(table: SweepTable) -> Figure:
-    """The stress along the strain and, if there is any, the largest of the others; of points along the same strain."""
-    curves = {point: table.curves(point)[1] for point in table.points}
-    points = [point for point, stress in curves.items() if len(stress)]
-    along, count = table.leading(points[0]), curves[points[0]].shape[2]
-    points = [p for p in points if table.leading(p) == along and curves[p].shape[2] == count][: len(COLOURS)]
-    largest = np.max([np.abs(curves[point]).max(axis=(0, 1)) for point in points], axis=0)
-    others = [k for k in np.argsort(-largest, kind="stable") if k != along and largest[k] > NOISE * largest[along]]
-    shown = [along, *map(int, others[:1])]
-    picture = Figure(figsize=(4.8 * len(shown), 4.6), layout="constrained")
-    panels = picture.subplots(1, len(shown), sharex=True, squeeze=False)[0]
-    strains, stresses = voigt_names(count)
-    for axes, component in zip(panels, shown, strict=True):
+    """Two panels: the stress along the strain, and the largest of the others, if there is any.
+
+    Points whose paths lead along another strain are left out.
+    """
+    there = [point for point in table.points if len(table.curves(point)[0])]
+    points = [point for point in there if _leads(table, point) == _leads(table, there[0])][: len(COLOURS)]
+    document = next(d for d in table.results_of(points[0]) if d.get("path"))
+    along, (strains, stresses) = response.leading_component(document), voigt_names(len(document["path"][0]["stress"]))
+    components = [along, *_others(table, points, along)[:1]]
+    picture = Figure(figsize=(0.4 + 4.6 * len(components), 4.6), layout="constrained")
+    panels = picture.subplots(1, len(components), sharex=True, squeeze=False)[0]
+    symbol = strain_symbols(len(strains))[along]
+    for axes, component in zip(panels, components, strict=True):
         for style, point in enumerate(points):
             _bundle(axes, table, point, component, COLOURS[style])
         axes.xaxis.set_major_locator(MaxNLocator(5))
         axes.axhline(0.0, color="0.6", linewidth=0.6, zorder=0)
-        label_axes(axes, f"${SYMBOLS[stresses[component]]}$", table, f"${SYMBOLS[strains[along]]}$")
+        label_axes(axes, f"$\\Sigma_{{{stresses[component][1:]}}}$", table, f"${symbol}$")
     picture.suptitle(f"{plain(table.name)}: realisations, means and their 95 % confidence intervals", fontsize=12)
     legend(picture, list(panels))
     return picture
+
+
+def _leads(table: SweepTable, point: int) -> tuple[str, str]:
+    """The plane state and the leading strain of the paths of a point."""
+    document = next(d for d in table.results_of(point) if d.get("path"))
+    return document["case"]["analysis"]["plane"], str(response.leading_component(document))
+
+
+def _others(table: SweepTable, points: Sequence[int], along: int) -> list[int]:
+    """The other stresses that are seen, the largest first."""
+    largest = np.max([np.abs(table.curves(point)[1]).max(axis=(0, 1)) for point in points], axis=0)
+    seen = [k for k in response.components_above(response.FAINT, largest[None]) if k != along]
+    return sorted(seen, key=lambda k: -largest[k])
 
 
 def _bundle(axes: Axes, table: SweepTable, point: int, component: int, colour: str) -> None:

@@ -7,18 +7,32 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
+from feti_homog.mechanics import response
+from feti_homog.mechanics.voigt import voigt_names
 from feti_homog.output.plots.plot_helpers import plain
 from feti_homog.sweep.report.series import Series, series_over
 from feti_homog.sweep.report.style import COLOURS, MARKERS, label_axes, legend, plot_series
 from feti_homog.sweep.report.sweep_table import SweepTable
 
 X_FACTOR, MARGIN = 0.94, 1.3  # factors on a logarithmic axis
-CHOICES = (("C11", "bulk", "shear"), ("C11", "C33", "C44", "C66"), ("onset_S11", "peak_S11"))
+CHOICES = (("C11", "bulk", "shear"), ("C11", "C33", "C44", "C66"))
 
 
 def names(table: SweepTable) -> tuple[str, ...]:
     """The outputs that are drawn: moduli, or the strength of paths."""
-    return next((chosen for chosen in CHOICES if all(name in table.outputs for name in chosen)), ())
+    return next((chosen for chosen in (*CHOICES, _along(table)) if all(name in table.outputs for name in chosen)), ())
+
+
+def _along(table: SweepTable) -> tuple[str, ...]:
+    """Of the stress along the leading strain of paths, the first and the largest; of a given stress the strain at the
+    end instead of the latter."""
+    document = next((d for d in table.finished if d.get("path")), None)
+    if document is None:
+        return ()
+    strains, stresses = voigt_names(len(document["path"][0]["stress"]))
+    leading = response.leading_component(document)
+    is_given = any(target.get(stresses[leading]) for target in response.targets(document))
+    return (f"onset_{stresses[leading]}", f"end_{strains[leading]}" if is_given else f"peak_{stresses[leading]}")
 
 
 def figure(table: SweepTable, key: str) -> Figure:

@@ -1,7 +1,8 @@
 """What the tables of a sweep hold: the columns of sweep.csv and the datasets of sweep.h5, with unit and meaning.
 
 In names, i and j stand for 1, 2 or 3, in stiffnesses of generalized plane strain for 1 to 6, and words in capitals for
-what varies between sweeps.
+what varies between sweeps.  If cases of a sweep are in generalized plane strain and others in a plane state, i and j of
+these are 1, 2 or 6, so that Cij is the same entry of all: the shear modulus in the plane is C66.
 """
 
 from __future__ import annotations
@@ -30,12 +31,12 @@ OUTPUT_COLUMNS = (
     Column("dofs", "", "degrees of freedom of all subdomains"),
     Column("multipliers", "", "Lagrange multipliers of the dual problem"),
     Column("iterations", "", "Krylov iterations of all states"),
-    Column("Cij", STRESS, "entry of L^ef"),
+    Column("Cij", STRESS, "entry of L^ef; beside generalized plane strain C66 is the shear modulus of all"),
     Column("Cij_compression", STRESS, "the same under minus the unit strains, with contact"),
     Column("thermal_Sij", f"{STRESS} per unit of temperature", "stress per unit of temperature at no strain"),
     Column("expansion_STRAIN", "1 / temperature", "strain per unit of temperature at no stress"),
     Column("anisotropy_axial", STRESS, "C11 - C22"),
-    Column("anisotropy_shear", STRESS, "C33 - (C11 + C22 - 2 C12) / 4; of generalized plane strain C66 - ..."),
+    Column("anisotropy_shear", STRESS, "C33 - (C11 + C22 - 2 C12) / 4; with generalized plane strain C66 - ..."),
     *columns(Moduli),
     *(column for column in columns(EngineeringConstants) if column.name not in MODULI),
     *columns(TransverselyIsotropic),
@@ -49,15 +50,16 @@ OUTPUT_COLUMNS = (
     Column("angle_ANGLE_Sij", STRESS, "macroscopic stress at an opening of that many degrees"),
     Column("onset_load_factor", "", "load factor of the first point of a path"),
     Column("dissipated", STRESS, "energy lost to all breaks of a path, per area of the cell"),
+    Column("work", STRESS, "work of the loads along a path, per area of the cell"),
     Column("onset_Sij", STRESS, "macroscopic stress at the first point of a path"),
+    Column("onset_STRAIN", "", "macroscopic strain at the first point of a path"),
     Column("peak_Sij", STRESS, "largest in magnitude of a path, with its sign"),
     Column("end_Sij", STRESS, "macroscopic stress at the end of a path"),
     Column("end_STRAIN", "", "macroscopic strain at the end of a path"),
     Column("end_STATUS", "", "interface nodes that are bonded, open or closed at the end of a path"),
-    Column("load_STRAIN", "", "macroscopic strain under a single load"),
+    Column("load_STRAIN", "", "macroscopic strain under the load of analysis `load`"),
     Column("load_Sij", STRESS, "macroscopic stress under it"),
     Column("load_stored", STRESS, "elastic energy stored under it, per area of the cell"),
-    Column("load_debonded_share", "", "debonded share of the length of all interfaces"),
     Column("load_STATUS", "", "interface nodes that are bonded, open or closed under it"),
     Column("envelope_AXIS", "that of the axis", "load at onset along the first axis of an envelope"),
     Column("envelope_least_AXIS_AXIS", "that of the axes", "least load at onset of all directions"),
@@ -75,11 +77,7 @@ DATASETS = (
     Column("/points/number", "", "the points"),
     Column("/points/SECTION.KEY", "that of the key", "of each point"),
     Column("/statistics/PART/COLUMN", "that of the column", "`count`, `mean`, `std`, `ci95` of each point"),
-    Column(
-        "/curves/point-K/strain",
-        "",
-        "strains at which the straight paths of a point are compared, where they rise with the load",
-    ),
+    Column("/curves/point-K/strain", "", "strains at which the straight paths of a point are compared"),
     Column("/curves/point-K/Sij", STRESS, "stresses there, a row for each realisation"),
     Column("/curves/point-K/Sij_PART", STRESS, "`mean`, `std`, `ci95` of these"),
 )

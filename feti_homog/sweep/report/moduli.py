@@ -24,6 +24,7 @@ from feti_homog.typing import Float
 FRACTION = "cell.fibre_fraction"
 PANELS = ("C11", "C33", "bulk", "shear")
 SPATIAL_PANELS = ("C11", "C33", "C44", "C66")  # of generalized plane strain
+COMMON_PANELS = ("C11", "C66")  # of that and of plane states
 FRACTIONS, MARGIN = 201, 1.05  # of the bounds: points, and how far they go beyond the largest fibre fraction
 X_FACTOR = 0.98
 
@@ -40,7 +41,7 @@ class PanelBounds:
 def panels_of(table: SweepTable) -> tuple[str, ...]:
     """The outputs that are drawn; none if the cases have no moduli."""
     planes = {document["case"]["analysis"]["plane"] for document in table.finished}
-    names = SPATIAL_PANELS if planes == {"generalized"} else PANELS
+    names = SPATIAL_PANELS if planes == {"generalized"} else COMMON_PANELS if "generalized" in planes else PANELS
     return names if all(name in table.outputs for name in names) else ()
 
 

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from feti_homog.mechanics.voigt import (
-    SPATIAL_STIFFNESSES,
     SPATIAL_STRAINS,
     SPATIAL_STRESSES,
-    STIFFNESSES,
     STRESSES,
     voigt_names,
 )
@@ -20,29 +18,40 @@ from feti_homog.output.text import point_tables
 Document = Mapping[str, Any]
 
 
-def outputs(document: Document) -> dict[str, float]:
-    """The numbers of a result.json by the names of the table's columns."""
+IN_THE_PLANE, IN_SPACE = (1, 2, 3), (1, 2, 6)
+"""The numbers i and j in the names Cij of a plane state: its own, and those of the same strains in space."""
+
+
+def numbers(planes: Iterable[str | None]) -> tuple[int, ...]:
+    """Those of a sweep over these plane states: where some cases are in space, Cij is the same entry of all."""
+    return IN_SPACE if "generalized" in planes else IN_THE_PLANE
+
+
+def outputs(document: Document, numbers: Sequence[int] = IN_THE_PLANE) -> dict[str, float]:
+    """The numbers of a result.json by the names of the table's columns; `numbers` of strains in the plane, in names."""
     cell, solver = document["cell"], document["solver"]
     found = {"fraction_meshed": cell["fibre_fraction"], "elements": cell["elements"], "nodes": cell["nodes"]}
     found |= {name: solver[name] for name in ("ranks", "subdomains", "dofs", "multipliers")}
     found |= {"iterations": sum(solver["iterations"])}
     for name, suffix in (("effective_stiffness", ""), ("effective_stiffness_compression", "_compression")):
-        found |= {f"{entry}{suffix}": value for entry, value in _entries(document.get(name, ())).items()}
+        found |= {f"{entry}{suffix}": value for entry, value in _entries(document.get(name, ()), numbers).items()}
     found |= _thermal(document)
     found |= _anisotropy(document.get("effective_stiffness"))
     for section in ("moduli", "constants", "transversely_isotropic"):
         found |= {name: value for name, value in document.get(section, {}).items() if value is not None}
-    found |= _bounds(document.get("bounds", {}))
-    found |= _angles(document.get("angle", ())) | _path(document.get("path", ())) | _load(document.get("load", {}))
+    found |= _bounds(document.get("bounds", {}), numbers)
+    found |= _angles(document.get("angle", ()), numbers) | _path(document.get("path", ()))
+    found |= _load(document.get("load"))
     found |= _envelope(document)
     found |= {f"check_{name}": error for name, error in document["checks"].items()}
     found |= {f"seconds_{stage}": took for stage, took in document["timings"].items()}
     return {name: float(value) for name, value in (found | {"memory": document["memory"]}).items()}
 
 
-def _entries(stiffness: Any) -> dict[str, float]:
-    """C11, C12, ... of a stiffness (3, 3) or (6, 6); none of an empty one."""
-    names = SPATIAL_STIFFNESSES if len(stiffness) == len(SPATIAL_STRESSES) else STIFFNESSES
+def _entries(stiffness: Any, numbers: Sequence[int]) -> dict[str, float]:
+    """C11, C12, ... of a stiffness (6, 6), or (3, 3) with the `numbers`; none of an empty one."""
+    rows = range(1, 7) if len(stiffness) == len(SPATIAL_STRESSES) else numbers
+    names = [f"C{i}{j}" for i in rows for j in rows]
     return dict(zip(names, np.ravel(stiffness).tolist(), strict=False))
 
 
@@ -78,19 +87,22 @@ def _anisotropy(stiffness: Any) -> dict[str, float]:
     }
 
 
-def _bounds(bounds: Document) -> dict[str, float]:
-    sides = {f"C{i + 1}{i + 1}_{side}": bounds[side][i][i] for side in ("reuss", "voigt") if bounds for i in range(3)}
+def _bounds(bounds: Document, numbers: Sequence[int]) -> dict[str, float]:
+    sides = {
+        f"C{i}{i}_{side}": bounds[side][k][k] for side in ("reuss", "voigt") if bounds for k, i in enumerate(numbers)
+    }
     for modulus, pair in ((bounds.get("hashin_shtrikman") or {}) if bounds else {}).items():
         sides |= {f"{modulus}_lower": pair[0], f"{modulus}_upper": pair[1]}
     return sides
 
 
-def _angles(points: Sequence[Document]) -> dict[str, float]:
+def _angles(points: Sequence[Document], numbers: Sequence[int]) -> dict[str, float]:
     found: dict[str, float] = {}
     for point in points:
-        values = (
-            _entries(point["stiffness"]) if "stiffness" in point else dict(zip(STRESSES, point["stress"], strict=True))
-        )
+        if "stiffness" in point:
+            values = _entries(point["stiffness"], numbers)
+        else:
+            values = dict(zip(STRESSES, point["stress"], strict=True))
         found |= {f"angle_{point['angle']:g}_{name}": value for name, value in values.items()}
     return found
 
@@ -100,21 +112,22 @@ def _path(points: Sequence[Document]) -> dict[str, float]:
     if not points:
         return {}
     stress = np.array([point["stress"] for point in points])
-    names = voigt_names(stress.shape[1])[1]
-    peak = stress[np.abs(stress).argmax(axis=0), range(len(names))]
-    found = {"onset_load_factor": points[0]["load_factor"], "dissipated": points[-1]["dissipated"]}
+    strains, stresses = voigt_names(stress.shape[1])
+    peak = stress[np.abs(stress).argmax(axis=0), range(len(stresses))]
+    found = {"onset_load_factor": points[0]["load_factor"]}
+    found |= {name: points[-1][name] for name in ("dissipated", "work")}
     for place, values in (("onset", stress[0]), ("peak", peak), ("end", stress[-1])):
-        found |= {f"{place}_{name}": value for name, value in zip(names, values.tolist(), strict=True)}
-    strains = voigt_names(stress.shape[1])[0]
-    found |= {f"end_{name}": value for name, value in zip(strains, points[-1]["strain"], strict=True)}
+        found |= {f"{place}_{name}": value for name, value in zip(stresses, values.tolist(), strict=True)}
+    for place, point in (("onset", points[0]), ("end", points[-1])):
+        found |= {f"{place}_{name}": value for name, value in zip(strains, point["strain"], strict=True)}
     return found | {f"end_{state}": points[-1][state] for state in point_tables.STATES}
 
 
-def _load(state: Document) -> dict[str, float]:
-    """Strains, stresses and energy under a single load, and what is debonded."""
-    if not state:
+def _load(point: Document | None) -> dict[str, float]:
+    """Strains, stresses and energy of the equilibrium under one load, and the interface nodes."""
+    if point is None:
         return {}
-    strains, stresses = voigt_names(len(state["strain"]))
-    found = dict(zip(strains, state["strain"], strict=True)) | dict(zip(stresses, state["stress"], strict=True))
-    found |= {name: state[name] for name in ("stored", "debonded_share", *point_tables.STATES)}
-    return {f"load_{name}": value for name, value in found.items()}
+    names = zip(voigt_names(len(point["strain"])), (point["strain"], point["stress"]), strict=True)
+    values = {name: value for keys, found in names for name, value in zip(keys, found, strict=True)}
+    values |= {name: point[name] for name in ("stored", *point_tables.STATES)}
+    return {f"load_{name}": value for name, value in values.items()}

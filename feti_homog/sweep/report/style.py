@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from feti_homog.output.plots.plot_helpers import unit_label
+from feti_homog.mechanics.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES
+from feti_homog.output.plots.plot_helpers import strain_symbols, unit_label
 from feti_homog.sweep.report.series import Series
 from feti_homog.sweep.report.sweep_table import SweepTable
 from feti_homog.typing import Float
@@ -21,8 +22,11 @@ NAMES = {
     **{name: f"$C_{{{name[1:]}}}$" for name in ("C33", "C44", "C66")},
     "bulk": "plane bulk modulus $k$",
     "shear": "shear modulus $\\mu$",
-    "onset_S11": "$\\Sigma_{11}$ at the first break",
-    "peak_S11": "largest $\\Sigma_{11}$",
+    **{f"onset_{name}": f"$\\Sigma_{{{name[1:]}}}$ at the first break" for name in SPATIAL_STRESSES},
+    **{f"peak_{name}": f"largest $\\Sigma_{{{name[1:]}}}$" for name in SPATIAL_STRESSES},
+    **{
+        f"end_{name}": f"${symbol}$ at the end" for name, symbol in zip(SPATIAL_STRAINS, strain_symbols(6), strict=True)
+    },
 }
 
 Baseline = Callable[[Float], Float]
@@ -60,8 +64,8 @@ def plot_series(
 
 def label_axes(axes: Axes, name: str, table: SweepTable, xlabel: str) -> None:
     """Labels, a faint grid, no box."""
-    unit = unit_label(table.stress_unit) or "(unit of the moduli)"
-    axes.set(xlabel=xlabel, ylabel=f"{NAMES.get(name, name)} {unit}")
+    unit = "" if name.startswith("end_") else unit_label(table.stress_unit) or "(unit of the moduli)"
+    axes.set(xlabel=xlabel, ylabel=f"{NAMES.get(name, name)} {unit}".rstrip())
     axes.grid(color="0.92", linewidth=0.6)
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)

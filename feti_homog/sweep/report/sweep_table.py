@@ -79,21 +79,17 @@ class SweepTable:
         return ", ".join(_in_words(name.replace("_", " "), value) for name, value in values if value is not None)
 
     def curves(self, point: int) -> tuple[Float, Float]:
-        """Strains (g,), g = CURVE_POINTS, and stresses of each finished realisation there, (n, g, 3), of generalized
-        plane strain (n, g, 6).
+        """Strains (g,), g = CURVE_POINTS, and the c stresses of each finished realisation there, (n, g, c).
 
-        Both are empty if the cases are no straight paths whose leading strain rises with the load.
+        Both are empty if the cases are no straight paths, or none whose strain rises with the load.
         """
         paths = [path for path in map(response.rising_strain, self.results_of(point)) if path is not None]
         if not paths:
             return np.zeros(0), np.zeros((0, 0, 3))
         strain = np.linspace(0.0, min(path[-1, -1] for path in paths), CURVE_POINTS)
-        curves = [[np.interp(strain, path[:, -1], stress) for stress in path[:, :-1].T] for path in paths]
-        return strain, np.array(curves).swapaxes(1, 2)
-
-    def leading(self, point: int) -> int:
-        """The component that the paths of a point are about."""
-        return response.leading_component(next(d for d in self.results_of(point) if d.get("path")))
+        stresses = range(paths[0].shape[1] - 1)
+        found = np.array([[np.interp(strain, p[:, -1], p[:, k]) for k in stresses] for p in paths])
+        return strain, found.swapaxes(1, 2)
 
 
 def _in_words(name: str, value: Any) -> str:

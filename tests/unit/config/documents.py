@@ -168,7 +168,7 @@ def documents(draw: st.DrawFn) -> dict[str, Any]:
         strain = {} if plane == "generalized" else draw(optional(strain=NONZERO_STRAINS))
         document["angle"] = {"values": draw(OPENINGS)} | strain
     expand = all(not {"expansion", "expansion_axial"}.isdisjoint(constants) for constants in phases.values())
-    along = {"axial_strength": POSITIVE, "axial_stiffness": POSITIVE} if plane == "generalized" else {}
+    along = dict.fromkeys(("axial_strength", "axial_stiffness"), strength) if plane == "generalized" else {}
     if analysis == "envelope":
         document["envelope"] = draw(envelopes(plane, expand))
         interface |= {"contact": False, "normal_strength": draw(POSITIVE)}

@@ -84,9 +84,13 @@ FAULTY_ENVELOPES: dict[str, tuple[str, tuple[str, ...]]] = {
         ended(f"[interface]\ndebonded = [{ARC}]\naxial_strength = 3.0\n"),
         ('[interface] axial_strength = 3.0: belongs to [analysis] type = "path" or "envelope", not "stiffness"',),
     ),
-    "axial_strength_infinite": (
-        envelope('["S11", "S33"]', bonds=f"{BONDS}\naxial_strength = inf", state="generalized"),
-        ("[interface] axial_strength = inf: expected a number above 0",),
+    "axial_strength_zero": (
+        envelope('["S11", "S33"]', bonds=f"{BONDS}\naxial_strength = 0", state="generalized"),
+        ("[interface] axial_strength = 0: expected a positive number, or inf",),
+    ),
+    "axial_strength_infinite_and_no_other": (
+        envelope('["S11", "S33"]', bonds="[interface]\naxial_strength = inf", state="generalized"),
+        ("[interface] normal_strength, tangential_strength, axial_strength: missing; ",),
     ),
     "axial_stiffness_in_the_plane": (
         ended("[interface]\nnormal_stiffness = 3.0\naxial_stiffness = 3.0\n"),

@@ -1,11 +1,14 @@
-"""The names of loads in [envelope], [path] and [load]."""
+"""The names of strains in case files and results against those of the problems that are solved."""
 
 from __future__ import annotations
 
-from feti_homog.config import load_names
-from feti_homog.mechanics import voigt
+from feti_homog.config.load_names import SPATIAL_STRAINS, STRAINS
+from feti_homog.fem.problem import AXIAL, GENERALIZED, PLANE
+from feti_homog.homogenization.phase_laws import AXIAL_SHEAR, IN_PLANE
 
 
-def test_names_are_those_of_results():
-    for name in ("STRAINS", "STRESSES", "SPATIAL_STRAINS", "SPATIAL_STRESSES"):
-        assert getattr(load_names, name) == getattr(voigt, name)
+def test_names_are_those_of_the_unit_loads():
+    assert PLANE.loads == STRAINS
+    assert GENERALIZED.loads[: GENERALIZED.stresses] == tuple(SPATIAL_STRAINS[place] for place in IN_PLANE)
+    assert AXIAL.loads == tuple(SPATIAL_STRAINS[place] for place in AXIAL_SHEAR)
+    assert sorted(IN_PLANE + AXIAL_SHEAR) == list(range(6))

@@ -74,6 +74,9 @@ VALID_CASES = {
         state="generalized",
         bonds="[interface]\naxial_strength = 3.0\naxial_stiffness = 2.0",
     ),
+    "envelope of bonds that nothing along the fibres breaks": envelope(
+        '["S33", "S13"]', state="generalized", bonds=f"{BONDS}\naxial_strength = inf\naxial_stiffness = inf"
+    ),
     "envelope after cooling": fibre("young = 3\npoisson = 0.3\nexpansion = 2e-5\n")
     .replace("poisson = 0.299", "poisson = 0.299\nexpansion = 1e-5")
     .replace('"strain"', '"generalized"')

@@ -2,13 +2,42 @@
 
 from __future__ import annotations
 
-import pytest
+from dataclasses import replace
 
+import pytest
+from support.cases import FIBRE, MATRIX, make_case
+
+from feti_homog.config.interface_section import Arc, InterfaceSection
+from feti_homog.config.sections import Angle
 from feti_homog.homogenization import cost_model
+from feti_homog.homogenization.phase_laws import problems
 
 
 def estimate(dofs=(100_000,), subdomains=(9,), bodies=9, applications=36):
-    return cost_model.estimate(dofs, subdomains, 10_000, bodies, applications)
+    return cost_model.estimate([n // 2 for n in dofs], subdomains, 10_000, bodies, {2: applications})
+
+
+def solves(case, problem):
+    return cost_model.applications(case, problem) / cost_model.ITERATIONS_OF_A_SOLVE
+
+
+def test_all_unit_loads_of_both_problems_are_counted():
+    strain, space = make_case(), make_case(plane="generalized")
+    expanding = [phase | {"expansion": 1e-5} for phase in (MATRIX, FIBRE)]
+    heated = make_case(plane="generalized", matrix=expanding[0], fibre=expanding[1])
+    counts = [[solves(case, problem) for problem in problems(case)] for case in (strain, space, heated)]
+    assert counts == [[3], [4, 2], [5, 2]]
+    angles = replace(heated, analysis=replace(heated.analysis, type="angle"), angle=Angle(values=(0.0, 30.0, 60.0)))
+    assert [solves(angles, problem) for problem in problems(angles)] == [15, 6]
+    # Under plus and minus each load; along the fibres nothing touches.
+    arcs = InterfaceSection(debonded=(Arc(fibre="all", angle=60.0),))
+    touching = [solves(replace(heated, interface=arcs), problem) for problem in problems(heated)]
+    assert touching == [2 * 5 * cost_model.SOLVES_OF_A_CONTACT, 2]
+
+
+def test_a_problem_more_takes_more():
+    one, both = (cost_model.estimate([50_000], [9], 10_000, 99, counts) for counts in ({2: 60}, {2: 60, 1: 40}))
+    assert one.seconds < both.seconds < 2 * one.seconds and one.memory < both.memory and one.ranks < both.ranks
 
 
 def test_more_work_takes_more_time_and_memory():

@@ -13,7 +13,7 @@ from scipy import stats
 
 from feti_homog.output.text.units import unit, with_unit
 from feti_homog.sweep.report import figures, tables
-from feti_homog.sweep.report.outputs import outputs
+from feti_homog.sweep.report.outputs import numbers, outputs
 from feti_homog.sweep.report.series import series_over
 from feti_homog.sweep.report.statistics import Statistics
 from feti_homog.sweep.report.sweep_table import SweepTable
@@ -99,6 +99,23 @@ def test_tables_hold_cases_and_statistics_of_points(tmp_path):
         assert file["points/cell.fibre_fraction"][()].tolist() == [0.2, 0.4]
         assert file["outputs/seconds_solve"].attrs["unit"] == "s"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["sweep.csv", "sweep.h5"]
+
+
+def test_entries_beside_cases_in_space_have_the_names_of_space(tmp_path):
+    """The third strain of the plane is the sixth of space."""
+    plane = document(0.4, 8, 0.0)
+    plane["effective_stiffness_compression"] = 2 * plane["effective_stiffness"]
+    plane["bounds"] = {side: plane["effective_stiffness"] for side in ("reuss", "voigt")}
+    plane["angle"] = [{"angle": 30.0, "stiffness": plane["effective_stiffness"]}]
+    space = document(0.4, 8, 0.0) | {"effective_stiffness": np.arange(36.0).reshape(6, 6), "moduli": {}}
+    space["case"]["analysis"]["plane"] = "generalized"
+    own = numbers(["strain", "generalized"])
+    found, beside = outputs(plane, own), outputs(space, own)
+    assert (found["C66"], found["C66_compression"], found["angle_30_C66"], found["C66_voigt"]) == (35, 70, 35, 35)
+    assert (beside["C66"], beside["C33"]) == (35, 14) and not [name for name in found if "C33" in name or "C13" in name]
+    for alone in (["strain", "stress"], [None, None]):
+        assert outputs(plane, numbers(alone)) == outputs(plane)
+    assert (outputs(plane)["C33"], outputs(plane)["C33_reuss"], outputs(space)["C33"]) == (35, 35, 14)
 
 
 @pytest.mark.slow

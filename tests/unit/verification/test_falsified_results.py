@@ -15,7 +15,7 @@ from support.falsifications import (
     shift,
     swap_rows,
 )
-from support.verified_results import CASES, falsified
+from support.verified_results import CASES, LOADS, MIXED_PATHS, falsified
 
 from feti_homog.verification.certificate import verify
 from feti_homog.verification.discrete_cell import DiscreteCell, gradient
@@ -23,7 +23,7 @@ from feti_homog.verification.reading import opened
 
 MATERIAL = {"stress", "stress 33", "equilibrium", "mean stress", "Hill"}
 SPRINGS = {"bond", "penetration", "complementarity"}
-PATHS = ("path", "thinned", "peaks", "energy", "springs' energy", "increments")
+PATHS = ("path", "thinned", "peaks", "energy", "springs' energy", "increments", *MIXED_PATHS)
 SPATIAL = ("spatial", "spatial contact", "spatial springs")
 ENVELOPES = ("envelope", "envelope by energy", "envelope in space")
 MATERIAL_33 = MATERIAL | {"bounds", "shown"}
@@ -35,8 +35,9 @@ def test_results_obey_every_law(results, kind):
     assert certificate.holds, certificate.text
     told = {finding.law.name for finding in certificate.findings}
     assert told >= {"stress", "equilibrium", "periodicity", "jump", "mean stress", "Hill", "load", "tables", "cell"}
-    assert ("penetration" in told) == (kind not in ("bonded", "plane", "overlap", *SPATIAL[::2], *ENVELOPES))
-    assert ("energy" in told) == (kind in (*PATHS, "loaded angle"))
+    assert ("penetration" in told) == (kind not in ("bonded", "plane", "overlap", "load", *SPATIAL[::2], *ENVELOPES))
+    assert ("energy" in told) == (kind in (*PATHS, *LOADS, "loaded angle"))
+    assert ("stress load" in told) == (kind in (*MIXED_PATHS, *LOADS))
     assert ("strength" in told) == (kind in (*PATHS, *ENVELOPES[::2])) and ("onset" in told) == (kind in ENVELOPES)
     assert ("moduli" in told) == (kind in ("bonded", "plane", "spatial", ENVELOPES[2]))
     assert ("compliance" in told) == (kind in (*SPATIAL[:2], ENVELOPES[2]))

@@ -1,0 +1,89 @@
+"""What the case of a result prescribes: of every component its strain or its stress, and a temperature.
+
+Components are those of strain, 3 or 6, and last in generalized plane strain a change of temperature, of which the
+strain is given.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from feti_homog.typing import Bool, Float
+
+NAMES = {
+    3: (("E11", "E22", "gamma12"), ("S11", "S22", "S12")),
+    6: (("E11", "E22", "E33", "gamma23", "gamma13", "gamma12"), ("S11", "S22", "S33", "S23", "S13", "S12")),
+}
+TEMPERATURE = "temperature"
+# Shares of a leg that are not told apart.
+SAME_SHARE = 1e-12
+
+Document = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Prescribed:
+    """A load: the values (n,) of its components, and of which (n,) the stress is given."""
+
+    values: Float
+    by_stress: Bool
+
+    @classmethod
+    def strain(cls, strain: Float, temperature: float) -> Prescribed:
+        """A strain (v,) and a change of temperature, which only generalized plane strain has."""
+        values = np.array([*strain, temperature] if len(strain) > 3 else strain, float)
+        return cls(values, np.zeros(len(values), bool))
+
+
+def targets(case: Document) -> list[Prescribed]:
+    """The loads that a case names, each in full: what one does not name stays, and is at first free of stress."""
+    v = 6 if case["analysis"]["plane"] == "generalized" else 3
+    n = v + (v > 3)
+    strains, stresses = NAMES[v]
+    places = {name: (k, False) for k, name in enumerate([*strains, TEMPERATURE][:n])}
+    places |= {name: (k, True) for k, name in enumerate(stresses)}
+    values, by_stress, found = np.zeros(n), np.arange(n) < v, []
+    for load in _given(case):
+        values, by_stress = values.copy(), by_stress.copy()
+        for name, value in (load if isinstance(load, Mapping) else dict(zip(strains, load, strict=True))).items():
+            place, by_stress[places[name][0]] = places[name]
+            values[place] = value
+        found.append(Prescribed(values, by_stress))
+    return found
+
+
+def _given(case: Document) -> Sequence[Any]:
+    """The loads as they stand in the case: strains, or tables of names."""
+    if "load" in case:
+        return [case["load"]["to"]]
+    path = case["path"]
+    single = [path[name] for name in ("strain", "to") if path.get(name)]
+    return path.get("waypoints") or single
+
+
+def at_points(case: Document, points: Sequence[Document]) -> Iterator[Prescribed]:
+    """What is prescribed at every point of a path: on the first leg a share of its end; later legs are straight from
+    what was prescribed last to their end, a component that changes its kind from what the last point has of it."""
+    ends, leg, ended = targets(case), 0, False
+    by_events = case["path"]["method"] == "events"
+    start, last = np.zeros(len(ends[0].values)), None
+    for point in points:
+        along = float(point["load_factor"]) * len(ends)
+        while leg < len(ends) - 1 and (ended or along > leg + 1 + SAME_SHARE):
+            before, end, leg, ended = ends[leg], ends[leg + 1], leg + 1, False
+            same = before.by_stress == end.by_stress
+            start = before.values if last is None else np.where(same, before.values, _values(last, end.by_stress))
+        share = along - leg
+        yield Prescribed((1 - share) * start + share * ends[leg].values, ends[leg].by_stress)
+        # After the last break at a waypoint comes its own point, at which nothing breaks.
+        ended, last = abs(share - 1) <= SAME_SHARE and not (by_events and point["broke"]), point
+
+
+def _values(point: Document, by_stress: Bool) -> Float:
+    """What a point has of components (n,): its strains and temperature, or its stresses."""
+    strain, stress = ([*point[name], point.get(TEMPERATURE, 0.0)][: len(by_stress)] for name in ("strain", "stress"))
+    return np.where(by_stress, stress, strain)

@@ -1,0 +1,22 @@
+"""Results of mixed loads, in the plane and in space, obey every law on any number of ranks."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from support.ranks import parallel_assert
+from support.verified_results import LOADS, MIXED_PATHS, document
+
+from feti_homog import Case, run
+from feti_homog.verification.certificate import verify
+
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
+
+
+@pytest.mark.parametrize("kind", [*MIXED_PATHS, *LOADS])
+def test_mixed_loads_obey_every_law(comm: Any, shared_path: Path, kind: str) -> None:
+    run(Case.parse(document(kind)), comm, out=shared_path / "out")
+    certificate = verify(shared_path / "out") if comm.rank == 0 else None
+    parallel_assert(comm, certificate is None or certificate.holds, certificate and certificate.text)
