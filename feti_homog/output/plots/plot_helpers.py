@@ -174,9 +174,14 @@ def load_label(attributes: Any, in_line: int = LOADS_IN_LINE) -> str:
     symbols = strain_symbols(len(strain))
     loads = [(symbols[k], float(strain[k])) for k in components_above(FAINT, strain[None])]
     loads += [(r"\Delta T", temperature)] * (temperature != 0.0)
-    words = [f"${name} = {{{value:.4g}}}$" for name, value in loads]
+    words = [f"${name} = {_in_formula(value)}$" for name, value in loads]
     lines = [", ".join(words[k : k + in_line]) for k in range(0, len(words), in_line)]
     return ",\n".join(lines) or "no strain"
+
+
+def _in_formula(value: float) -> str:
+    mantissa, _, exponent = f"{value:.4g}".partition("e")
+    return f"{{{mantissa}}}" + (rf" \cdot 10^{{{int(exponent)}}}" if exponent else "")
 
 
 def strain_symbols(count: int) -> tuple[str, ...]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-NAME, COLUMN = 22, 12
-THIS_CELL, LOWER, UPPER = "this cell", "lower bound", "upper bound"
+NAME, COLUMN, ABREAST = 22, 12, 5  # columns of the names and of each number; constants beside each other
+THIS_CELL, LOWER, UPPER, UNKNOWN = "this cell", "lower bound", "upper bound", "-"
 SHORT = {
     "E_axial": "E axial",
     "E_transverse": "E transv.",
@@ -37,17 +37,19 @@ def _constants(constants: Document | None, unit: str) -> list[str]:
 
 
 def _estimates(document: Document, unit: str) -> list[str]:
-    """A row for each source that tells a constant, a column for each constant that one of them tells."""
+    """A row for each source that tells a constant, a column for each constant that one of them tells; of many constants
+    one table below the other."""
     cell = document.get("transversely_isotropic")
     if cell is None:
         return []
     names, rows = comparison(document)
-    lines = [
-        f"Along the fibres and across them{unit}; {100 * cell['deviation']:.2g} % from transversely isotropic",
-        " " * NAME + "".join(f"{SHORT[name]:>{COLUMN + 1}}" for name in names),
-    ]
-    for title, numbers in rows:
-        lines.append(f"  {title:<{NAME - 2}}" + "".join(f"{number:>{COLUMN + 1}}" for number in numbers))
+    lines = [f"Along the fibres and across them{unit}; {100 * cell['deviation']:.2g} % from transversely isotropic"]
+    for first in range(0, len(names), ABREAST):
+        part = slice(first, first + ABREAST)
+        lines.append(" " * NAME + "".join(f"{SHORT[name]:>{COLUMN + 1}}" for name in names[part]))
+        told = [(title, numbers[part]) for title, numbers in rows if set(numbers[part]) != {UNKNOWN}]
+        for title, numbers in told:
+            lines.append(f"  {title:<{NAME - 2}}" + "".join(f"{number:>{COLUMN + 1}}" for number in numbers))
     return lines
 
 
@@ -71,4 +73,4 @@ def _known(row: Document) -> dict[str, Any]:
 
 
 def _number(value: float | None) -> str:
-    return "-" if value is None else f"{value:.5g}"
+    return UNKNOWN if value is None else f"{value:.5g}"

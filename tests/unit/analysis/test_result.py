@@ -50,6 +50,7 @@ def path_point(load: float) -> PathPoint:
         stress=STIFFNESS @ strain,
         broke=1,
         free_motions=0,
+        work=0.9,
         dissipated=0.5,
         dissipated_strain_controlled=0.6,
         stored=0.4,
@@ -65,7 +66,7 @@ def path_point(load: float) -> PathPoint:
 def made(kind: str, **answer: Any) -> Result:
     case = {"name": "a", "analysis": {"type": kind, "plane": "strain"}, "output": {"stress_unit": "GPa"}}
     if kind == "path":
-        case["path"] = {"method": "events"}
+        case["path"] = {"method": "events", "strain": [1.0, 0.0, 0.0]}
     if "tips" in answer:
         case["interface"] = {"contact": True}
     return Result(

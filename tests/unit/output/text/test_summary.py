@@ -146,19 +146,21 @@ def test_an_angle_is_a_table_of_stiffnesses() -> None:
 def test_a_path_is_a_table_of_chosen_points() -> None:
     points = [
         counted(100 - k, load_factor=0.01 * k, strain=[0, -2e-3 * k, 1e-5], stress=[1e-15, -3.5 * k, -2.0], broke=1,
-                dissipated=0.5 * k, dissipated_strain_controlled=0.6 * k, stored=0.7 * k, stored_in_springs=0.1 * k,
+                dissipated=0.5 * k, dissipated_strain_controlled=0.6 * k, stored=0.7 * k, work=1.2 * k, stored_in_springs=0.1 * k,
                 fracture_energy=0.4 * k, dissipation_ratio=1.25, debonded_share=0.005 * k)
         for k in range(101)
     ]  # fmt: skip
     document = changed(path=points, kkt_tolerance=1e-6)
     del document["effective_stiffness"], document["moduli"], document["bounds"]
     document["case"]["analysis"]["type"] = "path"
+    document["case"]["path"] = {"strain": [0.0, -0.2, 1e-3]}
     document["checks"] |= {"kkt_tension": 9e-7, "kkt_penetration": 2e-6}
     document["solver"] |= {"iterations": [*range(5, 30)], "factorizations": 3, "coarse_factorizations": 30}
     text = summary(document)
     assert max(map(len, text.splitlines())) < 80
     assert "101 points, 15 shown; 101 bonds broke" in text
     assert line(text, "Dissipated").endswith("per area (GPa): 50 along all equilibria, 60 if the strain only rises")
+    assert line(text, "Work") == "Work per area (GPa): 120"
     assert line(text, "Stored").endswith("per area (GPa): 70, 10 of it in springs")
     assert line(text, "Toughness").endswith("per area (GPa): 40; 1.2500 times it was dissipated")
     assert line(text, "Debonded") == "Debonded: 50.0 % of the interfaces"
