@@ -24,6 +24,11 @@ class Macroscopic:
     strain: Float
     stress: Float
 
+    @property
+    def stored(self) -> float:
+        """E.Sigma / 2."""
+        return 0.5 * float(self.strain @ self.stress)
+
     def scaled(self, factor: float) -> Macroscopic:
         """The state under `factor` times the load."""
         return Macroscopic(factor * self.strain, factor * self.stress)

@@ -43,9 +43,12 @@ class PathState:
     broken: float | None = None
 
     def energies_to(self, here: Macroscopic) -> Energies:
-        """Those of the way from the last point's state to one under the load at which this stands."""
+        """Those of the way from the last point's state to one under the load at which this stands.
+
+        The response between them may bend where contact changes, but that loses nothing: the work is what is stored or
+        lost."""
         lost = 0.0 if self.broken is None else self.last.released_to(here)
-        return Energies(self.last.work_to(here), lost, self.broken or 0.0)
+        return Energies(here.stored - self.last.stored + lost, lost, self.broken or 0.0)
 
 
 class Energies(NamedTuple):
