@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.config.load_names import TEMPERATURE
-from feti_homog.config.mixed_load import MixedLoad, completed, components
+from feti_homog.config.mixed_load import MixedLoad, Strain, completed, components, first_named
 from feti_homog.typing import Float
 
 SAME_LOAD = 1e-9  # load factors that differ by less, relatively, are one
@@ -26,14 +26,24 @@ Document = Mapping[str, Any]
 
 def targets(document: Document) -> tuple[dict[str, float], ...]:
     """The waypoints of a path, or the one load, in full: by name the strain or the stress of each component."""
-    case = document["case"]
-    section = case.get("path") or case["load"]
-    given = section.get("waypoints") or [section[name] for name in ("strain", "to") if name in section]
-    loads = [MixedLoad(**load) if isinstance(load, Mapping) else tuple(load) for load in given]
-    return completed(loads, case["analysis"]["plane"])
+    return completed(_given(document), document["case"]["analysis"]["plane"])
 
 
 def named_components(document: Document) -> list[int]:
+    """The components that the waypoints name, in Voigt order."""
+    loads = _given(document)
+    first = first_named(loads, document["case"]["analysis"]["plane"])
+    return [component for component, number in enumerate(first.values()) if number < len(loads)]
+
+
+def _given(document: Document) -> list[Strain | MixedLoad]:
+    """The loads as the case gives them."""
+    section = document["case"].get("path") or document["case"]["load"]
+    given = section.get("waypoints") or [section[name] for name in ("strain", "to") if name in section]
+    return [MixedLoad(**load) if isinstance(load, Mapping) else tuple(load) for load in given]
+
+
+def changed_components(document: Document) -> list[int]:
     """The components that the waypoints change, in Voigt order."""
     pairs, found = components(document["case"]["analysis"]["plane"]), set[int]()
     before: Mapping[str, float] = {stress: 0.0 for _, stress in pairs}
@@ -49,8 +59,8 @@ def leading_component(document: Document) -> int:
     """Of the components that the waypoints of a path change the one of the largest strain; of all if they change but
     the temperature."""
     largest = np.abs([point["strain"] for point in document["path"]]).max(axis=0)
-    named = named_components(document) or list(range(len(largest)))
-    return named[int(largest[named].argmax())]
+    changed = changed_components(document) or list(range(len(largest)))
+    return changed[int(largest[changed].argmax())]
 
 
 def components_above(share: float, values: Float) -> list[int]:

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from markdown_text import code, page, table
 
 from feti_homog.analysis.result import schema_keys
-from feti_homog.analysis.result_records import AnglePoint, EnvelopePoint, PathPoint
+from feti_homog.analysis.result_records import AnglePoint, EnvelopePoint, LoadPoint, PathPoint
 from feti_homog.output.files.csv_tables import Column, columns
 from feti_homog.output.files.field_layout import Item, items
 from feti_homog.output.files.spatial_layout import spatial_items
@@ -46,6 +46,7 @@ def results() -> str:
     spatial = _fields(spatial_items())
     parts = ["# Results", INTRODUCTION, "## result.json", JSON, keys, "## result.h5", HDF5, fields, SPATIAL, spatial]
     parts += ["## angle.csv", _columns(columns(AnglePoint)), "## path.csv", _columns(columns(PathPoint))]
+    parts += ["## load.csv", _columns(columns(LoadPoint))]
     parts += ["## envelope.csv", _columns(columns(EnvelopePoint))]
     parts += ["## sweep.csv", SWEEP_CSV, _columns(COLUMNS), "## sweep.h5", _columns(DATASETS, "dataset")]
     return page(*parts)

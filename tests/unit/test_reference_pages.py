@@ -74,6 +74,22 @@ CASES = {
         "interface": HALF_OPEN | ENERGY,
         "path": {"strain": STRAIN},
     },
+    "path in space": {
+        "analysis": SPACE | {"type": "path"},
+        "material": WARM,
+        "interface": {"normal_strength": 1.0},
+        "path": {"waypoints": [{"temperature": -1.0}, {"S22": 0.01, "S13": 0.01}]},
+    },
+    "load": {
+        "analysis": {"type": "load", "plane": "strain"},
+        "interface": HALF_OPEN,
+        "load": {"to": {"E11": 0.01}},
+    },
+    "load in space": {
+        "analysis": SPACE | {"type": "load"},
+        "material": WARM,
+        "load": {"to": {"S22": 0.01, "S13": 0.01, "temperature": -1.0}},
+    },
     "envelope": {
         "analysis": {"type": "envelope", "plane": "strain"},
         "interface": {"normal_strength": 1.0, "tangential_strength": 1.0},

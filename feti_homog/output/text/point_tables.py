@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from textwrap import wrap
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from feti_homog.config.load_names import TEMPERATURE
 from feti_homog.mechanics import response
 from feti_homog.mechanics.voigt import STRAINS, STRESSES, voigt_names
 
+WIDTH = 79
 ROWS = 15  # of a path's table
 COLUMNS = 5  # of its strains, stresses and the temperature
 ENTRIES = {"C11": (0, 0), "C22": (1, 1), "C12": (0, 1), "C33": (2, 2)}
@@ -130,7 +132,7 @@ def load_table(document: Mapping[str, Any], stress: str) -> list[str]:
     rows = [("strain", strain), (f"stress{stress}", sigma)]
     motions = point["free_motions"]
     return [
-        f"Equilibrium under {given}",
+        *wrap(f"Equilibrium under {given}", WIDTH),
         f"{'':<14}" + "".join(f"{name[1:]:>12}" for name in stresses),
         *(f"{label:<14}" + "".join(_number(value) for value in values) for label, values in rows),
         *_energies(point, stress),

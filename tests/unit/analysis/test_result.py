@@ -14,6 +14,7 @@ from feti_homog.analysis.result_records import (
     AnglePoint,
     CellInfo,
     Checks,
+    LoadPoint,
     PathPoint,
     SolverInfo,
     StiffnessBounds,
@@ -63,10 +64,20 @@ def path_point(load: float) -> PathPoint:
     )
 
 
+def load_point() -> LoadPoint:
+    return LoadPoint(
+        strain=np.arange(6.0), stress=np.arange(6.0, 0.0, -1.0), temperature=-100.0, free_motions=0, stored=0.4,
+        stored_in_springs=0.0, tips=TIPS, **DEBONDING, **COUNTS,
+    )  # fmt: skip
+
+
 def made(kind: str, **answer: Any) -> Result:
     case = {"name": "a", "analysis": {"type": kind, "plane": "strain"}, "output": {"stress_unit": "GPa"}}
     if kind == "path":
         case["path"] = {"method": "events", "strain": [1.0, 0.0, 0.0]}
+    if kind == "load":
+        case["analysis"]["plane"] = "generalized"
+        case["load"] = {"to": {"S22": 50.0, "temperature": -100.0}}
     if "tips" in answer:
         case["interface"] = {"contact": True}
     return Result(
@@ -101,6 +112,7 @@ RESULTS = {
     "angle with tips": made(
         "angle", angle=(AnglePoint(angle=90.0, stiffness=STIFFNESS, tips=TIPS, **DEBONDING, **COUNTS),),
     ),
+    "load": made("load", load=load_point()),
     "path": made("path", path=(path_point(0.5), path_point(1.0)), resumed=0),
 }  # fmt: skip
 
@@ -136,7 +148,7 @@ def test_descriptions_are_complete():
     assert all((key.meaning and key.type != "any") or key.path == "case.KEY" for key in described)
     by_path = {key.path: key for key in described}
     assert by_path["schema"].type == "integer" and by_path["timings.STAGE"].unit == "s"
-    assert by_path["path[].stress"].type == "numbers (3,)" and by_path["checks.hill"].type == "number"
+    assert by_path["path[].stress"].type == "numbers (3,) or (6,)" and by_path["checks.hill"].type == "number"
     assert by_path["bounds.hashin_shtrikman.bulk"].unit and by_path["solver.iterations"].type == "list of integers"
 
 
@@ -151,6 +163,13 @@ def test_columns_are_those_of_the_table(tmp_path, kind, points):
         assert written[1:7] == ["E11", "E22", "gamma12", "S11", "S22", "S12"] and "free_motions" in written
         column = written.index("dissipation_ratio")
         assert [row.split(",")[column] for row in rows] == ["", "1.25"]
+
+
+def test_columns_of_the_state_under_a_load(tmp_path):
+    header, row = csv_tables.write(tmp_path / "load.csv", [load_point()]).read_text().splitlines()
+    written = dict(zip(header.split(","), row.split(","), strict=True))
+    assert written["gamma13"] == "4.0" and written["S33"] == "4.0" and written["temperature"] == "-100.0"
+    assert "tips" not in written and written["open"] == "3"
 
 
 def test_columns_of_long_fibres(tmp_path):

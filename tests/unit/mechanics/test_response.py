@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from feti_homog.mechanics.response import (
+    changed_components,
     ends_of_legs,
     first_drop,
     first_leg,
@@ -118,9 +119,10 @@ def mixed(waypoints: Any, stresses: Any, plane: str = "generalized", **more: Any
 def test_what_a_waypoint_does_not_name_stays_and_the_components_that_change_are_named() -> None:
     path = mixed([{"temperature": -100.0}, {"S22": 60.0}, {"E22": 0.01}], [[0] * 6, [0, 60, 0, 0, 0, 0]])
     assert targets(path)[1]["temperature"] == -100.0 and targets(path)[1]["S13"] == 0.0
-    assert named_components(path) == [1] and leading_component(path) == 1
-    assert named_components(mixed({"S11": 0.0, "gamma12": 0.1}, [[0, 0, 1.0]], "strain")) == [2]
-    assert named_components(mixed([[0.1, 0, 0], {"S11": 5.0}, {"S11": 5.0, "E22": 0.1}], [[1, 0, 0]], "stress")) == [
+    assert changed_components(path) == [1] and leading_component(path) == 1
+    path = mixed({"S11": 0.0, "gamma12": 0.1}, [[0, 0, 1.0]], "strain")
+    assert changed_components(path) == [2] and named_components(path) == [0, 2]
+    assert changed_components(mixed([[0.1, 0, 0], {"S11": 5.0}, {"S11": 5.0, "E22": 0.1}], [[1, 0, 0]], "stress")) == [
         0,
         1,
     ]

@@ -54,11 +54,25 @@ def document(fraction, fibres, shift):
 def path_document(fibres, shift):
     points = [
         {"load_factor": f, "strain": [0.2 * f, 0, 0], "stress": [s + shift, s / 3, 0.0], "broke": 1,
-         "dissipated": 0.1 * f, "bonded": 9, "open": 1, "closed": 0}
+         "dissipated": 0.1 * f, "work": 0.3 * f, "bonded": 9, "open": 1, "closed": 0}
         for f, s in ((0.1, 4.0), (0.08, 2.0), (0.5, 5.0), (1.0, 8.0))
     ]  # fmt: skip
     base = document(0.4, fibres, 0.0)
     case = base["case"] | {"path": {"method": "events", "strain": [0.2, 0, 0]}}
+    del base["effective_stiffness"], base["moduli"]
+    return base | {"case": case, "path": points}
+
+
+def sheared(fibres, compliance):
+    """Under a given stress S13 in generalized plane strain: at load 0.5 the strain jumps to twice as much."""
+    points = [
+        {"load_factor": t, "strain": [0, 0, 0, 0, 4 * t * f * compliance, 0], "stress": [0, 0, 0, 0, 4 * t, 0],
+         "broke": 1, "dissipated": 0.1, "work": 0.3, "bonded": 9, "open": 1, "closed": 0}
+        for t, f in ((0.5, 1.0), (0.4, 1.5), (1.0, 2.0))
+    ]  # fmt: skip
+    base = document(0.4, fibres, 0.0)
+    case = base["case"] | {"path": {"method": "events", "to": {"S13": 4.0}}}
+    case["analysis"] = case["analysis"] | {"type": "path", "plane": "generalized"}
     del base["effective_stiffness"], base["moduli"]
     return base | {"case": case, "path": points}
 
@@ -72,6 +86,38 @@ def collected(inputs, documents, point, realisation):
         reason=[""] * len(documents), inputs=inputs, documents=documents,
         outputs={name: np.array([row.get(name, np.nan) for row in found]) for name in names},
     )  # fmt: skip
+
+
+@pytest.mark.slow
+def test_curves_of_a_given_stress_have_six_components(tmp_path):
+    documents = [sheared(fibres, e) for e in (0.1, 0.2) for fibres in (2, 4)]
+    table = collected({"cell.fibres": [2, 4, 2, 4], "cell.seed": [0, 0, 1, 1]}, documents, [1, 2, 1, 2], [1, 1, 2, 2])
+    tables.write(tmp_path, table)
+    assert table.outputs["onset_S13"].tolist() == [2.0] * 4 and table.outputs["work"].tolist() == [0.3] * 4
+    assert table.outputs["end_gamma13"].tolist() == pytest.approx([0.8, 0.8, 1.6, 1.6])
+    with h5py.File(tmp_path / "sweep.h5") as file:
+        group = file["curves/point-1"]
+        strain, stresses = group["strain"][()], group["S13"][()]
+    assert strain[-1] == pytest.approx(0.8) and stresses.shape == (2, len(strain))
+    # To the load 2 at the compliance 0.1, then a jump, then half as steep; of the other twice as soft.
+    assert np.interp([0.1, 0.3, 0.6], strain, stresses[0]) == pytest.approx([1.0, 2.0, 3.0])
+    assert np.interp([0.2, 0.6], strain, stresses[1]) == pytest.approx([1.0, 2.0])
+    assert_drawn(tmp_path, table, ["cell_size.png", "curves.png"])
+
+
+def test_the_state_under_a_load_has_columns():
+    point = {
+        "strain": [0.1, -0.02, 0.0],
+        "stress": [5.0, 0.0, 0.0],
+        "stored": 0.25,
+        "bonded": 9,
+        "open": 1,
+        "closed": 0,
+    }
+    base = document(0.4, 2, 0.0) | {"load": point}
+    found = outputs(base)
+    assert found["load_E11"] == 0.1 and found["load_S11"] == 5.0 and found["load_open"] == 1.0
+    assert unit("load_S11", "GPa") == "GPa" == unit("load_stored", "GPa") and unit("load_E11", "GPa") == ""
 
 
 def fractions():

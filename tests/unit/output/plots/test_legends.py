@@ -140,6 +140,45 @@ def test_a_path_of_small_strains_is_magnified_and_says_so(tmp_path: Path, monkey
     assert title.endswith(f"displacement × {scale:g}")
 
 
+def in_six(points: list[tuple[float, float, float]], path: dict[str, Any], **more: Any) -> dict[str, Any]:
+    """The document of a path in generalized plane strain of load factors with gamma13 and S13."""
+    counts = {"bonded": 4, "open": 3, "closed": 3, "broke": 1}
+    rows = [
+        counts | {"load_factor": t, "strain": [0, 0, 0, 0, e, 0], "stress": [1e-9, 0, 0, 0, s, 0]} | more
+        for t, e, s in points
+    ]
+    document = path_of([])
+    document["case"] |= {"analysis": {"type": "path", "plane": "generalized"}, "path": {"method": "events"} | path}
+    return document | {"path": rows}
+
+
+def test_under_a_given_shear_its_stress_alone_is_drawn_over_its_strain_at_a_rising_load() -> None:
+    document = in_six([(0.5, 1.0, 2.0), (0.4, 1.5, 1.6), (1.0, 4.0, 4.0)], {"to": {"S13": 4.0}})
+    figure = response_curves._path(document)
+    upper = figure.axes[0]
+    assert upper.get_xlabel() == r"macroscopic strain $\gamma_{13}$"
+    assert entries(figure)[:3] == [r"$\Sigma_{13}$", "all equilibria", "rising load"]
+    thick = max(upper.lines, key=lambda line: line.get_linewidth())
+    np.testing.assert_allclose(thick.get_xydata(), [[0, 0], [1, 2], [2, 2], [4, 4]])
+
+
+def test_a_change_of_temperature_has_an_axis_of_its_own() -> None:
+    points = [(0.5, 0.0, 0.0), (0.8, 1.0, 2.0), (1.0, 2.0, 3.0)]
+    figure = response_curves._path(
+        in_six(points, {"waypoints": [{"temperature": -9.0}, {"S13": 3.0}]}, temperature=-9.0)
+    )
+    labels = [axes.get_ylabel() for axes in figure.axes]
+    assert any("temperature" in label for label in labels) and "later legs" in entries(figure)
+    low, high = figure.axes[next(k for k, label in enumerate(labels) if "temperature" in label)].get_ylim()
+    assert low < -9.0 < 0.0 < high
+
+
+def test_words_of_a_load_leave_out_what_is_not_seen() -> None:
+    strain = np.array([0.02, -0.007, 3e-8, 0.0, 0.01, 6e-5])
+    lines = plot_helpers.load_label({"strain": strain, "temperature": -100.0}, 2).splitlines()
+    assert len(lines) == 3 and "33" not in "".join(lines) and r"{6} \cdot 10^{-5}" in lines[1] and "-100" in lines[2]
+
+
 def test_points_of_a_path_are_numbered_where_its_curve_folds_back(tmp_path: Path, monkeypatch: Any) -> None:
     write(tmp_path, sample(4), path_of([0.5, 0.2, 1.0]))
     upper, middle, lower = drawn(tmp_path, monkeypatch)["path.png"].axes

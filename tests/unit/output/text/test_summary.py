@@ -146,7 +146,8 @@ def test_an_angle_is_a_table_of_stiffnesses() -> None:
 def test_a_path_is_a_table_of_chosen_points() -> None:
     points = [
         counted(100 - k, load_factor=0.01 * k, strain=[0, -2e-3 * k, 1e-5], stress=[1e-15, -3.5 * k, -2.0], broke=1,
-                dissipated=0.5 * k, dissipated_strain_controlled=0.6 * k, stored=0.7 * k, work=1.2 * k, stored_in_springs=0.1 * k,
+                dissipated=0.5 * k, dissipated_strain_controlled=0.6 * k, stored=0.7 * k, stored_in_springs=0.1 * k,
+                work=1.2 * k,
                 fracture_energy=0.4 * k, dissipation_ratio=1.25, debonded_share=0.005 * k)
         for k in range(101)
     ]  # fmt: skip
@@ -172,6 +173,56 @@ def test_a_path_is_a_table_of_chosen_points() -> None:
     assert line(text, "Factorized").split(maxsplit=1)[1] == "3 subdomains, 30 coarse ones"
     assert line(text, "kkt_tension").endswith("pass") and line(text, "kkt_penetration").endswith("FAIL")
     assert "at most 1.0e-07; of contact 1.0e-06" in text
+
+
+ENERGIES = {
+    "dissipated": 1.0,
+    "dissipated_strain_controlled": 2.0,
+    "stored": 3.0,
+    "stored_in_springs": 0.0,
+    "work": 4.0,
+}
+
+
+def test_a_path_in_space_tells_what_is_named_or_there_in_100_columns() -> None:
+    strain, stress = [-0.01, 0.05, -0.001, 1e-9, 0.02, 1e-10], [1e-13, 60.0, 0.0, 0.0, 25.0, 1e-14]
+    points = [
+        counted(9 - k, load_factor=0.5 * k, strain=[k * e for e in strain], stress=[k * s for s in stress], broke=1,
+                temperature=-100.0, debonded_share=0.1) | ENERGIES
+        for k in (1, 2)
+    ]  # fmt: skip
+    document = changed(path=points)
+    document["case"]["analysis"] = {"type": "path", "plane": "generalized"}
+    document["case"]["path"] = {"waypoints": [{"temperature": -100.0}, {"S22": 120.0, "S13": 50.0}]}
+    text = summary(document)
+    assert max(map(len, text.splitlines())) <= 100
+    head = ["point", "load", "E22", "S22", "S13", "temperature", "E11", "bonded", "open", "closed"]
+    assert line(text, "point").split() == head
+    assert line(text, "1 ").split()[2:7] == ["0.1", "120", "50", "-100", "-0.02"]
+    assert "Also in path.csv: E33, gamma13" in text and "if the load only rises" in text
+
+
+def test_the_state_under_a_load_is_told() -> None:
+    point = counted(9, strain=[-0.01, 0.05, -0.001, 1e-12, 0.02, 0.0], stress=[0.0, 60.0, 0.0, 0.0, 25.0, 1e-12])
+    point |= {
+        "debonded_share": 0.125,
+        "free_motions": 2,
+        "temperature": -100.0,
+        "tips": tips_of(("strain", 3.0, 1, 60.0)),
+    }
+    document = changed(load=point | ENERGIES)
+    del document["effective_stiffness"], document["moduli"], document["bounds"]
+    document["case"]["analysis"] = {"type": "load", "plane": "generalized"}
+    document["case"]["load"] = {"to": {"S22": 60.0, "S13": 25.0, "gamma12": 0.0, "temperature": -100.0}}
+    text = summary(document)
+    assert max(map(len, text.splitlines())) <= 100 and text.startswith("pair: equilibrium under a load, plane gen")
+    assert "Equilibrium under S22 = 60, S13 = 25, gamma12 = 0, temperature = -100" in text
+    assert line(text, "stress").split() == ["stress", "(GPa)", "0", "60", "0", "0", "25", "0"]
+    assert line(text, "Stored") == "Stored per area (GPa): 3" and line(text, "Debonded").endswith(
+        "12.5 % of the interfaces"
+    )
+    assert "9 bonded, 9 open, 1 closed interface nodes" in text and "Free motions of fibres: 2" in text
+    assert "Largest energy release rate (GPa mm)" in text
 
 
 def test_bounds_are_those_of_bonded_cells_only() -> None:
