@@ -67,14 +67,7 @@ def answers(document: Document) -> list[Table]:
     unit = document["case"]["output"].get("stress_unit", "")
     label = f" ({unit})" if unit else ""
     found = [_envelope(document, label)] if document.get("envelope") else []
-    for key, words in (
-        ("effective_stiffness", "Effective stiffness"),
-        ("effective_stiffness_compression", "Effective stiffness under minus the unit strains"),
-    ):
-        if document.get(key) is not None:
-            strains, stresses = voigt_names(len(document[key]))
-            rows = [[name, *map(_number, row)] for name, row in zip(stresses, document[key], strict=True)]
-            found.append(Table(f"{words}{label}", ["", *strains], rows))
+    found += _stiffnesses(document, label)
     if document.get("thermal_stress") is not None:
         found.append(_thermal(document, label))
     found += _constants(document, label)
@@ -85,6 +78,20 @@ def answers(document: Document) -> list[Table]:
         found.append(Table(f"Bounds{label}", ["", "lower", "computed", "upper"], list(_bounds(document))))
     found += [_points(key, document, label) for key in ("angle", "path") if document.get(key)]
     return found + ([_load(document["load"], label)] if document.get("load") else [])
+
+
+def _stiffnesses(document: Document, label: str) -> list[Table]:
+    """The effective stiffness, also under minus the unit strains."""
+    found = []
+    for key, words in (
+        ("effective_stiffness", "Effective stiffness"),
+        ("effective_stiffness_compression", "Effective stiffness under minus the unit strains"),
+    ):
+        if document.get(key) is not None:
+            strains, stresses = voigt_names(len(document[key]))
+            rows = [[name, *map(_number, row)] for name, row in zip(stresses, document[key], strict=True)]
+            found.append(Table(f"{words}{label}", ["", *strains], rows))
+    return found
 
 
 def _envelope(document: Document, label: str) -> Table:

@@ -99,15 +99,14 @@ def _path_columns(document: Mapping[str, Any]) -> dict[str, Any]:
     points = document["path"]
     strain, stress = (_without_noise([point[name] for point in points]) for name in ("strain", "stress"))
     strains, stresses = voigt_names(strain.shape[1])
-    named, leading = response.named_components(document), response.leading_component(document)
-    found = {strains[leading]: strain[:, leading]}
-    seen = response.components_above(response.FAINT, stress)
-    found |= {name: stress[:, k] for k, name in enumerate(stresses) if k in named or k in seen}
+    leading = response.leading_component(document)
+    there = {*response.named_components(document), *response.components_above(response.FAINT, stress)}
+    found = {strains[leading]: strain[:, leading]} | {stresses[k]: stress[:, k] for k in sorted(there)}
     if any(point.get("temperature") for point in points):
         found[TEMPERATURE] = np.array([point["temperature"] for point in points])
-    by_stress = {name for target in response.targets(document) for name in target if name in stresses}
+    given = {name for target in response.targets(document) for name in target}
     others = response.components_above(response.FAINT, strain)
-    return found | {strains[k]: strain[:, k] for k in others if stresses[k] in by_stress}
+    return found | {strains[k]: strain[:, k] for k in others if stresses[k] in given}
 
 
 def _width(name: str) -> int:
