@@ -24,6 +24,11 @@ class Macroscopic:
     strain: Float
     stress: Float
 
+    @property
+    def stored(self) -> float:
+        """E.Sigma / 2."""
+        return 0.5 * float(self.strain @ self.stress)
+
     def scaled(self, factor: float) -> Macroscopic:
         """The state under `factor` times the load."""
         return Macroscopic(factor * self.strain, factor * self.stress)
@@ -31,11 +36,6 @@ class Macroscopic:
     def load(self, by_stress: Bool) -> Load:
         """The load that holds the state, with these (n,) components given by their stress."""
         return Load(np.where(by_stress, self.stress, self.strain), by_stress)
-
-    @property
-    def stored(self) -> float:
-        """E.Sigma / 2."""
-        return 0.5 * float(self.strain @ self.stress)
 
     def released_to(self, after: Macroscopic) -> float:
         """What a break at constant load loses, work - change of stored energy = 1/2 (E'.Sigma - E.Sigma'), with ' after

@@ -13,10 +13,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+import numpy as np
+
 from feti_homog.interface.bond_criterion import BondCriterion
 from feti_homog.interface.later_leg import LaterLeg
 from feti_homog.interface.load import Load
 from feti_homog.interface.loaded_cell import LoadedCell
+from feti_homog.interface.macroscopic import Macroscopic
 from feti_homog.interface.path_points import (
     NO_ENERGIES,
     UTILISATION_TIE,
@@ -61,13 +64,23 @@ def increments(
         leg = (step * len(waypoints) - 1) // steps
         begins_here = ((step - 1) * len(waypoints) - 1) // steps < leg
         origin, end = begin.last if begins_here else begin.origin, waypoints[leg]
-        load = origin.load(end.by_stress).after(step * len(waypoints) / steps - leg, end)
+        start = _start(origin, waypoints[leg - 1] if leg else None, end)
+        load = start.after(step * len(waypoints) / steps - leg, end)
         point = _increment(cell, criterion, load, worst_only, begin)
         after = PathState(step, 0.0, point.state.status, point.state.multipliers, origin, point.after.last)
         begin = after
         yield Point(step / steps, 1.0, point.state, point.broke, point.energies, point.used, after)
         if not point.state.converged:
             return
+
+
+def _start(origin: Macroscopic, before: Load | None, end: Load) -> Load:
+    """Where a leg of increments begins: at the waypoint before, which no step need meet; with the components that are
+    given in another way now as the last point has them."""
+    has = origin.load(end.by_stress)
+    if before is None:
+        return has
+    return Load(np.where(before.by_stress == end.by_stress, before.values, has.values), end.by_stress)
 
 
 def _increment(cell: LoadedCell, criterion: BondCriterion, load: Load, worst_only: bool, begin: PathState) -> Point:

@@ -43,8 +43,10 @@ class PathState:
     broken: float | None = None
 
     def energies_to(self, here: Macroscopic) -> Energies:
-        """Those of the way from the last point's state to one under the load at which this stands: what the loads work
-        is stored or lost."""
+        """Those of the way from the last point's state to one under the load at which this stands.
+
+        The response between them may bend where contact changes, but that loses nothing: the work is what is stored or
+        lost."""
         lost = 0.0 if self.broken is None else self.last.released_to(here)
         return Energies(here.stored - self.last.stored + lost, lost, self.broken or 0.0)
 

@@ -117,6 +117,15 @@ MIXED_PATHS: dict[str, dict[str, Any]] = {
         "interface": STRENGTHS,
         "path": {"waypoints": [{"S11": 6.0}, {"S11": -3.0}, {"S11": 7.5, "E22": 0.02}]},
     },
+    "uneven steps": {  # no step meets the first waypoint, and contact changes within steps
+        "cell": SQUARE,
+        "interface": STRENGTHS,
+        "path": {
+            "waypoints": [{"E11": 0.1}, {"E11": -0.05}, {"S11": 2.0}],
+            "method": "increments",
+            "increments": 11,
+        },
+    },
     "cooled": IN_SPACE | {"interface": STRENGTHS, "path": {"waypoints": COOLED}},
     "cooled, thinned": IN_SPACE | {"interface": STRENGTHS, "path": {"waypoints": COOLED}, "states": 7},
     "cooled by steps": IN_SPACE

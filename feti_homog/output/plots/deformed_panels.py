@@ -25,12 +25,12 @@ from feti_homog.output.plots.decimation import (
     outline_edges,
 )
 from feti_homog.output.plots.interface_marks import STATE_NAMES, InterfaceEdges, state_legend
+from feti_homog.output.plots.load_labels import LoadLabels
 from feti_homog.output.plots.plot_helpers import (
     STRESS_SYMBOLS,
     draw_segments,
     drawn_stress,
     fill_triangles,
-    load_label,
     magnification,
     pixels_of,
     plain,
@@ -41,6 +41,8 @@ from feti_homog.output.plots.plot_helpers import (
 )
 from feti_homog.output.text import point_tables
 from feti_homog.typing import Array
+
+Document = Mapping[str, Any]
 
 MAX_PANELS = 6
 MAX_FRAMES, FRAME_TIME = 24, 250  # of the animation; milliseconds
@@ -59,14 +61,17 @@ class DeformedCell:
     interface_edges: InterfaceEdges
     component: str
     scale: float
+    labels: LoadLabels
 
     @classmethod
-    def of(cls, file: Any, numbers: Sequence[int], output: Mapping[str, Any], scale: float, limit: int) -> DeformedCell:
-        """The stress that `output` chooses, or that suits all these states."""
+    def of(cls, file: Any, numbers: Sequence[int], document: Document, scale: float, limit: int) -> DeformedCell:
+        """The stress that the case chooses, or that suits all these states."""
         drawn = drawn_mesh(file, limit)
         borders = outline_edges(drawn, drawn.body)
-        component = stress_component(output.get("stress", "auto"), [file[f"state/{n}"] for n in numbers])
-        return cls(file, drawn, borders, InterfaceEdges.of(file, drawn, borders), component, scale)
+        chosen = document["case"]["output"].get("stress", "auto")
+        component = stress_component(chosen, [file[f"state/{n}"] for n in numbers])
+        edges = InterfaceEdges.of(file, drawn, borders)
+        return cls(file, drawn, borders, edges, component, scale, LoadLabels.of(document))
 
     def moved(self, number: int) -> Array:
         """(p, 2) places of the drawn nodes."""
@@ -86,7 +91,7 @@ class DeformedCell:
         axes.set(xticks=(), yticks=())
         axes.set_axis_off()
         attributes = state.attrs
-        axes.set_title(f"{attributes['label']}\n{load_label(attributes, LOADS_IN_PANEL)}", fontsize=9, y=1.0)
+        axes.set_title(f"{attributes['label']}\n{self.labels.label(attributes, LOADS_IN_PANEL)}", fontsize=9, y=1.0)
         figure: Any = axes.figure
         bar = figure.colorbar(shapes, cax=axes.inset_axes((1.02, 0.1, 0.035, 0.8)), extend=extend)
         bar.ax.tick_params(labelsize=7, pad=1, length=2)
@@ -94,7 +99,7 @@ class DeformedCell:
 
     def lines(self, number: int) -> int:
         """Lines of the words for the load of a state."""
-        return 1 + load_label(self.file[f"state/{number}"].attrs, LOADS_IN_PANEL).count("\n")
+        return 1 + self.labels.label(self.file[f"state/{number}"].attrs, LOADS_IN_PANEL).count("\n")
 
     @property
     def caption(self) -> str:
@@ -115,7 +120,7 @@ def draw_state(axes: Axes, directory: Path, number: int, stress: str = "auto", s
     path = directory / field_file.NAME
     try:
         with h5py.File(path, "r") as file:
-            cell = DeformedCell.of(file, [number], {"stress": stress}, scale, limit=STATE_LIMIT)
+            cell = DeformedCell.of(file, [number], {"case": {"output": {"stress": stress}}}, scale, STATE_LIMIT)
             cell.draw(axes, number, cell.moved(number))
             caption = cell.caption
     except (OSError, KeyError) as error:
@@ -126,9 +131,9 @@ def draw_state(axes: Axes, directory: Path, number: int, stress: str = "auto", s
     return caption
 
 
-def plot(directory: Path, file: Any, document: Mapping[str, Any]) -> list[Path]:
+def plot(directory: Path, file: Any, document: Document) -> list[Path]:
     """`angle_states.png`, or `path_states.png` and `path.gif`."""
-    output, count = document["case"]["output"], len(file.get("state", ()))
+    count = len(file.get("state", ()))
     if not count:
         return []
     scale = shown_scale(file, document)
@@ -136,16 +141,16 @@ def plot(directory: Path, file: Any, document: Mapping[str, Any]) -> list[Path]:
         # The first of the unit cases, if there are three an angle.
         every = range(0, count, count // len(document["angle"]) or 1)
         numbers = [every[round(k)] for k in np.linspace(0, len(every) - 1, min(MAX_PANELS, len(every)))]
-        return [save(_side_by_side(file, numbers, output, scale), directory / "angle_states.png")]
-    panels = _side_by_side(file, point_tables.chosen_states(document, MAX_PANELS, count), output, scale)
+        return [save(_side_by_side(file, numbers, document, scale), directory / "angle_states.png")]
+    panels = _side_by_side(file, point_tables.chosen_states(document, MAX_PANELS, count), document, scale)
     paths = [save(panels, directory / "path_states.png")]
     frames = point_tables.chosen_states(document, MAX_FRAMES, count)
-    return [*paths, _animation(file, frames, output, scale, directory / "path.gif")]
+    return [*paths, _animation(file, frames, document, scale, directory / "path.gif")]
 
 
 def shown_scale(file: Any, document: Mapping[str, Any]) -> float:
     """The factor of displacements in all pictures of an angle or a path and in the report: that of the case or, by
-    default, one at which the largest displacement and opening are seen, at least 1 under a given strain."""
+    default, one at which the largest displacement and opening are seen, at least 1 under a given load."""
     chosen = document.get("case", {}).get("output", {}).get("deformation_scale")
     if chosen is not None:
         return float(chosen)
@@ -153,7 +158,9 @@ def shown_scale(file: Any, document: Mapping[str, Any]) -> float:
     displacement = max(_largest_length(state["displacement"]) for state in states)
     opening = max(float(state["jump"][:, 0].max(initial=0.0)) for state in states)
     scale = magnification(displacement, float(min(file.attrs["width"], file.attrs["height"])), opening)
-    given = "path" in document or document.get("case", {}).get("angle", {}).get("strain") is not None
+    given = (
+        "path" in document or "load" in document or document.get("case", {}).get("angle", {}).get("strain") is not None
+    )
     return max(scale, 1.0) if given else scale
 
 
@@ -170,8 +177,8 @@ def _largest_length(table: Any) -> float:
     return max((float(np.linalg.norm(rows, axis=1).max()) for rows in blocks), default=0.0)
 
 
-def _side_by_side(file: Any, numbers: Sequence[int], output: Mapping[str, Any], scale: float) -> Figure:
-    cell = DeformedCell.of(file, numbers, output, scale, limit=PANEL_LIMIT)
+def _side_by_side(file: Any, numbers: Sequence[int], document: Document, scale: float) -> Figure:
+    cell = DeformedCell.of(file, numbers, document, scale, PANEL_LIMIT)
     places = [cell.moved(number) for number in numbers]
     size = np.subtract(*_corners(places)[::-1])
     rows = max(1, round(math.sqrt(0.7 * len(numbers) * size[0] / size[1])))
@@ -194,9 +201,9 @@ def _side_by_side(file: Any, numbers: Sequence[int], output: Mapping[str, Any], 
     return figure
 
 
-def _animation(file: Any, numbers: Sequence[int], output: Mapping[str, Any], scale: float, path: Path) -> Path:
+def _animation(file: Any, numbers: Sequence[int], document: Document, scale: float, path: Path) -> Path:
     """Frames of one layout, that of the last state."""
-    cell = DeformedCell.of(file, numbers, output, scale, limit=FRAME_LIMIT)
+    cell = DeformedCell.of(file, numbers, document, scale, FRAME_LIMIT)
     places = [cell.moved(number) for number in numbers]
     low, high = _corners(places)
     size = high - low

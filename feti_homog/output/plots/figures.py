@@ -21,6 +21,7 @@ from feti_homog.output.plots import axial_shear, deformed_panels, response_curve
 from feti_homog.output.plots.decimation import DrawnMesh, drawn_mesh, nodal_values, outline_edges
 from feti_homog.output.plots.fibre_numbers import write_fibre_numbers
 from feti_homog.output.plots.interface_marks import InterfaceEdges
+from feti_homog.output.plots.load_labels import LoadLabels
 from feti_homog.output.plots.plot_helpers import (
     STRESS_SYMBOLS,
     STYLE,
@@ -32,7 +33,6 @@ from feti_homog.output.plots.plot_helpers import (
     fill_triangles,
     label_cell_axes,
     largest_length,
-    load_label,
     magnification,
     plain,
     save,
@@ -54,7 +54,7 @@ def plot(directory: Path) -> list[Path]:
     - cell.png: bodies and subdomains;
     - of each load case case_E11.png, case_minus_E11.png, ... (unit strains), case_temperature.png or state_K.png;
     - of `angle` angle.png and angle_states.png, of `path` path.png, path_states.png and path.gif;
-    - of `envelope` envelope.png;
+    - of `load` load.png, of `envelope` envelope.png;
     - interface.png, if some interface is debonded.
 
     If there is a result.json, its case.output chooses the stress component (else that of the unit strain) and the
@@ -65,16 +65,21 @@ def plot(directory: Path) -> list[Path]:
     """
     directory = Path(directory)
     document = result_json.read(directory) if (directory / result_json.NAME).exists() else {}
-    output: Mapping[str, Any] = document.get("case", {}).get("output", {})
     with mpl.rc_context(STYLE):
         try:
-            paths = _pictures(directory, document, output) if output.get("fields", True) else []
+            paths = _pictures(directory, document) if _output(document).get("fields", True) else []
             return paths + response_curves.plot(directory, document)
         except OSError as error:
             raise FetiHomogError(f"cannot draw {directory / field_file.NAME}: {error.strerror or error}") from error
 
 
-def _pictures(directory: Path, document: Mapping[str, Any], output: Mapping[str, Any]) -> list[Path]:
+def _output(document: Mapping[str, Any]) -> Mapping[str, Any]:
+    """The section [output] of the case, empty without a result.json."""
+    found: Mapping[str, Any] = document.get("case", {}).get("output", {})
+    return found
+
+
+def _pictures(directory: Path, document: Mapping[str, Any]) -> list[Path]:
     """The pictures of result.h5."""
     with h5py.File(directory / field_file.NAME, "r") as file:
         drawn = drawn_mesh(file)
@@ -87,9 +92,10 @@ def _pictures(directory: Path, document: Mapping[str, Any], output: Mapping[str,
             for number in sorted(file.get("state", ()), key=int):
                 state = file[f"state/{number}"]
                 draw = _sheared if axial_shear.is_axial(state) else _deformed
-                figure = draw(file, state, drawn, borders, interface_edges, output)
-                paths.append(save(figure, directory / f"{_name(number, state.attrs)}.png"))
-        return paths + traction_plots.plot(directory, file, interface_edges, "path" in document)
+                figure = draw(file, state, drawn, borders, interface_edges, document)
+                name = "load" if document.get("load") else _name(number, state.attrs)
+                paths.append(save(figure, directory / f"{name}.png"))
+        return paths + traction_plots.plot(directory, file, interface_edges, document)
 
 
 def _name(number: str, attributes: Any) -> str:
@@ -129,19 +135,21 @@ def _deformed(
     drawn: DrawnMesh,
     borders: Array,
     interface_edges: InterfaceEdges,
-    output: Mapping[str, Any],
+    document: Mapping[str, Any],
 ) -> Figure:
     """The magnified deformed cell with a stress component in colour, and the outline it has left."""
     displacement = nodal_values(state["displacement"], drawn)
     seen = magnification(largest_length(displacement), float(np.ptp(drawn.points, axis=0).min()))
-    chosen = output.get("deformation_scale")
+    chosen = _output(document).get("deformation_scale")
     scale = seen if chosen is None else chosen
     moved = drawn.points + scale * displacement
-    figure, axes = _coloured(file, state, drawn, moved, output)
+    figure, axes = _coloured(file, state, drawn, moved, _output(document))
     draw_segments(axes, _left(file.attrs, drawn, borders), UNDEFORMED, 0.7)
     undeformed = Line2D([], [], color=UNDEFORMED, linewidth=0.7, label="undeformed")
     _outlined(figure, axes, state, moved, borders, interface_edges, [undeformed])
-    axes.set_title(f"{plain(file.attrs['title'])}\n{load_label(state.attrs)}, displacement × {scale:g}".lstrip())
+    axes.set_title(
+        f"{plain(file.attrs['title'])}\n{LoadLabels.of(document).label(state.attrs)}, displacement × {scale:g}".lstrip()
+    )
     return figure
 
 
@@ -151,17 +159,17 @@ def _sheared(
     drawn: DrawnMesh,
     borders: Array,
     interface_edges: InterfaceEdges,
-    output: Mapping[str, Any],
+    document: Mapping[str, Any],
 ) -> Figure:
     """The cell with an axial stress in colour and lines of equal displacement along the fibres, which moves nothing in
     the plane."""
-    figure, axes = _coloured(file, state, drawn, drawn.points, output)
+    figure, axes = _coloured(file, state, drawn, drawn.points, _output(document))
     step = axial_shear.draw_levels(axes, state, drawn)
     length = plain(file.attrs["length_unit"])
     words = f"$u_3$ every {step:g} {length}".rstrip()
     levels = Line2D([], [], color=axial_shear.INK, linewidth=axial_shear.WIDTH, label=words)
     _outlined(figure, axes, state, drawn.points, borders, interface_edges, [levels])
-    axes.set_title(f"{plain(file.attrs['title'])}\n{load_label(state.attrs)}".lstrip())
+    axes.set_title(f"{plain(file.attrs['title'])}\n{LoadLabels.of(document).label(state.attrs)}".lstrip())
     return figure
 
 

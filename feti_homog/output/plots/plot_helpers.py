@@ -33,7 +33,6 @@ STRESS_TABLES: dict[str, tuple[str, int | None]] = {
     "S33": ("stress_33", None),
     **{name: ("axial_stress", column) for column, name in enumerate(AXIAL_STRESSES)},
 }
-LOADS_IN_LINE = 3  # of the words for a load
 SAME_VALUE = 1e-6  # values that differ by less, relatively, are one
 CELL_INCHES = 4.8  # inches, the longer side of a drawn cell
 STYLE = {"font.size": 10, "axes.titlesize": 11, "axes.linewidth": 0.8}
@@ -166,22 +165,6 @@ def magnification(displacement: float, size: float, opening: float = 0.0) -> flo
 def largest_length(vectors: Array) -> float:
     """The largest length of vectors (n, 2)."""
     return float(np.linalg.norm(vectors, axis=1).max(initial=0.0))
-
-
-def load_label(attributes: Any, in_line: int = LOADS_IN_LINE) -> str:
-    """The strains that are seen, and the temperature, of a state with these attributes; so many in a line."""
-    strain, temperature = np.asarray(attributes["strain"]), float(attributes.get("temperature", 0.0))
-    symbols = strain_symbols(len(strain))
-    loads = [(symbols[k], float(strain[k])) for k in components_above(FAINT, strain[None])]
-    loads += [(r"\Delta T", temperature)] * (temperature != 0.0)
-    words = [f"${name} = {_in_formula(value)}$" for name, value in loads]
-    lines = [", ".join(words[k : k + in_line]) for k in range(0, len(words), in_line)]
-    return ",\n".join(lines) or "no strain"
-
-
-def _in_formula(value: float) -> str:
-    mantissa, _, exponent = f"{value:.4g}".partition("e")
-    return f"{{{mantissa}}}" + (rf" \cdot 10^{{{int(exponent)}}}" if exponent else "")
 
 
 def strain_symbols(count: int) -> tuple[str, ...]:

@@ -103,7 +103,8 @@ def _path(document: Document) -> Figure:
         _finish(axes)
     # The panels of path_states.png show the same points.
     numbers = point_tables.chosen(document, NUMBERED_POINTS, point_tables.kept_points(document))
-    _number_points(upper, (middle, lower), np.stack([strain, stress[:, component]], axis=1), numbers)
+    curve = np.stack([strain, stress[:, component]], axis=1)
+    _number_points(upper, (middle, lower), curve, numbers, INK[component])
     return figure
 
 
@@ -154,8 +155,8 @@ def _count_curves(axes: Axes, points: Sequence[Mapping[str, Any]], style: Mappin
     axes.set_ylabel("interface nodes")
 
 
-def _number_points(upper: Axes, below: Sequence[Axes], curve: Array, numbers: Sequence[int]) -> None:
-    """Points of a curve (points, 2) as ringed numbers, with arrows along it, and lines at their numbers below."""
+def _number_points(upper: Axes, below: Sequence[Axes], curve: Array, numbers: Sequence[int], ink: str) -> None:
+    """A curve (points, 2): points as ringed numbers, arrows in its ink, and lines at their numbers below."""
     ring = {"boxstyle": "circle,pad=0.15", "facecolor": "white", "edgecolor": "0.3", "linewidth": 0.6}
     for number in numbers:
         style: dict[str, Any] = {"color": "0.3", "fontsize": 7, "ha": "center", "va": "center", "bbox": ring}
@@ -165,7 +166,7 @@ def _number_points(upper: Axes, below: Sequence[Axes], curve: Array, numbers: Se
             axes.axvline(number, color="0.7", linewidth=0.7, linestyle=":", zorder=0)
         above = (number, 1.05)
         below[0].annotate(str(number), above, xycoords=below[0].get_xaxis_transform(), annotation_clip=False, **style)
-    pointer = {"arrowstyle": "-|>", "color": INK[0], "linewidth": 0, "shrinkB": 0}
+    pointer = {"arrowstyle": "-|>", "color": ink, "linewidth": 0, "shrinkB": 0}
     for (x0, y0), (x1, y1) in _direction_marks(curve):
         upper.annotate("", (x1, y1), (x0, y0), arrowprops=pointer)
 

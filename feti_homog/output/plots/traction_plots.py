@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -20,15 +21,17 @@ from feti_homog.output.plots.interface_marks import (
     STATE_NAMES,
     InterfaceEdges,
 )
-from feti_homog.output.plots.plot_helpers import load_label, save, unit_label
+from feti_homog.output.plots.load_labels import LoadLabels
+from feti_homog.output.plots.plot_helpers import save, unit_label
 from feti_homog.typing import Array
 
 MAX_FIBRES = 4
+LOADS_IN_LINE = 7
 INK = ("#1f4e9c", "#2a7f3f", "#c44e00")
 NAMES = {"traction": (r"$t_\mathrm{n}$", r"$t_\mathrm{t}$", r"$t_\mathrm{a}$"), "jump": ("gap", "slip", "axial slip")}
 
 
-def plot(directory: Path, file: Any, edges: InterfaceEdges, is_path: bool) -> list[Path]:
+def plot(directory: Path, file: Any, edges: InterfaceEdges, document: Mapping[str, Any]) -> list[Path]:
     """interface.png, if any state has debonded nodes: of a path's last state and first, else of one state."""
     names = sorted(file.get("state", ()), key=int)
     debonded = {name: int((file[f"state/{name}/status"][:] != BONDED).sum()) for name in names}
@@ -38,15 +41,15 @@ def plot(directory: Path, file: Any, edges: InterfaceEdges, is_path: bool) -> li
     # After all bonds are gone there is not much left to see, unless the faces touch.
     last = next((n for n in reversed(names) if 0 < debonded[n] < total or _touching(file, n)), names[-1])
     partly = [name for name in names if 0 < debonded[name] < total]
-    shown = list(dict.fromkeys([names[0], last])) if is_path else [(partly or [last])[len(partly) // 2]]
-    return [save(_figure(file, edges, shown), directory / "interface.png")]
+    shown = list(dict.fromkeys([names[0], last])) if "path" in document else [(partly or [last])[len(partly) // 2]]
+    return [save(_figure(file, edges, shown, LoadLabels.of(document)), directory / "interface.png")]
 
 
 def _touching(file: Any, name: str) -> bool:
     return bool((file[f"state/{name}/status"][:] == CLOSED).any())
 
 
-def _figure(file: Any, edges: InterfaceEdges, names: list[str]) -> Figure:
+def _figure(file: Any, edges: InterfaceEdges, names: list[str], labels: LoadLabels) -> Figure:
     """A row for each of the fibres that are most debonded: tractions, and jumps."""
     fibre, status = file["interface/fibre_number"][:], file[f"state/{names[-1]}/status"][:]
     numbers, count = np.unique(fibre[status != BONDED], return_counts=True)
@@ -62,7 +65,8 @@ def _figure(file: Any, edges: InterfaceEdges, names: list[str]) -> Figure:
                 _curves(axes, quantity, place.values, values, name == names[-1])
             _finish(axes, place)
         row[0].set_title(f"fibre {number}", fontsize=10, loc="left")
-    _labels(file, figure, grid, names, status[np.isin(fibre, chosen)])
+    _labels(file, figure, grid, status[np.isin(fibre, chosen)])
+    figure.suptitle(_title(file, names, labels), fontsize=10)
     return figure
 
 
@@ -98,7 +102,7 @@ def _finish(axes: Axes, place: Coordinate) -> None:
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def _labels(file: Any, figure: Figure, grid: Any, names: list[str], shaded: Array) -> None:
+def _labels(file: Any, figure: Figure, grid: Any, shaded: Array) -> None:
     stress = unit_label(file.attrs["stress_unit"]) or "(unit of the moduli)"
     length = unit_label(file.attrs["length_unit"]) or "(cell units)"
     for row in grid:
@@ -112,8 +116,12 @@ def _labels(file: Any, figure: Figure, grid: Any, names: list[str], shaded: Arra
         if kind in shaded
     ]
     figure.legend(handles=patches, loc="outside lower center", ncols=2, frameon=False)
+
+
+def _title(file: Any, names: list[str], labels: LoadLabels) -> str:
+    """The last state and, of more, the first."""
     first, last = (file[f"state/{name}"].attrs for name in (names[0], names[-1]))
-    title = f"{last['label']}: {load_label(last, in_line=7)}"
+    title = f"{last['label']}: {labels.label(last, LOADS_IN_LINE)}"
     if len(names) > 1:
-        title += f"   (dashed: {first['label']}: {load_label(first, in_line=7)})"
-    figure.suptitle(title, fontsize=10)
+        title += f"   (dashed: {first['label']}: {labels.label(first, LOADS_IN_LINE)})"
+    return title

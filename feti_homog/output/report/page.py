@@ -31,6 +31,7 @@ PICTURES = {
     "angle_states": "Deformed cell at several angles",
     "path": "Response along the path of load",
     "path_states": "Deformed cell along the path",
+    "load": "Deformed cell under the load",
     "envelope": "Onset of debonding",
     "interface": "Tractions and jumps of interfaces",
 }

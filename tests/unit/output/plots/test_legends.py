@@ -22,6 +22,7 @@ from feti_homog.output.files.field_file import FieldFile
 from feti_homog.output.files.result_json import SCHEMA
 from feti_homog.output.plots import deformed_panels, figures, plot_helpers, response_curves, traction_plots
 from feti_homog.output.plots.interface_marks import BONDED, CLOSED
+from feti_homog.output.plots.load_labels import LoadLabels
 
 DRAWING = (figures, deformed_panels, response_curves, traction_plots)
 
@@ -175,8 +176,29 @@ def test_a_change_of_temperature_has_an_axis_of_its_own() -> None:
 
 def test_words_of_a_load_leave_out_what_is_not_seen() -> None:
     strain = np.array([0.02, -0.007, 3e-8, 0.0, 0.01, 6e-5])
-    lines = plot_helpers.load_label({"strain": strain, "temperature": -100.0}, 2).splitlines()
+    lines = LoadLabels().label({"strain": strain, "temperature": -100.0}, 2).splitlines()
     assert len(lines) == 3 and "33" not in "".join(lines) and r"{6} \cdot 10^{-5}" in lines[1] and "-100" in lines[2]
+
+
+@pytest.mark.parametrize(("stress", "told"), [(7.0, "{7}"), (1e-13, "{0}")])
+def test_words_of_a_path_with_many_strains_are_the_leading_one_and_its_stress(stress: float, told: str) -> None:
+    state = {"strain": np.array([-0.01, 0.05, -0.01, 0.0, 0.001, 0.0]), "stress": np.array([0, stress, 0, 0, 1, 0])}
+    document = in_six([(0.5, 0.0, 0.0), (1.0, 2.0, 3.0)], {"to": {"S13": 3.0, "S22": 7.0}})
+    for point in document["path"]:
+        point["strain"], point["stress"] = state["strain"].tolist(), [0.0, 7.0, 0.0, 0.0, 1.0, 0.0]
+    words = LoadLabels.of(document).words(state | {"temperature": -100.0})
+    assert words == ["$E_{22} = {0.05}$", rf"$\Sigma_{{22}} = {told}$", r"$\Delta T = {-100}$"]
+    few = {"strain": np.array([0.0, 0.05, 0.0, 0.0, 0.001, 0.0]), "stress": state["stress"]}
+    assert LoadLabels.of(document).words(few) == ["$E_{22} = {0.05}$", r"$\gamma_{13} = {0.001}$"]
+
+
+def test_a_single_load_has_a_picture_that_says_what_it_gives(tmp_path: Path, monkeypatch: Any) -> None:
+    whole = sample(4)
+    point = {"strain": [0.02, -0.01, 0.003], "stress": [6.0, 0.0, 0.0]}
+    case = {"analysis": {"type": "load", "plane": "strain"}, "load": {"to": {"S11": 6.0}}, "output": {}}
+    write(tmp_path, replace(whole, states=whole.states[:1]), {"schema": SCHEMA, "case": case, "load": point})
+    title = drawn(tmp_path, monkeypatch)["load.png"].axes[0].get_title()
+    assert r"$\Sigma_{11} = {6}$" in title and "E_" not in title
 
 
 def test_points_of_a_path_are_numbered_where_its_curve_folds_back(tmp_path: Path, monkeypatch: Any) -> None:
