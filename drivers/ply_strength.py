@@ -72,15 +72,15 @@ def solved(given: argparse.Namespace, comm: Intracomm, test: str, temperature: f
 
 
 def curve(result: Result, component: int) -> np.ndarray:
-    """(n, 2) strain since the load began and stress of the points that a test with rising strain sees."""
+    """(n, 2) strain since the load began, from zero, and stress, as a test with rising strain sees them."""
+    if len(result.case["path"]["waypoints"]) == 1:
+        rising = result.rising_strain()
+        return rising[:, [-1, component]]
     points = result.points
-    strain, stress = points["strain"][:, component], points["stress"][:, component]
-    legs = len(result.case["path"]["waypoints"])
-    pulled = points["load_factor"] > (legs - 1) / legs
-    origin = strain[~pulled][-1] if (~pulled).any() else 0.0
-    strain, stress = strain[pulled] - origin, stress[pulled]
-    sees = strain >= np.maximum.accumulate(strain)
-    return np.column_stack([strain[sees], stress[sees]])
+    found = np.column_stack([points["strain"][:, component], points["stress"][:, component]])
+    cooled = int(np.flatnonzero(points["load_factor"] <= 0.5)[-1])
+    found = found[cooled + 1 :] - [found[cooled, 0], 0.0]
+    return np.vstack([np.zeros(2), found])
 
 
 def row(result: Result, component: int) -> list[float]:
@@ -88,7 +88,7 @@ def row(result: Result, component: int) -> list[float]:
     found = curve(result, component)
     broken = [point.stress[component] for point in result.path or () if point.broke]
     peak = int(found[:, 1].argmax())
-    return [found[0, 1] / found[0, 0], broken[0], found[peak, 1], found[peak, 0], len(result.path or ())]
+    return [found[1, 1] / found[1, 0], broken[0], found[peak, 1], found[peak, 0], len(result.path or ())]
 
 
 def write(folder: Path, found: dict[tuple[str, float], Result]) -> list[Path]:
@@ -103,7 +103,7 @@ def write(folder: Path, found: dict[tuple[str, float], Result]) -> list[Path]:
     for axes, (test, (strain, _, component, stress)) in zip(figure.subplots(1, 2), TESTS.items(), strict=True):
         own = {temperature: result for (name, temperature), result in found.items() if name == test}
         for colour, (temperature, result) in zip(INK, own.items(), strict=False):
-            points = np.vstack([np.zeros(2), curve(result, component)])
+            points = curve(result, component)
             label = f"cooled by {-temperature:g} K" if temperature else "not cooled"
             axes.plot(100 * points[:, 0], points[:, 1], color=colour, linewidth=1.2, label=label)
         axes.set(xlabel=f"${symbol(strain)}$ (%)", ylabel=f"${symbol(stress)}$ (MPa)")

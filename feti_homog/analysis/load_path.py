@@ -89,12 +89,12 @@ def _points(
         found = events(cell, criterion, waypoints, begin)
     else:
         found = increments(cell, criterion, waypoints, path.increments or 1, path.release == "worst", begin)
-    point: Point | None = None
+    count = known
     try:
-        for point in found:
+        for count, point in enumerate(found, known + 1):  # noqa: B007
             yield point, None
     except NotCarriedError as error:
-        if point is None:
+        if count == 0:
             raise
         context.faults.append(f"[path]: {error} beyond the last point; prescribe strains there")
 

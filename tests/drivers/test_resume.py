@@ -44,6 +44,46 @@ strain = [0.2, 0.0, 0.05]
 pictures = false
 states = 8
 """
+COOLED = """\
+[cell]
+geometry = "random"
+fibres = 2
+seed = 1
+min_gap = 0.1
+fibre_fraction = 0.4
+mesh_size = 0.15
+
+[material.matrix]
+young = 3.0
+poisson = 0.35
+expansion = 6e-5
+
+[material.fibre]
+young = 70.0
+poisson = 0.2
+expansion = 5e-6
+
+[analysis]
+type = "path"
+plane = "generalized"
+
+[interface]
+normal_stiffness = 60.0
+tangential_stiffness = 25.0
+criterion = "energy"
+toughness = 4e-6
+
+[path]
+waypoints = [{temperature = -100.0}, {S22 = 0.04, S13 = 0.01}, {S22 = -0.01}]
+
+[output]
+fields = false
+pictures = false
+states = "all"
+
+[petsc]
+feti_pc_type = "influence"
+"""
 INCREMENTS = 'waypoints = [[0.1, 0.0, 0.0], [-0.05, 0.02, 0.0]]\nmethod = "increments"\nincrements = 24'
 LATER_LEGS = "waypoints = [[0.02, 0.0, 0.0], [-0.05, 0.02, 0.0], [0.1, 0.0, 0.0]]"
 
@@ -129,6 +169,26 @@ def test_paths_of_every_kind_resume(tmp_path, ranks, path):
     assert job.returncode == 0, job.stderr
     assert document(tmp_path / "out")["resumed"] == kept >= 8
     assert_same_curve(document(tmp_path / "out")["path"], document(tmp_path / "whole")["path"])
+
+
+def test_a_cooled_path_in_space_resumes(tmp_path):
+    """Killed on its first leg beyond the cooling, where bonds break by energy, faces touch, and stresses are given."""
+    case = tmp_path / "case.toml"
+    case.write_text(COOLED)
+    job = command_line(1, "run", case, "--out", tmp_path / "whole")
+    assert job.returncode == 0, job.stderr
+    expected = document(tmp_path / "whole")["path"]
+    kept = killed(1, case, tmp_path / "out", len(expected) // 2, 0.0)
+    assert expected[kept - 1]["load_factor"] > 0.34 and kept < len(expected)
+    job = command_line(1, "run", case, "--out", tmp_path / "out", "--resume")
+    assert job.returncode == 0, job.stderr
+    found = document(tmp_path / "out")
+    assert found["resumed"] == kept
+    assert_same_curve(found["path"], expected)
+    for key in ("temperature", "work", "stored", "stored_in_springs", "fracture_energy", "debonded_length"):
+        a, b = (np.array([point[key] for point in points]) for points in (found["path"], expected))
+        assert np.abs(a - b).max() <= 1e-6 * np.abs(b).max(), key
+    assert sum(point["broke"] for point in expected) > 20 and any(point["closed"] for point in expected)
 
 
 def test_a_finished_run_is_left_alone(tmp_path, reference):
