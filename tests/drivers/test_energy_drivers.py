@@ -36,3 +36,21 @@ def test_cells_of_random_fibres_scatter(tmp_path):
     assert (peak >= first).all() and (peak > 40.0).all() and (peak < 100.0).all() and peak[0] != peak[1]
     results = [json.loads(path.read_text()) for path in tmp_path.glob("seed_*/result.json")]
     assert len(results) == 2 and all(result["status"] == "done" for result in results)
+
+
+def test_plies_break_by_tension_across_and_by_shear_along_the_fibres(tmp_path):
+    rows = driven("ply_strength", tmp_path)
+    assert [(row["test"], float(row["temperature"])) for row in rows] == [
+        ("tension", 0.0),
+        ("tension", -100.0),
+        ("shear", 0.0),
+        ("shear", -100.0),
+    ]
+    modulus, peak = column(rows, "modulus"), column(rows, "peak")
+    # Until a bond breaks the temperature changes no stiffness.
+    assert modulus[0] == pytest.approx(modulus[1], rel=1e-6) and modulus[2] == pytest.approx(modulus[3], rel=1e-6)
+    assert (peak > 40.0).all() and (peak < 150.0).all()
+    results = [json.loads(path.read_text()) for path in tmp_path.glob("*K/result.json")]
+    assert len(results) == 4 and all(result["status"] == "done" for result in results)
+    cooled = [result for result in results if len(result["case"]["path"]["waypoints"]) == 2]
+    assert all(result["path"][-1]["temperature"] == -100.0 for result in cooled)

@@ -10,7 +10,7 @@ from petsc4py import PETSc
 from support.cases import relative_error
 from support.ranks import parallel_assert
 
-from feti_homog import Case, compute
+from feti_homog import Case, run
 from feti_homog.analysis.criteria import criterion_of
 from feti_homog.common.petsc_options import case_options
 from feti_homog.common.progress import Progress
@@ -96,7 +96,7 @@ def test_onsets_are_the_first_events_of_mixed_paths(comm, bonds, temperature):
     number = 0
     for axes in AXES[:: 1 if bonds is ALONG else 2]:
         case = case_of(bonds, axes, temperature)
-        onsets = [point for point in compute(case, comm).envelope if point.factor]
+        onsets = [point for point in run(case, comm).envelope if point.factor]
         with torn(comm, case) as cell:
             for onset in onsets:
                 # Breaks at 0.8 of a leg.
