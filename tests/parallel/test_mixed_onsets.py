@@ -21,7 +21,7 @@ from feti_homog.interface.loaded_cell import LoadedCell
 from feti_homog.interface.path_following import events
 from feti_homog.interface.path_points import unloaded
 
-pytestmark = pytest.mark.parallel
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 
 EXACT = 1e-9
 ALONG = {"normal_strength": 0.02, "tangential_strength": 0.03, "axial_strength": 0.015}
