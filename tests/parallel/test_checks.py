@@ -91,13 +91,14 @@ def test_what_is_no_number_is_within_no_tolerance(comm):
 @pytest.mark.parametrize("method", ["events", "increments"])
 def test_a_path_whose_solve_breaks_down_is_no_result(comm, monkeypatch, method):
     cell = torn_cells.tear(comm, geometry="square", mesh_size=0.3)
-    context, solve = context_of(comm, cell), cell.solver.solve
+    path = LoadPath(strain=(1.0, 0.0, 0.0), method=method, increments=3)
+    context = context_of(comm, replace(cell, case=replace(cell.case, path=path)))
+    solve = cell.solver.solve
 
     def broken_down(strain, start):
         return replace(solve(strain, start), residual=np.nan, reason=-9)
 
     monkeypatch.setattr(cell.solver, "solve", broken_down)
-    path = LoadPath(strain=(1.0, 0.0, 0.0), method=method, increments=3)
     law, checkpoint = StrengthCriterion(10.0, 10.0, "max"), NoCheckpoint(comm)
     with pytest.raises(ConvergenceError, match="broke down after"):
         load_path.run(context, path, law, checkpoint, False)
