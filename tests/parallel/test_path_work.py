@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from support.loaded_twins import EPOXY_GLASS, is_end, relative, solved
 
-pytestmark = pytest.mark.parallel
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 
 EXACT = 1e-9
 HEXAGONAL = {"geometry": "hexagonal"}

@@ -7,7 +7,7 @@ import pytest
 from support.generalized_phases import CRYSTAL, WOOD
 from support.loaded_twins import EPOXY_GLASS, compare_paths
 
-pytestmark = pytest.mark.parallel
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 
 STRESS_OF = {
     "E11": "S11", "E22": "S22", "gamma12": "S12", "E33": "S33", "gamma13": "S13", "gamma23": "S23",
