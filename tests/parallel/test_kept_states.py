@@ -103,6 +103,7 @@ def whole(tmp_path_factory):
 
 @pytest.mark.parametrize("states", STATES)
 @pytest.mark.parametrize("kind", PATHS)
+@pytest.mark.few_ranks
 def test_kept_states_are_those_of_a_run_that_keeps_all(comm, shared_path, whole, kind, states):
     result = run(case(kind, states), comm, out=shared_path)
     assert len(result.states) == states if states != "peaks" else 2 <= len(result.states) < len(result.path)
