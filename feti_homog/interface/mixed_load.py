@@ -41,16 +41,20 @@ def solve(solver: FetiSolver, load: Load, start: Float, area: float, noise: tupl
     missing = load.values[unknown]
     if strains[0].any():
         missing = missing - stresses[0]
-    factors = _strains(stresses[-len(unknown) :], missing, *noise)
+    # Rank 0 decides: rounding on other processors may part the ranks where a stiffness is nearly none.
+    factors = solver.comm.bcast(_strains(stresses[-len(unknown) :], missing, *noise))
+    if factors is None:
+        raise NotCarriedError("nothing in the cell carries the stresses of the load")
     return superposed(solver, found, np.concatenate([np.ones(len(found) - len(unknown)), factors]))
 
 
-def _strains(stiffness: Float, stress: Float, least: float, rounding: float) -> Float:
-    """(u,) the strains that make the stresses (u,) by a stiffness (u, u) that may be singular."""
+def _strains(stiffness: Float, stress: Float, least: float, rounding: float) -> Float | None:
+    """(u,) the strains that make the stresses (u,) by a stiffness (u, u) that may be singular; None if it carries them
+    not."""
     eigenvalues, vectors = np.linalg.eigh((stiffness + stiffness.T) / 2)
     along, resists = vectors.T @ stress, eigenvalues > least
     if np.abs(along[~resists]).max(initial=0.0) > max(UNCARRIED_SHARE * np.abs(stress).max(), rounding):
-        raise NotCarriedError("nothing in the cell carries the stresses of the load")
+        return None
     return np.asarray(vectors[:, resists] @ (along[resists] / eigenvalues[resists]))
 
 
