@@ -98,8 +98,8 @@ class Cell:
     )
     file: Path | None = key(
         MESH_FILE,
-        "The mesh, relative to the case file: triangles of three nodes that fill a rectangle, in physical surfaces "
-        '"matrix", "fibre", "fibre:2", ...; the nodes on opposite sides match. Fibres may have any shape.',
+        "The mesh, relative to the case file: triangles of three or six nodes that fill a rectangle, in physical "
+        'surfaces "matrix", "fibre", "fibre:2", ...; the nodes on opposite sides match. Fibres may have any shape.',
         only=MESH,
     )
 
