@@ -25,6 +25,7 @@ FLOORS = (
     ("config",),
     ("mechanics",),
     ("verification",),
+    ("microstructure",),
     ("cell",),
     ("fem",),
     ("feti.thresholds",),
