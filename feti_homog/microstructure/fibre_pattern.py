@@ -70,7 +70,7 @@ class FibrePattern:
         return np.asarray(np.where(inside < self.size, inside, 0.0))
 
     def images(self, reach: float) -> tuple[Float, Int]:
-        """(m, 2) the centres, first the N of the rectangle, then their images nearer to it than `reach`; their owners."""
+        """(m, 2) the centres, first the N of the rectangle, then their images nearer to it than `reach`; owners."""
         own = np.arange(self.count)
         if not self.periodic:
             return self.centres, own
@@ -94,14 +94,9 @@ class FibrePattern:
         return float((distance - self.radii[owner[pairs]].sum(axis=1)).min())
 
     def pair_vectors(self, reach: float) -> Float:
-        """(k, 2) from one centre to another, each pair once, of those at most `reach` apart.
-
-        In a periodic cell `reach` is at most half of the shorter side: each pair then has one image that near.
-        """
-        if not self.periodic:
-            pairs = cKDTree(self.centres).query_pairs(reach, output_type="ndarray")
-            return np.asarray(self.centres[pairs[:, 1]] - self.centres[pairs[:, 0]])
-        assert reach <= self.size.min() / 2
-        pairs = cKDTree(self.wrapped, boxsize=self.size).query_pairs(reach, output_type="ndarray")
-        vectors = self.wrapped[pairs[:, 1]] - self.wrapped[pairs[:, 0]]
-        return np.asarray(vectors - self.size * np.round(vectors / self.size))
+        """(k, 2) from each centre to every other one at most `reach` away, images and its own among them."""
+        points, _ = self.images(reach * (1 + 1e-9))
+        own = points[: self.count]
+        near = cKDTree(own).sparse_distance_matrix(cKDTree(points), reach, output_type="ndarray")
+        near = near[near["i"] != near["j"]]
+        return np.asarray(points[near["j"]] - own[near["i"]])

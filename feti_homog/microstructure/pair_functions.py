@@ -47,7 +47,7 @@ def distances(pattern: FibrePattern) -> Float:
 def pair_functions(pattern: FibrePattern, r: Float) -> PairFunctions:
     """K(r) = A / (N (N - 1)) sum_{i != j} w_ij [|x_i - x_j| <= r] at the distances r (m,), and g = K' / (2 pi r).
 
-    At most half of the shorter side.  In a periodic cell w = 1 and |x_i - x_j| is that of the nearest images; in a
+    In a periodic cell w = 1, and r is at most half of the shorter side, up to which pairs have one image each; in a
     window w_ij = A / ((width - |dx|) (height - |dy|)), the translation correction [Ohser & Stoyan 1981], which keeps K
     and g unbiased.  Needs two fibres.
     """
@@ -55,7 +55,7 @@ def pair_functions(pattern: FibrePattern, r: Float) -> PairFunctions:
     place = np.searchsorted(r, np.hypot(*vectors.T))  # of the least r that is not below the distance
     place = np.minimum(place, len(r) - 1)  # of a distance that rounding put beyond the last
     shares = np.bincount(place, _translation_weights(pattern, vectors), len(r))
-    growth = shares * (2 * pattern.area / (pattern.count * (pattern.count - 1)))
+    growth = shares * (pattern.area / (pattern.count * (pattern.count - 1)))
     rings = pi * np.diff(r * r, prepend=0.0)
     return PairFunctions(r, np.cumsum(growth), growth / rings)
 
@@ -66,7 +66,7 @@ def pair_directions(pattern: FibrePattern, reach: float) -> Float:
     Sectors of 180 / SECTORS degrees, the first about x1, the others in order towards x2; a pair has no front and back.
     Pairs of a window have the weights of `pair_functions`.  All are 0 if no two fibres are that near.
     """
-    vectors = pattern.pair_vectors(min(reach, float(pattern.size.min()) / 2))
+    vectors = pattern.pair_vectors(reach)
     angle = np.degrees(np.arctan2(vectors[:, 1], vectors[:, 0]))
     sector = np.floor(angle * SECTORS / 180 + 0.5).astype(int) % SECTORS
     shares = np.bincount(sector, _translation_weights(pattern, vectors), SECTORS)
