@@ -1,4 +1,4 @@
-"""The fibres of a folder of results or of a case file, as a pattern whose statistics are measured."""
+"""The fibres of a table, a folder of results or a case file, as a pattern whose statistics are measured."""
 
 from __future__ import annotations
 
@@ -15,15 +15,23 @@ from feti_homog.cell.periodic_topology import Torus
 from feti_homog.config import case as cases
 from feti_homog.errors import CaseError
 from feti_homog.microstructure.fibre_pattern import FibrePattern
+from feti_homog.microstructure.measured_window import read_window
 from feti_homog.typing import Float
 
 
-def read(source: Path) -> FibrePattern:
-    """The fibres, at least two, in the cell's units of length.  On one rank.
+def read(source: Path, size: tuple[float, float] | None) -> FibrePattern:
+    """The fibres, at least two, in the source's unit of length.  On one rank.
+
+    Those of a table are in a window, of this width and height if the table has none; those of a folder or of a case, in
+    a periodic cell.
 
     Raises:
         CaseError, MeshError: the source is faulty, a fibre is not round, or there are fewer than two.
     """
+    if source.suffix != ".toml" and not source.is_dir():
+        return read_window(source, size)
+    if size is not None:
+        raise CaseError(f"--size: only for a table of fibres; {source} says how large the cell is")
     found = _of_case(source) if source.suffix == ".toml" else _of_result(source)
     if not np.isfinite(found.radii).all():
         numbers = ", ".join(map(str, np.flatnonzero(~np.isfinite(found.radii))[:5] + 1))

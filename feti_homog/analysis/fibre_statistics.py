@@ -1,4 +1,4 @@
-"""`feti-homog statistics`: how the fibres of a result or a case are placed."""
+"""`feti-homog statistics`: how the fibres of a table, a result or a case are placed."""
 
 from __future__ import annotations
 
@@ -14,14 +14,18 @@ from feti_homog.output.text import statistics_text
 MODELS = {"hard-core": hard_core, "poisson": poisson}
 
 
-def run(source: Path, out: Path | None, model: str, simulations: int) -> list[str]:
+def run(
+    source: Path, out: Path | None, model: str, simulations: int, size: tuple[float, float] | None = None
+) -> list[str]:
     """Measure, write three tables and a picture to `out` if it is given; returns the lines to print.  On one rank.
+
+    `size` is that of the window of a table that gives none.
 
     Raises:
         CaseError, MeshError: the source is faulty, `out` cannot be used, or the model has no such pattern.
         FetiHomogError: a file cannot be written.
     """
-    pattern = fibre_sources.read(source)
+    pattern = fibre_sources.read(source, size)
     if out is not None:
         output_folder.usable(out)
     found = measure(pattern, MODELS[model], simulations)

@@ -13,7 +13,7 @@ from feti_homog.microstructure.fibre_pattern import FibrePattern
 ATTEMPTS = 3
 
 
-def hard_core(pattern: FibrePattern, generator: np.random.Generator) -> FibrePattern:
+def hard_core(pattern: FibrePattern, generator: np.random.Generator, max_steps: int = MAX_STEPS) -> FibrePattern:
     """The same fibres elsewhere, as those of random cells are placed (`random_arrangement`): no gap is smaller than the
     smallest one of the pattern.  Across the sides of a window they are placed as in a periodic cell.
 
@@ -23,7 +23,7 @@ def hard_core(pattern: FibrePattern, generator: np.random.Generator) -> FibrePat
     grown = pattern.radii + max(pattern.smallest_gap, 0.0) / 2
     for _ in range(ATTEMPTS):
         places = generator.random((pattern.count, 2)) * pattern.size
-        centres, clearance = relax(places, grown, MAX_STEPS, (pattern.width, pattern.height))
+        centres, clearance = relax(places, grown, max_steps, (pattern.width, pattern.height))
         if clearance >= 1:
             return replace(pattern, centres=centres)
     raise MeshError(

@@ -1,8 +1,9 @@
-"""`feti-homog statistics DIR|CASE.toml`: how the fibres of a cell are placed."""
+"""`feti-homog statistics FILE.csv|DIR|CASE.toml`: how the fibres of a cross-section are placed."""
 
 from __future__ import annotations
 
 import argparse
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,8 +22,11 @@ MOST_SIMULATIONS = 9999
 
 def add(actions: argparse._SubParsersAction[Any]) -> None:
     """Add the command to those of a parser."""
-    parser = actions.add_parser("statistics", help="measure how the fibres of a cell are placed", description=HELP)
-    parser.add_argument("source", type=Path, metavar="DIR|CASE.toml", help="a folder of results, or a case file")
+    parser = actions.add_parser(
+        "statistics", help="measure how the fibres of a cross-section are placed", description=HELP
+    )
+    words = "a table of fibres in a window of a micrograph; or a folder of results, or a case file: periodic cells"
+    parser.add_argument("source", type=Path, metavar="FILE.csv|DIR|CASE.toml", help=words)
     parser.add_argument("--out", type=folder, metavar="DIR", help="folder of the tables and the picture")
     parser.add_argument(
         "--model",
@@ -33,6 +37,8 @@ def add(actions: argparse._SubParsersAction[Any]) -> None:
     parser.add_argument(
         "--simulations", type=_simulations, default=39, metavar="N", help="how many are compared (default 39)"
     )
+    words = "size of the window, in the unit of the table (default: what a comment in the table says)"
+    parser.add_argument("--size", type=_length, nargs=2, metavar=("WIDTH", "HEIGHT"), help=words)
     parser.set_defaults(action=_statistics)
 
 
@@ -42,10 +48,21 @@ def _simulations(word: str) -> int:
     return int(word)
 
 
+def _length(word: str) -> float:
+    try:
+        value = float(word)
+    except ValueError:
+        value = math.nan
+    if not 0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f"{word}: expected a length above 0")
+    return value
+
+
 def _statistics(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.analysis import fibre_statistics
     from feti_homog.common.mpi_errors import on_root_only
 
-    words = arguments.source, arguments.out, arguments.model, arguments.simulations
+    size = None if arguments.size is None else tuple(arguments.size)
+    words = arguments.source, arguments.out, arguments.model, arguments.simulations, size
     for line in on_root_only(comm, fibre_statistics.run, *words) or []:
         say(line)

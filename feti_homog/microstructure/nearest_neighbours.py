@@ -32,7 +32,7 @@ class NearestNeighbours:
     @cached_property
     def means(self) -> Float:
         """(k,) mean distances, NaN where none counts."""
-        total = np.where(self.weights > 0, self.weights * self.distances, 0.0).sum(axis=0)
+        total = (self.weights * np.where(self.weights > 0, self.distances, 0.0)).sum(axis=0)
         return np.where(self.weights.any(axis=0), total, np.nan)
 
     @cached_property
