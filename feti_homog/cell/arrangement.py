@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from math import fsum, pi, sqrt
 from typing import TYPE_CHECKING
@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from feti_homog.config.cell_section import Cell
 
 
+# Phase of the discs of cells that name none.
+FIBRE = "fibre"
 # Fibres of the lattices.
 FIBRES_OF = {"square": 1, "hexagonal": 2}
 # Quenched random packings jam near this area fraction.
@@ -30,12 +32,21 @@ MAX_STEPS = 2000
 
 @dataclass(frozen=True)
 class Arrangement:
-    """Discs with `centres` (N, 2) and `radii` (N,) on the torus of periods `width`, `height`; none touch."""
+    """Discs with `centres` (N, 2) and `radii` (N,) on the torus of periods `width`, `height`; none touch.
+
+    `phase` (N,) names what each disc is made of. Fibre k + 1 of a case is disc k.
+    """
 
     width: float
     height: float
     centres: Float
     radii: Float
+    phase: tuple[str, ...]
+
+    @property
+    def phases(self) -> tuple[str, ...]:
+        """The phases of the cell: the matrix, then those of the discs in the order in which they first appear."""
+        return ("matrix", *dict.fromkeys(self.phase))
 
 
 def arrange(cell: Cell) -> Arrangement:
@@ -70,7 +81,7 @@ def _lattice(cell: Cell, height: float, centres: Float, limit: float) -> Arrange
             f"{limit:.4f}; it must be smaller"
         )
     radius = sqrt(fraction * height / (pi * len(centres)))
-    return Arrangement(1.0, height, centres, np.full(len(centres), radius))
+    return Arrangement(1.0, height, centres, np.full(len(centres), radius), (FIBRE,) * len(centres))
 
 
 def random_arrangement(cell: Cell, max_steps: int = MAX_STEPS, max_attempts: int | None = None) -> Arrangement:
@@ -101,7 +112,7 @@ def random_arrangement(cell: Cell, max_steps: int = MAX_STEPS, max_attempts: int
     for _ in range(attempts):
         centres, clearance = _relax(generator.random((count, 2)), grown, max_steps)
         if clearance >= 1:
-            return clear_shift(Arrangement(1.0, 1.0, centres, radii))
+            return clear_shift(Arrangement(1.0, 1.0, centres, radii, (FIBRE,) * count))
         best = max(best, clearance)
     raise MeshError(
         f"{ask}: no arrangement found in {attempts} attempts; they reached a fibre fraction of at most about "
@@ -174,7 +185,7 @@ def clear_shift(arrangement: Arrangement) -> Arrangement:
     corners, half = np.array(list(product(*lines))), np.array(size) / 2
     offset = (centres - corners[:, None] + half) % size - half
     distance = np.abs(np.linalg.norm(offset, axis=2) - radii).min(axis=1)
-    return Arrangement(*size, (centres - corners[np.argmax(distance)]) % size, radii)
+    return replace(arrangement, centres=(centres - corners[np.argmax(distance)]) % size)
 
 
 ARRANGEMENTS: dict[str, Callable[[Cell], Arrangement]] = {

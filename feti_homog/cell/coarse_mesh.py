@@ -19,6 +19,8 @@ class CoarseMesh:
         points: (n, 2) nodes in the plane.
         triangles: (m, 3) counter-clockwise; none has two edges on the same circle.
         phase: (m,) index into `phases`, whose first name is "matrix".
+        precedence: (m,) in whose order the constituents of the triangles are numbered, 0 in the matrix: the fibre's
+            number, or the phase where fibres have none.
         representative: (n,) node that stands for the class of a node on the torus: x = width -> x = 0,
             y = height -> y = 0; idempotent.
         circles: (k, 3) centre and radius in the plane; periodic images are listed separately.
@@ -33,6 +35,7 @@ class CoarseMesh:
     triangles: Int32
     phase: Int32
     phases: tuple[str, ...]
+    precedence: Int32
     representative: Int32
     circles: Float
     arc_edges: Int32

@@ -62,21 +62,33 @@ def generate(cell: Cell, marks: Mapping[int, Sequence[float]] = NO_MARKS) -> Coa
             f"[cell] fibre_fraction = {cell.fibre_fraction}: a fibre has a radius of {arrangement.radii.min():.2g}; "
             f"expected at least {SMALLEST_RADIUS} of the width of the cell"
         )
+    return mesh_arrangement(arrangement, sizes, marks, _scale(cell, arrangement))
+
+
+def mesh_arrangement(
+    arrangement: Arrangement,
+    sizes: MeshSizes,
+    marks: Mapping[int, Sequence[float]] = NO_MARKS,
+    scale: float = 1.0,
+) -> CoarseMesh:
+    """The periodic coarse mesh of an arrangement, with elements of these sizes, scaled at the end; see `generate`."""
     lines = outline(arrangement, sizes, marks)
     points, triangles, circle = _fill(lines, sizes)
-    phase = (circle != MATRIX).astype(np.int32)
+    disc = np.where(circle == MATRIX, MATRIX, lines.disc[circle])
+    place = [arrangement.phases.index(name) for name in (*arrangement.phase, arrangement.phases[0])]
+    phase = np.array(place, np.int32)[disc]
     arcs = [curve for curve in lines.curves if curve.circle != MATRIX]
     arc_edges = np.concatenate([np.stack([arc.nodes[:-1], arc.nodes[1:]], axis=1) for arc in arcs])
     arc_edges = arc_edges.astype(np.int32)
     arc_circle = np.repeat([arc.circle for arc in arcs], [len(arc.nodes) - 1 for arc in arcs])
-    scale = _scale(cell, arrangement)
     return CoarseMesh(
         width=scale * arrangement.width,
         height=scale * arrangement.height,
         points=scale * points,
         triangles=flip_double_arcs(triangles, phase, arc_edges, arc_circle, len(points)),
         phase=phase,
-        phases=("matrix", "fibre"),
+        phases=arrangement.phases,
+        precedence=(disc + 1).astype(np.int32),
         representative=representatives(points, arrangement.width, arrangement.height),
         circles=scale * lines.circles,
         arc_edges=arc_edges,

@@ -167,6 +167,7 @@ def _coarse_mesh(raw: RawMesh, plane: Float, size: Float) -> CoarseMesh:
         triangles=triangles,
         phase=number[raw.group],
         phases=phases,
+        precedence=number[raw.group],
         representative=representatives(plane, width, height),
         circles=np.zeros((0, 3)),
         arc_edges=np.zeros((0, 2), np.int32),

@@ -44,11 +44,19 @@ class Curve:
 
 @dataclass(frozen=True)
 class Outline:
-    """Nodes (n, 2) on all lines, exactly in place, curves through them, and circles (k, 3) in the plane."""
+    """The lines of a cell.
+
+    Attributes:
+        points: (n, 2) nodes on all lines, exactly in place.
+        curves: through the nodes.
+        circles: (k, 3) in the plane, the images of one disc after the other.
+        disc: (k,) the disc of the arrangement that each circle is an image of.
+    """
 
     points: Float
     curves: tuple[Curve, ...]
     circles: Float
+    disc: Int
 
 
 def images(arrangement: Arrangement) -> tuple[Float, Int]:
@@ -88,7 +96,7 @@ def outline(arrangement: Arrangement, sizes: MeshSizes, marks: Mapping[int, Sequ
         curves += _side_curves(axis, places[axis], circles, size, field, numbering)
     caps = circle_size(circles[circle, 2], sizes.interface)
     curves += _arc_curves(circles, circle, start, stop, caps, field, numbering)
-    return Outline(numbering.points(), tuple(curves), circles)
+    return Outline(numbering.points(), tuple(curves), circles, fibre)
 
 
 class _Numbering:

@@ -49,12 +49,12 @@ class Torus:
         same = mesh.phase[left] == mesh.phase[right]
         label = components(len(mesh.triangles), left[same], right[same])
         torus = cls(mesh, node_class, edges, triangle_edges, torus_edge, label)
-        # Fibres on circles are numbered in the order of the circles, which is that of the arrangement.
+        # Where the precedence leaves it open, fibres on circles are numbered in the order of the circles.
         circle = np.full(len(edges), len(mesh.circles))
         circle[torus.arcs] = mesh.arc_circle
         first = np.full(label.max() + 1, len(mesh.circles))
         np.minimum.at(first, np.repeat(label, 3), circle[triangle_edges].ravel())
-        order = np.lexsort((np.arange(len(label)), first[label], mesh.phase))
+        order = np.lexsort((np.arange(len(label)), first[label], mesh.precedence))
         return replace(torus, constituent=_renumber(label, order))
 
     @cached_property

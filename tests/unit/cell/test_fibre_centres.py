@@ -10,7 +10,8 @@ from unit.cell.faulty_meshes import ALL_SIDES, FIBRE, MATRIX, RIGHT_SIDE, grid, 
 
 from feti_homog.cell.arrangement import arrange
 from feti_homog.cell.fibre_centres import fibre_circles
-from feti_homog.cell.gmsh_mesher import generate
+from feti_homog.cell.gmsh_mesher import generate, mesh_arrangement
+from feti_homog.cell.graded_size import MeshSizes
 from feti_homog.cell.msh_reader import read
 from feti_homog.cell.periodic_topology import Torus
 from feti_homog.config.cell_section import Cell
@@ -47,6 +48,17 @@ def test_fibres_are_numbered_as_arranged(cell):
     assert np.abs(offset - np.round(offset / size) * size).max() < 1e-12
     assert circles[1:, 2] == pytest.approx(arrangement.radii, rel=1e-12)
     assert np.isnan(circles[0]).all()
+
+
+def test_fibres_of_many_phases_are_numbered_as_arranged():
+    cell = Cell(geometry="random", fibre_fraction=0.5, fibres=7, mesh_size=0.1)
+    names = ("b", "a", "a", "c", "b", "a", "c")
+    arrangement = replace(arrange(cell), phase=names)
+    torus, circles = circles_of(mesh_arrangement(arrangement, MeshSizes(0.1, 0.1, 0.1)))
+    offset = circles[1:, :2] - arrangement.centres
+    assert np.abs(offset - np.round(offset)).max() < 1e-12
+    assert torus.mesh.phases == ("matrix", "b", "a", "c")
+    assert [torus.mesh.phases[phase] for phase in torus.constituent_phase] == ["matrix", *names]
 
 
 def test_numbers_do_not_depend_on_marks():

@@ -46,9 +46,9 @@ def periodic_grids(draw):
     a, b, c, d = (part.ravel() for part in (place[:-1, :-1], place[1:, :-1], place[1:, 1:], place[:-1, 1:]))
     triangles = rng.permutation(np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)]))
     points, width, height = np.stack([x[column], y[row]], axis=1), x[-1], y[-1]
-    none = np.zeros((0, 2), np.int32)
+    none, matrix = np.zeros((0, 2), np.int32), np.zeros(len(triangles), np.int32)
     mesh = CoarseMesh(
-        width, height, points, triangles.astype(np.int32), np.zeros(len(triangles), np.int32), ("matrix",),
+        width, height, points, triangles.astype(np.int32), matrix, ("matrix",), matrix,
         representatives(points, width, height), np.zeros((0, 3)), none, np.zeros(0, np.int32), none,
     )  # fmt: skip
     return PeriodicGrid(mesh, column, row)
