@@ -25,7 +25,8 @@ class Cell:
     geometry: str = key(
         choice(*CIRCULAR, "mesh"),
         '"square": a fibre in the middle of a square cell; "hexagonal": a cell sqrt(3) times as high as wide with '
-        'fibres in the middle and at the corners; "random": fibres in a square cell; "mesh": a gmsh file.',
+        'fibres in the middle and at the corners; "random": fibres in a square cell; "mesh": a file of '
+        "gmsh, Abaqus or VTK.",
     )
     fibre_fraction: float | None = key(
         real(above=0.0, below=1.0),
@@ -99,7 +100,21 @@ class Cell:
     file: Path | None = key(
         MESH_FILE,
         "The mesh, relative to the case file: triangles of three or six nodes that fill a rectangle, in physical "
-        'surfaces "matrix", "fibre", "fibre:2", ...; the nodes on opposite sides match. Fibres may have any shape.',
+        'surfaces "matrix", "fibre", "fibre:2", ...; the nodes on opposite sides match. Fibres may have any shape. '
+        "Of Abaqus' .inp files element sets have these names; of .vtu and .vtk files, which meshio reads, cell data "
+        '"phase" are 0 in the matrix, 1 in fibre, 2 in fibre:2, ...',
+        only=MESH,
+    )
+    repair: str = key(
+        choice("none", "snap"),
+        '"snap": nodes on sides that nearly match are moved to match; the result says how far.',
+        default="none",
+        only=MESH,
+    )
+    snap_tolerance: float = key(
+        real(least=0.0, most=0.1),
+        'How far nodes may be moved by repair = "snap" / width of the cell.',
+        default=1e-3,
         only=MESH,
     )
 

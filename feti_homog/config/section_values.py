@@ -14,11 +14,13 @@ STRAIN_COMPONENTS = "[E11, E22, gamma12]"
 FIBRE = integer(least=1)
 SEED = integer(least=0, most=10**15)
 
+MESH_SUFFIXES = (".msh", ".inp", ".vtu", ".vtk")
+
 Matrix = tuple[tuple[float, ...], ...]
 
 
 def _is_mesh_file(value: Any) -> bool:
-    return text.accepts(value) and value.endswith(".msh")
+    return text.accepts(value) and value.endswith(MESH_SUFFIXES)
 
 
 def _is_fibre_or_fibres(value: Any) -> bool:
@@ -53,7 +55,12 @@ def _positive_or_inf(what: str) -> ValueType:
     return ValueType(f"{what} above 0, or inf", _is_strength, lambda v: None if v == math.inf else float(v), schema)
 
 
-MESH_FILE = ValueType("the name of a .msh file", _is_mesh_file, Path, {"type": "string", "pattern": "\\.msh$"})
+MESH_FILE = ValueType(
+    f"the name of a {', '.join(MESH_SUFFIXES[:-1])} or {MESH_SUFFIXES[-1]} file",
+    _is_mesh_file,
+    Path,
+    {"type": "string", "pattern": f"\\.({'|'.join(suffix[1:] for suffix in MESH_SUFFIXES)})$"},
+)
 FIBRES = ValueType(
     'the number of a fibre, counted from 1, a list of numbers, or "all"',
     _is_fibre_or_fibres,

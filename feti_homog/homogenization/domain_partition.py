@@ -71,6 +71,7 @@ class CellSummary:
         constituent_phase: (constituents,) place of the phase of each in `phases`.
         centres, radii: (constituents, 2) and (constituents,) centre, within the cell, and radius of each fibre, NaN
             where there is none.
+        snapped: how far a node of a user's mesh was moved to make sides match, at most.
     """
 
     width: float
@@ -85,6 +86,7 @@ class CellSummary:
     centres: Float
     radii: Float
     moved_tips: MovedTips
+    snapped: float
 
     @property
     def fibres(self) -> int:
@@ -94,6 +96,11 @@ class CellSummary:
     def fibre_number(self, constituent: Int) -> Int:
         """(k,) numbers from 1, as a case file has them, of fibres that are these constituents (k,)."""
         return np.asarray(constituent - self.first_fibre + 1)
+
+    def warnings(self) -> list[str]:
+        """What was changed in a user's mesh, in words."""
+        moved = f"nodes on the sides of the mesh were moved by up to {self.snapped:.3g} to match"
+        return [moved] if self.snapped > 0 else []
 
     @property
     def period(self) -> Float:
@@ -126,7 +133,7 @@ def coarse_mesh(case: Case) -> CoarseMesh:
     if case.cell.file is not None:
         from feti_homog.cell.msh_reader import read
 
-        mesh = read(case.cell.file)
+        mesh = read(case.cell.file, case.cell.snap_tolerance if case.cell.repair == "snap" else None)
     else:
         from feti_homog.cell.gmsh_mesher import generate
 
@@ -173,6 +180,7 @@ def distribute(
         centres=centres,
         radii=circles[:, 2],
         moved_tips=dict(moved),
+        snapped=mesh.snapped,
     )
     own: list[list[Submesh]] = [[] for _ in range(n_ranks)]
     for submesh, rank in zip(submeshes, decomposition.rank, strict=True):
