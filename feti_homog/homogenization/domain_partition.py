@@ -123,9 +123,10 @@ def coarse_mesh(case: Case) -> CoarseMesh:
         MeshError: the cell cannot be meshed, or its mesh file is faulty.
     """
     # gmsh is imported on rank 0 alone, which is where this runs.
-    if case.cell.file is not None:
+    if case.cell.has_own_mesh:
         from feti_homog.cell.msh_reader import read
 
+        assert case.cell.file is not None
         mesh = read(case.cell.file)
     else:
         from feti_homog.cell.gmsh_mesher import generate
