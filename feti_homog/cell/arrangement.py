@@ -139,7 +139,7 @@ def table_arrangement(cell: Cell) -> Arrangement:
     """
     table = cell.table
     assert table is not None
-    rows, centres, radii, height = tabulated.fibres(table)
+    rows, centres, radii, height = tabulated.fibres(table, cell.window)
     discs = Arrangement(1.0, height, centres, radii, tuple(table.phase[row] for row in rows))
     shifted = clear_shift(discs)
     is_placed = table.left is not None and table.bottom is not None
