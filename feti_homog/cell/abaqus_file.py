@@ -50,6 +50,8 @@ def load(path: Path) -> RawMesh:
     for number, words, rows in _blocks(text):
         try:
             _take(content, words, rows)
+        except KeyError as error:
+            raise MeshError(f"{path.name}: line {number}, *{words['']}: no {error.args[0]}") from None
         except (ValueError, IndexError) as error:
             raise MeshError(f"{path.name}: line {number}, *{words['']}: {error}") from None
     faults = _faults(content)

@@ -15,12 +15,17 @@ FIBRE = integer(least=1)
 SEED = integer(least=0, most=10**15)
 
 MESH_SUFFIXES = (".msh", ".inp", ".vtu", ".vtk")
+MESH_FILE = ".msh, .inp, .vtu or .vtk file"
 
 Matrix = tuple[tuple[float, ...], ...]
 
 
-def _is_mesh_file(value: Any) -> bool:
-    return text.accepts(value) and value.endswith(MESH_SUFFIXES)
+def _is_cell_file(value: Any) -> bool:
+    return text.accepts(value) and value.endswith((*MESH_SUFFIXES, ".csv"))
+
+
+def _are_fibres(value: Any) -> bool:
+    return isinstance(value, list) and value != [] and all(isinstance(fibre, dict) for fibre in value)
 
 
 def _is_fibre_or_fibres(value: Any) -> bool:
@@ -55,11 +60,27 @@ def _positive_or_inf(what: str) -> ValueType:
     return ValueType(f"{what} above 0, or inf", _is_strength, lambda v: None if v == math.inf else float(v), schema)
 
 
-MESH_FILE = ValueType(
-    f"the name of a {', '.join(MESH_SUFFIXES[:-1])} or {MESH_SUFFIXES[-1]} file",
-    _is_mesh_file,
+CELL_FILE = ValueType(
+    f"the name of a {MESH_FILE}, or of a .csv file of a table",
+    _is_cell_file,
     Path,
-    {"type": "string", "pattern": f"\\.({'|'.join(suffix[1:] for suffix in MESH_SUFFIXES)})$"},
+    {"type": "string", "pattern": f"\\.({'|'.join(suffix[1:] for suffix in (*MESH_SUFFIXES, '.csv'))})$"},
+)
+FIBRE_LIST = ValueType(
+    "a list of fibres such as {x = 0.5, y = 0.5, radius = 0.3}",
+    _are_fibres,
+    tuple,
+    {
+        "type": "array",
+        "minItems": 1,
+        "items": {
+            "type": "object",
+            "properties": {"x": real().json_schema, "y": real().json_schema, "phase": {"type": "string"}}
+            | {"radius": real(above=0.0).json_schema},
+            "required": ["x", "y", "radius"],
+            "additionalProperties": False,
+        },
+    },
 )
 FIBRES = ValueType(
     'the number of a fibre, counted from 1, a list of numbers, or "all"',

@@ -89,6 +89,7 @@ FAULTS = {
     "unknown node": ("a.inp", _text(SQUARE.replace("2, 1, 3, 4", "2, 1, 3, 9")), "element 2: there is no node 9"),
     "unknown set": ("a.inp", _text(SQUARE + "*ELSET, ELSET=fibre\nother\n"), 'there is no element set "other"'),
     "unknown section": ("a.inp", _text(SQUARE + "*SOLID SECTION, ELSET=steel\n"), 'element set "steel": there is none'),
+    "nameless set": ("a.inp", _text(SQUARE + "*ELSET\n1\n"), "line 9, *ELSET: no ELSET"),
     "two parts": ("a.inp", _text("*PART, NAME=a\n*PART, NAME=b\n" + SQUARE), "2 parts: expected one"),
     "other files": ("a.inp", _text("*INCLUDE, INPUT=b.inp\n" + SQUARE), "other files are not read"),
     "no set": (
