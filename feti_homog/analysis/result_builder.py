@@ -39,7 +39,10 @@ def result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Fields
     """The numbers of an analysis with all that belongs to them; collective."""
     cell, progress = context.homogenization.cell, context.progress
     areas = cell.areas()
-    fractions = {phase: area / sum(areas.values()) for phase, area in areas.items()}
+    fractions = {
+        phase: area / (cell.summary.area if cell.summary.voids else sum(areas.values()))
+        for phase, area in areas.items()
+    }
     points: dict[str, Any] = {
         name: tuple(kind(**point) for point in analysis[name])
         for name, kind in (("angle", AnglePoint), ("path", PathPoint), ("envelope", EnvelopePoint))
@@ -79,6 +82,7 @@ def _cell_info(cell: TornCell, fractions: dict[str, float]) -> CellInfo:
         area=cell.summary.area,
         fibre_fraction=sum(f for phase, f in fractions.items() if phase not in AROUND_FIBRES),
         fractions=fractions,
+        porosity=1.0 - sum(fractions.values()) if cell.summary.voids else 0.0,
         elements=cell.sum_over_ranks(sum(len(s.mesh.triangles) for s in cell.subdomains)),
         nodes=cell.sum_over_ranks(sum(len(s.mesh.points) for s in cell.subdomains)),
     )
@@ -126,11 +130,17 @@ def _moduli_and_bounds(cell: TornCell, L: Float, fractions: dict[str, float]) ->
     case, shares = cell.case, list(fractions.values())
     phases = [plane_stiffness(case.material_of(phase), case.analysis.plane) for phase in fractions]
     isotropic = all(bounds.is_isotropic(stiffness) for stiffness in phases)
-    return {
-        "moduli": bounds.engineering_moduli(L),
-        "bounds": StiffnessBounds(
-            voigt=bounds.voigt(shares, phases),
-            reuss=bounds.reuss(shares, phases),
-            hashin_shtrikman=bounds.hashin_shtrikman(shares, phases) if isotropic else None,
-        ),
-    }
+    moduli: dict[str, Moduli | StiffnessBounds] = {"moduli": bounds.engineering_moduli(L)}
+    # With voids the lower bounds are zero.
+    return (
+        moduli
+        if cell.summary.voids
+        else moduli
+        | {
+            "bounds": StiffnessBounds(
+                voigt=bounds.voigt(shares, phases),
+                reuss=bounds.reuss(shares, phases),
+                hashin_shtrikman=bounds.hashin_shtrikman(shares, phases) if isotropic else None,
+            ),
+        }
+    )

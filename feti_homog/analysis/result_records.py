@@ -37,12 +37,13 @@ class CellInfo:
     width: float = described("width of the cell", LENGTH)
     height: float = described("height of the cell", LENGTH)
     area: float = described("area of the cell", f"{LENGTH} squared")
-    fibre_fraction: float = described("share of all phases but matrix and coating in the meshed area")
+    fibre_fraction: float = described("share of all phases but matrix and coating in the area of the cell")
     fractions: Mapping[str, float] = described(
-        "share of each phase in the meshed area", entries={"PHASE": "that of one phase"}
+        "share of each phase in the area of the cell", entries={"PHASE": "that of one phase"}
     )
     elements: int = described("triangles of the refined mesh")
     nodes: int = described("nodes of the refined mesh, those on cuts once for each subdomain")
+    porosity: float = described("share of voids in the area of the cell", default=0.0)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -29,7 +29,7 @@ def constants(cell: TornCell, analysis: Mapping[str, Any], fractions: Mapping[st
     """The keys of result.json that follow from `effective_stiffness` and `thermal_stress`.  Collective.
 
     Nothing follows where faces touch without tension: each column is a secant of its own load.  Estimates and bounds
-    are of cells with fibres and without debonding, estimates of round fibres.
+    are of cells with fibres and without voids and debonding, estimates of round fibres.
     """
     if "effective_stiffness_compression" in analysis:
         return {}
@@ -44,7 +44,8 @@ def constants(cell: TornCell, analysis: Mapping[str, Any], fractions: Mapping[st
     if strains is not None:
         found["thermal_expansion"] = strains
     is_debonded = cell.sum_over_ranks(int(cell.debonded(None).sum())) > 0
-    return found if is_debonded or len(fractions) < 2 else found | _comparisons(cell, fractions)
+    has_bounds = not is_debonded and not cell.summary.voids and len(fractions) > 1
+    return found if not has_bounds else found | _comparisons(cell, fractions)
 
 
 def _comparisons(cell: TornCell, fractions: Mapping[str, float]) -> dict[str, Any]:

@@ -1,8 +1,10 @@
-"""Which edges of a mesh are interfaces on the torus."""
+"""Which edges of a mesh are interfaces on the torus, between phases or beside voids."""
 
 from __future__ import annotations
 
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
 from feti_homog.cell.coarse_mesh import CoarseMesh, edge_keys, edges
 from feti_homog.cell.periodic_sides import paired_sides
@@ -10,10 +12,26 @@ from feti_homog.typing import Bool, Index, Int32
 
 
 def interface_edges(mesh: CoarseMesh) -> Int32:
-    """Edges (k, 2) between triangles of different phases on the torus; of those on sides the low copy."""
+    """Edges (k, 2) between triangles of different phases, or beside a void, on the torus; of those on sides the low
+    copy."""
     pairs, order = _neighbours(mesh)
     between = mesh.phase[order[:, 0] // 3] != mesh.phase[order[:, 1] // 3]
-    return np.asarray(pairs[order[between, 0]])
+    return np.concatenate([pairs[order[between, 0]], pairs[_alone(mesh, pairs)]])
+
+
+def void_edges(mesh: CoarseMesh) -> Int32:
+    """Edges (k, 2) that one triangle has on the torus: a void is on the other side; of those on sides the low copy."""
+    pairs = _low_copies(mesh, edges(mesh.triangles))
+    return np.asarray(pairs[_alone(mesh, pairs)])
+
+
+def voids(mesh: CoarseMesh) -> int:
+    """Number of connected boundaries of voids on the torus."""
+    pairs = mesh.representative[void_edges(mesh)]
+    classes, ends = np.unique(pairs, return_inverse=True)
+    ends = ends.reshape(-1, 2)
+    graph = coo_matrix((np.ones(len(ends)), tuple(ends.T)), shape=(len(classes),) * 2)
+    return int(connected_components(graph, directed=False)[0])
 
 
 def can_debond(mesh: CoarseMesh, pairs: Int32) -> Bool:
@@ -26,9 +44,18 @@ def can_debond(mesh: CoarseMesh, pairs: Int32) -> Bool:
 
 
 def _neighbours(mesh: CoarseMesh) -> tuple[Int32, Index]:
-    """The triangles' edges (3m, 2), low copies on sides, and the two places (e, 2) of each of them."""
+    """The triangles' edges (3m, 2), low copies on sides, and the two places (e, 2) of those that have two."""
     pairs = _low_copies(mesh, edges(mesh.triangles))
-    return pairs, np.argsort(edge_keys(pairs, len(mesh.points)), kind="stable").reshape(-1, 2)
+    keys = edge_keys(pairs, len(mesh.points))
+    order = np.argsort(keys, kind="stable")
+    twice = np.flatnonzero(keys[order][1:] == keys[order][:-1])
+    return pairs, np.stack([order[twice], order[twice + 1]], axis=1)
+
+
+def _alone(mesh: CoarseMesh, pairs: Int32) -> Bool:
+    """Which of the triangles' edges (3m, 2) no other triangle has."""
+    _, which, count = np.unique(edge_keys(pairs, len(mesh.points)), return_inverse=True, return_counts=True)
+    return np.asarray(count[which.ravel()] == 1)
 
 
 def _low_copies(mesh: CoarseMesh, pairs: Int32) -> Int32:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from feti_homog.cell import abaqus_file, bent_edges, gmsh_file, mesh_checks, vtk_file
+from feti_homog.cell import abaqus_file, bent_edges, gmsh_file, mesh_checks, void_checks, vtk_file
 from feti_homog.cell.bent_edges import with_bent_edges
 from feti_homog.cell.circle_detection import with_circles
 from feti_homog.cell.coarse_mesh import CoarseMesh, areas, representatives
@@ -25,9 +25,9 @@ def read(path: Path, snap: float | None = None) -> CoarseMesh:
     """The coarse mesh in a file of one of the LOADERS, moved to [0, width] x [0, height].
 
     It consists of triangles of three or six nodes in physical surfaces "matrix", "fibre", "glass", ..., fills a
-    rectangle, and has matching nodes on opposite sides. Lines in the physical curve "debonded" are edges between a
-    fibre and the matrix that are debonded. Round interfaces become circles (`with_circles`), others follow their
-    middle nodes, if they have them (`with_bent_edges`).
+    rectangle but for voids, and has matching nodes on opposite sides. Lines in the physical curve "debonded" are
+    edges between a fibre and the matrix that are debonded. Round interfaces become circles (`with_circles`), others
+    follow their middle nodes, if they have them (`with_bent_edges`).
     With `snap`, nodes on sides are first moved by up to that / width to where they should be (`snapped`).
 
     Raises:
@@ -43,10 +43,12 @@ def read(path: Path, snap: float | None = None) -> CoarseMesh:
     _refuse(path, bent_edges.faults(raw))
     origin, size, plane = _on_rectangle(raw.points[:, :2])
     corners = mesh_checks.missing_corners(plane, origin, size)
-    _refuse(path, mesh_checks.overlapping(raw), mesh_checks.open_edges(raw, plane, size), corners)
-    _refuse(path, mesh_checks.uncovered(plane, raw.triangles, size))
+    _refuse(path, mesh_checks.overlapping(raw), mesh_checks.hanging_nodes(raw, plane, size), corners)
+    _refuse(path, mesh_checks.too_large(plane, raw.triangles, size))
     _refuse(path, mesh_checks.not_periodic(raw, plane, size), mesh_checks.unrefined_sides(plane, size))
     mesh = _coarse_mesh(raw, _matched(plane, size), size)
+    _refuse(path, void_checks.unmatched_sides(raw, mesh))
+    _refuse(path, void_checks.islands(raw, mesh), void_checks.no_voids(raw, mesh))
     _refuse(path, mesh_checks.cannot_debond(raw, mesh.debonded_edges, can_debond(mesh, mesh.debonded_edges)))
     middles = replace(raw.middles, points=raw.middles.points - [*origin, 0.0])
     return replace(with_bent_edges(with_circles(mesh, middles), middles), snapped=moved)

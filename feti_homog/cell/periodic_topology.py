@@ -16,7 +16,7 @@ from scipy.sparse.csgraph import connected_components
 
 from feti_homog.cell.coarse_mesh import CoarseMesh
 from feti_homog.cell.periodic_sides import paired_sides
-from feti_homog.typing import Float, Int, Int32
+from feti_homog.typing import Bool, Float, Int, Int32
 
 
 @dataclass(frozen=True)
@@ -61,6 +61,11 @@ class Torus:
     def triangle_torus_edges(self) -> Int:
         """(m, 3) torus edge from vertex k to vertex k + 1 (mod 3)."""
         return self.torus_edge[self.triangle_edges]
+
+    @cached_property
+    def at_void(self) -> Bool:
+        """(torus edges,) whether a triangle is on one side of each only."""
+        return np.asarray(np.bincount(self.triangle_torus_edges.ravel()) == 1)
 
     @cached_property
     def edge_circles(self) -> Float:

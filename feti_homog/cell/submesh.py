@@ -30,6 +30,7 @@ class Submesh:
         circles: (e, 3) centre and radius of the circle that the edge lies on, radius 0 where straight.
         vertex_class: (v,) class of each vertex.
         edge_class: (e,) torus edge of each edge.
+        at_void: (torus edges,) whether one triangle of the whole cell has the torus edge, and a void is beside it.
         class_keys, edge_keys: global numbers of the classes and torus edges.
         period: (2,) width and height of the cell.
         pinned: local class that is pinned against translation of the whole cell, Eq. (15), or -1.
@@ -46,6 +47,7 @@ class Submesh:
     circles: Float
     vertex_class: Int
     edge_class: Int
+    at_void: Bool
     class_keys: Int
     edge_keys: Int
     period: Float
@@ -77,6 +79,7 @@ def part(submesh: Submesh, members: Int) -> Submesh:
         circles=submesh.circles[edges],
         vertex_class=vertex_class,
         edge_class=edge_class,
+        at_void=submesh.at_void[torus_edges],
         class_keys=submesh.class_keys[classes],
         edge_keys=submesh.edge_keys[torus_edges],
         pinned=int(pinned_here[0]) if len(pinned_here) else -1,
@@ -126,6 +129,7 @@ def _submesh(torus: Torus, index: int, members: Int, pinned: int) -> Submesh:
         circles=torus.edge_circles[edges],
         vertex_class=vertex_class,
         edge_class=edge_class,
+        at_void=torus.at_void[edge_keys],
         class_keys=class_keys,
         edge_keys=edge_keys,
         period=np.array([mesh.width, mesh.height]),

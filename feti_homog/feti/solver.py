@@ -30,6 +30,7 @@ from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.feti.krylov import ActiveRows, Krylov
 from feti_homog.feti.operators.dual_operator import DualOperator
+from feti_homog.feti.operators.inner_loads import CondensedLoads
 from feti_homog.feti.thresholds import DEFAULTS, MAX_RESTARTS, ZERO_JUMP, Thresholds
 from feti_homog.typing import Float
 
@@ -122,10 +123,14 @@ class FetiSolver:
         return np.concatenate([np.zeros((0, len(self.problem.loads))), *(s.Q for s in self.subdomains)])
 
     @cached_property
+    def condensed(self) -> CondensedLoads:
+        """The unit loads on the boundaries, with the answer of the interiors to what works there, beside voids."""
+        return CondensedLoads.of(self.subdomains, self.interface_operators.dofs, len(self.problem.loads))
+
+    @property
     def loads(self) -> Float:
-        """(boundary dofs, v) Q there; inside the uniform bodies it vanishes."""
-        loads: Float = self.Q[self.interface_operators.local_dofs]
-        return loads
+        """(boundary dofs, v) unit loads on the boundaries, Q there where no void is near."""
+        return self.condensed.boundary
 
     @cached_property
     def _torn_displacement(self) -> Float:
@@ -140,7 +145,7 @@ class FetiSolver:
     @cached_property
     def torn_stiffness(self) -> Float:
         """(v, v) sum |Omega_s| L_s - Q^T K+ Q: the stress integral of the torn cell under the unit loads."""
-        local = sum((s.area * s.L for s in self.subdomains), self.loads.T @ self._torn_displacement)
+        local = self.condensed.stiffness + self.loads.T @ self._torn_displacement
         return np.asarray(self.comm.allreduce(local))
 
     def stress_integral(self, solution: DualSolution) -> Float:
@@ -203,7 +208,8 @@ class FetiSolver:
 
     def displacement(self, solution: DualSolution) -> Float:
         """(local dofs,) u* of a solution; factors the interiors when first called.  Collective."""
-        return self.interface_operators.extend(self.boundary_displacement(solution))
+        u = self.interface_operators.extend(self.boundary_displacement(solution))
+        return np.asarray(u + self.condensed.inner @ solution.strain)
 
     def destroy(self) -> None:
         """Free the Krylov methods and the coarse factor, after the last solve; collective.

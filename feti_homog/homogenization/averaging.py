@@ -33,8 +33,9 @@ class Response:
         in_springs: the latter, 1/2 sum lam^2 C / |UC|.
         state: interface states, multipliers, jumps and amplitudes.
         u: (boundary dofs,) fluctuating displacement u* on the boundaries of this rank's subdomains.
-        checks: relative errors of the laws: `strain` <eps> = E, Eq. (3), with the opening of debonded faces as
-            part of <eps>; `hill` <sigma:eps> = Sigma:E, Eq. (8), springs included, relative to <sigma:eps> or, if
+        checks: relative errors of the laws: `strain` <eps> = E, Eq. (3), with the opening of debonded faces and
+            the strain of voids, which is that of their boundaries, as parts of <eps>;
+            `hill` <sigma:eps> = Sigma:E, Eq. (8), springs included, relative to <sigma:eps> or, if
             that is less, to what a bonded cell stores at least, E:<L^-1>^-1:E (Reuss), for a debonded one may store
             nothing; `jump`, the largest opening of a glued node relative to the largest displacement, which does not
             vanish where forces do; and the KKT certificate of contact.
@@ -101,7 +102,7 @@ class Homogenization:
         largest = (self._largest(u) + self.interface.imposed(strain)) or 1.0
         imposed = self.interface.imposed_strain(strain).max() or 1.0
         checks = {
-            "strain": float(np.abs(star - opening / cell.summary.area).max() / imposed),
+            "strain": float(np.abs(star - opening / cell.summary.area).max() / imposed) + self._strain_inside,
             "hill": float(abs(energy - stress @ strain) / (max(abs(energy), least) or 1.0)),
             "jump": self._largest(active * state.solution.jump) / largest,
         }
@@ -126,24 +127,27 @@ class Homogenization:
 
     @cached_property
     def _strain_of_displacements(self) -> Float:
-        """(boundary dofs, m) Q L^-1 of the uniform bodies: int eps* is its transpose times u."""
-        solver = self.cell.solver
-        m, slices = solver.problem.strains, solver.interface_operators.slices
-        pairs = zip(self.cell.subdomains, slices, strict=True)
-        return np.concatenate(
-            [np.zeros((0, m)), *(np.linalg.solve(s.L[:m, :m], solver.loads[own, :m].T).T for s, own in pairs)]
-        )
+        """(boundary dofs, m) of which int eps* over bodies and voids is the transpose times u."""
+        m, dofs = self.cell.solver.problem.strains, self.cell.solver.interface_operators.dofs
+        pairs = zip(self.cell.subdomains, dofs, strict=True)
+        return np.concatenate([np.zeros((0, m)), *(s.mean_strain[own] for s, own in pairs)])
 
     @cached_property
-    def _stiffness_of_bodies(self) -> Float:
-        """(v, v) sum |Omega_s| L_s of this rank's subdomains."""
-        v = len(self.loads)
-        return sum((s.area * s.L for s in self.cell.subdomains), np.zeros((v, v)))
+    def _strain_inside(self) -> float:
+        """The largest share of an inner node in int eps*, which is 0 if voids are closed; relative.  Collective."""
+        inner, size = 0.0, 0.0
+        for s, own in zip(self.cell.subdomains, self.cell.solver.interface_operators.dofs, strict=True):
+            inside = np.ones(len(s.mean_strain), bool)
+            inside[own] = False
+            size = max(size, float(np.sqrt(s.area)))
+            if s.submesh.at_void.any():
+                inner = max(inner, float(np.abs(s.mean_strain[inside]).max(initial=0.0)))
+        return float(self.cell.comm.allreduce(inner, MPI.MAX) / self.cell.comm.allreduce(size, MPI.MAX))
 
     def _averages(self, E: Float, u: Float) -> tuple[Float, Float, float]:
-        """<sigma>, <eps*> over the bodies, and <sigma:eps>; collective."""
+        """<sigma>, <eps*> over bodies and voids, and <sigma:eps>; collective."""
         cell, v = self.cell, len(E)
-        without_u, from_u = self._stiffness_of_bodies @ E, cell.solver.loads.T @ u
+        without_u, from_u = cell.solver.condensed.stiffness @ E, cell.solver.loads.T @ u
         energy = E @ without_u + 2 * E @ from_u + u @ cell.solver.interface_operators.apply_schur(u)
         sums = np.concatenate([without_u + from_u, self._strain_of_displacements.T @ u, [energy]])
         sums = allreduce_sum(cell.comm, sums) / cell.summary.area

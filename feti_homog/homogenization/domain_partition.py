@@ -9,6 +9,7 @@ import numpy as np
 from feti_homog.cell import tabulated
 from feti_homog.cell.coarse_mesh import CoarseMesh
 from feti_homog.cell.fibre_centres import fibre_circles
+from feti_homog.cell.interface_edges import voids
 from feti_homog.cell.periodic_topology import Torus, edge_pairs
 from feti_homog.cell.refinement import ReferenceLattice
 from feti_homog.cell.submesh import Submesh, cut
@@ -74,6 +75,7 @@ class CellSummary:
         centres, radii: (constituents, 2) and (constituents,) centre, within the cell, and radius of each fibre, NaN
             where there is none.
         snapped: how far a node of a user's mesh was moved to make sides match, at most.
+        voids: how many there are.
     """
 
     width: float
@@ -89,6 +91,7 @@ class CellSummary:
     radii: Float
     moved_tips: MovedTips
     snapped: float
+    voids: int
 
     @property
     def fibres(self) -> int:
@@ -200,6 +203,7 @@ def distribute(
         radii=circles[:, 2],
         moved_tips=dict(moved),
         snapped=mesh.snapped,
+        voids=voids(mesh),
     )
     own: list[list[Submesh]] = [[] for _ in range(n_ranks)]
     for submesh, rank in zip(submeshes, decomposition.rank, strict=True):

@@ -159,6 +159,9 @@ def assemble_subdomains(
     with progress.stage("assemble") as words:
         subdomains = agree(comm, _assemble, case, own.submeshes, lattice)
         dofs = comm.allreduce(sum(s.n_dofs for s in subdomains))
+        meshed = comm.allreduce(sum(s.area for s in subdomains))
+        if summary.voids:
+            words.append(f"{summary.voids} voids, porosity {1 - meshed / summary.area:.6g}")
         words.append(f"{dofs} degrees of freedom, refine = {case.cell.refine}, order = {case.cell.order}")
     return summary, own.shared, lattice, subdomains
 
@@ -183,6 +186,7 @@ def describe(case: Case, n_ranks: int) -> str:
     lines = [
         f"case       {case.name}: {case.analysis.type}, plane {case.analysis.plane}",
         f"cell       {summary.width:g} x {summary.height:g}, phases {', '.join(summary.phases)}",
+        *([f"voids      {summary.voids}"] if summary.voids else []),
         f"mesh       {summary.coarse_triangles} coarse triangles, {summary.coarse_triangles * len(lattice.triangles)} "
         f"elements of order {case.cell.order}, about {2 * sum(nodes)} degrees of freedom",
         *([f"fibres     {summary.fibres}, numbered from 1"] if case.interface else []),

@@ -70,7 +70,7 @@ class DiscreteCell:
         stiffnesses: (phases, v, v), v = 3 or in generalized plane strain 6.
         expansions: (phases, v) strains per unit of temperature, or None if they are not known.
         constituent: (subdomains,) part of a phase that each subdomain belongs to.
-        fractions: (phases,) shares of the meshed area.
+        fractions: (phases,) shares of the cell.
         radius: how near copies of a node are.
         largest_strain: the largest component of the strains of all states.
     """
@@ -101,7 +101,7 @@ class DiscreteCell:
         strains = [np.abs(state.attrs["strain"]).max() for state in files.file.get("state", {}).values()]
         largest = float(np.max(strains, initial=0.0))
         return cls(
-            files, stiffnesses, free, elements, sides, nodes, parts, faces, areas / areas.sum(), radius, largest
+            files, stiffnesses, free, elements, sides, nodes, parts, faces, areas / files.size.prod(), radius, largest
         )  # fmt: skip
 
     @cached_property
@@ -115,6 +115,34 @@ class DiscreteCell:
         along = rows[:, [0, 2, 2, 1]] if rows.shape[1] == 3 else rows
         pairs = along.reshape(-1, 2)
         return np.asarray(pairs[(pairs >= 0).all(axis=1)])
+
+    @property
+    def porosity(self) -> float:
+        """Share of the voids, 0 where no side is without a partner."""
+        return 1.0 - float(self.fractions.sum()) if self.sides.at_void.any() else 0.0
+
+    @cached_property
+    def node_integrals(self) -> Float:
+        """(n, 2) int dN/dx over all elements of each node, and over the voids that it lies at: int N n ds there, n
+        outward from the void."""
+        return np.asarray(self.elements.node_integrals + self.void_integrals)
+
+    @cached_property
+    def void_integrals(self) -> Float:
+        """(n, 2) int N n ds along the voids, by Gauss' rule of two points."""
+        sums, points = np.zeros_like(self.files.mesh.points), self.files.mesh.points
+        nodes = self.sides.nodes[self.sides.at_void]
+        for t in (0.5 - np.sqrt(1 / 12), 0.5 + np.sqrt(1 / 12)):
+            if nodes.shape[1] == 2:
+                shapes, slopes = np.array([1 - t, t]), np.array([-1.0, 1.0])
+            else:
+                shapes = np.array([(1 - t) * (1 - 2 * t), t * (2 * t - 1), 4 * t * (1 - t)])
+                slopes = np.array([4 * t - 3, 4 * t - 1, 4 - 8 * t])
+            dx, dy = np.einsum("a,sad->ds", slopes, points[nodes])
+            for column, part in enumerate((-dy, dx)):
+                terms = 0.5 * part[:, None] * shapes
+                sums[:, column] += np.bincount(nodes.ravel(), terms.ravel(), len(sums))
+        return sums
 
     @property
     def area(self) -> float:

@@ -98,7 +98,7 @@ def _check_equilibrium(ledger: Ledger, cell: DiscreteCell, state: State, fields:
 
 
 def _check_averages(ledger: Ledger, cell: DiscreteCell, state: State, fields: ElementFields) -> None:
-    """<sigma> = Sigma, <eps> = E with the opening of the faces, and Hill's condition."""
+    """<sigma> = Sigma, <eps> = E with the opening of the faces and the strain of voids, and Hill's condition."""
     area, weights = cell.area, cell.elements.area[:, None]
     mean = (weights * fields.stress).sum(axis=0) / area
     size = float(((weights * np.abs(fields.stress)).sum(axis=0) / area).max())
@@ -106,12 +106,21 @@ def _check_averages(ledger: Ledger, cell: DiscreteCell, state: State, fields: El
     size += ROUNDED_TERMS * float((weights[:, 0] * stiffest * fields.strain_size).sum() / area)
     ledger.record("mean stress", relative(mean - state.mean_stress, max(size, cell.least_stress(state))), state.name)
     jump = in_axes(cell, state.jump)
-    integral = cell.faces.sums(cell.elements.node_integrals[cell.nodes.node], of_fibre=False)
+    integral = cell.faces.sums(cell.node_integrals[cell.nodes.node], of_fibre=False)
     opening = np.einsum("ki,kj->ij", jump, integral)
     opened = np.bincount(PLACES[len(mean)].ravel(), opening.ravel(), len(mean)) / area
-    off = (weights * fields.strain).sum(axis=0) / area - state.strain - opened
+    off = (weights * fields.strain).sum(axis=0) / area + _void_strain(cell, state) - state.strain - opened
     scale = cell.strain_size(state)
     ledger.record("mean strain", relative(off, scale), state.name)
     work = area * float(state.mean_stress @ state.strain) - float((interface_forces(cell, state) * jump).sum())
     scale = max(abs(fields.energy), area * cell.least_stress(state) * scale)
     ledger.record("Hill", relative(np.array(fields.energy - work), scale), state.name)
+
+
+def _void_strain(cell: DiscreteCell, state: State) -> Float:
+    """(v,) mean over the cell of the strain of voids: their share of E, and int sym(u* (x) n) ds along them, which is
+    periodic and so closes around voids that the cell's boundary cuts."""
+    v = len(state.strain)
+    slope = np.einsum("ni,nd->id", state.fluctuation, cell.void_integrals)
+    strain = np.bincount(PLACES[v].ravel(), slope.ravel(), v) / cell.area
+    return np.asarray(strain + cell.porosity * state.strain)

@@ -10,10 +10,14 @@ from feti_homog.verification.ledger import Ledger, relative
 
 
 def check_mesh(ledger: Ledger, cell: DiscreteCell) -> None:
-    """Elements have positive areas that add up to the cell, and every torn side has one opposite partner."""
-    elements, sides = cell.elements, cell.sides
+    """Elements have positive areas that fill the cell but for voids; a torn side has one partner or is at a void."""
+    elements, sides, told = cell.elements, cell.sides, cell.files.document["cell"].get("porosity", 0.0)
     ledger.record("mesh", np.where(elements.least_jacobian > 0, 0.0, np.inf), "element {}".format)
-    ledger.record("mesh", relative(elements.area.sum() - cell.area, cell.area), "the sum of all areas")
+    ledger.record("mesh", relative(elements.area.sum() - (1 - told) * cell.area, cell.area), "the sum of all areas")
+    normals = sides.normal[sides.at_void]
+    ledger.record("mesh", relative(np.abs(normals.sum(axis=0)), cell.files.size.max()), "the sides at voids are closed")
+    is_told = bool(sides.at_void.any()) == (told > 0)
+    ledger.record("mesh", np.where(is_told, 0.0, np.inf), f"cell.porosity = {told:g}, {len(normals)} sides at voids")
     ledger.record("mesh", sides.mismatch, lambda i: f"a side of element {sides.element[i]}")
 
 

@@ -33,10 +33,11 @@ def _check_cell(ledger: Ledger, cell: DiscreteCell, told: Section) -> None:
     names, mesh = cell.files.phases, cell.files.mesh
     fibres = [number for number, name in enumerate(names) if name not in ("matrix", "coating")]
     expected = {"width": width, "height": height, "area": width * height, "elements": len(mesh.triangles)}
+    expected |= {"porosity": cell.porosity}
     expected |= {"nodes": len(mesh.points), "fibre_fraction": float(cell.fractions[fibres].sum())}
     for name, value in expected.items():
-        scale = 1.0 if name == "fibre_fraction" else abs(value) or 1.0
-        ledger.record("cell", abs(told[name] - value) / scale, f"cell.{name}")
+        scale = 1.0 if name in ("fibre_fraction", "porosity") else abs(value) or 1.0
+        ledger.record("cell", abs(told.get(name, 0.0) - value) / scale, f"cell.{name}")
     for name, value in zip(names, cell.fractions, strict=True):
         ledger.record("cell", abs(told["fractions"][name] - value), f"cell.fractions.{name}")
 

@@ -9,7 +9,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from feti_homog.typing import Float, Int
+from feti_homog.typing import Bool, Float, Int
 from feti_homog.verification.elements import SIDES
 from feti_homog.verification.reading import Mesh
 
@@ -26,18 +26,20 @@ class TornSides:
         nodes: (s, 2 or 3) its ends and, of order 2, the node between them.
         normal: (s, 2) outward, times the length of the chord.
         partner: (s,) the side at the same place of the torus, -1 if there is not exactly one.
+        at_void: (s,) whether there is none.
     """
 
     element: Int
     nodes: Int
     normal: Float
     partner: Int
+    at_void: Bool
 
     @property
     def mismatch(self) -> Float:
-        """(s,) |normal + partner's normal| / |normal|, infinite without a partner."""
+        """(s,) |normal + partner's normal| / |normal|, infinite for several partners, 0 at voids."""
         sums = np.hypot(*(self.normal + self.normal[self.partner]).T) / np.hypot(*self.normal.T)
-        return np.asarray(np.where(self.partner < 0, np.inf, sums))
+        return np.asarray(np.where(self.at_void, 0.0, np.where(self.partner < 0, np.inf, sums)))
 
 
 @dataclass(frozen=True)
@@ -68,7 +70,9 @@ def torn(mesh: Mesh, size: Float) -> tuple[TornSides, TornNodes, float]:
     chord = ends[:, 1] - ends[:, 0]
     normal = np.stack([chord[:, 1], -chord[:, 0]], axis=1)
     radius = SAME_PLACE * float(np.hypot(*normal.T).min(initial=float(size.min())))
-    sides = TornSides(element, nodes, normal, _partners(same_places(ends.mean(axis=1), size, radius)))
+    side_place = same_places(ends.mean(axis=1), size, radius)
+    alone = np.bincount(side_place, minlength=1)[side_place] == 1
+    sides = TornSides(element, nodes, normal, _partners(side_place), np.asarray(alone))
     number, first = np.unique(nodes, return_index=True)
     owner = element[first // nodes.shape[1]]
     place = same_places(mesh.points[number], size, radius)

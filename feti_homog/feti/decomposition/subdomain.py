@@ -13,6 +13,7 @@ from feti_homog.cell.unwrap import unwrap
 from feti_homog.errors import MeshError
 from feti_homog.fem.assembly import assemble
 from feti_homog.fem.problem import PLANE, Problem
+from feti_homog.fem.void_boundary import void_integrals
 from feti_homog.feti.thresholds import KERNEL_TOLERANCE
 from feti_homog.typing import Float, Int
 
@@ -34,6 +35,8 @@ class Subdomain:
         R: (cn, k) orthonormal kernel of K: translations, and a rotation in the plane if the piece can turn,
             less what the pinned class stops.
         positions: (n, 2) unwrapped positions of the classes.
+        mean_strain: (cn, m) whose transpose times u is int eps* of the displacements u over the subdomain and what
+            lies of voids beside it, int_Omega eps* + int u (x) n ds, n outward from the voids; 0 at voids.
     """
 
     submesh: Submesh
@@ -44,6 +47,7 @@ class Subdomain:
     area: float
     R: Float
     positions: Float
+    mean_strain: Float
     _built_stiffness: csr_matrix | None = field(repr=False)
 
     @classmethod
@@ -68,9 +72,10 @@ class Subdomain:
         K = _pinned(body.K, problem, submesh.pinned)
         _check_kernel(submesh, K, R)
         Q = body.Q
+        mean_strain = _mean_strain(submesh, mesh, Q, L, problem)
         if submesh.pinned >= 0:
             Q[problem.dofs(np.array([submesh.pinned]))] = 0.0
-        return cls(submesh, mesh, problem, L, Q, body.area, R, positions, K)
+        return cls(submesh, mesh, problem, L, Q, body.area, R, positions, mean_strain, K)
 
     @property
     def n_dofs(self) -> int:
@@ -117,6 +122,14 @@ class Subdomain:
         b = np.argmax(((x - x[a]) ** 2).sum(axis=1))
         (dx, dy), (ex, ey) = x[b] - x[a], (x - x[a]).T
         return candidates[[a, b, np.argmax(np.abs(dx * ey - dy * ex))]]
+
+
+def _mean_strain(submesh: Submesh, mesh: FineMesh, Q: Float, L: Float, problem: Problem) -> Float:
+    """(cn, m) `Subdomain.mean_strain`."""
+    m = problem.strains
+    parts = np.eye(m)[problem.voigt]
+    bodies = np.linalg.solve(L[:m, :m], Q[:, :m].T).T
+    return np.asarray(bodies + np.einsum("ck,ikm->cim", void_integrals(submesh, mesh), parts).reshape(-1, m))
 
 
 def kernel(problem: Problem, positions: Float, rotates: bool, pinned: int) -> Float:

@@ -50,6 +50,7 @@ class Interior:
 
     Attributes:
         dofs: their local numbers, sorted.
+        coupling: (n, inner dofs) K_bi.
     """
 
     def __init__(self, K: csr_matrix, dofs: Int) -> None:
@@ -59,16 +60,21 @@ class Interior:
         self.dofs = np.flatnonzero(inside)
         rows = K[self.dofs]
         self._Kib, self._Kbb = rows[:, dofs], K[dofs][:, dofs]
+        self.coupling = self._Kib.T.tocsr()
         if len(self.dofs):
             self._solver = DirectSolver(rows[:, self.dofs].tocsr(), "feti_interior_")
 
     def extend(self, x: Float) -> Float:
         """-K_ii^-1 K_ib x: the interior in equilibrium with boundary displacements x (n,) or (n, k)."""
-        return self._solver.solve(-self._Kib @ x) if len(self.dofs) else np.zeros((0, *x.shape[1:]))
+        return self.solve(-self._Kib @ x)
+
+    def solve(self, forces: Float) -> Float:
+        """K_ii^-1 f for forces (inner dofs,) or (inner dofs, k) while the boundary is held."""
+        return self._solver.solve(forces) if len(self.dofs) else np.zeros(forces.shape)
 
     def reactions(self, x: Float) -> Float:
         """S x, the forces that go with boundary displacements x (n,) or (n, k)."""
-        return np.asarray(self._Kbb @ x + self._Kib.T @ self.extend(x))
+        return np.asarray(self._Kbb @ x + self.coupling @ self.extend(x))
 
 
 def _by_columns(apply: Callable[[Float], Float], x: Float, out: Float | None) -> Float:

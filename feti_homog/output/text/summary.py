@@ -107,7 +107,7 @@ def _stiffness_blocks(document: Document, stress: str, toughness: str) -> list[l
     return [
         *blocks,
         _moduli(f"Engineering moduli{stress}", document["moduli"]),
-        _bounds(f"Bounds{stress}", document),
+        _bounds(f"Bounds{stress}", document) if document.get("bounds") else ["Bounds: none of cells with voids"],
     ]
 
 
@@ -119,6 +119,7 @@ def _cell(document: Document) -> list[str]:
     shares = ", ".join(f"{phase} {share:.6f}" for phase, share in fractions.items())
     mesh = [_number(cell["elements"], "element"), _number(cell["nodes"], "node")]
     mesh += [f"order {shape['order']}"] * ("order" in shape) + [f"refine {shape['refine']}"] * ("refine" in shape)
+    shares += f", voids {cell['porosity']:.6f}" if cell.get("porosity") else ""
     return [
         *_field("Cell", [str(shape["geometry"]), size]),
         *_field("Meshed", [f"fibre fraction {cell['fibre_fraction']:.6f}", *([f"({shares})"] if shares else [])]),

@@ -78,7 +78,7 @@ def _bounds(table: SweepTable) -> PanelBounds | None:
     """The bounds; None if the materials or plane states of the cases differ, or there are more than two phases."""
     described = {repr((d["case"]["material"], d["case"]["analysis"]["plane"])) for d in table.finished}
     case = table.finished[0]["case"]
-    if len(described) != 1 or set(case["material"]) != {"matrix", "fibre"}:
+    if len(described) != 1 or set(case["material"]) != {"matrix", "fibre"} or _has_voids(table):
         return None
     plane = case["analysis"]["plane"]
     materials = read_materials(case["material"], plane, TableReader({GEOMETRY: case["cell"]["geometry"]}))
@@ -92,6 +92,10 @@ def _bounds(table: SweepTable) -> PanelBounds | None:
 def _stiffness(material: Material, plane: str) -> Float:
     """Of a phase, (6, 6) in generalized plane strain."""
     return spatial_stiffness(material) if plane == "generalized" else plane_stiffness(material, plane)
+
+
+def _has_voids(table: SweepTable) -> bool:
+    return any(document["cell"].get("porosity") for document in table.finished)
 
 
 def _bounds_at(shares: list[float], phases: list[Float]) -> dict[str, list[float]]:
