@@ -78,7 +78,7 @@ class Cell:
     )
     refine: int = key(
         integer(least=0, most=8),
-        "How many times every element is split in four, on the ranks; new nodes of round interfaces lie on the circle.",
+        "How many times every element is split in four, on the ranks; new nodes of round and elliptic interfaces lie on them.",
         default=0,
     )
     order: int = key(
