@@ -80,7 +80,7 @@ class Cell:
     )
     refine: int = key(
         integer(least=0, most=8),
-        "How many times every element is split in four, on the ranks; new nodes of round and elliptic interfaces lie on them.",
+        "How many times every element is split in four, on the ranks; new nodes follow round and elliptic interfaces.",
         default=0,
     )
     order: int = key(
