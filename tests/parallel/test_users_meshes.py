@@ -7,9 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support.abaqus import write_inp
 from support.ranks import parallel_assert
 from support.users_meshes import polar_cell
 from support.verified_results import FIBRE, MATRIX
+from unit.cell.faulty_meshes import grid
 
 from feti_homog import Case, run
 from feti_homog.cell.msh_reader import read
@@ -76,6 +78,22 @@ def test_debonded_ellipse_obeys_every_law(comm: Any, shared_path: Path, order: i
     run(case, comm, out=shared_path / "out")
     certificate = verify(shared_path / "out") if comm.rank == 0 else None
     parallel_assert(comm, certificate is None or certificate.holds, certificate and certificate.text)
+
+
+def test_the_result_says_how_far_nodes_were_snapped(comm: Any, shared_path: Path) -> None:
+    """And has the stiffness of the mesh that matches, but for what they were moved."""
+    rough, good = shared_path / "rough.inp", shared_path / "good.inp"
+    if comm.rank == 0:
+        write_inp(good, grid())
+        write_inp(rough, grid().moved(n15=(1.0004, 0.5), n10=(1.0, 0.2503)))
+    comm.barrier()
+    cell = {"geometry": "mesh", "file": str(rough), "repair": "snap"}
+    result = run(case_of(rough, 1, cell=cell), comm)
+    expected = run(case_of(good, 1, cell=cell | {"file": str(good)}), comm)
+    warned = [warning for warning in result.warnings if "were moved by up to 0.0004 to match" in warning]
+    stiffness, exact = (np.asarray(r.effective_stiffness) for r in (result, expected))
+    difference = np.abs(stiffness - exact).max() / exact.max()
+    parallel_assert(comm, len(warned) == 1 and not expected.warnings and difference < 1e-3, f"{warned}, {difference}")
 
 
 def test_turned_mesh_has_the_turned_stiffness(comm: Any, shared_path: Path) -> None:
