@@ -26,7 +26,7 @@ LOADERS = {".msh": gmsh_file.load, ".inp": abaqus_file.load, ".vtu": vtk_file.lo
 def read(path: Path, snap: float | None = None) -> CoarseMesh:
     """The coarse mesh in a file of one of the LOADERS, moved to [0, width] x [0, height].
 
-    It consists of triangles of three or six nodes in physical surfaces "matrix", "fibre", "fibre:2", ..., fills a
+    It consists of triangles of three or six nodes in physical surfaces "matrix", "fibre", "glass", ..., fills a
     rectangle, and has matching nodes on opposite sides. Lines in the physical curve "debonded" are edges between a
     fibre and the matrix that are debonded. Round interfaces become circles (`with_circles`); others follow their
     middle nodes (`with_bent_edges`), or the ellipse that they are on (`elliptic_middles`).

@@ -33,7 +33,7 @@ def test_there_are_enough_faulty_meshes():
 
 
 def test_several_faults_are_told_at_once(tmp_path):
-    mesh = replace(grid(), names={1: "resin", 2: "fiber"}).with_element(5, 2, 0, (3, 4, 9))
+    mesh = replace(grid(), names={1: "my resin", 2: "my fibre"}).with_element(5, 2, 0, (3, 4, 9))
     assert len(_faults(mesh, tmp_path)) == 4
 
 
