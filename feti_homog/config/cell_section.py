@@ -19,7 +19,8 @@ TOUCHING = {"square": math.pi / 4, "hexagonal": math.pi / math.sqrt(12), "random
 
 GEOMETRY = Selector("cell", "geometry")
 ALL_CIRCULAR, RANDOM, TABLE = GEOMETRY.among(*CIRCULAR), GEOMETRY.among("random"), GEOMETRY.among("table")
-MESHED, FROM_A_FILE = GEOMETRY.among(*CIRCULAR, "table"), GEOMETRY.among("table", "mesh")
+MESH, MESHED = GEOMETRY.among("mesh"), GEOMETRY.among(*CIRCULAR, "table")
+FROM_A_FILE = GEOMETRY.among("table", "mesh")
 
 
 @dataclass(frozen=True, kw_only=True)

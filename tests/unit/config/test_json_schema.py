@@ -39,7 +39,7 @@ BETWEEN_NUMBERS = {
 }  # fmt: skip
 NOT_IN_JSON = {"fraction_is_nan", "strength_is_nan", "path_strain_nan", "load_nan"}
 INTEGER_TO_JSON = {"refine_is_real"}
-OUTSIDE_THE_FILE = {"mesh_not_there"}
+OUTSIDE_THE_FILE = {"no_table", "mesh_not_there"}
 BEYOND_A_SCHEMA = NO_TOML | BETWEEN_NUMBERS | NOT_IN_JSON | INTEGER_TO_JSON | OUTSIDE_THE_FILE
 
 
