@@ -3,8 +3,8 @@
     mpirun -n 2 .venv/bin/python drivers/micrograph.py --out results/micrograph
 
 meshes/micrograph.csv lists about 200 fibres in a window, which is made periodic.  Glass/epoxy in plane strain, bonds
-of 40 MPa in tension and 60 MPa in shear.  Beside each fibre's largest traction under S11 stands its local fibre fraction,
-its area over that of its Voronoi cell.
+of 40 MPa in tension and 60 MPa in shear.  Beside each fibre's largest traction under S11 stands its local fibre
+fraction, its area over that of its Voronoi cell.
 """
 
 from __future__ import annotations

@@ -4,7 +4,8 @@
     .venv/bin/python scripts/make_micrograph.py meshes/micrograph.csv
 
 No micrograph is behind it.  The window is cut out of a periodic random cell of the program, 300 fibres of 50 %, so
-that it is not periodic itself: fibres whose centres are in it are listed, in um, to 0.01 um, from the origin of a stage.
+that it is not periodic itself: fibres whose centres are in it are listed, in um, to 0.01 um, from the origin of a
+stage.
 """
 
 from __future__ import annotations
