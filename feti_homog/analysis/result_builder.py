@@ -58,7 +58,7 @@ def result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Fields
         checks=Checks(**context.checks),
         check_tolerance=context.tolerance("jump"),
         kkt_tolerance=CONTACT_TOLERANCE,
-        warnings=(*cell.case.warnings(), *context.warnings()),
+        warnings=(*cell.case.warnings(), *cell.summary.warnings(), *context.warnings()),
         faults=tuple(context.faults),
         status="not converged" if context.faults else "done",
         timings=progress.timings(),
@@ -78,6 +78,7 @@ def _cell_info(cell: TornCell, fractions: dict[str, float]) -> CellInfo:
         fractions=fractions,
         elements=cell.sum_over_ranks(sum(len(s.mesh.triangles) for s in cell.subdomains)),
         nodes=cell.sum_over_ranks(sum(len(s.mesh.points) for s in cell.subdomains)),
+        match_distance=cell.summary.match_distance,
     )
 
 

@@ -1,7 +1,4 @@
-#!/usr/bin/env python3
-"""Make meshes/micrograph.csv: a window of random fibres in the form in which a micrograph is measured.
-
-    .venv/bin/python scripts/make_micrograph.py meshes/micrograph.csv
+"""meshes/micrograph.csv: a window of random fibres in the form in which a micrograph is measured.
 
 No micrograph is behind it.  The window is cut out of a periodic random cell of the program, 300 fibres of 50 %, so
 that it is not periodic itself: fibres whose centres are in it are listed, in um, to 0.01 um, from the origin of a
@@ -9,9 +6,6 @@ stage.
 """
 
 from __future__ import annotations
-
-import sys
-from pathlib import Path
 
 import numpy as np
 
@@ -22,7 +16,7 @@ CELL = Cell(geometry="random", fibre_fraction=0.5, fibres=300, radius_spread=0.1
 RADIUS = 3.5  # um, in the mean
 SHARE = np.array([0.9, 0.74])  # of the cell's sides
 LEFT, BOTTOM = 1250.0, 830.0  # um
-HEAD = "# Not measured: a window of a random cell, by scripts/make_micrograph.py. Lengths in um."
+HEAD = "# Not measured: a window of a random cell, by tests/support/made_micrograph.py. Lengths in um."
 
 
 def text() -> str:
@@ -35,7 +29,3 @@ def text() -> str:
     corner = f"# width = {width:g}, height = {height:g}, left = {LEFT:g}, bottom = {BOTTOM:g}"
     rows = np.column_stack([centres[inside] + [LEFT, BOTTOM], radii[inside]])
     return "\n".join([HEAD, corner, "x,y,radius", *(f"{x:.2f},{y:.2f},{r:.2f}" for x, y, r in rows.tolist()), ""])
-
-
-if __name__ == "__main__":
-    Path(sys.argv[1]).write_text(text(), encoding="utf-8")
