@@ -32,9 +32,7 @@ class TipRecorder:
     def __init__(self, cell: TornCell, loaded: LoadedCell, springs: EnergyCriterion) -> None:
         """`loaded` are the interfaces of the cell.  Collective."""
         self._cell, self._loaded, self._springs = cell, loaded, springs
-        self._neighbours = InterfaceNeighbours(
-            cell.comm, cell.solver.jump_operator, cell.subdomains, cell.summary.phases[0]
-        )
+        self._neighbours = InterfaceNeighbours(cell.comm, cell.solver.jump_operator, cell.subdomains)
 
     def of(self, point: Point) -> Tips:
         """The tips of a point on every rank, by fibre and direction.  Collective."""
