@@ -145,7 +145,10 @@ SMALL_PIECES = PartitionPolicy(piece_dofs=100, max_pieces=50, breakable_boundary
 
 def wanted(load, edges, interface=None, n_ranks=1, refine=0, policy=SMALL_PIECES):
     """Default pieces of bodies of so many triangles and outer edges."""
-    case, lattice = replace(make_case(refine=refine), interfaces=() if interface is None else (interface,)), ReferenceLattice.of(refine, 1)
+    case, lattice = (
+        replace(make_case(refine=refine), interfaces=() if interface is None else (interface,)),
+        ReferenceLattice.of(refine, 1),
+    )
     return wanted_pieces(case, np.array(load), np.array(edges), lattice, n_ranks, policy).tolist()
 
 
