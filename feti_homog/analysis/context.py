@@ -207,9 +207,10 @@ class AnalysisContext:
         return EnergyReleaseRates(self.homogenization.cell, self.homogenization.interface)
 
     def tips(self, responses: Sequence[Response], loads: Sequence[str]) -> TipRates:
-        """Energy release rates at all tips under each load that strains the plane; none while all is bonded.
-        Collective."""
-        pairs = [(r, load) for r, load in zip(responses, loads, strict=True) if load.lstrip("-") in IN_PLANE_LOADS]
+        """Energy release rates at all tips under each load that strains the plane; none while all is bonded, nor where
+        interfaces have their pairs of phases: a virtual extension must not move faces that never part.  Collective."""
+        known = IN_PLANE_LOADS if all(each.between is None for each in self.case.interfaces) else ()
+        pairs = [(r, load) for r, load in zip(responses, loads, strict=True) if load.lstrip("-") in known]
         debonded = [(r, load) for r, load in pairs if r.counts["open"] + r.counts["closed"]]
         found = [(self._release_rates.of(response), load) for response, load in debonded]
         columns = [(at.fibre, at.direction, at.total, *at.modes.T, at.mode_angle, at.length) for at, _ in found]

@@ -9,8 +9,9 @@ from math import fsum, pi, sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
 
+from feti_homog.cell import tabulated
+from feti_homog.cell.torus_pairs import neighbours
 from feti_homog.errors import MeshError
 from feti_homog.typing import Float, Int
 
@@ -22,6 +23,10 @@ if TYPE_CHECKING:
 FIBRE = "fibre"
 # Fibres of the lattices.
 FIBRES_OF = {"square": 1, "hexagonal": 2}
+# Distance of the sides of a cell from tangency with a circle / mean radius, below which elements there are needles.
+LEAST_CLEARANCE = 1e-3
+# Decimals of coordinates / width of the cell of tables that may have any origin and unit.
+TABLE_DECIMALS = 10
 # Quenched random packings jam near this area fraction.
 JAMMED = 0.84
 # Relative excess of the radii that push over those that must not overlap: the descent ends in finite time.
@@ -34,7 +39,8 @@ MAX_STEPS = 2000
 class Arrangement:
     """Discs with `centres` (N, 2) and `radii` (N,) on the torus of periods `width`, `height`; none touch.
 
-    `phase` (N,) names what each disc is made of. Fibre k + 1 of a case is disc k.
+    `phase` (N,) names what each disc is made of. Fibre k + 1 of a case is disc k. `mesh_order` (N,) are the discs in
+    the order in which they are meshed, on which a few triangles depend; that of the discs if it is None.
     """
 
     width: float
@@ -42,6 +48,7 @@ class Arrangement:
     centres: Float
     radii: Float
     phase: tuple[str, ...]
+    mesh_order: Int | None = None
 
     @property
     def phases(self) -> tuple[str, ...]:
@@ -53,10 +60,10 @@ def arrange(cell: Cell) -> Arrangement:
     """The arrangement that a case asks for in a cell of width 1, its area fraction `cell.fibre_fraction` to rounding.
 
     square: one disc in the middle of a 1 x 1 cell. hexagonal: 1 x sqrt(3), a disc in the middle and one at
-    the corner. random: `cell.fibres` discs in a 1 x 1 cell, see `random_arrangement`.
+    the corner. random: `cell.fibres` discs in a 1 x 1 cell, see `random_arrangement`. table: see `table_arrangement`.
 
     Raises:
-        MeshError: discs of that fraction touch, or no arrangement is found.
+        MeshError: discs of that fraction touch, no arrangement is found, or the table is faulty.
     """
     return ARRANGEMENTS[cell.geometry](cell)
 
@@ -110,7 +117,7 @@ def random_arrangement(cell: Cell, max_steps: int = MAX_STEPS, max_attempts: int
         )
     attempts, best = max_attempts or max(3, min(10, 100 // count)), 0.0
     for _ in range(attempts):
-        centres, clearance = _relax(generator.random((count, 2)), grown, max_steps)
+        centres, clearance = relax(generator.random((count, 2)), grown, max_steps)
         if clearance >= 1:
             return clear_shift(Arrangement(1.0, 1.0, centres, radii, (FIBRE,) * count))
         best = max(best, clearance)
@@ -120,37 +127,48 @@ def random_arrangement(cell: Cell, max_steps: int = MAX_STEPS, max_attempts: int
     )
 
 
-def neighbours(centres: Float, size: Float, reach: float) -> tuple[Int, Int, Float]:
-    """All pairs i <= j nearer than `reach`, and the vectors (k, 2) from i to that image of j.
+def table_arrangement(cell: Cell) -> Arrangement:
+    """The fibres of the case's table, in the order of its rows; periodic images are one, the first of them.
 
-    Images of one disc are pairs i = j; each pair of images comes once or, where i = j, from both ends.
+    A table that says where its cell begins keeps that place, if the sides are clear of tangency with its discs; the
+    table of a cell gives the mesh of that cell. Else all is shifted (`clear_shift`), rounded and meshed in the order of
+    the coordinates, so that tables that differ by a shift, by the order of rows or by units have one mesh.
+
+    Raises:
+        MeshError: rows lie outside, come twice, overlap or touch.
     """
-    inside = centres % size
-    points, owner = [inside], [np.arange(len(centres))]
-    for step in product((-1, 0, 1), repeat=2):
-        image = inside + np.array(step) * size
-        near = np.all((image > -reach) & (image < size + reach), axis=1)
-        if any(step):
-            points.append(image[near])
-            owner.append(np.flatnonzero(near))
-    place, who = np.concatenate(points), np.concatenate(owner)
-    pairs = cKDTree(place).query_pairs(reach, output_type="ndarray")
-    pairs = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
-    first, second = pairs[:, 0], pairs[:, 1]
-    keep = (first < len(centres)) & (who[first] <= who[second])
-    first, second = first[keep], second[keep]
-    return who[first], who[second], place[second] - place[first]
+    table = cell.table
+    assert table is not None
+    rows, centres, radii, height = tabulated.fibres(table, cell.window)
+    discs = Arrangement(1.0, height, centres, radii, tuple(table.phase[row] for row in rows))
+    shifted = clear_shift(discs)
+    is_placed = table.left is not None and table.bottom is not None
+    clear = min(LEAST_CLEARANCE * float(discs.radii.mean()), _clearance(shifted))
+    if is_placed and _clearance(discs) >= clear:
+        return discs
+    rounded = shifted.centres.round(TABLE_DECIMALS)
+    order = np.lexsort((rounded[:, 1], rounded[:, 0]))
+    return replace(shifted, centres=rounded, radii=radii.round(TABLE_DECIMALS), mesh_order=order)
 
 
-def _relax(centres: Float, radii: Float, max_steps: int) -> tuple[Float, float]:
-    """Centres (N, 2) moved until discs on the unit torus do not overlap, and the clearance reached.
+def _clearance(arrangement: Arrangement) -> float:
+    """Distance of the sides of the cell from the nearest position at which they would touch a disc."""
+    size = np.array([arrangement.width, arrangement.height])
+    reach = arrangement.radii[:, None] * [1, -1]
+    touching = np.concatenate([(arrangement.centres[:, axis, None] + reach) / size[axis] for axis in (0, 1)])
+    return float(np.abs((touching - np.round(touching)) * arrangement.width).min())
+
+
+def relax(centres: Float, radii: Float, max_steps: int, size: tuple[float, float] = (1.0, 1.0)) -> tuple[Float, float]:
+    """Centres (N, 2) moved until discs on the torus of periods `size` do not overlap, and the clearance reached.
 
     The clearance is the smallest ratio of distance to sum of radii; at least 1 is success. Heavy-ball descent
     x += 0.25 f + 0.9 dx: no reductions over the discs, so that every machine gets the same numbers.
     """
-    target, step, clearance = radii * (1 + RADIUS_EXCESS), np.zeros_like(centres), 0.0
+    periods, target = np.array(size), radii * (1 + RADIUS_EXCESS)
+    step, clearance = np.zeros_like(centres), 0.0
     for _ in range(max_steps):
-        first, second, vector = neighbours(centres, np.ones(2), 2 * target.max())
+        first, second, vector = neighbours(centres, periods, 2 * target.max())
         distance = np.sqrt(vector[:, 0] * vector[:, 0] + vector[:, 1] * vector[:, 1])
         clearance = float(np.min(distance / (radii[first] + radii[second]), initial=2.0))
         if clearance >= 1:
@@ -158,7 +176,7 @@ def _relax(centres: Float, radii: Float, max_steps: int) -> tuple[Float, float]:
         overlap = np.maximum(target[first] + target[second] - distance, 0.0)
         push = (overlap / np.maximum(distance, 1e-9))[:, None] * vector
         step = 0.25 * (_sum_at(second, push, len(radii)) - _sum_at(first, push, len(radii))) + 0.9 * step
-        centres = (centres + step) % 1.0
+        centres = (centres + step) % periods
     return centres, clearance
 
 
@@ -192,4 +210,5 @@ ARRANGEMENTS: dict[str, Callable[[Cell], Arrangement]] = {
     "square": square_arrangement,
     "hexagonal": hexagonal_arrangement,
     "random": random_arrangement,
+    "table": table_arrangement,
 }

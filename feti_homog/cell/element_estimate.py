@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from feti_homog.cell.arrangement import FIBRES_OF
+from feti_homog.cell.arrangement import FIBRES_OF, arrange
 from feti_homog.cell.size_field import MAX_GROWTH, MIN_EDGES_AROUND
 
 if TYPE_CHECKING:
@@ -23,11 +23,15 @@ RATIOS = np.geomspace(1.0, 1e7, 400)
 
 def fibres_of(cell: Cell) -> int:
     """Number of fibres."""
+    if cell.geometry == "table":
+        return len(arrange(cell).radii)
     return cell.fibres or FIBRES_OF[cell.geometry]
 
 
 def mean_radius(cell: Cell) -> float:
     """Mean radius of the fibres / width of the cell."""
+    if cell.geometry == "table":
+        return float(arrange(cell).radii.mean())
     assert cell.fibre_fraction is not None
     return math.sqrt(cell.fibre_fraction * _height(cell) / (math.pi * fibres_of(cell)))
 
@@ -42,7 +46,7 @@ def triangles(cell: Cell) -> float:
 
     On both sides of circles of the length P there are 2 P int dx / (A (h + g x)^2) = 2 P / (A g h) triangles.
     """
-    count = _height(cell) / (TRIANGLE_AREA * cell.mesh_size**2) + TRIANGLES_OF_A_FIBRE * (cell.fibres or 0)
+    count = _height(cell) / (TRIANGLE_AREA * cell.mesh_size**2) + TRIANGLES_OF_A_FIBRE * _irregular_fibres(cell)
     if cell.interface_size is None:
         return count
     length = 2 * math.pi * mean_radius(cell) * fibres_of(cell)
@@ -64,6 +68,13 @@ def ratio_at_a_tip(count: float) -> float:
     return float(np.interp(count, counts, RATIOS))
 
 
+def _irregular_fibres(cell: Cell) -> int:
+    """Number of fibres that are no lattice."""
+    return 0 if cell.geometry in FIBRES_OF else fibres_of(cell)
+
+
 def _height(cell: Cell) -> float:
     """Height / width of the cell."""
+    if cell.geometry == "table":
+        return arrange(cell).height
     return math.sqrt(3.0) if cell.geometry == "hexagonal" else 1.0

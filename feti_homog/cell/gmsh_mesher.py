@@ -42,8 +42,9 @@ Signed = tuple[int, Curve]
 
 
 def generate(cell: Cell, marks: Mapping[int, Sequence[float]] = NO_MARKS) -> CoarseMesh:
-    """The periodic coarse mesh of a square, hexagonal or random cell, elements about mesh_size * width, on
-    circles interface_size * width.
+    """The periodic coarse mesh of a square, hexagonal or random cell, or of a table.
+
+    Elements have about the size mesh_size * width, on circles interface_size * width.
 
     It is made at the width 1 and then scaled, so that cells of one shape have one mesh at all sizes.
 
@@ -62,7 +63,7 @@ def generate(cell: Cell, marks: Mapping[int, Sequence[float]] = NO_MARKS) -> Coa
             f"[cell] fibre_fraction = {cell.fibre_fraction}: a fibre has a radius of {arrangement.radii.min():.2g}; "
             f"expected at least {SMALLEST_RADIUS} of the width of the cell"
         )
-    return mesh_arrangement(arrangement, sizes, marks, _scale(cell, arrangement))
+    return mesh_arrangement(arrangement, sizes, marks, arrangement_scale(cell, arrangement))
 
 
 def mesh_arrangement(
@@ -104,11 +105,12 @@ def _sizes(cell: Cell, marks: Mapping[int, Sequence[float]]) -> MeshSizes:
     return MeshSizes(cell.mesh_size, interface, tip)
 
 
-def _scale(cell: Cell, arrangement: Arrangement) -> float:
+def arrangement_scale(cell: Cell, arrangement: Arrangement) -> float:
     """Lengths of the cell / those of the arrangement."""
     if cell.fibre_radius is not None:
         return float(cell.fibre_radius / arrangement.radii.mean())
-    return cell.width or 1.0
+    width = cell.width if cell.table is None else cell.table.width
+    return width or 1.0
 
 
 def _refuse_extremes(cell: Cell, sizes: MeshSizes, tips: int) -> None:

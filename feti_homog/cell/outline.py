@@ -70,7 +70,10 @@ def images(arrangement: Arrangement) -> tuple[Float, Int]:
         circles.append(np.column_stack([centres[near], arrangement.radii[near]]))
         fibre.append(near)
     owner = np.concatenate(fibre)
-    order = np.argsort(owner, kind="stable")
+    rank = np.arange(len(arrangement.radii))
+    if arrangement.mesh_order is not None:
+        rank[arrangement.mesh_order] = np.arange(len(rank))
+    order = np.argsort(rank[owner], kind="stable")
     return np.concatenate(circles)[order], owner[order]
 
 

@@ -8,7 +8,8 @@ from itertools import product
 import numpy as np
 from scipy.spatial import cKDTree
 
-from feti_homog.cell.arrangement import Arrangement, neighbours
+from feti_homog.cell.arrangement import Arrangement
+from feti_homog.cell.torus_pairs import neighbours
 from feti_homog.typing import Bool, Float
 
 # Edges around a fibre, at least.

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import dataclasses
 import hashlib
 import json
-import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from feti_homog.config.cell_files import with_files
 from feti_homog.config.cell_section import GEOMETRY, TOUCHING, Cell, size_faults
 from feti_homog.config.document import read_document, to_document
 from feti_homog.config.envelope_rules import envelope_faults, read_envelope
@@ -247,12 +246,7 @@ def _checked_cell(cell: Cell, folder: Path, faults: list[str]) -> Cell:
     faults += size_faults(cell)
     if cell.width is not None and cell.fibre_radius is not None:
         faults.append("[cell] width, fibre_radius: exclude each other; give one")
-    if cell.file is None:
-        return cell
-    file = (folder / cell.file).resolve()
-    if not os.path.isfile(file):  # false, not an error, for a name too long
-        faults.append(f"[cell] file = {toml_value(str(cell.file))}: no such file (expected at {file})")
-    return dataclasses.replace(cell, file=file)
+    return with_files(cell, folder, faults)
 
 
 def check_phases(case: Case, phases: Iterable[str]) -> None:

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
+from feti_homog.config.fibre_table import FibreTable
 from feti_homog.config.schema import Selector, key
-from feti_homog.config.section_values import MESH_FILE, SEED
+from feti_homog.config.section_values import CELL_FILE, FIBRE_LIST, SEED
 from feti_homog.config.values import choice, integer, real
 
 CIRCULAR = ("square", "hexagonal", "random")
@@ -15,17 +18,22 @@ TOUCHING = {"square": math.pi / 4, "hexagonal": math.pi / math.sqrt(12), "random
 """Fibre fraction at which the fibres touch; of a random cell, that of the densest packing of circles."""
 
 GEOMETRY = Selector("cell", "geometry")
-ALL_CIRCULAR, RANDOM, MESH = GEOMETRY.among(*CIRCULAR), GEOMETRY.among("random"), GEOMETRY.among("mesh")
+ALL_CIRCULAR, RANDOM, TABLE = GEOMETRY.among(*CIRCULAR), GEOMETRY.among("random"), GEOMETRY.among("table")
+MESHED, FROM_A_FILE = GEOMETRY.among(*CIRCULAR, "table"), GEOMETRY.among("table", "mesh")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Cell:
-    """Geometry of the periodic cell and its mesh. Keys of another geometry keep their defaults."""
+    """Geometry of the periodic cell and its mesh. Keys of another geometry keep their defaults.
+
+    `table` is what `file` or `fibre_list` of geometry = "table" have, with the size of the cell; it is no key.
+    """
 
     geometry: str = key(
-        choice(*CIRCULAR, "mesh"),
+        choice(*CIRCULAR, "table", "mesh"),
         '"square": a fibre in the middle of a square cell; "hexagonal": a cell sqrt(3) times as high as wide with '
-        'fibres in the middle and at the corners; "random": fibres in a square cell; "mesh": a gmsh file.',
+        'fibres in the middle and at the corners; "random": fibres in a square cell; "table": fibres of a table, as of '
+        'a micrograph; "mesh": a gmsh file.',
     )
     fibre_fraction: float | None = key(
         real(above=0.0, below=1.0),
@@ -34,8 +42,12 @@ class Cell:
         only=ALL_CIRCULAR,
     )
     width: float | None = key(
-        real(least=1e-9, most=1e9), "Width of the cell.", unit="length", default=None, only=ALL_CIRCULAR,
-        default_words="1, or what fibre_radius makes it",
+        real(least=1e-9, most=1e9), "Width of the cell.", unit="length", default=None, only=MESHED,
+        default_words="1, or what fibre_radius or the table make it",
+    )  # fmt: skip
+    height: float | None = key(
+        real(least=1e-9, most=1e9), "Height of the cell.", unit="length", default=None, only=TABLE,
+        default_words="what the table says",
     )  # fmt: skip
     fibre_radius: float | None = key(
         real(least=1e-9, most=1e9), "Mean radius of the fibres, in place of width.", unit="length", default=None,
@@ -45,7 +57,7 @@ class Cell:
         real(least=1e-4, most=0.5),
         "Size of the elements, before refine, / width of the cell.",
         default=0.05,
-        only=ALL_CIRCULAR,
+        only=MESHED,
     )
     interface_size: float | None = key(
         real(least=1e-5, most=0.5),
@@ -53,7 +65,7 @@ class Cell:
         "0.4 of the distance. At most mesh_size.",
         default=None,
         default_words="mesh_size",
-        only=ALL_CIRCULAR,
+        only=MESHED,
     )
     tip_size: float | None = key(
         real(least=1e-6, most=0.5),
@@ -61,7 +73,7 @@ class Cell:
         "like those on interfaces. At most interface_size.",
         default=None,
         default_words="such that tips err no more than the rest; of paths and envelopes interface_size",
-        only=ALL_CIRCULAR,
+        only=MESHED,
     )
     refine: int = key(
         integer(least=0, most=8),
@@ -97,11 +109,32 @@ class Cell:
         only=RANDOM,
     )
     file: Path | None = key(
-        MESH_FILE,
-        "The mesh, relative to the case file: triangles of three nodes that fill a rectangle, in physical surfaces "
-        '"matrix", "fibre", "fibre:2", ...; the nodes on opposite sides match. Fibres may have any shape.',
-        only=MESH,
+        CELL_FILE,
+        'Relative to the case file. Of geometry = "mesh" the mesh: triangles of three or six nodes that fill a '
+        'rectangle, in physical surfaces "matrix", "fibre", "fibre:2", ...; the nodes on opposite sides match. Fibres '
+        'may have any shape. Of "table" the fibres, a row for each: columns x, y, radius and, if there are several, '
+        'phase; what follows # is a comment, of which "# width = 120, height = 80" says the size of the cell.',
+        default=None,
+        only=FROM_A_FILE,
+        default_words="required, or fibre_list of a table",
     )
+    fibre_list: tuple[Mapping[str, Any], ...] | None = key(
+        FIBRE_LIST, "The fibres, in place of file.", default=None, only=TABLE, default_words="what file has"
+    )
+    window: str = key(
+        choice("periodic", "cut"),
+        'What a table is. "periodic": a cell, whose fibres return on the other side; they must not overlap. "cut": a '
+        "piece of something larger, whose fibres may overlap across the border: they are moved apart as little as can "
+        "be.",
+        default="periodic",
+        only=TABLE,
+    )
+    table: FibreTable | None = field(default=None, compare=False)
+
+    @property
+    def has_own_mesh(self) -> bool:
+        """Whether the user brings the mesh."""
+        return self.geometry == "mesh"
 
 
 def size_faults(cell: Cell) -> list[str]:

@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
-from feti_homog.config.cell_section import CIRCULAR, GEOMETRY
+from feti_homog.config.cell_section import GEOMETRY, MESHED
 from feti_homog.config.interface_section import STIFFNESSES, STRENGTHS, Arc, InterfaceSection
 from feti_homog.config.schema import Selected, TableReader
 from feti_homog.config.section_values import ARCS, PAIR
@@ -119,7 +119,7 @@ def _missing_arcs(given: list[Any], selected: Selected) -> list[str]:
     # An empty list says that it is meant; of a user's mesh a curve may be debonded.
     keys = {"debonded", *STIFFNESSES, "axial_stiffness"}
     is_bare = bool(tables) and not any(table.keys() & keys for table in tables)
-    if analysis in ("stiffness", "load") and selected[GEOMETRY] in CIRCULAR and is_bare:
+    if analysis in ("stiffness", "load") and selected[GEOMETRY] in MESHED.values and is_bare:
         return [f"[interface] debonded: missing; expected {ARCS.expected}, or []: nothing else can open"]
     return []
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from feti_homog.config.cell_section import ALL_CIRCULAR, GEOMETRY
+from feti_homog.config.cell_section import ALL_CIRCULAR, FROM_A_FILE, GEOMETRY, MESHED, TABLE
 from feti_homog.config.envelope_section import pairs_of
 from feti_homog.config.interface_section import STIFFNESSES, STRENGTHS, Arc
 from feti_homog.config.load_names import STRAINS, STRESSES
@@ -43,6 +43,7 @@ def rules_of_one_case() -> Schema:
         "allOf": [
             *filter(None, required),
             *conditional,
+            *_file_rules(),
             *_material_rules(),
             *_arc_rules(),
             *_energy_rules(),
@@ -116,6 +117,16 @@ def _section_consequence(value: str) -> Schema:
     return {"required": required, "properties": excluded}
 
 
+def _file_rules() -> list[Schema]:
+    """A mesh comes in a file; the fibres of a table come in a file or a list."""
+    for_a_table = {"oneOf": [{"required": ["file"]}, {"required": ["fibre_list"]}]}
+    either = {"anyOf": [{"required": ["file"]}, {"required": ["fibre_list"]}]}
+    return [
+        {"if": _if(FROM_A_FILE), "then": _at(("cell",), either)},
+        {"if": _if(TABLE), "then": _at(("cell",), for_a_table)},
+    ]
+
+
 def _material_rules() -> list[Schema]:
     complete = [
         {"required": [name for name, entry in keys_of(contents).items() if entry.required]}
@@ -140,7 +151,7 @@ def _arc_rules() -> list[Schema]:
     return [
         {"if": _if(ANGLE_ANALYSIS), "then": {"required": ["interface"], **_at(("interface",), some_arc)}},
         {
-            "if": {"allOf": [_if(unbroken), _if(ALL_CIRCULAR)]},
+            "if": {"allOf": [_if(unbroken), _if(MESHED)]},
             "then": _at(
                 ("interface",),
                 {"anyOf": [{"required": [name]} for name in ("debonded", *STIFFNESSES, "axial_stiffness")]},

@@ -101,13 +101,13 @@ def _default_in_words(default: Any) -> str:
 
 
 def keys_of(table_class: type[Any]) -> dict[str, Key]:
-    """The keys of a table by name."""
-    return {each.name: each.metadata["key"] for each in dataclasses.fields(table_class)}
+    """The keys of a table by name; fields that are made of them are none."""
+    return {each.name: each.metadata["key"] for each in dataclasses.fields(table_class) if "key" in each.metadata}
 
 
 def defaults_of(table_class: type[Any]) -> dict[str, Any]:
     """The defaults of a table, as TOML has them, of the keys that have one."""
-    found = {each.name: each.default for each in dataclasses.fields(table_class)}
+    found = {each.name: each.default for each in dataclasses.fields(table_class) if each.name in keys_of(table_class)}
     return {name: _to_toml(value, {}) for name, value in found.items() if value not in (None, dataclasses.MISSING)}
 
 

@@ -18,8 +18,12 @@ SEED = integer(least=0, most=10**15)
 Matrix = tuple[tuple[float, ...], ...]
 
 
-def _is_mesh_file(value: Any) -> bool:
-    return text.accepts(value) and value.endswith(".msh")
+def _is_cell_file(value: Any) -> bool:
+    return text.accepts(value) and value.endswith((".msh", ".csv"))
+
+
+def _are_fibres(value: Any) -> bool:
+    return isinstance(value, list) and value != [] and all(isinstance(fibre, dict) for fibre in value)
 
 
 def _is_fibre_or_fibres(value: Any) -> bool:
@@ -58,7 +62,28 @@ def _positive_or_inf(what: str) -> ValueType:
     return ValueType(f"{what} above 0, or inf", _is_strength, lambda v: None if v == math.inf else float(v), schema)
 
 
-MESH_FILE = ValueType("the name of a .msh file", _is_mesh_file, Path, {"type": "string", "pattern": "\\.msh$"})
+CELL_FILE = ValueType(
+    "the name of a .msh file, or a .csv file of a table",
+    _is_cell_file,
+    Path,
+    {"type": "string", "pattern": "\\.(msh|csv)$"},
+)
+FIBRE_LIST = ValueType(
+    "a list of fibres such as {x = 0.5, y = 0.5, radius = 0.3}",
+    _are_fibres,
+    tuple,
+    {
+        "type": "array",
+        "minItems": 1,
+        "items": {
+            "type": "object",
+            "properties": {"x": real().json_schema, "y": real().json_schema, "phase": {"type": "string"}}
+            | {"radius": real(above=0.0).json_schema},
+            "required": ["x", "y", "radius"],
+            "additionalProperties": False,
+        },
+    },
+)
 FIBRES = ValueType(
     'the number of a fibre, counted from 1, a list of numbers, or "all"',
     _is_fibre_or_fibres,

@@ -55,7 +55,7 @@ class InterfaceNodes:
 
     def moved_tips(self, case: Case) -> MovedTips:
         """Tips that the mesher has put into a vertex near them; a user's mesh has its vertices where they are."""
-        if case.cell.file is not None:
+        if case.cell.has_own_mesh:
             return debonded_arcs.NOT_MOVED
         vertices = self.fibre[self.is_vertex], self.direction[self.is_vertex]
         return debonded_arcs.moved_tips(tips.directions(case), *vertices, float(np.degrees(MERGED)))

@@ -43,7 +43,7 @@ class Estimate:
 def applications(case: Case, problem: Problem) -> int:
     """About how many times the analysis applies the dual operator of a problem."""
     # A mesh may have a curve "debonded"; along the fibres nothing touches.
-    may_open = bool(case.arcs) or case.cell.file is not None or case.path is not None
+    may_open = bool(case.arcs) or case.cell.has_own_mesh or case.path is not None
     contact = case.interface is not None and case.interface.contact and may_open and problem != AXIAL
     solves = len(problem.loads)
     if case.angle is not None:
@@ -59,7 +59,7 @@ def _asks_for_tips(case: Case) -> bool:
     """Whether an envelope needs the inverse of the dual operator, which many solves call for."""
     bond = case.interface
     by_energy = bond is not None and bond.criterion == "energy" and bond.growth == "released"
-    return case.envelope is not None and by_energy and (bool(case.arcs) or case.cell.file is not None)
+    return case.envelope is not None and by_energy and (bool(case.arcs) or case.cell.has_own_mesh)
 
 
 def estimate(

@@ -63,7 +63,7 @@ def _remedies(case: Case, width: float, edge: float, length: float) -> str:
     digit = 10.0 ** (math.floor(math.log10(size)) - 1)
     size = math.floor(size / digit + 1e-9) * digit
     finer = [f"refine = {refine}"] if refine <= LARGEST_REFINE else []
-    if case.cell.file is not None:
+    if case.cell.has_own_mesh:
         return " or ".join([*finer, "a finer mesh"])
     if size >= SMALLEST_SIZE:
         finer.insert(0, f"interface_size = {size:.2g} (or mesh_size, of all elements)")

@@ -223,7 +223,6 @@ def _contents(document: Mapping[str, Any], file: h5py.File, altered: tuple[str, 
     size = np.array([file.attrs["width"], file.attrs["height"]], float)
     phases = tuple(map(str, file.attrs["phases"]))
     n, m, k = len(mesh.points), len(mesh.triangles), len(rows.points)
-    sections = _interfaces(document["case"])
     _expect(mesh.points.shape == (n, 2) and n > 0, "/mesh/points is no table of positions")
     _expect(mesh.triangles.shape in ((m, 3), (m, 6)) and m > 0, "/mesh/triangles is no table of triangles")
     _expect(bool((mesh.triangles >= 0).all() and (mesh.triangles < n).all()), "/mesh/triangles names unknown nodes")
@@ -235,10 +234,7 @@ def _contents(document: Mapping[str, Any], file: h5py.File, altered: tuple[str, 
     _expect(rows.points.shape == rows.normal.shape == (k, 2), "/interface has tables of different lengths")
     lengths = {table.shape for table in (rows.length, rows.fibre, rows.body, rows.pair)}
     _expect(lengths == {(k,)}, "/interface has tables of different lengths")
-    known = (rows.pair >= 0) & (rows.pair < max(len(sections), 1))
-    _expect(bool(known.all()), "/interface/pair names unknown interfaces")
-    named = {name for section in sections for name in section.get("between", ())}
-    _expect(named <= set(phases), "the case has interfaces between unknown phases")
+    _expect_known_pairs(_interfaces(document["case"]), rows, phases)
     _expect(len(fibres.body) == len(fibres.radius), "/fibre has tables of different lengths")
     _expect(fibres.centre.shape == (len(fibres.radius), 2), "/fibre has tables of different lengths")
     _expect(faces.shape == (k, 2), "/interface has tables of different lengths")
@@ -246,6 +242,13 @@ def _contents(document: Mapping[str, Any], file: h5py.File, altered: tuple[str, 
     within = (rows.fibre >= 1) & (rows.fibre <= len(fibres.radius))
     _expect(bool(within.all()), "/interface/fibre_number names unknown fibres")
     return ResultFiles(document, size, phases, mesh, rows, fibres, faces, file, altered)
+
+
+def _expect_known_pairs(sections: Sequence[Mapping[str, Any]], rows: InterfaceRows, phases: tuple[str, ...]) -> None:
+    known = (rows.pair >= 0) & (rows.pair < max(len(sections), 1))
+    _expect(bool(known.all()), "/interface/pair names unknown interfaces")
+    named = {name for section in sections for name in section.get("between", ())}
+    _expect(named <= set(phases), "the case has interfaces between unknown phases")
 
 
 def _interfaces(case: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:

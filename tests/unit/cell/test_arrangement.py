@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from support.circular_cells import cell
 
-from feti_homog.cell.arrangement import Arrangement, arrange, clear_shift, neighbours, random_arrangement
+from feti_homog.cell.arrangement import Arrangement, arrange, clear_shift, random_arrangement
+from feti_homog.cell.torus_pairs import neighbours
 from feti_homog.errors import MeshError
 
 

@@ -1,0 +1,67 @@
+"""What a cell takes from files: the mesh of its user, or the table of its fibres with the size of the cell."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from pathlib import Path
+
+from feti_homog.config.cell_section import Cell
+from feti_homog.config.fibre_table import FibreTable, read_table, table_of
+from feti_homog.config.wording import toml_value
+from feti_homog.errors import CaseError
+
+SUFFIXES = {"mesh": ".msh", "table": ".csv"}
+# Columns of tables that say nothing of round fibres without coatings.
+OTHER_SHAPES = ("coating", "a", "b", "angle")
+
+
+def with_files(cell: Cell, folder: Path, faults: list[str]) -> Cell:
+    """The cell with its file's path completed and its table read; faults are added to `faults`."""
+    if cell.geometry not in SUFFIXES:
+        return cell
+    if cell.file is not None and cell.fibre_list is not None:
+        faults.append("[cell] file, fibre_list: exclude each other; give one")
+        return cell
+    if cell.file is None:
+        return _listed(cell, faults)
+    file, given = (folder / cell.file).resolve(), toml_value(str(cell.file))
+    if file.suffix != SUFFIXES[cell.geometry]:
+        expected = f"the name of a {SUFFIXES[cell.geometry]} file for geometry = {toml_value(cell.geometry)}"
+        faults.append(f"[cell] file = {given}: expected {expected}")
+    elif not os.path.isfile(file):  # false, not an error, for a name too long
+        faults.append(f"[cell] file = {given}: no such file (expected at {file})")
+    elif cell.geometry == "table":
+        return _with_table(replace(cell, file=file), faults)
+    return replace(cell, file=file)
+
+
+def _listed(cell: Cell, faults: list[str]) -> Cell:
+    if cell.fibre_list is not None:
+        return _with_table(cell, faults)
+    instead = ", or fibre_list" if cell.geometry == "table" else ""
+    faults.append(f"[cell] file: missing; expected the name of a {SUFFIXES[cell.geometry]} file{instead}")
+    return cell
+
+
+def _with_table(cell: Cell, faults: list[str]) -> Cell:
+    """The cell with its table, which has the size of the cell."""
+    try:
+        table = read_table(cell.file) if cell.file is not None else table_of(cell.fibre_list or (), "fibre_list")
+    except CaseError as error:
+        faults += [f"[cell] {fault}" for fault in error.faults]
+        return cell
+    unknown = [name for name in OTHER_SHAPES if getattr(table, name) is not None]
+    faults += [f"[cell] {table.name}: column {name}: fibres have x, y, radius and phase" for name in unknown]
+    width, height = (_size(name, getattr(cell, name), table, faults) for name in ("width", "height"))
+    return replace(cell, table=replace(table, width=width, height=height))
+
+
+def _size(name: str, asked: float | None, table: FibreTable, faults: list[str]) -> float | None:
+    """Width or height of the cell: that of the case or that of the table, which must not differ."""
+    own: float | None = getattr(table, name)
+    if asked is None and own is None:
+        faults.append(f"[cell] {name}: missing; {table.name} has no line such as # width = 120, height = 80")
+    elif None not in (asked, own) and asked != own:
+        faults.append(f"[cell] {name} = {asked:g}: {table.name} says {own:g}; give one")
+    return own if asked is None else asked

@@ -1,0 +1,41 @@
+"""Tables of fibres with one fault each, and the line that says so."""
+
+from __future__ import annotations
+
+HEAD = "x,y,radius\n"
+ROW = "1,2,0.5\n"
+
+FAULTY_TABLES = {
+    "empty": ("", "t.csv: no rows; expected a line of names such as x, y, radius, then fibres"),
+    "comments alone": ("# width = 3\n\n", "t.csv: no rows; expected a line of names"),
+    "names alone": (HEAD, "t.csv: no fibres; expected a row for each"),
+    "no names": ("1,2,3\n", 't.csv: row 1: "1, 2, 3": expected names of columns, as x, y, radius'),
+    "unknown column": ("x,y,radius,size\n1,2,3,4\n", 't.csv: row 1: column "size": unknown; known here: x, y,'),
+    "misspelt column": ("x,y,radius,phas\n1,2,3,a\n", 't.csv: row 1: column "phas": unknown; did you mean phase?'),
+    "missing column": ("x,radius\n1,2\n", "t.csv: row 1: column y: missing"),
+    "missing radius": ("x,y,phase\n1,2,fibre\n", "t.csv: row 1: column radius: missing"),
+    "one semi-axis": ("x,y,a\n1,2,3\n", "t.csv: row 1: column b: missing"),
+    "column twice": ("x,y,radius,X\n1,2,3,4\n", "t.csv: row 1: column x: there are two of it"),
+    "too short a row": (HEAD + ROW + "1,2\n", "t.csv: row 3: has 2 columns; expected 3, as there are names"),
+    "too long a row": (HEAD + "1,2,3,4\n", "t.csv: row 2: has 4 columns; expected 3, as there are names"),
+    "decimal commas": (HEAD + "1,5,2,5,0,5\n", "t.csv: row 2: has 6 columns; expected 3, as there are names"),
+    "no number": (HEAD + "# comment\n\n1,here,3\n", 't.csv: row 4: y = "here": expected a number'),
+    "a number with words": (HEAD + "1,2,3 um\n", 't.csv: row 2: radius = "3 um": expected a number above 0'),
+    "not finite": (HEAD + "nan,2,3\n", 't.csv: row 2: x = "nan": expected a number'),
+    "infinite": (HEAD + "1,inf,3\n", 't.csv: row 2: y = "inf": expected a number'),
+    "underscores": (HEAD + "1_0,2,3\n", 't.csv: row 2: x = "1_0": expected a number'),
+    "no value": (HEAD + "1,,3\n", "t.csv: row 2: y: no value; expected a number"),
+    "no radius": (HEAD + "1,2,\n", "t.csv: row 2: radius: no value; expected a number"),
+    "radius 0": (HEAD + ROW + "1,2,0\n", "t.csv: row 3: radius = 0.0: expected a number above 0"),
+    "negative radius": (HEAD + "1,2,-3\n", "t.csv: row 2: radius = -3.0: expected a number above 0"),
+    "negative coating": (
+        "x,y,radius,coating\n1,2,3,-0.1\n",
+        "t.csv: row 2: coating = -0.1: expected a number at least 0",
+    ),
+    "matrix": ("x,y,radius,phase\n1,2,3,matrix\n", 't.csv: row 2: phase = "matrix": expected a name of letters'),
+    "name of a phase": ("x,y,radius,phase\n1,2,3,e glass\n", 't.csv: row 2: phase = "e glass": expected a name'),
+    "width": ("# width = -3\n" + HEAD + ROW, "t.csv: row 1: width = -3: expected a number above 0"),
+    "no width": ("# width = wide\n" + HEAD + ROW, "t.csv: row 1: width = wide: expected a number above 0"),
+    "two widths": ("# width = 3\n# width = 4\n" + HEAD + ROW, "t.csv: row 2: width = 4: an earlier line says 3"),
+    "no text": (b"x,y,radius\n1,2,\xff\n", "t.csv: expected text in UTF-8; it has other bytes at 15"),
+}
