@@ -58,7 +58,7 @@ def result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Fields
         checks=Checks(**context.checks),
         check_tolerance=context.tolerance("jump"),
         kkt_tolerance=CONTACT_TOLERANCE,
-        warnings=(*cell.case.warnings(), *context.warnings()),
+        warnings=(*cell.case.warnings(), *cell.summary.warnings(), *context.warnings()),
         faults=tuple(context.faults),
         status="not converged" if context.faults else "done",
         timings=progress.timings(),

@@ -19,6 +19,7 @@ TOUCHING = {"square": math.pi / 4, "hexagonal": math.pi / math.sqrt(12), "random
 
 GEOMETRY = Selector("cell", "geometry")
 ALL_CIRCULAR, RANDOM, TABLE = GEOMETRY.among(*CIRCULAR), GEOMETRY.among("random"), GEOMETRY.among("table")
+MESH = GEOMETRY.among("mesh")
 MESHED, FROM_A_FILE = GEOMETRY.among(*CIRCULAR, "table"), GEOMETRY.among("table", "mesh")
 
 
@@ -33,7 +34,7 @@ class Cell:
         choice(*CIRCULAR, "table", "mesh"),
         '"square": a fibre in the middle of a square cell; "hexagonal": a cell sqrt(3) times as high as wide with '
         'fibres in the middle and at the corners; "random": fibres in a square cell; "table": fibres of a table, as of '
-        'a micrograph; "mesh": a gmsh file.',
+        'a micrograph; "mesh": a file of gmsh, Abaqus or VTK.',
     )
     fibre_fraction: float | None = key(
         real(above=0.0, below=1.0),
@@ -112,11 +113,25 @@ class Cell:
         CELL_FILE,
         'Relative to the case file. Of geometry = "mesh" the mesh: triangles of three or six nodes that fill a '
         'rectangle, in physical surfaces "matrix", "fibre", "fibre:2", ...; the nodes on opposite sides match. Fibres '
-        'may have any shape. Of "table" the fibres, a row for each: columns x, y, radius and, if there are several, '
-        'phase; what follows # is a comment, of which "# width = 120, height = 80" says the size of the cell.',
+        "may have any shape. Of Abaqus' files (.inp) element sets have these names; of .vtu and .vtk files, which "
+        'meshio reads, cell data "phase" are 0 in the matrix, 1 in fibre, 2 in fibre:2, ... Of "table" the fibres, a '
+        "row for each: columns x, y, radius and, if there are several, phase; what follows # is a comment, of which "
+        '"# width = 120, height = 80" says the size of the cell.',
         default=None,
         only=FROM_A_FILE,
         default_words="required, or fibre_list of a table",
+    )
+    repair: str = key(
+        choice("none", "snap"),
+        '"snap": nodes on sides that nearly match are moved to match; the result says how far.',
+        default="none",
+        only=MESH,
+    )
+    snap_tolerance: float = key(
+        real(least=0.0, most=0.1),
+        'How far nodes may be moved by repair = "snap" / width of the cell.',
+        default=1e-3,
+        only=MESH,
     )
     fibre_list: tuple[Mapping[str, Any], ...] | None = key(
         FIBRE_LIST, "The fibres, in place of file.", default=None, only=TABLE, default_words="what file has"

@@ -75,6 +75,7 @@ class CellSummary:
         constituent_phase: (constituents,) place of the phase of each in `phases`.
         centres, radii: (constituents, 2) and (constituents,) centre, within the cell, and radius of each fibre, NaN
             where there is none.
+        snapped: how far a node of a user's mesh was moved to make sides match, at most.
     """
 
     width: float
@@ -90,6 +91,7 @@ class CellSummary:
     centres: Float
     radii: Float
     moved_tips: MovedTips
+    snapped: float
 
     @property
     def fibres(self) -> int:
@@ -105,6 +107,11 @@ class CellSummary:
         """(k,) numbers from 1, as a case file has them, of the fibres that are these constituents (k,) or that these
         coat; 0 of the matrix."""
         return np.asarray(self.numbers[constituent])
+
+    def warnings(self) -> list[str]:
+        """What was changed in a user's mesh, in words."""
+        moved = f"nodes on the sides of the mesh were moved by up to {self.snapped:.3g} to match"
+        return [moved] if self.snapped > 0 else []
 
     @property
     def period(self) -> Float:
@@ -138,7 +145,7 @@ def coarse_mesh(case: Case) -> CoarseMesh:
         from feti_homog.cell.msh_reader import read
 
         assert case.cell.file is not None
-        mesh = read(case.cell.file)
+        mesh = read(case.cell.file, case.cell.snap_tolerance if case.cell.repair == "snap" else None)
     else:
         from feti_homog.cell.gmsh_mesher import generate
 
@@ -203,6 +210,7 @@ def distribute(
         centres=centres,
         radii=circles[:, 2],
         moved_tips=dict(moved),
+        snapped=mesh.snapped,
     )
     own: list[list[Submesh]] = [[] for _ in range(n_ranks)]
     for submesh, rank in zip(submeshes, decomposition.rank, strict=True):

@@ -195,7 +195,7 @@ def describe(case: Case, n_ranks: int) -> str:
             for rank, (count, n) in enumerate(zip(own, nodes, strict=True))
         ),
         *cost_model.estimate_lines(taken, n_ranks),
-        *(f"warning    {warning}" for warning in (*case.warnings(), *unresolved)),
+        *(f"warning    {warning}" for warning in (*case.warnings(), *summary.warnings(), *unresolved)),
         *(f"remark     {remark}" for remark in (*case.remarks(), *moved_fibres(case))),
         "the case is valid",
     ]
