@@ -78,6 +78,7 @@ def _cell_info(cell: TornCell, fractions: dict[str, float]) -> CellInfo:
         fractions=fractions,
         elements=cell.sum_over_ranks(sum(len(s.mesh.triangles) for s in cell.subdomains)),
         nodes=cell.sum_over_ranks(sum(len(s.mesh.points) for s in cell.subdomains)),
+        match_distance=cell.summary.match_distance,
     )
 
 

@@ -43,6 +43,11 @@ class CellInfo:
     )
     elements: int = described("triangles of the refined mesh")
     nodes: int = described("nodes of the refined mesh, those on cuts once for each subdomain")
+    match_distance: float | None = described(
+        "of a cell that matches a table, in mean diameters: root mean square difference of the sorted distances of "
+        "nearest and second neighbours",
+        default=None,
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -29,6 +29,10 @@ def _are_fibres(value: Any) -> bool:
     return isinstance(value, list) and value != [] and all(isinstance(fibre, dict) for fibre in value)
 
 
+def _is_table_file(value: Any) -> bool:
+    return text.accepts(value) and value.endswith(".csv")
+
+
 def _is_fibre_or_fibres(value: Any) -> bool:
     is_list = isinstance(value, list) and value != [] and all(map(FIBRE.accepts, value))
     return value == "all" or FIBRE.accepts(value) or is_list
@@ -65,6 +69,7 @@ def _positive_or_inf(what: str) -> ValueType:
     return ValueType(f"{what} above 0, or inf", _is_strength, lambda v: None if v == math.inf else float(v), schema)
 
 
+TABLE_FILE = ValueType("the name of a .csv file", _is_table_file, Path, {"type": "string", "pattern": "\\.csv$"})
 CELL_FILE = ValueType(
     f"the name of a {MESH_FILE}, or of a .csv file of a table",
     _is_cell_file,

@@ -10,6 +10,7 @@ from feti_homog.cell import tabulated
 from feti_homog.cell.coarse_mesh import CoarseMesh
 from feti_homog.cell.fibre_centres import fibre_circles
 from feti_homog.cell.fibre_numbers import fibre_numbers
+from feti_homog.cell.matched_arrangement import distance_of
 from feti_homog.cell.periodic_topology import Torus, edge_pairs
 from feti_homog.cell.refinement import ReferenceLattice
 from feti_homog.cell.submesh import Submesh, cut
@@ -76,6 +77,7 @@ class CellSummary:
         centres, radii: (constituents, 2) and (constituents,) centre, within the cell, and radius of each fibre, NaN
             where there is none.
         snapped: how far a node of a user's mesh was moved to make sides match, at most.
+        match_distance: how far the fibres are from the table that they match, see `neighbour_match`; None without one.
     """
 
     width: float
@@ -92,6 +94,7 @@ class CellSummary:
     radii: Float
     moved_tips: MovedTips
     snapped: float
+    match_distance: float | None
 
     @property
     def fibres(self) -> int:
@@ -211,11 +214,19 @@ def distribute(
         radii=circles[:, 2],
         moved_tips=dict(moved),
         snapped=mesh.snapped,
+        match_distance=_match_distance(case, mesh, centres[first_fibre:], circles[first_fibre:, 2]),
     )
     own: list[list[Submesh]] = [[] for _ in range(n_ranks)]
     for submesh, rank in zip(submeshes, decomposition.rank, strict=True):
         own[rank].append(submesh)
     return [RankShare(summary, *share) for share in zip(own, shared, strict=True)]
+
+
+def _match_distance(case: Case, mesh: CoarseMesh, centres: Float, radii: Float) -> float | None:
+    """That of `CellSummary`."""
+    if case.cell.match is None:
+        return None
+    return distance_of(case.cell.match, mesh.width, mesh.height, centres, radii)
 
 
 def wanted_pieces(

@@ -6,6 +6,7 @@ import numpy as np
 
 from feti_homog.microstructure.pair_functions import SECTORS
 from feti_homog.microstructure.statistics import FibreStatistics
+from feti_homog.microstructure.voronoi_cells import VoronoiCells
 from feti_homog.typing import Float
 
 ORDINALS = ("nearest", "second", "third")
@@ -22,7 +23,7 @@ def text(found: FibreStatistics, model: str, simulations: int) -> str:
         ("radii", _spread(pattern.radii)),
         ("smallest gap", f"{pattern.smallest_gap:.4g}, {pattern.smallest_gap / size:.3f} mean diameters"),
         *_neighbours(found, size),
-        ("local fractions", f"{_spread(cells.fractions[cells.whole])}, in {cells.whole.sum()} Voronoi cells"),
+        ("local fractions", _local_fractions(cells)),
         ("directions", _directions(found.directions)),
         ("randomness", _randomness(found, model, simulations)),
     ]
@@ -30,9 +31,15 @@ def text(found: FibreStatistics, model: str, simulations: int) -> str:
 
 
 def _spread(values: Float) -> str:
-    if not len(values):
-        return "none"
     return f"{values.mean():.4g} +- {values.std():.2g}, from {values.min():.4g} to {values.max():.4g}"
+
+
+def _local_fractions(cells: VoronoiCells) -> str:
+    known = cells.fractions[cells.whole]
+    if not len(known):
+        return "none known: the window is too small"
+    limits = f"from {known.min():.4g} to {known.max():.4g}"
+    return f"{cells.mean_fraction:.4g} +- {cells.fraction_deviation:.2g}, {limits}, in {len(known)} Voronoi cells"
 
 
 def _neighbours(found: FibreStatistics, size: float) -> list[tuple[str, str]]:
