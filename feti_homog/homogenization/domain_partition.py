@@ -214,7 +214,7 @@ def distribute(
         radii=circles[:, 2],
         moved_tips=dict(moved),
         snapped=mesh.snapped,
-        match_distance=_match_distance(case, mesh, centres[first_fibre:], circles[first_fibre:, 2]),
+        match_distance=_match_distance(case, mesh, centres[is_fibre], circles[is_fibre, 2]),
     )
     own: list[list[Submesh]] = [[] for _ in range(n_ranks)]
     for submesh, rank in zip(submeshes, decomposition.rank, strict=True):
