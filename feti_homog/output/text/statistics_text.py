@@ -10,6 +10,7 @@ from feti_homog.microstructure.voronoi_cells import VoronoiCells
 from feti_homog.typing import Float
 
 ORDINALS = ("nearest", "second", "third")
+LEVEL = 0.05  # of the test of randomness
 
 
 def text(found: FibreStatistics, model: str, simulations: int) -> str:
@@ -58,6 +59,8 @@ def _directions(shares: Float) -> str:
 
 
 def _randomness(found: FibreStatistics, model: str, simulations: int) -> str:
-    value, level = found.random.p_value, 0.05
-    verdict = "not told from it" if value > level else "not one of its patterns at the level of 5 %"
+    value = found.random.p_value
+    verdict = "not told from it" if value > LEVEL else f"not one of its patterns at the level of {100 * LEVEL:g} %"
+    if 1 / (simulations + 1) > LEVEL:
+        verdict = f"too few simulations for a level of {100 * LEVEL:g} %"
     return f"L(r) beside {simulations} simulations of the model {model}: p = {value:.3g}, {verdict}"
