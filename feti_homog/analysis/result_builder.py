@@ -85,12 +85,13 @@ def _cell_info(cell: TornCell, fractions: dict[str, float]) -> CellInfo:
         porosity=1.0 - sum(fractions.values()) if cell.summary.voids else 0.0,
         elements=cell.sum_over_ranks(sum(len(s.mesh.triangles) for s in cell.subdomains)),
         nodes=cell.sum_over_ranks(sum(len(s.mesh.points) for s in cell.subdomains)),
+        match_distance=cell.summary.match_distance,
     )
 
 
 def _fibres(summary: CellSummary) -> tuple[FibreInfo, ...]:
     """The fibres of the cell."""
-    bodies = range(summary.first_fibre, len(summary.centres))
+    bodies = summary.fibre_bodies
     return tuple(
         FibreInfo(
             number=number,

@@ -25,8 +25,8 @@ EITHER, EITHER_STIFFNESS = "(3,) or (6,)", "(3, 3) or (6, 6)"
 ENERGY = f"{STRESS} times that of the cell"
 TEMPERATURE = "change of temperature, of generalized plane strain whose phases expand"
 DEBONDED_ANGLE = (
-    "the same in degrees of arc, `debonded_length` / radius; of a fibre that is not round 360 times the share of its "
-    "interface"
+    "the same in degrees of arc, `debonded_length` / radius; of a fibre that is not round, or whose coating has an "
+    "interface too, 360 times the share of its interfaces"
 )
 
 
@@ -44,6 +44,11 @@ class CellInfo:
     elements: int = described("triangles of the refined mesh")
     nodes: int = described("nodes of the refined mesh, those on cuts once for each subdomain")
     porosity: float = described("share of voids in the area of the cell", default=0.0)
+    match_distance: float | None = described(
+        "of a cell that matches a table, in mean diameters: root mean square difference of the sorted distances of "
+        "nearest and second neighbours",
+        default=None,
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

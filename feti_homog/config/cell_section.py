@@ -10,7 +10,7 @@ from typing import Any
 
 from feti_homog.config.fibre_table import FibreTable
 from feti_homog.config.schema import Selector, key
-from feti_homog.config.section_values import CELL_FILE, FIBRE_LIST, SEED
+from feti_homog.config.section_values import CELL_FILE, FIBRE_LIST, SEED, TABLE_FILE
 from feti_homog.config.values import choice, integer, real
 
 CIRCULAR = ("square", "hexagonal", "random")
@@ -41,6 +41,8 @@ class Cell:
         "Area of the fibres / area of the cell, below that at which they touch: pi/4 (square), pi/sqrt(12) "
         "(hexagonal; random, where min_gap lowers it).",
         only=ALL_CIRCULAR,
+        unless="match",
+        default_words="required, or that of match",
     )
     width: float | None = key(
         real(least=1e-9, most=1e9), "Width of the cell.", unit="length", default=None, only=MESHED,
@@ -78,7 +80,7 @@ class Cell:
     )
     refine: int = key(
         integer(least=0, most=8),
-        "How many times every element is split in four, on the ranks; new nodes of round interfaces lie on the circle.",
+        "How many times every element is split in four, on the ranks; new nodes follow round and elliptic interfaces.",
         default=0,
     )
     order: int = key(
@@ -93,7 +95,19 @@ class Cell:
         "The stiffness is the same.",
         default="torus",
     )
-    fibres: int | None = key(integer(least=1, most=100_000), "Number of fibres.", only=RANDOM)
+    fibres: int | None = key(
+        integer(least=1, most=100_000), "Number of fibres.", only=RANDOM, unless="match",
+        default_words="required, or that of match",
+    )  # fmt: skip
+    match: Path | None = key(
+        TABLE_FILE,
+        "A table of the fibres in a window of a micrograph, relative to the case file: columns x, y, radius, and a "
+        'comment such as "# width = 120, height = 80". The cell gets its radii and, as near as can be, its '
+        "distributions of the distances of nearest and second neighbours, but none below min_gap.",
+        default=None,
+        only=RANDOM,
+        default_words="none",
+    )
     min_gap: float = key(
         real(least=0.0, most=1.0), "Smallest gap between fibres / their mean diameter.", default=0.05, only=RANDOM
     )

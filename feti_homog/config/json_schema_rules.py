@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from feti_homog.config.cell_section import ALL_CIRCULAR, FROM_A_FILE, GEOMETRY, MESHED, TABLE
+from feti_homog.config.cell_section import ALL_CIRCULAR, GEOMETRY, MESH, MESHED, TABLE
 from feti_homog.config.envelope_section import pairs_of
 from feti_homog.config.interface_section import STIFFNESSES, STRENGTHS, Arc
 from feti_homog.config.load_names import STRAINS, STRESSES
@@ -105,9 +105,15 @@ def _rule(selector: Selector, value: str) -> Schema:
 def _consequence(path: Sequence[str], keys: Mapping[str, Key], selector: Selector, value: str) -> Schema:
     own = {name: entry for name, entry in keys.items() if entry.only is not None and entry.only.selector == selector}
     belongs = {name: entry.belongs({selector: value}) for name, entry in own.items()}
-    required = [name for name, entry in own.items() if entry.required and belongs[name]]
+    required = [_presence(name, entry) for name, entry in own.items() if entry.required and belongs[name]]
     excluded = {name: False for name, is_own in belongs.items() if not is_own}
-    return _at(path, {"required": required, "properties": excluded}) if own else {}
+    return _at(path, {"properties": excluded} | ({"allOf": required} if required else {})) if own else {}
+
+
+def _presence(name: str, entry: Key) -> Schema:
+    """That a key is there, or what it is not required beside."""
+    there = {"required": [name]}
+    return {"anyOf": [there, {"required": [entry.unless]}]} if entry.unless else there
 
 
 def _section_consequence(value: str) -> Schema:
@@ -118,12 +124,18 @@ def _section_consequence(value: str) -> Schema:
 
 
 def _file_rules() -> list[Schema]:
-    """A mesh comes in a file; the fibres of a table come in a file or a list."""
-    for_a_table = {"oneOf": [{"required": ["file"]}, {"required": ["fibre_list"]}]}
-    either = {"anyOf": [{"required": ["file"]}, {"required": ["fibre_list"]}]}
+    """A mesh comes in a file; the fibres of a table come in a file, or in a list with the size of the cell."""
+    in_a_list = {"required": ["fibre_list", "width", "height"]}
+    of_a_table = {"oneOf": [{"required": ["file"]}, {"required": ["fibre_list"]}]}
+    listed = {"if": {"required": ["fibre_list"]}, "then": in_a_list}
+    of_a_mesh = {"required": ["file"]}
+
+    def named(suffix: str) -> Schema:
+        return {"properties": {"file": {"pattern": f"\\.{suffix}$"}}}
+
     return [
-        {"if": _if(FROM_A_FILE), "then": _at(("cell",), either)},
-        {"if": _if(TABLE), "then": _at(("cell",), for_a_table)},
+        {"if": _if(MESH), "then": _at(("cell",), of_a_mesh | named("msh"))},
+        {"if": _if(TABLE), "then": _at(("cell",), of_a_table | listed | named("csv"))},
     ]
 
 

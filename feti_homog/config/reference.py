@@ -113,7 +113,7 @@ def _rows(section: str, place: str, keys: Mapping[str, Key]) -> tuple[KeyRow, ..
 def _row(section: str, place: str, name: str, entry: Key) -> KeyRow:
     conditions = [SECTIONS_OF_AN_ANALYSIS.get(section), entry.only]
     applies = ", ".join(condition.in_words(section) for condition in conditions if condition is not None)
-    default = "required" if entry.required else entry.default
+    default = "required" if entry.required and not entry.unless else entry.default
     return KeyRow(section, place, name, entry.type.expected, entry.unit, default, applies, entry.meaning)
 
 

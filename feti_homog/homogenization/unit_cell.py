@@ -79,8 +79,11 @@ class TornCell:
         """
         nodes = self.solver.jump_operator.nodes
         number, moved = self.summary.fibre_number(nodes.fibre), self.summary.moved_tips
-        cracks = nodes.precracked & (self.case.interface is not None)
-        return cracks | debonded_arcs.debonded(self.case.arcs, opening, number, self.directions, moved)
+        found = nodes.precracked & bool(self.case.interfaces)
+        for pair, interface in enumerate(self.case.interfaces):
+            inside = debonded_arcs.debonded(interface.debonded, opening, number, self.directions, moved)
+            found |= inside & (nodes.pair == pair)
+        return np.asarray(found)
 
     def areas(self) -> dict[str, float]:
         """Meshed area of each phase; collective."""
@@ -172,6 +175,13 @@ def _assemble(case: Case, submeshes: list[Submesh], lattice: ReferenceLattice) -
     return [Subdomain.build(s, lattice, phase_laws.plane_law(case, s.phase), problem) for s in submeshes]
 
 
+def _match_lines(case: Case, summary: CellSummary) -> list[str]:
+    if case.cell.match is None:
+        return []
+    words = "mean diameters, the distance of the distributions of nearest and second neighbours"
+    return [f"match      {case.cell.match.name}, to {summary.match_distance:.4f} {words}"]
+
+
 def describe(case: Case, n_ranks: int) -> str:
     """What a run of the case on `n_ranks` ranks would do, in words; on rank 0."""
     lattice = ReferenceLattice.of(case.cell.refine, case.cell.order)
@@ -190,6 +200,7 @@ def describe(case: Case, n_ranks: int) -> str:
         f"mesh       {summary.coarse_triangles} coarse triangles, {summary.coarse_triangles * len(lattice.triangles)} "
         f"elements of order {case.cell.order}, about {2 * sum(nodes)} degrees of freedom",
         *([f"fibres     {summary.fibres}, numbered from 1"] if case.interface else []),
+        *_match_lines(case, summary),
         f"tearing    {summary.bodies} bodies, {summary.subdomains} subdomains, {multipliers} multipliers",
         *(
             f"rank {rank:<5} {count} subdomains, about {2 * n} degrees of freedom"

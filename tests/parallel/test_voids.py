@@ -57,21 +57,17 @@ def test_strain_of_voids_is_missed_if_it_is_not_counted(comm, shared_path):
     assert comm.allreduce(sums)[0] > 0.1
 
 
-@pytest.mark.parametrize(
-    "geometry, expected",
-    [("square", (40.268438, 9.710096, 6.303568)), ("hexagonal", (36.123857, 14.523762, 10.800047))],
-)
-def test_cells_of_round_voids(comm, shared_path, geometry, expected):
-    """Spectral solutions: Kolosov-Muskhelishvili series, two truncations of which agree to the digits given."""
-    write(comm, shared_path, geometry=geometry, mesh_size=0.1)
+def test_square_cell_of_round_voids(comm, shared_path):
+    """The spectral solution: Kolosov-Muskhelishvili series, two truncations of which agree to the digits given."""
+    write(comm, shared_path, mesh_size=0.1)
     _, L, _ = solve(case_of(shared_path, fibre=False, order=2, refine=2), comm)
-    assert [L[0, 0], L[0, 1], L[2, 2]] == pytest.approx(expected, rel=2e-4)
+    assert [L[0, 0], L[0, 1], L[2, 2]] == pytest.approx((40.268438, 9.710096, 6.303568), rel=2e-4)
 
 
 def test_few_voids_soften_as_the_dilute_limit_says(comm, shared_path):
     """dk/dc = -k (k + mu) / mu, d mu/dc = -2 mu (k + mu) / k at c = 0, to first order in c."""
     c, (k, mu) = 0.004, bulk_and_shear(MATRIX)
-    write(comm, shared_path, geometry="hexagonal", fibre_fraction=c, mesh_size=0.2, interface_size=0.01)
+    write(comm, shared_path, fibre_fraction=c, mesh_size=0.2, interface_size=0.01)
     _, L, _ = solve(case_of(shared_path, fibre=False, order=2, refine=1), comm)
     bulk, shear = (L[0, 0] + L[0, 1]) / 2, L[2, 2]
     assert (bulk - k) / c == pytest.approx(-k * (k + mu) / mu, rel=0.03)
