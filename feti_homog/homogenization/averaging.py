@@ -139,6 +139,8 @@ class Homogenization:
         for s, own in zip(self.cell.subdomains, self.cell.solver.interface_operators.dofs, strict=True):
             inside = np.ones(len(s.mean_strain), bool)
             inside[own] = False
+            if s.submesh.pinned >= 0:  # it does not move
+                inside[s.problem.dofs(np.array([s.submesh.pinned]))] = False
             size = max(size, float(np.sqrt(s.area)))
             if s.submesh.at_void.any():
                 inner = max(inner, float(np.abs(s.mean_strain[inside]).max(initial=0.0)))
