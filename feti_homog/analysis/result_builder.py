@@ -31,6 +31,9 @@ from feti_homog.mechanics import bounds
 from feti_homog.mechanics.bounds import Moduli
 from feti_homog.typing import Float
 
+# Phases that are no fibres.
+AROUND_FIBRES = ("matrix", "coating")
+
 
 def result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Fields | None) -> Result:
     """The numbers of an analysis with all that belongs to them; collective."""
@@ -74,7 +77,7 @@ def _cell_info(cell: TornCell, fractions: dict[str, float]) -> CellInfo:
         width=cell.summary.width,
         height=cell.summary.height,
         area=cell.summary.area,
-        fibre_fraction=sum(f for phase, f in fractions.items() if phase != "matrix"),
+        fibre_fraction=sum(f for phase, f in fractions.items() if phase not in AROUND_FIBRES),
         fractions=fractions,
         elements=cell.sum_over_ranks(sum(len(s.mesh.triangles) for s in cell.subdomains)),
         nodes=cell.sum_over_ranks(sum(len(s.mesh.points) for s in cell.subdomains)),

@@ -37,7 +37,7 @@ class CellInfo:
     width: float = described("width of the cell", LENGTH)
     height: float = described("height of the cell", LENGTH)
     area: float = described("area of the cell", f"{LENGTH} squared")
-    fibre_fraction: float = described("share of all fibres in the meshed area")
+    fibre_fraction: float = described("share of all phases but matrix and coating in the meshed area")
     fractions: Mapping[str, float] = described(
         "share of each phase in the meshed area", entries={"PHASE": "that of one phase"}
     )

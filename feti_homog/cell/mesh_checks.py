@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -11,6 +10,7 @@ from scipy.spatial import cKDTree
 
 from feti_homog.cell.coarse_mesh import areas, edge_keys, edges
 from feti_homog.cell.middle_nodes import MiddleNodes
+from feti_homog.config.material_sections import PHASE
 from feti_homog.typing import Bool, Float, Int, Int32
 
 # Nodes nearer than this, relative to the cell, are at the same place: files may round coordinates.
@@ -23,7 +23,6 @@ FLAT_AREA = 1e-9
 SMALLEST, LARGEST = 1e-100, 1e100
 # The physical curve of the edges that are debonded from the start.
 DEBONDED = "debonded"
-PHASE = re.compile(r"matrix|fibre(:\S+)?")
 SIDES = {(0, 0): "left", (0, 1): "right", (1, 0): "lower", (1, 1): "upper"}
 
 
@@ -93,7 +92,7 @@ def unlabelled(mesh: RawMesh) -> list[str]:
 def unknown_phases(mesh: RawMesh) -> list[str]:
     """Physical surfaces whose name is not a phase, and a missing matrix."""
     names = [name for group in mesh.groups for name in group]
-    known = 'the names are "matrix", "fibre", "fibre:2", ...'
+    known = 'expected "matrix", "fibre", "glass", ... of letters, digits, _ and -, "fibre:2", not "void"'
     strange = [name for name in names if not PHASE.fullmatch(name)]
     faults = [f'{mesh.container} "{name}" is not a phase: {known}' for name in dict.fromkeys(strange)]
     if "matrix" not in names:

@@ -80,7 +80,7 @@ class Cell:
     )
     refine: int = key(
         integer(least=0, most=8),
-        "How many times every element is split in four, on the ranks; new nodes of round interfaces lie on the circle.",
+        "How many times every element is split in four, on the ranks; new nodes follow round and elliptic interfaces.",
         default=0,
     )
     order: int = key(
@@ -126,7 +126,7 @@ class Cell:
     file: Path | None = key(
         CELL_FILE,
         'Relative to the case file. Of geometry = "mesh" the mesh: triangles of three or six nodes that fill a '
-        'rectangle, in physical surfaces "matrix", "fibre", "fibre:2", ...; the nodes on opposite sides match. Fibres '
+        'rectangle, in physical surfaces "matrix", "fibre", "glass", ...; the nodes on opposite sides match. Fibres '
         "may have any shape. Of Abaqus' files (.inp) element sets have these names; of .vtu and .vtk files, which "
         'meshio reads, cell data "phase" are 0 in the matrix, 1 in fibre, 2 in fibre:2, ... Of "table" the fibres, a '
         "row for each: columns x, y, radius and, if there are several, phase; what follows # is a comment, of which "

@@ -38,8 +38,8 @@ WIDTH = 100  # characters of a printed line
 INDENT: dict[str, Any] = {"initial_indent": "      ", "subsequent_indent": "      ", "break_on_hyphens": False}
 
 MATERIAL_MEANING = (
-    'One section for each phase: [material.matrix], [material.fibre] and, for a phase of a mesh, [material."fibre:2"], '
-    "which otherwise has the constants of fibre; each in one of four forms."
+    "One section for each phase: [material.matrix], [material.fibre] and, for phases of a mesh or a table, sections of "
+    "their names, [material.glass]; fibre:2 without its own has the constants of fibre. Each in one of four forms."
 )
 
 

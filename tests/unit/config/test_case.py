@@ -182,3 +182,15 @@ def test_locking_is_warned_of(tmp_path):
 
 def test_incompressible_is_allowed_in_plane_stress(tmp_path):
     case_of(tmp_path, changed(("0.299", "0.5"), ('"strain"', '"stress"')))
+
+
+def test_phases_of_any_name(tmp_path):
+    named = MESH.replace("material.fibre", "material.E-glass_1") + '[material."carbon:2"]\nyoung = 5\npoisson = 0\n'
+    case = case_of(tmp_path, named)
+    check_phases(case, ["matrix", "E-glass_1", "carbon:2"])
+    assert case.material_of("E-glass_1") == Isotropic(200.0, 0.222)
+    with pytest.raises(CaseError, match=r"^\[material.boron\]: missing section; the mesh has this phase$"):
+        check_phases(case, ["matrix", "E-glass_1", "carbon:2", "boron"])
+    for name in ("void", '"my glass"', '"glass:"'):
+        with pytest.raises(CaseError, match="unknown phase"):
+            case_of(tmp_path, MESH + f"[material.{name}]\nyoung = 5\npoisson = 0\n")
