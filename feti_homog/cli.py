@@ -1,5 +1,5 @@
 """The command line: `feti-homog run CASE.toml --out DIR`, `check CASE.toml`, `plot DIR`, `report DIR`, `export DIR`,
-`verify DIR`, `sweep`, `collect`, `keys`, `schema`, `options`.
+`verify DIR`, `statistics`, `sweep`, `collect`, `keys`, `schema`, `options`.
 
 Options with a double dash are ours, with a single dash PETSc's.
 """
@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, NoReturn
 
 from feti_homog import __version__
 from feti_homog.api import folder, parsed, start
+from feti_homog.commands import statistics
 from feti_homog.common.command_words import split_argv
 from feti_homog.common.interrupts import end_on_signals, launched_rank
 from feti_homog.common.petsc_option_table import help_text
@@ -102,6 +103,7 @@ def command_parser() -> Parser:
                                 description=VERIFY_HELP)  # fmt: skip
     verify.add_argument("directory", type=folder, metavar="DIR")
     verify.add_argument("--json", action="store_true", help="print the certificate as JSON")
+    statistics.add(actions)
     _add_sweep(actions.add_parser("sweep", help="run the cases of a file with [sweep]", description=SWEEP_HELP))
     collect = actions.add_parser(
         "collect",

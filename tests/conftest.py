@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from collections import Counter
 from collections.abc import Callable, Generator
 from functools import cache
 from pathlib import Path
@@ -48,6 +49,26 @@ def shared_path(comm: Any, tmp_path: Path) -> Path:
 @pytest.fixture
 def mpirun() -> Callable[..., Any]:
     return jobs.mpirun
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    words = "of the cases of each parametrized test only every N-th, from the first"
+    parser.addoption("--every", type=int, default=1, metavar="N", help=words)
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave out what --every does, of the tests that marks and names have left."""
+    chosen: list[pytest.Item] = []
+    dropped: list[pytest.Item] = []
+    cases: Counter[str] = Counter()
+    for item in items:
+        test = item.nodeid.partition("[")[0]
+        (chosen if cases[test] % config.getoption("every") == 0 else dropped).append(item)
+        cases[test] += 1
+    items[:] = chosen
+    if dropped:
+        config.hook.pytest_deselected(items=dropped)
 
 
 @pytest.hookimpl(trylast=True)

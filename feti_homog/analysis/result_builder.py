@@ -23,6 +23,7 @@ from feti_homog.analysis.result_records import (
     SolverInfo,
     StiffnessBounds,
 )
+from feti_homog.cell.arrangement import COATING
 from feti_homog.common.mpi_errors import on_root
 from feti_homog.config.materials import plane_stiffness
 from feti_homog.homogenization.domain_partition import CellSummary
@@ -74,7 +75,7 @@ def _cell_info(cell: TornCell, fractions: dict[str, float]) -> CellInfo:
         width=cell.summary.width,
         height=cell.summary.height,
         area=cell.summary.area,
-        fibre_fraction=sum(f for phase, f in fractions.items() if phase != "matrix"),
+        fibre_fraction=sum(f for phase, f in fractions.items() if phase not in ("matrix", COATING)),
         fractions=fractions,
         elements=cell.sum_over_ranks(sum(len(s.mesh.triangles) for s in cell.subdomains)),
         nodes=cell.sum_over_ranks(sum(len(s.mesh.points) for s in cell.subdomains)),

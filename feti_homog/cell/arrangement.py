@@ -155,7 +155,7 @@ def random_arrangement(cell: Cell, max_steps: int = MAX_STEPS, max_attempts: int
         )
     attempts, best = max_attempts or max(3, min(10, 100 // count)), 0.0
     for _ in range(attempts):
-        centres, clearance = _relax(generator.random((count, 2)), grown, max_steps)
+        centres, clearance = relax(generator.random((count, 2)), grown, max_steps)
         if clearance >= 1:
             return clear_shift(Arrangement(1.0, 1.0, centres, radii, (FIBRE,) * count, coating=coating))
         best = max(best, clearance)
@@ -177,8 +177,8 @@ def table_arrangement(cell: Cell) -> Arrangement:
     """
     table = cell.table
     assert table is not None
-    rows, centres, radii, height = tabulated.fibres(table)
-    coating = _coating(cell, radii) if table.coating is None else table.coating[rows] * radii
+    rows, centres, radii, height = tabulated.fibres(table, cell.window)
+    coating = None if table.coating is None else table.coating[rows] * radii
     discs = Arrangement(1.0, height, centres, radii, tuple(table.phase[row] for row in rows), coating=coating)
     shifted = clear_shift(discs)
     is_placed = table.left is not None and table.bottom is not None
@@ -200,15 +200,16 @@ def _clearance(arrangement: Arrangement) -> float:
     return float(np.abs((touching - np.round(touching)) * arrangement.width).min())
 
 
-def _relax(centres: Float, radii: Float, max_steps: int) -> tuple[Float, float]:
-    """Centres (N, 2) moved until discs on the unit torus do not overlap, and the clearance reached.
+def relax(centres: Float, radii: Float, max_steps: int, size: tuple[float, float] = (1.0, 1.0)) -> tuple[Float, float]:
+    """Centres (N, 2) moved until discs on the torus of periods `size` do not overlap, and the clearance reached.
 
     The clearance is the smallest ratio of distance to sum of radii; at least 1 is success. Heavy-ball descent
     x += 0.25 f + 0.9 dx: no reductions over the discs, so that every machine gets the same numbers.
     """
-    target, step, clearance = radii * (1 + RADIUS_EXCESS), np.zeros_like(centres), 0.0
+    periods, target = np.array(size), radii * (1 + RADIUS_EXCESS)
+    step, clearance = np.zeros_like(centres), 0.0
     for _ in range(max_steps):
-        first, second, vector = neighbours(centres, np.ones(2), 2 * target.max())
+        first, second, vector = neighbours(centres, periods, 2 * target.max())
         distance = np.sqrt(vector[:, 0] * vector[:, 0] + vector[:, 1] * vector[:, 1])
         clearance = float(np.min(distance / (radii[first] + radii[second]), initial=2.0))
         if clearance >= 1:
@@ -216,7 +217,7 @@ def _relax(centres: Float, radii: Float, max_steps: int) -> tuple[Float, float]:
         overlap = np.maximum(target[first] + target[second] - distance, 0.0)
         push = (overlap / np.maximum(distance, 1e-9))[:, None] * vector
         step = 0.25 * (_sum_at(second, push, len(radii)) - _sum_at(first, push, len(radii))) + 0.9 * step
-        centres = (centres + step) % 1.0
+        centres = (centres + step) % periods
     return centres, clearance
 
 

@@ -10,12 +10,15 @@ from scipy.sparse.csgraph import connected_components, depth_first_order
 
 from feti_homog.cell.coarse_mesh import CoarseMesh, double_arcs, edge_keys, edges, flip_double_arcs
 from feti_homog.cell.interface_edges import interface_edges
+from feti_homog.cell.middle_nodes import MiddleNodes
 from feti_homog.typing import Bool, Float, Int, Int32
 
 # Largest distance of a node from its circle, relative to the radius: files may round coordinates to seven digits.
 ROUNDNESS_TOLERANCE = 1e-6
 # A circle has at least so many edges, none longer than the radius: other regular polygons are meant as such.
 MIN_CIRCLE_EDGES = 8
+# With middle nodes on the circle the same of halves of edges.
+MIN_BENT_EDGES, LONGEST_BENT_EDGE = 4, 1.5
 
 
 @dataclass(frozen=True)
@@ -26,39 +29,42 @@ class _Loop:
     places: Float
 
 
-def with_circles(mesh: CoarseMesh) -> CoarseMesh:
+def with_circles(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
     """The mesh with the round interfaces as circles, their nodes moved onto them exactly.
 
     A closed interface between two phases is a circle if all its nodes are within ROUNDNESS_TOLERANCE radii of one,
     there are at least MIN_CIRCLE_EDGES edges, none on a side of the cell or longer than the radius, and no corner of
-    the cell is on it. Others stay polygons.
+    the cell is on it. Where its edges have middle nodes these must lie on it too, and MIN_BENT_EDGES edges are enough.
+    Others stay polygons.
     """
     pairs = interface_edges(mesh)
     size = mesh.period
-    loops = _loops(mesh, pairs, size)
+    bends = middles.between(pairs)
+    has_middles = len(middles.tags) > 0
+    loops = _loops(mesh, pairs, size, MIN_BENT_EDGES if has_middles else MIN_CIRCLE_EDGES)
     loop_of = np.full(len(mesh.points), -1)
     for number, loop in enumerate(loops):
         loop_of[loop.classes] = number
     loop_of = loop_of[mesh.representative[pairs[:, 0]]]
     points, circles, arc_edges = mesh.points.copy(), [], []
     for number, loop in enumerate(loops):
-        circle = _fit(loop.places)
-        if circle is None:
-            continue
         own = pairs[loop_of == number]
+        circle = _fit(loop.places, LONGEST_BENT_EDGE if has_middles else 1.0)
+        if circle is None or _on_sides(mesh.points[own], size).any():
+            continue
         moved = _moved(mesh.points[loop.classes], loop.places, circle, size)
-        if moved is None or _on_sides(mesh.points[own], size).any():
+        images = _images(mesh, loop, circle, own, size)
+        if moved is None or (has_middles and not _through(images, bends[loop_of == number])):
             continue
         points[loop.classes] = moved
-        for image, its_edges in _images(mesh, loop, circle, own, size):
-            circles.append(image)
-            arc_edges.append(its_edges)
+        circles += [image for image, _ in images]
+        arc_edges += [own[mine] for _, mine in images]
     mesh = replace(mesh, points=_copied(mesh, points, size))
     return _without_double_arcs(_with_arcs(mesh, circles, arc_edges))
 
 
-def _loops(mesh: CoarseMesh, pairs: Int32, size: Float) -> list[_Loop]:
-    """The interfaces that are simple closed curves and contractible on the torus."""
+def _loops(mesh: CoarseMesh, pairs: Int32, size: Float, least: int) -> list[_Loop]:
+    """The interfaces that are simple closed curves of at least so many edges and contractible on the torus."""
     if len(pairs) == 0:
         return []
     classes, ends = np.unique(mesh.representative[pairs], return_inverse=True)
@@ -72,7 +78,7 @@ def _loops(mesh: CoarseMesh, pairs: Int32, size: Float) -> list[_Loop]:
     branching = np.bincount(part, np.bincount(ends.ravel()) != 2) > 0
     _, first, number = np.unique(part, return_index=True, return_counts=True)
     loops = []
-    for start in first[~branching & (number >= MIN_CIRCLE_EDGES)].tolist():
+    for start in first[~branching & (number >= least)].tolist():
         order, _ = depth_first_order(graph, start, directed=False)
         hops = np.stack([np.asarray(step[order, np.roll(order, -1)]).ravel() for step in steps], axis=1)
         if np.all(np.abs(hops.sum(axis=0)) < size / 2):
@@ -82,8 +88,9 @@ def _loops(mesh: CoarseMesh, pairs: Int32, size: Float) -> list[_Loop]:
     return loops
 
 
-def _fit(places: Float) -> Float | None:
-    """Centre and radius (3,) of the circle through a closed chain of places (k, 2); None if not round."""
+def _fit(places: Float, longest: float) -> Float | None:
+    """Centre and radius (3,) of the circle through a closed chain of places (k, 2); None if not round, or with edges
+    longer than `longest` radii."""
     middle = places.mean(axis=0)
     offset = places - middle
     scale = np.abs(offset).max()
@@ -94,7 +101,7 @@ def _fit(places: Float) -> Float | None:
     spokes = scaled - (x, y)
     away = np.abs(np.linalg.norm(spokes, axis=1) - radius).max()
     chord = np.linalg.norm(np.roll(scaled, -1, axis=0) - scaled, axis=1).max()
-    if away > ROUNDNESS_TOLERANCE * radius or chord > radius:
+    if away > ROUNDNESS_TOLERANCE * radius or chord > longest * radius:
         return None
     return np.array([*(middle + scale * np.array([x, y])), scale * radius])
 
@@ -124,15 +131,21 @@ def _on_sides(ends: Float, size: Float) -> Bool:
     return np.asarray(np.any(np.all(ends == 0, axis=1) | np.all(ends == size, axis=1), axis=1))
 
 
-def _images(mesh: CoarseMesh, loop: _Loop, circle: Float, own: Int32, size: Float) -> list[tuple[Float, Int32]]:
-    """The images of a circle in the plane, each with its edges (a, 2) among the loop's own."""
+def _through(images: list[tuple[Float, Int]], bends: Float) -> bool:
+    """Whether all middle nodes (a, 2) lie on the circles of their edges."""
+    away = [np.abs(np.linalg.norm(bends[mine] - image[:2], axis=1) / image[2] - 1) for image, mine in images]
+    return bool(np.all(np.concatenate(away) <= ROUNDNESS_TOLERANCE))
+
+
+def _images(mesh: CoarseMesh, loop: _Loop, circle: Float, own: Int32, size: Float) -> list[tuple[Float, Int]]:
+    """The images of a circle in the plane, each with the numbers of its edges among the loop's own (a, 2)."""
     order = np.argsort(loop.classes)
     place = order[np.searchsorted(loop.classes[order], mesh.representative[own[:, 0]])]
     steps = np.round((loop.places[place] - mesh.points[own[:, 0]]) / size)
     distinct, which = np.unique(steps, axis=0, return_inverse=True)
     which = which.ravel()
     centres = circle[:2] - distinct * size
-    return [(np.append(centre, circle[2]), own[which == k]) for k, centre in enumerate(centres)]
+    return [(np.append(centre, circle[2]), np.flatnonzero(which == k)) for k, centre in enumerate(centres)]
 
 
 def _copied(mesh: CoarseMesh, points: Float, size: Float) -> Float:

@@ -64,7 +64,7 @@ def generate(cell: Cell, marks: Mapping[int, Sequence[float]] = NO_MARKS) -> Coa
             f"[cell] fibre_fraction = {cell.fibre_fraction}: a fibre has a radius of {arrangement.radii.min():.2g}; "
             f"expected at least {SMALLEST_RADIUS} of the width of the cell"
         )
-    return mesh_arrangement(arrangement, sizes, marks, _scale(cell, arrangement))
+    return mesh_arrangement(arrangement, sizes, marks, arrangement_scale(cell, arrangement))
 
 
 def mesh_arrangement(
@@ -109,7 +109,7 @@ def _sizes(cell: Cell, marks: Mapping[int, Sequence[float]]) -> MeshSizes:
     return MeshSizes(cell.mesh_size, interface, tip)
 
 
-def _scale(cell: Cell, arrangement: Arrangement) -> float:
+def arrangement_scale(cell: Cell, arrangement: Arrangement) -> float:
     """Lengths of the cell / those of the arrangement."""
     if cell.fibre_radius is not None:
         return float(cell.fibre_radius / arrangement.radii.mean())
@@ -203,7 +203,7 @@ def _add_lines(gmsh: ModuleType, lines: Outline) -> list[list[int]]:
 
 
 def _add_surfaces(gmsh: ModuleType, lines: Outline) -> tuple[list[int], list[int]]:
-    """Add the plane surfaces of fibres, coatings and matrix; their tags, and the smallest circle around each or MATRIX."""
+    """Add the plane surfaces of fibres, coatings and matrix; their tags, and the circle next around each or MATRIX."""
     geo, made = gmsh.model.geo, _add_lines(gmsh, lines)
 
     def add_loop(loop: list[Signed]) -> int:

@@ -37,7 +37,7 @@ class MeshSizes:
 
     def are_graded(self, arrangement: Arrangement) -> bool:
         """Whether the mesh is finer on circles or at tips than elsewhere, as it is on thin coatings."""
-        return min(self.tip, self.on_circles(arrangement).min()) < self.largest
+        return bool(min(self.tip, self.on_circles(arrangement).min()) < self.largest)
 
     def on_circles(self, arrangement: Arrangement) -> Float:
         """(N,) on the circles of each disc."""

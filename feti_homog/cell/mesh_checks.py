@@ -10,6 +10,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from feti_homog.cell.coarse_mesh import areas, edge_keys, edges
+from feti_homog.cell.middle_nodes import MiddleNodes
 from feti_homog.typing import Bool, Float, Int, Int32
 
 # Nodes nearer than this, relative to the cell, are at the same place: files may round coordinates.
@@ -37,6 +38,7 @@ class RawMesh:
         triangles: (m, 3) nodes, numbered from 0.
         group: (m,) index into `groups`, the lists of physical surfaces that the elements' entities belong to.
         debonded: (d, 2) node tags of the lines in the physical curve DEBONDED.
+        middles: the middle nodes of second-order triangles.
     """
 
     node_tags: Int
@@ -46,6 +48,7 @@ class RawMesh:
     group: Int
     groups: tuple[tuple[str, ...], ...]
     debonded: Int
+    middles: MiddleNodes
 
     def node(self, number: int) -> str:
         """A node in words."""

@@ -70,7 +70,7 @@ def circle_size(arrangement: Arrangement, largest: float) -> Float:
 
 def coating_size(arrangement: Arrangement) -> Float:
     """sqrt(t a) (N,) of the coating of the thickness t on each disc of the radius a."""
-    return np.sqrt(arrangement.thickness * arrangement.radii)
+    return np.asarray(np.sqrt(arrangement.thickness * arrangement.radii))
 
 
 def wrap(points: Float, size: Float) -> Float:

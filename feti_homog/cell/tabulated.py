@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from feti_homog.cell import cut_window
 from feti_homog.cell.torus_pairs import neighbours
 from feti_homog.errors import MeshError
 from feti_homog.typing import Bool, Float, Int
@@ -19,27 +20,54 @@ SAME_FIBRE = 0.01
 LEAST_GAP = 1e-4
 # Radius / width of the cell above which positions on a circle differ by more than rounding.
 SMALLEST_RADIUS = 1e-6
+# Thickness / radius of the thinnest and of the thickest coating.
+COATINGS = 1e-3, 1.0
 # Faults that are told one by one.
 MAX_FAULTS = 30
 
 
-def fibres(table: FibreTable) -> tuple[Int, Float, Float, float]:
+def fibres(table: FibreTable, window: str) -> tuple[Int, Float, Float, float]:
     """The rows (k,) that are fibres, their centres (k, 2) and radii (k,), and the height; all / width of the cell.
 
-    Of rows a period apart, which are images of one fibre, it is the first.
+    In a periodic window, rows a period apart are images of one fibre, the first of them. In one that is cut out of
+    something larger, fibres that overlap across its border are moved apart.
 
     Raises:
         MeshError: rows lie outside, come twice, overlap or touch; a line for each fault.
     """
+    kept, centres, moved, size = _on_torus(table, window)
+    return kept, (centres + moved) % size / size[0], table.radius[kept] / size[0], float(size[1] / size[0])
+
+
+def moved_rows(table: FibreTable, window: str) -> tuple[Int, Float]:
+    """The rows (m,) whose fibres a cut window moves, numbered as the table has them, and how far (m,). Raises as
+    `fibres`.
+    """
+    kept, _, moved, _ = _on_torus(table, window)
+    distance = np.linalg.norm(moved, axis=1)
+    far = distance > cut_window.TOLERANCE * table.radius.mean()
+    return table.row[kept[far]], distance[far]
+
+
+def _on_torus(table: FibreTable, window: str) -> tuple[Int, Float, Float, Float]:
+    """Rows (k,) that are fibres, where they are (k, 2) in the cell, their moves (k, 2), and the cell's size (2,)."""
     assert table.width is not None and table.height is not None
     size = np.array([table.width, table.height])
     centres = table.centres - _corner(table)
-    _raise_faults(table, _outside(table, centres, size))
-    first, faults = _without_images(table, centres, size)
+    is_cut = window == "cut"
+    _raise_faults(table, _outside(table, centres, size, is_cut))
+    first, faults = _without_images(table, centres, size, is_cut)
     _raise_faults(table, faults)
     kept = np.flatnonzero(first)
-    _raise_faults(table, _contacts(table, kept, centres[kept], size))
-    return kept, centres[kept] % size / size[0], table.radius[kept] / size[0], float(size[1] / size[0])
+    centres = centres[kept]
+    _raise_faults(table, _contacts(table, kept, centres, size, is_cut))
+    if not is_cut:
+        return kept, centres, np.zeros_like(centres), size
+    try:
+        return kept, centres, cut_window.moves(centres, table.outer_radius[kept], size), size
+    except MeshError as error:
+        words = "fibres overlap across the border, and " + str(error)
+        raise MeshError(f'[cell] {table.name}: window = "cut": {words}; leave some of them out') from error
 
 
 def _corner(table: FibreTable) -> Float:
@@ -55,22 +83,35 @@ def _raise_faults(table: FibreTable, faults: list[str]) -> None:
         raise MeshError(*(f"[cell] {table.name}: {fault}" for fault in faults[:MAX_FAULTS]), *rest)
 
 
-def _outside(table: FibreTable, centres: Float, size: Float) -> list[str]:
-    """Faults of fibres that are no part of the cell, or too large or too small for it."""
+def _outside(table: FibreTable, centres: Float, size: Float, is_cut: bool) -> list[str]:
+    """Faults of fibres that are no part of the cell, or too large or too small for it.
+
+    Discs reach into a periodic cell; of a cut window the centres are within.
+    """
     radius, faults = table.radius, []
     for axis, (name, width) in enumerate(zip(("width", "height"), size.tolist(), strict=True)):
         over = np.maximum(-centres[:, axis], centres[:, axis] - width)
-        reach = radius if (table.left, table.bottom)[axis] is not None else 2 * radius.max()
-        for k in np.flatnonzero(over > reach * (1 + SAME_FIBRE)).tolist():
+        reach = radius if (table.left, table.bottom)[axis] is not None else np.full_like(radius, 2 * radius.max())
+        for k in np.flatnonzero(over > (SAME_FIBRE * radius if is_cut else (1 + SAME_FIBRE) * reach)).tolist():
             value = table.centres[k, axis]
             faults.append(f"row {table.row[k]}: {'xy'[axis]} = {value:g}: lies outside the cell, of {name} {width:g}")
     for k in np.flatnonzero((2 * radius >= size.min()) | (radius < SMALLEST_RADIUS * size[0])).tolist():
         limits = f"from {SMALLEST_RADIUS * size[0]:g} to below {size.min() / 2:g} in this cell"
         faults.append(f"row {table.row[k]}: radius = {radius[k]:g}: expected {limits}")
-    return faults
+    return faults + _unlikely_coatings(table)
 
 
-def _without_images(table: FibreTable, centres: Float, size: Float) -> tuple[Bool, list[str]]:
+def _unlikely_coatings(table: FibreTable) -> list[str]:
+    """Faults of coatings that are too thin or too thick to be meshed."""
+    if table.coating is None:
+        return []
+    least, most = COATINGS
+    bad = np.flatnonzero((table.coating > 0) & ((table.coating < least) | (table.coating > most)))
+    expected = f"expected 0, or from {least:g} to {most:g}"
+    return [f"row {table.row[k]}: coating = {table.coating[k]:g}: {expected}" for k in bad.tolist()]
+
+
+def _without_images(table: FibreTable, centres: Float, size: Float, is_cut: bool) -> tuple[Bool, list[str]]:
     """(N,) which rows are the first of their fibre, and faults of rows at one place that are not one fibre."""
     first, second, vector = neighbours(centres, size, SAME_FIBRE * table.radius.max())
     radius, apart = table.radius, np.linalg.norm(vector, axis=1)
@@ -78,27 +119,28 @@ def _without_images(table: FibreTable, centres: Float, size: Float) -> tuple[Boo
     near = (first != second) & (apart < SAME_FIBRE * smaller)
     first, second, vector = first[near], second[near], vector[near]
     in_place = np.linalg.norm(centres[second] - centres[first] - vector, axis=1) < SAME_FIBRE * radius[first]
-    alike = np.abs(radius[second] - radius[first]) < SAME_FIBRE * smaller[near]
+    both = np.column_stack([radius, table.outer_radius])
+    alike = (np.abs(both[second] - both[first]) < SAME_FIBRE * smaller[near, None]).all(axis=1)
     faults = []
     for i, j, is_here, is_alike in zip(first.tolist(), second.tolist(), in_place, alike, strict=True):
         rows = f"rows {table.row[i]} and {table.row[j]}"
         if is_here:
             faults.append(f"{rows}: are at one place; expected each fibre once")
-        elif not is_alike or table.phase[i] != table.phase[j]:
+        elif not is_cut and (not is_alike or table.phase[i] != table.phase[j]):
             faults.append(f"{rows}: are images of one fibre, a period apart; expected one radius and one phase")
     is_first = np.ones(len(radius), bool)
-    is_first[np.maximum(first, second)] = False
+    is_first[np.maximum(first, second)] = is_cut
     return is_first, faults
 
 
-def _contacts(table: FibreTable, kept: Int, centres: Float, size: Float) -> list[str]:
-    """Faults of fibres, the rows `kept` (k,), that overlap or touch."""
-    radius = table.radius[kept]
+def _contacts(table: FibreTable, kept: Int, centres: Float, size: Float, is_cut: bool) -> list[str]:
+    """Faults of fibres, the rows `kept` (k,), that overlap or touch; of a cut window only of those that do within."""
+    radius = table.outer_radius[kept]
     first, second, vector = neighbours(centres, size, 2 * radius.max() * (1 + LEAST_GAP))
     together = radius[first] + radius[second]
     gap = np.linalg.norm(vector, axis=1) - together
     across = np.linalg.norm(centres[second] - centres[first] - vector, axis=1) > SAME_FIBRE * radius[first]
-    bad = np.flatnonzero(gap < LEAST_GAP * together / 2)
+    bad = np.flatnonzero((gap < LEAST_GAP * together / 2) & ~(across & is_cut))
     faults = []
     for k in bad[np.unique(np.stack([first[bad], second[bad]]), axis=1, return_index=True)[1]].tolist():
         i, j = table.row[kept[first[k]]], table.row[kept[second[k]]]

@@ -118,11 +118,11 @@ class Cell:
     )
     file: Path | None = key(
         CELL_FILE,
-        'Relative to the case file. Of geometry = "mesh" the mesh: triangles of three nodes that fill a rectangle, in '
-        'physical surfaces "matrix", "fibre", "fibre:2", ...; the nodes on opposite sides match. Fibres may have any '
-        'shape. Of "table" the fibres, a row for each: columns x, y, radius and, if there are any, phase and '
-        "coating (thickness / radius); what "
-        'follows # is a comment, of which "# width = 120, height = 80" says the size of the cell.',
+        'Relative to the case file. Of geometry = "mesh" the mesh: triangles of three or six nodes that fill a '
+        'rectangle, in physical surfaces "matrix", "fibre", "fibre:2", ...; the nodes on opposite sides match. Fibres '
+        'may have any shape. Of "table" the fibres, a row for each: columns x, y, radius and, if there are any, phase '
+        'and coating (thickness / radius); what follows # is a comment, of which "# width = 120, height = 80" says the '
+        "size of the cell.",
         default=None,
         only=FROM_A_FILE,
         default_words="required, or fibre_list of a table",

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from feti_homog.cell import tabulated
 from feti_homog.cell.coarse_mesh import CoarseMesh
 from feti_homog.cell.fibre_centres import fibre_circles
 from feti_homog.cell.periodic_topology import Torus, edge_pairs
@@ -22,6 +23,7 @@ from feti_homog.interface import debonded_arcs
 from feti_homog.interface.debonded_arcs import MovedTips
 from feti_homog.typing import Float, Int
 
+MOST_LISTED = 30  # moved fibres that are told one by one
 ROUNDING = 1e-9  # of coordinates, relative to the cell
 
 
@@ -134,6 +136,22 @@ def coarse_mesh(case: Case) -> CoarseMesh:
         mesh = generate(replace(case.cell, tip_size=tips.size(case)), tips.directions(case))
     cases.check_phases(case, mesh.phases)
     return mesh
+
+
+def moved_fibres(case: Case) -> tuple[str, ...]:
+    """Which rows of a table its cut window moves, and how far, in one line; none of other cells.
+
+    Raises:
+        MeshError: the table is faulty.
+    """
+    table = case.cell.table
+    if table is None or case.cell.window != "cut":
+        return ()
+    rows, far = tabulated.moved_rows(table, case.cell.window)
+    listed = [f"row {rows[k]} by {far[k]:.3g}" for k in np.argsort(-far, kind="stable")[:MOST_LISTED]]
+    rest = [f"and {len(rows) - MOST_LISTED} others by less"] if len(rows) > MOST_LISTED else []
+    which = f": {', '.join(listed + rest)}" if listed else ""
+    return (f'[cell] window = "cut": {len(rows)} of {len(table.radius)} fibres moved{which}',)
 
 
 def distribute(

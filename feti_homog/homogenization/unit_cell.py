@@ -27,6 +27,7 @@ from feti_homog.homogenization.domain_partition import (
     RankShare,
     coarse_mesh,
     distribute,
+    moved_fibres,
 )
 from feti_homog.interface import debonded_arcs
 from feti_homog.typing import Bool, Float, Int
@@ -153,6 +154,8 @@ def assemble_subdomains(
             words.append("its debonded curve is bonded, for there is no [interface]")
         words.append(f"{summary.coarse_triangles} triangles, {summary.bodies} bodies, {summary.subdomains} subdomains")
         del mesh, shares
+    for line in on_root_only(comm, moved_fibres, case) or ():
+        progress.say(f"remark: {line}")
     with progress.stage("assemble") as words:
         subdomains = agree(comm, _assemble, case, own.submeshes, lattice)
         dofs = comm.allreduce(sum(s.n_dofs for s in subdomains))
@@ -190,7 +193,7 @@ def describe(case: Case, n_ranks: int) -> str:
         ),
         *cost_model.estimate_lines(taken, n_ranks),
         *(f"warning    {warning}" for warning in (*case.warnings(), *unresolved)),
-        *(f"remark     {remark}" for remark in case.remarks()),
+        *(f"remark     {remark}" for remark in (*case.remarks(), *moved_fibres(case))),
         "the case is valid",
     ]
     return "\n".join(lines)

@@ -32,7 +32,8 @@ def _check_cell(ledger: Ledger, cell: DiscreteCell, told: Section) -> None:
     width, height = cell.files.size
     names, mesh = cell.files.phases, cell.files.mesh
     expected = {"width": width, "height": height, "area": width * height, "elements": len(mesh.triangles)}
-    expected |= {"nodes": len(mesh.points), "fibre_fraction": 1.0 - cell.fractions[0]}
+    fibres = sum(share for name, share in zip(names, cell.fractions, strict=True) if name not in ("matrix", "coating"))
+    expected |= {"nodes": len(mesh.points), "fibre_fraction": fibres}
     for name, value in expected.items():
         scale = 1.0 if name == "fibre_fraction" else abs(value) or 1.0
         ledger.record("cell", abs(told[name] - value) / scale, f"cell.{name}")
@@ -49,7 +50,7 @@ def _check_fibres(ledger: Ledger, cell: DiscreteCell, told: Sequence[Section]) -
     expected = [(number, phases[phase]) for number, phase in zip(numbers, fibres.phase, strict=True)]
     ledger.record("tables", np.where(listed == expected, 0.0, np.inf), "fibres")
     if listed == expected:
-        circles = np.array([[*(fibre["centre"] or (None, None)), fibre["radius"]] for fibre in told], float)
+        circles = np.array([[*fibre.get("centre", (None, None)), fibre.get("radius")] for fibre in told], float)
         stored = np.column_stack([fibres.centre, fibres.radius])
         off = np.where(np.isnan(circles) & np.isnan(stored), 0.0, circles - stored)
         ledger.record("tables", relative(off, cell.files.size.max()).max(axis=1), lambda i: f"fibres[{i}]")

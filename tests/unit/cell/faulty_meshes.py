@@ -120,11 +120,11 @@ def _quadrilaterals() -> MshFile:
     return grid().without(11, 12).with_element(50, 3, FIBRE, (a, b, c, grid().elements[12][3][2]))
 
 
-def _second_order() -> MshFile:
-    """Two 6-node triangles on the unit square."""
-    places = [(0, 0), (2, 0), (2, 2), (0, 2), (1, 0), (2, 1), (1, 1), (1, 2), (0, 1)]
-    nodes = {k: (x / 2, y / 2, 0.0) for k, (x, y) in enumerate(places, 1)}
-    return MshFile(nodes, {1: (9, 1, 1, (1, 2, 3, 5, 6, 7)), 2: (9, 1, 1, (1, 3, 4, 7, 8, 9))})
+def _third_order() -> MshFile:
+    """A 10-node triangle."""
+    places = [(0, 0), (3, 0), (0, 3), (1, 0), (2, 0), (2, 1), (1, 2), (0, 2), (0, 1), (1, 1)]
+    nodes = {k: (float(x), float(y), 0.0) for k, (x, y) in enumerate(places, 1)}
+    return MshFile(nodes, {1: (21, 1, 1, tuple(range(1, 11)))})
 
 
 def _sheared() -> MshFile:
@@ -201,7 +201,7 @@ FAULTY_MESHES: dict[str, tuple[Callable[[Path], None], str]] = {
         _mesh(_quadrilaterals),
         "element 50 at (0.375, 0.375), the first of 1, is a Quadrilateral 4",
     ),
-    "second order": (_mesh(_second_order), "set order = 2 in [cell]"),
+    "third order": (_mesh(_third_order), "only triangles of three or six nodes can be used (mesh with Mesh.Element"),
     "tetrahedra": (
         _mesh(lambda: grid().moved(n13=(0.5, 0.5, 1)).with_element(60, 4, 1, (1, 2, 7, 13))),
         "Tetrahedron",

@@ -8,6 +8,7 @@ from pathlib import Path
 import gmsh
 import numpy as np
 import pytest
+from support.users_meshes import polar_cell
 from unit.cell.faulty_meshes import FAULTY_MESHES, MshFile, grid
 
 from feti_homog.cell.coarse_mesh import CoarseMesh, areas
@@ -107,7 +108,7 @@ def test_polygons_stay_polygons(corner, tmp_path):
 
 @pytest.mark.parametrize("centre", [(0.5, 0.5), (0.0, 0.0), (0.1, 0.45), (0.93, 0.08)])
 def test_round_fibre_is_found_wherever_the_cell_cuts_it(centre, tmp_path):
-    _polar_cell(centre, 0.35, tmp_path / "round.msh")
+    polar_cell(centre, 0.35, tmp_path / "round.msh")
     mesh = read(tmp_path / "round.msh")
     _assert_periodic(mesh)
     size = np.array([mesh.width, mesh.height])
@@ -122,7 +123,7 @@ def test_round_fibre_is_found_wherever_the_cell_cuts_it(centre, tmp_path):
 
 
 def test_an_ellipse_is_no_circle(tmp_path):
-    _polar_cell((0.5, 0.5), 0.35, tmp_path / "round.msh", stretch=1 + 1e-5)
+    polar_cell((0.5, 0.5), 0.35, tmp_path / "round.msh", stretch=1 + 1e-5)
     assert len(read(tmp_path / "round.msh").circles) == 0
 
 
@@ -152,45 +153,6 @@ def _rewritten(source: Path, target: Path, version: float, binary: int) -> None:
         gmsh.write(str(target))
     finally:
         gmsh.finalize()
-
-
-def _polar_cell(centre: tuple[float, float], radius: float, path: Path, stretch: float = 1.0) -> None:
-    """A periodic mesh of the unit cell by gmsh's OpenCASCADE kernel, with one fibre about `centre`."""
-    gmsh.initialize(interruptible=False)
-    try:
-        gmsh.option.setNumber("General.Terminal", 0)
-        occ = gmsh.model.occ
-        cell = (2, occ.addRectangle(0, 0, 0, 1, 1))
-        places = [(centre[0] + i, centre[1] + j) for i in (-1, 0, 1) for j in (-1, 0, 1)]
-        discs = [(2, occ.addDisk(x, y, 0, radius * stretch, radius)) for x, y in places]
-        parts, origin = occ.fragment([cell], discs)
-        inside = set(origin[0])
-        occ.remove([part for part in parts if part not in inside], recursive=True)
-        fibres = sorted(inside & {part for images in origin[1:] for part in images})
-        occ.synchronize()
-        matrix = sorted(inside - set(fibres))
-        gmsh.model.addPhysicalGroup(2, [tag for _, tag in matrix], name="matrix")
-        gmsh.model.addPhysicalGroup(2, [tag for _, tag in fibres], name="fibre")
-        for axis in (0, 1):
-            _make_periodic(axis)
-        gmsh.option.setNumber("Mesh.MeshSizeMax", 0.1)
-        gmsh.model.mesh.generate(2)
-        gmsh.write(str(path))
-    finally:
-        gmsh.finalize()
-
-
-def _make_periodic(axis: int) -> None:
-    """Copy the mesh of each curve on the low side along an axis to its partner on the high side."""
-    for _, curve in gmsh.model.getEntities(1):
-        box = np.array(gmsh.model.getBoundingBox(1, curve))
-        shift = np.eye(3)[axis]
-        if abs(box[axis]) < 1e-4 and abs(box[3 + axis]) < 1e-4:
-            low, high = box[:3] + shift - 1e-4, box[3:] + shift + 1e-4
-            (partner,) = gmsh.model.getEntitiesInBoundingBox(*low, *high, dim=1)
-            matrix = np.eye(4)
-            matrix[axis, 3] = 1
-            gmsh.model.mesh.setPeriodic(1, [partner[1]], [curve], matrix.ravel())
 
 
 def _content(mesh: CoarseMesh) -> np.ndarray:

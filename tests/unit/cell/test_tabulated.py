@@ -52,7 +52,7 @@ def test_origin_units_and_order_of_rows_do_not_matter(name):
     size = np.array([built.width, built.height])
     expected = generate(cell_of(table(built.centres, built.radii, size.tolist())))
     order = np.random.default_rng(0).permutation(len(built.radii))
-    moved = 137.3 * ((built.centres + [0.21, 0.73]) % size) + [1e3, -2e3]
+    moved = 137.3 * ((built.centres + np.array([0.21, 0.73])) % size) + np.array([1e3, -2e3])
     unit = 137.3 * size
     mesh = generate(cell_of(table(moved[order], 137.3 * built.radii[order], unit.tolist())))
     assert np.array_equal(mesh.triangles, expected.triangles)

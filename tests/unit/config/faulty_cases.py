@@ -100,7 +100,7 @@ FAULTY_CASES: dict[str, tuple[str, tuple[str, ...]]] = {
     ),
     "interface_size_of_a_mesh": (
         changed((MESH_CELL[0], MESH_CELL[1] + "\ninterface_size = 0.01")),
-        ('[cell] interface_size = 0.01: belongs to geometry = "square" or "hexagonal" or "random", not "mesh"',),
+        ('[cell] interface_size = 0.01: belongs to geometry = "square" or "hexagonal" or "random" or "table", not',),
     ),
     "tip_size_above_mesh_size": (
         cell("= 0.05", "= 0.05\ntip_size = 0.06"),
@@ -136,7 +136,7 @@ FAULTY_CASES: dict[str, tuple[str, tuple[str, ...]]] = {
     ),
     "file_of_hexagonal": (
         cell("mesh_size", 'file = "cell.msh"\nmesh_size'),
-        ('[cell] file = "cell.msh": belongs to geometry = "mesh", not "hexagonal"',),
+        ('[cell] file = "cell.msh": belongs to geometry = "table" or "mesh", not "hexagonal"',),
     ),
     "random_without_fibres": (
         cell('"hexagonal"', '"random"'),

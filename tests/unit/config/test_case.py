@@ -37,8 +37,9 @@ def test_keys_that_are_left_out_have_their_defaults(tmp_path):
     assert case.name == "cell"
     assert dataclasses.asdict(case.cell) == {
         "geometry": "hexagonal", "fibre_fraction": 0.4, "mesh_size": 0.05, "interface_size": None, "tip_size": None,
-        "refine": 0, "order": 1, "bodies": "torus", "fibres": None, "width": None, "fibre_radius": None,
+        "refine": 0, "order": 1, "bodies": "torus", "fibres": None, "width": None, "fibre_radius": None, "coating": None,
         "min_gap": 0.05, "seed": 0, "radius_spread": 0.0, "file": None,
+        "height": None, "fibre_list": None, "window": "periodic", "table": None,
     }  # fmt: skip
     assert list(case.materials.items()) == [
         ("matrix", Isotropic(88.0, 0.299)),
@@ -68,8 +69,8 @@ def test_faults_are_told_by_section_and_key(tmp_path, name):
 def test_one_fault_is_one_line(tmp_path, name):
     with pytest.raises(CaseError) as caught:
         case_of(tmp_path, FAULTY[name][0])
-    # a mistyped key that is required is also missing; a mesh has none of the three keys of the hexagonal cell
-    related = {"young_mistyped": 2, "mesh_with_fraction": 3}
+    # a mistyped key that is required is also missing; a mesh has neither fraction nor size of elements
+    related = {"young_mistyped": 2, "mesh_with_fraction": 2}
     assert len(caught.value.faults) == related.get(name, 1), caught.value.faults
 
 

@@ -1,0 +1,113 @@
+"""A window cut out of a micrograph made periodic: fibres that overlap across its border are moved apart."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import nnls
+
+from feti_homog.cell.torus_pairs import neighbours
+from feti_homog.errors import MeshError
+from feti_homog.typing import Float, Int
+
+# Gap / sum of the radii that fibres which are moved apart get.
+WANTED_GAP = 0.01
+# Overlap / sum of the radii that counts as none, and what distances are made larger by to come below it.
+TOLERANCE = 1e-6
+# Moves differ from the smallest ones by less than this, / mean radius.
+SETTLED = 1e-4
+MAX_STEPS = 100
+
+
+@dataclass(frozen=True)
+class _Pairs:
+    """Fibres `first` and `second` (k,), the latter moved by `shift` (k, 2) periods, and least distances (k,)."""
+
+    first: Int
+    second: Int
+    shift: Float
+    least: Float
+
+    @property
+    def key(self) -> Float:
+        """(k, 4) what tells pairs from each other."""
+        return np.column_stack([self.first, self.second, np.round(self.shift)])
+
+    def joined(self, other: _Pairs) -> _Pairs:
+        """All pairs of both, each once."""
+        keys = np.concatenate([self.key, other.key])
+        once = np.unique(keys, axis=0, return_index=True)[1]
+        least = np.concatenate([self.least, other.least])[once]
+        return _Pairs(keys[once, 0].astype(np.intp), keys[once, 1].astype(np.intp), keys[once, 2:], least)
+
+    def where(self, chosen: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]) -> _Pairs:
+        return _Pairs(self.first[chosen], self.second[chosen], self.shift[chosen], self.least[chosen])
+
+    def vectors(self, centres: Float, size: Float) -> Float:
+        """(k, 2) from the first fibres to the second."""
+        return np.asarray(centres[self.second] - centres[self.first] + self.shift * size)
+
+
+def moves(centres: Float, radii: Float, size: Float) -> Float:
+    """(N, 2) the moves d of discs on the torus of periods `size` (2,) that part those which overlap.
+
+    They are a local minimum of sum |d|^2 such that all distances are at least those that there were, or the sum of
+    the radii and WANTED_GAP of it where that is less or discs overlapped. Each step solves it with the distances
+    |v| >= r replaced by n . v >= r, n the present directions; since n . v <= |v|, its solution keeps the distances.
+
+    Raises:
+        MeshError: there is no room.
+    """
+    moved, pairs = np.zeros_like(centres), _near(centres, np.zeros_like(centres), radii, size).where(np.zeros(0, bool))
+    for _ in range(MAX_STEPS):
+        near = _near(centres, moved, radii, size)
+        distance = np.linalg.norm(near.vectors(centres + moved, size), axis=1)
+        short = near.where(distance < near.least * (1 - TOLERANCE))
+        before, pairs = moved, pairs.joined(short)
+        moved = _least_moves(pairs, centres, moved, size, float(radii.mean()))
+        if len(short.first) == 0 and np.abs(moved - before).max() < SETTLED * radii.mean():
+            return moved
+    raise MeshError("there is no room to move them apart")
+
+
+def _near(centres: Float, moved: Float, radii: Float, size: Float) -> _Pairs:
+    """Pairs of different discs that are, or soon may be, nearer than they must be."""
+    present = centres + moved
+    first, second, vector = neighbours(present, size, 3 * radii.max())
+    apart = first != second
+    first, second, vector = first[apart], second[apart], vector[apart]
+    shift = np.round((vector - present[second] + present[first]) / size)
+    before = np.linalg.norm(centres[second] - centres[first] + shift * size, axis=1)
+    together = radii[first] + radii[second]
+    wanted = together * (1 + WANTED_GAP)
+    overlap = before < together * (1 + TOLERANCE)
+    return _Pairs(first, second, shift, np.where(overlap, wanted, np.minimum(before, wanted)))
+
+
+def _least_moves(pairs: _Pairs, centres: Float, moved: Float, size: Float, unit: float) -> Float:
+    """(N, 2) the d of least sum |d|^2 with n . (v + d_second - d_first) >= r for all pairs, n their present directions.
+
+    By non-negative least squares: C. L. Lawson, R. J. Hanson, Solving Least Squares Problems, 1974, chapter 23.
+    """
+    result = np.zeros_like(centres)
+    if len(pairs.first) == 0:
+        return result
+    present = pairs.vectors(centres + moved, size)
+    length = np.linalg.norm(present, axis=1)
+    normal = np.where(length[:, None] > 0, present / np.maximum(length, 1e-300)[:, None], [1.0, 0.0])
+    own, place = np.unique(np.concatenate([pairs.first, pairs.second]), return_inverse=True)
+    rows, count = np.arange(len(normal)), len(normal)
+    matrix = np.zeros((2 * len(own) + 1, count))
+    for axis in (0, 1):
+        matrix[2 * place[:count] + axis, rows] -= normal[:, axis]
+        matrix[2 * place[count:] + axis, rows] += normal[:, axis]
+    needed = pairs.least * (1 + TOLERANCE) - (normal * pairs.vectors(centres, size)).sum(axis=1)
+    matrix[-1] = needed / unit
+    target = np.zeros(len(matrix))
+    target[-1] = 1.0
+    residual = matrix @ nnls(matrix, target, maxiter=100 * count)[0] - target
+    if abs(residual[-1]) < TOLERANCE:
+        raise MeshError("there is no room to move them apart")
+    result[own] = (-residual[:-1] / residual[-1]).reshape(-1, 2) * unit
+    return result

@@ -1,0 +1,123 @@
+"""The triangles of a .msh file, as gmsh reads it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+
+from feti_homog.cell import mesh_checks
+from feti_homog.cell.gmsh_mesher import LINE, TRIANGLE, gmsh_session
+from feti_homog.cell.mesh_checks import RawMesh
+from feti_homog.cell.middle_nodes import MiddleNodes
+from feti_homog.errors import MeshError
+from feti_homog.typing import Int
+
+# How a mesh file of gmsh begins; other text would be run as a script.
+HEADERS = ("$MeshFormat", "$Comments", "$PhysicalNames", "$NOD")
+# What to do about other elements, by order and dimension.
+REMEDY = {
+    (1, 2): "do not recombine",
+    (2, 2): "do not recombine",
+    (3, 2): "mesh with Mesh.ElementOrder = 1 or 2",
+    (1, 3): "mesh the surfaces only",
+    (2, 3): "mesh the surfaces only",
+    (3, 3): "mesh the surfaces only",
+}
+# gmsh's types of elements of second order; how many nodes a triangle of each type has.
+LINE_2, TRIANGLE_2 = 8, 9
+NODES_OF_TRIANGLES = {TRIANGLE: 3, TRIANGLE_2: 6}
+
+
+def load(path: Path) -> RawMesh:
+    """The triangles of a file; only their kind has been checked.
+
+    Raises:
+        MeshError: if gmsh cannot read it, or if it has other elements.
+    """
+    try:
+        with path.open("rb") as file:
+            start = file.read(4096).lstrip().decode("latin-1")
+    except OSError as error:
+        raise MeshError(f"{path}: cannot be read: {error.strerror}") from None
+    if not start.startswith(HEADERS):
+        raise MeshError(f"{path.name}: not a gmsh mesh file: it does not begin with {HEADERS[0]}")
+    with gmsh_session() as gmsh:
+        try:
+            gmsh.open(str(path))
+        except Exception as error:  # gmsh raises nothing more specific
+            raise MeshError(f"{path.name}: gmsh cannot read it: {error}") from None
+        faults = _other_kinds(gmsh)
+        if faults:
+            raise MeshError(*(f"{path.name}: {fault}" for fault in faults))
+        return _raw_mesh(gmsh)
+
+
+def _other_kinds(gmsh: ModuleType) -> list[str]:
+    """Elements that are not triangles of three or six nodes, and the lack of these."""
+    faults = []
+    kinds = [kind for dimension in (2, 3) for kind in gmsh.model.mesh.getElementTypes(dimension)]
+    for kind in kinds:
+        if kind not in NODES_OF_TRIANGLES:
+            tags, nodes = gmsh.model.mesh.getElementsByType(kind)
+            name, dimension, order, *_ = gmsh.model.mesh.getElementProperties(kind)
+            points = [gmsh.model.mesh.getNode(node)[0] for node in nodes[: len(nodes) // len(tags)]]
+            first = f"element {tags[0]} at {mesh_checks.at(np.mean(points, axis=0))}"
+            faults.append(
+                f"{first}, the first of {len(tags)}, is a {name}: only triangles of three or six nodes can be used "
+                f"({REMEDY[min(order, 3), dimension]})"
+            )
+    if not kinds:
+        faults.append("no triangles in it: mesh the surfaces and put them in physical surfaces before saving")
+    return faults
+
+
+def _raw_mesh(gmsh: ModuleType) -> RawMesh:
+    """The triangles of gmsh's current model, with the nodes that they use."""
+    tags, corners, group, groups, sides, middles = [], [], [], [], [np.zeros((0, 2), int)], [np.zeros(0, int)]
+    for _, entity in gmsh.model.getEntities(2):
+        for kind, count in NODES_OF_TRIANGLES.items():
+            own_tags, own_nodes = gmsh.model.mesh.getElementsByType(kind, entity)
+            if len(own_tags) == 0:
+                continue
+            physical = gmsh.model.getPhysicalGroupsForEntity(2, entity)
+            groups.append(tuple(gmsh.model.getPhysicalName(2, tag) or f"number {tag}" for tag in physical))
+            group.append(np.full(len(own_tags), len(groups) - 1))
+            own = own_nodes.reshape(-1, count).astype(np.int64)
+            tags.append(own_tags)
+            corners.append(own[:, :3])
+            if count == 6:
+                sides.append(own[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2))
+                middles.append(own[:, 3:].ravel())
+    node_tags, coordinates, _ = gmsh.model.mesh.getNodes()
+    order = np.argsort(node_tags)
+    points = coordinates.reshape(-1, 3)[order]
+    used, triangles = np.unique(np.concatenate(corners), return_inverse=True)
+    edges, middle = np.concatenate(sides), np.concatenate(middles)
+    return RawMesh(
+        node_tags=used,
+        points=points[np.searchsorted(node_tags[order], used)],
+        element_tags=np.concatenate(tags).astype(np.int64),
+        triangles=triangles.reshape(-1, 3).astype(np.int32),
+        group=np.concatenate(group),
+        groups=tuple(groups),
+        debonded=_debonded_lines(gmsh),
+        middles=MiddleNodes(
+            edges=np.searchsorted(used, edges).astype(np.int32),
+            tags=middle,
+            points=points[np.searchsorted(node_tags[order], middle)],
+        ),
+    )
+
+
+def _debonded_lines(gmsh: ModuleType) -> Int:
+    """Node tags (d, 2) of the lines in the physical curve "debonded"."""
+    lines = [np.zeros(0, np.int64)]
+    for _, entity in gmsh.model.getEntities(1):
+        groups = gmsh.model.getPhysicalGroupsForEntity(1, entity)
+        if any(gmsh.model.getPhysicalName(1, tag) == mesh_checks.DEBONDED for tag in groups):
+            for kind, count in ((LINE, 2), (LINE_2, 3)):
+                nodes = gmsh.model.mesh.getElementsByType(kind, entity)[1].astype(np.int64)
+                lines.append(nodes.reshape(-1, count)[:, :2].ravel())
+    return np.concatenate(lines).reshape(-1, 2)

@@ -1,0 +1,32 @@
+"""Random patterns of fibres that do not overlap, with the radii and the gap of a measured one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from feti_homog.cell.arrangement import MAX_STEPS, relax
+from feti_homog.errors import MeshError
+from feti_homog.microstructure.fibre_pattern import FibrePattern
+
+ATTEMPTS = 3
+
+
+def hard_core(pattern: FibrePattern, generator: np.random.Generator, max_steps: int = MAX_STEPS) -> FibrePattern:
+    """The same fibres elsewhere, as those of random cells are placed (`random_arrangement`): no gap is smaller than the
+    smallest one of the pattern.  Across the sides of a window they are placed as in a periodic cell.
+
+    Raises:
+        MeshError: no such pattern is found.
+    """
+    grown = pattern.radii + max(pattern.smallest_gap, 0.0) / 2
+    for _ in range(ATTEMPTS):
+        places = generator.random((pattern.count, 2)) * pattern.size
+        centres, clearance = relax(places, grown, max_steps, (pattern.width, pattern.height))
+        if clearance >= 1:
+            return replace(pattern, centres=centres)
+    raise MeshError(
+        f"no random pattern with the fibre fraction {pattern.fibre_fraction:.4g} and the smallest gap "
+        f"{pattern.smallest_gap:.4g} is found; compare with --model poisson"
+    )

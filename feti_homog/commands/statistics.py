@@ -1,0 +1,68 @@
+"""`feti-homog statistics FILE.csv|DIR|CASE.toml`: how the fibres of a cross-section are placed."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from feti_homog.api import folder
+from feti_homog.common.standard_streams import say
+
+if TYPE_CHECKING:
+    from mpi4py.MPI import Intracomm
+
+HELP = (
+    "Print the distances of nearest neighbours, local fibre fractions and directions of pairs, and compare Ripley's "
+    "L(r) with simulations of random fibres. With --out, write tables of these, of g(r) and of K(r), and a picture."
+)
+MOST_SIMULATIONS = 9999
+
+
+def add(actions: argparse._SubParsersAction[Any]) -> None:
+    """Add the command to those of a parser."""
+    parser = actions.add_parser(
+        "statistics", help="measure how the fibres of a cross-section are placed", description=HELP
+    )
+    words = "a table of fibres in a window of a micrograph; or a folder of results, or a case file: periodic cells"
+    parser.add_argument("source", type=Path, metavar="FILE.csv|DIR|CASE.toml", help=words)
+    parser.add_argument("--out", type=folder, metavar="DIR", help="folder of the tables and the picture")
+    parser.add_argument(
+        "--model",
+        choices=("hard-core", "poisson"),
+        default="hard-core",
+        help="what is random: fibres of these radii with at least the smallest gap found (the default), or points",
+    )
+    parser.add_argument(
+        "--simulations", type=_simulations, default=39, metavar="N", help="how many are compared (default 39)"
+    )
+    words = "size of the window, in the unit of the table (default: what a comment in the table says)"
+    parser.add_argument("--size", type=_length, nargs=2, metavar=("WIDTH", "HEIGHT"), help=words)
+    parser.set_defaults(action=_statistics)
+
+
+def _simulations(word: str) -> int:
+    if not word.isdecimal() or not 1 <= int(word) <= MOST_SIMULATIONS:
+        raise argparse.ArgumentTypeError(f"{word}: expected an integer from 1 to {MOST_SIMULATIONS}")
+    return int(word)
+
+
+def _length(word: str) -> float:
+    try:
+        value = float(word)
+    except ValueError:
+        value = math.nan
+    if not 0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f"{word}: expected a length above 0")
+    return value
+
+
+def _statistics(arguments: argparse.Namespace, comm: Intracomm) -> None:
+    from feti_homog.analysis import fibre_statistics
+    from feti_homog.common.mpi_errors import on_root_only
+
+    size = None if arguments.size is None else tuple(arguments.size)
+    words = arguments.source, arguments.out, arguments.model, arguments.simulations, size
+    for line in on_root_only(comm, fibre_statistics.run, *words) or []:
+        say(line)

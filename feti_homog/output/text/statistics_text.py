@@ -1,0 +1,56 @@
+"""What `feti-homog statistics` prints."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from feti_homog.microstructure.pair_functions import SECTORS
+from feti_homog.microstructure.statistics import FibreStatistics
+from feti_homog.typing import Float
+
+ORDINALS = ("nearest", "second", "third")
+
+
+def text(found: FibreStatistics, model: str, simulations: int) -> str:
+    """A line for each quantity; lengths in the unit of the fibres' table, and in mean diameters."""
+    pattern, cells = found.pattern, found.cells
+    kind = "periodic cell" if pattern.periodic else "window, corrected for its edges,"
+    size = 2 * pattern.mean_radius
+    lines = [
+        ("fibres", f"{pattern.count} in a {kind} of {pattern.width:.6g} x {pattern.height:.6g}"),
+        ("fibre fraction", f"{pattern.fibre_fraction:.4f}"),
+        ("radii", _spread(pattern.radii)),
+        ("smallest gap", f"{pattern.smallest_gap:.4g}, {pattern.smallest_gap / size:.3f} mean diameters"),
+        *_neighbours(found, size),
+        ("local fractions", f"{_spread(cells.fractions[cells.whole])}, in {cells.whole.sum()} Voronoi cells"),
+        ("directions", _directions(found.directions)),
+        ("randomness", _randomness(found, model, simulations)),
+    ]
+    return "\n".join(f"{name:<16}{words}" for name, words in lines)
+
+
+def _spread(values: Float) -> str:
+    if not len(values):
+        return "none"
+    return f"{values.mean():.4g} +- {values.std():.2g}, from {values.min():.4g} to {values.max():.4g}"
+
+
+def _neighbours(found: FibreStatistics, size: float) -> list[tuple[str, str]]:
+    near = found.neighbours
+    return [
+        (f"{name} centre", f"{mean:.4g} +- {deviation:.2g}, {mean / size:.3f} +- {deviation / size:.3f} mean diameters")
+        if np.isfinite(mean)
+        else (f"{name} centre", "none known: the window is too small")
+        for name, mean, deviation in zip(ORDINALS, near.means, near.deviations, strict=True)
+    ]
+
+
+def _directions(shares: Float) -> str:
+    angle = int(shares.argmax()) * 180 / SECTORS
+    return f"{shares.min():.2f} to {shares.max():.2f} times as many near pairs as evenly, most about {angle:g} degrees"
+
+
+def _randomness(found: FibreStatistics, model: str, simulations: int) -> str:
+    value, level = found.random.p_value, 0.05
+    verdict = "not told from it" if value > level else "not one of its patterns at the level of 5 %"
+    return f"L(r) beside {simulations} simulations of the model {model}: p = {value:.3g}, {verdict}"

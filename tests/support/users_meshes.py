@@ -1,0 +1,59 @@
+"""Meshes as users make them, by gmsh."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import gmsh
+import numpy as np
+
+
+def polar_cell(
+    centre: tuple[float, float],
+    radius: float,
+    path: Path,
+    stretch: float = 1.0,
+    order: int = 1,
+    size: float = 0.1,
+    turn: float = 0.0,
+) -> None:
+    """A periodic mesh of the unit cell by gmsh's OpenCASCADE kernel, with one fibre about `centre`: an
+    ellipse of semi-axes radius * stretch and radius, the first at `turn` radians from the horizontal."""
+    gmsh.initialize(interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        occ = gmsh.model.occ
+        cell = (2, occ.addRectangle(0, 0, 0, 1, 1))
+        places = [(centre[0] + i, centre[1] + j) for i in (-1, 0, 1) for j in (-1, 0, 1)]
+        discs = [(2, occ.addDisk(x, y, 0, radius * stretch, radius)) for x, y in places]
+        for disc, (x, y) in zip(discs, places, strict=True):
+            occ.rotate([disc], x, y, 0, 0, 0, 1, turn)
+        parts, origin = occ.fragment([cell], discs)
+        inside = set(origin[0])
+        occ.remove([part for part in parts if part not in inside], recursive=True)
+        fibres = sorted(inside & {part for images in origin[1:] for part in images})
+        occ.synchronize()
+        matrix = sorted(inside - set(fibres))
+        gmsh.model.addPhysicalGroup(2, [tag for _, tag in matrix], name="matrix")
+        gmsh.model.addPhysicalGroup(2, [tag for _, tag in fibres], name="fibre")
+        for axis in (0, 1):
+            _make_periodic(axis)
+        gmsh.option.setNumber("Mesh.MeshSizeMax", size)
+        gmsh.option.setNumber("Mesh.ElementOrder", order)
+        gmsh.model.mesh.generate(2)
+        gmsh.write(str(path))
+    finally:
+        gmsh.finalize()
+
+
+def _make_periodic(axis: int) -> None:
+    """Copy the mesh of each curve on the low side along an axis to its partner on the high side."""
+    for _, curve in gmsh.model.getEntities(1):
+        box = np.array(gmsh.model.getBoundingBox(1, curve))
+        shift = np.eye(3)[axis]
+        if abs(box[axis]) < 1e-4 and abs(box[3 + axis]) < 1e-4:
+            low, high = box[:3] + shift - 1e-4, box[3:] + shift + 1e-4
+            (partner,) = gmsh.model.getEntitiesInBoundingBox(*low, *high, dim=1)
+            matrix = np.eye(4)
+            matrix[axis, 3] = 1
+            gmsh.model.mesh.setPeriodic(1, [partner[1]], [curve], matrix.ravel())

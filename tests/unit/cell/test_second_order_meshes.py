@@ -1,0 +1,99 @@
+"""Meshes of 6-node triangles: their middle nodes give the curves of interfaces, their corners the coarse mesh."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from support.users_meshes import polar_cell
+from unit.cell.faulty_meshes import grid, node
+from unit.cell.second_order import FAULTY_MIDDLES, second_order
+
+from feti_homog.cell.coarse_mesh import CoarseMesh
+from feti_homog.cell.fibre_centres import fibre_circles
+from feti_homog.cell.msh_reader import read
+from feti_homog.cell.periodic_topology import Torus
+from feti_homog.cell.refinement import ReferenceLattice, refine
+from feti_homog.cell.submesh import cut
+from feti_homog.errors import MeshError
+
+
+@pytest.mark.parametrize("name", FAULTY_MIDDLES)
+def test_faulty_middle_nodes_are_refused(name, tmp_path):
+    mesh, message = FAULTY_MIDDLES[name]
+    with pytest.raises(MeshError) as caught:
+        read(_written(mesh, tmp_path))
+    assert [message in fault for fault in caught.value.faults] == [True], caught.value
+
+
+@pytest.mark.parametrize("centre", [(0.5, 0.5), (0.0, 0.0), (0.93, 0.08)])
+def test_round_fibre_is_that_of_the_same_mesh_of_first_order(centre, tmp_path):
+    for order in (1, 2):
+        polar_cell(centre, 0.35, tmp_path / f"{order}.msh", order=order)
+    first, second = (read(tmp_path / f"{order}.msh") for order in (1, 2))
+    assert len(second.arc_edges) == len(first.arc_edges) > 0
+    assert second.circles == pytest.approx(first.circles, abs=1e-8)
+    assert len(second.points) == len(first.points) and len(second.triangles) == len(first.triangles)
+
+
+def test_few_edges_are_a_circle_if_their_middle_nodes_are_on_it(tmp_path):
+    polar_cell((0.5, 0.5), 0.1, tmp_path / "round.msh", order=2, size=0.2)
+    mesh = read(tmp_path / "round.msh")
+    assert len(mesh.arc_edges) < 8 and mesh.circles == pytest.approx(np.array([[0.5, 0.5, 0.1]]), abs=1e-8)
+
+
+def test_straight_edges_stay_straight(tmp_path):
+    """Corners on a circle are no circle if the middle nodes say that the sides are straight."""
+    ring = [(2 + 2**0.5, 2), (3, 3), (2, 2 + 2**0.5), (1, 3), (2 - 2**0.5, 2), (1, 1), (2, 2 - 2**0.5), (3, 1)]
+    mesh = grid().moved(**{f"n{node(round(x), round(y))}": (x / 4, y / 4) for x, y in ring})
+    assert len(read(_written(mesh, tmp_path)).circles) == 1
+    assert len(read(_written(second_order(mesh), tmp_path)).circles) == 0
+
+
+def test_bent_edges_go_through_their_middle_nodes(tmp_path):
+    """A square fibre whose right side is bent outwards: three points define the arc."""
+    middles = {(0.75, 0.375): (0.77, 0.37), (0.75, 0.625): (0.76, 0.63)}
+    mesh = read(_written(second_order(grid(), lambda x, y: middles.get((x, y), (x, y))), tmp_path))
+    assert len(mesh.arc_edges) == 2 and np.isnan(fibre_circles(Torus.of(mesh))[1, 2])
+    for edge, circle in zip(mesh.arc_edges, mesh.circles, strict=True):
+        ends = mesh.points[edge]
+        on_arc = np.array([*ends, middles[tuple(ends.mean(axis=0).tolist())]])
+        assert np.linalg.norm(on_arc - circle[:2], axis=1) == pytest.approx(np.full(3, circle[2]), rel=1e-12)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_refinement_follows_an_ellipse(order, tmp_path):
+    """Areas approach pi a b by h^4, as arcs through three nodes of an ellipse do; those of order 1 also lack what
+    lies beyond 64 chords of an arc, of the order of h^2."""
+    errors = []
+    for size in (0.12, 0.06):
+        polar_cell((0.5, 0.5), 0.2, tmp_path / "ellipse.msh", stretch=1.5, order=2, size=size)
+        mesh = read(tmp_path / "ellipse.msh")
+        errors.append(abs(_fibre_area(mesh, refinements=6, order=order) - np.pi * 0.06) / (np.pi * 0.06))
+        polar_cell((0.5, 0.5), 0.2, tmp_path / "ellipse.msh", stretch=1.5, order=1, size=size)
+        assert errors[-1] < 0.05 * abs(_fibre_area(read(tmp_path / "ellipse.msh"), 0, 1) / (np.pi * 0.06) - 1)
+    assert errors[1] < errors[0] / (8 if order == 2 else 4) and errors[1] < 2e-5
+
+
+def test_debonded_lines_of_second_order(tmp_path):
+    mesh = second_order(grid())
+    line = (node(3, 1), node(3, 2))
+    middle = next(tag for tag, place in mesh.nodes.items() if place == (0.75, 0.375, 0.0))
+    mesh = mesh.with_curve([line])
+    mesh = mesh.with_element(900, 8, 7, (*line, middle))
+    result = read(_written(mesh, tmp_path))
+    assert np.sort(result.points[result.debonded_edges[0]], axis=0).tolist() == [[0.75, 0.25], [0.75, 0.5]]
+
+
+def _written(mesh, folder):
+    mesh.write(folder / "mesh.msh")
+    return folder / "mesh.msh"
+
+
+def _fibre_area(mesh: CoarseMesh, refinements: int, order: int) -> float:
+    """Area within the fine vertices and middle nodes of the fibre's elements."""
+    torus, lattice = Torus.of(mesh), ReferenceLattice.of(refinements, order)
+    (fibre,) = (s for s in cut(torus, torus.constituent) if s.phase == "fibre")
+    fine = refine(fibre, lattice)
+    order_of_corners = [0, 1, 2] if order == 1 else [0, 3, 1, 4, 2, 5]
+    x, y = np.moveaxis(fine.points[fine.triangles[:, order_of_corners]], 2, 0)
+    return float(np.sum(x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)) / 2)
