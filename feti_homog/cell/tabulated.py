@@ -21,7 +21,7 @@ LEAST_GAP = 1e-4
 # Radius / width of the cell above which positions on a circle differ by more than rounding.
 SMALLEST_RADIUS = 1e-6
 # Thickness / radius of the thinnest and of the thickest coating.
-COATINGS = 1e-3, 1.0
+COATINGS = 0.01, 1.0
 # Faults that are told one by one.
 MAX_FAULTS = 30
 

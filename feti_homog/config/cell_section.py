@@ -54,7 +54,7 @@ class Cell:
         only=ALL_CIRCULAR, default_words="what width makes it",
     )  # fmt: skip
     coating: float | None = key(
-        real(least=1e-3, most=1.0),
+        real(least=0.01, most=1.0),
         'Thickness of the coatings of all fibres / radius of the fibre, which is within; of the phase "coating". '
         "fibre_fraction and fibre_radius are those without them, gaps those with them.",
         default=None,
