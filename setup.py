@@ -34,7 +34,9 @@ setup(
         # These must be built on one MPI: from the distribution or the cluster's modules, never by default
         # from wheels (the h5py wheel has no MPI).
         "mpi": ["petsc4py>=3.18", "mpi4py>=3.1", "h5py>=3.7"],
+        "meshes": ["meshio>=5.3"],  # cells in .vtu and .vtk files
         "dev": [
+            "meshio>=5.3",
             "pytest>=7.4",
             "selenium>=4.20",
             "hypothesis>=6.100",

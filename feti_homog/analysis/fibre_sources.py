@@ -13,9 +13,9 @@ from feti_homog.cell.gmsh_mesher import arrangement_scale
 from feti_homog.cell.msh_reader import read as read_mesh
 from feti_homog.cell.periodic_topology import Torus
 from feti_homog.config import case as cases
+from feti_homog.config.fibre_window import read_window
 from feti_homog.errors import CaseError
 from feti_homog.microstructure.fibre_pattern import FibrePattern
-from feti_homog.microstructure.measured_window import read_window
 from feti_homog.typing import Float
 
 

@@ -23,7 +23,6 @@ from feti_homog.analysis.result_records import (
     SolverInfo,
     StiffnessBounds,
 )
-from feti_homog.cell.arrangement import COATING
 from feti_homog.common.mpi_errors import on_root
 from feti_homog.config.materials import plane_stiffness
 from feti_homog.homogenization.domain_partition import CellSummary
@@ -31,6 +30,9 @@ from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.mechanics import bounds
 from feti_homog.mechanics.bounds import Moduli
 from feti_homog.typing import Float
+
+# Phases that are no fibres.
+AROUND_FIBRES = ("matrix", "coating")
 
 
 def result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Fields | None) -> Result:
@@ -59,7 +61,7 @@ def result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Fields
         checks=Checks(**context.checks),
         check_tolerance=context.tolerance("jump"),
         kkt_tolerance=CONTACT_TOLERANCE,
-        warnings=(*cell.case.warnings(), *context.warnings()),
+        warnings=(*cell.case.warnings(), *cell.summary.warnings(), *context.warnings()),
         faults=tuple(context.faults),
         status="not converged" if context.faults else "done",
         timings=progress.timings(),
@@ -75,10 +77,11 @@ def _cell_info(cell: TornCell, fractions: dict[str, float]) -> CellInfo:
         width=cell.summary.width,
         height=cell.summary.height,
         area=cell.summary.area,
-        fibre_fraction=sum(f for phase, f in fractions.items() if phase not in ("matrix", COATING)),
+        fibre_fraction=sum(f for phase, f in fractions.items() if phase not in AROUND_FIBRES),
         fractions=fractions,
         elements=cell.sum_over_ranks(sum(len(s.mesh.triangles) for s in cell.subdomains)),
         nodes=cell.sum_over_ranks(sum(len(s.mesh.points) for s in cell.subdomains)),
+        match_distance=cell.summary.match_distance,
     )
 
 

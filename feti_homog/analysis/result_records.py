@@ -37,12 +37,17 @@ class CellInfo:
     width: float = described("width of the cell", LENGTH)
     height: float = described("height of the cell", LENGTH)
     area: float = described("area of the cell", f"{LENGTH} squared")
-    fibre_fraction: float = described("share of all fibres in the meshed area")
+    fibre_fraction: float = described("share of all phases but matrix and coating in the meshed area")
     fractions: Mapping[str, float] = described(
         "share of each phase in the meshed area", entries={"PHASE": "that of one phase"}
     )
     elements: int = described("triangles of the refined mesh")
     nodes: int = described("nodes of the refined mesh, those on cuts once for each subdomain")
+    match_distance: float | None = described(
+        "of a cell that matches a table, in mean diameters: root mean square difference of the sorted distances of "
+        "nearest and second neighbours",
+        default=None,
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

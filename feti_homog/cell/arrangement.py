@@ -90,11 +90,16 @@ def arrange(cell: Cell) -> Arrangement:
     """The arrangement that a case asks for in a cell of width 1, its area fraction `cell.fibre_fraction` to rounding.
 
     square: one disc in the middle of a 1 x 1 cell. hexagonal: 1 x sqrt(3), a disc in the middle and one at
-    the corner. random: `cell.fibres` discs in a 1 x 1 cell, see `random_arrangement`. table: see `table_arrangement`.
+    the corner. random: `cell.fibres` discs in a 1 x 1 cell, see `random_arrangement`, with
+    `cell.match` see `matched_arrangement`. table: see `table_arrangement`.
 
     Raises:
         MeshError: discs of that fraction touch, no arrangement is found, or the table is faulty.
     """
+    if cell.match is not None:
+        from feti_homog.cell.matched_arrangement import matched_arrangement  # it is made of what stands here
+
+        return matched_arrangement(cell)
     return ARRANGEMENTS[cell.geometry](cell)
 
 

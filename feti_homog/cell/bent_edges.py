@@ -5,12 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
-from feti_homog.cell.coarse_mesh import CoarseMesh, edge_keys
+from feti_homog.cell.coarse_mesh import CoarseMesh, edge_keys, flip_double_arcs
 from feti_homog.cell.interface_edges import interface_edges
 from feti_homog.cell.mesh_checks import SAME_PLACE, RawMesh, at, first_of
 from feti_homog.cell.middle_nodes import MiddleNodes
-from feti_homog.typing import Bool, Float
+from feti_homog.typing import Bool, Float, Int32
 
 # Distance of a middle node from its edge / length of the edge up to which the edge is straight.
 STRAIGHT = 1e-5
@@ -42,20 +44,30 @@ def with_bent_edges(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
     """The mesh whose interface edges follow the circle through their ends and their middle node.
 
     Those already on circles stay there, and so do straight ones, whose middle node is within STRAIGHT of the chord.
+    Edges are flipped where a triangle has two on one curve, which has no corner there.
     """
     pairs, nodes = interface_edges(mesh), len(mesh.points)
     pairs = pairs[~np.isin(edge_keys(pairs, nodes), edge_keys(mesh.arc_edges, nodes))]
     a, b, middle = mesh.points[pairs[:, 0]], mesh.points[pairs[:, 1]], middles.between(pairs)
     _, away, length = _offsets(middle, a, b)
     bent = np.abs(away) > STRAIGHT * length
-    circles = _circumcircles(a[bent], b[bent], middle[bent])
+    circles, arcs = _circumcircles(a[bent], b[bent], middle[bent]), pairs[bent].astype(np.int32)
+    triangles = flip_double_arcs(mesh.triangles, mesh.phase, arcs, _curves(mesh, arcs), nodes)
     number = len(mesh.circles) + np.arange(len(circles), dtype=np.int32)
     return replace(
         mesh,
+        triangles=triangles,
         circles=np.concatenate([mesh.circles, circles]),
-        arc_edges=np.concatenate([mesh.arc_edges, pairs[bent].astype(np.int32)]),
+        arc_edges=np.concatenate([mesh.arc_edges, arcs]),
         arc_circle=np.concatenate([mesh.arc_circle, number]),
     )
+
+
+def _curves(mesh: CoarseMesh, pairs: Int32) -> Int32:
+    """(k,) which edges (k, 2) are connected."""
+    ends = mesh.representative[pairs]
+    graph = coo_matrix((np.ones(len(ends), np.int8), (ends[:, 0], ends[:, 1])), shape=(len(mesh.points),) * 2)
+    return np.asarray(connected_components(graph, directed=False)[1][ends[:, 0]], np.int32)
 
 
 def _offsets(middle: Float, start: Float, stop: Float) -> tuple[Float, Float, Float]:

@@ -22,7 +22,7 @@ MIN_BENT_EDGES, LONGEST_BENT_EDGE = 4, 1.5
 
 
 @dataclass(frozen=True)
-class _Loop:
+class Loop:
     """A closed interface: its node classes (k,) in order, and where they lie, unwrapped, (k, 2)."""
 
     classes: Int
@@ -41,7 +41,7 @@ def with_circles(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
     size = mesh.period
     bends = middles.between(pairs)
     has_middles = len(middles.tags) > 0
-    loops = _loops(mesh, pairs, size, MIN_BENT_EDGES if has_middles else MIN_CIRCLE_EDGES)
+    loops = closed_loops(mesh, pairs, size, MIN_BENT_EDGES if has_middles else MIN_CIRCLE_EDGES)
     loop_of = np.full(len(mesh.points), -1)
     for number, loop in enumerate(loops):
         loop_of[loop.classes] = number
@@ -50,7 +50,7 @@ def with_circles(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
     for number, loop in enumerate(loops):
         own = pairs[loop_of == number]
         circle = _fit(loop.places, LONGEST_BENT_EDGE if has_middles else 1.0)
-        if circle is None or _on_sides(mesh.points[own], size).any():
+        if circle is None or on_sides(mesh.points[own], size).any():
             continue
         moved = _moved(mesh.points[loop.classes], loop.places, circle, size)
         images = _images(mesh, loop, circle, own, size)
@@ -63,7 +63,7 @@ def with_circles(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
     return _without_double_arcs(_with_arcs(mesh, circles, arc_edges))
 
 
-def _loops(mesh: CoarseMesh, pairs: Int32, size: Float, least: int) -> list[_Loop]:
+def closed_loops(mesh: CoarseMesh, pairs: Int32, size: Float, least: int) -> list[Loop]:
     """The interfaces that are simple closed curves of at least so many edges and contractible on the torus."""
     if len(pairs) == 0:
         return []
@@ -84,7 +84,7 @@ def _loops(mesh: CoarseMesh, pairs: Int32, size: Float, least: int) -> list[_Loo
         if np.all(np.abs(hops.sum(axis=0)) < size / 2):
             nodes = classes[order]
             places = mesh.points[nodes[0]] + np.cumsum(hops, axis=0) - hops
-            loops.append(_Loop(nodes, places))
+            loops.append(Loop(nodes, places))
     return loops
 
 
@@ -126,7 +126,7 @@ def _moved(points: Float, places: Float, circle: Float, size: Float) -> Float | 
     return moved
 
 
-def _on_sides(ends: Float, size: Float) -> Bool:
+def on_sides(ends: Float, size: Float) -> Bool:
     """Whether edges with ends (k, 2, 2) lie on a side of the cell."""
     return np.asarray(np.any(np.all(ends == 0, axis=1) | np.all(ends == size, axis=1), axis=1))
 
@@ -137,7 +137,7 @@ def _through(images: list[tuple[Float, Int]], bends: Float) -> bool:
     return bool(np.all(np.concatenate(away) <= ROUNDNESS_TOLERANCE))
 
 
-def _images(mesh: CoarseMesh, loop: _Loop, circle: Float, own: Int32, size: Float) -> list[tuple[Float, Int]]:
+def _images(mesh: CoarseMesh, loop: Loop, circle: Float, own: Int32, size: Float) -> list[tuple[Float, Int]]:
     """The images of a circle in the plane, each with the numbers of its edges among the loop's own (a, 2)."""
     order = np.argsort(loop.classes)
     place = order[np.searchsorted(loop.classes[order], mesh.representative[own[:, 0]])]

@@ -27,6 +27,7 @@ class CoarseMesh:
         arc_edges: (a, 2) edges of the mesh whose ends lie on a circle, to rounding.
         arc_circle: (a,) the circle of each of them.
         debonded_edges: (d, 2) edges between a fibre and the matrix that are debonded from the start.
+        snapped: how far a node of a user's mesh was moved to make sides match, at most.
     """
 
     width: float
@@ -41,6 +42,7 @@ class CoarseMesh:
     arc_edges: Int32
     arc_circle: Int32
     debonded_edges: Int32
+    snapped: float = 0.0
 
     @property
     def period(self) -> Float:

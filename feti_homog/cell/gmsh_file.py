@@ -8,9 +8,9 @@ from types import ModuleType
 import numpy as np
 
 from feti_homog.cell import mesh_checks
+from feti_homog.cell.element_blocks import Block, assembled
 from feti_homog.cell.gmsh_mesher import LINE, TRIANGLE, gmsh_session
 from feti_homog.cell.mesh_checks import RawMesh
-from feti_homog.cell.middle_nodes import MiddleNodes
 from feti_homog.errors import MeshError
 from feti_homog.typing import Int
 
@@ -75,40 +75,17 @@ def _other_kinds(gmsh: ModuleType) -> list[str]:
 
 def _raw_mesh(gmsh: ModuleType) -> RawMesh:
     """The triangles of gmsh's current model, with the nodes that they use."""
-    tags, corners, group, groups, sides, middles = [], [], [], [], [np.zeros((0, 2), int)], [np.zeros(0, int)]
+    blocks, groups = list[Block](), list[tuple[str, ...]]()
     for _, entity in gmsh.model.getEntities(2):
         for kind, count in NODES_OF_TRIANGLES.items():
-            own_tags, own_nodes = gmsh.model.mesh.getElementsByType(kind, entity)
-            if len(own_tags) == 0:
-                continue
-            physical = gmsh.model.getPhysicalGroupsForEntity(2, entity)
-            groups.append(tuple(gmsh.model.getPhysicalName(2, tag) or f"number {tag}" for tag in physical))
-            group.append(np.full(len(own_tags), len(groups) - 1))
-            own = own_nodes.reshape(-1, count).astype(np.int64)
-            tags.append(own_tags)
-            corners.append(own[:, :3])
-            if count == 6:
-                sides.append(own[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2))
-                middles.append(own[:, 3:].ravel())
+            tags, nodes = gmsh.model.mesh.getElementsByType(kind, entity)
+            if len(tags):
+                own = nodes.reshape(-1, count).astype(np.int64)
+                blocks.append(Block(tags.astype(np.int64), own, np.full(len(tags), len(groups))))
+                physical = gmsh.model.getPhysicalGroupsForEntity(2, entity)
+                groups.append(tuple(gmsh.model.getPhysicalName(2, tag) or f"number {tag}" for tag in physical))
     node_tags, coordinates, _ = gmsh.model.mesh.getNodes()
-    order = np.argsort(node_tags)
-    points = coordinates.reshape(-1, 3)[order]
-    used, triangles = np.unique(np.concatenate(corners), return_inverse=True)
-    edges, middle = np.concatenate(sides), np.concatenate(middles)
-    return RawMesh(
-        node_tags=used,
-        points=points[np.searchsorted(node_tags[order], used)],
-        element_tags=np.concatenate(tags).astype(np.int64),
-        triangles=triangles.reshape(-1, 3).astype(np.int32),
-        group=np.concatenate(group),
-        groups=tuple(groups),
-        debonded=_debonded_lines(gmsh),
-        middles=MiddleNodes(
-            edges=np.searchsorted(used, edges).astype(np.int32),
-            tags=middle,
-            points=points[np.searchsorted(node_tags[order], middle)],
-        ),
-    )
+    return assembled(node_tags.astype(np.int64), coordinates.reshape(-1, 3), blocks, groups, _debonded_lines(gmsh))
 
 
 def _debonded_lines(gmsh: ModuleType) -> Int:

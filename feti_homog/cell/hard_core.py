@@ -20,13 +20,21 @@ def hard_core(pattern: FibrePattern, generator: np.random.Generator, max_steps: 
     Raises:
         MeshError: no such pattern is found.
     """
-    grown = pattern.radii + max(pattern.smallest_gap, 0.0) / 2
+    try:
+        return placed(pattern, max(pattern.smallest_gap, 0.0), generator, max_steps)
+    except MeshError as error:
+        raise MeshError(f"{error}; compare with --model poisson") from error
+
+
+def placed(
+    pattern: FibrePattern, gap: float, generator: np.random.Generator, max_steps: int = MAX_STEPS
+) -> FibrePattern:
+    """The same fibres at random places at least `gap` from each other.  Raises MeshError if none are found."""
+    grown = pattern.radii + gap / 2
     for _ in range(ATTEMPTS):
         places = generator.random((pattern.count, 2)) * pattern.size
         centres, clearance = relax(places, grown, max_steps, (pattern.width, pattern.height))
         if clearance >= 1:
             return replace(pattern, centres=centres)
-    raise MeshError(
-        f"no random pattern with the fibre fraction {pattern.fibre_fraction:.4g} and the smallest gap "
-        f"{pattern.smallest_gap:.4g} is found; compare with --model poisson"
-    )
+    words = f"with the fibre fraction {pattern.fibre_fraction:.4g} and the smallest gap {gap:.4g}"
+    raise MeshError(f"no random pattern {words} is found")

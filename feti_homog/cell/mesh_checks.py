@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -11,6 +10,7 @@ from scipy.spatial import cKDTree
 
 from feti_homog.cell.coarse_mesh import areas, edge_keys, edges
 from feti_homog.cell.middle_nodes import MiddleNodes
+from feti_homog.config.material_sections import PHASE
 from feti_homog.typing import Bool, Float, Int, Int32
 
 # Nodes nearer than this, relative to the cell, are at the same place: files may round coordinates.
@@ -23,7 +23,6 @@ FLAT_AREA = 1e-9
 SMALLEST, LARGEST = 1e-100, 1e100
 # The physical curve of the edges that are debonded from the start.
 DEBONDED = "debonded"
-PHASE = re.compile(r"matrix|fibre(:\S+)?")
 SIDES = {(0, 0): "left", (0, 1): "right", (1, 0): "lower", (1, 1): "upper"}
 
 
@@ -36,9 +35,10 @@ class RawMesh:
         points: (n, 3) their positions.
         element_tags: (m,) the file's numbers of the elements.
         triangles: (m, 3) nodes, numbered from 0.
-        group: (m,) index into `groups`, the lists of physical surfaces that the elements' entities belong to.
+        group: (m,) index into `groups`, the names of the physical surfaces or sets that the elements belong to.
         debonded: (d, 2) node tags of the lines in the physical curve DEBONDED.
         middles: the middle nodes of second-order triangles.
+        container: what the file calls a group.
     """
 
     node_tags: Int
@@ -49,6 +49,7 @@ class RawMesh:
     groups: tuple[tuple[str, ...], ...]
     debonded: Int
     middles: MiddleNodes
+    container: str
 
     def node(self, number: int) -> str:
         """A node in words."""
@@ -80,22 +81,22 @@ def unlabelled(mesh: RawMesh) -> list[str]:
     faults = []
     none = np.flatnonzero(np.isin(mesh.group, [k for k, names in enumerate(mesh.groups) if not names]))
     if len(none):
-        faults.append(f"{first_of(map(mesh.element, none), len(none))}: not in any physical surface")
+        faults.append(f"{first_of(map(mesh.element, none), len(none))}: not in any {mesh.container}")
     for number, names in enumerate(mesh.groups):
         if len(names) > 1:
             element = mesh.element(int(np.argmax(mesh.group == number)))
-            faults.append(f"{element} is in {len(names)} physical surfaces: {', '.join(names)}")
+            faults.append(f"{element} is in {len(names)} {mesh.container}s: {', '.join(names)}")
     return faults
 
 
 def unknown_phases(mesh: RawMesh) -> list[str]:
     """Physical surfaces whose name is not a phase, and a missing matrix."""
     names = [name for group in mesh.groups for name in group]
-    known = 'the names are "matrix", "fibre", "fibre:2", ...'
+    known = 'expected "matrix", "fibre", "glass", ... of letters, digits, _ and -, "fibre:2", not "void"'
     strange = [name for name in names if not PHASE.fullmatch(name)]
-    faults = [f'physical surface "{name}" is not a phase: {known}' for name in dict.fromkeys(strange)]
+    faults = [f'{mesh.container} "{name}" is not a phase: {known}' for name in dict.fromkeys(strange)]
     if "matrix" not in names:
-        faults.append('no physical surface is named "matrix"')
+        faults.append(f'no {mesh.container} is named "matrix"')
     return faults
 
 

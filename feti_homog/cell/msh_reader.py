@@ -1,4 +1,4 @@
-"""A user's mesh: read from a .msh file, checked, and made into the coarse mesh of the cell."""
+"""A user's mesh: read from a file, checked, and made into the coarse mesh of the cell."""
 
 from __future__ import annotations
 
@@ -7,32 +7,40 @@ from pathlib import Path
 
 import numpy as np
 
-from feti_homog.cell import bent_edges, gmsh_file, mesh_checks
+from feti_homog.cell import abaqus_file, bent_edges, gmsh_file, mesh_checks, vtk_file
 from feti_homog.cell.bent_edges import with_bent_edges
 from feti_homog.cell.circle_detection import with_circles
 from feti_homog.cell.coarse_mesh import CoarseMesh, areas, representatives
+from feti_homog.cell.ellipse_detection import elliptic_middles
 from feti_homog.cell.interface_edges import can_debond
 from feti_homog.cell.mesh_checks import RawMesh
 from feti_homog.cell.periodic_sides import paired_sides
+from feti_homog.cell.periodic_topology import Torus
+from feti_homog.cell.snapping import snapped
 from feti_homog.errors import MeshError
 from feti_homog.typing import Float
 
+LOADERS = {".msh": gmsh_file.load, ".inp": abaqus_file.load, ".vtu": vtk_file.load, ".vtk": vtk_file.load}
 
-def read(path: Path) -> CoarseMesh:
-    """The coarse mesh in a .msh file of any gmsh version, moved to [0, width] x [0, height].
 
-    It consists of triangles of three or six nodes in physical surfaces "matrix", "fibre", "fibre:2", ..., fills a
+def read(path: Path, snap: float | None = None) -> CoarseMesh:
+    """The coarse mesh in a file of one of the LOADERS, moved to [0, width] x [0, height].
+
+    It consists of triangles of three or six nodes in physical surfaces "matrix", "fibre", "glass", ..., fills a
     rectangle, and has matching nodes on opposite sides. Lines in the physical curve "debonded" are edges between a
-    fibre and the matrix that are debonded. Round interfaces become circles (`with_circles`), others follow their
-    middle nodes, if they have them (`with_bent_edges`).
+    fibre and the matrix that are debonded. Round interfaces become circles (`with_circles`); others follow their
+    middle nodes (`with_bent_edges`), or the ellipse that they are on (`elliptic_middles`).
+    With `snap`, nodes on sides are first moved by up to that / width to where they should be (`snapped`).
 
     Raises:
         MeshError: with all faults of the first stage that has any: file, labels, shapes, middle nodes, connections,
             sides, debonded lines.
     """
-    raw = gmsh_file.load(path)
+    raw, moved = LOADERS[path.suffix](path), 0.0
     _refuse(path, mesh_checks.unlabelled(raw), mesh_checks.unknown_phases(raw), mesh_checks.stray_lines(raw))
     _refuse(path, mesh_checks.not_finite(raw))
+    if snap is not None:
+        raw, moved = snapped(raw, snap)
     _refuse(path, mesh_checks.not_planar(raw), mesh_checks.flat_or_inverted(raw), mesh_checks.duplicate_nodes(raw))
     _refuse(path, bent_edges.faults(raw))
     origin, size, plane = _on_rectangle(raw.points[:, :2])
@@ -43,7 +51,11 @@ def read(path: Path) -> CoarseMesh:
     mesh = _coarse_mesh(raw, _matched(plane, size), size)
     _refuse(path, mesh_checks.cannot_debond(raw, mesh.debonded_edges, can_debond(mesh, mesh.debonded_edges)))
     middles = replace(raw.middles, points=raw.middles.points - [*origin, 0.0])
-    return with_bent_edges(with_circles(mesh, middles), middles)
+    mesh = with_circles(mesh, middles)
+    # Fibres keep the numbers that they have without bent edges: round ones first.
+    numbers = Torus.of(mesh).constituent.astype(np.int32)
+    mesh = with_bent_edges(mesh, middles if len(middles.tags) else elliptic_middles(mesh))
+    return replace(mesh, precedence=numbers, snapped=moved)
 
 
 def _refuse(path: Path, *faults: list[str]) -> None:

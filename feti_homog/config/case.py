@@ -19,6 +19,7 @@ from feti_homog.config.interface_rules import misplaced_sections, read_angle, re
 from feti_homog.config.interface_section import Arc, InterfaceSection
 from feti_homog.config.load_rules import expansion_faults, read_load, read_path, stress_free
 from feti_homog.config.load_section import LoadPath, SingleLoad
+from feti_homog.config.matched_cell import with_match
 from feti_homog.config.material_forms import Isotropic, Material
 from feti_homog.config.material_sections import coating_faults, phase_faults, provider, read_materials
 from feti_homog.config.mixed_load import MixedLoad, Strain, completed
@@ -140,8 +141,9 @@ class Case:
         """Short name of what the case computes: the same whatever its name, output, PETSc options and max_events."""
         document = {k: v for k, v in self.resolved().items() if k not in ("name", "output", "petsc")}
         document.get("path", {}).pop("max_events", None)
-        document["cell"].pop("file", None)
-        content = b"" if self.cell.file is None else self.cell.file.read_bytes()
+        for key in ("file", "match"):
+            document["cell"].pop(key, None)
+        content = b"".join(path.read_bytes() for path in (self.cell.file, self.cell.match) if path is not None)
         return hashlib.sha256(json.dumps(document, sort_keys=True).encode() + content).hexdigest()[:16]
 
 
@@ -167,7 +169,7 @@ def parse(values: Mapping[str, Any], folder: Path) -> Case:
     if decomposition and decomposition.subdomains and decomposition.max_dofs:
         faults.append("[decomposition] subdomains, max_dofs: exclude each other; give one")
     sections = {
-        "cell": cell and _checked_cell(cell, folder, faults),
+        "cell": cell and _checked_cell(with_match(cell, folder, faults), folder, faults),
         "materials": read_materials(document.get("material"), reader.selected[PLANE], reader),
         "analysis": _read_section(document, "analysis", reader),
         "decomposition": decomposition,
@@ -240,6 +242,8 @@ def _checked_cell(cell: Cell, folder: Path, faults: list[str]) -> Cell:
     faults += size_faults(cell)
     if cell.width is not None and cell.fibre_radius is not None:
         faults.append("[cell] width, fibre_radius: exclude each other; give one")
+    if cell.match is not None and cell.coating is not None:
+        faults.append("[cell] coating, match: exclude each other; fibres that match a table have no coatings")
     return with_files(cell, folder, faults)
 
 

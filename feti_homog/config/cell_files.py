@@ -10,10 +10,12 @@ import numpy as np
 
 from feti_homog.config.cell_section import Cell
 from feti_homog.config.fibre_table import FibreTable, read_table, table_of
+from feti_homog.config.section_values import MESH_FILE, MESH_SUFFIXES
 from feti_homog.config.wording import toml_value
 from feti_homog.errors import CaseError
 
-SUFFIXES = {"mesh": ".msh", "table": ".csv"}
+SUFFIXES = {"mesh": MESH_SUFFIXES, "table": (".csv",)}
+FILES = {"mesh": MESH_FILE, "table": ".csv file"}
 # Columns of tables that say nothing of round fibres.
 OTHER_SHAPES = ("a", "b", "angle")
 
@@ -28,8 +30,8 @@ def with_files(cell: Cell, folder: Path, faults: list[str]) -> Cell:
     if cell.file is None:
         return _listed(cell, faults)
     file, given = (folder / cell.file).resolve(), toml_value(str(cell.file))
-    if file.suffix != SUFFIXES[cell.geometry]:
-        expected = f"the name of a {SUFFIXES[cell.geometry]} file for geometry = {toml_value(cell.geometry)}"
+    if file.suffix not in SUFFIXES[cell.geometry]:
+        expected = f"the name of a {FILES[cell.geometry]} for geometry = {toml_value(cell.geometry)}"
         faults.append(f"[cell] file = {given}: expected {expected}")
     elif not os.path.isfile(file):  # false, not an error, for a name too long
         faults.append(f"[cell] file = {given}: no such file (expected at {file})")
@@ -42,7 +44,7 @@ def _listed(cell: Cell, faults: list[str]) -> Cell:
     if cell.fibre_list is not None:
         return _with_table(cell, faults)
     instead = ", or fibre_list" if cell.geometry == "table" else ""
-    faults.append(f"[cell] file: missing; expected the name of a {SUFFIXES[cell.geometry]} file{instead}")
+    faults.append(f"[cell] file: missing; expected the name of a {FILES[cell.geometry]}{instead}")
     return cell
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from feti_homog.config.fibre_table import FibreTable
 from feti_homog.config.schema import Selector, key
-from feti_homog.config.section_values import CELL_FILE, FIBRE_LIST, SEED
+from feti_homog.config.section_values import CELL_FILE, FIBRE_LIST, SEED, TABLE_FILE
 from feti_homog.config.values import choice, integer, real
 
 CIRCULAR = ("square", "hexagonal", "random")
@@ -19,6 +19,7 @@ TOUCHING = {"square": math.pi / 4, "hexagonal": math.pi / math.sqrt(12), "random
 
 GEOMETRY = Selector("cell", "geometry")
 ALL_CIRCULAR, RANDOM, TABLE = GEOMETRY.among(*CIRCULAR), GEOMETRY.among("random"), GEOMETRY.among("table")
+MESH = GEOMETRY.among("mesh")
 MESHED, FROM_A_FILE = GEOMETRY.among(*CIRCULAR, "table"), GEOMETRY.among("table", "mesh")
 
 
@@ -33,13 +34,15 @@ class Cell:
         choice(*CIRCULAR, "table", "mesh"),
         '"square": a fibre in the middle of a square cell; "hexagonal": a cell sqrt(3) times as high as wide with '
         'fibres in the middle and at the corners; "random": fibres in a square cell; "table": fibres of a table, as of '
-        'a micrograph; "mesh": a gmsh file.',
+        'a micrograph; "mesh": a file of gmsh, Abaqus or VTK.',
     )
     fibre_fraction: float | None = key(
         real(above=0.0, below=1.0),
         "Area of the fibres / area of the cell, below that at which they touch: pi/4 (square), pi/sqrt(12) "
         "(hexagonal; random, where min_gap lowers it).",
         only=ALL_CIRCULAR,
+        unless="match",
+        default_words="required, or that of match",
     )
     width: float | None = key(
         real(least=1e-9, most=1e9), "Width of the cell.", unit="length", default=None, only=MESHED,
@@ -85,7 +88,7 @@ class Cell:
     )
     refine: int = key(
         integer(least=0, most=8),
-        "How many times every element is split in four, on the ranks; new nodes of round interfaces lie on the circle.",
+        "How many times every element is split in four, on the ranks; new nodes follow round and elliptic interfaces.",
         default=0,
     )
     order: int = key(
@@ -100,7 +103,19 @@ class Cell:
         "The stiffness is the same.",
         default="torus",
     )
-    fibres: int | None = key(integer(least=1, most=100_000), "Number of fibres.", only=RANDOM)
+    fibres: int | None = key(
+        integer(least=1, most=100_000), "Number of fibres.", only=RANDOM, unless="match",
+        default_words="required, or that of match",
+    )  # fmt: skip
+    match: Path | None = key(
+        TABLE_FILE,
+        "A table of the fibres in a window of a micrograph, relative to the case file: columns x, y, radius, and a "
+        'comment such as "# width = 120, height = 80". The cell gets its radii and, as near as can be, its '
+        "distributions of the distances of nearest and second neighbours, but none below min_gap.",
+        default=None,
+        only=RANDOM,
+        default_words="none",
+    )
     min_gap: float = key(
         real(least=0.0, most=1.0), "Smallest gap between fibres / their mean diameter.", default=0.05, only=RANDOM
     )
@@ -119,13 +134,26 @@ class Cell:
     file: Path | None = key(
         CELL_FILE,
         'Relative to the case file. Of geometry = "mesh" the mesh: triangles of three or six nodes that fill a '
-        'rectangle, in physical surfaces "matrix", "fibre", "fibre:2", ...; the nodes on opposite sides match. Fibres '
-        'may have any shape. Of "table" the fibres, a row for each: columns x, y, radius and, if there are any, phase '
-        'and coating (thickness / radius); what follows # is a comment, of which "# width = 120, height = 80" says the '
-        "size of the cell.",
+        'rectangle, in physical surfaces "matrix", "fibre", "glass", ...; the nodes on opposite sides match. Fibres '
+        "may have any shape. Of Abaqus' files (.inp) element sets have these names; of .vtu and .vtk files, which "
+        'meshio reads, cell data "phase" are 0 in the matrix, 1 in fibre, 2 in fibre:2, ... Of "table" the fibres, a '
+        "row for each: columns x, y, radius and, if there are any, phase and coating (thickness / radius); what "
+        'follows # is a comment, of which "# width = 120, height = 80" says the size of the cell.',
         default=None,
         only=FROM_A_FILE,
         default_words="required, or fibre_list of a table",
+    )
+    repair: str = key(
+        choice("none", "snap"),
+        '"snap": nodes on sides that nearly match are moved to match; the result says how far.',
+        default="none",
+        only=MESH,
+    )
+    snap_tolerance: float = key(
+        real(least=0.0, most=0.1),
+        'How far nodes may be moved by repair = "snap" / width of the cell.',
+        default=1e-3,
+        only=MESH,
     )
     fibre_list: tuple[Mapping[str, Any], ...] | None = key(
         FIBRE_LIST, "The fibres, in place of file.", default=None, only=TABLE, default_words="what file has"

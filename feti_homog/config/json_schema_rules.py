@@ -105,9 +105,15 @@ def _rule(selector: Selector, value: str) -> Schema:
 def _consequence(path: Sequence[str], keys: Mapping[str, Key], selector: Selector, value: str) -> Schema:
     own = {name: entry for name, entry in keys.items() if entry.only is not None and entry.only.selector == selector}
     belongs = {name: entry.belongs({selector: value}) for name, entry in own.items()}
-    required = [name for name, entry in own.items() if entry.required and belongs[name]]
+    required = [_presence(name, entry) for name, entry in own.items() if entry.required and belongs[name]]
     excluded = {name: False for name, is_own in belongs.items() if not is_own}
-    return _at(path, {"required": required, "properties": excluded}) if own else {}
+    return _at(path, {"properties": excluded} | ({"allOf": required} if required else {})) if own else {}
+
+
+def _presence(name: str, entry: Key) -> Schema:
+    """That a key is there, or what it is not required beside."""
+    there = {"required": [name]}
+    return {"anyOf": [there, {"required": [entry.unless]}]} if entry.unless else there
 
 
 def _section_consequence(value: str) -> Schema:

@@ -12,7 +12,9 @@ from feti_homog.config.materials import expansion, plane_stiffness, spatial_stif
 from feti_homog.config.schema import TableReader, keys_of
 from feti_homog.config.wording import suggestion, toml_key, toml_value
 
-PHASE = re.compile(r"matrix|coating|fibre(:\w+)?")
+# Not "void", where there is no material.
+PHASE = re.compile(r"(?!void$)[A-Za-z0-9_-]+(:[A-Za-z0-9_-]+)?")
+CONSTANTS = frozenset(name for form in MATERIAL_FORMS.values() for name in keys_of(form))
 COATING = "coating"
 
 
@@ -53,8 +55,9 @@ def coating_faults(cell: Cell, materials: Mapping[str, object]) -> list[str]:
 def _phase_fault(phase: str, geometry: str | None, owners: Mapping[str, str]) -> str:
     """What is wrong with the name of a phase, empty if nothing."""
     section = f"[material.{toml_key(phase)}]"
-    if not PHASE.fullmatch(phase):
-        return f"{section}: unknown phase; {suggestion(phase, ('matrix', 'fibre', 'coating', 'fibre:2'), owners)}"
+    of_circles = geometry in CIRCULAR and ":" not in phase and phase not in ("matrix", "fibre", COATING)
+    if of_circles or not PHASE.fullmatch(phase) or phase in CONSTANTS:
+        return f"{section}: unknown phase; {suggestion(phase, ('matrix', 'fibre', COATING, 'fibre:2'), owners)}"
     if ":" in phase and geometry in CIRCULAR:
         return f'{section}: belongs to geometry = "mesh", not {toml_value(geometry)}'
     return ""

@@ -38,8 +38,8 @@ WIDTH = 100  # characters of a printed line
 INDENT: dict[str, Any] = {"initial_indent": "      ", "subsequent_indent": "      ", "break_on_hyphens": False}
 
 MATERIAL_MEANING = (
-    'One section for each phase: [material.matrix], [material.fibre] and, for a phase of a mesh, [material."fibre:2"], '
-    "which otherwise has the constants of fibre; each in one of four forms."
+    "One section for each phase: [material.matrix], [material.fibre] and, for phases of a mesh or a table, sections of "
+    "their names, [material.glass]; fibre:2 without its own has the constants of fibre. Each in one of four forms."
 )
 
 
@@ -113,7 +113,7 @@ def _rows(section: str, place: str, keys: Mapping[str, Key]) -> tuple[KeyRow, ..
 def _row(section: str, place: str, name: str, entry: Key) -> KeyRow:
     conditions = [SECTIONS_OF_AN_ANALYSIS.get(section), entry.only]
     applies = ", ".join(condition.in_words(section) for condition in conditions if condition is not None)
-    default = "required" if entry.required else entry.default
+    default = "required" if entry.required and not entry.unless else entry.default
     return KeyRow(section, place, name, entry.type.expected, entry.unit, default, applies, entry.meaning)
 
 

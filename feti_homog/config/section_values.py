@@ -14,15 +14,22 @@ STRAIN_COMPONENTS = "[E11, E22, gamma12]"
 FIBRE = integer(least=1)
 SEED = integer(least=0, most=10**15)
 
+MESH_SUFFIXES = (".msh", ".inp", ".vtu", ".vtk")
+MESH_FILE = ".msh, .inp, .vtu or .vtk file"
+
 Matrix = tuple[tuple[float, ...], ...]
 
 
 def _is_cell_file(value: Any) -> bool:
-    return text.accepts(value) and value.endswith((".msh", ".csv"))
+    return text.accepts(value) and value.endswith((*MESH_SUFFIXES, ".csv"))
 
 
 def _are_fibres(value: Any) -> bool:
     return isinstance(value, list) and value != [] and all(isinstance(fibre, dict) for fibre in value)
+
+
+def _is_table_file(value: Any) -> bool:
+    return text.accepts(value) and value.endswith(".csv")
 
 
 def _is_fibre_or_fibres(value: Any) -> bool:
@@ -57,11 +64,12 @@ def _positive_or_inf(what: str) -> ValueType:
     return ValueType(f"{what} above 0, or inf", _is_strength, lambda v: None if v == math.inf else float(v), schema)
 
 
+TABLE_FILE = ValueType("the name of a .csv file", _is_table_file, Path, {"type": "string", "pattern": "\\.csv$"})
 CELL_FILE = ValueType(
-    "the name of a .msh file, or a .csv file of a table",
+    f"the name of a {MESH_FILE}, or of a .csv file of a table",
     _is_cell_file,
     Path,
-    {"type": "string", "pattern": "\\.(msh|csv)$"},
+    {"type": "string", "pattern": f"\\.({'|'.join(suffix[1:] for suffix in (*MESH_SUFFIXES, '.csv'))})$"},
 )
 FIBRE_LIST = ValueType(
     "a list of fibres such as {x = 0.5, y = 0.5, radius = 0.3}",

@@ -10,6 +10,7 @@ from feti_homog.cell import tabulated
 from feti_homog.cell.arrangement import COATING
 from feti_homog.cell.coarse_mesh import CoarseMesh
 from feti_homog.cell.fibre_centres import fibre_circles
+from feti_homog.cell.matched_arrangement import distance_of
 from feti_homog.cell.periodic_topology import Torus, edge_pairs
 from feti_homog.cell.refinement import ReferenceLattice
 from feti_homog.cell.submesh import Submesh, cut
@@ -80,6 +81,8 @@ class CellSummary:
         constituent_phase: (constituents,) place of the phase of each in `phases`.
         centres, radii: (constituents, 2) and (constituents,) centre, within the cell, and radius of each fibre, NaN
             where there is none.
+        snapped: how far a node of a user's mesh was moved to make sides match, at most.
+        match_distance: how far the fibres are from the table that they match, see `neighbour_match`; None without one.
     """
 
     width: float
@@ -94,6 +97,8 @@ class CellSummary:
     centres: Float
     radii: Float
     moved_tips: MovedTips
+    snapped: float
+    match_distance: float | None
 
     @property
     def fibres(self) -> int:
@@ -103,6 +108,11 @@ class CellSummary:
     def fibre_number(self, constituent: Int) -> Int:
         """(k,) numbers from 1, as a case file has them, of fibres that are these constituents (k,)."""
         return np.asarray(constituent - self.first_fibre + 1)
+
+    def warnings(self) -> list[str]:
+        """What was changed in a user's mesh, in words."""
+        moved = f"nodes on the sides of the mesh were moved by up to {self.snapped:.3g} to match"
+        return [moved] if self.snapped > 0 else []
 
     @property
     def period(self) -> Float:
@@ -136,7 +146,7 @@ def coarse_mesh(case: Case) -> CoarseMesh:
         from feti_homog.cell.msh_reader import read
 
         assert case.cell.file is not None
-        mesh = read(case.cell.file)
+        mesh = read(case.cell.file, case.cell.snap_tolerance if case.cell.repair == "snap" else None)
     else:
         from feti_homog.cell.gmsh_mesher import generate
 
@@ -201,11 +211,20 @@ def distribute(
         centres=centres,
         radii=circles[:, 2],
         moved_tips=dict(moved),
+        snapped=mesh.snapped,
+        match_distance=_match_distance(case, mesh, centres[first_fibre:], circles[first_fibre:, 2]),
     )
     own: list[list[Submesh]] = [[] for _ in range(n_ranks)]
     for submesh, rank in zip(submeshes, decomposition.rank, strict=True):
         own[rank].append(submesh)
     return [RankShare(summary, *share) for share in zip(own, shared, strict=True)]
+
+
+def _match_distance(case: Case, mesh: CoarseMesh, centres: Float, radii: Float) -> float | None:
+    """That of `CellSummary`."""
+    if case.cell.match is None:
+        return None
+    return distance_of(case.cell.match, mesh.width, mesh.height, centres, radii)
 
 
 def wanted_pieces(

@@ -169,6 +169,13 @@ def _assemble(case: Case, submeshes: list[Submesh], lattice: ReferenceLattice) -
     return [Subdomain.build(s, lattice, phase_laws.plane_law(case, s.phase), problem) for s in submeshes]
 
 
+def _match_lines(case: Case, summary: CellSummary) -> list[str]:
+    if case.cell.match is None:
+        return []
+    words = "mean diameters, the distance of the distributions of nearest and second neighbours"
+    return [f"match      {case.cell.match.name}, to {summary.match_distance:.4f} {words}"]
+
+
 def describe(case: Case, n_ranks: int) -> str:
     """What a run of the case on `n_ranks` ranks would do, in words; on rank 0."""
     lattice = ReferenceLattice.of(case.cell.refine, case.cell.order)
@@ -186,13 +193,14 @@ def describe(case: Case, n_ranks: int) -> str:
         f"mesh       {summary.coarse_triangles} coarse triangles, {summary.coarse_triangles * len(lattice.triangles)} "
         f"elements of order {case.cell.order}, about {2 * sum(nodes)} degrees of freedom",
         *([f"fibres     {summary.fibres}, numbered from 1"] if case.interface else []),
+        *_match_lines(case, summary),
         f"tearing    {summary.bodies} bodies, {summary.subdomains} subdomains, {multipliers} multipliers",
         *(
             f"rank {rank:<5} {count} subdomains, about {2 * n} degrees of freedom"
             for rank, (count, n) in enumerate(zip(own, nodes, strict=True))
         ),
         *cost_model.estimate_lines(taken, n_ranks),
-        *(f"warning    {warning}" for warning in (*case.warnings(), *unresolved)),
+        *(f"warning    {warning}" for warning in (*case.warnings(), *summary.warnings(), *unresolved)),
         *(f"remark     {remark}" for remark in (*case.remarks(), *moved_fibres(case))),
         "the case is valid",
     ]

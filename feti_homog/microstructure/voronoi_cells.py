@@ -24,19 +24,36 @@ class VoronoiCells:
         areas: (N,), with the sum width x height.
         fractions: (N,) local fibre fractions pi R^2 / area, whose mean, weighted with the areas, is the fibre fraction.
             Cells of the centres know no radii: of unequal fibres close together that of the larger may be above 1.
-        whole: (N,) whether the cell is what it would be in larger surroundings; false for cells that a window may cut.
+        weights: (N,), with the sum 1, of the cells in a distribution: 1/N in a periodic cell.  In a window a cell
+            counts if it is what it would be in larger surroundings, with the weight 1 / (share of the places of the
+            window where it would fit in, with all that decides on it): larger cells are fewer.
     """
 
     areas: Float
     fractions: Float
-    whole: Bool
+    weights: Float
+
+    @property
+    def whole(self) -> Bool:
+        """(N,) whether a cell counts; in a window some do not."""
+        return np.asarray(self.weights > 0)
+
+    @property
+    def mean_fraction(self) -> float:
+        """Weighted mean of the local fractions, NaN if no cell counts."""
+        return float(self.weights @ self.fractions) if self.weights.any() else np.nan
+
+    @property
+    def fraction_deviation(self) -> float:
+        """Their weighted standard deviation."""
+        return float(np.sqrt(self.weights @ (self.fractions - self.mean_fraction) ** 2))
 
 
 def voronoi_cells(pattern: FibrePattern) -> VoronoiCells:
     """Of a periodic cell by the images around it, of a window by mirror images, which cut the cells at its sides.
 
-    A cell in a window is whole if the circles about its corners, through its centre, lie within the window: no
-    fibre outside could change it.
+    A cell in a window counts if the circles about its corners, through its centre, lie within the window: no fibre
+    outside could change it.
     """
     points = _periodic(pattern) if pattern.periodic else _mirrored(pattern)
     diagram = Voronoi(points)
@@ -44,17 +61,26 @@ def voronoi_cells(pattern: FibrePattern) -> VoronoiCells:
     finite = np.all(ends >= 0, axis=1)
     edges = diagram.vertices[ends[finite]]
     length = np.hypot(*(edges[:, 1] - edges[:, 0]).T)
-    areas, whole = np.zeros(pattern.count), np.ones(pattern.count, dtype=bool)
+    areas = np.zeros(pattern.count)
+    lowest, highest = np.full((pattern.count, 2), np.inf), np.full((pattern.count, 2), -np.inf)
     for owner, other in (diagram.ridge_points[finite].T, diagram.ridge_points[finite].T[::-1]):
         own = owner < pattern.count
         height = np.hypot(*(points[other[own]] - points[owner[own]]).T) / 2
         areas += np.bincount(owner[own], length[own] * height / 2, pattern.count)
-        if not pattern.periodic:
-            corners = edges[own]
-            radius = np.linalg.norm(corners - points[owner[own], None], axis=2)
-            room = np.minimum(corners, pattern.size - corners).min(axis=2)
-            whole[owner[own][np.any(radius > room, axis=1)]] = False
-    return VoronoiCells(areas, pi * pattern.radii**2 / areas, whole)
+        radius = np.linalg.norm(edges[own] - points[owner[own], None], axis=2)[..., None]
+        np.minimum.at(lowest, owner[own], (edges[own] - radius).min(axis=1))
+        np.maximum.at(highest, owner[own], (edges[own] + radius).max(axis=1))
+    return VoronoiCells(areas, pi * pattern.radii**2 / areas, _weights(pattern, lowest, highest))
+
+
+def _weights(pattern: FibrePattern, lowest: Float, highest: Float) -> Float:
+    """Those of cells whose circles lie between the corners `lowest` and `highest` (N, 2)."""
+    if pattern.periodic:
+        return np.full(pattern.count, 1 / pattern.count)
+    within = np.all((lowest >= 0) & (highest <= pattern.size), axis=1)
+    room = np.prod(pattern.size - (highest - lowest), axis=1)
+    raw = np.where(within & (room > 0), 1 / np.where(room > 0, room, 1.0), 0.0)
+    return np.asarray(raw / (raw.sum() or 1.0))
 
 
 def _periodic(pattern: FibrePattern) -> Float:

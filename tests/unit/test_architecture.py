@@ -22,10 +22,10 @@ LONGEST_MODULE, LONGEST_FUNCTION, MOST_COMPLEX = 300, 60, 12
 FLOORS = (
     ("errors", "typing"),
     ("common",),
+    ("microstructure",),
     ("config",),
     ("mechanics",),
     ("verification",),
-    ("microstructure",),
     ("cell",),
     ("fem",),
     ("feti.thresholds",),

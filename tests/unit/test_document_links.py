@@ -9,6 +9,7 @@ import tomllib
 from functools import cache
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from feti_homog import cli
@@ -150,4 +151,6 @@ def test_the_recipe_for_a_mesh_is_the_file_and_is_read(tmp_path):
         gmsh.write(str(tmp_path / "two_fibres.msh"))
     mesh = msh_reader.read(tmp_path / "two_fibres.msh")
     assert mesh.phases == ("matrix", "fibre", "fibre:2")
-    assert len(mesh.debonded_edges) and len(mesh.circles) == 1
+    # The circle is one, the ellipse an arc an edge.
+    assert len(mesh.debonded_edges) and np.all(mesh.circles[0] == pytest.approx([1.5, 0.5, 0.3]))
+    assert 1 < len(mesh.circles) == 1 + np.count_nonzero(mesh.arc_circle > 0)

@@ -27,6 +27,7 @@ from feti_homog.sweep.report.outputs import outputs
 
 pytestmark = pytest.mark.slow
 
+TABLE = Path(__file__).parents[2] / "meshes" / "clustered.csv"
 BASE = {
     "cell": {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.25},
     "material": {"matrix": {"young": 88.0, "poisson": 0.299}, "fibre": {"young": 200.0, "poisson": 0.222}},
@@ -41,6 +42,10 @@ WARM = {name: phase | {"expansion": 1e-5} for name, phase in BASE["material"].it
 CASES = {
     "bonded": {"analysis": {"type": "stiffness", "plane": "strain"}},
     "debonded": {"analysis": {"type": "stiffness", "plane": "strain"}, "interface": HALF_OPEN},
+    "matched": {
+        "analysis": {"type": "stiffness", "plane": "strain"},
+        "cell": {"geometry": "random", "match": str(TABLE), "fibres": 10, "mesh_size": 0.1},
+    },
     "angle": {
         "analysis": {"type": "angle", "plane": "strain"},
         "interface": {"debonded": [ARC]},

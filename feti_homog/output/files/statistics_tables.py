@@ -43,7 +43,7 @@ def fibre_columns(found: FibreStatistics) -> dict[str, Array]:
     return columns | {
         "voronoi_area": cells.areas,
         "local_fraction": cells.fractions,
-        "whole_cell": cells.whole.astype(int),
+        "cell_weight": cells.weights,
     }
 
 

@@ -11,7 +11,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import EllipseCollection
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 
 from feti_homog.microstructure.pair_functions import SECTORS
 from feti_homog.microstructure.statistics import FibreStatistics
@@ -40,7 +39,8 @@ def figure(found: FibreStatistics, name: str, model: str) -> Figure:
     nearest_distances(near, found)
     _local_fractions(local, found)
     _directions(right.add_subplot(2, 3, 5, projection="polar"), found)
-    _histogram(radii, found.pattern.radii / found.pattern.mean_radius, "radius / mean radius")
+    relative = found.pattern.radii / found.pattern.mean_radius
+    _histogram(radii, relative, np.full(found.pattern.count, 1 / found.pattern.count), "radius / mean radius")
     picture.suptitle(f"{plain(name)}: {found.pattern.count} fibres, {100 * found.pattern.fibre_fraction:.1f} %")
     return picture
 
@@ -102,7 +102,8 @@ def _clustering(axes: Axes, found: FibreStatistics, model: str) -> None:
 
 
 def _local_fractions(axes: Axes, found: FibreStatistics) -> None:
-    _histogram(axes, found.cells.fractions[found.cells.whole], "local fibre fraction")
+    whole = found.cells.whole
+    _histogram(axes, found.cells.fractions[whole], found.cells.weights[whole], "local fibre fraction")
     axes.axvline(found.pattern.fibre_fraction, color=COLOURS[1], linewidth=1.2, label="fibre fraction")
     axes.legend(frameon=False)
 
@@ -117,15 +118,16 @@ def _directions(axes: Any, found: FibreStatistics) -> None:
     axes.tick_params(labelsize=8)
 
 
-def _histogram(axes: Axes, values: Float, label: str) -> None:
+def _histogram(axes: Axes, values: Float, weights: Float, label: str) -> None:
+    """Shares of the fibres, each with its weight."""
     middle, width = float(np.mean(values)) if len(values) else 0.0, float(np.ptp(values)) if len(values) else 0.0
     least = 0.01 * middle or 0.01  # equal values fill one bar
     limits = (middle - least, middle + least) if width < least else None
-    axes.hist(values, bins=1 if limits else BINS, range=limits, color="#9fb6da", edgecolor=COLOURS[0], linewidth=0.6)
+    bins = 1 if limits else BINS
+    axes.hist(values, bins, range=limits, weights=weights, color="#9fb6da", edgecolor=COLOURS[0], linewidth=0.6)
     if limits:
         axes.set_xlim(middle - 10 * least, middle + 10 * least)
-    axes.yaxis.set_major_locator(MaxNLocator(integer=True))
-    _label(axes, label, "number of fibres")
+    _label(axes, label, "share of fibres")
 
 
 def _label(axes: Axes, xlabel: str, ylabel: str) -> None:

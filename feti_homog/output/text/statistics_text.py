@@ -6,9 +6,11 @@ import numpy as np
 
 from feti_homog.microstructure.pair_functions import SECTORS
 from feti_homog.microstructure.statistics import FibreStatistics
+from feti_homog.microstructure.voronoi_cells import VoronoiCells
 from feti_homog.typing import Float
 
 ORDINALS = ("nearest", "second", "third")
+LEVEL = 0.05  # of the test of randomness
 
 
 def text(found: FibreStatistics, model: str, simulations: int) -> str:
@@ -22,7 +24,7 @@ def text(found: FibreStatistics, model: str, simulations: int) -> str:
         ("radii", _spread(pattern.radii)),
         ("smallest gap", f"{pattern.smallest_gap:.4g}, {pattern.smallest_gap / size:.3f} mean diameters"),
         *_neighbours(found, size),
-        ("local fractions", f"{_spread(cells.fractions[cells.whole])}, in {cells.whole.sum()} Voronoi cells"),
+        ("local fractions", _local_fractions(cells)),
         ("directions", _directions(found.directions)),
         ("randomness", _randomness(found, model, simulations)),
     ]
@@ -30,9 +32,15 @@ def text(found: FibreStatistics, model: str, simulations: int) -> str:
 
 
 def _spread(values: Float) -> str:
-    if not len(values):
-        return "none"
     return f"{values.mean():.4g} +- {values.std():.2g}, from {values.min():.4g} to {values.max():.4g}"
+
+
+def _local_fractions(cells: VoronoiCells) -> str:
+    known = cells.fractions[cells.whole]
+    if not len(known):
+        return "none known: the window is too small"
+    limits = f"from {known.min():.4g} to {known.max():.4g}"
+    return f"{cells.mean_fraction:.4g} +- {cells.fraction_deviation:.2g}, {limits}, in {len(known)} Voronoi cells"
 
 
 def _neighbours(found: FibreStatistics, size: float) -> list[tuple[str, str]]:
@@ -51,6 +59,8 @@ def _directions(shares: Float) -> str:
 
 
 def _randomness(found: FibreStatistics, model: str, simulations: int) -> str:
-    value, level = found.random.p_value, 0.05
-    verdict = "not told from it" if value > level else "not one of its patterns at the level of 5 %"
+    value = found.random.p_value
+    verdict = "not told from it" if value > LEVEL else f"not one of its patterns at the level of {100 * LEVEL:g} %"
+    if 1 / (simulations + 1) > LEVEL:
+        verdict = f"too few simulations for a level of {100 * LEVEL:g} %"
     return f"L(r) beside {simulations} simulations of the model {model}: p = {value:.3g}, {verdict}"

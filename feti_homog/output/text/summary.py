@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from math import floor, log10
+from pathlib import Path
 from textwrap import wrap
 from typing import Any
 
@@ -122,8 +123,16 @@ def _cell(document: Document) -> list[str]:
     return [
         *_field("Cell", [str(shape["geometry"]), size]),
         *_field("Meshed", [f"fibre fraction {cell['fibre_fraction']:.6f}", *([f"({shares})"] if shares else [])]),
+        *_match(shape, cell),
         *_field("Mesh", mesh),
     ]
+
+
+def _match(shape: Document, cell: Document) -> list[str]:
+    """How far the fibres are from those of a table."""
+    distance = cell.get("match_distance")
+    words = f"distances of neighbours differ by {distance or 0:.4f} mean diameters"
+    return [] if distance is None else _field("Match", [Path(shape["match"]).name, words])
 
 
 def _solver(solver: Document) -> list[str]:

@@ -17,6 +17,9 @@ from feti_homog.cell.hard_core import hard_core
 from feti_homog.config import case as cases
 from feti_homog.errors import CaseError, MeshError
 from feti_homog.microstructure.nearest_neighbours import nearest_neighbours
+from feti_homog.microstructure.randomness import poisson
+from feti_homog.microstructure.statistics import measure
+from feti_homog.output.text import statistics_text
 
 MESHES = Path(__file__).parents[3] / "meshes"
 SMALL = BASE.replace('geometry = "hexagonal"\n', f"{RANDOM}width = 40.0\n").replace("0.05", "0.1")
@@ -110,6 +113,19 @@ def test_tables_and_picture_hold_what_was_measured(tmp_path):
     assert np.all(pairs["L_random_low"] <= pairs["L_random_mean"])
     assert directions["relative_share"].mean() == pytest.approx(1.0) and directions["angle"][-1] == 165.0
     assert "fibre fraction  0.4000" in lines[0] and "periodic cell of 40 x 40" in lines[0]
+
+
+@pytest.mark.parametrize(
+    ("fibres", "simulations", "words"),
+    [
+        (square_lattice(), 39, "p = 0.025, not one of its patterns at the level of 5 %"),
+        (square_lattice(), 18, "p = 0.0526, too few simulations for a level of 5 %"),
+        (poisson_points(40), 19, "not told from it"),
+    ],
+)
+def test_randomness_is_judged_by_enough_simulations(fibres, simulations, words):
+    found = measure(fibres, poisson, simulations)
+    assert statistics_text.text(found, "poisson", simulations).endswith(words)
 
 
 def test_without_out_nothing_is_written(tmp_path):

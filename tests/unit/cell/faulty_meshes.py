@@ -211,7 +211,8 @@ FAULTY_MESHES: dict[str, tuple[Callable[[Path], None], str]] = {
         "element 5 at (0.666666667, 0.0833333333): not in any physical surface",
     ),
     "no name": (_mesh(lambda: replace(grid(), names={MATRIX: "matrix"})), '"number 2" is not a phase'),
-    "misspelt": (_mesh(lambda: replace(grid(), names={1: "matrix", 2: "fiber"})), '"fiber" is not a phase'),
+    "two words": (_mesh(lambda: replace(grid(), names={1: "matrix", 2: "my glass"})), '"my glass" is not a phase'),
+    "meshed void": (_mesh(lambda: replace(grid(), names={1: "matrix", 2: "void"})), '"void" is not a phase'),
     "empty variant": (
         _mesh(lambda: replace(grid(), names={1: "matrix", 2: "fibre:"})),
         '"fibre:" is not a phase',

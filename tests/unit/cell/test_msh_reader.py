@@ -33,7 +33,7 @@ def test_there_are_enough_faulty_meshes():
 
 
 def test_several_faults_are_told_at_once(tmp_path):
-    mesh = replace(grid(), names={1: "resin", 2: "fiber"}).with_element(5, 2, 0, (3, 4, 9))
+    mesh = replace(grid(), names={1: "my resin", 2: "my fibre"}).with_element(5, 2, 0, (3, 4, 9))
     assert len(_faults(mesh, tmp_path)) == 4
 
 
@@ -124,7 +124,8 @@ def test_round_fibre_is_found_wherever_the_cell_cuts_it(centre, tmp_path):
 
 def test_an_ellipse_is_no_circle(tmp_path):
     polar_cell((0.5, 0.5), 0.35, tmp_path / "round.msh", stretch=1 + 1e-5)
-    assert len(read(tmp_path / "round.msh").circles) == 0
+    mesh = read(tmp_path / "round.msh")
+    assert len(mesh.circles) == len(mesh.arc_edges) > 8 and np.ptp(mesh.circles[:, 2]) > 1e-6
 
 
 @pytest.mark.parametrize(("name", "height", "circles"), [("square", 1.0, 1), ("hexagonal", np.sqrt(3), 5)])

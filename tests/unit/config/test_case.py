@@ -37,9 +37,10 @@ def test_keys_that_are_left_out_have_their_defaults(tmp_path):
     assert case.name == "cell"
     assert dataclasses.asdict(case.cell) == {
         "geometry": "hexagonal", "fibre_fraction": 0.4, "mesh_size": 0.05, "interface_size": None, "tip_size": None,
-        "refine": 0, "order": 1, "bodies": "torus", "fibres": None, "width": None, "fibre_radius": None, "coating": None,
-        "min_gap": 0.05, "seed": 0, "radius_spread": 0.0, "file": None,
-        "height": None, "fibre_list": None, "window": "periodic", "table": None,
+        "refine": 0, "order": 1, "bodies": "torus", "fibres": None, "width": None, "fibre_radius": None,
+        "coating": None, "min_gap": 0.05, "seed": 0, "radius_spread": 0.0, "file": None,
+        "repair": "none", "snap_tolerance": 1e-3,
+        "height": None, "fibre_list": None, "window": "periodic", "table": None, "match": None,
     }  # fmt: skip
     assert list(case.materials.items()) == [
         ("matrix", Isotropic(88.0, 0.299)),
@@ -181,3 +182,15 @@ def test_locking_is_warned_of(tmp_path):
 
 def test_incompressible_is_allowed_in_plane_stress(tmp_path):
     case_of(tmp_path, changed(("0.299", "0.5"), ('"strain"', '"stress"')))
+
+
+def test_phases_of_any_name(tmp_path):
+    named = MESH.replace("material.fibre", "material.E-glass_1") + '[material."carbon:2"]\nyoung = 5\npoisson = 0\n'
+    case = case_of(tmp_path, named)
+    check_phases(case, ["matrix", "E-glass_1", "carbon:2"])
+    assert case.material_of("E-glass_1") == Isotropic(200.0, 0.222)
+    with pytest.raises(CaseError, match=r"^\[material.boron\]: missing section; the mesh has this phase$"):
+        check_phases(case, ["matrix", "E-glass_1", "carbon:2", "boron"])
+    for name in ("void", '"my glass"', '"glass:"'):
+        with pytest.raises(CaseError, match="unknown phase"):
+            case_of(tmp_path, MESH + f"[material.{name}]\nyoung = 5\npoisson = 0\n")

@@ -90,6 +90,16 @@ def test_cells_called_whole_stay_as_they_are_whatever_is_outside():
     assert 30 < np.count_nonzero(cells.whole) < 80
 
 
+def test_weights_of_a_window_keep_voronoi_areas_unbiased():
+    """The mean area of cells is 1 / density; of those that are whole, without weights, it is less."""
+    cells = [voronoi_cells(poisson_points(100, 10.0, seed, periodic=False)) for seed in range(200)]
+    means = np.array([each.weights @ each.areas for each in cells])
+    plain = np.array([each.areas[each.whole].mean() for each in cells])
+    assert means.mean() == pytest.approx(1.0, abs=4 * means.std() / np.sqrt(200))
+    assert plain.mean() < 1.0 - 8 * plain.std() / np.sqrt(200)
+    assert cells[0].mean_fraction == pytest.approx(cells[0].weights @ cells[0].fractions)
+
+
 @both
 def test_all_is_the_same_in_other_units(periodic):
     points = poisson_points(50, periodic=periodic)
