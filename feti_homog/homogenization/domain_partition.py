@@ -203,7 +203,7 @@ def distribute(
         raise CaseError(*faults)
     parts = torus.constituent if case.cell.bodies == "torus" else torus.plane_parts()
     wanted = wanted_pieces(case, np.bincount(parts), _outer_edges(torus, parts), lattice, n_ranks, policy)
-    if case.interface is None and case.decomposition == Decomposition():
+    if not case.interfaces and case.decomposition == Decomposition():
         wanted = np.maximum(wanted, _coating_pieces(torus, parts, policy))
     decomposition = decompose(torus, parts, wanted, n_ranks)
     submeshes = list(cut(torus, decomposition.subdomain))
