@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from itertools import chain, pairwise
 from types import MappingProxyType, ModuleType
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from feti_homog.cell import element_estimate
+from feti_homog.cell import element_estimate, elliptic_outline
 from feti_homog.cell.arrangement import Arrangement, arrange
+from feti_homog.cell.bent_edges import with_bent_edges
 from feti_homog.cell.coarse_mesh import CoarseMesh, areas, flip_double_arcs, representatives
 from feti_homog.cell.graded_size import MeshSizes
 from feti_homog.cell.outline import MATRIX, Curve, Outline, outline
@@ -73,16 +75,19 @@ def mesh_arrangement(
     scale: float = 1.0,
 ) -> CoarseMesh:
     """The periodic coarse mesh of an arrangement, with elements of these sizes, scaled at the end; see `generate`."""
-    lines = outline(arrangement, sizes, marks)
+    has_ellipses = arrangement.frames is not None
+    lines = (elliptic_outline.outline if has_ellipses else outline)(arrangement, sizes, marks)
     points, triangles, circle = _fill(lines, sizes)
     disc = np.where(circle == MATRIX, MATRIX, lines.disc[circle])
     place = [arrangement.phases.index(name) for name in (*arrangement.phase, arrangement.phases[0])]
     phase = np.array(place, np.int32)[disc]
-    arcs = [curve for curve in lines.curves if curve.circle != MATRIX]
-    arc_edges = np.concatenate([np.stack([arc.nodes[:-1], arc.nodes[1:]], axis=1) for arc in arcs])
+    arcs = [curve for curve in lines.curves if curve.circle != MATRIX and lines.circles[curve.circle, 2] > 0]
+    arc_edges = np.concatenate(
+        [np.zeros((0, 2), np.int32)] + [np.stack([arc.nodes[:-1], arc.nodes[1:]], axis=1) for arc in arcs]
+    )
     arc_edges = arc_edges.astype(np.int32)
-    arc_circle = np.repeat([arc.circle for arc in arcs], [len(arc.nodes) - 1 for arc in arcs])
-    return CoarseMesh(
+    arc_circle = np.repeat(np.array([arc.circle for arc in arcs], int), [len(arc.nodes) - 1 for arc in arcs])
+    mesh = CoarseMesh(
         width=scale * arrangement.width,
         height=scale * arrangement.height,
         points=scale * points,
@@ -96,6 +101,10 @@ def mesh_arrangement(
         arc_circle=arc_circle.astype(np.int32),
         debonded_edges=np.zeros((0, 2), np.int32),
     )
+    if not has_ellipses:
+        return mesh
+    middles = elliptic_outline.middles(lines, arrangement)
+    return with_bent_edges(mesh, replace(middles, points=scale * middles.points))
 
 
 def _sizes(cell: Cell, marks: Mapping[int, Sequence[float]]) -> MeshSizes:

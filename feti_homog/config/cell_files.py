@@ -9,13 +9,14 @@ from pathlib import Path
 from feti_homog.config.cell_section import Cell
 from feti_homog.config.fibre_table import FibreTable, read_table, table_of
 from feti_homog.config.section_values import MESH_FILE, MESH_SUFFIXES
+from feti_homog.config.table_shapes import with_shapes
 from feti_homog.config.wording import toml_value
 from feti_homog.errors import CaseError
 
 SUFFIXES = {"mesh": MESH_SUFFIXES, "table": (".csv",)}
 FILES = {"mesh": MESH_FILE, "table": ".csv file"}
-# Columns of tables that say nothing of round fibres without coatings.
-OTHER_SHAPES = ("coating", "a", "b", "angle")
+# Columns of tables that say nothing of fibres without coatings.
+OTHER_SHAPES = ("coating",)
 
 
 def with_files(cell: Cell, folder: Path, faults: list[str]) -> Cell:
@@ -54,7 +55,10 @@ def _with_table(cell: Cell, faults: list[str]) -> Cell:
         faults += [f"[cell] {fault}" for fault in error.faults]
         return cell
     unknown = [name for name in OTHER_SHAPES if getattr(table, name) is not None]
-    faults += [f"[cell] {table.name}: column {name}: fibres have x, y, radius and phase" for name in unknown]
+    faults += [
+        f"[cell] {table.name}: column {name}: fibres have x, y, radius or a, b and angle, and phase" for name in unknown
+    ]
+    table = with_shapes(table, cell.window, faults)
     width, height = (_size(name, getattr(cell, name), table, faults) for name in ("width", "height"))
     return replace(cell, table=replace(table, width=width, height=height))
 
