@@ -1,5 +1,5 @@
 """The command line: `feti-homog run CASE.toml --out DIR`, `check CASE.toml`, `plot DIR`, `report DIR`, `export DIR`,
-`verify DIR`, `statistics`, `sweep`, `collect`, `keys`, `schema`, `options`.
+`verify DIR`, `statistics`, `fibres`, `sweep`, `collect`, `keys`, `schema`, `options`.
 
 Options with a double dash are ours, with a single dash PETSc's.
 """
@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, NoReturn
 
 from feti_homog import __version__
 from feti_homog.api import folder, parsed, start
-from feti_homog.commands import statistics
+from feti_homog.commands import fibres, statistics
 from feti_homog.common.command_words import split_argv
 from feti_homog.common.interrupts import end_on_signals, launched_rank
 from feti_homog.common.petsc_option_table import help_text
@@ -104,6 +104,7 @@ def command_parser() -> Parser:
     verify.add_argument("directory", type=folder, metavar="DIR")
     verify.add_argument("--json", action="store_true", help="print the certificate as JSON")
     statistics.add(actions)
+    fibres.add(actions)
     _add_sweep(actions.add_parser("sweep", help="run the cases of a file with [sweep]", description=SWEEP_HELP))
     collect = actions.add_parser(
         "collect",
@@ -217,10 +218,11 @@ def _written_report(directory: Path) -> Path:
 def _export(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.common.mpi_errors import on_root
     from feti_homog.output.cards import export
+    from feti_homog.output.files import product_file
 
     text = on_root(comm, export.card, arguments.directory, arguments.format, arguments.symmetry)
     if arguments.out is not None:
-        text = str(on_root(comm, export.write, arguments.out, text))
+        text = str(on_root(comm, product_file.write, arguments.out, text))
     _print_product(comm, text)
 
 

@@ -52,7 +52,7 @@ def main() -> int:
     arguments = parser.parse_args()
     progress = Progress(MPI.COMM_WORLD, quiet=True)
     case = cases.load(arguments.case)
-    case = dataclasses.replace(case, interface=None, analysis=dataclasses.replace(case.analysis, plane=arguments.plane))
+    case = dataclasses.replace(case, interfaces=(), analysis=dataclasses.replace(case.analysis, plane=arguments.plane))
     if arguments.tool == "feti":
         report = feti(case, progress, arguments.loads, arguments.rtol)
     else:

@@ -206,10 +206,16 @@ class AnalysisContext:
         """Collective when first used."""
         return EnergyReleaseRates(self.homogenization.cell, self.homogenization.interface)
 
+    @property
+    def _rated_loads(self) -> tuple[str, ...]:
+        """Those that strain the plane; none where interfaces have their pairs of phases, for the virtual extension of a
+        crack must not move faces that never part."""
+        return () if any(each.between is not None for each in self.case.interfaces) else IN_PLANE_LOADS
+
     def tips(self, responses: Sequence[Response], loads: Sequence[str]) -> TipRates:
-        """Energy release rates at all tips under each load that strains the plane; none while all is bonded.
-        Collective."""
-        pairs = [(r, load) for r, load in zip(responses, loads, strict=True) if load.lstrip("-") in IN_PLANE_LOADS]
+        """Energy release rates at all tips under each load that has them; none while all is bonded.  Collective."""
+        rated = self._rated_loads
+        pairs = [(r, load) for r, load in zip(responses, loads, strict=True) if load.lstrip("-") in rated]
         debonded = [(r, load) for r, load in pairs if r.counts["open"] + r.counts["closed"]]
         found = [(self._release_rates.of(response), load) for response, load in debonded]
         columns = [(at.fibre, at.direction, at.total, *at.modes.T, at.mode_angle, at.length) for at, _ in found]

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+
+import numpy as np
 
 from feti_homog.config.interface_section import InterfaceSection
 from feti_homog.errors import CaseError
 from feti_homog.feti.preconditioners.influence import Influence
-from feti_homog.homogenization import bonds
+from feti_homog.homogenization.bonds import axial_stiffness
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface.bond_criterion import BondCriterion
 from feti_homog.interface.energy_criterion import EnergyCriterion
 from feti_homog.interface.strength_criterion import StrengthCriterion
 from feti_homog.interface.tip_criterion import TipCriterion
+from feti_homog.typing import Float, Int
 
 
 def criterion_of(cell: TornCell) -> BondCriterion:
@@ -21,32 +25,41 @@ def criterion_of(cell: TornCell) -> BondCriterion:
     Raises:
         CaseError: tips of debonding ask for what the solver does not have.
     """
-    bond = cell.case.interface
-    if bond is None:
+    bonds = cell.case.interfaces
+    if not bonds:
         return StrengthCriterion(math.inf, math.inf, "max")
-    if bond.criterion != "energy":
-        return _strengths(bond)
+    pair = cell.solver.jump_operator.nodes.pair
+    if bonds[0].criterion != "energy":
+        return _strengths(bonds, pair)
     has_tips = cell.case.path is not None or cell.sum_over_ranks(int(cell.debonded(None).sum())) > 0
-    return _at_tips(cell, _springs(bond)) if bond.growth == "released" and has_tips else _springs(bond)
+    springs = _springs(bonds, pair)
+    return _at_tips(cell, springs) if bonds[0].growth == "released" and has_tips else springs
 
 
-def _strengths(bond: InterfaceSection) -> StrengthCriterion:
+def _strengths(bonds: Sequence[InterfaceSection], pair: Int) -> StrengthCriterion:
     return StrengthCriterion(
-        bond.normal_strength or math.inf,
-        bond.tangential_strength or math.inf,
-        bond.criterion,
-        bond.axial_strength or bond.tangential_strength or math.inf,
+        _of_nodes([bond.normal_strength for bond in bonds], pair),
+        _of_nodes([bond.tangential_strength for bond in bonds], pair),
+        bonds[0].criterion,
+        _of_nodes([bond.axial_strength or bond.tangential_strength for bond in bonds], pair),
     )
 
 
-def _springs(bond: InterfaceSection) -> EnergyCriterion:
+def _springs(bonds: Sequence[InterfaceSection], pair: Int) -> EnergyCriterion:
     return EnergyCriterion(
-        bond.normal_stiffness or math.inf,
-        bond.tangential_stiffness or math.inf,
-        bond.toughness or math.inf,
-        bond.mode_sensitivity,
-        bonds.axial_stiffness(bond),
+        _of_nodes([bond.normal_stiffness for bond in bonds], pair),
+        _of_nodes([bond.tangential_stiffness for bond in bonds], pair),
+        _of_nodes([bond.toughness for bond in bonds], pair),
+        _of_nodes([bond.mode_sensitivity for bond in bonds], pair),
+        _of_nodes([axial_stiffness(bond) for bond in bonds], pair),
     )
+
+
+def _of_nodes(values: Sequence[float | None], pair: Int) -> float | Float:
+    """The values of interfaces at the nodes (k,) with the interfaces `pair` (k,), None being inf: one for all, if there
+    is one interface."""
+    finite = [math.inf if value is None else value for value in values]
+    return finite[0] if len(finite) == 1 else np.array(finite)[pair]
 
 
 def _at_tips(cell: TornCell, springs: EnergyCriterion) -> TipCriterion:

@@ -137,35 +137,42 @@ class _Finder:
         return np.tensordot(np.stack([column[load] for load in self._loads], axis=1), self._unit, axes=1)
 
     def _least(self, stress: Float, components: int) -> Float:
-        """(n,) utilisations that the solver's error makes under stresses (n, m)."""
-        noise = self._noise * np.abs(stress).max(axis=1)
-        return self._onset.bonds.utilisation(np.repeat(noise[:, None], components, axis=1))
+        """(n, k) utilisations that the solver's error makes under stresses (n, m)."""
+        of_one = self._onset.bonds.utilisation(np.ones((len(self._fibre), components)))
+        return np.asarray(self._noise * np.abs(stress).max(axis=1)[:, None] * of_one)
 
     def _first(self, factors: Float, before: Float, ahead: Float) -> Float:
-        """(n, 3 + c) least factor of each ray, fibre and direction of its bond, and tractions there; of those that
-        break together the one of the first fibre and the least direction.  Collective."""
-        n, c = len(factors), ahead.shape[2]
+        """(n, 3 + d) least factor of each ray, fibre and direction of its bond, and how it breaks; of those that break
+        together the one of the first fibre and the least direction.  Collective."""
+        n, d = len(factors), len(self._break_names(ahead.shape[2]))
         least = factors.min(axis=1, initial=np.inf)
         self._comm.Allreduce(MPI.IN_PLACE, least, MPI.MIN)
-        own = np.full((n, 3 + c), np.inf)
+        own = np.full((n, 3 + d), np.inf)
         own[:, 0] = least
         together = factors[:, self._order] <= least[:, None] * (1.0 + UTILISATION_TIE)
         rays = np.flatnonzero(together.any(axis=1) & np.isfinite(least))
         node: Int = self._order[together[rays].argmax(axis=1)] if len(rays) else np.zeros(0, np.int64)
         own[rays, 1], own[rays, 2] = self._fibre[node], self._direction[node]
-        own[rays, 3:] = before[node] + least[rays, None] * ahead[rays, node]
+        own[rays, 3:] = self._breaks(node, before[node] + least[rays, None] * ahead[rays, node])
         table = np.stack(self._comm.allgather(own))
         first = np.lexsort((np.round(table[:, :, 2], DIRECTION_DIGITS), table[:, :, 1]), axis=0)[0]
         return np.asarray(table[first, np.arange(n)])
 
     def _of_bond(self, bond: Float) -> dict[str, Any]:
         """Where a bond is, and how it breaks."""
-        place = {"fibre": int(bond[1]), "bond_angle": float(bond[2])}
-        law = self._onset.bonds
-        if isinstance(law, EnergyCriterion):
-            return place | {"psi": float(np.degrees(law.mode_angle(bond[None, 3:]))[0])}
-        return place | dict(
-            zip(("normal", "tangential", "axial"), law.shares(bond[None, 3:])[0].tolist(), strict=False)
+        names = self._break_names(self._unit.shape[2])
+        return {"fibre": int(bond[1]), "bond_angle": float(bond[2])} | dict(zip(names, bond[3:].tolist(), strict=True))
+
+    def _break_names(self, components: int) -> tuple[str, ...]:
+        """What is told of the break of a bond under a traction of so many components."""
+        by_energy = isinstance(self._onset.bonds, EnergyCriterion)
+        return ("psi",) if by_energy else ("normal", "tangential", "axial")[:components]
+
+    def _breaks(self, node: Int, traction: Float) -> Float:
+        """(p, d) the same for tractions (p, c) at the nodes (p,)."""
+        law = self._onset.bonds.at(node)
+        return (
+            np.degrees(law.mode_angle(traction))[:, None] if isinstance(law, EnergyCriterion) else law.shares(traction)
         )
 
 

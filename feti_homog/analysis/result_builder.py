@@ -87,7 +87,7 @@ def _cell_info(cell: TornCell, fractions: dict[str, float]) -> CellInfo:
 
 def _fibres(summary: CellSummary) -> tuple[FibreInfo, ...]:
     """The fibres of the cell."""
-    bodies = range(summary.first_fibre, len(summary.centres))
+    bodies = summary.fibre_bodies
     return tuple(
         FibreInfo(
             number=number,

@@ -25,8 +25,8 @@ EITHER, EITHER_STIFFNESS = "(3,) or (6,)", "(3, 3) or (6, 6)"
 ENERGY = f"{STRESS} times that of the cell"
 TEMPERATURE = "change of temperature, of generalized plane strain whose phases expand"
 DEBONDED_ANGLE = (
-    "the same in degrees of arc, `debonded_length` / radius; of a fibre that is not round 360 times the share of its "
-    "interface"
+    "the same in degrees of arc, `debonded_length` / radius; of a fibre that is not round, or whose coating has an "
+    "interface too, 360 times the share of its interfaces"
 )
 
 

@@ -48,13 +48,17 @@ def constants(cell: TornCell, analysis: Mapping[str, Any], fractions: Mapping[st
 
 
 def _comparisons(cell: TornCell, fractions: Mapping[str, float]) -> dict[str, Any]:
-    """Estimates of round fibres, and bounds of rigidly bonded ones of any section: of transversely isotropic phases."""
+    """Estimates of round fibres, and bounds of rigidly bonded ones of any section: of transversely isotropic phases.
+
+    Estimates are of fibres that the same bonds hold in the matrix.
+    """
     phases = {phase: _constants_of(cell, phase) for phase in fractions}
     matrix, *others = cell.summary.phases
     has_springs = bonds.has_springs(cell.case)
     found: dict[str, Any] = {}
     radii = {phase: cell.summary.radii[_of_phase(cell, phase)] for phase in others}
-    if not any(_no_estimate(own, has_springs) for own in radii.values()):
+    is_plain = all(interface.between is None for interface in cell.case.interfaces)
+    if is_plain and not any(_no_estimate(own, has_springs) for own in radii.values()):
         springs = {phase: _springs(cell, float(own[0])) if has_springs else None for phase, own in radii.items()}
         fibres = [Fibres(fractions[phase], phases[phase], springs[phase]) for phase in others]
         found["estimates"] = estimates(phases[matrix], fibres)
@@ -66,8 +70,7 @@ def _comparisons(cell: TornCell, fractions: Mapping[str, float]) -> dict[str, An
 def _of_phase(cell: TornCell, phase: str) -> Bool:
     """(constituents,) which fibres are of a phase."""
     summary = cell.summary
-    fibres = np.arange(len(summary.radii)) >= summary.first_fibre
-    return np.asarray(fibres & (summary.constituent_phase == summary.phases.index(phase)))
+    return np.asarray(summary.constituent_phase == summary.phases.index(phase))
 
 
 def _no_estimate(radii: Float, has_springs: bool) -> bool:
@@ -83,6 +86,6 @@ def _constants_of(cell: TornCell, phase: str) -> TransverselyIsotropic:
 
 def _springs(cell: TornCell, radius: float) -> Springs:
     """Those of the interfaces of fibres with this radius."""
-    normal, tangential = bonds.springs(cell.case).stiffness
-    (axial,) = bonds.axial_springs(cell.case).stiffness
+    ((normal, tangential),) = bonds.springs(cell.case).stiffness
+    ((axial,),) = bonds.axial_springs(cell.case).stiffness
     return Springs(normal, tangential, axial, radius)

@@ -32,18 +32,16 @@ class TipRecorder:
     def __init__(self, cell: TornCell, loaded: LoadedCell, springs: EnergyCriterion) -> None:
         """`loaded` are the interfaces of the cell.  Collective."""
         self._cell, self._loaded, self._springs = cell, loaded, springs
-        self._neighbours = InterfaceNeighbours(
-            cell.comm, cell.solver.jump_operator, cell.subdomains, cell.summary.phases[0]
-        )
+        self._neighbours = InterfaceNeighbours(cell.comm, cell.solver.jump_operator, cell.subdomains)
 
     def of(self, point: Point) -> Tips:
-        """The tips of a point on every rank, by fibre and direction.  Collective."""
+        """The tips of a point on every rank, by fibre, interface and direction.  Collective."""
         cell, nodes = self._cell, self._loaded.nodes
         traction = point.scale * self._loaded.traction(point.state.solutions)
         own = tip_energies(self._springs, self._neighbours, point.state.status, traction, point.used)
         direction = bond_directions(cell)[own.node]
         fibre = cell.summary.fibre_number(nodes.fibre[own.node])
-        table = np.column_stack([fibre, direction, own.opening, own.shear, own.mode])
+        table = np.column_stack([fibre, direction, own.opening, own.shear, own.mode, nodes.pair[own.node]])
         table = np.concatenate(cell.comm.allgather(table))
-        table = table[np.lexsort((np.round(table[:, 1], DIRECTION_DIGITS), table[:, 0]))]
-        return Tips(tuple(table[:, 0].astype(int).tolist()), *table.T[1:])
+        table = table[np.lexsort((np.round(table[:, 1], DIRECTION_DIGITS), table[:, 5], table[:, 0]))]
+        return Tips(tuple(table[:, 0].astype(int).tolist()), *table.T[1:5])

@@ -11,8 +11,8 @@ from feti_homog.cell.torus_pairs import neighbours
 from feti_homog.errors import MeshError
 from feti_homog.typing import Float, Int
 
-# Gap / sum of the radii that fibres which are moved apart get.
-WANTED_GAP = 0.01
+# Gap / sum of the radii of fibres across the border, at least and at most.
+LEAST_GAP, MOST_GAP = 0.01, 0.05
 # Overlap / sum of the radii that counts as none, and what distances are made larger by to come below it.
 TOLERANCE = 1e-6
 # Moves differ from the smallest ones by less than this, / mean radius.
@@ -50,18 +50,21 @@ class _Pairs:
 
 
 def moves(centres: Float, radii: Float, size: Float) -> Float:
-    """(N, 2) the moves d of discs on the torus of periods `size` (2,) that part those which overlap.
+    """(N, 2) the moves d of discs on the torus of periods `size` (2,) that part those which overlap across its border.
 
-    They are a local minimum of sum |d|^2 such that all distances are at least those that there were, or the sum of
-    the radii and WANTED_GAP of it where that is less or discs overlapped. Each step solves it with the distances
-    |v| >= r replaced by n . v >= r, n the present directions; since n . v <= |v|, its solution keeps the distances.
+    They are a local minimum of sum |d|^2 such that no gap across the border is less than the smallest one within, and
+    no gap within becomes less than that, all relative to the sum of the radii and that gap between LEAST_GAP and
+    MOST_GAP. Each step solves it with the distances |v| >= r replaced by n . v >= r, n the present directions; since
+    n . v <= |v|, its solution keeps the distances.
 
     Raises:
         MeshError: there is no room.
     """
-    moved, pairs = np.zeros_like(centres), _near(centres, np.zeros_like(centres), radii, size).where(np.zeros(0, bool))
+    moved, gap = np.zeros_like(centres), _gap_within(centres, radii, size)
+    nobody = np.zeros(0, np.intp)
+    pairs = _Pairs(nobody, nobody, np.zeros((0, 2)), np.zeros(0))
     for _ in range(MAX_STEPS):
-        near = _near(centres, moved, radii, size)
+        near = _near(centres, moved, radii, size, gap)
         distance = np.linalg.norm(near.vectors(centres + moved, size), axis=1)
         short = near.where(distance < near.least * (1 - TOLERANCE))
         before, pairs = moved, pairs.joined(short)
@@ -71,7 +74,15 @@ def moves(centres: Float, radii: Float, size: Float) -> Float:
     raise MeshError("there is no room to move them apart")
 
 
-def _near(centres: Float, moved: Float, radii: Float, size: Float) -> _Pairs:
+def _gap_within(centres: Float, radii: Float, size: Float) -> float:
+    """The smallest gap / sum of the radii of discs that are not across the border, within its limits."""
+    first, second, vector = neighbours(centres, size, 3 * radii.max())
+    across = np.abs(centres[second] - centres[first] - vector).max(axis=1) > TOLERANCE * radii.mean()
+    gap = np.linalg.norm(vector, axis=1) / (radii[first] + radii[second]) - 1
+    return float(np.clip(gap[~across].min(initial=MOST_GAP), LEAST_GAP, MOST_GAP))
+
+
+def _near(centres: Float, moved: Float, radii: Float, size: Float, gap: float) -> _Pairs:
     """Pairs of different discs that are, or soon may be, nearer than they must be."""
     present = centres + moved
     first, second, vector = neighbours(present, size, 3 * radii.max())
@@ -79,10 +90,8 @@ def _near(centres: Float, moved: Float, radii: Float, size: Float) -> _Pairs:
     first, second, vector = first[apart], second[apart], vector[apart]
     shift = np.round((vector - present[second] + present[first]) / size)
     before = np.linalg.norm(centres[second] - centres[first] + shift * size, axis=1)
-    together = radii[first] + radii[second]
-    wanted = together * (1 + WANTED_GAP)
-    overlap = before < together * (1 + TOLERANCE)
-    return _Pairs(first, second, shift, np.where(overlap, wanted, np.minimum(before, wanted)))
+    wanted = (radii[first] + radii[second]) * (1 + gap)
+    return _Pairs(first, second, shift, np.where(shift.any(axis=1), wanted, np.minimum(before, wanted)))
 
 
 def _least_moves(pairs: _Pairs, centres: Float, moved: Float, size: Float, unit: float) -> Float:

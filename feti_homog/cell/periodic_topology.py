@@ -11,12 +11,15 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
+from scipy.sparse import coo_matrix, csr_matrix
+from scipy.sparse.csgraph import connected_components, dijkstra
 
 from feti_homog.cell.coarse_mesh import CoarseMesh
 from feti_homog.cell.periodic_sides import paired_sides
 from feti_homog.typing import Float, Int, Int32
+
+# The phase whose parts each have the number of the fibre that they surround.
+COATING = "coating"
 
 
 @dataclass(frozen=True)
@@ -95,6 +98,20 @@ class Torus:
         """(constituents,) phase of each constituent."""
         first = np.unique(self.constituent, return_index=True)[1]
         return np.asarray(self.mesh.phase[first], np.int64)
+
+    @cached_property
+    def nesting(self) -> Int:
+        """(constituents,) places from the outermost to the innermost: by the number of others between a constituent and
+        the matrix, a coating before what it coats, and then by number."""
+        left, right = edge_pairs(self.triangle_torus_edges)
+        a, b = self.constituent[left], self.constituent[right]
+        phase, n = self.constituent_phase, len(self.constituent_phase)
+        touching = csr_matrix((np.ones(len(a)), (a, b)), shape=(n, n))
+        depth = dijkstra(touching, False, np.flatnonzero(phase == 0), unweighted=True, min_only=True)
+        coats = np.array([name == COATING for name in self.mesh.phases])[phase]
+        place = np.empty(n, np.int64)
+        place[np.lexsort((np.arange(n), ~coats, depth))] = np.arange(n)
+        return place
 
     def plane_parts(self) -> Int:
         """(m,) constituents cut by the cell's boundary, as the paper's Fig. 2a does (`bodies = "plane"`)."""

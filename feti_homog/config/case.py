@@ -15,7 +15,7 @@ from feti_homog.config.document import read_document, to_document
 from feti_homog.config.envelope_rules import envelope_faults, read_envelope
 from feti_homog.config.envelope_section import Envelope
 from feti_homog.config.generalized_plane import generalized_faults
-from feti_homog.config.interface_rules import misplaced_sections, read_angle, read_interface
+from feti_homog.config.interface_rules import interface_tables, misplaced_sections, read_angle, read_interfaces
 from feti_homog.config.interface_section import Arc, InterfaceSection
 from feti_homog.config.load_rules import expansion_faults, read_load, read_path, stress_free
 from feti_homog.config.load_section import LoadPath, SingleLoad
@@ -43,7 +43,7 @@ class Case:
 
     Attributes:
         materials: by phase, in the file's order.
-        interface: None if the bonding is perfect.
+        interfaces: none if the bonding is perfect; of several each has its pair of phases.
         angle, path, single_load, envelope: there if the analysis is of that type; single_load is the section [load].
         petsc: options without dash.
     """
@@ -52,7 +52,7 @@ class Case:
     cell: Cell
     materials: dict[str, Material]
     analysis: Analysis
-    interface: InterfaceSection | None
+    interfaces: tuple[InterfaceSection, ...]
     angle: Angle | None
     path: LoadPath | None
     single_load: SingleLoad | None
@@ -74,7 +74,13 @@ class Case:
     @property
     def arcs(self) -> tuple[Arc, ...]:
         """What is debonded from the start; none if the bonding is perfect."""
-        return () if self.interface is None else self.interface.debonded
+        return tuple(arc for interface in self.interfaces for arc in interface.debonded)
+
+    @property
+    def interface(self) -> InterfaceSection | None:
+        """The first of the interfaces, None if the bonding is perfect: contact, criterion and growth are those of
+        all."""
+        return self.interfaces[0] if self.interfaces else None
 
     @property
     def targets(self) -> tuple[Mapping[str, float], ...]:
@@ -135,6 +141,8 @@ class Case:
         sections = {section: getattr(self, FIELDS.get(section, section)) for section in SECTIONS if section != "cell"}
         given = {section: contents for section, contents in sections.items() if contents is not None}
         document |= {section: to_table(contents, selected) for section, contents in given.items()}
+        if len(self.interfaces) > 1:
+            document["interface"] = [to_table(interface, selected) for interface in self.interfaces]
         return document | {"petsc": dict(self.petsc)}
 
     def digest(self) -> str:
@@ -177,7 +185,7 @@ def parse(values: Mapping[str, Any], folder: Path) -> Case:
     faults += misplaced_sections(document, analysis)
     faults += generalized_faults(reader.selected)
     sections |= {
-        "interface": read_interface(document.get("interface"), reader),
+        "interfaces": read_interfaces(document, reader),
         "angle": read_angle(document.get("angle"), reader),
         "path": read_path(document.get("path"), reader),
         "single_load": read_load(document.get("load"), reader),
@@ -185,7 +193,7 @@ def parse(values: Mapping[str, Any], folder: Path) -> Case:
         "output": _read_section(document, "output", reader),
         "petsc": read_petsc(document.get("petsc", {}), faults),
     }
-    bonding = sections["envelope"], sections["interface"], sections["materials"]
+    bonding = sections["envelope"], sections["interfaces"], sections["materials"]
     faults += envelope_faults(*bonding, document, reader.selected)
     faults += expansion_faults(sections["path"], sections["single_load"], sections["materials"])
     if faults:
@@ -196,7 +204,8 @@ def parse(values: Mapping[str, Any], folder: Path) -> Case:
 def _selected(document: Mapping[str, Any]) -> Selected:
     """The values that decide which keys belong to the case."""
     selectors = (GEOMETRY, ANALYSIS_TYPE, PLANE, METHOD, CRITERION, DRAWN_STRESS)
-    return {s: selected_value(SECTIONS[s.section], document.get(s.section), s.key) for s in selectors}
+    tables = dict(document) | {"interface": next(iter(interface_tables(document)), None)}
+    return {s: selected_value(SECTIONS[s.section], tables.get(s.section), s.key) for s in selectors}
 
 
 def _top_level_faults(document: Mapping[str, Any]) -> list[str]:

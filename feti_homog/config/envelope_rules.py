@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import inf
 from typing import Any
 
@@ -36,7 +36,7 @@ def read_envelope(table: Any, reader: TableReader) -> Envelope | None:
 
 def envelope_faults(
     envelope: Envelope | None,
-    interface: InterfaceSection | None,
+    interfaces: Sequence[InterfaceSection] | None,
     materials: Mapping[str, Material] | None,
     document: Mapping[str, Any],
     selected: Selected,
@@ -45,20 +45,21 @@ def envelope_faults(
     if selected[ENVELOPE_ANALYSIS.selector] not in ENVELOPE_ANALYSIS.values:
         return []
     faults = [] if "interface" in document else [f"[interface]: missing section; {TYPE} needs it"]
-    if interface is not None:
-        faults += _bonding_faults(interface, selected)
+    if interfaces:
+        faults += _bonding_faults(interfaces, selected)
     if envelope is not None and envelope.temperature is not None:
         faults += missing_expansions(materials or {}, "[envelope] temperature")
     return faults
 
 
-def _bonding_faults(interface: InterfaceSection, selected: Selected) -> list[str]:
+def _bonding_faults(interfaces: Sequence[InterfaceSection], selected: Selected) -> list[str]:
     """Faults of bonds that nothing breaks, and of faces that may touch."""
     faults = []
     names = STRENGTHS if selected[PLANE] in GENERALIZED.values else STRENGTHS[:2]
-    if interface.criterion != "energy" and all(getattr(interface, name) in (None, inf) for name in names):
+    strengths = {getattr(interface, name) for interface in interfaces for name in names}
+    if interfaces[0].criterion != "energy" and strengths <= {None, inf}:
         faults.append(f"[interface] {', '.join(names)}: missing; {TYPE} needs one")
-    if interface.contact and interface.debonded:
+    if interfaces[0].contact and any(interface.debonded for interface in interfaces):
         faults.append(
             f"[interface] contact: expected false with debonded arcs; {TYPE} superposes loads, which contact forbids"
         )

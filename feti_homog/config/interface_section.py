@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from feti_homog.config.schema import key
-from feti_homog.config.section_values import ARCS, FIBRES, STIFFNESS, STRENGTH, TOUGHNESS
+from feti_homog.config.section_values import ARCS, FIBRES, PAIR, STIFFNESS, STRENGTH, TOUGHNESS
 from feti_homog.config.selectors import ANALYSIS_TYPE, BREAKING, BY_ENERGY, GENERALIZED
 from feti_homog.config.values import POSITIVE_OR_INF, boolean, choice, real
 
@@ -42,7 +42,8 @@ class Arc:
 @dataclass(frozen=True, kw_only=True)
 class InterfaceSection:
     """Bonding of fibres and matrix: what is debonded from the start, and the tractions that debond more. Without this
-    section bonding is perfect.
+    section bonding is perfect. Several sections [[interface]], each with its pair of phases, have the same contact,
+    criterion and growth.
 
     A strength of None is unlimited.
     """
@@ -132,4 +133,11 @@ class InterfaceSection:
         "How much of the toughness in opening holds in shear: 1 all modes have the same, 0 shear alone breaks nothing.",
         default=0.25,
         only=BY_ENERGY,
+    )
+    between: tuple[str, str] | None = key(
+        PAIR,
+        "The two phases whose interfaces these are, in any order; pairs that no section names never part. Needed where "
+        "there are several sections [[interface]].",
+        default=None,
+        default_words="the matrix and all others",
     )

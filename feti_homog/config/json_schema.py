@@ -36,6 +36,7 @@ def json_schema() -> Schema:
         "properties": {
             "name": dict(text.json_schema) | {"description": "Name of the case; by default that of the file."},
             **{section: _reference(section) for section in SECTIONS},
+            "interface": {"anyOf": [_reference("interface"), _several(_reference("interface"))]},
             "material": _materials(),
             "petsc": _petsc(),
             SWEEP: _sweep(),
@@ -57,6 +58,10 @@ def json_schema() -> Schema:
 
 def _reference(name: str) -> Schema:
     return {"$ref": f"#/$defs/{name}"}
+
+
+def _several(table: Schema) -> Schema:
+    return {"type": "array", "items": table, "minItems": 1}
 
 
 def _definition(form: str) -> str:

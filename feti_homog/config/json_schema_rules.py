@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from feti_homog.config.cell_section import ALL_CIRCULAR, FROM_A_FILE, GEOMETRY, MESHED, TABLE
+from feti_homog.config.cell_section import ALL_CIRCULAR, GEOMETRY, MESH, MESHED, TABLE
 from feti_homog.config.envelope_section import pairs_of
 from feti_homog.config.interface_section import STIFFNESSES, STRENGTHS, Arc
 from feti_homog.config.load_names import STRAINS, STRESSES
@@ -124,12 +124,18 @@ def _section_consequence(value: str) -> Schema:
 
 
 def _file_rules() -> list[Schema]:
-    """A mesh comes in a file; the fibres of a table come in a file or a list."""
-    for_a_table = {"oneOf": [{"required": ["file"]}, {"required": ["fibre_list"]}]}
-    either = {"anyOf": [{"required": ["file"]}, {"required": ["fibre_list"]}]}
+    """A mesh comes in a file; the fibres of a table come in a file, or in a list with the size of the cell."""
+    in_a_list = {"required": ["fibre_list", "width", "height"]}
+    of_a_table = {"oneOf": [{"required": ["file"]}, {"required": ["fibre_list"]}]}
+    listed = {"if": {"required": ["fibre_list"]}, "then": in_a_list}
+    of_a_mesh = {"required": ["file"]}
+
+    def named(suffix: str) -> Schema:
+        return {"properties": {"file": {"pattern": f"\\.{suffix}$"}}}
+
     return [
-        {"if": _if(FROM_A_FILE), "then": _at(("cell",), either)},
-        {"if": _if(TABLE), "then": _at(("cell",), for_a_table)},
+        {"if": _if(MESH), "then": _at(("cell",), of_a_mesh | named("msh"))},
+        {"if": _if(TABLE), "then": _at(("cell",), of_a_table | listed | named("csv"))},
     ]
 
 

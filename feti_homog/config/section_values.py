@@ -11,6 +11,7 @@ from typing import Any
 from feti_homog.config.values import SMALLEST, ValueType, integer, is_number, is_number_list, real, text, to_floats
 
 STRAIN_COMPONENTS = "[E11, E22, gamma12]"
+PAIR_EXAMPLE = '["coating", "matrix"]'
 FIBRE = integer(least=1)
 SEED = integer(least=0, most=10**15)
 
@@ -35,6 +36,10 @@ def _is_table_file(value: Any) -> bool:
 def _is_fibre_or_fibres(value: Any) -> bool:
     is_list = isinstance(value, list) and value != [] and all(map(FIBRE.accepts, value))
     return value == "all" or FIBRE.accepts(value) or is_list
+
+
+def _are_two_phases(value: Any) -> bool:
+    return isinstance(value, list) and len(value) == 2 and all(map(text.accepts, value)) and value[0] != value[1]
 
 
 def _are_openings(value: Any) -> bool:
@@ -111,6 +116,12 @@ ARCS = ValueType(
     lambda v: isinstance(v, list) and all(isinstance(arc, dict) for arc in v),
     tuple,
     {"type": "array", "items": {"$ref": "#/$defs/arc"}},
+)
+PAIR = ValueType(
+    f"the names of two phases, such as {PAIR_EXAMPLE}",
+    _are_two_phases,
+    tuple,
+    {**_list_of(2, text.json_schema), "uniqueItems": True},
 )
 STRENGTH = _positive_or_inf("a traction")
 STIFFNESS = _positive_or_inf("a stiffness")

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
 from feti_homog.cell.outline import MERGED
-from feti_homog.cell.periodic_topology import Torus
+from feti_homog.cell.periodic_topology import Torus, edge_pairs, shared_edges
 from feti_homog.cell.refinement import ReferenceLattice
 from feti_homog.config.case import Case
+from feti_homog.config.interface_rules import interface_label
 from feti_homog.config.interface_section import Arc
 from feti_homog.homogenization import tips
 from feti_homog.interface import debonded_arcs
@@ -20,32 +22,33 @@ from feti_homog.typing import Bool, Float, Int
 
 @dataclass(frozen=True)
 class InterfaceNodes:
-    """Nodes of interfaces on rank 0, before the refinement: (k,) numbers of fibres from 1, directions in degrees about
-    their centres, and whether they are vertices of the coarse mesh.
+    """Nodes of interfaces on rank 0, before the refinement: (k,) numbers of fibres from 1, interfaces of the case,
+    directions in degrees about their centres, and whether they are vertices of the coarse mesh.
     """
 
     fibre: Int
+    pair: Int
     direction: Float
     is_vertex: Bool
 
     @classmethod
-    def of(cls, torus: Torus, lattice: ReferenceLattice, first_fibre: int, centres: Float) -> InterfaceNodes:
-        """Those on edges between constituents, on their chords."""
-        body = np.repeat(torus.constituent, 3)
-        edge = torus.triangle_torus_edges.ravel()
-        count = int(edge.max()) + 1
-        low, high = np.full(count, body.max()), np.zeros(count, np.int64)
-        np.minimum.at(low, edge, body)
-        np.maximum.at(high, edge, body)
-        between = np.flatnonzero(low != high)
+    def of(cls, torus: Torus, lattice: ReferenceLattice, pairs: Int, numbers: Int, centres: Float) -> InterfaceNodes:
+        """Those on edges that may debond, on their chords; `pairs` as in `share_entities`, `numbers` (constituents,)
+        those of fibres."""
+        left, right = edge_pairs(torus.triangle_torus_edges)
+        pair = pairs[torus.mesh.phase[left], torus.mesh.phase[right]]
+        sides = torus.constituent[np.stack([left, right])][:, pair >= 0]
+        inner = np.take_along_axis(sides, torus.nesting[sides].argmax(axis=0)[None], axis=0)[0]
+        between = shared_edges(torus.triangle_torus_edges)[pair >= 0]
         plane = np.unique(torus.torus_edge, return_index=True)[1][between]
         share = np.linspace(0.0, 1.0, lattice.intervals + 1)[None, :, None]
         ends = torus.mesh.points[torus.edges[plane]]
         points = (ends[:, :1] * (1 - share) + ends[:, 1:] * share).reshape(-1, 2)
-        fibre = np.repeat(high[between], lattice.intervals + 1)
+        fibre = np.repeat(inner, lattice.intervals + 1)
         is_vertex = np.tile(np.isin(share.ravel(), (0.0, 1.0)), len(between))
         return cls(
-            fibre - first_fibre + 1,
+            numbers[fibre],
+            np.repeat(pair[pair >= 0], lattice.intervals + 1),
             debonded_arcs.angles(points, fibre, centres, torus.mesh.period),
             is_vertex,
         )
@@ -57,27 +60,42 @@ class InterfaceNodes:
         vertices = self.fibre[self.is_vertex], self.direction[self.is_vertex]
         return debonded_arcs.moved_tips(tips.directions(case), *vertices, float(np.degrees(MERGED)))
 
+    def within(self, pair: int) -> InterfaceNodes:
+        """Those of one interface of the case."""
+        own = self.pair == pair
+        return InterfaceNodes(self.fibre[own], self.pair[own], self.direction[own], self.is_vertex[own])
+
     def selects(self, arc: Arc, opening: float | None, fibre: int | None, moved: MovedTips) -> bool:
         """Whether any node, of that fibre if it is given, is within the arc."""
         inside = debonded_arcs.debonded([arc], opening, self.fibre, self.direction, moved)
         return bool((inside if fibre is None else inside[self.fibre == fibre]).any())
 
 
+def fibre_faults(case: Case, centres: Float) -> list[str]:
+    """What is wrong with the fibres of arcs in a cell whose fibres have these centres (fibres, 2), NaN where there is
+    none."""
+    return [
+        fault
+        for pair, interface in enumerate(case.interfaces)
+        for fault in debonded_arcs.faults(interface.debonded, centres, interface_label(pair, len(case.interfaces)))
+    ]
+
+
 def faults(case: Case, nodes: InterfaceNodes, moved: MovedTips) -> list[str]:
     """Faults of arcs, and of openings of [angle], other than 0 that select no node of a fibre."""
     openings: Sequence[float | None] = [None] if case.angle is None else case.angle.values
     found = []
-    for place, arc in enumerate(case.arcs):
-        for opening in openings:
+    for pair, interface in enumerate(case.interfaces):
+        own, label = nodes.within(pair), interface_label(pair, len(case.interfaces))
+        for (place, arc), opening in product(enumerate(interface.debonded), openings):
             whole = opening if arc.angle is None else arc.angle
             fibres = [None] if isinstance(arc.fibre, str) else list(arc.fibre)
-            empty = [fibre for fibre in fibres if whole and not nodes.selects(arc, opening, fibre, moved)]
-            found += [_fault(place, whole, fibre, nodes) for fibre in empty]
+            empty = [fibre for fibre in fibres if whole and not own.selects(arc, opening, fibre, moved)]
+            found += [_fault(f"[{label}] debonded[{place}]", whole, fibre, own) for fibre in empty]
     return list(dict.fromkeys(found))
 
 
-def _fault(place: int, opening: float | None, fibre: int | None, nodes: InterfaceNodes) -> str:
-    line = f"[interface] debonded[{place}]"
+def _fault(line: str, opening: float | None, fibre: int | None, nodes: InterfaceNodes) -> str:
     if fibre is not None and fibre not in nodes.fibre:
         return f"{line}.fibre: fibre {fibre} has no interface that can debond"
     whose = "any fibre" if fibre is None else f"fibre {fibre}"

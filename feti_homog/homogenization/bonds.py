@@ -6,20 +6,22 @@ import math
 
 from feti_homog.config.case import Case
 from feti_homog.config.interface_section import InterfaceSection
-from feti_homog.feti.decomposition.interface_springs import GLUE, InterfaceSprings
+from feti_homog.feti.decomposition.interface_springs import InterfaceSprings
 
 
 def springs(case: Case) -> InterfaceSprings:
     """Those of the problem in the plane: normal and tangential."""
-    bond = case.interface
-    if bond is None:
-        return GLUE
-    return InterfaceSprings((bond.normal_stiffness or math.inf, bond.tangential_stiffness or math.inf))
+    return InterfaceSprings(tuple(map(plane_stiffnesses, case.interfaces)))
 
 
 def axial_springs(case: Case) -> InterfaceSprings:
     """Those of the problem along the fibres."""
-    return GLUE if case.interface is None else InterfaceSprings((axial_stiffness(case.interface),))
+    return InterfaceSprings(tuple((axial_stiffness(bond),) for bond in case.interfaces))
+
+
+def plane_stiffnesses(bond: InterfaceSection) -> tuple[float, float]:
+    """k_n and k_t."""
+    return bond.normal_stiffness or math.inf, bond.tangential_stiffness or math.inf
 
 
 def axial_stiffness(bond: InterfaceSection) -> float:
@@ -29,4 +31,5 @@ def axial_stiffness(bond: InterfaceSection) -> float:
 
 def has_springs(case: Case) -> bool:
     """Whether any bond gives way."""
-    return any(map(math.isfinite, (*springs(case).stiffness, *axial_springs(case).stiffness)))
+    stiffnesses = (*springs(case).stiffness, *axial_springs(case).stiffness)
+    return any(math.isfinite(stiffness) for own in stiffnesses for stiffness in own)

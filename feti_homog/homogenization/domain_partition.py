@@ -9,6 +9,7 @@ import numpy as np
 from feti_homog.cell import tabulated
 from feti_homog.cell.coarse_mesh import CoarseMesh
 from feti_homog.cell.fibre_centres import fibre_circles
+from feti_homog.cell.fibre_numbers import fibre_numbers
 from feti_homog.cell.matched_arrangement import distance_of
 from feti_homog.cell.periodic_topology import Torus, edge_pairs
 from feti_homog.cell.refinement import ReferenceLattice
@@ -18,11 +19,11 @@ from feti_homog.config.case import Case
 from feti_homog.errors import CaseError
 from feti_homog.feti.decomposition.partition import decompose, pieces_for_count, pieces_for_size
 from feti_homog.feti.decomposition.shared_entities import SharedEntities, share_entities
-from feti_homog.homogenization import arc_selection, process_zone, tips
+from feti_homog.homogenization import arc_selection, interface_pairs, process_zone, tips
 from feti_homog.homogenization.arc_selection import InterfaceNodes
 from feti_homog.interface import debonded_arcs
 from feti_homog.interface.debonded_arcs import MovedTips
-from feti_homog.typing import Float, Int
+from feti_homog.typing import Bool, Float, Int
 
 MOST_LISTED = 30  # moved fibres that are told one by one
 ROUNDING = 1e-9  # of coordinates, relative to the cell
@@ -69,8 +70,9 @@ class CellSummary:
         width, height: periods.
         phases: names of the material phases, the matrix first.
         bodies, subdomains, coarse_triangles: numbers of them.
-        interface_edge: longest coarse edge between a fibre and the matrix.
-        first_fibre: the constituent that is fibre number 1 of the case file.
+        interface_edge: longest coarse edge between phases.
+        numbers: (constituents,) of the fibre that each is, from 1 as in case files, or that it coats; 0 of the matrix.
+        is_fibre: (constituents,) which are fibres: neither the matrix nor a coating of one.
         constituent_phase: (constituents,) place of the phase of each in `phases`.
         centres, radii: (constituents, 2) and (constituents,) centre, within the cell, and radius of each fibre, NaN
             where there is none.
@@ -85,7 +87,8 @@ class CellSummary:
     subdomains: int
     coarse_triangles: int
     interface_edge: float
-    first_fibre: int
+    numbers: Int
+    is_fibre: Bool
     constituent_phase: Int
     centres: Float
     radii: Float
@@ -96,11 +99,17 @@ class CellSummary:
     @property
     def fibres(self) -> int:
         """Number of fibres."""
-        return len(self.centres) - self.first_fibre
+        return int(self.is_fibre.sum())
+
+    @property
+    def fibre_bodies(self) -> Int:
+        """(fibres,) the constituents that are fibres, in the order of their numbers."""
+        return np.flatnonzero(self.is_fibre)
 
     def fibre_number(self, constituent: Int) -> Int:
-        """(k,) numbers from 1, as a case file has them, of fibres that are these constituents (k,)."""
-        return np.asarray(constituent - self.first_fibre + 1)
+        """(k,) numbers from 1, as a case file has them, of the fibres that are these constituents (k,) or that these
+        coat; 0 of the matrix."""
+        return np.asarray(self.numbers[constituent])
 
     def warnings(self) -> list[str]:
         """What was changed in a user's mesh, in words."""
@@ -173,13 +182,14 @@ def distribute(
         CaseError: an arc of the case lies on a fibre that cannot have it, or selects no node.
     """
     torus = Torus.of(mesh)
-    first_fibre = int(np.count_nonzero(torus.constituent_phase == 0))
+    numbers, is_fibre = fibre_numbers(torus)
+    pairs = interface_pairs.pairs_of(case, mesh.phases)
     circles = fibre_circles(torus)
     centres = _in_cell(circles[:, :2], mesh.period)
-    faults = debonded_arcs.faults(case.arcs, centres[first_fibre:])
+    faults = interface_pairs.faults(case, torus) + arc_selection.fibre_faults(case, centres[is_fibre])
     moved = debonded_arcs.NOT_MOVED
     if case.arcs and not faults:
-        nodes = InterfaceNodes.of(torus, lattice, first_fibre, centres)
+        nodes = InterfaceNodes.of(torus, lattice, pairs, numbers, centres)
         moved = nodes.moved_tips(case)
         faults = arc_selection.faults(case, nodes, moved)
     if faults:
@@ -188,7 +198,7 @@ def distribute(
     wanted = wanted_pieces(case, np.bincount(parts), _outer_edges(torus, parts), lattice, n_ranks, policy)
     decomposition = decompose(torus, parts, wanted, n_ranks)
     submeshes = list(cut(torus, decomposition.subdomain))
-    shared = share_entities(torus, submeshes, decomposition.rank, lattice.intervals - 1, n_ranks)
+    shared = share_entities(torus, pairs, submeshes, decomposition.rank, lattice.intervals - 1, n_ranks)
     summary = CellSummary(
         width=mesh.width,
         height=mesh.height,
@@ -197,13 +207,14 @@ def distribute(
         subdomains=len(submeshes),
         coarse_triangles=len(mesh.triangles),
         interface_edge=process_zone.longest_edge(mesh),
-        first_fibre=first_fibre,
+        numbers=numbers,
+        is_fibre=is_fibre,
         constituent_phase=torus.constituent_phase,
         centres=centres,
         radii=circles[:, 2],
         moved_tips=dict(moved),
         snapped=mesh.snapped,
-        match_distance=_match_distance(case, mesh, centres[first_fibre:], circles[first_fibre:, 2]),
+        match_distance=_match_distance(case, mesh, centres[is_fibre], circles[is_fibre, 2]),
     )
     own: list[list[Submesh]] = [[] for _ in range(n_ranks)]
     for submesh, rank in zip(submeshes, decomposition.rank, strict=True):

@@ -73,7 +73,7 @@ class EnergyReleaseRates:
         """Collective."""
         nodes, matrix = interface.nodes, cell.summary.phases[0]
         self.cell, self.interface, self._period = cell, interface, cell.summary.period
-        neighbours = InterfaceNeighbours(cell.comm, cell.solver.jump_operator, cell.subdomains, matrix)
+        neighbours = InterfaceNeighbours(cell.comm, cell.solver.jump_operator, cell.subdomains)
         self._chains = InterfaceChains(neighbours.adjacency)
         self._extension = CrackExtension(cell.subdomains, matrix, self._period)
         self.points, self.fibre = self._gathered(nodes.points), self._gathered(nodes.fibre)

@@ -11,7 +11,7 @@ from feti_homog.typing import Float
 
 
 class FibreInterfaces:
-    """The interfaces of the f fibres of a cell with the matrix, in the order of their numbers.
+    """The interfaces of the f fibres of a cell, in the order of their numbers; a coated fibre may have two.
 
     A node stands for its tributary length; so does a debonded one.
     """
@@ -21,8 +21,9 @@ class FibreInterfaces:
         self._comm, self._nodes = cell.comm, cell.solver.jump_operator.nodes
         self._fibres = cell.summary.fibres
         self._fibre = cell.summary.fibre_number(self._nodes.fibre) - 1
-        radius = cell.summary.radii[cell.summary.first_fibre :]
         self._length = self._sums(self._nodes.length)
+        of_coating = self._sums(self._nodes.length * ~cell.summary.is_fibre[self._nodes.fibre])
+        radius = np.where(of_coating > 0, np.nan, cell.summary.radii[cell.summary.fibre_bodies])
         round_fibre = np.degrees(1.0 / np.where(np.isnan(radius), 1.0, radius))
         self._degrees = np.where(np.isnan(radius), 360.0 / np.where(self._length > 0, self._length, 1.0), round_fibre)
 
@@ -31,7 +32,8 @@ class FibreInterfaces:
         return self._sums(self._nodes.length * (status != BONDED))
 
     def angle(self, length: Float) -> Float:
-        """(f,) degrees of arc of lengths (f,); of a fibre that is not round 360 times the share of its interface."""
+        """(f,) degrees of arc of lengths (f,); of a fibre that is not round, or whose coating has an interface too, 360
+        times the share of its interfaces."""
         return np.asarray(length * self._degrees)
 
     def share(self, length: Float) -> float:

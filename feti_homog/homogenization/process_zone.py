@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from feti_homog.cell.coarse_mesh import CoarseMesh
-from feti_homog.cell.interface_edges import can_debond, interface_edges
+from feti_homog.cell.interface_edges import interface_edges
 from feti_homog.config.case import Case
 from feti_homog.config.materials import plane_stiffness
 from feti_homog.mechanics.bounds import engineering_moduli
@@ -19,24 +19,23 @@ LARGEST_REFINE, SMALLEST_SIZE = 8, 1e-5
 
 
 def longest_edge(mesh: CoarseMesh) -> float:
-    """The longest edge between a fibre and the matrix; 0 if there is none."""
-    pairs = interface_edges(mesh)
-    ends = mesh.points[pairs[can_debond(mesh, pairs)]]
+    """The longest edge between phases; 0 if there is none."""
+    ends = mesh.points[interface_edges(mesh)]
     return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max(initial=0.0))
 
 
 def process_zone(case: Case) -> float | None:
-    """The length E' G_Ic / sigma_c^2 of bonds that break by energy, sigma_c = sqrt(2 k_n G_Ic); None of others.
+    """The length E' G_Ic / sigma_c^2 of bonds that break by energy, sigma_c = sqrt(2 k_n G_Ic), of several interfaces
+    the least; None of others.
 
     E' is Young's modulus of the plane state, E / (1 - nu^2) in plane strain, of the most compliant phase, which the
     matrix is in general, and of its most compliant axis.
     """
-    bond = case.interface
-    if bond is None or bond.criterion != "energy" or bond.normal_stiffness is None or bond.toughness is None:
+    lengths = [1 / (2 * bond.normal_stiffness) for bond in case.interfaces if bond.toughness and bond.normal_stiffness]
+    if case.interface is None or case.interface.criterion != "energy" or not lengths:
         return None
     moduli = [engineering_moduli(plane_stiffness(m, case.analysis.plane)) for m in case.materials.values()]
-    strength = math.sqrt(2 * bond.normal_stiffness * bond.toughness)
-    return min(min(m.E1, m.E2) for m in moduli) * bond.toughness / strength**2
+    return min(min(m.E1, m.E2) for m in moduli) * min(lengths)
 
 
 def warnings(case: Case, width: float, edge: float) -> list[str]:

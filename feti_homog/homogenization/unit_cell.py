@@ -79,8 +79,11 @@ class TornCell:
         """
         nodes = self.solver.jump_operator.nodes
         number, moved = self.summary.fibre_number(nodes.fibre), self.summary.moved_tips
-        cracks = nodes.precracked & (self.case.interface is not None)
-        return cracks | debonded_arcs.debonded(self.case.arcs, opening, number, self.directions, moved)
+        found = nodes.precracked & bool(self.case.interfaces)
+        for pair, interface in enumerate(self.case.interfaces):
+            inside = debonded_arcs.debonded(interface.debonded, opening, number, self.directions, moved)
+            found |= inside & (nodes.pair == pair)
+        return np.asarray(found)
 
     def areas(self) -> dict[str, float]:
         """Meshed area of each phase; collective."""

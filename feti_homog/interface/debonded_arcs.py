@@ -94,13 +94,14 @@ def _ends(arc: Arc, half: float, fibre: Int, moved: MovedTips) -> Float:
     return ends
 
 
-def faults(arcs: Sequence[Arc], centres: Float) -> list[str]:
-    """What is wrong with arcs on a cell whose fibres have these centres (fibres, 2), NaN where there is none."""
+def faults(arcs: Sequence[Arc], centres: Float, label: str = "interface") -> list[str]:
+    """What is wrong with the arcs of the interface of this label on a cell whose fibres have these centres (fibres, 2),
+    NaN where there is none."""
     found = []
     for place, arc in enumerate(arcs):
         chosen = range(1, len(centres) + 1) if isinstance(arc.fibre, str) else arc.fibre
         written = arc.fibre if isinstance(arc.fibre, str) or len(arc.fibre) > 1 else arc.fibre[0]
-        line = f"[interface] debonded[{place}].fibre = {toml_value(written)}: "
+        line = f"[{label}] debonded[{place}].fibre = {toml_value(written)}: "
         if max(chosen, default=0) > len(centres):
             found.append(f"{line}expected at most {len(centres)}; the cell has {len(centres)} fibres, counted from 1")
         winding = [number for number in chosen if number <= len(centres) and np.isnan(centres[number - 1, 0])]

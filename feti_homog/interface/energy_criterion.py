@@ -5,6 +5,7 @@ Tavara, Mantic, Graciani, Paris, Eng. Anal. Bound. Elem. 35 (2011) 207; the mode
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,7 +14,8 @@ import numpy as np
 
 from feti_homog.interface.contact import Status
 from feti_homog.interface.loaded_cell import LoadedCell
-from feti_homog.typing import Float
+from feti_homog.interface.strength_criterion import at_nodes
+from feti_homog.typing import Float, Int
 
 
 @dataclass(frozen=True)
@@ -25,6 +27,8 @@ class EnergyCriterion:
 
     A traction along the fibre adds G_III = t_a^2 / (2 k_a) to G_II: all shear counts alike.
 
+    The attributes are those of all nodes, or (k,) of each.
+
     Attributes:
         normal_stiffness, tangential_stiffness: k_n and k_t, stress per length.
         toughness: G_Ic, energy per area.
@@ -32,11 +36,15 @@ class EnergyCriterion:
         axial_stiffness: k_a, along the fibre.
     """
 
-    normal_stiffness: float
-    tangential_stiffness: float
-    toughness: float
-    mode_sensitivity: float
-    axial_stiffness: float = math.inf
+    normal_stiffness: float | Float
+    tangential_stiffness: float | Float
+    toughness: float | Float
+    mode_sensitivity: float | Float
+    axial_stiffness: float | Float = math.inf
+
+    def at(self, node: Int) -> EnergyCriterion:
+        """That of the nodes (p,), one after the other."""
+        return EnergyCriterion(*(at_nodes(getattr(self, each.name), node) for each in dataclasses.fields(self)))
 
     def law(self, cell: LoadedCell, status: Status) -> Callable[[Float], Float]:
         """`utilisation`, whatever is debonded."""

@@ -38,7 +38,8 @@ class TipEnergies:
     tips: Tips
 
     def utilisation(self, springs: EnergyCriterion, traction: Float, tip: Int) -> Float:
-        """(p,) sqrt of what the breaks of bonds release / (G_c l), for tractions (p, c) at the tips (p,)."""
+        """(p,) sqrt of what the breaks of bonds release / (G_c l), for tractions (p, c) at the tips (p,), of which
+        `springs` are."""
         tips = self.tips.chosen(tip)
         released = tips.released(traction, contact=False)
         return np.asarray(np.sqrt(released / (springs.toughness * tips.length)) * springs.mode_factor(traction))
@@ -71,27 +72,29 @@ class OnsetCriterion:
 
     def utilisation(self, traction: Float, node: Int) -> Float:
         """(p,) share of what breaks them that tractions (p, c) at the nodes (p,) use; 0 of debonded ones."""
-        used = self.bonds.utilisation(traction)
-        if self.tips is not None and isinstance(self.bonds, EnergyCriterion):
+        bonds = self.bonds.at(node)
+        used = bonds.utilisation(traction)
+        if self.tips is not None and isinstance(bonds, EnergyCriterion):
             tip = self.tips.number[node]
             at = np.flatnonzero(tip >= 0)
-            used[at] = self.tips.utilisation(self.bonds, traction[at], tip[at])
+            used[at] = self.tips.utilisation(bonds.at(at), traction[at], tip[at])
         return np.where(self.bonded[node], used, 0.0)
 
     def factors(self, ahead: Float, least: Float, before: Float | None = None) -> Float:
         """(n, k) the f >= 0 at which each bond breaks under each of n rays of tractions `before` (k, c) + f `ahead`
         (n, k, c); inf where none does, or where it is not the first by far.
 
-        Utilisations by `ahead` of at most `least` (n,) are none.  `before` alone breaks nothing.
+        Utilisations by `ahead` of at most `least`, (n,) or (n, k), are none.  `before` alone breaks nothing.
         """
         n, k, c = ahead.shape
         ray, node = np.divmod(np.arange(n * k), max(k, 1))
         used, found = self.utilisation(ahead.reshape(-1, c), node), np.full(n * k, np.inf)
-        loaded = np.flatnonzero(used > least[ray])
+        loaded = np.flatnonzero(used > np.broadcast_to(least.reshape(n, -1), (n, k)).ravel())
         if before is None:
             found[loaded] = 1.0 / used[loaded]
         elif isinstance(self.bonds, StrengthCriterion):
-            found[loaded] = self.bonds.factor(before[node[loaded]], ahead.reshape(-1, c)[loaded])
+            bonds = self.bonds.at(node[loaded])
+            found[loaded] = bonds.factor(before[node[loaded]], ahead.reshape(-1, c)[loaded])
         else:
             rays = _Rays(before[node[loaded]], ahead.reshape(-1, c)[loaded], node[loaded], ray[loaded])
             found[loaded] = self._searched(rays, used[loaded], n)

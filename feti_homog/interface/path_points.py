@@ -101,7 +101,7 @@ def fracture_energy(cell: LoadedCell, criterion: BondCriterion, which: Bool, tra
     springs = spring_criterion(criterion)
     if springs is None:
         return 0.0
-    energy = float(springs.fracture_toughness(traction[which]) @ cell.nodes.length[which])
+    energy = float(springs.at(np.flatnonzero(which)).fracture_toughness(traction[which]) @ cell.nodes.length[which])
     return float(cell.comm.allreduce(energy) / cell.area)
 
 

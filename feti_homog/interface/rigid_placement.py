@@ -14,6 +14,7 @@ import numpy as np
 from mpi4py import MPI
 from scipy.sparse import csr_matrix
 
+from feti_homog.cell.periodic_topology import components
 from feti_homog.common.mpi_errors import on_root
 from feti_homog.errors import ConvergenceError
 from feti_homog.feti.coarse.natural import NaturalCoarseSpace
@@ -50,7 +51,8 @@ class Placement:
 
 @dataclass(frozen=True)
 class _Fibres:
-    """On rank 0, of all open nodes: the change of gap and slip with each free motion, (k, motions), and the fibre."""
+    """On rank 0, of all open nodes: the change of gap and slip with each free motion, (k, motions), and the fibre; a
+    fibre and its coating, which may part too, are one."""
 
     is_open: Bool
     opening: Float
@@ -134,13 +136,21 @@ def _decided_on_root(
     """decide(fibres, *gaps, noise) of rank 0, with the gaps of all nodes, on every rank; collective."""
     free = csr_matrix(coarse.unconstrained_modes)
     opening, slip = (np.asarray((coarse.G[nodes.row + i] @ free).todense()) for i in range(2))
-    parts = comm.gather((is_open, opening, slip, nodes.fibre, *gaps))
+    parts = comm.gather((is_open, opening, slip, nodes.bodies, *gaps))
 
     def decided() -> T:
         whole = [np.concatenate(p) for p in zip(*(parts or []), strict=True)]
-        return decide(_Fibres(*whole[:4]), *whole[4:], noise)
+        return decide(_Fibres(whole[0], whole[1], whole[2], _moving_together(whole[3])), *whole[4:], noise)
 
     return on_root(comm, decided)
+
+
+def _moving_together(bodies: Array) -> Array:
+    """(k,) labels of the inner of the two bodies (k, 2) of each node; those whose gaps depend on each other's motions
+    have the same."""
+    outer, inner = bodies.T
+    between = np.isin(outer, inner)
+    return np.asarray(components(int(bodies.max(initial=0)) + 1, outer[between], inner[between])[inner])
 
 
 def _place_all(fibres: _Fibres, gap: Float, noise: float) -> tuple[Float, Bool]:

@@ -10,12 +10,14 @@ import numpy as np
 
 from feti_homog.interface.contact import Status
 from feti_homog.interface.loaded_cell import LoadedCell
-from feti_homog.typing import Float
+from feti_homog.typing import Float, Int
 
 
 @dataclass(frozen=True)
 class StrengthCriterion:
     """Limits of the traction on a bonded face, force per area; compression never breaks a bond.
+
+    Strengths are those of all nodes, or (k,) of each.
 
     Attributes:
         normal, tangential: strengths R^n and R^t, inf where there is none.
@@ -24,10 +26,15 @@ class StrengthCriterion:
         axial: strength R^a along the fibre, whose share |t_a| / R^a counts like the others.
     """
 
-    normal: float
-    tangential: float
+    normal: float | Float
+    tangential: float | Float
     criterion: str
-    axial: float = math.inf
+    axial: float | Float = math.inf
+
+    def at(self, node: Int) -> StrengthCriterion:
+        """That of the nodes (p,), one after the other."""
+        normal, tangential, axial = (at_nodes(value, node) for value in (self.normal, self.tangential, self.axial))
+        return StrengthCriterion(normal, tangential, self.criterion, axial)
 
     def law(self, cell: LoadedCell, status: Status) -> Callable[[Float], Float]:
         """`utilisation`, whatever is debonded."""
@@ -48,12 +55,13 @@ class StrengthCriterion:
         """(k, c) what each component of tractions (k, c) is of its strength."""
         pulls = np.abs(traction)
         pulls[:, 0] = np.maximum(traction[:, 0], 0.0)
-        return np.asarray(pulls / self.limits[: traction.shape[1]])
+        return np.asarray(pulls / self.limits[..., : traction.shape[1]])
 
     def factor(self, before: Float, ahead: Float) -> Float:
         """(k,) the least f >= 0 at which `before` + f `ahead`, tractions (k, c), break; inf where none does.  `before`
         breaks nothing."""
-        s, ds = before / self.limits[: before.shape[1]], ahead / self.limits[: before.shape[1]]
+        limits = self.limits[..., : before.shape[1]]
+        s, ds = before / limits, ahead / limits
         if self.criterion == "max":
             towards = np.abs(ds)
             towards[:, 0] = np.maximum(ds[:, 0], 0.0)
@@ -67,8 +75,13 @@ class StrengthCriterion:
 
     @property
     def limits(self) -> Float:
-        """(3,) the strengths."""
-        return np.array([self.normal, self.tangential, self.axial])
+        """(3,) or (k, 3) the strengths."""
+        return np.stack(np.broadcast_arrays(self.normal, self.tangential, self.axial), axis=-1)
+
+
+def at_nodes(value: float | Float, node: Int) -> float | Float:
+    """A value of all nodes, or those (k,) of each, at the nodes (p,)."""
+    return value[node] if isinstance(value, np.ndarray) else value
 
 
 def _largest_root(s: Float, ds: Float) -> Float:

@@ -77,12 +77,14 @@ class TipCriterion:
         """The utilisation (k,) of tractions (k, c) on the interface nodes of this rank, with these bonds.  Collective;
         what it returns is not."""
         tips = self.tips(cell, status)
-        own, whole = tips.node, self.springs.toughness * tips.length
+        own = tips.node
+        springs = self.springs.at(own)
+        whole = springs.toughness * tips.length
 
         def utilisation(traction: Float) -> Float:
             used = self.springs.utilisation(traction)
             released = tips.released(traction[own], cell.plane.contact)
-            used[own] = np.sqrt(released / whole) * self.springs.mode_factor(traction[own])
+            used[own] = np.sqrt(released / whole) * springs.mode_factor(traction[own])
             return used
 
         return utilisation
@@ -93,8 +95,8 @@ class TipCriterion:
         numbers, mine = self._own(status)
         H = self.influence.inverse_blocks(self.influence.neighbours.rows[numbers][:, None] + np.arange(2))
         own, H = numbers[mine] - self.influence.neighbours.first, H[mine]
-        length, springs = cell.nodes.length[own], self.springs
-        stiffness = length[:, None] * [springs.normal_stiffness, springs.tangential_stiffness]
+        length, springs = cell.nodes.length[own], self.springs.at(own)
+        stiffness = np.stack([length * springs.normal_stiffness, length * springs.tangential_stiffness], axis=1)
         stiffness, axial = np.minimum(stiffness, self.influence.norm), np.zeros(0)
         if self.axial is not None and cell.axial is not None:
             cell.axial.solver.activate(cell.axial.active(status))

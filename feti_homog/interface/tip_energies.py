@@ -39,6 +39,7 @@ def tip_energies(
     everywhere = np.concatenate(neighbours.comm.allgather(status))
     beside = (neighbours.adjacency @ (everywhere != BONDED) > 0)[neighbours.first :][: len(status)]
     node = np.flatnonzero((status == BONDED) & beside)
-    energy = used[node] ** 2 * springs.fracture_toughness(traction[node])
-    mode = springs.mode_angle(traction[node])
+    own = springs.at(node)
+    energy = used[node] ** 2 * own.fracture_toughness(traction[node])
+    mode = own.mode_angle(traction[node])
     return TipEnergies(node, energy * np.cos(mode) ** 2, energy * np.sin(mode) ** 2, np.degrees(mode))

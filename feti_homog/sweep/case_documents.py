@@ -62,16 +62,36 @@ def _with_values(base: Mapping[str, Any], point: Assignment, faults: list[str]) 
     for path, value in point.items():
         table = document
         for name in path[:-1]:
-            table = table.setdefault(name, {})
-            if not isinstance(table, dict):
+            table = _entry(table, name)
+            if table is None:
                 faults.append(f"[{SWEEP}] {dotted_key(path)}: {toml_value(name)} is no section")
                 return document
+        if isinstance(table, list):
+            faults.append(f"[{SWEEP}] {dotted_key(path)}: {_several(path, table)}")
+            return document
         last = path[-1]
         if isinstance(value, dict) and isinstance(table.get(last, {}), dict):
             table[last] = table.get(last, {}) | value
         else:
             table[last] = value
     return document
+
+
+def _entry(table: Any, name: str) -> Any:
+    """The table or the list of tables of this name, a new one if there is none, and of a list the table of this number,
+    from 1; None if there is something else."""
+    if isinstance(table, list):
+        is_one = name.isdecimal() and 0 < int(name) <= len(table)
+        found = table[int(name) - 1] if is_one else None
+    else:
+        found = table.setdefault(name, {})
+    return found if isinstance(found, dict | list) else None
+
+
+def _several(path: Sequence[str], tables: Sequence[Any]) -> str:
+    """What is wrong with a key of several sections of one name."""
+    section, key = dotted_key(path[:-1]), path[-1]
+    return f"there are {len(tables)} sections [[{section}]]; expected {section}.1.{key} or the like"
 
 
 def _realisation_faults(documents: Sequence[dict[str, Any]], points: Sequence[Assignment]) -> list[str]:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -24,12 +23,12 @@ def check_arcs(ledger: Ledger, cell: DiscreteCell, states: Sequence[StateNumbers
     In a user's mesh a curve may be debonded that is not in the files, so that only the first is known.
     """
     document, case = cell.files.document, cell.files.case
-    arcs, from_mesh = case.get("interface", {}).get("debonded", ()), case["cell"]["geometry"] == "mesh"
+    from_mesh = case["cell"]["geometry"] == "mesh"
     points = document.get("angle", ())
     for state in states:
         # A number that is wrong breaks the law of the tables.
         opening = points[min(max(state.point, 0), len(points) - 1)]["angle"] if points else None
-        inside, outside = _sides(cell, arcs, opening)
+        inside, outside = _sides(cell, opening)
         bonded = state.status == BONDED
         ledger.record("arcs", np.count_nonzero(inside & bonded), f"{state.name}, bonded within arcs")
         # The first state of a path by events is the one at which the first bonds break.
@@ -38,12 +37,13 @@ def check_arcs(ledger: Ledger, cell: DiscreteCell, states: Sequence[StateNumbers
             ledger.record("arcs", np.count_nonzero(outside & ~bonded), f"{state.name}, debonded outside of arcs")
 
 
-def _sides(cell: DiscreteCell, arcs: Sequence[Mapping[str, Any]], opening: float | None) -> tuple[Bool, Bool]:
+def _sides(cell: DiscreteCell, opening: float | None) -> tuple[Bool, Bool]:
     """Which interface nodes (k,) are inside of an arc, and which are outside of all of them."""
     rows, angle = cell.files.interface, directions(cell)
     inside, outside = np.zeros(len(angle), bool), np.ones(len(angle), bool)
-    for arc in arcs:
-        own = np.ones(len(angle), bool) if arc["fibre"] == "all" else np.isin(rows.fibre, arc["fibre"])
+    arcs = [(n, arc) for n, section in enumerate(cell.files.interfaces) for arc in section.get("debonded", ())]
+    for pair, arc in arcs:
+        own = (rows.pair == pair) & ((arc["fibre"] == "all") | np.isin(rows.fibre, arc["fibre"]))
         half = (arc["angle"] if arc.get("angle") is not None else float(opening or 0.0)) / 2
         away = np.abs((angle - arc["centre"] + 180.0) % 360.0 - 180.0)
         inside |= own & ((away < half - AT_TIP) | (half >= 180.0))

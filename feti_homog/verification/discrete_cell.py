@@ -10,6 +10,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from feti_homog.typing import Bool, Float, Int
+from feti_homog.verification.bonds import inwardness, pairs_of
 from feti_homog.verification.constitutive_law import expansions, plane_stiffnesses, spatial_stiffnesses
 from feti_homog.verification.elements import Elements
 from feti_homog.verification.reading import ResultFiles
@@ -35,10 +36,10 @@ class Faces:
 
     Attributes:
         row: (b,) the interface node at the place of each torn node, -1 if there is none.
-        is_fibre: (b,) whether the torn node belongs to a fibre.
+        is_fibre: (b,) whether the torn node belongs to a fibre, the inner of the two bodies.
         copies: (b,) how many copies of the torn node its subdomain has, periodic images of each other.
         distance: (k,) of each interface node from its place, infinite if there is no such place.
-        breakable: (places,) whether exactly one fibre and the matrix meet there.
+        pair: (places,) place of the section of the two bodies that meet there alone; -1 where they never part.
         place: (k,) of each interface node, -1 if there is none.
     """
 
@@ -46,7 +47,7 @@ class Faces:
     is_fibre: Bool
     copies: Int
     distance: Float
-    breakable: Bool
+    pair: Int
     place: Int
 
     def sums(self, values: Float, of_fibre: bool) -> Float:
@@ -70,6 +71,7 @@ class DiscreteCell:
         stiffnesses: (phases, v, v), v = 3 or in generalized plane strain 6.
         expansions: (phases, v) strains per unit of temperature, or None if they are not known.
         constituent: (subdomains,) part of a phase that each subdomain belongs to.
+        inner: (s,) which of the torn sides are the inner faces of bonds that may break.
         fractions: (phases,) shares of the meshed area.
         radius: how near copies of a node are.
         largest_strain: the largest component of the strains of all states.
@@ -82,6 +84,7 @@ class DiscreteCell:
     sides: TornSides
     nodes: TornNodes
     constituent: Int
+    inner: Bool
     faces: Faces
     fractions: Float
     radius: float
@@ -96,22 +99,22 @@ class DiscreteCell:
         elements = Elements(mesh, stiffnesses)
         sides, nodes, radius = torn(mesh, files.size)
         parts = constituents(mesh, sides)
-        faces = _faces(files, nodes, parts, radius)
+        inwards = inwardness(mesh, files.phases, sides, parts)
+        faces = _faces(files, nodes, parts, inwards, radius)
+        inner = _inner_sides(files, sides, inwards[parts[mesh.subdomain]])
         areas = np.bincount(mesh.phase, elements.area, len(files.phases))
         strains = [np.abs(state.attrs["strain"]).max() for state in files.file.get("state", {}).values()]
         largest = float(np.max(strains, initial=0.0))
         return cls(
-            files, stiffnesses, free, elements, sides, nodes, parts, faces, areas / areas.sum(), radius, largest
+            files, stiffnesses, free, elements, sides, nodes, parts, inner, faces, areas / areas.sum(), radius, largest
         )  # fmt: skip
 
     @cached_property
     def beside(self) -> Int:
         """(e, 2) interface nodes that lie beside each other."""
-        sides, phase = self.sides, self.files.mesh.phase
-        outer = (phase[sides.element] > 0) & (sides.partner >= 0) & (phase[sides.element[sides.partner]] == 0)
         row_of = np.full(len(self.files.mesh.points), -1)
         row_of[self.nodes.node] = self.faces.row
-        rows = row_of[sides.nodes[outer]]
+        rows = row_of[self.sides.nodes[self.inner]]
         along = rows[:, [0, 2, 2, 1]] if rows.shape[1] == 3 else rows
         pairs = along.reshape(-1, 2)
         return np.asarray(pairs[(pairs >= 0).all(axis=1)])
@@ -161,12 +164,24 @@ def gradient(strain: Float) -> Float:
     return np.array(plane if len(strain) == 3 else [*plane, strain[[4, 3]]])
 
 
-def _faces(files: ResultFiles, nodes: TornNodes, parts: Int, radius: float) -> Faces:
-    """Where the interface nodes of a result are on its mesh."""
-    is_fibre = np.asarray(nodes.phase > 0)
-    members = np.unique(np.column_stack([nodes.place, parts[nodes.subdomain], is_fibre]), axis=0)
-    meeting = [np.bincount(members[members[:, 2] == kind, 0], minlength=nodes.places) for kind in (0, 1)]
-    breakable = np.asarray((meeting[0] == 1) & (meeting[1] == 1))
+def _inner_sides(files: ResultFiles, sides: TornSides, inwards: Int) -> Bool:
+    """(s,) whether a torn side faces a body farther outwards from which it may part; `inwards` (m,) of the elements."""
+    phase, other = files.mesh.phase, sides.element[sides.partner]
+    may_part = (sides.partner >= 0) & (pairs_of(files)[phase[sides.element], phase[other]] >= 0)
+    return np.asarray(may_part & (inwards[sides.element] > inwards[other]))
+
+
+def _faces(files: ResultFiles, nodes: TornNodes, parts: Int, inwards: Int, radius: float) -> Faces:
+    """Where the interface nodes of a result are on its mesh; `inwards` (parts,) as `inwardness` has it."""
+    depth = inwards[parts[nodes.subdomain]]
+    members = np.unique(np.column_stack([nodes.place, depth, nodes.phase]), axis=0)
+    two = np.flatnonzero(np.bincount(members[:, 0], minlength=nodes.places) == 2)
+    outer, inner = np.searchsorted(members[:, 0], two), np.searchsorted(members[:, 0], two, side="right") - 1
+    pair = np.full(nodes.places, -1)
+    pair[two] = pairs_of(files)[members[outer, 2], members[inner, 2]]
+    innermost = np.zeros(nodes.places, np.int64)
+    innermost[two] = members[inner, 1]
+    is_fibre = np.asarray((pair[nodes.place] >= 0) & (depth == innermost[nodes.place]))
     points, size = files.interface.points, files.size
     place, distance = np.full(len(points), -1), np.full(len(points), np.inf)
     if len(points) and len(nodes.node):
@@ -180,4 +195,4 @@ def _faces(files: ResultFiles, nodes: TornNodes, parts: Int, radius: float) -> F
         nodes.place * (int(nodes.subdomain.max(initial=0)) + 1) + nodes.subdomain,
         return_inverse=True, return_counts=True,
     )  # fmt: skip
-    return Faces(row_of[nodes.place], is_fibre, count[which.ravel()], distance, breakable, place)
+    return Faces(row_of[nodes.place], is_fibre, count[which.ravel()], distance, pair, place)

@@ -16,7 +16,7 @@ from functools import cache, cached_property
 import numpy as np
 
 from feti_homog.typing import Float, Int
-from feti_homog.verification.reading import Mesh
+from feti_homog.verification.cell_tables import Mesh
 
 ELEMENTS_AT_ONCE = 1 << 15
 # Gradients of so many numbers are kept from state to state: 400 MB.

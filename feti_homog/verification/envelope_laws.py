@@ -10,6 +10,7 @@ import numpy as np
 
 from feti_homog.typing import Float
 from feti_homog.verification.arc_laws import directions
+from feti_homog.verification.bonds import bonds_of
 from feti_homog.verification.discrete_cell import DiscreteCell
 from feti_homog.verification.interface_laws import BONDED, mode, shares, utilisation
 from feti_homog.verification.ledger import Ledger, relative
@@ -28,7 +29,7 @@ class _Bonds:
     """Tractions and utilisations under any load, from the states of the unit loads."""
 
     def __init__(self, cell: DiscreteCell, states: Sequence[StateNumbers]) -> None:
-        self.section = cell.files.case["interface"]
+        self.section = bonds_of(cell.files)
         self._loads = np.array([[*state.strain, state.temperature] for state in states]).T
         self._unit = np.stack([state.traction for state in states])
         status = states[0].status
@@ -64,9 +65,9 @@ def check_envelope(ledger: Ledger, cell: DiscreteCell, states: Sequence[StateNum
             of_strains = asked["plane"][0] in NAMES[len(stiffness)][0]
             strain = unit if of_strains else np.linalg.solve(stiffness, unit)
             least = NOISE_PER_RTOL * float(document["solver"]["rtol"]) * np.abs(stiffness @ strain).max()
-            noise = utilisation(bonds.section, np.full((1, bonds.traction(strain, 0.0).shape[1]), least))[0]
-            largest = bonds.used(bonds.traction(strain, 0.0)).max(initial=0.0)
-            ledger.record("onset", 0.0 if largest <= noise else np.inf, f"{at}, where some load breaks a bond")
+            traction = bonds.traction(strain, 0.0)
+            over = bonds.used(traction) > utilisation(bonds.section, np.full_like(traction, least))
+            ledger.record("onset", np.inf if over.any() else 0.0, f"{at}, where some load breaks a bond")
 
 
 def _unit(plane: Sequence[str], angle: float, count: int) -> Float:
@@ -109,7 +110,7 @@ def _check_bonds(ledger: Ledger, cell: DiscreteCell, bonds: _Bonds, point: Point
     node = int(np.flatnonzero(here)[np.argmax(used[here])])
     if not is_tip:
         ledger.record("strength", (largest - used[node]) / largest, f"{at}, fibre and bond_angle")
-    for name, value in _mode(bonds.section, traction[node : node + 1]).items():
+    for name, value in _mode(bonds_of(cell.files, np.array([node])), traction[node : node + 1]).items():
         ledger.record("onset", abs(point[name] - value) / (90.0 if name == "psi" else 1.0), f"{at}.{name}")
 
 

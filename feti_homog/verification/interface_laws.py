@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.typing import Float
+from feti_homog.verification.bonds import bonds_of
 from feti_homog.verification.discrete_cell import DiscreteCell
 from feti_homog.verification.field_laws import in_axes, largest_displacement
 from feti_homog.verification.ledger import Ledger, relative
@@ -34,14 +35,15 @@ def check_interface_state(ledger: Ledger, cell: DiscreteCell, state: State) -> N
 
 def spring_jumps(cell: DiscreteCell, state: State) -> Float:
     """(k, c) what elastic bonds give way: traction / stiffness."""
-    section = cell.files.case.get("interface", {})
-    return np.asarray(state.traction / _along_fibres(section, "stiffness")[: state.traction.shape[1]])
+    stiffness = _along_fibres(bonds_of(cell.files), "stiffness")
+    return np.asarray(state.traction / stiffness[..., : state.traction.shape[1]])
 
 
 def _along_fibres(section: Mapping[str, Any], what: str) -> Float:
-    """(3,) normal, tangential and axial stiffness or strength; the last is by default the second."""
-    normal, tangential = (section.get(f"{name}_{what}") or np.inf for name in ("normal", "tangential"))
-    return np.array([normal, tangential, section.get(f"axial_{what}") or tangential], float)
+    """(3,) or (k, 3) normal, tangential and axial stiffness or strength; the last is by default the second."""
+    normal, tangential = (section.get(f"{name}_{what}", np.inf) for name in ("normal", "tangential"))
+    components = normal, tangential, section.get(f"axial_{what}", tangential)
+    return np.stack(np.broadcast_arrays(*(np.asarray(value, float) for value in components)), axis=-1)
 
 
 def utilisation(section: Mapping[str, Any], traction: Float) -> Float:
@@ -57,7 +59,7 @@ def utilisation(section: Mapping[str, Any], traction: Float) -> Float:
 
 def shares(section: Mapping[str, Any], traction: Float) -> Float:
     """(k, c) what each component uses of its strength."""
-    return np.asarray(_pulls(traction) / _along_fibres(section, "strength")[: traction.shape[1]])
+    return np.asarray(_pulls(traction) / _along_fibres(section, "strength")[..., : traction.shape[1]])
 
 
 def _pulls(traction: Float) -> Float:
@@ -68,7 +70,7 @@ def _pulls(traction: Float) -> Float:
 def spring_energies(section: Mapping[str, Any], traction: Float) -> Float:
     """(k, 2) G_I = <t_n>^2 / (2 k_n) and G_II = t_t^2 / (2 k_t) of tractions (k, 2); t_a^2 / (2 k_a) adds to the
     latter."""
-    energies = _pulls(traction) ** 2 / (2 * _along_fibres(section, "stiffness")[: traction.shape[1]])
+    energies = _pulls(traction) ** 2 / (2 * _along_fibres(section, "stiffness")[..., : traction.shape[1]])
     return np.column_stack([energies[:, 0], energies[:, 1:].sum(axis=1)])
 
 
@@ -80,8 +82,8 @@ def mode(section: Mapping[str, Any], traction: Float) -> Float:
 
 def toughness(section: Mapping[str, Any], psi: Float) -> Float:
     """(k,) G_c = G_Ic [1 + tan^2((1 - lambda) psi)]."""
-    turned = (1 - float(section["mode_sensitivity"])) * psi
-    return np.asarray(float(section["toughness"]) * (1 + np.tan(turned) ** 2))
+    turned = (1 - np.asarray(section["mode_sensitivity"], float)) * psi
+    return np.asarray(np.asarray(section["toughness"], float) * (1 + np.tan(turned) ** 2))
 
 
 def _energy_share(section: Mapping[str, Any], traction: Float) -> Float:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.typing import AnyInt, Bool, Float
+from feti_homog.verification.bonds import bonds_of
 from feti_homog.verification.discrete_cell import DiscreteCell
 from feti_homog.verification.elements import ElementFields
 from feti_homog.verification.interface_laws import BONDED, CLOSED, OPEN, spring_jumps, utilisation
@@ -70,7 +71,7 @@ class StateNumbers:
     @classmethod
     def of(cls, cell: DiscreteCell, state: State, fields: ElementFields) -> StateNumbers:
         """Those of a state of a cell."""
-        section = cell.files.case.get("interface", {})
+        section = bonds_of(cell.files)
         used = np.where(state.status == BONDED, utilisation(section, state.traction), 0.0)
         if section.get("growth") == "released":
             used[tips(cell, state.status)] = np.nan

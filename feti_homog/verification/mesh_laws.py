@@ -18,16 +18,19 @@ def check_mesh(ledger: Ledger, cell: DiscreteCell) -> None:
 
 
 def check_interface(ledger: Ledger, cell: DiscreteCell) -> None:
-    """Each place where one fibre meets the matrix has one interface node, of that fibre, and there are no others."""
+    """Each place where two bodies meet that may part has one interface node, of the inner one and of their section,
+    and there are no others."""
     rows, faces = cell.files.interface, cell.faces
     at = "interface node {}".format
     ledger.record("interface", faces.distance / cell.files.size.max(), at)
     count = np.bincount(faces.place[faces.place >= 0], minlength=cell.nodes.places)
-    wrong = np.flatnonzero(count != faces.breakable)
+    wrong = np.flatnonzero(count != (faces.pair >= 0))
     first = [int(cell.nodes.node[np.argmax(cell.nodes.place == place)]) for place in wrong[:1]]
     words = f"{len(wrong)} places with another number of interface nodes than one, the first at mesh node {first}"
     ledger.record("interface", np.where(len(wrong), np.inf, 0.0), words)
     ledger.record("interface", _strangers(cell), at)
+    misplaced = (faces.place >= 0) & (rows.pair != faces.pair[faces.place])
+    ledger.record("interface", np.where(misplaced, np.inf, 0.0), at)
     if (faces.place >= 0).all():
         normal, length, is_round = _shape(cell)
         turned, longer = np.hypot(*(rows.normal - normal).T), rows.length / length
@@ -46,14 +49,15 @@ def _shape(cell: DiscreteCell) -> tuple[Float, Float, Bool]:
     one sixth, and its middle two thirds.
     """
     files, sides, rows = cell.files, cell.sides, cell.files.interface
-    inner = cell.files.mesh.phase[sides.element] > 0
-    inner &= (cell.files.mesh.phase[sides.element[sides.partner]] == 0) & (sides.partner >= 0)
+    inner = cell.inner
+    # A coating has the number of its fibre and another radius.
+    own_radius = np.where(_is_fibre(cell), files.fibres.radius[rows.fibre - 1], np.nan)
     row_of = np.full(len(files.mesh.points), -1)
     row_of[cell.nodes.node] = cell.faces.row
     row = row_of[sides.nodes[inner]]
     chord = np.hypot(*sides.normal[inner].T)
     # A side whose nodes are no interface nodes belongs to none of them.
-    radius = files.fibres.radius[rows.fibre[row.max(axis=1)] - 1]
+    radius = own_radius[row.max(axis=1)]
     arc = np.where(np.isnan(radius), chord, 2 * radius * np.arcsin(np.minimum(chord / (2 * radius), 1.0)))
     shares = np.array([0.5, 0.5] if row.shape[1] == 2 else [1 / 6, 1 / 6, 2 / 3])
     known = row >= 0
@@ -61,8 +65,8 @@ def _shape(cell: DiscreteCell) -> tuple[Float, Float, Bool]:
     length = np.bincount(row[known], (arc[:, None] * shares)[known], k)
     parts = sides.normal[inner][:, None] * shares[:, None]
     normal = np.stack([np.bincount(row[known], part[known], k) for part in np.moveaxis(parts, 2, 0)], axis=1)
-    centre, is_round = files.fibres.centre[rows.fibre - 1], ~np.isnan(files.fibres.radius[rows.fibre - 1])
-    radial = from_centre(rows.points, centre, files.size) / files.fibres.radius[rows.fibre - 1][:, None]
+    centre, is_round = files.fibres.centre[rows.fibre - 1], ~np.isnan(own_radius)
+    radial = from_centre(rows.points, centre, files.size) / own_radius[:, None]
     flat = normal / np.hypot(*normal.T)[:, None]
     return np.asarray(np.where(is_round[:, None], radial, flat)), np.asarray(length, float), np.asarray(is_round)
 
@@ -73,9 +77,17 @@ def from_centre(points: Float, centres: Float, size: Float) -> Float:
     return np.asarray(away - np.round(away / size) * size)
 
 
+def _is_fibre(cell: DiscreteCell) -> Bool:
+    """(k,) whether the inner body is the fibre of the number itself, not a coating of it."""
+    rows, fibres = cell.files.interface, cell.files.fibres
+    return np.asarray(rows.body == fibres.body[rows.fibre - 1])
+
+
 def _strangers(cell: DiscreteCell) -> Float:
-    """(k,) with how many nodes each shares its fibre on the mesh, or its number of the fibre, but not the other."""
-    nodes, faces, fibre = cell.nodes, cell.faces, cell.files.interface.fibre
+    """(k,) with how many nodes each shares its body on the mesh, or its label of the body and number of the fibre, but
+    not the other."""
+    nodes, faces, rows = cell.nodes, cell.faces, cell.files.interface
+    fibre = rows.fibre + (int(rows.fibre.max(initial=0)) + 1) * rows.body.astype(np.int64)
     own = (faces.row >= 0) & faces.is_fibre
     part = np.full(len(fibre), -1)
     part[faces.row[own]] = cell.constituent[nodes.subdomain[own]]

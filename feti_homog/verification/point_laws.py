@@ -10,6 +10,7 @@ import numpy as np
 
 from feti_homog.typing import Float, Int
 from feti_homog.verification.arc_laws import directions
+from feti_homog.verification.bonds import bonds_of
 from feti_homog.verification.discrete_cell import DiscreteCell
 from feti_homog.verification.interface_laws import BONDED, mode, spring_energies, toughness
 from feti_homog.verification.ledger import Ledger, relative
@@ -45,7 +46,7 @@ def _check_path(
         if not point.get("temperature"):
             off = point["stored"] - float(np.dot(point["strain"], point["stress"])) / 2
             ledger.record("energy", relative(np.array(off), scale), f"path[{number}].stored")
-    if cell.files.case.get("interface", {}).get("criterion") == "energy":
+    if cell.files.by_energy:
         _check_ratios(ledger, points)
         _check_toughness(ledger, cell, known, points, cell.files.case["path"]["method"] == "events")
         for state in known:
@@ -55,7 +56,8 @@ def _check_path(
 def tip_shares(cell: DiscreteCell, state: StateNumbers, told: Mapping[str, Sequence[float]]) -> tuple[Int, Float]:
     """(t,) the tips of a state, by fibre and direction, and sqrt(G / G_c) by what is told of them; none, if of other
     tips."""
-    section, node = cell.files.case["interface"], _tips_in_order(cell, state)
+    node = _tips_in_order(cell, state)
+    section = bonds_of(cell.files, node)
     if len(told["G_I"]) != len(node) or len(told["G_II"]) != len(node):
         return node[:0], np.zeros(0)
     energy = np.array(told["G_I"]) + np.array(told["G_II"])
@@ -65,7 +67,8 @@ def tip_shares(cell: DiscreteCell, state: StateNumbers, told: Mapping[str, Seque
 def _tips_in_order(cell: DiscreteCell, state: StateNumbers) -> Int:
     node = np.flatnonzero(tips(cell, state.status))
     turned = np.round(_directions(cell)[node], DIRECTION_DIGITS)
-    return np.asarray(node[np.lexsort((turned, cell.files.interface.fibre[node]))])
+    rows = cell.files.interface
+    return np.asarray(node[np.lexsort((turned, rows.pair[node], rows.fibre[node]))])
 
 
 def _directions(cell: DiscreteCell) -> Float:
@@ -83,8 +86,10 @@ def _check_debonding(ledger: Ledger, cell: DiscreteCell, state: StateNumbers, po
         np.bincount(rows.fibre - 1, weights, len(fibres.radius))
         for weights in (rows.length, rows.length * (state.status != BONDED))
     )
-    angle = np.where(np.isnan(fibres.radius), 360.0 * debonded / np.where(whole > 0, whole, 1.0), 0.0)
-    angle += np.where(np.isnan(fibres.radius), 0.0, np.degrees(debonded / fibres.radius))
+    coated = np.bincount(rows.fibre - 1, rows.body != fibres.body[rows.fibre - 1], len(fibres.radius)) > 0
+    radius = np.where(coated, np.nan, fibres.radius)
+    angle = np.where(np.isnan(radius), 360.0 * debonded / np.where(whole > 0, whole, 1.0), 0.0)
+    angle += np.where(np.isnan(radius), 0.0, np.degrees(debonded / radius))
     share = debonded.sum() / (whole.sum() or 1.0)
     expected = {"debonded_length": debonded, "debonding_angle": np.nan_to_num(angle), "debonded_share": share}
     scales = {"debonded_length": float(whole.max(initial=0.0)), "debonding_angle": 360.0, "debonded_share": 1.0}
@@ -106,24 +111,26 @@ def _check_toughness(
 ) -> None:
     """The fracture energy grows with the length that breaks: by G_c in the mode of the state before, if that is in the
     files, else by between G_Ic and G_c in pure shear."""
-    section, length = cell.files.case["interface"], cell.files.interface.length / cell.area
+    length = cell.files.interface.length / cell.area
     scale = max(points[-1]["fracture_energy"], 1e-300)
     ledger.record("energy", points[0]["fracture_energy"] * by_events / scale, "path[0].fracture_energy")
     for state, after in pairwise(states):
         grown = points[after.point]["fracture_energy"] - points[state.point]["fracture_energy"]
         broken = (state.status == BONDED) & (after.status != BONDED)
+        section = bonds_of(cell.files, broken)
         if by_events and after.point == state.point + 1:
             low = high = float(toughness(section, mode(section, state.traction[broken])) @ length[broken])
         else:
-            ends = toughness(section, np.array([0.0, np.pi / 2]))
-            low, high = (float(end * length[broken].sum()) for end in ends)
+            modes = np.zeros(int(broken.sum())), np.full(int(broken.sum()), np.pi / 2)
+            low, high = (float(toughness(section, psi) @ length[broken]) for psi in modes)
         off = max(low - grown, grown - high, 0.0)
         ledger.record("energy", off / scale, f"{after.name}, fracture_energy")
 
 
 def _check_tips(ledger: Ledger, cell: DiscreteCell, state: StateNumbers, told: Mapping[str, Sequence[float]]) -> None:
     """The tips are the bonds beside broken ones, in the mode of their tractions; by springs also with their energy."""
-    section, node = cell.files.case["interface"], _tips_in_order(cell, state)
+    node = _tips_in_order(cell, state)
+    section = bonds_of(cell.files, node)
     fibre, where = cell.files.interface.fibre[node], f"{state.name}, tip {{}}".format
     if list(told["fibre"]) != fibre.tolist() or any(len(values) != len(node) for values in told.values()):
         ledger.record("tables", np.inf, f"{state.name}, tips")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +14,7 @@ import numpy as np
 
 from feti_homog.errors import CaseError
 from feti_homog.typing import AnyInt, Float, Int
+from feti_homog.verification.cell_tables import Fibres, InterfaceRows, Mesh
 from feti_homog.verification.checksums import is_as_written, seal_of
 
 JSON, FIELDS = "result.json", "result.h5"
@@ -27,50 +28,8 @@ DERIVED: dict[str, tuple[Any, ...]] = {
 }  # fmt: skip
 # In generalized plane strain stresses 33 are among the stresses, and there are strains along the fibres.
 SPATIAL_DERIVED = {name: shape for name, shape in DERIVED.items() if name != "stress_33"} | {"axial_strain": ("m", 2)}
+ROWS = ("points", "normal", "length", "fibre_number", "fibre", "pair")
 MISSING_FIELDS = "only a run with `fields = true` in [output] leaves what there is to verify"
-
-
-@dataclass(frozen=True)
-class Mesh:
-    """n nodes and m elements; each subdomain has nodes of its own.
-
-    Attributes:
-        points: (n, 2).
-        triangles: (m, 3 or 6) vertices, then the nodes on the sides 01, 12, 20.
-        subdomain, phase: (m,) of the elements; phase 0 is the matrix.
-    """
-
-    points: Float
-    triangles: Int
-    subdomain: AnyInt
-    phase: AnyInt
-
-
-@dataclass(frozen=True)
-class InterfaceRows:
-    """The k interface nodes.
-
-    Attributes:
-        points: (k, 2).
-        normal: (k, 2) from fibre to matrix.
-        length: (k,) tributary length.
-        fibre: (k,) number of the fibre, from 1.
-    """
-
-    points: Float
-    normal: Float
-    length: Float
-    fibre: AnyInt
-
-
-@dataclass(frozen=True)
-class Fibres:
-    """The f fibres by number: numbers and phases (f,), centres (f, 2), radii (f,); NaN where there is none."""
-
-    number: AnyInt
-    phase: AnyInt
-    centre: Float
-    radius: Float
 
 
 @dataclass(frozen=True)
@@ -147,7 +106,17 @@ class ResultFiles:
     @property
     def contact(self) -> bool:
         """Whether debonded faces must not overlap."""
-        return bool(self.case.get("interface", {}).get("contact", False))
+        return any(section.get("contact", False) for section in self.interfaces)
+
+    @property
+    def interfaces(self) -> Sequence[Mapping[str, Any]]:
+        """The sections of interfaces; none of perfect bonding."""
+        return _interfaces(self.case)
+
+    @property
+    def by_energy(self) -> bool:
+        """Whether bonds break by energy."""
+        return any(section.get("criterion") == "energy" for section in self.interfaces)
 
     def states(self) -> Iterator[State]:
         """The states in their order, one in memory at a time."""
@@ -247,9 +216,9 @@ def _document(path: Path) -> Mapping[str, Any]:
 
 def _contents(document: Mapping[str, Any], file: h5py.File, altered: tuple[str, ...]) -> ResultFiles:
     """The whole of both files but the states."""
-    mesh = Mesh(*(_rows(file[f"mesh/{name}"]) for name in ("points", "triangles", "subdomain", "phase")))
-    rows = InterfaceRows(*(_rows(file[f"interface/{name}"]) for name in ("points", "normal", "length", "fibre_number")))
-    fibres = Fibres(*(_rows(file[f"fibre/{name}"]) for name in ("number", "phase", "centre", "radius")))
+    mesh = Mesh(*(_rows(file[f"mesh/{name}"]) for name in ("points", "triangles", "subdomain", "phase", "body")))
+    rows = InterfaceRows(*(_rows(file[f"interface/{name}"]) for name in ROWS))
+    fibres = Fibres(*(_rows(file[f"fibre/{name}"]) for name in ("number", "body", "phase", "centre", "radius")))
     faces = np.stack([_rows(file[f"interface/{name}"]) for name in ("fibre_node", "matrix_node")], axis=1)
     size = np.array([file.attrs["width"], file.attrs["height"]], float)
     phases = tuple(map(str, file.attrs["phases"]))
@@ -257,16 +226,34 @@ def _contents(document: Mapping[str, Any], file: h5py.File, altered: tuple[str, 
     _expect(mesh.points.shape == (n, 2) and n > 0, "/mesh/points is no table of positions")
     _expect(mesh.triangles.shape in ((m, 3), (m, 6)) and m > 0, "/mesh/triangles is no table of triangles")
     _expect(bool((mesh.triangles >= 0).all() and (mesh.triangles < n).all()), "/mesh/triangles names unknown nodes")
-    _expect(mesh.subdomain.shape == mesh.phase.shape == (m,), "/mesh has labels of another number of elements")
+    _expect(
+        mesh.subdomain.shape == mesh.phase.shape == mesh.body.shape == (m,),
+        "/mesh has labels of another number of elements",
+    )
     _expect(bool((mesh.phase >= 0).all() and (mesh.phase < len(phases)).all()), "/mesh/phase names unknown phases")
     _expect(rows.points.shape == rows.normal.shape == (k, 2), "/interface has tables of different lengths")
-    _expect(rows.length.shape == rows.fibre.shape == (k,), "/interface has tables of different lengths")
+    lengths = {table.shape for table in (rows.length, rows.fibre, rows.body, rows.pair)}
+    _expect(lengths == {(k,)}, "/interface has tables of different lengths")
+    _expect_known_pairs(_interfaces(document["case"]), rows, phases)
+    _expect(len(fibres.body) == len(fibres.radius), "/fibre has tables of different lengths")
     _expect(fibres.centre.shape == (len(fibres.radius), 2), "/fibre has tables of different lengths")
     _expect(faces.shape == (k, 2), "/interface has tables of different lengths")
     _expect(bool((faces >= 0).all() and (faces < n).all()), "/interface names unknown nodes")
     within = (rows.fibre >= 1) & (rows.fibre <= len(fibres.radius))
     _expect(bool(within.all()), "/interface/fibre_number names unknown fibres")
     return ResultFiles(document, size, phases, mesh, rows, fibres, faces, file, altered)
+
+
+def _expect_known_pairs(sections: Sequence[Mapping[str, Any]], rows: InterfaceRows, phases: tuple[str, ...]) -> None:
+    known = (rows.pair >= 0) & (rows.pair < max(len(sections), 1))
+    _expect(bool(known.all()), "/interface/pair names unknown interfaces")
+    named = {name for section in sections for name in section.get("between", ())}
+    _expect(named <= set(phases), "the case has interfaces between unknown phases")
+
+
+def _interfaces(case: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
+    sections = case.get("interface", [])
+    return sections if isinstance(sections, list) else [sections]
 
 
 def _rows(table: h5py.Dataset) -> Any:

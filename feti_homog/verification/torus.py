@@ -10,8 +10,8 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from feti_homog.typing import Float, Int
+from feti_homog.verification.cell_tables import Mesh
 from feti_homog.verification.elements import SIDES
-from feti_homog.verification.reading import Mesh
 
 # Places nearer than this share of the shortest side are one.
 SAME_PLACE = 1e-2

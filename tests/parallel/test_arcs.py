@@ -41,7 +41,7 @@ def torn(case, comm):
     """The torn cell; number, direction and state of all interface nodes by the opening, on every rank."""
     PETSc.garbage_cleanup(comm)
     cell = tear(case, comm, Progress(comm, quiet=True))
-    number = cell.solver.jump_operator.nodes.fibre - cell.summary.first_fibre + 1
+    number = cell.summary.fibre_number(cell.solver.jump_operator.nodes.fibre)
 
     def nodes(opening=None):
         parts = comm.allgather((number, cell.directions, cell.debonded(opening)))
@@ -70,7 +70,7 @@ def check(comm, case, nodes, cell, arcs, opening=None):
     """Tips are bonded nodes, and a chain of e edges of M intervals has e M - 1 debonded nodes."""
     number, direction, state = nodes(opening)
     edges = comm.bcast(edges_inside(case, arcs) if comm.rank == 0 else None)
-    for fibre in range(1, len(cell.summary.centres) - cell.summary.first_fibre + 1):
+    for fibre in range(1, cell.summary.fibres + 1):
         own = number == fibre
         for centre, angle in arcs.get(fibre, []):
             for tip in (centre - angle / 2, centre + angle / 2):
@@ -88,7 +88,7 @@ def check(comm, case, nodes, cell, arcs, opening=None):
 def test_tips_are_nodes_and_stay_bonded(comm, cell, mesh, bodies):
     case = case_of(cell | mesh | {"bodies": bodies}, [ARC])
     cell, nodes = torn(case, comm)
-    fibres = len(cell.summary.centres) - cell.summary.first_fibre
+    fibres = cell.summary.fibres
     check(comm, case, nodes, cell, {fibre: [(0.0, 60.0)] for fibre in range(1, fibres + 1)})
 
 

@@ -145,7 +145,10 @@ SMALL_PIECES = PartitionPolicy(piece_dofs=100, max_pieces=50, breakable_boundary
 
 def wanted(load, edges, interface=None, n_ranks=1, refine=0, policy=SMALL_PIECES):
     """Default pieces of bodies of so many triangles and outer edges."""
-    case, lattice = replace(make_case(refine=refine), interface=interface), ReferenceLattice.of(refine, 1)
+    case, lattice = (
+        replace(make_case(refine=refine), interfaces=() if interface is None else (interface,)),
+        ReferenceLattice.of(refine, 1),
+    )
     return wanted_pieces(case, np.array(load), np.array(edges), lattice, n_ranks, policy).tolist()
 
 
@@ -183,7 +186,7 @@ def test_every_rank_has_a_piece(interface):
 
 def torn_by_default(comm, interface, policy=SMALL_PIECES):
     """A cell of two fibres and a matrix; the bodies of its pieces and the triangles of the largest piece."""
-    case = replace(make_case(geometry="hexagonal", mesh_size=0.1), interface=interface)
+    case = replace(make_case(geometry="hexagonal", mesh_size=0.1), interfaces=() if interface is None else (interface,))
     cell = unit_cell.tear(case, comm, Progress(comm, quiet=True), policy=policy)
     own = comm.allgather([s.submesh.body for s in cell.subdomains])
     largest = comm.allreduce(max((len(s.submesh.triangles) for s in cell.subdomains), default=0), MPI.MAX)

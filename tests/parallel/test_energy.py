@@ -204,7 +204,7 @@ def test_a_tip_releases_its_toughness(comm):
 def test_every_interface_node_has_a_neighbour_on_either_side(comm, case):
     cell = torn_cells.tear(comm, **case)
     nodes = cell.solver.jump_operator.nodes
-    found = InterfaceNeighbours(comm, cell.solver.jump_operator, cell.subdomains, "matrix")
+    found = InterfaceNeighbours(comm, cell.solver.jump_operator, cell.subdomains)
     points, fibre = (np.concatenate(comm.allgather(values)) for values in (nodes.points, nodes.fibre))
     degree = np.asarray(found.adjacency.sum(axis=1)).ravel()
     # Where the boundary of the cell cuts a fibre in two bodies the tips of both parts end there.
@@ -222,7 +222,7 @@ def test_the_inverse_blocks_are_those_of_the_solver(comm):
     """H_ii of two bonds, by the solver's own solution of what their release changes."""
     cell = torn_cells.tear(comm, geometry="square", mesh_size=0.2, **CELL)
     interface = torn_cells.interface(cell, False)
-    neighbours = InterfaceNeighbours(comm, cell.solver.jump_operator, cell.subdomains, "matrix")
+    neighbours = InterfaceNeighbours(comm, cell.solver.jump_operator, cell.subdomains)
     status = np.full(len(interface.nodes.row), BONDED, np.int8)
     strain, start = np.array([0.02, 0.005, 0.01]), np.zeros(cell.solver.rows)
     for released in (3, 7):

@@ -37,6 +37,11 @@ MESH_CELL = (
     'geometry = "mesh"\nfile = "cell.msh"',
 )
 
+TABLE_CELL = (
+    MESH_CELL[0],
+    'geometry = "table"\nwidth = 1.0\nheight = 1.0\nfibre_list = [{x = 0.5, y = 0.5, radius = 0.3}]',
+)
+
 
 def changed(*edits: tuple[str, str], end: str = "") -> str:
     """The right case with its words exchanged and lines added at its end."""

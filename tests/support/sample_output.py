@@ -133,7 +133,7 @@ def _interface(mesh: MeshPart) -> InterfacePart:
     points, length, fibre = np.concatenate(sides), np.full(10, 0.125), np.ones(10, int)
     in_fibre, in_matrix = (_nodes_at(mesh, points, body) for body in (1, 0))
     vertex = np.arange(10)[:, None]
-    return InterfacePart(points, np.concatenate(normals), length, fibre, fibre, in_fibre, vertex, in_matrix)
+    return InterfacePart(points, np.concatenate(normals), length, fibre, fibre, 0 * fibre, in_fibre, vertex, in_matrix)
 
 
 def _nodes_at(mesh: MeshPart, points: np.ndarray, body: int) -> np.ndarray:

@@ -61,7 +61,7 @@ def tear(comm, arcs=(), thresholds=DEFAULTS, springs=(None, None), **case):
     PETSc.garbage_cleanup(comm)
     normal, tangential = springs
     bonding = sections.InterfaceSection(debonded=tuple(arcs), normal_stiffness=normal, tangential_stiffness=tangential)
-    case = replace(make_case(**case), interface=bonding)
+    case = replace(make_case(**case), interfaces=() if bonding is None else (bonding,))
     with case_options(case.petsc):
         return unit_cell.tear(case, comm, Progress(comm, quiet=True), thresholds)
 

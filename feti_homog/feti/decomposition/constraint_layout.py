@@ -25,6 +25,7 @@ class InterfaceNodes:
         normal: (k, 2) from fibre to matrix; the tangent is (-n_y, n_x).
         length: (k,) tributary interface length: traction = nodal force / length.
         fibre: (k,) constituent.
+        pair: (k,) interface of the case.
         bodies: (k, 2) the body around the fibre, and the fibre's own.
         precracked: (k,) whether the mesh has it debonded from the start.
         fibre_node: (k,) the fibre's copy among the fine nodes of this rank.
@@ -35,6 +36,7 @@ class InterfaceNodes:
     normal: Float
     length: Float
     fibre: Int
+    pair: Int
     bodies: Int
     precracked: Bool
     fibre_node: Int
@@ -168,7 +170,7 @@ class ConstraintLayout:
         share = np.where((p % 2 == 0) & shared.is_edge[entity], 4, 2) / 3 if quadratic else np.ones(len(p))
         share = share * np.where(shared.is_edge[entity], 1.0, 0.5)
         positions = np.concatenate([_class_points(s) for s in self.subdomains] or [np.zeros((0, 2))])
-        # Sharers are sorted by body, so the last one is the fibre's, and it is this rank's, which owns the rows.
+        # Sharers are sorted inwards, so the last one is the fibre's, and it is this rank's, which owns the rows.
         copy = self.base[shared.pointer[entity + 1] - 1] + p
         return InterfaceNodes(
             row=self._owned_row[entity] + self.components * ((p + 1) * (k - 1) - 1),
@@ -176,26 +178,30 @@ class ConstraintLayout:
             normal=self._normals(entity, p),
             length=share * shared.length[entity] / m,
             fibre=shared.fibre[entity],
+            pair=shared.pair[entity],
             bodies=shared.body[np.stack([shared.pointer[entity], shared.pointer[entity + 1] - 1], axis=1)],
             precracked=shared.precracked[entity],
             fibre_node=copy,
         )
 
-    def copies(self) -> Int:
-        """(local rows, 2) how many copies matrix and fibre have where a row is between them; 0 of other rows."""
+    def facing(self) -> tuple[Int, Int]:
+        """(local rows, 2) how many copies matrix and fibre, the outer and the inner of two bodies, have where a row is
+        between them, and (local rows,) the inner body; 0 and -1 of other rows."""
         shared = self.shared
         entity = np.repeat(np.arange(len(shared.key)), shared.copies)
-        # Sharers are sorted by body: the first is the matrix's.
-        is_matrix = shared.body == shared.body[shared.pointer[:-1]][entity]
-        of_matrix = np.bincount(entity[is_matrix], minlength=len(shared.key))
-        breakable = np.flatnonzero(shared.fibre >= 0)
-        e, p = expand(breakable, shared.nodes[breakable])
+        # Sharers are sorted inwards: the first is the matrix's.
+        outer, inner = shared.body[shared.pointer[:-1]], shared.body[shared.pointer[1:] - 1]
+        of_outer, of_inner = (
+            np.bincount(entity[shared.body == own[entity]], minlength=len(outer)) for own in (outer, inner)
+        )
+        two = np.flatnonzero((outer != inner) & (of_outer + of_inner == shared.copies))
+        e, p = expand(two, shared.nodes[two])
         row = self.first[e] + self.components * ((p + 1) * (shared.copies[e] - 1) - 1)
-        found = np.zeros((len(self.rows), 2), np.int64)
-        copies = np.stack([of_matrix[e], shared.copies[e] - of_matrix[e]], axis=1)
+        copies, inside = np.zeros((len(self.rows), 2), np.int64), np.full(len(self.rows), -1)
         for component in range(self.components):
-            found[row + component] = copies
-        return found
+            copies[row + component] = np.stack([of_outer[e], of_inner[e]], axis=1)
+            inside[row + component] = inner[e]
+        return copies, inside
 
     def matrix_copies(self) -> tuple[Int, Int]:
         """The breakable nodes of which this rank has the matrix's first copy: the local row of the bond of each, and

@@ -1,4 +1,4 @@
-"""Where fibres meet the matrix: normals and lengths of the shared vertices and edges, and which may break."""
+"""Where two bodies meet whose bond may break: normals and lengths of the shared vertices and edges."""
 
 from __future__ import annotations
 
@@ -12,18 +12,21 @@ from feti_homog.typing import Bool, Float, Int
 
 @dataclass(frozen=True)
 class InterfaceGeometry:
-    """Of n shared entities; the attributes are those of `SharedEntities`, 0 where fibres do not meet the matrix."""
+    """Of n shared entities; the attributes are those of `SharedEntities`, 0 where no bond may break."""
 
     fibre: Int
+    pair: Int
     normal: Float
     length: Float
     precracked: Bool
 
 
-def interface_geometry(torus: Torus, key: Int, is_edge: Bool, pointer: Int, body: Int) -> InterfaceGeometry:
-    """Fibre, normals, length and precrack of n shared entities; arguments as in `SharedEntities`."""
-    fibre = _breakable_fibre(torus, pointer, body)
-    edge, normal, length = _edge_geometry(torus)
+def interface_geometry(torus: Torus, pairs: Int, key: Int, is_edge: Bool, pointer: Int, body: Int) -> InterfaceGeometry:
+    """Fibre, normals, length and precrack of n shared entities; arguments as in `SharedEntities`, and `pairs` as in
+    `share_entities`."""
+    pair = _breakable_pairs(torus, pairs, pointer, body)
+    fibre = np.where(pair >= 0, body[pointer[1:] - 1], -1)
+    edge, normal, length = _edge_geometry(torus, pairs)
     n_edges, n_classes = torus.torus_edge.max() + 1, torus.node_class.max() + 1
     edge_normal, edge_length = np.zeros((n_edges, 2, 2)), np.zeros(n_edges)
     edge_normal[edge], edge_length[edge] = normal, length
@@ -43,25 +46,25 @@ def interface_geometry(torus: Torus, key: Int, is_edge: Bool, pointer: Int, body
     lengths[~is_edge], lengths[is_edge] = vertex_length[vertices], edge_length[edges]
     precracked = np.empty(len(key), bool)
     precracked[~is_edge], precracked[is_edge] = bonded_edges_at[vertices] == 0, ~bonded[edges]
-    return InterfaceGeometry(fibre, normals, lengths, precracked & (fibre >= 0))
+    return InterfaceGeometry(fibre, pair, normals, lengths, precracked & (fibre >= 0))
 
 
-def _breakable_fibre(torus: Torus, pointer: Int, body: Int) -> Int:
-    """(n,) the fibre of the entities where one fibre and the matrix meet and no third body, else -1."""
-    is_fibre = torus.constituent_phase > 0
-    low, high = body[pointer[:-1]], body[pointer[1:] - 1]
+def _breakable_pairs(torus: Torus, pairs: Int, pointer: Int, body: Int) -> Int:
+    """(n,) the interface of the two bodies that meet there; -1 where it never parts or a third body meets them."""
+    outer, inner = body[pointer[:-1]], body[pointer[1:] - 1]
     copies = np.diff(pointer)
-    third = (body != np.repeat(low, copies)) & (body != np.repeat(high, copies))
+    third = (body != np.repeat(outer, copies)) & (body != np.repeat(inner, copies))
     thirds = np.bincount(np.repeat(np.arange(len(copies)), copies), third, len(copies))
-    return np.where((thirds == 0) & ~is_fibre[low] & is_fibre[high], high, -1)
+    phase = torus.constituent_phase
+    return np.where((thirds == 0) & (outer != inner), pairs[phase[outer], phase[inner]], -1)
 
 
-def _edge_geometry(torus: Torus) -> tuple[Int, Float, Float]:
-    """Torus edges between a fibre and the matrix, their normals at start and end, and their (arc) lengths."""
-    mesh, is_fibre = torus.mesh, torus.constituent_phase > 0
+def _edge_geometry(torus: Torus, pairs: Int) -> tuple[Int, Float, Float]:
+    """Torus edges whose bonds may break, their normals at start and end, and their (arc) lengths."""
+    mesh, body = torus.mesh, torus.constituent
     left, right = edge_pairs(torus.triangle_torus_edges)
-    mixed = is_fibre[torus.constituent[left]] != is_fibre[torus.constituent[right]]
-    fibre = np.where(is_fibre[torus.constituent[left]], left, right)[mixed]
+    mixed = pairs[mesh.phase[left], mesh.phase[right]] >= 0
+    fibre = np.where(torus.nesting[body[left]] > torus.nesting[body[right]], left, right)[mixed]
     edge = shared_edges(torus.triangle_torus_edges)[mixed]
     k = np.argmax(torus.triangle_torus_edges[fibre] == edge[:, None], axis=1)
     start, end = mesh.triangles[fibre, k], mesh.triangles[fibre, (k + 1) % 3]

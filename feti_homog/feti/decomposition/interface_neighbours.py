@@ -25,17 +25,16 @@ class InterfaceNeighbours:
         adjacency: (n, n) 1 between neighbours.
     """
 
-    def __init__(
-        self, comm: MPI.Intracomm, jump_operator: JumpOperator, subdomains: Sequence[Subdomain], matrix: str
-    ) -> None:
-        """`matrix` is the name of its phase.  Collective."""
+    def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, subdomains: Sequence[Subdomain]) -> None:
+        """Collective."""
         own = jump_operator.owned[0] + jump_operator.nodes.row
         if (np.diff(own) <= 0).any():
             raise ValueError("the interface nodes of a rank are not in the order of their rows")
         self.comm = comm
         self.rows: Int = np.concatenate(comm.allgather(own))
         self.first = int(np.searchsorted(self.rows, own[0])) if len(own) else 0
-        pairs = np.concatenate(comm.allgather(self._pairs(jump_operator, subdomains, matrix)))
+        fibre = np.concatenate(comm.allgather(jump_operator.nodes.fibre))
+        pairs = np.concatenate(comm.allgather(self._pairs(jump_operator, subdomains, fibre)))
         # A side between two pieces of a fibre is no interface, though both its ends may be.
         pairs, count = np.unique(pairs, axis=0, return_counts=True)
         a, b = pairs[count == 1].T
@@ -43,16 +42,16 @@ class InterfaceNeighbours:
         entries = np.ones(2 * len(a)), (np.concatenate([a, b]), np.concatenate([b, a]))
         self.adjacency: csr_matrix = coo_matrix(entries, shape=(n, n)).tocsr()
 
-    def _pairs(self, jump_operator: JumpOperator, subdomains: Sequence[Subdomain], matrix: str) -> Int:
-        """(e, 2) numbers, the lower first, of neighbours on the outer sides of this rank's fibres."""
+    def _pairs(self, jump_operator: JumpOperator, subdomains: Sequence[Subdomain], fibre: Int) -> Int:
+        """(e, 2) numbers, the lower first, of neighbours on the outer sides of this rank's fibres; `fibre` (n,) is that
+        of each node."""
         number = self._node_numbers(jump_operator)
         found, first = [np.zeros((0, 2), np.int64)], 0
         for s in subdomains:
             nodes = first + s.mesh.node_class[s.mesh.triangles]
             first += s.mesh.n_classes
-            if s.submesh.phase == matrix:
-                continue
-            sides = np.sort(number[nodes[:, SIDES[nodes.shape[1]]].reshape(-1, 2)], axis=1)
+            own = np.where((number >= 0) & (fibre[number] == s.submesh.body), number, -1) if len(fibre) else number
+            sides = np.sort(own[nodes[:, SIDES[nodes.shape[1]]].reshape(-1, 2)], axis=1)
             pairs, count = np.unique(sides[sides[:, 0] >= 0], axis=0, return_counts=True)
             found.append(pairs[count == 1])
         return np.concatenate(found)

@@ -15,16 +15,17 @@ class InterfaceSprings:
     """Traction = stiffness x jump at every node that holds, in tension and compression.
 
     Attributes:
-        stiffness: stress per opening and per slip, or per slip along the fibre; infinite ones are glue.
+        stiffness: of each interface of the case stress per opening and per slip, or per slip along the fibre;
+            infinite ones are glue.
     """
 
-    stiffness: tuple[float, ...]
+    stiffness: tuple[tuple[float, ...], ...]
 
     def compliance(self, jump_operator: JumpOperator) -> Float:
         """(owned rows,) C = 1 / (k l) of the rows of interface nodes with the tributary lengths l, 0 of all others."""
         nodes, C = jump_operator.nodes, np.zeros(jump_operator.owned[1] - jump_operator.owned[0])
-        for component, stiffness in enumerate(self.stiffness):
-            C[nodes.row + component] = 1.0 / (stiffness * nodes.length)
+        for component, stiffness in enumerate(zip(*self.stiffness, strict=True)):
+            C[nodes.row + component] = 1.0 / (np.array(stiffness)[nodes.pair] * nodes.length)
         return C
 
 

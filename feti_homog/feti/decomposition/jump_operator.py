@@ -33,7 +33,8 @@ class JumpOperator:
         nodes: the interface nodes that this rank owns.
         matrix_copies: local rows of the interface nodes of which this rank has a copy of the matrix, and these copies,
             as `ConstraintLayout.matrix_copies` has them.
-        copies: (local rows, 2) of matrix and fibre where a row is between them, 0 of other rows.
+        copies: (local rows, 2) of matrix and fibre where a row is between two bodies, 0 of other rows.
+        inside: (local rows,) the inner of these bodies, the fibre in general; -1 of other rows.
         owned: first global row of this rank and the one after its last.
         global_rows: number of rows on all ranks.
         shared: the vertices and edges that the rows belong to.
@@ -60,7 +61,7 @@ class JumpOperator:
         self.node_rows = layout.node_rows()
         self.nodes = layout.interface_nodes()
         self.matrix_copies = layout.matrix_copies()
-        self.copies = layout.copies()
+        self.copies, self.inside = layout.facing()
         self.vector = PETSc.Vec().createMPI((self.owned[1] - self.owned[0], self.global_rows), comm=comm)
         self._exchanges: dict[int, _Exchange] = {}
 

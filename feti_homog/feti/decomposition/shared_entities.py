@@ -26,9 +26,12 @@ class SharedEntities:
         is_edge: (n,) bool.
         nodes: (n,) fine nodes on the entity: 1, or the inner lattice nodes of an edge.
         first: (n,) number of its first vector constraint.
-        pointer, sharer: the subdomains that share entity i are sharer[pointer[i]:pointer[i + 1]], sorted by body.
+        pointer, sharer: the subdomains that share entity i are sharer[pointer[i]:pointer[i + 1]], sorted by body, from
+            the outermost to the innermost.
         body: constituent of each sharer.
-        fibre: (n,) the fibre that may debond here from the matrix, or -1 where nothing can break.
+        fibre: (n,) the body that may debond here from the one around it, a fibre or a coating in general; or -1 where
+            nothing can break.
+        pair: (n,) the interface of the case that these two bodies have, -1 where nothing can break.
         normal: (n, 2, 2) unit normals from fibre to matrix at the start and the end of the entity.
         length: (n,) interface length of the edge, or of all edges that meet in the vertex.
         precracked: (n,) whether the mesh has the edge, or all edges that meet in the vertex, debonded.
@@ -44,6 +47,7 @@ class SharedEntities:
     sharer: Int
     body: Int
     fibre: Int
+    pair: Int
     normal: Float
     length: Float
     precracked: Bool
@@ -68,6 +72,7 @@ class SharedEntities:
             sharer=self.sharer[sharers],
             body=self.body[sharers],
             fibre=self.fibre[mask],
+            pair=self.pair[mask],
             normal=self.normal[mask],
             length=self.length[mask],
             precracked=self.precracked[mask],
@@ -92,25 +97,27 @@ class _Sharers:
 
 
 def share_entities(
-    torus: Torus, submeshes: Sequence[Submesh], rank: Int, nodes_on_edge: int, n_ranks: int
+    torus: Torus, pairs: Int, submeshes: Sequence[Submesh], rank: Int, nodes_on_edge: int, n_ranks: int
 ) -> list[SharedEntities]:
     """The shared entities of each rank, in the order of ranks.
 
     An entity belongs to the rank of its last sharer; constraints are numbered rank by rank.
 
     Args:
+        pairs: (phases, phases) the interface of the case between two phases, -1 where they never part.
         rank: (s,) rank of each submesh.
         nodes_on_edge: fine nodes inside a coarse edge.
     """
-    found = _find_sharers(submeshes, edges_have_nodes=nodes_on_edge > 0)
+    body = np.array([s.body for s in submeshes])
+    found = _find_sharers(submeshes, torus.nesting[body], edges_have_nodes=nodes_on_edge > 0)
     owner = rank[found.sharer[found.pointer[1:] - 1]] if len(found.key) else np.zeros(0, np.int64)
     order = np.argsort(owner, kind="stable")
     found, owner = found.reordered(order), owner[order]
     copies = np.diff(found.pointer)
     nodes = np.where(found.is_edge, nodes_on_edge, 1)
     ends = np.r_[0, np.cumsum(nodes * (copies - 1))]
-    body = np.array([s.body for s in submeshes])[found.sharer]
-    interface = interface_geometry(torus, found.key, found.is_edge, found.pointer, body)
+    body = body[found.sharer]
+    interface = interface_geometry(torus, pairs, found.key, found.is_edge, found.pointer, body)
     whole = SharedEntities(
         key=found.key,
         is_edge=found.is_edge,
@@ -120,6 +127,7 @@ def share_entities(
         sharer=found.sharer,
         body=body,
         fibre=interface.fibre,
+        pair=interface.pair,
         normal=interface.normal,
         length=interface.length,
         precracked=interface.precracked,
@@ -136,23 +144,24 @@ def share_entities(
     return shares
 
 
-def _find_sharers(submeshes: Sequence[Submesh], edges_have_nodes: bool) -> _Sharers:
-    """The vertex classes, but for the pinned one, and the edges that several submeshes share."""
+def _find_sharers(submeshes: Sequence[Submesh], nesting: Int, edges_have_nodes: bool) -> _Sharers:
+    """The vertex classes, but for the pinned one, and the edges that several submeshes share; `nesting` (s,) is the
+    place of the body of each."""
     classes = [s.class_keys if s.pinned < 0 else np.delete(s.class_keys, s.pinned) for s in submeshes]
-    kinds = [_several(classes, submeshes)]
+    kinds = [_several(classes, nesting)]
     if edges_have_nodes:
-        kinds.append(_several([s.edge_keys for s in submeshes], submeshes))
+        kinds.append(_several([s.edge_keys for s in submeshes], nesting))
     key, copies, sharer = (np.concatenate(a) for a in zip(*kinds, strict=True))
     is_edge = np.repeat([False, True][: len(kinds)], [len(k[0]) for k in kinds])
     return _Sharers(key, is_edge, np.r_[0, np.cumsum(copies)], sharer)
 
 
-def _several(keys: Sequence[Int], submeshes: Sequence[Submesh]) -> tuple[Int, Int, Int]:
-    """Keys that several submeshes have, how many, and which: sorted by key, then body, then subdomain."""
+def _several(keys: Sequence[Int], nesting: Int) -> tuple[Int, Int, Int]:
+    """Keys that several submeshes have, how many, and which: sorted by key, then place (s,) of the body, then
+    subdomain."""
     sizes = [len(k) for k in keys]
     key, subdomain = np.concatenate(keys), np.repeat(np.arange(len(keys)), sizes)
-    body = np.repeat([s.body for s in submeshes], sizes)
-    order = np.lexsort((subdomain, body, key))
+    order = np.lexsort((subdomain, np.repeat(nesting, sizes), key))
     unique, which, count = np.unique(key[order], return_inverse=True, return_counts=True)
     several = count > 1
     return unique[several], count[several], subdomain[order][several[which]]

@@ -37,6 +37,7 @@ class InterfaceOperators:
         skins: the same for the preconditioner and the coarse space, to whom a fibre on springs has a soft skin.
         facewise: whether the soft modes of each are to be looked for face by face.
         B: (local rows, n) the constraints on them, and `BT` its transpose.
+        of_fibre: (n,) whether each boundary dof is a fibre's, or the inner of two bodies'.
         diagonal: (n,) of K, with springs that of their chain.
         compliance: (owned rows,) of the springs that no skin stands for, where fibre and matrix are both cut.
     """
@@ -66,6 +67,7 @@ class InterfaceOperators:
         sizes = _sizes(jump_operator.shared, subdomains, self.dofs)
         can_condense = bool(PETSc.Sys.hasExternalPackage("mumps"))
         self.compliance = _of_cut_nodes(jump_operator, compliance)
+        self.of_fibre = self._inner_dofs(jump_operator)
         roots = self._compliance_roots(jump_operator, compliance)
         springs = [s.submesh.phase != MATRIX and root is not None for s, root in zip(subdomains, roots, strict=True)]
         sizes = [replace(size, has_springs=has) for size, has in zip(sizes, springs, strict=True)]
@@ -89,10 +91,7 @@ class InterfaceOperators:
         if compliance is None or not self._any(jump_operator, compliance):
             return [None for _ in self.subdomains]
         local, copies = jump_operator.gather(compliance), jump_operator.copies
-        found = [
-            compliance_root(self.B[:, span], local, copies, subdomain.submesh.phase != MATRIX)
-            for subdomain, span in zip(self.subdomains, self.slices, strict=True)
-        ]
+        found = [compliance_root(self.B[:, span], local, copies, self.of_fibre[span]) for span in self.slices]
         return [root if root.shape[1] else None for root in found]
 
     @staticmethod
@@ -105,11 +104,15 @@ class InterfaceOperators:
         """The dofs of each subdomain among the n."""
         return [slice(a, b) for a, b in pairwise(self.offsets.tolist())]
 
-    @property
-    def of_fibre(self) -> Bool:
-        """(n,) whether each boundary dof is a fibre's."""
-        is_fibre = np.array([s.submesh.phase != MATRIX for s in self.subdomains], bool)
-        return np.repeat(is_fibre, np.diff(self.offsets))
+    def _inner_dofs(self, jump_operator: JumpOperator) -> Bool:
+        """`of_fibre`; where more than two bodies meet all but the matrix are fibres."""
+        sizes = np.diff(self.offsets)
+        of_fibre = np.repeat(np.array([s.submesh.phase != MATRIX for s in self.subdomains], bool), sizes)
+        body = np.repeat(np.array([s.submesh.body for s in self.subdomains], np.int64), sizes)
+        between = np.flatnonzero(jump_operator.inside >= 0)
+        entries = self.B[between].tocoo()
+        of_fibre[entries.col] = body[entries.col] == jump_operator.inside[between][entries.row]
+        return of_fibre
 
     def apply_schur(self, x: Float) -> Float:
         """S x for x (n,) or (n, k)."""

@@ -15,7 +15,7 @@ from scipy.sparse import csr_matrix, diags
 
 from feti_homog.feti.operators.explicit import ExplicitInterfaceOperator
 from feti_homog.feti.operators.implicit import ImplicitInterfaceOperator
-from feti_homog.typing import Float, Int
+from feti_homog.typing import Bool, Float, Int
 
 
 class DenseSoftSkin(ExplicitInterfaceOperator):
@@ -81,7 +81,7 @@ def _half(T: csr_matrix, TS: Float) -> Float:
     return np.asarray(solve_triangular(cholesky(middle, lower=True), TS, lower=True))
 
 
-def compliance_root(B: csr_matrix, compliance: Float, copies: Int, is_fibre: bool) -> csr_matrix:
+def compliance_root(B: csr_matrix, compliance: Float, copies: Int, of_fibre: Bool) -> csr_matrix:
     """(n, r) T of the springs on one body, for its constraints B (rows, n) and the compliance C (rows,) of the rows.
 
     A node's spring belongs to the fibre, but where the fibre is cut, to the matrix: so it softens one body alone.
@@ -89,8 +89,9 @@ def compliance_root(B: csr_matrix, compliance: Float, copies: Int, is_fibre: boo
 
     Args:
         copies: (rows, 2) how many copies matrix and fibre have there.
+        of_fibre: (n,) on which of the dofs the body is the fibre: a coating is the matrix of what it coats.
     """
-    of_fibre = copies[:, 1] == 1
-    own = of_fibre if is_fibre else ~of_fibre & (copies[:, 0] == 1)
+    whole = copies[:, 1] == 1
+    own = np.where(abs(B) @ of_fibre > 0, whole, ~whole & (copies[:, 0] == 1))
     rows = np.flatnonzero((compliance > 0) & own & (B.getnnz(axis=1) > 0))
     return (diags(np.sqrt(compliance[rows])) @ B[rows]).T.tocsr()

@@ -20,7 +20,7 @@ from feti_homog.common.distributed_arrays import allreduce_sum, gather_rows, sca
 from feti_homog.errors import CaseError
 from feti_homog.feti.decomposition.interface_neighbours import InterfaceNeighbours
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
-from feti_homog.feti.operators.interface_operators import MATRIX, InterfaceOperators
+from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.preconditioners.body_ties import BodyTies
 from feti_homog.feti.preconditioners.bordered_inverse import BorderedInverse
 from feti_homog.feti.preconditioners.reference_cell import ReferenceCell, one_sided_jumps
@@ -55,7 +55,7 @@ class Influence:
             raise CaseError(f"-feti_influence_columns {self._most_columns}: expected a whole number above 0")
         self._BD = one_sided_jumps(comm, jump_operator, operators)
         self._ties = BodyTies(comm, jump_operator)
-        self.neighbours = InterfaceNeighbours(comm, jump_operator, operators.subdomains, MATRIX)
+        self.neighbours = InterfaceNeighbours(comm, jump_operator, operators.subdomains)
         self._adjacency = self.neighbours.adjacency + identity(self.neighbours.adjacency.shape[0], format="csr")
         self._batch = INFLUENCE_BATCH * comm.size
         # Columns without which the reference cell is not the one at hand.

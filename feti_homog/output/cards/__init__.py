@@ -1,4 +1,4 @@
 """Effective constants as material cards of other programs: Abaqus, CalculiX, ANSYS, MOOSE, and as a table.
 
-May use `output.files` and the floors below `output`.  Main entries: `export.card` and `export.write`.
+May use `output.files` and the floors below `output`.  Main entry: `export.card`.
 """

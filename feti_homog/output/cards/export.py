@@ -13,7 +13,7 @@ from feti_homog.output.cards.effective_material import (
     in_axes_of_the_cell,
     nearest_transversely_isotropic,
 )
-from feti_homog.output.files import atomic, output_folder, result_json
+from feti_homog.output.files import result_json
 
 FORMATS: dict[str, Callable[[EffectiveMaterial], str]] = {
     "abaqus": abaqus.text,
@@ -43,19 +43,3 @@ def card(directory: Path, form: str, symmetry: str) -> str:
     except (AttributeError, KeyError, TypeError, ValueError) as error:
         place = f"{type(error).__name__}: {error}"
         raise CaseError(f"{path}: it is damaged, or no result of this program ({place})") from error
-
-
-def write(path: Path, text: str) -> Path:
-    """Write a card to a file, whole or not at all; returns its path.
-
-    Raises:
-        CaseError: `path` cannot be a card's: it is a folder, in no folder, or a file of a result.
-        FetiHomogError: it cannot be written.
-    """
-    if path.is_dir():
-        raise CaseError(f"--out {path}: expected a file, but it is a folder")
-    if not path.parent.is_dir():
-        raise CaseError(f"--out {path}: expected a file in a folder that there is")
-    if output_folder.RESULT_FILE.fullmatch(path.name):
-        raise CaseError(f"--out {path}: expected another name; results have files of that name")
-    return atomic.replace_text(path, f"{text}\n")

@@ -50,7 +50,9 @@ class MeshPart:
     body: AnyInt = described("body of each element, from 0, the matrix", shape="(m,)", dtype="int32")
     subdomain: AnyInt = described("subdomain of each element, from 0", shape="(m,)", dtype="int32")
     phase: AnyInt = described("phase of each element, a place in `phases`", shape="(m,)", dtype="int32")
-    fibre_number: AnyInt = described("number of the fibre, from 1; 0 in the matrix", shape="(m,)", dtype="int32")
+    fibre_number: AnyInt = described(
+        "number of the fibre, also of its coating, from 1; 0 in the matrix", shape="(m,)", dtype="int32"
+    )
 
 
 @dataclass(frozen=True)
@@ -75,8 +77,11 @@ class InterfacePart:
     points: Float = described("positions of the interface nodes", LENGTH, "(k, 2)")
     normal: Float = described("unit normals (n1, n2), from fibre to matrix; tangents are (-n2, n1)", shape="(k, 2)")
     length: Float = described("tributary length: that of the interface which a node stands for", LENGTH, "(k,)")
-    fibre: AnyInt = described("body of the fibre", shape="(k,)", dtype="int32")
+    fibre: AnyInt = described("body of the fibre, or of its coating", shape="(k,)", dtype="int32")
     fibre_number: AnyInt = described("number of the fibre, from 1", shape="(k,)", dtype="int32")
+    pair: AnyInt = described(
+        "place, from 0, of its section among the case's [[interface]]", shape="(k,)", dtype="int32"
+    )
     fibre_node: AnyInt = described("a node of the mesh on the fibre's face, from 0", shape="(k,)", dtype="int64")
     vertex: AnyInt = described("number of the interface node, from 0: viewers' elements", shape="(k, 1)", dtype="int64")
     matrix_node: AnyInt = described(

@@ -43,19 +43,14 @@ def mesh_part(cell: TornCell) -> MeshPart:
         body=np.repeat([s.submesh.body for s in subdomains], sizes).astype(np.int32),
         subdomain=np.repeat([s.submesh.index for s in subdomains], sizes).astype(np.int32),
         phase=np.repeat(phase, sizes).astype(np.int32),
-        fibre_number=np.repeat([_fibre_number(cell, s.submesh.body) for s in subdomains], sizes).astype(np.int32),
+        fibre_number=np.repeat([cell.summary.numbers[s.submesh.body] for s in subdomains], sizes).astype(np.int32),
     )
-
-
-def _fibre_number(cell: TornCell, body: int) -> int:
-    """The number of a body's fibre, 0 for the matrix."""
-    return max(0, body - cell.summary.first_fibre + 1)
 
 
 def fibre_part(cell: TornCell) -> FibrePart:
     """The fibres on rank 0, none on the others."""
     summary = cell.summary
-    body = np.arange(summary.first_fibre, len(summary.centres) if cell.comm.rank == 0 else 0)
+    body = summary.fibre_bodies[: None if cell.comm.rank == 0 else 0]
     return FibrePart(
         number=summary.fibre_number(body),
         body=body,
@@ -76,6 +71,7 @@ def interface_part(cell: TornCell) -> InterfacePart:
         length=nodes.length,
         fibre=nodes.fibre,
         fibre_number=cell.summary.fibre_number(nodes.fibre),
+        pair=nodes.pair,
         fibre_node=numbers[nodes.fibre_node],
         vertex=(cell.comm.exscan(len(nodes.row)) or 0) + np.arange(len(nodes.row))[:, None],
         matrix_node=jumps.from_matrix(numbers),

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from feti_homog.output.plots.plot_helpers import plain
+from feti_homog.output.plots.plot_helpers import interfaces_of, plain
 from feti_homog.typing import Array
 
 # Loads beyond so many times the median are outside of the picture: those of directions that hardly open a bond.
@@ -107,7 +107,7 @@ def _limit(axes: Axes, places: Array) -> list[str]:
 def _notes(case: Document, without: int) -> list[str]:
     """Criterion, temperature and how many directions have no onset."""
     temperature = case["envelope"].get("temperature")
-    notes = [f"criterion {case['interface']['criterion']}"]
+    notes = [f"criterion {interfaces_of(case)[0]['criterion']}"]
     if temperature is not None:
         notes.append(f"$\\Delta T = {{{temperature:g}}}$ first")
     return [*notes, f"no onset in {without} directions"] if without else notes

@@ -27,12 +27,13 @@ class Coordinate:
     label: str
 
 
-def coordinate(file: Any, edges: InterfaceEdges, number: int) -> Coordinate:
-    """Of a round fibre the direction of the normal, in degrees; of any other the arc length, counterclockwise from
-    where the normal is nearest to x1 (around each of its boundaries, if it has several, one after the other)."""
-    own = np.flatnonzero(file["interface/fibre_number"][:] == number)
+def coordinate(file: Any, edges: InterfaceEdges, body: int) -> Coordinate:
+    """Of a body that is a round fibre, or its coating, the direction of the normal, in degrees; of any other the arc
+    length, counterclockwise from where the normal is nearest to x1 (around each of its boundaries, if it has several,
+    one after the other)."""
+    own = np.flatnonzero(file["interface/fibre"][:] == body)
     normal = file["interface/normal"][:]
-    radius = file["fibre/radius"][:][file["fibre/number"][:] == number]
+    radius = file["fibre/radius"][:][np.isin(file["fibre/number"][:], file["interface/fibre_number"][:][own])]
     if np.isfinite(radius).all():
         angle = np.degrees(np.arctan2(normal[own, 1], normal[own, 0]))
         order = np.argsort(angle)

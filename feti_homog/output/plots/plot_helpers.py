@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
@@ -186,6 +186,12 @@ def drawn_stress(state: Any, component: str, drawn: DrawnMesh) -> Array:
     """The stress (q,) of a state in each triangle drawn."""
     table, column = STRESS_TABLES[component]
     return triangle_means(state[table], column, drawn)
+
+
+def interfaces_of(case: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
+    """The section [interface] of a resolved case, or all sections [[interface]]; none of perfect bonding."""
+    sections = case.get("interface", [])
+    return sections if isinstance(sections, list) else [sections]
 
 
 def plain(text: str) -> str:

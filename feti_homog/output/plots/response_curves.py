@@ -15,7 +15,7 @@ from feti_homog.mechanics import response
 from feti_homog.mechanics.voigt import STRESSES, voigt_names
 from feti_homog.output.plots import envelope_plot
 from feti_homog.output.plots.interface_marks import BONDED, CLOSED, OPEN, STATE_COLOURS, STATE_NAMES
-from feti_homog.output.plots.plot_helpers import plain, save, strain_symbols, unit_label
+from feti_homog.output.plots.plot_helpers import interfaces_of, plain, save, strain_symbols, unit_label
 from feti_homog.output.text import point_tables
 from feti_homog.typing import Array
 
@@ -52,7 +52,7 @@ def _angle(document: Document) -> Figure:
     axes.set_xlabel("debonding angle (degrees)")
     axes.set_ylabel(f"{'effective stiffness' if stiff else 'macroscopic stress'} {_stress_unit(case)}")
     axes.xaxis.set_major_locator(MultipleLocator(60 if angles[-1] > 180 else 30))
-    contact = "contact" if case["interface"]["contact"] else "no contact"
+    contact = "contact" if all(bond["contact"] for bond in interfaces_of(case)) else "no contact"
     load = "" if stiff else f", $E = [{', '.join(f'{e:g}' for e in points[0]['strain'])}]$"
     axes.set_title(f"{plain(case.get('name', ''))}: plane {case['analysis']['plane']}, {contact}{load}".lstrip(": "))
     _finish(axes)
@@ -183,7 +183,13 @@ def _direction_marks(curve: Array) -> list[tuple[Array, Array]]:
 
 
 def _strengths(case: Mapping[str, Any]) -> str:
-    bond, unit = case.get("interface", {}), case.get("output", {}).get("stress_unit", "")
+    bonds, unit = interfaces_of(case) or [{}], case.get("output", {}).get("stress_unit", "")
+    if len(bonds) == 1:
+        return _strengths_of(bonds[0], unit)
+    return "; ".join(f"{plain('-'.join(bond['between']))}: {_strengths_of(bond, unit)}" for bond in bonds)
+
+
+def _strengths_of(bond: Mapping[str, Any], unit: str) -> str:
     if bond.get("criterion") == "energy":
         return rf"$G_\mathrm{{Ic}} = {bond['toughness']:g}$"
     limits = ((r"R^\mathrm{n}", "normal_strength"), (r"R^\mathrm{t}", "tangential_strength"))

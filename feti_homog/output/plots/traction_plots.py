@@ -51,23 +51,28 @@ def _touching(file: Any, name: str) -> bool:
 
 def _figure(file: Any, edges: InterfaceEdges, names: list[str], labels: LoadLabels) -> Figure:
     """A row for each of the fibres that are most debonded: tractions, and jumps."""
-    fibre, status = file["interface/fibre_number"][:], file[f"state/{names[-1]}/status"][:]
-    numbers, count = np.unique(fibre[status != BONDED], return_counts=True)
-    chosen = np.sort(numbers[np.argsort(-count, kind="stable")][:MAX_FIBRES])
+    fibre, status = file["interface/fibre"][:], file[f"state/{names[-1]}/status"][:]
+    bodies, count = np.unique(fibre[status != BONDED], return_counts=True)
+    chosen = np.sort(bodies[np.argsort(-count, kind="stable")][:MAX_FIBRES])
     figure = Figure(figsize=(9.0, 2.4 * len(chosen) + 1.5), layout="constrained")
     grid = figure.subplots(len(chosen), 2, sharex="row", sharey="col", squeeze=False)
-    for row, number in zip(grid, chosen, strict=True):
-        place = coordinate(file, edges, number)
+    for row, body in zip(grid, chosen, strict=True):
+        place = coordinate(file, edges, body)
         for axes, quantity in zip(row, NAMES, strict=True):
             _shade(axes, place, status[place.nodes])
             for name in names:
                 values = _values(file[f"state/{name}"], quantity)[place.nodes]
                 _curves(axes, quantity, place.values, values, name == names[-1])
             _finish(axes, place)
-        row[0].set_title(f"fibre {number}", fontsize=10, loc="left")
+        row[0].set_title(_name(file, body, place), fontsize=10, loc="left")
     _labels(file, figure, grid, status[np.isin(fibre, chosen)])
     figure.suptitle(_title(file, names, labels), fontsize=10)
     return figure
+
+
+def _name(file: Any, body: int, place: Coordinate) -> str:
+    number = file["interface/fibre_number"][place.nodes[0]]
+    return f"fibre {number}" if body in file["fibre/body"][:] else f"coating of fibre {number}"
 
 
 def _values(state: Any, quantity: str) -> Array:

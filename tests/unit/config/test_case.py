@@ -13,6 +13,7 @@ from unit.config.faulty_bonding import BARE_ARC, FAULTY_BONDINGS, PATH, debonded
 from unit.config.faulty_cases import FAULTY_CASES
 from unit.config.faulty_envelopes import FAULTY_ENVELOPES
 from unit.config.faulty_loads import FAULTY_LOADS
+from unit.config.faulty_table_cells import FAULTY_TABLE_CELLS
 from unit.config.valid_cases import MESH, VALID_CASES
 
 from feti_homog.config.case import check_phases, load, parse
@@ -22,7 +23,7 @@ from feti_homog.config.material_forms import General, Isotropic, Orthotropic
 from feti_homog.config.sections import Angle
 from feti_homog.errors import CaseError
 
-FAULTY = FAULTY_CASES | FAULTY_BONDINGS | FAULTY_ENVELOPES | FAULTY_LOADS
+FAULTY = FAULTY_CASES | FAULTY_BONDINGS | FAULTY_ENVELOPES | FAULTY_LOADS | FAULTY_TABLE_CELLS
 
 
 def case_of(tmp_path: Path, content: str, name: str = "cell.toml"):
@@ -75,7 +76,7 @@ def test_one_fault_is_one_line(tmp_path, name):
 
 
 def test_there_are_enough_faulty_cases():
-    parts = (FAULTY_CASES, FAULTY_BONDINGS, FAULTY_ENVELOPES, FAULTY_LOADS)
+    parts = (FAULTY_CASES, FAULTY_BONDINGS, FAULTY_ENVELOPES, FAULTY_LOADS, FAULTY_TABLE_CELLS)
     assert len(FAULTY) == sum(map(len, parts)) >= 100
 
 

@@ -15,13 +15,14 @@ from unit.config.faulty_bonding import FAULTY_BONDINGS
 from unit.config.faulty_cases import FAULTY_CASES
 from unit.config.faulty_envelopes import FAULTY_ENVELOPES
 from unit.config.faulty_loads import FAULTY_LOADS
+from unit.config.faulty_table_cells import FAULTY_TABLE_CELLS
 from unit.config.valid_cases import VALID_CASES, VALID_SWEEPS
 
 from feti_homog.config.json_schema import json_schema
 
 VALIDATOR = Draft202012Validator(json_schema())
 FILES = [path for folder in ("drivers", "scripts/cases") for path in sorted((ROOT / folder).glob("*.toml"))]
-FAULTY = FAULTY_CASES | FAULTY_BONDINGS | FAULTY_ENVELOPES | FAULTY_LOADS
+FAULTY = FAULTY_CASES | FAULTY_BONDINGS | FAULTY_ENVELOPES | FAULTY_LOADS | FAULTY_TABLE_CELLS
 
 NO_TOML = {"syntax", "syntax_unclosed", "key_twice", "section_twice", "number_too_long"}
 BETWEEN_NUMBERS = {
@@ -39,7 +40,7 @@ BETWEEN_NUMBERS = {
 }  # fmt: skip
 NOT_IN_JSON = {"fraction_is_nan", "strength_is_nan", "path_strain_nan", "load_nan"}
 INTEGER_TO_JSON = {"refine_is_real"}
-OUTSIDE_THE_FILE = {"mesh_not_there"}
+OUTSIDE_THE_FILE = {"no_table", "mesh_not_there"}
 BEYOND_A_SCHEMA = NO_TOML | BETWEEN_NUMBERS | NOT_IN_JSON | INTEGER_TO_JSON | OUTSIDE_THE_FILE
 
 

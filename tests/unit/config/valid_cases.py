@@ -10,6 +10,7 @@ from support.base_case import (
     OUT_OF_PLANE,
     RANDOM,
     SPATIAL,
+    TABLE_CELL,
     TRANSVERSE,
     changed,
     fibre,
@@ -35,6 +36,15 @@ VALID_CASES = {
     + "[decomposition]\nmax_dofs = 5000\n[petsc]\nfeti_ksp_rtol = 1e-8\nfeti_view = true\n",
     "random": changed(('geometry = "hexagonal"\n', RANDOM + "seed = 7\nradius_spread = 0.2\n")),
     "fine interfaces": changed(("mesh_size = 0.05", "mesh_size = 0.05\ninterface_size = 0.05\ntip_size = 1e-5")),
+    "table": changed(TABLE_CELL),
+    "table of two phases": changed(
+        (
+            TABLE_CELL[0],
+            'geometry = "table"\nwindow = "cut"\nwidth = 1.0\nheight = 2\nfibre_list = ['
+            '{x = -0.5, y = 0, radius = 0.1}, {x = 0, y = 1.5, radius = 0.1, phase = "fibre:2"}]',
+        ),
+        end='[material."fibre:2"]\nyoung = 3.0\npoisson = 0.1\n',
+    ),
     "mesh of three phases": MESH + '[material."fibre:2"]\nstiffness = [[3, 1, 0], [1, 3, 0], [0, 0, 1]]\n',
     "orthotropic": fibre("E1 = 10.0\nE2 = 5.0\nE3 = 5.0\nnu12 = 0.3\nnu13 = 0.3\nnu23 = 0.2\nG12 = 2.0\nangle = 30\n"),
     "orthotropic in space": fibre(

@@ -31,7 +31,7 @@ def test_all_unit_loads_of_both_problems_are_counted():
     assert [solves(angles, problem) for problem in problems(angles)] == [15, 6]
     # Under plus and minus each load; along the fibres nothing touches.
     arcs = InterfaceSection(debonded=(Arc(fibre="all", angle=60.0),))
-    touching = [solves(replace(heated, interface=arcs), problem) for problem in problems(heated)]
+    touching = [solves(replace(heated, interfaces=(arcs,)), problem) for problem in problems(heated)]
     assert touching == [2 * 5 * cost_model.SOLVES_OF_A_CONTACT, 2]
 
 

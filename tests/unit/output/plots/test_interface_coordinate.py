@@ -41,7 +41,8 @@ def around(whole: Sample, count: int, number: int) -> Sample:
     order = np.random.default_rng(5).permutation(len(sides))
     old = vars(whole.interface)
     tables = {name: np.resize(table, (len(sides), *table.shape[1:])) for name, table in old.items()}
-    tables |= {"points": sides[order], "normal": normals[order], "fibre_number": np.full(len(sides), number)}
+    tables |= {"points": sides[order], "normal": normals[order]}
+    tables |= {name: np.full(len(sides), number) for name in ("fibre", "fibre_number")}
     states = tuple(replace(state, **_resized(state, len(whole.interface.points), len(sides))) for state in whole.states)
     fibres = replace(whole.fibres, number=np.array([number]))
     return replace(whole, interface=type(whole.interface)(**tables), fibres=fibres, states=states)

@@ -1,0 +1,27 @@
+"""The numbers of fibres, as case files and results have them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from feti_homog.cell.periodic_topology import COATING, Torus, edge_pairs
+from feti_homog.typing import Bool, Int
+
+
+def fibre_numbers(torus: Torus) -> tuple[Int, Bool]:
+    """(constituents,) the number of the fibre that each is, from 1, or that it coats, 0 of the matrix; and which of
+    them (constituents,) are fibres.
+
+    A coating of several fibres has the lowest of their numbers; one that coats none is a fibre itself.
+    """
+    phase, n = torus.constituent_phase, len(torus.constituent_phase)
+    coats = np.array([name == COATING for name in torus.mesh.phases])[phase]
+    sides = torus.constituent[np.stack(edge_pairs(torus.triangle_torus_edges))]
+    coating, core = np.hstack([sides, sides[::-1]])
+    inside = coats[coating] & ~coats[core] & (phase[core] > 0)
+    is_coating = np.zeros(n, bool)
+    is_coating[coating[inside]] = True
+    is_fibre = (phase > 0) & ~is_coating
+    number = np.where(is_fibre, np.cumsum(is_fibre), n)
+    np.minimum.at(number, coating[inside], number[core[inside]])
+    return np.where(phase > 0, number, 0), is_fibre

@@ -1,0 +1,39 @@
+"""`feti-homog fibres CASE.toml|DIR`: the fibres of a cell as a table, to edit them and use it as a cell."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from feti_homog.common.standard_streams import print_product, say
+
+if TYPE_CHECKING:
+    from mpi4py.MPI import Intracomm
+
+HELP = (
+    'Print a row for each fibre, with centre, radius and phase: the file of [cell] geometry = "table". The table of a '
+    "cell gives that cell again."
+)
+
+
+def add(actions: argparse._SubParsersAction[Any]) -> None:
+    """Add the command to those of a parser."""
+    parser = actions.add_parser("fibres", help="print the fibres of a cell as a table", description=HELP)
+    parser.add_argument("source", type=Path, metavar="CASE.toml|DIR", help="a case file, or a folder of results")
+    parser.add_argument("--out", type=Path, metavar="FILE.csv", help="write the table to a file instead of printing it")
+    parser.set_defaults(action=_fibres)
+
+
+def _fibres(arguments: argparse.Namespace, comm: Intracomm) -> None:
+    from feti_homog.analysis import fibre_rows
+    from feti_homog.common.mpi_errors import on_root_only
+    from feti_homog.output.files import product_file
+
+    text = on_root_only(comm, fibre_rows.table, arguments.source)
+    if arguments.out is None:
+        on_root_only(comm, print_product, text or "")
+    else:
+        path = on_root_only(comm, product_file.write, arguments.out, text or "")
+        if path is not None:
+            say(str(path))

@@ -1,0 +1,122 @@
+"""Interfaces between pairs of phases: against cells in which one pair is all that there is, and on their own files."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from support import coated_cells
+from unit.cell.faulty_meshes import MATRIX, grid, node
+
+from feti_homog import Case, run
+from feti_homog.common.mpi_errors import on_root
+from feti_homog.verification.certificate import verify
+
+EPOXY, GLASS = {"young": 2.79, "poisson": 0.33}, {"young": 70.8, "poisson": 0.22}
+BETWEEN = {"young": 10.0, "poisson": 0.3}
+STRONG = {"normal_strength": 0.06, "tangential_strength": 0.08}
+SPRINGS = {"normal_stiffness": 20.0, "tangential_stiffness": 5.0}
+ENERGY = {"criterion": "energy", "normal_stiffness": 2.0, "tangential_stiffness": 0.5, "toughness": 4e-4}
+LAWS = {
+    "strength": STRONG,
+    "springs": SPRINGS | STRONG | {"criterion": "quadratic"},
+    "energy": ENERGY,
+    "energy of springs": ENERGY | {"growth": "springs"},
+}
+PATH = {"to": {"E11": 0.2, "E22": 0.0, "gamma12": 0.05}}
+OUTER, INNER = ["fibre:2", "matrix"], ["fibre", "fibre:2"]
+
+
+def case_of(folder, name, materials, interface, fields=False, **analysis):
+    (kind,) = analysis
+    sections = {} if interface is None else {"interface": interface}
+    return Case.parse(
+        {
+            "cell": {"geometry": "mesh", "file": f"{name}.msh"},
+            "material": dict(zip(("matrix", "fibre", "fibre:2"), materials, strict=False)),
+            "analysis": {"type": kind, "plane": "strain"},
+            "petsc": {"feti_ksp_rtol": 1e-11},
+            "output": {"pictures": False, "fields": fields},
+        }
+        | ({} if analysis[kind] is None else analysis)
+        | sections,
+        folder,
+    )
+
+
+@pytest.fixture
+def meshes(comm, shared_path):
+    """A fibre in two rings: of one phase, of two, and with a ring of the matrix."""
+
+    def write():
+        for name, core, ring in (("plain", "fibre", "fibre"), ("coated", *INNER), ("core", "fibre", "matrix")):
+            coated_cells.write(shared_path / f"{name}.msh", core, ring)
+
+    on_root(comm, write)
+    return shared_path
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize(
+    "between, plain, ring", [(OUTER, "plain", GLASS), (INNER, "core", EPOXY)], ids=["outer", "inner"]
+)
+def test_one_of_two_interfaces_breaks_as_if_it_were_alone(comm, meshes, law, between, plain, ring):
+    """A coating of the material of the fibre whose outer side breaks is part of it; of the matrix, part of that."""
+    alone = run(case_of(meshes, plain, (EPOXY, GLASS), LAWS[law], path=PATH), comm)
+    named = LAWS[law] | {"between": between}
+    found = run(case_of(meshes, "coated", (EPOXY, GLASS, ring), named, path=PATH), comm)
+    assert [point.broke for point in found.path] == [point.broke for point in alone.path]
+    assert len(alone.path) > 4
+    stress = np.array([point.stress for point in alone.path])
+    assert np.array([point.stress for point in found.path]) == pytest.approx(stress, abs=1e-9 * np.abs(stress).max())
+    assert sum(found.path[-1].debonded_length) == pytest.approx(sum(alone.path[-1].debonded_length), rel=1e-9)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("laws", [("strength", {"normal_strength": 0.05}), ("energy", {"toughness": 3e-4})], ids=str)
+def test_both_interfaces_break_as_their_files_certify(comm, meshes, laws):
+    law, other = LAWS[laws[0]], LAWS[laws[0]] | SPRINGS | laws[1]
+    interfaces = [law | {"between": INNER}, other | {"between": OUTER}]
+    case = case_of(meshes, "coated", (EPOXY, GLASS, BETWEEN), interfaces, fields=True, path=PATH)
+    result = run(case, comm, out=meshes / "out")
+    assert result.status == "done" and len(result.path) > 4
+    certificate = on_root(comm, verify, meshes / "out")
+    assert certificate.holds, certificate
+
+
+@pytest.mark.parallel
+def test_equal_laws_of_two_pairs_are_one_law(comm, shared_path):
+    """Two kinds of fibre, of one material."""
+    mesh = grid(lambda x, y: 0.25 < x < 0.5 and y < 0.75)
+    second = {tag: e for tag, e in mesh.elements.items() if e[1] != MATRIX and min(e[3]) >= node(0, 2)}
+    for tag, (kind, _, _, nodes) in second.items():
+        mesh = mesh.with_element(tag, kind, 3, nodes)
+    mesh.names[3] = "fibre:2"
+    on_root(comm, mesh.write, shared_path / "two.msh")
+    paths = []
+    for interface in (STRONG, [STRONG | {"between": ["matrix", name]} for name in ("fibre", "fibre:2")]):
+        paths.append(run(case_of(shared_path, "two", (EPOXY, GLASS, GLASS), interface, path=PATH), comm).path)
+    one, two = ([(point.broke, *point.stress) for point in path] for path in paths)
+    assert np.array(one) == pytest.approx(np.array(two), rel=1e-8, abs=1e-10) and len(one) > 1
+
+
+@pytest.mark.parallel
+def test_springs_of_a_laminate_are_in_series(comm, shared_path):
+    """1 / C11 = sum of c / M and of 1 / (k_n W), M = lambda + 2 mu: four interfaces of two stiffnesses, exact."""
+    mesh = grid(lambda x, y: 0.25 < x < 0.75)
+    for tag, (kind, physical, _, nodes) in list(mesh.elements.items()):
+        if physical != MATRIX and min((n - 1) % 5 for n in nodes) >= 2:
+            mesh = mesh.with_element(tag, kind, 3, nodes)
+    mesh.names[3] = "fibre:2"
+    on_root(comm, mesh.write, shared_path / "strips.msh")
+    pairs = {("matrix", "fibre"): 30.0, ("fibre:2", "fibre"): 7.0, ("fibre:2", "matrix"): 50.0}
+    interfaces = [{"between": list(pair), "normal_stiffness": k} for pair, k in pairs.items()]
+    case = case_of(shared_path, "strips", (EPOXY, GLASS, BETWEEN), interfaces, stiffness=None)
+    found = run(case, comm).effective_stiffness
+    constrained = [
+        m["young"] * (1 - m["poisson"]) / (1 + m["poisson"]) / (1 - 2 * m["poisson"]) for m in (EPOXY, GLASS, BETWEEN)
+    ]
+    compliance = (
+        0.5 / constrained[0] + 0.25 / constrained[1] + 0.25 / constrained[2] + sum(1 / k for k in pairs.values())
+    )
+    assert found[0, 0] == pytest.approx(1 / compliance, rel=1e-9)

@@ -1,0 +1,64 @@
+"""`feti-homog fibres`: the table of a cell is the cell."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.base_case import BASE
+from unit.cell.faulty_meshes import grid
+
+from feti_homog.analysis import fibre_rows
+from feti_homog.cell.arrangement import arrange
+from feti_homog.config.case import load
+from feti_homog.config.fibre_table import read_table
+from feti_homog.errors import CaseError
+
+CELL = 'geometry = "hexagonal"\nfibre_fraction = 0.4\n'
+FIBRES = 'fibre_list = [{x = 1, y = 2, radius = 0.3}, {x = 2.8, y = 2, radius = 0.3, phase = "fibre:2"}]'
+CELLS = {
+    "square": 'geometry = "square"\nfibre_fraction = 0.75\n',
+    "hexagonal": CELL,
+    "random": 'geometry = "random"\nfibres = 30\nfibre_fraction = 0.5\nradius_spread = 0.3\n',
+    "with a radius": 'geometry = "random"\nfibres = 9\nfibre_fraction = 0.5\nfibre_radius = 3.5\n',
+    "table": f'geometry = "table"\nwidth = 5\nheight = 4\n{FIBRES}\n',
+    "cut window": f'geometry = "table"\nwidth = 2.2\nheight = 4\nwindow = "cut"\n{FIBRES}\n',
+}
+SECOND = '[material."fibre:2"]\nyoung = 300.0\npoisson = 0.2\n'
+
+
+def case_of(path, cell, more=""):
+    path.write_text(BASE.replace(CELL, cell) + more)
+    return path
+
+
+@pytest.mark.parametrize("name", CELLS)
+def test_the_table_of_a_cell_gives_the_cell(name, tmp_path):
+    source = case_of(tmp_path / "case.toml", CELLS[name], SECOND if "fibre:2" in CELLS[name] else "")
+    (tmp_path / "t.csv").write_text(fibre_rows.table(source))
+    again = case_of(tmp_path / "again.toml", 'geometry = "table"\nfile = "t.csv"\n', SECOND)
+    found, expected = arrange(load(again).cell), arrange(load(source).cell)
+    assert found.phase == expected.phase and found.height == pytest.approx(expected.height, rel=1e-15)
+    assert np.abs(found.centres - expected.centres).max() < 1e-15
+    assert found.radii == pytest.approx(expected.radii, rel=1e-15)
+
+
+def test_the_table_of_a_users_mesh_has_its_round_fibres(tmp_path):
+    """Here of one that is not round."""
+    grid().write(tmp_path / "cell.msh")
+    source = case_of(tmp_path / "case.toml", 'geometry = "mesh"\nfile = "cell.msh"\n')
+    source.write_text(source.read_text().replace("mesh_size = 0.05\n", ""))
+    with pytest.raises(CaseError, match=r"case.toml: fibres that are not round have no radius: 1$"):
+        fibre_rows.table(source)
+
+
+def test_units_and_names(tmp_path):
+    source = case_of(tmp_path / "case.toml", CELLS["with a radius"])
+    (tmp_path / "t.csv").write_text(fibre_rows.table(source))
+    table = read_table(tmp_path / "t.csv")
+    assert table.radius.mean() == pytest.approx(3.5, rel=1e-14) and table.phase == ("fibre",) * 9
+    assert np.pi * np.sum(table.radius**2) / (table.width * table.height) == pytest.approx(0.5, rel=1e-14)
+    assert (table.left, table.bottom) == (0.0, 0.0)
+    moved = replace(load(source).cell, fibre_radius=None)
+    assert np.abs(table.centres / table.width - arrange(moved).centres).max() < 1e-15

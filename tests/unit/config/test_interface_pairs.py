@@ -1,0 +1,105 @@
+"""Several sections [[interface]]: what is read, resolved and refused."""
+
+from __future__ import annotations
+
+import pytest
+
+from feti_homog import Case
+from feti_homog.errors import CaseError
+from feti_homog.sweep.case_documents import case_documents
+
+OUTER, INNER = ["coating", "matrix"], ["fibre", "coating"]
+STRONG = {"normal_strength": 1.0}
+ENERGY = {"criterion": "energy", "normal_stiffness": 2.0, "tangential_stiffness": 1.0, "toughness": 0.1}
+
+
+def document(interface, kind="path"):
+    path = {"path": {"to": {"E11": 0.1}}} if kind == "path" else {}
+    return {
+        "cell": {"geometry": "square", "fibre_fraction": 0.4},
+        "material": {name: {"young": 1.0, "poisson": 0.3} for name in ("matrix", "fibre")},
+        "analysis": {"type": kind, "plane": "strain"},
+        "interface": interface,
+    } | path
+
+
+def test_a_list_of_one_is_the_section():
+    one, listed = (Case.parse(document(interface)) for interface in (STRONG, [STRONG]))
+    assert one == listed and one.resolved()["interface"] == listed.resolved()["interface"]
+    assert one.digest() == listed.digest() and "between" not in one.resolved()["interface"]
+
+
+def test_several_are_resolved_to_themselves():
+    case = Case.parse(document([STRONG | {"between": OUTER}, {"normal_strength": 3.0, "between": INNER}]))
+    assert [interface.between for interface in case.interfaces] == [("coating", "matrix"), ("fibre", "coating")]
+    assert [interface.normal_strength for interface in case.interfaces] == [1.0, 3.0]
+    assert Case.parse(case.resolved()) == case
+
+
+FAULTY = {
+    "no pair": ([STRONG | {"between": OUTER}, STRONG], "[interface 2] between: missing; of several [[interface]]"),
+    "the same pair": (
+        [STRONG | {"between": OUTER}, STRONG | {"between": OUTER[::-1]}],
+        '[interface 2] between = ["matrix", "coating"]: expected another pair than [interface 1] has',
+    ),
+    "a phase with itself": (STRONG | {"between": ["matrix", "matrix"]}, "[interface] between = "),
+    "one phase": (STRONG | {"between": "coating"}, '[interface] between = "coating": expected the names of two phases'),
+    "three phases": (STRONG | {"between": ["a", "b", "c"]}, "expected the names of two phases"),
+    "contact": (
+        [STRONG | {"between": OUTER}, STRONG | {"between": INNER, "contact": False}],
+        "[interface 2] contact = false: expected true, as of [interface 1]",
+    ),
+    "criteria": (
+        [STRONG | {"between": OUTER}, STRONG | {"between": INNER, "criterion": "quadratic"}],
+        '[interface 2] criterion = "quadratic": expected "max", as of [interface 1]',
+    ),
+    "growth": (
+        [ENERGY | {"between": OUTER}, ENERGY | {"between": INNER, "growth": "springs"}],
+        '[interface 2] growth = "springs": expected "released", as of [interface 1]',
+    ),
+    "a value of the second": (
+        [STRONG | {"between": OUTER}, {"normal_strength": -1.0, "between": INNER}],
+        "[interface 2] normal_strength = -1.0: expected",
+    ),
+    "an arc of the second": (
+        [STRONG | {"between": OUTER}, STRONG | {"between": INNER, "debonded": [{"fibre": 0, "angle": 3.0}]}],
+        "[interface 2] debonded[0].fibre = 0: ",
+    ),
+    "a spring that is missing": (
+        [ENERGY | {"between": OUTER}, {k: v for k, v in ENERGY.items() if "tangential" not in k} | {"between": INNER}],
+        "[interface 2] tangential_stiffness: missing",
+    ),
+    "none": ([], "interface = []: expected a section [interface]"),
+    "no table": ([STRONG | {"between": OUTER}, 3], "interface 2 = 3: expected a section"),
+}
+
+
+@pytest.mark.parametrize("name", FAULTY)
+def test_faults_name_their_section(name):
+    interface, words = FAULTY[name]
+    with pytest.raises(CaseError) as caught:
+        Case.parse(document(interface))
+    assert any(words in fault for fault in caught.value.faults), caught.value.faults
+
+
+def test_sweeps_vary_a_key_of_one_section():
+    base = document([STRONG | {"between": OUTER}, STRONG | {"between": INNER}])
+    faults: list[str] = []
+    (found,) = case_documents(base, [{("interface", "2", "normal_strength"): 5.0}], None, faults)
+    assert not faults
+    assert [interface["normal_strength"] for interface in found.document["interface"]] == [1.0, 5.0]
+
+
+@pytest.mark.parametrize(
+    "path, words",
+    [
+        (("interface", "normal_strength"), "there are 2 sections [[interface]]; expected interface.1.normal_strength"),
+        (("interface", "3", "normal_strength"), '"3" is no section'),
+        (("interface", "0", "normal_strength"), '"0" is no section'),
+    ],
+)
+def test_sweeps_say_which_section_they_lack(path, words):
+    base = document([STRONG | {"between": OUTER}, STRONG | {"between": INNER}])
+    faults: list[str] = []
+    case_documents(base, [{path: 5.0}], None, faults)
+    assert any(words in fault for fault in faults), faults
