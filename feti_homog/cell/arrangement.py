@@ -157,12 +157,12 @@ def table_arrangement(cell: Cell) -> Arrangement:
         MeshError: rows lie outside, come twice, overlap or touch.
     """
     table = cell.table
-    assert table is not None
+    assert table is not None and table.width is not None
     rows, centres, radii, height = tabulated.fibres(table, cell.window)
     discs = Arrangement(1.0, height, centres, radii, tuple(table.phase[row] for row in rows))
     clearance, shift = _clearance, clear_shift
     if table.a is not None:
-        unit = elliptic_table.ellipses_of(table, rows, centres).frames / (table.width or 1.0)
+        unit = elliptic_table.ellipses_of(table, rows, centres).frames / table.width
         discs, clearance, shift = replace(discs, frames=unit), elliptic_table.clearance, elliptic_table.clear_shift
     shifted = shift(discs)
     is_placed = table.left is not None and table.bottom is not None

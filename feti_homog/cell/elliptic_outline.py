@@ -1,4 +1,4 @@
-"""The lines of a cell with ellipses: its sides and the arcs of fibres in it, cut where they meet, with nodes on them."""
+"""The lines of a cell with ellipses: its sides and the arcs in it, cut where they meet, with nodes on them."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ def ellipses_of(table: FibreTable, rows: Int, centres: Float) -> Ellipses:
 
 
 def contacts(table: FibreTable, rows: Int, centres: Float, size: Float, least: float) -> list[str]:
-    """Faults of fibres, the rows (k,) about centres (k, 2), that overlap, or whose gap / mean radius is below `least`."""
+    """Faults of the rows (k,) about centres (k, 2) that overlap, or whose gap / mean radius is below `least`."""
     ellipses = ellipses_of(table, rows, centres)
     first, second, vector = neighbours(centres, size, 2 * ellipses.longest.max() * (1 + least))
     other = Ellipses(centres[first] + vector, ellipses.frames[second])

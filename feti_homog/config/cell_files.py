@@ -55,9 +55,8 @@ def _with_table(cell: Cell, faults: list[str]) -> Cell:
         faults += [f"[cell] {fault}" for fault in error.faults]
         return cell
     unknown = [name for name in OTHER_SHAPES if getattr(table, name) is not None]
-    faults += [
-        f"[cell] {table.name}: column {name}: fibres have x, y, radius or a, b and angle, and phase" for name in unknown
-    ]
+    known = "fibres have x, y, radius (or a, b, angle), phase"
+    faults += [f"[cell] {table.name}: column {name}: {known}" for name in unknown]
     table = with_shapes(table, cell.window, faults)
     width, height = (_size(name, getattr(cell, name), table, faults) for name in ("width", "height"))
     return replace(cell, table=replace(table, width=width, height=height))

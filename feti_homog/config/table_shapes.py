@@ -29,6 +29,8 @@ def with_shapes(table: FibreTable, window: str, faults: list[str]) -> FibreTable
     is_oval = a != b
     if not is_oval.any():
         return replace(table, radius=a, a=None, b=None, angle=None)
+    if table.coating is not None:
+        _tell(table, is_oval & (table.coating > 0), "an ellipse has no coating", faults)
     if window == "cut":
         row = table.row[is_oval][0]
         faults.append(f'[cell] {table.name}: row {row}: an ellipse, but window = "cut" moves round fibres only')
