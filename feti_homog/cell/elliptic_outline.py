@@ -52,8 +52,9 @@ def outline(arrangement: Arrangement, sizes: MeshSizes, marks: Mapping[int, Sequ
     for axis in (0, 1):
         curves += _side_curves(axis, places[axis], ellipses, size, field, numbering)
     curves += _arc_curves(ellipses, which, start, stop, sizes.interface, field, numbering)
+    around = np.full(len(ellipses), MATRIX)
     radii = np.where(arrangement.ellipses.are_round, arrangement.radii, 0.0)
-    return Outline(numbering.points(), tuple(curves), np.column_stack([ellipses.centres, radii[fibre]]), fibre)
+    return Outline(numbering.points(), tuple(curves), np.column_stack([ellipses.centres, radii[fibre]]), fibre, around)
 
 
 def middles(lines: Outline, arrangement: Arrangement) -> MiddleNodes:

@@ -47,7 +47,7 @@ def size_field(
         at_vertices(vertices, size, largest),
     ]
     base = graded(sources, size, largest)
-    if not sizes.is_graded:
+    if not sizes.are_graded(arrangement):
         return SizeField(base)
     on_curves = cKDTree(wrap(points, size), boxsize=size)
     tree = cKDTree(wrap(tips.reshape(-1, 2), size), boxsize=size)

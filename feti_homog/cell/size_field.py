@@ -33,11 +33,13 @@ def line_size(arrangement: Arrangement, largest: float, vertices: Float) -> Call
     must have, with the distance to the next one.
     """
     size = np.array([arrangement.width, arrangement.height])
-    caps = circle_size(arrangement.radii, largest)
+    radii, disc = arrangement.circles
+    circles, caps = np.column_stack([arrangement.centres[disc], radii]), circle_size(arrangement, largest)
+    outer = np.unique(disc, return_index=True)[1]
     sources = [
-        _between_fibres(arrangement, size, caps, largest),
-        _at_sides(arrangement, size, caps, largest),
-        _at_corners(arrangement, size, caps),
+        _between_fibres(circles[outer], size, caps[outer], largest),
+        _at_sides(circles, size, caps, largest),
+        _at_corners(circles, size, caps),
         at_vertices(vertices, size, largest),
     ]
     return graded(sources, size, largest)
@@ -60,9 +62,20 @@ def graded(sources: Sequence[Source], size: Float, largest: float) -> Callable[[
     return at
 
 
-def circle_size(radii: Float, largest: float) -> Float:
-    """Largest edge length (k,) on circles, such that each has at least MIN_EDGES_AROUND edges."""
-    return np.minimum(largest, 2 * np.pi * radii / MIN_EDGES_AROUND)
+def circle_size(arrangement: Arrangement, largest: float) -> Float:
+    """Largest edge length (k,) on the circles of an arrangement, such that each has at least MIN_EDGES_AROUND edges.
+
+    Those on a coating of the thickness t on the radius a have at most sqrt(t a): then they are t / 8 away from their
+    arcs, and elements across the coating do not turn over when their edges are bent.
+    """
+    radii, disc = arrangement.circles
+    caps = np.minimum(largest, 2 * np.pi * radii / MIN_EDGES_AROUND)
+    return np.where(arrangement.coated[disc], np.minimum(caps, coating_size(arrangement)[disc]), caps)
+
+
+def coating_size(arrangement: Arrangement) -> Float:
+    """sqrt(t a) (N,) of the coating of the thickness t on each disc of the radius a."""
+    return np.asarray(np.sqrt(arrangement.thickness * arrangement.radii))
 
 
 def wrap(points: Float, size: Float) -> Float:
@@ -71,9 +84,9 @@ def wrap(points: Float, size: Float) -> Float:
     return np.where(wrapped >= size, 0.0, wrapped)
 
 
-def _between_fibres(arrangement: Arrangement, size: Float, caps: Float, largest: float) -> Source:
+def _between_fibres(circles: Float, size: Float, caps: Float, largest: float) -> Source:
     """Facing points of near fibres; the edges at either suit the gap and those of the other fibre."""
-    centres, radii = arrangement.centres, arrangement.radii
+    centres, radii = circles[:, :2], circles[:, 2]
     first, second, vector = neighbours(centres, size, 2 * radii.max() + largest)
     distance = np.linalg.norm(vector, axis=1)
     gap = distance - radii[first] - radii[second]
@@ -94,9 +107,9 @@ def passage_growth(width: Float, curvature: Float) -> Float:
     return np.asarray(np.minimum(MAX_GROWTH, np.sqrt((4 - 2 * PASSAGE_EDGE) * 2 * width * curvature)))
 
 
-def _at_sides(arrangement: Arrangement, size: Float, caps: Float, largest: float) -> Source:
+def _at_sides(circles: Float, size: Float, caps: Float, largest: float) -> Source:
     """Where a circle comes near a side or hardly crosses it: extreme point, foot on the side, crossings."""
-    centres, radii = arrangement.centres % size, arrangement.radii
+    centres, radii = circles[:, :2] % size, circles[:, 2]
     sources: list[Source] = []
     for axis, sign in product((0, 1), (-1.0, 1.0)):
         distance = centres[:, axis] if sign < 0 else size[axis] - centres[:, axis]
@@ -127,13 +140,13 @@ def _where(chosen: Bool, *source: Float) -> Source:
     return places, lengths, growths
 
 
-def _at_corners(arrangement: Arrangement, size: Float, caps: Float) -> Source:
+def _at_corners(circles: Float, size: Float, caps: Float) -> Source:
     """Where a circle passes near the corner: the corner and the nearest point of the circle."""
-    offset = (arrangement.centres + size / 2) % size - size / 2
+    offset = (circles[:, :2] + size / 2) % size - size / 2
     distance = np.linalg.norm(offset, axis=1)
-    length = PASSAGE_EDGE * np.abs(distance - arrangement.radii)
+    length = PASSAGE_EDGE * np.abs(distance - circles[:, 2])
     near = length < caps
-    facing = offset[near] * (1 - arrangement.radii[near] / distance[near])[:, None]
+    facing = offset[near] * (1 - circles[near, 2] / distance[near])[:, None]
     places = np.concatenate([facing, np.zeros_like(facing)])
     return places, np.tile(length[near], 2), np.full(len(places), MAX_GROWTH)
 

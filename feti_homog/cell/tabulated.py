@@ -21,6 +21,8 @@ SAME_FIBRE = 0.01
 LEAST_GAP = 1e-4
 # Radius / width of the cell above which positions on a circle differ by more than rounding.
 SMALLEST_RADIUS = 1e-6
+# Thickness / radius of the thinnest and of the thickest coating.
+COATINGS = 0.01, 1.0
 # Faults that are told one by one.
 MAX_FAULTS = 30
 
@@ -66,7 +68,7 @@ def _on_torus(table: FibreTable, window: str) -> tuple[Int, Float, Float, Float]
     if not is_cut:
         return kept, centres, np.zeros_like(centres), size
     try:
-        return kept, centres, cut_window.moves(centres, table.radius[kept], size), size
+        return kept, centres, cut_window.moves(centres, table.outer_radius[kept], size), size
     except MeshError as error:
         words = "fibres overlap across the border, and " + str(error)
         raise MeshError(f'[cell] {table.name}: window = "cut": {words}; leave some of them out') from error
@@ -102,7 +104,17 @@ def _outside(table: FibreTable, centres: Float, size: Float, is_cut: bool) -> li
     for k in np.flatnonzero((2 * radius >= size.min()) | (radius < SMALLEST_RADIUS * size[0])).tolist():
         limits = f"from {SMALLEST_RADIUS * size[0]:g} to below {size.min() / 2:g} in this cell"
         faults.append(f"row {table.row[k]}: radius = {radius[k]:g}: expected {limits}")
-    return faults
+    return faults + _unlikely_coatings(table)
+
+
+def _unlikely_coatings(table: FibreTable) -> list[str]:
+    """Faults of coatings that are too thin or too thick to be meshed."""
+    if table.coating is None:
+        return []
+    least, most = COATINGS
+    bad = np.flatnonzero((table.coating > 0) & ((table.coating < least) | (table.coating > most)))
+    expected = f"expected 0, or from {least:g} to {most:g}"
+    return [f"row {table.row[k]}: coating = {table.coating[k]:g}: {expected}" for k in bad.tolist()]
 
 
 def _without_images(table: FibreTable, centres: Float, size: Float, is_cut: bool) -> tuple[Bool, list[str]]:
@@ -113,7 +125,8 @@ def _without_images(table: FibreTable, centres: Float, size: Float, is_cut: bool
     near = (first != second) & (apart < SAME_FIBRE * smaller)
     first, second, vector = first[near], second[near], vector[near]
     in_place = np.linalg.norm(centres[second] - centres[first] - vector, axis=1) < SAME_FIBRE * radius[first]
-    alike = np.abs(radius[second] - radius[first]) < SAME_FIBRE * smaller[near]
+    both = np.column_stack([radius, table.outer_radius])
+    alike = (np.abs(both[second] - both[first]) < SAME_FIBRE * smaller[near, None]).all(axis=1)
     if table.a is not None:
         squares = ellipses_of(table, np.arange(len(radius)), centres).squares
         alike &= np.abs(squares[second] - squares[first]).max(axis=(1, 2)) < SAME_FIBRE * smaller[near] ** 2
@@ -131,7 +144,7 @@ def _without_images(table: FibreTable, centres: Float, size: Float, is_cut: bool
 
 def _contacts(table: FibreTable, kept: Int, centres: Float, size: Float, is_cut: bool) -> list[str]:
     """Faults of fibres, the rows `kept` (k,), that overlap or touch; of a cut window only of those that do within."""
-    radius = table.radius[kept]
+    radius = table.outer_radius[kept]
     first, second, vector = neighbours(centres, size, 2 * radius.max() * (1 + LEAST_GAP))
     together = radius[first] + radius[second]
     gap = np.linalg.norm(vector, axis=1) - together

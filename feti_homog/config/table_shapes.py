@@ -30,7 +30,7 @@ def with_shapes(table: FibreTable, window: str, faults: list[str]) -> FibreTable
     if not is_oval.any():
         return replace(table, radius=a, a=None, b=None, angle=None)
     if table.coating is not None:
-        _tell(table, is_oval & (table.coating > 0), "an ellipse has no coating", faults)
+        _tell(table, table.coating > 0, "a coating, but some fibres are ellipses", faults)
     if window == "cut":
         row = table.row[is_oval][0]
         faults.append(f'[cell] {table.name}: row {row}: an ellipse, but window = "cut" moves round fibres only')

@@ -178,7 +178,11 @@ SHAPES = {
     "both": ([ROWS[0] | {"radius": 0.1}], "periodic", "row 1: has a radius and semi-axes; give one"),
     "thin": ([ROWS[0] | {"b": 0.01}], "periodic", "row 1: expected a / b from 0.05 to 20"),
     "cut": (ROWS, "cut", 'row 1: an ellipse, but window = "cut" moves round fibres only'),
-    "coated": ([ROWS[0] | {"coating": 0.1}], "periodic", "row 1: an ellipse has no coating"),
+    "coated": (
+        [ROWS[0] | {"coating": 0.1}],
+        "periodic",
+        "row 1: a coating, but some fibres are ellipses",
+    ),
 }
 
 
