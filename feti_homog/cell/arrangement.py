@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from feti_homog.cell import tabulated
+from feti_homog.cell import elliptic_table, tabulated
+from feti_homog.cell.ellipses import Ellipses
 from feti_homog.cell.torus_pairs import neighbours
 from feti_homog.config.phase_names import COATING
 from feti_homog.errors import MeshError
@@ -43,6 +44,8 @@ class Arrangement:
     `phase` (N,) names what each disc is made of. Fibre k + 1 of a case is disc k. `mesh_order` (N,) are the discs in
     the order in which they are meshed, on which a few triangles depend; that of the discs if it is None. `coating` (N,)
     is the thickness of the ring around each disc, 0 where there is none; None if no disc has one. Rings do not touch.
+    `frames` (N, 2, 2) are those of `Ellipses` where some discs are ellipses, with `radii` of the same areas and without
+    coatings; else None.
     """
 
     width: float
@@ -52,6 +55,7 @@ class Arrangement:
     phase: tuple[str, ...]
     mesh_order: Int | None = None
     coating: Float | None = None
+    frames: Float | None = None
 
     @property
     def phases(self) -> tuple[str, ...]:
@@ -83,6 +87,17 @@ class Arrangement:
         radii = np.concatenate([self.outer_radii, self.radii[self.coated]])
         order = np.argsort(disc, kind="stable")
         return radii[order], disc[order]
+
+    @property
+    def ellipses(self) -> Ellipses:
+        """The discs and ellipses."""
+        assert self.frames is not None
+        return Ellipses(self.centres, self.frames)
+
+    @property
+    def round_radii(self) -> Float:
+        """(N,) radii of discs, NaN of ellipses."""
+        return self.radii if self.frames is None else np.where(self.ellipses.are_round, self.radii, np.nan)
 
 
 def arrange(cell: Cell) -> Arrangement:
@@ -180,19 +195,25 @@ def table_arrangement(cell: Cell) -> Arrangement:
         MeshError: rows lie outside, come twice, overlap or touch.
     """
     table = cell.table
-    assert table is not None
+    assert table is not None and table.width is not None
     rows, centres, radii, height = tabulated.fibres(table, cell.window)
     coating = None if table.coating is None else table.coating[rows] * radii
     discs = Arrangement(1.0, height, centres, radii, tuple(table.phase[row] for row in rows), coating=coating)
-    shifted = clear_shift(discs)
+    clearance, shift = _clearance, clear_shift
+    if table.a is not None:
+        unit = elliptic_table.ellipses_of(table, rows, centres).frames / table.width
+        discs, clearance, shift = replace(discs, frames=unit), elliptic_table.clearance, elliptic_table.clear_shift
+    shifted = shift(discs)
     is_placed = table.left is not None and table.bottom is not None
-    clear = min(LEAST_CLEARANCE * float(discs.radii.mean()), _clearance(shifted))
-    if is_placed and _clearance(discs) >= clear:
+    clear = min(LEAST_CLEARANCE * float(discs.radii.mean()), clearance(shifted))
+    if is_placed and clearance(discs) >= clear:
         return discs
     rounded = shifted.centres.round(TABLE_DECIMALS)
     order = np.lexsort((rounded[:, 1], rounded[:, 0]))
+    frames = None if shifted.frames is None else shifted.frames.round(TABLE_DECIMALS)
     thickness = None if coating is None else coating.round(TABLE_DECIMALS)
-    return replace(shifted, centres=rounded, radii=radii.round(TABLE_DECIMALS), mesh_order=order, coating=thickness)
+    even = replace(shifted, centres=rounded, radii=radii.round(TABLE_DECIMALS), coating=thickness, frames=frames)
+    return replace(even, mesh_order=order)
 
 
 def _clearance(arrangement: Arrangement) -> float:

@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from itertools import chain, pairwise
 from types import MappingProxyType, ModuleType
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from feti_homog.cell import element_estimate
+from feti_homog.cell import element_estimate, elliptic_outline
 from feti_homog.cell.arrangement import Arrangement, arrange
+from feti_homog.cell.bent_edges import with_bent_edges
 from feti_homog.cell.coarse_mesh import CoarseMesh, areas, flip_double_arcs, representatives
 from feti_homog.cell.graded_size import MeshSizes
 from feti_homog.cell.outline import MATRIX, Curve, Outline, outline
@@ -75,7 +77,8 @@ def mesh_arrangement(
     scale: float = 1.0,
 ) -> CoarseMesh:
     """The periodic coarse mesh of an arrangement, with elements of these sizes, scaled at the end; see `generate`."""
-    lines = outline(arrangement, sizes, marks)
+    has_ellipses = arrangement.frames is not None
+    lines = (elliptic_outline.outline if has_ellipses else outline)(arrangement, sizes, marks)
     points, triangles, circle = _fill(lines, sizes, sizes.are_graded(arrangement))
     place = {name: number for number, name in enumerate(arrangement.phases)}
     within = [
@@ -83,11 +86,8 @@ def mesh_arrangement(
     ]
     phase = np.array([place[name] for name in (*within, arrangement.phases[0])], np.int32)[circle]
     number = lines.disc + 1 + np.where(lines.is_coating, len(arrangement.radii), 0)
-    arcs = [curve for curve in lines.curves if curve.circle != MATRIX]
-    arc_edges = np.concatenate([np.stack([arc.nodes[:-1], arc.nodes[1:]], axis=1) for arc in arcs])
-    arc_edges = arc_edges.astype(np.int32)
-    arc_circle = np.repeat([arc.circle for arc in arcs], [len(arc.nodes) - 1 for arc in arcs])
-    return CoarseMesh(
+    arc_edges, arc_circle = _arc_edges(lines)
+    mesh = CoarseMesh(
         width=scale * arrangement.width,
         height=scale * arrangement.height,
         points=scale * points,
@@ -98,9 +98,21 @@ def mesh_arrangement(
         representative=representatives(points, arrangement.width, arrangement.height),
         circles=scale * lines.circles,
         arc_edges=arc_edges,
-        arc_circle=arc_circle.astype(np.int32),
+        arc_circle=arc_circle,
         debonded_edges=np.zeros((0, 2), np.int32),
     )
+    if not has_ellipses:
+        return mesh
+    middles = elliptic_outline.middles(lines, arrangement)
+    return with_bent_edges(mesh, replace(middles, points=scale * middles.points))
+
+
+def _arc_edges(lines: Outline) -> tuple[Int32, Int32]:
+    """Edges (a, 2) on circles, and their circles (a,)."""
+    arcs = [curve for curve in lines.curves if curve.circle != MATRIX and lines.circles[curve.circle, 2] > 0]
+    pairs = [np.stack([arc.nodes[:-1], arc.nodes[1:]], axis=1) for arc in arcs]
+    circle = np.repeat(np.array([arc.circle for arc in arcs], np.int32), [len(edges) for edges in pairs])
+    return np.concatenate([np.zeros((0, 2), np.int32), *pairs]).astype(np.int32), circle
 
 
 def _sizes(cell: Cell, marks: Mapping[int, Sequence[float]]) -> MeshSizes:

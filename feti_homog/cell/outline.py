@@ -112,14 +112,14 @@ def outline(arrangement: Arrangement, sizes: MeshSizes, marks: Mapping[int, Sequ
     circles, fibre, around = images(arrangement)
     places = [_crossings(circles, axis, size) for axis in (0, 1)]
     sides = ((axis, level) for axis in (0, 1) for level in (0.0, size[1 - axis]))
-    border = np.concatenate([_on_side(places[axis], axis, level) for axis, level in sides])
+    border = np.concatenate([on_side(places[axis], axis, level) for axis, level in sides])
     circle, start, stop = _arcs(circles, _vertex_angles(circles, fibre, border, marks), size)
     ends = _on_circle(circles[circle], start)
     away = cKDTree(border).query(ends)[0] > SAME_PLACE * size.max()
     border = np.unique(border, axis=0)
     # Vertices within coatings are as far from each other as those on the circle around, which they face.
     outer = np.concatenate([border, ends[away & (around[circle] == MATRIX)]])
-    numbering = _Numbering(np.concatenate([border, ends[away]]))
+    numbering = Numbering(np.concatenate([border, ends[away]]))
     field = size_field(arrangement, sizes, outer, _tips(arrangement, marks, numbering.vertices))
 
     curves = []
@@ -136,7 +136,7 @@ def _caps(arrangement: Arrangement, largest: float, fibre: Int, around: Int) -> 
     return np.asarray(circle_size(arrangement, largest)[first[fibre] + (around != MATRIX)])
 
 
-class _Numbering:
+class Numbering:
     """Gives numbers to the nodes: first the vertices (v, 2), found by position, then those between."""
 
     def __init__(self, vertices: Float) -> None:
@@ -166,7 +166,7 @@ def _crossings(circles: Float, axis: int, size: Float) -> Float:
     return np.concatenate([[0.0], np.sort(crossing[(crossing > 0) & (crossing < size[axis])]), [size[axis]]])
 
 
-def _on_side(places: Float, axis: int, level: float) -> Float:
+def on_side(places: Float, axis: int, level: float) -> Float:
     """Points (k, 2) on the side along `axis` at the given level of the other coordinate."""
     points = np.full((len(places), 2), level)
     points[:, axis] = places
@@ -220,18 +220,18 @@ def _tips(arrangement: Arrangement, marks: Mapping[int, Sequence[float]], vertic
 
 
 def _side_curves(
-    axis: int, places: Float, circles: Float, around: Int, size: Float, field: SizeField, numbering: _Numbering
+    axis: int, places: Float, circles: Float, around: Int, size: Float, field: SizeField, numbering: Numbering
 ) -> list[Curve]:
     """The pieces of the two sides along `axis`, with the same nodes on both."""
     begin, span = places[:-1], np.diff(places)
 
     def point(piece: Int, share: Float) -> Float:
-        return _on_side(begin[piece] + span[piece] * share, axis, 0.0)
+        return on_side(begin[piece] + span[piece] * share, axis, 0.0)
 
     samples = EdgeSamples.of(field, point, span, np.full(len(span), np.inf), SIDE_SAMPLES)
     curves = []
     for level, low in ((0.0, True), (size[1 - axis], False)):
-        inside = _disc_at(_on_side(begin + span / 2, axis, level), circles)
+        inside = _disc_at(on_side(begin + span / 2, axis, level), circles)
         # A chord has two edges or more: a triangle with two arc edges beside it could not be flipped. From one circle
         # of a coating to the other it is no chord.
         into = around[inside] * (inside != MATRIX) + MATRIX * (inside == MATRIX)
@@ -242,7 +242,7 @@ def _side_curves(
         for number, stations in enumerate(samples.stations(least)):
             along = begin[number] + span[number] * stations
             along[[0, -1]] = places[number : number + 2]
-            nodes = numbering.along(_on_side(along, axis, level))
+            nodes = numbering.along(on_side(along, axis, level))
             # Counter-clockwise around the cell: along the coordinate at the bottom and at the right.
             curves.append(Curve(nodes if low == (axis == 0) else nodes[::-1], MATRIX, int(inside[number])))
     return curves
@@ -262,7 +262,7 @@ def _arc_curves(
     stop: Float,
     caps: Float,
     field: SizeField,
-    numbering: _Numbering,
+    numbering: Numbering,
 ) -> list[Curve]:
     """The arcs (a,) from angle `start` to `stop` on their circles as curves, with edges of at most `caps` (a,)."""
     span = stop - start

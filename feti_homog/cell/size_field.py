@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from itertools import product
 
 import numpy as np
@@ -40,8 +40,13 @@ def line_size(arrangement: Arrangement, largest: float, vertices: Float) -> Call
         _between_fibres(circles[outer], size, caps[outer], largest),
         _at_sides(circles, size, caps, largest),
         _at_corners(circles, size, caps),
-        _at_vertices(vertices, size, largest),
+        at_vertices(vertices, size, largest),
     ]
+    return graded(sources, size, largest)
+
+
+def graded(sources: Sequence[Source], size: Float, largest: float) -> Callable[[Float], Float]:
+    """The function h(x) = min(largest, min_k (h_k + g_k |x - x_k|)) of positions (n, 2) on the torus."""
     places, lengths, growths = (np.concatenate(parts) for parts in zip(*sources, strict=True))
     lengths, growths = np.append(lengths, np.inf), np.append(growths, MAX_GROWTH)
     places = wrap(places, size)
@@ -86,7 +91,7 @@ def _between_fibres(circles: Float, size: Float, caps: Float, largest: float) ->
     distance = np.linalg.norm(vector, axis=1)
     gap = distance - radii[first] - radii[second]
     normal = vector / distance[:, None]
-    growth = _growth(gap, 1 / radii[first] + 1 / radii[second])
+    growth = passage_growth(gap, 1 / radii[first] + 1 / radii[second])
     places, lengths, growths = [], [], []
     for here, there, sign in ((first, second, 1.0), (second, first, -1.0)):
         length = np.minimum(PASSAGE_EDGE * gap, caps[there] + MAX_GROWTH * gap)
@@ -97,7 +102,7 @@ def _between_fibres(circles: Float, size: Float, caps: Float, largest: float) ->
     return np.concatenate(places), np.concatenate(lengths), np.concatenate(growths)
 
 
-def _growth(width: Float, curvature: Float) -> Float:
+def passage_growth(width: Float, curvature: Float) -> Float:
     """Growth with which edges stay below twice the width w + c s^2 / 2 of a passage of curvature c."""
     return np.asarray(np.minimum(MAX_GROWTH, np.sqrt((4 - 2 * PASSAGE_EDGE) * 2 * width * curvature)))
 
@@ -112,7 +117,7 @@ def _at_sides(circles: Float, size: Float, caps: Float, largest: float) -> Sourc
         extreme[:, axis] += sign * radii
         foot[:, axis] += sign * distance
         width = np.abs(distance - radii)
-        growth = _growth(width, 1 / radii)
+        growth = passage_growth(width, 1 / radii)
         length = np.minimum(PASSAGE_EDGE * width, caps + MAX_GROWTH * width)
         sources += [
             _where(length < caps, extreme, length, growth),
@@ -146,7 +151,7 @@ def _at_corners(circles: Float, size: Float, caps: Float) -> Source:
     return places, np.tile(length[near], 2), np.full(len(places), MAX_GROWTH)
 
 
-def _at_vertices(vertices: Float, size: Float, largest: float) -> Source:
+def at_vertices(vertices: Float, size: Float, largest: float) -> Source:
     """Vertices, once on the torus, with the distance to the nearest other one."""
     places = wrap(vertices, size)
     tree = cKDTree(places, boxsize=size)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from feti_homog.cell import cut_window
+from feti_homog.cell.elliptic_table import contacts, ellipses_of
 from feti_homog.cell.torus_pairs import neighbours
 from feti_homog.errors import MeshError
 from feti_homog.typing import Bool, Float, Int
@@ -60,6 +61,9 @@ def _on_torus(table: FibreTable, window: str) -> tuple[Int, Float, Float, Float]
     _raise_faults(table, faults)
     kept = np.flatnonzero(first)
     centres = centres[kept]
+    if table.a is not None:
+        _raise_faults(table, contacts(table, kept, centres, size, LEAST_GAP))
+        return kept, centres, np.zeros_like(centres), size
     _raise_faults(table, _contacts(table, kept, centres, size, is_cut))
     if not is_cut:
         return kept, centres, np.zeros_like(centres), size
@@ -89,6 +93,8 @@ def _outside(table: FibreTable, centres: Float, size: Float, is_cut: bool) -> li
     Discs reach into a periodic cell; of a cut window the centres are within.
     """
     radius, faults = table.radius, []
+    if table.a is not None and table.b is not None:
+        radius = np.maximum(table.a, table.b)
     for axis, (name, width) in enumerate(zip(("width", "height"), size.tolist(), strict=True)):
         over = np.maximum(-centres[:, axis], centres[:, axis] - width)
         reach = radius if (table.left, table.bottom)[axis] is not None else np.full_like(radius, 2 * radius.max())
@@ -121,13 +127,16 @@ def _without_images(table: FibreTable, centres: Float, size: Float, is_cut: bool
     in_place = np.linalg.norm(centres[second] - centres[first] - vector, axis=1) < SAME_FIBRE * radius[first]
     both = np.column_stack([radius, table.outer_radius])
     alike = (np.abs(both[second] - both[first]) < SAME_FIBRE * smaller[near, None]).all(axis=1)
+    if table.a is not None:
+        squares = ellipses_of(table, np.arange(len(radius)), centres).squares
+        alike &= np.abs(squares[second] - squares[first]).max(axis=(1, 2)) < SAME_FIBRE * smaller[near] ** 2
     faults = []
     for i, j, is_here, is_alike in zip(first.tolist(), second.tolist(), in_place, alike, strict=True):
         rows = f"rows {table.row[i]} and {table.row[j]}"
         if is_here:
             faults.append(f"{rows}: are at one place; expected each fibre once")
         elif not is_cut and (not is_alike or table.phase[i] != table.phase[j]):
-            faults.append(f"{rows}: are images of one fibre, a period apart; expected one radius and one phase")
+            faults.append(f"{rows}: are images of one fibre, a period apart; expected one shape and one phase")
     is_first = np.ones(len(radius), bool)
     is_first[np.maximum(first, second)] = is_cut
     return is_first, faults

@@ -11,13 +11,12 @@ import numpy as np
 from feti_homog.config.cell_section import Cell
 from feti_homog.config.fibre_table import FibreTable, read_table, table_of
 from feti_homog.config.section_values import MESH_FILE, MESH_SUFFIXES
+from feti_homog.config.table_shapes import with_shapes
 from feti_homog.config.wording import toml_value
 from feti_homog.errors import CaseError
 
 SUFFIXES = {"mesh": MESH_SUFFIXES, "table": (".csv",)}
 FILES = {"mesh": MESH_FILE, "table": ".csv file"}
-# Columns of tables that say nothing of round fibres.
-OTHER_SHAPES = ("a", "b", "angle")
 
 
 def with_files(cell: Cell, folder: Path, faults: list[str]) -> Cell:
@@ -55,12 +54,11 @@ def _with_table(cell: Cell, faults: list[str]) -> Cell:
     except CaseError as error:
         faults += [f"[cell] {fault}" for fault in error.faults]
         return cell
-    unknown = [name for name in OTHER_SHAPES if getattr(table, name) is not None]
-    faults += [f"[cell] {table.name}: column {name}: fibres have x, y, radius, phase and coating" for name in unknown]
     if cell.coating is not None and table.coating is not None:
         faults.append(f"[cell] coating = {cell.coating:g}: {table.name} has a column of it; give one")
     elif cell.coating is not None:
         table = replace(table, coating=np.full(len(table.row), cell.coating))
+    table = with_shapes(table, cell.window, faults)
     width, height = (_size(name, getattr(cell, name), table, faults) for name in ("width", "height"))
     return replace(cell, table=replace(table, width=width, height=height))
 
