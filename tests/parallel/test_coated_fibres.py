@@ -6,8 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.ranks import parallel_assert
 
 from feti_homog import Case, run
+from feti_homog.verification.certificate import verify
 
 pytestmark = pytest.mark.parallel
 
@@ -86,3 +88,18 @@ def test_thin_coatings_take_few_iterations(young):
     cell = {"geometry": "random", "fibres": 6, "min_gap": 0.1, "order": 1, "fibre_fraction": 0.4}
     result = result_of((young, 0.3), 0.01, **cell)
     assert max(result.solver.iterations) < 25
+
+
+@pytest.mark.parametrize("thickness", [0.05, 0.01])
+def test_thin_coatings_obey_every_law(comm, shared_path, thickness):
+    cell = {"geometry": "square", "mesh_size": 0.1, "fibre_fraction": 0.3, "coating": thickness, "order": 2}
+    phases = {"matrix": MATRIX, "fibre": FIBRE, "coating": (1.0, 0.35)}
+    document = {
+        "cell": cell,
+        "material": {name: dict(zip(("young", "poisson"), own, strict=True)) for name, own in phases.items()},
+        "analysis": {"type": "stiffness", "plane": "strain"},
+        "output": {"pictures": False},
+    }
+    run(Case.parse(document, Path()), out=shared_path / "result", comm=comm)
+    certificate = verify(shared_path / "result") if comm.rank == 0 else None
+    parallel_assert(comm, certificate is None or certificate.holds, certificate and certificate.text)
