@@ -13,6 +13,7 @@ import numpy as np
 from feti_homog.cell import elliptic_table, tabulated
 from feti_homog.cell.ellipses import Ellipses
 from feti_homog.cell.torus_pairs import neighbours
+from feti_homog.config.phase_names import COATING
 from feti_homog.errors import MeshError
 from feti_homog.typing import Bool, Float, Int
 
@@ -22,8 +23,6 @@ if TYPE_CHECKING:
 
 # Phase of the discs of cells that name none.
 FIBRE = "fibre"
-# Phase of what surrounds coated discs.
-COATING = "coating"
 # Fibres of the lattices.
 FIBRES_OF = {"square": 1, "hexagonal": 2}
 # Distance of the sides of a cell from tangency with a circle / mean radius, below which elements there are needles.

@@ -13,12 +13,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from feti_homog.cell import element_estimate, elliptic_outline
-from feti_homog.cell.arrangement import COATING, Arrangement, arrange
+from feti_homog.cell.arrangement import Arrangement, arrange
 from feti_homog.cell.bent_edges import with_bent_edges
 from feti_homog.cell.coarse_mesh import CoarseMesh, areas, flip_double_arcs, representatives
 from feti_homog.cell.graded_size import MeshSizes
 from feti_homog.cell.outline import MATRIX, Curve, Outline, outline
 from feti_homog.cell.size_field import MAX_GROWTH
+from feti_homog.config.phase_names import COATING
 from feti_homog.errors import MeshError
 from feti_homog.typing import Float, Index, Int32
 

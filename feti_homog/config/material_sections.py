@@ -9,13 +9,13 @@ from collections.abc import Iterable, Mapping
 from feti_homog.config.cell_section import CIRCULAR, GEOMETRY, Cell
 from feti_homog.config.material_forms import MATERIAL_FORMS, Material
 from feti_homog.config.materials import expansion, plane_stiffness, spatial_stiffness
+from feti_homog.config.phase_names import COATING
 from feti_homog.config.schema import TableReader, keys_of
 from feti_homog.config.wording import suggestion, toml_key, toml_value
 
 # Not "void", where there is no material.
 PHASE = re.compile(r"(?!void$)[A-Za-z0-9_-]+(:[A-Za-z0-9_-]+)?")
 CONSTANTS = frozenset(name for form in MATERIAL_FORMS.values() for name in keys_of(form))
-COATING = "coating"
 
 
 def read_materials(table: object, plane: str | None, reader: TableReader) -> dict[str, Material]:

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from feti_homog.cell import tabulated
-from feti_homog.cell.arrangement import COATING
 from feti_homog.cell.coarse_mesh import CoarseMesh
 from feti_homog.cell.fibre_centres import fibre_circles
 from feti_homog.cell.fibre_numbers import fibre_numbers
@@ -17,7 +16,6 @@ from feti_homog.cell.refinement import ReferenceLattice
 from feti_homog.cell.submesh import Submesh, cut
 from feti_homog.config import case as cases
 from feti_homog.config.case import Case
-from feti_homog.config.sections import Decomposition
 from feti_homog.errors import CaseError
 from feti_homog.feti.decomposition.partition import decompose, pieces_for_count, pieces_for_size
 from feti_homog.feti.decomposition.shared_entities import SharedEntities, share_entities
@@ -47,10 +45,6 @@ class PartitionPolicy:
             the load of a rank, for they can be distributed evenly as they are.
         breakable_boundary_dofs: where bonds may break, a body is cut only if its boundary has more: the cell is solved
             so often then that whole bodies pay as long as dense matrices of their boundaries are small.
-        coating_triangles: coarse triangles of a piece of a bonded coating. A ring bends easily and resists to change
-            its thickness, which no scaling of a whole one meets: of 6 coated fibres with coatings like the matrix, 0.1
-            and 0.05 radii thick, whole ones take 156 and 346 iterations, pieces of 4 triangles 55 and 63; at 0.01 radii
-            whole ones do not converge, pieces take 111.
 
     `scripts/benchmark scripts/cases/benchmark_1m.toml --tools feti` times the bonded ones, and `scripts/benchmark_path`
     the last.
@@ -63,7 +57,6 @@ class PartitionPolicy:
     even_cut_factor: float = 12.0
     even_share: float = 1 / 16
     breakable_boundary_dofs: int = 2500
-    coating_triangles: int = 4
 
 
 DEFAULT_POLICY = PartitionPolicy()
@@ -203,8 +196,6 @@ def distribute(
         raise CaseError(*faults)
     parts = torus.constituent if case.cell.bodies == "torus" else torus.plane_parts()
     wanted = wanted_pieces(case, np.bincount(parts), _outer_edges(torus, parts), lattice, n_ranks, policy)
-    if not case.interfaces and case.decomposition == Decomposition():
-        wanted = np.maximum(wanted, _coating_pieces(torus, parts, policy))
     decomposition = decompose(torus, parts, wanted, n_ranks)
     submeshes = list(cut(torus, decomposition.subdomain))
     shared = share_entities(torus, pairs, submeshes, decomposition.rank, lattice.intervals - 1, n_ranks)
@@ -271,16 +262,6 @@ def wanted_pieces(
     by_boundary = np.minimum(-(-boundary // policy.piece_boundary_dofs), load)
     pieces = np.where(to_cut, np.maximum(by_size, by_boundary), 1)
     return pieces if pieces.sum() >= n_ranks else pieces_for_count(load, n_ranks)
-
-
-def _coating_pieces(torus: Torus, parts: Int, policy: PartitionPolicy) -> Int:
-    """(b,) pieces of each body that is a coating; 1 of others."""
-    phases = torus.mesh.phases
-    if COATING not in phases:
-        return np.ones(parts.max() + 1, np.int64)
-    triangles = np.bincount(parts, torus.mesh.phase == phases.index(COATING)).astype(np.int64)
-    pieces = triangles // policy.coating_triangles
-    return np.asarray(np.minimum(np.maximum(pieces, 1), 1 + policy.max_pieces * pieces // max(1, int(pieces.sum()))))
 
 
 def _in_cell(points: Float, period: Float) -> Float:

@@ -79,3 +79,10 @@ def test_soft_coatings_tend_to_elastic_interfaces():
         glued = result_of(None, interface=springs, fibre_fraction=share).effective_stiffness
         errors.append(np.abs(coated - glued).max())
     assert np.log2(errors[0] / errors[1]) == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.parametrize("young", [3e-3, 3.0, 3e3])
+def test_thin_coatings_take_few_iterations(young):
+    cell = {"geometry": "random", "fibres": 6, "min_gap": 0.1, "order": 1, "fibre_fraction": 0.4}
+    result = result_of((young, 0.3), 0.01, **cell)
+    assert max(result.solver.iterations) < 25
