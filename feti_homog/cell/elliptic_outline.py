@@ -115,11 +115,11 @@ def _vertex_angles(
         along = np.where(_on_upright(places, size), normal[:, 0], normal[:, 1])
         where.append(places)
         lengths.append(one.bend(normal) * np.arccos(np.minimum(np.abs(along), 1.0)))
-        marked = np.radians(marks.get(owner, ()))
+        marked, offsets = np.radians(marks.get(owner, ())), places - ellipses.centres[number]
+        away = np.abs((marked[:, None] - np.arctan2(offsets[:, 1], offsets[:, 0]) + np.pi) % TURN - np.pi)
+        marked = marked[(away > MERGED).all(axis=1)]
         mine = ellipses[np.full(len(marked), number)]
-        for mark in mine.parameter(directions(marked)) % TURN:
-            if np.all(np.abs((mark - own + np.pi) % TURN - np.pi) > MERGED):
-                own = np.append(own, mark)
+        own = np.append(own, mine.parameter(directions(marked)) % TURN)
         angles.append(np.sort(own) if len(own) else np.zeros(1))
     return angles, (np.concatenate(where), np.concatenate(lengths))
 

@@ -104,7 +104,8 @@ def mesh_arrangement(
     if not has_ellipses:
         return mesh
     middles = elliptic_outline.middles(lines, arrangement)
-    return with_bent_edges(mesh, replace(middles, points=scale * middles.points))
+    bent = with_bent_edges(mesh, replace(middles, points=scale * middles.points))
+    return replace(bent, centres=scale * arrangement.centres)
 
 
 def _arc_edges(lines: Outline) -> tuple[Int32, Int32]:

@@ -92,9 +92,10 @@ def _outside(table: FibreTable, centres: Float, size: Float, is_cut: bool) -> li
 
     Discs reach into a periodic cell; of a cut window the centres are within.
     """
-    radius, faults = table.radius, []
+    radius, faults, called = table.radius, [], ["radius"] * len(table.row)
     if table.a is not None and table.b is not None:
         radius = np.maximum(table.a, table.b)
+        called = np.where(table.a == table.b, "radius", np.where(table.a > table.b, "a", "b")).tolist()
     for axis, (name, width) in enumerate(zip(("width", "height"), size.tolist(), strict=True)):
         over = np.maximum(-centres[:, axis], centres[:, axis] - width)
         reach = radius if (table.left, table.bottom)[axis] is not None else np.full_like(radius, 2 * radius.max())
@@ -103,7 +104,7 @@ def _outside(table: FibreTable, centres: Float, size: Float, is_cut: bool) -> li
             faults.append(f"row {table.row[k]}: {'xy'[axis]} = {value:g}: lies outside the cell, of {name} {width:g}")
     for k in np.flatnonzero((2 * radius >= size.min()) | (radius < SMALLEST_RADIUS * size[0])).tolist():
         limits = f"from {SMALLEST_RADIUS * size[0]:g} to below {size.min() / 2:g} in this cell"
-        faults.append(f"row {table.row[k]}: radius = {radius[k]:g}: expected {limits}")
+        faults.append(f"row {table.row[k]}: {called[k]} = {radius[k]:g}: expected {limits}")
     return faults + _unlikely_coatings(table)
 
 

@@ -10,6 +10,7 @@ import pytest
 from feti_homog.cell.arrangement import arrange
 from feti_homog.cell.coarse_mesh import areas
 from feti_homog.cell.ellipses import Ellipses, gaps
+from feti_homog.cell.fibre_centres import fibre_circles
 from feti_homog.cell.gmsh_mesher import generate
 from feti_homog.cell.periodic_topology import Torus
 from feti_homog.cell.refinement import ReferenceLattice, refine
@@ -153,7 +154,7 @@ FAULTY = {
     ),
     "its own image": ([{"x": 0.5, "y": 0.5, "a": 0.49, "b": 0.05}, {"x": 0.5, "y": 0.9, "a": 0.4999999, "b": 0.1}],
         "row 2 and its image: touch across the border"),
-    "too large": ([{"x": 0.5, "y": 0.5, "a": 0.6, "b": 0.1}], "row 1: radius = 0.6: expected"),
+    "too large": ([{"x": 0.5, "y": 0.5, "a": 0.6, "b": 0.1}], "row 1: a = 0.6: expected"),
     "images of two shapes": (
         [{"x": 0.0, "y": 0.5, "a": 0.2, "b": 0.1}, {"x": 1.0, "y": 0.5, "a": 0.1, "b": 0.2}],
         "rows 1 and 2: are images of one fibre, a period apart; expected one shape",
@@ -191,3 +192,16 @@ def test_faulty_shapes_name_the_row(name):
     (rows, window, line), faults = SHAPES[name], []
     with_shapes(table_of(rows, "t.csv"), window, faults)
     assert faults == [f"[cell] t.csv: {line}"]
+
+
+@pytest.mark.parametrize("row", [ROWS[0], {"x": 0.5, "y": 0.5, "a": 0.4, "b": 0.05, "angle": 50.0}])
+def test_tips_of_arcs_are_nodes_in_their_directions(row):
+    """Seen from the centre that the fibre is known to have, whatever its polygon's."""
+    cell, tips = cell_of(table([row]), 0.3), (10.0, 55.0, 200.0)
+    mesh = generate(cell, {0: tips})
+    x, y, radius = fibre_circles(Torus.of(mesh))[1]
+    assert [x, y] == pytest.approx(arrange(cell).centres[0], abs=1e-12) and np.isnan(radius)
+    nodes = (mesh.points[np.unique(mesh.arc_edges)] - [x, y] + 0.5) % 1.0 - 0.5
+    found = np.degrees(np.arctan2(nodes[:, 1], nodes[:, 0]))
+    away = (found[:, None] - tips + 180.0) % 360.0 - 180.0
+    assert np.abs(away).min(axis=0) == pytest.approx(0.0, abs=1e-6)
