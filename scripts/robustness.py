@@ -1,4 +1,4 @@
-"""Iterations to 1e-8 at every combination of fibres, fibre fraction, gap, cut of the matrix, contrast and mesh size.
+"""Iterations to 1e-8 at every combination of fibres, fibre fraction, gap, cut, contrast, mesh size and coating.
 
 Each line of the CSV is one cell with its three load cases; cells that the file holds already are not run again, so that
 a long list can be worked off in parts.  "uncut" leaves the matrix whole and looks for soft modes none the less.
@@ -31,13 +31,16 @@ from feti_homog.config.case import Case  # noqa: E402
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds  # noqa: E402
 from feti_homog.homogenization.unit_cell import tear  # noqa: E402
 
+# Columns that are no whole numbers.
+REAL = ("fraction", "gap", "contrast", "coating", "coating_contrast", "vectors", "seconds")
 # Coarse elements along the side of a cell with one fibre.
 ELEMENTS = 5
 
 
 @dataclass(frozen=True)
 class Cell:
-    """One combination; `pieces` of the matrix per fibre, `gap` in fibre diameters."""
+    """One combination; `pieces` of the matrix per fibre, `gap` in fibre diameters, `coating` thickness / radius, 0 of
+    none, with a stiffness over that of the matrix of `coating_contrast`."""
 
     fibres: int
     fraction: float
@@ -45,6 +48,8 @@ class Cell:
     pieces: int
     contrast: float
     refine: int
+    coating: float
+    coating_contrast: float
 
     @property
     def possible(self) -> bool:
@@ -52,20 +57,23 @@ class Cell:
         return not (self.fraction >= 0.65 and self.gap > 0.1)
 
     def case(self, space: str) -> Case:
-        """The case, with that kind of coarse space."""
+        """The case, with that kind of coarse space; where there are coatings it and the cut are the program's own."""
+        coating = {"coating": {"young": 3.0 * self.coating_contrast, "poisson": 0.3}} if self.coating else {}
         return cases.parse(
             {
                 "cell": {
                     "geometry": "random", "fibres": self.fibres, "fibre_fraction": self.fraction, "min_gap": self.gap,
                     "mesh_size": 1 / (ELEMENTS * self.fibres**0.5), "refine": self.refine,
+                    **({"coating": self.coating} if self.coating else {}),
                 },
                 "material": {
                     "matrix": {"young": 3.0, "poisson": 0.35},
                     "fibre": {"young": 3.0 * self.contrast, "poisson": 0.3},
+                    **coating,
                 },
                 "analysis": {"type": "stiffness", "plane": "strain"},
-                "decomposition": {"subdomains": self.fibres * (1 + self.pieces) or 1},
-                "petsc": {"feti_ksp_rtol": 1e-8, "feti_coarse_space": space},
+                "decomposition": {} if self.coating else {"subdomains": self.fibres * (1 + self.pieces) or 1},
+                "petsc": {"feti_ksp_rtol": 1e-8, "feti_coarse_space": "auto" if self.coating else space},
             },
             Path(),
         )  # fmt: skip
@@ -91,7 +99,8 @@ class Row(Cell):
         """Of the table."""
         return (
             f"{self.fibres:6}{self.fraction:9.2f}{self.gap:6.2f}{self.pieces:7}{self.contrast:9.0e}{self.refine:7}"
-            f"{self.dofs:9}{self.subdomains:8}{self.boundary:9}{self.vectors:8.2f}{self.iterations:11}{self.seconds:8.1f}"
+            f"{self.coating:8.2g}{self.coating_contrast:9.0e}"
+            f"{self.dofs:9}{self.subdomains:8}{self.boundary:9}{self.vectors:8.2f}{self.iterations:11}{self.seconds:6.1f}"
         )
 
 
@@ -105,7 +114,7 @@ def main() -> None:
     known = {row.cell for row in done}
     wanted = [cell for cell in grid if cell.possible and cell not in known]
     say(f"{len(grid)} combinations, {len(done)} done, {len(wanted)} to do")
-    say("fibres fraction   gap pieces contrast refine     dofs subdom. boundary vectors iterations seconds")
+    say("fibres fraction   gap pieces contrast refine coating contrast     dofs subdom. boundary vectors iterations s")
     for cell in wanted:
         done.append(measure(cell, arguments.space, comm))
         say(done[-1].line(), flush=True)
@@ -122,7 +131,9 @@ def _silent(*_: object, **__: object) -> None:
 def combinations(arguments: argparse.Namespace) -> list[Cell]:
     """All cells that the lists of the command line make."""
     a = arguments
-    return [Cell(*of) for of in product(a.fibres, a.fractions, a.gaps, a.pieces, a.contrasts, a.refine)]
+    bare = a.fibres, a.fractions, a.gaps, a.pieces, a.contrasts, a.refine
+    coats = [(0.0, 1.0)] if a.coatings is None else list(product(a.coatings, a.coating_contrasts))
+    return [Cell(*of, *coat) for of in product(*bare) for coat in coats]
 
 
 def summary(rows: list[Row]) -> str:
@@ -156,7 +167,7 @@ def measure(cell: Cell, space: str, comm: MPI.Intracomm, thresholds: Thresholds 
 def _read(path: Path) -> list[Row]:
     if not path.exists():
         return []
-    kinds: dict[str, Callable[[str], Any]] = dict.fromkeys(("fraction", "gap", "contrast", "vectors", "seconds"), float)
+    kinds: dict[str, Callable[[str], Any]] = dict.fromkeys(REAL, float)
     with path.open(newline="") as stream:
         return [Row(**{k: kinds.get(k, int)(v) for k, v in line.items()}) for line in csv.DictReader(stream)]
 
@@ -177,6 +188,8 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--pieces", type=int, nargs="+", default=[0, 1, 4], help="per fibre, 0: matrix uncut")
     parser.add_argument("--contrasts", type=float, nargs="+", default=[1e-3, 2.0, 1e3, 1e6])
     parser.add_argument("--refine", type=int, nargs="+", default=[0, 1, 2])
+    parser.add_argument("--coatings", type=float, nargs="+", help="thickness / radius; by default none")
+    parser.add_argument("--coating-contrasts", type=float, nargs="+", default=[1e-3, 1.0, 1e3], help="of the matrix")
     parser.add_argument("--space", choices=("natural", "adaptive"), default="adaptive")
     parser.add_argument("--out", type=Path, default=Path("results/robustness.csv"), metavar="FILE.csv")
     return parser

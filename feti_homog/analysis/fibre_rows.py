@@ -58,5 +58,5 @@ def _of_cell(cell: Cell) -> tuple[Float, Float, list[str]]:
         return mesh.period, circles, [mesh.phases[phase] for phase in torus.constituent_phase[inner]]
     arrangement = arrange(cell)
     scale = arrangement_scale(cell, arrangement)
-    circles = scale * np.column_stack([arrangement.centres, arrangement.radii])
+    circles = scale * np.column_stack([arrangement.centres, arrangement.round_radii])
     return scale * np.array([arrangement.width, arrangement.height]), circles, list(arrangement.phase)

@@ -57,7 +57,7 @@ def _of_case(path: Path) -> FibrePattern:
         return _periodic(mesh.width, mesh.height, fibre_circles(torus)[torus.constituent_phase > 0])
     arrangement = arrange(cell)
     scale = arrangement_scale(cell, arrangement)
-    circles = scale * np.column_stack([arrangement.centres, arrangement.radii])
+    circles = scale * np.column_stack([arrangement.centres, arrangement.round_radii])
     return _periodic(scale * arrangement.width, scale * arrangement.height, circles)
 
 

@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from feti_homog.cell import tabulated
+from feti_homog.cell import elliptic_table, tabulated
+from feti_homog.cell.ellipses import Ellipses
 from feti_homog.cell.torus_pairs import neighbours
+from feti_homog.config.phase_names import COATING
 from feti_homog.errors import MeshError
-from feti_homog.typing import Float, Int
+from feti_homog.typing import Bool, Float, Int
 
 if TYPE_CHECKING:
     from feti_homog.config.cell_section import Cell
@@ -40,7 +42,10 @@ class Arrangement:
     """Discs with `centres` (N, 2) and `radii` (N,) on the torus of periods `width`, `height`; none touch.
 
     `phase` (N,) names what each disc is made of. Fibre k + 1 of a case is disc k. `mesh_order` (N,) are the discs in
-    the order in which they are meshed, on which a few triangles depend; that of the discs if it is None.
+    the order in which they are meshed, on which a few triangles depend; that of the discs if it is None. `coating` (N,)
+    is the thickness of the ring around each disc, 0 where there is none; None if no disc has one. Rings do not touch.
+    `frames` (N, 2, 2) are those of `Ellipses` where some discs are ellipses, with `radii` of the same areas and without
+    coatings; else None.
     """
 
     width: float
@@ -49,11 +54,50 @@ class Arrangement:
     radii: Float
     phase: tuple[str, ...]
     mesh_order: Int | None = None
+    coating: Float | None = None
+    frames: Float | None = None
 
     @property
     def phases(self) -> tuple[str, ...]:
-        """The phases of the cell: the matrix, then those of the discs in the order in which they first appear."""
-        return ("matrix", *dict.fromkeys(self.phase))
+        """The phases of the cell: the matrix, those of the discs in the order in which they first appear, coatings."""
+        return ("matrix", *dict.fromkeys(self.phase), *((COATING,) if self.coated.any() else ()))
+
+    @property
+    def thickness(self) -> Float:
+        """(N,) of the coatings."""
+        return np.zeros(len(self.radii)) if self.coating is None else self.coating
+
+    @property
+    def coated(self) -> Bool:
+        """(N,) which discs have a coating."""
+        return np.asarray(self.thickness > 0)
+
+    @property
+    def outer_radii(self) -> Float:
+        """(N,) of the discs with their coatings."""
+        return np.asarray(self.radii + self.thickness)
+
+    @property
+    def circles(self) -> tuple[Float, Int]:
+        """Radii (k,) of all circles, and their discs (k,): for each disc the outer circle, then that within a coating.
+
+        The circles come in the order of the discs.
+        """
+        disc = np.concatenate([np.arange(len(self.radii)), np.flatnonzero(self.coated)])
+        radii = np.concatenate([self.outer_radii, self.radii[self.coated]])
+        order = np.argsort(disc, kind="stable")
+        return radii[order], disc[order]
+
+    @property
+    def ellipses(self) -> Ellipses:
+        """The discs and ellipses."""
+        assert self.frames is not None
+        return Ellipses(self.centres, self.frames)
+
+    @property
+    def round_radii(self) -> Float:
+        """(N,) radii of discs, NaN of ellipses."""
+        return self.radii if self.frames is None else np.where(self.ellipses.are_round, self.radii, np.nan)
 
 
 def arrange(cell: Cell) -> Arrangement:
@@ -84,8 +128,9 @@ def hexagonal_arrangement(cell: Cell) -> Arrangement:
 
 
 def _lattice(cell: Cell, height: float, centres: Float, limit: float) -> Arrangement:
-    """Equal discs at the centres (N, 2) of a 1 x height cell, which touch at the fraction `limit`."""
+    """Equal discs at the centres (N, 2) of a 1 x height cell, which touch at the fraction `limit` if they are bare."""
     fraction = cell.fibre_fraction
+    limit /= (1 + (cell.coating or 0.0)) ** 2
     assert fraction is not None
     if fraction >= limit:
         raise MeshError(
@@ -93,14 +138,20 @@ def _lattice(cell: Cell, height: float, centres: Float, limit: float) -> Arrange
             f"{limit:.4f}; it must be smaller"
         )
     radius = sqrt(fraction * height / (pi * len(centres)))
-    return Arrangement(1.0, height, centres, np.full(len(centres), radius), (FIBRE,) * len(centres))
+    radii = np.full(len(centres), radius)
+    return Arrangement(1.0, height, centres, radii, (FIBRE,) * len(centres), coating=_coating(cell, radii))
+
+
+def _coating(cell: Cell, radii: Float) -> Float | None:
+    """Thickness (N,) of the coatings that a case gives all its fibres."""
+    return None if cell.coating is None else cell.coating * radii
 
 
 def random_arrangement(cell: Cell, max_steps: int = MAX_STEPS, max_attempts: int | None = None) -> Arrangement:
     """Discs at random in the unit square, periodic, the same for the same case on every machine.
 
     Radii are uniform in mean * (1 - s, 1 + s), s = `radius_spread`, and scaled to the fraction. Any two
-    discs, images included, are at least `min_gap` mean diameters apart. Random centres are moved down the
+    discs, coatings and images included, are at least `min_gap` mean diameters apart. Random centres are moved down the
     gradient of the overlap energy 1/2 sum max(0, R_i + R_j - |x_i - x_j|)^2 of the discs grown by half the
     gap until it is zero; when that has not come after `max_steps`, it starts again from other centres, up to
     `max_attempts` times (default: 10 for few fibres, 3 for many). Last, all is shifted (`clear_shift`).
@@ -113,18 +164,19 @@ def random_arrangement(cell: Cell, max_steps: int = MAX_STEPS, max_attempts: int
     generator = np.random.default_rng(cell.seed)
     radii = 1 + cell.radius_spread * generator.uniform(-1, 1, count)
     radii *= sqrt(fraction / (pi * fsum(radii * radii)))
-    grown = radii + gap * fsum(radii) / count
+    coating = _coating(cell, radii)
+    grown = (radii if coating is None else radii + coating) + gap * fsum(radii) / count
     ask = f"[cell] fibre_fraction = {fraction:g} with min_gap = {gap:g} and fibres = {count}"
     if pi * np.sum(grown**2) > 0.9:
         raise MeshError(
             f"{ask}: random arrangements with this gap exist up to a fibre fraction of at most about "
-            f"{JAMMED / (1 + gap) ** 2:.2f}; lower one of them"
+            f"{JAMMED / (1 + (cell.coating or 0.0) + gap) ** 2:.2f}; lower one of them"
         )
     attempts, best = max_attempts or max(3, min(10, 100 // count)), 0.0
     for _ in range(attempts):
         centres, clearance = relax(generator.random((count, 2)), grown, max_steps)
         if clearance >= 1:
-            return clear_shift(Arrangement(1.0, 1.0, centres, radii, (FIBRE,) * count))
+            return clear_shift(Arrangement(1.0, 1.0, centres, radii, (FIBRE,) * count, coating=coating))
         best = max(best, clearance)
     raise MeshError(
         f"{ask}: no arrangement found in {attempts} attempts; they reached a fibre fraction of at most about "
@@ -143,24 +195,33 @@ def table_arrangement(cell: Cell) -> Arrangement:
         MeshError: rows lie outside, come twice, overlap or touch.
     """
     table = cell.table
-    assert table is not None
+    assert table is not None and table.width is not None
     rows, centres, radii, height = tabulated.fibres(table, cell.window)
-    discs = Arrangement(1.0, height, centres, radii, tuple(table.phase[row] for row in rows))
-    shifted = clear_shift(discs)
+    coating = None if table.coating is None else table.coating[rows] * radii
+    discs = Arrangement(1.0, height, centres, radii, tuple(table.phase[row] for row in rows), coating=coating)
+    clearance, shift = _clearance, clear_shift
+    if table.a is not None:
+        unit = elliptic_table.ellipses_of(table, rows, centres).frames / table.width
+        discs, clearance, shift = replace(discs, frames=unit), elliptic_table.clearance, elliptic_table.clear_shift
+    shifted = shift(discs)
     is_placed = table.left is not None and table.bottom is not None
-    clear = min(LEAST_CLEARANCE * float(discs.radii.mean()), _clearance(shifted))
-    if is_placed and _clearance(discs) >= clear:
+    clear = min(LEAST_CLEARANCE * float(discs.radii.mean()), clearance(shifted))
+    if is_placed and clearance(discs) >= clear:
         return discs
     rounded = shifted.centres.round(TABLE_DECIMALS)
     order = np.lexsort((rounded[:, 1], rounded[:, 0]))
-    return replace(shifted, centres=rounded, radii=radii.round(TABLE_DECIMALS), mesh_order=order)
+    frames = None if shifted.frames is None else shifted.frames.round(TABLE_DECIMALS)
+    thickness = None if coating is None else coating.round(TABLE_DECIMALS)
+    even = replace(shifted, centres=rounded, radii=radii.round(TABLE_DECIMALS), coating=thickness, frames=frames)
+    return replace(even, mesh_order=order)
 
 
 def _clearance(arrangement: Arrangement) -> float:
     """Distance of the sides of the cell from the nearest position at which they would touch a disc."""
     size = np.array([arrangement.width, arrangement.height])
-    reach = arrangement.radii[:, None] * [1, -1]
-    touching = np.concatenate([(arrangement.centres[:, axis, None] + reach) / size[axis] for axis in (0, 1)])
+    radii, disc = arrangement.circles
+    reach = radii[:, None] * [1, -1]
+    touching = np.concatenate([(arrangement.centres[disc, axis, None] + reach) / size[axis] for axis in (0, 1)])
     return float(np.abs((touching - np.round(touching)) * arrangement.width).min())
 
 
@@ -197,7 +258,8 @@ def clear_shift(arrangement: Arrangement) -> Arrangement:
     line touches a disc; among their combinations the one whose corner is farthest from a circle is taken.
     """
     size = (arrangement.width, arrangement.height)
-    centres, radii = arrangement.centres, arrangement.radii
+    radii, disc = arrangement.circles
+    centres = arrangement.centres[disc]
     lines = []
     for axis in (0, 1):
         touching = np.sort(np.concatenate([centres[:, axis] - radii, centres[:, axis] + radii]) % size[axis])
@@ -208,7 +270,7 @@ def clear_shift(arrangement: Arrangement) -> Arrangement:
     corners, half = np.array(list(product(*lines))), np.array(size) / 2
     offset = (centres - corners[:, None] + half) % size - half
     distance = np.abs(np.linalg.norm(offset, axis=2) - radii).min(axis=1)
-    return replace(arrangement, centres=(centres - corners[np.argmax(distance)]) % size)
+    return replace(arrangement, centres=(arrangement.centres - corners[np.argmax(distance)]) % size)
 
 
 ARRANGEMENTS: dict[str, Callable[[Cell], Arrangement]] = {

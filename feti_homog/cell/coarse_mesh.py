@@ -28,6 +28,7 @@ class CoarseMesh:
         arc_circle: (a,) the circle of each of them.
         debonded_edges: (d, 2) edges between a fibre and the matrix that are debonded from the start.
         snapped: how far a node of a user's mesh was moved to make sides match, at most.
+        centres: (fibres, 2) of fibres whose precedence is their number from 1, where they are known; else None.
     """
 
     width: float
@@ -43,6 +44,7 @@ class CoarseMesh:
     arc_circle: Int32
     debonded_edges: Int32
     snapped: float = 0.0
+    centres: Float | None = None
 
     @property
     def period(self) -> Float:

@@ -15,27 +15,32 @@ SAME_CIRCLE = 1e-9
 
 
 def fibre_circles(torus: Torus) -> Float:
-    """(constituents, 3) centre and radius of each fibre's circle; any image of it.
+    """(constituents, 3) centre and radius of each fibre's circle, of a coating the outer one; any image of it.
 
-    The centre of a fibre that is not round is that of its area, and its radius NaN.  NaN for the matrix, and for a
-    fibre that winds around the torus, which has no centre.
+    The centre of a fibre that is not round is that of its area, or the one that the mesh knows, and its radius NaN.
+    NaN for the matrix, and for a fibre that winds around the torus, which has no centre.
     """
     circles = np.full((len(torus.constituent_phase), 3), np.nan)
     for submesh in cut(torus, torus.constituent):
         if torus.constituent_phase[submesh.body] > 0:
             circles[submesh.body] = _circle(submesh)
+    if torus.mesh.centres is not None:
+        body, first = np.unique(torus.constituent, return_index=True)
+        number = torus.mesh.precedence[first]
+        known = np.isnan(circles[body, 2]) & (number > 0)
+        circles[body[known], :2] = torus.mesh.centres[number[known] - 1]
     return circles
 
 
 def _circle(submesh: Submesh) -> Float:
     """(3,) that of one fibre."""
     around = _boundary_circles(submesh)
-    radius = around[0, 2] if len(around) else 0.0
-    offset = around[:, :2] - around[:1, :2]
-    offset -= np.round(offset / submesh.period) * submesh.period
-    away = np.abs(np.column_stack([offset, around[:, 2] - radius]))
-    if radius > 0 and np.all(away < SAME_CIRCLE * radius):
-        return np.asarray(around[0])
+    if len(around) and around[:, 2].min() > 0:
+        outer = around[np.argmax(around[:, 2])]
+        offset = around[:, :2] - outer[:2]
+        offset -= np.round(offset / submesh.period) * submesh.period
+        if np.all(np.abs(offset) < SAME_CIRCLE * outer[2]):
+            return np.asarray(outer)
     shift, closes = unwrap(submesh)
     if not closes:
         return np.full(3, np.nan)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from feti_homog.cell.periodic_topology import COATING, Torus, edge_pairs
+from feti_homog.cell.periodic_topology import Torus, edge_pairs
+from feti_homog.config.phase_names import COATING
 from feti_homog.typing import Bool, Int
 
 

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from itertools import chain, pairwise
 from types import MappingProxyType, ModuleType
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from feti_homog.cell import element_estimate
+from feti_homog.cell import element_estimate, elliptic_outline
 from feti_homog.cell.arrangement import Arrangement, arrange
+from feti_homog.cell.bent_edges import with_bent_edges
 from feti_homog.cell.coarse_mesh import CoarseMesh, areas, flip_double_arcs, representatives
 from feti_homog.cell.graded_size import MeshSizes
 from feti_homog.cell.outline import MATRIX, Curve, Outline, outline
 from feti_homog.cell.size_field import MAX_GROWTH
+from feti_homog.config.phase_names import COATING
 from feti_homog.errors import MeshError
 from feti_homog.typing import Float, Index, Int32
 
@@ -73,29 +77,43 @@ def mesh_arrangement(
     scale: float = 1.0,
 ) -> CoarseMesh:
     """The periodic coarse mesh of an arrangement, with elements of these sizes, scaled at the end; see `generate`."""
-    lines = outline(arrangement, sizes, marks)
-    points, triangles, circle = _fill(lines, sizes)
-    disc = np.where(circle == MATRIX, MATRIX, lines.disc[circle])
-    place = [arrangement.phases.index(name) for name in (*arrangement.phase, arrangement.phases[0])]
-    phase = np.array(place, np.int32)[disc]
-    arcs = [curve for curve in lines.curves if curve.circle != MATRIX]
-    arc_edges = np.concatenate([np.stack([arc.nodes[:-1], arc.nodes[1:]], axis=1) for arc in arcs])
-    arc_edges = arc_edges.astype(np.int32)
-    arc_circle = np.repeat([arc.circle for arc in arcs], [len(arc.nodes) - 1 for arc in arcs])
-    return CoarseMesh(
+    has_ellipses = arrangement.frames is not None
+    lines = (elliptic_outline.outline if has_ellipses else outline)(arrangement, sizes, marks)
+    points, triangles, circle = _fill(lines, sizes, sizes.are_graded(arrangement))
+    place = {name: number for number, name in enumerate(arrangement.phases)}
+    within = [
+        COATING if coat else arrangement.phase[disc] for disc, coat in zip(lines.disc, lines.is_coating, strict=True)
+    ]
+    phase = np.array([place[name] for name in (*within, arrangement.phases[0])], np.int32)[circle]
+    number = lines.disc + 1 + np.where(lines.is_coating, len(arrangement.radii), 0)
+    arc_edges, arc_circle = _arc_edges(lines)
+    mesh = CoarseMesh(
         width=scale * arrangement.width,
         height=scale * arrangement.height,
         points=scale * points,
         triangles=flip_double_arcs(triangles, phase, arc_edges, arc_circle, len(points)),
         phase=phase,
         phases=arrangement.phases,
-        precedence=(disc + 1).astype(np.int32),
+        precedence=np.append(number, 0)[circle].astype(np.int32),
         representative=representatives(points, arrangement.width, arrangement.height),
         circles=scale * lines.circles,
         arc_edges=arc_edges,
-        arc_circle=arc_circle.astype(np.int32),
+        arc_circle=arc_circle,
         debonded_edges=np.zeros((0, 2), np.int32),
     )
+    if not has_ellipses:
+        return mesh
+    middles = elliptic_outline.middles(lines, arrangement)
+    bent = with_bent_edges(mesh, replace(middles, points=scale * middles.points))
+    return replace(bent, centres=scale * arrangement.centres)
+
+
+def _arc_edges(lines: Outline) -> tuple[Int32, Int32]:
+    """Edges (a, 2) on circles, and their circles (a,)."""
+    arcs = [curve for curve in lines.curves if curve.circle != MATRIX and lines.circles[curve.circle, 2] > 0]
+    pairs = [np.stack([arc.nodes[:-1], arc.nodes[1:]], axis=1) for arc in arcs]
+    circle = np.repeat(np.array([arc.circle for arc in arcs], np.int32), [len(edges) for edges in pairs])
+    return np.concatenate([np.zeros((0, 2), np.int32), *pairs]).astype(np.int32), circle
 
 
 def _sizes(cell: Cell, marks: Mapping[int, Sequence[float]]) -> MeshSizes:
@@ -149,12 +167,12 @@ def gmsh_session() -> Iterator[ModuleType]:
         gmsh.finalize()
 
 
-def _fill(lines: Outline, sizes: MeshSizes) -> tuple[Float, Int32, Index]:
-    """Nodes (n, 2), those of the outline first, triangles (m, 3) and the circle around each (or MATRIX)."""
+def _fill(lines: Outline, sizes: MeshSizes, is_graded: bool) -> tuple[Float, Int32, Index]:
+    """Nodes (n, 2), those of the outline first, triangles (m, 3) and the smallest circle around each (or MATRIX)."""
     with gmsh_session() as gmsh:
         gmsh.option.setNumber("Mesh.MeshSizeMax", sizes.largest)
         surfaces, circle = _add_surfaces(gmsh, lines)
-        if sizes.is_graded:
+        if is_graded:
             _grow_from_lines(gmsh, surfaces, sizes.largest)
         gmsh.model.mesh.generate(2)
         tags, coordinates, _ = gmsh.model.mesh.getNodes()
@@ -199,7 +217,7 @@ def _add_lines(gmsh: ModuleType, lines: Outline) -> list[list[int]]:
 
 
 def _add_surfaces(gmsh: ModuleType, lines: Outline) -> tuple[list[int], list[int]]:
-    """Add the plane surfaces of fibres and matrix; their tags, and the circle around each or MATRIX."""
+    """Add the plane surfaces of fibres, coatings and matrix; their tags, and the circle next around each or MATRIX."""
     geo, made = gmsh.model.geo, _add_lines(gmsh, lines)
 
     def add_loop(loop: list[Signed]) -> int:
@@ -207,26 +225,27 @@ def _add_surfaces(gmsh: ModuleType, lines: Outline) -> tuple[list[int], list[int
         return int(geo.addCurveLoop(list(chain.from_iterable(tags))))
 
     surfaces, circle = [], []
-    discs = [(tag, curve) for tag, curve in enumerate(lines.curves, 1) if curve.inside != MATRIX]
-    for loop in _loops(discs):
-        surfaces.append(geo.addPlaneSurface([add_loop(loop)]))
-        circle.append(loop[0][1].inside)
-    for loops in _with_holes(_loops(_matrix_lines(lines)), lines.points):
-        surfaces.append(geo.addPlaneSurface([add_loop(loop) for loop in loops]))
-        circle.append(MATRIX)
+    regions = defaultdict(list)
+    for loop in _loops(_bounding_lines(lines)):
+        regions[loop[0][1].inside].append(loop)
+    # The matrix is last.
+    for region in sorted(regions, key=lambda inside: inside == MATRIX):
+        for loops in _with_holes(regions[region], lines.points):
+            surfaces.append(geo.addPlaneSurface([add_loop(loop) for loop in loops]))
+            circle.append(region)
     geo.synchronize()
     return surfaces, circle
 
 
-def _matrix_lines(lines: Outline) -> list[Signed]:
-    """The lines that have matrix on their left: pieces of sides, and arcs backwards with a negative tag."""
-    result = []
-    for tag, curve in enumerate(lines.curves, 1):
-        if curve.circle != MATRIX:
-            result.append((-tag, Curve(curve.nodes[::-1], curve.circle, MATRIX)))
-        elif curve.inside == MATRIX:
-            result.append((tag, curve))
-    return result
+def _bounding_lines(lines: Outline) -> list[Signed]:
+    """All lines with what they bound on their left: pieces of sides, arcs, and arcs backwards with a negative tag."""
+    forwards = list(enumerate(lines.curves, 1))
+    backwards = [
+        (-tag, Curve(curve.nodes[::-1], curve.circle, curve.outside, curve.inside))
+        for tag, curve in forwards
+        if curve.circle != MATRIX
+    ]
+    return forwards + backwards
 
 
 def _loops(lines: list[Signed]) -> list[list[Signed]]:
@@ -256,8 +275,8 @@ def _with_holes(loops: list[list[Signed]], points: Float) -> list[list[list[Sign
 
 
 def _is_hole(loop: list[Signed]) -> bool:
-    """Whether no piece of a side is in the loop."""
-    return all(curve.circle != MATRIX for _, curve in loop)
+    """Whether the loop is a circle run backwards."""
+    return all(tag < 0 for tag, _ in loop)
 
 
 def _polygon(loop: list[Signed], points: Float) -> Float:

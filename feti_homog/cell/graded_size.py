@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from feti_homog.cell.arrangement import Arrangement
-from feti_homog.cell.size_field import MAX_GROWTH, line_size, wrap
+from feti_homog.cell.size_field import MAX_GROWTH, coating_size, line_size, wrap
 from feti_homog.typing import Float
 
 # Samples of a size on a line for each of its edges, where the size is graded.
@@ -35,10 +35,13 @@ class MeshSizes:
         """One size for all."""
         return cls(largest, largest, largest)
 
-    @property
-    def is_graded(self) -> bool:
-        """Whether the mesh is finer on circles or at tips than elsewhere."""
-        return self.tip < self.largest
+    def are_graded(self, arrangement: Arrangement) -> bool:
+        """Whether the mesh is finer on circles or at tips than elsewhere, as it is on thin coatings."""
+        return bool(min(self.tip, self.on_circles(arrangement).min()) < self.largest)
+
+    def on_circles(self, arrangement: Arrangement) -> Float:
+        """(N,) on the circles of each disc."""
+        return np.where(arrangement.coated, np.minimum(self.interface, coating_size(arrangement)), self.interface)
 
 
 @dataclass(frozen=True)
@@ -55,36 +58,36 @@ class SizeField:
 
 
 def size_field(arrangement: Arrangement, sizes: MeshSizes, vertices: Float, tips: Float) -> SizeField:
-    """`line_size`, but at most h_i + g d at the distance d from a circle, and h_t + g max(0, d - h_t) from one of the
+    """`line_size`, but at most h_i + g d at the distance d from a disc, and h_t + g max(0, d - h_t) from one of the
     `tips` (t, 2), so that the edges at a tip have the size h_t; the growth g is MAX_GROWTH."""
     base = line_size(arrangement, sizes.largest, vertices)
-    if not sizes.is_graded:
+    if not sizes.are_graded(arrangement):
         return SizeField(base)
     size = np.array([arrangement.width, arrangement.height])
-    to_circle = _circle_distance(arrangement, size, sizes.interface)
+    on_circles = _from_circles(arrangement, size, sizes.on_circles(arrangement))
     tree = cKDTree(wrap(tips.reshape(-1, 2), size), boxsize=size)
 
     def at(points: Float) -> Float:
         # Without tips the distance is infinite.
         at_tips = sizes.tip + MAX_GROWTH * np.maximum(0.0, tree.query(wrap(points, size))[0] - sizes.tip)
-        on_circles = sizes.interface + MAX_GROWTH * to_circle(points)
-        return np.asarray(np.minimum(base(points), np.minimum(on_circles, at_tips)))
+        return np.asarray(np.minimum(base(points), np.minimum(on_circles(points), at_tips)))
 
     return SizeField(at, 1 / SAMPLES_OF_AN_EDGE)
 
 
-def _circle_distance(arrangement: Arrangement, size: Float, spacing: float) -> Callable[[Float], Float]:
-    """Distances (n,) of positions (n, 2) on the torus from the nearest circle; which that is, points `spacing` apart
-    on the circles tell."""
-    counts = np.ceil(2 * np.pi * arrangement.radii / spacing).astype(int)
+def _from_circles(arrangement: Arrangement, size: Float, caps: Float) -> Callable[[Float], Float]:
+    """The function h_i + g d (n,) of positions (n, 2) on the torus, d the distance from the nearest outer circle and
+    h_i the one of `caps` (N,) of its disc. Which that is, points h_i apart on the circles tell."""
+    radii = arrangement.outer_radii
+    counts = np.ceil(2 * np.pi * radii / caps).astype(int)
     circle = np.repeat(np.arange(len(counts)), counts)
     angle = 2 * np.pi * (np.arange(len(circle)) - np.repeat(np.cumsum(counts) - counts, counts)) / counts[circle]
-    spokes = arrangement.radii[circle, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    spokes = radii[circle, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     tree = cKDTree(wrap(arrangement.centres[circle] + spokes, size), boxsize=size)
 
-    def distance(points: Float) -> Float:
+    def at(points: Float) -> Float:
         nearest = circle[tree.query(wrap(points, size))[1]]
         offset = (points - arrangement.centres[nearest] + size / 2) % size - size / 2
-        return np.asarray(np.abs(np.linalg.norm(offset, axis=1) - arrangement.radii[nearest]))
+        return np.asarray(caps[nearest] + MAX_GROWTH * np.abs(np.linalg.norm(offset, axis=1) - radii[nearest]))
 
-    return distance
+    return at

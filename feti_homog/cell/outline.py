@@ -13,7 +13,7 @@ from feti_homog.cell.arrangement import Arrangement
 from feti_homog.cell.edge_samples import EdgeSamples
 from feti_homog.cell.graded_size import MeshSizes, SizeField, size_field
 from feti_homog.cell.size_field import circle_size
-from feti_homog.typing import Float, Int
+from feti_homog.typing import Bool, Float, Int
 
 MATRIX = -1
 # Relative distance below which two positions are one.
@@ -34,12 +34,14 @@ class Curve:
     Attributes:
         nodes: (k,) numbers of its nodes, from end to end.
         circle: the circle it lies on; MATRIX for a piece of a side.
-        inside: what is on its left: the disc of that circle, or MATRIX.
+        inside: what is on its left: the disc, or the coating, within that circle, or MATRIX.
+        outside: of a piece of a circle, what is on its right: the coating within the circle around it, or MATRIX.
     """
 
     nodes: Int
     circle: int
     inside: int
+    outside: int = MATRIX
 
 
 @dataclass(frozen=True)
@@ -49,28 +51,51 @@ class Outline:
     Attributes:
         points: (n, 2) nodes on all lines, exactly in place.
         curves: through the nodes.
-        circles: (k, 3) in the plane, the images of one disc after the other.
+        circles: (k, 3) in the plane, the images of one disc after the other, that of a coating before the one within.
         disc: (k,) the disc of the arrangement that each circle is an image of.
+        around: (k,) the circle around each; MATRIX if there is none.
     """
 
     points: Float
     curves: tuple[Curve, ...]
     circles: Float
     disc: Int
+    around: Int
+
+    @property
+    def is_coating(self) -> Bool:
+        """(k,) which circles have a coating within."""
+        return np.isin(np.arange(len(self.around)), self.around)
 
 
-def images(arrangement: Arrangement) -> tuple[Float, Int]:
-    """Circles (k, 3) of the periodic images that reach into the cell, fibre by fibre, and their fibres (k,)."""
+def images(arrangement: Arrangement) -> tuple[Float, Int, Int]:
+    """Circles (k, 3) of the periodic images that reach into the cell, their fibres (k,), the circles around them (k,).
+
+    Fibre by fibre, the circles of each image one after the other, from without.
+    """
     size = np.array([arrangement.width, arrangement.height])
+    outer, fibre = _outer_images(arrangement, size)
+    coated = arrangement.coated[fibre]
+    inner = np.column_stack([outer[:, :2], arrangement.radii[fibre]])[coated]
+    place = np.arange(len(outer)) + np.cumsum(coated) - coated
+    rank = np.concatenate([place, place[coated] + 1])
+    order = np.argsort(rank)
+    around = np.concatenate([np.full(len(outer), MATRIX), place[coated]])
+    return np.concatenate([outer, inner])[order], np.concatenate([fibre, fibre[coated]])[order], around[order]
+
+
+def _outer_images(arrangement: Arrangement, size: Float) -> tuple[Float, Int]:
+    """Those of the discs with their coatings."""
+    radii = arrangement.outer_radii
     circles, fibre = [], []
     for step in product((-1, 0, 1), repeat=2):
         centres = arrangement.centres + np.array(step) * size
         outside = centres - np.clip(centres, 0, size)
-        near = np.flatnonzero((outside**2).sum(axis=1) < arrangement.radii**2)
-        circles.append(np.column_stack([centres[near], arrangement.radii[near]]))
+        near = np.flatnonzero((outside**2).sum(axis=1) < radii**2)
+        circles.append(np.column_stack([centres[near], radii[near]]))
         fibre.append(near)
     owner = np.concatenate(fibre)
-    rank = np.arange(len(arrangement.radii))
+    rank = np.arange(len(radii))
     if arrangement.mesh_order is not None:
         rank[arrangement.mesh_order] = np.arange(len(rank))
     order = np.argsort(rank[owner], kind="stable")
@@ -84,25 +109,34 @@ def outline(arrangement: Arrangement, sizes: MeshSizes, marks: Mapping[int, Sequ
     that become nodes.
     """
     size = np.array([arrangement.width, arrangement.height])
-    circles, fibre = images(arrangement)
+    circles, fibre, around = images(arrangement)
     places = [_crossings(circles, axis, size) for axis in (0, 1)]
     sides = ((axis, level) for axis in (0, 1) for level in (0.0, size[1 - axis]))
-    border = np.concatenate([_on_side(places[axis], axis, level) for axis, level in sides])
+    border = np.concatenate([on_side(places[axis], axis, level) for axis, level in sides])
     circle, start, stop = _arcs(circles, _vertex_angles(circles, fibre, border, marks), size)
     ends = _on_circle(circles[circle], start)
     away = cKDTree(border).query(ends)[0] > SAME_PLACE * size.max()
-    numbering = _Numbering(np.concatenate([np.unique(border, axis=0), ends[away]]))
-    field = size_field(arrangement, sizes, numbering.vertices, _tips(arrangement, marks, numbering.vertices))
+    border = np.unique(border, axis=0)
+    # Vertices within coatings are as far from each other as those on the circle around, which they face.
+    outer = np.concatenate([border, ends[away & (around[circle] == MATRIX)]])
+    numbering = Numbering(np.concatenate([border, ends[away]]))
+    field = size_field(arrangement, sizes, outer, _tips(arrangement, marks, numbering.vertices))
 
     curves = []
     for axis in (0, 1):
-        curves += _side_curves(axis, places[axis], circles, size, field, numbering)
-    caps = circle_size(circles[circle, 2], sizes.interface)
-    curves += _arc_curves(circles, circle, start, stop, caps, field, numbering)
-    return Outline(numbering.points(), tuple(curves), circles, fibre)
+        curves += _side_curves(axis, places[axis], circles, around, size, field, numbering)
+    caps = _caps(arrangement, sizes.interface, fibre, around)
+    curves += _arc_curves(circles, around, circle, start, stop, caps[circle], field, numbering)
+    return Outline(numbering.points(), tuple(curves), circles, fibre, around)
 
 
-class _Numbering:
+def _caps(arrangement: Arrangement, largest: float, fibre: Int, around: Int) -> Float:
+    """Largest edge length (k,) on the circles of these discs (k,) with these circles around (k,)."""
+    first = np.unique(arrangement.circles[1], return_index=True)[1]
+    return np.asarray(circle_size(arrangement, largest)[first[fibre] + (around != MATRIX)])
+
+
+class Numbering:
     """Gives numbers to the nodes: first the vertices (v, 2), found by position, then those between."""
 
     def __init__(self, vertices: Float) -> None:
@@ -132,7 +166,7 @@ def _crossings(circles: Float, axis: int, size: Float) -> Float:
     return np.concatenate([[0.0], np.sort(crossing[(crossing > 0) & (crossing < size[axis])]), [size[axis]]])
 
 
-def _on_side(places: Float, axis: int, level: float) -> Float:
+def on_side(places: Float, axis: int, level: float) -> Float:
     """Points (k, 2) on the side along `axis` at the given level of the other coordinate."""
     points = np.full((len(places), 2), level)
     points[:, axis] = places
@@ -181,42 +215,54 @@ def _tips(arrangement: Arrangement, marks: Mapping[int, Sequence[float]], vertic
     fibre = np.repeat(list(known), [len(own) for own in known.values()]).astype(int)
     angle = np.radians([mark for own in known.values() for mark in own])
     size = np.array([arrangement.width, arrangement.height])
-    places = _on_circle(np.column_stack([arrangement.centres, arrangement.radii])[fibre], angle)
+    places = _on_circle(np.column_stack([arrangement.centres, arrangement.outer_radii])[fibre], angle)
     return np.asarray(vertices[cKDTree(vertices % size, boxsize=size).query(places % size)[1]])
 
 
 def _side_curves(
-    axis: int, places: Float, circles: Float, size: Float, field: SizeField, numbering: _Numbering
+    axis: int, places: Float, circles: Float, around: Int, size: Float, field: SizeField, numbering: Numbering
 ) -> list[Curve]:
     """The pieces of the two sides along `axis`, with the same nodes on both."""
     begin, span = places[:-1], np.diff(places)
 
     def point(piece: Int, share: Float) -> Float:
-        return _on_side(begin[piece] + span[piece] * share, axis, 0.0)
+        return on_side(begin[piece] + span[piece] * share, axis, 0.0)
 
     samples = EdgeSamples.of(field, point, span, np.full(len(span), np.inf), SIDE_SAMPLES)
     curves = []
     for level, low in ((0.0, True), (size[1 - axis], False)):
-        inside = _disc_at(_on_side(begin + span / 2, axis, level), circles)
-        # A chord has two edges or more: a triangle with two arc edges beside it could not be flipped.
-        least = np.where(inside == MATRIX, 1, 2)
+        inside = _disc_at(on_side(begin + span / 2, axis, level), circles)
+        # A chord has two edges or more: a triangle with two arc edges beside it could not be flipped. From one circle
+        # of a coating to the other it is no chord.
+        into = around[inside] * (inside != MATRIX) + MATRIX * (inside == MATRIX)
+        crosses = np.zeros(len(inside), bool)
+        crosses[:-1] |= into[1:] == inside[:-1]
+        crosses[1:] |= into[:-1] == inside[1:]
+        least = np.where((inside == MATRIX) | crosses, 1, 2)
         for number, stations in enumerate(samples.stations(least)):
             along = begin[number] + span[number] * stations
             along[[0, -1]] = places[number : number + 2]
-            nodes = numbering.along(_on_side(along, axis, level))
+            nodes = numbering.along(on_side(along, axis, level))
             # Counter-clockwise around the cell: along the coordinate at the bottom and at the right.
             curves.append(Curve(nodes if low == (axis == 0) else nodes[::-1], MATRIX, int(inside[number])))
     return curves
 
 
 def _disc_at(points: Float, circles: Float) -> Int:
-    """The circle (k,) whose disc holds each point, or MATRIX."""
+    """The smallest circle (k,) around each point, or MATRIX."""
     holds = np.linalg.norm(points[:, None] - circles[:, :2], axis=2) < circles[:, 2]
-    return np.where(holds.any(axis=1), holds.argmax(axis=1), MATRIX)
+    return np.where(holds.any(axis=1), np.where(holds, circles[:, 2], np.inf).argmin(axis=1), MATRIX)
 
 
 def _arc_curves(
-    circles: Float, circle: Int, start: Float, stop: Float, caps: Float, field: SizeField, numbering: _Numbering
+    circles: Float,
+    around: Int,
+    circle: Int,
+    start: Float,
+    stop: Float,
+    caps: Float,
+    field: SizeField,
+    numbering: Numbering,
 ) -> list[Curve]:
     """The arcs (a,) from angle `start` to `stop` on their circles as curves, with edges of at most `caps` (a,)."""
     span = stop - start
@@ -229,5 +275,5 @@ def _arc_curves(
     stations = samples.stations(np.ones(len(span), dtype=np.intp))
     for number, begin, turn, own in zip(circle.tolist(), start, span, stations, strict=True):
         nodes = numbering.along(_on_circle(circles[number], begin + turn * own))
-        curves.append(Curve(nodes, number, number))
+        curves.append(Curve(nodes, number, number, int(around[number])))
     return curves

@@ -16,10 +16,8 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 
 from feti_homog.cell.coarse_mesh import CoarseMesh
 from feti_homog.cell.periodic_sides import paired_sides
+from feti_homog.config.phase_names import COATING
 from feti_homog.typing import Bool, Float, Int, Int32
-
-# The phase whose parts each have the number of the fibre that they surround.
-COATING = "coating"
 
 
 @dataclass(frozen=True)

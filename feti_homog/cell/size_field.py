@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from itertools import product
 
 import numpy as np
@@ -33,13 +33,20 @@ def line_size(arrangement: Arrangement, largest: float, vertices: Float) -> Call
     must have, with the distance to the next one.
     """
     size = np.array([arrangement.width, arrangement.height])
-    caps = circle_size(arrangement.radii, largest)
+    radii, disc = arrangement.circles
+    circles, caps = np.column_stack([arrangement.centres[disc], radii]), circle_size(arrangement, largest)
+    outer = np.unique(disc, return_index=True)[1]
     sources = [
-        _between_fibres(arrangement, size, caps, largest),
-        _at_sides(arrangement, size, caps, largest),
-        _at_corners(arrangement, size, caps),
-        _at_vertices(vertices, size, largest),
+        _between_fibres(circles[outer], size, caps[outer], largest),
+        _at_sides(circles, size, caps, largest),
+        _at_corners(circles, size, caps),
+        at_vertices(vertices, size, largest),
     ]
+    return graded(sources, size, largest)
+
+
+def graded(sources: Sequence[Source], size: Float, largest: float) -> Callable[[Float], Float]:
+    """The function h(x) = min(largest, min_k (h_k + g_k |x - x_k|)) of positions (n, 2) on the torus."""
     places, lengths, growths = (np.concatenate(parts) for parts in zip(*sources, strict=True))
     lengths, growths = np.append(lengths, np.inf), np.append(growths, MAX_GROWTH)
     places = wrap(places, size)
@@ -55,9 +62,20 @@ def line_size(arrangement: Arrangement, largest: float, vertices: Float) -> Call
     return at
 
 
-def circle_size(radii: Float, largest: float) -> Float:
-    """Largest edge length (k,) on circles, such that each has at least MIN_EDGES_AROUND edges."""
-    return np.minimum(largest, 2 * np.pi * radii / MIN_EDGES_AROUND)
+def circle_size(arrangement: Arrangement, largest: float) -> Float:
+    """Largest edge length (k,) on the circles of an arrangement, such that each has at least MIN_EDGES_AROUND edges.
+
+    Those on a coating of the thickness t on the radius a have at most sqrt(t a): then they are t / 8 away from their
+    arcs, and elements across the coating do not turn over when their edges are bent.
+    """
+    radii, disc = arrangement.circles
+    caps = np.minimum(largest, 2 * np.pi * radii / MIN_EDGES_AROUND)
+    return np.where(arrangement.coated[disc], np.minimum(caps, coating_size(arrangement)[disc]), caps)
+
+
+def coating_size(arrangement: Arrangement) -> Float:
+    """sqrt(t a) (N,) of the coating of the thickness t on each disc of the radius a."""
+    return np.asarray(np.sqrt(arrangement.thickness * arrangement.radii))
 
 
 def wrap(points: Float, size: Float) -> Float:
@@ -66,14 +84,14 @@ def wrap(points: Float, size: Float) -> Float:
     return np.where(wrapped >= size, 0.0, wrapped)
 
 
-def _between_fibres(arrangement: Arrangement, size: Float, caps: Float, largest: float) -> Source:
+def _between_fibres(circles: Float, size: Float, caps: Float, largest: float) -> Source:
     """Facing points of near fibres; the edges at either suit the gap and those of the other fibre."""
-    centres, radii = arrangement.centres, arrangement.radii
+    centres, radii = circles[:, :2], circles[:, 2]
     first, second, vector = neighbours(centres, size, 2 * radii.max() + largest)
     distance = np.linalg.norm(vector, axis=1)
     gap = distance - radii[first] - radii[second]
     normal = vector / distance[:, None]
-    growth = _growth(gap, 1 / radii[first] + 1 / radii[second])
+    growth = passage_growth(gap, 1 / radii[first] + 1 / radii[second])
     places, lengths, growths = [], [], []
     for here, there, sign in ((first, second, 1.0), (second, first, -1.0)):
         length = np.minimum(PASSAGE_EDGE * gap, caps[there] + MAX_GROWTH * gap)
@@ -84,14 +102,14 @@ def _between_fibres(arrangement: Arrangement, size: Float, caps: Float, largest:
     return np.concatenate(places), np.concatenate(lengths), np.concatenate(growths)
 
 
-def _growth(width: Float, curvature: Float) -> Float:
+def passage_growth(width: Float, curvature: Float) -> Float:
     """Growth with which edges stay below twice the width w + c s^2 / 2 of a passage of curvature c."""
     return np.asarray(np.minimum(MAX_GROWTH, np.sqrt((4 - 2 * PASSAGE_EDGE) * 2 * width * curvature)))
 
 
-def _at_sides(arrangement: Arrangement, size: Float, caps: Float, largest: float) -> Source:
+def _at_sides(circles: Float, size: Float, caps: Float, largest: float) -> Source:
     """Where a circle comes near a side or hardly crosses it: extreme point, foot on the side, crossings."""
-    centres, radii = arrangement.centres % size, arrangement.radii
+    centres, radii = circles[:, :2] % size, circles[:, 2]
     sources: list[Source] = []
     for axis, sign in product((0, 1), (-1.0, 1.0)):
         distance = centres[:, axis] if sign < 0 else size[axis] - centres[:, axis]
@@ -99,7 +117,7 @@ def _at_sides(arrangement: Arrangement, size: Float, caps: Float, largest: float
         extreme[:, axis] += sign * radii
         foot[:, axis] += sign * distance
         width = np.abs(distance - radii)
-        growth = _growth(width, 1 / radii)
+        growth = passage_growth(width, 1 / radii)
         length = np.minimum(PASSAGE_EDGE * width, caps + MAX_GROWTH * width)
         sources += [
             _where(length < caps, extreme, length, growth),
@@ -122,18 +140,18 @@ def _where(chosen: Bool, *source: Float) -> Source:
     return places, lengths, growths
 
 
-def _at_corners(arrangement: Arrangement, size: Float, caps: Float) -> Source:
+def _at_corners(circles: Float, size: Float, caps: Float) -> Source:
     """Where a circle passes near the corner: the corner and the nearest point of the circle."""
-    offset = (arrangement.centres + size / 2) % size - size / 2
+    offset = (circles[:, :2] + size / 2) % size - size / 2
     distance = np.linalg.norm(offset, axis=1)
-    length = PASSAGE_EDGE * np.abs(distance - arrangement.radii)
+    length = PASSAGE_EDGE * np.abs(distance - circles[:, 2])
     near = length < caps
-    facing = offset[near] * (1 - arrangement.radii[near] / distance[near])[:, None]
+    facing = offset[near] * (1 - circles[near, 2] / distance[near])[:, None]
     places = np.concatenate([facing, np.zeros_like(facing)])
     return places, np.tile(length[near], 2), np.full(len(places), MAX_GROWTH)
 
 
-def _at_vertices(vertices: Float, size: Float, largest: float) -> Source:
+def at_vertices(vertices: Float, size: Float, largest: float) -> Source:
     """Vertices, once on the torus, with the distance to the nearest other one."""
     places = wrap(vertices, size)
     tree = cKDTree(places, boxsize=size)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from feti_homog.cell import cut_window
+from feti_homog.cell.elliptic_table import contacts, ellipses_of
 from feti_homog.cell.torus_pairs import neighbours
 from feti_homog.errors import MeshError
 from feti_homog.typing import Bool, Float, Int
@@ -20,6 +21,8 @@ SAME_FIBRE = 0.01
 LEAST_GAP = 1e-4
 # Radius / width of the cell above which positions on a circle differ by more than rounding.
 SMALLEST_RADIUS = 1e-6
+# Thickness / radius of the thinnest and of the thickest coating.
+COATINGS = 0.01, 1.0
 # Faults that are told one by one.
 MAX_FAULTS = 30
 
@@ -58,11 +61,14 @@ def _on_torus(table: FibreTable, window: str) -> tuple[Int, Float, Float, Float]
     _raise_faults(table, faults)
     kept = np.flatnonzero(first)
     centres = centres[kept]
+    if table.a is not None:
+        _raise_faults(table, contacts(table, kept, centres, size, LEAST_GAP))
+        return kept, centres, np.zeros_like(centres), size
     _raise_faults(table, _contacts(table, kept, centres, size, is_cut))
     if not is_cut:
         return kept, centres, np.zeros_like(centres), size
     try:
-        return kept, centres, cut_window.moves(centres, table.radius[kept], size), size
+        return kept, centres, cut_window.moves(centres, table.outer_radius[kept], size), size
     except MeshError as error:
         words = "fibres overlap across the border, and " + str(error)
         raise MeshError(f'[cell] {table.name}: window = "cut": {words}; leave some of them out') from error
@@ -86,7 +92,10 @@ def _outside(table: FibreTable, centres: Float, size: Float, is_cut: bool) -> li
 
     Discs reach into a periodic cell; of a cut window the centres are within.
     """
-    radius, faults = table.radius, []
+    radius, faults, called = table.radius, [], ["radius"] * len(table.row)
+    if table.a is not None and table.b is not None:
+        radius = np.maximum(table.a, table.b)
+        called = np.where(table.a == table.b, "radius", np.where(table.a > table.b, "a", "b")).tolist()
     for axis, (name, width) in enumerate(zip(("width", "height"), size.tolist(), strict=True)):
         over = np.maximum(-centres[:, axis], centres[:, axis] - width)
         reach = radius if (table.left, table.bottom)[axis] is not None else np.full_like(radius, 2 * radius.max())
@@ -95,8 +104,18 @@ def _outside(table: FibreTable, centres: Float, size: Float, is_cut: bool) -> li
             faults.append(f"row {table.row[k]}: {'xy'[axis]} = {value:g}: lies outside the cell, of {name} {width:g}")
     for k in np.flatnonzero((2 * radius >= size.min()) | (radius < SMALLEST_RADIUS * size[0])).tolist():
         limits = f"from {SMALLEST_RADIUS * size[0]:g} to below {size.min() / 2:g} in this cell"
-        faults.append(f"row {table.row[k]}: radius = {radius[k]:g}: expected {limits}")
-    return faults
+        faults.append(f"row {table.row[k]}: {called[k]} = {radius[k]:g}: expected {limits}")
+    return faults + _unlikely_coatings(table)
+
+
+def _unlikely_coatings(table: FibreTable) -> list[str]:
+    """Faults of coatings that are too thin or too thick to be meshed."""
+    if table.coating is None:
+        return []
+    least, most = COATINGS
+    bad = np.flatnonzero((table.coating > 0) & ((table.coating < least) | (table.coating > most)))
+    expected = f"expected 0, or from {least:g} to {most:g}"
+    return [f"row {table.row[k]}: coating = {table.coating[k]:g}: {expected}" for k in bad.tolist()]
 
 
 def _without_images(table: FibreTable, centres: Float, size: Float, is_cut: bool) -> tuple[Bool, list[str]]:
@@ -107,14 +126,18 @@ def _without_images(table: FibreTable, centres: Float, size: Float, is_cut: bool
     near = (first != second) & (apart < SAME_FIBRE * smaller)
     first, second, vector = first[near], second[near], vector[near]
     in_place = np.linalg.norm(centres[second] - centres[first] - vector, axis=1) < SAME_FIBRE * radius[first]
-    alike = np.abs(radius[second] - radius[first]) < SAME_FIBRE * smaller[near]
+    both = np.column_stack([radius, table.outer_radius])
+    alike = (np.abs(both[second] - both[first]) < SAME_FIBRE * smaller[near, None]).all(axis=1)
+    if table.a is not None:
+        squares = ellipses_of(table, np.arange(len(radius)), centres).squares
+        alike &= np.abs(squares[second] - squares[first]).max(axis=(1, 2)) < SAME_FIBRE * smaller[near] ** 2
     faults = []
     for i, j, is_here, is_alike in zip(first.tolist(), second.tolist(), in_place, alike, strict=True):
         rows = f"rows {table.row[i]} and {table.row[j]}"
         if is_here:
             faults.append(f"{rows}: are at one place; expected each fibre once")
         elif not is_cut and (not is_alike or table.phase[i] != table.phase[j]):
-            faults.append(f"{rows}: are images of one fibre, a period apart; expected one radius and one phase")
+            faults.append(f"{rows}: are images of one fibre, a period apart; expected one shape and one phase")
     is_first = np.ones(len(radius), bool)
     is_first[np.maximum(first, second)] = is_cut
     return is_first, faults
@@ -122,7 +145,7 @@ def _without_images(table: FibreTable, centres: Float, size: Float, is_cut: bool
 
 def _contacts(table: FibreTable, kept: Int, centres: Float, size: Float, is_cut: bool) -> list[str]:
     """Faults of fibres, the rows `kept` (k,), that overlap or touch; of a cut window only of those that do within."""
-    radius = table.radius[kept]
+    radius = table.outer_radius[kept]
     first, second, vector = neighbours(centres, size, 2 * radius.max() * (1 + LEAST_GAP))
     together = radius[first] + radius[second]
     gap = np.linalg.norm(vector, axis=1) - together

@@ -39,7 +39,7 @@ def load(path: Path) -> RawMesh:
     except OSError as error:
         raise MeshError(f"{path}: cannot be read: {error.strerror}") from None
     except Exception as error:  # meshio's readers raise whatever they meet
-        raise MeshError(f"{path.name}: meshio cannot read it: {error or type(error).__name__}") from None
+        raise MeshError(f"{path.name}: meshio cannot read it: {str(error).strip() or type(error).__name__}") from None
     faults = _faults(mesh)
     if faults:
         raise MeshError(*(f"{path.name}: {fault}" for fault in faults))

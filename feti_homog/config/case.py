@@ -21,7 +21,7 @@ from feti_homog.config.load_rules import expansion_faults, read_load, read_path,
 from feti_homog.config.load_section import LoadPath, SingleLoad
 from feti_homog.config.matched_cell import with_match
 from feti_homog.config.material_forms import Isotropic, Material
-from feti_homog.config.material_sections import phase_faults, provider, read_materials
+from feti_homog.config.material_sections import coating_faults, phase_faults, provider, read_materials
 from feti_homog.config.mixed_load import MixedLoad, Strain, completed
 from feti_homog.config.petsc_section import Scalar, read_petsc
 from feti_homog.config.schema import Selected, TableReader, selected_value, to_table
@@ -193,6 +193,8 @@ def parse(values: Mapping[str, Any], folder: Path) -> Case:
         "output": _read_section(document, "output", reader),
         "petsc": read_petsc(document.get("petsc", {}), faults),
     }
+    if isinstance(document.get("material"), dict) and sections["cell"]:
+        faults += coating_faults(sections["cell"], document["material"])
     bonding = sections["envelope"], sections["interfaces"], sections["materials"]
     faults += envelope_faults(*bonding, document, reader.selected)
     faults += expansion_faults(sections["path"], sections["single_load"], sections["materials"])
@@ -236,10 +238,11 @@ def _read_section(document: Mapping[str, Any], section: str, reader: TableReader
 def _checked_cell(cell: Cell, folder: Path, faults: list[str]) -> Cell:
     """The cell with its file's path completed; faults between its keys are added to `faults`."""
     if cell.fibre_fraction is not None:
-        crowding = (1.0 + cell.min_gap) ** 2 if cell.geometry == "random" else 1.0
-        limit = TOUCHING[cell.geometry] / crowding
+        spacing = (cell.coating or 0.0) + (cell.min_gap if cell.geometry == "random" else 0.0)
+        limit = TOUCHING[cell.geometry] / (1.0 + spacing) ** 2
         if cell.fibre_fraction >= limit:
-            reason = "no circles min_gap apart are denser" if crowding > 1 else "there the fibres touch"
+            reason = "there the coatings touch" if cell.coating else "there the fibres touch"
+            reason = "no circles min_gap apart are denser" if spacing > (cell.coating or 0.0) else reason
             faults.append(
                 f"[cell] fibre_fraction = {cell.fibre_fraction}: expected less than "
                 f"{limit_in_words(limit, cell.fibre_fraction, 4)} for "
@@ -248,6 +251,8 @@ def _checked_cell(cell: Cell, folder: Path, faults: list[str]) -> Cell:
     faults += size_faults(cell)
     if cell.width is not None and cell.fibre_radius is not None:
         faults.append("[cell] width, fibre_radius: exclude each other; give one")
+    if cell.match is not None and cell.coating is not None:
+        faults.append("[cell] coating, match: exclude each other; fibres that match a table have no coatings")
     return with_files(cell, folder, faults)
 
 

@@ -6,16 +6,17 @@ import os
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from feti_homog.config.cell_section import Cell
 from feti_homog.config.fibre_table import FibreTable, read_table, table_of
 from feti_homog.config.section_values import MESH_FILE, MESH_SUFFIXES
+from feti_homog.config.table_shapes import with_shapes
 from feti_homog.config.wording import toml_value
 from feti_homog.errors import CaseError
 
 SUFFIXES = {"mesh": MESH_SUFFIXES, "table": (".csv",)}
 FILES = {"mesh": MESH_FILE, "table": ".csv file"}
-# Columns of tables that say nothing of round fibres without coatings.
-OTHER_SHAPES = ("coating", "a", "b", "angle")
 
 
 def with_files(cell: Cell, folder: Path, faults: list[str]) -> Cell:
@@ -27,7 +28,8 @@ def with_files(cell: Cell, folder: Path, faults: list[str]) -> Cell:
         return cell
     if cell.file is None:
         return _listed(cell, faults)
-    file, given = (folder / cell.file).resolve(), toml_value(str(cell.file))
+    file = Path(os.path.realpath(folder / cell.file))  # unlike resolve, no error for links in a circle
+    given = toml_value(str(cell.file))
     if file.suffix not in SUFFIXES[cell.geometry]:
         expected = f"the name of a {FILES[cell.geometry]} for geometry = {toml_value(cell.geometry)}"
         faults.append(f"[cell] file = {given}: expected {expected}")
@@ -53,8 +55,11 @@ def _with_table(cell: Cell, faults: list[str]) -> Cell:
     except CaseError as error:
         faults += [f"[cell] {fault}" for fault in error.faults]
         return cell
-    unknown = [name for name in OTHER_SHAPES if getattr(table, name) is not None]
-    faults += [f"[cell] {table.name}: column {name}: fibres have x, y, radius and phase" for name in unknown]
+    if cell.coating is not None and table.coating is not None:
+        faults.append(f"[cell] coating = {cell.coating:g}: {table.name} has a column of it; give one")
+    elif cell.coating is not None:
+        table = replace(table, coating=np.full(len(table.row), cell.coating))
+    table = with_shapes(table, cell.window, faults)
     width, height = (_size(name, getattr(cell, name), table, faults) for name in ("width", "height"))
     return replace(cell, table=replace(table, width=width, height=height))
 

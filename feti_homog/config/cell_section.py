@@ -56,6 +56,14 @@ class Cell:
         real(least=1e-9, most=1e9), "Mean radius of the fibres, in place of width.", unit="length", default=None,
         only=ALL_CIRCULAR, default_words="what width makes it",
     )  # fmt: skip
+    coating: float | None = key(
+        real(least=0.01, most=1.0),
+        'Thickness of the coatings of all fibres / radius of the fibre, which is within; of the phase "coating". '
+        "fibre_fraction and fibre_radius are those without them, gaps those with them.",
+        default=None,
+        only=MESHED,
+        default_words="none, or the column coating of a table",
+    )
     mesh_size: float = key(
         real(least=1e-4, most=0.5),
         "Size of the elements, before refine, / width of the cell.",
@@ -129,8 +137,10 @@ class Cell:
         'rectangle, in physical surfaces "matrix", "fibre", "glass", ...; the nodes on opposite sides match. Fibres '
         "may have any shape. Of Abaqus' files (.inp) element sets have these names; of .vtu and .vtk files, which "
         'meshio reads, cell data "phase" are 0 in the matrix, 1 in fibre, 2 in fibre:2, ... Of "table" the fibres, a '
-        "row for each: columns x, y, radius and, if there are several, phase; what follows # is a comment, of which "
-        '"# width = 120, height = 80" says the size of the cell.',
+        "row for each: columns x, y, radius and, if there are any, phase and coating (thickness / radius); of ellipses "
+        "a and b, the semi-axes, in place of the radius, and angle from x to a in degrees: refine follows arcs through "
+        "three points of each edge before refine, which miss the ellipse by the fourth power of its length. What "
+        'follows # is a comment, of which "# width = 120, height = 80" says the size of the cell.',
         default=None,
         only=FROM_A_FILE,
         default_words="required, or fibre_list of a table",

@@ -67,6 +67,11 @@ class FibreTable:
         """(N, 2)."""
         return np.column_stack([self.x, self.y])
 
+    @property
+    def outer_radius(self) -> Float:
+        """(N,) with the coating."""
+        return self.radius if self.coating is None else self.radius * (1 + self.coating)
+
 
 def read_table(path: Path) -> FibreTable:
     """The table in a text file, which is not judged as a whole: fibres may overlap.

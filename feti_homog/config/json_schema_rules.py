@@ -153,6 +153,7 @@ def _material_rules() -> list[Schema]:
     return [
         _at(("material",), {"required": ["matrix"], "additionalProperties": {"anyOf": complete} | expansions}),
         {"if": _if(ALL_CIRCULAR), "then": _at(("material",), of_circles)},
+        {"if": _at(("cell",), {"required": ["coating"]}), "then": _at(("material",), {"required": ["coating"]})},
     ]
 
 

@@ -18,7 +18,7 @@ def with_match(cell: Cell, folder: Path, faults: list[str]) -> Cell:
     none of its own; faults are added to `faults`."""
     if cell.match is None:
         return cell
-    file, given = (folder / cell.match).resolve(), f"[cell] match = {toml_value(str(cell.match))}"
+    file, given = Path(os.path.realpath(folder / cell.match)), f"[cell] match = {toml_value(str(cell.match))}"
     if not os.path.isfile(file):  # false, not an error, for a name too long
         faults.append(f"{given}: no such file (expected at {file})")
         return cell

@@ -6,9 +6,10 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Mapping
 
-from feti_homog.config.cell_section import CIRCULAR, GEOMETRY
+from feti_homog.config.cell_section import CIRCULAR, GEOMETRY, Cell
 from feti_homog.config.material_forms import MATERIAL_FORMS, Material
 from feti_homog.config.materials import expansion, plane_stiffness, spatial_stiffness
+from feti_homog.config.phase_names import COATING
 from feti_homog.config.schema import TableReader, keys_of
 from feti_homog.config.wording import suggestion, toml_key, toml_value
 
@@ -37,12 +38,26 @@ def read_materials(table: object, plane: str | None, reader: TableReader) -> dic
     return materials
 
 
+def coating_faults(cell: Cell, materials: Mapping[str, object]) -> list[str]:
+    """Faults of coatings without a material, and of a material of coatings where there are none."""
+    if cell.has_own_mesh:
+        return []
+    has_coatings = cell.coating is not None
+    if cell.table is not None:
+        has_coatings = cell.table.coating is not None and bool((cell.table.coating > 0).any())
+    if has_coatings and COATING not in materials:
+        return [f"[material.{COATING}]: missing section; [cell] has coatings"]
+    if not has_coatings and COATING in materials:
+        return [f"[material.{COATING}]: no fibre has a coating; expected [cell] coating, or a column of a table"]
+    return []
+
+
 def _phase_fault(phase: str, geometry: str | None, owners: Mapping[str, str]) -> str:
     """What is wrong with the name of a phase, empty if nothing."""
     section = f"[material.{toml_key(phase)}]"
-    of_circles = geometry in CIRCULAR and ":" not in phase and phase not in ("matrix", "fibre")
+    of_circles = geometry in CIRCULAR and ":" not in phase and phase not in ("matrix", "fibre", COATING)
     if of_circles or not PHASE.fullmatch(phase) or phase in CONSTANTS:
-        return f"{section}: unknown phase; {suggestion(phase, ('matrix', 'fibre', 'fibre:2'), owners)}"
+        return f"{section}: unknown phase; {suggestion(phase, ('matrix', 'fibre', COATING, 'fibre:2'), owners)}"
     if ":" in phase and geometry in CIRCULAR:
         return f'{section}: belongs to geometry = "mesh", not {toml_value(geometry)}'
     return ""

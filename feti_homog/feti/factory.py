@@ -10,6 +10,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from feti_homog.common.mpi_errors import agree
+from feti_homog.config.phase_names import COATING
 from feti_homog.feti.coarse.adaptive import AdaptiveCoarseSpace
 from feti_homog.feti.coarse.coarse_space import CoarseSpace
 from feti_homog.feti.coarse.natural import NaturalCoarseSpace
@@ -95,6 +96,7 @@ def _sizes(
         all_dense=comm.allreduce(all(dense), MPI.LAND),
         all_searchable=comm.allreduce(all(np.logical_or(dense, operators.facewise)), MPI.LAND),
         shared_dofs=shared_dofs(comm, jump_operator),
+        has_coatings=comm.allreduce(any(s.submesh.phase == COATING for s in operators.subdomains), MPI.LOR),
     )
 
 

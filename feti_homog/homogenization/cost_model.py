@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from math import ceil
 
 from feti_homog.config.case import Case
+from feti_homog.config.phase_names import COATING
 from feti_homog.fem.problem import AXIAL, Problem
 
 # Seconds to start Python, MPI, PETSc and gmsh.
@@ -29,6 +30,8 @@ BASE_BYTES, DOF_BYTES = 2.1e8, 6.7e2
 DOFS_OF_A_RANK = 50_000
 # Typical numbers, by which a case is estimated and its operators are chosen.
 ITERATIONS_OF_A_SOLVE, SOLVES_OF_A_CONTACT, SOLVES_OF_A_PATH = 20, 3, 100
+# The same of a solve with coatings, were it not for influence columns (`feti.solver_plan`).
+ITERATIONS_WITH_COATINGS = 400
 
 
 @dataclass(frozen=True)
@@ -52,7 +55,12 @@ def applications(case: Case, problem: Problem) -> int:
         solves *= 2  # under plus and minus each unit load
     if case.path is not None or _asks_for_tips(case):
         solves = SOLVES_OF_A_PATH
-    return ITERATIONS_OF_A_SOLVE * solves * (SOLVES_OF_A_CONTACT if contact else 1)
+    return _iterations(case) * solves * (SOLVES_OF_A_CONTACT if contact else 1)
+
+
+def _iterations(case: Case) -> int:
+    """About those of a solve by a preconditioner."""
+    return ITERATIONS_WITH_COATINGS if COATING in case.materials else ITERATIONS_OF_A_SOLVE
 
 
 def _asks_for_tips(case: Case) -> bool:

@@ -11,6 +11,7 @@ import numpy as np
 
 from feti_homog.errors import CaseError
 from feti_homog.verification.arc_laws import check_arcs
+from feti_homog.verification.bonds import COATING
 from feti_homog.verification.derived_laws import check_derived
 from feti_homog.verification.discrete_cell import DiscreteCell
 from feti_homog.verification.envelope_laws import check_envelope
@@ -83,7 +84,8 @@ def _of(directory: Path) -> Certificate:
 
 
 def _verified(files: ResultFiles) -> Certificate:
-    ledger = Ledger(laws(float(files.document["solver"]["rtol"]), files.case["cell"]["geometry"] == "mesh"))
+    rtol, users_mesh = float(files.document["solver"]["rtol"]), files.case["cell"]["geometry"] == "mesh"
+    ledger = Ledger(laws(rtol, users_mesh, has_coatings=COATING in files.case["material"]))
     ledger.record("files", len(files.altered), ", ".join(files.altered))
     cell = DiscreteCell.of(files)
     check_mesh(ledger, cell)

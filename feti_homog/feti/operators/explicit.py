@@ -15,7 +15,7 @@ from scipy.sparse import csr_matrix
 from feti_homog.common import petsc_ctypes
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.linalg.packed_symmetric import full_from_lower, invert_upper
-from feti_homog.feti.thresholds import DENSE_COLUMNS_ONE_BY_ONE
+from feti_homog.feti.thresholds import DENSE_COLUMNS_ONE_BY_ONE, ILL_CONDITIONED
 from feti_homog.typing import Float, Int
 
 
@@ -43,6 +43,9 @@ class ExplicitInterfaceOperator:
         except np.linalg.LinAlgError as error:
             raise np.linalg.LinAlgError(f"the regularised Schur complement of a subdomain: {error}") from error
         self._flexibility_diagonal = both.diagonal().copy()
+        # Each diagonal has less than the norm of its matrix.
+        conditioning = self._schur_diagonal.max(initial=0.0) * self._flexibility_diagonal.max(initial=0.0)
+        self._refines = bool(conditioning > ILL_CONDITIONED)
         np.fill_diagonal(both, 0.0)
         self._both = both
 
@@ -51,8 +54,16 @@ class ExplicitInterfaceOperator:
         return self._product(x, out, self._schur_diagonal, lower=1)
 
     def apply_flexibility(self, x: Float, out: Float | None = None) -> Float:
-        """S+ x for x (n,) or (n, k), into `out` if it is given; else in Fortran order."""
-        return self._product(x, out, self._flexibility_diagonal, lower=0)
+        """S+ x for x (n,) or (n, k), into `out` if it is given; else in Fortran order.
+
+        Where the inverse is ill-conditioned, as of a thin ring, with one step of iterative refinement.
+        """
+        y = self._product(x, out, self._flexibility_diagonal, lower=0)
+        if self._refines:
+            left = x - self.apply_schur(y)
+            left[self._fixed] -= self._term @ y[self._fixed]
+            y += self._product(left, None, self._flexibility_diagonal, lower=0)
+        return y
 
     def _product(self, x: Float, out: Float | None, diagonal: Float, lower: int) -> Float:
         """The symmetric matrix of one triangle of the array, and of a diagonal, times x; fastest in Fortran order."""

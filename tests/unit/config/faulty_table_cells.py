@@ -40,7 +40,7 @@ FAULTY_TABLE_CELLS: dict[str, tuple[str, tuple[str, ...]]] = {
     ),
     "fibre_with_a_coating": (
         cell(MESH_CELL[0], TABLE_CELL[1].replace("radius = 0.3", "radius = 0.3, coating = 0.1")),
-        ("[cell] fibre_list: column coating: fibres have x, y, radius and phase",),
+        ("[material.coating]: missing section; [cell] has coatings",),
     ),
     "list_of_numbers": (
         cell(MESH_CELL[0], TABLE_CELL[1].replace("[{x = 0.5, y = 0.5, radius = 0.3}]", "[0.5, 0.5, 0.3]")),

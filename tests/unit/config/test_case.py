@@ -39,7 +39,8 @@ def test_keys_that_are_left_out_have_their_defaults(tmp_path):
     assert dataclasses.asdict(case.cell) == {
         "geometry": "hexagonal", "fibre_fraction": 0.4, "mesh_size": 0.05, "interface_size": None, "tip_size": None,
         "refine": 0, "order": 1, "bodies": "torus", "fibres": None, "width": None, "fibre_radius": None,
-        "min_gap": 0.05, "seed": 0, "radius_spread": 0.0, "file": None, "repair": "none", "snap_tolerance": 1e-3,
+        "coating": None, "min_gap": 0.05, "seed": 0, "radius_spread": 0.0, "file": None,
+        "repair": "none", "snap_tolerance": 1e-3,
         "height": None, "fibre_list": None, "window": "periodic", "table": None, "match": None,
     }  # fmt: skip
     assert list(case.materials.items()) == [

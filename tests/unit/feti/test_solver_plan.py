@@ -113,3 +113,10 @@ def test_unknown_values(given, words):
     with pytest.raises(CaseError) as caught:
         read(**given)
     assert caught.value.faults == (words,)
+
+
+def test_coatings_are_left_to_influence_columns_whatever_their_size():
+    coated = replace(STIFFNESS, has_coatings=True, shared_dofs=10 * DEFAULTS.assembled_schur_dofs)
+    assert choose(coated, SolverOptions()).preconditioner == "influence"
+    assert choose(replace(coated, all_dense=False), SolverOptions()).preconditioner == "dirichlet"
+    assert choose(coated, SolverOptions(preconditioner="dirichlet")).preconditioner == "dirichlet"

@@ -1,0 +1,122 @@
+"""Ellipses as affine images of the unit circle: points, tangency with lines, curvature, and distances."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from feti_homog.typing import Bool, Float, Int
+
+# Directions in which the distance of two ellipses is first looked for, and how often the best are looked between.
+DIRECTIONS, ZOOMS, ZOOM = 180, 12, 9
+# Relative difference of the squares of semi-axes of a circle.
+SAME_AXES = 1e-12
+
+
+@dataclass(frozen=True)
+class Ellipses:
+    """The k images c + F p of the unit circle |p| = 1; `centres` (k, 2), `frames` (k, 2, 2)."""
+
+    centres: Float
+    frames: Float
+
+    @classmethod
+    def of(cls, centres: Float, a: Float, b: Float, angle: Float) -> Ellipses:
+        """Those of semi-axes a, b (k,), the first at `angle` (k,) in degrees from x."""
+        cosine, sine = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+        axes = np.stack([np.stack([cosine, sine], axis=1), np.stack([-sine, cosine], axis=1)], axis=2)
+        return cls(centres, axes * np.stack([a, b], axis=1)[:, None])
+
+    def __len__(self) -> int:
+        return len(self.centres)
+
+    def __getitem__(self, rows: Int | Bool) -> Ellipses:
+        return Ellipses(self.centres[rows], self.frames[rows])
+
+    @property
+    def squares(self) -> Float:
+        """(k, 2, 2) F F^T, which say of an ellipse all but where it is."""
+        return np.asarray(self.frames @ self.frames.transpose(0, 2, 1))
+
+    @property
+    def reach(self) -> Float:
+        """(k, 2) how far they reach from their centres along x and y."""
+        return np.asarray(np.linalg.norm(self.frames, axis=2))
+
+    @property
+    def are_round(self) -> Bool:
+        """(k,) which are circles."""
+        squares, radius = self.squares, np.abs(np.linalg.det(self.frames))
+        away = np.abs(squares - radius[:, None, None] * np.eye(2)).max(axis=(1, 2))
+        return np.asarray(away < SAME_AXES * radius)
+
+    @property
+    def longest(self) -> Float:
+        """(k,) the longer semi-axes."""
+        return np.asarray(np.linalg.norm(self.frames, axis=1).max(axis=1))
+
+    def at(self, angle: Float) -> Float:
+        """(k, 2) the point c + F (cos t, sin t) of each at its parameter t (k,)."""
+        return np.asarray(self.centres + np.einsum("kij,kj->ki", self.frames, directions(angle)))
+
+    def unit(self, offsets: Float) -> Float:
+        """(k, 2) F^-1 d of a vector d (k, 2) for each."""
+        return np.asarray(np.linalg.solve(self.frames, offsets[:, :, None])[:, :, 0])
+
+    def parameter(self, offsets: Float) -> Float:
+        """(k,) the parameter at which the ray from each centre along d (k, 2) meets the ellipse."""
+        unit = self.unit(offsets)
+        return np.arctan2(unit[:, 1], unit[:, 0])
+
+    def level(self, points: Float) -> Float:
+        """(n, k) |F^-1 (x - c)| of points (n, 2): below 1 within."""
+        inverse = np.linalg.inv(self.frames)
+        return np.asarray(np.linalg.norm(np.einsum("kij,nkj->nki", inverse, points[:, None] - self.centres), axis=2))
+
+    def support(self, normal: Float) -> Float:
+        """(k,) |F^T n|: how far each reaches from its centre along the unit vector n (k, 2)."""
+        return np.asarray(np.linalg.norm(np.einsum("kij,ki->kj", self.frames, normal), axis=1))
+
+    def facing(self, normal: Float) -> Float:
+        """(k, 2) the point of each whose outward normal is n (k, 2)."""
+        along = np.einsum("kij,kj->ki", self.squares, normal)
+        return np.asarray(self.centres + along / self.support(normal)[:, None])
+
+    def bend(self, normal: Float) -> Float:
+        """(k,) the radius of curvature det(F)^2 / |F^T n|^3 at the point whose normal is n (k, 2)."""
+        return np.asarray(np.linalg.det(self.frames) ** 2 / self.support(normal) ** 3)
+
+    def normal(self, angle: Float) -> Float:
+        """(k, 2) the outward unit normal of each at its parameter (k,)."""
+        across = np.einsum("kji,kj->ki", np.linalg.inv(self.frames), directions(angle))
+        return np.asarray(across / np.linalg.norm(across, axis=1)[:, None])
+
+
+def directions(angle: Float) -> Float:
+    """(..., 2) unit vectors at angles in radians."""
+    return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+
+
+def gaps(first: Ellipses, second: Ellipses) -> tuple[Float, Float]:
+    """The gap (k,) between each of the first and of the second, and the direction (k,) in radians across it.
+
+    Of convex bodies it is max_n (c_2 - c_1) . n - |F_1^T n| - |F_2^T n|: the distance where they are apart, else minus
+    the shortest way that parts them.
+    """
+    vector = second.centres - first.centres
+    one, other = first.squares, second.squares
+
+    def gap(angle: Float) -> Float:
+        n = directions(angle)
+        reach = [np.sqrt(np.einsum("kmi,kij,kmj->km", n, squares, n)) for squares in (one, other)]
+        return np.asarray(np.einsum("ki,kmi->km", vector, n) - reach[0] - reach[1])
+
+    step = 2 * np.pi / DIRECTIONS
+    around = np.arctan2(vector[:, 1], vector[:, 0])[:, None] + step * np.arange(DIRECTIONS)
+    best = around[np.arange(len(vector)), gap(around).argmax(axis=1)]
+    for _ in range(ZOOMS):
+        around = best[:, None] + np.linspace(-step, step, ZOOM)
+        best = around[np.arange(len(vector)), gap(around).argmax(axis=1)]
+        step *= 2 / (ZOOM - 1)
+    return gap(best[:, None])[:, 0], best

@@ -1,0 +1,105 @@
+"""Cells of coated fibres against closed forms, plain cells and elastic interfaces."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.ranks import parallel_assert
+
+from feti_homog import Case, run
+from feti_homog.verification.certificate import verify
+
+pytestmark = pytest.mark.parallel
+
+MATRIX, FIBRE = (3.0, 0.35), (70.0, 0.2)
+TIGHT = {"feti_ksp_rtol": 1e-8}
+
+
+def result_of(coating, thickness=None, interface=None, **cell):
+    phases = {"matrix": MATRIX, "fibre": FIBRE} | ({} if thickness is None else {"coating": coating})
+    document = {
+        "cell": {"geometry": "square", "mesh_size": 0.1, "order": 2, "refine": 1, **cell},
+        "material": {name: dict(zip(("young", "poisson"), own, strict=True)) for name, own in phases.items()},
+        "analysis": {"type": "stiffness", "plane": "strain"},
+        "petsc": TIGHT,
+    }
+    if thickness is not None:
+        document["cell"]["coating"] = thickness
+    if interface:
+        document["interface"] = interface
+    result = run(Case.parse(document, Path()))
+    assert result.status == "done"
+    return result
+
+
+def moduli(phase):
+    """Plane strain bulk modulus lambda + G, and G."""
+    young, poisson = phase
+    shear = young / (2 * (1 + poisson))
+    return shear / (1 - 2 * poisson), shear
+
+
+def cylinder(matrix_bulk, matrix_shear, fibre_bulk, share):
+    """Z. Hashin, B. W. Rosen, J. Appl. Mech. 31, 1964: bulk modulus of a composite cylinder."""
+    return matrix_bulk + share / (1 / (fibre_bulk - matrix_bulk) + (1 - share) / (matrix_bulk + matrix_shear))
+
+
+@pytest.mark.parametrize("coating", [(0.3, 0.35), (20.0, 0.3)])
+def test_bulk_modulus_is_that_of_a_cylinder_of_cylinders(coating):
+    """At a tenth of coated fibres the square cell departs from it by less than 1e-4."""
+    share, thickness = 0.08, 0.1
+    outer = share * (1 + thickness) ** 2
+    coated = cylinder(*moduli(coating), moduli(FIBRE)[0], share / outer)
+    expected = cylinder(*moduli(MATRIX), coated, outer)
+    result = result_of(coating, thickness, fibre_fraction=share)
+    assert result.moduli.bulk == pytest.approx(expected, rel=3e-4)
+    assert result.cell.fibre_fraction == pytest.approx(share, rel=1e-4)
+    assert result.cell.fractions["coating"] == pytest.approx(outer - share, rel=1e-3)
+
+
+def test_a_coating_of_the_material_around_or_within_is_none():
+    share, thickness = 0.3, 0.1
+    inside = result_of(FIBRE, thickness, fibre_fraction=share).effective_stiffness
+    outside = result_of(MATRIX, thickness, fibre_fraction=share).effective_stiffness
+    larger = result_of(None, fibre_fraction=share * (1 + thickness) ** 2).effective_stiffness
+    assert outside == pytest.approx(result_of(None, fibre_fraction=share).effective_stiffness, abs=1e-4 * 7)
+    assert inside == pytest.approx(larger, abs=1e-4 * 10)
+
+
+def test_soft_coatings_tend_to_elastic_interfaces():
+    """k_n = (lambda + 2 G) / t and k_t = G / t, as t / a falls with the stiffness: an error of the first order in t."""
+    share, poisson, errors = 0.3, 0.3, []
+    radius = np.sqrt(share / np.pi)
+    for thickness in (0.04, 0.02):
+        young = thickness * 3.0
+        bulk, shear = moduli((young, poisson))
+        t = thickness * radius
+        springs = {"normal_stiffness": (bulk + shear) / t, "tangential_stiffness": shear / t}
+        coated = result_of((young, poisson), thickness, fibre_fraction=share).effective_stiffness
+        glued = result_of(None, interface=springs, fibre_fraction=share).effective_stiffness
+        errors.append(np.abs(coated - glued).max())
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.parametrize("young", [3e-3, 3.0, 3e3])
+def test_thin_coatings_take_few_iterations(young):
+    cell = {"geometry": "random", "fibres": 6, "min_gap": 0.1, "order": 1, "fibre_fraction": 0.4}
+    result = result_of((young, 0.3), 0.01, **cell)
+    assert max(result.solver.iterations) < 25
+
+
+@pytest.mark.parametrize("thickness", [0.05, 0.01])
+def test_thin_coatings_obey_every_law(comm, shared_path, thickness):
+    cell = {"geometry": "square", "mesh_size": 0.1, "fibre_fraction": 0.3, "coating": thickness, "order": 2}
+    phases = {"matrix": MATRIX, "fibre": FIBRE, "coating": (1.0, 0.35)}
+    document = {
+        "cell": cell,
+        "material": {name: dict(zip(("young", "poisson"), own, strict=True)) for name, own in phases.items()},
+        "analysis": {"type": "stiffness", "plane": "strain"},
+        "output": {"pictures": False},
+    }
+    run(Case.parse(document, Path()), out=shared_path / "result", comm=comm)
+    certificate = verify(shared_path / "result") if comm.rank == 0 else None
+    parallel_assert(comm, certificate is None or certificate.holds, certificate and certificate.text)

@@ -1,0 +1,87 @@
+"""L^ef of cells of tables with ellipses: Eshelby's solution, cells turned by a right angle, and refinement."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from parallel.test_users_meshes import eshelby, plane_strain
+from support.cases import FIBRE, MATRIX, relative_error, solve
+from support.ranks import parallel_assert
+
+from feti_homog import Case, run
+from feti_homog.config import case as cases
+from feti_homog.verification.certificate import verify
+
+pytestmark = pytest.mark.parallel
+
+ROWS = [
+    {"x": 0.45, "y": 0.55, "a": 0.28, "b": 0.14, "angle": 30.0},
+    {"x": 0.02, "y": 0.06, "a": 0.2, "b": 0.12, "angle": 100.0},
+    {"x": 0.93, "y": 0.55, "radius": 0.1},
+]
+
+
+def stiffness(comm, rows, **cell):
+    document = {
+        "cell": {"geometry": "table", "width": 1.0, "height": 1.0, "fibre_list": rows, "mesh_size": 0.1} | cell,
+        "material": {"matrix": MATRIX, "fibre": FIBRE},
+        "analysis": {"type": "stiffness", "plane": "strain"},
+        "petsc": {"feti_ksp_rtol": 1e-11},
+    }
+    return solve(cases.parse(document, Path()), comm)[1]
+
+
+@pytest.mark.quick
+def test_few_ellipses_have_the_stiffness_of_eshelby(comm):
+    """The dilute solution with the matrix's mean strain around (Mori and Tanaka); images err by their fraction f."""
+    a, b = 0.08, 0.04
+    found = stiffness(comm, [{"x": 0.5, "y": 0.5, "a": a, "b": b}], order=2)
+    L, Lf = plane_strain(**MATRIX), plane_strain(**FIBRE)
+    A = np.linalg.inv(np.eye(3) + eshelby(a, b, MATRIX["poisson"]) @ np.linalg.solve(L, Lf - L))
+    f = np.pi * a * b
+    raised = f * (Lf - L) @ A @ np.linalg.inv((1 - f) * np.eye(3) + f * A)
+    assert np.abs(found - L - raised).max() < f * np.abs(raised).max()
+
+
+def test_turned_table_has_the_turned_stiffness(comm):
+    """By a right angle: E11 is E22, and the couplings with the shear change their signs; another mesh."""
+    turned = [row | {"x": 1.0 - row["y"], "y": row["x"]} for row in ROWS]
+    turned = [row | ({"angle": row["angle"] + 90.0} if "angle" in row else {}) for row in turned]
+    first, second = (stiffness(comm, rows, order=2) for rows in (ROWS, turned))
+    swap = np.array([[0, 1, 0], [1, 0, 0], [0, 0, -1]])
+    assert relative_error(second, swap @ first @ swap) < 1e-4
+    assert np.abs(first[2, :2]).max() > 1e-3 * np.abs(first).max()
+
+
+@pytest.mark.quick
+@pytest.mark.parametrize("order", [1, 2])
+def test_debonded_ellipse_obeys_every_law(comm, shared_path, order):
+    document = {
+        "cell": {
+            "geometry": "table",
+            "width": 1.0,
+            "height": 1.0,
+            "fibre_list": ROWS,
+            "mesh_size": 0.15,
+            "order": order,
+        },
+        "material": {"matrix": MATRIX, "fibre": FIBRE},
+        "interface": {"contact": True, "debonded": [{"fibre": [1, 2], "centre": 40.0, "angle": 110.0}]},
+        "analysis": {"type": "stiffness", "plane": "strain"},
+        "output": {"pictures": False},
+    }
+    run(Case.parse(document), comm, out=shared_path / "out")
+    certificate = verify(shared_path / "out") if comm.rank == 0 else None
+    parallel_assert(comm, certificate is None or certificate.holds, certificate and certificate.text)
+
+
+@pytest.mark.parametrize(("order", "least"), [(1, 1.9), (2, 3.5)])
+def test_stiffness_converges_under_refinement(comm, order, least):
+    """By about h^2 and h^4, where the coarse mesh is refined with its arcs."""
+    found = [stiffness(comm, ROWS[:1], order=order, refine=refine, mesh_size=0.15) for refine in range(4)]
+    steps = [np.abs(b - a).max() for a, b in pairwise(found)]
+    rates = [np.log2(one / other) for one, other in pairwise(steps)]
+    assert min(rates) > least, rates
