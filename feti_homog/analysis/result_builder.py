@@ -98,8 +98,9 @@ def _fibres(summary: CellSummary) -> tuple[FibreInfo, ...]:
             phase=summary.phases[summary.constituent_phase[body]],
             centre=None if np.isnan(summary.centres[body, 0]) else summary.centres[body],
             radius=None if np.isnan(summary.radii[body]) else float(summary.radii[body]),
+            coating=float(thickness) if thickness > 0 else None,
         )
-        for number, body in enumerate(bodies, start=1)
+        for number, (body, thickness) in enumerate(zip(bodies, summary.coatings, strict=True), start=1)
     )
 
 

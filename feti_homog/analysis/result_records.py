@@ -64,6 +64,7 @@ class FibreInfo:
         default=None,
     )
     radius: float | None = described("radius of its circle; absent if it is not round", LENGTH, default=None)
+    coating: float | None = described("thickness of its coating; absent without one", LENGTH, default=None)
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import numpy as np
 
 from feti_homog.cell.periodic_topology import Torus, edge_pairs
 from feti_homog.config.phase_names import COATING
-from feti_homog.typing import Bool, Int
+from feti_homog.typing import Bool, Float, Int
 
 
 def fibre_numbers(torus: Torus) -> tuple[Int, Bool]:
@@ -26,3 +26,14 @@ def fibre_numbers(torus: Torus) -> tuple[Int, Bool]:
     number = np.where(is_fibre, np.cumsum(is_fibre), n)
     np.minimum.at(number, coating[inside], number[core[inside]])
     return np.where(phase > 0, number, 0), is_fibre
+
+
+def coating_thickness(numbers: Int, is_fibre: Bool, radii: Float) -> Float:
+    """(fibres,) thickness of their coatings, 0 without one, for `fibre_numbers` and the radii (constituents,).
+
+    NaN where fibre or coating is not round.
+    """
+    coats, fibres = np.flatnonzero((numbers > 0) & ~is_fibre), np.flatnonzero(is_fibre)
+    thickness, coated = np.zeros(len(fibres)), numbers[coats] - 1
+    thickness[coated] = radii[coats] - radii[fibres[coated]]
+    return thickness

@@ -9,7 +9,7 @@ import numpy as np
 from feti_homog.cell import tabulated
 from feti_homog.cell.coarse_mesh import CoarseMesh
 from feti_homog.cell.fibre_centres import fibre_circles
-from feti_homog.cell.fibre_numbers import fibre_numbers
+from feti_homog.cell.fibre_numbers import coating_thickness, fibre_numbers
 from feti_homog.cell.interface_edges import voids
 from feti_homog.cell.matched_arrangement import distance_of
 from feti_homog.cell.periodic_topology import Torus, edge_pairs
@@ -108,6 +108,11 @@ class CellSummary:
     def fibre_bodies(self) -> Int:
         """(fibres,) the constituents that are fibres, in the order of their numbers."""
         return np.flatnonzero(self.is_fibre)
+
+    @property
+    def coatings(self) -> Float:
+        """(fibres,) thickness of their coatings, 0 without one; NaN where they are not round."""
+        return coating_thickness(self.numbers, self.is_fibre, self.radii)
 
     def fibre_number(self, constituent: Int) -> Int:
         """(k,) numbers from 1, as a case file has them, of the fibres that are these constituents (k,) or that these

@@ -56,6 +56,8 @@ def test_bulk_modulus_is_that_of_a_cylinder_of_cylinders(coating):
     result = result_of(coating, thickness, fibre_fraction=share)
     assert result.moduli.bulk == pytest.approx(expected, rel=3e-4)
     assert result.cell.fibre_fraction == pytest.approx(share, rel=1e-4)
+    (fibre,) = result.fibres
+    assert fibre.coating == pytest.approx(thickness * fibre.radius, rel=1e-9)
     assert result.cell.fractions["coating"] == pytest.approx(outer - share, rel=1e-3)
 
 

@@ -46,6 +46,11 @@ CASES = {
         "analysis": {"type": "stiffness", "plane": "strain"},
         "cell": {"geometry": "random", "match": str(TABLE), "fibres": 10, "mesh_size": 0.1},
     },
+    "coated": {
+        "analysis": {"type": "stiffness", "plane": "strain"},
+        "cell": BASE["cell"] | {"coating": 0.2},
+        "material": BASE["material"] | {"coating": {"young": 10.0, "poisson": 0.3}},
+    },
     "angle": {
         "analysis": {"type": "angle", "plane": "strain"},
         "interface": {"debonded": [ARC]},

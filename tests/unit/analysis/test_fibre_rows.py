@@ -44,6 +44,15 @@ def test_the_table_of_a_cell_gives_the_cell(name, tmp_path):
     assert found.radii == pytest.approx(expected.radii, rel=1e-15)
 
 
+def test_coatings_are_a_column(tmp_path):
+    coating = "[material.coating]\nyoung = 3.0\npoisson = 0.2\n"
+    source = case_of(tmp_path / "case.toml", f"{CELLS['random']}coating = 0.07\n", coating)
+    (tmp_path / "t.csv").write_text(fibre_rows.table(source))
+    again = case_of(tmp_path / "again.toml", 'geometry = "table"\nfile = "t.csv"\n', coating)
+    found, expected = arrange(load(again).cell), arrange(load(source).cell)
+    assert found.coating == pytest.approx(expected.coating, rel=1e-13)
+
+
 def test_the_table_of_a_users_mesh_has_its_round_fibres(tmp_path):
     """Here of one that is not round."""
     grid().write(tmp_path / "cell.msh")
