@@ -102,9 +102,9 @@ DENSE_COLUMNS_ONE_BY_ONE = 6
 # Columns for which sparse factors are solved at once: bounds the memory of their right-hand sides, 8 bytes a dof each.
 SPARSE_COLUMNS_AT_ONCE = 64
 
-# Largest diagonal entries of S and of its regularised inverse, multiplied, above which products with the inverse are
-# refined: up to 3e3 of fibres and pieces of the matrix, 1.5e4 of rings a twentieth of their radius thick, 4e6 of a
-# hundredth.  Forces balance to 4e-12 there, and to 5e-8 without.
+# Largest diagonal entries of S and of its regularised inverse, multiplied, above which products of a coating with the
+# inverse are refined: up to 3e3 of fibres and pieces of the matrix, 1.5e4 of rings a twentieth of their radius thick,
+# 4e6 of a hundredth.  Forces balance to 4e-12 there, and to 5e-8 without.
 ILL_CONDITIONED = 1e4
 
 # solver, krylov

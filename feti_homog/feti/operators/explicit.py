@@ -13,6 +13,7 @@ from scipy.linalg.blas import dsymm, dsymv
 from scipy.sparse import csr_matrix
 
 from feti_homog.common import petsc_ctypes
+from feti_homog.config.phase_names import COATING
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.linalg.packed_symmetric import full_from_lower, invert_upper
 from feti_homog.feti.thresholds import DENSE_COLUMNS_ONE_BY_ONE, ILL_CONDITIONED
@@ -45,7 +46,9 @@ class ExplicitInterfaceOperator:
         self._flexibility_diagonal = both.diagonal().copy()
         # Each diagonal has less than the norm of its matrix.
         conditioning = self._schur_diagonal.max(initial=0.0) * self._flexibility_diagonal.max(initial=0.0)
-        self._refines = bool(conditioning > ILL_CONDITIONED)
+        # Where pieces are ill-conditioned because they are nearly incompressible, refined products and the coarse
+        # matrices would no longer agree to rounding.
+        self._refines = subdomain.submesh.phase == COATING and bool(conditioning > ILL_CONDITIONED)
         np.fill_diagonal(both, 0.0)
         self._both = both
 
@@ -56,7 +59,7 @@ class ExplicitInterfaceOperator:
     def apply_flexibility(self, x: Float, out: Float | None = None) -> Float:
         """S+ x for x (n,) or (n, k), into `out` if it is given; else in Fortran order.
 
-        Where the inverse is ill-conditioned, as of a thin ring, with one step of iterative refinement.
+        Of a thin coating, whose inverse is ill-conditioned, with one step of iterative refinement.
         """
         y = self._product(x, out, self._flexibility_diagonal, lower=0)
         if self._refines:
