@@ -7,8 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
+from feti_homog.cell.coarse_mesh import CoarseMesh
 from feti_homog.cell.gmsh_mesher import generate
 from feti_homog.config.cell_section import Cell
+from feti_homog.typing import Bool
 
 
 def write_voids(path: Path, voids: Sequence[int] | None = None, **cell) -> None:
@@ -20,6 +22,11 @@ def write_voids(path: Path, voids: Sequence[int] | None = None, **cell) -> None:
         away = centres[:, None] - mesh.circles[np.array(voids, int), :2]
         away -= np.round(away / mesh.period) * mesh.period
         kept = (np.hypot(*np.moveaxis(away, 2, 0)) > mesh.circles[np.array(voids, int), 2]).all(axis=1)
+    write_part(path, mesh, kept)
+
+
+def write_part(path: Path, mesh: CoarseMesh, kept: Bool) -> None:
+    """The file of those triangles of a mesh that are `kept` (m,)."""
     triangles, phase = mesh.triangles[kept], mesh.phase[kept]
     names = [f'2 {number + 1} "{name}"' for number, name in enumerate(mesh.phases) if (phase == number).any()]
     used = np.unique(triangles)
