@@ -19,13 +19,13 @@ from feti_homog.cell.outline import (
     ARC_SAMPLES,
     MATRIX,
     MERGED,
-    QUARTER,
     SAME_PLACE,
     SIDE_SAMPLES,
     TURN,
     Curve,
     Numbering,
     Outline,
+    arcs_within,
     on_side,
 )
 from feti_homog.typing import Float, Int
@@ -42,7 +42,7 @@ def outline(arrangement: Arrangement, sizes: MeshSizes, marks: Mapping[int, Sequ
     sides = ((axis, level) for axis in (0, 1) for level in (0.0, size[1 - axis]))
     border = np.concatenate([on_side(places[axis], axis, level) for axis, level in sides])
     angles, sharp = _vertex_angles(ellipses, fibre, border, size, marks)
-    which, start, stop = _arcs(ellipses, angles, size)
+    which, start, stop = arcs_within(angles, lambda of, angle: ellipses[of].at(angle), size)
     ends = ellipses[which].at(start)
     away = cKDTree(border).query(ends)[0] > SAME_PLACE * size.max()
     numbering = Numbering(np.concatenate([np.unique(border, axis=0), ends[away]]))
@@ -127,22 +127,6 @@ def _vertex_angles(
 def _on_upright(places: Float, size: Float) -> Float:
     """(n,) whether positions (n, 2) on the border are on the left or right side."""
     return np.asarray(np.abs(places[:, 0] - np.clip(np.round(places[:, 0] / size[0]), 0, 1) * size[0]) == 0)
-
-
-def _arcs(ellipses: Ellipses, angles: list[Float], size: Float) -> tuple[Int, Float, Float]:
-    """Ellipse, start and stop parameter (a,) of the arcs within the cell, each at most a quarter turn."""
-    which, start, stop = [], [], []
-    for number, own in enumerate(angles):
-        for begin, span in zip(own, np.diff(own, append=own[0] + TURN), strict=True):
-            parts = max(1, int(np.ceil(span / QUARTER - SAME_PLACE)))
-            stations = begin + span * np.arange(parts + 1) / parts
-            which.append(np.full(parts, number))
-            start.append(stations[:-1])
-            stop.append(stations[1:])
-    whose, first, last = np.concatenate(which), np.concatenate(start), np.concatenate(stop)
-    middle = ellipses[whose].at((first + last) / 2)
-    within = np.all((middle > 0) & (middle < size), axis=1)
-    return whose[within], first[within], last[within]
 
 
 def _tips(arrangement: Arrangement, marks: Mapping[int, Sequence[float]], vertices: Float, size: Float) -> Float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -113,7 +113,8 @@ def outline(arrangement: Arrangement, sizes: MeshSizes, marks: Mapping[int, Sequ
     places = [_crossings(circles, axis, size) for axis in (0, 1)]
     sides = ((axis, level) for axis in (0, 1) for level in (0.0, size[1 - axis]))
     border = np.concatenate([on_side(places[axis], axis, level) for axis, level in sides])
-    circle, start, stop = _arcs(circles, _vertex_angles(circles, fibre, border, marks), size)
+    angles = _vertex_angles(circles, fibre, border, marks)
+    circle, start, stop = arcs_within(angles, lambda of, angle: _on_circle(circles[of], angle), size)
     ends = _on_circle(circles[circle], start)
     away = cKDTree(border).query(ends)[0] > SAME_PLACE * size.max()
     border = np.unique(border, axis=0)
@@ -193,18 +194,21 @@ def _vertex_angles(circles: Float, fibre: Int, border: Float, marks: Mapping[int
     return angles
 
 
-def _arcs(circles: Float, angles: list[Float], size: Float) -> tuple[Int, Float, Float]:
-    """Circle, start and stop angle (a,) of the arcs within the cell, each at most a quarter turn."""
-    circle, start, stop = [], [], []
+def arcs_within(angles: list[Float], at: Callable[[Int, Float], Float], size: Float) -> tuple[Int, Float, Float]:
+    """Curve, start and stop angle (a,) of the arcs within the cell, each at most a quarter turn.
+
+    `angles` are those of the vertices of each closed curve; at(curves, angles) are the points (a, 2) there.
+    """
+    curve, start, stop = [], [], []
     for number, own in enumerate(angles):
         for begin, span in zip(own, np.diff(own, append=own[0] + TURN), strict=True):
             parts = max(1, int(np.ceil(span / QUARTER - SAME_PLACE)))
             stations = begin + span * np.arange(parts + 1) / parts
-            circle.append(np.full(parts, number))
+            curve.append(np.full(parts, number))
             start.append(stations[:-1])
             stop.append(stations[1:])
-    whose, first, last = np.concatenate(circle), np.concatenate(start), np.concatenate(stop)
-    middle = _on_circle(circles[whose], (first + last) / 2)
+    whose, first, last = np.concatenate(curve), np.concatenate(start), np.concatenate(stop)
+    middle = at(whose, (first + last) / 2)
     within = np.all((middle > 0) & (middle < size), axis=1)
     return whose[within], first[within], last[within]
 

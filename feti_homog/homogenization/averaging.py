@@ -130,20 +130,21 @@ class Homogenization:
         """(boundary dofs, m) of which int eps* over bodies and voids is the transpose times u."""
         m, dofs = self.cell.solver.problem.strains, self.cell.solver.interface_operators.dofs
         pairs = zip(self.cell.subdomains, dofs, strict=True)
-        return np.concatenate([np.zeros((0, m)), *(s.mean_strain[own] for s, own in pairs)])
+        return np.concatenate([np.zeros((0, m)), *(s.mean_strain(own) for s, own in pairs)])
 
     @cached_property
     def _strain_inside(self) -> float:
         """The largest share of an inner node in int eps*, which is 0 if voids are closed; relative.  Collective."""
         inner, size = 0.0, 0.0
         for s, own in zip(self.cell.subdomains, self.cell.solver.interface_operators.dofs, strict=True):
-            inside = np.ones(len(s.mean_strain), bool)
+            size = max(size, float(np.sqrt(s.area)))
+            if not s.submesh.at_void.any():
+                continue
+            inside = np.ones(s.n_dofs, bool)
             inside[own] = False
             if s.submesh.pinned >= 0:  # it does not move
                 inside[s.problem.dofs(np.array([s.submesh.pinned]))] = False
-            size = max(size, float(np.sqrt(s.area)))
-            if s.submesh.at_void.any():
-                inner = max(inner, float(np.abs(s.mean_strain[inside]).max(initial=0.0)))
+            inner = max(inner, float(np.abs(s.mean_strain(np.flatnonzero(inside))).max(initial=0.0)))
         return float(self.cell.comm.allreduce(inner, MPI.MAX) / self.cell.comm.allreduce(size, MPI.MAX))
 
     def _averages(self, E: Float, u: Float) -> tuple[Float, Float, float]:

@@ -35,8 +35,6 @@ class Subdomain:
         R: (cn, k) orthonormal kernel of K: translations, and a rotation in the plane if the piece can turn,
             less what the pinned class stops.
         positions: (n, 2) unwrapped positions of the classes.
-        mean_strain: (cn, m) whose transpose times u is int eps* of the displacements u over the subdomain and what
-            lies of voids beside it, int_Omega eps* + int u (x) n ds, n outward from the voids; 0 at voids.
     """
 
     submesh: Submesh
@@ -47,7 +45,6 @@ class Subdomain:
     area: float
     R: Float
     positions: Float
-    mean_strain: Float
     _built_stiffness: csr_matrix | None = field(repr=False)
 
     @classmethod
@@ -72,10 +69,19 @@ class Subdomain:
         K = _pinned(body.K, problem, submesh.pinned)
         _check_kernel(submesh, K, R)
         Q = body.Q
-        mean_strain = _mean_strain(submesh, mesh, Q, L, problem)
         if submesh.pinned >= 0:
             Q[problem.dofs(np.array([submesh.pinned]))] = 0.0
-        return cls(submesh, mesh, problem, L, Q, body.area, R, positions, mean_strain, K)
+        return cls(submesh, mesh, problem, L, Q, body.area, R, positions, K)
+
+    def mean_strain(self, dofs: Int) -> Float:
+        """(k, m) whose transpose times the displacements u of `dofs` (k,) is their share in int eps* over the subdomain
+        and what lies of voids beside it, int_Omega eps* + int u (x) n ds, n outward from the voids; 0 at voids."""
+        m = self.problem.strains
+        bodies = np.linalg.solve(self.L[:m, :m], self.Q[dofs, :m].T).T
+        if not self.submesh.at_void.any():
+            return np.asarray(bodies)
+        voids = np.einsum("ck,ikm->cim", void_integrals(self.submesh, self.mesh), np.eye(m)[self.problem.voigt])
+        return np.asarray(bodies + voids.reshape(-1, m)[dofs])
 
     @property
     def n_dofs(self) -> int:
@@ -122,14 +128,6 @@ class Subdomain:
         b = np.argmax(((x - x[a]) ** 2).sum(axis=1))
         (dx, dy), (ex, ey) = x[b] - x[a], (x - x[a]).T
         return candidates[[a, b, np.argmax(np.abs(dx * ey - dy * ex))]]
-
-
-def _mean_strain(submesh: Submesh, mesh: FineMesh, Q: Float, L: Float, problem: Problem) -> Float:
-    """(cn, m) `Subdomain.mean_strain`."""
-    m = problem.strains
-    parts = np.eye(m)[problem.voigt]
-    bodies = np.linalg.solve(L[:m, :m], Q[:, :m].T).T
-    return np.asarray(bodies + np.einsum("ck,ikm->cim", void_integrals(submesh, mesh), parts).reshape(-1, m))
 
 
 def kernel(problem: Problem, positions: Float, rotates: bool, pinned: int) -> Float:

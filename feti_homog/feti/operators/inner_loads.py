@@ -25,24 +25,25 @@ class CondensedLoads:
     Attributes:
         boundary: (boundary dofs, v) q.
         stiffness: (v, v) sum of C.
-        inner: (local dofs, v) -K_ii^-1 Q_i, 0 on the boundary.
+        inner: of the subdomains beside voids, by their places, (their dofs, v) -K_ii^-1 Q_i, 0 on the boundary.
     """
 
     boundary: Float
     stiffness: Float
-    inner: Float
+    inner: dict[int, Float]
 
     @classmethod
     def of(cls, subdomains: Sequence[Subdomain], dofs: Sequence[Int], loads: int) -> CondensedLoads:
         """Condense to the `dofs` of each subdomain; interiors beside voids are factored for it and not kept."""
-        boundary, inner, stiffness = [np.zeros((0, loads))], [np.zeros((0, loads))], np.zeros((loads, loads))
-        for s, own in zip(subdomains, dofs, strict=True):
-            q, C, u = s.Q[own], s.area * s.L, np.zeros(s.Q.shape)
+        boundary, stiffness = [np.zeros((0, loads))], np.zeros((loads, loads))
+        inner: dict[int, Float] = {}
+        for place, (s, own) in enumerate(zip(subdomains, dofs, strict=True)):
+            q, C = s.Q[own], s.area * s.L
             if s.submesh.at_void.any():
+                u = inner[place] = np.zeros(s.Q.shape)
                 interior = Interior(s.assemble_stiffness(), own)
                 u[interior.dofs] = interior.solve(-s.Q[interior.dofs])
                 q, C = q + interior.coupling @ u[interior.dofs], C + s.Q.T @ u
             boundary.append(q)
-            inner.append(u)
             stiffness += C
-        return cls(np.concatenate(boundary), stiffness, np.concatenate(inner))
+        return cls(np.concatenate(boundary), stiffness, inner)
