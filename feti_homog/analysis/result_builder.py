@@ -39,10 +39,8 @@ def result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Fields
     """The numbers of an analysis with all that belongs to them; collective."""
     cell, progress = context.homogenization.cell, context.progress
     areas = cell.areas()
-    fractions = {
-        phase: area / (cell.summary.area if cell.summary.voids else sum(areas.values()))
-        for phase, area in areas.items()
-    }
+    whole = cell.summary.area if cell.summary.voids else sum(areas.values())
+    fractions = {phase: area / whole for phase, area in areas.items()}
     points: dict[str, Any] = {
         name: tuple(kind(**point) for point in analysis[name])
         for name, kind in (("angle", AnglePoint), ("path", PathPoint), ("envelope", EnvelopePoint))
@@ -132,17 +130,12 @@ def _moduli_and_bounds(cell: TornCell, L: Float, fractions: dict[str, float]) ->
     case, shares = cell.case, list(fractions.values())
     phases = [plane_stiffness(case.material_of(phase), case.analysis.plane) for phase in fractions]
     isotropic = all(bounds.is_isotropic(stiffness) for stiffness in phases)
-    moduli: dict[str, Moduli | StiffnessBounds] = {"moduli": bounds.engineering_moduli(L)}
+    found: dict[str, Moduli | StiffnessBounds] = {"moduli": bounds.engineering_moduli(L)}
     # With voids the lower bounds are zero.
-    return (
-        moduli
-        if cell.summary.voids
-        else moduli
-        | {
-            "bounds": StiffnessBounds(
-                voigt=bounds.voigt(shares, phases),
-                reuss=bounds.reuss(shares, phases),
-                hashin_shtrikman=bounds.hashin_shtrikman(shares, phases) if isotropic else None,
-            ),
-        }
-    )
+    if not cell.summary.voids:
+        found["bounds"] = StiffnessBounds(
+            voigt=bounds.voigt(shares, phases),
+            reuss=bounds.reuss(shares, phases),
+            hashin_shtrikman=bounds.hashin_shtrikman(shares, phases) if isotropic else None,
+        )
+    return found
