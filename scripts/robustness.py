@@ -1,4 +1,4 @@
-"""Iterations to 1e-8 at every combination of fibres, fibre fraction, gap, cut, contrast, mesh size and coating.
+"""Iterations to 1e-8 at every combination of fibres, fibre fraction, gap, cut, contrast, mesh size, coating and mix.
 
 Each line of the CSV is one cell with its three load cases; cells that the file holds already are not run again, so that
 a long list can be worked off in parts.  "uncut" leaves the matrix whole and looks for soft modes none the less.
@@ -32,7 +32,11 @@ from feti_homog.feti.thresholds import DEFAULTS, Thresholds  # noqa: E402
 from feti_homog.homogenization.unit_cell import tear  # noqa: E402
 
 # Columns that are no whole numbers.
-REAL = ("fraction", "gap", "contrast", "coating", "coating_contrast", "vectors", "seconds")
+REAL = ("fraction", "gap", "contrast", "coating", "coating_contrast", "mix", "mix_contrast", "vectors", "seconds")
+HEADING = (
+    "fibres fraction   gap pieces contrast refine coating contrast   mix contrast"
+    "     dofs subdom. boundary vectors iterations s"
+)
 # Coarse elements along the side of a cell with one fibre.
 ELEMENTS = 5
 
@@ -40,7 +44,8 @@ ELEMENTS = 5
 @dataclass(frozen=True)
 class Cell:
     """One combination; `pieces` of the matrix per fibre, `gap` in fibre diameters, `coating` thickness / radius, 0 of
-    none, with a stiffness over that of the matrix of `coating_contrast`."""
+    none, with a stiffness over that of the matrix of `coating_contrast`.  `mix` is the radius of fibres of a second
+    phase / that of the others, 0 of none; they have half the fraction, and the stiffness `mix_contrast`."""
 
     fibres: int
     fraction: float
@@ -48,8 +53,10 @@ class Cell:
     pieces: int
     contrast: float
     refine: int
-    coating: float
-    coating_contrast: float
+    coating: float = 0.0
+    coating_contrast: float = 1.0
+    mix: float = 0.0
+    mix_contrast: float = 1.0
 
     @property
     def possible(self) -> bool:
@@ -59,10 +66,11 @@ class Cell:
     def case(self, space: str) -> Case:
         """The case, with that kind of coarse space; where there are coatings it and the cut are the program's own."""
         coating = {"coating": {"young": 3.0 * self.coating_contrast, "poisson": 0.3}} if self.coating else {}
+        other = {"other": {"young": 3.0 * self.mix_contrast, "poisson": 0.3}} if self.mix else {}
         return cases.parse(
             {
                 "cell": {
-                    "geometry": "random", "fibres": self.fibres, "fibre_fraction": self.fraction, "min_gap": self.gap,
+                    "geometry": "random", "fibres": self.fibres, "min_gap": self.gap, **self._fractions(),
                     "mesh_size": 1 / (ELEMENTS * self.fibres**0.5), "refine": self.refine,
                     **({"coating": self.coating} if self.coating else {}),
                 },
@@ -70,6 +78,7 @@ class Cell:
                     "matrix": {"young": 3.0, "poisson": 0.35},
                     "fibre": {"young": 3.0 * self.contrast, "poisson": 0.3},
                     **coating,
+                    **other,
                 },
                 "analysis": {"type": "stiffness", "plane": "strain"},
                 "decomposition": {} if self.coating else {"subdomains": self.fibres * (1 + self.pieces) or 1},
@@ -78,8 +87,15 @@ class Cell:
             Path(),
         )  # fmt: skip
 
+    def _fractions(self) -> dict[str, Any]:
+        """The keys of the fibres' fractions and radii."""
+        if not self.mix:
+            return {"fibre_fraction": self.fraction}
+        half = self.fraction / 2
+        return {"mix": {"fibre": half, "other": half}, "radii": {"fibre": 1.0, "other": self.mix}}
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, kw_only=True)
 class Row(Cell):
     """What came of a cell: `vectors` coarse vectors per subdomain, `boundary` dofs of the largest subdomain."""
 
@@ -99,7 +115,7 @@ class Row(Cell):
         """Of the table."""
         return (
             f"{self.fibres:6}{self.fraction:9.2f}{self.gap:6.2f}{self.pieces:7}{self.contrast:9.0e}{self.refine:7}"
-            f"{self.coating:8.2g}{self.coating_contrast:9.0e}"
+            f"{self.coating:8.2g}{self.coating_contrast:9.0e}{self.mix:6.2g}{self.mix_contrast:9.0e}"
             f"{self.dofs:9}{self.subdomains:8}{self.boundary:9}{self.vectors:8.2f}{self.iterations:11}{self.seconds:6.1f}"
         )
 
@@ -114,7 +130,7 @@ def main() -> None:
     known = {row.cell for row in done}
     wanted = [cell for cell in grid if cell.possible and cell not in known]
     say(f"{len(grid)} combinations, {len(done)} done, {len(wanted)} to do")
-    say("fibres fraction   gap pieces contrast refine coating contrast     dofs subdom. boundary vectors iterations s")
+    say(HEADING)
     for cell in wanted:
         done.append(measure(cell, arguments.space, comm))
         say(done[-1].line(), flush=True)
@@ -133,7 +149,8 @@ def combinations(arguments: argparse.Namespace) -> list[Cell]:
     a = arguments
     bare = a.fibres, a.fractions, a.gaps, a.pieces, a.contrasts, a.refine
     coats = [(0.0, 1.0)] if a.coatings is None else list(product(a.coatings, a.coating_contrasts))
-    return [Cell(*of, *coat) for of in product(*bare) for coat in coats]
+    mixes = [(0.0, 1.0)] if a.mix is None else list(product(a.mix, a.mix_contrasts))
+    return [Cell(*of, *coat, *mix) for of in product(*bare) for coat in coats for mix in mixes]
 
 
 def summary(rows: list[Row]) -> str:
@@ -190,6 +207,8 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--refine", type=int, nargs="+", default=[0, 1, 2])
     parser.add_argument("--coatings", type=float, nargs="+", help="thickness / radius; by default none")
     parser.add_argument("--coating-contrasts", type=float, nargs="+", default=[1e-3, 1.0, 1e3], help="of the matrix")
+    parser.add_argument("--mix", type=float, nargs="+", help="radius of fibres of a second phase / of the others")
+    parser.add_argument("--mix-contrasts", type=float, nargs="+", default=[1e-3, 1.0, 1e3], help="of the matrix")
     parser.add_argument("--space", choices=("natural", "adaptive"), default="adaptive")
     parser.add_argument("--out", type=Path, default=Path("results/robustness.csv"), metavar="FILE.csv")
     return parser
