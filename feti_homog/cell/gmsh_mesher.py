@@ -17,6 +17,7 @@ from feti_homog.cell.coarse_mesh import CoarseMesh, areas, flip_double_arcs, rep
 from feti_homog.cell.graded_size import MeshSizes
 from feti_homog.cell.outline import MATRIX, Curve, Outline, outline
 from feti_homog.cell.size_field import MAX_GROWTH
+from feti_homog.config.mixed_cell import fractions_in_words, mixed_width
 from feti_homog.config.phase_names import COATING
 from feti_homog.errors import MeshError
 from feti_homog.typing import Float, Index, Int32
@@ -61,8 +62,9 @@ def generate(cell: Cell, marks: Mapping[int, Sequence[float]] = NO_MARKS) -> Coa
     _refuse_extremes(cell, sizes, sum(len(own) for own in marks.values()))
     arrangement = arrange(cell)
     if arrangement.radii.min() < SMALLEST_RADIUS * arrangement.width:
+        asked = fractions_in_words(cell) if cell.fractions else 'geometry = "table"'
         raise MeshError(
-            f"[cell] fibre_fraction = {cell.fibre_fraction}: a fibre has a radius of {arrangement.radii.min():.2g}; "
+            f"[cell] {asked}: a fibre has a radius of {arrangement.radii.min():.2g}; "
             f"expected at least {SMALLEST_RADIUS} of the width of the cell"
         )
     return mesh_arrangement(arrangement, sizes, marks, arrangement_scale(cell, arrangement))
@@ -121,7 +123,7 @@ def arrangement_scale(cell: Cell, arrangement: Arrangement) -> float:
     """Lengths of the cell / those of the arrangement."""
     if cell.fibre_radius is not None:
         return float(cell.fibre_radius / arrangement.radii.mean())
-    width = cell.width if cell.table is None else cell.table.width
+    width = mixed_width(cell) if cell.table is None else cell.table.width
     return width or 1.0
 
 
