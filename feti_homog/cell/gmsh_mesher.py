@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
 from itertools import chain, pairwise
 from types import MappingProxyType, ModuleType
 from typing import TYPE_CHECKING
@@ -14,7 +13,6 @@ import numpy as np
 
 from feti_homog.cell import element_estimate, elliptic_outline
 from feti_homog.cell.arrangement import Arrangement, arrange
-from feti_homog.cell.bent_edges import with_bent_edges
 from feti_homog.cell.coarse_mesh import CoarseMesh, areas, flip_double_arcs, representatives
 from feti_homog.cell.graded_size import MeshSizes
 from feti_homog.cell.outline import MATRIX, Curve, Outline, outline
@@ -89,7 +87,7 @@ def mesh_arrangement(
     phase = np.array([place[name] for name in (*within, arrangement.phases[0])], np.int32)[circle]
     number = lines.disc + 1 + np.where(lines.is_coating, len(arrangement.radii), 0)
     arc_edges, arc_circle = _arc_edges(lines)
-    mesh = CoarseMesh(
+    return CoarseMesh(
         width=scale * arrangement.width,
         height=scale * arrangement.height,
         points=scale * points,
@@ -98,21 +96,17 @@ def mesh_arrangement(
         phases=arrangement.phases,
         precedence=np.append(number, 0)[circle].astype(np.int32),
         representative=representatives(points, arrangement.width, arrangement.height),
-        circles=scale * lines.circles,
+        ellipses=lines.ellipses.scaled(scale),
         arc_edges=arc_edges,
         arc_circle=arc_circle,
         debonded_edges=np.zeros((0, 2), np.int32),
+        centres=scale * arrangement.centres if has_ellipses else None,
     )
-    if not has_ellipses:
-        return mesh
-    middles = elliptic_outline.middles(lines, arrangement)
-    bent = with_bent_edges(mesh, replace(middles, points=scale * middles.points))
-    return replace(bent, centres=scale * arrangement.centres)
 
 
 def _arc_edges(lines: Outline) -> tuple[Int32, Int32]:
     """Edges (a, 2) on circles, and their circles (a,)."""
-    arcs = [curve for curve in lines.curves if curve.circle != MATRIX and lines.circles[curve.circle, 2] > 0]
+    arcs = [curve for curve in lines.curves if curve.circle != MATRIX]
     pairs = [np.stack([arc.nodes[:-1], arc.nodes[1:]], axis=1) for arc in arcs]
     circle = np.repeat(np.array([arc.circle for arc in arcs], np.int32), [len(edges) for edges in pairs])
     return np.concatenate([np.zeros((0, 2), np.int32), *pairs]).astype(np.int32), circle

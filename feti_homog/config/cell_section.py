@@ -157,8 +157,7 @@ class Cell:
         "may have any shape. Of Abaqus' files (.inp) element sets have these names; of .vtu and .vtk files, which "
         'meshio reads, cell data "phase" are 0 in the matrix, 1 in fibre, 2 in fibre:2, ... Of "table" the fibres, a '
         "row for each: columns x, y, radius and, if there are any, phase and coating (thickness / radius); of ellipses "
-        "a and b, the semi-axes, in place of the radius, and angle from x to a in degrees: refine follows arcs through "
-        "three points of each edge before refine, which miss the ellipse by the fourth power of its length. What "
+        "a and b, the semi-axes, in place of the radius, and angle from x to a in degrees. What "
         'follows # is a comment, of which "# width = 120, height = 80" says the size of the cell.',
         default=None,
         only=FROM_A_FILE,
