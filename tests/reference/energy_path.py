@@ -17,13 +17,14 @@ SLIGHT = 1e-14  # share of the largest stiffness that makes that of free fibres 
 
 @dataclass(frozen=True)
 class SlowEnergyPath:
-    """A cell on springs of the stiffnesses `springs` (normal, tangential); bonds beside a broken one break by what that
+    """A cell on springs of the stiffnesses `springs` (normal, tangential), numbers or (k,) as
+    the toughness; bonds beside a broken one break by what that
     releases, with growth "released", or by the energy of their own springs."""
 
     programme: QuadraticProgramme
-    springs: tuple[float, float]
-    toughness: float
-    mode_sensitivity: float
+    springs: tuple[float | np.ndarray, float | np.ndarray]
+    toughness: float | np.ndarray
+    mode_sensitivity: float | np.ndarray
     growth: str
 
     proportional = SlowLoadPath.proportional

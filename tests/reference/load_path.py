@@ -27,12 +27,13 @@ class Event:
 
 @dataclass(frozen=True)
 class SlowLoadPath:
-    """A cell whose bonds have the strengths `normal` and `tangential`, by the `criterion` "max" or "quadratic"."""
+    """A cell whose bonds have the strengths `normal` and `tangential`, numbers or (k,), by the
+    `criterion` "max" or "quadratic"."""
 
     programme: QuadraticProgramme
     contact: bool
-    normal: float
-    tangential: float
+    normal: float | np.ndarray
+    tangential: float | np.ndarray
     criterion: str
 
     def state(self, strain, bonded):

@@ -17,6 +17,7 @@ from scipy.sparse.linalg import splu
 
 from reference import monolithic
 
+MOST_DEPTHS = 8  # that places and depths are told apart by
 EXACT = 1e-9  # relative, of the KKT conditions of an answer
 
 
@@ -40,9 +41,12 @@ def torus_keys(points, size):
 
 
 class QuadraticProgramme:
-    """The cell of round fibres made of meshed parts (points, triangles, body, is matrix, L).
+    """The cell of round fibres made of meshed parts (points, triangles, body, depth, L).
 
-    `centres` and `radii` are those of the fibres; interface nodes are sorted by `key`.
+    The depth is how many interfaces are around a part: 0 of the matrix. `centres` (f, 2) are those of the fibres,
+    `radii` (f,) or, of coated ones, (depths, f) those of the circles around depths 1, 2, ...; circle (d - 1) f + k is
+    that of fibre k. Interface nodes are sorted by `key`; `matrix` and `fibre_node` are the outer and the inner node,
+    `fibre` the circle.
     """
 
     def __init__(self, parts, centres, radii, size):
@@ -53,12 +57,12 @@ class QuadraticProgramme:
         self.n = len(classes)
         self.points = np.zeros((self.n, 2))
         self.points[number.ravel()] = np.concatenate([p for p, *_ in parts])
-        matrix, middle = np.zeros(self.n, bool), np.zeros(self.n, bool)
+        depth, middle = np.zeros(self.n, int), np.zeros(self.n, bool)
         self.mean, self.Q = np.zeros((3, 3)), np.zeros((2 * self.n, 3))
         rows, columns, values = [], [], []
-        for (points, triangles, _, is_matrix, L), start in zip(parts, first, strict=False):
+        for (points, triangles, _, around, L), start in zip(parts, first, strict=False):
             nodes = number.ravel()[start:][triangles]
-            matrix[nodes] = is_matrix
+            depth[nodes] = around
             middle[nodes[:, 3:]] = True
             for own, corners in zip(nodes, points[triangles], strict=True):
                 k, q, area = monolithic.element(corners, L)
@@ -71,20 +75,28 @@ class QuadraticProgramme:
         entries = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
         self.K = coo_matrix(entries).tocsc()
         self.scale = self.K.diagonal().max()
-        _, on_matrix, on_fibre = np.intersect1d(
-            np.where(matrix, classes[:, 1], -1), np.where(matrix, -2, classes[:, 1]), return_indices=True
-        )
-        self.matrix, self.fibre_node = on_matrix, on_fibre
-        self.key, self.middle = classes[on_fibre, 1], middle[on_fibre]
-        self.pinned = int(np.setdiff1d(np.flatnonzero(matrix), on_matrix)[0])
-        fibre, arm = nearest(self.points, np.asarray(centres), np.asarray(radii), self.size)
-        self.fibre, self.radius = fibre[on_fibre], np.asarray(radii)[fibre[on_fibre]]
-        self.normal = arm[on_fibre] / np.hypot(*arm[on_fibre].T)[:, None]
-        self.angle = np.degrees(np.arctan2(*arm[on_fibre].T[::-1]))
-        self.rigid = np.zeros((self.n, 2, len(radii), 3))
-        own = np.flatnonzero(~matrix)
-        self.rigid[own, 0, fibre[own], 0] = self.rigid[own, 1, fibre[own], 1] = 1.0
-        self.rigid[own, :, fibre[own], 2] = arm[own][:, ::-1] * [-1, 1] / np.asarray(radii)[fibre[own], None]
+        # A place has one node of each body that meets there.
+        place = MOST_DEPTHS * classes[:, 1] + depth
+        _, self.matrix, self.fibre_node = np.intersect1d(place + 1, place, return_indices=True)
+        self.key, self.middle = classes[self.fibre_node, 1], middle[self.fibre_node]
+        self.pinned = int(np.setdiff1d(np.flatnonzero(depth == 0), self.matrix)[0])
+        self._place(depth, np.asarray(centres), np.atleast_2d(radii))
+
+    def _place(self, depth, centres, radii):
+        """Circles, normals and angles of the interface nodes, and the rigid motions (n, 2, circles, 3) of all nodes."""
+        circle, arm = np.zeros(self.n, int), np.zeros((self.n, 2))
+        for d, own in enumerate(radii, 1):
+            inside = np.flatnonzero(depth == d)
+            fibre, arm[inside] = nearest(self.points[inside], centres, own, self.size)
+            circle[inside] = (d - 1) * len(centres) + fibre
+        on, radius = self.fibre_node, radii.ravel()
+        self.fibre, self.radius = circle[on], radius[circle[on]]
+        self.normal = arm[on] / np.hypot(*arm[on].T)[:, None]
+        self.angle = np.degrees(np.arctan2(*arm[on].T[::-1]))
+        self.rigid = np.zeros((self.n, 2, radii.size, 3))
+        own = np.flatnonzero(depth > 0)
+        self.rigid[own, 0, circle[own], 0] = self.rigid[own, 1, circle[own], 1] = 1.0
+        self.rigid[own, :, circle[own], 2] = arm[own][:, ::-1] * [-1, 1] / radius[circle[own], None]
 
     def lengths(self):
         """(k,) tributary arc lengths: halves of the arcs between linear nodes, Simpson's shares of quadratic ones."""
@@ -107,7 +119,7 @@ class QuadraticProgramme:
         K, f = (T.T @ self.K @ T).tocsc() / self.scale, -T.T @ (self.Q @ strain) / self.scale
         C = (self._gaps(free) @ T).tocsr()
         v, pressure = minimise(
-            K, f, C, lambda active: rigid_motions(self.rigid, T, self.fibre_node[bonded], C[active]), reach
+            K, f, C, lambda active: rigid_motions(self.rigid, T, self._held(bonded), C[active]), reach
         )
         u = T @ v
         residual = self.K @ u + self.Q @ strain
@@ -122,35 +134,40 @@ class QuadraticProgramme:
         return State(float(energy), stress, u, *turned, closed)
 
     def solve_elastic(self, strain, bonded, contact, springs):
-        """The same with springs of the stiffnesses `springs` (normal, tangential) at bonded nodes, and normal ones in
-        compression between debonded faces.  The energy is that of the bodies and of the springs."""
-        lengths, k = self.lengths(), len(bonded)
+        """The same with springs of stiffnesses `springs` (normal, tangential), numbers or (k,), at bonded nodes, and
+        normal ones in compression between debonded faces.  The energy is that of the bodies and of the springs."""
+        k, lengths = len(bonded), self.lengths()
+        stiffness = [s * lengths for s in springs]
         free = np.flatnonzero(~bonded) if contact else np.zeros(0, int)
         T, reach = self._together(np.zeros(k, bool)), self.size.max() * np.abs(strain).max()
         stretched = [jumps[bonded] for jumps in (self._gaps(np.arange(k)), self._slips())]
-        own = [J.T @ diags(s * lengths[bonded]) @ J for s, J in zip(springs, stretched, strict=True)]
+        own = [J.T @ diags(s[bonded]) @ J for s, J in zip(stiffness, stretched, strict=True)]
         whole = (self.K + own[0] + own[1]).tocsc()
         # How far the springs of touching faces give way is an unknown of its own.
-        K = block_diag([T.T @ whole @ T, diags(springs[0] * lengths[free])]).tocsc() / self.scale
+        K = block_diag([T.T @ whole @ T, diags(stiffness[0][free])]).tocsc() / self.scale
         f = np.r_[-T.T @ (self.Q @ strain), np.zeros(len(free))] / self.scale
         gaps = (self._gaps(free) @ T).tocsr()
         C = hstack([gaps, identity(len(free))]).tocsr()
 
         def motions(active):
-            rigid = rigid_motions(self.rigid, T, self.fibre_node[bonded], gaps[active])
+            rigid = rigid_motions(self.rigid, T, self._held(bonded), gaps[active])
             return np.concatenate([rigid, np.zeros((len(free), rigid.shape[1]))])
 
         v, pressure = minimise(K, f, C, motions, reach)
         u, give = T @ v[: T.shape[1]], v[T.shape[1] :]
         energy = strain @ self.mean @ strain / 2 + strain @ self.Q.T @ u + u @ (whole @ u) / 2
-        energy += springs[0] * lengths[free] @ give**2 / 2
+        energy += stiffness[0][free] @ give**2 / 2
         stress = (self.mean @ strain + self.Q.T @ u) / self.size.prod()
         closed = np.zeros(k, bool)
         closed[free] = pressure > 0
         jump = np.stack([self._gaps(np.arange(k)) @ u, self._slips() @ u], axis=1)
-        force = np.where(bonded, 1.0, 0.0)[:, None] * jump * springs * lengths[:, None]
-        force[closed, 0] = springs[0] * lengths[closed] * jump[closed, 0]
+        force = np.where(bonded, 1.0, 0.0)[:, None] * jump * np.stack(stiffness, axis=1)
+        force[closed, 0] = stiffness[0][closed] * jump[closed, 0]
         return State(float(energy), stress, u.reshape(-1, 2), jump, force, closed)
+
+    def _held(self, bonded):
+        """(held, 2, circles, 3) how the rigid motions would part the bonded nodes."""
+        return self.rigid[self.fibre_node[bonded]] - self.rigid[self.matrix[bonded]]
 
     def _together(self, bonded):
         """(2n, free dofs) displacements of all nodes from those that are free; bonded nodes move as one."""
@@ -187,16 +204,13 @@ def nearest(points, centres, radii, size):
 
 
 def rigid_motions(rigid, T, held, C):
-    """(free dofs, z) motions of the fibres, of those `rigid` (n, c, fibres, m), that neither one of the nodes `held`
-    nor a row of C resists; T (cn, free dofs) are the displacements of all nodes."""
+    """(free dofs, z) motions of the fibres, of all `rigid` (n, c, fibres, m), that do not part what is held, as `held`
+    (h, c, fibres, m) says, and that no row of C resists; T (cn, free dofs) are the displacements of all nodes."""
     n, c, fibres, m = rigid.shape
-    motions = [np.zeros((T.shape[1], 0))]
-    for f in range(fibres):
-        v = (T.T @ rigid[:, :, f].reshape(c * n, m)) / np.maximum(T.T @ np.ones(c * n), 1.0)[:, None]
-        resisted = np.concatenate([rigid[held, :, f].reshape(-1, m), C @ v, np.zeros((m, m))])
-        _, size, modes = np.linalg.svd(resisted, full_matrices=False)
-        motions.append(v @ modes[size < 1e-9].T)
-    return np.concatenate(motions, axis=1)
+    v = (T.T @ rigid.reshape(n * c, fibres * m)) / np.maximum(T.T @ np.ones(c * n), 1.0)[:, None]
+    resisted = np.concatenate([held.reshape(-1, fibres * m), C @ v, np.zeros((fibres * m,) * 2)])
+    _, size, modes = np.linalg.svd(resisted, full_matrices=False)
+    return np.asarray(v @ modes[size < 1e-9].T)
 
 
 def minimise(K, f, C, free_motions, reach):

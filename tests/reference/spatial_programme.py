@@ -135,7 +135,7 @@ class SpatialProgramme:
             f, C = np.r_[f, np.zeros(give)], hstack([gaps, identity(give)]).tocsr()
 
         def motions(active):
-            rigid = rigid_motions(self.rigid, T, self.fibre_node[bonded], gaps[active])
+            rigid = rigid_motions(self.rigid, T, self.rigid[self.fibre_node[bonded]], gaps[active])
             return np.concatenate([rigid, np.zeros((give, rigid.shape[1]))])
 
         imposed = np.abs(np.linalg.solve(self.mean[:6, :6], self.mean[:6] @ load)).max()

@@ -134,7 +134,7 @@ class LoadedTwin:
 
 
 def _plane(s):
-    return s.mesh.points, s.mesh.triangles, s.submesh.body, s.submesh.phase == "matrix", s.L
+    return s.mesh.points, s.mesh.triangles, s.submesh.body, int(s.submesh.phase != "matrix"), s.L
 
 
 def _spatial(s, C, alpha):

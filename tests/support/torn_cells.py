@@ -81,16 +81,22 @@ def interface(cell, contact):
 
 def build(comm, **case):
     """The cell of `tear` and its quadratic programme.  Collective."""
-    cell = tear(comm, **case)
+    return referenced(tear(comm, **case))
+
+
+def referenced(cell):
+    """A cell of round fibres, all of them coated or none, and its quadratic programme.  Collective."""
+    comm, fibres = cell.comm, arrange(cell.case.cell)
     size = np.array([cell.summary.width, cell.summary.height])
+    inwards = ["matrix", *(["coating"] if fibres.coated.all() else []), "fibre"]
+    radii = np.array([fibres.outer_radii, fibres.radii])[-len(inwards) + 1 :]
     parts = [
-        (s.mesh.points, s.mesh.triangles, s.submesh.body, s.submesh.phase == "matrix", s.L) for s in cell.subdomains
+        (s.mesh.points, s.mesh.triangles, s.submesh.body, inwards.index(s.submesh.phase), s.L) for s in cell.subdomains
     ]
     parts, points = comm.gather(parts), comm.gather(cell.solver.jump_operator.nodes.points)
     if parts is None:
         return ReferencedCell(cell, None, np.zeros(0, int))
-    fibres = arrange(cell.case.cell)
-    reference = QuadraticProgramme([part for own in parts for part in own], fibres.centres, fibres.radii, size)
+    reference = QuadraticProgramme([part for own in parts for part in own], fibres.centres, radii, size)
     key = torus_keys(np.concatenate(points), size)
     order = np.searchsorted(reference.key, key)
     assert (np.sort(key) == reference.key).all()
