@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
 # Phase of the discs of cells that name none.
 FIBRE = "fibre"
-# Fibres of the lattices.
-FIBRES_OF = {"square": 1, "hexagonal": 2}
 # Distance of the sides of a cell from tangency with a circle / mean radius, below which elements there are needles.
 LEAST_CLEARANCE = 1e-3
 # Decimals of coordinates / width of the cell of tables that may have any origin and unit.
