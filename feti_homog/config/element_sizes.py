@@ -13,6 +13,7 @@ import numpy as np
 from feti_homog.config.cell_section import FIBRES_OF, Cell
 from feti_homog.config.material_forms import Material
 from feti_homog.config.materials import plane_stiffness, spatial_stiffness
+from feti_homog.config.mixed_cell import fibre_counts
 from feti_homog.config.phase_names import COATING
 from feti_homog.typing import Float
 
@@ -83,12 +84,12 @@ def without_chosen(cell: Cell, table: dict[str, Any]) -> dict[str, Any]:
 def coarsest(cell: Cell) -> float:
     """mesh_size of the coarsest mesh: half the distance of as many fibres on a square lattice / width of the
     cell, in two digits."""
-    fibres, height = cell.fibres or FIBRES_OF.get(cell.geometry, 1), 1.0
-    if cell.geometry == "hexagonal":
-        height = math.sqrt(3.0)
     if cell.table is not None:
         assert cell.table.width is not None and cell.table.height is not None
         fibres, height = len(cell.table.radius), cell.table.height / cell.table.width
+    else:
+        fibres = FIBRES_OF.get(cell.geometry) or sum(fibre_counts(cell).values())
+        height = math.sqrt(3.0) if cell.geometry == "hexagonal" else 1.0
     return min(LARGEST, float(f"{PITCH_SHARE * math.sqrt(height / fibres):.2g}"))
 
 

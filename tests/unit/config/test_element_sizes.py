@@ -17,6 +17,7 @@ GEOMETRIES = {
     "square": {"geometry": "square", "fibre_fraction": 0.4},
     "hexagonal": {"geometry": "hexagonal", "fibre_fraction": 0.4},
     "random": {"geometry": "random", "fibre_fraction": 0.4, "fibres": 25},
+    "mix": {"geometry": "random", "fibres": 25, "mix": {"fibre": 0.2, "glass": 0.2}},
     "table": {
         "geometry": "table", "width": 200.0, "height": 50.0,
         "fibre_list": [{"x": 25.0 + 50 * k, "y": 25.0, "radius": 10.0} for k in range(4)],
@@ -25,9 +26,10 @@ GEOMETRIES = {
 
 
 def case_of(young=70.0, geometry="hexagonal", matrix=MATRIX, bonding=None, plane="strain", **cell):
+    names = GEOMETRIES[geometry].get("mix", ["fibre"])
     document = {
         "cell": GEOMETRIES[geometry] | cell,
-        "material": {"matrix": matrix, "fibre": {"young": young, "poisson": 0.2}},
+        "material": {"matrix": matrix} | {name: {"young": young, "poisson": 0.2} for name in names},
         "analysis": {"type": "stiffness", "plane": plane},
     }
     return cases.parse(document | ({} if bonding is None else {"interface": bonding}), Path())
@@ -37,7 +39,9 @@ def splits(*arguments, **more):
     return case_of(*arguments, **more).cell.refine
 
 
-@pytest.mark.parametrize(("geometry", "size"), {"square": 0.5, "hexagonal": 0.47, "random": 0.1, "table": 0.12}.items())
+@pytest.mark.parametrize(
+    ("geometry", "size"), {"square": 0.5, "hexagonal": 0.47, "random": 0.1, "mix": 0.1, "table": 0.12}.items()
+)
 def test_coarse_elements_are_half_the_pitch_of_the_fibres(geometry, size):
     """sqrt(area / fibres) / 2 / width: of the square cell 1/2, of four fibres in 4 x 1 squares 1/8."""
     assert case_of(geometry=geometry, accuracy=1e-3).cell.mesh_size == pytest.approx(size)
