@@ -83,6 +83,8 @@ def _cell_info(cell: TornCell, fractions: dict[str, float]) -> CellInfo:
         porosity=1.0 - sum(fractions.values()) if cell.summary.voids else 0.0,
         elements=cell.sum_over_ranks(sum(len(s.mesh.triangles) for s in cell.subdomains)),
         nodes=cell.sum_over_ranks(sum(len(s.mesh.points) for s in cell.subdomains)),
+        mesh_size=None if cell.case.cell.has_own_mesh else cell.case.cell.mesh_size,
+        refine=cell.case.cell.refine,
         match_distance=cell.summary.match_distance,
     )
 

@@ -43,6 +43,12 @@ class CellInfo:
     )
     elements: int = described("triangles of the refined mesh")
     nodes: int = described("nodes of the refined mesh, those on cuts once for each subdomain")
+    mesh_size: float | None = described(
+        "size of the elements before refinement / width, as the case says or as `accuracy` chooses; absent of users' "
+        "meshes",
+        default=None,
+    )
+    refine: int = described("how many times elements were split in four, likewise", default=0)
     porosity: float = described("share of voids in the area of the cell", default=0.0)
     match_distance: float | None = described(
         "of a cell that matches a table, in mean diameters: root mean square difference of the sorted distances of "

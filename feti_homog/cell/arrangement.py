@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from feti_homog.config.cell_section import Cell
 
 
-# Fibres of the lattices.
-FIBRES_OF = {"square": 1, "hexagonal": 2}
 # Distance of the sides of a cell from tangency with a circle / mean radius, below which elements there are needles.
 LEAST_CLEARANCE = 1e-3
 # Decimals of coordinates / width of the cell of tables that may have any origin and unit.

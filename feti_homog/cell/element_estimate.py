@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from feti_homog.cell.arrangement import FIBRES_OF, arrange
+from feti_homog.cell.arrangement import arrange
 from feti_homog.cell.size_field import MAX_GROWTH, MIN_EDGES_AROUND
+from feti_homog.config.cell_section import FIBRES_OF
 from feti_homog.config.mixed_cell import fibre_counts
 
 if TYPE_CHECKING:

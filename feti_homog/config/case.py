@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from feti_homog.config import element_sizes
 from feti_homog.config.cell_files import with_files
 from feti_homog.config.cell_section import GEOMETRY, TOUCHING, Cell, size_faults
 from feti_homog.config.document import read_document, to_document
@@ -137,7 +138,8 @@ class Case:
             METHOD: None if self.path is None else self.path.method,
             CRITERION: None if self.interface is None else self.interface.criterion,
         }
-        document: dict[str, Any] = {"name": self.name, "cell": to_table(self.cell, selected)}
+        cell = element_sizes.without_chosen(self.cell, to_table(self.cell, selected))
+        document: dict[str, Any] = {"name": self.name, "cell": cell}
         document["material"] = {phase: to_table(material, selected) for phase, material in self.materials.items()}
         sections = {section: getattr(self, FIELDS.get(section, section)) for section in SECTIONS if section != "cell"}
         given = {section: contents for section, contents in sections.items() if contents is not None}
@@ -174,6 +176,7 @@ def parse(values: Mapping[str, Any], folder: Path) -> Case:
     reader = TableReader(_selected(document), KEY_OWNERS, _top_level_faults(document))
     analysis, faults = reader.selected[ANALYSIS_TYPE], reader.faults
     cell = _read_section(document, "cell", reader)
+    faults += element_sizes.exclusions(document.get("cell"))
     decomposition = _read_section(document, "decomposition", reader)
     if decomposition and decomposition.subdomains and decomposition.max_dofs:
         faults.append("[decomposition] subdomains, max_dofs: exclude each other; give one")
@@ -199,6 +202,9 @@ def parse(values: Mapping[str, Any], folder: Path) -> Case:
     bonding = sections["envelope"], sections["interfaces"], sections["materials"]
     faults += envelope_faults(*bonding, document, reader.selected)
     faults += expansion_faults(sections["path"], sections["single_load"], sections["materials"])
+    if not faults:
+        plane, free_faces = sections["analysis"].plane, bool(sections["interfaces"])
+        sections["cell"] = element_sizes.with_sizes(sections["cell"], sections["materials"], plane, free_faces, faults)
     if faults:
         raise CaseError(*faults)
     return Case(name=document.get("name", "case"), **sections)

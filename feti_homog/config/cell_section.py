@@ -17,6 +17,8 @@ from feti_homog.config.values import choice, integer, real
 CIRCULAR = ("square", "hexagonal", "random")
 TOUCHING = {"square": math.pi / 4, "hexagonal": math.pi / math.sqrt(12), "random": math.pi / math.sqrt(12)}
 """Fibre fraction at which the fibres touch; of a random cell, that of the densest packing of circles."""
+FIBRES_OF = {"square": 1, "hexagonal": 2}
+"""Fibres of the lattices."""
 
 GEOMETRY = Selector("cell", "geometry")
 ALL_CIRCULAR, RANDOM, TABLE = GEOMETRY.among(*CIRCULAR), GEOMETRY.among("random"), GEOMETRY.among("table")
@@ -91,6 +93,23 @@ class Cell:
         integer(least=0, most=8),
         "How many times every element is split in four, on the ranks; new nodes follow round and elliptic interfaces.",
         default=0,
+    )
+    accuracy: float | None = key(
+        real(least=1e-7, most=0.1),
+        "Largest relative error of the strain energy under any macroscopic strain, and so of the entries of the "
+        "effective stiffness: mesh_size and refine are chosen, which it excludes with interface_size and tip_size. It "
+        "is not that of paths after bonds break.",
+        default=None,
+        default_words="none",
+        only=MESHED,
+    )
+    element_size: float | None = key(
+        real(least=1e-6, most=0.5),
+        "Largest size of the elements, after refine, / width of the cell: mesh_size and refine are chosen, as with "
+        "accuracy.",
+        default=None,
+        default_words="none",
+        only=MESHED,
     )
     order: int = key(
         integer(least=1, most=2),

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import product
 from typing import Any
 
 from feti_homog.config.cell_section import ALL_CIRCULAR, GEOMETRY, MESH, MESHED, TABLE
+from feti_homog.config.element_sizes import ASKED, CHOSEN
 from feti_homog.config.envelope_section import pairs_of
 from feti_homog.config.interface_section import STIFFNESSES, STRENGTHS, Arc
 from feti_homog.config.load_names import STRAINS, STRESSES
@@ -50,6 +52,8 @@ def rules_of_one_case() -> Schema:
             *_generalized_rules(),
             *_envelope_rules(),
             _at(("cell",), {"not": {"required": ["width", "fibre_radius"]}}),
+            _at(("cell",), {"not": {"required": list(ASKED)}}),
+            *(_at(("cell",), {"not": {"required": list(pair)}}) for pair in product(ASKED, CHOSEN)),
             *_mix_rules(),
             _at(("decomposition",), {"not": {"required": ["subdomains", "max_dofs"]}}),
             _at(("path",), {"oneOf": [{"required": [name]} for name in ("strain", "to", "waypoints")]}),

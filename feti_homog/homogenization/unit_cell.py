@@ -13,6 +13,7 @@ from feti_homog.cell.refinement import ReferenceLattice
 from feti_homog.cell.submesh import Submesh
 from feti_homog.common.mpi_errors import agree, on_root_only
 from feti_homog.common.progress import Progress
+from feti_homog.config import element_sizes
 from feti_homog.config.case import Case
 from feti_homog.fem.problem import AXIAL
 from feti_homog.feti.decomposition.shared_entities import SharedEntities
@@ -208,6 +209,11 @@ def describe(case: Case, n_ranks: int) -> str:
         *([f"voids      {summary.voids}"] if summary.voids else []),
         f"mesh       {summary.coarse_triangles} coarse triangles, {summary.coarse_triangles * len(lattice.triangles)} "
         f"elements of order {case.cell.order}, about {2 * sum(nodes)} degrees of freedom",
+        *(
+            [f"sizes      mesh_size = {case.cell.mesh_size:g}, refine = {case.cell.refine}, as asked for by {asked}"]
+            if (asked := element_sizes.asked(case.cell))
+            else []
+        ),
         *([f"fibres     {summary.fibres}, numbered from 1"] if case.interface else []),
         *_mix_lines(case, summary),
         *_match_lines(case, summary),

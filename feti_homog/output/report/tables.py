@@ -53,7 +53,7 @@ def facts(document: Document) -> list[tuple[str, str]]:
         ("Cell", f"{case['cell']['geometry']}, {cell['width']:.6g} x {cell['height']:.6g} {length}".rstrip()),
         ("Phases", fractions),
         ("Mesh", f"{_count(cell['elements'])} elements, {_count(cell['nodes'])} nodes, "
-                 f"order {case['cell'].get('order', 1)}, refine {case['cell'].get('refine', 0)}"),
+                 f"order {case['cell'].get('order', 1)}, refine {case['cell'].get('refine', cell.get('refine', 0))}"),
         ("Solver", f"{_count(ranks)} rank{'' if ranks == 1 else 's'}, {_count(solver['subdomains'])} subdomains, "
                    f"{_count(solver['dofs'])} degrees of freedom"),
         ("Iterations", f"{sum(iterations)} in {len(iterations)} states, to {solver['rtol']:g}"),

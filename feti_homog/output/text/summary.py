@@ -8,6 +8,7 @@ from pathlib import Path
 from textwrap import wrap
 from typing import Any
 
+from feti_homog.config.element_sizes import ASKED
 from feti_homog.mechanics.voigt import SPATIAL_STRESSES, STRAINS, STRESSES
 from feti_homog.output.text.constants_tables import constants_blocks
 from feti_homog.output.text.envelope_table import envelope_table
@@ -119,7 +120,7 @@ def _cell(document: Document) -> list[str]:
     shape, fractions = case["cell"], cell.get("fractions", {})
     shares = ", ".join(f"{phase} {share:.6f}" for phase, share in fractions.items())
     mesh = [_number(cell["elements"], "element"), _number(cell["nodes"], "node")]
-    mesh += [f"order {shape['order']}"] * ("order" in shape) + [f"refine {shape['refine']}"] * ("refine" in shape)
+    mesh += [f"order {shape['order']}"] * ("order" in shape) + _sizes(shape, cell)
     shares += f", voids {cell['porosity']:.6f}" if cell.get("porosity") else ""
     return [
         *_field("Cell", [str(shape["geometry"]), size]),
@@ -127,6 +128,14 @@ def _cell(document: Document) -> list[str]:
         *_match(shape, cell),
         *_field("Mesh", mesh),
     ]
+
+
+def _sizes(shape: Document, cell: Document) -> list[str]:
+    """How often elements were split, and the coarse mesh where the program chose it."""
+    if "refine" in shape:
+        return [f"refine {shape['refine']}"]
+    asked = [f"{name} = {shape[name]:g}" for name in ASKED if name in shape]
+    return [f"refine {cell['refine']} of mesh_size {cell['mesh_size']:g} for {asked[0]}"] if asked else []
 
 
 def _match(shape: Document, cell: Document) -> list[str]:

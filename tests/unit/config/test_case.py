@@ -13,6 +13,7 @@ from unit.config.faulty_bonding import BARE_ARC, FAULTY_BONDINGS, PATH, debonded
 from unit.config.faulty_cases import FAULTY_CASES
 from unit.config.faulty_envelopes import FAULTY_ENVELOPES
 from unit.config.faulty_loads import FAULTY_LOADS
+from unit.config.faulty_sizes import FAULTY_SIZES
 from unit.config.faulty_table_cells import FAULTY_TABLE_CELLS
 from unit.config.valid_cases import MESH, VALID_CASES
 
@@ -23,7 +24,7 @@ from feti_homog.config.material_forms import General, Isotropic, Orthotropic
 from feti_homog.config.sections import Angle
 from feti_homog.errors import CaseError
 
-FAULTY = FAULTY_CASES | FAULTY_BONDINGS | FAULTY_ENVELOPES | FAULTY_LOADS | FAULTY_TABLE_CELLS
+FAULTY = FAULTY_CASES | FAULTY_BONDINGS | FAULTY_ENVELOPES | FAULTY_LOADS | FAULTY_SIZES | FAULTY_TABLE_CELLS
 
 
 def case_of(tmp_path: Path, content: str, name: str = "cell.toml"):
@@ -38,6 +39,7 @@ def test_keys_that_are_left_out_have_their_defaults(tmp_path):
     assert case.name == "cell"
     assert dataclasses.asdict(case.cell) == {
         "geometry": "hexagonal", "fibre_fraction": 0.4, "mesh_size": 0.05, "interface_size": None, "tip_size": None,
+        "accuracy": None, "element_size": None,
         "refine": 0, "order": 1, "bodies": "torus", "fibres": None, "width": None, "fibre_radius": None,
         "coating": None, "min_gap": 0.05, "seed": 0, "radius_spread": 0.0, "file": None,
         "repair": "none", "snap_tolerance": 1e-3,
@@ -78,7 +80,7 @@ def test_one_fault_is_one_line(tmp_path, name):
 
 
 def test_there_are_enough_faulty_cases():
-    parts = (FAULTY_CASES, FAULTY_BONDINGS, FAULTY_ENVELOPES, FAULTY_LOADS, FAULTY_TABLE_CELLS)
+    parts = (FAULTY_CASES, FAULTY_BONDINGS, FAULTY_ENVELOPES, FAULTY_LOADS, FAULTY_SIZES, FAULTY_TABLE_CELLS)
     assert len(FAULTY) == sum(map(len, parts)) >= 100
 
 

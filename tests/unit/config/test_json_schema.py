@@ -15,6 +15,7 @@ from unit.config.faulty_bonding import FAULTY_BONDINGS
 from unit.config.faulty_cases import FAULTY_CASES
 from unit.config.faulty_envelopes import FAULTY_ENVELOPES
 from unit.config.faulty_loads import FAULTY_LOADS
+from unit.config.faulty_sizes import FAULTY_SIZES
 from unit.config.faulty_table_cells import FAULTY_TABLE_CELLS
 from unit.config.valid_cases import VALID_CASES, VALID_SWEEPS
 
@@ -22,7 +23,7 @@ from feti_homog.config.json_schema import json_schema
 
 VALIDATOR = Draft202012Validator(json_schema())
 FILES = [path for folder in ("drivers", "scripts/cases") for path in sorted((ROOT / folder).glob("*.toml"))]
-FAULTY = FAULTY_CASES | FAULTY_BONDINGS | FAULTY_ENVELOPES | FAULTY_LOADS | FAULTY_TABLE_CELLS
+FAULTY = FAULTY_CASES | FAULTY_BONDINGS | FAULTY_ENVELOPES | FAULTY_LOADS | FAULTY_SIZES | FAULTY_TABLE_CELLS
 
 NO_TOML = {"syntax", "syntax_unclosed", "key_twice", "section_twice", "number_too_long"}
 BETWEEN_NUMBERS = {
@@ -37,6 +38,7 @@ BETWEEN_NUMBERS = {
     "temperature_without_expansion", "temperature_of_a_load_without_one_expansion", "load_of_zero",
     "path_to_a_load_of_zero", "waypoint_of_a_load_of_zero", "waypoint_that_names_what_it_is",
     "waypoint_of_the_strain_that_a_load_is", "increments_too_few_for_loads",
+    "accuracy_of_linear_elements_that_nearly_lock",
 }  # fmt: skip
 NOT_IN_JSON = {"fraction_is_nan", "strength_is_nan", "path_strain_nan", "load_nan"}
 INTEGER_TO_JSON = {"refine_is_real"}

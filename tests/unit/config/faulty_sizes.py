@@ -1,0 +1,37 @@
+"""Sections [cell] with a fault in the accuracy or the size of elements that they ask for."""
+
+from __future__ import annotations
+
+from support.base_case import MESH_CELL, cell
+
+# name: (content of the file, words that must stand in its faults)
+FAULTY_SIZES: dict[str, tuple[str, tuple[str, ...]]] = {
+    "accuracy_and_mesh_size": (
+        cell("mesh_size = 0.05", "mesh_size = 0.05\naccuracy = 1e-3"),
+        ("[cell] accuracy, mesh_size: exclude each other; accuracy chooses the sizes",),
+    ),
+    "accuracy_and_fine_tips": (
+        cell("mesh_size = 0.05", "refine = 0\naccuracy = 1e-3\ntip_size = 1e-3"),
+        ("[cell] accuracy, tip_size, refine: exclude each other",),
+    ),
+    "element_size_and_refine": (
+        cell("mesh_size = 0.05", "refine = 1\nelement_size = 0.01"),
+        ("[cell] element_size, refine: exclude each other; element_size chooses the sizes",),
+    ),
+    "accuracy_and_element_size": (
+        cell("mesh_size = 0.05", "element_size = 0.01\naccuracy = 1e-3"),
+        ("[cell] accuracy, element_size: exclude each other; give one",),
+    ),
+    "accuracy_beyond_the_tolerance_of_the_solver": (
+        cell("mesh_size = 0.05", "accuracy = 1e-8"),
+        ("[cell] accuracy = 1e-08: expected a number at least 1e-07 and at most 0.1",),
+    ),
+    "accuracy_of_a_users_mesh": (
+        cell(MESH_CELL[0], MESH_CELL[1] + "\naccuracy = 1e-3"),
+        ('[cell] accuracy = 0.001: belongs to geometry = "square"',),
+    ),
+    "accuracy_of_linear_elements_that_nearly_lock": (
+        cell("mesh_size = 0.05", "accuracy = 1e-7").replace("0.299", "0.45"),
+        ("[cell] accuracy = 1e-07: would need elements split 12 times, more than 8",),
+    ),
+}
