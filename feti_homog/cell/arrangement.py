@@ -13,7 +13,8 @@ import numpy as np
 from feti_homog.cell import elliptic_table, tabulated
 from feti_homog.cell.ellipses import Ellipses
 from feti_homog.cell.torus_pairs import neighbours
-from feti_homog.config.phase_names import COATING
+from feti_homog.config.mixed_cell import fibre_counts, fractions_in_words
+from feti_homog.config.phase_names import COATING, FIBRE
 from feti_homog.errors import MeshError
 from feti_homog.typing import Bool, Float, Int
 
@@ -21,8 +22,6 @@ if TYPE_CHECKING:
     from feti_homog.config.cell_section import Cell
 
 
-# Phase of the discs of cells that name none.
-FIBRE = "fibre"
 # Fibres of the lattices.
 FIBRES_OF = {"square": 1, "hexagonal": 2}
 # Distance of the sides of a cell from tangency with a circle / mean radius, below which elements there are needles.
@@ -101,10 +100,10 @@ class Arrangement:
 
 
 def arrange(cell: Cell) -> Arrangement:
-    """The arrangement that a case asks for in a cell of width 1, its area fraction `cell.fibre_fraction` to rounding.
+    """The arrangement that a case asks for in a cell of width 1, its fractions `cell.fractions` to rounding.
 
     square: one disc in the middle of a 1 x 1 cell. hexagonal: 1 x sqrt(3), a disc in the middle and one at
-    the corner. random: `cell.fibres` discs in a 1 x 1 cell, see `random_arrangement`, with
+    the corner. random: discs in a 1 x 1 cell, see `random_arrangement`, with
     `cell.match` see `matched_arrangement`. table: see `table_arrangement`.
 
     Raises:
@@ -150,7 +149,7 @@ def _coating(cell: Cell, radii: Float) -> Float | None:
 def random_arrangement(cell: Cell, max_steps: int = MAX_STEPS, max_attempts: int | None = None) -> Arrangement:
     """Discs at random in the unit square, periodic, the same for the same case on every machine.
 
-    Radii are uniform in mean * (1 - s, 1 + s), s = `radius_spread`, and scaled to the fraction. Any two
+    Radii are uniform in mean * (1 - s, 1 + s), s = `radius_spread`, and scaled to the fraction of each phase. Any two
     discs, coatings and images included, are at least `min_gap` mean diameters apart. Random centres are moved down the
     gradient of the overlap energy 1/2 sum max(0, R_i + R_j - |x_i - x_j|)^2 of the discs grown by half the
     gap until it is zero; when that has not come after `max_steps`, it starts again from other centres, up to
@@ -159,14 +158,16 @@ def random_arrangement(cell: Cell, max_steps: int = MAX_STEPS, max_attempts: int
     Raises:
         MeshError: no arrangement is found.
     """
-    count, gap, fraction = cell.fibres, cell.min_gap, cell.fibre_fraction
-    assert count is not None and fraction is not None
+    phase = tuple(name for name, own in fibre_counts(cell).items() for _ in range(own))
+    count, gap, fraction = len(phase), cell.min_gap, fsum(cell.fractions.values())
     generator = np.random.default_rng(cell.seed)
     radii = 1 + cell.radius_spread * generator.uniform(-1, 1, count)
-    radii *= sqrt(fraction / (pi * fsum(radii * radii)))
+    for name, share in cell.fractions.items():
+        own = np.array(phase) == name
+        radii[own] *= sqrt(share / (pi * fsum(radii[own] ** 2)))
     coating = _coating(cell, radii)
     grown = (radii if coating is None else radii + coating) + gap * fsum(radii) / count
-    ask = f"[cell] fibre_fraction = {fraction:g} with min_gap = {gap:g} and fibres = {count}"
+    ask = f"[cell] {fractions_in_words(cell)} with min_gap = {gap:g} and fibres = {count}"
     if pi * np.sum(grown**2) > 0.9:
         raise MeshError(
             f"{ask}: random arrangements with this gap exist up to a fibre fraction of at most about "
@@ -176,7 +177,7 @@ def random_arrangement(cell: Cell, max_steps: int = MAX_STEPS, max_attempts: int
     for _ in range(attempts):
         centres, clearance = relax(generator.random((count, 2)), grown, max_steps)
         if clearance >= 1:
-            return clear_shift(Arrangement(1.0, 1.0, centres, radii, (FIBRE,) * count, coating=coating))
+            return clear_shift(Arrangement(1.0, 1.0, centres, radii, phase, coating=coating))
         best = max(best, clearance)
     raise MeshError(
         f"{ask}: no arrangement found in {attempts} attempts; they reached a fibre fraction of at most about "

@@ -9,6 +9,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from feti_homog.cell.coarse_mesh import CoarseMesh, edge_keys, flip_double_arcs
+from feti_homog.cell.ellipses import Ellipses
 from feti_homog.cell.interface_edges import interface_edges
 from feti_homog.cell.mesh_checks import SAME_PLACE, RawMesh, at, first_of
 from feti_homog.cell.middle_nodes import MiddleNodes
@@ -53,11 +54,11 @@ def with_bent_edges(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
     bent = np.abs(away) > STRAIGHT * length
     circles, arcs = _circumcircles(a[bent], b[bent], middle[bent]), pairs[bent].astype(np.int32)
     triangles = flip_double_arcs(mesh.triangles, mesh.phase, arcs, _curves(mesh, arcs), nodes)
-    number = len(mesh.circles) + np.arange(len(circles), dtype=np.int32)
+    number = len(mesh.ellipses) + np.arange(len(circles), dtype=np.int32)
     return replace(
         mesh,
         triangles=triangles,
-        circles=np.concatenate([mesh.circles, circles]),
+        ellipses=mesh.ellipses.joined(Ellipses.round(circles)),
         arc_edges=np.concatenate([mesh.arc_edges, arcs]),
         arc_circle=np.concatenate([mesh.arc_circle, number]),
     )

@@ -9,6 +9,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components, depth_first_order
 
 from feti_homog.cell.coarse_mesh import CoarseMesh, double_arcs, edge_keys, edges, flip_double_arcs
+from feti_homog.cell.ellipses import Ellipses
 from feti_homog.cell.interface_edges import interface_edges
 from feti_homog.cell.middle_nodes import MiddleNodes
 from feti_homog.typing import Bool, Float, Int, Int32
@@ -53,7 +54,7 @@ def with_circles(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
         if circle is None or on_sides(mesh.points[own], size).any():
             continue
         moved = _moved(mesh.points[loop.classes], loop.places, circle, size)
-        images = _images(mesh, loop, circle, own, size)
+        images = _images(mesh, loop, circle, own)
         if moved is None or (has_middles and not _through(images, bends[loop_of == number])):
             continue
         points[loop.classes] = moved
@@ -137,15 +138,20 @@ def _through(images: list[tuple[Float, Int]], bends: Float) -> bool:
     return bool(np.all(np.concatenate(away) <= ROUNDNESS_TOLERANCE))
 
 
-def _images(mesh: CoarseMesh, loop: Loop, circle: Float, own: Int32, size: Float) -> list[tuple[Float, Int]]:
+def _images(mesh: CoarseMesh, loop: Loop, circle: Float, own: Int32) -> list[tuple[Float, Int]]:
     """The images of a circle in the plane, each with the numbers of its edges among the loop's own (a, 2)."""
+    return [(np.append(circle[:2] - step, circle[2]), mine) for step, mine in loop_images(mesh, loop, own)]
+
+
+def loop_images(mesh: CoarseMesh, loop: Loop, own: Int32) -> list[tuple[Float, Int]]:
+    """How far (2,) the loop is from each of its images in the plane, and the edges of that among the loop's own
+    (a, 2)."""
     order = np.argsort(loop.classes)
     place = order[np.searchsorted(loop.classes[order], mesh.representative[own[:, 0]])]
-    steps = np.round((loop.places[place] - mesh.points[own[:, 0]]) / size)
+    steps = np.round((loop.places[place] - mesh.points[own[:, 0]]) / mesh.period)
     distinct, which = np.unique(steps, axis=0, return_inverse=True)
     which = which.ravel()
-    centres = circle[:2] - distinct * size
-    return [(np.append(centre, circle[2]), np.flatnonzero(which == k)) for k, centre in enumerate(centres)]
+    return [(step * mesh.period, np.flatnonzero(which == k)) for k, step in enumerate(distinct)]
 
 
 def _copied(mesh: CoarseMesh, points: Float, size: Float) -> Float:
@@ -158,7 +164,7 @@ def _with_arcs(mesh: CoarseMesh, circles: list[Float], arc_edges: list[Int32]) -
     counts = np.array([len(own) for own in arc_edges], dtype=np.intp)
     return replace(
         mesh,
-        circles=np.array(circles).reshape(-1, 3),
+        ellipses=Ellipses.round(np.array(circles).reshape(-1, 3)),
         arc_edges=np.concatenate([np.zeros((0, 2), np.int32), *arc_edges]),
         arc_circle=np.repeat(np.arange(len(circles), dtype=np.int32), counts),
     )

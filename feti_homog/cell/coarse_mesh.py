@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from feti_homog.cell.ellipses import Ellipses
 from feti_homog.cell.periodic_sides import paired_sides
 from feti_homog.typing import Float, Int, Int32
 
@@ -23,9 +24,9 @@ class CoarseMesh:
             number, or the phase where fibres have none.
         representative: (n,) node that stands for the class of a node on the torus: x = width -> x = 0,
             y = height -> y = 0; idempotent.
-        circles: (k, 3) centre and radius in the plane; periodic images are listed separately.
-        arc_edges: (a, 2) edges of the mesh whose ends lie on a circle, to rounding.
-        arc_circle: (a,) the circle of each of them.
+        ellipses: k circles and ellipses in the plane; periodic images are listed separately.
+        arc_edges: (a, 2) edges of the mesh whose ends lie on one of them, to rounding.
+        arc_circle: (a,) that one.
         debonded_edges: (d, 2) edges between a fibre and the matrix that are debonded from the start.
         snapped: how far a node of a user's mesh was moved to make sides match, at most.
         centres: (fibres, 2) of fibres whose precedence is their number from 1, where they are known; else None.
@@ -39,7 +40,7 @@ class CoarseMesh:
     phases: tuple[str, ...]
     precedence: Int32
     representative: Int32
-    circles: Float
+    ellipses: Ellipses
     arc_edges: Int32
     arc_circle: Int32
     debonded_edges: Int32
@@ -50,6 +51,11 @@ class CoarseMesh:
     def period(self) -> Float:
         """(2,) width and height."""
         return np.array([self.width, self.height])
+
+    @property
+    def circles(self) -> Float:
+        """(k, 3) centre and radius of the ellipses, NaN where these are not round."""
+        return self.ellipses.circles
 
 
 def areas(points: Float, triangles: Int32) -> Float:

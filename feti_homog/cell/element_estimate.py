@@ -9,6 +9,7 @@ import numpy as np
 
 from feti_homog.cell.arrangement import FIBRES_OF, arrange
 from feti_homog.cell.size_field import MAX_GROWTH, MIN_EDGES_AROUND
+from feti_homog.config.mixed_cell import fibre_counts
 
 if TYPE_CHECKING:
     from feti_homog.config.cell_section import Cell
@@ -25,15 +26,14 @@ def fibres_of(cell: Cell) -> int:
     """Number of fibres."""
     if cell.geometry == "table":
         return len(arrange(cell).radii)
-    return cell.fibres or FIBRES_OF[cell.geometry]
+    return FIBRES_OF.get(cell.geometry) or sum(fibre_counts(cell).values())
 
 
 def mean_radius(cell: Cell) -> float:
     """Mean radius of the fibres / width of the cell."""
     if cell.geometry == "table":
         return float(arrange(cell).radii.mean())
-    assert cell.fibre_fraction is not None
-    return math.sqrt(cell.fibre_fraction * _height(cell) / (math.pi * fibres_of(cell)))
+    return math.sqrt(math.fsum(cell.fractions.values()) * _height(cell) / (math.pi * fibres_of(cell)))
 
 
 def interface_size(cell: Cell) -> float:

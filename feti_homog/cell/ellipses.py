@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from feti_homog.typing import Bool, Float, Int
+from feti_homog.typing import Bool, Float, Int, Int32
 
 # Directions in which the distance of two ellipses is first looked for, and how often the best are looked between.
 DIRECTIONS, ZOOMS, ZOOM = 180, 12, 9
@@ -28,10 +28,30 @@ class Ellipses:
         axes = np.stack([np.stack([cosine, sine], axis=1), np.stack([-sine, cosine], axis=1)], axis=2)
         return cls(centres, axes * np.stack([a, b], axis=1)[:, None])
 
+    @classmethod
+    def round(cls, circles: Float) -> Ellipses:
+        """The circles of centre and radius (k, 3)."""
+        return cls(circles[:, :2], circles[:, 2, None, None] * np.eye(2))
+
+    @property
+    def circles(self) -> Float:
+        """(k, 3) centre and radius; that of ellipses which are not round is NaN."""
+        radius = np.sqrt(np.abs(np.linalg.det(self.frames)))
+        return np.column_stack([self.centres, np.where(self.are_round, radius, np.nan)])
+
+    def joined(self, others: Ellipses) -> Ellipses:
+        """These, then the others."""
+        pairs = (self.centres, others.centres), (self.frames, others.frames)
+        return Ellipses(*(np.concatenate(pair) for pair in pairs))
+
+    def scaled(self, factor: float) -> Ellipses:
+        """All lengths multiplied."""
+        return Ellipses(factor * self.centres, factor * self.frames)
+
     def __len__(self) -> int:
         return len(self.centres)
 
-    def __getitem__(self, rows: Int | Bool) -> Ellipses:
+    def __getitem__(self, rows: Int | Int32 | Bool) -> Ellipses:
         return Ellipses(self.centres[rows], self.frames[rows])
 
     @property

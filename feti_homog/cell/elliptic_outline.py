@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import pairwise, product
+from itertools import product
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from feti_homog.cell.arrangement import Arrangement
 from feti_homog.cell.edge_samples import EdgeSamples
-from feti_homog.cell.ellipse_detection import Ellipse
 from feti_homog.cell.ellipses import Ellipses, directions
 from feti_homog.cell.elliptic_size import size_field
 from feti_homog.cell.graded_size import MeshSizes, SizeField
-from feti_homog.cell.middle_nodes import MiddleNodes
 from feti_homog.cell.outline import (
     ARC_SAMPLES,
     MATRIX,
@@ -35,7 +33,7 @@ LENGTH_STEPS = 256
 
 
 def outline(arrangement: Arrangement, sizes: MeshSizes, marks: Mapping[int, Sequence[float]]) -> Outline:
-    """As `outline.outline`; the radii of ellipses are 0."""
+    """As `outline.outline`."""
     size = np.array([arrangement.width, arrangement.height])
     ellipses, fibre = _images(arrangement, size)
     places = [_crossings(ellipses, axis, size) for axis in (0, 1)]
@@ -53,22 +51,7 @@ def outline(arrangement: Arrangement, sizes: MeshSizes, marks: Mapping[int, Sequ
         curves += _side_curves(axis, places[axis], ellipses, size, field, numbering)
     curves += _arc_curves(ellipses, which, start, stop, sizes.interface, field, numbering)
     around = np.full(len(ellipses), MATRIX)
-    radii = np.where(arrangement.ellipses.are_round, arrangement.radii, 0.0)
-    return Outline(numbering.points(), tuple(curves), np.column_stack([ellipses.centres, radii[fibre]]), fibre, around)
-
-
-def middles(lines: Outline, arrangement: Arrangement) -> MiddleNodes:
-    """The points on the ellipses between the ends of each edge, at its middle parameter."""
-    edges, points = [np.zeros((0, 2), np.int32)], [np.zeros((0, 2))]
-    for curve in lines.curves:
-        if curve.circle == MATRIX or lines.circles[curve.circle, 2] > 0:
-            continue
-        frame = arrangement.ellipses.frames[lines.disc[curve.circle]]
-        nodes = lines.points[curve.nodes]
-        edges.append(np.array(list(pairwise(curve.nodes)), np.int32))
-        points.append(Ellipse(lines.circles[curve.circle, :2], frame).between(nodes[:-1], nodes[1:]))
-    found, where = np.concatenate(edges), np.concatenate(points)
-    return MiddleNodes(found, np.zeros(len(found), np.int64), np.column_stack([where, np.zeros(len(where))]))
+    return Outline(numbering.points(), tuple(curves), ellipses, fibre, around)
 
 
 def _images(arrangement: Arrangement, size: Float) -> tuple[Ellipses, Int]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
 from itertools import chain, pairwise
 from types import MappingProxyType, ModuleType
 from typing import TYPE_CHECKING
@@ -14,11 +13,11 @@ import numpy as np
 
 from feti_homog.cell import element_estimate, elliptic_outline
 from feti_homog.cell.arrangement import Arrangement, arrange
-from feti_homog.cell.bent_edges import with_bent_edges
 from feti_homog.cell.coarse_mesh import CoarseMesh, areas, flip_double_arcs, representatives
 from feti_homog.cell.graded_size import MeshSizes
 from feti_homog.cell.outline import MATRIX, Curve, Outline, outline
 from feti_homog.cell.size_field import MAX_GROWTH
+from feti_homog.config.mixed_cell import fractions_in_words, mixed_width
 from feti_homog.config.phase_names import COATING
 from feti_homog.errors import MeshError
 from feti_homog.typing import Float, Index, Int32
@@ -63,8 +62,9 @@ def generate(cell: Cell, marks: Mapping[int, Sequence[float]] = NO_MARKS) -> Coa
     _refuse_extremes(cell, sizes, sum(len(own) for own in marks.values()))
     arrangement = arrange(cell)
     if arrangement.radii.min() < SMALLEST_RADIUS * arrangement.width:
+        asked = fractions_in_words(cell) if cell.fractions else 'geometry = "table"'
         raise MeshError(
-            f"[cell] fibre_fraction = {cell.fibre_fraction}: a fibre has a radius of {arrangement.radii.min():.2g}; "
+            f"[cell] {asked}: a fibre has a radius of {arrangement.radii.min():.2g}; "
             f"expected at least {SMALLEST_RADIUS} of the width of the cell"
         )
     return mesh_arrangement(arrangement, sizes, marks, arrangement_scale(cell, arrangement))
@@ -87,7 +87,7 @@ def mesh_arrangement(
     phase = np.array([place[name] for name in (*within, arrangement.phases[0])], np.int32)[circle]
     number = lines.disc + 1 + np.where(lines.is_coating, len(arrangement.radii), 0)
     arc_edges, arc_circle = _arc_edges(lines)
-    mesh = CoarseMesh(
+    return CoarseMesh(
         width=scale * arrangement.width,
         height=scale * arrangement.height,
         points=scale * points,
@@ -96,21 +96,17 @@ def mesh_arrangement(
         phases=arrangement.phases,
         precedence=np.append(number, 0)[circle].astype(np.int32),
         representative=representatives(points, arrangement.width, arrangement.height),
-        circles=scale * lines.circles,
+        ellipses=lines.ellipses.scaled(scale),
         arc_edges=arc_edges,
         arc_circle=arc_circle,
         debonded_edges=np.zeros((0, 2), np.int32),
+        centres=scale * arrangement.centres if has_ellipses else None,
     )
-    if not has_ellipses:
-        return mesh
-    middles = elliptic_outline.middles(lines, arrangement)
-    bent = with_bent_edges(mesh, replace(middles, points=scale * middles.points))
-    return replace(bent, centres=scale * arrangement.centres)
 
 
 def _arc_edges(lines: Outline) -> tuple[Int32, Int32]:
     """Edges (a, 2) on circles, and their circles (a,)."""
-    arcs = [curve for curve in lines.curves if curve.circle != MATRIX and lines.circles[curve.circle, 2] > 0]
+    arcs = [curve for curve in lines.curves if curve.circle != MATRIX]
     pairs = [np.stack([arc.nodes[:-1], arc.nodes[1:]], axis=1) for arc in arcs]
     circle = np.repeat(np.array([arc.circle for arc in arcs], np.int32), [len(edges) for edges in pairs])
     return np.concatenate([np.zeros((0, 2), np.int32), *pairs]).astype(np.int32), circle
@@ -127,7 +123,7 @@ def arrangement_scale(cell: Cell, arrangement: Arrangement) -> float:
     """Lengths of the cell / those of the arrangement."""
     if cell.fibre_radius is not None:
         return float(cell.fibre_radius / arrangement.radii.mean())
-    width = cell.width if cell.table is None else cell.table.width
+    width = mixed_width(cell) if cell.table is None else cell.table.width
     return width or 1.0
 
 

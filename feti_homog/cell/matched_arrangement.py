@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from feti_homog.cell.arrangement import FIBRE, Arrangement, clear_shift
+from feti_homog.cell.arrangement import Arrangement, clear_shift
 from feti_homog.cell.hard_core import placed
 from feti_homog.config.fibre_window import read_window
+from feti_homog.config.phase_names import FIBRE
 from feti_homog.errors import MeshError
 from feti_homog.microstructure.fibre_pattern import FibrePattern
 from feti_homog.microstructure.neighbour_match import match_distance, matched, wanted_distances

@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from feti_homog.cell.coarse_mesh import areas, edge_keys, edges
 from feti_homog.cell.middle_nodes import MiddleNodes
-from feti_homog.config.material_sections import PHASE
+from feti_homog.config.phase_names import PHASE
 from feti_homog.typing import Bool, Float, Int, Int32
 
 # Nodes nearer than this, relative to the cell, are at the same place: files may round coordinates.

@@ -11,7 +11,8 @@ from feti_homog.cell import abaqus_file, bent_edges, gmsh_file, mesh_checks, voi
 from feti_homog.cell.bent_edges import with_bent_edges
 from feti_homog.cell.circle_detection import with_circles
 from feti_homog.cell.coarse_mesh import CoarseMesh, areas, representatives
-from feti_homog.cell.ellipse_detection import elliptic_middles
+from feti_homog.cell.ellipse_detection import with_ellipses
+from feti_homog.cell.ellipses import Ellipses
 from feti_homog.cell.interface_edges import can_debond
 from feti_homog.cell.mesh_checks import RawMesh
 from feti_homog.cell.periodic_sides import paired_sides
@@ -28,8 +29,8 @@ def read(path: Path, snap: float | None = None) -> CoarseMesh:
 
     It consists of triangles of three or six nodes in physical surfaces "matrix", "fibre", "glass", ..., fills a
     rectangle but for voids, and has matching nodes on opposite sides. Lines in the physical curve "debonded" are
-    edges between a fibre and the matrix that are debonded. Round interfaces become circles (`with_circles`); others
-    follow their middle nodes (`with_bent_edges`), or the ellipse that they are on (`elliptic_middles`).
+    edges between a fibre and the matrix that are debonded. Round interfaces become circles (`with_circles`), elliptic
+    ones ellipses (`with_ellipses`); others follow their middle nodes (`with_bent_edges`).
     With `snap`, nodes on sides are first moved by up to that / width to where they should be (`snapped`).
 
     Raises:
@@ -56,7 +57,7 @@ def read(path: Path, snap: float | None = None) -> CoarseMesh:
     mesh = with_circles(mesh, middles)
     # Fibres keep the numbers that they have without bent edges: round ones first.
     numbers = Torus.of(mesh).constituent.astype(np.int32)
-    mesh = with_bent_edges(mesh, middles if len(middles.tags) else elliptic_middles(mesh))
+    mesh = with_bent_edges(with_ellipses(mesh, middles), middles)
     return replace(mesh, precedence=numbers, snapped=moved)
 
 
@@ -102,7 +103,7 @@ def _coarse_mesh(raw: RawMesh, plane: Float, size: Float) -> CoarseMesh:
         phases=phases,
         precedence=number[raw.group],
         representative=representatives(plane, width, height),
-        circles=np.zeros((0, 3)),
+        ellipses=Ellipses.round(np.zeros((0, 3))),
         arc_edges=np.zeros((0, 2), np.int32),
         arc_circle=np.zeros(0, np.int32),
         debonded_edges=np.searchsorted(raw.node_tags, raw.debonded).astype(np.int32),

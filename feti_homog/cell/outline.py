@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 
 from feti_homog.cell.arrangement import Arrangement
 from feti_homog.cell.edge_samples import EdgeSamples
+from feti_homog.cell.ellipses import Ellipses
 from feti_homog.cell.graded_size import MeshSizes, SizeField, size_field
 from feti_homog.cell.size_field import circle_size
 from feti_homog.typing import Bool, Float, Int
@@ -51,14 +52,15 @@ class Outline:
     Attributes:
         points: (n, 2) nodes on all lines, exactly in place.
         curves: through the nodes.
-        circles: (k, 3) in the plane, the images of one disc after the other, that of a coating before the one within.
+        ellipses: k circles and ellipses in the plane, the images of one disc after the other, that of a coating before
+            the one within.
         disc: (k,) the disc of the arrangement that each circle is an image of.
         around: (k,) the circle around each; MATRIX if there is none.
     """
 
     points: Float
     curves: tuple[Curve, ...]
-    circles: Float
+    ellipses: Ellipses
     disc: Int
     around: Int
 
@@ -128,7 +130,7 @@ def outline(arrangement: Arrangement, sizes: MeshSizes, marks: Mapping[int, Sequ
         curves += _side_curves(axis, places[axis], circles, around, size, field, numbering)
     caps = _caps(arrangement, sizes.interface, fibre, around)
     curves += _arc_curves(circles, around, circle, start, stop, caps[circle], field, numbering)
-    return Outline(numbering.points(), tuple(curves), circles, fibre, around)
+    return Outline(numbering.points(), tuple(curves), Ellipses.round(circles), fibre, around)
 
 
 def _caps(arrangement: Arrangement, largest: float, fibre: Int, around: Int) -> Float:

@@ -15,6 +15,7 @@ from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra
 
 from feti_homog.cell.coarse_mesh import CoarseMesh
+from feti_homog.cell.ellipses import Ellipses
 from feti_homog.cell.periodic_sides import paired_sides
 from feti_homog.config.phase_names import COATING
 from feti_homog.typing import Bool, Float, Int, Int32
@@ -51,9 +52,9 @@ class Torus:
         label = components(len(mesh.triangles), left[same], right[same])
         torus = cls(mesh, node_class, edges, triangle_edges, torus_edge, label)
         # Where the precedence leaves it open, fibres on circles are numbered in the order of the circles.
-        circle = np.full(len(edges), len(mesh.circles))
+        circle = np.full(len(edges), len(mesh.ellipses))
         circle[torus.arcs] = mesh.arc_circle
-        first = np.full(label.max() + 1, len(mesh.circles))
+        first = np.full(label.max() + 1, len(mesh.ellipses))
         np.minimum.at(first, np.repeat(label, 3), circle[triangle_edges].ravel())
         order = np.lexsort((np.arange(len(label)), first[label], mesh.precedence))
         return replace(torus, constituent=_renumber(label, order))
@@ -69,11 +70,29 @@ class Torus:
         return np.asarray(np.bincount(self.triangle_torus_edges.ravel()) == 1)
 
     @cached_property
+    def edge_ellipses(self) -> Ellipses:
+        """The e ellipses that the plane edges lie on; those of straight edges are points."""
+        n = len(self.edges)
+        centres, frames = np.zeros((n, 2)), np.zeros((n, 2, 2))
+        own = self.mesh.ellipses[self.mesh.arc_circle]
+        centres[self.arcs], frames[self.arcs] = own.centres, own.frames
+        return Ellipses(centres, frames)
+
+    @cached_property
     def edge_circles(self) -> Float:
-        """(e, 3) centre and radius of the circle that each plane edge lies on; radius 0 where it is straight."""
+        """(e, 3) centre and radius of these ellipses: NaN where they are not round, 0 where the edge is straight."""
         circles = np.zeros((len(self.edges), 3))
         circles[self.arcs] = self.mesh.circles[self.mesh.arc_circle]
         return circles
+
+    @cached_property
+    def edge_turns(self) -> Float:
+        """(e,) how far the parameter turns on its ellipse along each plane edge, at most pi; 0 where it is straight."""
+        turns, own = np.zeros(len(self.edges)), self.mesh.ellipses[self.mesh.arc_circle]
+        start, stop = (own.unit(self.mesh.points[self.edges[self.arcs, end]] - own.centres) for end in (0, 1))
+        sine = start[:, 0] * stop[:, 1] - start[:, 1] * stop[:, 0]
+        turns[self.arcs] = np.arctan2(np.abs(sine), (start * stop).sum(axis=1))
+        return turns
 
     @cached_property
     def edge_lengths(self) -> Float:

@@ -51,6 +51,11 @@ class ReferenceLattice:
         number[nodes[:, 1], nodes[:, 2]] = np.arange(len(nodes))
         return cls(m, nodes, number[corners[..., 1], corners[..., 2]])
 
+    @property
+    def order(self) -> int:
+        """Of the elements: 1 or 2."""
+        return 1 if self.triangles.shape[1] == 3 else 2
+
     def number(self, vertices: Int, edges: Int, backwards: Bool, n_vertices: int, n_edges: int) -> Int:
         """(t, q) node numbers: vertices first, then M - 1 nodes an edge along its direction, then interiors."""
         inner = self.intervals - 1
@@ -69,7 +74,7 @@ class FineMesh:
     Attributes:
         points: (n, 2) plane positions.
         nodes: (t, q) plane node of each lattice node of each coarse triangle.
-        curved: (t,) whether an edge of the coarse triangle lies on a circle; the others are affine images of
+        curved: (t,) whether an edge of the coarse triangle lies on an ellipse; the others are affine images of
             the lattice.
         node_class: (n,) class of each plane node; a class is what the degrees of freedom belong to.
         n_classes: c.
@@ -91,7 +96,7 @@ class FineMesh:
 
 
 def refine(submesh: Submesh, lattice: ReferenceLattice) -> FineMesh:
-    """Refine the subdomain; new nodes on circles lie on them."""
+    """Refine the subdomain; new nodes on circles and ellipses lie on them."""
     edges, back, inner = submesh.triangle_edges, submesh.backwards, lattice.intervals - 1
     plane = lattice.number(submesh.triangles, edges, back, len(submesh.points), len(submesh.edges)).astype(np.int32)
     n_classes, n_edges = len(submesh.class_keys), len(submesh.edge_keys)
@@ -101,7 +106,7 @@ def refine(submesh: Submesh, lattice: ReferenceLattice) -> FineMesh:
     points[plane] = _positions(submesh, lattice)
     node_class[plane] = torus
     c = n_classes + n_edges * inner + n - len(submesh.points) - len(submesh.edges) * inner
-    curved = (submesh.circles[edges, 2] > 0).any(axis=1)
+    curved = (submesh.turns[edges] > 0).any(axis=1)
     return FineMesh(points, plane, curved, node_class, c, lattice)
 
 
@@ -123,18 +128,19 @@ def _positions(submesh: Submesh, lattice: ReferenceLattice) -> Float:
 
     x = sum_k b_k x_k + sum_edges (1 - b_o)^2 delta(s): delta is the arc's distance from its chord at
     s = b_b / (b_a + b_b), b_o the coordinate of the vertex opposite.  Mid-edge nodes of quadratic
-    elements are midpoints except on the arcs, so only elements at a circle are curved.
+    elements are midpoints except on the arcs, so only elements at an arc are curved.
     """
     b = lattice.nodes / lattice.intervals
     x = b @ submesh.points[submesh.triangles]
     for k in range(3):
         edge = submesh.triangle_edges[:, k]
-        curved = np.flatnonzero(submesh.circles[edge, 2] > 0)
+        curved = np.flatnonzero(submesh.turns[edge] > 0)
         a, c = submesh.points[submesh.triangles[curved, k]], submesh.points[submesh.triangles[curved, (k + 1) % 3]]
         span = 1 - b[:, (k + 2) % 3]
         s = np.divide(b[:, (k + 1) % 3], span, out=np.zeros_like(span), where=span > 0)
-        x[curved] += span[:, None] ** 2 * (_arc(a, c, submesh.circles[edge[curved]], s) - _chord(a, c, s))
-    if lattice.triangles.shape[1] == 6:
+        centre, turn = submesh.circles[edge[curved], :2], submesh.turns[edge[curved]]
+        x[curved] += span[:, None] ** 2 * (_arc(a, c, centre, turn, s) - _chord(a, c, s))
+    if lattice.order == 2:
         _straighten(x, submesh, lattice)
     return x
 
@@ -143,7 +149,7 @@ def _straighten(x: Float, submesh: Submesh, lattice: ReferenceLattice) -> None:
     """Put mid-edge nodes midway between their vertices, save those on arcs."""
     corners = lattice.triangles[:, :3]
     middle = (x[:, corners] + x[:, np.roll(corners, -1, axis=1)]) / 2
-    curved = submesh.circles[submesh.triangle_edges, 2] > 0
+    curved = submesh.turns[submesh.triangle_edges] > 0
     on_edge = lattice.nodes[lattice.triangles[:, 3:]][..., [2, 0, 1]] == 0
     on_arc = (curved[:, None, None, :] & on_edge).any(axis=3)
     x[:, lattice.triangles[:, 3:]] = np.where(on_arc[..., None], x[:, lattice.triangles[:, 3:]], middle)
@@ -154,11 +160,12 @@ def _chord(a: Float, b: Float, s: Float) -> Float:
     return a[:, None] + s[None, :, None] * (b - a)[:, None]
 
 
-def _arc(a: Float, b: Float, circle: Float, s: Float) -> Float:
-    """(t, q, 2) points that cut the arcs from a to b (less than a half circle) in the ratio s."""
-    centre = circle[:, None, :2]
-    from_a, from_b = a[:, None] - centre, b[:, None] - centre
-    sine = from_a[..., 0] * from_b[..., 1] - from_a[..., 1] * from_b[..., 0]
-    angle = np.arctan2(np.abs(sine), (from_a * from_b).sum(axis=2))
+def _arc(a: Float, b: Float, centre: Float, turn: Float, s: Float) -> Float:
+    """(t, q, 2) points that cut the arcs from a to b in the ratio s of their parameters, which turn by `turn` (t,).
+
+    An affine map takes the arc of a circle, where the weights of the spokes are these, to that of an ellipse.
+    """
+    from_a, from_b, angle = a[:, None] - centre[:, None], b[:, None] - centre[:, None], turn[:, None]
     weight_a, weight_b = np.sin((1 - s) * angle), np.sin(s * angle)
-    return np.asarray(centre + (weight_a[..., None] * from_a + weight_b[..., None] * from_b) / np.sin(angle)[..., None])
+    spokes = (weight_a[..., None] * from_a + weight_b[..., None] * from_b) / np.sin(angle)[..., None]
+    return np.asarray(centre[:, None] + spokes)

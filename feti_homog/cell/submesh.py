@@ -27,7 +27,9 @@ class Submesh:
         triangle_edges: (t, 3) edge from vertex k to vertex k + 1 (mod 3).
         backwards: (t, 3) true where the triangle runs along the edge against its direction.
         edges: (e, 2) vertices from start to end.
-        circles: (e, 3) centre and radius of the circle that the edge lies on, radius 0 where straight.
+        circles: (e, 3) centre and radius of the circle that the edge lies on; the radius is NaN if that is an ellipse,
+            0 where the edge is straight.
+        turns: (e,) how far the parameter turns on it along the edge; 0 where the edge is straight.
         vertex_class: (v,) class of each vertex.
         edge_class: (e,) torus edge of each edge.
         at_void: (torus edges,) whether one triangle of the whole cell has the torus edge, and a void is beside it.
@@ -45,6 +47,7 @@ class Submesh:
     backwards: Bool
     edges: Int
     circles: Float
+    turns: Float
     vertex_class: Int
     edge_class: Int
     at_void: Bool
@@ -77,6 +80,7 @@ def part(submesh: Submesh, members: Int) -> Submesh:
         backwards=submesh.backwards[members],
         edges=np.searchsorted(vertices, submesh.edges[edges]),
         circles=submesh.circles[edges],
+        turns=submesh.turns[edges],
         vertex_class=vertex_class,
         edge_class=edge_class,
         at_void=submesh.at_void[torus_edges],
@@ -127,6 +131,7 @@ def _submesh(torus: Torus, index: int, members: Int, pinned: int) -> Submesh:
         backwards=ends[triangle_edges, 0] != triangles,
         edges=ends,
         circles=torus.edge_circles[edges],
+        turns=torus.edge_turns[edges],
         vertex_class=vertex_class,
         edge_class=edge_class,
         at_void=torus.at_void[edge_keys],

@@ -22,6 +22,7 @@ from feti_homog.config.load_section import LoadPath, SingleLoad
 from feti_homog.config.matched_cell import with_match
 from feti_homog.config.material_forms import Isotropic, Material
 from feti_homog.config.material_sections import coating_faults, phase_faults, provider, read_materials
+from feti_homog.config.mixed_cell import mix_faults
 from feti_homog.config.mixed_load import MixedLoad, Strain, completed
 from feti_homog.config.petsc_section import Scalar, read_petsc
 from feti_homog.config.schema import Selected, TableReader, selected_value, to_table
@@ -178,7 +179,7 @@ def parse(values: Mapping[str, Any], folder: Path) -> Case:
         faults.append("[decomposition] subdomains, max_dofs: exclude each other; give one")
     sections = {
         "cell": cell and _checked_cell(with_match(cell, folder, faults), folder, faults),
-        "materials": read_materials(document.get("material"), reader.selected[PLANE], reader),
+        "materials": read_materials(document.get("material"), document.get("cell"), reader.selected[PLANE], reader),
         "analysis": _read_section(document, "analysis", reader),
         "decomposition": decomposition,
     }
@@ -248,7 +249,7 @@ def _checked_cell(cell: Cell, folder: Path, faults: list[str]) -> Cell:
                 f"{limit_in_words(limit, cell.fibre_fraction, 4)} for "
                 f"geometry = {toml_value(cell.geometry)}: {reason}"
             )
-    faults += size_faults(cell)
+    faults += size_faults(cell) + mix_faults(cell)
     if cell.width is not None and cell.fibre_radius is not None:
         faults.append("[cell] width, fibre_radius: exclude each other; give one")
     if cell.match is not None and cell.coating is not None:

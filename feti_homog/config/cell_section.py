@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from feti_homog.config.fibre_table import FibreTable
+from feti_homog.config.phase_names import FIBRE
 from feti_homog.config.schema import Selector, key
-from feti_homog.config.section_values import CELL_FILE, FIBRE_LIST, SEED, TABLE_FILE
+from feti_homog.config.section_values import CELL_FILE, FIBRE_LIST, FRACTIONS, RADII, SEED, TABLE_FILE
 from feti_homog.config.values import choice, integer, real
 
 CIRCULAR = ("square", "hexagonal", "random")
@@ -41,8 +42,8 @@ class Cell:
         "Area of the fibres / area of the cell, below that at which they touch: pi/4 (square), pi/sqrt(12) "
         "(hexagonal; random, where min_gap lowers it).",
         only=ALL_CIRCULAR,
-        unless="match",
-        default_words="required, or that of match",
+        unless=("match", "mix"),
+        default_words="required, or that of match or mix",
     )
     width: float | None = key(
         real(least=1e-9, most=1e9), "Width of the cell.", unit="length", default=None, only=MESHED,
@@ -104,9 +105,27 @@ class Cell:
         default="torus",
     )
     fibres: int | None = key(
-        integer(least=1, most=100_000), "Number of fibres.", only=RANDOM, unless="match",
-        default_words="required, or that of match",
+        integer(least=1, most=100_000), "Number of fibres.", only=RANDOM, unless=("match", "radii"),
+        default_words="required, or that of match, or what width and radii make it",
     )  # fmt: skip
+    mix: Mapping[str, float] | None = key(
+        FRACTIONS,
+        "Fibres of several phases, in place of fibre_fraction: the area of those of each / area of the cell. Each "
+        "needs its [material.NAME].",
+        default=None,
+        only=RANDOM,
+        default_words="none",
+    )
+    radii: Mapping[str, float] | None = key(
+        RADII,
+        "Mean radius of the fibres of each phase of mix, in place of fibre_radius. Of fibres, or of as many as a cell "
+        "of this width takes, each phase gets the nearest whole number, at least one; its radii are then scaled such "
+        "that its fraction is exact.",
+        unit="length",
+        default=None,
+        only=RANDOM,
+        default_words="equal ones",
+    )
     match: Path | None = key(
         TABLE_FILE,
         "A table of the fibres in a window of a micrograph, relative to the case file: columns x, y, radius, and a "
@@ -138,8 +157,7 @@ class Cell:
         "may have any shape. Of Abaqus' files (.inp) element sets have these names; of .vtu and .vtk files, which "
         'meshio reads, cell data "phase" are 0 in the matrix, 1 in fibre, 2 in fibre:2, ... Of "table" the fibres, a '
         "row for each: columns x, y, radius and, if there are any, phase and coating (thickness / radius); of ellipses "
-        "a and b, the semi-axes, in place of the radius, and angle from x to a in degrees: refine follows arcs through "
-        "three points of each edge before refine, which miss the ellipse by the fourth power of its length. What "
+        "a and b, the semi-axes, in place of the radius, and angle from x to a in degrees. What "
         'follows # is a comment, of which "# width = 120, height = 80" says the size of the cell.',
         default=None,
         only=FROM_A_FILE,
@@ -169,6 +187,13 @@ class Cell:
         only=TABLE,
     )
     table: FibreTable | None = field(default=None, compare=False)
+
+    @property
+    def fractions(self) -> dict[str, float]:
+        """Fibre fraction of each phase of round fibres, in the order of the names; none where files say it."""
+        if self.mix is not None:
+            return dict(sorted(self.mix.items()))
+        return {} if self.fibre_fraction is None else {FIBRE: self.fibre_fraction}
 
     @property
     def has_own_mesh(self) -> bool:

@@ -13,9 +13,9 @@ from typing import Any
 from feti_homog.config.interface_section import Arc
 from feti_homog.config.json_schema_rules import Schema, rules_of_one_case
 from feti_homog.config.material_forms import MATERIAL_FORMS
-from feti_homog.config.material_sections import PHASE
 from feti_homog.config.mixed_load import MixedLoad
 from feti_homog.config.petsc_section import PREFIXED
+from feti_homog.config.phase_names import PHASE
 from feti_homog.config.schema import Key, defaults_of, keys_of
 from feti_homog.config.sections import SECTIONS
 from feti_homog.config.sweep_section import AXIS_MEANING, RANGE_KEYS, SWEEP, SweepSection

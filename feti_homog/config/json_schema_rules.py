@@ -50,6 +50,7 @@ def rules_of_one_case() -> Schema:
             *_generalized_rules(),
             *_envelope_rules(),
             _at(("cell",), {"not": {"required": ["width", "fibre_radius"]}}),
+            *_mix_rules(),
             _at(("decomposition",), {"not": {"required": ["subdomains", "max_dofs"]}}),
             _at(("path",), {"oneOf": [{"required": [name]} for name in ("strain", "to", "waypoints")]}),
             *_mixed_load_rules(),
@@ -111,9 +112,9 @@ def _consequence(path: Sequence[str], keys: Mapping[str, Key], selector: Selecto
 
 
 def _presence(name: str, entry: Key) -> Schema:
-    """That a key is there, or what it is not required beside."""
-    there = {"required": [name]}
-    return {"anyOf": [there, {"required": [entry.unless]}]} if entry.unless else there
+    """That a key is there, or one that it is not required beside."""
+    there: list[Schema] = [{"required": [each]} for each in (name, *entry.unless)]
+    return {"anyOf": there} if entry.unless else there[0]
 
 
 def _section_consequence(value: str) -> Schema:
@@ -139,6 +140,14 @@ def _file_rules() -> list[Schema]:
     ]
 
 
+def _mix_rules() -> list[Schema]:
+    """A mix has the fractions; radii, with the number of fibres or the width, make the size of the cell."""
+    apart = [{"not": {"required": ["mix", name]}} for name in ("fibre_fraction", "match")]
+    one_size = {"oneOf": [{"required": ["fibres"]}, {"required": ["width"]}], "properties": {"fibre_radius": False}}
+    of_radii = {"required": ["mix"], **one_size}
+    return [_at(("cell",), {"allOf": [*apart, {"if": {"required": ["radii"]}, "then": of_radii}]})]
+
+
 def _material_rules() -> list[Schema]:
     complete = [
         {"required": [name for name, entry in keys_of(contents).items() if entry.required]}
@@ -150,9 +159,10 @@ def _material_rules() -> list[Schema]:
         "not": {"required": ["expansion", axial]},
     }
     of_circles = {"required": ["fibre"], "patternProperties": {"^fibre:": False}}
+    unmixed = {"allOf": [_if(ALL_CIRCULAR), {"not": _at(("cell",), {"required": ["mix"]})}]}
     return [
         _at(("material",), {"required": ["matrix"], "additionalProperties": {"anyOf": complete} | expansions}),
-        {"if": _if(ALL_CIRCULAR), "then": _at(("material",), of_circles)},
+        {"if": unmixed, "then": _at(("material",), of_circles)},
         {"if": _at(("cell",), {"required": ["coating"]}), "then": _at(("material",), {"required": ["coating"]})},
     ]
 

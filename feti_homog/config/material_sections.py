@@ -2,40 +2,52 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Iterable, Mapping
 
 from feti_homog.config.cell_section import CIRCULAR, GEOMETRY, Cell
 from feti_homog.config.material_forms import MATERIAL_FORMS, Material
 from feti_homog.config.materials import expansion, plane_stiffness, spatial_stiffness
-from feti_homog.config.phase_names import COATING
+from feti_homog.config.phase_names import COATING, FIBRE, MATRIX, PHASE
 from feti_homog.config.schema import TableReader, keys_of
+from feti_homog.config.section_values import FRACTIONS
 from feti_homog.config.wording import suggestion, toml_key, toml_value
 
-# Not "void", where there is no material.
-PHASE = re.compile(r"(?!void$)[A-Za-z0-9_-]+(:[A-Za-z0-9_-]+)?")
+SUGGESTED = (MATRIX, FIBRE, COATING, "fibre:2")  # of phases that may have any name
 CONSTANTS = frozenset(name for form in MATERIAL_FORMS.values() for name in keys_of(form))
 
 
-def read_materials(table: object, plane: str | None, reader: TableReader) -> dict[str, Material]:
-    """The materials by phase; what depends on a geometry or plane state that is faulty is not checked."""
+def read_materials(table: object, cell: object, plane: str | None, reader: TableReader) -> dict[str, Material]:
+    """The materials by phase; what depends on a geometry, mix or plane state that is faulty is not checked.
+
+    `cell` is the section [cell] as it stands in the document.
+    """
     if table is None:
         return {}
     if not isinstance(table, dict):
         reader.faults.append(f"material = {toml_value(table)}: expected sections [material.matrix], [material.fibre]")
         return {}
     geometry = reader.selected[GEOMETRY]
+    fibres = fibre_phases(cell) if geometry in CIRCULAR else None
+    known = None if fibres is None else (MATRIX, *fibres, COATING)
     materials = {}
     for phase, constants in table.items():
-        fault = _phase_fault(phase, geometry, reader.owners)
+        fault = _phase_fault(phase, known, geometry, reader.owners)
         material = None if fault else _read_material(constants, f"material.{toml_key(phase)}", plane, reader)
         reader.faults += [fault] if fault else []
         if material is not None:
             materials[phase] = material
-    needed = ("matrix", "fibre") if geometry in CIRCULAR else ("matrix",)
+    needed = (MATRIX, *(fibres or ()))
     reader.faults += [f"[material.{phase}]: missing section" for phase in needed if phase not in table]
     return materials
+
+
+def fibre_phases(cell: object) -> tuple[str, ...] | None:
+    """What the fibres of a section [cell] without a file are made of, None if its mix is faulty."""
+    mix = cell.get("mix") if isinstance(cell, dict) else None
+    if mix is None:
+        return (FIBRE,)
+    return tuple(mix) if FRACTIONS.accepts(mix) else None
 
 
 def coating_faults(cell: Cell, materials: Mapping[str, object]) -> list[str]:
@@ -52,12 +64,13 @@ def coating_faults(cell: Cell, materials: Mapping[str, object]) -> list[str]:
     return []
 
 
-def _phase_fault(phase: str, geometry: str | None, owners: Mapping[str, str]) -> str:
-    """What is wrong with the name of a phase, empty if nothing."""
+def _phase_fault(phase: str, known: tuple[str, ...] | None, geometry: str | None, owners: Mapping[str, str]) -> str:
+    """What is wrong with the name of a phase, empty if nothing; `known` are all that a cell has, None if any may be."""
     section = f"[material.{toml_key(phase)}]"
-    of_circles = geometry in CIRCULAR and ":" not in phase and phase not in ("matrix", "fibre", COATING)
-    if of_circles or not PHASE.fullmatch(phase) or phase in CONSTANTS:
-        return f"{section}: unknown phase; {suggestion(phase, ('matrix', 'fibre', COATING, 'fibre:2'), owners)}"
+    is_unknown = known is not None and ":" not in phase and phase not in known
+    if is_unknown or not PHASE.fullmatch(phase) or phase in CONSTANTS:
+        elsewhere = {} if phase == FIBRE else owners
+        return f"{section}: unknown phase; {suggestion(phase, known or SUGGESTED, elsewhere)}"
     if ":" in phase and geometry in CIRCULAR:
         return f'{section}: belongs to geometry = "mesh", not {toml_value(geometry)}'
     return ""

@@ -59,7 +59,7 @@ class Key:
         only: when it belongs to the table; always, if None.
         required: whether it must be there where it belongs.
         instead: what to write where it does not belong; empty if there is nothing like it.
-        unless: another key of the table, beside which it is not required; empty if there is none.
+        unless: other keys of the table, beside any of which it is not required.
     """
 
     type: ValueType
@@ -69,7 +69,7 @@ class Key:
     only: Condition | None
     required: bool
     instead: str = ""
-    unless: str = ""
+    unless: tuple[str, ...] = ()
 
     def belongs(self, selected: Selected) -> bool:
         """Whether the key belongs to the table; not, if that depends on a faulty selector."""
@@ -85,7 +85,7 @@ def key(
     default_words: str = "",
     only: Condition | None = None,
     instead: str = "",
-    unless: str = "",
+    unless: tuple[str, ...] = (),
 ) -> Any:
     """A dataclass field read from the key of its name; required where it belongs if it has no default.
 
@@ -157,7 +157,7 @@ class TableReader:
     def _fault(self, name: str, entry: Key, table: Mapping[str, Any], section: str) -> str:
         """What is wrong with one known key, empty if nothing."""
         if name not in table:
-            missing = entry.required and entry.unless not in table and entry.belongs(self.selected)
+            missing = entry.required and not {*entry.unless} & {*table} and entry.belongs(self.selected)
             return f": missing; expected {entry.type.expected}" if missing else ""
         line = f" = {toml_value(table[name])}: "
         if entry.only is not None and not entry.belongs(self.selected):

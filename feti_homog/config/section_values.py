@@ -8,6 +8,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+from feti_homog.config.phase_names import FIBRE_PHASE
 from feti_homog.config.values import SMALLEST, ValueType, integer, is_number, is_number_list, real, text, to_floats
 
 STRAIN_COMPONENTS = "[E11, E22, gamma12]"
@@ -31,6 +32,26 @@ def _are_fibres(value: Any) -> bool:
 
 def _is_table_file(value: Any) -> bool:
     return text.accepts(value) and value.endswith(".csv")
+
+
+def _by_phase(words: str, example: str, number: ValueType) -> ValueType:
+    """A table of numbers by the phases of fibres."""
+
+    def accepts(value: Any) -> bool:
+        is_table = isinstance(value, dict) and value != {}
+        return is_table and all(map(FIBRE_PHASE.fullmatch, value)) and all(map(number.accepts, value.values()))
+
+    return ValueType(
+        f"a table by phase, other than matrix, coating and void, of {words}, such as {example}",
+        accepts,
+        lambda value: {phase: float(entry) for phase, entry in value.items()},
+        {
+            "type": "object",
+            "minProperties": 1,
+            "patternProperties": {f"^({FIBRE_PHASE.pattern})$": number.json_schema},
+            "additionalProperties": False,
+        },
+    )
 
 
 def _is_fibre_or_fibres(value: Any) -> bool:
@@ -92,6 +113,8 @@ FIBRE_LIST = ValueType(
         },
     },
 )
+FRACTIONS = _by_phase("numbers above 0 and below 1", "{glass = 0.3, carbon = 0.25}", real(above=0.0, below=1.0))
+RADII = _by_phase("numbers from 1e-9 to 1e9", "{glass = 6.0, carbon = 3.5}", real(least=1e-9, most=1e9))
 FIBRES = ValueType(
     'the number of a fibre, counted from 1, a list of numbers, or "all"',
     _is_fibre_or_fibres,

@@ -206,7 +206,7 @@ def distribute(
     wanted = wanted_pieces(case, np.bincount(parts), _outer_edges(torus, parts), lattice, n_ranks, policy)
     decomposition = decompose(torus, parts, wanted, n_ranks)
     submeshes = list(cut(torus, decomposition.subdomain))
-    shared = share_entities(torus, pairs, submeshes, decomposition.rank, lattice.intervals - 1, n_ranks)
+    shared = share_entities(torus, pairs, submeshes, decomposition.rank, lattice, n_ranks)
     summary = CellSummary(
         width=mesh.width,
         height=mesh.height,

@@ -182,6 +182,15 @@ def _match_lines(case: Case, summary: CellSummary) -> list[str]:
     return [f"match      {case.cell.match.name}, to {summary.match_distance:.4f} {words}"]
 
 
+def _mix_lines(case: Case, summary: CellSummary) -> list[str]:
+    """How many fibres each phase of a mix has got, and how large they are."""
+    if case.cell.mix is None:
+        return []
+    phase, radii = summary.constituent_phase[summary.is_fibre], summary.radii[summary.is_fibre]
+    own = [(name, radii[phase == k]) for k, name in enumerate(summary.phases) if name in case.cell.mix]
+    return [f"mix        {', '.join(f'{len(r)} of {name}, mean radius {r.mean():.6g}' for name, r in own)}"]
+
+
 def describe(case: Case, n_ranks: int) -> str:
     """What a run of the case on `n_ranks` ranks would do, in words; on rank 0."""
     lattice = ReferenceLattice.of(case.cell.refine, case.cell.order)
@@ -200,6 +209,7 @@ def describe(case: Case, n_ranks: int) -> str:
         f"mesh       {summary.coarse_triangles} coarse triangles, {summary.coarse_triangles * len(lattice.triangles)} "
         f"elements of order {case.cell.order}, about {2 * sum(nodes)} degrees of freedom",
         *([f"fibres     {summary.fibres}, numbered from 1"] if case.interface else []),
+        *_mix_lines(case, summary),
         *_match_lines(case, summary),
         f"tearing    {summary.bodies} bodies, {summary.subdomains} subdomains, {multipliers} multipliers",
         *(

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 
 from feti_homog.cell.refinement import ReferenceLattice, edge_node
+from feti_homog.feti.decomposition.edge_arcs import along, mean_speed
 from feti_homog.feti.decomposition.shared_entities import SharedEntities
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.typing import Bool, Float, Int
@@ -142,14 +143,26 @@ class ConstraintLayout:
                 values.append((contrasts[r, j] * turn[local]).ravel())
         return np.concatenate(rows), np.concatenate(columns), np.concatenate(values)
 
+    def _places(self, entity: Int, p: Int) -> Float:
+        """(i,) where fine node p of the entities is, in [0, 1] along edges."""
+        return np.where(self.shared.is_edge[entity], (p + 1) / self.lattice.intervals, 0.0)
+
     def _normals(self, entity: Int, p: Int) -> Float:
-        """Normals at fine node p of the entities; along an arc they turn evenly."""
-        shared, m = self.shared, self.lattice.intervals
-        s = np.where(shared.is_edge[entity], (p + 1) / m, 0.0)
-        a, b = shared.normal[entity, 0], shared.normal[entity, 1]
-        angle = s * np.arctan2(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], (a * b).sum(axis=1))
-        cos, sin = np.cos(angle), np.sin(angle)
-        return np.stack([cos * a[:, 0] - sin * a[:, 1], sin * a[:, 0] + cos * a[:, 1]], axis=1)
+        """(i, 2) unit normals at fine node p of the entities."""
+        shared = self.shared
+        normal = along(shared.normal[entity], shared.turn[entity], self._places(entity, p))
+        return np.asarray(normal / np.hypot(*normal.T)[:, None])
+
+    def _lengths(self, entity: Int, p: Int) -> Float:
+        """(i,) row sums of the interface mass matrix: halves of sides for linear elements, Simpson's rule for quadratic
+        ones."""
+        shared, lattice = self.shared, self.lattice
+        is_edge = shared.is_edge[entity]
+        in_middle = is_edge & (p % 2 == 0) & (lattice.order == 2)
+        weight = np.where(in_middle, 4, 2) / 3 if lattice.order == 2 else np.ones(len(p))
+        place, reach = self._places(entity, p), np.where(in_middle, 1, lattice.order) / lattice.intervals
+        length = mean_speed(shared.normal[entity], shared.turn[entity], place - reach, place + reach)
+        return np.asarray(weight * np.where(is_edge, 1.0, 0.5) * length / lattice.intervals)
 
     def node_rows(self) -> tuple[Int, Int]:
         """First owned row and number of rows of each fine node whose rows are owned."""
@@ -161,14 +174,10 @@ class ConstraintLayout:
 
     def interface_nodes(self) -> InterfaceNodes:
         """The breakable nodes whose rows are owned."""
-        shared, m = self.shared, self.lattice.intervals
+        shared = self.shared
         breakable = np.flatnonzero(self._owned & (shared.fibre >= 0))
         entity, p = expand(breakable, shared.nodes[breakable])
         k = shared.copies[entity]
-        # Row sums of the interface mass matrix: halves for linear, Simpson's rule for quadratic elements.
-        quadratic = self.lattice.triangles.shape[1] == 6
-        share = np.where((p % 2 == 0) & shared.is_edge[entity], 4, 2) / 3 if quadratic else np.ones(len(p))
-        share = share * np.where(shared.is_edge[entity], 1.0, 0.5)
         positions = np.concatenate([_class_points(s) for s in self.subdomains] or [np.zeros((0, 2))])
         # Sharers are sorted inwards, so the last one is the fibre's, and it is this rank's, which owns the rows.
         copy = self.base[shared.pointer[entity + 1] - 1] + p
@@ -176,7 +185,7 @@ class ConstraintLayout:
             row=self._owned_row[entity] + self.components * ((p + 1) * (k - 1) - 1),
             points=positions[copy],
             normal=self._normals(entity, p),
-            length=share * shared.length[entity] / m,
+            length=self._lengths(entity, p),
             fibre=shared.fibre[entity],
             pair=shared.pair[entity],
             bodies=shared.body[np.stack([shared.pointer[entity], shared.pointer[entity + 1] - 1], axis=1)],

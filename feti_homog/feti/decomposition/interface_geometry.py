@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from feti_homog.cell.periodic_topology import Torus, edge_pairs, shared_edges
+from feti_homog.feti.decomposition.edge_arcs import mean_speed
 from feti_homog.typing import Bool, Float, Int
 
 
@@ -17,36 +18,40 @@ class InterfaceGeometry:
     fibre: Int
     pair: Int
     normal: Float
-    length: Float
+    turn: Float
     precracked: Bool
 
 
-def interface_geometry(torus: Torus, pairs: Int, key: Int, is_edge: Bool, pointer: Int, body: Int) -> InterfaceGeometry:
-    """Fibre, normals, length and precrack of n shared entities; arguments as in `SharedEntities`, and `pairs` as in
-    `share_entities`."""
+def interface_geometry(
+    torus: Torus, pairs: Int, key: Int, is_edge: Bool, pointer: Int, body: Int, side: float
+) -> InterfaceGeometry:
+    """Fibre, normals, turn and precrack of n shared entities; arguments as in `SharedEntities`, and `pairs` as in
+    `share_entities`; the side of an element is the share `side` of a coarse edge."""
     pair = _breakable_pairs(torus, pairs, pointer, body)
     fibre = np.where(pair >= 0, body[pointer[1:] - 1], -1)
-    edge, normal, length = _edge_geometry(torus, pairs)
+    edge, normal, turn = _edge_geometry(torus, pairs)
     n_edges, n_classes = torus.torus_edge.max() + 1, torus.node_class.max() + 1
-    edge_normal, edge_length = np.zeros((n_edges, 2, 2)), np.zeros(n_edges)
-    edge_normal[edge], edge_length[edge] = normal, length
+    edge_normal, edge_turn = np.zeros((n_edges, 2, 2)), np.zeros(n_edges)
+    edge_normal[edge], edge_turn[edge] = normal, turn
     bonded = np.zeros(n_edges, bool)
     bonded[edge] = True
     bonded[torus.torus_edge[torus.plane_edges(torus.mesh.debonded_edges)]] = False
     ends = torus.node_class[torus.edges[np.unique(torus.torus_edge, return_index=True)[1]]]
     vertex_normal, vertex_length = np.zeros((n_classes, 2)), np.zeros(n_classes)
-    for end in range(2):
-        np.add.at(vertex_normal, ends[:, end], edge_normal[:, end] * edge_length[:, None])
-        np.add.at(vertex_length, ends[:, end], edge_length)
-    vertex_normal /= np.maximum(np.hypot(*vertex_normal.T), 1e-300)[:, None]
+    for end, (low, high) in enumerate(((0.0, side), (1.0 - side, 1.0))):
+        length = mean_speed(edge_normal, edge_turn, np.full(n_edges, low), np.full(n_edges, high))
+        unit = edge_normal[:, end] / np.maximum(np.hypot(*edge_normal[:, end].T), 1e-300)[:, None]
+        np.add.at(vertex_normal, ends[:, end], unit * length[:, None])
+        np.add.at(vertex_length, ends[:, end], length)
+    vertex_normal *= (vertex_length / np.maximum(np.hypot(*vertex_normal.T), 1e-300))[:, None]
     bonded_edges_at = np.bincount(ends[bonded].ravel(), minlength=n_classes)
     vertices, edges = key[~is_edge], key[is_edge]
-    normals, lengths = np.empty((len(key), 2, 2)), np.empty(len(key))
+    normals, turns = np.empty((len(key), 2, 2)), np.zeros(len(key))
     normals[~is_edge], normals[is_edge] = vertex_normal[vertices][:, None], edge_normal[edges]
-    lengths[~is_edge], lengths[is_edge] = vertex_length[vertices], edge_length[edges]
+    turns[is_edge] = edge_turn[edges]
     precracked = np.empty(len(key), bool)
     precracked[~is_edge], precracked[is_edge] = bonded_edges_at[vertices] == 0, ~bonded[edges]
-    return InterfaceGeometry(fibre, pair, normals, lengths, precracked & (fibre >= 0))
+    return InterfaceGeometry(fibre, pair, normals, turns, precracked & (fibre >= 0))
 
 
 def _breakable_pairs(torus: Torus, pairs: Int, pointer: Int, body: Int) -> Int:
@@ -60,7 +65,7 @@ def _breakable_pairs(torus: Torus, pairs: Int, pointer: Int, body: Int) -> Int:
 
 
 def _edge_geometry(torus: Torus, pairs: Int) -> tuple[Int, Float, Float]:
-    """Torus edges whose bonds may break, their normals at start and end, and their (arc) lengths."""
+    """Torus edges whose bonds may break, their normals at start and end, as in `SharedEntities`, and their turns."""
     mesh, body = torus.mesh, torus.constituent
     left, right = edge_pairs(torus.triangle_torus_edges)
     mixed = pairs[mesh.phase[left], mesh.phase[right]] >= 0
@@ -71,16 +76,18 @@ def _edge_geometry(torus: Torus, pairs: Int) -> tuple[Int, Float, Float]:
     plane = torus.triangle_edges[fibre, k]
     backwards = torus.edges[plane, 0] != start
     a, b = mesh.points[start], mesh.points[end]
-    chord = np.hypot(*(b - a).T)
-    outward = np.stack([b[:, 1] - a[:, 1], a[:, 0] - b[:, 0]], axis=1) / chord[:, None]
-    circle = torus.edge_circles[plane]
-    curved = circle[:, 2] > 0
-    radius = circle[curved, 2]
-    length = chord.copy()
-    length[curved] = 2 * radius * np.arcsin(chord[curved] / (2 * radius))
-    normal = np.stack([outward, outward], axis=1)
-    radial = np.stack([a, b], axis=1)[curved] - circle[curved, None, :2]
-    side = np.sign((radial.sum(axis=1) * outward[curved]).sum(axis=1))
-    normal[curved] = side[:, None, None] * radial / circle[curved, 2, None, None]
+    turn, own = torus.edge_turns[plane], torus.edge_ellipses[plane]
+    normal = np.repeat(_across(b - a)[:, None], 2, axis=1)
+    curved = turn > 0
+    spokes = np.stack([own[curved].unit((end - own.centres)[curved]) for end in (a, b)], axis=1)
+    tangent = np.einsum("eij,epj->epi", own.frames[curved], -_across(spokes)) * turn[curved, None, None]
+    radial = _across(tangent)
+    side = np.sign((radial.sum(axis=1) * normal[curved, 0]).sum(axis=1))
+    normal[curved] = side[:, None, None] * radial
     normal[backwards] = normal[backwards, ::-1]
-    return edge, normal, length
+    return edge, normal, turn
+
+
+def _across(vectors: Float) -> Float:
+    """Vectors (..., 2) turned by a right angle, clockwise."""
+    return np.stack([vectors[..., 1], -vectors[..., 0]], axis=-1)

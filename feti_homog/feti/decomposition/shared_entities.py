@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from feti_homog.cell.periodic_topology import Torus
+from feti_homog.cell.refinement import ReferenceLattice
 from feti_homog.cell.submesh import Submesh
 from feti_homog.feti.decomposition.interface_geometry import interface_geometry
 from feti_homog.typing import Bool, Float, Int
@@ -32,8 +33,9 @@ class SharedEntities:
         fibre: (n,) the body that may debond here from the one around it, a fibre or a coating in general; or -1 where
             nothing can break.
         pair: (n,) the interface of the case that these two bodies have, -1 where nothing can break.
-        normal: (n, 2, 2) unit normals from fibre to matrix at the start and the end of the entity.
-        length: (n,) interface length of the edge, or of all edges that meet in the vertex.
+        normal: (n, 2, 2) normals from fibre to matrix at the start and the end of the edge, as long as dx / ds, s in
+            [0, 1] the place along it; at a vertex, where sides of elements meet, as long as dx / ds on these together.
+        turn: (n,) of the edge, as in `Submesh`; 0 at vertices.
         precracked: (n,) whether the mesh has the edge, or all edges that meet in the vertex, debonded.
         owned: (2,) first vector constraint of this rank and the one after its last.
         constraints: number of vector constraints on all ranks.
@@ -49,7 +51,7 @@ class SharedEntities:
     fibre: Int
     pair: Int
     normal: Float
-    length: Float
+    turn: Float
     precracked: Bool
     owned: tuple[int, int]
     constraints: int
@@ -74,7 +76,7 @@ class SharedEntities:
             fibre=self.fibre[mask],
             pair=self.pair[mask],
             normal=self.normal[mask],
-            length=self.length[mask],
+            turn=self.turn[mask],
             precracked=self.precracked[mask],
             owned=owned,
         )
@@ -97,7 +99,7 @@ class _Sharers:
 
 
 def share_entities(
-    torus: Torus, pairs: Int, submeshes: Sequence[Submesh], rank: Int, nodes_on_edge: int, n_ranks: int
+    torus: Torus, pairs: Int, submeshes: Sequence[Submesh], rank: Int, lattice: ReferenceLattice, n_ranks: int
 ) -> list[SharedEntities]:
     """The shared entities of each rank, in the order of ranks.
 
@@ -106,18 +108,19 @@ def share_entities(
     Args:
         pairs: (phases, phases) the interface of the case between two phases, -1 where they never part.
         rank: (s,) rank of each submesh.
-        nodes_on_edge: fine nodes inside a coarse edge.
+        lattice: of the coarse triangles.
     """
     body = np.array([s.body for s in submeshes])
-    found = _find_sharers(submeshes, torus.nesting[body], edges_have_nodes=nodes_on_edge > 0)
+    found = _find_sharers(submeshes, torus.nesting[body], edges_have_nodes=lattice.intervals > 1)
     owner = rank[found.sharer[found.pointer[1:] - 1]] if len(found.key) else np.zeros(0, np.int64)
     order = np.argsort(owner, kind="stable")
     found, owner = found.reordered(order), owner[order]
     copies = np.diff(found.pointer)
-    nodes = np.where(found.is_edge, nodes_on_edge, 1)
+    nodes = np.where(found.is_edge, lattice.intervals - 1, 1)
     ends = np.r_[0, np.cumsum(nodes * (copies - 1))]
     body = body[found.sharer]
-    interface = interface_geometry(torus, pairs, found.key, found.is_edge, found.pointer, body)
+    side = lattice.order / lattice.intervals
+    interface = interface_geometry(torus, pairs, found.key, found.is_edge, found.pointer, body, side)
     whole = SharedEntities(
         key=found.key,
         is_edge=found.is_edge,
@@ -129,7 +132,7 @@ def share_entities(
         fibre=interface.fibre,
         pair=interface.pair,
         normal=interface.normal,
-        length=interface.length,
+        turn=interface.turn,
         precracked=interface.precracked,
         owned=(0, int(ends[-1])),
         constraints=int(ends[-1]),

@@ -81,7 +81,8 @@ def _bounds(table: SweepTable) -> PanelBounds | None:
     if len(described) != 1 or set(case["material"]) != {"matrix", "fibre"} or _has_voids(table):
         return None
     plane = case["analysis"]["plane"]
-    materials = read_materials(case["material"], plane, TableReader({GEOMETRY: case["cell"]["geometry"]}))
+    reader = TableReader({GEOMETRY: case["cell"]["geometry"]})
+    materials = read_materials(case["material"], case["cell"], plane, reader)
     phases = [_stiffness(materials[phase], plane) for phase in ("matrix", "fibre")]
     largest = max(float(document["cell"]["fibre_fraction"]) for document in table.finished)
     c = np.linspace(0.0, min(1.0, MARGIN * largest), FRACTIONS)

@@ -52,10 +52,10 @@ def test_equal_semi_axes_make_discs(interface_size):
 
 
 def test_nearly_equal_semi_axes_nearly_make_discs():
-    """Which are meshed as ellipses; refined, their area and that of a disc beside differ by the arcs' h^4."""
+    """Which are meshed as ellipses."""
     rows = [{"x": 0.3, "y": 0.2, "a": 0.2 + 1e-9, "b": 0.2, "angle": 37.0}, {"x": 0.8, "y": 0.7, "radius": 0.15}]
     areas_ = [fibre_areas(generate(cell_of(table(each)))) for each in (rows, [rows[1] | {"x": 0.3, "y": 0.2}, rows[1]])]
-    assert areas_[0] == pytest.approx(areas_[1] * np.array([0.2 / 0.15, 1.0]) ** 2, rel=2e-5)
+    assert areas_[0] == pytest.approx(areas_[1] * np.array([0.2 / 0.15, 1.0]) ** 2, rel=2e-8)
 
 
 @pytest.mark.parametrize("corner", [(0.0, 0.0), (-0.2, -0.27), (-0.61, -0.31), (-0.46, -0.4)])
@@ -84,9 +84,9 @@ def square_of(row):
     return axes @ np.diag([row["a"], row["b"]]) ** 2 @ axes.T
 
 
-def fibre_areas(mesh):
-    """(fibres,) areas after refinement with quadratic elements, by the corners and middles of their edges."""
-    torus, lattice = Torus.of(mesh), ReferenceLattice.of(3, 1)
+def fibre_areas(mesh, refinements=3):
+    """(fibres,) areas within the refined polygons."""
+    torus, lattice = Torus.of(mesh), ReferenceLattice.of(refinements, 1)
     found = np.zeros(torus.constituent.max() + 1)
     for submesh in cut(torus, torus.constituent):
         fine = refine(submesh, lattice)
@@ -94,11 +94,12 @@ def fibre_areas(mesh):
     return found[1:]
 
 
-def test_areas_approach_those_of_the_ellipses():
-    """By h^4 of the coarse edges, until those of the refined polygons count."""
-    exact = np.pi * np.array([0.25 * 0.1, 0.18 * 0.1, 0.08**2])
-    errors = [np.abs(fibre_areas(generate(cell_of(table(ROWS), size))) / exact - 1).max() for size in (0.1, 0.02)]
-    assert errors[0] < 2e-3 and errors[1] < 2e-4
+def test_refinement_follows_the_ellipses():
+    """Each halving quarters what the polygons of nodes lack of pi a b."""
+    exact, mesh = np.pi * np.array([0.25 * 0.1, 0.18 * 0.1, 0.08**2]), generate(cell_of(table(ROWS)))
+    missing = np.array([1 - fibre_areas(mesh, refinements) / exact for refinements in range(6)])
+    assert missing[:-1] / missing[1:] == pytest.approx(4.0, rel=0.03)
+    assert missing[-1].min() > 0 and missing[-1].max() < 1e-4
 
 
 def test_order_units_and_origin_do_not_matter():

@@ -1,0 +1,44 @@
+"""Normals and lengths along arcs: against the ellipse itself, and against straight lines."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.special import ellipeinc
+
+from feti_homog.cell.ellipses import Ellipses
+from feti_homog.feti.decomposition.edge_arcs import along, mean_speed
+
+A, B = 0.5, 0.2
+
+
+def tangents(angle, turn):
+    """(k, 2) dx / ds at the angles (k,) of the ellipse of semi-axes A and B."""
+    return np.stack([-A * turn * np.sin(angle), B * turn * np.cos(angle)], axis=1)
+
+
+def test_between_the_ends_of_an_arc_is_what_the_ellipse_has():
+    start, turn, place = 0.3, 0.4, np.linspace(0, 1, 7)
+    ends = np.repeat(np.stack([tangents(np.array([start + s * turn]), turn)[0] for s in (0, 1)])[None], 7, axis=0)
+    found = along(ends, np.full(7, turn), place)
+    assert found == pytest.approx(tangents(start + place * turn, turn), abs=1e-15)
+    own = Ellipses.of(np.zeros((7, 2)), np.full(7, A), np.full(7, B), np.zeros(7))
+    normal = np.stack([found[:, 1], -found[:, 0]], axis=1) / np.hypot(*found.T)[:, None]
+    assert normal == pytest.approx(own.normal(start + place * turn), abs=1e-14)
+
+
+def test_speeds_add_up_to_the_elliptic_integral():
+    corners = np.linspace(0, np.pi / 2, 9)
+    turn = np.diff(corners)
+    ends = np.stack([tangents(corners[:-1], turn), tangents(corners[1:], turn)], axis=1)
+    whole = mean_speed(ends, turn, np.zeros(8), np.ones(8)).sum()
+    assert whole == pytest.approx(A * ellipeinc(np.pi / 2, 1 - (B / A) ** 2), rel=1e-8)
+    halves = [mean_speed(ends, turn, np.full(8, s), np.full(8, s + 0.5)).sum() / 2 for s in (0, 0.5)]
+    assert sum(halves) == pytest.approx(whole, rel=1e-8)
+
+
+def test_along_straight_edges_nothing_turns():
+    ends = np.repeat(np.random.default_rng(0).normal(size=(5, 1, 2)), 2, axis=1)
+    place = np.linspace(0, 1, 5)
+    assert along(ends, np.zeros(5), place) == pytest.approx(ends[:, 0], rel=1e-15)
+    assert mean_speed(ends, np.zeros(5), place, place + 1) == pytest.approx(np.hypot(*ends[:, 0].T), rel=1e-14)
