@@ -6,8 +6,9 @@ Layers are pairs of phase and outer radius, from within; states that stay finite
 from __future__ import annotations
 
 import numpy as np
-from reference.coated_fibre import hill, michell
 from scipy.optimize import brentq
+
+from reference.coated_fibre import hill, michell
 
 
 def carried(layers, states_of):
@@ -78,9 +79,9 @@ def axisymmetric_stiffness(layers):
     A[-1, -2:], right[-1, 0] = [1, 1 / R**2], 0.5
     amplitudes = np.linalg.solve(A, right)
     shares = np.diff(np.append(0, radii**2)) / R**2
-    k, l, n, _ = np.transpose(constants)
-    mean = shares @ (2 * l[:, None] * amplitudes[::2]) + [0, shares @ n]
-    outside = pressure(-1, R) @ amplitudes[-2:] + [0, l[-1]]
+    _, cross, along, _ = np.transpose(constants)  # Hill's k, l, n, and G
+    mean = shares @ (2 * cross[:, None] * amplitudes[::2]) + [0, shares @ along]
+    outside = pressure(-1, R) @ amplitudes[-2:] + [0, cross[-1]]
     return np.array([outside, mean])
 
 
