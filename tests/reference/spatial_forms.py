@@ -148,13 +148,25 @@ def stiffness_of_constants(E1, E2, G12, G23, nu12, nu23):
     return np.linalg.inv(S)
 
 
+def layered_contrast(fibre, coating, share):
+    """The contrast of a homogeneous fibre that answers cos(n t) as one in a coating does, over the matrix: function of
+    n; `share` is the area of the fibre within that of both."""
+
+    def contrast(n):
+        reflected = (coating - fibre) / (coating + fibre) * share**n
+        return coating * (1 - reflected) / (1 + reflected)
+
+    return contrast
+
+
 def axial_shear_modulus(geometry, c, contrast, terms=40):
     """Axial shear modulus of round fibres over that of the matrix, by Rayleigh's method (Perrins, McKenzie, McPhedran
     1979): Re B_n z^-n about each fibre, n odd, a its radius,
 
     B_n / (g a^2n) + sum_m (m+n-1 over n) S_(m+n) B_m = delta_n1, g = (1 - contrast) / (1 + contrast),
 
-    with the sums S_k of z^-k over the lattice; the modulus is 1 - 2 pi B_1 / area.
+    with the sums S_k of z^-k over the lattice; the modulus is 1 - 2 pi B_1 / area.  Of fibres in layers the contrast
+    is a function of n, as `layered_contrast` makes one.
     """
     skew = 1j if geometry == "square" else np.exp(1j * np.pi / 3)
     area = skew.imag
@@ -164,8 +176,8 @@ def axial_shear_modulus(geometry, c, contrast, terms=40):
     # S_2 is that of a lattice without a direction, S_4 and S_6 are Eisenstein's; of higher ones few cells are enough.
     sums = {2: np.pi / area} | ({4: 3.1512120021538977, 6: 0} if geometry == "square" else {4: 0, 6: 5.863031693414968})
     a, n = np.sqrt(c * area / np.pi), np.arange(1, 2 * terms, 2)
-    g = (1 - contrast) / (1 + contrast)
-    A = np.eye(terms) / g
+    own = np.broadcast_to(contrast(n) if callable(contrast) else contrast, terms)
+    A = np.diag((1 + own) / (1 - own))
     for row, p in enumerate(n):
         for column, m in enumerate(n):
             k = int(m + p)
