@@ -91,7 +91,7 @@ def test_constants_converge_with_quadratic_elements(constants, coating):
 
 @every_coating
 def test_transverse_shear_is_the_generalized_self_consistent_one(constants, coating):
-    """Christensen and Lo's condition for three phases; periodic cells depart from it by a higher power of the fraction."""
+    """Christensen and Lo's condition for three phases; periodic cells depart by a higher power of the fraction."""
     departures = []
     for fraction in (0.01, 0.1):
         layers = cylinders(coating, fraction)
