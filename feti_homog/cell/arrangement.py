@@ -41,8 +41,8 @@ class Arrangement:
     `phase` (N,) names what each disc is made of. Fibre k + 1 of a case is disc k. `mesh_order` (N,) are the discs in
     the order in which they are meshed, on which a few triangles depend; that of the discs if it is None. `coating` (N,)
     is the thickness of the ring around each disc, 0 where there is none; None if no disc has one. Rings do not touch.
-    `frames` (N, 2, 2) are those of `Ellipses` where some discs are ellipses, with `radii` of the same areas and without
-    coatings; else None.
+    `frames` (N, 2, 2) are those of `Ellipses` where some discs are ellipses, with `radii` of the same areas; else None.
+    A coating makes the semi-axes of an ellipse longer by its thickness.
     """
 
     width: float

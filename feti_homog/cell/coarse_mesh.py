@@ -29,7 +29,8 @@ class CoarseMesh:
         arc_circle: (a,) that one.
         debonded_edges: (d, 2) edges between a fibre and the matrix that are debonded from the start.
         snapped: how far a node of a user's mesh was moved to make sides match, at most.
-        centres: (fibres, 2) of fibres whose precedence is their number from 1, where they are known; else None.
+        centres: (fibres, 2) of fibres whose precedence is their number from 1, where they are known, else None; those
+            of their coatings are behind them in the same order.
     """
 
     width: float

@@ -44,6 +44,11 @@ class Ellipses:
         pairs = (self.centres, others.centres), (self.frames, others.frames)
         return Ellipses(*(np.concatenate(pair) for pair in pairs))
 
+    def grown(self, thickness: Float) -> Ellipses:
+        """Those whose semi-axes are longer by `thickness` (k,)."""
+        lengths = np.linalg.norm(self.frames, axis=1)
+        return Ellipses(self.centres, self.frames * (1 + thickness[:, None] / lengths)[:, None])
+
     def scaled(self, factor: float) -> Ellipses:
         """All lengths multiplied."""
         return Ellipses(factor * self.centres, factor * self.frames)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from itertools import product
 
 import numpy as np
@@ -18,13 +19,13 @@ from feti_homog.cell.outline import (
     MATRIX,
     MERGED,
     SAME_PLACE,
-    SIDE_SAMPLES,
     TURN,
     Curve,
     Numbering,
     Outline,
     arcs_within,
     on_side,
+    side_curves,
 )
 from feti_homog.typing import Float, Int
 
@@ -35,7 +36,7 @@ LENGTH_STEPS = 256
 def outline(arrangement: Arrangement, sizes: MeshSizes, marks: Mapping[int, Sequence[float]]) -> Outline:
     """As `outline.outline`."""
     size = np.array([arrangement.width, arrangement.height])
-    ellipses, fibre = _images(arrangement, size)
+    ellipses, fibre, around = _images(arrangement, size)
     places = [_crossings(ellipses, axis, size) for axis in (0, 1)]
     sides = ((axis, level) for axis in (0, 1) for level in (0.0, size[1 - axis]))
     border = np.concatenate([on_side(places[axis], axis, level) for axis, level in sides])
@@ -43,26 +44,37 @@ def outline(arrangement: Arrangement, sizes: MeshSizes, marks: Mapping[int, Sequ
     which, start, stop = arcs_within(angles, lambda of, angle: ellipses[of].at(angle), size)
     ends = ellipses[which].at(start)
     away = cKDTree(border).query(ends)[0] > SAME_PLACE * size.max()
-    numbering = Numbering(np.concatenate([np.unique(border, axis=0), ends[away]]))
+    border = np.unique(border, axis=0)
+    numbering = Numbering(np.concatenate([border, ends[away]]))
+    # Vertices within coatings are as far from each other as those on the ellipse around, which they face.
+    outer = np.concatenate([border, ends[away & (around[which] == MATRIX)]])
     tips = _tips(arrangement, marks, numbering.vertices, size)
-    field = size_field(arrangement, sizes, numbering.vertices, sharp, tips)
+    field = size_field(arrangement, sizes, outer, sharp, tips)
     curves = []
     for axis in (0, 1):
-        curves += _side_curves(axis, places[axis], ellipses, size, field, numbering)
-    curves += _arc_curves(ellipses, which, start, stop, sizes.interface, field, numbering)
-    around = np.full(len(ellipses), MATRIX)
+        curves += side_curves(axis, places[axis], partial(_ellipse_at, ellipses), around, size, field, numbering)
+    curves += _arc_curves(ellipses, around, which, start, stop, sizes.interface, field, numbering)
     return Outline(numbering.points(), tuple(curves), ellipses, fibre, around)
 
 
-def _images(arrangement: Arrangement, size: Float) -> tuple[Ellipses, Int]:
-    """Periodic images that may reach into the cell, fibre by fibre, and their fibres (k,)."""
+def _images(arrangement: Arrangement, size: Float) -> tuple[Ellipses, Int, Int]:
+    """Periodic images that may reach into the cell, their fibres (k,), and the ellipses around them (k,).
+
+    Fibre by fibre, the ellipses of each image one after the other, from without.
+    """
     steps = np.array(list(product((-1, 0, 1), repeat=2)))
     order = arrangement.mesh_order
     fibre = np.repeat(np.arange(len(arrangement.radii)) if order is None else order, len(steps))
-    own = arrangement.ellipses[fibre]
-    moved = Ellipses(own.centres + np.tile(steps, (len(arrangement.radii), 1)) * size, own.frames)
-    near = np.all((moved.centres + moved.reach > 0) & (moved.centres - moved.reach < size), axis=1)
-    return moved[near], fibre[near]
+    shift = np.tile(steps, (len(arrangement.radii), 1)) * size
+    inner = Ellipses(arrangement.centres[fibre] + shift, arrangement.ellipses.frames[fibre])
+    outer = inner.grown(arrangement.thickness[fibre])
+    near = np.all((outer.centres + outer.reach > 0) & (outer.centres - outer.reach < size), axis=1)
+    coated = arrangement.coated[fibre[near]]
+    place = np.arange(len(coated)) + np.cumsum(coated) - coated
+    rank = np.argsort(np.concatenate([place, place[coated] + 1]))
+    around = np.concatenate([np.full(len(coated), MATRIX), place[coated]])
+    owner = np.concatenate([fibre[near], fibre[near][coated]])
+    return outer[near].joined(inner[near][coated])[rank], owner[rank], around[rank]
 
 
 def _crossings(ellipses: Ellipses, axis: int, size: Float) -> Float:
@@ -115,36 +127,28 @@ def _on_upright(places: Float, size: Float) -> Float:
 def _tips(arrangement: Arrangement, marks: Mapping[int, Sequence[float]], vertices: Float, size: Float) -> Float:
     """The vertices (t, 2) that the marks have become; those of fibres that are not there are none."""
     known = {fibre: own for fibre, own in marks.items() if fibre < len(arrangement.radii)}
-    own = arrangement.ellipses[np.repeat(list(known), [len(angles) for angles in known.values()]).astype(int)]
+    outer = arrangement.ellipses.grown(arrangement.thickness)
+    own = outer[np.repeat(list(known), [len(angles) for angles in known.values()]).astype(int)]
     angle = np.radians([mark for angles in known.values() for mark in angles])
     places = own.at(own.parameter(directions(angle)))
     return np.asarray(vertices[cKDTree(vertices % size, boxsize=size).query(places % size)[1]])
 
 
-def _side_curves(
-    axis: int, places: Float, ellipses: Ellipses, size: Float, field: SizeField, numbering: Numbering
-) -> list[Curve]:
-    """The pieces of the two sides along `axis`, with the same nodes on both."""
-    begin, span = places[:-1], np.diff(places)
-
-    def point(piece: Int, share: Float) -> Float:
-        return on_side(begin[piece] + span[piece] * share, axis, 0.0)
-
-    samples = EdgeSamples.of(field, point, span, np.full(len(span), np.inf), SIDE_SAMPLES)
-    curves = []
-    for level, low in ((0.0, True), (size[1 - axis], False)):
-        holds = ellipses.level(on_side(begin + span / 2, axis, level)) < 1
-        inside = np.where(holds.any(axis=1), holds.argmax(axis=1), MATRIX)
-        for number, stations in enumerate(samples.stations(np.where(inside == MATRIX, 1, 2))):
-            along = begin[number] + span[number] * stations
-            along[[0, -1]] = places[number : number + 2]
-            nodes = numbering.along(on_side(along, axis, level))
-            curves.append(Curve(nodes if low == (axis == 0) else nodes[::-1], MATRIX, int(inside[number])))
-    return curves
+def _ellipse_at(ellipses: Ellipses, points: Float) -> Int:
+    """The smallest ellipse (k,) around each point, or MATRIX."""
+    holds, area = ellipses.level(points) < 1, np.abs(np.linalg.det(ellipses.frames))
+    return np.where(holds.any(axis=1), np.where(holds, area, np.inf).argmin(axis=1), MATRIX)
 
 
 def _arc_curves(
-    ellipses: Ellipses, which: Int, start: Float, stop: Float, largest: float, field: SizeField, numbering: Numbering
+    ellipses: Ellipses,
+    around: Int,
+    which: Int,
+    start: Float,
+    stop: Float,
+    largest: float,
+    field: SizeField,
+    numbering: Numbering,
 ) -> list[Curve]:
     """The arcs (a,) between parameters as curves, with edges of at most `largest` or what the curvature asks for."""
     own = ellipses[which]
@@ -169,5 +173,5 @@ def _arc_curves(
     for number, stations in enumerate(samples.stations(np.ones(len(own), dtype=np.intp))):
         arc = np.full(len(stations), number)
         nodes = numbering.along(point(arc, stations))
-        curves.append(Curve(nodes, int(which[number]), int(which[number])))
+        curves.append(Curve(nodes, int(which[number]), int(which[number]), int(around[which[number]])))
     return curves

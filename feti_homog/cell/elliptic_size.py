@@ -9,6 +9,7 @@ from scipy.spatial import cKDTree
 
 from feti_homog.cell.arrangement import Arrangement
 from feti_homog.cell.ellipses import Ellipses, directions, gaps
+from feti_homog.cell.elliptic_table import shells
 from feti_homog.cell.graded_size import SAMPLES_OF_AN_EDGE, MeshSizes, SizeField
 from feti_homog.cell.size_field import (
     MAX_GROWTH,
@@ -22,10 +23,12 @@ from feti_homog.cell.size_field import (
     wrap,
 )
 from feti_homog.cell.torus_pairs import neighbours
-from feti_homog.typing import Float
+from feti_homog.typing import Float, Int
 
 # Points of each ellipse at which its curvature, and its distance from corners, are taken.
 POINTS = 256
+# Edges of coatings / thickness.
+LONGEST = 10.0
 
 
 def size_field(
@@ -33,14 +36,17 @@ def size_field(
 ) -> SizeField:
     """As `graded_size.size_field`; `crossings` are where sides of the cell meet ellipses (c, 2), and the length (c,)
     R phi of the angle phi between them where the radius of curvature is R."""
-    size = np.array([arrangement.width, arrangement.height])
-    ellipses, largest = arrangement.ellipses, sizes.largest
+    size, largest = np.array([arrangement.width, arrangement.height]), sizes.largest
+    ellipses, disc = shells(arrangement)
     angle, which = np.tile(np.linspace(0, 2 * np.pi, POINTS, endpoint=False), len(ellipses)), np.arange(len(ellipses))
-    around = ellipses[np.repeat(which, POINTS)]
-    points, caps = around.at(angle), edge_size(around, around.normal(angle), sizes.interface)
+    around = np.repeat(which, POINTS)
+    points, normal = ellipses[around].at(angle), ellipses[around].normal(angle)
+    thin = _coating_size(arrangement, disc[around], normal)
+    caps = np.minimum(edge_size(ellipses[around], normal, sizes.interface), thin)
+    outer = ellipses[np.unique(disc, return_index=True)[1]]
     sources = [
         (points, caps, np.full(len(points), MAX_GROWTH)),
-        _between(ellipses, size, largest),
+        _between(outer, size, largest),
         _beside_sides(ellipses, size, largest),
         (crossings[0], np.minimum(crossings[1] / WEDGE, largest), np.full(len(crossings[0]), MAX_GROWTH)),
         _at_corner(points, size, largest),
@@ -49,16 +55,29 @@ def size_field(
     base = graded(sources, size, largest)
     if not sizes.are_graded(arrangement):
         return SizeField(base)
-    on_curves = cKDTree(wrap(points, size), boxsize=size)
+    on_curves, beside = cKDTree(wrap(points, size), boxsize=size), np.minimum(sizes.interface, thin)
     tree = cKDTree(wrap(tips.reshape(-1, 2), size), boxsize=size)
 
     def at(positions: Float) -> Float:
         places = wrap(positions, size)
         at_tips = sizes.tip + MAX_GROWTH * np.maximum(0.0, tree.query(places)[0] - sizes.tip)
-        beside = sizes.interface + MAX_GROWTH * on_curves.query(places)[0]
-        return np.asarray(np.minimum(base(positions), np.minimum(beside, at_tips)))
+        distance, nearest = on_curves.query(places)
+        return np.asarray(np.minimum(base(positions), np.minimum(beside[nearest] + MAX_GROWTH * distance, at_tips)))
 
     return SizeField(at, 1 / SAMPLES_OF_AN_EDGE)
+
+
+def _coating_size(arrangement: Arrangement, disc: Int, normal: Float) -> Float:
+    """Largest edge length (k,) on either side of the coatings of discs (k,) where their normals are n (k, 2).
+
+    As of circles, sqrt(t R), with the thickness and the radius of curvature there, but not longer than in the thinnest
+    coatings of circles, LONGEST t; infinite without a coating.
+    """
+    own = arrangement.ellipses[disc]
+    thickness = own.grown(arrangement.thickness[disc]).support(normal) - own.support(normal)
+    return np.where(
+        arrangement.coated[disc], np.minimum(np.sqrt(thickness * own.bend(normal)), LONGEST * thickness), np.inf
+    )
 
 
 def edge_size(ellipses: Ellipses, normal: Float, largest: float) -> Float:

@@ -1,4 +1,4 @@
-"""Ellipses of a table on the torus: which overlap or touch, and where the cell's sides pass between them."""
+"""Ellipses of a table on the torus: with their coatings, and where the cell's sides pass between them."""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from feti_homog.cell.ellipses import Ellipses, gaps
-from feti_homog.cell.torus_pairs import neighbours
+from feti_homog.cell.ellipses import Ellipses
 from feti_homog.typing import Float, Int
 
 if TYPE_CHECKING:
@@ -23,29 +22,26 @@ def ellipses_of(table: FibreTable, rows: Int, centres: Float) -> Ellipses:
     return Ellipses.of(centres, table.a[rows], table.b[rows], table.angle[rows])
 
 
-def contacts(table: FibreTable, rows: Int, centres: Float, size: Float, least: float) -> list[str]:
-    """Faults of the rows (k,) about centres (k, 2) that overlap, or whose gap / mean radius is below `least`."""
-    ellipses = ellipses_of(table, rows, centres)
-    first, second, vector = neighbours(centres, size, 2 * ellipses.longest.max() * (1 + least))
-    other = Ellipses(centres[first] + vector, ellipses.frames[second])
-    gap, _ = gaps(ellipses[first], other)
-    near = least * (table.radius[rows[first]] + table.radius[rows[second]]) / 2
-    bad = np.flatnonzero(gap < near)
-    faults = []
-    for k in bad[np.unique(np.stack([first[bad], second[bad]]), axis=1, return_index=True)[1]].tolist():
-        i, j = table.row[rows[first[k]]], table.row[rows[second[k]]]
-        who = f"rows {i} and {j}" if i != j else f"row {i} and its image"
-        is_across = np.abs(centres[second[k]] - centres[first[k]] - vector[k]).max() > size.max() / 4
-        what = f"overlap by {-gap[k]:.3g}" if gap[k] < -near[k] else "touch"
-        faults.append(f"{who}: {what}{' across the border' if is_across else ''}")
-    return faults
+def with_coatings(table: FibreTable, rows: Int, centres: Float) -> Ellipses:
+    """Those with the coatings of the thickness t around them, of semi-axes a + t and b + t."""
+    own = ellipses_of(table, rows, centres)
+    return own if table.coating is None else own.grown((table.coating * table.radius)[rows])
+
+
+def shells(arrangement: Arrangement) -> tuple[Ellipses, Int]:
+    """All ellipses of an arrangement, and their discs (k,): for each the outer one, then that within a coating."""
+    own, coated = arrangement.ellipses, arrangement.coated
+    disc = np.concatenate([np.arange(len(own)), np.flatnonzero(coated)])
+    order = np.argsort(disc, kind="stable")
+    return own.grown(arrangement.thickness).joined(own[coated])[order], disc[order]
 
 
 def clearance(arrangement: Arrangement) -> float:
     """Distance of the sides of the cell from the nearest position at which they would touch an ellipse."""
     size = np.array([arrangement.width, arrangement.height])
-    reach = arrangement.ellipses.reach[:, None] * np.array([1, -1])[:, None]
-    touching = (arrangement.centres[:, None] + reach) / size
+    ellipses, _ = shells(arrangement)
+    reach = ellipses.reach[:, None] * np.array([1, -1])[:, None]
+    touching = (ellipses.centres[:, None] + reach) / size
     return float(np.abs((touching - np.round(touching)) * arrangement.width).min())
 
 
@@ -54,18 +50,18 @@ def clear_shift(arrangement: Arrangement) -> Arrangement:
 
     As of discs: the sides are in the middles of the widest gaps between tangents, the corner far from ellipses.
     """
-    size, reach = np.array([arrangement.width, arrangement.height]), arrangement.ellipses.reach
-    lines = []
+    size, (ellipses, disc) = np.array([arrangement.width, arrangement.height]), shells(arrangement)
+    reach, lines = ellipses.reach, []
     for axis in (0, 1):
-        centre = arrangement.centres[:, axis]
+        centre = ellipses.centres[:, axis]
         touching = np.sort(np.concatenate([centre - reach[:, axis], centre + reach[:, axis]]) % size[axis])
         widths = np.diff(touching, append=touching[0] + size[axis])
         wide = np.argsort(-widths, kind="stable")[:4]
         wide = wide[widths[wide] > 0.7 * widths[wide[0]]]
         lines.append(touching[wide] + widths[wide] / 2)
     corners = np.array(list(product(*lines)))
-    offset = (corners[:, None] - arrangement.centres + size / 2) % size - size / 2
-    unit = np.einsum("kij,nkj->nki", np.linalg.inv(arrangement.ellipses.frames), offset)
-    away = np.abs(np.linalg.norm(unit, axis=2) - 1) * arrangement.radii
+    offset = (corners[:, None] - ellipses.centres + size / 2) % size - size / 2
+    unit = np.einsum("kij,nkj->nki", np.linalg.inv(ellipses.frames), offset)
+    away = np.abs(np.linalg.norm(unit, axis=2) - 1) * arrangement.radii[disc]
     corner = corners[np.argmax(away.min(axis=1))]
     return replace(arrangement, centres=(arrangement.centres - corner) % size)

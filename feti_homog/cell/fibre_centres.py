@@ -28,7 +28,7 @@ def fibre_circles(torus: Torus) -> Float:
         body, first = np.unique(torus.constituent, return_index=True)
         number = torus.mesh.precedence[first]
         known = np.isnan(circles[body, 2]) & (number > 0)
-        circles[body[known], :2] = torus.mesh.centres[number[known] - 1]
+        circles[body[known], :2] = torus.mesh.centres[(number[known] - 1) % len(torus.mesh.centres)]
     return circles
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import product
 
 import numpy as np
@@ -127,7 +128,7 @@ def outline(arrangement: Arrangement, sizes: MeshSizes, marks: Mapping[int, Sequ
 
     curves = []
     for axis in (0, 1):
-        curves += _side_curves(axis, places[axis], circles, around, size, field, numbering)
+        curves += side_curves(axis, places[axis], partial(_disc_at, circles), around, size, field, numbering)
     caps = _caps(arrangement, sizes.interface, fibre, around)
     curves += _arc_curves(circles, around, circle, start, stop, caps[circle], field, numbering)
     return Outline(numbering.points(), tuple(curves), Ellipses.round(circles), fibre, around)
@@ -225,10 +226,17 @@ def _tips(arrangement: Arrangement, marks: Mapping[int, Sequence[float]], vertic
     return np.asarray(vertices[cKDTree(vertices % size, boxsize=size).query(places % size)[1]])
 
 
-def _side_curves(
-    axis: int, places: Float, circles: Float, around: Int, size: Float, field: SizeField, numbering: Numbering
+def side_curves(
+    axis: int,
+    places: Float,
+    disc_at: Callable[[Float], Int],
+    around: Int,
+    size: Float,
+    field: SizeField,
+    numbering: Numbering,
 ) -> list[Curve]:
-    """The pieces of the two sides along `axis`, with the same nodes on both."""
+    """The pieces of the two sides along `axis`, with the same nodes on both; `disc_at` tells the smallest closed curve
+    around points, which is a number of `around` or MATRIX."""
     begin, span = places[:-1], np.diff(places)
 
     def point(piece: Int, share: Float) -> Float:
@@ -237,7 +245,7 @@ def _side_curves(
     samples = EdgeSamples.of(field, point, span, np.full(len(span), np.inf), SIDE_SAMPLES)
     curves = []
     for level, low in ((0.0, True), (size[1 - axis], False)):
-        inside = _disc_at(on_side(begin + span / 2, axis, level), circles)
+        inside = disc_at(on_side(begin + span / 2, axis, level))
         # A chord has two edges or more: a triangle with two arc edges beside it could not be flipped. From one circle
         # of a coating to the other it is no chord.
         into = around[inside] * (inside != MATRIX) + MATRIX * (inside == MATRIX)
@@ -254,7 +262,7 @@ def _side_curves(
     return curves
 
 
-def _disc_at(points: Float, circles: Float) -> Int:
+def _disc_at(circles: Float, points: Float) -> Int:
     """The smallest circle (k,) around each point, or MATRIX."""
     holds = np.linalg.norm(points[:, None] - circles[:, :2], axis=2) < circles[:, 2]
     return np.where(holds.any(axis=1), np.where(holds, circles[:, 2], np.inf).argmin(axis=1), MATRIX)

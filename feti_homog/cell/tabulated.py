@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from feti_homog.cell import cut_window
-from feti_homog.cell.elliptic_table import contacts, ellipses_of
+from feti_homog.cell.ellipses import Ellipses, gaps
+from feti_homog.cell.elliptic_table import ellipses_of, with_coatings
 from feti_homog.cell.torus_pairs import neighbours
 from feti_homog.errors import MeshError
 from feti_homog.typing import Bool, Float, Int
@@ -61,14 +62,13 @@ def _on_torus(table: FibreTable, window: str) -> tuple[Int, Float, Float, Float]
     _raise_faults(table, faults)
     kept = np.flatnonzero(first)
     centres = centres[kept]
-    if table.a is not None:
-        _raise_faults(table, contacts(table, kept, centres, size, LEAST_GAP))
-        return kept, centres, np.zeros_like(centres), size
-    _raise_faults(table, _contacts(table, kept, centres, size, is_cut))
+    ellipses = None if table.a is None else with_coatings(table, kept, centres)
+    _raise_faults(table, _contacts(table, kept, centres, size, is_cut, ellipses))
     if not is_cut:
         return kept, centres, np.zeros_like(centres), size
+    frames = None if ellipses is None else ellipses.frames
     try:
-        return kept, centres, cut_window.moves(centres, table.outer_radius[kept], size), size
+        return kept, centres, cut_window.moves(centres, table.outer_radius[kept], size, frames), size
     except MeshError as error:
         words = "fibres overlap across the border, and " + str(error)
         raise MeshError(f'[cell] {table.name}: window = "cut": {words}; leave some of them out') from error
@@ -143,12 +143,19 @@ def _without_images(table: FibreTable, centres: Float, size: Float, is_cut: bool
     return is_first, faults
 
 
-def _contacts(table: FibreTable, kept: Int, centres: Float, size: Float, is_cut: bool) -> list[str]:
-    """Faults of fibres, the rows `kept` (k,), that overlap or touch; of a cut window only of those that do within."""
+def _contacts(
+    table: FibreTable, kept: Int, centres: Float, size: Float, is_cut: bool, ellipses: Ellipses | None
+) -> list[str]:
+    """Faults of fibres, the rows `kept` (k,) and their ellipses if some are not round, that overlap or touch; of a cut
+    window only of those that do within."""
     radius = table.outer_radius[kept]
-    first, second, vector = neighbours(centres, size, 2 * radius.max() * (1 + LEAST_GAP))
+    longest = radius.max() if ellipses is None else ellipses.longest.max()
+    first, second, vector = neighbours(centres, size, 2 * longest * (1 + LEAST_GAP))
     together = radius[first] + radius[second]
-    gap = np.linalg.norm(vector, axis=1) - together
+    if ellipses is None:
+        gap = np.linalg.norm(vector, axis=1) - together
+    else:
+        gap, _ = gaps(ellipses[first], Ellipses(centres[first] + vector, ellipses.frames[second]))
     across = np.linalg.norm(centres[second] - centres[first] - vector, axis=1) > SAME_FIBRE * radius[first]
     bad = np.flatnonzero((gap < LEAST_GAP * together / 2) & ~(across & is_cut))
     faults = []

@@ -62,7 +62,8 @@ class Cell:
     coating: float | None = key(
         real(least=0.01, most=1.0),
         'Thickness of the coatings of all fibres / radius of the fibre, which is within; of the phase "coating". '
-        "fibre_fraction and fibre_radius are those without them, gaps those with them.",
+        "fibre_fraction and fibre_radius are those without them, gaps those with them. Coatings of ellipses make both "
+        "semi-axes longer by coating sqrt(a b).",
         default=None,
         only=MESHED,
         default_words="none, or the column coating of a table",

@@ -13,7 +13,7 @@ from feti_homog.typing import Bool, Float
 THINNEST = 0.05
 
 
-def with_shapes(table: FibreTable, window: str, faults: list[str]) -> FibreTable:
+def with_shapes(table: FibreTable, faults: list[str]) -> FibreTable:
     """The table whose radii sqrt(a b) are those of discs of the same area, and whose discs have semi-axes too.
 
     Semi-axes are None if all fibres are round. Faults are added to `faults`.
@@ -29,11 +29,6 @@ def with_shapes(table: FibreTable, window: str, faults: list[str]) -> FibreTable
     is_oval = a != b
     if not is_oval.any():
         return replace(table, radius=a, a=None, b=None, angle=None)
-    if table.coating is not None:
-        _tell(table, table.coating > 0, "a coating, but some fibres are ellipses", faults)
-    if window == "cut":
-        row = table.row[is_oval][0]
-        faults.append(f'[cell] {table.name}: row {row}: an ellipse, but window = "cut" moves round fibres only')
     radius: Float = np.where(is_oval, np.sqrt(a * b), a)
     return replace(table, radius=radius, a=a, b=b, angle=np.where(is_oval, angle, 0.0))
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from parallel.test_users_meshes import eshelby, plane_strain
 from scipy.special import ellipe
-from support.cases import FIBRE, MATRIX, relative_error, solve
+from support.cases import FIBRE, MATRIX, monolithic_stiffness, relative_error, solve
 from support.ranks import parallel_assert
 
 from feti_homog import Case, run
@@ -26,14 +26,18 @@ ROWS = [
 ]
 
 
-def stiffness(comm, rows, **cell):
+def solved(comm, rows, coating=None, **cell):
     document = {
         "cell": {"geometry": "table", "width": 1.0, "height": 1.0, "fibre_list": rows, "mesh_size": 0.1} | cell,
-        "material": {"matrix": MATRIX, "fibre": FIBRE},
+        "material": {"matrix": MATRIX, "fibre": FIBRE} | ({} if coating is None else {"coating": coating}),
         "analysis": {"type": "stiffness", "plane": "strain"},
         "petsc": {"feti_ksp_rtol": 1e-11},
     }
-    return solve(cases.parse(document, Path()), comm)[1]
+    return solve(cases.parse(document, Path()), comm)[:2]
+
+
+def stiffness(comm, rows, coating=None, **cell):
+    return solved(comm, rows, coating, **cell)[1]
 
 
 @pytest.mark.quick
@@ -97,3 +101,20 @@ def test_stiffness_converges_to_that_of_another_mesh(comm, order, least):
     errors = [np.abs(each - exact).max() for each in found]
     rates = [np.log2(one / other) for one, other in pairwise(errors)]
     assert min(rates) > least, rates
+
+
+@pytest.mark.quick
+@pytest.mark.parametrize("order", [1, 2])
+def test_coated_ellipses_have_the_stiffness_of_their_mesh_solved_at_once(comm, order):
+    rows = [row | {"coating": 0.1} for row in ROWS]
+    cell, found = solved(comm, rows, {"young": 20.0, "poisson": 0.2}, order=order, mesh_size=0.15)
+    assert relative_error(found, monolithic_stiffness(cell)) < 1e-8
+
+
+def test_coatings_of_the_material_within_make_ellipses_larger(comm):
+    """Of ellipses whose semi-axes are longer by the thickness, which is `coating` times sqrt(a b)."""
+    inner = {"x": 0.45, "y": 0.55, "a": 0.24, "b": 0.12, "angle": 30.0}
+    thick = 0.1 * np.sqrt(inner["a"] * inner["b"])
+    outer = inner | {axis: inner[axis] + thick for axis in "ab"}
+    coated = stiffness(comm, [inner | {"coating": 0.1}], FIBRE, order=2)
+    assert relative_error(coated, stiffness(comm, [outer], order=2)) < 1e-4

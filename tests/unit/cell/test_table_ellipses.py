@@ -30,7 +30,7 @@ ROWS = [
 def table(rows, corner=None):
     left, bottom = corner or (None, None)
     faults = []
-    found = with_shapes(replace(table_of(rows, "t.csv"), width=1.0, height=1.0), "periodic", faults)
+    found = with_shapes(replace(table_of(rows, "t.csv"), width=1.0, height=1.0), faults)
     assert not faults
     return replace(found, left=left, bottom=bottom)
 
@@ -177,21 +177,15 @@ def test_neighbours_that_only_circles_around_them_would_hit_are_allowed():
 
 
 SHAPES = {
-    "both": ([ROWS[0] | {"radius": 0.1}], "periodic", "row 1: has a radius and semi-axes; give one"),
-    "thin": ([ROWS[0] | {"b": 0.01}], "periodic", "row 1: expected a / b from 0.05 to 20"),
-    "cut": (ROWS, "cut", 'row 1: an ellipse, but window = "cut" moves round fibres only'),
-    "coated": (
-        [ROWS[0] | {"coating": 0.1}],
-        "periodic",
-        "row 1: a coating, but some fibres are ellipses",
-    ),
+    "both": ([ROWS[0] | {"radius": 0.1}], "row 1: has a radius and semi-axes; give one"),
+    "thin": ([ROWS[0] | {"b": 0.01}], "row 1: expected a / b from 0.05 to 20"),
 }
 
 
 @pytest.mark.parametrize("name", SHAPES)
 def test_faulty_shapes_name_the_row(name):
-    (rows, window, line), faults = SHAPES[name], []
-    with_shapes(table_of(rows, "t.csv"), window, faults)
+    (rows, line), faults = SHAPES[name], []
+    with_shapes(table_of(rows, "t.csv"), faults)
     assert faults == [f"[cell] t.csv: {line}"]
 
 
