@@ -243,6 +243,8 @@ class AnalysisContext:
             "debonded_length": length,
             "debonding_angle": self.fibre_interfaces.angle(length),
         }
+        if len(self.case.interfaces) > 1:
+            debonding["debonded_shares"] = self.fibre_interfaces.shares(last.state.status)
         return debonding | last.counts | {"iterations": sum(r.state.iterations for r in responses)}
 
     @cached_property

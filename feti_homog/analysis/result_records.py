@@ -29,6 +29,8 @@ DEBONDED_ANGLE = (
     "interface too, 360 times the share of its interfaces"
 )
 
+DEBONDED_SHARES = "the same of the interfaces of each section [[interface]], in their order; absent where there is one"
+
 
 @dataclass(frozen=True)
 class CellInfo:
@@ -122,7 +124,7 @@ class StiffnessBounds:
 
 @dataclass(frozen=True, eq=False)  # arrays have no single answer to "equal"
 class Tips:
-    """The t tips of debonding at a point, bonds that hold beside broken ones, by fibre and direction.
+    """The t tips of debonding at a point, bonds that hold beside broken ones, by fibre, interface and direction.
 
     What drives them is an energy per area, compared with G_c(psi): that of their spring or, where `growth` is
     "released", what their break would release.
@@ -135,6 +137,9 @@ class Tips:
     G_I: Float = described("what drives each tip by opening, with G_II / G_I = tan^2 psi", ENERGY, "(t,)")
     G_II: Float = described("what drives it by shear", ENERGY, "(t,)")
     psi: Float = described("mode of its traction: 0 opens, 90 shears", DEGREES, "(t,)")
+    interface: tuple[int, ...] | None = described(
+        "number, from 1, of its section [[interface]]; absent where there is one", default=None
+    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -182,6 +187,7 @@ class AnglePoint:
     stored: float | None = described("energy stored under it per area of the cell", STRESS, default=None)
     stored_in_springs: float | None = described("the share of elastic interfaces in it", STRESS, default=None)
     debonded_share: float = described("debonded share of the length of all interfaces")
+    debonded_shares: Float | None = described(DEBONDED_SHARES, "", "(i,)", default=None)
     debonded_length: Float = described("debonded length of each fibre's interface", LENGTH, "(f,)")
     debonding_angle: Float = described(DEBONDED_ANGLE, DEGREES, "(f,)")
     tips: TipRates | None = described("energy release rates at the tips of its arcs", default=None)
@@ -225,6 +231,7 @@ class PathPoint:
         "`dissipated` / `fracture_energy`, once there is any; 1 of bonds that lose their toughness alone", default=None
     )
     debonded_share: float = described("debonded share of the length of all interfaces")
+    debonded_shares: Float | None = described(DEBONDED_SHARES, "", "(i,)", default=None)
     debonded_length: Float = described("debonded length of each fibre's interface", LENGTH, "(f,)")
     debonding_angle: Float = described(DEBONDED_ANGLE, DEGREES, "(f,)")
     tips: Tips | None = described(
@@ -247,6 +254,7 @@ class LoadPoint:
     stored: float = described("elastic energy stored per area of the cell", STRESS)
     stored_in_springs: float = described("the share of elastic interfaces in it", STRESS)
     debonded_share: float = described("debonded share of the length of all interfaces")
+    debonded_shares: Float | None = described(DEBONDED_SHARES, "", "(i,)", default=None)
     debonded_length: Float = described("debonded length of each fibre's interface", LENGTH, "(f,)")
     debonding_angle: Float = described(DEBONDED_ANGLE, DEGREES, "(f,)")
     tips: TipRates | None = described(

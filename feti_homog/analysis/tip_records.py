@@ -44,4 +44,6 @@ class TipRecorder:
         table = np.column_stack([fibre, direction, own.opening, own.shear, own.mode, nodes.pair[own.node]])
         table = np.concatenate(cell.comm.allgather(table))
         table = table[np.lexsort((np.round(table[:, 1], DIRECTION_DIGITS), table[:, 5], table[:, 0]))]
-        return Tips(tuple(table[:, 0].astype(int).tolist()), *table.T[1:5])
+        fibre, angle, opening, shear, mode, pair = table.T
+        sections = tuple((pair + 1).astype(int).tolist()) if len(cell.case.interfaces) > 1 else None
+        return Tips(tuple(fibre.astype(int).tolist()), angle, opening, shear, mode, sections)

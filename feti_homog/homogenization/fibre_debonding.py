@@ -19,7 +19,7 @@ class FibreInterfaces:
     def __init__(self, cell: TornCell) -> None:
         """Collective."""
         self._comm, self._nodes = cell.comm, cell.solver.jump_operator.nodes
-        self._fibres = cell.summary.fibres
+        self._fibres, self._pairs = cell.summary.fibres, len(cell.case.interfaces)
         self._fibre = cell.summary.fibre_number(self._nodes.fibre) - 1
         self._length = self._sums(self._nodes.length)
         of_coating = self._sums(self._nodes.length * ~cell.summary.is_fibre[self._nodes.fibre])
@@ -39,6 +39,15 @@ class FibreInterfaces:
     def share(self, length: Float) -> float:
         """What lengths (f,) are of all interfaces."""
         return float(length.sum() / (self._length.sum() or 1.0))
+
+    def shares(self, status: Status) -> Float:
+        """(i,) debonded share of the length of the interfaces of each section [[interface]].  Collective."""
+        whole, debonded = (
+            np.bincount(self._nodes.pair, values, self._pairs).astype(float)
+            for values in (self._nodes.length, self._nodes.length * (status != BONDED))
+        )
+        whole = allreduce_sum(self._comm, whole)
+        return np.asarray(allreduce_sum(self._comm, debonded) / np.where(whole > 0, whole, 1.0))
 
     def _sums(self, values: Float) -> Float:
         sums: Float = np.bincount(self._fibre, values, self._fibres).astype(float)

@@ -92,11 +92,20 @@ def _check_debonding(ledger: Ledger, cell: DiscreteCell, state: StateNumbers, po
     angle += np.where(np.isnan(radius), 0.0, np.degrees(debonded / radius))
     share = debonded.sum() / (whole.sum() or 1.0)
     expected = {"debonded_length": debonded, "debonding_angle": np.nan_to_num(angle), "debonded_share": share}
-    scales = {"debonded_length": float(whole.max(initial=0.0)), "debonding_angle": 360.0, "debonded_share": 1.0}
+    scales = {"debonded_length": float(whole.max(initial=0.0)), "debonding_angle": 360.0}
+    if len(cell.files.interfaces) > 1:
+        expected["debonded_shares"] = _shares_of_pairs(cell, state)
     for name, value in expected.items():
-        told = np.array(point[name], float)
+        told = np.array(point.get(name, np.nan), float)
         off = told - value if told.shape == np.shape(value) else np.array(np.inf)
-        ledger.record("tables", relative(off, scales[name]), f"{state.name}, {name}")
+        ledger.record("tables", relative(off, scales.get(name, 1.0)), f"{state.name}, {name}")
+
+
+def _shares_of_pairs(cell: DiscreteCell, state: StateNumbers) -> Float:
+    """(sections,) debonded length / length of the interfaces of each section."""
+    rows, count = cell.files.interface, len(cell.files.interfaces)
+    own = rows.pair[:, None] == np.arange(count)
+    return np.asarray((rows.length * (state.status != BONDED)) @ own / (rows.length @ own))
 
 
 def _check_ratios(ledger: Ledger, points: Sequence[Point]) -> None:
@@ -132,7 +141,10 @@ def _check_tips(ledger: Ledger, cell: DiscreteCell, state: StateNumbers, told: M
     node = _tips_in_order(cell, state)
     section = bonds_of(cell.files, node)
     fibre, where = cell.files.interface.fibre[node], f"{state.name}, tip {{}}".format
-    if list(told["fibre"]) != fibre.tolist() or any(len(values) != len(node) for values in told.values()):
+    pair = (cell.files.interface.pair[node] + 1).tolist() if len(cell.files.interfaces) > 1 else None
+    if (list(told["fibre"]), told.get("interface")) != (fibre.tolist(), pair) or any(
+        len(values) != len(node) for values in told.values()
+    ):
         ledger.record("tables", np.inf, f"{state.name}, tips")
         return
     psi = mode(section, state.traction[node])

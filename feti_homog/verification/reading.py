@@ -28,7 +28,7 @@ DERIVED: dict[str, tuple[Any, ...]] = {
 }  # fmt: skip
 # In generalized plane strain stresses 33 are among the stresses, and there are strains along the fibres.
 SPATIAL_DERIVED = {name: shape for name, shape in DERIVED.items() if name != "stress_33"} | {"axial_strain": ("m", 2)}
-ROWS = ("points", "normal", "length", "fibre_number", "fibre", "pair")
+ROWS = ("points", "normal", "length", "fibre_number", "fibre")
 MISSING_FIELDS = "only a run with `fields = true` in [output] leaves what there is to verify"
 
 
@@ -217,7 +217,11 @@ def _document(path: Path) -> Mapping[str, Any]:
 def _contents(document: Mapping[str, Any], file: h5py.File, altered: tuple[str, ...]) -> ResultFiles:
     """The whole of both files but the states."""
     mesh = Mesh(*(_rows(file[f"mesh/{name}"]) for name in ("points", "triangles", "subdomain", "phase", "body")))
-    rows = InterfaceRows(*(_rows(file[f"interface/{name}"]) for name in ROWS))
+    own = file["interface"]
+    # Results of before there were several sections have no pairs.
+    pair = _rows(own["pair"]) if "pair" in own else np.zeros(len(own["points"]), np.int32)
+    points, normal, length, number, body = (_rows(own[name]) for name in ROWS)
+    rows = InterfaceRows(points, normal, length, number, body, pair)
     fibres = Fibres(*(_rows(file[f"fibre/{name}"]) for name in ("number", "body", "phase", "centre", "radius")))
     faces = np.stack([_rows(file[f"interface/{name}"]) for name in ("fibre_node", "matrix_node")], axis=1)
     size = np.array([file.attrs["width"], file.attrs["height"]], float)

@@ -50,6 +50,15 @@ CASES: dict[str, dict[str, Any]] = {
         },
         "path": {"waypoints": WAYPOINTS},
     },
+    "pairs": {
+        "cell": SQUARE | {"coating": 0.2},
+        "material": {"matrix": MATRIX, "fibre": FIBRE, "coating": {"young": 120.0, "poisson": 0.25}},
+        "interface": [
+            SPRINGS | {"between": ["coating", "matrix"], "criterion": "energy", "toughness": 0.02},
+            SPRINGS | {"between": ["fibre", "coating"], "criterion": "energy", "toughness": 0.018},
+        ],
+        "path": {"strain": [0.15, 0.0, 0.05]},
+    },
     "springs' energy": {
         "cell": RANDOM | {"order": 2},
         "interface": SPRINGS | {"criterion": "energy", "toughness": 0.02, "growth": "springs"},

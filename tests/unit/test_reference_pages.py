@@ -38,6 +38,11 @@ HALF_OPEN = {"debonded": [ARC | {"angle": 60.0}]}
 STRAIN = [0.1, 0.0, 0.0]
 ENERGY = {"normal_stiffness": 900.0, "tangential_stiffness": 300.0, "criterion": "energy", "toughness": 0.005}
 SPACE = {"plane": "generalized"}
+COATED = {
+    "cell": BASE["cell"] | {"coating": 0.2},
+    "material": BASE["material"] | {"coating": {"young": 10.0, "poisson": 0.3}},
+}
+OUTER, INNER = {"between": ["coating", "matrix"]}, {"between": ["fibre", "coating"]}
 WARM = {name: phase | {"expansion": 1e-5} for name, phase in BASE["material"].items()}
 CASES = {
     "bonded": {"analysis": {"type": "stiffness", "plane": "strain"}},
@@ -46,10 +51,24 @@ CASES = {
         "analysis": {"type": "stiffness", "plane": "strain"},
         "cell": {"geometry": "random", "match": str(TABLE), "fibres": 10, "mesh_size": 0.1},
     },
-    "coated": {
-        "analysis": {"type": "stiffness", "plane": "strain"},
-        "cell": BASE["cell"] | {"coating": 0.2},
-        "material": BASE["material"] | {"coating": {"young": 10.0, "poisson": 0.3}},
+    "coated": COATED | {"analysis": {"type": "stiffness", "plane": "strain"}},
+    "angle of two interfaces": COATED
+    | {
+        "analysis": {"type": "angle", "plane": "strain"},
+        "interface": [OUTER | {"debonded": [ARC]}, INNER],
+        "angle": {"values": [0, 60]},
+    },
+    "load on two interfaces": COATED
+    | {
+        "analysis": {"type": "load", "plane": "strain"},
+        "interface": [OUTER | HALF_OPEN, INNER],
+        "load": {"to": {"E11": 0.01}},
+    },
+    "path of two interfaces": COATED
+    | {
+        "analysis": {"type": "path", "plane": "strain"},
+        "interface": [OUTER | HALF_OPEN | ENERGY, INNER | ENERGY],
+        "path": {"strain": STRAIN},
     },
     "angle": {
         "analysis": {"type": "angle", "plane": "strain"},

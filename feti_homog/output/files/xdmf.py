@@ -40,7 +40,7 @@ INTERFACE_POINTS = {
     **{name: f"column/state/K/{name}" for name in ("traction_n", "traction_t", "jump_n", "jump_t")},
     "status": "state/K/status",
     "normal": "vector/interface/normal",
-    **{name: f"interface/{name}" for name in ("length", "fibre", "fibre_number")},
+    **{name: f"interface/{name}" for name in ("length", "fibre", "fibre_number", "pair")},
 }
 # Of generalized plane strain there are these too.
 SPATIAL_ELEMENTS = {name: f"column/state/K/{name}" for name in AXIAL_STRESSES}

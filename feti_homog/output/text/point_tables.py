@@ -135,7 +135,7 @@ def load_table(document: Mapping[str, Any], stress: str) -> list[str]:
         f"{'':<14}" + "".join(f"{name[1:]:>12}" for name in stresses),
         *(f"{label:<14}" + "".join(_number(value) for value in values) for label, values in rows),
         *_energies(point, stress),
-        _debonded(point),
+        *_debonded(document, point),
         ", ".join(f"{point[state]} {state}" for state in STATES) + " interface nodes",
         *([f"Free motions of fibres: {motions}"] if motions else []),
     ]
@@ -154,7 +154,7 @@ def _path_energies(document: Mapping[str, Any], stress: str) -> list[str]:
     if "dissipation_ratio" in last:
         ratio = f"{last['dissipation_ratio']:.4f} times it was dissipated"
         lines.append(f"Toughness of what broke per area{stress}: {last['fracture_energy']:.6g}; {ratio}")
-    return [*lines, _debonded(last)]
+    return [*lines, *_debonded(document, last)]
 
 
 def _energies(point: Point, stress: str) -> list[str]:
@@ -163,8 +163,14 @@ def _energies(point: Point, stress: str) -> list[str]:
     return [f"Stored per area{stress}: {point['stored']:.6g}{springs}"]
 
 
-def _debonded(point: Point) -> str:
-    return f"Debonded: {100 * point['debonded_share']:.1f} % of the interfaces"
+def _debonded(document: Mapping[str, Any], point: Point) -> list[str]:
+    """The share of the interfaces that has debonded, and those of the pairs of phases if there are several."""
+    words = f"Debonded: {100 * point['debonded_share']:.1f} % of the interfaces"
+    if "debonded_shares" in point:
+        shares = zip(document["case"]["interface"], point["debonded_shares"], strict=True)
+        pairs = [f"{100 * share:.1f} % of {' and '.join(section['between'])}" for section, share in shares]
+        words += f"; {', '.join(pairs)}"
+    return wrap(words, WIDTH)
 
 
 def sweep_table(rows: Sequence[tuple[str, str, str]]) -> list[str]:

@@ -23,7 +23,7 @@ from feti_homog.verification.reading import opened
 
 MATERIAL = {"stress", "stress 33", "equilibrium", "mean stress", "Hill"}
 SPRINGS = {"bond", "penetration", "complementarity"}
-PATHS = ("path", "thinned", "peaks", "energy", "springs' energy", "increments", *MIXED_PATHS)
+PATHS = ("path", "thinned", "peaks", "energy", "pairs", "springs' energy", "increments", *MIXED_PATHS)
 SPATIAL = ("spatial", "spatial contact", "spatial springs")
 ENVELOPES = ("envelope", "envelope by energy", "envelope in space")
 MATERIAL_33 = MATERIAL | {"bounds", "shown"}
@@ -47,6 +47,11 @@ def test_results_obey_every_law(results, kind):
 def other_fibre(_, file):
     number = file["interface/fibre_number"]
     number[0] = 1 if number[0] > 1 else 2
+
+
+def other_pair(_, file):
+    pair = file["interface/pair"]
+    pair[0] = 1 - pair[0]
 
 
 def length_and_traction(_, file):
@@ -153,6 +158,10 @@ FALSE = {
         "energy", both(*(document("path", 5, "tips", name, 0, factor=9.0) for name in ("G_I", "G_II"))), {"strength"},
     ),
     "a missing tip": ("energy", lambda content, _: content["path"][5]["tips"]["psi"].pop(), {"tables"}),
+    "a debonded share of a pair": ("pairs", document("path", -1, "debonded_shares", 1), {"tables"}),
+    "the interface of a tip": ("pairs", document("path", -1, "tips", "interface", 0, to=7), {"tables"}),
+    "no interfaces of tips": ("pairs", lambda content, _: content["path"][-1]["tips"].pop("interface"), {"tables"}),
+    "pairs of two nodes": ("pairs", other_pair, {"interface", "tables"}),
     "a waypoint": ("increments", document("case", "path", "waypoints", 1, 0), {"load"}),
     "a modulus": ("bonded", document("moduli", "E1"), {"moduli"}),
     "a bound": ("bonded", document("bounds", "hashin_shtrikman", "shear", 1), {"bounds"}),
@@ -166,6 +175,15 @@ FALSE = {
 def test_a_falsified_copy_breaks_its_laws(results, tmp_path, name):
     kind, edit, laws = FALSE[name]
     assert broken(falsified(results(kind), tmp_path / "copy", edit)) == laws | {"files"}
+
+
+def test_a_file_from_before_there_were_pairs_is_verified(results, tmp_path):
+    """There was one section [[interface]] then."""
+
+    def edit(_, file):
+        del file["interface/pair"]
+
+    assert broken(falsified(results("path"), tmp_path / "copy", edit)) == {"files"}
 
 
 def test_a_file_with_another_byte_is_noticed(results, tmp_path):
