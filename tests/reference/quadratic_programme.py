@@ -208,7 +208,7 @@ def rigid_motions(rigid, T, held, C):
     (h, c, fibres, m) says, and that no row of C resists; T (cn, free dofs) are the displacements of all nodes."""
     n, c, fibres, m = rigid.shape
     v = (T.T @ rigid.reshape(n * c, fibres * m)) / np.maximum(T.T @ np.ones(c * n), 1.0)[:, None]
-    resisted = np.concatenate([held.reshape(-1, fibres * m), C @ v, np.zeros((fibres * m,) * 2)])
+    resisted = np.concatenate([held.reshape(len(held) * c, fibres * m), C @ v, np.zeros((fibres * m,) * 2)])
     _, size, modes = np.linalg.svd(resisted, full_matrices=False)
     return np.asarray(v @ modes[size < 1e-9].T)
 
