@@ -33,11 +33,18 @@ def with_files(cell: Cell, folder: Path, faults: list[str]) -> Cell:
     if file.suffix not in SUFFIXES[cell.geometry]:
         expected = f"the name of a {FILES[cell.geometry]} for geometry = {toml_value(cell.geometry)}"
         faults.append(f"[cell] file = {given}: expected {expected}")
-    elif not os.path.isfile(file):  # false, not an error, for a name too long
-        faults.append(f"[cell] file = {given}: no such file (expected at {file})")
+    elif words := missing(file):
+        faults.append(f"[cell] file = {given}: {words}")
     elif cell.geometry == "table":
         return _with_table(replace(cell, file=file), faults)
     return replace(cell, file=file)
+
+
+def missing(file: Path) -> str:
+    """Why there is no such file, empty if there is."""
+    if os.path.isfile(file):  # false, not an error, for a name too long
+        return ""
+    return f"a folder; expected a file at {file}" if os.path.isdir(file) else f"no such file (expected at {file})"
 
 
 def _listed(cell: Cell, faults: list[str]) -> Cell:

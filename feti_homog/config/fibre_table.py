@@ -103,12 +103,12 @@ def read_table(path: Path) -> FibreTable:
 
 
 def table_of(entries: Sequence[Mapping[str, Any]], name: str) -> FibreTable:
-    """The table of a list of fibres with the same keys as columns have; its faults count the fibres from 1.
+    """The table of a list of fibres with the same keys as columns have; its faults count its rows from 1.
 
     Raises:
         CaseError: the list is faulty; a line for each fault.
     """
-    faults = _Faults(name, "fibre")
+    faults = _Faults(name)
     for number, entry in enumerate(entries, 1):
         for key in entry.keys() - set(COLUMNS):
             faults.add(number, f"{key} = {toml_value(entry[key])}: unknown key; {suggestion(key, COLUMNS, {})}")
@@ -118,12 +118,12 @@ def table_of(entries: Sequence[Mapping[str, Any]], name: str) -> FibreTable:
 class _Faults:
     """Gathers the faults of a table, each with the row that has it."""
 
-    def __init__(self, name: str, row_word: str = "row") -> None:
+    def __init__(self, name: str) -> None:
         self.lines: list[str] = []
-        self._name, self._word = name, row_word
+        self._name = name
 
     def add(self, row: int, words: str) -> None:
-        self.lines.append(f"{self._name}: {self._word} {row}: {words}")
+        self.lines.append(f"{self._name}: row {row}: {words}")
 
     def throw(self) -> None:
         """Raise those that there are, the first ones in full."""
@@ -150,7 +150,7 @@ def _read_sizes(comment: str, row: int, sizes: dict[str, float], faults: _Faults
     """Add what a comment says of the cell to `sizes`."""
     for key, word in SIZE.findall(comment):
         value = _number(word, ";")
-        if value is None or (value <= 0 and key in SIZES[:2]):
+        if value is None or not is_number(value) or (value <= 0 and key in SIZES[:2]):
             expected = "a number above 0" if key in SIZES[:2] else "a number"
             faults.add(row, f"{key} = {word}: expected {expected}")
         elif sizes.setdefault(key, value) != value:
@@ -158,12 +158,12 @@ def _read_sizes(comment: str, row: int, sizes: dict[str, float], faults: _Faults
 
 
 def _number(word: str, delimiter: str) -> float | None:
-    """The number that a word is; None if it is none, or of no sensible magnitude."""
+    """The number that a word is; None if it is none."""
     try:
         value = float(word if delimiter == "," else word.replace(",", "."))
     except ValueError:
         return None
-    return value if is_number(value) and "_" not in word else None
+    return value if math.isfinite(value) and "_" not in word else None
 
 
 def _check_names(names: list[str], row: int, faults: _Faults) -> None:
@@ -191,6 +191,9 @@ def _split(
 ) -> Iterator[tuple[int, dict[str, Any]]]:
     """Each row's number, and its cells by column: numbers, texts, and nothing for cells that are empty."""
     for row, line in lines:
+        if line.count('"') % 2:
+            faults.add(row, "a quotation mark is not closed")
+            continue
         words = [_bare(word) for word in line.split(delimiter)]
         if len(words) != len(names):
             faults.add(row, f"has {len(words)} columns; expected {len(names)}, as there are names")

@@ -6,6 +6,7 @@ import os
 from dataclasses import replace
 from pathlib import Path
 
+from feti_homog.config.cell_files import missing
 from feti_homog.config.cell_section import Cell
 from feti_homog.config.wording import toml_value
 from feti_homog.errors import CaseError
@@ -19,8 +20,8 @@ def with_match(cell: Cell, folder: Path, faults: list[str]) -> Cell:
     if cell.match is None:
         return cell
     file, given = Path(os.path.realpath(folder / cell.match)), f"[cell] match = {toml_value(str(cell.match))}"
-    if not os.path.isfile(file):  # false, not an error, for a name too long
-        faults.append(f"{given}: no such file (expected at {file})")
+    if words := missing(file):
+        faults.append(f"{given}: {words}")
         return cell
     from feti_homog.config.fibre_window import read_window
     from feti_homog.microstructure.neighbour_match import knows_neighbours

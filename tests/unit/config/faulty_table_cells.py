@@ -32,11 +32,11 @@ FAULTY_TABLE_CELLS: dict[str, tuple[str, tuple[str, ...]]] = {
     ),
     "fibre_of_no_radius": (
         cell(MESH_CELL[0], TABLE_CELL[1].replace("radius = 0.3", "radius = -0.3")),
-        ("[cell] fibre_list: fibre 1: radius = -0.3: expected a number above 0",),
+        ("[cell] fibre_list: row 1: radius = -0.3: expected a number above 0",),
     ),
     "fibre_misspelt": (
         cell(MESH_CELL[0], TABLE_CELL[1].replace("radius = 0.3", "radius = 0.3, phas = 1")),
-        ("[cell] fibre_list: fibre 1: phas = 1: unknown key; did you mean phase?",),
+        ("[cell] fibre_list: row 1: phas = 1: unknown key; did you mean phase?",),
     ),
     "fibre_with_a_coating": (
         cell(MESH_CELL[0], TABLE_CELL[1].replace("radius = 0.3", "radius = 0.3, coating = 0.1")),

@@ -75,13 +75,13 @@ def test_a_list_is_read_as_a_table():
     assert table.centres.tolist() == [[1, 2.5], [4, 5]]
 
 
-def test_faults_of_a_list_count_its_fibres():
+def test_faults_of_a_list_count_its_rows():
     good = {"x": 1, "y": 2, "radius": 3}
     with pytest.raises(CaseError) as error:
         table_of([good | {"y": True}, {"x": 1, "y": 2, "radus": 3}, good | {"radius": "3"}], "list")
     assert error.value.faults == (
-        "list: fibre 2: radus = 3: unknown key; did you mean radius?",
-        "list: fibre 1: y = true: expected a number",
-        "list: fibre 2: radius: no value; expected a number",
-        'list: fibre 3: radius = "3": expected a number above 0',
+        "list: row 2: radus = 3: unknown key; did you mean radius?",
+        "list: row 1: y = true: expected a number",
+        "list: row 2: radius: no value; expected a number",
+        'list: row 3: radius = "3": expected a number above 0',
     )
