@@ -14,12 +14,13 @@ from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
 from feti_homog.fem.virtual_extension import energy_change
+from feti_homog.fem.void_boundary import nodes_along
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.typing import Float, Int
 
 QUARTER_TURN = np.array([[0.0, -1.0], [1.0, 0.0]])
-# Radius around a tip beyond which nothing turns / distance to the next tip or circle, and at most / a period of the
-# cell; radius within which all turns alike / that one.
+# Radius around a tip beyond which nothing turns / distance to what must not turn, and at most / a period of the cell;
+# radius within which all turns alike / that one.
 REACH, REACH_OF_A_PERIOD, CORE = 0.8, 0.32, 0.5
 # Relative distance from a circle beyond which a node of the same fibre is on another image of it.
 OFF_CIRCLE = 1e-4
@@ -82,16 +83,29 @@ class _Elements:
         return energy_change(points, total, self.subdomain.L[:3, :3], moved, changed)
 
 
+def obstacles(subdomains: Sequence[Subdomain], matrix: str, debonding: Int) -> Float:
+    """(k, 2) nodes that no extension of a crack may move: of this rank's subdomains those at voids, and the boundaries
+    of those that neither are the matrix nor of the constituents `debonding` from it, as fibres within coatings."""
+    points = [np.zeros((0, 2))]
+    for own in subdomains:
+        submesh, edges = own.submesh, own.submesh.at_void
+        if submesh.phase != matrix and submesh.body not in debonding:
+            edges = edges | (np.bincount(submesh.edge_class[submesh.triangle_edges].ravel()) == 1)
+        points.append(own.mesh.points[np.unique(nodes_along(submesh, own.mesh, edges))])
+    return np.concatenate(points)
+
+
 def reach_of_tips(
-    tips: Int, spokes: Float, radius: Float, points: Float, fibre: Int, tree: cKDTree, period: Float
+    tips: Int, spokes: Float, radius: Float, points: Float, fibre: Int, tree: cKDTree, fixed: Float, period: Float
 ) -> Float:
-    """(t,) radius around each tip in which its crack may be extended: no other tip, no other circle and no other image
-    of its own is there.
+    """(t,) radius around each tip in which its crack may be extended: no other tip, nothing fixed, no other circle and
+    no other image of its own is there.
 
     Args:
         tips: (t,) the interface nodes that are tips.
         spokes, radius: (t, 2) and (t,) from the centres of their circles to the tips.
         points, fibre: (n, 2) and (n,) of all interface nodes; `tree` of the points on the torus.
+        fixed: (k, 2) the `obstacles` of all ranks.
     """
     reach = np.minimum(radius, REACH_OF_A_PERIOD / REACH * period.min())
     near = tree.query_ball_point(wrapped(points[tips], period), reach)
@@ -101,6 +115,9 @@ def reach_of_tips(
         is_tip = np.isin(others, np.delete(tips, t))
         limits = off_circle | is_tip | (fibre[others] != fibre[tips[t]])
         reach[t] = min(reach[t], np.linalg.norm(away[limits], axis=1).min(initial=np.inf))
+    if len(fixed):
+        distance, _ = cKDTree(wrapped(fixed, period), boxsize=period).query(wrapped(points[tips], period))
+        reach = np.minimum(reach, distance)
     return REACH * reach
 
 

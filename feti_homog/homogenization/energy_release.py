@@ -18,7 +18,7 @@ from scipy.spatial import cKDTree
 from feti_homog.common.distributed_arrays import allreduce_sum
 from feti_homog.feti.decomposition.interface_neighbours import InterfaceNeighbours
 from feti_homog.homogenization.averaging import Response
-from feti_homog.homogenization.crack_extension import CrackExtension, nearest_image, reach_of_tips, wrapped
+from feti_homog.homogenization.crack_extension import CrackExtension, nearest_image, obstacles, reach_of_tips, wrapped
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface.contact import BONDED, Interface, Status
 from feti_homog.interface.crack_tips import CrackTips, InterfaceChains, closing_work
@@ -81,6 +81,7 @@ class EnergyReleaseRates:
         direction = np.round(self._gathered(cell.directions), DIRECTION_DIGITS)
         self.direction, self.length = np.where(direction <= -180.0, 180.0, direction), self._gathered(nodes.length)
         self._tree = cKDTree(wrapped(self.points, self._period), boxsize=self._period)
+        self._fixed = self._gathered(obstacles(cell.subdomains, matrix, self.fibre))
 
     def of(self, response: Response) -> EnergyRelease:
         """G and its modes at all tips of a response.  Collective."""
@@ -126,7 +127,7 @@ class EnergyReleaseRates:
         summary, solution, fibre = self.cell.summary, response.state.solution, self.fibre[tips.node]
         place, radius = self.points[tips.node], summary.radii[fibre]
         spokes = nearest_image(place - summary.centres[fibre], self._period)
-        reach = reach_of_tips(tips.node, spokes, radius, self.points, self.fibre, self._tree, self._period)
+        reach = reach_of_tips(tips.node, spokes, radius, self.points, self.fibre, self._tree, self._fixed, self._period)
         u, E = self.cell.solver.displacement(solution), strain_tensor(solution.strain[:3])
         change = self._extension.energy_changes(fibre, place, spokes, reach, u, E)
         turn = self.direction[tips.node] - self.direction[tips.behind]

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 from reference.references import DEBONDED_FIBRE_BEM, DEBONDED_FIBRE_FEM, DEBONDED_FIBRE_TOTAL
-from support.cases import FIBRE, MATRIX
+from support.cases import FIBRE, MATRIX, relative_error
 from support.ranks import parallel_assert
+from support.void_cells import write_voids
 from unit.cell.faulty_meshes import RIGHT_SIDE, grid
 
 from feti_homog import Case, run
@@ -209,3 +210,44 @@ def test_one_fibre_in_a_large_matrix_has_the_published_rates(comm):
             parallel_assert(comm, np.abs(total - expected).max() < 5e-3 * largest, f"{t}: {total}")
         parallel_assert(comm, np.abs(modes - DEBONDED_FIBRE_FEM[t]).max() < 0.015 * largest, f"{t}: {modes}")
         parallel_assert(comm, np.abs(modes - DEBONDED_FIBRE_BEM[t]).max() < 0.06 * largest, f"{t}: {modes}")
+
+
+def loaded(comm, cell, arcs, materials=(), folder="."):
+    """The point of a load on the cell, whose arcs are 100 degrees long where they do not say."""
+    document = {
+        "cell": cell,
+        "material": {"matrix": MATRIX, "fibre": FIBRE} | dict(materials),
+        "analysis": {"type": "load", "plane": "strain"},
+        "interface": {"debonded": [{"angle": 100.0} | arc for arc in arcs]} | FREE,
+        "load": {"to": {"E11": 0.3, "E22": 0.2, "gamma12": 0.5}},
+        "petsc": {"feti_ksp_rtol": 1e-11},
+    }
+    return run(Case.parse(document, Path(folder)), comm).load
+
+
+@pytest.mark.quick
+@pytest.mark.parametrize("centre", [0.0, 100.0])
+def test_beside_a_void_rates_are_those_beside_a_fibre_that_nothing_holds(comm, shared_path, centre):
+    """On one mesh; one tip is so near that the void would be within reach of its extension."""
+    cell = {"geometry": "random", "fibres": 2, "fibre_fraction": 0.35, "min_gap": 0.1, "seed": 1, "mesh_size": 0.08}
+    if comm.rank == 0:
+        write_voids(shared_path / "fibres.msh", voids=[], **cell)
+        write_voids(shared_path / "void.msh", voids=[2], **cell)
+    comm.barrier()
+    own, other = {"fibre": 1, "centre": centre}, {"fibre": 2, "centre": 0.0, "angle": 360.0}
+    mesh = {"geometry": "mesh", "order": 2}
+    expected = loaded(comm, mesh | {"file": "fibres.msh"}, [own, other], folder=shared_path)
+    found = loaded(comm, mesh | {"file": "void.msh"}, [own], folder=shared_path)
+    assert relative_error(found.stress, expected.stress) < 1e-8
+    assert relative_error(found.tips.G, expected.tips.G[np.array(expected.tips.fibre) == 1]) < 1e-7
+
+
+@pytest.mark.parametrize("coating", [0.3, 0.02])
+def test_rates_of_coated_fibres_are_those_of_fibres_of_one_material(comm, coating):
+    """Of the same outer radius, on another mesh; the fibre within the coating is bonded to it."""
+    radius, arc = 0.3, {"fibre": 1, "centre": 20.0}
+    cell = {"geometry": "square", "mesh_size": 0.08, "interface_size": 0.04, "order": 2}
+    expected = loaded(comm, cell | {"fibre_fraction": np.pi * radius**2}, [arc])
+    within = {"fibre_fraction": np.pi * (radius / (1 + coating)) ** 2, "coating": coating}
+    found = loaded(comm, cell | within, [arc], {"coating": FIBRE})
+    assert relative_error(found.tips.G, expected.tips.G) < 2e-3
