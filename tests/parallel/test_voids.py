@@ -15,6 +15,7 @@ from feti_homog.config import case as cases
 from feti_homog.verification.certificate import verify
 
 pytestmark = pytest.mark.parallel
+STRENGTHS = {"normal_strength": 5.0, "tangential_strength": 5.0}
 RANDOM = {"geometry": "random", "fibres": 4, "fibre_fraction": 0.35, "min_gap": 0.2, "seed": 2}
 
 
@@ -99,6 +100,34 @@ def test_files_are_certified_and_what_is_told_of_voids_is_checked(comm, shared_p
             (out / "result.json").write_text(json.dumps(document))
             assert {"mesh", "cell"} <= broken(out)
     comm.barrier()
+
+
+@pytest.mark.parametrize(
+    "sections",
+    [
+        {
+            "analysis": {"type": "path", "plane": "strain"},
+            "interface": STRENGTHS | {"normal_stiffness": 900.0, "tangential_stiffness": 300.0},
+            "path": {"to": {"E11": 0.2}},
+        },
+        {
+            "analysis": {"type": "envelope", "plane": "strain"},
+            "interface": STRENGTHS,
+            "envelope": {"plane": ["S22", "S12"], "directions": 6},
+        },
+    ],
+    ids=["path", "envelope"],
+)
+def test_debonding_beside_voids_is_certified(comm, shared_path, sections):
+    write(comm, shared_path, voids=[0, 1], **RANDOM)
+    document = {
+        "cell": {"geometry": "mesh", "file": "cell.msh"},
+        "material": {"matrix": MATRIX, "fibre": FIBRE},
+        "output": {"pictures": False},
+    }
+    result = run(cases.parse(document | sections, shared_path), comm, out=shared_path / "out")
+    assert result.status == "done" and (result.path is None or len(result.path) > 4)
+    assert comm.bcast(broken(shared_path / "out") if comm.rank == 0 else None) == set()
 
 
 def broken(folder):
