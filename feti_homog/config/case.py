@@ -203,8 +203,7 @@ def parse(values: Mapping[str, Any], folder: Path) -> Case:
     faults += envelope_faults(*bonding, document, reader.selected)
     faults += expansion_faults(sections["path"], sections["single_load"], sections["materials"])
     if not faults:
-        plane, free_faces = sections["analysis"].plane, bool(sections["interfaces"])
-        sections["cell"] = element_sizes.with_sizes(sections["cell"], sections["materials"], plane, free_faces, faults)
+        sections["cell"] = _sized_cell(document["cell"], sections, faults)
     if faults:
         raise CaseError(*faults)
     return Case(name=document.get("name", "case"), **sections)
@@ -261,6 +260,14 @@ def _checked_cell(cell: Cell, folder: Path, faults: list[str]) -> Cell:
     if cell.match is not None and cell.coating is not None:
         faults.append("[cell] coating, match: exclude each other; fibres that match a table have no coatings")
     return with_files(cell, folder, faults)
+
+
+def _sized_cell(table: Mapping[str, Any], sections: Mapping[str, Any], faults: list[str]) -> Cell:
+    """The cell with the sizes of elements, and unless its table says it the order, that it asks for."""
+    cell: Cell = sections["cell"]
+    plane, free_faces = sections["analysis"].plane, bool(sections["interfaces"])
+    orders = (cell.order,) if "order" in table else (1, 2)
+    return element_sizes.with_sizes(cell, sections["materials"], plane, free_faces, orders, faults)
 
 
 def check_phases(case: Case, phases: Iterable[str]) -> None:

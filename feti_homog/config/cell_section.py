@@ -98,8 +98,8 @@ class Cell:
     accuracy: float | None = key(
         real(least=1e-7, most=0.1),
         "Largest relative error of the strain energy under any macroscopic strain, and so of the entries of the "
-        "effective stiffness: mesh_size and refine are chosen, which it excludes with interface_size and tip_size. It "
-        "is not that of paths after bonds break.",
+        "effective stiffness: mesh_size and refine are chosen, which it excludes with interface_size and tip_size, and "
+        "order, unless it is given. It is not that of paths after bonds break.",
         default=None,
         default_words="none",
         only=MESHED,
@@ -115,7 +115,7 @@ class Cell:
     order: int = key(
         integer(least=1, most=2),
         "Order of the triangles. 1: linear; they lock in plane strain where poisson is above 0.49. 2: quadratic, "
-        "curved on round interfaces.",
+        "curved on round interfaces. With accuracy that of the two which takes fewer nodes, unless it is given.",
         default=1,
     )
     bodies: str = key(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
 from itertools import permutations
 from typing import Any
@@ -44,30 +44,45 @@ def exclusions(table: object) -> list[str]:
     return []
 
 
-def with_sizes(cell: Cell, materials: Mapping[str, Material], plane: str, free_faces: bool, faults: list[str]) -> Cell:
-    """The cell with the mesh_size and the refine that its accuracy or its element_size asks for.
+def with_sizes(
+    cell: Cell,
+    materials: Mapping[str, Material],
+    plane: str,
+    free_faces: bool,
+    orders: Collection[int],
+    faults: list[str],
+) -> Cell:
+    """The cell with the mesh_size, the refine and the order that its accuracy or its element_size asks for.
 
     Of an accuracy eps, the coarsest mesh is refined r times, with r the least for which `coarse_error` / 4^(p r) <= eps
-    for elements of order p. Of an element_size e, it is refined r times with r the most for which e 2^r is at most its
-    size, and the coarse elements have that size. A fault is added where more than MOST_REFINED were needed.
+    for elements of order p; of orders the one with the fewest nodes, about p^2 4^r. Of an element_size e, it is refined
+    r times with r the most for which e 2^r is at most its size, and the coarse elements have that size. It is a fault
+    if more than MOST_REFINED were needed.
 
     Args:
         free_faces: whether there are faces that no other phase holds firmly: of voids, of bonds that are soft or part.
+        orders: among which an accuracy chooses.
     """
     if cell.element_size is not None:
         refine = min(MOST_REFINED, max(0, math.floor(math.log2(coarsest(cell) / cell.element_size))))
         return replace(cell, mesh_size=min(coarsest(cell), cell.element_size * 2**refine), refine=refine)
     if cell.accuracy is None:
         return cell
-    error = coarse_error(materials, plane, cell.order, free_faces)
-    refine = max(0, math.ceil(math.log(error / cell.accuracy, 4**cell.order))) if error > 0 else 0
-    if refine > MOST_REFINED:
-        better = "a larger one, or order = 2" if cell.order == 1 else "a larger one"
+    refinements = {order: _refinements(cell.accuracy, materials, plane, order, free_faces) for order in orders}
+    order = min(refinements, key=lambda p: (p**2 * 4 ** refinements[p], p))
+    if refinements[order] > MOST_REFINED:
+        better = "a larger one, or order = 2" if order == 1 else "a larger one"
         faults.append(
-            f"[cell] accuracy = {cell.accuracy:g}: would need elements split {refine} times, more than {MOST_REFINED}; "
-            f"expected {better}"
+            f"[cell] accuracy = {cell.accuracy:g}: would need elements split {refinements[order]} times, more than "
+            f"{MOST_REFINED}; expected {better}"
         )
-    return replace(cell, mesh_size=coarsest(cell), refine=refine)
+    return replace(cell, mesh_size=coarsest(cell), refine=refinements[order], order=order)
+
+
+def _refinements(accuracy: float, materials: Mapping[str, Material], plane: str, order: int, free_faces: bool) -> int:
+    """The least r for which coarse_error / 4^(p r) is at most the accuracy."""
+    error = coarse_error(materials, plane, order, free_faces)
+    return max(0, math.ceil(math.log(error / accuracy, 4**order))) if error > 0 else 0
 
 
 def asked(cell: Cell) -> str:

@@ -58,6 +58,15 @@ def test_as_few_splits_as_the_estimate_allows(accuracy, order):
     assert refine == 0 or error / 4 ** (order * (refine - 1)) > asked
 
 
+@pytest.mark.parametrize("young", [3.6, 4.5, 70.0, 0.01])
+@pytest.mark.parametrize("accuracy", [0.1, 1e-2, 1e-3, 1e-4])
+def test_an_accuracy_chooses_the_order_with_fewer_nodes(young, accuracy):
+    nodes = {order: order**2 * 4 ** splits(young, order=order, accuracy=accuracy) for order in (1, 2)}
+    cell = case_of(young, accuracy=accuracy).cell
+    assert cell.order**2 * 4**cell.refine == min(nodes.values())
+    assert cell.order == 1 or nodes[2] < nodes[1]
+
+
 def test_the_estimate_of_isotropic_phases_in_closed_form():
     """In plane strain the eigenvalues are the ratios of the bulk moduli k = mu / (1 - 2 nu) and of the shear moduli mu;
     kappa is the largest k / mu."""
@@ -122,5 +131,6 @@ def test_a_resolved_case_asks_for_the_same(asked):
     case = case_of(**asked)
     resolved = case.resolved()["cell"]
     assert asked.items() <= resolved.items() and not {"mesh_size", "refine"} & set(resolved)
+    assert resolved["order"] == case.cell.order == (2 if "accuracy" in asked else 1)
     again = cases.parse(case.resolved(), Path())
     assert (again, again.digest()) == (case, case.digest())
