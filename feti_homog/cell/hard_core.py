@@ -11,6 +11,8 @@ from feti_homog.errors import MeshError
 from feti_homog.microstructure.fibre_pattern import FibrePattern
 
 ATTEMPTS = 3
+# Area fraction of discs grown by half the gap above which there are no random patterns.
+DENSEST = 0.9
 
 
 def hard_core(pattern: FibrePattern, generator: np.random.Generator, max_steps: int = MAX_STEPS) -> FibrePattern:
@@ -31,7 +33,8 @@ def placed(
 ) -> FibrePattern:
     """The same fibres at random places at least `gap` from each other.  Raises MeshError if none are found."""
     grown = pattern.radii + gap / 2
-    for _ in range(ATTEMPTS):
+    attempts = ATTEMPTS if np.pi * np.sum(grown**2) < DENSEST * pattern.area else 0
+    for _ in range(attempts):
         places = generator.random((pattern.count, 2)) * pattern.size
         centres, clearance = relax(places, grown, max_steps, (pattern.width, pattern.height))
         if clearance >= 1:

@@ -27,7 +27,8 @@ def matched_arrangement(cell: Cell) -> Arrangement:
 
     The radii are quantiles of those of the table `cell.match`, dealt at random and scaled to the fraction. The centres
     are placed as those of other random cells, `min_gap` mean diameters apart, and then moved one by one until the
-    distances of the nearest and the second neighbours are distributed as in the table (`neighbour_match.matched`).
+    distances of the nearest and the second neighbours are distributed as in the table (`neighbour_match.matched`). Of
+    coated fibres the gap is that of the coatings.
 
     Raises:
         CaseError: the table is faulty.
@@ -40,14 +41,15 @@ def matched_arrangement(cell: Cell) -> Arrangement:
     levels = (np.arange(count) + 0.5) / count
     radii = generator.permutation(np.quantile(window.radii, levels))
     radii *= sqrt(fraction / (pi * fsum(radii * radii)))
-    gap = cell.min_gap * 2 * fsum(radii) / count
+    gap, grown = cell.min_gap * 2 * fsum(radii) / count, 1 + (cell.coating or 0.0)
     try:
-        start = placed(FibrePattern(1.0, 1.0, np.zeros((count, 2)), radii, periodic=True), gap, generator)
+        start = placed(FibrePattern(1.0, 1.0, np.zeros((count, 2)), radii * grown, periodic=True), gap, generator)
     except MeshError as error:
         keys = f"[cell] fibre_fraction = {fraction:g} with min_gap = {cell.min_gap:g} and fibres = {count}"
         raise MeshError(f"{keys}: no arrangement found; lower one of them, or change seed") from error
-    centres = matched(start, gap, wanted_distances(window, count), generator)
-    return clear_shift(Arrangement(1.0, 1.0, centres, radii, (FIBRE,) * count))
+    centres = matched(start, gap, wanted_distances(window, count) / grown, generator)
+    coating = None if cell.coating is None else cell.coating * radii
+    return clear_shift(Arrangement(1.0, 1.0, centres, radii, (FIBRE,) * count, coating=coating))
 
 
 def distance_of(table: Path, width: float, height: float, centres: Float, radii: Float) -> float:

@@ -257,8 +257,6 @@ def _checked_cell(cell: Cell, folder: Path, faults: list[str]) -> Cell:
     faults += size_faults(cell) + mix_faults(cell)
     if cell.width is not None and cell.fibre_radius is not None:
         faults.append("[cell] width, fibre_radius: exclude each other; give one")
-    if cell.match is not None and cell.coating is not None:
-        faults.append("[cell] coating, match: exclude each other; fibres that match a table have no coatings")
     return with_files(cell, folder, faults)
 
 

@@ -64,6 +64,15 @@ def test_fraction_gap_and_radii_are_kept(table):
     assert np.all((found.centres >= 0) & (found.centres < 1))
 
 
+def test_coatings_keep_their_gap_and_fibres_their_distances(table):
+    found = arrange(cell(table, coating=0.1))
+    assert found.coating == pytest.approx(0.1 * found.radii)
+    assert pattern_of(found).fibre_fraction == pytest.approx(0.2, abs=1e-14)
+    rings = replace(pattern_of(found), radii=found.outer_radii)
+    assert rings.smallest_gap >= 0.01 * 2 * found.radii.mean() * (1 - 1e-9)
+    assert distance(table, found) < 0.02 < 0.08 < distance(table, arrange(cell(coating=0.1)))
+
+
 def test_same_seed_same_cell_other_seed_another(table):
     first, again, other = (arrange(cell(table, seed=seed)) for seed in (3, 3, 4))
     assert np.array_equal(first.centres, again.centres) and np.array_equal(first.radii, again.radii)

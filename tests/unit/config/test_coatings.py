@@ -34,8 +34,6 @@ def listed(*coatings: float | None, **cell: object) -> dict:
     (SQUARE | {"coating": 0.0}, ("coating",), "[cell] coating = 0.0: expected a number at least 0.01 and at most 1"),
     (SQUARE | {"fibre_fraction": 0.65}, ("coating",),
      '[cell] fibre_fraction = 0.65: expected less than 0.6491 for geometry = "square": there the coatings touch'),
-    ({"geometry": "random", "match": "t.csv", "coating": 0.1}, ("coating",),
-     "[cell] coating, match: exclude each other; fibres that match a table have no coatings"),
     (listed(0.1, 0.0), (), "[material.coating]: missing section; [cell] has coatings"),
     (listed(0.1, None, coating=0.2), ("coating",), "[cell] coating = 0.2: fibre_list has a column of it; give one"),
 ])  # fmt: skip
