@@ -206,31 +206,28 @@ class AnalysisContext:
         """Collective when first used."""
         return EnergyReleaseRates(self.homogenization.cell, self.homogenization.interface)
 
-    @property
-    def _rated_loads(self) -> tuple[str, ...]:
-        """Those that strain the plane; none where interfaces have their pairs of phases, for the virtual extension of a
-        crack must not move faces that never part."""
-        return () if any(each.between is not None for each in self.case.interfaces) else IN_PLANE_LOADS
-
     def tips(self, responses: Sequence[Response], loads: Sequence[str]) -> TipRates:
         """Energy release rates at all tips under each load that has them; none while all is bonded.  Collective."""
-        rated = self._rated_loads
-        pairs = [(r, load) for r, load in zip(responses, loads, strict=True) if load.lstrip("-") in rated]
+        pairs = [(r, load) for r, load in zip(responses, loads, strict=True) if load.lstrip("-") in IN_PLANE_LOADS]
         debonded = [(r, load) for r, load in pairs if r.counts["open"] + r.counts["closed"]]
         found = [(self._release_rates.of(response), load) for response, load in debonded]
-        columns = [(at.fibre, at.direction, at.total, *at.modes.T, at.mode_angle, at.length) for at, _ in found]
-        fibre, angle, G, G_I, G_II, psi, length = (
-            map(np.concatenate, zip(*columns, strict=True)) if found else [EMPTY] * 7
+        columns = [
+            (at.fibre, at.pair, at.direction, at.total, *at.modes.T, at.mode_angle, at.length) for at, _ in found
+        ]
+        fibre, pair, angle, G, G_I, G_II, psi, length = (
+            map(np.concatenate, zip(*columns, strict=True)) if found else [EMPTY] * 8
         )
+        sections = tuple((pair + 1).astype(int).tolist()) if len(self.case.interfaces) > 1 else None
         return TipRates(
             load=tuple(load for at, load in found for _ in at.fibre),
-            fibre=tuple(int(number) for number in fibre),
+            fibre=tuple(fibre.astype(int).tolist()),
             angle=angle,
             G=G,
             G_I=G_I,
             G_II=G_II,
             psi=psi,
             length=length,
+            interface=sections,
         )
 
     def point(self, responses: Sequence[Response]) -> dict[str, Any]:

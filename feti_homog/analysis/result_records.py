@@ -29,6 +29,7 @@ DEBONDED_ANGLE = (
     "interface too, 360 times the share of its interfaces"
 )
 
+OWN_SECTION = "number, from 1, of its section [[interface]]; absent where there is one"
 DEBONDED_SHARES = "the same of the interfaces of each section [[interface]], in their order; absent where there is one"
 
 
@@ -137,16 +138,14 @@ class Tips:
     G_I: Float = described("what drives each tip by opening, with G_II / G_I = tan^2 psi", ENERGY, "(t,)")
     G_II: Float = described("what drives it by shear", ENERGY, "(t,)")
     psi: Float = described("mode of its traction: 0 opens, 90 shears", DEGREES, "(t,)")
-    interface: tuple[int, ...] | None = described(
-        "number, from 1, of its section [[interface]]; absent where there is one", default=None
-    )
+    interface: tuple[int, ...] | None = described(OWN_SECTION, default=None)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TipRates:
     """Energy release rates at the tips of debonded arcs on round fibres, at constant macroscopic strain.
 
-    Of t pairs of a load and a tip, by load, fibre and direction.
+    Of t pairs of a load and a tip, by load, fibre, interface and direction.
     """
 
     load: tuple[str, ...] = described(
@@ -160,6 +159,7 @@ class TipRates:
     G_II: Float = described("its part in shear", ENERGY, "(t,)")
     psi: Float = described("its mode, tan^2 psi = G_II / G_I: 0 opens, 90 shears", DEGREES, "(t,)")
     length: Float = described("length behind the tip at which the modes of rigid bonds are told apart", LENGTH, "(t,)")
+    interface: tuple[int, ...] | None = described(OWN_SECTION, default=None)
 
 
 @dataclass(frozen=True, kw_only=True)

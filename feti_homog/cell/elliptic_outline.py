@@ -27,6 +27,7 @@ from feti_homog.cell.outline import (
     on_side,
     side_curves,
 )
+from feti_homog.cell.tip_marks import marked
 from feti_homog.typing import Float, Int
 
 # Steps of a quarter of an ellipse between which its length is taken to be linear.
@@ -40,14 +41,16 @@ def outline(arrangement: Arrangement, sizes: MeshSizes, marks: Mapping[int, Sequ
     places = [_crossings(ellipses, axis, size) for axis in (0, 1)]
     sides = ((axis, level) for axis in (0, 1) for level in (0.0, size[1 - axis]))
     border = np.concatenate([on_side(places[axis], axis, level) for axis, level in sides])
-    angles, sharp = _vertex_angles(ellipses, fibre, border, size, marks)
+    curve = fibre + len(arrangement.radii) * (around != MATRIX)
+    angles, sharp = _vertex_angles(ellipses, curve, border, size, marks)
     which, start, stop = arcs_within(angles, lambda of, angle: ellipses[of].at(angle), size)
     ends = ellipses[which].at(start)
     away = cKDTree(border).query(ends)[0] > SAME_PLACE * size.max()
     border = np.unique(border, axis=0)
     numbering = Numbering(np.concatenate([border, ends[away]]))
-    # Vertices within coatings are as far from each other as those on the ellipse around, which they face.
-    outer = np.concatenate([border, ends[away & (around[which] == MATRIX)]])
+    # Vertices within coatings are as far from each other as those on the ellipse around, which they face, or marked.
+    sparse = (around != MATRIX) & ~np.isin(curve, list(marks))
+    outer = np.concatenate([border, ends[away & ~sparse[which]]])
     tips = _tips(arrangement, marks, numbering.vertices, size)
     field = size_field(arrangement, sizes, outer, sharp, tips)
     curves = []
@@ -92,7 +95,7 @@ def _crossings(ellipses: Ellipses, axis: int, size: Float) -> Float:
 
 
 def _vertex_angles(
-    ellipses: Ellipses, fibre: Int, border: Float, size: Float, marks: Mapping[int, Sequence[float]]
+    ellipses: Ellipses, curve: Int, border: Float, size: Float, marks: Mapping[int, Sequence[float]]
 ) -> tuple[list[Float], tuple[Float, Float]]:
     """Sorted parameters in [0, 2 pi) of the vertices of each ellipse: crossings of the sides, and the marks.
 
@@ -100,7 +103,7 @@ def _vertex_angles(
     """
     angles, where, lengths = [], [np.zeros((0, 2))], [np.zeros(0)]
     near = cKDTree(border).query_ball_point(ellipses.centres, ellipses.longest * (1 + SAME_PLACE))
-    for number, (owner, candidates) in enumerate(zip(fibre.tolist(), near, strict=True)):
+    for number, (owner, candidates) in enumerate(zip(curve.tolist(), near, strict=True)):
         places = border[candidates]
         one = ellipses[np.full(len(places), number)]
         on_it = np.abs(np.linalg.norm(one.unit(places - one.centres), axis=1) - 1) < SAME_PLACE
@@ -110,11 +113,11 @@ def _vertex_angles(
         along = np.where(_on_upright(places, size), normal[:, 0], normal[:, 1])
         where.append(places)
         lengths.append(one.bend(normal) * np.arccos(np.minimum(np.abs(along), 1.0)))
-        marked, offsets = np.radians(marks.get(owner, ())), places - ellipses.centres[number]
-        away = np.abs((marked[:, None] - np.arctan2(offsets[:, 1], offsets[:, 0]) + np.pi) % TURN - np.pi)
-        marked = marked[(away > MERGED).all(axis=1)]
-        mine = ellipses[np.full(len(marked), number)]
-        own = np.append(own, mine.parameter(directions(marked)) % TURN)
+        wanted, offsets = np.radians(marks.get(owner, ())), places - ellipses.centres[number]
+        away = np.abs((wanted[:, None] - np.arctan2(offsets[:, 1], offsets[:, 0]) + np.pi) % TURN - np.pi)
+        wanted = wanted[(away > MERGED).all(axis=1)]
+        mine = ellipses[np.full(len(wanted), number)]
+        own = np.append(own, mine.parameter(directions(wanted)) % TURN)
         angles.append(np.sort(own) if len(own) else np.zeros(1))
     return angles, (np.concatenate(where), np.concatenate(lengths))
 
@@ -125,11 +128,10 @@ def _on_upright(places: Float, size: Float) -> Float:
 
 
 def _tips(arrangement: Arrangement, marks: Mapping[int, Sequence[float]], vertices: Float, size: Float) -> Float:
-    """The vertices (t, 2) that the marks have become; those of fibres that are not there are none."""
-    known = {fibre: own for fibre, own in marks.items() if fibre < len(arrangement.radii)}
-    outer = arrangement.ellipses.grown(arrangement.thickness)
-    own = outer[np.repeat(list(known), [len(angles) for angles in known.values()]).astype(int)]
-    angle = np.radians([mark for angles in known.values() for mark in angles])
+    """The vertices (t, 2) that the marks have become; those of curves that are not there are none."""
+    curve, angle = marked(arrangement, marks)
+    fibre = curve % len(arrangement.radii)
+    own = arrangement.ellipses[fibre].grown(np.where(curve == fibre, arrangement.thickness[fibre], 0.0))
     places = own.at(own.parameter(directions(angle)))
     return np.asarray(vertices[cKDTree(vertices % size, boxsize=size).query(places % size)[1]])
 

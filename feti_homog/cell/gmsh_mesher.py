@@ -51,8 +51,8 @@ def generate(cell: Cell, marks: Mapping[int, Sequence[float]] = NO_MARKS) -> Coa
 
     It is made at the width 1 and then scaled, so that cells of one shape have one mesh at all sizes.
 
-    `marks` maps a fibre (its number in the arrangement) to angles in degrees, measured at its centre, where
-    the mesh gets nodes: tips of debonded arcs. A mark within MERGED of where the circle crosses the cell's
+    `marks` maps a curve (`outline.outline`) to angles in degrees, measured at its centre, where the mesh gets nodes:
+    tips of debonded arcs. A mark within MERGED of where the circle crosses the cell's
     boundary, or of another mark, is moved there.
 
     Raises:

@@ -15,6 +15,7 @@ from feti_homog.cell.edge_samples import EdgeSamples
 from feti_homog.cell.ellipses import Ellipses
 from feti_homog.cell.graded_size import MeshSizes, SizeField, size_field
 from feti_homog.cell.size_field import circle_size
+from feti_homog.cell.tip_marks import marked
 from feti_homog.typing import Bool, Float, Int
 
 MATRIX = -1
@@ -108,21 +109,23 @@ def _outer_images(arrangement: Arrangement, size: Float) -> tuple[Float, Int]:
 def outline(arrangement: Arrangement, sizes: MeshSizes, marks: Mapping[int, Sequence[float]]) -> Outline:
     """All lines of the cell with nodes at distances of at most `sizes`, closer in narrow passages.
 
-    Opposite sides have the same nodes. `marks` maps a fibre to angles in degrees, measured at its centre,
-    that become nodes.
+    Opposite sides have the same nodes. `marks` maps a curve to angles in degrees, measured at its centre, that become
+    nodes: of N fibres curve k is the outer one of fibre k, and N + k that within its coating.
     """
     size = np.array([arrangement.width, arrangement.height])
     circles, fibre, around = images(arrangement)
     places = [_crossings(circles, axis, size) for axis in (0, 1)]
     sides = ((axis, level) for axis in (0, 1) for level in (0.0, size[1 - axis]))
     border = np.concatenate([on_side(places[axis], axis, level) for axis, level in sides])
-    angles = _vertex_angles(circles, fibre, border, marks)
+    curve = fibre + len(arrangement.radii) * (around != MATRIX)
+    angles = _vertex_angles(circles, curve, border, marks)
     circle, start, stop = arcs_within(angles, lambda of, angle: _on_circle(circles[of], angle), size)
     ends = _on_circle(circles[circle], start)
     away = cKDTree(border).query(ends)[0] > SAME_PLACE * size.max()
     border = np.unique(border, axis=0)
-    # Vertices within coatings are as far from each other as those on the circle around, which they face.
-    outer = np.concatenate([border, ends[away & (around[circle] == MATRIX)]])
+    # Vertices within coatings are as far from each other as those on the circle around, which they face, unless marked.
+    sparse = (around != MATRIX) & ~np.isin(curve, list(marks))
+    outer = np.concatenate([border, ends[away & ~sparse[circle]]])
     numbering = Numbering(np.concatenate([border, ends[away]]))
     field = size_field(arrangement, sizes, outer, _tips(arrangement, marks, numbering.vertices))
 
@@ -182,11 +185,11 @@ def _on_circle(circles: Float, angles: Float) -> Float:
     return np.asarray(circles[..., :2] + circles[..., 2:] * np.stack([np.cos(angles), np.sin(angles)], axis=-1))
 
 
-def _vertex_angles(circles: Float, fibre: Int, border: Float, marks: Mapping[int, Sequence[float]]) -> list[Float]:
+def _vertex_angles(circles: Float, curve: Int, border: Float, marks: Mapping[int, Sequence[float]]) -> list[Float]:
     """Sorted angles in [0, 2 pi) of the vertices of each circle: crossings of the sides, and the marks."""
     angles = []
     near = cKDTree(border).query_ball_point(circles[:, :2], circles[:, 2] * (1 + SAME_PLACE))
-    for circle, owner, candidates in zip(circles, fibre.tolist(), near, strict=True):
+    for circle, owner, candidates in zip(circles, curve.tolist(), near, strict=True):
         offset = border[candidates] - circle[:2]
         offset = offset[np.linalg.norm(offset, axis=1) > circle[2] * (1 - SAME_PLACE)]
         own = (np.arctan2(offset[:, 1], offset[:, 0]) % TURN).tolist()
@@ -217,12 +220,11 @@ def arcs_within(angles: list[Float], at: Callable[[Int, Float], Float], size: Fl
 
 
 def _tips(arrangement: Arrangement, marks: Mapping[int, Sequence[float]], vertices: Float) -> Float:
-    """The vertices (t, 2) that the marks have become; those of fibres that are not there are none."""
-    known = {fibre: own for fibre, own in marks.items() if fibre < len(arrangement.radii)}
-    fibre = np.repeat(list(known), [len(own) for own in known.values()]).astype(int)
-    angle = np.radians([mark for own in known.values() for mark in own])
-    size = np.array([arrangement.width, arrangement.height])
-    places = _on_circle(np.column_stack([arrangement.centres, arrangement.outer_radii])[fibre], angle)
+    """The vertices (t, 2) that the marks have become; those of curves that are not there are none."""
+    curve, angle = marked(arrangement, marks)
+    size, fibre = np.array([arrangement.width, arrangement.height]), curve % len(arrangement.radii)
+    radii = np.concatenate([arrangement.outer_radii, arrangement.radii])[curve]
+    places = _on_circle(np.column_stack([arrangement.centres[fibre], radii]), angle)
     return np.asarray(vertices[cKDTree(vertices % size, boxsize=size).query(places % size)[1]])
 
 

@@ -53,12 +53,17 @@ class InterfaceNodes:
             is_vertex,
         )
 
-    def moved_tips(self, case: Case) -> MovedTips:
-        """Tips that the mesher has put into a vertex near them; a user's mesh has its vertices where they are."""
+    def moved_tips(self, case: Case) -> tuple[MovedTips, ...]:
+        """Of each interface the tips that the mesher has put into a vertex near them; a user's mesh has its vertices
+        where they are."""
         if case.cell.has_own_mesh:
-            return debonded_arcs.NOT_MOVED
-        vertices = self.fibre[self.is_vertex], self.direction[self.is_vertex]
-        return debonded_arcs.moved_tips(tips.directions(case), *vertices, float(np.degrees(MERGED)))
+            return (debonded_arcs.NOT_MOVED,) * len(case.interfaces)
+        most, moved = float(np.degrees(MERGED)), []
+        for pair, interface in enumerate(case.interfaces):
+            own = self.is_vertex & (self.pair == pair)
+            wanted = tips.on_interface(case, interface)
+            moved.append(debonded_arcs.moved_tips(wanted, self.fibre[own], self.direction[own], most))
+        return tuple(moved)
 
     def within(self, pair: int) -> InterfaceNodes:
         """Those of one interface of the case."""
@@ -81,7 +86,7 @@ def fibre_faults(case: Case, centres: Float) -> list[str]:
     ]
 
 
-def faults(case: Case, nodes: InterfaceNodes, moved: MovedTips) -> list[str]:
+def faults(case: Case, nodes: InterfaceNodes, moved: Sequence[MovedTips]) -> list[str]:
     """Faults of arcs, and of openings of [angle], other than 0 that select no node of a fibre."""
     openings: Sequence[float | None] = [None] if case.angle is None else case.angle.values
     found = []
@@ -90,7 +95,7 @@ def faults(case: Case, nodes: InterfaceNodes, moved: MovedTips) -> list[str]:
         for (place, arc), opening in product(enumerate(interface.debonded), openings):
             whole = opening if arc.angle is None else arc.angle
             fibres = [None] if isinstance(arc.fibre, str) else list(arc.fibre)
-            empty = [fibre for fibre in fibres if whole and not own.selects(arc, opening, fibre, moved)]
+            empty = [fibre for fibre in fibres if whole and not own.selects(arc, opening, fibre, moved[pair])]
             found += [_fault(f"[{label}] debonded[{place}]", whole, fibre, own) for fibre in empty]
     return list(dict.fromkeys(found))
 

@@ -8,8 +8,10 @@ as they are.  So it is an admissible variation of the equilibrium, whose energy 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TypeVar
 
 import numpy as np
+from mpi4py import MPI
 from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
@@ -18,39 +20,41 @@ from feti_homog.fem.void_boundary import nodes_along
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.typing import Float, Int
 
+Array = TypeVar("Array", Float, Int)
+
 QUARTER_TURN = np.array([[0.0, -1.0], [1.0, 0.0]])
 # Radius around a tip beyond which nothing turns / distance to what must not turn, and at most / a period of the cell;
 # radius within which all turns alike / that one.
 REACH, REACH_OF_A_PERIOD, CORE = 0.8, 0.32, 0.5
-# Relative distance from a circle beyond which a node of the same fibre is on another image of it.
+# Relative distance from a circle beyond which a node of the same bodies is on another boundary or image of them.
 OFF_CIRCLE = 1e-4
+VOID = -1
 
 
 class CrackExtension:
     """The elements of a rank, from which the energy of a crack's extension is summed."""
 
-    def __init__(self, subdomains: Sequence[Subdomain], matrix: str, period: Float) -> None:
-        """`matrix` is the name of its phase, `period` (2,) that of the cell."""
-        self._matrix, self._period = matrix, period
-        self._bodies = [_Elements(s, period) for s in subdomains]
+    def __init__(self, subdomains: Sequence[Subdomain], period: Float) -> None:
+        """`period` (2,) is that of the cell."""
+        self._pieces = [_Elements(s, period) for s in subdomains]
 
-    def energy_changes(self, fibre: Int, tips: Float, spokes: Float, reach: Float, u: Float, E: Float) -> Float:
+    def energy_changes(self, bodies: Int, tips: Float, spokes: Float, reach: Float, u: Float, E: Float) -> Float:
         """(t,) changes of this rank's energy when the crack at each tip turns by a unit angle.
 
         Args:
-            fibre: (t,) constituents at whose interface the tips are.
+            bodies: (t, 2) the two constituents between which each tip is; no other is within its reach.
             tips, spokes: (t, 2) their places, and those from the centres of their circles.
-            reach: (t,) beyond it nothing turns; only the fibre and the matrix are within it.
+            reach: (t,) beyond it nothing turns.
             u: (dofs of this rank,) u*.
             E: (2, 2) macroscopic strain.
         """
-        change, first = np.zeros(len(fibre)), 0
-        for body in self._bodies:
-            submesh, last = body.subdomain.submesh, first + body.subdomain.n_dofs
-            own = u[first:last].reshape(-1, 2)[body.subdomain.mesh.node_class]
+        change, first = np.zeros(len(bodies)), 0
+        for piece in self._pieces:
+            last = first + piece.subdomain.n_dofs
+            own = u[first:last].reshape(-1, 2)[piece.subdomain.mesh.node_class]
             first = last
-            for t in np.flatnonzero((submesh.phase == self._matrix) | (fibre == submesh.body)):
-                change[t] += body.energy_change(tips[t], spokes[t], reach[t], own, E)
+            for t in np.flatnonzero((bodies == piece.subdomain.submesh.body).any(axis=1)):
+                change[t] += piece.energy_change(tips[t], spokes[t], reach[t], own, E)
         return change
 
 
@@ -83,42 +87,55 @@ class _Elements:
         return energy_change(points, total, self.subdomain.L[:3, :3], moved, changed)
 
 
-def obstacles(subdomains: Sequence[Subdomain], matrix: str, debonding: Int) -> Float:
-    """(k, 2) nodes that no extension of a crack may move: of this rank's subdomains those at voids, and the boundaries
-    of those that neither are the matrix nor of the constituents `debonding` from it, as fibres within coatings."""
-    points = [np.zeros((0, 2))]
-    for own in subdomains:
-        submesh, edges = own.submesh, own.submesh.at_void
-        if submesh.phase != matrix and submesh.body not in debonding:
-            edges = edges | (np.bincount(submesh.edge_class[submesh.triangle_edges].ravel()) == 1)
-        points.append(own.mesh.points[np.unique(nodes_along(submesh, own.mesh, edges))])
-    return np.concatenate(points)
+def body_boundaries(comm: MPI.Comm, subdomains: Sequence[Subdomain]) -> tuple[Float, Int]:
+    """(k, 2) nodes on the boundaries of the bodies of all ranks, and (k,) whose they are; VOID at voids.  Collective.
+
+    Where two bodies meet, nodes come once for each.  Cuts between the pieces of a body are no boundaries of it.
+    """
+    sides = [np.bincount(s.submesh.edge_class[s.submesh.triangle_edges].ravel()) == 1 for s in subdomains]
+    keys = [s.submesh.edge_keys[own] for s, own in zip(subdomains, sides, strict=True)]
+    own_edges = [
+        np.column_stack([key, np.full(len(key), s.submesh.body)]) for s, key in zip(subdomains, keys, strict=True)
+    ]
+    edges, pieces = np.unique(_of_all(comm, own_edges, np.zeros((0, 2), np.int64)), axis=0, return_counts=True)
+    cuts = edges[pieces > 1]
+    points, body = [], []
+    for s, own in zip(subdomains, sides, strict=True):
+        cut = np.isin(s.submesh.edge_keys, cuts[cuts[:, 1] == s.submesh.body, 0])
+        for which, name in ((own & ~cut & ~s.submesh.at_void, s.submesh.body), (s.submesh.at_void, VOID)):
+            points.append(s.mesh.points[np.unique(nodes_along(s.submesh, s.mesh, which))])
+            body.append(np.full(len(points[-1]), name))
+    return _of_all(comm, points, np.zeros((0, 2))), _of_all(comm, body, np.zeros(0, np.int64))
 
 
-def reach_of_tips(
-    tips: Int, spokes: Float, radius: Float, points: Float, fibre: Int, tree: cKDTree, fixed: Float, period: Float
-) -> Float:
-    """(t,) radius around each tip in which its crack may be extended: no other tip, nothing fixed, no other circle and
-    no other image of its own is there.
+def _of_all(comm: MPI.Comm, own: list[Array], none: Array) -> Array:
+    """The rows of all ranks; `none` has no rows.  Collective."""
+    rows: Array = np.concatenate(comm.allgather(np.concatenate([none, *own])))
+    return rows
+
+
+def reach_of_tips(tips: Float, spokes: Float, bodies: Int, boundaries: tuple[Float, Int], period: Float) -> Float:
+    """(t,) radius around each tip in which its crack may be extended: no other tip and no boundary is there but the
+    circle between its bodies.
 
     Args:
-        tips: (t,) the interface nodes that are tips.
-        spokes, radius: (t, 2) and (t,) from the centres of their circles to the tips.
-        points, fibre: (n, 2) and (n,) of all interface nodes; `tree` of the points on the torus.
-        fixed: (k, 2) the `obstacles` of all ranks.
+        tips, spokes: (t, 2) their places, and those from the centres of their circles.
+        bodies: (t, 2) the two constituents between which each tip is.
+        boundaries: those of all bodies (`body_boundaries`).
     """
+    radius, (points, body) = np.linalg.norm(spokes, axis=1), boundaries
     reach = np.minimum(radius, REACH_OF_A_PERIOD / REACH * period.min())
-    near = tree.query_ball_point(wrapped(points[tips], period), reach)
+    places = wrapped(tips, period)
+    if len(tips) > 1:
+        nearest, _ = cKDTree(places, boxsize=period).query(places, 2)
+        reach = np.minimum(reach, nearest[:, 1])
+    near = cKDTree(wrapped(points, period), boxsize=period).query_ball_point(places, reach)
     for t, others in enumerate(near):
-        away = nearest_image(points[others] - points[tips[t]], period)
+        away = nearest_image(points[others] - tips[t], period)
         off_circle = np.abs(np.linalg.norm(away + spokes[t], axis=1) / radius[t] - 1) > OFF_CIRCLE
-        is_tip = np.isin(others, np.delete(tips, t))
-        limits = off_circle | is_tip | (fibre[others] != fibre[tips[t]])
+        limits = off_circle | ~np.isin(body[others], bodies[t])
         reach[t] = min(reach[t], np.linalg.norm(away[limits], axis=1).min(initial=np.inf))
-    if len(fixed):
-        distance, _ = cKDTree(wrapped(fixed, period), boxsize=period).query(wrapped(points[tips], period))
-        reach = np.minimum(reach, distance)
-    return REACH * reach
+    return np.asarray(REACH * reach)
 
 
 def wrapped(points: Float, period: Float) -> Float:

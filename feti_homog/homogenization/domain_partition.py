@@ -94,7 +94,7 @@ class CellSummary:
     constituent_phase: Int
     centres: Float
     radii: Float
-    moved_tips: MovedTips
+    moved_tips: tuple[MovedTips, ...]
     snapped: float
     voids: int
     match_distance: float | None
@@ -160,7 +160,7 @@ def coarse_mesh(case: Case) -> CoarseMesh:
     else:
         from feti_homog.cell.gmsh_mesher import generate
 
-        mesh = generate(replace(case.cell, tip_size=tips.size(case)), tips.directions(case))
+        mesh = generate(replace(case.cell, tip_size=tips.size(case)), tips.marks(case))
     cases.check_phases(case, mesh.phases)
     return mesh
 
@@ -195,7 +195,7 @@ def distribute(
     circles = fibre_circles(torus)
     centres = _in_cell(circles[:, :2], mesh.period)
     faults = interface_pairs.faults(case, torus) + arc_selection.fibre_faults(case, centres[is_fibre])
-    moved = debonded_arcs.NOT_MOVED
+    moved = (debonded_arcs.NOT_MOVED,) * len(case.interfaces)
     if case.arcs and not faults:
         nodes = InterfaceNodes.of(torus, lattice, pairs, numbers, centres)
         moved = nodes.moved_tips(case)
@@ -220,7 +220,7 @@ def distribute(
         constituent_phase=torus.constituent_phase,
         centres=centres,
         radii=circles[:, 2],
-        moved_tips=dict(moved),
+        moved_tips=tuple(map(dict, moved)),
         snapped=mesh.snapped,
         voids=voids(mesh),
         match_distance=_match_distance(case, mesh, centres[is_fibre], circles[is_fibre, 2]),

@@ -18,7 +18,13 @@ from scipy.spatial import cKDTree
 from feti_homog.common.distributed_arrays import allreduce_sum
 from feti_homog.feti.decomposition.interface_neighbours import InterfaceNeighbours
 from feti_homog.homogenization.averaging import Response
-from feti_homog.homogenization.crack_extension import CrackExtension, nearest_image, obstacles, reach_of_tips, wrapped
+from feti_homog.homogenization.crack_extension import (
+    CrackExtension,
+    body_boundaries,
+    nearest_image,
+    reach_of_tips,
+    wrapped,
+)
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface.contact import BONDED, Interface, Status
 from feti_homog.interface.crack_tips import CrackTips, InterfaceChains, closing_work
@@ -34,16 +40,18 @@ MODE_LENGTH = 1e-3
 
 @dataclass(frozen=True)
 class EnergyRelease:
-    """At t tips under one load, in the order of fibres and directions.
+    """At t tips under one load, in the order of fibres, interfaces and directions.
 
     Attributes:
         fibre: (t,) numbers from 1.
+        pair: (t,) interfaces of the case.
         direction: (t,) degrees in (-180, 180] about the centre of the fibre.
         modes: (t, 2) G_I and G_II.
         length: (t,) at which rigid bonds have these modes.
     """
 
     fibre: Int
+    pair: Int
     direction: Float
     modes: Float
     length: Float
@@ -65,23 +73,25 @@ class EnergyReleaseRates:
 
     Attributes:
         interface: with whose contact the responses were found.
-        points, fibre, direction, length: (n, 2) and (n,) of the interface nodes of all ranks: positions, constituents,
-            degrees about the centre of the fibre, tributary lengths.
+        points, bodies, pair, direction, length: (n, 2) and (n,) of the interface nodes of all ranks: positions, the
+            outer and the inner constituent, interfaces of the case, degrees about the centre of the inner one,
+            tributary lengths.
     """
 
     def __init__(self, cell: TornCell, interface: Interface) -> None:
         """Collective."""
-        nodes, matrix = interface.nodes, cell.summary.phases[0]
+        nodes = interface.nodes
         self.cell, self.interface, self._period = cell, interface, cell.summary.period
         neighbours = InterfaceNeighbours(cell.comm, cell.solver.jump_operator, cell.subdomains)
         self._chains = InterfaceChains(neighbours.adjacency)
-        self._extension = CrackExtension(cell.subdomains, matrix, self._period)
-        self.points, self.fibre = self._gathered(nodes.points), self._gathered(nodes.fibre)
+        self._extension = CrackExtension(cell.subdomains, self._period)
+        self._boundaries = body_boundaries(cell.comm, cell.subdomains)
+        self.points, self.bodies = self._gathered(nodes.points), self._gathered(nodes.bodies)
+        self.pair = self._gathered(nodes.pair)
         # Rounded, lest rounding decide their order.
         direction = np.round(self._gathered(cell.directions), DIRECTION_DIGITS)
         self.direction, self.length = np.where(direction <= -180.0, 180.0, direction), self._gathered(nodes.length)
         self._tree = cKDTree(wrapped(self.points, self._period), boxsize=self._period)
-        self._fixed = self._gathered(obstacles(cell.subdomains, matrix, self.fibre))
 
     def of(self, response: Response) -> EnergyRelease:
         """G and its modes at all tips of a response.  Collective."""
@@ -94,45 +104,58 @@ class EnergyReleaseRates:
         closing, length = self._closing(tips, status, force, jump)
         modes = self._modes(tips, response, force, closing)
         return EnergyRelease(
-            fibre=self.cell.summary.fibre_number(self.fibre[tips.node]),
+            fibre=self._numbers(tips),
+            pair=self.pair[tips.node],
             direction=self.direction[tips.node],
             modes=response.scale**2 * modes,
             length=length,
         )
 
     def _tips(self, status: Status) -> CrackTips:
-        """The tips on round fibres, in the order of fibres and directions."""
+        """The tips on circles, in the order of fibres, interfaces and directions."""
         found = self._chains.tips(status)
-        order = np.lexsort((self.direction[found.node], self.fibre[found.node]))
-        return found.chosen(order[np.isfinite(self.cell.summary.radii[self.fibre[found.node[order]]])])
+        order = np.lexsort((self.direction[found.node], self.pair[found.node], self._numbers(found)))
+        return found.chosen(order[np.isfinite(self._radius(found)[order])])
+
+    def _numbers(self, tips: CrackTips) -> Int:
+        """(t,) numbers of the fibres that have them, also of those within coatings."""
+        return self.cell.summary.fibre_number(self.bodies[tips.node, 1])
+
+    def _radius(self, tips: CrackTips) -> Float:
+        """(t,) of the circle of each, NaN where it is none."""
+        return np.asarray(self.cell.summary.radii[self.bodies[tips.node, 1]])
 
     def _modes(self, tips: CrackTips, response: Response, force: Float, closing: Float) -> Float:
         """(t, 2) G_I and G_II for forces (n, 2) and the work of closing (t, 2), of scale 1.  Collective."""
-        bond = self.cell.case.interface
-        given = () if bond is None else (bond.normal_stiffness, bond.tangential_stiffness)
-        stiffness = np.array([np.inf if k is None else k for k in given])
-        if np.isinf(stiffness).all():
-            work = closing.sum(axis=1, keepdims=True)
-            share = np.divide(closing, work, out=np.zeros_like(closing), where=work > 0)
-            return np.asarray(share * np.maximum(0.0, self._released(tips, response))[:, None])
+        stiffness = self._stiffnesses()[self.pair[tips.node]]
+        is_rigid = np.isinf(stiffness)
         traction = force[tips.node] / self.length[tips.node, None]
         # Faces that are pressed together do not part.
         traction[:, 0] = np.maximum(traction[:, 0], 0.0)
-        return np.where(np.isinf(stiffness), closing, traction**2 / (2 * stiffness))
+        modes = np.where(is_rigid, closing, traction**2 / (2 * stiffness))
+        rigid = np.flatnonzero(is_rigid.all(axis=1))
+        work = closing[rigid].sum(axis=1, keepdims=True)
+        share = np.divide(closing[rigid], work, out=np.zeros_like(closing[rigid]), where=work > 0)
+        modes[rigid] = share * np.maximum(0.0, self._released(tips.chosen(rigid), response))[:, None]
+        return modes
+
+    def _stiffnesses(self) -> Float:
+        """(interfaces, 2) normal and tangential ones of the bonds, infinite where they are rigid."""
+        given = [(each.normal_stiffness, each.tangential_stiffness) for each in self.cell.case.interfaces]
+        return np.array([[np.inf if k is None else k for k in own] for own in given or [(None, None)]])
 
     def _released(self, tips: CrackTips, response: Response) -> Float:
         """(t,) G of a virtual extension of the crack at each tip.  Collective."""
         if not len(tips.node):
             return np.zeros(0)
-        summary, solution, fibre = self.cell.summary, response.state.solution, self.fibre[tips.node]
-        place, radius = self.points[tips.node], summary.radii[fibre]
-        spokes = nearest_image(place - summary.centres[fibre], self._period)
-        reach = reach_of_tips(tips.node, spokes, radius, self.points, self.fibre, self._tree, self._fixed, self._period)
+        solution, bodies, place = response.state.solution, self.bodies[tips.node], self.points[tips.node]
+        spokes = nearest_image(place - self.cell.summary.centres[bodies[:, 1]], self._period)
+        reach = reach_of_tips(place, spokes, bodies, self._boundaries, self._period)
         u, E = self.cell.solver.displacement(solution), strain_tensor(solution.strain[:3])
-        change = self._extension.energy_changes(fibre, place, spokes, reach, u, E)
+        change = self._extension.energy_changes(bodies, place, spokes, reach, u, E)
         turn = self.direction[tips.node] - self.direction[tips.behind]
         outward = np.sign((turn + 180.0) % 360.0 - 180.0)
-        return np.asarray(-outward * allreduce_sum(self.cell.comm, change) / radius)
+        return np.asarray(-outward * allreduce_sum(self.cell.comm, change) / self._radius(tips))
 
     def _steps(self, tips: CrackTips, within: Float) -> int:
         """How many nodes of a chain lie within distances (t,) of the tips at most, and one element more."""
@@ -148,7 +171,7 @@ class EnergyReleaseRates:
     def _closing(self, tips: CrackTips, status: Status, force: Float, jump: Float) -> tuple[Float, Float]:
         """(t, 2) `closing_work` in opening and in shear, and (t,) the length that is closed: MODE_LENGTH, or the
         element behind the tip if that is longer."""
-        wanted = MODE_LENGTH * self.cell.summary.radii[self.fibre[tips.node]]
+        wanted = MODE_LENGTH * self._radius(tips)
         work, length = np.zeros((len(wanted), 2)), np.zeros(len(wanted))
         chains = [
             self._chains.onward(tips.node, start, self._steps(tips, wanted)) for start in (tips.behind, tips.ahead)

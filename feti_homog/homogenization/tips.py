@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from feti_homog.cell import element_estimate
 from feti_homog.config.case import Case
+from feti_homog.config.interface_section import InterfaceSection
+from feti_homog.config.phase_names import COATING, MATRIX
 from feti_homog.config.selectors import BREAKING
 from feti_homog.interface import debonded_arcs
 
@@ -17,10 +19,21 @@ TIP_TRIANGLES = 2.0
 LEAST_SIZE = 1e-5
 
 
-def directions(case: Case) -> dict[int, list[float]]:
-    """Directions in [0, 360) of the tips of all arcs, at all their openings, by the fibre's number from 0."""
+def on_interface(case: Case, interface: InterfaceSection) -> dict[int, list[float]]:
+    """Directions in [0, 360) of the tips of its arcs, at all their openings, by the fibre's number from 0."""
     openings = case.angle.values if case.angle else ()
-    return debonded_arcs.tips(case.arcs, openings, element_estimate.fibres_of(case.cell))
+    return debonded_arcs.tips(interface.debonded, openings, element_estimate.fibres_of(case.cell))
+
+
+def marks(case: Case) -> dict[int, list[float]]:
+    """Directions of all tips by the number of their curve (`outline.outline`)."""
+    found: dict[int, set[float]] = {}
+    for interface in case.interfaces:
+        is_within = interface.between is not None and {COATING, MATRIX} & set(interface.between) == {COATING}
+        first = element_estimate.fibres_of(case.cell) if is_within else 0
+        for fibre, own in on_interface(case, interface).items():
+            found.setdefault(first + fibre, set()).update(own)
+    return {curve: sorted(found[curve]) for curve in sorted(found)}
 
 
 def size(case: Case) -> float | None:
@@ -31,7 +44,7 @@ def size(case: Case) -> float | None:
     with R the mean radius / width; but with several openings not so small that their tips took more than TIP_TRIANGLES.
     Along paths tips move, and only what the case says counts; so it is with envelopes, for they begin paths.
     """
-    cell, tips = case.cell, sum(len(own) for own in directions(case).values())
+    cell, tips = case.cell, sum(len(own) for own in marks(case).values())
     if cell.tip_size is not None or case.analysis.type in BREAKING.values or not tips:
         return cell.tip_size
     radius, around = element_estimate.mean_radius(cell), element_estimate.interface_size(cell)

@@ -79,9 +79,9 @@ class TornCell:
         Arcs without an angle have that `opening`; None if there are none.
         """
         nodes = self.solver.jump_operator.nodes
-        number, moved = self.summary.fibre_number(nodes.fibre), self.summary.moved_tips
+        number = self.summary.fibre_number(nodes.fibre)
         found = nodes.precracked & bool(self.case.interfaces)
-        for pair, interface in enumerate(self.case.interfaces):
+        for pair, (interface, moved) in enumerate(zip(self.case.interfaces, self.summary.moved_tips, strict=True)):
             inside = debonded_arcs.debonded(interface.debonded, opening, number, self.directions, moved)
             found |= inside & (nodes.pair == pair)
         return np.asarray(found)

@@ -251,3 +251,45 @@ def test_rates_of_coated_fibres_are_those_of_fibres_of_one_material(comm, coatin
     within = {"fibre_fraction": np.pi * (radius / (1 + coating)) ** 2, "coating": coating}
     found = loaded(comm, cell | within, [arc], {"coating": FIBRE})
     assert relative_error(found.tips.G, expected.tips.G) < 2e-3
+
+
+INNER, OUTER = ["fibre", "coating"], ["coating", "matrix"]
+
+
+@pytest.mark.parametrize(
+    ("growing", "order", "bond", "error"),
+    [(OUTER, 2, FREE, 2e-3), (INNER, 2, TOUCHING, 2e-3), (INNER, 1, TOUCHING, 6e-3)],
+    ids=["outer", "inner", "linear"],
+)
+def test_each_interface_of_a_coated_fibre_releases_what_the_energy_loses(comm, growing, order, bond, error):
+    """While the arc on the other interface stays as long as it is."""
+    radius, coating, strain = 0.25, 0.3, {"E11": 0.3, "E22": -0.5, "gamma12": 0.4}
+    cell = {
+        "fibre_fraction": np.pi * radius**2,
+        "coating": coating,
+        "mesh_size": 0.05,
+        "order": order,
+        "refine": 3 - order,
+    }
+
+    def solved_with(opening):
+        arcs = [{"fibre": 1, "centre": 20.0, "angle": opening if name == growing else 70.0} for name in (INNER, OUTER)]
+        document = {
+            "cell": SQUARE | cell,
+            "material": {"matrix": MATRIX, "fibre": FIBRE, "coating": {"young": 20.0, "poisson": 0.3}},
+            "analysis": {"type": "load", "plane": "strain"},
+            "interface": [
+                {"between": INNER, "debonded": arcs[:1]} | bond,
+                {"between": OUTER, "debonded": arcs[1:]} | bond,
+            ],
+            "load": {"to": strain},
+            "petsc": {"feti_ksp_rtol": 1e-10},
+        }
+        return run(Case.parse(document), comm).load
+
+    energies = [np.dot(solved_with(100.0 + 2 * half).stress, list(strain.values())) / 2 for half in (-STEP, STEP)]
+    tips, own = solved_with(100.0).tips, 1 + [INNER, OUTER].index(growing)
+    lost = (energies[0] - energies[1]) / (2 * np.radians(STEP) * radius * (1.0 if own == 1 else 1 + coating))
+    parallel_assert(comm, tips.interface == (1, 1, 2, 2) and set(tips.fibre) == {1})
+    found = tips.G[np.array(tips.interface) == own].sum()
+    assert abs(found / lost - 1) < error, (found, lost)

@@ -52,6 +52,8 @@ CASES = {
         "cell": {"geometry": "random", "match": str(TABLE), "fibres": 10, "mesh_size": 0.1},
     },
     "coated": COATED | {"analysis": {"type": "stiffness", "plane": "strain"}},
+    "stiffness of two interfaces": COATED
+    | {"analysis": {"type": "stiffness", "plane": "strain"}, "interface": [OUTER | HALF_OPEN, INNER]},
     "angle of two interfaces": COATED
     | {
         "analysis": {"type": "angle", "plane": "strain"},

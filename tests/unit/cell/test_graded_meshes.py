@@ -99,10 +99,11 @@ MARKS = {0: (30.0, 150.0, 170.0), 1: (-170.0, 45.0), 4: (90.0,)}
 
 def at_marks(mesh, arrangement, marks):
     """For each mark its place (2,) and the lengths of the edges on the circle that meet in its vertex on the torus."""
-    lengths, size = edge_lengths(mesh), mesh.period
-    for fibre, own in marks.items():
+    lengths, size, count = edge_lengths(mesh), mesh.period, len(arrangement.radii)
+    for curve, own in marks.items():
+        fibre, radii = curve % count, arrangement.radii if curve >= count else arrangement.outer_radii
         for angle in np.radians(own):
-            place = arrangement.centres[fibre] + arrangement.radii[fibre] * np.array([np.cos(angle), np.sin(angle)])
+            place = arrangement.centres[fibre] + radii[fibre] * np.array([np.cos(angle), np.sin(angle)])
             away = (mesh.points - place + size / 2) % size - size / 2
             vertex = np.argmin(np.linalg.norm(away, axis=1))
             assert np.linalg.norm(away[vertex]) < 1e-12
@@ -120,6 +121,19 @@ def test_edges_at_tips_are_as_long_as_asked(interface, size):
     assert np.mean(lengths) > 0.93 * size
     # The same behind a tip as before it.
     assert max(own.max() / own.min() for own in lengths) < 1.15
+
+
+@pytest.mark.parametrize("coating", [0.3, 0.05])
+@pytest.mark.parametrize("curve", [0, 1], ids=["outer", "inner"])
+def test_the_circles_of_a_coated_fibre_have_their_own_tips(curve, coating):
+    case = cell("square", fraction=0.3, coating=coating, tip_size=5e-4)
+    mesh, arrangement = generate(case, {curve: (30.0, 150.0)}), arrange(case)
+    own = np.array([own for _, own in at_marks(mesh, arrangement, {curve: (30.0, 150.0)})])
+    assert np.all((own > 0.85 * 5e-4) & (own <= 5e-4 * (1 + 1e-6)))
+    coarse = edge_lengths(generate(replace(case, tip_size=None), {curve: (30.0, 150.0)}))
+    ends = mesh.points[mesh.arc_edges] - arrangement.centres[0]
+    is_inner = np.linalg.norm(ends, axis=2).mean(axis=1) < arrangement.radii[0] * (1 + coating / 2)
+    assert edge_lengths(mesh)[is_inner == (curve == 0)].min() > 2.5 * 5e-4 and coarse.min() > 2.5 * 5e-4
 
 
 @pytest.mark.parametrize("case", [replace(SQUARE, tip_size=1e-5), replace(WIDE_GAPS, tip_size=1e-4)])
