@@ -25,6 +25,7 @@ from feti_homog.microstructure.voronoi_cells import voronoi_cells
 
 TABLE = Path(__file__).parents[1] / "meshes" / "micrograph.csv"
 MATERIAL = {"matrix": {"young": 2790.0, "poisson": 0.33}, "fibre": {"young": 70800.0, "poisson": 0.22}}  # MPa
+TRACTION = "largest normal traction / $\\Sigma_{11}$"
 STRENGTHS = {"normal_strength": 40.0, "tangential_strength": 60.0}  # MPa
 
 
@@ -92,24 +93,53 @@ def write(folder: Path, stiffness: Result, onset: Result, fields: Any) -> list[P
     correlation = np.corrcoef(fractions, tractions)[0, 1]
     print(f"local fibre fractions {fractions.min():.2f} to {fractions.max():.2f}")
     print(f"largest tractions {tractions.min():.2f} to {tractions.max():.2f} S11, correlation {correlation:.2f}")
-    figure = Figure(figsize=(9.2, 4.2), layout="constrained")
-    left, right = figure.subplots(1, 2)
-    stress = np.array([point.stress[:2] for point in points])
-    left.plot(*stress[[*range(len(stress)), 0]].T, color=INK[0])
-    left.set(xlabel="$\\Sigma_{11}$ (MPa)", ylabel="$\\Sigma_{22}$ (MPa)", aspect="equal")
-    left.set_title("Onset of debonding", fontsize=11)
-    right.scatter(fractions, tractions, s=12, color=INK[0], linewidth=0)
     first = sorted({point.fibre - 1 for point in points})
-    right.scatter(fractions[first], tractions[first], s=22, color=INK[1], label="first to debond", linewidth=0)
-    right.set(xlabel="local fibre fraction", ylabel="largest normal traction / $\\Sigma_{11}$")
-    right.set_title(f"{len(fractions)} fibres, correlation {correlation:.2f}", fontsize=11)
-    right.legend(frameon=False, fontsize=9)
+    figure = Figure(figsize=(13.6, 4.4), layout="constrained")
+    micrograph, envelope, scatter = figure.subplots(1, 3)
+    draw_fibres(micrograph, stiffness, tractions, first)
+    stress = np.array([point.stress[:2] for point in points])
+    envelope.plot(*stress[[*range(len(stress)), 0]].T, color=INK[0])
+    envelope.set(xlabel="$\\Sigma_{11}$ (MPa)", ylabel="$\\Sigma_{22}$ (MPa)", aspect="equal")
+    envelope.set_title("Onset of debonding", fontsize=11)
+    scatter.scatter(fractions, tractions, s=12, color=INK[0], linewidth=0)
+    scatter.scatter(fractions[first], tractions[first], s=22, color=INK[1], label="first to debond", linewidth=0)
+    scatter.set(xlabel="local fibre fraction", ylabel=TRACTION)
+    scatter.set_title(f"{len(fractions)} fibres, correlation {correlation:.2f}", fontsize=11)
+    scatter.legend(frameon=False, fontsize=9)
     figure.savefig(folder / "micrograph.png")
     rows = [
         [k + 1, *fibre.centre, fibre.radius, fractions[k], tractions[k]] for k, fibre in enumerate(stiffness.fibres)
     ]
     head = ("fibre", "x", "y", "radius", "local fraction", "largest traction / S11")
     return [figures.tabulate(folder / "micrograph.csv", head, rows), folder / "micrograph.png"]
+
+
+def draw_fibres(axes: Any, result: Result, tractions: np.ndarray, first: list[int]) -> None:
+    """The cell with its fibres by their largest tractions, those that come first in the colour of their points."""
+    from matplotlib.collections import EllipseCollection
+
+    cell = result.cell
+    steps = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1]), axis=-1).reshape(-1, 2) * [cell.width, cell.height]
+    centres = np.array([fibre.centre for fibre in result.fibres])
+    for own, line, ink in ((slice(None), 0.3, "0.3"), (first, 1.6, INK[1])):
+        diameters = np.tile([2 * fibre.radius for fibre in np.array(result.fibres, object)[own]], len(steps))
+        discs = EllipseCollection(
+            diameters,
+            diameters,
+            np.zeros(len(diameters)),
+            units="xy",
+            offsets=(steps[:, None] + centres[own]).reshape(-1, 2),
+            offset_transform=axes.transData,
+            array=np.tile(tractions[own], len(steps)),
+            cmap="viridis",
+            edgecolor=ink,
+            linewidth=line,
+        )
+        discs.set_clim(tractions.min(), tractions.max())
+        axes.add_collection(discs)
+    axes.figure.colorbar(discs, ax=axes, label=TRACTION, shrink=0.85)
+    axes.set(xlim=(0, cell.width), ylim=(0, cell.height), aspect="equal", xlabel="$x_1$ (um)", ylabel="$x_2$ (um)")
+    axes.set_title("The window, made periodic", fontsize=11)
 
 
 if __name__ == "__main__":

@@ -18,6 +18,7 @@ from feti_homog.output.text import point_tables
 Document = Mapping[str, Any]
 
 
+PHASES_OF_ONE_FIBRE = 2
 IN_THE_PLANE, IN_SPACE = (1, 2, 3), (1, 2, 6)
 """The numbers i and j in the names Cij of a plane state: its own, and those of the same strains in space."""
 
@@ -29,8 +30,8 @@ def numbers(planes: Iterable[str | None]) -> tuple[int, ...]:
 
 def outputs(document: Document, numbers: Sequence[int] = IN_THE_PLANE) -> dict[str, float]:
     """The numbers of a result.json by the names of the table's columns; `numbers` of strains in the plane, in names."""
-    cell, solver = document["cell"], document["solver"]
-    found = {"fraction_meshed": cell["fibre_fraction"], "elements": cell["elements"], "nodes": cell["nodes"]}
+    solver = document["solver"]
+    found = _cell(document["cell"])
     found |= {name: solver[name] for name in ("ranks", "subdomains", "dofs", "multipliers")}
     found |= {"iterations": sum(solver["iterations"])}
     for name, suffix in (("effective_stiffness", ""), ("effective_stiffness_compression", "_compression")):
@@ -46,6 +47,15 @@ def outputs(document: Document, numbers: Sequence[int] = IN_THE_PLANE) -> dict[s
     found |= {f"check_{name}": error for name, error in document["checks"].items()}
     found |= {f"seconds_{stage}": took for stage, took in document["timings"].items()}
     return {name: float(value) for name, value in (found | {"memory": document["memory"]}).items()}
+
+
+def _cell(cell: Mapping[str, Any]) -> dict[str, float]:
+    """What the mesh is like."""
+    found = {"fraction_meshed": cell["fibre_fraction"], "elements": cell["elements"], "nodes": cell["nodes"]}
+    fractions = cell.get("fractions", {})
+    if len(fractions) > PHASES_OF_ONE_FIBRE:
+        found |= {f"fraction_{phase}": share for phase, share in fractions.items()}
+    return found | ({"match_distance": cell["match_distance"]} if "match_distance" in cell else {})
 
 
 def _entries(stiffness: Any, numbers: Sequence[int]) -> dict[str, float]:
