@@ -41,7 +41,7 @@ def outline(arrangement: Arrangement, sizes: MeshSizes, marks: Mapping[int, Sequ
     places = [_crossings(ellipses, axis, size) for axis in (0, 1)]
     sides = ((axis, level) for axis in (0, 1) for level in (0.0, size[1 - axis]))
     border = np.concatenate([on_side(places[axis], axis, level) for axis, level in sides])
-    curve = fibre + len(arrangement.radii) * (around != MATRIX)
+    curve = np.where(around == MATRIX, fibre, ~fibre)
     angles, sharp = _vertex_angles(ellipses, curve, border, size, marks)
     which, start, stop = arcs_within(angles, lambda of, angle: ellipses[of].at(angle), size)
     ends = ellipses[which].at(start)
@@ -130,8 +130,8 @@ def _on_upright(places: Float, size: Float) -> Float:
 def _tips(arrangement: Arrangement, marks: Mapping[int, Sequence[float]], vertices: Float, size: Float) -> Float:
     """The vertices (t, 2) that the marks have become; those of curves that are not there are none."""
     curve, angle = marked(arrangement, marks)
-    fibre = curve % len(arrangement.radii)
-    own = arrangement.ellipses[fibre].grown(np.where(curve == fibre, arrangement.thickness[fibre], 0.0))
+    fibre = np.where(curve < 0, ~curve, curve)
+    own = arrangement.ellipses[fibre].grown(np.where(curve < 0, 0.0, arrangement.thickness[fibre]))
     places = own.at(own.parameter(directions(angle)))
     return np.asarray(vertices[cKDTree(vertices % size, boxsize=size).query(places % size)[1]])
 

@@ -110,14 +110,14 @@ def outline(arrangement: Arrangement, sizes: MeshSizes, marks: Mapping[int, Sequ
     """All lines of the cell with nodes at distances of at most `sizes`, closer in narrow passages.
 
     Opposite sides have the same nodes. `marks` maps a curve to angles in degrees, measured at its centre, that become
-    nodes: of N fibres curve k is the outer one of fibre k, and N + k that within its coating.
+    nodes: curve k is the outer one of fibre k, and ~k that within its coating.
     """
     size = np.array([arrangement.width, arrangement.height])
     circles, fibre, around = images(arrangement)
     places = [_crossings(circles, axis, size) for axis in (0, 1)]
     sides = ((axis, level) for axis in (0, 1) for level in (0.0, size[1 - axis]))
     border = np.concatenate([on_side(places[axis], axis, level) for axis, level in sides])
-    curve = fibre + len(arrangement.radii) * (around != MATRIX)
+    curve = np.where(around == MATRIX, fibre, ~fibre)
     angles = _vertex_angles(circles, curve, border, marks)
     circle, start, stop = arcs_within(angles, lambda of, angle: _on_circle(circles[of], angle), size)
     ends = _on_circle(circles[circle], start)
@@ -222,8 +222,8 @@ def arcs_within(angles: list[Float], at: Callable[[Int, Float], Float], size: Fl
 def _tips(arrangement: Arrangement, marks: Mapping[int, Sequence[float]], vertices: Float) -> Float:
     """The vertices (t, 2) that the marks have become; those of curves that are not there are none."""
     curve, angle = marked(arrangement, marks)
-    size, fibre = np.array([arrangement.width, arrangement.height]), curve % len(arrangement.radii)
-    radii = np.concatenate([arrangement.outer_radii, arrangement.radii])[curve]
+    size, fibre = np.array([arrangement.width, arrangement.height]), np.where(curve < 0, ~curve, curve)
+    radii = np.where(curve < 0, arrangement.radii[fibre], arrangement.outer_radii[fibre])
     places = _on_circle(np.column_stack([arrangement.centres[fibre], radii]), angle)
     return np.asarray(vertices[cKDTree(vertices % size, boxsize=size).query(places % size)[1]])
 

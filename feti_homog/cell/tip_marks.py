@@ -11,8 +11,9 @@ from feti_homog.typing import Float, Int
 
 
 def marked(arrangement: Arrangement, marks: Mapping[int, Sequence[float]]) -> tuple[Int, Float]:
-    """Curve and angle in radians (t,) of the marks on curves that are there."""
-    there = np.concatenate([np.ones(len(arrangement.radii), bool), arrangement.coated])
-    known = {curve: own for curve, own in marks.items() if curve < len(there) and there[curve]}
+    """Curve and angle in radians (t,) of the marks on curves that are there: k is the outer curve of fibre k, ~k that
+    within its coating."""
+    there = {*range(len(arrangement.radii)), *(~np.flatnonzero(arrangement.coated)).tolist()}
+    known = {curve: own for curve, own in marks.items() if curve in there}
     curve = np.repeat(list(known), [len(own) for own in known.values()]).astype(int)
     return curve, np.radians([mark for own in known.values() for mark in own])

@@ -30,9 +30,8 @@ def marks(case: Case) -> dict[int, list[float]]:
     found: dict[int, set[float]] = {}
     for interface in case.interfaces:
         is_within = interface.between is not None and {COATING, MATRIX} & set(interface.between) == {COATING}
-        first = element_estimate.fibres_of(case.cell) if is_within else 0
         for fibre, own in on_interface(case, interface).items():
-            found.setdefault(first + fibre, set()).update(own)
+            found.setdefault(~fibre if is_within else fibre, set()).update(own)
     return {curve: sorted(found[curve]) for curve in sorted(found)}
 
 
