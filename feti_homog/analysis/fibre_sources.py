@@ -6,6 +6,7 @@ from pathlib import Path
 
 from feti_homog.analysis import listed_fibres
 from feti_homog.config.fibre_window import read_window
+from feti_homog.config.phase_names import VOID
 from feti_homog.errors import CaseError
 from feti_homog.microstructure.fibre_pattern import FibrePattern
 
@@ -14,7 +15,7 @@ def read(source: Path, size: tuple[float, float] | None) -> FibrePattern:
     """The fibres, at least two, in the source's unit of length.  On one rank.
 
     Those of a table are in a window, of this width and height if the table has none; those of a folder or of a case, in
-    a periodic cell.
+    a periodic cell. Voids are left out.
 
     Raises:
         CaseError, MeshError: the source is faulty, a fibre is not round, or there are fewer than two.
@@ -25,7 +26,8 @@ def read(source: Path, size: tuple[float, float] | None) -> FibrePattern:
         raise CaseError(f"--size: only for a table of fibres; {source} says how large the cell is")
     fibres = listed_fibres.read(source)
     width, height = fibres.size.tolist()
-    found = FibrePattern(width, height, fibres.circles[:, :2], fibres.circles[:, 2], periodic=True)
+    circles = fibres.circles[[name != VOID for name in fibres.phases]]
+    found = FibrePattern(width, height, circles[:, :2], circles[:, 2], periodic=True)
     if found.count < 2:
         raise CaseError(f"{source}: expected at least two fibres, got {found.count}")
     return found

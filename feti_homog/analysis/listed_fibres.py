@@ -53,6 +53,8 @@ def read(source: Path) -> ListedFibres:
 def _of_result(directory: Path) -> ListedFibres:
     document = stored_result.read(directory)
     fibres, cell = document["fibres"], document["cell"]
+    if cell.get("porosity"):
+        raise CaseError(f"{directory}: results do not list voids; give the case file")
     nowhere = (np.nan, np.nan)
     circles = [(*(fibre.get("centre") or nowhere), fibre.get("radius") or np.nan) for fibre in fibres]
     return ListedFibres(

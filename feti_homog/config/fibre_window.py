@@ -19,13 +19,13 @@ SAME_CENTRE = 1e-6
 def read_window(path: Path, size: tuple[float, float] | None = None) -> FibrePattern:
     """The fibres of a table, at least two, in a window of this width and height, else of those that the table gives.
 
-    The window begins at the `left` and `bottom` of the table, else at 0.
+    Voids are left out. The window begins at the `left` and `bottom` of the table, else at 0.
 
     Raises:
         CaseError: the table is faulty, or its size unknown; a fibre is not round, has its centre outside of the window,
             or is there twice.
     """
-    table = read_table(path)
+    table = read_table(path).solid
     width, height = size or (table.width, table.height)
     if width is None or height is None:
         raise CaseError(

@@ -51,6 +51,10 @@ CASES = {
         "analysis": {"type": "stiffness", "plane": "strain"},
         "cell": {"geometry": "random", "match": str(TABLE), "fibres": 10, "mesh_size": 0.1},
     },
+    "voids": {
+        "analysis": {"type": "stiffness", "plane": "strain"},
+        "cell": {"geometry": "random", "fibre_fraction": 0.3, "fibres": 2, "voids": 0.05, "mesh_size": 0.1},
+    },
     "coated": COATED | {"analysis": {"type": "stiffness", "plane": "strain"}},
     "stiffness of two interfaces": COATED
     | {"analysis": {"type": "stiffness", "plane": "strain"}, "interface": [OUTER | HALF_OPEN, INNER]},
