@@ -165,7 +165,8 @@ class Cell:
         TABLE_FILE,
         "A table of the fibres in a window of a micrograph, relative to the case file: columns x, y, radius, and a "
         'comment such as "# width = 120, height = 80". The cell gets its radii and, as near as can be, its '
-        "distributions of the distances of nearest and second neighbours, but none below min_gap.",
+        "distributions of the distances of nearest and second neighbours, but none below min_gap. Ellipses count as "
+        "discs of the same area.",
         default=None,
         only=RANDOM,
         default_words="none",

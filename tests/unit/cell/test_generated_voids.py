@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import tomli_w
+from mpi4py import MPI
 from support.circular_cells import cell as circular
 
+from feti_homog import run
 from feti_homog.analysis import fibre_rows, fibre_sources
 from feti_homog.cell.arrangement import arrange
 from feti_homog.cell.coarse_mesh import areas
@@ -93,8 +96,6 @@ def test_the_table_of_a_cell_with_voids_gives_it_again(tmp_path, cell):
 
 
 def _toml(case):
-    import tomli_w
-
     document = {k: v for k, v in case.resolved().items() if k in ("cell", "material", "analysis")}
     return tomli_w.dumps(document)
 
@@ -140,11 +141,16 @@ def test_too_many_voids_are_told():
         arrange(circular(fraction=0.5, gap=0.05, voids=0.4))
 
 
+def test_the_folder_of_a_result_does_not_list_voids(tmp_path):
+    """Its fibres have statistics all the same."""
+    cell = RANDOM | {"fibres": 3, "voids": 0.05, "mesh_size": 0.2}
+    run(case_of(tmp_path, cell), MPI.COMM_SELF, out=tmp_path / "run")
+    with pytest.raises(CaseError, match="has voids, which only a case of a table or of a random cell lists"):
+        fibre_rows.table(tmp_path / "run")
+    assert fibre_sources.read(tmp_path / "run", None).count == 3
+
+
 def test_a_void_is_no_fibre_that_can_debond(tmp_path):
-    from mpi4py import MPI
-
-    from feti_homog import run
-
     document = {
         "cell": table(ROWS),
         "material": {"matrix": MATRIX, "fibre": {"young": 70.0, "poisson": 0.2}},
