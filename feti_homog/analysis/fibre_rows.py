@@ -33,6 +33,8 @@ def table(source: Path) -> str:
         columns["angle"] = _words(np.where(is_round, np.nan, ellipses.angles))
     if fibres.coatings.any():
         columns["coating"] = _words(fibres.coatings / fibres.radii)
+    if fibres.cores.any():
+        columns["inner_radius"] = _words(fibres.cores)
     rows = map(",".join, zip(*columns.values(), strict=True))
     width, height = fibres.size.tolist()
     size = f"# width = {width!r}, height = {height!r}, left = 0, bottom = 0"

@@ -32,6 +32,7 @@ class ListedFibres:
         ellipses: N circles and ellipses about centres within the cell.
         phases: their names; those of cells that the program meshes have the voids behind them.
         coatings: (N,) thickness of the coatings, 0 without one.
+        cores: (N,) radii of the voids within hollow fibres, 0 of others.
         lacks_voids: whether there are voids that are not listed.
     """
 
@@ -39,6 +40,7 @@ class ListedFibres:
     ellipses: Ellipses
     phases: tuple[str, ...]
     coatings: Float
+    cores: Float
     lacks_voids: bool
 
     @property
@@ -76,6 +78,7 @@ def _of_result(directory: Path) -> ListedFibres:
         Ellipses.of(centres, a, b, np.array([fibre.get("angle") or 0.0 for fibre in fibres])),
         tuple(fibre["phase"] for fibre in fibres),
         np.array([fibre.get("coating") or 0.0 for fibre in fibres]),
+        np.zeros(len(fibres)),
         bool(cell.get("porosity")),
     )
 
@@ -86,10 +89,14 @@ def _of_cell(cell: Cell) -> ListedFibres:
     arrangement = arrange(cell)
     scale = arrangement_scale(cell, arrangement)
     size = scale * np.array([arrangement.width, arrangement.height])
-    centres, radii = scale * arrangement.centres % size, scale * arrangement.radii
-    discs = Ellipses.round(np.column_stack([centres, radii]))
-    ellipses = discs if arrangement.frames is None else Ellipses(centres, scale * arrangement.frames)
-    return ListedFibres(size, ellipses, arrangement.phase, scale * arrangement.thickness, lacks_voids=False)
+    hollow = arrangement.is_hollow
+    discs = Ellipses.round(np.column_stack([arrangement.centres, arrangement.radii]))
+    inner = discs if arrangement.frames is None else arrangement.ellipses
+    own = inner.grown(np.where(hollow, arrangement.thickness, 0.0))
+    ellipses = Ellipses(scale * own.centres % size, scale * own.frames)
+    coatings = scale * np.where(hollow, 0.0, arrangement.thickness)
+    cores = scale * np.where(hollow, arrangement.radii, 0.0)
+    return ListedFibres(size, ellipses, arrangement.phase, coatings, cores, lacks_voids=False)
 
 
 def _of_mesh(cell: Cell) -> ListedFibres:
@@ -100,4 +107,4 @@ def _of_mesh(cell: Cell) -> ListedFibres:
     ellipses = Ellipses(fibre_circles(torus)[:, :2] % mesh.period, fibre_frames(torus))
     coatings = coating_thickness(numbers, is_fibre, ellipses.semi_axes)
     phases = tuple(mesh.phases[phase] for phase in torus.constituent_phase[is_fibre])
-    return ListedFibres(mesh.period, ellipses[is_fibre], phases, coatings, voids(mesh) > 0)
+    return ListedFibres(mesh.period, ellipses[is_fibre], phases, coatings, np.zeros(len(phases)), voids(mesh) > 0)

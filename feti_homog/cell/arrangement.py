@@ -40,7 +40,8 @@ class Arrangement:
     `mesh_order` (N,) are the discs in the order in which they are meshed, on which a few triangles depend; that of the
     discs if it is None. `coating` (N,) is the thickness of the ring around each disc, 0 where there is none; None if no
     disc has one. Rings do not touch. `frames` (N, 2, 2) are those of `Ellipses` where some discs are ellipses, with
-    `radii` of the same areas; else None. A coating makes the semi-axes of an ellipse longer by its thickness.
+    `radii` of the same areas; else None. A coating makes the semi-axes of an ellipse longer by its thickness. Discs
+    that are `hollow` (N,), if any, are voids within rings of the fibre's own phase.
     """
 
     width: float
@@ -51,17 +52,29 @@ class Arrangement:
     mesh_order: Int | None = None
     coating: Float | None = None
     frames: Float | None = None
+    hollow: Bool | None = None
 
     @property
     def phases(self) -> tuple[str, ...]:
         """The phases of the cell: the matrix, those of the fibres in the order in which they first appear, coatings."""
         named = dict.fromkeys(name for name in self.phase if name != VOID)
-        return (MATRIX, *named, *((COATING,) if self.coated.any() else ()))
+        return (MATRIX, *named, *((COATING,) if (self.coated & ~self.is_hollow).any() else ()))
 
     @property
     def is_void(self) -> Bool:
         """(N,) which discs are voids."""
         return np.array([name == VOID for name in self.phase], bool)
+
+    @property
+    def is_hollow(self) -> Bool:
+        """(N,) which discs are hollow fibres."""
+        return np.zeros(len(self.radii), bool) if self.hollow is None else self.hollow
+
+    @property
+    def within(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """What is in each disc (N,), and what is in the ring around it if there is one (N,)."""
+        both = list(zip(self.phase, self.is_hollow.tolist(), strict=True))
+        return tuple(VOID if void else own for own, void in both), tuple(own if void else COATING for own, void in both)
 
     @property
     def fibres(self) -> int:
@@ -219,10 +232,20 @@ def table_arrangement(cell: Cell) -> Arrangement:
     assert table is not None and table.width is not None
     rows, centres, radii, height = tabulated.fibres(table, cell.window)
     coating = None if table.coating is None else table.coating[rows] * radii
-    discs = Arrangement(1.0, height, centres, radii, tuple(table.phase[row] for row in rows), coating=coating)
+    hollow = None
+    if table.inner_radius is not None:
+        core = table.inner_radius[rows] / table.width
+        hollow = core > 0
+        coating = np.where(hollow, radii - core, 0.0 if coating is None else coating)
+        radii = np.where(hollow, core, radii)
+    phase = tuple(table.phase[row] for row in rows)
+    discs = Arrangement(1.0, height, centres, radii, phase, coating=coating, hollow=hollow)
     clearance, shift = _clearance, clear_shift
     if table.a is not None:
         unit = elliptic_table.ellipses_of(table, rows, centres).frames / table.width
+        unit = np.where(
+            discs.is_hollow[:, None, None], unit * (radii * table.width / table.radius[rows])[:, None, None], unit
+        )
         discs, clearance, shift = replace(discs, frames=unit), elliptic_table.clearance, elliptic_table.clear_shift
     shifted = shift(discs)
     is_placed = table.left is not None and table.bottom is not None

@@ -19,7 +19,7 @@ from feti_homog.cell.outline import MATRIX, Curve, Outline, outline
 from feti_homog.cell.size_field import MAX_GROWTH
 from feti_homog.cell.void_holes import without_voids
 from feti_homog.config.mixed_cell import fractions_in_words, mixed_width
-from feti_homog.config.phase_names import COATING, VOID
+from feti_homog.config.phase_names import VOID
 from feti_homog.errors import MeshError
 from feti_homog.typing import Float, Index, Int32
 
@@ -81,12 +81,12 @@ def mesh_arrangement(
     has_ellipses = arrangement.frames is not None
     lines = (elliptic_outline.outline if has_ellipses else outline)(arrangement, sizes, marks)
     points, triangles, circle = _fill(lines, sizes, sizes.are_graded(arrangement))
-    within = [
-        COATING if coat else arrangement.phase[disc] for disc, coat in zip(lines.disc, lines.is_coating, strict=True)
-    ]
+    in_disc, in_ring = arrangement.within
+    within = [(in_ring if ring else in_disc)[disc] for disc, ring in zip(lines.disc, lines.is_coating, strict=True)]
     place = {name: number for number, name in enumerate((*arrangement.phases, VOID))}
     phase = np.array([place[name] for name in (*within, arrangement.phases[0])], np.int32)[circle]
-    number = lines.disc + 1 + np.where(lines.is_coating, arrangement.fibres, 0)
+    is_coating = lines.is_coating & ~arrangement.is_hollow[lines.disc]
+    number = lines.disc + 1 + np.where(is_coating, arrangement.fibres, 0)
     arc_edges, arc_circle = _arc_edges(lines)
     filled = CoarseMesh(
         width=scale * arrangement.width,
@@ -103,7 +103,7 @@ def mesh_arrangement(
         debonded_edges=np.zeros((0, 2), np.int32),
         centres=scale * arrangement.centres[: arrangement.fibres] if has_ellipses else None,
     )
-    return without_voids(filled, place[VOID]) if arrangement.is_void.any() else filled
+    return without_voids(filled, place[VOID]) if VOID in within else filled
 
 
 def _arc_edges(lines: Outline) -> tuple[Int32, Int32]:

@@ -193,8 +193,9 @@ class Cell:
         "may have any shape. Of Abaqus' files (.inp) element sets have these names; of .vtu and .vtk files, which "
         'meshio reads, cell data "phase" are 0 in the matrix, 1 in fibre, 2 in fibre:2, ... Of "table" the fibres, a '
         "row for each: columns x, y, radius and, if there are any, phase and coating (thickness / radius); of ellipses "
-        "a and b, the semi-axes, in place of the radius, and angle from x to a in degrees; of voids the phase is void. "
-        'What follows # is a comment, of which "# width = 120, height = 80" says the size of the cell.',
+        "a and b, the semi-axes, in place of the radius, and angle from x to a in degrees; of "
+        "hollow fibres inner_radius. Rows of the phase void are voids. What "
+        'follows # is a comment, of which "# width = 120, height = 80" says the size of the cell.',
         default=None,
         only=FROM_A_FILE,
         default_words="required, or fibre_list of a table",
@@ -234,7 +235,9 @@ class Cell:
     @property
     def has_voids(self) -> bool:
         """Whether there are voids, as far as is known before a user's mesh is read."""
-        return bool(self.voids) or (self.table is not None and bool(self.table.is_void.any()))
+        hollow = None if self.table is None else self.table.inner_radius
+        listed = self.table is not None and bool(self.table.is_void.any())
+        return bool(self.voids) or listed or (hollow is not None and bool(hollow.any()))
 
     @property
     def has_own_mesh(self) -> bool:

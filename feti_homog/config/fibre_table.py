@@ -17,16 +17,17 @@ from feti_homog.config.wording import suggestion, toml_value
 from feti_homog.errors import CaseError
 from feti_homog.typing import Bool, Float, Int
 
-NUMBERS = ("x", "y", "radius", "coating", "a", "b", "angle")
+NUMBERS = ("x", "y", "radius", "coating", "a", "b", "angle", "inner_radius")
 COLUMNS = (*NUMBERS[:3], "phase", *NUMBERS[3:])
 SIZES = ("width", "height", "left", "bottom")
 """What comment lines may say of the cell: its size, and the coordinates of its lower left corner."""
+OF_FIBRES = ("coating", "inner_radius")
 PHASE_NAME = re.compile(r"[A-Za-z0-9_:-]+")
 SIZE = re.compile(r"\b(width|height|left|bottom)\s*[=:]\s*([^\s;=]+?)(?=,?\s|,?$|;|,[a-z])")
 TYPES = (
     dict.fromkeys(("x", "y", "angle"), real())
     | dict.fromkeys(("radius", "a", "b"), real(above=0.0))
-    | {"coating": real(least=0.0)}
+    | dict.fromkeys(("coating", "inner_radius"), real(least=0.0))
 )
 # Faults that are told one by one.
 MAX_FAULTS = 30
@@ -43,6 +44,7 @@ class FibreTable:
         radius: (N,); NaN where the table gives semi-axes instead.
         phase: N names, "fibre" where the table gives none, "void" of voids.
         coating: (N,) thickness / radius, 0 where a cell is empty; None without that column, like what follows.
+        inner_radius: (N,) of the void within hollow fibres, 0 of others.
         a, b, angle: (N,) semi-axes, and the angle in degrees from x to a, of ellipses; NaN where a cell is empty.
         width, height: of the cell; None if the table does not say.
         left, bottom: coordinates of its lower left corner; None if the table does not say.
@@ -58,6 +60,7 @@ class FibreTable:
     a: Float | None
     b: Float | None
     angle: Float | None
+    inner_radius: Float | None
     width: float | None
     height: float | None
     left: float | None
@@ -92,6 +95,7 @@ class FibreTable:
             a=optional(self.a),
             b=optional(self.b),
             angle=optional(self.angle),
+            inner_radius=optional(self.inner_radius),
         )
 
     @property
@@ -240,7 +244,7 @@ def _table(
     if not rows and not faults.lines:
         faults.lines.append(f"{name}: no fibres; expected a row for each")
     faults.throw()
-    nothing = {"coating": 0.0, "angle": 0.0}
+    nothing = {"coating": 0.0, "angle": 0.0, "inner_radius": 0.0}
 
     def column(key: str) -> Float:
         return np.array([cells.get(key, nothing.get(key, math.nan)) for cells in rows.values()], float)
@@ -259,6 +263,7 @@ def _table(
         a=optional("a"),
         b=optional("b"),
         angle=optional("angle"),
+        inner_radius=optional("inner_radius"),
         width=sizes.get("width"),
         height=sizes.get("height"),
         left=sizes.get("left"),
@@ -276,8 +281,8 @@ def _cell_faults(cells: Mapping[str, Any]) -> Iterator[str]:
         if complaint:
             yield f"{key} = {toml_value(cells[key])}: {complaint}"
     phase = cells.get("phase", "fibre")
-    if phase == VOID and cells.get("coating", 0.0) != 0.0:
-        yield f"coating = {toml_value(cells['coating'])}: a void has none"
+    if phase == VOID:
+        yield from (f"{key} = {toml_value(cells[key])}: a void has none" for key in OF_FIBRES if cells.get(key))
     if not isinstance(phase, str) or not PHASE_NAME.fullmatch(phase) or phase == "matrix":
         yield (
             f"phase = {toml_value(phase)}: expected a name of letters, digits, _, - and :, "

@@ -106,9 +106,11 @@ FIBRE_LIST = ValueType(
         "minItems": 1,
         "items": {
             "type": "object",
-            "properties": {"x": real().json_schema, "y": real().json_schema, "phase": {"type": "string"}}
-            | {"radius": real(above=0.0).json_schema},
-            "required": ["x", "y", "radius"],
+            "properties": {"phase": {"type": "string"}}
+            | dict.fromkeys(("x", "y", "angle"), real().json_schema)
+            | dict.fromkeys(("radius", "a", "b"), real(above=0.0).json_schema)
+            | dict.fromkeys(("coating", "inner_radius"), real(least=0.0).json_schema),
+            "required": ["x", "y"],
             "additionalProperties": False,
         },
     },

@@ -12,6 +12,9 @@ from feti_homog.typing import Bool, Float
 BOTH_SIZES = "has a radius and semi-axes; give one"
 # Shorter / longer semi-axis of a fibre, at least: elements at the tips would be too small.
 THINNEST = 0.05
+# Inner / outer radius of hollow fibres.
+WIDEST_CORE = 0.05, 0.98
+HOLLOW_WORDS = f"expected inner_radius / radius from {WIDEST_CORE[0]:g} to {WIDEST_CORE[1]:g}, or 0"
 
 
 def with_shapes(table: FibreTable, faults: list[str]) -> FibreTable:
@@ -43,6 +46,17 @@ def equal_area_radii(table: FibreTable) -> Float:
     if table.a is None or table.b is None:
         return table.radius
     return np.where(np.isnan(table.a), table.radius, np.where(table.a == table.b, table.a, np.sqrt(table.a * table.b)))
+
+
+def check_hollow(table: FibreTable, faults: list[str]) -> None:
+    """Add faults of hollow fibres to `faults`."""
+    if table.inner_radius is None:
+        return
+    hollow, inner = table.inner_radius > 0, table.inner_radius / table.radius
+    _tell(table, hollow & ((inner < WIDEST_CORE[0]) | (inner > WIDEST_CORE[1])), HOLLOW_WORDS, faults)
+    _tell(table, hollow & (table.outer_radius > table.radius), "has an inner_radius and a coating; give one", faults)
+    if table.a is not None:
+        _tell(table, hollow & (table.a != table.b), "has an inner_radius, which only round fibres may have", faults)
 
 
 def _tell(table: FibreTable, are_faulty: Bool, words: str, faults: list[str]) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.cases import FIBRE, MATRIX, relative_error
+from support.cases import FIBRE, MATRIX, monolithic_stiffness, relative_error, solve
 from support.void_cells import write_part
 
 from feti_homog import run
@@ -20,6 +20,8 @@ pytestmark = pytest.mark.parallel
 VOID = {"x": 0.0, "y": 0.0, "radius": 0.15, "phase": "void"}
 OVAL = {"x": 0.5, "y": 0.02, "a": 0.16, "b": 0.08, "angle": 30.0, "phase": "void"}
 ROWS = [VOID, {"x": 0.5, "y": 0.5, "radius": 0.2}, {"x": 0.9, "y": 0.55, "radius": 0.1}, OVAL]
+
+TWICE = {"matrix": MATRIX, "fibre": MATRIX}
 
 
 def table(rows, **keys):
@@ -114,3 +116,21 @@ def test_an_accuracy_counts_free_faces_of_voids():
         cases.parse(document | {"cell": {"fibre_list": rows} | asked}, Path()) for rows in (ROWS[1:3], ROWS[:3])
     )
     assert void.cell.refine > plain.cell.refine == 0
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_hollow_fibre_of_the_matrix_is_a_void(comm, order):
+    """Of the tube's inner radius, on another mesh."""
+    keys = {"mesh_size": 0.05, "order": order, "refine": 1}
+    tube = solved(comm, table([ROWS[1] | {"radius": 0.3, "inner_radius": 0.2}], **keys), material=TWICE)
+    hole = solved(comm, table([ROWS[1] | {"phase": "void"}], **keys), fibre=False)
+    assert tube.cell.porosity == pytest.approx(hole.cell.porosity, rel=1e-3)
+    assert relative_error(tube.effective_stiffness, hole.effective_stiffness) < {1: 4e-3, 2: 1e-4}[order]
+
+
+def test_hollow_fibres_have_the_monolithic_stiffness(comm):
+    rows = [VOID, ROWS[1] | {"inner_radius": 0.15}, {"x": 0.0, "y": 0.5, "radius": 0.15, "inner_radius": 0.05}]
+    for pieces in ({}, {"decomposition": {"subdomains": 6}}):
+        case = cases.parse(_document(table(rows, refine=1)) | pieces, Path())
+        torn, L, _ = solve(case, comm)
+        assert relative_error(L, monolithic_stiffness(torn)) < 1e-9
