@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
 from feti_homog.analysis import listed_fibres
 from feti_homog.config.fibre_window import read_window
+from feti_homog.config.phase_names import VOID
 from feti_homog.errors import CaseError
 from feti_homog.microstructure.fibre_pattern import FibrePattern
 
@@ -14,7 +17,7 @@ def read(source: Path, size: tuple[float, float] | None) -> FibrePattern:
     """The fibres, at least two, in the source's unit of length.  On one rank.
 
     Those of a table are in a window, of this width and height if the table has none; those of a folder or of a case, in
-    a periodic cell. Ellipses count as discs of the same centres and areas.
+    a periodic cell. Voids are left out; ellipses count as discs of the same centres and areas.
 
     Raises:
         CaseError, MeshError: the source is faulty, a fibre is no circle or ellipse, or there are fewer than two.
@@ -25,7 +28,9 @@ def read(source: Path, size: tuple[float, float] | None) -> FibrePattern:
         raise CaseError(f"--size: only for a table of fibres; {source} says how large the cell is")
     fibres = listed_fibres.read(source)
     width, height = fibres.size.tolist()
-    found = FibrePattern(width, height, fibres.ellipses.centres, fibres.radii, periodic=True)
+    is_fibre = np.array([name != VOID for name in fibres.phases])
+    centres, radii = fibres.ellipses.centres[is_fibre], fibres.radii[is_fibre]
+    found = FibrePattern(width, height, centres, radii, periodic=True)
     if found.count < 2:
         raise CaseError(f"{source}: expected at least two fibres, got {found.count}")
     return found

@@ -62,6 +62,8 @@ def read(source: Path) -> ListedFibres:
 def _of_result(directory: Path) -> ListedFibres:
     document = stored_result.read(directory)
     fibres, cell = document["fibres"], document["cell"]
+    if cell.get("porosity"):
+        raise CaseError(f"{directory}: results do not list voids; give the case file")
     unknown = (np.nan, np.nan)
     centres = np.array([fibre.get("centre") or unknown for fibre in fibres], float).reshape(-1, 2)
     axes = [

@@ -21,13 +21,13 @@ def read_window(path: Path, size: tuple[float, float] | None = None) -> FibrePat
     """The fibres of a table, at least two, in a window of this width and height, else of those that the table gives;
     ellipses as discs of the same centres and areas.
 
-    The window begins at the `left` and `bottom` of the table, else at 0.
+    Voids are left out. The window begins at the `left` and `bottom` of the table, else at 0.
 
     Raises:
         CaseError: the table is faulty, or its size unknown; a fibre has its centre outside of the window, or is there
             twice.
     """
-    table = read_table(path)
+    table = read_table(path).solid
     width, height = size or (table.width, table.height)
     if width is None or height is None:
         raise CaseError(
