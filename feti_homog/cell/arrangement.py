@@ -113,11 +113,6 @@ class Arrangement:
         assert self.frames is not None
         return Ellipses(self.centres, self.frames)
 
-    @property
-    def round_radii(self) -> Float:
-        """(N,) radii of discs, NaN of ellipses."""
-        return self.radii if self.frames is None else np.where(self.ellipses.are_round, self.radii, np.nan)
-
 
 def arrange(cell: Cell) -> Arrangement:
     """The arrangement that a case asks for in a cell of width 1, its fractions `cell.fractions` to rounding.

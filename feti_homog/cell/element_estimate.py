@@ -1,4 +1,4 @@
-"""About how many triangles a mesh of round fibres will have, before it is made."""
+"""About how many triangles a mesh of round and elliptic fibres will have, before it is made."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from feti_homog.cell.arrangement import arrange
+from feti_homog.cell.ellipses import Ellipses
 from feti_homog.cell.size_field import MAX_GROWTH, MIN_EDGES_AROUND
 from feti_homog.config.cell_section import FIBRES_OF
 from feti_homog.config.mixed_cell import fibre_counts
@@ -43,14 +44,17 @@ def interface_size(cell: Cell) -> float:
 
 
 def triangles(cell: Cell) -> float:
-    """Those of a cell without debonded arcs: of one size, about fibres, and beside fine interfaces.
+    """Those of a cell without debonded arcs: of one size, about fibres, at ends of ellipses, beside fine interfaces.
 
-    On both sides of circles of the length P there are 2 P int dx / (A (h + g x)^2) = 2 P / (A g h) triangles.
+    On both sides of interfaces of the length P there are 2 P int dx / (A (h + g x)^2) = 2 P / (A g h) triangles.
     """
     count = _height(cell) / (TRIANGLE_AREA * cell.mesh_size**2) + TRIANGLES_OF_A_FIBRE * _irregular_fibres(cell)
+    ellipses = _ellipses(cell)
+    if ellipses is not None:
+        count += _triangles_of_ends(ellipses, cell.interface_size or cell.mesh_size)
     if cell.interface_size is None:
         return count
-    length = 2 * math.pi * mean_radius(cell) * fibres_of(cell)
+    length = 2 * math.pi * mean_radius(cell) * fibres_of(cell) if ellipses is None else math.fsum(ellipses.perimeters)
     return count + 2 * length / (TRIANGLE_AREA * MAX_GROWTH * cell.interface_size)
 
 
@@ -67,6 +71,19 @@ def ratio_at_a_tip(count: float) -> float:
     """How much smaller elements at a tip may be than around, if it is to add no more triangles than `count`."""
     counts = [triangles_of_a_tip(ratio) for ratio in RATIOS]
     return float(np.interp(count, counts, RATIOS))
+
+
+def _ellipses(cell: Cell) -> Ellipses | None:
+    """The fibres, if some are not round."""
+    arrangement = arrange(cell) if cell.geometry == "table" else None
+    return None if arrangement is None or arrangement.frames is None else arrangement.ellipses
+
+
+def _triangles_of_ends(ellipses: Ellipses, around: float) -> float:
+    """Those that the ends of long axes, where the radius of curvature is b^2 / a, add among elements of this size."""
+    short, long = np.sort(ellipses.semi_axes[~ellipses.are_round], axis=1).T
+    at_ends = 2 * np.pi * short**2 / long / MIN_EDGES_AROUND
+    return 2 * math.fsum(map(triangles_of_a_tip, np.maximum(1.0, around / at_ends).tolist()))
 
 
 def _irregular_fibres(cell: Cell) -> int:

@@ -82,6 +82,13 @@ class Ellipses:
         return np.asarray(np.linalg.norm(self.frames, axis=1))
 
     @property
+    def perimeters(self) -> Float:
+        """(k,) by Ramanujan's second formula, short by at most 0.04 %."""
+        a, b = self.semi_axes.T
+        h = 3 * ((a - b) / (a + b)) ** 2
+        return np.asarray(np.pi * (a + b) * (1 + h / (10 + np.sqrt(4 - h))))
+
+    @property
     def angles(self) -> Float:
         """(k,) from x to the first semi-axis, in degrees."""
         return np.asarray(np.degrees(np.arctan2(self.frames[:, 1, 0], self.frames[:, 0, 0])))
