@@ -1,4 +1,4 @@
-"""Iterations to 1e-8 at every combination of fibres, fibre fraction, gap, cut, contrast, mesh size, coating and mix.
+"""Iterations to 1e-8 at every combination of fibres, fraction, gap, cut, contrast, mesh size, coating, mix and voids.
 
 Each line of the CSV is one cell with its three load cases; cells that the file holds already are not run again, so that
 a long list can be worked off in parts.  "uncut" leaves the matrix whole and looks for soft modes none the less.
@@ -32,20 +32,34 @@ from feti_homog.feti.thresholds import DEFAULTS, Thresholds  # noqa: E402
 from feti_homog.homogenization.unit_cell import tear  # noqa: E402
 
 # Columns that are no whole numbers.
-REAL = ("fraction", "gap", "contrast", "coating", "coating_contrast", "mix", "mix_contrast", "vectors", "seconds")
+REAL = (
+    "fraction",
+    "gap",
+    "contrast",
+    "coating",
+    "coating_contrast",
+    "mix",
+    "mix_contrast",
+    "voids",
+    "vectors",
+    "seconds",
+)
 HEADING = (
-    "fibres fraction   gap pieces contrast refine coating contrast   mix contrast"
+    "fibres fraction   gap pieces contrast refine coating contrast   mix contrast voids"
     "     dofs subdom. boundary vectors iterations s"
 )
 # Coarse elements along the side of a cell with one fibre.
 ELEMENTS = 5
+# Of cells with voids.
+POROSITY = 0.05
 
 
 @dataclass(frozen=True)
 class Cell:
     """One combination; `pieces` of the matrix per fibre, `gap` in fibre diameters, `coating` thickness / radius, 0 of
     none, with a stiffness over that of the matrix of `coating_contrast`.  `mix` is the radius of fibres of a second
-    phase / that of the others, 0 of none; they have half the fraction, and the stiffness `mix_contrast`."""
+    phase / that of the others, 0 of none; they have half the fraction, and the stiffness `mix_contrast`.  `voids` is
+    the radius of voids / that of the fibres, 0 of none; their fraction is POROSITY."""
 
     fibres: int
     fraction: float
@@ -57,6 +71,7 @@ class Cell:
     coating_contrast: float = 1.0
     mix: float = 0.0
     mix_contrast: float = 1.0
+    voids: float = 0.0
 
     @property
     def possible(self) -> bool:
@@ -73,6 +88,7 @@ class Cell:
                     "geometry": "random", "fibres": self.fibres, "min_gap": self.gap, **self._fractions(),
                     "mesh_size": 1 / (ELEMENTS * self.fibres**0.5), "refine": self.refine,
                     **({"coating": self.coating} if self.coating else {}),
+                    **({"voids": POROSITY, "void_radius": self.voids} if self.voids else {}),
                 },
                 "material": {
                     "matrix": {"young": 3.0, "poisson": 0.35},
@@ -115,7 +131,7 @@ class Row(Cell):
         """Of the table."""
         return (
             f"{self.fibres:6}{self.fraction:9.2f}{self.gap:6.2f}{self.pieces:7}{self.contrast:9.0e}{self.refine:7}"
-            f"{self.coating:8.2g}{self.coating_contrast:9.0e}{self.mix:6.2g}{self.mix_contrast:9.0e}"
+            f"{self.coating:8.2g}{self.coating_contrast:9.0e}{self.mix:6.2g}{self.mix_contrast:9.0e}{self.voids:6.2g}"
             f"{self.dofs:9}{self.subdomains:8}{self.boundary:9}{self.vectors:8.2f}{self.iterations:11}{self.seconds:6.1f}"
         )
 
@@ -150,7 +166,8 @@ def combinations(arguments: argparse.Namespace) -> list[Cell]:
     bare = a.fibres, a.fractions, a.gaps, a.pieces, a.contrasts, a.refine
     coats = [(0.0, 1.0)] if a.coatings is None else list(product(a.coatings, a.coating_contrasts))
     mixes = [(0.0, 1.0)] if a.mix is None else list(product(a.mix, a.mix_contrasts))
-    return [Cell(*of, *coat, *mix) for of in product(*bare) for coat in coats for mix in mixes]
+    voids = [0.0] if a.voids is None else a.voids
+    return [Cell(*of, *coat, *mix, v) for of in product(*bare) for coat in coats for mix in mixes for v in voids]
 
 
 def summary(rows: list[Row]) -> str:
@@ -209,6 +226,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--coating-contrasts", type=float, nargs="+", default=[1e-3, 1.0, 1e3], help="of the matrix")
     parser.add_argument("--mix", type=float, nargs="+", help="radius of fibres of a second phase / of the others")
     parser.add_argument("--mix-contrasts", type=float, nargs="+", default=[1e-3, 1.0, 1e3], help="of the matrix")
+    parser.add_argument("--voids", type=float, nargs="+", help="radius of voids / of the fibres")
     parser.add_argument("--space", choices=("natural", "adaptive"), default="adaptive")
     parser.add_argument("--out", type=Path, default=Path("results/robustness.csv"), metavar="FILE.csv")
     return parser

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from feti_homog.analysis import listed_fibres
 from feti_homog.config.fibre_window import read_window
+from feti_homog.config.phase_names import VOID
 from feti_homog.errors import CaseError
 from feti_homog.microstructure.fibre_pattern import FibrePattern
 
@@ -14,10 +15,10 @@ def read(source: Path, size: tuple[float, float] | None) -> FibrePattern:
     """The fibres, at least two, in the source's unit of length.  On one rank.
 
     Those of a table are in a window, of this width and height if the table has none; those of a folder or of a case, in
-    a periodic cell.
+    a periodic cell. Voids are left out; ellipses count as discs of the same centres and areas.
 
     Raises:
-        CaseError, MeshError: the source is faulty, a fibre is not round, or there are fewer than two.
+        CaseError, MeshError: the source is faulty, a fibre is no circle or ellipse, or there are fewer than two.
     """
     if source.suffix != ".toml" and not source.is_dir():
         return read_window(source, size)
@@ -25,7 +26,8 @@ def read(source: Path, size: tuple[float, float] | None) -> FibrePattern:
         raise CaseError(f"--size: only for a table of fibres; {source} says how large the cell is")
     fibres = listed_fibres.read(source)
     width, height = fibres.size.tolist()
-    found = FibrePattern(width, height, fibres.circles[:, :2], fibres.circles[:, 2], periodic=True)
+    own = [name != VOID for name in fibres.phases]
+    found = FibrePattern(width, height, fibres.ellipses.centres[own], fibres.radii[own], periodic=True)
     if found.count < 2:
         raise CaseError(f"{source}: expected at least two fibres, got {found.count}")
     return found

@@ -9,9 +9,12 @@ import numpy as np
 
 from feti_homog.analysis import stored_result
 from feti_homog.cell.arrangement import arrange
+from feti_homog.cell.ellipses import Ellipses
 from feti_homog.cell.fibre_centres import fibre_circles
 from feti_homog.cell.fibre_numbers import coating_thickness, fibre_numbers
+from feti_homog.cell.fibre_shapes import fibre_frames
 from feti_homog.cell.gmsh_mesher import arrangement_scale
+from feti_homog.cell.interface_edges import voids
 from feti_homog.cell.msh_reader import read as read_mesh
 from feti_homog.cell.periodic_topology import Torus
 from feti_homog.config import case as cases
@@ -26,40 +29,54 @@ class ListedFibres:
 
     Attributes:
         size: (2,) width and height.
-        circles: (N, 3) centre within the cell and radius; NaN of those that are not round.
-        phases: their names.
+        ellipses: N circles and ellipses about centres within the cell.
+        phases: their names; those of cells that the program meshes have the voids behind them.
         coatings: (N,) thickness of the coatings, 0 without one.
+        lacks_voids: whether there are voids that are not listed.
     """
 
     size: Float
-    circles: Float
+    ellipses: Ellipses
     phases: tuple[str, ...]
     coatings: Float
+    lacks_voids: bool
+
+    @property
+    def radii(self) -> Float:
+        """(N,) of circles, and of discs of the same area as the ellipses."""
+        return np.asarray(np.sqrt(self.ellipses.semi_axes.prod(axis=1)))
 
 
 def read(source: Path) -> ListedFibres:
     """Those of a case file or a folder of results.  On one rank.
 
     Raises:
-        CaseError, MeshError: the source is faulty, or a fibre is not round.
+        CaseError, MeshError: the source is faulty, or a fibre is neither round nor an ellipse.
     """
     found = _of_result(source) if source.is_dir() else _of_cell(cases.load(source).cell)
-    lost = np.flatnonzero(~np.isfinite(np.column_stack([found.circles, found.coatings])).all(axis=1)) + 1
+    known = np.column_stack([found.ellipses.centres, found.radii, found.coatings])
+    lost = np.flatnonzero(~np.isfinite(known).all(axis=1)) + 1
     if len(lost):
-        raise CaseError(f"{source}: fibres that are not round have no radius: {', '.join(map(str, lost[:10]))}")
+        listed = ", ".join(map(str, lost[:10]))
+        raise CaseError(f"{source}: fibres that are neither round nor ellipses have no radius: {listed}")
     return found
 
 
 def _of_result(directory: Path) -> ListedFibres:
     document = stored_result.read(directory)
     fibres, cell = document["fibres"], document["cell"]
-    nowhere = (np.nan, np.nan)
-    circles = [(*(fibre.get("centre") or nowhere), fibre.get("radius") or np.nan) for fibre in fibres]
+    unknown = (np.nan, np.nan)
+    centres = np.array([fibre.get("centre") or unknown for fibre in fibres], float).reshape(-1, 2)
+    axes = [
+        (radius, radius) if (radius := fibre.get("radius")) else fibre.get("semi_axes") or unknown for fibre in fibres
+    ]
+    a, b = np.array(axes, float).reshape(-1, 2).T
     return ListedFibres(
         np.array([cell["width"], cell["height"]]),
-        np.array(circles, float).reshape(-1, 3),
+        Ellipses.of(centres, a, b, np.array([fibre.get("angle") or 0.0 for fibre in fibres])),
         tuple(fibre["phase"] for fibre in fibres),
         np.array([fibre.get("coating") or 0.0 for fibre in fibres]),
+        bool(cell.get("porosity")),
     )
 
 
@@ -69,9 +86,10 @@ def _of_cell(cell: Cell) -> ListedFibres:
     arrangement = arrange(cell)
     scale = arrangement_scale(cell, arrangement)
     size = scale * np.array([arrangement.width, arrangement.height])
-    circles = scale * np.column_stack([arrangement.centres, arrangement.round_radii])
-    circles[:, :2] %= size
-    return ListedFibres(size, circles, arrangement.phase, scale * arrangement.thickness)
+    centres, radii = scale * arrangement.centres % size, scale * arrangement.radii
+    discs = Ellipses.round(np.column_stack([centres, radii]))
+    ellipses = discs if arrangement.frames is None else Ellipses(centres, scale * arrangement.frames)
+    return ListedFibres(size, ellipses, arrangement.phase, scale * arrangement.thickness, lacks_voids=False)
 
 
 def _of_mesh(cell: Cell) -> ListedFibres:
@@ -79,8 +97,7 @@ def _of_mesh(cell: Cell) -> ListedFibres:
     mesh = read_mesh(cell.file)
     torus = Torus.of(mesh)
     numbers, is_fibre = fibre_numbers(torus)
-    circles = fibre_circles(torus)
-    coatings = coating_thickness(numbers, is_fibre, circles[:, 2])
-    circles[:, :2] %= mesh.period
+    ellipses = Ellipses(fibre_circles(torus)[:, :2] % mesh.period, fibre_frames(torus))
+    coatings = coating_thickness(numbers, is_fibre, ellipses.semi_axes)
     phases = tuple(mesh.phases[phase] for phase in torus.constituent_phase[is_fibre])
-    return ListedFibres(mesh.period, circles[is_fibre], phases, coatings)
+    return ListedFibres(mesh.period, ellipses[is_fibre], phases, coatings, voids(mesh) > 0)

@@ -23,6 +23,7 @@ from feti_homog.analysis.result_records import (
     SolverInfo,
     StiffnessBounds,
 )
+from feti_homog.cell.ellipses import Ellipses
 from feti_homog.common.mpi_errors import on_root
 from feti_homog.config.materials import plane_stiffness
 from feti_homog.homogenization.domain_partition import CellSummary
@@ -92,12 +93,16 @@ def _cell_info(cell: TornCell, fractions: dict[str, float]) -> CellInfo:
 def _fibres(summary: CellSummary) -> tuple[FibreInfo, ...]:
     """The fibres of the cell."""
     bodies = summary.fibre_bodies
+    ellipses = Ellipses(summary.centres, summary.frames)
+    is_ellipse = np.isnan(summary.radii) & ~np.isnan(ellipses.angles)
     return tuple(
         FibreInfo(
             number=number,
             phase=summary.phases[summary.constituent_phase[body]],
             centre=None if np.isnan(summary.centres[body, 0]) else summary.centres[body],
             radius=None if np.isnan(summary.radii[body]) else float(summary.radii[body]),
+            semi_axes=ellipses.semi_axes[body] if is_ellipse[body] else None,
+            angle=float(ellipses.angles[body]) if is_ellipse[body] else None,
             coating=float(thickness) if thickness > 0 else None,
         )
         for number, (body, thickness) in enumerate(zip(bodies, summary.coatings, strict=True), start=1)

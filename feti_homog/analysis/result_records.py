@@ -67,12 +67,11 @@ class FibreInfo:
     number: int = described("number in `fibre = N` of case files, from 1")
     phase: str = described("name of its phase")
     centre: Float | None = described(
-        "centre of its circle, or of its area if it is not round, within the cell; absent if it winds around the cell",
-        LENGTH,
-        "(2,)",
-        default=None,
+        "that of its circle, else of its area, in the cell; absent if it winds around it", LENGTH, "(2,)", default=None
     )
     radius: float | None = described("radius of its circle; absent if it is not round", LENGTH, default=None)
+    semi_axes: Float | None = described("of an ellipse; absent of other shapes", LENGTH, "(2,)", default=None)
+    angle: float | None = described("from x1 to the first semi-axis of an ellipse", DEGREES, default=None)
     coating: float | None = described("thickness of its coating; absent without one", LENGTH, default=None)
 
 

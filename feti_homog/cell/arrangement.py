@@ -12,9 +12,9 @@ import numpy as np
 
 from feti_homog.cell import elliptic_table, tabulated
 from feti_homog.cell.ellipses import Ellipses
-from feti_homog.cell.torus_pairs import neighbours
-from feti_homog.config.mixed_cell import fibre_counts, fractions_in_words
-from feti_homog.config.phase_names import COATING, FIBRE
+from feti_homog.cell.relaxation import relax
+from feti_homog.config.mixed_cell import fibre_counts, fractions_in_words, void_count
+from feti_homog.config.phase_names import COATING, FIBRE, MATRIX, VOID
 from feti_homog.errors import MeshError
 from feti_homog.typing import Bool, Float, Int
 
@@ -28,8 +28,6 @@ LEAST_CLEARANCE = 1e-3
 TABLE_DECIMALS = 10
 # Quenched random packings jam near this area fraction.
 JAMMED = 0.84
-# Relative excess of the radii that push over those that must not overlap: the descent ends in finite time.
-RADIUS_EXCESS = 1e-3
 # Steps of the descent after which an arrangement counts as jammed; found ones take less than 200.
 MAX_STEPS = 2000
 
@@ -38,11 +36,11 @@ MAX_STEPS = 2000
 class Arrangement:
     """Discs with `centres` (N, 2) and `radii` (N,) on the torus of periods `width`, `height`; none touch.
 
-    `phase` (N,) names what each disc is made of. Fibre k + 1 of a case is disc k. `mesh_order` (N,) are the discs in
-    the order in which they are meshed, on which a few triangles depend; that of the discs if it is None. `coating` (N,)
-    is the thickness of the ring around each disc, 0 where there is none; None if no disc has one. Rings do not touch.
-    `frames` (N, 2, 2) are those of `Ellipses` where some discs are ellipses, with `radii` of the same areas; else None.
-    A coating makes the semi-axes of an ellipse longer by its thickness.
+    `phase` (N,) names what each disc is made of. Fibre k + 1 of a case is disc k; voids come after the fibres.
+    `mesh_order` (N,) are the discs in the order in which they are meshed, on which a few triangles depend; that of the
+    discs if it is None. `coating` (N,) is the thickness of the ring around each disc, 0 where there is none; None if no
+    disc has one. Rings do not touch. `frames` (N, 2, 2) are those of `Ellipses` where some discs are ellipses, with
+    `radii` of the same areas; else None. A coating makes the semi-axes of an ellipse longer by its thickness.
     """
 
     width: float
@@ -56,8 +54,19 @@ class Arrangement:
 
     @property
     def phases(self) -> tuple[str, ...]:
-        """The phases of the cell: the matrix, those of the discs in the order in which they first appear, coatings."""
-        return ("matrix", *dict.fromkeys(self.phase), *((COATING,) if self.coated.any() else ()))
+        """The phases of the cell: the matrix, those of the fibres in the order in which they first appear, coatings."""
+        named = dict.fromkeys(name for name in self.phase if name != VOID)
+        return (MATRIX, *named, *((COATING,) if self.coated.any() else ()))
+
+    @property
+    def is_void(self) -> Bool:
+        """(N,) which discs are voids."""
+        return np.array([name == VOID for name in self.phase], bool)
+
+    @property
+    def fibres(self) -> int:
+        """Number of fibres."""
+        return int((~self.is_void).sum())
 
     @property
     def thickness(self) -> Float:
@@ -140,35 +149,39 @@ def _lattice(cell: Cell, height: float, centres: Float, limit: float) -> Arrange
 
 
 def _coating(cell: Cell, radii: Float) -> Float | None:
-    """Thickness (N,) of the coatings that a case gives all its fibres."""
+    """Thickness (N,) of the coatings that a case gives all its fibres, of these radii."""
     return None if cell.coating is None else cell.coating * radii
 
 
 def random_arrangement(cell: Cell, max_steps: int = MAX_STEPS, max_attempts: int | None = None) -> Arrangement:
     """Discs at random in the unit square, periodic, the same for the same case on every machine.
 
-    Radii are uniform in mean * (1 - s, 1 + s), s = `radius_spread`, and scaled to the fraction of each phase. Any two
-    discs, coatings and images included, are at least `min_gap` mean diameters apart. Random centres are moved down the
-    gradient of the overlap energy 1/2 sum max(0, R_i + R_j - |x_i - x_j|)^2 of the discs grown by half the
-    gap until it is zero; when that has not come after `max_steps`, it starts again from other centres, up to
-    `max_attempts` times (default: 10 for few fibres, 3 for many). Last, all is shifted (`clear_shift`).
+    Radii are uniform in mean * (1 - s, 1 + s), s = `radius_spread`, and scaled to the fraction of each phase; those of
+    voids are all alike. Any two discs, coatings and images included, are at least `min_gap` mean diameters of fibres
+    apart. Random centres are moved down the gradient of the overlap energy 1/2 sum max(0, R_i + R_j - |x_i - x_j|)^2 of
+    the discs grown by half the gap until it is zero; when that has not come after `max_steps`, it starts again from
+    other centres, up to `max_attempts` times (default: 10 for few fibres, 3 for many). Last, all is shifted
+    (`clear_shift`).
 
     Raises:
         MeshError: no arrangement is found.
     """
     phase = tuple(name for name, own in fibre_counts(cell).items() for _ in range(own))
-    count, gap, fraction = len(phase), cell.min_gap, fsum(cell.fractions.values())
+    fibres, gap, fraction = len(phase), cell.min_gap, fsum(cell.fractions.values())
     generator = np.random.default_rng(cell.seed)
-    radii = 1 + cell.radius_spread * generator.uniform(-1, 1, count)
+    radii = 1 + cell.radius_spread * generator.uniform(-1, 1, fibres)
     for name, share in cell.fractions.items():
         own = np.array(phase) == name
         radii[own] *= sqrt(share / (pi * fsum(radii[own] ** 2)))
-    coating = _coating(cell, radii)
-    grown = (radii if coating is None else radii + coating) + gap * fsum(radii) / count
-    ask = f"[cell] {fractions_in_words(cell)} with min_gap = {gap:g} and fibres = {count}"
+    coating, clear = _coating(cell, radii), gap * fsum(radii) / fibres
+    radii, coating = _with_voids(cell, radii, coating)
+    count, phase = len(radii), phase + (VOID,) * (len(radii) - fibres)
+    grown = (radii if coating is None else radii + coating) + clear
+    ask = f"[cell] {fractions_in_words(cell)} with min_gap = {gap:g} and fibres = {fibres}"
+    of_all = "fraction of fibres and voids" if cell.voids else "fibre fraction"
     if pi * np.sum(grown**2) > 0.9:
         raise MeshError(
-            f"{ask}: random arrangements with this gap exist up to a fibre fraction of at most about "
+            f"{ask}: random arrangements with this gap exist up to a {of_all} of at most about "
             f"{JAMMED / (1 + (cell.coating or 0.0) + gap) ** 2:.2f}; lower one of them"
         )
     attempts, best = max_attempts or max(3, min(10, 100 // count)), 0.0
@@ -181,6 +194,15 @@ def random_arrangement(cell: Cell, max_steps: int = MAX_STEPS, max_attempts: int
         f"{ask}: no arrangement found in {attempts} attempts; they reached a fibre fraction of at most about "
         f"{fraction * best**2:.2f} with this gap; lower one of them, or change seed"
     )
+
+
+def _with_voids(cell: Cell, radii: Float, coating: Float | None) -> tuple[Float, Float | None]:
+    """Radii and coatings of the fibres, and after them those of the voids."""
+    count = void_count(cell, float(radii.mean()))
+    if not count:
+        return radii, coating
+    own = np.full(count, sqrt((cell.voids or 0.0) / (pi * count)))
+    return np.append(radii, own), None if coating is None else np.append(coating, np.zeros(count))
 
 
 def table_arrangement(cell: Cell) -> Arrangement:
@@ -222,32 +244,6 @@ def _clearance(arrangement: Arrangement) -> float:
     reach = radii[:, None] * [1, -1]
     touching = np.concatenate([(arrangement.centres[disc, axis, None] + reach) / size[axis] for axis in (0, 1)])
     return float(np.abs((touching - np.round(touching)) * arrangement.width).min())
-
-
-def relax(centres: Float, radii: Float, max_steps: int, size: tuple[float, float] = (1.0, 1.0)) -> tuple[Float, float]:
-    """Centres (N, 2) moved until discs on the torus of periods `size` do not overlap, and the clearance reached.
-
-    The clearance is the smallest ratio of distance to sum of radii; at least 1 is success. Heavy-ball descent
-    x += 0.25 f + 0.9 dx: no reductions over the discs, so that every machine gets the same numbers.
-    """
-    periods, target = np.array(size), radii * (1 + RADIUS_EXCESS)
-    step, clearance = np.zeros_like(centres), 0.0
-    for _ in range(max_steps):
-        first, second, vector = neighbours(centres, periods, 2 * target.max())
-        distance = np.sqrt(vector[:, 0] * vector[:, 0] + vector[:, 1] * vector[:, 1])
-        clearance = float(np.min(distance / (radii[first] + radii[second]), initial=2.0))
-        if clearance >= 1:
-            break
-        overlap = np.maximum(target[first] + target[second] - distance, 0.0)
-        push = (overlap / np.maximum(distance, 1e-9))[:, None] * vector
-        step = 0.25 * (_sum_at(second, push, len(radii)) - _sum_at(first, push, len(radii))) + 0.9 * step
-        centres = (centres + step) % periods
-    return centres, clearance
-
-
-def _sum_at(rows: Int, vectors: Float, count: int) -> Float:
-    """Sums (count, 2) of the vectors (k, 2) of each row, added one after the other."""
-    return np.stack([np.bincount(rows, vectors[:, axis], count) for axis in (0, 1)], axis=1)
 
 
 def clear_shift(arrangement: Arrangement) -> Arrangement:

@@ -26,12 +26,12 @@ RATIOS = np.geomspace(1.0, 1e7, 400)
 def fibres_of(cell: Cell) -> int:
     """Number of fibres."""
     if cell.geometry == "table":
-        return len(arrange(cell).radii)
+        return arrange(cell).fibres
     return FIBRES_OF.get(cell.geometry) or sum(fibre_counts(cell).values())
 
 
 def mean_radius(cell: Cell) -> float:
-    """Mean radius of the fibres / width of the cell."""
+    """Mean radius of the fibres, of a table of the voids too, / width of the cell."""
     if cell.geometry == "table":
         return float(arrange(cell).radii.mean())
     return math.sqrt(math.fsum(cell.fractions.values()) * _height(cell) / (math.pi * fibres_of(cell)))

@@ -77,9 +77,19 @@ class Ellipses:
         return np.asarray(away < SAME_AXES * radius)
 
     @property
+    def semi_axes(self) -> Float:
+        """(k, 2) their lengths, for frames whose columns are along them."""
+        return np.asarray(np.linalg.norm(self.frames, axis=1))
+
+    @property
+    def angles(self) -> Float:
+        """(k,) from x to the first semi-axis, in degrees."""
+        return np.asarray(np.degrees(np.arctan2(self.frames[:, 1, 0], self.frames[:, 0, 0])))
+
+    @property
     def longest(self) -> Float:
         """(k,) the longer semi-axes."""
-        return np.asarray(np.linalg.norm(self.frames, axis=1).max(axis=1))
+        return np.asarray(self.semi_axes.max(axis=1))
 
     def at(self, angle: Float) -> Float:
         """(k, 2) the point c + F (cos t, sin t) of each at its parameter t (k,)."""

@@ -37,13 +37,13 @@ def size_field(
     """As `graded_size.size_field`; `crossings` are where sides of the cell meet ellipses (c, 2), and the length (c,)
     R phi of the angle phi between them where the radius of curvature is R."""
     size, largest = np.array([arrangement.width, arrangement.height]), sizes.largest
-    ellipses, disc = shells(arrangement)
+    ellipses, disc = _in_mesh_order(arrangement, *shells(arrangement))
     angle, which = np.tile(np.linspace(0, 2 * np.pi, POINTS, endpoint=False), len(ellipses)), np.arange(len(ellipses))
     around = np.repeat(which, POINTS)
     points, normal = ellipses[around].at(angle), ellipses[around].normal(angle)
     thin = _coating_size(arrangement, disc[around], normal)
     caps = np.minimum(edge_size(ellipses[around], normal, sizes.interface), thin)
-    outer = ellipses[np.unique(disc, return_index=True)[1]]
+    outer = ellipses[np.sort(np.unique(disc, return_index=True)[1])]
     sources = [
         (points, caps, np.full(len(points), MAX_GROWTH)),
         _between(outer, size, largest),
@@ -65,6 +65,14 @@ def size_field(
         return np.asarray(np.minimum(base(positions), np.minimum(beside[nearest] + MAX_GROWTH * distance, at_tips)))
 
     return SizeField(at, 1 / SAMPLES_OF_AN_EDGE)
+
+
+def _in_mesh_order(arrangement: Arrangement, ellipses: Ellipses, disc: Int) -> tuple[Ellipses, Int]:
+    """Ellipses and their discs (k,) in the order in which these are meshed: the order of rows does not matter."""
+    if arrangement.mesh_order is None:
+        return ellipses, disc
+    order = np.argsort(np.argsort(arrangement.mesh_order)[disc], kind="stable")
+    return ellipses[order], disc[order]
 
 
 def _coating_size(arrangement: Arrangement, disc: Int, normal: Float) -> Float:

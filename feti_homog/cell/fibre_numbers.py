@@ -8,6 +8,9 @@ from feti_homog.cell.periodic_topology import Torus, edge_pairs
 from feti_homog.config.phase_names import COATING
 from feti_homog.typing import Bool, Float, Int
 
+# Relative to the longer semi-axis: coatings whose thicknesses along both differ by less are of one.
+SAME_LENGTH = 1e-6
+
 
 def fibre_numbers(torus: Torus) -> tuple[Int, Bool]:
     """(constituents,) the number of the fibre that each is, from 1, or that it coats, 0 of the matrix; and which of
@@ -28,12 +31,15 @@ def fibre_numbers(torus: Torus) -> tuple[Int, Bool]:
     return np.where(phase > 0, number, 0), is_fibre
 
 
-def coating_thickness(numbers: Int, is_fibre: Bool, radii: Float) -> Float:
-    """(fibres,) thickness of their coatings, 0 without one, for `fibre_numbers` and the radii (constituents,).
+def coating_thickness(numbers: Int, is_fibre: Bool, semi_axes: Float) -> Float:
+    """(fibres,) by how much coatings make both semi-axes longer, 0 without one, for `fibre_numbers` and the semi-axes
+    (constituents, 2), of discs the radius twice.
 
-    NaN where fibre or coating is not round.
+    NaN where fibre or coating is neither round nor an ellipse, and where their semi-axes differ by two lengths.
     """
     coats, fibres = np.flatnonzero((numbers > 0) & ~is_fibre), np.flatnonzero(is_fibre)
     thickness, coated = np.zeros(len(fibres)), numbers[coats] - 1
-    thickness[coated] = radii[coats] - radii[fibres[coated]]
+    outer, inner = np.sort(semi_axes[coats], axis=1), np.sort(semi_axes[fibres[coated]], axis=1)
+    low, high = (outer - inner).T
+    thickness[coated] = np.where(np.abs(high - low) <= SAME_LENGTH * outer[:, 1], low, np.nan)
     return thickness

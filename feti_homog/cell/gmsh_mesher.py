@@ -17,8 +17,9 @@ from feti_homog.cell.coarse_mesh import CoarseMesh, areas, flip_double_arcs, rep
 from feti_homog.cell.graded_size import MeshSizes
 from feti_homog.cell.outline import MATRIX, Curve, Outline, outline
 from feti_homog.cell.size_field import MAX_GROWTH
+from feti_homog.cell.void_holes import without_voids
 from feti_homog.config.mixed_cell import fractions_in_words, mixed_width
-from feti_homog.config.phase_names import COATING
+from feti_homog.config.phase_names import COATING, VOID
 from feti_homog.errors import MeshError
 from feti_homog.typing import Float, Index, Int32
 
@@ -64,7 +65,7 @@ def generate(cell: Cell, marks: Mapping[int, Sequence[float]] = NO_MARKS) -> Coa
     if arrangement.radii.min() < SMALLEST_RADIUS * arrangement.width:
         asked = fractions_in_words(cell) if cell.fractions else 'geometry = "table"'
         raise MeshError(
-            f"[cell] {asked}: a fibre has a radius of {arrangement.radii.min():.2g}; "
+            f"[cell] {asked}: a fibre or void has a radius of {arrangement.radii.min():.2g}; "
             f"expected at least {SMALLEST_RADIUS} of the width of the cell"
         )
     return mesh_arrangement(arrangement, sizes, marks, arrangement_scale(cell, arrangement))
@@ -80,14 +81,14 @@ def mesh_arrangement(
     has_ellipses = arrangement.frames is not None
     lines = (elliptic_outline.outline if has_ellipses else outline)(arrangement, sizes, marks)
     points, triangles, circle = _fill(lines, sizes, sizes.are_graded(arrangement))
-    place = {name: number for number, name in enumerate(arrangement.phases)}
     within = [
         COATING if coat else arrangement.phase[disc] for disc, coat in zip(lines.disc, lines.is_coating, strict=True)
     ]
+    place = {name: number for number, name in enumerate((*arrangement.phases, VOID))}
     phase = np.array([place[name] for name in (*within, arrangement.phases[0])], np.int32)[circle]
-    number = lines.disc + 1 + np.where(lines.is_coating, len(arrangement.radii), 0)
+    number = lines.disc + 1 + np.where(lines.is_coating, arrangement.fibres, 0)
     arc_edges, arc_circle = _arc_edges(lines)
-    return CoarseMesh(
+    filled = CoarseMesh(
         width=scale * arrangement.width,
         height=scale * arrangement.height,
         points=scale * points,
@@ -100,8 +101,9 @@ def mesh_arrangement(
         arc_edges=arc_edges,
         arc_circle=arc_circle,
         debonded_edges=np.zeros((0, 2), np.int32),
-        centres=scale * arrangement.centres if has_ellipses else None,
+        centres=scale * arrangement.centres[: arrangement.fibres] if has_ellipses else None,
     )
+    return without_voids(filled, place[VOID]) if arrangement.is_void.any() else filled
 
 
 def _arc_edges(lines: Outline) -> tuple[Int32, Int32]:
@@ -122,7 +124,7 @@ def _sizes(cell: Cell, marks: Mapping[int, Sequence[float]]) -> MeshSizes:
 def arrangement_scale(cell: Cell, arrangement: Arrangement) -> float:
     """Lengths of the cell / those of the arrangement."""
     if cell.fibre_radius is not None:
-        return float(cell.fibre_radius / arrangement.radii.mean())
+        return float(cell.fibre_radius / arrangement.radii[: arrangement.fibres].mean())
     width = mixed_width(cell) if cell.table is None else cell.table.width
     return width or 1.0
 

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from feti_homog.cell.arrangement import MAX_STEPS, relax
+from feti_homog.cell.arrangement import MAX_STEPS
+from feti_homog.cell.relaxation import relax
 from feti_homog.errors import MeshError
 from feti_homog.microstructure.fibre_pattern import FibrePattern
 

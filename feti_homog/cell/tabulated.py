@@ -29,7 +29,8 @@ MAX_FAULTS = 30
 
 
 def fibres(table: FibreTable, window: str) -> tuple[Int, Float, Float, float]:
-    """The rows (k,) that are fibres, their centres (k, 2) and radii (k,), and the height; all / width of the cell.
+    """The rows (k,) that are fibres, then voids, their centres (k, 2), radii (k,), and the height; all / width of the
+    cell.
 
     In a periodic window, rows a period apart are images of one fibre, the first of them. In one that is cut out of
     something larger, fibres that overlap across its border are moved apart.
@@ -38,7 +39,9 @@ def fibres(table: FibreTable, window: str) -> tuple[Int, Float, Float, float]:
         MeshError: rows lie outside, come twice, overlap or touch; a line for each fault.
     """
     kept, centres, moved, size = _on_torus(table, window)
-    return kept, (centres + moved) % size / size[0], table.radius[kept] / size[0], float(size[1] / size[0])
+    order = np.argsort(table.is_void[kept], kind="stable")
+    kept, places = kept[order], (centres + moved)[order]
+    return kept, places % size / size[0], table.radius[kept] / size[0], float(size[1] / size[0])
 
 
 def moved_rows(table: FibreTable, window: str) -> tuple[Int, Float]:

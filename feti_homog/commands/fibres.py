@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
 
 HELP = (
-    'Print a row for each fibre, with centre, radius and phase: the file of [cell] geometry = "table". The table of a '
-    "cell gives that cell again."
+    'Print a row for each fibre, with centre, radius or semi-axes, and phase: the file of [cell] geometry = "table". '
+    "The table of a cell gives that cell again."
 )
 
 

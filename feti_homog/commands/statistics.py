@@ -15,7 +15,8 @@ if TYPE_CHECKING:
 
 HELP = (
     "Print the distances of nearest neighbours, local fibre fractions and directions of pairs, and compare Ripley's "
-    "L(r) with simulations of random fibres. With --out, write tables of these, of g(r) and of K(r), and a picture."
+    "L(r) with simulations of random fibres. Ellipses count as discs of the same area. With --out, write tables of "
+    "these, of g(r) and of K(r), and a picture."
 )
 MOST_SIMULATIONS = 9999
 

@@ -23,7 +23,7 @@ from feti_homog.config.load_section import LoadPath, SingleLoad
 from feti_homog.config.matched_cell import with_match
 from feti_homog.config.material_forms import Isotropic, Material
 from feti_homog.config.material_sections import coating_faults, phase_faults, provider, read_materials
-from feti_homog.config.mixed_cell import mix_faults
+from feti_homog.config.mixed_cell import mix_faults, void_faults
 from feti_homog.config.mixed_load import MixedLoad, Strain, completed
 from feti_homog.config.petsc_section import Scalar, read_petsc
 from feti_homog.config.schema import Selected, TableReader, selected_value, to_table
@@ -254,7 +254,7 @@ def _checked_cell(cell: Cell, folder: Path, faults: list[str]) -> Cell:
                 f"{limit_in_words(limit, cell.fibre_fraction, 4)} for "
                 f"geometry = {toml_value(cell.geometry)}: {reason}"
             )
-    faults += size_faults(cell) + mix_faults(cell)
+    faults += size_faults(cell) + mix_faults(cell) + void_faults(cell)
     if cell.width is not None and cell.fibre_radius is not None:
         faults.append("[cell] width, fibre_radius: exclude each other; give one")
     return with_files(cell, folder, faults)
@@ -263,7 +263,7 @@ def _checked_cell(cell: Cell, folder: Path, faults: list[str]) -> Cell:
 def _sized_cell(table: Mapping[str, Any], sections: Mapping[str, Any], faults: list[str]) -> Cell:
     """The cell with the sizes of elements, and unless its table says it the order, that it asks for."""
     cell: Cell = sections["cell"]
-    plane, free_faces = sections["analysis"].plane, bool(sections["interfaces"])
+    plane, free_faces = sections["analysis"].plane, bool(sections["interfaces"]) or cell.has_voids
     orders = (cell.order,) if "order" in table else (1, 2)
     return element_sizes.with_sizes(cell, sections["materials"], plane, free_faces, orders, faults)
 

@@ -65,7 +65,7 @@ def _with_table(cell: Cell, faults: list[str]) -> Cell:
     if cell.coating is not None and table.coating is not None:
         faults.append(f"[cell] coating = {cell.coating:g}: {table.name} has a column of it; give one")
     elif cell.coating is not None:
-        table = replace(table, coating=np.full(len(table.row), cell.coating))
+        table = replace(table, coating=np.where(table.is_void, 0.0, cell.coating))
     table = with_shapes(table, faults)
     width, height = (_size(name, getattr(cell, name), table, faults) for name in ("width", "height"))
     return replace(cell, table=replace(table, width=width, height=height))

@@ -146,11 +146,27 @@ class Cell:
         only=RANDOM,
         default_words="equal ones",
     )
+    voids: float | None = key(
+        real(least=0.0, most=0.5),
+        "Voids at random among the fibres, min_gap from them and from each other: their area / area of the cell.",
+        default=None,
+        only=RANDOM,
+        default_words="none",
+    )
+    void_radius: float | None = key(
+        real(least=0.05, most=20.0),
+        "Radius of the voids / mean radius of the fibres. There is the nearest whole number of voids, at least one; "
+        "their radius is then scaled such that their fraction is exact.",
+        default=None,
+        only=RANDOM,
+        default_words="1",
+    )
     match: Path | None = key(
         TABLE_FILE,
         "A table of the fibres in a window of a micrograph, relative to the case file: columns x, y, radius, and a "
         'comment such as "# width = 120, height = 80". The cell gets its radii and, as near as can be, its '
-        "distributions of the distances of nearest and second neighbours, but none below min_gap.",
+        "distributions of the distances of nearest and second neighbours, but none below min_gap. Ellipses count as "
+        "discs of the same area.",
         default=None,
         only=RANDOM,
         default_words="none",
@@ -177,8 +193,8 @@ class Cell:
         "may have any shape. Of Abaqus' files (.inp) element sets have these names; of .vtu and .vtk files, which "
         'meshio reads, cell data "phase" are 0 in the matrix, 1 in fibre, 2 in fibre:2, ... Of "table" the fibres, a '
         "row for each: columns x, y, radius and, if there are any, phase and coating (thickness / radius); of ellipses "
-        "a and b, the semi-axes, in place of the radius, and angle from x to a in degrees. What "
-        'follows # is a comment, of which "# width = 120, height = 80" says the size of the cell.',
+        "a and b, the semi-axes, in place of the radius, and angle from x to a in degrees; of voids the phase is void. "
+        'What follows # is a comment, of which "# width = 120, height = 80" says the size of the cell.',
         default=None,
         only=FROM_A_FILE,
         default_words="required, or fibre_list of a table",
@@ -214,6 +230,11 @@ class Cell:
         if self.mix is not None:
             return dict(sorted(self.mix.items()))
         return {} if self.fibre_fraction is None else {FIBRE: self.fibre_fraction}
+
+    @property
+    def has_voids(self) -> bool:
+        """Whether there are voids, as far as is known before a user's mesh is read."""
+        return bool(self.voids) or (self.table is not None and bool(self.table.is_void.any()))
 
     @property
     def has_own_mesh(self) -> bool:

@@ -5,16 +5,17 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from feti_homog.config.phase_names import VOID
 from feti_homog.config.values import is_number, real
 from feti_homog.config.wording import suggestion, toml_value
 from feti_homog.errors import CaseError
-from feti_homog.typing import Float, Int
+from feti_homog.typing import Bool, Float, Int
 
 NUMBERS = ("x", "y", "radius", "coating", "a", "b", "angle")
 COLUMNS = (*NUMBERS[:3], "phase", *NUMBERS[3:])
@@ -40,7 +41,7 @@ class FibreTable:
         row: (N,) line of the file, counted from 1, or place in the list: what faults call the fibre.
         x, y: (N,) centres.
         radius: (N,); NaN where the table gives semi-axes instead.
-        phase: N names, "fibre" where the table gives none.
+        phase: N names, "fibre" where the table gives none, "void" of voids.
         coating: (N,) thickness / radius, 0 where a cell is empty; None without that column, like what follows.
         a, b, angle: (N,) semi-axes, and the angle in degrees from x to a, of ellipses; NaN where a cell is empty.
         width, height: of the cell; None if the table does not say.
@@ -66,6 +67,32 @@ class FibreTable:
     def centres(self) -> Float:
         """(N, 2)."""
         return np.column_stack([self.x, self.y])
+
+    @property
+    def is_void(self) -> Bool:
+        """(N,) which rows are voids."""
+        return np.array([name == VOID for name in self.phase], bool)
+
+    @property
+    def solid(self) -> FibreTable:
+        """The table without its voids."""
+        kept = np.flatnonzero(~self.is_void)
+
+        def optional(values: Float | None) -> Float | None:
+            return None if values is None else values[kept]
+
+        return replace(
+            self,
+            row=self.row[kept],
+            x=self.x[kept],
+            y=self.y[kept],
+            radius=self.radius[kept],
+            phase=tuple(self.phase[k] for k in kept.tolist()),
+            coating=optional(self.coating),
+            a=optional(self.a),
+            b=optional(self.b),
+            angle=optional(self.angle),
+        )
 
     @property
     def outer_radius(self) -> Float:
@@ -249,6 +276,8 @@ def _cell_faults(cells: Mapping[str, Any]) -> Iterator[str]:
         if complaint:
             yield f"{key} = {toml_value(cells[key])}: {complaint}"
     phase = cells.get("phase", "fibre")
+    if phase == VOID and cells.get("coating", 0.0) != 0.0:
+        yield f"coating = {toml_value(cells['coating'])}: a void has none"
     if not isinstance(phase, str) or not PHASE_NAME.fullmatch(phase) or phase == "matrix":
         yield (
             f"phase = {toml_value(phase)}: expected a name of letters, digits, _, - and :, "

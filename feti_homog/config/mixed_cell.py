@@ -38,9 +38,26 @@ def _radius(cell: Cell, phase: str) -> float:
     return 1.0 if cell.radii is None else cell.radii[phase]
 
 
+def void_count(cell: Cell, fibre_radius: float) -> int:
+    """How many voids a random cell of width 1 has, whose fibres have this mean radius: the whole number next to that of
+    their radius, at least one."""
+    if not cell.voids:
+        return 0
+    radius = fibre_radius * (1.0 if cell.void_radius is None else cell.void_radius)
+    return max(1, round(cell.voids / (pi * radius**2)))
+
+
 def fractions_in_words(cell: Cell) -> str:
-    """The key with the fractions of a cell without a file, and its value."""
-    return f"fibre_fraction = {cell.fibre_fraction:g}" if cell.mix is None else f"mix = {toml_value(dict(cell.mix))}"
+    """The keys with the fractions of a cell without a file, and their values."""
+    fibres = f"fibre_fraction = {cell.fibre_fraction:g}" if cell.mix is None else f"mix = {toml_value(dict(cell.mix))}"
+    return f"{fibres}, voids = {cell.voids:g}" if cell.voids else fibres
+
+
+def void_faults(cell: Cell) -> list[str]:
+    """What is wrong with the keys of voids together."""
+    if cell.voids is None:
+        return [] if cell.void_radius is None else ["[cell] void_radius: belongs to voids, which is missing"]
+    return ["[cell] match, voids: exclude each other; cells that match a table have no voids"] if cell.match else []
 
 
 def mixed_width(cell: Cell) -> float | None:

@@ -10,7 +10,9 @@ FIBRE = "fibre"
 """The fibres of cells that name no phases."""
 COATING = "coating"
 """The rings around fibres."""
-PHASE = re.compile(r"(?!void$)[A-Za-z0-9_-]+(:[A-Za-z0-9_-]+)?")
-"""Any of them; "void" is where there is no material."""
-FIBRE_PHASE = re.compile(rf"(?!(void|{MATRIX}|{COATING})$)[A-Za-z0-9_-]+")
+VOID = "void"
+"""Where there is no material."""
+PHASE = re.compile(rf"(?!{VOID}$)[A-Za-z0-9_-]+(:[A-Za-z0-9_-]+)?")
+"""Any of them that has a material."""
+FIBRE_PHASE = re.compile(rf"(?!({VOID}|{MATRIX}|{COATING})$)[A-Za-z0-9_-]+")
 """What fibres of a mix may be made of."""

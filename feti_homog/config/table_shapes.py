@@ -9,6 +9,7 @@ import numpy as np
 from feti_homog.config.fibre_table import FibreTable
 from feti_homog.typing import Bool, Float
 
+BOTH_SIZES = "has a radius and semi-axes; give one"
 # Shorter / longer semi-axis of a fibre, at least: elements at the tips would be too small.
 THINNEST = 0.05
 
@@ -20,17 +21,28 @@ def with_shapes(table: FibreTable, faults: list[str]) -> FibreTable:
     """
     if table.a is None or table.b is None:
         return replace(table, a=None, b=None, angle=None)
-    given = ~np.isnan(table.a)
-    a, b = np.where(given, table.a, table.radius), np.where(given, table.b, table.radius)
+    is_round = np.isnan(table.a)
+    a, b = np.where(is_round, table.radius, table.a), np.where(is_round, table.radius, table.b)
     angle = np.zeros(len(a)) if table.angle is None else table.angle
-    _tell(table, given & ~np.isnan(table.radius), "has a radius and semi-axes; give one", faults)
+    _tell(table, have_both_sizes(table), BOTH_SIZES, faults)
     thin = np.minimum(a, b) < THINNEST * np.maximum(a, b)
     _tell(table, thin, f"expected a / b from {THINNEST:g} to {1 / THINNEST:g}", faults)
     is_oval = a != b
     if not is_oval.any():
         return replace(table, radius=a, a=None, b=None, angle=None)
-    radius: Float = np.where(is_oval, np.sqrt(a * b), a)
-    return replace(table, radius=radius, a=a, b=b, angle=np.where(is_oval, angle, 0.0))
+    return replace(table, radius=equal_area_radii(table), a=a, b=b, angle=np.where(is_oval, angle, 0.0))
+
+
+def have_both_sizes(table: FibreTable) -> Bool:
+    """(N,) which rows are faulty: they have a radius and semi-axes."""
+    return np.zeros(len(table.row), bool) if table.a is None else ~np.isnan(table.a) & ~np.isnan(table.radius)
+
+
+def equal_area_radii(table: FibreTable) -> Float:
+    """(N,) radii of discs of the same area: sqrt(a b) of ellipses."""
+    if table.a is None or table.b is None:
+        return table.radius
+    return np.where(np.isnan(table.a), table.radius, np.where(table.a == table.b, table.a, np.sqrt(table.a * table.b)))
 
 
 def _tell(table: FibreTable, are_faulty: Bool, words: str, faults: list[str]) -> None:

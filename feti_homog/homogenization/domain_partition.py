@@ -8,8 +8,10 @@ import numpy as np
 
 from feti_homog.cell import tabulated
 from feti_homog.cell.coarse_mesh import CoarseMesh
+from feti_homog.cell.ellipses import Ellipses
 from feti_homog.cell.fibre_centres import fibre_circles
 from feti_homog.cell.fibre_numbers import coating_thickness, fibre_numbers
+from feti_homog.cell.fibre_shapes import fibre_frames
 from feti_homog.cell.interface_edges import voids
 from feti_homog.cell.matched_arrangement import distance_of
 from feti_homog.cell.periodic_topology import Torus, edge_pairs
@@ -77,6 +79,7 @@ class CellSummary:
         constituent_phase: (constituents,) place of the phase of each in `phases`.
         centres, radii: (constituents, 2) and (constituents,) centre, within the cell, and radius of each fibre, NaN
             where there is none.
+        frames: (constituents, 2, 2) those of `Ellipses`, of fibres that are circles or ellipses; else NaN.
         snapped: how far a node of a user's mesh was moved to make sides match, at most.
         voids: how many there are.
         match_distance: how far the fibres are from the table that they match, see `neighbour_match`; None without one.
@@ -94,6 +97,7 @@ class CellSummary:
     constituent_phase: Int
     centres: Float
     radii: Float
+    frames: Float
     moved_tips: tuple[MovedTips, ...]
     snapped: float
     voids: int
@@ -112,7 +116,7 @@ class CellSummary:
     @property
     def coatings(self) -> Float:
         """(fibres,) thickness of their coatings, 0 without one; NaN where they are not round."""
-        return coating_thickness(self.numbers, self.is_fibre, self.radii)
+        return coating_thickness(self.numbers, self.is_fibre, Ellipses(self.centres, self.frames).semi_axes)
 
     def fibre_number(self, constituent: Int) -> Int:
         """(k,) numbers from 1, as a case file has them, of the fibres that are these constituents (k,) or that these
@@ -220,6 +224,7 @@ def distribute(
         constituent_phase=torus.constituent_phase,
         centres=centres,
         radii=circles[:, 2],
+        frames=fibre_frames(torus),
         moved_tips=tuple(map(dict, moved)),
         snapped=mesh.snapped,
         voids=voids(mesh),

@@ -165,7 +165,7 @@ def assemble_subdomains(
         dofs = comm.allreduce(sum(s.n_dofs for s in subdomains))
         meshed = comm.allreduce(sum(s.area for s in subdomains))
         if summary.voids:
-            words.append(f"{summary.voids} voids, porosity {1 - meshed / summary.area:.6g}")
+            words.append(f"{summary.voids} voids, porosity {1 - meshed / summary.area:.6g},")
         words.append(f"{dofs} degrees of freedom, refine = {case.cell.refine}, order = {case.cell.order}")
     return summary, own.shared, lattice, subdomains
 

@@ -51,6 +51,20 @@ CASES = {
         "analysis": {"type": "stiffness", "plane": "strain"},
         "cell": {"geometry": "random", "match": str(TABLE), "fibres": 10, "mesh_size": 0.1},
     },
+    "voids": {
+        "analysis": {"type": "stiffness", "plane": "strain"},
+        "cell": {"geometry": "random", "fibre_fraction": 0.3, "fibres": 2, "voids": 0.05, "mesh_size": 0.1},
+    },
+    "ellipse": {
+        "analysis": {"type": "stiffness", "plane": "strain"},
+        "cell": {
+            "geometry": "table",
+            "width": 1.0,
+            "height": 1.0,
+            "mesh_size": 0.2,
+            "fibre_list": [{"x": 0.5, "y": 0.5, "a": 0.3, "b": 0.2}],
+        },
+    },
     "coated": COATED | {"analysis": {"type": "stiffness", "plane": "strain"}},
     "stiffness of two interfaces": COATED
     | {"analysis": {"type": "stiffness", "plane": "strain"}, "interface": [OUTER | HALF_OPEN, INNER]},

@@ -25,6 +25,7 @@ MODULI = {column.name for column in columns(Moduli)}
 OUTPUT_COLUMNS = (
     Column("fraction_meshed", "", "share of all fibres in the meshed area"),
     Column("fraction_PHASE", "", "share of a phase in the meshed area, if there are more than matrix and fibre"),
+    Column("porosity", "", "share of voids in the area of the cell, where there are some"),
     Column("match_distance", "", "of cells with `match`: how far they are from the table, in mean diameters"),
     Column("elements", "", "triangles of the refined mesh"),
     Column("nodes", "", "nodes of the refined mesh, those on cuts once for each subdomain"),

@@ -55,6 +55,8 @@ def _cell(cell: Mapping[str, Any]) -> dict[str, float]:
     fractions = cell.get("fractions", {})
     if len(fractions) > PHASES_OF_ONE_FIBRE:
         found |= {f"fraction_{phase}": share for phase, share in fractions.items()}
+    if cell.get("porosity"):
+        found["porosity"] = cell["porosity"]
     return found | ({"match_distance": cell["match_distance"]} if "match_distance" in cell else {})
 
 

@@ -66,12 +66,21 @@ def test_tables_are_windows(tmp_path, size):
 
 
 SIZE = "# width = 12, height = 8\n"
+
+
+def test_ellipses_count_as_discs_of_the_same_area(tmp_path):
+    ellipses = f"{SIZE}x,y,radius,a,b,angle\n1,2,,1,4,30\n5,6,0.5,,,\n"
+    discs = f"{SIZE}x,y,radius\n1,2,2\n5,6,0.5\n"
+    found, expected = (fibre_sources.read(write(tmp_path / "f.csv", text), None) for text in (ellipses, discs))
+    assert np.array_equal(found.radii, expected.radii) and np.array_equal(found.centres, expected.centres)
+
+
 FAULTY = {
     "x,y,radius\n1,2,1\n3,4,1\n": ["f.csv: the size of the window is not known"],
     f"{SIZE}x,y,radius\n1,2,1\n13,4,1\n1,-0.5,1\n": ["row 4: its centre is outside", "row 5: its centre is outside"],
     f"{SIZE}x,y,radius\n1,2,1\n3,4,1\n1,2,2\n": ["row 5: there is a fibre at the same place before"],
     f"{SIZE}x,y,radius\n1,2,1\n": ["expected at least two fibres, got 1"],
-    f"{SIZE}x,y,a,b\n1,2,1,2\n3,4,1,2\n": ["row 3: expected a radius", "row 4: expected a radius"],
+    f"{SIZE}x,y,radius,a,b\n1,2,1,1,2\n3,4,1,,\n": ["row 3: has a radius and semi-axes"],
     f"{SIZE}x,y,radius\n1,2,1\n3,four,1\n": ['row 4: y = "four"'],
 }
 

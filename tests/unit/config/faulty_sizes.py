@@ -31,7 +31,7 @@ FAULTY_SIZES: dict[str, tuple[str, tuple[str, ...]]] = {
         ('[cell] accuracy = 0.001: belongs to geometry = "square"',),
     ),
     "accuracy_of_linear_elements_that_nearly_lock": (
-        cell("mesh_size = 0.05", "accuracy = 1e-7").replace("0.299", "0.45"),
+        cell("mesh_size = 0.05", "accuracy = 1e-7\norder = 1").replace("0.299", "0.45"),
         ("[cell] accuracy = 1e-07: would need elements split 12 times, more than 8",),
     ),
 }
