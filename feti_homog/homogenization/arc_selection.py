@@ -96,12 +96,16 @@ def faults(case: Case, nodes: InterfaceNodes, moved: Sequence[MovedTips]) -> lis
             whole = opening if arc.angle is None else arc.angle
             fibres = [None] if isinstance(arc.fibre, str) else list(arc.fibre)
             empty = [fibre for fibre in fibres if whole and not own.selects(arc, opening, fibre, moved[pair])]
-            found += [_fault(f"[{label}] debonded[{place}]", whole, fibre, own) for fibre in empty]
+            line = f"[{label}] debonded[{place}]"
+            found += [_fault(line, whole, fibre, own, interface.between) for fibre in empty]
     return list(dict.fromkeys(found))
 
 
-def _fault(line: str, opening: float | None, fibre: int | None, nodes: InterfaceNodes) -> str:
+def _fault(
+    line: str, opening: float | None, fibre: int | None, nodes: InterfaceNodes, between: Sequence[str] | None
+) -> str:
     if fibre is not None and fibre not in nodes.fibre:
-        return f"{line}.fibre: fibre {fibre} has no interface that can debond"
+        which = "that can debond" if between is None else f"between {' and '.join(between)}"
+        return f"{line}.fibre: fibre {fibre} has no interface {which}"
     whose = "any fibre" if fibre is None else f"fibre {fibre}"
     return f"{line}: no node of {whose} is within the arc of {opening} degrees; make it wider, or the elements smaller"

@@ -177,6 +177,20 @@ def test_arcs_of_fibres_that_are_not_there_are_refused(comm):
     assert second == f"[interface] debonded[1].fibre = 6: {expected}"
 
 
+def test_arcs_of_fibres_without_an_interface_between_the_pair_are_refused(comm):
+    cell = RANDOM | {"mix": {"glass": 0.25, "carbon": 0.2}, "min_gap": 0.05}
+    del cell["fibre_fraction"]
+    arcs = [{"fibre": [1, 5], "centre": 0.0, "angle": 60.0}]
+    interfaces = [{"between": ["matrix", "glass"]}, {"between": ["matrix", "carbon"], "debonded": arcs}]
+    case = case_of(
+        cell, [], interface=interfaces, material={"matrix": MATRIX, "glass": FIBRE, "carbon": FIBRE}
+    )  # fibres of carbon come first
+    with pytest.raises(CaseError) as caught:
+        tear(case, comm, Progress(comm, quiet=True))
+    words = "[interface 2] debonded[0].fibre: fibre 5 has no interface between matrix and carbon"
+    assert caught.value.faults == (words,)
+
+
 def test_arcs_of_a_fibre_without_centre_are_refused(comm, shared_path):
     if comm.rank == 0:
         grid(lambda x, y: abs(y - 0.5) < 0.25).write(shared_path / "grid.msh")

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from feti_homog.output.plots.plot_helpers import interfaces_of, plain
 from feti_homog.typing import Array
@@ -40,6 +41,7 @@ def figure(document: Document) -> Figure:
     axes.set_xlabel(axis_label(plane[0], unit))
     axes.set_ylabel(axis_label(plane[1], unit))
     axes.set_aspect("equal", adjustable="box")
+    axes.xaxis.set_major_locator(MaxNLocator(5))  # labels of small stresses are long
     title = f"{plain(case.get('name', ''))}: onset of debonding, plane {case['analysis']['plane']}".lstrip(": ")
     axes.set_title("\n".join([title, ", ".join(notes)]))
     axes.grid(color="0.92", linewidth=0.6)

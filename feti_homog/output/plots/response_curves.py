@@ -89,9 +89,7 @@ def _path(document: Document) -> Figure:
     _stress_curves(upper, document, strain, shown, style)
     upper.set_ylabel(f"macroscopic stress {_stress_unit(case)}")
     upper.set_xlabel(f"macroscopic strain ${strain_symbols(strains.shape[1])[component]}$")
-    upper.set_title(
-        f"{plain(case.get('name', ''))}: plane {case['analysis']['plane']}, {_strengths(case)}".lstrip(": ")
-    )
+    upper.set_title(_path_title(case))
     for number in shown:
         middle.plot(stress[:, number], color=INK[number], linewidth=1.2, **style)
     _temperature(middle, points, style)
@@ -182,11 +180,14 @@ def _direction_marks(curve: Array) -> list[tuple[Array, Array]]:
     return [(starts[k], middles[k] + 0.02 * steps[k]) for k in sorted(longest) if length[k] > SHORTEST_ARROW]
 
 
-def _strengths(case: Mapping[str, Any]) -> str:
+def _path_title(case: Mapping[str, Any]) -> str:
+    """What the case is and what breaks its bonds; of several interfaces a line for each."""
     bonds, unit = interfaces_of(case) or [{}], case.get("output", {}).get("stress_unit", "")
+    title = f"{plain(case.get('name', ''))}: plane {case['analysis']['plane']}".lstrip(": ")
     if len(bonds) == 1:
-        return _strengths_of(bonds[0], unit)
-    return "; ".join(f"{plain('-'.join(bond['between']))}: {_strengths_of(bond, unit)}" for bond in bonds)
+        return f"{title}, {_strengths_of(bonds[0], unit)}"
+    lines = [f"{plain('-'.join(bond['between']))}: {_strengths_of(bond, unit)}" for bond in bonds]
+    return "\n".join([title, *lines])
 
 
 def _strengths_of(bond: Mapping[str, Any], unit: str) -> str:

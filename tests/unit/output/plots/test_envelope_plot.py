@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 
 from feti_homog.output.plots import envelope_plot
@@ -62,3 +64,11 @@ def test_modes():
     assert envelope_plot.modes(document([1.0] * 4, normal=1.0, tangential=1.0)["envelope"]) == pytest.approx([45.0] * 4)
     found = envelope_plot.modes(document([1.0, None], psi=30.0)["envelope"])
     assert found[0] == 30.0 and np.isnan(found[1])
+
+
+def test_labels_of_small_loads_do_not_overlap():
+    figure = envelope_plot.figure(document([0.02, 0.02, 0.1, 0.1, 0.1, 0.07], normal=1.0, tangential=0.0))
+    FigureCanvasAgg(figure).draw()
+    boxes = [label.get_window_extent() for label in figure.axes[0].get_xticklabels()]
+    assert len(boxes) > 2
+    assert all(one.x1 < other.x0 for one, other in pairwise(boxes))

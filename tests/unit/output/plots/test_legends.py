@@ -208,3 +208,19 @@ def test_points_of_a_path_are_numbered_where_its_curve_folds_back(tmp_path: Path
         assert {"0", "1", "2"} <= {text.get_text() for text in axes.texts if isinstance(text, Annotation)}
     np.testing.assert_allclose(lower.lines[0].get_xdata(), [0, 1, 2])
     np.testing.assert_allclose(middle.lines[0].get_ydata(), [1.5, 0.6, 3.0])
+
+
+def test_several_interfaces_have_lines_of_the_title_that_are_within_the_picture():
+    document = path_of([0.0, 0.1])
+    document["case"] |= {
+        "name": "a_case_of_several_interfaces",
+        "interface": [
+            {"contact": True, "between": pair, "normal_strength": 0.03125, "tangential_strength": 0.05125}
+            for pair in (["coating", "matrix"], ["glass", "coating"])
+        ],
+    }
+    figure = response_curves._path(document)
+    FigureCanvasAgg(figure).draw()
+    title = figure.axes[0].title
+    assert title.get_text().count("\n") == 2
+    assert figure.bbox.x0 <= title.get_window_extent().x0 and title.get_window_extent().x1 <= figure.bbox.x1
