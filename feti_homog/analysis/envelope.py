@@ -109,7 +109,8 @@ class _Finder:
         self._most = max(1, self._comm.allreduce(self._unit.shape[1], MPI.MAX))
         nodes = cell.solver.jump_operator.nodes
         self._direction, self._fibre = bond_directions(cell), cell.summary.fibre_number(nodes.fibre)
-        self._order = np.lexsort((np.round(self._direction, DIRECTION_DIGITS), self._fibre))
+        self._pair, self._interfaces = nodes.pair, len(context.case.interfaces)
+        self._order = np.lexsort((np.round(self._direction, DIRECTION_DIGITS), self._pair, self._fibre))
 
     def points(self, rays: Rays) -> Iterator[dict[str, Any]]:
         """What result.json says of each ray, but its direction.  Collective."""
@@ -142,26 +143,28 @@ class _Finder:
         return np.asarray(self._noise * np.abs(stress).max(axis=1)[:, None] * of_one)
 
     def _first(self, factors: Float, before: Float, ahead: Float) -> Float:
-        """(n, 3 + d) least factor of each ray, fibre and direction of its bond, and how it breaks; of those that break
-        together the one of the first fibre and the least direction.  Collective."""
+        """(n, 4 + d) least factor of each ray, fibre, interface and direction of its bond, and how it breaks; of those
+        that break together the one of the first fibre and interface and the least direction.  Collective."""
         n, d = len(factors), len(self._break_names(ahead.shape[2]))
         least = factors.min(axis=1, initial=np.inf)
         self._comm.Allreduce(MPI.IN_PLACE, least, MPI.MIN)
-        own = np.full((n, 3 + d), np.inf)
+        own = np.full((n, 4 + d), np.inf)
         own[:, 0] = least
         together = factors[:, self._order] <= least[:, None] * (1.0 + UTILISATION_TIE)
         rays = np.flatnonzero(together.any(axis=1) & np.isfinite(least))
         node: Int = self._order[together[rays].argmax(axis=1)] if len(rays) else np.zeros(0, np.int64)
-        own[rays, 1], own[rays, 2] = self._fibre[node], self._direction[node]
-        own[rays, 3:] = self._breaks(node, before[node] + least[rays, None] * ahead[rays, node])
+        own[rays, 1:4] = np.column_stack([self._fibre[node], self._pair[node], self._direction[node]])
+        own[rays, 4:] = self._breaks(node, before[node] + least[rays, None] * ahead[rays, node])
         table = np.stack(self._comm.allgather(own))
-        first = np.lexsort((np.round(table[:, :, 2], DIRECTION_DIGITS), table[:, :, 1]), axis=0)[0]
+        first = np.lexsort((np.round(table[:, :, 3], DIRECTION_DIGITS), table[:, :, 2], table[:, :, 1]), axis=0)[0]
         return np.asarray(table[first, np.arange(n)])
 
     def _of_bond(self, bond: Float) -> dict[str, Any]:
         """Where a bond is, and how it breaks."""
         names = self._break_names(self._unit.shape[2])
-        return {"fibre": int(bond[1]), "bond_angle": float(bond[2])} | dict(zip(names, bond[3:].tolist(), strict=True))
+        pair = {"interface": int(bond[2]) + 1} if self._interfaces > 1 else {}
+        where = {"fibre": int(bond[1])} | pair | {"bond_angle": float(bond[3])}
+        return where | dict(zip(names, bond[4:].tolist(), strict=True))
 
     def _break_names(self, components: int) -> tuple[str, ...]:
         """What is told of the break of a bond under a traction of so many components."""

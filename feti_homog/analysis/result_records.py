@@ -285,6 +285,7 @@ class EnvelopePoint:
         "macroscopic stress at onset", STRESS, EITHER, STRESSES, spatial_components=SPATIAL_STRESSES, default=None
     )
     fibre: int | None = described("number of the fibre whose bond breaks first", default=None)
+    interface: int | None = described(OWN_SECTION, default=None)
     bond_angle: float | None = described(
         "direction of that bond from the fibre's centre; of a fibre without centre that of its normal",
         DEGREES,

@@ -62,11 +62,12 @@ def generate(cell: Cell, marks: Mapping[int, Sequence[float]] = NO_MARKS) -> Coa
     sizes = _sizes(cell, marks)
     _refuse_extremes(cell, sizes, sum(len(own) for own in marks.values()))
     arrangement = arrange(cell)
-    if arrangement.radii.min() < SMALLEST_RADIUS * arrangement.width:
+    smallest = int(arrangement.radii.argmin())
+    if arrangement.radii[smallest] < SMALLEST_RADIUS * arrangement.width:
         asked = fractions_in_words(cell) if cell.fractions else 'geometry = "table"'
         raise MeshError(
-            f"[cell] {asked}: a fibre or void has a radius of {arrangement.radii.min():.2g}; "
-            f"expected at least {SMALLEST_RADIUS} of the width of the cell"
+            f"[cell] {asked}: a {'void' if arrangement.is_void[smallest] else 'fibre'} has a radius of "
+            f"{arrangement.radii.min():.2g}; expected at least {SMALLEST_RADIUS} of the width of the cell"
         )
     return mesh_arrangement(arrangement, sizes, marks, arrangement_scale(cell, arrangement))
 

@@ -98,7 +98,8 @@ def _check_bonds(ledger: Ledger, cell: DiscreteCell, bonds: _Bonds, point: Point
     rows = cell.files.interface
     by_normal, about_centre = np.degrees(np.arctan2(rows.normal[:, 1], rows.normal[:, 0])), directions(cell)
     away = np.where(np.isnan(about_centre), by_normal, about_centre) - point["bond_angle"]
-    here = (rows.fibre == point["fibre"]) & (np.abs((away + 180.0) % 360.0 - 180.0) < SAME_DIRECTION)
+    here = (rows.fibre == point["fibre"]) & (rows.pair == point.get("interface", 1) - 1)
+    here &= np.abs((away + 180.0) % 360.0 - 180.0) < SAME_DIRECTION
     ledger.record("tables", 0.0 if here.any() else np.inf, f"{at}, where no bond is")
     if not here.any():
         return

@@ -120,3 +120,36 @@ def test_springs_of_a_laminate_are_in_series(comm, shared_path):
         0.5 / constrained[0] + 0.25 / constrained[1] + 0.25 / constrained[2] + sum(1 / k for k in pairs.values())
     )
     assert found[0, 0] == pytest.approx(1 / compliance, rel=1e-9)
+
+
+@pytest.mark.parallel
+def test_an_envelope_of_two_interfaces_tells_which_breaks_first(comm, shared_path):
+    """Its onset is the lesser of the two of one interface each."""
+    cell = {"geometry": "square", "fibre_fraction": 0.3, "coating": 0.2, "mesh_size": 0.12}
+    material = {"matrix": EPOXY, "fibre": GLASS, "coating": {"young": 1.5, "poisson": 0.35}}
+    sections = [
+        {"between": ["coating", "matrix"], "normal_strength": 0.05, "tangential_strength": 0.05},
+        {"between": ["fibre", "coating"], "normal_strength": 0.05, "tangential_strength": 0.04},
+    ]
+
+    def onsets(chosen, out=None):
+        document = {
+            "cell": cell,
+            "material": material,
+            "analysis": {"type": "envelope", "plane": "strain"},
+            "interface": chosen,
+            "envelope": {"plane": ["S11", "S12"], "directions": 12},
+            "output": {"pictures": False},
+        }
+        return run(Case.parse(document), comm, out=out).envelope
+
+    both, *each = onsets(sections, shared_path / "run"), *(onsets([section]) for section in sections)
+    for point, *own in zip(both, *each, strict=True):
+        factors = [other.factor for other in own]
+        assert point.factor == pytest.approx(min(factors), rel=1e-9)
+        assert point.interface == 1 + int(np.argmin(factors)) and own[0].interface is None
+    assert {point.interface for point in both} == {1, 2}
+    if comm.rank == 0:
+        assert verify(shared_path / "run").holds
+        assert "interface" in (shared_path / "run/envelope.csv").read_text().splitlines()[0]
+    comm.barrier()

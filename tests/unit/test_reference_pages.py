@@ -68,6 +68,12 @@ CASES = {
     "coated": COATED | {"analysis": {"type": "stiffness", "plane": "strain"}},
     "stiffness of two interfaces": COATED
     | {"analysis": {"type": "stiffness", "plane": "strain"}, "interface": [OUTER | HALF_OPEN, INNER]},
+    "envelope of two interfaces": COATED
+    | {
+        "analysis": {"type": "envelope", "plane": "strain"},
+        "interface": [OUTER | {"normal_strength": 1.0}, INNER | {"normal_strength": 1.0}],
+        "envelope": {"plane": ["S11", "S22"], "directions": 8},
+    },
     "angle of two interfaces": COATED
     | {
         "analysis": {"type": "angle", "plane": "strain"},

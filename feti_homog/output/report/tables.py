@@ -13,7 +13,7 @@ from feti_homog.output.text.point_tables import chosen, shown_entries
 from feti_homog.output.text.spatial_tables import THERMAL
 from feti_homog.output.text.units import with_unit
 
-ENVELOPE_NUMBERS = ("fibre", "bond_angle", "normal", "tangential", "axial", "psi")
+ENVELOPE_NUMBERS = ("fibre", "interface", "bond_angle", "normal", "tangential", "axial", "psi")
 MOST_ROWS = 60  # of a table of points
 NOISE = 1e-12  # what the solver leaves of a zero
 

@@ -30,7 +30,7 @@ def envelope_table(document: Document, stress: str) -> list[str]:
         lines.append(f"  {words:<9}{_load(point):.7g} at {point['angle']:g} degrees")
     names = [name for name in (*SHARES, "psi") if name in known[0]]
     lines.append(
-        f"{'angle':>8}{axes[0]:>12}{axes[1]:>12}{'fibre':>6}{'at':>9}"
+        f"{'angle':>8}{axes[0]:>12}{axes[1]:>12}{'fibre':>6}{'at':>9}{_interface(known[0], 'interface')}"
         + "".join(f"{HEADS.get(name, name):>10}" for name in names)
     )
     return lines + [_row(point, names) for point in _chosen(points)]
@@ -63,4 +63,10 @@ def _row(point: Document, names: Sequence[str]) -> str:
         return f"{point['angle']:>8.5g}{'none':>12}{'none':>12}"
     first, second = components(point)
     used = "".join(f"{_rounded(point[name], 1.0):>10.4g}" for name in names)
-    return f"{point['angle']:>8.5g}{first:>12.6g}{second:>12.6g}{point['fibre']:>6}{point['bond_angle']:>9.2f}{used}"
+    place = f"{point['fibre']:>6}{point['bond_angle']:>9.2f}{_interface(point, point.get('interface'))}"
+    return f"{point['angle']:>8.5g}{first:>12.6g}{second:>12.6g}{place}{used}"
+
+
+def _interface(point: Document, words: object) -> str:
+    """A column of cases that have several."""
+    return f"{words:>10}" if "interface" in point else ""
