@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.config.materials import expansion, spatial_stiffness
+from feti_homog.config.phase_names import COATING
 from feti_homog.homogenization import bonds
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.mechanics.estimates.constituents import Fibres, Springs
@@ -51,14 +52,14 @@ def constants(cell: TornCell, analysis: Mapping[str, Any], fractions: Mapping[st
 def _comparisons(cell: TornCell, fractions: Mapping[str, float]) -> dict[str, Any]:
     """Estimates of round fibres, and bounds of rigidly bonded ones of any section: of transversely isotropic phases.
 
-    Estimates are of fibres that the same bonds hold in the matrix.
+    Estimates are of fibres without coatings that the same bonds hold in the matrix.
     """
     phases = {phase: _constants_of(cell, phase) for phase in fractions}
     matrix, *others = cell.summary.phases
     has_springs = bonds.has_springs(cell.case)
     found: dict[str, Any] = {}
     radii = {phase: cell.summary.radii[_of_phase(cell, phase)] for phase in others}
-    is_plain = all(interface.between is None for interface in cell.case.interfaces)
+    is_plain = COATING not in others and all(interface.between is None for interface in cell.case.interfaces)
     if is_plain and not any(_no_estimate(own, has_springs) for own in radii.values()):
         springs = {phase: _springs(cell, float(own[0])) if has_springs else None for phase, own in radii.items()}
         fibres = [Fibres(fractions[phase], phases[phase], springs[phase]) for phase in others]

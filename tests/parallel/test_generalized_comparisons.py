@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 from support.ranks import parallel_assert
-from support.spatial_cells import solved
+from support.spatial_cells import EPOXY, GLASS, solved
 
 pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 
@@ -52,3 +52,11 @@ def test_free_faces_have_a_compliance_and_no_estimates(comm):
     result = solved(comm, sections=arcs, **CELL)
     parallel_assert(comm, result.compliance is not None and result.constants is not None)
     parallel_assert(comm, result.estimates is None and result.fibre_bounds is None)
+
+
+def test_coated_fibres_have_bounds_and_no_estimates(comm):
+    """A coating is no fibre: estimates of cylinders beside each other say nothing of cylinders within each other."""
+    material = {"matrix": EPOXY, "fibre": GLASS, "coating": {"young": 1.0, "poisson": 0.3}}
+    result = solved(comm, sections={"material": material}, coating=0.2, **CELL)
+    lower, upper = result.fibre_bounds.G_axial
+    parallel_assert(comm, lower < result.transversely_isotropic.G_axial < upper and result.estimates is None)
