@@ -59,14 +59,19 @@ def _comparisons(cell: TornCell, fractions: Mapping[str, float]) -> dict[str, An
     has_springs = bonds.has_springs(cell.case)
     found: dict[str, Any] = {}
     radii = {phase: cell.summary.radii[_of_phase(cell, phase)] for phase in others}
-    is_plain = COATING not in others and all(interface.between is None for interface in cell.case.interfaces)
-    if is_plain and not any(_no_estimate(own, has_springs) for own in radii.values()):
+    if _is_plain(cell) and not any(_no_estimate(own, has_springs) for own in radii.values()):
         springs = {phase: _springs(cell, float(own[0])) if has_springs else None for phase, own in radii.items()}
         fibres = [Fibres(fractions[phase], phases[phase], springs[phase]) for phase in others]
         found["estimates"] = estimates(phases[matrix], fibres)
     if not has_springs and all(map(is_transversely_isotropic, phases.values())):
         found["fibre_bounds"] = fibre_bounds(list(fractions.values()), list(phases.values()))
     return found
+
+
+def _is_plain(cell: TornCell) -> bool:
+    """Whether there are fibres without coatings, all in the matrix and bonded alike."""
+    no_pairs = all(interface.between is None for interface in cell.case.interfaces)
+    return no_pairs and COATING not in cell.summary.phases
 
 
 def _of_phase(cell: TornCell, phase: str) -> Bool:
