@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from feti_homog.analysis import stored_result
+from feti_homog.cell import tabulated
 from feti_homog.cell.arrangement import arrange
 from feti_homog.cell.ellipses import Ellipses
 from feti_homog.cell.fibre_centres import fibre_circles
@@ -19,6 +20,7 @@ from feti_homog.cell.msh_reader import read as read_mesh
 from feti_homog.cell.periodic_topology import Torus
 from feti_homog.config import case as cases
 from feti_homog.config.cell_section import Cell
+from feti_homog.config.rounded_polygons import RoundedPolygons
 from feti_homog.errors import CaseError
 from feti_homog.typing import Float
 
@@ -33,6 +35,7 @@ class ListedFibres:
         phases: their names; those of cells that the program meshes have the voids behind them.
         coatings: (N,) thickness of the coatings, 0 without one.
         cores: (N,) radii of the voids within hollow fibres, 0 of others.
+        polygons: those that some are, else None; they have discs of the same areas among the ellipses.
         lacks_voids: whether there are voids that are not listed.
     """
 
@@ -42,6 +45,7 @@ class ListedFibres:
     coatings: Float
     cores: Float
     lacks_voids: bool
+    polygons: RoundedPolygons | None = None
 
     @property
     def radii(self) -> Float:
@@ -96,7 +100,14 @@ def _of_cell(cell: Cell) -> ListedFibres:
     ellipses = Ellipses(scale * own.centres % size, scale * own.frames)
     coatings = scale * np.where(hollow, 0.0, arrangement.thickness)
     cores = scale * np.where(hollow, arrangement.radii, 0.0)
-    return ListedFibres(size, ellipses, arrangement.phase, coatings, cores, lacks_voids=False)
+    return ListedFibres(size, ellipses, arrangement.phase, coatings, cores, False, _polygons(cell))
+
+
+def _polygons(cell: Cell) -> RoundedPolygons | None:
+    """Those of a table, in the order of its fibres."""
+    if cell.table is None or cell.table.polygons is None:
+        return None
+    return cell.table.polygons[tabulated.fibres(cell.table, cell.window)[0]]
 
 
 def _of_mesh(cell: Cell) -> ListedFibres:

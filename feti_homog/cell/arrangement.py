@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from feti_homog.cell import elliptic_table, tabulated
+from feti_homog.cell.convex_shapes import ConvexShapes
 from feti_homog.cell.ellipses import Ellipses
 from feti_homog.cell.relaxation import relax
 from feti_homog.config.mixed_cell import fibre_counts, fractions_in_words, void_count
@@ -22,10 +22,6 @@ if TYPE_CHECKING:
     from feti_homog.config.cell_section import Cell
 
 
-# Distance of the sides of a cell from tangency with a circle / mean radius, below which elements there are needles.
-LEAST_CLEARANCE = 1e-3
-# Decimals of coordinates / width of the cell of tables that may have any origin and unit.
-TABLE_DECIMALS = 10
 # Quenched random packings jam near this area fraction.
 JAMMED = 0.84
 # Steps of the descent after which an arrangement counts as jammed; found ones take less than 200.
@@ -41,7 +37,8 @@ class Arrangement:
     discs if it is None. `coating` (N,) is the thickness of the ring around each disc, 0 where there is none; None if no
     disc has one. Rings do not touch. `frames` (N, 2, 2) are those of `Ellipses` where some discs are ellipses, with
     `radii` of the same areas; else None. A coating makes the semi-axes of an ellipse longer by its thickness. Discs
-    that are `hollow` (N,), if any, are voids within rings of the fibre's own phase.
+    that are `hollow` (N,), if any, are voids within rings of the fibre's own phase. `shapes` are the outlines where
+    some are polygons, with `radii` of the same areas; else None.
     """
 
     width: float
@@ -53,6 +50,7 @@ class Arrangement:
     coating: Float | None = None
     frames: Float | None = None
     hollow: Bool | None = None
+    shapes: ConvexShapes | None = None
 
     @property
     def phases(self) -> tuple[str, ...]:
@@ -119,7 +117,7 @@ def arrange(cell: Cell) -> Arrangement:
 
     square: one disc in the middle of a 1 x 1 cell. hexagonal: 1 x sqrt(3), a disc in the middle and one at
     the corner. random: discs in a 1 x 1 cell, see `random_arrangement`, with
-    `cell.match` see `matched_arrangement`. table: see `table_arrangement`.
+    `cell.match` see `matched_arrangement`. table: see `table_arrangement.table_arrangement`.
 
     Raises:
         MeshError: discs of that fraction touch, no arrangement is found, or the table is faulty.
@@ -128,6 +126,10 @@ def arrange(cell: Cell) -> Arrangement:
         from feti_homog.cell.matched_arrangement import matched_arrangement  # it is made of what stands here
 
         return matched_arrangement(cell)
+    if cell.geometry == "table":
+        from feti_homog.cell.table_arrangement import table_arrangement
+
+        return table_arrangement(cell)
     return ARRANGEMENTS[cell.geometry](cell)
 
 
@@ -194,10 +196,10 @@ def random_arrangement(cell: Cell, max_steps: int = MAX_STEPS, max_attempts: int
         )
     attempts, best = max_attempts or max(3, min(10, 100 // count)), 0.0
     for _ in range(attempts):
-        centres, clearance = relax(generator.random((count, 2)), grown, max_steps)
-        if clearance >= 1:
+        centres, reached = relax(generator.random((count, 2)), grown, max_steps)
+        if reached >= 1:
             return clear_shift(Arrangement(1.0, 1.0, centres, radii, phase, coating=coating))
-        best = max(best, clearance)
+        best = max(best, reached)
     raise MeshError(
         f"{ask}: no arrangement found in {attempts} attempts; they reached a fibre fraction of at most about "
         f"{fraction * best**2:.2f} with this gap; lower one of them, or change seed"
@@ -213,49 +215,7 @@ def _with_voids(cell: Cell, radii: Float, coating: Float | None) -> tuple[Float,
     return np.append(radii, own), None if coating is None else np.append(coating, np.zeros(count))
 
 
-def table_arrangement(cell: Cell) -> Arrangement:
-    """The fibres of the case's table, in the order of its rows; periodic images are one, the first of them.
-
-    A table that says where its cell begins keeps that place, if the sides are clear of tangency with its discs; the
-    table of a cell gives the mesh of that cell. Else all is shifted (`clear_shift`), rounded and meshed in the order of
-    the coordinates, so that tables that differ by a shift, by the order of rows or by units have one mesh.
-
-    Raises:
-        MeshError: rows lie outside, come twice, overlap or touch.
-    """
-    table = cell.table
-    assert table is not None and table.width is not None
-    rows, centres, radii, height = tabulated.fibres(table, cell.window)
-    coating = None if table.coating is None else table.coating[rows] * radii
-    hollow = None
-    if table.inner_radius is not None:
-        core = table.inner_radius[rows] / table.width
-        hollow = core > 0
-        coating = np.where(hollow, radii - core, 0.0 if coating is None else coating)
-        radii = np.where(hollow, core, radii)
-    phase = tuple(table.phase[row] for row in rows)
-    discs = Arrangement(1.0, height, centres, radii, phase, coating=coating, hollow=hollow)
-    clearance, shift = _clearance, clear_shift
-    if table.a is not None:
-        unit = elliptic_table.ellipses_of(table, rows, centres).frames / table.width
-        unit = np.where(
-            discs.is_hollow[:, None, None], unit * (radii * table.width / table.radius[rows])[:, None, None], unit
-        )
-        discs, clearance, shift = replace(discs, frames=unit), elliptic_table.clearance, elliptic_table.clear_shift
-    shifted = shift(discs)
-    is_placed = table.left is not None and table.bottom is not None
-    clear = min(LEAST_CLEARANCE * float(discs.radii.mean()), clearance(shifted))
-    if is_placed and clearance(discs) >= clear:
-        return discs
-    rounded = shifted.centres.round(TABLE_DECIMALS)
-    order = np.lexsort((rounded[:, 1], rounded[:, 0]))
-    frames = None if shifted.frames is None else shifted.frames.round(TABLE_DECIMALS)
-    thickness = None if coating is None else coating.round(TABLE_DECIMALS)
-    even = replace(shifted, centres=rounded, radii=radii.round(TABLE_DECIMALS), coating=thickness, frames=frames)
-    return replace(even, mesh_order=order)
-
-
-def _clearance(arrangement: Arrangement) -> float:
+def clearance(arrangement: Arrangement) -> float:
     """Distance of the sides of the cell from the nearest position at which they would touch a disc."""
     size = np.array([arrangement.width, arrangement.height])
     radii, disc = arrangement.circles
@@ -290,5 +250,4 @@ ARRANGEMENTS: dict[str, Callable[[Cell], Arrangement]] = {
     "square": square_arrangement,
     "hexagonal": hexagonal_arrangement,
     "random": random_arrangement,
-    "table": table_arrangement,
 }

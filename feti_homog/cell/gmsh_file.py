@@ -51,7 +51,7 @@ def load(path: Path) -> RawMesh:
         faults = _other_kinds(gmsh)
         if faults:
             raise MeshError(*(f"{path.name}: {fault}" for fault in faults))
-        return _raw_mesh(gmsh)
+        return triangles_of_model(gmsh)
 
 
 def _other_kinds(gmsh: ModuleType) -> list[str]:
@@ -73,7 +73,7 @@ def _other_kinds(gmsh: ModuleType) -> list[str]:
     return faults
 
 
-def _raw_mesh(gmsh: ModuleType) -> RawMesh:
+def triangles_of_model(gmsh: ModuleType) -> RawMesh:
     """The triangles of gmsh's current model, with the nodes that they use."""
     blocks, groups = list[Block](), list[tuple[str, ...]]()
     for _, entity in gmsh.model.getEntities(2):

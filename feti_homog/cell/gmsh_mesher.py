@@ -69,6 +69,10 @@ def generate(cell: Cell, marks: Mapping[int, Sequence[float]] = NO_MARKS) -> Coa
             f"[cell] {asked}: a {'void' if arrangement.is_void[smallest] else 'fibre'} has a radius of "
             f"{arrangement.radii.min():.2g}; expected at least {SMALLEST_RADIUS} of the width of the cell"
         )
+    if arrangement.shapes is not None:
+        from feti_homog.cell.shape_mesher import mesh_shapes  # it is made of what stands here
+
+        return mesh_shapes(arrangement, sizes, arrangement_scale(cell, arrangement))
     return mesh_arrangement(arrangement, sizes, marks, arrangement_scale(cell, arrangement))
 
 

@@ -38,10 +38,15 @@ def read(path: Path, snap: float | None = None) -> CoarseMesh:
             sides, debonded lines.
     """
     raw, moved = LOADERS[path.suffix](path), 0.0
-    _refuse(path, mesh_checks.unlabelled(raw), mesh_checks.unknown_phases(raw), mesh_checks.stray_lines(raw))
-    _refuse(path, mesh_checks.not_finite(raw))
+    _refuse(path.name, mesh_checks.unlabelled(raw), mesh_checks.unknown_phases(raw), mesh_checks.stray_lines(raw))
+    _refuse(path.name, mesh_checks.not_finite(raw))
     if snap is not None:
         raw, moved = snapped(raw, snap)
+    return replace(made(raw, path.name), snapped=moved)
+
+
+def made(raw: RawMesh, path: str) -> CoarseMesh:
+    """The coarse mesh of triangles in phases; `path` names them in faults. Raises as `read`."""
     _refuse(path, mesh_checks.not_planar(raw), mesh_checks.flat_or_inverted(raw), mesh_checks.duplicate_nodes(raw))
     _refuse(path, bent_edges.faults(raw))
     origin, size, plane = _on_rectangle(raw.points[:, :2])
@@ -58,12 +63,12 @@ def read(path: Path, snap: float | None = None) -> CoarseMesh:
     # Fibres keep the numbers that they have without bent edges: round ones first.
     numbers = Torus.of(mesh).constituent.astype(np.int32)
     mesh = with_bent_edges(with_ellipses(mesh, middles), middles)
-    return replace(mesh, precedence=numbers, snapped=moved)
+    return replace(mesh, precedence=numbers)
 
 
-def _refuse(path: Path, *faults: list[str]) -> None:
+def _refuse(path: str, *faults: list[str]) -> None:
     """Raise MeshError if there are faults."""
-    found = [f"{path.name}: {fault}" for kind in faults for fault in kind]
+    found = [f"{path}: {fault}" for kind in faults for fault in kind]
     if found:
         raise MeshError(*found)
 

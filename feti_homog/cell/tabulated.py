@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from feti_homog.cell import cut_window
+from feti_homog.cell.convex_shapes import ConvexShapes, shape_gaps
 from feti_homog.cell.ellipses import Ellipses, gaps
 from feti_homog.cell.elliptic_table import ellipses_of, with_coatings
+from feti_homog.cell.shaped_table import shapes_of
 from feti_homog.cell.torus_pairs import neighbours
 from feti_homog.errors import MeshError
 from feti_homog.typing import Bool, Float, Int
@@ -66,7 +68,8 @@ def _on_torus(table: FibreTable, window: str) -> tuple[Int, Float, Float, Float]
     kept = np.flatnonzero(first)
     centres = centres[kept]
     ellipses = None if table.a is None else with_coatings(table, kept, centres)
-    _raise_faults(table, _contacts(table, kept, centres, size, is_cut, ellipses))
+    shapes = None if table.polygons is None else _shapes(table, kept, centres, ellipses)
+    _raise_faults(table, _contacts(table, kept, centres, size, is_cut, ellipses, shapes))
     if not is_cut:
         return kept, centres, np.zeros_like(centres), size
     frames = None if ellipses is None else ellipses.frames
@@ -75,6 +78,13 @@ def _on_torus(table: FibreTable, window: str) -> tuple[Int, Float, Float, Float]
     except MeshError as error:
         words = "fibres overlap across the border, and " + str(error)
         raise MeshError(f'[cell] {table.name}: window = "cut": {words}; leave some of them out') from error
+
+
+def _shapes(table: FibreTable, kept: Int, centres: Float, ellipses: Ellipses | None) -> ConvexShapes:
+    """Those of the rows `kept` (k,), with their coatings."""
+    assert table.polygons is not None
+    discs = Ellipses.round(np.column_stack([centres, table.outer_radius[kept]]))
+    return shapes_of(discs if ellipses is None else ellipses, table.polygons[kept])
 
 
 def _corner(table: FibreTable) -> Float:
@@ -96,8 +106,10 @@ def _outside(table: FibreTable, centres: Float, size: Float, is_cut: bool) -> li
     Discs reach into a periodic cell; of a cut window the centres are within.
     """
     radius, faults, called = table.radius, [], ["radius"] * len(table.row)
+    if table.polygons is not None:
+        radius = np.where(table.polygons.sides > 0, table.polygons.circumradius, radius)
     if table.a is not None and table.b is not None:
-        radius = np.maximum(table.a, table.b)
+        radius = np.maximum(radius, np.maximum(table.a, table.b))
         called = np.where(table.a == table.b, "radius", np.where(table.a > table.b, "a", "b")).tolist()
     for axis, (name, width) in enumerate(zip(("width", "height"), size.tolist(), strict=True)):
         over = np.maximum(-centres[:, axis], centres[:, axis] - width)
@@ -147,15 +159,24 @@ def _without_images(table: FibreTable, centres: Float, size: Float, is_cut: bool
 
 
 def _contacts(
-    table: FibreTable, kept: Int, centres: Float, size: Float, is_cut: bool, ellipses: Ellipses | None
+    table: FibreTable,
+    kept: Int,
+    centres: Float,
+    size: Float,
+    is_cut: bool,
+    ellipses: Ellipses | None,
+    shapes: ConvexShapes | None,
 ) -> list[str]:
-    """Faults of fibres, the rows `kept` (k,) and their ellipses if some are not round, that overlap or touch; of a cut
-    window only of those that do within."""
+    """Faults of fibres, the rows `kept` (k,) and their ellipses or shapes if some are not round, that overlap or touch;
+    of a cut window only of those that do within."""
     radius = table.outer_radius[kept]
     longest = radius.max() if ellipses is None else ellipses.longest.max()
+    longest = longest if shapes is None else float(shapes.extents.max())
     first, second, vector = neighbours(centres, size, 2 * longest * (1 + LEAST_GAP))
     together = radius[first] + radius[second]
-    if ellipses is None:
+    if shapes is not None:
+        gap = shape_gaps(shapes[first], shapes[second].at(centres[first] + vector))
+    elif ellipses is None:
         gap = np.linalg.norm(vector, axis=1) - together
     else:
         gap, _ = gaps(ellipses[first], Ellipses(centres[first] + vector, ellipses.frames[second]))

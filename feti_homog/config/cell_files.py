@@ -10,6 +10,7 @@ import numpy as np
 
 from feti_homog.config.cell_section import Cell
 from feti_homog.config.fibre_table import FibreTable, read_table, table_of
+from feti_homog.config.rounded_polygons import with_polygons
 from feti_homog.config.section_values import MESH_FILE, MESH_SUFFIXES
 from feti_homog.config.table_shapes import check_hollow, with_shapes
 from feti_homog.config.wording import toml_value
@@ -66,7 +67,7 @@ def _with_table(cell: Cell, faults: list[str]) -> Cell:
         faults.append(f"[cell] coating = {cell.coating:g}: {table.name} has a column of it; give one")
     elif cell.coating is not None:
         table = replace(table, coating=np.where(table.is_void, 0.0, cell.coating))
-    table = with_shapes(table, faults)
+    table = with_shapes(with_polygons(table, cell.window, faults), faults)
     check_hollow(table, faults)
     width, height = (_size(name, getattr(cell, name), table, faults) for name in ("width", "height"))
     return replace(cell, table=replace(table, width=width, height=height))

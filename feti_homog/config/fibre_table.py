@@ -12,12 +12,13 @@ from typing import Any
 import numpy as np
 
 from feti_homog.config.phase_names import VOID
+from feti_homog.config.rounded_polygons import RoundedPolygons
 from feti_homog.config.values import is_number, real
 from feti_homog.config.wording import suggestion, toml_value
 from feti_homog.errors import CaseError
 from feti_homog.typing import Bool, Float, Int
 
-NUMBERS = ("x", "y", "radius", "coating", "a", "b", "angle", "inner_radius")
+NUMBERS = ("x", "y", "radius", "coating", "a", "b", "angle", "inner_radius", "sides", "corner")
 COLUMNS = (*NUMBERS[:3], "phase", *NUMBERS[3:])
 SIZES = ("width", "height", "left", "bottom")
 """What comment lines may say of the cell: its size, and the coordinates of its lower left corner."""
@@ -27,7 +28,7 @@ SIZE = re.compile(r"\b(width|height|left|bottom)\s*[=:]\s*([^\s;=]+?)(?=,?\s|,?$
 TYPES = (
     dict.fromkeys(("x", "y", "angle"), real())
     | dict.fromkeys(("radius", "a", "b"), real(above=0.0))
-    | dict.fromkeys(("coating", "inner_radius"), real(least=0.0))
+    | dict.fromkeys(("coating", "inner_radius", "sides", "corner"), real(least=0.0))
 )
 # Faults that are told one by one.
 MAX_FAULTS = 30
@@ -44,6 +45,7 @@ class FibreTable:
         radius: (N,); NaN where the table gives semi-axes instead.
         phase: N names, "fibre" where the table gives none, "void" of voids.
         coating: (N,) thickness / radius, 0 where a cell is empty; None without that column, like what follows.
+        sides, corner: (N,) of rounded polygons; NaN where a cell is empty.
         inner_radius: (N,) of the void within hollow fibres, 0 of others.
         a, b, angle: (N,) semi-axes, and the angle in degrees from x to a, of ellipses; NaN where a cell is empty.
         width, height: of the cell; None if the table does not say.
@@ -61,10 +63,13 @@ class FibreTable:
     b: Float | None
     angle: Float | None
     inner_radius: Float | None
+    sides: Float | None
+    corner: Float | None
     width: float | None
     height: float | None
     left: float | None
     bottom: float | None
+    polygons: RoundedPolygons | None = None
 
     @property
     def centres(self) -> Float:
@@ -96,6 +101,9 @@ class FibreTable:
             b=optional(self.b),
             angle=optional(self.angle),
             inner_radius=optional(self.inner_radius),
+            sides=optional(self.sides),
+            corner=optional(self.corner),
+            polygons=None if self.polygons is None else self.polygons[kept],
         )
 
     @property
@@ -244,7 +252,7 @@ def _table(
     if not rows and not faults.lines:
         faults.lines.append(f"{name}: no fibres; expected a row for each")
     faults.throw()
-    nothing = {"coating": 0.0, "angle": 0.0, "inner_radius": 0.0}
+    nothing = {"coating": 0.0, "angle": 0.0, "inner_radius": 0.0, "sides": 0.0, "corner": 0.0}
 
     def column(key: str) -> Float:
         return np.array([cells.get(key, nothing.get(key, math.nan)) for cells in rows.values()], float)
@@ -264,6 +272,8 @@ def _table(
         b=optional("b"),
         angle=optional("angle"),
         inner_radius=optional("inner_radius"),
+        sides=optional("sides"),
+        corner=optional("corner"),
         width=sizes.get("width"),
         height=sizes.get("height"),
         left=sizes.get("left"),

@@ -109,7 +109,7 @@ FIBRE_LIST = ValueType(
             "properties": {"phase": {"type": "string"}}
             | dict.fromkeys(("x", "y", "angle"), real().json_schema)
             | dict.fromkeys(("radius", "a", "b"), real(above=0.0).json_schema)
-            | dict.fromkeys(("coating", "inner_radius"), real(least=0.0).json_schema),
+            | dict.fromkeys(("coating", "inner_radius", "sides", "corner"), real(least=0.0).json_schema),
             "required": ["x", "y"],
             "additionalProperties": False,
         },

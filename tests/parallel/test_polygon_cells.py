@@ -1,0 +1,103 @@
+"""L^ef of tables with rounded polygons: a monolithic solve, circles, a user's mesh of a square, refinement, laws."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.cases import FIBRE, MATRIX, monolithic_stiffness, relative_error, solve
+from unit.cell.faulty_meshes import grid
+
+from feti_homog import run
+from feti_homog.config import case as cases
+from feti_homog.verification.certificate import verify
+
+pytestmark = pytest.mark.parallel
+
+SQUARE = {"x": 0.5, "y": 0.5, "radius": 0.25 * 2**0.5, "sides": 4, "angle": 45.0}
+ROWS = [
+    {"x": 0.0, "y": 0.0, "radius": 0.25, "sides": 6, "corner": 0.2, "angle": 10.0},
+    {"x": 0.5, "y": 0.5, "radius": 0.2},
+    {"x": 0.05, "y": 0.5, "radius": 0.18, "sides": 3, "corner": 0.3, "angle": 90.0},
+    {"x": 0.5, "y": 0.05, "a": 0.16, "b": 0.08, "angle": 30.0},
+]
+
+
+def case_of(cell, folder=None, **sections):
+    document = {
+        "cell": cell,
+        "material": {"matrix": MATRIX, "fibre": FIBRE},
+        "analysis": {"type": "stiffness", "plane": "strain"},
+        "petsc": {"feti_ksp_rtol": 1e-11},
+        "output": {"pictures": False},
+    }
+    return cases.parse(document | sections, Path() if folder is None else folder)
+
+
+def table(*rows, **keys):
+    return {"geometry": "table", "width": 1.0, "height": 1.0, "fibre_list": list(rows), "mesh_size": 0.1} | keys
+
+
+def stiffness(comm, *rows, **keys):
+    return solve(case_of(table(*rows, **keys)), comm)[1]
+
+
+@pytest.mark.quick
+@pytest.mark.parametrize("keys", [{}, {"order": 2, "refine": 1}])
+@pytest.mark.parametrize("pieces", [{}, {"decomposition": {"subdomains": 9}}])
+def test_torn_polygons_have_the_monolithic_stiffness(comm, keys, pieces):
+    torn, L, responses = solve(case_of(table(*ROWS, **keys), **pieces), comm)
+    assert relative_error(L, monolithic_stiffness(torn)) < 1e-9
+    assert max(max(r.checks.values()) for r in responses) < 1e-8
+
+
+@pytest.mark.parametrize("sides", [3, 8])
+def test_a_corner_of_one_makes_a_circle(comm, sides):
+    row = {"x": 0.5, "y": 0.5, "radius": 0.2 / np.cos(np.pi / sides), "sides": sides, "corner": 1.0}
+    found = stiffness(comm, row, order=2, refine=1)
+    expected = stiffness(comm, {"x": 0.5, "y": 0.5, "radius": 0.2}, order=2, refine=1)
+    assert relative_error(found, expected) < 1e-5
+
+
+def test_a_sharp_square_is_that_of_a_users_mesh(comm, shared_path):
+    """Of squares, on other nodes; both err at the corners."""
+    if comm.rank == 0:
+        grid().write(shared_path / "grid.msh")
+    comm.barrier()
+    mesh = {"geometry": "mesh", "file": "grid.msh", "order": 2, "refine": 4}
+    expected = solve(case_of(mesh, shared_path), comm)[1]
+    found = stiffness(comm, SQUARE, order=2, refine=2)
+    assert relative_error(found, expected) < 5e-4
+
+
+@pytest.mark.parametrize(("order", "rate"), [(1, 1.8), (2, 3.3)])
+def test_stiffness_converges_under_refinement(comm, order, rate):
+    """The refined edges follow straight sides and arcs exactly."""
+    row = SQUARE | {"corner": 0.5, "angle": 20.0}
+    exact = stiffness(comm, row, order=2, refine=3)
+    errors = [relative_error(stiffness(comm, row, order=order, refine=refine), exact) for refine in (0, 1, 2)]
+    assert np.log2(errors[0] / errors[2]) / 2 > rate, errors
+
+
+def test_turned_cells_have_turned_stiffnesses(comm):
+    """A quarter of a turn leaves a square cell of a square alone, and a hexagon's shear coupling changes its sign."""
+    square = stiffness(comm, SQUARE | {"corner": 0.3, "angle": 20.0}, order=2, refine=1)
+    assert square[0, 0] == pytest.approx(square[1, 1], rel=1e-4)
+    assert square[0, 2] == pytest.approx(-square[1, 2], abs=1e-4 * square[0, 0])
+    hexagon = {"x": 0.5, "y": 0.5, "radius": 0.35, "sides": 6, "corner": 0.3}
+    one, other = (stiffness(comm, hexagon | {"angle": turn}, order=2, refine=1) for turn in (10.0, 100.0))
+    assert relative_error(other[[1, 0, 2]][:, [1, 0, 2]] * np.outer([1, 1, -1], [1, 1, -1]), one) < 1e-4
+
+
+def test_polygons_debond_and_are_certified(comm, shared_path):
+    sections = {
+        "analysis": {"type": "path", "plane": "strain"},
+        "interface": {"normal_strength": 2.0, "tangential_strength": 2.0},
+        "path": {"strain": [1.0, 0.0, 0.0], "max_events": 200},
+    }
+    result = run(case_of(table(*ROWS[:2], mesh_size=0.2), **sections), comm, out=shared_path / "run")
+    assert result.path[-1].debonded_share > 0.2
+    if comm.rank == 0:
+        assert verify(shared_path / "run").holds
+    comm.barrier()
