@@ -67,13 +67,11 @@ def _add_surfaces(gmsh: ModuleType, arrangement: Arrangement) -> dict[int, int]:
     added, disc, ring = _add_outlines(gmsh, arrangement)
     _, parts = occ.fragment([rectangle], added)
     occ.synchronize()
-    in_disc, in_ring = arrangement.within
     number, phase = dict.fromkeys(parts[0], 0), dict.fromkeys(parts[0], MATRIX)
     for pieces, own, is_ring in zip(parts[1:], disc, ring, strict=True):
-        is_coating = is_ring and not arrangement.is_hollow[own]
-        for piece in set(pieces) & set(number):
-            number[piece] = own + 1 + arrangement.fibres * is_coating
-            phase[piece] = (in_ring if is_ring else in_disc)[own]
+        inside = set(pieces) & set(number)
+        number |= dict.fromkeys(inside, _precedence(arrangement, own, is_ring))
+        phase |= dict.fromkeys(inside, arrangement.within[is_ring][own])
     outside = {piece for pieces in parts for piece in pieces} - set(number)
     voids = {piece for piece, name in phase.items() if name == VOID}
     occ.remove(sorted(outside | voids), recursive=True)
@@ -81,6 +79,11 @@ def _add_surfaces(gmsh: ModuleType, arrangement: Arrangement) -> dict[int, int]:
     for name in sorted(set(phase.values()) - {VOID}):
         gmsh.model.addPhysicalGroup(2, sorted(tag for (_, tag), own in phase.items() if own == name), name=name)
     return {tag: own for (_, tag), own in number.items()}
+
+
+def _precedence(arrangement: Arrangement, disc: int, is_ring: bool) -> int:
+    """The number of the fibre, from 1; of coatings those behind them in the same order."""
+    return disc + 1 + arrangement.fibres * (is_ring and not arrangement.is_hollow[disc])
 
 
 def _add_outlines(gmsh: ModuleType, arrangement: Arrangement) -> tuple[list[Surface], list[int], list[bool]]:

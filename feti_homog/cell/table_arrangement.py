@@ -10,9 +10,11 @@ import numpy as np
 from feti_homog.cell import elliptic_table, shaped_table, tabulated
 from feti_homog.cell.arrangement import Arrangement, clear_shift, clearance
 from feti_homog.cell.ellipses import Ellipses
+from feti_homog.typing import Float, Int
 
 if TYPE_CHECKING:
     from feti_homog.config.cell_section import Cell
+    from feti_homog.config.fibre_table import FibreTable
 
 # Distance of the sides of a cell from tangency with a circle / mean radius, below which elements there are needles.
 LEAST_CLEARANCE = 1e-3
@@ -32,37 +34,49 @@ def table_arrangement(cell: Cell) -> Arrangement:
     """
     table = cell.table
     assert table is not None and table.width is not None
-    rows, centres, radii, height = tabulated.fibres(table, cell.window)
+    discs = _discs(table, *tabulated.fibres(table, cell.window))
+    clear_of, shift = clearance, clear_shift
+    if discs.shapes is not None:
+        clear_of, shift = shaped_table.clearance, shaped_table.clear_shift
+    elif discs.frames is not None:
+        clear_of, shift = elliptic_table.clearance, elliptic_table.clear_shift
+    shifted = shift(discs)
+    is_placed = table.left is not None and table.bottom is not None
+    clear = min(LEAST_CLEARANCE * float(discs.radii.mean()), clear_of(shifted))
+    return discs if is_placed and clear_of(discs) >= clear else _rounded(shifted)
+
+
+def _discs(table: FibreTable, rows: Int, centres: Float, radii: Float, height: float) -> Arrangement:
+    """The rows (k,) with these centres and radii / width of the cell."""
+    assert table.width is not None
     coating = None if table.coating is None else table.coating[rows] * radii
-    hollow = None
+    hollow, share = None, np.ones(len(rows))
     if table.inner_radius is not None:
         core = table.inner_radius[rows] / table.width
         hollow = core > 0
+        share = np.where(hollow, core / radii, 1.0)
         coating = np.where(hollow, radii - core, 0.0 if coating is None else coating)
         radii = np.where(hollow, core, radii)
     phase = tuple(table.phase[row] for row in rows)
     discs = Arrangement(1.0, height, centres, radii, phase, coating=coating, hollow=hollow)
-    clear_of, shift = clearance, clear_shift
     if table.a is not None:
-        unit = elliptic_table.ellipses_of(table, rows, centres).frames / table.width
-        unit = np.where(
-            discs.is_hollow[:, None, None], unit * (radii * table.width / table.radius[rows])[:, None, None], unit
-        )
-        discs, clear_of, shift = replace(discs, frames=unit), elliptic_table.clearance, elliptic_table.clear_shift
-    if table.polygons is not None:
-        own = Ellipses.round(np.column_stack([centres, radii])) if discs.frames is None else discs.ellipses
-        shapes = shaped_table.shapes_of(own, table.polygons[rows], table.width)
-        discs, clear_of, shift = replace(discs, shapes=shapes), shaped_table.clearance, shaped_table.clear_shift
-    shifted = shift(discs)
-    is_placed = table.left is not None and table.bottom is not None
-    clear = min(LEAST_CLEARANCE * float(discs.radii.mean()), clear_of(shifted))
-    if is_placed and clear_of(discs) >= clear:
+        frames = elliptic_table.ellipses_of(table, rows, centres).frames / table.width
+        discs = replace(discs, frames=np.where(share[:, None, None] < 1, share[:, None, None] * frames, frames))
+    if table.polygons is None:
         return discs
-    rounded = shifted.centres.round(TABLE_DECIMALS)
-    order = np.lexsort((rounded[:, 1], rounded[:, 0]))
-    frames = None if shifted.frames is None else shifted.frames.round(TABLE_DECIMALS)
-    thickness = None if coating is None else coating.round(TABLE_DECIMALS)
-    even = replace(shifted, centres=rounded, radii=radii.round(TABLE_DECIMALS), coating=thickness, frames=frames)
+    own = Ellipses.round(np.column_stack([centres, radii])) if discs.frames is None else discs.ellipses
+    return replace(discs, shapes=shaped_table.shapes_of(own, table.polygons[rows], table.width))
+
+
+def _rounded(arrangement: Arrangement) -> Arrangement:
+    """The arrangement with coordinates of TABLE_DECIMALS, meshed in their order."""
+    centres, coating, frames = arrangement.centres.round(TABLE_DECIMALS), arrangement.coating, arrangement.frames
     return replace(
-        even, mesh_order=order, shapes=None if shifted.shapes is None else shifted.shapes.rounded(TABLE_DECIMALS)
+        arrangement,
+        centres=centres,
+        radii=arrangement.radii.round(TABLE_DECIMALS),
+        mesh_order=np.lexsort((centres[:, 1], centres[:, 0])),
+        coating=None if coating is None else coating.round(TABLE_DECIMALS),
+        frames=None if frames is None else frames.round(TABLE_DECIMALS),
+        shapes=None if arrangement.shapes is None else arrangement.shapes.rounded(TABLE_DECIMALS),
     )

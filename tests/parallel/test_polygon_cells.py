@@ -44,7 +44,7 @@ def stiffness(comm, *rows, **keys):
 
 
 @pytest.mark.quick
-@pytest.mark.parametrize("keys", [{}, {"order": 2, "refine": 1}])
+@pytest.mark.parametrize("keys", [{"refine": 1}, {"order": 2}])
 @pytest.mark.parametrize("pieces", [{}, {"decomposition": {"subdomains": 9}}])
 def test_torn_polygons_have_the_monolithic_stiffness(comm, keys, pieces):
     torn, L, responses = solve(case_of(table(*ROWS, **keys), **pieces), comm)
@@ -65,19 +65,19 @@ def test_a_sharp_square_is_that_of_a_users_mesh(comm, shared_path):
     if comm.rank == 0:
         grid().write(shared_path / "grid.msh")
     comm.barrier()
-    mesh = {"geometry": "mesh", "file": "grid.msh", "order": 2, "refine": 4}
+    mesh = {"geometry": "mesh", "file": "grid.msh", "order": 2, "refine": 3}
     expected = solve(case_of(mesh, shared_path), comm)[1]
-    found = stiffness(comm, SQUARE, order=2, refine=2)
-    assert relative_error(found, expected) < 5e-4
+    found = stiffness(comm, SQUARE, order=2, refine=1)
+    assert relative_error(found, expected) < 1e-3
 
 
 @pytest.mark.parametrize(("order", "rate"), [(1, 1.8), (2, 3.3)])
 def test_stiffness_converges_under_refinement(comm, order, rate):
     """The refined edges follow straight sides and arcs exactly."""
     row = SQUARE | {"corner": 0.5, "angle": 20.0}
-    exact = stiffness(comm, row, order=2, refine=3)
-    errors = [relative_error(stiffness(comm, row, order=order, refine=refine), exact) for refine in (0, 1, 2)]
-    assert np.log2(errors[0] / errors[2]) / 2 > rate, errors
+    exact = stiffness(comm, row, order=2, refine=2)
+    errors = [relative_error(stiffness(comm, row, order=order, refine=refine), exact) for refine in (0, 1)]
+    assert np.log2(errors[0] / errors[1]) > rate, errors
 
 
 def test_turned_cells_have_turned_stiffnesses(comm):
@@ -96,7 +96,7 @@ def test_polygons_debond_and_are_certified(comm, shared_path):
         "interface": {"normal_strength": 2.0, "tangential_strength": 2.0},
         "path": {"strain": [1.0, 0.0, 0.0], "max_events": 200},
     }
-    result = run(case_of(table(*ROWS[:2], mesh_size=0.2), **sections), comm, out=shared_path / "run")
+    result = run(case_of(table(*ROWS[:2], mesh_size=0.4), **sections), comm, out=shared_path / "run")
     assert result.path[-1].debonded_share > 0.2
     if comm.rank == 0:
         assert verify(shared_path / "run").holds
