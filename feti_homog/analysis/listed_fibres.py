@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -70,7 +72,13 @@ def read(source: Path) -> ListedFibres:
 
 def _of_result(directory: Path) -> ListedFibres:
     document = stored_result.read(directory)
-    fibres, cell = document["fibres"], document["cell"]
+    if document["case"]["cell"]["geometry"] != "mesh" and not _is_complete(document):
+        return _of_cell(cases.parse(document["case"], directory).cell)
+    return _of_records(document["fibres"], document["cell"])
+
+
+def _of_records(fibres: Sequence[Mapping[str, Any]], cell: Mapping[str, Any]) -> ListedFibres:
+    """Those of `fibres` and `cell` of a result."""
     unknown = (np.nan, np.nan)
     centres = np.array([fibre.get("centre") or unknown for fibre in fibres], float).reshape(-1, 2)
     axes = [
@@ -83,8 +91,14 @@ def _of_result(directory: Path) -> ListedFibres:
         tuple(fibre["phase"] for fibre in fibres),
         np.array([fibre.get("coating") or 0.0 for fibre in fibres]),
         np.zeros(len(fibres)),
-        bool(cell.get("porosity")),
+        lacks_voids=bool(cell.get("porosity")),
     )
+
+
+def _is_complete(document: Mapping[str, Any]) -> bool:
+    """Whether a result tells all outlines: it does not those of voids, nor of polygons."""
+    are_known = all("radius" in fibre or "semi_axes" in fibre for fibre in document["fibres"])
+    return are_known and not document["cell"].get("porosity")
 
 
 def _of_cell(cell: Cell) -> ListedFibres:

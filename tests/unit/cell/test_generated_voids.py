@@ -7,6 +7,7 @@ import pytest
 import tomli_w
 from mpi4py import MPI
 from support.circular_cells import cell as circular
+from support.void_cells import write_voids
 
 from feti_homog import run
 from feti_homog.analysis import fibre_rows, fibre_sources
@@ -141,13 +142,21 @@ def test_too_many_voids_are_told():
         arrange(circular(fraction=0.5, gap=0.05, voids=0.4))
 
 
-def test_the_folder_of_a_result_does_not_list_voids(tmp_path):
-    """Its fibres have statistics all the same."""
-    cell = RANDOM | {"fibres": 3, "voids": 0.05, "mesh_size": 0.2}
-    run(case_of(tmp_path, cell), MPI.COMM_SELF, out=tmp_path / "run")
-    with pytest.raises(CaseError, match="has voids, which only a case of a table or of a random cell lists"):
-        fibre_rows.table(tmp_path / "run")
+def test_the_folder_of_a_result_has_the_table_of_its_case(tmp_path):
+    case = case_of(tmp_path, RANDOM | {"fibres": 3, "voids": 0.05, "mesh_size": 0.2})
+    (tmp_path / "case.toml").write_text(_toml(case))
+    run(case, MPI.COMM_SELF, out=tmp_path / "run")
+    assert fibre_rows.table(tmp_path / "run") == fibre_rows.table(tmp_path / "case.toml")
     assert fibre_sources.read(tmp_path / "run", None).count == 3
+
+
+def test_voids_of_a_users_mesh_are_not_listed(tmp_path):
+    """Its fibres have statistics all the same."""
+    write_voids(tmp_path / "cell.msh", voids=[0], **RANDOM | {"fibres": 3, "mesh_size": 0.1})
+    (tmp_path / "case.toml").write_text(_toml(case_of(tmp_path, {"geometry": "mesh", "file": "cell.msh"})))
+    with pytest.raises(CaseError, match="has voids, which only a case of a table or of a random cell lists"):
+        fibre_rows.table(tmp_path / "case.toml")
+    assert fibre_sources.read(tmp_path / "case.toml", None).count == 2
 
 
 def test_a_void_is_no_fibre_that_can_debond(tmp_path):

@@ -7,8 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import tomli_w
+from mpi4py import MPI
 from unit.cell.test_gmsh_mesher import least_angle
 
+from feti_homog import run
 from feti_homog.analysis import fibre_rows
 from feti_homog.cell.arrangement import arrange
 from feti_homog.cell.coarse_mesh import areas
@@ -117,6 +119,8 @@ def test_the_table_of_polygons_gives_the_cell_again(tmp_path):
     mesh, again = generate(case.cell), generate(cases.parse(document, tmp_path).cell)
     sums = [[areas(m.points, m.triangles)[m.phase == phase].sum() for phase in range(3)] for m in (mesh, again)]
     assert sums[0] == pytest.approx(sums[1], rel=1e-3) and voids(again) == 1
+    run(case, MPI.COMM_SELF, out=tmp_path / "run")
+    assert fibre_rows.table(tmp_path / "run") == (tmp_path / "again.csv").read_text()
 
 
 @pytest.mark.parametrize(("row", "fault"), [
