@@ -6,11 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from feti_homog.cell.ellipses import Ellipses, directions
+from feti_homog.cell.ellipses import Ellipses, directions, widest
 from feti_homog.typing import Bool, Float, Int
-
-# Directions in which the distance of two shapes is first looked for, and how often the best are looked between.
-DIRECTIONS, ZOOMS, ZOOM = 180, 12, 9
 
 
 @dataclass(frozen=True)
@@ -101,11 +98,4 @@ def shape_gaps(first: ConvexShapes, second: ConvexShapes) -> Float:
         n = directions(angle)
         return np.asarray(np.einsum("ki,kmi->km", vector, n) - first.support(n) - second.support(-n))
 
-    step = 2 * np.pi / DIRECTIONS
-    around = np.arctan2(vector[:, 1], vector[:, 0])[:, None] + step * np.arange(DIRECTIONS)
-    best = around[np.arange(len(vector)), gap(around).argmax(axis=1)]
-    for _ in range(ZOOMS):
-        around = best[:, None] + np.linspace(-step, step, ZOOM)
-        best = around[np.arange(len(vector)), gap(around).argmax(axis=1)]
-        step *= 2 / (ZOOM - 1)
-    return gap(best[:, None])[:, 0]
+    return widest(vector, gap)[0]

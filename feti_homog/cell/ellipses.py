@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -154,6 +155,12 @@ def gaps(first: Ellipses, second: Ellipses) -> tuple[Float, Float]:
         reach = [np.sqrt(np.einsum("kmi,kij,kmj->km", n, squares, n)) for squares in (one, other)]
         return np.asarray(np.einsum("ki,kmi->km", vector, n) - reach[0] - reach[1])
 
+    return widest(vector, gap)
+
+
+def widest(vector: Float, gap: Callable[[Float], Float]) -> tuple[Float, Float]:
+    """The largest gap (k,) of pairs at these vectors (k, 2) from the first to the second, and its direction (k,) in
+    radians; gap(a) are those across directions a (k, m)."""
     step = 2 * np.pi / DIRECTIONS
     around = np.arctan2(vector[:, 1], vector[:, 0])[:, None] + step * np.arange(DIRECTIONS)
     best = around[np.arange(len(vector)), gap(around).argmax(axis=1)]

@@ -69,6 +69,8 @@ def _with_table(cell: Cell, faults: list[str]) -> Cell:
         table = replace(table, coating=np.where(table.is_void, 0.0, cell.coating))
     table = with_shapes(with_polygons(table, cell.window, faults), faults)
     check_hollow(table, faults)
+    if table.polygons is not None and cell.tip_size is not None:
+        faults.append(f"[cell] tip_size = {cell.tip_size:g}: {table.name} has polygons, and with them no nodes at tips")
     width, height = (_size(name, getattr(cell, name), table, faults) for name in ("width", "height"))
     return replace(cell, table=replace(table, width=width, height=height))
 

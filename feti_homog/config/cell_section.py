@@ -99,7 +99,7 @@ class Cell:
         real(least=1e-7, most=0.1),
         "Largest relative error of the strain energy under any macroscopic strain, and so of the entries of the "
         "effective stiffness: mesh_size and refine are chosen, which it excludes with interface_size and tip_size, and "
-        "order, unless it is given. It is not that of paths after bonds break.",
+        "order, unless it is given. It is not that of paths after bonds break, nor of polygons with sharp corners.",
         default=None,
         default_words="none",
         only=MESHED,

@@ -145,6 +145,8 @@ def test_faults_of_the_table():
         case_of({"x": 0.5, "y": 0.5, "radius": 0.1, "corner": 0.3})
     with pytest.raises(CaseError, match='window = "cut": fibre_list has polygons, which it does not move'):
         case_of(SQUARE, window="cut")
+    with pytest.raises(CaseError, match=r"tip_size = 0\.01: fibre_list has polygons, and with them no nodes at tips"):
+        case_of(SQUARE, tip_size=0.01)
 
 
 @pytest.mark.parametrize(("row", "fault"), [
