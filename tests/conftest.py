@@ -54,17 +54,21 @@ def mpirun() -> Callable[..., Any]:
 def pytest_addoption(parser: pytest.Parser) -> None:
     words = "of the cases of each parametrized test only every N-th, from the first"
     parser.addoption("--every", type=int, default=1, metavar="N", help=words)
+    words = "of those not the cases that `-m 'not few_ranks' --every N` runs on more ranks"
+    parser.addoption("--but-every", type=int, metavar="N", help=words)
 
 
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave out what --every does, of the tests that marks and names have left."""
+    """Leave out what --every and --but-every do, of the tests that marks and names have left."""
+    every, others = config.getoption("every"), config.getoption("but_every")
     chosen: list[pytest.Item] = []
     dropped: list[pytest.Item] = []
     cases: Counter[str] = Counter()
     for item in items:
         test = item.nodeid.partition("[")[0]
-        (chosen if cases[test] % config.getoption("every") == 0 else dropped).append(item)
+        runs_elsewhere = others and cases[test] % others == 0 and item.get_closest_marker("few_ranks") is None
+        (chosen if cases[test] % every == 0 and not runs_elsewhere else dropped).append(item)
         cases[test] += 1
     items[:] = chosen
     if dropped:

@@ -236,9 +236,8 @@ def test_infinite_strengths_never_break(torn):
     assert is_certified(points)
 
 
+@pytest.mark.few_ranks
 def test_twenty_fibres_debond_to_the_end_certified_and_dissipating(comm):
-    if comm.size > 2:
-        pytest.skip("one test, two cores")
     many = {"geometry": "random", "fibres": 20, "fibre_fraction": 0.4, "min_gap": 0.1, "seed": 2, "mesh_size": 0.08}
     cell = torn_cells.tear(comm, **many, **INFLUENCE)
     points = follow(cell, True, StrengthCriterion(30.0, 15.0, "max"), [[1.0, -0.3, 0.4]])
