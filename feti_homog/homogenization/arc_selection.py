@@ -8,7 +8,7 @@ from itertools import product
 
 import numpy as np
 
-from feti_homog.cell.outline import MERGED
+from feti_homog.cell.circle_arcs import MERGED
 from feti_homog.cell.periodic_topology import Torus, edge_pairs, shared_edges
 from feti_homog.cell.refinement import ReferenceLattice
 from feti_homog.config.case import Case

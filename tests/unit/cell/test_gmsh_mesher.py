@@ -12,7 +12,8 @@ from support.circular_cells import cell
 
 from feti_homog.cell.arrangement import arrange
 from feti_homog.cell.coarse_mesh import areas, flip_double_arcs
-from feti_homog.cell.gmsh_mesher import _fill, generate
+from feti_homog.cell.filling import Tile, fill
+from feti_homog.cell.gmsh_mesher import generate
 from feti_homog.cell.graded_size import MeshSizes
 from feti_homog.cell.outline import outline
 
