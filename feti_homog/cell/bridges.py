@@ -105,10 +105,16 @@ def _clearance(centres: Float, radii: Float, ends: Int, most: float) -> Float:
     return clearance
 
 
-def bridges(lines: CentreLines, size: Float, margin: float, vertices: OnCircles) -> Bridges:
-    """Bridges on these lines, clear of third discs, `margin` away from the sides of the cell, and LEAST_ANGLE from each
-    other and from the `vertices` that circles have; of two that are too near the shorter one."""
-    inside = np.all((lines.facing > margin) & (lines.facing < size - margin), axis=(1, 2))
+def bridges(lines: CentreLines, size: Float, margin: float, largest: float, vertices: OnCircles) -> Bridges:
+    """Bridges on these lines, clear of third discs and of the sides of the cell, and LEAST_ANGLE from each other and
+    from the `vertices` that circles have; of two that are too near the shorter one.
+
+    Their ends are `margin` away from the sides, and their middles one of the `largest` edges there, or as long as they
+    are: beside a side there would be no room for good triangles.
+    """
+    middle = lines.facing.mean(axis=1)
+    away, ends_away = (np.minimum(points, size - points) for points in (middle, lines.facing))
+    inside = (ends_away.min(axis=(1, 2)) > margin) & (away.min(axis=1) > np.minimum(largest, lines.gap))
     clear = np.flatnonzero(inside & (lines.clearance > 1 + CLEAR))
     order = np.lexsort((clear, (lines.gap[clear] / size.max()).round(GAP_DECIMALS)))
     found = Bridges(lines.ends[clear[order]], lines.angle[clear[order]])

@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from feti_homog.cell.bridges import TURN, Bridges, OnCircles
 from feti_homog.cell.curves import MATRIX, Curves, Numbering
-from feti_homog.cell.edge_samples import EdgeSamples
+from feti_homog.cell.edge_samples import EdgeSamples, Sampling
 from feti_homog.cell.graded_size import SizeField
 from feti_homog.typing import Float, Int
 
@@ -18,9 +18,6 @@ SAME_PLACE = 1e-9
 # A mark nearer than this many radians to another vertex of its circle is that vertex.
 MERGED = np.radians(0.05)
 QUARTER = TURN / 4
-# Positions at which the size is sampled along an arc and along a bridge.
-ARC_SAMPLES = 65
-BRIDGE_SAMPLES = 17
 
 
 def on_circles(circles: Float, which: Int, angles: Float) -> Float:
@@ -82,7 +79,7 @@ def arc_curves(
     caps: Float,
     field: SizeField,
     numbering: Numbering,
-    most: int,
+    sampling: Sampling,
 ) -> Curves:
     """The arcs (a,) from angle `start` to `stop` on their circles as curves, with edges of at most `caps` (a,)."""
     span = stop - start
@@ -90,14 +87,14 @@ def arc_curves(
     def point(arc: Int, share: Float) -> Float:
         return on_circle(circles[circle[arc]], start[arc] + span[arc] * share)
 
-    samples = EdgeSamples.of(field, point, span * circles[circle, 2], lambda arc, share: caps[arc], ARC_SAMPLES)
-    station, first = samples.stations(np.ones(len(span), np.int64), most)
+    samples = EdgeSamples.of(field, point, span * circles[circle, 2], lambda arc, share: caps[arc], sampling.arc)
+    station, first = samples.stations(np.ones(len(span), np.int64), sampling.most_nodes)
     arc = np.repeat(np.arange(len(span)), np.diff(first))
     return Curves(numbering.along(point(arc, station), first), first, circle, circle, around[circle])
 
 
 def bridge_curves(
-    circles: Float, bridges: Bridges, caps: Float, field: SizeField, numbering: Numbering, most: int
+    circles: Float, bridges: Bridges, caps: Float, field: SizeField, numbering: Numbering, sampling: Sampling
 ) -> Curves:
     """The bridges between circles with edges of at most `caps` (k,), with edges as long as if the sizes at their ends
     were interpolated: as gmsh does it where elements are not graded."""
@@ -111,8 +108,8 @@ def bridge_curves(
     def cap(bridge: Int, share: Float) -> Float:
         return np.asarray(low[bridge] * (1 - share) + high[bridge] * share)
 
-    samples = EdgeSamples.of(field, point, np.linalg.norm(way, axis=1), cap, BRIDGE_SAMPLES)
-    share, first = samples.stations(np.ones(len(way), np.int64), most)
+    samples = EdgeSamples.of(field, point, np.linalg.norm(way, axis=1), cap, sampling.bridge)
+    share, first = samples.stations(np.ones(len(way), np.int64), sampling.most_nodes)
     bridge = np.repeat(np.arange(len(way)), np.diff(first))
     straight = np.full(len(way), MATRIX)
     return Curves(numbering.along(point(bridge, share), first), first, straight, straight, straight)

@@ -84,7 +84,7 @@ def backwards(node: Int, first: Int, turned: Bool) -> Int:
     counts = np.diff(first)
     place = np.arange(len(node))
     mirror = np.repeat(first[:-1] + first[1:] - 1, counts) - place
-    return node[np.where(np.repeat(turned, counts), mirror, place)]
+    return np.asarray(node[np.where(np.repeat(turned, counts), mirror, place)])
 
 
 class Numbering:

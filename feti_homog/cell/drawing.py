@@ -32,6 +32,11 @@ class Drawing:
     parts: tuple[tuple[Int, Tile], ...]
     scale: float
 
+    @property
+    def phases(self) -> tuple[str, ...]:
+        """Those of the mesh."""
+        return self.arrangement.phases
+
     def filled(self) -> CoarseMesh:
         """The mesh, all tiles filled here."""
         return self.mesh([fill(tile) for _, tile in self.parts])

@@ -16,6 +16,21 @@ OnCurves = Callable[[Int, Float], Float]
 
 
 @dataclass(frozen=True)
+class Sampling:
+    """How sizes are sampled: at so many positions along an arc, a piece of a side and a bridge, and for at most so many
+    nodes in all."""
+
+    arc: int
+    side: int
+    bridge: int
+    most_nodes: int
+
+
+# Of a cell that one rank meshes in minutes, and of one that all ranks mesh: there an arc is a few edges long.
+WHOLE, IN_TILES = Sampling(65, 513, 17, 120_000), Sampling(33, 129, 17, 3_000_000)
+
+
+@dataclass(frozen=True)
 class EdgeSamples:
     """The size of edges h sampled along c curves: at positions `share` (n,) in [0, 1] of them there is ds / h `density`
     (n,); those of curve k are from first[k] up to first[k + 1]."""

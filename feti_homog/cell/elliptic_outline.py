@@ -11,13 +11,13 @@ from scipy.spatial import cKDTree
 
 from feti_homog.cell.arrangement import Arrangement
 from feti_homog.cell.bridges import TURN
-from feti_homog.cell.circle_arcs import ARC_SAMPLES, MERGED, SAME_PLACE, arcs_within
+from feti_homog.cell.circle_arcs import MERGED, SAME_PLACE, arcs_within
 from feti_homog.cell.curves import MATRIX, Curves, Numbering
-from feti_homog.cell.edge_samples import EdgeSamples
+from feti_homog.cell.edge_samples import WHOLE, EdgeSamples
 from feti_homog.cell.ellipses import Ellipses, directions
 from feti_homog.cell.elliptic_size import size_field
 from feti_homog.cell.graded_size import MeshSizes, SizeField
-from feti_homog.cell.outline import MAX_LINE_NODES, Outline, on_side, side_curves
+from feti_homog.cell.outline import Outline, on_side, side_curves
 from feti_homog.cell.tip_marks import marked
 from feti_homog.typing import Float, Int
 
@@ -45,7 +45,7 @@ def outline(arrangement: Arrangement, sizes: MeshSizes, marks: Mapping[int, Sequ
     tips = _tips(arrangement, marks, numbering.vertices, size)
     field = size_field(arrangement, sizes, outer, sharp, tips)
     find = partial(_ellipse_at, ellipses)
-    curves = [side_curves(axis, places[axis], find, around, size, field, numbering) for axis in (0, 1)]
+    curves = [side_curves(axis, places[axis], find, around, size, field, numbering, WHOLE) for axis in (0, 1)]
     curves.append(_arc_curves(ellipses, around, which, start, stop, sizes.interface, field, numbering))
     return Outline(numbering.points(), Curves.joined(curves), ellipses, fibre, around)
 
@@ -108,8 +108,8 @@ def _vertex_angles(
         wanted = wanted[(away > MERGED).all(axis=1)]
         mine = ellipses[np.full(len(wanted), number)]
         angles.append(np.append(own, mine.parameter(directions(wanted)) % TURN))
-    number = np.repeat(np.arange(len(curve)), [len(own) for own in angles[1:]])
-    return (number, np.concatenate(angles)), (np.concatenate(where), np.concatenate(lengths))
+    whose = np.repeat(np.arange(len(curve)), [len(own) for own in angles[1:]])
+    return (whose, np.concatenate(angles)), (np.concatenate(where), np.concatenate(lengths))
 
 
 def _on_upright(places: Float, size: Float) -> Float:
@@ -160,7 +160,7 @@ def _arc_curves(
     def point(arc: Int, share: Float) -> Float:
         return own[arc].at(parameter(arc, share))
 
-    samples = EdgeSamples.of(field, point, length[:, -1], lambda arc, share: np.full(len(arc), largest), ARC_SAMPLES)
-    station, first = samples.stations(np.ones(len(own), np.int64), MAX_LINE_NODES)
+    samples = EdgeSamples.of(field, point, length[:, -1], lambda arc, share: np.full(len(arc), largest), WHOLE.arc)
+    station, first = samples.stations(np.ones(len(own), np.int64), WHOLE.most_nodes)
     arc = np.repeat(np.arange(len(own)), np.diff(first))
     return Curves(numbering.along(point(arc, station), first), first, which, which, around[which])

@@ -14,6 +14,7 @@ import numpy as np
 from feti_homog.cell.coarse_mesh import areas, flip_double_arcs
 from feti_homog.cell.curves import MATRIX, OUTSIDE, Curve, Curves
 from feti_homog.cell.size_field import MAX_GROWTH
+from feti_homog.errors import MeshError
 from feti_homog.typing import Float, Int, Int32
 
 # gmsh's algorithms. The first makes the better triangles of one size, but leaves a disc with thousands of nodes on its
@@ -22,6 +23,8 @@ FRONTAL_DELAUNAY, DELAUNAY = 6, 5
 # Decimals of the coordinates that gmsh is given. The last bits of the outline's differ from machine to machine, and
 # with them gmsh would make other triangles.
 DECIMALS = 12
+# Of the area of triangles against that of the part of the cell that they fill, relative.
+AREA_TOLERANCE = 1e-9
 # gmsh's element types.
 LINE, TRIANGLE = 1, 2
 
@@ -83,25 +86,55 @@ def gmsh_session() -> Iterator[ModuleType]:
 
 
 def fill(tile: Tile) -> Filling:
-    """The triangles of a tile; as few as possible have two edges on one circle."""
+    """The triangles of a tile; as few as possible have two edges on one circle.
+
+    Raises:
+        MeshError: gmsh cannot fill it.
+    """
     with gmsh_session() as gmsh:
         gmsh.option.setNumber("Mesh.MeshSizeMax", tile.largest)
         surfaces, circle = _add_surfaces(gmsh, tile)
         if tile.is_graded:
             _grow_from_lines(gmsh, surfaces, tile.largest)
-        gmsh.model.mesh.generate(2)
+        try:
+            gmsh.model.mesh.generate(2)
+        except Exception as error:  # gmsh has no other
+            raise _unfilled(tile, str(error)) from error
         tags, coordinates, _ = gmsh.model.mesh.getNodes()
         elements = [gmsh.model.mesh.getElementsByType(TRIANGLE, surface)[1] for surface in surfaces]
     order = np.argsort(tags)
     points = coordinates.reshape(-1, 3)[order, :2]
     points[: len(tile.points)] = tile.points
     triangles = np.searchsorted(tags[order], np.concatenate(elements)).astype(np.int32).reshape(-1, 3)
-    clockwise = areas(points, triangles) < 0
-    triangles[clockwise] = triangles[clockwise][:, ::-1]
+    area = areas(points, triangles)
+    if abs(np.abs(area).sum() / _bounded_area(tile) - 1) > AREA_TOLERANCE:
+        raise _unfilled(tile, "triangles are missing")
+    triangles[area < 0] = triangles[area < 0][:, ::-1]
     circle_of = np.repeat(circle, [len(nodes) // 3 for nodes in elements])
     arcs, own = arc_edges(tile.curves)
     triangles = flip_double_arcs(triangles, circle_of.astype(np.int32), arcs, own, len(points))
     return Filling(points[len(tile.points) :], triangles, circle_of)
+
+
+def _unfilled(tile: Tile, why: str) -> MeshError:
+    (x, y), (right, top) = tile.points.min(axis=0), tile.points.max(axis=0)
+    return MeshError(
+        f"[cell] gmsh cannot fill the part from ({x:.4g}, {y:.4g}) to ({right:.4g}, {top:.4g}) of the cell of width 1: "
+        f"{why}; expected another seed, mesh_size or interface_size"
+    )
+
+
+def _bounded_area(tile: Tile) -> float:
+    """Area within the curves that bound a tile: 1/2 of the integral of x dy - y dx along those with the tile on their
+    left, less along those with it on their right."""
+    curves = tile.curves
+    sign = (curves.inside != OUTSIDE).astype(float) - (curves.outside != OUTSIDE)
+    within = np.ones(len(curves.node), bool)
+    within[curves.first[1:] - 1] = False
+    begin = np.flatnonzero(within)
+    a, b = tile.points[curves.node[begin]], tile.points[curves.node[begin + 1]]
+    weight = np.repeat(sign, np.diff(curves.first) - 1)
+    return float(weight @ (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / 2)
 
 
 def arc_edges(curves: Curves) -> tuple[Int32, Int32]:

@@ -10,6 +10,7 @@ from feti_homog.cell import element_estimate, elliptic_outline
 from feti_homog.cell.arrangement import Arrangement, arrange
 from feti_homog.cell.coarse_mesh import CoarseMesh
 from feti_homog.cell.drawing import Drawing
+from feti_homog.cell.edge_samples import IN_TILES
 from feti_homog.cell.filling import Tile
 from feti_homog.cell.graded_size import MeshSizes
 from feti_homog.cell.outline import outline
@@ -21,13 +22,11 @@ if TYPE_CHECKING:
     from feti_homog.config.cell_section import Cell
 
 
-# Elements that are meshed on one rank in some minutes.
-MAX_TRIANGLES = 1_000_000
+# Elements that are meshed in some minutes on one rank, and by all ranks together.
+MAX_TRIANGLES, MAX_TRIANGLES_OF_TILES = 1_000_000, 20_000_000
 # Radius / width of the cell above which positions on a circle differ by more than rounding.
 SMALLEST_RADIUS = 1e-6
 NO_MARKS: Mapping[int, Sequence[float]] = MappingProxyType({})
-# And nodes on lines of cells that all ranks mesh together.
-MAX_TRIANGLES_OF_TILES, MAX_NODES_OF_TILES = 20_000_000, 3_000_000
 
 
 def generate(cell: Cell, marks: Mapping[int, Sequence[float]] = NO_MARKS) -> CoarseMesh:
@@ -83,13 +82,13 @@ def draw_arrangement(
     arrangement: Arrangement, sizes: MeshSizes, marks: Mapping[int, Sequence[float]], scale: float
 ) -> Drawing:
     """The outline of an arrangement and its tiles; see `mesh_arrangement`."""
-    tiles = tiling(arrangement, marks)
+    tiles = tiling(arrangement, sizes.largest, marks)
     if arrangement.frames is not None:
         lines = elliptic_outline.outline(arrangement, sizes, marks)
     elif tiles is None:
         lines = outline(arrangement, sizes, marks)
     else:
-        lines = outline(arrangement, sizes, marks, tiles.bridges, MAX_NODES_OF_TILES)
+        lines = outline(arrangement, sizes, marks, tiles.bridges, IN_TILES)
     whole = Tile(lines.points, lines.curves, sizes.largest, sizes.are_graded(arrangement))
     return Drawing(arrangement, lines, tuple(cut(lines, whole, tiles)), scale)
 

@@ -72,7 +72,7 @@ class MatrixTiles:
     """The tile of the matrix next to discs.
 
     Attributes:
-        lines: half-lines that divide the matrix.
+        lines: half-lines that divide the matrix: of the pieces of sides, then of the bridges.
         tile: (h,) on the left of each.
         alone: (n,) of the matrix around a disc without such lines; NOWHERE where there are some.
     """
@@ -83,13 +83,19 @@ class MatrixTiles:
 
     def beside(self, disc: Int, angle: Float) -> Int:
         """(k,) tiles of the matrix beside the circles of discs (k,) at these angles."""
-        order = np.lexsort((self.lines.angle, self.lines.node))
-        node, at = self.lines.node[order], self.lines.angle[order]
-        # Twice a turn apart, so that those of one disc stay together.
-        found = np.searchsorted(node * 2 * TURN + at, disc * 2 * TURN + angle % TURN, side="right") - 1
-        first, last = np.searchsorted(node, disc), np.searchsorted(node, disc, side="right") - 1
-        around = self.tile[order[np.where(found < first, last, found)]]
-        return np.where(self.alone[disc] == NOWHERE, around, self.alone[disc])
+        return beside(self.lines, self.tile, self.alone, disc, angle)
+
+
+def beside(lines: HalfLines, label: Int, alone: Int, disc: Int, angle: Float) -> Int:
+    """The label (k,) of the matrix beside discs (k,) at these angles: that of the half-line clockwise from there, of
+    labels (h,), or that of discs that are alone (n,)."""
+    order = np.lexsort((lines.angle, lines.node))
+    node, at = lines.node[order], lines.angle[order]
+    # Twice a turn apart, so that those of one disc stay together.
+    found = np.searchsorted(node * 2 * TURN + at, disc * 2 * TURN + angle % TURN, side="right") - 1
+    first, last = np.searchsorted(node, disc), np.searchsorted(node, disc, side="right") - 1
+    around = label[order[np.where(found < first, last, found)]]
+    return np.where(alone[disc] == NOWHERE, around, alone[disc])
 
 
 def matrix_tiles(
@@ -101,23 +107,29 @@ def matrix_tiles(
         circles: (k, 3).
         sides: nodes (s, 2) and ends (s, 2, 2) of the pieces of sides in the matrix, counter-clockwise around the cell.
 
-    Bridges that no others join to the sides are left out. None if the place of a disc without bridges is not found.
+    None if it is not found in which face some disc or group of discs is that bridges do not join to the sides.
     """
     nodes, starts = sides
     corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]]) * size
     centres = np.concatenate([circles[:, :2], corners])
     facing = np.stack([_on(circles, bridges.ends[:, end], bridges.angle + end * np.pi) for end in (0, 1)], axis=1)
-    every = HalfLines.of(np.concatenate([nodes, bridges.ends]), centres, np.concatenate([starts, facing]))
-    joined = coo_matrix((np.ones(len(every.node), np.int8), (every.node, every.node[every.twin])), (len(centres),) * 2)
-    part = connected_components(joined, directed=False)[1]
-    half = every.chosen(np.flatnonzero(part[every.node] == part[nodes[0, 0]]))
-    after, face = half.faces()
-    tile = grid_cell(_centroids(half, after, face), size, grid)[face]
-    found = MatrixTiles(half, tile, np.full(len(circles), NOWHERE))
-    alone = np.ones(len(centres), bool)
-    alone[half.node] = False
-    place = _place_of_lone_discs(found, lines, np.flatnonzero(alone[: len(circles)]), size)
-    return None if place is None else MatrixTiles(half, tile, place)
+    half = HalfLines.of(np.concatenate([nodes, bridges.ends]), centres, np.concatenate([starts, facing]))
+    after, loop = half.faces()
+    lone = np.setdiff1d(lines.ends, half.node)
+    count = loop.max() + 1
+    alone = np.full(len(circles), NOWHERE)
+    alone[lone] = count + np.arange(len(lone))
+    face = _faces_of_loops(half, loop, alone, lines, count + len(lone), size)
+    area, moment = _areas_and_moments(half, after, loop)
+    areas = np.bincount(face[:count], area, face.max() + 1)
+    # A face has one loop around it, and others in it, which are negative. The one beyond the sides has none around it.
+    around = np.bincount(face[:count], area > 0, face.max() + 1)
+    beyond = face[loop[half.twin[0]]]
+    if (np.delete(around, beyond) != 1).any():
+        return None
+    moments = np.stack([np.bincount(face[:count], moment[:, k], face.max() + 1) for k in (0, 1)], axis=1)
+    tile = grid_cell(moments / areas[:, None], size, grid)
+    return MatrixTiles(half, tile[face[loop]], np.where(alone == NOWHERE, NOWHERE, tile[face[alone]]))
 
 
 def grid_cell(points: Float, size: Float, grid: Int) -> Int:
@@ -129,34 +141,29 @@ def grid_cell(points: Float, size: Float, grid: Int) -> Int:
 
 def _on(circles: Float, which: Int, angle: Float) -> Float:
     """Points (k, 2) on circles (k,) at these angles."""
-    return circles[which, :2] + circles[which, 2:] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    return np.asarray(circles[which, :2] + circles[which, 2:] * np.stack([np.cos(angle), np.sin(angle)], axis=1))
 
 
-def _centroids(half: HalfLines, after: Int, face: Int) -> Float:
-    """(faces, 2) of the polygons around which the half-lines run."""
+def _areas_and_moments(half: HalfLines, after: Int, loop: Int) -> tuple[Float, Float]:
+    """Areas (l,) and first moments (l, 2) of the polygons around which the half-lines run."""
     end = half.start[half.twin]
     a, b = np.concatenate([half.start, end]), np.concatenate([end, half.start[after]])
-    cross, face = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], np.concatenate([face, face])
-    area = np.bincount(face, cross)
-    return np.stack([np.bincount(face, (a + b)[:, k] * cross) for k in (0, 1)], axis=1) / (3 * area[:, None])
+    cross, loop = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], np.concatenate([loop, loop])
+    return np.bincount(loop, cross) / 2, np.stack(
+        [np.bincount(loop, (a + b)[:, k] * cross) for k in (0, 1)], axis=1
+    ) / 6
 
 
-def _place_of_lone_discs(tiles: MatrixTiles, lines: CentreLines, discs: Int, size: Float) -> Int | None:
-    """`MatrixTiles.alone` where these discs have no lines; None if one of them cannot be found.
+def _faces_of_loops(half: HalfLines, loop: Int, alone: Int, lines: CentreLines, count: int, size: Float) -> Int:
+    """(count,) the face of each loop, and of each lone disc.
 
-    The line of centres from a lone disc to its neighbour crosses no bridge, for both are edges of one triangulation. So
-    both discs have the same matrix beside them there.
+    A line of centres crosses no bridge, for both are edges of one triangulation. So, in the cell and away from third
+    discs, there is one face along it.
     """
-    free = lines.clearance > 1
-    free &= np.all((lines.facing > 0) & (lines.facing < size), axis=(1, 2))
+    free = (lines.clearance > 1) & np.all((lines.facing > 0) & (lines.facing < size), axis=(1, 2))
     ends, angle = lines.ends[free], lines.angle[free]
-    is_alone = np.zeros(len(tiles.alone), bool)
-    is_alone[discs] = True
-    one, other = is_alone[ends].T
-    both = ends[one & other]
-    cluster = connected_components(coo_matrix((np.ones(len(both), np.int8), both.T), (len(is_alone),) * 2), False)[1]
-    place = np.full(len(is_alone), NOWHERE)
-    for begins, turn, (lone, next_) in ((one & ~other, np.pi, (0, 1)), (other & ~one, 0.0, (1, 0))):
-        place[cluster[ends[begins, lone]]] = tiles.beside(ends[begins, next_], angle[begins] + turn)
-    place = np.where(is_alone, place[cluster], NOWHERE)
-    return None if (place[discs] == NOWHERE).any() else place
+    is_bridge = np.isin(ends[:, 0] * len(alone) + ends[:, 1], half.node * len(alone) + half.node[half.twin])
+    ends, angle = ends[~is_bridge], angle[~is_bridge]
+    one, other = (beside(half, loop, alone, ends[:, end], angle + end * np.pi) for end in (0, 1))
+    graph = coo_matrix((np.ones(len(one), np.int8), (one, other)), shape=(count, count))
+    return np.asarray(connected_components(graph, directed=False)[1], np.int64)

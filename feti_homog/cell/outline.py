@@ -22,17 +22,13 @@ from feti_homog.cell.circle_arcs import (
     vertex_angles,
 )
 from feti_homog.cell.curves import MATRIX, OUTSIDE, Curves, Numbering, backwards
-from feti_homog.cell.edge_samples import EdgeSamples
+from feti_homog.cell.edge_samples import WHOLE, EdgeSamples, Sampling
 from feti_homog.cell.ellipses import Ellipses
 from feti_homog.cell.graded_size import MeshSizes, SizeField, size_field
 from feti_homog.cell.size_field import circle_size
 from feti_homog.cell.tip_marks import marked
 from feti_homog.typing import Bool, Float, Int
 
-# Positions at which the size is sampled along a piece of a side.
-SIDE_SAMPLES = 513
-# Nodes on lines with which a cell is still meshed in minutes.
-MAX_LINE_NODES = 120_000
 NO_BRIDGES = Bridges(np.zeros((0, 2), np.int64), np.zeros(0))
 
 
@@ -100,15 +96,15 @@ def outline(
     sizes: MeshSizes,
     marks: Mapping[int, Sequence[float]],
     bridges: Bridges = NO_BRIDGES,
-    most: int = MAX_LINE_NODES,
+    sampling: Sampling = WHOLE,
 ) -> Outline:
-    """All lines of the cell with nodes at distances of at most `sizes`, closer in narrow passages, at most `most`.
+    """All lines of the cell with nodes at distances of at most `sizes`, closer in narrow passages.
 
     Opposite sides have the same nodes. `marks` maps a curve to angles in degrees, measured at its centre, that become
     nodes: curve k is the outer one of fibre k, and ~k that within its coating. The bridges are the last curves.
 
     Raises:
-        MeshError: there would be more nodes.
+        MeshError: there would be more nodes than the `sampling` allows.
     """
     size = np.array([arrangement.width, arrangement.height])
     circles, fibre, around = images(arrangement)
@@ -127,11 +123,11 @@ def outline(
     field = size_field(arrangement, sizes, outer, _tips(arrangement, marks, numbering.vertices))
 
     find = partial(disc_at, circles)
-    curves = [side_curves(axis, places[axis], find, around, size, field, numbering, most) for axis in (0, 1)]
+    curves = [side_curves(axis, places[axis], find, around, size, field, numbering, sampling) for axis in (0, 1)]
     caps = _caps(arrangement, sizes.interface, fibre, around)
-    curves.append(arc_curves(circles, around, circle, start, stop, caps[circle], field, numbering, most))
+    curves.append(arc_curves(circles, around, circle, start, stop, caps[circle], field, numbering, sampling))
     if len(bridges.angle):
-        curves.append(bridge_curves(circles, bridges, caps, field, numbering, most))
+        curves.append(bridge_curves(circles, bridges, caps, field, numbering, sampling))
     return Outline(numbering.points(), Curves.joined(curves), Ellipses.round(circles), fibre, around)
 
 
@@ -184,7 +180,7 @@ def side_curves(
     size: Float,
     field: SizeField,
     numbering: Numbering,
-    most: int = MAX_LINE_NODES,
+    sampling: Sampling,
 ) -> Curves:
     """The pieces of the two sides along `axis`, with the same nodes on both; `disc_at` tells the smallest closed curve
     around points, which is a number of `around` or MATRIX."""
@@ -193,7 +189,7 @@ def side_curves(
     def point(piece: Int, share: Float) -> Float:
         return on_side(begin[piece] + span[piece] * share, axis, 0.0)
 
-    samples = EdgeSamples.of(field, point, span, lambda piece, share: np.full(len(piece), np.inf), SIDE_SAMPLES)
+    samples = EdgeSamples.of(field, point, span, lambda piece, share: np.full(len(piece), np.inf), sampling.side)
     parts = []
     for level, low in ((0.0, True), (size[1 - axis], False)):
         inside = disc_at(on_side(begin + span / 2, axis, level))
@@ -204,7 +200,7 @@ def side_curves(
         crosses[:-1] |= into[1:] == inside[:-1]
         crosses[1:] |= into[:-1] == inside[1:]
         least = np.where((inside == MATRIX) | crosses, 1, 2)
-        station, first = samples.stations(least, most)
+        station, first = samples.stations(least, sampling.most_nodes)
         piece = np.repeat(np.arange(len(span)), np.diff(first))
         along = begin[piece] + span[piece] * station
         along[first[:-1]], along[first[1:] - 1] = begin, places[1:]

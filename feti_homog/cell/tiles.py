@@ -49,8 +49,11 @@ def is_tiled(arrangement: Arrangement) -> bool:
     return len(arrangement.radii) >= LEAST_DISCS and arrangement.frames is None and arrangement.shapes is None
 
 
-def tiling(arrangement: Arrangement, marks: Mapping[int, Sequence[float]]) -> Tiling | None:
-    """That of a large cell of round fibres; None of others. `marks` are as in `outline.outline`."""
+def tiling(arrangement: Arrangement, largest: float, marks: Mapping[int, Sequence[float]]) -> Tiling | None:
+    """That of a large cell of round fibres; None of others, and where there is no room for bridges.
+
+    `largest` is the size of elements, and `marks` are as in `outline.outline`.
+    """
     if not is_tiled(arrangement):
         return None
     size = np.array([arrangement.width, arrangement.height])
@@ -59,7 +62,7 @@ def tiling(arrangement: Arrangement, marks: Mapping[int, Sequence[float]]) -> Ti
     lines = centre_lines(circles, outer)
     marked = [(k, np.radians(angle)) for k in outer.tolist() for angle in marks.get(int(disc[k]), ())]
     vertices = np.array([k for k, _ in marked], np.int64), np.array([angle for _, angle in marked])
-    found = bridges(lines, size, CLEAR * arrangement.outer_radii.mean(), vertices)
+    found = bridges(lines, size, CLEAR * arrangement.outer_radii.mean(), largest, vertices)
     sides = _side_pieces(circles, outer, size)
     grid = np.maximum(1, np.round(size * np.sqrt(len(arrangement.radii) / DISCS_OF_A_TILE / size.prod()))).astype(int)
     matrix = matrix_tiles(circles, sides, found, lines, size, grid)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,12 +17,11 @@ from feti_homog.cell.matched_arrangement import distance_of
 from feti_homog.cell.periodic_topology import Torus, edge_pairs
 from feti_homog.cell.refinement import ReferenceLattice
 from feti_homog.cell.submesh import Submesh, cut
-from feti_homog.config import case as cases
 from feti_homog.config.case import Case
 from feti_homog.errors import CaseError
 from feti_homog.feti.decomposition.partition import decompose, pieces_for_count, pieces_for_size
 from feti_homog.feti.decomposition.shared_entities import SharedEntities, share_entities
-from feti_homog.homogenization import arc_selection, interface_pairs, process_zone, tips
+from feti_homog.homogenization import arc_selection, interface_pairs, process_zone
 from feti_homog.homogenization.arc_selection import InterfaceNodes
 from feti_homog.interface import debonded_arcs
 from feti_homog.interface.debonded_arcs import MovedTips
@@ -146,27 +145,6 @@ class RankShare:
     summary: CellSummary
     submeshes: list[Submesh]
     shared: SharedEntities
-
-
-def coarse_mesh(case: Case) -> CoarseMesh:
-    """The coarse mesh that the case describes, its phases checked against the materials.
-
-    Raises:
-        CaseError: a phase has no material, or a material no phase.
-        MeshError: the cell cannot be meshed, or its mesh file is faulty.
-    """
-    # gmsh is imported on rank 0 alone, which is where this runs.
-    if case.cell.has_own_mesh:
-        from feti_homog.cell.msh_reader import read
-
-        assert case.cell.file is not None
-        mesh = read(case.cell.file, case.cell.snap_tolerance if case.cell.repair == "snap" else None)
-    else:
-        from feti_homog.cell.gmsh_mesher import generate
-
-        mesh = generate(replace(case.cell, tip_size=tips.size(case)), tips.marks(case))
-    cases.check_phases(case, mesh.phases)
-    return mesh
 
 
 def moved_fibres(case: Case) -> tuple[str, ...]:
