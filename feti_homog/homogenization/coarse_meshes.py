@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import heapq
 from dataclasses import replace
+from itertools import chain
+from operator import itemgetter
 from typing import TYPE_CHECKING
 
 from mpi4py import MPI
@@ -36,15 +38,21 @@ def coarse_mesh_of_all(case: Case, comm: MPI.Intracomm) -> CoarseMesh | None:
     Which rank fills a tile does not change the mesh. Raises as `coarse_mesh`, on every rank.
     """
     begun = on_root_only(comm, _begun, case)
-    drawn = None if isinstance(begun, CoarseMesh) else begun
-    tiles = [] if drawn is None else [tile for _, tile in drawn.parts]
-    ranks = _dealt([len(tile.points) for tile in tiles], comm.size)
+    tiles = [] if begun is None or isinstance(begun, CoarseMesh) else [tile for _, tile in begun.parts]
+    fillings = fill_together(tiles, comm)
+    return begun if begun is None or isinstance(begun, CoarseMesh) else begun.mesh(fillings)
+
+
+def fill_together(tiles: list[Tile], comm: MPI.Intracomm) -> list[Filling]:
+    """The filled tiles of rank 0, in their order, there; an empty list on others.  Collective.
+
+    Raises:
+        MeshError: on every rank, if one cannot fill a tile of its.
+    """
+    ranks = dealt([len(tile.points) for tile in tiles], comm.size)
     own: list[tuple[int, Tile]] = comm.scatter([[(k, tiles[k]) for k in mine] for mine in ranks])
-    gathered = comm.gather(agree(comm, _fill, own))
-    if drawn is None or gathered is None:
-        return begun if isinstance(begun, CoarseMesh) else None
-    fillings = dict(pair for filled in gathered for pair in filled)
-    return drawn.mesh([fillings[k] for k in range(len(tiles))])
+    gathered = comm.gather(agree(comm, _fill, own)) or []
+    return [filling for _, filling in sorted(chain.from_iterable(gathered), key=itemgetter(0))]
 
 
 def _begun(case: Case) -> Drawing | CoarseMesh:
@@ -64,7 +72,7 @@ def _begun(case: Case) -> Drawing | CoarseMesh:
     return begun
 
 
-def _dealt(loads: list[int], n_ranks: int) -> list[list[int]]:
+def dealt(loads: list[int], n_ranks: int) -> list[list[int]]:
     """The numbers of the tiles of each rank: the largest goes first, each to the least loaded rank."""
     ranks: list[list[int]] = [[] for _ in range(n_ranks)]
     heap = [(0, rank) for rank in range(n_ranks)]
