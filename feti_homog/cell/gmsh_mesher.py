@@ -14,7 +14,7 @@ from feti_homog.cell.edge_samples import IN_TILES
 from feti_homog.cell.filling import Tile
 from feti_homog.cell.graded_size import MeshSizes
 from feti_homog.cell.outline import outline
-from feti_homog.cell.tiles import cut, is_tiled, tiling
+from feti_homog.cell.tiles import DEFAULT_TILES, TilePolicy, cut, is_tiled, tiling
 from feti_homog.config.mixed_cell import fractions_in_words, mixed_width
 from feti_homog.errors import MeshError
 
@@ -29,13 +29,17 @@ SMALLEST_RADIUS = 1e-6
 NO_MARKS: Mapping[int, Sequence[float]] = MappingProxyType({})
 
 
-def generate(cell: Cell, marks: Mapping[int, Sequence[float]] = NO_MARKS) -> CoarseMesh:
+def generate(
+    cell: Cell, marks: Mapping[int, Sequence[float]] = NO_MARKS, policy: TilePolicy = DEFAULT_TILES
+) -> CoarseMesh:
     """The mesh that `draw` begins, all of it made here."""
-    drawn = draw(cell, marks)
+    drawn = draw(cell, marks, policy)
     return drawn if isinstance(drawn, CoarseMesh) else drawn.filled()
 
 
-def draw(cell: Cell, marks: Mapping[int, Sequence[float]] = NO_MARKS) -> Drawing | CoarseMesh:
+def draw(
+    cell: Cell, marks: Mapping[int, Sequence[float]] = NO_MARKS, policy: TilePolicy = DEFAULT_TILES
+) -> Drawing | CoarseMesh:
     """The periodic coarse mesh of a square, hexagonal or random cell, or of a table; but for the triangles, unless it
     has polygons.
 
@@ -52,7 +56,7 @@ def draw(cell: Cell, marks: Mapping[int, Sequence[float]] = NO_MARKS) -> Drawing
     """
     sizes = _sizes(cell, marks)
     arrangement = arrange(cell)
-    most = MAX_TRIANGLES_OF_TILES if is_tiled(arrangement) else MAX_TRIANGLES
+    most = MAX_TRIANGLES_OF_TILES if is_tiled(arrangement, policy) else MAX_TRIANGLES
     _refuse_extremes(cell, sizes, sum(len(own) for own in marks.values()), most)
     smallest = int(arrangement.radii.argmin())
     if arrangement.radii[smallest] < SMALLEST_RADIUS * arrangement.width:
@@ -65,7 +69,7 @@ def draw(cell: Cell, marks: Mapping[int, Sequence[float]] = NO_MARKS) -> Drawing
         from feti_homog.cell.shape_mesher import mesh_shapes  # it is made of what stands here
 
         return mesh_shapes(arrangement, sizes, arrangement_scale(cell, arrangement))
-    return draw_arrangement(arrangement, sizes, marks, arrangement_scale(cell, arrangement))
+    return _drawing(arrangement, sizes, marks, arrangement_scale(cell, arrangement), policy)
 
 
 def mesh_arrangement(
@@ -75,14 +79,18 @@ def mesh_arrangement(
     scale: float = 1.0,
 ) -> CoarseMesh:
     """The periodic coarse mesh of an arrangement, with elements of these sizes, scaled at the end; see `generate`."""
-    return draw_arrangement(arrangement, sizes, marks, scale).filled()
+    return _drawing(arrangement, sizes, marks, scale, DEFAULT_TILES).filled()
 
 
-def draw_arrangement(
-    arrangement: Arrangement, sizes: MeshSizes, marks: Mapping[int, Sequence[float]], scale: float
+def _drawing(
+    arrangement: Arrangement,
+    sizes: MeshSizes,
+    marks: Mapping[int, Sequence[float]],
+    scale: float,
+    policy: TilePolicy,
 ) -> Drawing:
     """The outline of an arrangement and its tiles; see `mesh_arrangement`."""
-    tiles = tiling(arrangement, sizes.largest, marks)
+    tiles = tiling(arrangement, sizes.largest, marks, policy)
     if arrangement.frames is not None:
         lines = elliptic_outline.outline(arrangement, sizes, marks)
     elif tiles is None:

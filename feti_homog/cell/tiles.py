@@ -19,10 +19,22 @@ from feti_homog.cell.matrix_faces import MatrixTiles, grid_cell, matrix_tiles
 from feti_homog.cell.outline import Outline, crossings, disc_at, images, on_side
 from feti_homog.typing import Float, Int
 
-# Cells with fewer discs are filled at once.
-LEAST_DISCS = 400
-# Tiles of fewer have longer borders, on which nodes are where bridges are; with more, there are few tiles to deal out.
-DISCS_OF_A_TILE = 25
+
+@dataclass(frozen=True)
+class TilePolicy:
+    """Which cells are cut into tiles, and into how many.
+
+    Attributes:
+        least_discs: cells with fewer are filled at once.
+        discs: of a tile. With fewer, more of the mesh is beside borders, whose places are those of bridges; with more,
+            there are fewer tiles to share among ranks.
+    """
+
+    least_discs: int = 400
+    discs: int = 25
+
+
+DEFAULT_TILES = TilePolicy()
 
 
 @dataclass(frozen=True)
@@ -44,17 +56,19 @@ class Tiling:
     within: Int
 
 
-def is_tiled(arrangement: Arrangement) -> bool:
+def is_tiled(arrangement: Arrangement, policy: TilePolicy) -> bool:
     """Whether it is large and has round discs only."""
-    return len(arrangement.radii) >= LEAST_DISCS and arrangement.frames is None and arrangement.shapes is None
+    return len(arrangement.radii) >= policy.least_discs and arrangement.frames is None and arrangement.shapes is None
 
 
-def tiling(arrangement: Arrangement, largest: float, marks: Mapping[int, Sequence[float]]) -> Tiling | None:
+def tiling(
+    arrangement: Arrangement, largest: float, marks: Mapping[int, Sequence[float]], policy: TilePolicy
+) -> Tiling | None:
     """That of a large cell of round fibres; None of others, and where there is no room for bridges.
 
     `largest` is the size of elements, and `marks` are as in `outline.outline`.
     """
-    if not is_tiled(arrangement):
+    if not is_tiled(arrangement, policy):
         return None
     size = np.array([arrangement.width, arrangement.height])
     circles, disc, around = images(arrangement)
@@ -64,7 +78,7 @@ def tiling(arrangement: Arrangement, largest: float, marks: Mapping[int, Sequenc
     vertices = np.array([k for k, _ in marked], np.int64), np.array([angle for _, angle in marked])
     found = bridges(lines, size, CLEAR * arrangement.outer_radii.mean(), largest, vertices)
     sides = _side_pieces(circles, outer, size)
-    grid = np.maximum(1, np.round(size * np.sqrt(len(arrangement.radii) / DISCS_OF_A_TILE / size.prod()))).astype(int)
+    grid = np.maximum(1, np.round(size * np.sqrt(len(arrangement.radii) / policy.discs / size.prod()))).astype(int)
     matrix = matrix_tiles(circles, sides, found, lines, size, grid)
     if matrix is None:
         return None

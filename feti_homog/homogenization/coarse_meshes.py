@@ -6,38 +6,36 @@ import heapq
 from dataclasses import replace
 from itertools import chain
 from operator import itemgetter
-from typing import TYPE_CHECKING
 
 from mpi4py import MPI
 
 from feti_homog.cell.coarse_mesh import CoarseMesh
+from feti_homog.cell.drawing import Drawing
+from feti_homog.cell.filling import Filling, Tile, fill
+from feti_homog.cell.tiles import DEFAULT_TILES, TilePolicy
 from feti_homog.common.mpi_errors import agree, on_root_only
 from feti_homog.config import case as cases
 from feti_homog.config.case import Case
 from feti_homog.homogenization import tips
 
-if TYPE_CHECKING:
-    from feti_homog.cell.drawing import Drawing
-    from feti_homog.cell.filling import Filling, Tile
 
-
-def coarse_mesh(case: Case) -> CoarseMesh:
+def coarse_mesh(case: Case, policy: TilePolicy = DEFAULT_TILES) -> CoarseMesh:
     """The coarse mesh that the case describes, its phases checked against the materials.
 
     Raises:
         CaseError: a phase has no material, or a material no phase.
         MeshError: the cell cannot be meshed, or its mesh file is faulty.
     """
-    begun = _begun(case)
+    begun = _begun(case, policy)
     return begun if isinstance(begun, CoarseMesh) else begun.filled()
 
 
-def coarse_mesh_of_all(case: Case, comm: MPI.Intracomm) -> CoarseMesh | None:
+def coarse_mesh_of_all(case: Case, comm: MPI.Intracomm, policy: TilePolicy = DEFAULT_TILES) -> CoarseMesh | None:
     """`coarse_mesh` on rank 0, None on others; they fill its tiles together.  Collective.
 
     Which rank fills a tile does not change the mesh. Raises as `coarse_mesh`, on every rank.
     """
-    begun = on_root_only(comm, _begun, case)
+    begun = on_root_only(comm, _begun, case, policy)
     tiles = [] if begun is None or isinstance(begun, CoarseMesh) else [tile for _, tile in begun.parts]
     fillings = fill_together(tiles, comm)
     return begun if begun is None or isinstance(begun, CoarseMesh) else begun.mesh(fillings)
@@ -55,7 +53,7 @@ def fill_together(tiles: list[Tile], comm: MPI.Intracomm) -> list[Filling]:
     return [filling for _, filling in sorted(chain.from_iterable(gathered), key=itemgetter(0))]
 
 
-def _begun(case: Case) -> Drawing | CoarseMesh:
+def _begun(case: Case, policy: TilePolicy) -> Drawing | CoarseMesh:
     """A user's mesh, or the cell with its tiles still to be filled."""
     # gmsh is imported where it is needed.
     begun: Drawing | CoarseMesh
@@ -67,7 +65,7 @@ def _begun(case: Case) -> Drawing | CoarseMesh:
     else:
         from feti_homog.cell.gmsh_mesher import draw
 
-        begun = draw(replace(case.cell, tip_size=tips.size(case)), tips.marks(case))
+        begun = draw(replace(case.cell, tip_size=tips.size(case)), tips.marks(case), policy)
     cases.check_phases(case, begun.phases)
     return begun
 
@@ -85,8 +83,4 @@ def dealt(loads: list[int], n_ranks: int) -> list[list[int]]:
 
 def _fill(tiles: list[tuple[int, Tile]]) -> list[tuple[int, Filling]]:
     """These numbered tiles, filled."""
-    if not tiles:
-        return []
-    from feti_homog.cell.filling import fill
-
     return [(number, fill(tile)) for number, tile in tiles]

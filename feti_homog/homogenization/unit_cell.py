@@ -150,7 +150,7 @@ def assemble_subdomains(
     """
     lattice = ReferenceLattice.of(case.cell.refine, case.cell.order)
     with progress.stage("mesh") as words:
-        mesh = coarse_mesh_of_all(case, comm)
+        mesh = coarse_mesh_of_all(case, comm, policy.tiles)
         shares = on_root_only(comm, distribute, case, mesh, lattice, comm.size, policy)
         own: RankShare = comm.scatter(shares or [])
         summary = own.summary
