@@ -2,7 +2,8 @@
 
 Each run is an MPI job of its own: a random cell of fibre fraction 0.6 with gaps of 4 %, cut as by default, three unit
 strains together to 1e-8.  `together` is the strong study with one coarse factor by MUMPS on all ranks, also where the
-program would have each factor for itself, on as many ranks as there are cores.  More ranks than cores take turns: their
+program would have each factor for itself, on as many ranks as there are cores.  `events` are the first ones of paths of
+random cells that debond.  More ranks than cores take turns: their
 iterations and messages count, their times do not.
 A run whose report is in DIR/scaling is not made again, so that a long list can be worked off in parts.  The tables,
 the picture and the model are of all runs of the studies that are there.  Remove the folder to measure anew.
@@ -20,12 +21,14 @@ from pathlib import Path
 from typing import NamedTuple
 
 from benchmark import job
+from scaling_events import study as study_events
 from scaling_forecast import assumptions, checks, forecast, table, verdict
 from scaling_model import Machine, Prediction, measured, network
 from scaling_plot import plot
 from scaling_report import Row, by_ranks, by_size, memory, speedups, write
 
 HERE = Path(__file__).parent
+EVENTS = "events"
 STUDIES = {
     "weak": "weak scaling: as many dofs on every rank",
     "strong": "strong scaling: one cell",
@@ -53,15 +56,20 @@ def main() -> int:
     """Work off the studies that are wanted; print and write what there is of all."""
     parser = _parser()
     arguments = parser.parse_args()
-    if unknown := set(arguments.studies) - set(STUDIES):
-        parser.error(f"{', '.join(unknown)}: expected some of {', '.join(STUDIES)}")
+    if unknown := set(arguments.studies) - {*STUDIES, EVENTS}:
+        parser.error(f"{', '.join(unknown)}: expected some of {', '.join((*STUDIES, EVENTS))}")
     arguments.out.joinpath("scaling").mkdir(parents=True, exist_ok=True)
     runs = planned(arguments)
-    wanted = dict.fromkeys(run for study in arguments.studies for run in runs[study])
+    wanted = dict.fromkeys(run for study in arguments.studies if study != EVENTS for run in runs[study])
     done = [work_off(run, arguments) for run in wanted]
     found = {study: rows_of(study, some, arguments) for study, some in runs.items()}
-    print(*report(found, arguments), sep="\n")
-    write(arguments.out / "scaling.csv", found)
+    if any(found.values()):
+        print(*report(found, arguments), sep="\n")
+        write(arguments.out / "scaling.csv", found)
+    if EVENTS in arguments.studies:
+        complete, lines = study_events(arguments)
+        print("", *lines, sep="\n")
+        done.append(complete)
     return int(not all(done) or any(not row.converged for rows in found.values() for row in rows))
 
 
@@ -160,7 +168,7 @@ def _parser() -> argparse.ArgumentParser:
         "studies",
         nargs="*",
         default=["weak", "strong", "together"],
-        help="of weak, strong, together, sizes; all but the last",
+        help="of weak, strong, together, events, sizes; by default the first three",
     )
     parser.add_argument("--ranks", type=int, nargs="+", default=[1, 2, 4, 8, 16])
     parser.add_argument("--dofs", type=int, default=40_000, help="of a rank in weak scaling")
@@ -170,6 +178,8 @@ def _parser() -> argparse.ArgumentParser:
         "--sizes", type=int, nargs="+", default=[100_000, 300_000, 1_000_000, 3_000_000, 10_000_000], help="dofs"
     )
     parser.add_argument("--size-ranks", type=int, default=2, help="ranks for sizes")
+    parser.add_argument("--event-fibres", type=int, nargs="+", default=[12, 48], help="of the cells that debond")
+    parser.add_argument("--events", type=int, default=40, help="of each path, the first so many")
     parser.add_argument("--cores", type=int, default=os.cpu_count(), help="ranks up to which times count")
     parser.add_argument("--repeat", type=int, default=1, help="the fastest of so many timed runs counts")
     parser.add_argument("--timeout", type=float, default=1800.0, metavar="S", help="seconds that a run may take")

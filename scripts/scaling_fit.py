@@ -6,7 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import nnls
+from scipy.optimize import least_squares, nnls
+
+from feti_homog.typing import Float
 
 
 @dataclass(frozen=True)
@@ -34,7 +36,7 @@ class Power:
 
 
 def fit_shares(work: Sequence[float], ranks: Sequence[float], seconds: Sequence[float]) -> Shares:
-    """The shares with the least sum of squares of relative errors.
+    """The shares of `nonnegative` least squares.
 
     Raises:
         ValueError: all runs are on equally many ranks, so that nothing tells the shares apart.
@@ -42,8 +44,23 @@ def fit_shares(work: Sequence[float], ranks: Sequence[float], seconds: Sequence[
     if len(set(ranks)) < 2:
         raise ValueError("serial and parallel shares need runs on two numbers of ranks")
     w, p, t = (np.asarray(values, float) for values in (work, ranks, seconds))
-    serial, parallel = nnls(np.column_stack([w / t, w / p / t]), np.ones(len(t)))[0]
-    return Shares(float(serial), float(parallel))
+    return Shares(*map(float, nonnegative(np.column_stack([w, w / p]), t, np.zeros_like(t))))
+
+
+def nonnegative(columns: Float, seconds: Float, known: Float) -> Float:
+    """(k,) x >= 0 with the least sum of squares of log((columns x + known) / seconds).
+
+    Logarithms, so that twice as long and half as long are equally wrong.  `columns` (runs, k), the others (runs,).
+    """
+    relative = columns / seconds[:, None]
+    scale = relative.mean(axis=0)
+    start = nnls(relative / scale, 1.0 - known / seconds)[0]
+    # Not at a bound, where the method has no derivative.
+    start = np.maximum(start, 1e-3 * max(start.max(), 1e-3))
+    found = least_squares(
+        lambda x: np.log(relative / scale @ x + known / seconds), start, bounds=(0.0, np.inf), xtol=1e-12, ftol=1e-12
+    )
+    return np.asarray(found.x / scale)
 
 
 def fit_power(work: Sequence[float], seconds: Sequence[float]) -> Power:

@@ -111,7 +111,7 @@ def random_cell(fibres: int, dofs: int, refine: int, together: bool) -> Case:
 def measure(case: Case, progress: StagePeaks, together: bool) -> dict[str, Any]:
     """Seconds, iterations, sizes, memory and messages of a case."""
     comm = progress.comm
-    network = {name: _ping(comm, *sizes) for name, sizes in PINGS.items()}
+    network = {name: ping(comm, *sizes) for name, sizes in PINGS.items()}
     thresholds = replace(DEFAULTS, replicated_vectors=0) if together else DEFAULTS
     cell = tear(case, comm, progress, thresholds)
     solver = cell.solver
@@ -150,7 +150,7 @@ def _messages(cell: TornCell) -> dict[str, Any]:
     gather; in a sum they change places.  `logged` are the bytes, both ways, that PETSc counted in the solves.
     """
     comm = cell.comm
-    counts = LOADS * np.array(comm.allgather(_foreign(cell.solver.jump_operator, comm)))
+    counts = LOADS * np.array(comm.allgather(foreign(cell.solver.jump_operator, comm)))
     log = PETSc.Log.Event("VecScatterBegin").getPerfInfo(PETSc.Log.Stage("solve").id)
     return {
         "told": counts.sum(axis=0).tolist(),
@@ -161,7 +161,7 @@ def _messages(cell: TornCell) -> dict[str, Any]:
     }
 
 
-def _foreign(jump_operator: JumpOperator, comm: MPI.Intracomm) -> Int:
+def foreign(jump_operator: JumpOperator, comm: MPI.Intracomm) -> Int:
     """(ranks,) local rows that each of the other ranks owns."""
     ends = np.array(comm.allgather(jump_operator.owned[1]))
     counts = np.bincount(np.searchsorted(ends, jump_operator.rows, side="right"), minlength=comm.size)
@@ -169,7 +169,7 @@ def _foreign(jump_operator: JumpOperator, comm: MPI.Intracomm) -> Int:
     return counts
 
 
-def _ping(comm: MPI.Intracomm, size: int, times: int) -> float:
+def ping(comm: MPI.Intracomm, size: int, times: int) -> float:
     """Seconds of a message of `size` bytes from rank 0 to 1 and back, the mean of `times`; 0 on one rank."""
     message, seconds = bytearray(size), 0.0
     comm.Barrier()
