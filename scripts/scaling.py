@@ -1,9 +1,12 @@
 """Weak and strong scaling by ranks, cost by size, and a model of what 64 and 1 024 ranks would do.
 
 Each run is an MPI job of its own: a random cell of fibre fraction 0.6 with gaps of 4 %, cut as by default, three unit
-strains together to 1e-8.  More ranks than cores take turns: their iterations and messages count, their times do not.
+strains together to 1e-8.  `together` is the strong study with one coarse factor by MUMPS on all ranks, also where the
+program would have each factor for itself, on as many ranks as there are cores.  `events` are the first ones of paths of
+random cells that debond.  More ranks than cores take turns: their
+iterations and messages count, their times do not.
 A run whose report is in DIR/scaling is not made again, so that a long list can be worked off in parts.  The tables,
-the picture and the model are of all runs of the three studies that are there.  Remove the folder to measure anew.
+the picture and the model are of all runs of the studies that are there.  Remove the folder to measure anew.
 """
 
 from __future__ import annotations
@@ -18,15 +21,18 @@ from pathlib import Path
 from typing import NamedTuple
 
 from benchmark import job
+from scaling_events import study as study_events
 from scaling_forecast import assumptions, checks, forecast, table, verdict
-from scaling_model import Machine, Prediction, measured
+from scaling_model import Machine, Prediction, measured, network
 from scaling_plot import plot
-from scaling_report import Row, by_ranks, by_size, speedups, write
+from scaling_report import Row, by_ranks, by_size, memory, speedups, write
 
 HERE = Path(__file__).parent
+EVENTS = "events"
 STUDIES = {
     "weak": "weak scaling: as many dofs on every rank",
     "strong": "strong scaling: one cell",
+    "together": "strong scaling with one coarse factor by all ranks",
     "sizes": "cost by size: microseconds of a rank per dof",
 }
 
@@ -38,25 +44,32 @@ class Run(NamedTuple):
     dofs: int
     refine: int
     ranks: int
+    together: bool = False
 
     def report(self, out: Path) -> Path:
         """Where its report is."""
-        return out / "scaling" / f"{self.fibres}_fibres_{self.dofs}_dofs_refine_{self.refine}_ranks_{self.ranks}.json"
+        name = f"{self.fibres}_fibres_{self.dofs}_dofs_refine_{self.refine}_ranks_{self.ranks}"
+        return out / "scaling" / f"{name}{'_together' if self.together else ''}.json"
 
 
 def main() -> int:
     """Work off the studies that are wanted; print and write what there is of all."""
     parser = _parser()
     arguments = parser.parse_args()
-    if unknown := set(arguments.studies) - set(STUDIES):
-        parser.error(f"{', '.join(unknown)}: expected some of {', '.join(STUDIES)}")
+    if unknown := set(arguments.studies) - {*STUDIES, EVENTS}:
+        parser.error(f"{', '.join(unknown)}: expected some of {', '.join((*STUDIES, EVENTS))}")
     arguments.out.joinpath("scaling").mkdir(parents=True, exist_ok=True)
     runs = planned(arguments)
-    wanted = dict.fromkeys(run for study in arguments.studies for run in runs[study])
+    wanted = dict.fromkeys(run for study in arguments.studies if study != EVENTS for run in runs[study])
     done = [work_off(run, arguments) for run in wanted]
     found = {study: rows_of(study, some, arguments) for study, some in runs.items()}
-    print(*report(found, arguments), sep="\n")
-    write(arguments.out / "scaling.csv", found)
+    if any(found.values()):
+        print(*report(found, arguments), sep="\n")
+        write(arguments.out / "scaling.csv", found)
+    if EVENTS in arguments.studies:
+        complete, lines = study_events(arguments)
+        print("", *lines, sep="\n")
+        done.append(complete)
     return int(not all(done) or any(not row.converged for rows in found.values() for row in rows))
 
 
@@ -67,6 +80,9 @@ def planned(arguments: argparse.Namespace) -> dict[str, list[Run]]:
     return {
         "weak": [Run(fibres * p, dofs * p, refine, p) for p in arguments.ranks],
         "strong": [Run(fibres * most, dofs * most, refine, p) for p in arguments.ranks],
+        "together": [
+            Run(fibres * most, dofs * most, refine, p, together=True) for p in arguments.ranks if p <= arguments.cores
+        ],
         "sizes": [Run(*cell, refine, arguments.size_ranks) for cell in ladder],
     }
 
@@ -82,7 +98,8 @@ def work_off(run: Run, arguments: argparse.Namespace) -> bool:
         report = Path(folder) / path.name
         for _ in range(times):
             words = [HERE / "scaling_tool.py", report, "--fibres", run.fibres, "--dofs", run.dofs]
-            fault = job(run.ranks, [*words, "--refine", run.refine], arguments.timeout)
+            words += ["--refine", run.refine, *(["--together"] if run.together else [])]
+            fault = job(run.ranks, words, arguments.timeout)
             if fault:
                 print(f"{run.ranks} ranks, {run.dofs} dofs: {fault}", flush=True)
                 return False
@@ -110,19 +127,24 @@ def rows_of(study: str, runs: Sequence[Run], arguments: argparse.Namespace) -> l
 def report(found: dict[str, list[Row]], arguments: argparse.Namespace) -> list[str]:
     """All tables and what the model says; draws the picture."""
     lines = [line for study, rows in found.items() if rows for line in study_tables(study, rows, arguments.cores)]
-    rows = list({(row.dofs, row.ranks): row for some in found.values() for row in some}.values())
-    if {row.ranks == 1 for row in rows} != {True, False}:
-        return [*lines, "", "the cost model needs a run on one rank and one on more"]
-    miscounted = max(row.miscounted for row in rows)
-    machine = Machine(1e-6 * arguments.latency, 1e9 * arguments.bandwidth)
-    rates = measured(rows, arguments.cores)
+    rows = list({(row.dofs, row.ranks, row.together): row for some in found.values() for row in some}.values())
+    # PETSc counts the messages of a factor that ranks share among those of multipliers.
+    miscounted = max((row.miscounted for row in rows if not row.together), default=0.0)
+    try:
+        rates, here = measured(rows, arguments.cores), network(rows, arguments.cores)
+    except ValueError as error:
+        return [*lines, "", f"no cost model: {error}"]
+    latency, bandwidth = (arguments.latency, arguments.bandwidth)
+    machine = Machine(
+        here.latency if latency is None else 1e-6 * latency, here.bandwidth if bandwidth is None else 1e9 * bandwidth
+    )
     futures = forecast(rates, machine)
     picture = arguments.out / "scaling.png"
     plot(picture, found, futures)
     return [
         *lines,
         *("", f"counted bytes of multipliers and PETSc's log differ by {miscounted:.1%} at most"),
-        *("", *assumptions(rates, machine), "", *checks(rates, machine, rows, arguments.cores)),
+        *("", *assumptions(rates, machine), "", *checks(rates, here, rows, arguments.cores)),
         *forecast_lines(futures),
         *("", f"{picture} {arguments.out / 'scaling.csv'}"),
     ]
@@ -136,14 +158,17 @@ def forecast_lines(futures: dict[str, list[Prediction]]) -> list[str]:
 
 def study_tables(study: str, rows: Sequence[Row], cores: int) -> list[str]:
     """The tables of one study."""
-    tables = by_size(rows) if study == "sizes" else [*by_ranks(rows, cores), *speedups(rows, cores)]
+    tables = by_size(rows) if study == "sizes" else [*by_ranks(rows, cores), *speedups(rows, cores), "", *memory(rows)]
     return ["", STUDIES[study], *tables]
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument(
-        "studies", nargs="*", default=["weak", "strong"], help="of weak, strong, sizes; default first two"
+        "studies",
+        nargs="*",
+        default=["weak", "strong", "together"],
+        help="of weak, strong, together, events, sizes; by default the first three",
     )
     parser.add_argument("--ranks", type=int, nargs="+", default=[1, 2, 4, 8, 16])
     parser.add_argument("--dofs", type=int, default=40_000, help="of a rank in weak scaling")
@@ -153,11 +178,13 @@ def _parser() -> argparse.ArgumentParser:
         "--sizes", type=int, nargs="+", default=[100_000, 300_000, 1_000_000, 3_000_000, 10_000_000], help="dofs"
     )
     parser.add_argument("--size-ranks", type=int, default=2, help="ranks for sizes")
+    parser.add_argument("--event-fibres", type=int, nargs="+", default=[12, 48], help="of the cells that debond")
+    parser.add_argument("--events", type=int, default=40, help="of each path, the first so many")
     parser.add_argument("--cores", type=int, default=os.cpu_count(), help="ranks up to which times count")
     parser.add_argument("--repeat", type=int, default=1, help="the fastest of so many timed runs counts")
     parser.add_argument("--timeout", type=float, default=1800.0, metavar="S", help="seconds that a run may take")
-    parser.add_argument("--latency", type=float, default=2.0, help="assumed, microseconds a message")
-    parser.add_argument("--bandwidth", type=float, default=10.0, help="assumed, GB/s")
+    parser.add_argument("--latency", type=float, metavar="US", help="of the forecast, a message; else as measured here")
+    parser.add_argument("--bandwidth", type=float, metavar="GB/S", help="of the forecast; else as measured here")
     parser.add_argument("--out", type=Path, default=Path("results"), metavar="DIR")
     return parser
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from scaling_model import COARSE, COARSE_POWER, LOCAL, MESH, TOGETHER, Machine, Prediction, Rates, predict
+from scaling_model import COARSE, LOCAL, MESH, Machine, Prediction, Rates, predict
 from scaling_report import COARSE_SUMS, GATHERS, SCALARS, SUMS, SUMS_TOGETHER, Row
 
 from feti_homog.feti.thresholds import DEFAULTS
@@ -29,23 +29,26 @@ def forecast(rates: Rates, machine: Machine) -> dict[str, list[Prediction]]:
 
 
 def assumptions(rates: Rates, machine: Machine) -> list[str]:
-    """What the model takes for granted."""
+    """The model in words, with its constants."""
     r = rates
+    mesh, alone = r.mesh, (r.factor, r.solve)
+    shared = zip((r.factor_together, r.solve_together), alone, strict=True)
     return [
-        "cost model: seconds on p ranks = mesh + subdomains + coarse problem + messages, none behind another",
-        f"  mesh        {r.mesh:.2g} s a coarse triangle, {1e3 * r.triangles:.1f} of them in 1 000 dofs: meshed, torn "
-        "and dealt out by rank 0",
+        "cost model: seconds on p ranks = mesh + subdomains + coarse problem + messages, none behind another; all "
+        "constants are of these runs",
+        f"  mesh        {1e6 * mesh.serial:.1f} + {1e6 * mesh.parallel:.1f} / p microseconds a coarse triangle, "
+        f"{1e3 * r.triangles:.1f} of them in 1 000 dofs: meshed, torn and dealt out",
         f"  subdomains  assemble {1e6 * r.assemble:.2f}, set-up {1e6 * r.setup:.2f}, an iteration of {r.loads} loads "
         f"{1e6 * r.apply:.3f} microseconds a dof, measured on 1 rank; over p,",
         f"              times {r.imbalance:.2f} for the fullest rank (measured), or more where few subdomains are left "
         f"to each; {1e3 * r.subdomains:.2f} of them in 1 000 dofs",
-        f"  coarse      n = {1e3 * r.coarse:.2f} unknowns in 1 000 dofs, summed and factored by every rank for itself "
-        f"in {r.factor:.2g} n^{COARSE_POWER} s,",
-        f"              solved once an iteration in {r.solve:.2g} n log2 n s a load, which ranks deal out: powers of "
-        f"sparse plane problems, assumed; factors measured, up to n = {r.largest_coarse};",
-        f"              from {DEFAULTS.replicated_vectors / r.vectors / 1e6:.0f} million dofs by all ranks together, "
-        f"p^{TOGETHER} times faster, assumed",
-        f"  messages    {1e6 * machine.latency:g} microseconds each and {machine.bandwidth / 1e9:g} GB/s, assumed; "
+        f"  coarse      n = {1e3 * r.coarse:.2f} unknowns in 1 000 dofs, up to {r.largest_coarse} timed; seconds of "
+        "the factor, and of a solve of one load:",
+        "              by every rank for itself, which solves for its loads: "
+        + ", ".join(f"{f.factor:.2g} n^{f.exponent:.2f}" for f in alone),
+        f"              from {DEFAULTS.replicated_vectors / r.vectors / 1e6:.0f} million dofs by all together: "
+        + ", ".join(f"({s.serial:.2g} + {s.parallel:.2g} / p) n^{f.exponent:.2f}" for s, f in shared),
+        f"  messages    {1e6 * machine.latency:.2g} microseconds each and {machine.bandwidth / 1e9:.2g} GB/s; "
         f"{GATHERS + SUMS} exchanges an iteration, each of {r.neighbours} messages and {r.surface:.1f} values",
         f"              times the root of the rank's dofs (most that were counted); {COARSE_SUMS} sums over ranks of "
         f"{r.loads} n values ({SUMS_TOGETHER} where ranks solve together) and {SCALARS} of single ones,",
@@ -58,25 +61,30 @@ def assumptions(rates: Rates, machine: Machine) -> list[str]:
 
 
 def checks(rates: Rates, machine: Machine, rows: Sequence[Row], cores: int) -> list[str]:
-    """The model against every run that was timed."""
+    """The model beside every run that was timed: seconds of both, and its relative error."""
+    names = ("mesh", "assemble", "set-up", "solve", "total")
     lines = [
-        f"{'model / measured':26}{'mesh':>9}{'set-up':>9}{'solve':>9}{'total':>9}{'coarse: factor':>16}{'solve':>8}",
-        f"{'dofs':>10}{'ranks':>6}",
+        "model, measured seconds, and the model's error; c: one coarse factor by all ranks, asked for",
+        f"{'dofs':>10}{'ranks':>6}  " + "".join(f"{name:^24}" for name in names),
     ]
-    for row in sorted(rows, key=lambda row: (row.dofs, row.ranks)):
-        if row.ranks <= cores:
-            p = predict(rates, machine, row.dofs, row.ranks)
-            pairs = [
-                (p.mesh, row.seconds["mesh"]),
-                (p.setup + p.coarse_factor, row.seconds["set-up"]),
-                (p.apply + p.coarse_solve + p.messages, row.seconds["solve"]),
-                (p.total, row.total),
-            ]
-            ratios = "".join(f"{a / b:9.2f}" for a, b in pairs)
-            once = p.coarse_solve / rates.iterations
-            factor, solve = p.coarse_factor / row.coarse_factor, once / row.coarse_solve
-            lines.append(f"{row.dofs:10}{row.ranks:6}{'':10}{ratios}{factor:16.2f}{solve:8.2f}")
-    return lines
+    errors: dict[str, list[float]] = {name: [] for name in names}
+    for row in sorted(rows, key=lambda row: (row.dofs, row.ranks, row.together)):
+        if row.ranks > cores:
+            continue
+        p = predict(rates, machine, row.dofs, row.ranks, row.together)
+        found = {
+            "mesh": (p.mesh, row.seconds["mesh"]),
+            "assemble": (p.assemble, row.seconds["assemble"]),
+            "set-up": (p.setup + p.coarse_factor, row.seconds["set-up"]),
+            "solve": (p.apply + p.coarse_solve + p.messages, row.seconds["solve"]),
+            "total": (p.total, row.total),
+        }
+        for name, (model, seconds) in found.items():
+            errors[name].append(model / seconds - 1.0)
+        cells = "".join(f"{a:9.2f}{b:8.2f}{a / b - 1.0:+7.0%}" for a, b in found.values())
+        lines.append(f"{row.dofs:10}{row.ranks:6}{' c' if row.together else '  '}{cells}")
+    largest = ", ".join(f"{name} {max(map(abs, some)):.0%}" for name, some in errors.items())
+    return [*lines, f"largest error: {largest}"]
 
 
 def table(title: str, found: Sequence[Prediction]) -> list[str]:

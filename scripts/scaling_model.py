@@ -1,7 +1,8 @@
 """A cost model of the solver on more ranks than there are here, with rates measured on few.
 
-Every term is one that the program has today: a mesh and a tearing on rank 0, work on subdomains that ranks share, a
-coarse problem that every rank factors to solve for some load cases, or all together if it is large, and messages.
+Every term is one that the program has today: a mesh and a tearing of which some share is dealt to the ranks, work on
+subdomains that ranks share, a coarse problem that every rank factors to solve for some load cases, or all together if
+it is large, and messages.
 """
 
 from __future__ import annotations
@@ -9,15 +10,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import ceil, log2, sqrt
+from statistics import median
 from typing import Any
 
+from scaling_fit import Power, Shares, fit_power, fit_shares
 from scaling_report import COARSE_SUMS, GATHERS, SCALARS, SUMS, SUMS_TOGETHER, VALUE_BYTES, Row
 
 from feti_homog.feti.thresholds import DEFAULTS
 
-MESH, LOCAL, COARSE, MESSAGES = "mesh on rank 0", "subdomains", "coarse problem", "messages"
-# Powers: of the coarse unknowns, in their factorization; of the ranks, by which they are faster together.
-COARSE_POWER, TOGETHER = 1.5, 0.5
+MESH, LOCAL, COARSE, MESSAGES = "mesh", "subdomains", "coarse problem", "messages"
 
 
 @dataclass(frozen=True)
@@ -33,9 +34,10 @@ class Rates:
     """Measured: seconds per unit of work, and sizes per dof.
 
     Attributes:
-        mesh: seconds per coarse triangle.
+        mesh: of a coarse triangle.
         assemble, setup, apply: seconds per dof, `apply` of an iteration.
-        factor, solve: seconds per n^1.5 of the coarse unknowns n, and per n log2 n and load case.
+        factor, solve: of the coarse unknowns on one rank, `solve` of one load case.
+        factor_together, solve_together: on all ranks, per unknown to the powers of `factor` and `solve`.
         loads: load cases solved together.
         triangles, subdomains, vectors, coarse, coarse_bytes: per dof.
         largest_coarse: most coarse unknowns that were timed.
@@ -45,12 +47,14 @@ class Rates:
         imbalance: dofs of the fullest rank relative to the mean.
     """
 
-    mesh: float
+    mesh: Shares
     assemble: float
     setup: float
     apply: float
-    factor: float
-    solve: float
+    factor: Power
+    solve: Power
+    factor_together: Shares
+    solve_together: Shares
     loads: int
     triangles: float
     subdomains: float
@@ -65,29 +69,67 @@ class Rates:
 
 
 def measured(rows: Sequence[Row], cores: int) -> Rates:
-    """Rates from the rows: times from those whose ranks each have a core, sizes and counts from all."""
-    return Rates(**_times(rows, cores), **_per_dof(rows), **_counts(rows, cores))
+    """Rates from the rows: times from those whose ranks each have a core, sizes and counts from all.
+
+    Raises:
+        ValueError: the timed rows are on too few numbers of ranks, or of too few sizes.
+    """
+    if not any(row.ranks == 1 and not row.together for row in rows):
+        raise ValueError("rates of subdomains need a run on one rank")
+    return Rates(**_local_times(rows, cores), **_coarse_times(rows, cores), **_per_dof(rows), **_counts(rows, cores))
 
 
-def _times(rows: Sequence[Row], cores: int) -> dict[str, Any]:
-    """Seconds per unit of work: of the subdomains on one rank, of mesh and coarse problem on all that have a core."""
+def network(rows: Sequence[Row], cores: int) -> Machine:
+    """Medians of the messages that were timed between two ranks that each have a core.
+
+    Raises:
+        ValueError: there is no such run.
+    """
+    timed = [row for row in rows if 1 < row.ranks <= cores]
+    if not timed:
+        raise ValueError("times of messages need a run on two ranks with a core each")
+    return Machine(median(row.latency for row in timed), median(row.bandwidth for row in timed))
+
+
+def _local_times(rows: Sequence[Row], cores: int) -> dict[str, Any]:
+    """Seconds per unit of work: of the subdomains on one rank, of the mesh on all that have a core."""
     timed = [row for row in rows if row.ranks <= cores]
-    alone = [row for row in rows if row.ranks == 1]
+    alone = [row for row in timed if row.ranks == 1 and not row.together]
     return dict(
-        mesh=_rate((row.seconds["mesh"], row.triangles) for row in timed),
+        mesh=fit_shares(
+            [row.triangles for row in timed], [row.ranks for row in timed], [row.seconds["mesh"] for row in timed]
+        ),
         assemble=_rate((row.seconds["assemble"], row.dofs) for row in alone),
         setup=_rate((row.seconds["set-up"] - row.coarse_factor, row.dofs) for row in alone),
         apply=_rate(
             (row.seconds["solve"] - row.iterations * row.coarse_solve, row.iterations * row.dofs) for row in alone
         ),
-        factor=_rate((row.coarse_factor, _factored(row.coarse, row.vectors, row.ranks)) for row in timed),
-        solve=_rate((row.coarse_solve, _solved(row.coarse, row.vectors, row.ranks, row.loads)) for row in timed),
     )
+
+
+def _coarse_times(rows: Sequence[Row], cores: int) -> dict[str, Any]:
+    """Powers of the coarse unknowns where every rank factors, and shares that ranks deal out where all do together."""
+    timed = [row for row in rows if row.ranks <= cores]
+    single, together = ([row for row in timed if row.together is wanted] for wanted in (False, True))
+    unknowns = [row.coarse for row in single]
+    factor = fit_power(unknowns, [row.coarse_factor for row in single])
+    solve = fit_power(unknowns, [row.coarse_solve / ceil(row.loads / row.ranks) for row in single])
+    return dict(
+        factor=factor,
+        solve=solve,
+        factor_together=_dealt(together, factor, [row.coarse_factor for row in together]),
+        solve_together=_dealt(together, solve, [row.coarse_solve / row.loads for row in together]),
+    )
+
+
+def _dealt(rows: Sequence[Row], power: Power, seconds: Sequence[float]) -> Shares:
+    """Shares of what takes the runs so many seconds, for work that is this power of the coarse unknowns."""
+    return fit_shares([row.coarse**power.exponent for row in rows], [row.ranks for row in rows], seconds)
 
 
 def _per_dof(rows: Sequence[Row]) -> dict[str, Any]:
     """Sizes per dof."""
-    several = [row for row in rows if row.ranks > 1] or rows
+    several = [row for row in rows if row.ranks > 1 and not row.together] or rows
     return dict(
         triangles=_rate((row.triangles, row.dofs) for row in rows),
         subdomains=_rate((row.subdomains, row.dofs) for row in rows),
@@ -108,19 +150,6 @@ def _counts(rows: Sequence[Row], cores: int) -> dict[str, Any]:
         neighbours=max(max(row.neighbours) for row in rows),
         imbalance=most.fullest * most.ranks / most.dofs,
     )
-
-
-def _factored(coarse: float, vectors: float, ranks: int) -> float:
-    """Work of a coarse factorization on the busiest rank: all of it, or a share where ranks do it together."""
-    share: float = ranks**TOGETHER if vectors > DEFAULTS.replicated_vectors else 1.0
-    return float(coarse**COARSE_POWER) / share
-
-
-def _solved(coarse: float, vectors: float, ranks: int, loads: int) -> float:
-    """Work of the coarse solves on the busiest rank: for the loads that are dealt to it, or a share of all."""
-    replicated = vectors <= DEFAULTS.replicated_vectors
-    share: float = ceil(loads / ranks) if replicated else loads / ranks**TOGETHER
-    return coarse * log2(coarse) * share
 
 
 def _rate(pairs: Iterable[tuple[float, float]]) -> float:
@@ -164,24 +193,37 @@ class Prediction:
         return sum(self.parts.values())
 
 
-def predict(rates: Rates, machine: Machine, dofs: float, ranks: int) -> Prediction:
-    """What a cell of `dofs` takes on `ranks`."""
+def is_together(vectors: float) -> bool:
+    """Whether ranks share one coarse factor for so many vectors."""
+    return vectors > DEFAULTS.replicated_vectors
+
+
+def predict(rates: Rates, machine: Machine, dofs: float, ranks: int, together: bool | None = None) -> Prediction:
+    """What a cell of `dofs` takes on `ranks`; with one coarse factor on all if `together`, by default as the program
+    chooses."""
     subdomains = max(rates.subdomains * dofs, 1.0)
     # A rank has whole subdomains, and none is cut for its sake.
     whole = ceil(subdomains / ranks) * ranks / subdomains
     own = dofs / ranks * max(rates.imbalance if ranks > 1 else 1.0, whole)
     coarse = max(rates.coarse * dofs, 2.0)
-    vectors = rates.vectors * dofs
-    sums = SUMS_TOGETHER if vectors > DEFAULTS.replicated_vectors else COARSE_SUMS
+    if together is None:
+        together = is_together(rates.vectors * dofs) and ranks > 1
+    if together:
+        factor = rates.factor_together.seconds(coarse**rates.factor.exponent, ranks)
+        solve = rates.loads * rates.solve_together.seconds(coarse**rates.solve.exponent, ranks)
+    else:
+        factor = rates.factor.seconds(coarse)
+        solve = ceil(rates.loads / ranks) * rates.solve.seconds(coarse)
+    sums = SUMS_TOGETHER if together else COARSE_SUMS
     return Prediction(
         dofs=dofs,
         ranks=ranks,
-        mesh=rates.mesh * rates.triangles * dofs,
+        mesh=rates.mesh.seconds(rates.triangles * dofs, ranks),
         assemble=rates.assemble * own,
         setup=rates.setup * own,
-        coarse_factor=rates.factor * _factored(coarse, vectors, ranks),
+        coarse_factor=factor,
         apply=rates.iterations * rates.apply * own,
-        coarse_solve=rates.iterations * rates.solve * _solved(coarse, vectors, ranks, rates.loads),
+        coarse_solve=rates.iterations * solve,
         messages=_messages(rates, machine, dofs, ranks, sums) if ranks > 1 else 0.0,
     )
 

@@ -7,12 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from feti_homog.feti.thresholds import DEFAULTS
-
 STAGES = ("mesh", "assemble", "set-up", "solve")
 COLUMNS = (
     "fibres", "ranks", "dofs", "subdomains", "vectors", "kernel", "iterations", "converged", "memory", "sent",
-    "messages", "summed", "coarse_factor", "coarse_solve", "coarse_bytes", "solver", "total",
+    "messages", "summed", "together", "coarse_factor", "coarse_solve", "coarse_bytes", "solver", "total",
 )  # fmt: skip
 VALUE_BYTES = 8
 # What one iteration does: exchanges of multipliers (a gather and a sum each for the operator and the preconditioner,
@@ -28,7 +26,9 @@ SUMS_TOGETHER = 9
 class Row:
     """A run: what was asked for, sizes, seconds of each stage, and the counts of `scaling_tool`.
 
-    `wanted` are the dofs asked for, `fullest` those of the rank with most, `memory` the MB of all ranks.
+    `wanted` are the dofs asked for, `fullest` those of the rank with most; `together` says whether the ranks share one
+    coarse factor, by MUMPS.  `peaks` are the MB of each rank by stage, `coarse_memory` those by which the coarse
+    factorization lets them grow.  `latency` (s) and `bandwidth` (bytes / s) are those of messages between two ranks.
     """
 
     fibres: int
@@ -45,7 +45,7 @@ class Row:
     iterations: int
     converged: bool
     seconds: dict[str, float]
-    memory: float
+    peaks: dict[str, list[float]]
     told: tuple[int, ...]
     heard: tuple[int, ...]
     neighbours: tuple[int, ...]
@@ -54,6 +54,10 @@ class Row:
     coarse_factor: float
     coarse_solve: float
     coarse_bytes: int
+    coarse_memory: list[float]
+    together: bool
+    latency: float
+    bandwidth: float
 
     @property
     def solver(self) -> float:
@@ -64,6 +68,11 @@ class Row:
     def total(self) -> float:
         """Seconds of all stages."""
         return sum(self.seconds.values())
+
+    @property
+    def memory(self) -> float:
+        """MB of all ranks, each at its peak."""
+        return sum(max(of_a_rank) for of_a_rank in zip(*self.peaks.values(), strict=True))
 
     @property
     def coarse(self) -> int:
@@ -89,7 +98,7 @@ class Row:
     @property
     def summed(self) -> int:
         """Bytes that every rank puts into the sums over ranks of an iteration."""
-        sums = SUMS_TOGETHER if self.vectors > DEFAULTS.replicated_vectors else COARSE_SUMS
+        sums = SUMS_TOGETHER if self.together else COARSE_SUMS
         return VALUE_BYTES * (sums * self.coarse * self.loads + SCALARS)
 
     @property
@@ -112,6 +121,24 @@ def by_ranks(rows: Sequence[Row], cores: int) -> list[str]:
         lines.append(
             f"{row.ranks:5}{row.fibres:8}{row.dofs:10}{row.subdomains:8}{row.coarse:8}{row.iterations:11}"
             f"{row.sent / 1e3:10.1f}{row.messages:10}{row.summed / 1e3:11.1f}{''.join(shown)}"
+        )
+    return lines
+
+
+def memory(rows: Sequence[Row]) -> list[str]:
+    """Aligned lines: peaks of the rank with most in each stage, of rank 0 and of all others when it meshes, and what
+    the coarse factorization takes of each."""
+    lines = [
+        "MB of the rank with most, interpreter and libraries included; of rank 0 and of the others (on average)",
+        f"{'ranks':>5}{'dofs':>10}" + "".join(f"{s:>10}" for s in STAGES)
+        + f"{'rank 0, mesh':>14}{'others':>8}{'coarse factor':>15}{'all ranks':>11}",
+    ]  # fmt: skip
+    for row in rows:
+        first, *others = row.peaks["mesh"]
+        mean = f"{sum(others) / len(others):8.0f}" if others else f"{'-':>8}"
+        most = "".join(f"{max(row.peaks[s]):10.0f}" for s in STAGES)
+        lines.append(
+            f"{row.ranks:5}{row.dofs:10}{most}{first:14.0f}{mean}{max(row.coarse_memory):15.1f}{row.memory:11.0f}"
         )
     return lines
 

@@ -10,7 +10,9 @@ import argparse
 import json
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +25,7 @@ from benchmark_tool import peak  # noqa: E402
 from mpi4py import MPI  # noqa: E402
 from petsc4py import PETSc  # noqa: E402
 
+from feti_homog.common import process_memory  # noqa: E402
 from feti_homog.common.mpi_errors import run_main  # noqa: E402
 from feti_homog.common.petsc_options import case_options  # noqa: E402
 from feti_homog.common.progress import Progress  # noqa: E402
@@ -30,6 +33,8 @@ from feti_homog.config import case as cases  # noqa: E402
 from feti_homog.config.case import Case  # noqa: E402
 from feti_homog.feti.coarse.adaptive import AdaptiveCoarseSpace  # noqa: E402
 from feti_homog.feti.decomposition.jump_operator import JumpOperator  # noqa: E402
+from feti_homog.feti.linalg.saddle_point import SaddlePoint  # noqa: E402
+from feti_homog.feti.thresholds import DEFAULTS  # noqa: E402
 from feti_homog.homogenization.unit_cell import TornCell, tear  # noqa: E402
 from feti_homog.typing import Int  # noqa: E402
 
@@ -40,6 +45,8 @@ RTOL = 1e-8
 TRIANGLES, IN_GAPS = 2.31, 6.0
 # Solves of the coarse problem that are timed; the fastest counts.
 TIMED = 5
+# Messages between two ranks that are timed: bytes of one, and how many.
+PINGS = {"latency": (8, 2000), "bandwidth": (4 << 20, 50)}
 # Bytes of an entry of the coarse matrix on its way: value, row, column.
 ENTRY_BYTES = 16
 
@@ -51,20 +58,42 @@ def main() -> int:
     parser.add_argument("--fibres", type=int, required=True)
     parser.add_argument("--dofs", type=int, required=True, help="about so many degrees of freedom")
     parser.add_argument("--refine", type=int, required=True)
+    parser.add_argument("--together", action="store_true", help="one coarse factor by MUMPS, on all ranks")
     arguments = parser.parse_args()
-    case = random_cell(arguments.fibres, arguments.dofs, arguments.refine)
+    case = random_cell(arguments.fibres, arguments.dofs, arguments.refine, arguments.together)
     PETSc.Log.begin()
-    progress = Progress(MPI.COMM_WORLD, quiet=True)
+    progress = StagePeaks(MPI.COMM_WORLD, quiet=True)
     with case_options(case.petsc):
-        report = measure(case, progress)
+        report = measure(case, progress, arguments.together)
     if progress.comm.rank == 0:
         asked = {"fibres": arguments.fibres, "wanted": arguments.dofs, "refine": arguments.refine, "loads": LOADS}
         arguments.report.write_text(json.dumps(asked | report, indent=1))
     return 0
 
 
-def random_cell(fibres: int, dofs: int, refine: int) -> Case:
-    """A case with about so many degrees of freedom."""
+class StagePeaks(Progress):
+    """Keeps the peak of resident memory of each stage too, in megabytes of this rank."""
+
+    def __init__(self, comm: MPI.Intracomm, quiet: bool) -> None:
+        super().__init__(comm, quiet)
+        self.peaks: dict[str, float] = {}
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[list[str]]:
+        """As `Progress.stage`."""
+        process_memory.forget_peak()
+        with super().stage(name) as words:
+            yield words
+        self.peaks[name] = peak()
+
+    def all_peaks(self) -> dict[str, list[float]]:
+        """Of every rank, by stage.  Collective."""
+        return {name: self.comm.allgather(megabytes) for name, megabytes in self.peaks.items()}
+
+
+def random_cell(fibres: int, dofs: int, refine: int, together: bool) -> Case:
+    """A case with about so many degrees of freedom, its coarse problem solved by MUMPS if `together`."""
+    library = {"feti_coarse_pc_factor_mat_solver_type": "mumps"} if together else {}
     each = dofs / fibres / 4**refine
     regular = (np.sqrt(each + (IN_GAPS / 2) ** 2) - IN_GAPS / 2) ** 2
     document = {
@@ -74,20 +103,22 @@ def random_cell(fibres: int, dofs: int, refine: int) -> Case:
         },
         "material": {"matrix": {"young": 3.0, "poisson": 0.35}, "fibre": {"young": 70.0, "poisson": 0.2}},
         "analysis": {"type": "stiffness", "plane": "strain"},
-        "petsc": {"feti_ksp_rtol": RTOL, "feti_coarse_space": "adaptive"},
+        "petsc": {"feti_ksp_rtol": RTOL, "feti_coarse_space": "adaptive"} | library,
     }  # fmt: skip
     return cases.parse(document, Path())
 
 
-def measure(case: Case, progress: Progress) -> dict[str, Any]:
-    """Seconds, iterations, sizes and messages of a case."""
+def measure(case: Case, progress: StagePeaks, together: bool) -> dict[str, Any]:
+    """Seconds, iterations, sizes, memory and messages of a case."""
     comm = progress.comm
-    cell = tear(case, comm, progress)
+    network = {name: ping(comm, *sizes) for name, sizes in PINGS.items()}
+    thresholds = replace(DEFAULTS, replicated_vectors=0) if together else DEFAULTS
+    cell = tear(case, comm, progress, thresholds)
     solver = cell.solver
-    progress.seconds["set-up"] = progress.seconds.pop("factor")
+    for by_stage in (progress.seconds, progress.peaks):
+        by_stage["set-up"] = by_stage.pop("factor")
     with progress.stage("solve"):
         solutions = solver.solve_many(np.eye(LOADS), np.zeros((solver.rows, LOADS)))
-    memory = sum(comm.allgather(peak()))
     if not isinstance(solver.coarse, AdaptiveCoarseSpace):
         raise TypeError("the study is of the adaptive coarse space")
     own = comm.allgather(len(solver.Q))
@@ -102,9 +133,11 @@ def measure(case: Case, progress: Progress) -> dict[str, Any]:
         "iterations": solutions[0].iterations,
         "converged": solutions[0].reason > 0,
         "seconds": progress.timings(),
-        "memory": memory,
+        "peaks": progress.all_peaks(),
+        "latency": network["latency"] / 2,
+        "bandwidth": 2 * PINGS["bandwidth"][0] / network["bandwidth"] if comm.size > 1 else 0.0,
         **_messages(cell),
-        **_coarse(solver.coarse, comm),
+        **_coarse(solver.coarse, comm, together),
     }
     solver.destroy()
     return report
@@ -117,7 +150,7 @@ def _messages(cell: TornCell) -> dict[str, Any]:
     gather; in a sum they change places.  `logged` are the bytes, both ways, that PETSc counted in the solves.
     """
     comm = cell.comm
-    counts = LOADS * np.array(comm.allgather(_foreign(cell.solver.jump_operator, comm)))
+    counts = LOADS * np.array(comm.allgather(foreign(cell.solver.jump_operator, comm)))
     log = PETSc.Log.Event("VecScatterBegin").getPerfInfo(PETSc.Log.Stage("solve").id)
     return {
         "told": counts.sum(axis=0).tolist(),
@@ -128,7 +161,7 @@ def _messages(cell: TornCell) -> dict[str, Any]:
     }
 
 
-def _foreign(jump_operator: JumpOperator, comm: MPI.Intracomm) -> Int:
+def foreign(jump_operator: JumpOperator, comm: MPI.Intracomm) -> Int:
     """(ranks,) local rows that each of the other ranks owns."""
     ends = np.array(comm.allgather(jump_operator.owned[1]))
     counts = np.bincount(np.searchsorted(ends, jump_operator.rows, side="right"), minlength=comm.size)
@@ -136,12 +169,37 @@ def _foreign(jump_operator: JumpOperator, comm: MPI.Intracomm) -> Int:
     return counts
 
 
-def _coarse(coarse: AdaptiveCoarseSpace, comm: MPI.Intracomm) -> dict[str, float]:
-    """Seconds to sum and factor the coarse matrices and to solve with them once, and bytes that every rank is told."""
+def ping(comm: MPI.Intracomm, size: int, times: int) -> float:
+    """Seconds of a message of `size` bytes from rank 0 to 1 and back, the mean of `times`; 0 on one rank."""
+    message, seconds = bytearray(size), 0.0
+    comm.Barrier()
+    if comm.rank < 2 <= comm.size:
+        start = time.perf_counter()
+        for _ in range(times):
+            if comm.rank == 0:
+                comm.Send(message, 1)
+                comm.Recv(message, 1)
+            else:
+                comm.Recv(message, 0)
+                comm.Send(message, 0)
+        seconds = (time.perf_counter() - start) / times
+    return comm.bcast(seconds)
+
+
+def _coarse(coarse: AdaptiveCoarseSpace, comm: MPI.Intracomm, asked: bool) -> dict[str, Any]:
+    """Seconds to sum and factor the coarse matrices and to solve with them once, bytes that every rank is told, and
+    by how many megabytes the factorization lets the memory of each rank grow at its peak."""
     right = np.ones((coarse.coarse_dimension, LOADS)), np.ones((coarse.natural.kernel_dimension, LOADS))
     solve = min(_seconds(lambda: coarse.saddle.solve(*right)) for _ in range(TIMED))
+    together = isinstance(coarse.saddle, SaddlePoint) and comm.size > 1
+    coarse.destroy()
+    process_memory.forget_peak()
+    before = peak()
+    factor = _seconds(coarse.factor)
     return {
-        "coarse_factor": comm.allreduce(_seconds(coarse.factor), MPI.MAX),
+        "together": asked or together,
+        "coarse_memory": comm.allgather(peak() - before),
+        "coarse_factor": comm.allreduce(factor, MPI.MAX),
         "coarse_solve": comm.allreduce(solve, MPI.MAX),
         "coarse_bytes": ENTRY_BYTES * coarse.saddle.entries,
     }

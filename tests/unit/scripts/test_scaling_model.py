@@ -1,0 +1,133 @@
+"""The cost model of the scaling study: from runs that were made up of known constants, it finds these again."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import ceil
+
+import pytest
+from scaling_fit import fit_power, fit_shares
+from scaling_forecast import checks
+from scaling_model import LOCAL, Machine, measured, network, predict
+from scaling_report import Row, by_ranks, memory
+
+CORES = 2
+NETWORK = Machine(2e-6, 1e10)
+ITERATIONS, LOADS = 20, 3
+
+
+def made_up(dofs: int, ranks: int, together: bool = False) -> Row:
+    """A run whose seconds follow constants that the tests know; its messages take no time."""
+    triangles, coarse = dofs // 50, dofs // 500
+    factor, solve = 1e-6 * coarse**1.5, 1e-7 * coarse**1.2
+    if together:
+        factor, solve = (1.0 + 4.0 / ranks) * factor, LOADS * (2.0 + 1.0 / ranks) * solve
+    else:
+        solve = ceil(LOADS / ranks) * solve
+    own = dofs / ranks
+    seconds = {
+        "mesh": 1e-5 * triangles * (0.25 + 0.75 / ranks),
+        "assemble": 2e-6 * own,
+        "set-up": 5e-6 * own + factor,
+        "solve": ITERATIONS * (3e-7 * own + solve),
+    }
+    return Row(
+        fibres=1, wanted=dofs, refine=2, loads=LOADS, ranks=ranks, dofs=dofs, fullest=dofs // ranks,
+        triangles=triangles, subdomains=dofs // 1000, vectors=coarse, kernel=0, iterations=ITERATIONS,
+        converged=True, seconds=seconds, peaks={stage: [100.0 + r for r in range(ranks)] for stage in seconds},
+        told=(0,) * ranks, heard=(0,) * ranks, neighbours=(0,) * ranks, exchanges=0, logged=(0.0,) * ranks,
+        coarse_factor=factor, coarse_solve=solve, coarse_bytes=0, coarse_memory=[1.0] * ranks, together=together,
+        latency=NETWORK.latency, bandwidth=NETWORK.bandwidth,
+    )  # fmt: skip
+
+
+ROWS = [
+    *(made_up(dofs, ranks) for dofs in (100_000, 1_000_000) for ranks in (1, 2)),
+    *(made_up(1_000_000, ranks, together=True) for ranks in (1, 2)),
+]
+
+
+def test_shares_of_amdahl():
+    """Of 3 w (0.2 + 0.8 / p), at any sizes."""
+    runs = [(w, p, 3 * w * (0.2 + 0.8 / p)) for w, p in [(10, 1), (700, 2), (30, 4)]]
+    found = fit_shares(*zip(*runs, strict=True))
+    assert (found.serial, found.parallel) == pytest.approx((0.6, 2.4))
+    assert found.seconds(100, 8) == pytest.approx(300 * (0.2 + 0.1))
+
+
+def test_shares_are_not_negative():
+    """What gets slower with ranks has no parallel share; the serial one is the geometric mean."""
+    found = fit_shares([1, 1], [1, 2], [1.0, 2.0])
+    assert found.parallel == pytest.approx(0.0, abs=1e-4)
+    assert found.serial == pytest.approx(2**0.5, rel=1e-4)
+
+
+def test_power():
+    found = fit_power([10, 100, 1000], [2e-3 * n**1.4 for n in (10, 100, 1000)])
+    assert (found.factor, found.exponent) == pytest.approx((2e-3, 1.4))
+
+
+@pytest.mark.parametrize(
+    "fit", [lambda: fit_shares([1, 2], [2, 2], [1, 2]), lambda: fit_power([5, 5], [1, 2]), lambda: network(ROWS, 1)]
+)
+def test_runs_that_do_not_tell_a_constant(fit):
+    with pytest.raises(ValueError, match="need"):
+        fit()
+
+
+def test_no_run_on_one_rank():
+    with pytest.raises(ValueError, match="one rank"):
+        measured([row for row in ROWS if row.ranks > 1], CORES)
+
+
+def test_constants_are_found_again():
+    """Also where runs on more ranks than cores, whose seconds are no measure, are among the rows."""
+    slow = replace(made_up(1_000_000, 4), seconds=dict.fromkeys(ROWS[0].seconds, 1e3), coarse_factor=1e3)
+    rates = measured([*ROWS, slow], CORES)
+    assert (rates.mesh.serial, rates.mesh.parallel) == pytest.approx((2.5e-6, 7.5e-6))
+    assert (rates.assemble, rates.setup, rates.apply) == pytest.approx((2e-6, 5e-6, 3e-7))
+    assert (rates.factor.factor, rates.factor.exponent) == pytest.approx((1e-6, 1.5))
+    assert (rates.solve.factor, rates.solve.exponent) == pytest.approx((1e-7, 1.2))
+    assert (rates.factor_together.serial, rates.factor_together.parallel) == pytest.approx((1e-6, 4e-6))
+    assert (rates.solve_together.serial, rates.solve_together.parallel) == pytest.approx((2e-7, 1e-7))
+    assert network(ROWS, CORES) == NETWORK
+
+
+@pytest.mark.parametrize("row", ROWS, ids=lambda row: f"{row.dofs}-{row.ranks}-{row.together}")
+def test_model_gives_the_runs_that_it_is_of(row):
+    """With messages that take no time, as in the runs that were made up."""
+    p = predict(measured(ROWS, CORES), Machine(0.0, float("inf")), row.dofs, row.ranks, row.together)
+    assert p.total == pytest.approx(row.total, rel=1e-3)
+    assert p.mesh == pytest.approx(row.seconds["mesh"])
+    assert p.setup + p.coarse_factor == pytest.approx(row.seconds["set-up"], rel=1e-3)
+
+
+def test_ranks_share_a_factor_from_some_size_on():
+    """The program's choice where none is asked for: by the vectors; one rank has nobody to share with."""
+    rates = measured(ROWS, CORES)
+    for dofs, ranks, together in [(1e6, 16, False), (1e8, 16, True), (1e8, 1, False)]:
+        assert predict(rates, NETWORK, dofs, ranks) == predict(rates, NETWORK, dofs, ranks, together)
+
+
+def test_subdomains_scale_until_each_rank_has_one():
+    rates = measured(ROWS, CORES)
+    local = [predict(rates, NETWORK, 100_000, ranks).parts[LOCAL] for ranks in (1, 10, 100, 1000)]
+    assert local[0] / local[2] == pytest.approx(100)
+    assert local[3] == pytest.approx(local[2])
+
+
+def test_errors_of_the_model_are_told():
+    """A run that took twice as long as its stage should shows as -50 %; one without a core each is left out."""
+    rates = measured(ROWS, CORES)
+    slow = replace(ROWS[0], seconds={**ROWS[0].seconds, "assemble": 2 * ROWS[0].seconds["assemble"]})
+    lines = checks(rates, NETWORK, [slow, replace(ROWS[1], ranks=4)], CORES)
+    assert len(lines) == 4
+    assert "-50%" in lines[2] and "assemble 50%" in lines[-1]
+
+
+def test_tables_of_runs():
+    """Seconds of ranks that take turns are not shown; memory is of the fullest rank, and of all at their peaks."""
+    rows = [ROWS[0], ROWS[1]]
+    assert by_ranks(rows, cores=1)[-1].split()[-1] == "-"
+    assert ROWS[1].memory == 201.0
+    assert memory(rows)[-1].split()[-1] == "201"
