@@ -7,7 +7,7 @@ from math import ceil
 
 import pytest
 from scaling_fit import fit_power, fit_shares
-from scaling_forecast import checks
+from scaling_forecast import assumptions, checks
 from scaling_model import LOCAL, Machine, measured, network, predict
 from scaling_report import Row, by_ranks, memory
 
@@ -123,6 +123,11 @@ def test_errors_of_the_model_are_told():
     lines = checks(rates, NETWORK, [slow, replace(ROWS[1], ranks=4)], CORES)
     assert len(lines) == 4
     assert "-50%" in lines[2] and "assemble 50%" in lines[-1]
+
+
+def test_how_far_the_coarse_problem_is_from_those_timed():
+    """Ten million dofs have ten times the coarse unknowns of the largest run, of one million."""
+    assert any("n is 10.0 times the largest" in line for line in assumptions(measured(ROWS, CORES), NETWORK))
 
 
 def test_tables_of_runs():
