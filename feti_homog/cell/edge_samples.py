@@ -11,29 +11,43 @@ from feti_homog.cell.graded_size import SizeField
 from feti_homog.errors import MeshError
 from feti_homog.typing import Float, Int
 
-# Nodes on lines with which a cell is still meshed in minutes.
-MAX_LINE_NODES = 120_000
+# Something (n,) of the curves (n,) at the positions (n,) in [0, 1] on them.
+OnCurves = Callable[[Int, Float], Float]
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """How sizes are sampled: at so many positions along an arc, a piece of a side and a bridge, and for at most so many
+    nodes in all."""
+
+    arc: int
+    side: int
+    bridge: int
+    most_nodes: int
+
+
+# Of a cell that one rank meshes in minutes, and of one that all ranks mesh: there an arc is a few edges long.
+WHOLE, IN_TILES = Sampling(65, 513, 17, 120_000), Sampling(33, 129, 17, 3_000_000)
 
 
 @dataclass(frozen=True)
 class EdgeSamples:
-    """The size of edges sampled along curves: for each of them the positions in [0, 1], and there ds / h."""
+    """The size of edges h sampled along c curves: at positions `share` (n,) in [0, 1] of them there is ds / h `density`
+    (n,); those of curve k are from first[k] up to first[k + 1]."""
 
-    shares: list[Float]
-    densities: list[Float]
+    share: Float
+    density: Float
+    first: Int
 
     @classmethod
-    def of(
-        cls, field: SizeField, point: Callable[[Int, Float], Float], lengths: Float, caps: Float, least: int
-    ) -> EdgeSamples:
+    def of(cls, field: SizeField, point: OnCurves, lengths: Float, cap: OnCurves, least: int) -> EdgeSamples:
         """Samples at `least` equidistant positions, and between them as far as the field asks for more.
 
-        `point` gives the points (n, 2) of curves (n,) at the positions (n,); `lengths` and `caps`, the largest size,
-        are those of the curves (c,).
+        `point` gives the points (n, 2) and `cap` the largest sizes (n,) there; `lengths` (c,) are those of the curves.
         """
         count = len(lengths)
         curve, share = np.repeat(np.arange(count), least), np.tile(np.linspace(0, 1, least), count)
-        sizes = np.minimum(field.at(point(curve, share)), caps[curve])
+        sizes = np.minimum(field.at(point(curve, share)), cap(curve, share))
         while True:
             way = np.diff(share) * lengths[curve[:-1]]
             wide = (np.diff(curve) == 0) & (way > field.step * np.minimum(sizes[:-1], sizes[1:]))
@@ -41,24 +55,49 @@ class EdgeSamples:
                 break
             at = np.flatnonzero(wide) + 1
             between, own = (share[at - 1] + share[at]) / 2, curve[at]
-            more = np.minimum(field.at(point(own, between)), caps[own])
+            more = np.minimum(field.at(point(own, between)), cap(own, between))
             curve, share, sizes = (np.insert(*x) for x in ((curve, at, own), (share, at, between), (sizes, at, more)))
-        ends = np.flatnonzero(np.diff(curve)) + 1
-        return cls(np.split(share, ends), np.split(lengths[curve] / sizes, ends))
+        return cls(share, lengths[curve] / sizes, np.searchsorted(curve, np.arange(count + 1)))
 
-    def stations(self, least: Int) -> list[Float]:
-        """For each curve the positions in [0, 1] of its nodes, `least` (c,) edges or more, equidistant in ds / h.
+    def stations(self, least: Int, most: int) -> tuple[Float, Int]:
+        """Positions (m,) in [0, 1] of the nodes of each curve, with where its begin (c + 1,): `least` (c,) edges or
+        more, equidistant in ds / h.
 
-        Raises MeshError if they would be too many.
+        Raises MeshError if they would be more than `most`.
         """
-        pairs = list(zip(self.shares, self.densities, strict=True))
-        measures = [np.concatenate([[0.0], np.cumsum((d[1:] + d[:-1]) / 2 * np.diff(share))]) for share, d in pairs]
-        whole = np.array([measure[-1] for measure in measures])
-        if whole.sum() > MAX_LINE_NODES:
+        measure = self._measures()
+        whole = measure[self.first[1:] - 1]
+        if whole.sum() > most:
             raise MeshError(
                 f"[cell] the lines of the cell need about {whole.sum():.2g} nodes; expected at most "
-                f"{MAX_LINE_NODES}: make mesh_size and interface_size larger, or fibre_fraction or fibres smaller"
+                f"{most}: make mesh_size and interface_size larger, or fibre_fraction or fibres smaller"
             )
-        counts = np.maximum(np.ceil(whole - 1e-6).astype(int), least)
-        parts = zip(measures, counts, self.shares, strict=True)
-        return [np.interp(np.linspace(0, own[-1], count + 1), own, share) for own, count, share in parts]
+        edges = np.maximum(np.ceil(whole - 1e-6).astype(int), least)
+        first = np.concatenate([[0], np.cumsum(edges + 1)])
+        curve = np.repeat(np.arange(len(edges)), edges + 1)
+        target = (np.arange(first[-1]) - first[curve]) * (whole / edges)[curve]
+        target[first[1:] - 1] = whole
+        return self._at(measure, curve, target), first
+
+    def _measures(self) -> Float:
+        """(n,) int ds / h from the beginning of the curve, by the trapezoidal rule."""
+        measure, counts = np.zeros(len(self.share)), np.diff(self.first)
+        for count in np.unique(counts):
+            rows = self.first[:-1][counts == count, None] + np.arange(count)
+            d, s = self.density[rows], self.share[rows]
+            measure[rows[:, 1:]] = np.cumsum((d[:, 1:] + d[:, :-1]) / 2 * np.diff(s, axis=1), axis=1)
+        return measure
+
+    def _at(self, measure: Float, curve: Int, target: Float) -> Float:
+        """The positions (m,) where the measure of curves (m,) is `target` (m,), linear between samples."""
+        last = self.first[1:] - 1
+        # All in one ascending row, the curves 1 apart; the rounding of large sums may miss an interval by one.
+        shift = np.concatenate([[0.0], np.cumsum(measure[last] + 1)[:-1]])
+        row = measure + np.repeat(shift, np.diff(self.first))
+        j = np.searchsorted(row, target + shift[curve], side="right") - 1
+        j = np.clip(j, self.first[curve], last[curve] - 1)
+        j = np.maximum(j - (measure[j] > target), self.first[curve])
+        j = np.minimum(j + (measure[j + 1] <= target), last[curve] - 1)
+        slope = (self.share[j + 1] - self.share[j]) / (measure[j + 1] - measure[j])
+        at = slope * (target - measure[j]) + self.share[j]
+        return np.where(target == measure[last[curve]], 1.0, at)

@@ -10,23 +10,14 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from feti_homog.cell.arrangement import Arrangement
-from feti_homog.cell.edge_samples import EdgeSamples
+from feti_homog.cell.bridges import TURN
+from feti_homog.cell.circle_arcs import MERGED, SAME_PLACE, arcs_within
+from feti_homog.cell.curves import MATRIX, Curves, Numbering
+from feti_homog.cell.edge_samples import WHOLE, EdgeSamples
 from feti_homog.cell.ellipses import Ellipses, directions
 from feti_homog.cell.elliptic_size import size_field
 from feti_homog.cell.graded_size import MeshSizes, SizeField
-from feti_homog.cell.outline import (
-    ARC_SAMPLES,
-    MATRIX,
-    MERGED,
-    SAME_PLACE,
-    TURN,
-    Curve,
-    Numbering,
-    Outline,
-    arcs_within,
-    on_side,
-    side_curves,
-)
+from feti_homog.cell.outline import Outline, on_side, side_curves
 from feti_homog.cell.tip_marks import marked
 from feti_homog.typing import Float, Int
 
@@ -43,7 +34,7 @@ def outline(arrangement: Arrangement, sizes: MeshSizes, marks: Mapping[int, Sequ
     border = np.concatenate([on_side(places[axis], axis, level) for axis, level in sides])
     curve = np.where(around == MATRIX, fibre, ~fibre)
     angles, sharp = _vertex_angles(ellipses, curve, border, size, marks)
-    which, start, stop = arcs_within(angles, lambda of, angle: ellipses[of].at(angle), size)
+    which, start, stop = arcs_within(len(fibre), *angles, lambda of, angle: ellipses[of].at(angle), size)
     ends = ellipses[which].at(start)
     away = cKDTree(border).query(ends)[0] > SAME_PLACE * size.max()
     border = np.unique(border, axis=0)
@@ -53,11 +44,10 @@ def outline(arrangement: Arrangement, sizes: MeshSizes, marks: Mapping[int, Sequ
     outer = np.concatenate([border, ends[away & ~sparse[which]]])
     tips = _tips(arrangement, marks, numbering.vertices, size)
     field = size_field(arrangement, sizes, outer, sharp, tips)
-    curves = []
-    for axis in (0, 1):
-        curves += side_curves(axis, places[axis], partial(_ellipse_at, ellipses), around, size, field, numbering)
-    curves += _arc_curves(ellipses, around, which, start, stop, sizes.interface, field, numbering)
-    return Outline(numbering.points(), tuple(curves), ellipses, fibre, around)
+    find = partial(_ellipse_at, ellipses)
+    curves = [side_curves(axis, places[axis], find, around, size, field, numbering, WHOLE) for axis in (0, 1)]
+    curves.append(_arc_curves(ellipses, around, which, start, stop, sizes.interface, field, numbering))
+    return Outline(numbering.points(), Curves.joined(curves), ellipses, fibre, around)
 
 
 def _images(arrangement: Arrangement, size: Float) -> tuple[Ellipses, Int, Int]:
@@ -96,12 +86,12 @@ def _crossings(ellipses: Ellipses, axis: int, size: Float) -> Float:
 
 def _vertex_angles(
     ellipses: Ellipses, curve: Int, border: Float, size: Float, marks: Mapping[int, Sequence[float]]
-) -> tuple[list[Float], tuple[Float, Float]]:
-    """Sorted parameters in [0, 2 pi) of the vertices of each ellipse: crossings of the sides, and the marks.
+) -> tuple[tuple[Int, Float], tuple[Float, Float]]:
+    """Ellipse (v,) and parameter (v,) in [0, 2 pi) of the vertices of ellipses: crossings of the sides, and the marks.
 
     Also the crossings (c, 2), and R phi (c,) of the angle between side and ellipse there, whose radius is R.
     """
-    angles, where, lengths = [], [np.zeros((0, 2))], [np.zeros(0)]
+    angles, where, lengths = [np.zeros(0)], [np.zeros((0, 2))], [np.zeros(0)]
     near = cKDTree(border).query_ball_point(ellipses.centres, ellipses.longest * (1 + SAME_PLACE))
     for number, (owner, candidates) in enumerate(zip(curve.tolist(), near, strict=True)):
         places = border[candidates]
@@ -117,9 +107,9 @@ def _vertex_angles(
         away = np.abs((wanted[:, None] - np.arctan2(offsets[:, 1], offsets[:, 0]) + np.pi) % TURN - np.pi)
         wanted = wanted[(away > MERGED).all(axis=1)]
         mine = ellipses[np.full(len(wanted), number)]
-        own = np.append(own, mine.parameter(directions(wanted)) % TURN)
-        angles.append(np.sort(own) if len(own) else np.zeros(1))
-    return angles, (np.concatenate(where), np.concatenate(lengths))
+        angles.append(np.append(own, mine.parameter(directions(wanted)) % TURN))
+    whose = np.repeat(np.arange(len(curve)), [len(own) for own in angles[1:]])
+    return (whose, np.concatenate(angles)), (np.concatenate(where), np.concatenate(lengths))
 
 
 def _on_upright(places: Float, size: Float) -> Float:
@@ -151,7 +141,7 @@ def _arc_curves(
     largest: float,
     field: SizeField,
     numbering: Numbering,
-) -> list[Curve]:
+) -> Curves:
     """The arcs (a,) between parameters as curves, with edges of at most `largest` or what the curvature asks for."""
     own = ellipses[which]
     share = np.linspace(0, 1, LENGTH_STEPS + 1)
@@ -170,10 +160,7 @@ def _arc_curves(
     def point(arc: Int, share: Float) -> Float:
         return own[arc].at(parameter(arc, share))
 
-    samples = EdgeSamples.of(field, point, length[:, -1], np.full(len(own), largest), ARC_SAMPLES)
-    curves = []
-    for number, stations in enumerate(samples.stations(np.ones(len(own), dtype=np.intp))):
-        arc = np.full(len(stations), number)
-        nodes = numbering.along(point(arc, stations))
-        curves.append(Curve(nodes, int(which[number]), int(which[number]), int(around[which[number]])))
-    return curves
+    samples = EdgeSamples.of(field, point, length[:, -1], lambda arc, share: np.full(len(arc), largest), WHOLE.arc)
+    station, first = samples.stations(np.ones(len(own), np.int64), WHOLE.most_nodes)
+    arc = np.repeat(np.arange(len(own)), np.diff(first))
+    return Curves(numbering.along(point(arc, station), first), first, which, which, around[which])

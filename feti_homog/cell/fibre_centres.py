@@ -6,7 +6,7 @@ import numpy as np
 
 from feti_homog.cell.coarse_mesh import areas
 from feti_homog.cell.periodic_topology import Torus
-from feti_homog.cell.submesh import Submesh, cut
+from feti_homog.cell.submesh import Submesh, cut_bodies
 from feti_homog.cell.unwrap import unwrap
 from feti_homog.typing import Float
 
@@ -20,10 +20,10 @@ def fibre_circles(torus: Torus) -> Float:
     The centre of a fibre that is not round is that of its area, or the one that the mesh knows, and its radius NaN.
     NaN for the matrix, and for a fibre that winds around the torus, which has no centre.
     """
-    circles = np.full((len(torus.constituent_phase), 3), np.nan)
-    for submesh in cut(torus, torus.constituent):
-        if torus.constituent_phase[submesh.body] > 0:
-            circles[submesh.body] = _circle(submesh)
+    circles = _discs(torus)
+    others = np.isnan(circles[torus.constituent, 2]) & (torus.constituent_phase[torus.constituent] > 0)
+    for submesh in cut_bodies(torus, np.flatnonzero(others)):
+        circles[submesh.body] = _centre_of_area(submesh)
     if torus.mesh.centres is not None:
         body, first = np.unique(torus.constituent, return_index=True)
         number = torus.mesh.precedence[first]
@@ -32,24 +32,34 @@ def fibre_circles(torus: Torus) -> Float:
     return circles
 
 
-def _circle(submesh: Submesh) -> Float:
-    """(3,) that of one fibre."""
-    around = _boundary_circles(submesh)
-    if len(around) and around[:, 2].min() > 0:
-        outer = around[np.argmax(around[:, 2])]
-        offset = around[:, :2] - outer[:2]
-        offset -= np.round(offset / submesh.period) * submesh.period
-        if np.all(np.abs(offset) < SAME_CIRCLE * outer[2]):
-            return np.asarray(outer)
+def _discs(torus: Torus) -> Float:
+    """(constituents, 3) the largest circle of those whose boundary is on one circle, or on several around one centre;
+    NaN of others."""
+    edge, body = torus.triangle_torus_edges, torus.constituent
+    left, right, between = torus.sides
+    outer = torus.at_void.copy()
+    outer[between] = body[left] != body[right]
+    triangle, k = np.nonzero(outer[edge])
+    own, around = body[triangle], torus.edge_circles[torus.triangle_edges[triangle, k]]
+    n = len(torus.constituent_phase)
+    order = np.lexsort((torus.triangle_edges[triangle, k], -np.nan_to_num(around[:, 2]), own))
+    bodies, first = np.unique(own[order], return_index=True)
+    circles = np.full((n, 3), np.nan)
+    circles[bodies] = around[order[first]]
+    offset = around[:, :2] - circles[own, :2]
+    offset -= np.round(offset / torus.mesh.period) * torus.mesh.period
+    on_one = (around[:, 2] > 0) & np.all(np.abs(offset) < SAME_CIRCLE * circles[own, 2:], axis=1)
+    is_disc = torus.constituent_phase > 0
+    is_disc[own[~on_one]] = False
+    circles[~is_disc] = np.nan
+    return circles
+
+
+def _centre_of_area(submesh: Submesh) -> Float:
+    """(3,) that of a fibre, and NaN for the radius."""
     shift, closes = unwrap(submesh)
     if not closes:
         return np.full(3, np.nan)
     middles = submesh.points[submesh.triangles].mean(axis=1) + shift
     weights = areas(submesh.points, submesh.triangles.astype(np.int32))
     return np.asarray(np.r_[np.average(middles, axis=0, weights=weights), np.nan])
-
-
-def _boundary_circles(submesh: Submesh) -> Float:
-    """(b, 3) circles of the edges that the piece has on one side only, radius 0 where they are straight."""
-    sides = np.bincount(submesh.edge_class[submesh.triangle_edges].ravel(), minlength=len(submesh.edge_keys))
-    return np.asarray(submesh.circles[sides[submesh.edge_class] == 1])

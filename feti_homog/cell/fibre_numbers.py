@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from feti_homog.cell.periodic_topology import Torus, edge_pairs
+from feti_homog.cell.periodic_topology import Torus
 from feti_homog.config.phase_names import COATING
 from feti_homog.typing import Bool, Float, Int
 
@@ -20,7 +20,7 @@ def fibre_numbers(torus: Torus) -> tuple[Int, Bool]:
     """
     phase, n = torus.constituent_phase, len(torus.constituent_phase)
     coats = np.array([name == COATING for name in torus.mesh.phases])[phase]
-    sides = torus.constituent[np.stack(edge_pairs(torus.triangle_torus_edges))]
+    sides = torus.constituent[np.stack(torus.sides[:2])]
     coating, core = np.hstack([sides, sides[::-1]])
     inside = coats[coating] & ~coats[core] & (phase[core] > 0)
     is_coating = np.zeros(n, bool)

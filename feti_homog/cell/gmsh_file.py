@@ -9,7 +9,7 @@ import numpy as np
 
 from feti_homog.cell import mesh_checks
 from feti_homog.cell.element_blocks import Block, assembled
-from feti_homog.cell.gmsh_mesher import LINE, TRIANGLE, gmsh_session
+from feti_homog.cell.filling import LINE, TRIANGLE, gmsh_session
 from feti_homog.cell.mesh_checks import RawMesh
 from feti_homog.errors import MeshError
 from feti_homog.typing import Int

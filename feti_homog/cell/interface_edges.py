@@ -16,13 +16,13 @@ def interface_edges(mesh: CoarseMesh) -> Int32:
     copy."""
     pairs, order = _neighbours(mesh)
     between = mesh.phase[order[:, 0] // 3] != mesh.phase[order[:, 1] // 3]
-    return np.concatenate([pairs[order[between, 0]], pairs[_alone(mesh, pairs)]])
+    return np.concatenate([pairs[order[between, 0]], pairs[_alone(pairs, order)]])
 
 
 def void_edges(mesh: CoarseMesh) -> Int32:
     """Edges (k, 2) that one triangle has on the torus: a void is on the other side; of those on sides the low copy."""
-    pairs = _low_copies(mesh, edges(mesh.triangles))
-    return np.asarray(pairs[_alone(mesh, pairs)])
+    pairs, order = _neighbours(mesh)
+    return np.asarray(pairs[_alone(pairs, order)])
 
 
 def voids(mesh: CoarseMesh) -> int:
@@ -52,10 +52,11 @@ def _neighbours(mesh: CoarseMesh) -> tuple[Int32, Index]:
     return pairs, np.stack([order[twice], order[twice + 1]], axis=1)
 
 
-def _alone(mesh: CoarseMesh, pairs: Int32) -> Bool:
-    """Which of the triangles' edges (3m, 2) no other triangle has."""
-    _, which, count = np.unique(edge_keys(pairs, len(mesh.points)), return_inverse=True, return_counts=True)
-    return np.asarray(count[which.ravel()] == 1)
+def _alone(pairs: Int32, order: Index) -> Bool:
+    """Which of the edges of `_neighbours` (3m, 2) no other triangle has."""
+    alone = np.ones(len(pairs), bool)
+    alone[order] = False
+    return alone
 
 
 def _low_copies(mesh: CoarseMesh, pairs: Int32) -> Int32:

@@ -11,40 +11,25 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from feti_homog.cell.arrangement import Arrangement
-from feti_homog.cell.edge_samples import EdgeSamples
+from feti_homog.cell.bridges import Bridges, OnCircles
+from feti_homog.cell.circle_arcs import (
+    SAME_PLACE,
+    arc_curves,
+    arcs_within,
+    bridge_curves,
+    on_circle,
+    on_circles,
+    vertex_angles,
+)
+from feti_homog.cell.curves import MATRIX, OUTSIDE, Curves, Numbering, backwards
+from feti_homog.cell.edge_samples import WHOLE, EdgeSamples, Sampling
 from feti_homog.cell.ellipses import Ellipses
 from feti_homog.cell.graded_size import MeshSizes, SizeField, size_field
 from feti_homog.cell.size_field import circle_size
 from feti_homog.cell.tip_marks import marked
 from feti_homog.typing import Bool, Float, Int
 
-MATRIX = -1
-# Relative distance below which two positions are one.
-SAME_PLACE = 1e-9
-# A mark nearer than this many radians to another vertex of its circle is that vertex.
-MERGED = np.radians(0.05)
-TURN = 2 * np.pi
-QUARTER = TURN / 4
-# Positions at which the size is sampled along an arc and along a piece of a side.
-ARC_SAMPLES = 65
-SIDE_SAMPLES = 513
-
-
-@dataclass(frozen=True)
-class Curve:
-    """A piece of a side or a circle from vertex to vertex, counter-clockwise around the cell or the disc.
-
-    Attributes:
-        nodes: (k,) numbers of its nodes, from end to end.
-        circle: the circle it lies on; MATRIX for a piece of a side.
-        inside: what is on its left: the disc, or the coating, within that circle, or MATRIX.
-        outside: of a piece of a circle, what is on its right: the coating within the circle around it, or MATRIX.
-    """
-
-    nodes: Int
-    circle: int
-    inside: int
-    outside: int = MATRIX
+NO_BRIDGES = Bridges(np.zeros((0, 2), np.int64), np.zeros(0))
 
 
 @dataclass(frozen=True)
@@ -61,7 +46,7 @@ class Outline:
     """
 
     points: Float
-    curves: tuple[Curve, ...]
+    curves: Curves
     ellipses: Ellipses
     disc: Int
     around: Int
@@ -106,35 +91,55 @@ def _outer_images(arrangement: Arrangement, size: Float) -> tuple[Float, Int]:
     return np.concatenate(circles)[order], owner[order]
 
 
-def outline(arrangement: Arrangement, sizes: MeshSizes, marks: Mapping[int, Sequence[float]]) -> Outline:
+def outline(
+    arrangement: Arrangement,
+    sizes: MeshSizes,
+    marks: Mapping[int, Sequence[float]],
+    bridges: Bridges = NO_BRIDGES,
+    sampling: Sampling = WHOLE,
+) -> Outline:
     """All lines of the cell with nodes at distances of at most `sizes`, closer in narrow passages.
 
     Opposite sides have the same nodes. `marks` maps a curve to angles in degrees, measured at its centre, that become
-    nodes: curve k is the outer one of fibre k, and ~k that within its coating.
+    nodes: curve k is the outer one of fibre k, and ~k that within its coating. The bridges are the last curves.
+
+    Raises:
+        MeshError: there would be more nodes than the `sampling` allows.
     """
     size = np.array([arrangement.width, arrangement.height])
     circles, fibre, around = images(arrangement)
-    places = [_crossings(circles, axis, size) for axis in (0, 1)]
+    places = [crossings(circles, axis, size) for axis in (0, 1)]
     sides = ((axis, level) for axis in (0, 1) for level in (0.0, size[1 - axis]))
     border = np.concatenate([on_side(places[axis], axis, level) for axis, level in sides])
     curve = np.where(around == MATRIX, fibre, ~fibre)
-    angles = _vertex_angles(circles, curve, border, marks)
-    circle, start, stop = arcs_within(angles, lambda of, angle: _on_circle(circles[of], angle), size)
-    ends = _on_circle(circles[circle], start)
-    away = cKDTree(border).query(ends)[0] > SAME_PLACE * size.max()
-    border = np.unique(border, axis=0)
+    vertices = vertex_angles(circles, curve, border, marks)
     # Vertices within coatings are as far from each other as those on the circle around, which they face, unless marked.
     sparse = (around != MATRIX) & ~np.isin(curve, list(marks))
-    outer = np.concatenate([border, ends[away & ~sparse[circle]]])
-    numbering = Numbering(np.concatenate([border, ends[away]]))
+    outer = np.concatenate([np.unique(border, axis=0), _arcs(circles, border, vertices, size, ~sparse)[1]])
+    # Ends of bridges are where there is room for them, and make nothing finer.
+    vertices = tuple(np.concatenate(parts) for parts in zip(vertices, bridges.on_circles, strict=True))
+    (circle, start, stop), ends = _arcs(circles, border, vertices, size, np.ones(len(circles), bool))
+    numbering = Numbering(np.concatenate([np.unique(border, axis=0), ends]))
     field = size_field(arrangement, sizes, outer, _tips(arrangement, marks, numbering.vertices))
 
-    curves = []
-    for axis in (0, 1):
-        curves += side_curves(axis, places[axis], partial(_disc_at, circles), around, size, field, numbering)
+    find = partial(disc_at, circles)
+    curves = [side_curves(axis, places[axis], find, around, size, field, numbering, sampling) for axis in (0, 1)]
     caps = _caps(arrangement, sizes.interface, fibre, around)
-    curves += _arc_curves(circles, around, circle, start, stop, caps[circle], field, numbering)
-    return Outline(numbering.points(), tuple(curves), Ellipses.round(circles), fibre, around)
+    curves.append(arc_curves(circles, around, circle, start, stop, caps[circle], field, numbering, sampling))
+    if len(bridges.angle):
+        curves.append(bridge_curves(circles, bridges, caps, field, numbering, sampling))
+    return Outline(numbering.points(), Curves.joined(curves), Ellipses.round(circles), fibre, around)
+
+
+def _arcs(
+    circles: Float, border: Float, vertices: OnCircles, size: Float, chosen: Bool
+) -> tuple[tuple[Int, Float, Float], Float]:
+    """The arcs of `arcs_within`, and the points (v, 2) at which those of the `chosen` (k,) circles begin, but for those
+    on the border, near its points (b, 2)."""
+    arcs = arcs_within(len(circles), *vertices, partial(on_circles, circles), size)
+    ends = on_circles(circles, *arcs[:2])
+    away = cKDTree(border).query(ends)[0] > SAME_PLACE * size.max()
+    return arcs, ends[away & chosen[arcs[0]]]
 
 
 def _caps(arrangement: Arrangement, largest: float, fibre: Int, around: Int) -> Float:
@@ -143,29 +148,7 @@ def _caps(arrangement: Arrangement, largest: float, fibre: Int, around: Int) -> 
     return np.asarray(circle_size(arrangement, largest)[first[fibre] + (around != MATRIX)])
 
 
-class Numbering:
-    """Gives numbers to the nodes: first the vertices (v, 2), found by position, then those between."""
-
-    def __init__(self, vertices: Float) -> None:
-        self.vertices = vertices
-        self._tree = cKDTree(vertices)
-        self._between: list[Float] = []
-        self._count = len(vertices)
-
-    def along(self, points: Float) -> Int:
-        """Numbers (k,) of the nodes at `points` (k, 2) on one curve, whose ends are vertices."""
-        _, ends = self._tree.query(points[[0, -1]])
-        between = np.arange(self._count, self._count + len(points) - 2)
-        self._count += len(between)
-        self._between.append(points[1:-1])
-        return np.concatenate([ends[:1], between, ends[1:]])
-
-    def points(self) -> Float:
-        """Positions (n, 2) of all nodes by number."""
-        return np.concatenate([self.vertices, *self._between])
-
-
-def _crossings(circles: Float, axis: int, size: Float) -> Float:
+def crossings(circles: Float, axis: int, size: Float) -> Float:
     """Sorted coordinates along `axis` of the vertices on the side at 0: corners and crossings of circles."""
     depth, centre, radius = circles[:, 1 - axis], circles[:, axis], circles[:, 2]
     half = np.sqrt(np.maximum(radius**2 - depth**2, 0.0))
@@ -180,51 +163,12 @@ def on_side(places: Float, axis: int, level: float) -> Float:
     return points
 
 
-def _on_circle(circles: Float, angles: Float) -> Float:
-    """Points (..., 2) on circles (..., 3) at angles in radians."""
-    return np.asarray(circles[..., :2] + circles[..., 2:] * np.stack([np.cos(angles), np.sin(angles)], axis=-1))
-
-
-def _vertex_angles(circles: Float, curve: Int, border: Float, marks: Mapping[int, Sequence[float]]) -> list[Float]:
-    """Sorted angles in [0, 2 pi) of the vertices of each circle: crossings of the sides, and the marks."""
-    angles = []
-    near = cKDTree(border).query_ball_point(circles[:, :2], circles[:, 2] * (1 + SAME_PLACE))
-    for circle, owner, candidates in zip(circles, curve.tolist(), near, strict=True):
-        offset = border[candidates] - circle[:2]
-        offset = offset[np.linalg.norm(offset, axis=1) > circle[2] * (1 - SAME_PLACE)]
-        own = (np.arctan2(offset[:, 1], offset[:, 0]) % TURN).tolist()
-        for mark in np.radians(marks.get(owner, ())) % TURN:
-            if all(abs((mark - angle + np.pi) % TURN - np.pi) > MERGED for angle in own):
-                own.append(mark)
-        angles.append(np.sort(own) if own else np.zeros(1))
-    return angles
-
-
-def arcs_within(angles: list[Float], at: Callable[[Int, Float], Float], size: Float) -> tuple[Int, Float, Float]:
-    """Curve, start and stop angle (a,) of the arcs within the cell, each at most a quarter turn.
-
-    `angles` are those of the vertices of each closed curve; at(curves, angles) are the points (a, 2) there.
-    """
-    curve, start, stop = [], [], []
-    for number, own in enumerate(angles):
-        for begin, span in zip(own, np.diff(own, append=own[0] + TURN), strict=True):
-            parts = max(1, int(np.ceil(span / QUARTER - SAME_PLACE)))
-            stations = begin + span * np.arange(parts + 1) / parts
-            curve.append(np.full(parts, number))
-            start.append(stations[:-1])
-            stop.append(stations[1:])
-    whose, first, last = np.concatenate(curve), np.concatenate(start), np.concatenate(stop)
-    middle = at(whose, (first + last) / 2)
-    within = np.all((middle > 0) & (middle < size), axis=1)
-    return whose[within], first[within], last[within]
-
-
 def _tips(arrangement: Arrangement, marks: Mapping[int, Sequence[float]], vertices: Float) -> Float:
     """The vertices (t, 2) that the marks have become; those of curves that are not there are none."""
     curve, angle = marked(arrangement, marks)
     size, fibre = np.array([arrangement.width, arrangement.height]), np.where(curve < 0, ~curve, curve)
     radii = np.where(curve < 0, arrangement.radii[fibre], arrangement.outer_radii[fibre])
-    places = _on_circle(np.column_stack([arrangement.centres[fibre], radii]), angle)
+    places = on_circle(np.column_stack([arrangement.centres[fibre], radii]), angle)
     return np.asarray(vertices[cKDTree(vertices % size, boxsize=size).query(places % size)[1]])
 
 
@@ -236,7 +180,8 @@ def side_curves(
     size: Float,
     field: SizeField,
     numbering: Numbering,
-) -> list[Curve]:
+    sampling: Sampling,
+) -> Curves:
     """The pieces of the two sides along `axis`, with the same nodes on both; `disc_at` tells the smallest closed curve
     around points, which is a number of `around` or MATRIX."""
     begin, span = places[:-1], np.diff(places)
@@ -244,8 +189,8 @@ def side_curves(
     def point(piece: Int, share: Float) -> Float:
         return on_side(begin[piece] + span[piece] * share, axis, 0.0)
 
-    samples = EdgeSamples.of(field, point, span, np.full(len(span), np.inf), SIDE_SAMPLES)
-    curves = []
+    samples = EdgeSamples.of(field, point, span, lambda piece, share: np.full(len(piece), np.inf), sampling.side)
+    parts = []
     for level, low in ((0.0, True), (size[1 - axis], False)):
         inside = disc_at(on_side(begin + span / 2, axis, level))
         # A chord has two edges or more: a triangle with two arc edges beside it could not be flipped. From one circle
@@ -255,41 +200,24 @@ def side_curves(
         crosses[:-1] |= into[1:] == inside[:-1]
         crosses[1:] |= into[:-1] == inside[1:]
         least = np.where((inside == MATRIX) | crosses, 1, 2)
-        for number, stations in enumerate(samples.stations(least)):
-            along = begin[number] + span[number] * stations
-            along[[0, -1]] = places[number : number + 2]
-            nodes = numbering.along(on_side(along, axis, level))
-            # Counter-clockwise around the cell: along the coordinate at the bottom and at the right.
-            curves.append(Curve(nodes if low == (axis == 0) else nodes[::-1], MATRIX, int(inside[number])))
-    return curves
+        station, first = samples.stations(least, sampling.most_nodes)
+        piece = np.repeat(np.arange(len(span)), np.diff(first))
+        along = begin[piece] + span[piece] * station
+        along[first[:-1]], along[first[1:] - 1] = begin, places[1:]
+        node = numbering.along(on_side(along, axis, level), first)
+        # Counter-clockwise around the cell: along the coordinate at the bottom and at the right.
+        turned = np.full(len(span), low != (axis == 0))
+        straight, beyond = np.full(len(span), MATRIX), np.full(len(span), OUTSIDE)
+        parts.append(Curves(backwards(node, first, turned), first, straight, inside, beyond))
+    return Curves.joined(parts)
 
 
-def _disc_at(circles: Float, points: Float) -> Int:
-    """The smallest circle (k,) around each point, or MATRIX."""
-    holds = np.linalg.norm(points[:, None] - circles[:, :2], axis=2) < circles[:, 2]
-    return np.where(holds.any(axis=1), np.where(holds, circles[:, 2], np.inf).argmin(axis=1), MATRIX)
-
-
-def _arc_curves(
-    circles: Float,
-    around: Int,
-    circle: Int,
-    start: Float,
-    stop: Float,
-    caps: Float,
-    field: SizeField,
-    numbering: Numbering,
-) -> list[Curve]:
-    """The arcs (a,) from angle `start` to `stop` on their circles as curves, with edges of at most `caps` (a,)."""
-    span = stop - start
-
-    def point(arc: Int, share: Float) -> Float:
-        return _on_circle(circles[circle[arc]], start[arc] + span[arc] * share)
-
-    samples = EdgeSamples.of(field, point, span * circles[circle, 2], caps, ARC_SAMPLES)
-    curves = []
-    stations = samples.stations(np.ones(len(span), dtype=np.intp))
-    for number, begin, turn, own in zip(circle.tolist(), start, span, stations, strict=True):
-        nodes = numbering.along(_on_circle(circles[number], begin + turn * own))
-        curves.append(Curve(nodes, number, number, int(around[number])))
-    return curves
+def disc_at(circles: Float, points: Float) -> Int:
+    """The smallest circle (k,) around each point on a line, or MATRIX."""
+    beyond = circles[:, :2] - np.clip(circles[:, :2], points.min(axis=0), points.max(axis=0))
+    near = np.flatnonzero(np.linalg.norm(beyond, axis=1) < circles[:, 2])
+    if not len(near):
+        return np.full(len(points), MATRIX)
+    own = circles[near]
+    holds = np.linalg.norm(points[:, None] - own[:, :2], axis=2) < own[:, 2]
+    return np.where(holds.any(axis=1), near[np.where(holds, own[:, 2], np.inf).argmin(axis=1)], MATRIX)

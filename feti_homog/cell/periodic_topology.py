@@ -65,6 +65,14 @@ class Torus:
         return self.torus_edge[self.triangle_edges]
 
     @cached_property
+    def sides(self) -> tuple[Int, Int, Int]:
+        """The triangles (e,) and (e,) on either side of each torus edge that two share, and that edge (e,)."""
+        flat = self.triangle_torus_edges.ravel()
+        order = np.argsort(flat, kind="stable")
+        twice = np.flatnonzero(flat[order][1:] == flat[order][:-1])
+        return order[twice] // 3, order[twice + 1] // 3, flat[order[twice]]
+
+    @cached_property
     def at_void(self) -> Bool:
         """(torus edges,) whether a triangle is on one side of each only."""
         return np.asarray(np.bincount(self.triangle_torus_edges.ravel()) == 1)
@@ -125,7 +133,7 @@ class Torus:
     def nesting(self) -> Int:
         """(constituents,) places from the outermost to the innermost: by the number of others between a constituent and
         the matrix, a coating before what it coats, and then by number."""
-        left, right = edge_pairs(self.triangle_torus_edges)
+        left, right, _ = self.sides
         a, b = self.constituent[left], self.constituent[right]
         phase, n = self.constituent_phase, len(self.constituent_phase)
         touching = csr_matrix((np.ones(len(a)), (a, b)), shape=(n, n))
@@ -149,12 +157,6 @@ def edge_pairs(triangle_edges: Int) -> tuple[Int, Int]:
     order = np.argsort(flat, kind="stable")
     twice = flat[order][1:] == flat[order][:-1]
     return order[:-1][twice] // 3, order[1:][twice] // 3
-
-
-def shared_edges(triangle_edges: Int) -> Int:
-    """The edges that two triangles share, in the order of `edge_pairs`."""
-    flat = np.sort(triangle_edges, axis=None)
-    return np.asarray(flat[:-1][flat[1:] == flat[:-1]])
 
 
 def components(n: int, left: Int, right: Int) -> Int:

@@ -16,8 +16,8 @@ import numpy as np
 from feti_homog.cell.arrangement import Arrangement
 from feti_homog.cell.coarse_mesh import CoarseMesh
 from feti_homog.cell.convex_shapes import ConvexShapes
+from feti_homog.cell.filling import gmsh_session
 from feti_homog.cell.gmsh_file import triangles_of_model
-from feti_homog.cell.gmsh_mesher import gmsh_session
 from feti_homog.cell.graded_size import MeshSizes
 from feti_homog.cell.msh_reader import made
 from feti_homog.cell.shape_sizes import SizeAt, shape_sizes

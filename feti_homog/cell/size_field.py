@@ -20,6 +20,8 @@ PASSAGE_EDGE = 1.5
 WEDGE = 3
 # Growth of the edge length per distance, at most.
 MAX_GROWTH = 0.4
+# Positions whose sources are looked for at once, for the memory that this takes.
+CHUNK = 100_000
 
 # Places (k, 2), edge lengths (k,) and growths (k,).
 Source = tuple[Float, Float, Float]
@@ -53,11 +55,15 @@ def graded(sources: Sequence[Source], size: Float, largest: float) -> Callable[[
     tree = cKDTree(places, boxsize=size)
     count = min(16, len(places))
 
-    def at(points: Float) -> Float:
+    def near(points: Float) -> Float:
         # Beyond the bound the tree gives the source behind the last, which is infinite.
-        distance, nearest = tree.query(wrap(points, size), k=count, distance_upper_bound=largest / MAX_GROWTH)
+        distance, nearest = tree.query(points, k=count, distance_upper_bound=largest / MAX_GROWTH)
         graded = (lengths[nearest] + growths[nearest] * distance).reshape(len(points), -1)
         return np.asarray(np.minimum(largest, graded.min(axis=1)))
+
+    def at(points: Float) -> Float:
+        wrapped = wrap(points, size)
+        return np.concatenate([near(wrapped[k : k + CHUNK]) for k in range(0, max(1, len(points)), CHUNK)])
 
     return at
 

@@ -65,6 +65,14 @@ def cut(torus: Torus, subdomain: Int) -> Iterator[Submesh]:
         yield _submesh(torus, index, members, pinned)
 
 
+def cut_bodies(torus: Torus, members: Int) -> Iterator[Submesh]:
+    """The triangles `members` (m,) as a submesh for each constituent that has some; none is pinned."""
+    order = members[np.argsort(torus.constituent[members], kind="stable")]
+    ends = np.flatnonzero(np.diff(torus.constituent[order])) + 1
+    for index, own in enumerate(np.split(order, ends) if len(order) else ()):
+        yield _submesh(torus, index, own, -1)
+
+
 def part(submesh: Submesh, members: Int) -> Submesh:
     """The coarse triangles `members` (m,) of a submesh, as a submesh of its own."""
     vertices, triangles = np.unique(submesh.triangles[members], return_inverse=True)

@@ -8,8 +8,8 @@ from itertools import product
 
 import numpy as np
 
-from feti_homog.cell.outline import MERGED
-from feti_homog.cell.periodic_topology import Torus, edge_pairs, shared_edges
+from feti_homog.cell.circle_arcs import MERGED
+from feti_homog.cell.periodic_topology import Torus
 from feti_homog.cell.refinement import ReferenceLattice
 from feti_homog.config.case import Case
 from feti_homog.config.interface_rules import interface_label
@@ -35,11 +35,11 @@ class InterfaceNodes:
     def of(cls, torus: Torus, lattice: ReferenceLattice, pairs: Int, numbers: Int, centres: Float) -> InterfaceNodes:
         """Those on edges that may debond, on their chords; `pairs` as in `share_entities`, `numbers` (constituents,)
         those of fibres."""
-        left, right = edge_pairs(torus.triangle_torus_edges)
+        left, right, edge = torus.sides
         pair = pairs[torus.mesh.phase[left], torus.mesh.phase[right]]
         sides = torus.constituent[np.stack([left, right])][:, pair >= 0]
         inner = np.take_along_axis(sides, torus.nesting[sides].argmax(axis=0)[None], axis=0)[0]
-        between = shared_edges(torus.triangle_torus_edges)[pair >= 0]
+        between = edge[pair >= 0]
         plane = np.unique(torus.torus_edge, return_index=True)[1][between]
         share = np.linspace(0.0, 1.0, lattice.intervals + 1)[None, :, None]
         ends = torus.mesh.points[torus.edges[plane]]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,15 +14,15 @@ from feti_homog.cell.fibre_numbers import coating_thickness, fibre_numbers
 from feti_homog.cell.fibre_shapes import fibre_frames
 from feti_homog.cell.interface_edges import voids
 from feti_homog.cell.matched_arrangement import distance_of
-from feti_homog.cell.periodic_topology import Torus, edge_pairs
+from feti_homog.cell.periodic_topology import Torus
 from feti_homog.cell.refinement import ReferenceLattice
 from feti_homog.cell.submesh import Submesh, cut
-from feti_homog.config import case as cases
+from feti_homog.cell.tiles import DEFAULT_TILES, TilePolicy
 from feti_homog.config.case import Case
 from feti_homog.errors import CaseError
 from feti_homog.feti.decomposition.partition import decompose, pieces_for_count, pieces_for_size
 from feti_homog.feti.decomposition.shared_entities import SharedEntities, share_entities
-from feti_homog.homogenization import arc_selection, interface_pairs, process_zone, tips
+from feti_homog.homogenization import arc_selection, interface_pairs, process_zone
 from feti_homog.homogenization.arc_selection import InterfaceNodes
 from feti_homog.interface import debonded_arcs
 from feti_homog.interface.debonded_arcs import MovedTips
@@ -34,7 +34,7 @@ ROUNDING = 1e-9  # of coordinates, relative to the cell
 
 @dataclass(frozen=True)
 class PartitionPolicy:
-    """Into how many pieces bodies are cut by default; sizes in degrees of freedom after refinement.
+    """Into how many pieces the mesh and bodies are cut by default; sizes in degrees of freedom after refinement.
 
     Attributes:
         piece_dofs: of a piece; with smaller pieces the coarse problem takes longer, with larger ones the factors and
@@ -48,6 +48,7 @@ class PartitionPolicy:
             the load of a rank, for they can be distributed evenly as they are.
         breakable_boundary_dofs: where bonds may break, a body is cut only if its boundary has more: the cell is solved
             so often then that whole bodies pay as long as dense matrices of their boundaries are small.
+        tiles: of the coarse mesh.
 
     `scripts/benchmark scripts/cases/benchmark_1m.toml --tools feti` times the bonded ones, and `scripts/benchmark_path`
     the last.
@@ -60,6 +61,7 @@ class PartitionPolicy:
     even_cut_factor: float = 12.0
     even_share: float = 1 / 16
     breakable_boundary_dofs: int = 2500
+    tiles: TilePolicy = DEFAULT_TILES
 
 
 DEFAULT_POLICY = PartitionPolicy()
@@ -148,27 +150,6 @@ class RankShare:
     shared: SharedEntities
 
 
-def coarse_mesh(case: Case) -> CoarseMesh:
-    """The coarse mesh that the case describes, its phases checked against the materials.
-
-    Raises:
-        CaseError: a phase has no material, or a material no phase.
-        MeshError: the cell cannot be meshed, or its mesh file is faulty.
-    """
-    # gmsh is imported on rank 0 alone, which is where this runs.
-    if case.cell.has_own_mesh:
-        from feti_homog.cell.msh_reader import read
-
-        assert case.cell.file is not None
-        mesh = read(case.cell.file, case.cell.snap_tolerance if case.cell.repair == "snap" else None)
-    else:
-        from feti_homog.cell.gmsh_mesher import generate
-
-        mesh = generate(replace(case.cell, tip_size=tips.size(case)), tips.marks(case))
-    cases.check_phases(case, mesh.phases)
-    return mesh
-
-
 def moved_fibres(case: Case) -> tuple[str, ...]:
     """Which rows of a table its cut window moves, and how far, in one line; none of other cells.
 
@@ -227,7 +208,7 @@ def distribute(
         frames=fibre_frames(torus),
         moved_tips=tuple(map(dict, moved)),
         snapped=mesh.snapped,
-        voids=voids(mesh),
+        voids=voids(mesh) if torus.at_void.any() else 0,
         match_distance=_match_distance(case, mesh, centres[is_fibre], circles[is_fibre, 2]),
     )
     own: list[list[Submesh]] = [[] for _ in range(n_ranks)]
@@ -286,6 +267,6 @@ def _in_cell(points: Float, period: Float) -> Float:
 
 def _outer_edges(torus: Torus, parts: Int) -> Int:
     """(b,) coarse edges of each body that others share."""
-    left, right = edge_pairs(torus.triangle_torus_edges)
+    left, right, _ = torus.sides
     outer = parts[left] != parts[right]
     return np.bincount(np.r_[parts[left[outer]], parts[right[outer]]], minlength=int(parts.max()) + 1)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from feti_homog.cell.periodic_topology import Torus, edge_pairs
+from feti_homog.cell.periodic_topology import Torus
 from feti_homog.config.case import Case
 from feti_homog.config.interface_rules import interface_label
 from feti_homog.config.wording import toml_value
@@ -31,8 +31,9 @@ def pairs_of(case: Case, phases: tuple[str, ...]) -> Int:
 def faults(case: Case, torus: Torus) -> list[str]:
     """Faults of interfaces between phases that the cell does not have, or that touch nowhere in it."""
     phases, found = torus.mesh.phases, []
-    left, right = (torus.mesh.phase[each] for each in edge_pairs(torus.triangle_torus_edges))
-    touching = {frozenset(pair) for pair in np.unique(np.stack([left, right], axis=1), axis=0).tolist()}
+    left, right = (torus.mesh.phase[each] for each in torus.sides[:2])
+    touching = np.zeros((len(phases), len(phases)), bool)
+    touching[left, right] = touching[right, left] = True
     for number, interface in enumerate(case.interfaces):
         if interface.between is None:
             continue
@@ -40,6 +41,6 @@ def faults(case: Case, torus: Torus) -> list[str]:
         unknown = [name for name in interface.between if name not in phases]
         if unknown:
             found.append(f"{line}the cell has no phase {toml_value(unknown[0])}; it has {', '.join(phases)}")
-        elif frozenset(map(phases.index, interface.between)) not in touching:
+        elif not touching[tuple(map(phases.index, interface.between))]:
             found.append(f"{line}expected phases that touch; in this cell they do nowhere")
     return found

@@ -21,12 +21,12 @@ from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.solver import FetiSolver
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 from feti_homog.homogenization import bonds, cost_model, phase_laws, process_zone
+from feti_homog.homogenization.coarse_meshes import coarse_mesh, coarse_mesh_of_all
 from feti_homog.homogenization.domain_partition import (
     DEFAULT_POLICY,
     CellSummary,
     PartitionPolicy,
     RankShare,
-    coarse_mesh,
     distribute,
     moved_fibres,
 )
@@ -143,14 +143,14 @@ def assemble_axial(case: Case, subdomains: Sequence[Subdomain]) -> list[Subdomai
 def assemble_subdomains(
     case: Case, comm: MPI.Intracomm, progress: Progress, policy: PartitionPolicy = DEFAULT_POLICY
 ) -> tuple[CellSummary, SharedEntities, ReferenceLattice, list[Subdomain]]:
-    """Mesh and cut the cell on rank 0; refine and assemble the subdomains on their ranks.  Collective.
+    """Mesh the cell, cut it on rank 0; refine and assemble the subdomains on their ranks.  Collective.
 
     Returns the summary, what this rank's subdomains share with others, the lattice of the refinement, and they.
     Raises as `tear`.
     """
     lattice = ReferenceLattice.of(case.cell.refine, case.cell.order)
     with progress.stage("mesh") as words:
-        mesh = on_root_only(comm, coarse_mesh, case)
+        mesh = coarse_mesh_of_all(case, comm, policy.tiles)
         shares = on_root_only(comm, distribute, case, mesh, lattice, comm.size, policy)
         own: RankShare = comm.scatter(shares or [])
         summary = own.summary

@@ -15,7 +15,7 @@ from feti_homog.cell.arrangement import arrange
 from feti_homog.common.progress import Progress
 from feti_homog.config import case as cases
 from feti_homog.errors import CaseError
-from feti_homog.homogenization.domain_partition import coarse_mesh
+from feti_homog.homogenization.coarse_meshes import coarse_mesh
 from feti_homog.homogenization.unit_cell import tear
 
 pytestmark = pytest.mark.parallel

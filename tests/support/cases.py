@@ -15,6 +15,7 @@ from feti_homog.common.progress import Progress
 from feti_homog.config import case as cases
 from feti_homog.feti.thresholds import DEFAULTS
 from feti_homog.homogenization.averaging import Homogenization
+from feti_homog.homogenization.domain_partition import DEFAULT_POLICY
 from feti_homog.homogenization.unit_cell import tear
 
 MATRIX, FIBRE = {"young": 88.0, "poisson": 0.299}, {"young": 200.0, "poisson": 0.222}
@@ -33,12 +34,12 @@ def make_case(*, matrix=MATRIX, fibre=FIBRE, plane="strain", petsc=None, decompo
     return cases.parse(document, Path(folder))
 
 
-def solve(case, comm, thresholds=DEFAULTS):
+def solve(case, comm, thresholds=DEFAULTS, policy=DEFAULT_POLICY):
     """The torn cell, L^ef and the responses."""
     PETSc.garbage_cleanup(comm)
     progress = Progress(comm, quiet=True)
     with case_options(case.petsc):
-        cell = tear(case, comm, progress, thresholds)
+        cell = tear(case, comm, progress, thresholds, policy)
         responses = []
         context = AnalysisContext(
             Homogenization(cell, contact=False),

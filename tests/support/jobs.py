@@ -17,6 +17,8 @@ RUN_VARIABLES = {
     "OMPI_MCA_smsc": "^cma",  # the same of Open MPI 5
     "OMPI_MCA_btl_tcp_if_include": "lo",  # which complains of networks that lead nowhere
     "OMPI_MCA_mpi_yield_when_idle": "1",  # jobs share the cores
+    "OMPI_MCA_hwloc_base_binding_policy": "none",  # all of them: rank 0 of every small job would be bound to the first
+    "PRTE_MCA_hwloc_default_binding_policy": "none",  # the same of Open MPI 5
     "OMP_NUM_THREADS": "1",
     "H5PY_ALWAYS_USE_MPI": "1",
 }

@@ -14,7 +14,7 @@ import pytest
 
 from feti_homog import cli
 from feti_homog.cell import msh_reader
-from feti_homog.cell.gmsh_mesher import gmsh_session
+from feti_homog.cell.filling import gmsh_session
 from feti_homog.config.case import parse
 from feti_homog.config.sweep_section import SWEEP
 from feti_homog.sweep import plan

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from feti_homog.cell.periodic_topology import Torus, edge_pairs, shared_edges
+from feti_homog.cell.periodic_topology import Torus
 from feti_homog.feti.decomposition.edge_arcs import mean_speed
 from feti_homog.typing import Bool, Float, Int
 
@@ -36,15 +36,17 @@ def interface_geometry(
     bonded = np.zeros(n_edges, bool)
     bonded[edge] = True
     bonded[torus.torus_edge[torus.plane_edges(torus.mesh.debonded_edges)]] = False
-    ends = torus.node_class[torus.edges[np.unique(torus.torus_edge, return_index=True)[1]]]
+    plane = np.empty(n_edges, np.int64)
+    plane[torus.torus_edge[::-1]] = np.arange(len(torus.edges))[::-1]
+    ends = torus.node_class[torus.edges[plane[edge]]]
     vertex_normal, vertex_length = np.zeros((n_classes, 2)), np.zeros(n_classes)
     for end, (low, high) in enumerate(((0.0, side), (1.0 - side, 1.0))):
-        length = mean_speed(edge_normal, edge_turn, np.full(n_edges, low), np.full(n_edges, high))
-        unit = edge_normal[:, end] / np.maximum(np.hypot(*edge_normal[:, end].T), 1e-300)[:, None]
+        length = mean_speed(normal, turn, np.full(len(edge), low), np.full(len(edge), high))
+        unit = normal[:, end] / np.maximum(np.hypot(*normal[:, end].T), 1e-300)[:, None]
         np.add.at(vertex_normal, ends[:, end], unit * length[:, None])
         np.add.at(vertex_length, ends[:, end], length)
     vertex_normal *= (vertex_length / np.maximum(np.hypot(*vertex_normal.T), 1e-300))[:, None]
-    bonded_edges_at = np.bincount(ends[bonded].ravel(), minlength=n_classes)
+    bonded_edges_at = np.bincount(ends[bonded[edge]].ravel(), minlength=n_classes)
     vertices, edges = key[~is_edge], key[is_edge]
     normals, turns = np.empty((len(key), 2, 2)), np.zeros(len(key))
     normals[~is_edge], normals[is_edge] = vertex_normal[vertices][:, None], edge_normal[edges]
@@ -67,10 +69,10 @@ def _breakable_pairs(torus: Torus, pairs: Int, pointer: Int, body: Int) -> Int:
 def _edge_geometry(torus: Torus, pairs: Int) -> tuple[Int, Float, Float]:
     """Torus edges whose bonds may break, their normals at start and end, as in `SharedEntities`, and their turns."""
     mesh, body = torus.mesh, torus.constituent
-    left, right = edge_pairs(torus.triangle_torus_edges)
+    left, right, edge = torus.sides
     mixed = pairs[mesh.phase[left], mesh.phase[right]] >= 0
     fibre = np.where(torus.nesting[body[left]] > torus.nesting[body[right]], left, right)[mixed]
-    edge = shared_edges(torus.triangle_torus_edges)[mixed]
+    edge = edge[mixed]
     k = np.argmax(torus.triangle_torus_edges[fibre] == edge[:, None], axis=1)
     start, end = mesh.triangles[fibre, k], mesh.triangles[fibre, (k + 1) % 3]
     plane = torus.triangle_edges[fibre, k]

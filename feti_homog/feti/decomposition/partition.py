@@ -9,7 +9,7 @@ import numpy as np
 import pymetis
 from scipy.sparse import coo_matrix, csr_matrix
 
-from feti_homog.cell.periodic_topology import Torus, components, edge_pairs, shared_edges
+from feti_homog.cell.periodic_topology import Torus, components
 from feti_homog.feti.thresholds import LENGTH_CLASSES, MAX_IMBALANCE
 from feti_homog.typing import Int
 
@@ -36,9 +36,9 @@ def decompose(
 
     Every subdomain is connected through edges: pieces that METIS leaves in several parts are split.
     """
-    left, right = edge_pairs(torus.triangle_torus_edges)
+    left, right, edge = torus.sides
     inside = parts[left] == parts[right]
-    length = torus.edge_lengths[shared_edges(torus.triangle_torus_edges)]
+    length = torus.edge_lengths[edge]
     weight = np.ceil(length_classes * length / length.max()).astype(np.int64)
     piece = _cut(parts, pieces, left[inside], right[inside], weight[inside])
     key = parts * (piece.max() + 1) + piece

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 from mpi4py import MPI
+from petsc4py import PETSc
 from scipy.sparse import csr_matrix
 
 from feti_homog.feti.linalg.collectives import allgather_rows
 from feti_homog.feti.linalg.distributed_matrix import assemble_distributed
 from feti_homog.feti.linalg.sparse_direct import DirectSolver, IndefiniteSolver, factor_by_mumps
+from feti_homog.feti.thresholds import MUMPS_COLUMNS_ONE_BY_ONE
 from feti_homog.typing import Float
 
 
@@ -26,16 +28,26 @@ class DistributedDirectSolver:
         self._ksp = factor_by_mumps(assemble_distributed(comm, part), prefix, definite)
         self._x, self._b = self._ksp.getOperators()[0].createVecs()
 
-    def solve(self, b: Float) -> Float:
-        """A^-1 b for b (n,) or (n, k), the same on every rank.  Collective."""
-        x = np.empty_like(b)
-        own = slice(*self._b.getOwnershipRange())
-        counts = np.diff(self._b.getOwnershipRanges())
-        for column, right in zip(x.reshape(len(b), -1).T, b.reshape(len(b), -1).T, strict=True):
-            self._b.setArray(right[own])
-            self._ksp.solve(self._b, self._x)
-            column[:] = allgather_rows(self.comm, self._x.getArray(readonly=True), counts)
-        return x
+    def solve(self, B: Float) -> Float:
+        """A^-1 B for B (n,) or (n, k), the same on every rank.  Collective."""
+        right = B.reshape(len(B), -1)[slice(*self._b.getOwnershipRange())]
+        X = np.empty(right.shape, order="F")
+        if right.shape[1] > MUMPS_COLUMNS_ONE_BY_ONE and self._ksp.getType() == PETSc.KSP.Type.PREONLY:
+            self._solve_at_once(np.asfortranarray(right), X)
+        else:
+            for x, b in zip(X.T, right.T, strict=True):
+                self._b.setArray(b)
+                self._ksp.solve(self._b, self._x)
+                x[:] = self._x.getArray(readonly=True)
+        return allgather_rows(self.comm, X, np.diff(self._b.getOwnershipRanges())).reshape(B.shape)
+
+    def _solve_at_once(self, right: Float, X: Float) -> None:
+        """X = A^-1 B on this rank's rows (own rows, k), both in the order of Fortran.  Collective."""
+        sizes = (self._b.getSizes(), X.shape[1])
+        matrices = [PETSc.Mat().createDense(sizes, array=a, comm=self._b.comm) for a in (right, X)]
+        self._ksp.getPC().matApply(*matrices)
+        for matrix in matrices:
+            matrix.destroy()
 
     def destroy(self) -> None:
         """Free the factor.  Collective."""

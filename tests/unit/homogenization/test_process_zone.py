@@ -10,7 +10,7 @@ from unit.cell.faulty_meshes import grid
 
 from feti_homog.config import case as cases
 from feti_homog.homogenization import process_zone
-from feti_homog.homogenization.domain_partition import coarse_mesh
+from feti_homog.homogenization.coarse_meshes import coarse_mesh
 from feti_homog.homogenization.unit_cell import describe
 
 # Glass and epoxy in MPa and micrometres, G_Ic = 2 J/m2, fibres of 7.5 micrometres: Tavara and others, Eng. Anal. Bound.

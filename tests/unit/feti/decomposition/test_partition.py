@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from feti_homog.cell.gmsh_mesher import generate
-from feti_homog.cell.periodic_topology import Torus, components, edge_pairs, shared_edges
+from feti_homog.cell.periodic_topology import Torus, components, edge_pairs
 from feti_homog.config.cell_section import Cell
 from feti_homog.feti.decomposition.partition import decompose, pieces_for_count, pieces_for_size
 
@@ -95,7 +95,7 @@ def test_cuts_are_short():
 def cut_length(torus, **options):
     """Length of all edges along which bodies are cut into pieces of about 20 triangles."""
     left, right = edge_pairs(torus.triangle_torus_edges)
-    length = torus.edge_lengths[shared_edges(torus.triangle_torus_edges)]
+    length = torus.edge_lengths[torus.sides[2]]
     subdomain = fine(torus, 1, **options).subdomain
     within = torus.constituent[left] == torus.constituent[right]
     return length[within & (subdomain[left] != subdomain[right])].sum()

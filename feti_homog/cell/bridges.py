@@ -1,0 +1,157 @@
+"""Bridges: straight lines across the matrix between the facing points of neighbouring discs.
+
+A bridge is normal to both circles and, in a narrow gap, about as long as the edges there, so a mesh can have it without
+bad triangles. Borders of tiles run along bridges and arcs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import Delaunay, cKDTree
+
+from feti_homog.typing import Bool, Float, Int
+
+TURN = 2 * np.pi
+# Bridges stay away from third discs by this part of their radii, and their ends from sides by that of the mean radius.
+CLEAR = 0.3
+# Between two bridges on one disc, at least.
+LEAST_ANGLE = np.radians(25)
+# Lines whose neighbourhoods are looked at together.
+CHUNK = 20_000
+# Decimals in which gaps are compared, relative to the cell; ties are broken by place.
+GAP_DECIMALS = 9
+
+# Circle (v,) and angle (v,) in radians of points on circles.
+OnCircles = tuple[Int, Float]
+
+
+@dataclass(frozen=True)
+class Bridges:
+    """b lines from disc ends[:, 0] to disc ends[:, 1], which is in the direction `angle` (b,) from it."""
+
+    ends: Int
+    angle: Float
+
+    @property
+    def on_circles(self) -> OnCircles:
+        """Where all of them begin, and then where all end."""
+        return self.ends.T.ravel(), np.concatenate([self.angle, self.angle + np.pi]) % TURN
+
+    def chosen(self, those: Bool) -> Bridges:
+        """Those where the mask (b,) is true."""
+        return Bridges(self.ends[those], self.angle[those])
+
+
+@dataclass(frozen=True)
+class CentreLines:
+    """Edges of Delaunay's triangulation of the centres of discs.
+
+    Attributes:
+        ends: (e, 2) discs.
+        angle: (e,) direction from the first to the second.
+        gap: (e,) distance of the discs.
+        facing: (e, 2, 2) the point of each end's circle that faces the other.
+        clearance: (e,) least distance of the line from the centre of a third disc / its radius.
+    """
+
+    ends: Int
+    angle: Float
+    gap: Float
+    facing: Float
+    clearance: Float
+
+
+def centre_lines(circles: Float, which: Int) -> CentreLines:
+    """Those of the discs `which` (n,) of circles (k, 3)."""
+    centres, radii = circles[which, :2], circles[which, 2]
+    corners = Delaunay(centres).simplices
+    pairs = np.sort(np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]]), axis=1)
+    ends = np.unique(pairs, axis=0)
+    vector = centres[ends[:, 1]] - centres[ends[:, 0]]
+    length = np.linalg.norm(vector, axis=1)
+    normal = vector / length[:, None]
+    facing = centres[ends] + radii[ends][:, :, None] * np.stack([normal, -normal], axis=1)
+    return CentreLines(
+        ends=which[ends],
+        angle=np.arctan2(normal[:, 1], normal[:, 0]),
+        gap=length - radii[ends].sum(axis=1),
+        facing=facing,
+        clearance=_clearance(centres, radii, ends, 1 + CLEAR),
+    )
+
+
+def _clearance(centres: Float, radii: Float, ends: Int, most: float) -> Float:
+    """(e,) least distance / radius of third discs from the lines between the `ends` (e, 2), if below `most`."""
+    clearance = np.full(len(ends), np.inf)
+    # Discs of about one radius at a time: small ones far from a line need not be looked at.
+    classes = np.floor(np.log2(radii / radii.min())).astype(int)
+    for members in (np.flatnonzero(classes == level) for level in np.unique(classes)):
+        tree, reach = cKDTree(centres[members]), most * radii[members].max()
+        for begin in range(0, len(ends), CHUNK):
+            own = ends[begin : begin + CHUNK]
+            start, vector = centres[own[:, 0]], centres[own[:, 1]] - centres[own[:, 0]]
+            length = np.linalg.norm(vector, axis=1)
+            near = tree.query_ball_point(start + vector / 2, length / 2 + reach)
+            line = np.repeat(np.arange(len(own)), [len(found) for found in near])
+            disc = members[np.concatenate([np.zeros(0, np.int64), *filter(len, near)]).astype(int)]
+            third = (disc[:, None] != own[line]).all(axis=1)
+            line, disc = line[third], disc[third]
+            offset = centres[disc] - start[line]
+            share = np.clip((offset * vector[line]).sum(axis=1) / length[line] ** 2, 0, 1)
+            away = np.linalg.norm(offset - share[:, None] * vector[line], axis=1)
+            np.minimum.at(clearance[begin : begin + CHUNK], line, away / radii[disc])
+    return clearance
+
+
+def bridges(lines: CentreLines, size: Float, margin: float, largest: float, vertices: OnCircles) -> Bridges:
+    """Bridges on these lines, clear of third discs and of the sides of the cell, and LEAST_ANGLE from each other and
+    from the `vertices` that circles have; of two that are too near the shorter one.
+
+    Their ends are `margin` away from the sides, and their middles one of the `largest` edges there, or as long as they
+    are: beside a side there would be no room for good triangles.
+    """
+    middle = lines.facing.mean(axis=1)
+    away, ends_away = (np.minimum(points, size - points) for points in (middle, lines.facing))
+    inside = (ends_away.min(axis=(1, 2)) > margin) & (away.min(axis=1) > np.minimum(largest, lines.gap))
+    clear = np.flatnonzero(inside & (lines.clearance > 1 + CLEAR))
+    order = np.lexsort((clear, (lines.gap[clear] / size.max()).round(GAP_DECIMALS)))
+    found = Bridges(lines.ends[clear[order]], lines.angle[clear[order]])
+    circle, angle = (np.concatenate(parts) for parts in zip(found.on_circles, vertices, strict=True))
+    # Vertices come before all bridges.
+    first, count = len(vertices[0]), len(order)
+    rank = np.concatenate([first + np.arange(count), first + np.arange(count), np.arange(first)])
+    return found.chosen(_best(first + count, *_too_near(circle, angle % TURN, rank))[first:])
+
+
+def _too_near(circle: Int, angle: Float, rank: Int) -> tuple[Int, Int]:
+    """Ranks of points on the same circle within LEAST_ANGLE of each other: two arrays, the better rank first."""
+    order = np.lexsort((angle, circle))
+    circle, angle, rank = circle[order], angle[order], rank[order]
+    first = np.flatnonzero(np.diff(circle, prepend=-1) != 0)
+    counts = np.diff(first, append=len(circle))
+    begin, count = np.repeat(first, counts), np.repeat(counts, counts)
+    better, worse = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
+    for step in range(1, int(counts.max(initial=0))):
+        after = begin + (np.arange(len(circle)) - begin + step) % count
+        near = ((angle[after] - angle) % TURN < LEAST_ANGLE) & (step < count)
+        if not near.any():
+            break
+        better.append(np.minimum(rank[near], rank[after][near]))
+        worse.append(np.maximum(rank[near], rank[after][near]))
+    return np.concatenate(better), np.concatenate(worse)
+
+
+def _best(count: int, better: Int, worse: Int) -> Bool:
+    """(count,) which ranks stay if each, best first, excludes the worse of its pairs (better, worse)."""
+    stays, open_ = np.zeros(count, bool), np.ones(count, bool)
+    while open_.any():
+        between = open_[better] & open_[worse]
+        better, worse = better[between], worse[between]
+        free = open_.copy()
+        free[worse] = False
+        stays |= free
+        open_ &= ~free
+        open_[worse[free[better]]] = False
+    return stays

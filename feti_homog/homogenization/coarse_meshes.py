@@ -1,0 +1,86 @@
+"""The coarse mesh of a case, on rank 0; of large cells all ranks make a part of the triangles."""
+
+from __future__ import annotations
+
+import heapq
+from dataclasses import replace
+from itertools import chain
+from operator import itemgetter
+
+from mpi4py import MPI
+
+from feti_homog.cell.coarse_mesh import CoarseMesh
+from feti_homog.cell.drawing import Drawing
+from feti_homog.cell.filling import Filling, Tile, fill
+from feti_homog.cell.tiles import DEFAULT_TILES, TilePolicy
+from feti_homog.common.mpi_errors import agree, on_root_only
+from feti_homog.config import case as cases
+from feti_homog.config.case import Case
+from feti_homog.homogenization import tips
+
+
+def coarse_mesh(case: Case, policy: TilePolicy = DEFAULT_TILES) -> CoarseMesh:
+    """The coarse mesh that the case describes, its phases checked against the materials.
+
+    Raises:
+        CaseError: a phase has no material, or a material no phase.
+        MeshError: the cell cannot be meshed, or its mesh file is faulty.
+    """
+    begun = _begun(case, policy)
+    return begun if isinstance(begun, CoarseMesh) else begun.filled()
+
+
+def coarse_mesh_of_all(case: Case, comm: MPI.Intracomm, policy: TilePolicy = DEFAULT_TILES) -> CoarseMesh | None:
+    """`coarse_mesh` on rank 0, None on others; they fill its tiles together.  Collective.
+
+    Which rank fills a tile does not change the mesh. Raises as `coarse_mesh`, on every rank.
+    """
+    begun = on_root_only(comm, _begun, case, policy)
+    tiles = [] if begun is None or isinstance(begun, CoarseMesh) else [tile for _, tile in begun.parts]
+    fillings = fill_together(tiles, comm)
+    return begun if begun is None or isinstance(begun, CoarseMesh) else begun.mesh(fillings)
+
+
+def fill_together(tiles: list[Tile], comm: MPI.Intracomm) -> list[Filling]:
+    """The filled tiles of rank 0, in their order, there; an empty list on others.  Collective.
+
+    Raises:
+        MeshError: on every rank, if one cannot fill a tile of its.
+    """
+    ranks = dealt([len(tile.points) for tile in tiles], comm.size)
+    own: list[tuple[int, Tile]] = comm.scatter([[(k, tiles[k]) for k in mine] for mine in ranks])
+    gathered = comm.gather(agree(comm, _fill, own)) or []
+    return [filling for _, filling in sorted(chain.from_iterable(gathered), key=itemgetter(0))]
+
+
+def _begun(case: Case, policy: TilePolicy) -> Drawing | CoarseMesh:
+    """A user's mesh, or the cell with its tiles still to be filled."""
+    # gmsh is imported where it is needed.
+    begun: Drawing | CoarseMesh
+    if case.cell.has_own_mesh:
+        from feti_homog.cell.msh_reader import read
+
+        assert case.cell.file is not None
+        begun = read(case.cell.file, case.cell.snap_tolerance if case.cell.repair == "snap" else None)
+    else:
+        from feti_homog.cell.gmsh_mesher import draw
+
+        begun = draw(replace(case.cell, tip_size=tips.size(case)), tips.marks(case), policy)
+    cases.check_phases(case, begun.phases)
+    return begun
+
+
+def dealt(loads: list[int], n_ranks: int) -> list[list[int]]:
+    """The numbers of the tiles of each rank: the largest goes first, each to the least loaded rank."""
+    ranks: list[list[int]] = [[] for _ in range(n_ranks)]
+    heap = [(0, rank) for rank in range(n_ranks)]
+    for tile in sorted(range(len(loads)), key=lambda k: -loads[k]):
+        total, rank = heap[0]
+        ranks[rank].append(tile)
+        heapq.heapreplace(heap, (total + loads[tile], rank))
+    return ranks
+
+
+def _fill(tiles: list[tuple[int, Tile]]) -> list[tuple[int, Filling]]:
+    """These numbered tiles, filled."""
+    return [(number, fill(tile)) for number, tile in tiles]
