@@ -48,6 +48,8 @@ def assumptions(rates: Rates, machine: Machine) -> list[str]:
         + ", ".join(f"{f.factor:.2g} n^{f.exponent:.2f}" for f in alone),
         f"              from {DEFAULTS.replicated_vectors / r.vectors / 1e6:.0f} million dofs by all together: "
         + ", ".join(f"({s.serial:.2g} + {s.parallel:.2g} / p) n^{f.exponent:.2f}" for s, f in shared),
+        f"              of {STRONG_DOFS / 1e6:g} million dofs n is {r.coarse * STRONG_DOFS / r.largest_coarse:.1f} "
+        "times the largest that was timed: the further, the less these powers are worth (`sizes` times larger ones)",
         f"  messages    {1e6 * machine.latency:.2g} microseconds each and {machine.bandwidth / 1e9:.2g} GB/s; "
         f"{GATHERS + SUMS} exchanges an iteration, each of {r.neighbours} messages and {r.surface:.1f} values",
         f"              times the root of the rank's dofs (most that were counted); {COARSE_SUMS} sums over ranks of "

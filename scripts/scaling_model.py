@@ -16,6 +16,7 @@ from typing import Any
 from scaling_fit import Power, Shares, fit_power, fit_shares
 from scaling_report import COARSE_SUMS, GATHERS, SCALARS, SUMS, SUMS_TOGETHER, VALUE_BYTES, Row
 
+from feti_homog.cell.tiles import DEFAULT_TILES
 from feti_homog.feti.thresholds import DEFAULTS
 
 MESH, LOCAL, COARSE, MESSAGES = "mesh", "subdomains", "coarse problem", "messages"
@@ -95,9 +96,10 @@ def _local_times(rows: Sequence[Row], cores: int) -> dict[str, Any]:
     """Seconds per unit of work: of the subdomains on one rank, of the mesh on all that have a core."""
     timed = [row for row in rows if row.ranks <= cores]
     alone = [row for row in timed if row.ranks == 1 and not row.together]
+    cells = _meshed_alike(timed)
     return dict(
         mesh=fit_shares(
-            [row.triangles for row in timed], [row.ranks for row in timed], [row.seconds["mesh"] for row in timed]
+            [row.triangles for row in cells], [row.ranks for row in cells], [row.seconds["mesh"] for row in cells]
         ),
         assemble=_rate((row.seconds["assemble"], row.dofs) for row in alone),
         setup=_rate((row.seconds["set-up"] - row.coarse_factor, row.dofs) for row in alone),
@@ -105,6 +107,12 @@ def _local_times(rows: Sequence[Row], cores: int) -> dict[str, Any]:
             (row.seconds["solve"] - row.iterations * row.coarse_solve, row.iterations * row.dofs) for row in alone
         ),
     )
+
+
+def _meshed_alike(rows: Sequence[Row]) -> Sequence[Row]:
+    """Those of cells so large that all ranks mesh them, as those of the forecast; all rows, if there are too few."""
+    large = [row for row in rows if row.fibres >= DEFAULT_TILES.least_discs]
+    return large if len({row.ranks for row in large}) > 1 else rows
 
 
 def _coarse_times(rows: Sequence[Row], cores: int) -> dict[str, Any]:

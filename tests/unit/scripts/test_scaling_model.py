@@ -7,7 +7,7 @@ from math import ceil
 
 import pytest
 from scaling_fit import fit_power, fit_shares
-from scaling_forecast import checks
+from scaling_forecast import assumptions, checks
 from scaling_model import LOCAL, Machine, measured, network, predict
 from scaling_report import Row, by_ranks, memory
 
@@ -93,6 +93,18 @@ def test_constants_are_found_again():
     assert network(ROWS, CORES) == NETWORK
 
 
+def test_mesh_is_of_cells_that_all_ranks_mesh():
+    """Runs of 400 fibres take half as long on two ranks, all others do not; one of 400 alone tells nothing."""
+    small = [replace(row, seconds={**row.seconds, "mesh": 1.0}) for row in ROWS]
+    large = [replace(made_up(4_000_000, p), fibres=400) for p in (1, 2)]
+    large = [replace(row, seconds={**row.seconds, "mesh": 8.0 / row.ranks}) for row in large]
+    # The serial share is zero, where the search converges slowly.
+    assert measured([*small, *large], CORES).mesh.seconds(80_000, 4) == pytest.approx(2.0, rel=1e-3)
+    rows = [*small, large[0]]
+    every = fit_shares([r.triangles for r in rows], [r.ranks for r in rows], [r.seconds["mesh"] for r in rows])
+    assert measured(rows, CORES).mesh == every
+
+
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: f"{row.dofs}-{row.ranks}-{row.together}")
 def test_model_gives_the_runs_that_it_is_of(row):
     """With messages that take no time, as in the runs that were made up."""
@@ -123,6 +135,11 @@ def test_errors_of_the_model_are_told():
     lines = checks(rates, NETWORK, [slow, replace(ROWS[1], ranks=4)], CORES)
     assert len(lines) == 4
     assert "-50%" in lines[2] and "assemble 50%" in lines[-1]
+
+
+def test_how_far_the_coarse_problem_is_from_those_timed():
+    """Ten million dofs have ten times the coarse unknowns of the largest run, of one million."""
+    assert any("n is 10.0 times the largest" in line for line in assumptions(measured(ROWS, CORES), NETWORK))
 
 
 def test_tables_of_runs():
