@@ -59,18 +59,64 @@ class Submesh:
 
 def cut(torus: Torus, subdomain: Int) -> Iterator[Submesh]:
     """Cut the coarse cell into its subdomains; `subdomain` (m,) numbers each triangle's, from 0 without gaps."""
+    for own in cut_for_ranks(torus, subdomain, np.zeros(subdomain.max() + 1, np.int64), 1):
+        yield from own.cut()
+
+
+@dataclass(frozen=True)
+class SubmeshesOfRank:
+    """The subdomains of one rank before it cuts them apart.
+
+    Attributes:
+        whole: all of their triangles as one submesh.
+        member: (t,) which of the subdomains each triangle is of.
+        index, body, phase: of each subdomain, as in `Submesh`.
+    """
+
+    whole: Submesh
+    member: Int
+    index: Int
+    body: Int
+    phase: tuple[str, ...]
+
+    @property
+    def loads(self) -> Int:
+        """Coarse triangles of each."""
+        return np.bincount(self.member, minlength=len(self.index))
+
+    def cut(self) -> list[Submesh]:
+        """The subdomains."""
+        order = np.argsort(self.member, kind="stable")
+        members = np.split(order, np.cumsum(self.loads)[:-1])
+        pieces = [part(self.whole, those) for those in members]
+        own = zip(pieces, self.index.tolist(), self.body.tolist(), self.phase, strict=True)
+        return [replace(piece, index=index, body=body, phase=phase) for piece, index, body, phase in own]
+
+
+def cut_for_ranks(torus: Torus, subdomain: Int, rank: Int, n_ranks: int) -> Iterator[SubmeshesOfRank]:
+    """What each rank gets of the coarse cell: `subdomain` (m,) numbers that of each triangle, from 0 without gaps, and
+    `rank` (s,) is that of each subdomain."""
     pinned = pinned_class(torus)
-    order = np.argsort(subdomain, kind="stable")
-    for index, members in enumerate(np.split(order, np.cumsum(np.bincount(subdomain))[:-1])):
-        yield _submesh(torus, index, members, pinned)
+    first = np.unique(subdomain, return_index=True)[1]
+    body, phase = torus.constituent[first], torus.mesh.phase[first]
+    for r in range(n_ranks):
+        index = np.flatnonzero(rank == r)
+        members = np.flatnonzero(rank[subdomain] == r)
+        yield SubmeshesOfRank(
+            whole=_submesh(torus, members, pinned),
+            member=np.searchsorted(index, subdomain[members]),
+            index=index,
+            body=body[index],
+            phase=tuple(torus.mesh.phases[k] for k in phase[index].tolist()),
+        )
 
 
 def cut_bodies(torus: Torus, members: Int) -> Iterator[Submesh]:
     """The triangles `members` (m,) as a submesh for each constituent that has some; none is pinned."""
     order = members[np.argsort(torus.constituent[members], kind="stable")]
     ends = np.flatnonzero(np.diff(torus.constituent[order])) + 1
-    for index, own in enumerate(np.split(order, ends) if len(order) else ()):
-        yield _submesh(torus, index, own, -1)
+    for own in np.split(order, ends) if len(order) else ():
+        yield replace(_submesh(torus, own, -1), body=int(torus.constituent[own[0]]))
 
 
 def part(submesh: Submesh, members: Int) -> Submesh:
@@ -119,8 +165,8 @@ def pinned_class(torus: Torus) -> int:
     return int(np.lexsort((distance, ~in_matrix, low != high))[0])
 
 
-def _submesh(torus: Torus, index: int, members: Int, pinned: int) -> Submesh:
-    """The triangles `members` (t,) of the cell as submesh number `index`; `pinned` is the pinned class."""
+def _submesh(torus: Torus, members: Int, pinned: int) -> Submesh:
+    """The triangles `members` (t,) of the cell as one submesh, of no body and phase; `pinned` is the pinned class."""
     mesh = torus.mesh
     vertices, triangles = np.unique(mesh.triangles[members], return_inverse=True)
     edges, triangle_edges = np.unique(torus.triangle_edges[members], return_inverse=True)
@@ -130,9 +176,9 @@ def _submesh(torus: Torus, index: int, members: Int, pinned: int) -> Submesh:
     edge_keys, edge_class = np.unique(torus.torus_edge[edges], return_inverse=True)
     pinned_here = np.flatnonzero(class_keys == pinned)
     return Submesh(
-        index=index,
-        body=int(torus.constituent[members[0]]),
-        phase=mesh.phases[mesh.phase[members[0]]],
+        index=0,
+        body=0,
+        phase="",
         points=mesh.points[vertices],
         triangles=triangles,
         triangle_edges=triangle_edges,

@@ -13,6 +13,7 @@ from feti_homog.cell.coarse_mesh import CoarseMesh
 from feti_homog.cell.drawing import Drawing
 from feti_homog.cell.filling import Filling, Tile, fill
 from feti_homog.cell.tiles import DEFAULT_TILES, TilePolicy
+from feti_homog.common.dealing import deal
 from feti_homog.common.mpi_errors import agree, on_root_only
 from feti_homog.config import case as cases
 from feti_homog.config.case import Case
@@ -48,7 +49,7 @@ def fill_together(tiles: list[Tile], comm: MPI.Intracomm) -> list[Filling]:
         MeshError: on every rank, if one cannot fill a tile of its.
     """
     ranks = dealt([len(tile.points) for tile in tiles], comm.size)
-    own: list[tuple[int, Tile]] = comm.scatter([[(k, tiles[k]) for k in mine] for mine in ranks])
+    own = deal(comm, [[(k, tiles[k]) for k in mine] for mine in ranks])
     gathered = comm.gather(agree(comm, _fill, own)) or []
     return [filling for _, filling in sorted(chain.from_iterable(gathered), key=itemgetter(0))]
 

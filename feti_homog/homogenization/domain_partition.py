@@ -16,7 +16,7 @@ from feti_homog.cell.interface_edges import voids
 from feti_homog.cell.matched_arrangement import distance_of
 from feti_homog.cell.periodic_topology import Torus
 from feti_homog.cell.refinement import ReferenceLattice
-from feti_homog.cell.submesh import Submesh, cut
+from feti_homog.cell.submesh import SubmeshesOfRank, cut_for_ranks
 from feti_homog.cell.tiles import DEFAULT_TILES, TilePolicy
 from feti_homog.config.case import Case
 from feti_homog.errors import CaseError
@@ -146,7 +146,7 @@ class RankShare:
     """What one rank gets of the cut cell: its submeshes, and the entities that they share with others."""
 
     summary: CellSummary
-    submeshes: list[Submesh]
+    submeshes: SubmeshesOfRank
     shared: SharedEntities
 
 
@@ -190,14 +190,14 @@ def distribute(
     parts = torus.constituent if case.cell.bodies == "torus" else torus.plane_parts()
     wanted = wanted_pieces(case, np.bincount(parts), _outer_edges(torus, parts), lattice, n_ranks, policy)
     decomposition = decompose(torus, parts, wanted, n_ranks)
-    submeshes = list(cut(torus, decomposition.subdomain))
-    shared = share_entities(torus, pairs, submeshes, decomposition.rank, lattice, n_ranks)
+    subdomain, rank = decomposition.subdomain, decomposition.rank
+    shared = share_entities(torus, pairs, subdomain, rank, lattice, n_ranks)
     summary = CellSummary(
         width=mesh.width,
         height=mesh.height,
         phases=mesh.phases,
         bodies=int(parts.max()) + 1,
-        subdomains=len(submeshes),
+        subdomains=len(rank),
         coarse_triangles=len(mesh.triangles),
         interface_edge=process_zone.longest_edge(mesh),
         numbers=numbers,
@@ -211,9 +211,7 @@ def distribute(
         voids=voids(mesh) if torus.at_void.any() else 0,
         match_distance=_match_distance(case, mesh, centres[is_fibre], circles[is_fibre, 2]),
     )
-    own: list[list[Submesh]] = [[] for _ in range(n_ranks)]
-    for submesh, rank in zip(submeshes, decomposition.rank, strict=True):
-        own[rank].append(submesh)
+    own = cut_for_ranks(torus, subdomain, rank, n_ranks)
     return [RankShare(summary, *share) for share in zip(own, shared, strict=True)]
 
 

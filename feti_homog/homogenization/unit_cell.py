@@ -10,7 +10,8 @@ import numpy as np
 from mpi4py import MPI
 
 from feti_homog.cell.refinement import ReferenceLattice
-from feti_homog.cell.submesh import Submesh
+from feti_homog.cell.submesh import SubmeshesOfRank
+from feti_homog.common.dealing import deal
 from feti_homog.common.mpi_errors import agree, on_root_only
 from feti_homog.common.progress import Progress
 from feti_homog.config import element_sizes
@@ -152,7 +153,7 @@ def assemble_subdomains(
     with progress.stage("mesh") as words:
         mesh = coarse_mesh_of_all(case, comm, policy.tiles)
         shares = on_root_only(comm, distribute, case, mesh, lattice, comm.size, policy)
-        own: RankShare = comm.scatter(shares or [])
+        own: RankShare = deal(comm, shares or [])
         summary = own.summary
         if mesh is not None and len(mesh.debonded_edges) and case.interface is None:
             words.append("its debonded curve is bonded, for there is no [interface]")
@@ -170,10 +171,10 @@ def assemble_subdomains(
     return summary, own.shared, lattice, subdomains
 
 
-def _assemble(case: Case, submeshes: list[Submesh], lattice: ReferenceLattice) -> list[Subdomain]:
+def _assemble(case: Case, submeshes: SubmeshesOfRank, lattice: ReferenceLattice) -> list[Subdomain]:
     """The subdomains of this rank, refined and assembled."""
     problem = phase_laws.plane_problem(case)
-    return [Subdomain.build(s, lattice, phase_laws.plane_law(case, s.phase), problem) for s in submeshes]
+    return [Subdomain.build(s, lattice, phase_laws.plane_law(case, s.phase), problem) for s in submeshes.cut()]
 
 
 def _match_lines(case: Case, summary: CellSummary) -> list[str]:
@@ -197,9 +198,9 @@ def describe(case: Case, n_ranks: int) -> str:
     lattice = ReferenceLattice.of(case.cell.refine, case.cell.order)
     shares = distribute(case, coarse_mesh(case), lattice, n_ranks)
     summary, multipliers = shares[0].summary, 2 * shares[0].shared.constraints
-    triangles = [sum(len(s.triangles) for s in share.submeshes) for share in shares]
+    triangles = [len(share.submeshes.member) for share in shares]
     nodes = [t * lattice.intervals**2 // 2 for t in triangles]
-    own = [len(share.submeshes) for share in shares]
+    own = [len(share.submeshes.index) for share in shares]
     problems = {problem.components: cost_model.applications(case, problem) for problem in phase_laws.problems(case)}
     taken = cost_model.estimate(nodes, own, summary.coarse_triangles, summary.bodies, problems)
     unresolved = process_zone.warnings(case, summary.width, summary.interface_edge)

@@ -6,14 +6,14 @@ subdomains needs k - 1 vector constraints, so these are numbered by arithmetic a
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from feti_homog.cell.periodic_topology import Torus
 from feti_homog.cell.refinement import ReferenceLattice
-from feti_homog.cell.submesh import Submesh
+from feti_homog.cell.submesh import pinned_class
 from feti_homog.feti.decomposition.interface_geometry import interface_geometry
 from feti_homog.typing import Bool, Float, Int
 
@@ -99,19 +99,20 @@ class _Sharers:
 
 
 def share_entities(
-    torus: Torus, pairs: Int, submeshes: Sequence[Submesh], rank: Int, lattice: ReferenceLattice, n_ranks: int
-) -> list[SharedEntities]:
+    torus: Torus, pairs: Int, subdomain: Int, rank: Int, lattice: ReferenceLattice, n_ranks: int
+) -> Iterator[SharedEntities]:
     """The shared entities of each rank, in the order of ranks.
 
     An entity belongs to the rank of its last sharer; constraints are numbered rank by rank.
 
     Args:
         pairs: (phases, phases) the interface of the case between two phases, -1 where they never part.
-        rank: (s,) rank of each submesh.
+        subdomain: (m,) of each triangle.
+        rank: (s,) rank of each subdomain.
         lattice: of the coarse triangles.
     """
-    body = np.array([s.body for s in submeshes])
-    found = _find_sharers(submeshes, torus.nesting[body], edges_have_nodes=lattice.intervals > 1)
+    body = torus.constituent[np.unique(subdomain, return_index=True)[1]]
+    found = _find_sharers(torus, subdomain, torus.nesting[body], edges_have_nodes=lattice.intervals > 1)
     owner = rank[found.sharer[found.pointer[1:] - 1]] if len(found.key) else np.zeros(0, np.int64)
     order = np.argsort(owner, kind="stable")
     found, owner = found.reordered(order), owner[order]
@@ -139,35 +140,39 @@ def share_entities(
     )
     limits = ends[np.searchsorted(owner, np.arange(n_ranks + 1))].tolist()
     entity = np.repeat(np.arange(len(found.key)), copies)
-    shares = []
     for r in range(n_ranks):
         takes_part = np.zeros(len(found.key), bool)
         takes_part[entity[rank[found.sharer] == r]] = True
-        shares.append(whole.restricted(takes_part, (limits[r], limits[r + 1])))
-    return shares
+        yield whole.restricted(takes_part, (limits[r], limits[r + 1]))
 
 
-def _find_sharers(submeshes: Sequence[Submesh], nesting: Int, edges_have_nodes: bool) -> _Sharers:
-    """The vertex classes, but for the pinned one, and the edges that several submeshes share; `nesting` (s,) is the
-    place of the body of each."""
-    classes = [s.class_keys if s.pinned < 0 else np.delete(s.class_keys, s.pinned) for s in submeshes]
-    kinds = [_several(classes, nesting)]
+def _find_sharers(torus: Torus, subdomain: Int, nesting: Int, edges_have_nodes: bool) -> _Sharers:
+    """The vertex classes, but for the pinned one, and the torus edges that several subdomains share; `subdomain` (m,)
+    is that of each triangle, `nesting` (s,) the place of the body of each."""
+    key, copies, sharer = _several(torus.node_class[torus.mesh.triangles], subdomain, nesting)
+    kept = key != pinned_class(torus)
+    kinds = [(key[kept], copies[kept], sharer[np.repeat(kept, copies)])]
     if edges_have_nodes:
-        kinds.append(_several([s.edge_keys for s in submeshes], nesting))
+        kinds.append(_several(torus.triangle_torus_edges, subdomain, nesting))
     key, copies, sharer = (np.concatenate(a) for a in zip(*kinds, strict=True))
     is_edge = np.repeat([False, True][: len(kinds)], [len(k[0]) for k in kinds])
     return _Sharers(key, is_edge, np.r_[0, np.cumsum(copies)], sharer)
 
 
-def _several(keys: Sequence[Int], nesting: Int) -> tuple[Int, Int, Int]:
-    """Keys that several submeshes have, how many, and which: sorted by key, then place (s,) of the body, then
-    subdomain."""
-    sizes = [len(k) for k in keys]
-    key, subdomain = np.concatenate(keys), np.repeat(np.arange(len(keys)), sizes)
-    order = np.lexsort((subdomain, np.repeat(nesting, sizes), key))
-    unique, which, count = np.unique(key[order], return_inverse=True, return_counts=True)
-    several = count > 1
-    return unique[several], count[several], subdomain[order][several[which]]
+def _several(keys: Int, subdomain: Int, nesting: Int) -> tuple[Int, Int, Int]:
+    """Which of the keys (m, 3) of triangles several subdomains have, how many, and which: sorted by key, then place
+    (s,) of the body, then subdomain."""
+    n = len(nesting)
+    low, high = np.full(keys.max() + 1, n), np.full(keys.max() + 1, -1)
+    for corner in keys.T:
+        np.minimum.at(low, corner, subdomain)
+        np.maximum.at(high, corner, subdomain)
+    shared = low[keys] != high[keys]
+    both = np.unique(keys[shared] * n + np.broadcast_to(subdomain[:, None], keys.shape)[shared])
+    key, whose = both // n, both % n
+    order = np.lexsort((whose, nesting[whose], key))
+    unique, count = np.unique(key, return_counts=True)
+    return unique, count, whose[order]
 
 
 def _ranges(start: Int, count: Int) -> Int:

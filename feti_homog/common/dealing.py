@@ -1,0 +1,25 @@
+"""Parts of what rank 0 has, one for each rank."""
+
+from __future__ import annotations
+
+from typing import TypeVar
+
+from mpi4py import MPI
+from mpi4py.util import pkl5
+
+T = TypeVar("T")
+
+
+def deal(comm: MPI.Intracomm, parts: list[T]) -> T:
+    """Part r of rank 0's list on rank r; the list is empty afterwards.  Collective.
+
+    Arrays are sent from where they are, of any size: a scatter would pickle all parts at once, its own too, and fails
+    from 2 GiB on.
+    """
+    large = pkl5.Intracomm(comm)
+    if comm.rank:
+        received: T = large.recv(source=0)
+        return received
+    while len(parts) > 1:
+        large.send(parts.pop(), dest=len(parts))
+    return parts.pop()
