@@ -7,8 +7,11 @@ import pytest
 
 from feti_homog.cell.gmsh_mesher import generate
 from feti_homog.cell.periodic_topology import Torus, components, edge_pairs
+from feti_homog.cell.refinement import ReferenceLattice
+from feti_homog.cell.submesh import cut_for_ranks, pinned_class
 from feti_homog.config.cell_section import Cell
 from feti_homog.feti.decomposition.partition import decompose, pieces_for_count, pieces_for_size
+from feti_homog.feti.decomposition.shared_entities import share_entities
 
 
 def torus_of(fibres, seed, mesh_size):
@@ -99,3 +102,45 @@ def cut_length(torus, **options):
     subdomain = fine(torus, 1, **options).subdomain
     within = torus.constituent[left] == torus.constituent[right]
     return length[within & (subdomain[left] != subdomain[right])].sum()
+
+
+def test_subdomains_that_ranks_cut_are_those_of_the_whole_cell(torus):
+    """Each against the triangles, classes and edges of the torus that it has."""
+    decomposition = fine(torus, 3)
+    found = {}
+    for r, own in enumerate(cut_for_ranks(torus, decomposition.subdomain, decomposition.rank, 3)):
+        assert np.all(decomposition.rank[own.index] == r) and own.loads.sum() == len(own.member)
+        found |= {submesh.index: submesh for submesh in own.cut()}
+    assert sorted(found) == list(range(len(decomposition.rank)))
+    assert sum(submesh.pinned >= 0 for submesh in found.values()) >= 1
+    mesh = torus.mesh
+    for index, submesh in found.items():
+        members = np.flatnonzero(decomposition.subdomain == index)
+        assert submesh.body == torus.constituent[members[0]] and submesh.phase == mesh.phases[mesh.phase[members[0]]]
+        assert np.array_equal(submesh.points[submesh.triangles], mesh.points[mesh.triangles[members]])
+        keys = submesh.class_keys[submesh.vertex_class[submesh.triangles]]
+        assert np.array_equal(keys, torus.node_class[mesh.triangles[members]])
+        edges = submesh.edge_keys[submesh.edge_class[submesh.triangle_edges]]
+        assert np.array_equal(edges, torus.triangle_torus_edges[members])
+        starts = submesh.edges[submesh.triangle_edges, submesh.backwards.astype(int)]
+        assert np.array_equal(starts, submesh.triangles)
+
+
+def test_shared_entities_are_those_of_several_subdomains(torus):
+    """Counted triangle by triangle; each constraint belongs to one rank."""
+    decomposition, pairs = fine(torus, 3), np.array([[-1, 0], [0, -1]])
+    subdomain, rank = decomposition.subdomain, decomposition.rank
+    lattice = ReferenceLattice.of(1, 1)
+    shares = list(share_entities(torus, pairs, subdomain, rank, lattice, 3))
+    expected = {}
+    for kind, keys in ((False, torus.node_class[torus.mesh.triangles]), (True, torus.triangle_torus_edges)):
+        for key, owner in zip(keys.tolist(), subdomain.tolist(), strict=True):
+            for k in key:
+                expected.setdefault((kind, k), set()).add(owner)
+    expected = {key: owners for key, owners in expected.items() if len(owners) > 1}
+    expected.pop((False, pinned_class(torus)), None)
+    assert sum(share.owned[1] - share.owned[0] for share in shares) == shares[0].constraints
+    for r, share in enumerate(shares):
+        owners = [set(own.tolist()) for own in np.split(share.sharer, share.pointer[1:-1])]
+        found = dict(zip(zip(share.is_edge.tolist(), share.key.tolist(), strict=True), owners, strict=True))
+        assert found == {key: own for key, own in expected.items() if any(rank[k] == r for k in own)}
