@@ -20,21 +20,14 @@ from feti_homog.config.case import Case
 from feti_homog.homogenization import tips
 
 
-def coarse_mesh(case: Case, policy: TilePolicy = DEFAULT_TILES) -> CoarseMesh:
-    """The coarse mesh that the case describes, its phases checked against the materials.
+def coarse_mesh(case: Case, comm: MPI.Intracomm, policy: TilePolicy = DEFAULT_TILES) -> CoarseMesh | None:
+    """The coarse mesh of the case, its phases checked against the materials; None but on rank 0.  Collective.
+
+    The ranks fill its tiles together; who fills one does not change the mesh.
 
     Raises:
-        CaseError: a phase has no material, or a material no phase.
-        MeshError: the cell cannot be meshed, or its mesh file is faulty.
-    """
-    begun = _begun(case, policy)
-    return begun if isinstance(begun, CoarseMesh) else begun.filled()
-
-
-def coarse_mesh_of_all(case: Case, comm: MPI.Intracomm, policy: TilePolicy = DEFAULT_TILES) -> CoarseMesh | None:
-    """`coarse_mesh` on rank 0, None on others; they fill its tiles together.  Collective.
-
-    Which rank fills a tile does not change the mesh. Raises as `coarse_mesh`, on every rank.
+        CaseError: on every rank, if a phase has no material, or a material no phase.
+        MeshError: on every rank, if the cell cannot be meshed, or its mesh file is faulty.
     """
     begun = on_root_only(comm, _begun, case, policy)
     tiles = [] if begun is None or isinstance(begun, CoarseMesh) else [tile for _, tile in begun.parts]

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from mpi4py import MPI
 
+from feti_homog.cell.coarse_mesh import CoarseMesh
 from feti_homog.cell.refinement import ReferenceLattice
 from feti_homog.cell.submesh import SubmeshesOfRank
 from feti_homog.common.dealing import deal
@@ -22,7 +23,7 @@ from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.solver import FetiSolver
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 from feti_homog.homogenization import bonds, cost_model, phase_laws, process_zone
-from feti_homog.homogenization.coarse_meshes import coarse_mesh, coarse_mesh_of_all
+from feti_homog.homogenization.coarse_meshes import coarse_mesh
 from feti_homog.homogenization.domain_partition import (
     DEFAULT_POLICY,
     CellSummary,
@@ -151,7 +152,7 @@ def assemble_subdomains(
     """
     lattice = ReferenceLattice.of(case.cell.refine, case.cell.order)
     with progress.stage("mesh") as words:
-        mesh = coarse_mesh_of_all(case, comm, policy.tiles)
+        mesh = coarse_mesh(case, comm, policy.tiles)
         shares = on_root_only(comm, distribute, case, mesh, lattice, comm.size, policy)
         own: RankShare = deal(comm, shares or [])
         summary = own.summary
@@ -193,10 +194,19 @@ def _mix_lines(case: Case, summary: CellSummary) -> list[str]:
     return [f"mix        {', '.join(f'{len(r)} of {name}, mean radius {r.mean():.6g}' for name, r in own)}"]
 
 
-def describe(case: Case, n_ranks: int) -> str:
-    """What a run of the case on `n_ranks` ranks would do, in words; on rank 0."""
+def describe(case: Case, comm: MPI.Intracomm) -> str:
+    """What a run of the case on these ranks would do, in words; empty but on rank 0.  Collective.
+
+    Raises as `tear`.
+    """
+    mesh = coarse_mesh(case, comm)
+    return on_root_only(comm, _described, case, mesh, comm.size) or ""
+
+
+def _described(case: Case, mesh: CoarseMesh, n_ranks: int) -> str:
+    """That of `describe`."""
     lattice = ReferenceLattice.of(case.cell.refine, case.cell.order)
-    shares = distribute(case, coarse_mesh(case), lattice, n_ranks)
+    shares = distribute(case, mesh, lattice, n_ranks)
     summary, multipliers = shares[0].summary, 2 * shares[0].shared.constraints
     triangles = [len(share.submeshes.member) for share in shares]
     nodes = [t * lattice.intervals**2 // 2 for t in triangles]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from feti_homog.common.mpi_errors import on_root, on_root_only
+from feti_homog.common.mpi_errors import on_root
 from feti_homog.common.petsc_options import case_options
 from feti_homog.config import case as cases
 from feti_homog.config.document import read_document
@@ -33,5 +33,5 @@ def of_file(path: Path, comm: Intracomm) -> str:
     else:
         case, words = on_root(comm, cases.load, path), ""
     with case_options(case.petsc):
-        text = on_root_only(comm, describe, case, comm.size)
+        text = describe(case, comm)
     return f"{words}{text}" if comm.rank == 0 else ""

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 from petsc4py import PETSc
 from support.cases import FIBRE, MATRIX
 from support.ranks import parallel_assert
@@ -52,7 +53,7 @@ def torn(case, comm):
 
 def edges_inside(case, arcs):
     """For each fibre with arcs (centre, angle): its coarse edges on the torus whose middle is within one of them."""
-    mesh, arrangement = coarse_mesh(case), arrange(case.cell)
+    mesh, arrangement = coarse_mesh(case, MPI.COMM_SELF), arrange(case.cell)
     size = np.array([mesh.width, mesh.height])
     middle = mesh.points[mesh.arc_edges].mean(axis=1)
     found = {}

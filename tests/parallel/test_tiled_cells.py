@@ -6,13 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 from support.cases import FIBRE, MATRIX, monolithic_stiffness, relative_error, solve
 
 from feti_homog.cell.tiles import TilePolicy
 from feti_homog.config import case as cases
 from feti_homog.errors import MeshError
 from feti_homog.homogenization import coarse_meshes
-from feti_homog.homogenization.coarse_meshes import coarse_mesh, coarse_mesh_of_all, dealt
+from feti_homog.homogenization.coarse_meshes import coarse_mesh, dealt
 from feti_homog.homogenization.domain_partition import PartitionPolicy
 
 pytestmark = pytest.mark.parallel
@@ -35,10 +36,10 @@ def case_of(**keys):
 
 @pytest.mark.quick
 def test_the_mesh_is_that_of_one_rank(comm):
-    mesh = coarse_mesh_of_all(case_of(), comm, SMALL)
+    mesh = coarse_mesh(case_of(), comm, SMALL)
     assert (mesh is None) == (comm.rank > 0)
     if mesh is not None:
-        alone = coarse_mesh(case_of(), SMALL)
+        alone = coarse_mesh(case_of(), MPI.COMM_SELF, SMALL)
         for name in ("points", "triangles", "phase", "representative", "arc_edges"):
             assert np.array_equal(getattr(mesh, name), getattr(alone, name))
 
@@ -63,7 +64,7 @@ def test_a_tile_that_one_rank_cannot_fill_ends_the_job_on_all(comm, monkeypatch)
     if comm.rank == comm.size - 1:
         monkeypatch.setattr(coarse_meshes, "fill", broken)
     with pytest.raises(MeshError, match="gmsh cannot fill it"):
-        coarse_mesh_of_all(case_of(), comm, SMALL)
+        coarse_mesh(case_of(), comm, SMALL)
 
 
 def test_tiles_are_dealt_evenly():

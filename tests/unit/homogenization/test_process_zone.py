@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 from unit.cell.faulty_meshes import grid
 
 from feti_homog.config import case as cases
@@ -34,7 +35,7 @@ def case_of(normal_stiffness=2025.0, criterion="energy", plane="strain", folder=
 
 
 def warnings(case):
-    mesh = coarse_mesh(case)
+    mesh = coarse_mesh(case, MPI.COMM_SELF)
     return process_zone.warnings(case, mesh.width, process_zone.longest_edge(mesh))
 
 
@@ -52,7 +53,7 @@ def test_the_length_is_that_of_the_matrix_and_the_strength(stiffness, plane, len
 @pytest.mark.parametrize(("size", "edges"), [(None, 48), (0.01, 4 * 57)])
 def test_the_longest_edge_is_a_chord(size, edges):
     """The circle in quarters, each of as many edges as its length takes: the cell is 21.02 micrometres wide."""
-    found = process_zone.longest_edge(coarse_mesh(case_of(interface_size=size)))
+    found = process_zone.longest_edge(coarse_mesh(case_of(interface_size=size), MPI.COMM_SELF))
     assert found == pytest.approx(2 * 7.5 * np.sin(np.pi / edges), rel=1e-9)
 
 
@@ -85,6 +86,6 @@ def test_a_mesh_of_ones_own_is_refined(tmp_path):
 
 
 def test_check_tells_of_it():
-    lines = describe(case_of(), 1).splitlines()
+    lines = describe(case_of(), MPI.COMM_SELF).splitlines()
     assert [line.startswith('warning    [interface] criterion = "energy": elements') for line in lines].count(True) == 1
-    assert "warning" not in describe(case_of(refine=2), 1)
+    assert "warning" not in describe(case_of(refine=2), MPI.COMM_SELF)
