@@ -87,7 +87,7 @@ class SubmeshesOfRank:
     def cut(self) -> list[Submesh]:
         """The subdomains."""
         order = np.argsort(self.member, kind="stable")
-        members = np.split(order, np.cumsum(self.loads)[:-1])
+        members = np.split(order, np.cumsum(self.loads))[:-1]
         pieces = [part(self.whole, those) for those in members]
         own = zip(pieces, self.index.tolist(), self.body.tolist(), self.phase, strict=True)
         return [replace(piece, index=index, body=body, phase=phase) for piece, index, body, phase in own]

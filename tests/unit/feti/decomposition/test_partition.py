@@ -112,6 +112,8 @@ def test_subdomains_that_ranks_cut_are_those_of_the_whole_cell(torus):
         assert np.all(decomposition.rank[own.index] == r) and own.loads.sum() == len(own.member)
         found |= {submesh.index: submesh for submesh in own.cut()}
     assert sorted(found) == list(range(len(decomposition.rank)))
+    *_, idle = cut_for_ranks(torus, decomposition.subdomain, decomposition.rank, 4)
+    assert idle.cut() == [] and len(idle.loads) == 0
     assert sum(submesh.pinned >= 0 for submesh in found.values()) >= 1
     mesh = torus.mesh
     for index, submesh in found.items():
