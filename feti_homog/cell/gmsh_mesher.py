@@ -55,9 +55,8 @@ def draw(
         MeshError: the fibres cannot be arranged, or there would be too many elements.
     """
     sizes = _sizes(cell, marks)
+    _refuse_extremes(cell, sizes, sum(len(own) for own in marks.values()), _most_triangles(cell, policy))
     arrangement = arrange(cell)
-    most = MAX_TRIANGLES_OF_TILES if is_tiled(arrangement, policy) else MAX_TRIANGLES
-    _refuse_extremes(cell, sizes, sum(len(own) for own in marks.values()), most)
     smallest = int(arrangement.radii.argmin())
     if arrangement.radii[smallest] < SMALLEST_RADIUS * arrangement.width:
         asked = fractions_in_words(cell) if cell.fractions else 'geometry = "table"'
@@ -114,6 +113,15 @@ def arrangement_scale(cell: Cell, arrangement: Arrangement) -> float:
         return float(cell.fibre_radius / arrangement.radii[: arrangement.fibres].mean())
     width = mixed_width(cell) if cell.table is None else cell.table.width
     return width or 1.0
+
+
+def _most_triangles(cell: Cell, policy: TilePolicy) -> int:
+    """As many as are meshed in some minutes; random fibres are round."""
+    if cell.geometry == "table":
+        tiled = is_tiled(arrange(cell), policy)
+    else:
+        tiled = element_estimate.fibres_of(cell) >= policy.least_discs
+    return MAX_TRIANGLES_OF_TILES if tiled else MAX_TRIANGLES
 
 
 def _refuse_extremes(cell: Cell, sizes: MeshSizes, tips: int, most: int) -> None:

@@ -85,8 +85,8 @@ CASES: dict[str, tuple[str, str]] = {
     "fraction at the limit": (fraction("0.9068998"), "fibre_fraction = 0.9068998: expected less than 0.9068997 for"),
     "elements without number": (changed(("0.05", "1e-4")), "mesh_size = 0.0001: about 4e+08 elements before refine"),
     "fibres without number": (
-        changed(('geometry = "hexagonal"', 'geometry = "random"\nfibres = 100000')),
-        "fibres = 100000: about 1.6e+07 elements before refine; expected at most 1000000",
+        changed(('geometry = "hexagonal"', 'geometry = "random"\nfibres = 100000\ninterface_size = 1e-4')),
+        "fibres = 100000: about 9.8e+07 elements before refine; expected at most 20000000",
     ),
     "fibres that nearly touch": (fraction("0.90689968"), "the lines of the cell need about "),
     "fibres of no size": (fraction("1e-99"), "a fibre has a radius of 1.7e-50; expected at least 1e-06 of the width"),
