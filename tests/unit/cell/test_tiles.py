@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 
+import gmsh
 import numpy as np
 import pytest
 from support.circular_cells import cell
@@ -14,7 +15,7 @@ from feti_homog.cell import filling
 from feti_homog.cell.arrangement import arrange
 from feti_homog.cell.bridges import CLEAR, LEAST_ANGLE
 from feti_homog.cell.coarse_mesh import areas
-from feti_homog.cell.curves import MATRIX, OUTSIDE, Curves
+from feti_homog.cell.curves import MATRIX, OUTSIDE
 from feti_homog.cell.gmsh_mesher import draw, generate
 from feti_homog.cell.periodic_topology import Torus
 from feti_homog.cell.tiles import TilePolicy, is_tiled
@@ -165,12 +166,10 @@ def test_a_tile_that_gmsh_leaves_unfilled_is_told(monkeypatch):
         filling.fill(tile)
 
 
-def test_a_tile_that_gmsh_fails_on_is_told():
-    """A square, and a triangle that reaches out of it."""
-    points = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.5, 0.3], [1.5, 0.5], [0.5, 0.7]])
-    node, first = np.array([0, 1, 2, 3, 0, 4, 5, 6, 4]), np.array([0, 5, 9])
-    curves = Curves(node, first, np.array([MATRIX, 0]), np.array([MATRIX, 0]), np.array([OUTSIDE, MATRIX]))
-    with pytest.raises(
-        MeshError, match=r"gmsh cannot fill the part from \(0, 0\) to \(1.5, 1\) .*; expected another seed"
-    ):
-        filling.fill(filling.Tile(points, curves, 0.5, False))
+def test_a_tile_that_gmsh_fails_on_is_told(monkeypatch):
+    def broken(dimension):
+        raise RuntimeError(f"no mesh of dimension {dimension}")
+
+    monkeypatch.setattr(gmsh.model.mesh, "generate", broken)
+    with pytest.raises(MeshError, match=r"gmsh cannot fill the part .*: no mesh of dimension 2; expected another"):
+        filling.fill(drawn("dense").parts[0][1])
