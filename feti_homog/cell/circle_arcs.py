@@ -96,8 +96,11 @@ def arc_curves(
 def bridge_curves(
     circles: Float, bridges: Bridges, caps: Float, field: SizeField, numbering: Numbering, sampling: Sampling
 ) -> Curves:
-    """The bridges between circles, on which edges are at most `caps` (k,), as curves; their edges are no longer than the
-    sizes at both ends, interpolated. So gmsh interpolates across the matrix where elements are not graded."""
+    """The bridges between circles, on which edges are at most `caps` (k,), as curves.
+
+    Their edges are no longer than the sizes at both ends, interpolated: so gmsh interpolates across the matrix where
+    elements are not graded.
+    """
     ends = [on_circles(circles, bridges.ends[:, end], bridges.angle + end * np.pi) for end in (0, 1)]
     begin, way = ends[0], ends[1] - ends[0]
     low, high = (np.minimum(field.at(ends[k]), caps[bridges.ends[:, k]]) for k in (0, 1))
