@@ -122,7 +122,10 @@ def bridges(lines: CentreLines, size: Float, margin: float, largest: float, vert
     # Vertices come before all bridges.
     first, count = len(vertices[0]), len(order)
     rank = np.concatenate([first + np.arange(count), first + np.arange(count), np.arange(first)])
-    return found.chosen(_best(first + count, *_too_near(circle, angle % TURN, rank))[first:])
+    better, worse = _too_near(circle, angle % TURN, rank)
+    # All vertices stay, however near each other.
+    is_bridge = worse >= first
+    return found.chosen(_best(first + count, better[is_bridge], worse[is_bridge])[first:])
 
 
 def _too_near(circle: Int, angle: Float, rank: Int) -> tuple[Int, Int]:

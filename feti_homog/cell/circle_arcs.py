@@ -98,18 +98,21 @@ def bridge_curves(
 ) -> Curves:
     """The bridges between circles, on which edges are at most `caps` (k,), as curves.
 
-    Their edges are no longer than the sizes at both ends, interpolated: so gmsh interpolates across the matrix where
-    elements are not graded.
+    Where elements are not graded, edges are no longer than the sizes at both ends, interpolated: so gmsh does it across
+    the matrix.
     """
     ends = [on_circles(circles, bridges.ends[:, end], bridges.angle + end * np.pi) for end in (0, 1)]
     begin, way = ends[0], ends[1] - ends[0]
+    is_uniform = np.isinf(field.step)
     low, high = (np.minimum(field.at(ends[k]), caps[bridges.ends[:, k]]) for k in (0, 1))
 
     def point(bridge: Int, share: Float) -> Float:
         return np.asarray(begin[bridge] + share[:, None] * way[bridge])
 
     def cap(bridge: Int, share: Float) -> Float:
-        return np.asarray(low[bridge] * (1 - share) + high[bridge] * share)
+        return (
+            np.asarray(low[bridge] * (1 - share) + high[bridge] * share) if is_uniform else np.full(len(share), np.inf)
+        )
 
     samples = EdgeSamples.of(field, point, np.linalg.norm(way, axis=1), cap, sampling.bridge)
     share, first = samples.stations(np.ones(len(way), np.int64), sampling.most_nodes)

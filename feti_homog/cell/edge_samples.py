@@ -18,7 +18,7 @@ OnCurves = Callable[[Int, Float], Float]
 @dataclass(frozen=True)
 class Sampling:
     """How sizes are sampled: at so many positions along an arc, a piece of a side and a bridge, and for at most so many
-    nodes in all."""
+    nodes on all arcs, on the sides along one axis, and on all bridges."""
 
     arc: int
     side: int

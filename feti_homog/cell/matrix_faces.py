@@ -99,12 +99,19 @@ def beside(lines: HalfLines, label: Int, alone: Int, disc: Int, angle: Float) ->
 
 
 def matrix_tiles(
-    circles: Float, sides: tuple[Int, Float], bridges: Bridges, lines: CentreLines, size: Float, grid: Int
+    circles: Float,
+    outer: Int,
+    sides: tuple[Int, Float],
+    bridges: Bridges,
+    lines: CentreLines,
+    size: Float,
+    grid: Int,
 ) -> MatrixTiles | None:
     """The faces dealt to the cells of a grid (2,) by their centroids.
 
     Args:
         circles: (k, 3).
+        outer: (n,) those that bound the matrix.
         sides: nodes (s, 2) and ends (s, 2, 2) of the pieces of sides in the matrix, counter-clockwise around the cell.
 
     None if it is not found in which face some disc or group of discs is that bridges do not join to the sides.
@@ -115,7 +122,7 @@ def matrix_tiles(
     facing = np.stack([_on(circles, bridges.ends[:, end], bridges.angle + end * np.pi) for end in (0, 1)], axis=1)
     half = HalfLines.of(np.concatenate([nodes, bridges.ends]), centres, np.concatenate([starts, facing]))
     after, loop = half.faces()
-    lone = np.setdiff1d(lines.ends, half.node)
+    lone = np.setdiff1d(outer, half.node)
     count = loop.max() + 1
     alone = np.full(len(circles), NOWHERE)
     alone[lone] = count + np.arange(len(lone))
@@ -123,7 +130,9 @@ def matrix_tiles(
     area, moment = _areas_and_moments(half, after, loop)
     areas = np.bincount(face[:count], area, face.max() + 1)
     # A face has one loop around it, and others in it, which are negative. The one beyond the sides has none around it.
-    around = np.bincount(face[:count], area > 0, face.max() + 1)
+    # Loops around trees, which have both halves of all their lines, have no area but for rounding.
+    is_tree = np.bincount(loop, loop[half.twin] != loop) == 0
+    around = np.bincount(face[:count], (area > 0) & ~is_tree, face.max() + 1)
     beyond = face[loop[half.twin[0]]]
     if (np.delete(around, beyond) != 1).any():
         return None
@@ -162,7 +171,8 @@ def _faces_of_loops(half: HalfLines, loop: Int, alone: Int, lines: CentreLines, 
     """
     free = (lines.clearance > 1) & np.all((lines.facing > 0) & (lines.facing < size), axis=(1, 2))
     ends, angle = lines.ends[free], lines.angle[free]
-    is_bridge = np.isin(ends[:, 0] * len(alone) + ends[:, 1], half.node * len(alone) + half.node[half.twin])
+    n = half.node.max() + 1
+    is_bridge = np.isin(ends[:, 0] * n + ends[:, 1], half.node * n + half.node[half.twin])
     ends, angle = ends[~is_bridge], angle[~is_bridge]
     one, other = (beside(half, loop, alone, ends[:, end], angle + end * np.pi) for end in (0, 1))
     graph = coo_matrix((np.ones(len(one), np.int8), (one, other)), shape=(count, count))

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
+from scipy.spatial import QhullError
 
 from feti_homog.cell.arrangement import Arrangement
 from feti_homog.cell.bridges import CLEAR, Bridges, bridges, centre_lines
@@ -26,8 +27,8 @@ class TilePolicy:
 
     Attributes:
         least_discs: cells with fewer are filled at once.
-        discs: of a tile. With fewer, more of the mesh is beside borders, whose places are those of bridges; with more,
-            there are fewer tiles to share among ranks.
+        discs: of a tile. Smaller tiles put more nodes on borders, where bridges fix their places; larger ones leave too
+            few tiles for many ranks.
     """
 
     least_discs: int = 400
@@ -44,9 +45,9 @@ class Tiling:
     Attributes:
         bridges: those on borders of tiles.
         beside: (b, 2) the tiles on the left and on the right of each.
-        matrix: of the matrix.
-        sides: (s,) of the pieces of sides in the matrix, in the order of the outline's.
-        within: (k,) of what is in each circle.
+        matrix: the faces of the matrix, with the tile of each.
+        sides: (s,) the tile beside each piece of a side in the matrix, in the order of the outline's.
+        within: (k,) the tile of what is in each circle.
     """
 
     bridges: Bridges
@@ -73,13 +74,16 @@ def tiling(
     size = np.array([arrangement.width, arrangement.height])
     circles, disc, around = images(arrangement)
     outer = np.flatnonzero(around == MATRIX)
-    lines = centre_lines(circles, outer)
+    try:
+        lines = centre_lines(circles, outer)
+    except QhullError:  # all centres on one line
+        return None
     marked = [(k, np.radians(angle)) for k in outer.tolist() for angle in marks.get(int(disc[k]), ())]
     vertices = np.array([k for k, _ in marked], np.int64), np.array([angle for _, angle in marked])
     found = bridges(lines, size, CLEAR * arrangement.outer_radii.mean(), largest, vertices)
     sides = _side_pieces(circles, outer, size)
     grid = np.maximum(1, np.round(size * np.sqrt(len(arrangement.radii) / policy.discs / size.prod()))).astype(int)
-    matrix = matrix_tiles(circles, sides, found, lines, size, grid)
+    matrix = matrix_tiles(circles, outer, sides, found, lines, size, grid)
     if matrix is None:
         return None
     half, n_sides = matrix.lines, len(sides[0])

@@ -1,4 +1,4 @@
-"""Parts of what rank 0 has, one for each rank."""
+"""Parts of what rank 0 has, one for each rank, and parts that it gets from them."""
 
 from __future__ import annotations
 
@@ -23,3 +23,12 @@ def deal(comm: MPI.Intracomm, parts: list[T]) -> T:
     while len(parts) > 1:
         large.send(parts.pop(), dest=len(parts))
     return parts.pop()
+
+
+def collect(comm: MPI.Intracomm, part: T) -> list[T]:
+    """The parts of all ranks, by rank, on rank 0, and none on others; of any size, as `deal`.  Collective."""
+    large = pkl5.Intracomm(comm)
+    if comm.rank:
+        large.send(part, dest=0)
+        return []
+    return [part, *(large.recv(source=r) for r in range(1, comm.size))]

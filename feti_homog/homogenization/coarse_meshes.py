@@ -13,7 +13,7 @@ from feti_homog.cell.coarse_mesh import CoarseMesh
 from feti_homog.cell.drawing import Drawing
 from feti_homog.cell.filling import Filling, Tile, fill
 from feti_homog.cell.tiles import DEFAULT_TILES, TilePolicy
-from feti_homog.common.dealing import deal
+from feti_homog.common.dealing import collect, deal
 from feti_homog.common.mpi_errors import agree, on_root_only
 from feti_homog.config import case as cases
 from feti_homog.config.case import Case
@@ -31,8 +31,7 @@ def coarse_mesh(case: Case, comm: MPI.Intracomm, policy: TilePolicy = DEFAULT_TI
     """
     begun = on_root_only(comm, _begun, case, policy)
     tiles = [] if begun is None or isinstance(begun, CoarseMesh) else [tile for _, tile in begun.parts]
-    fillings = fill_together(tiles, comm)
-    return begun if begun is None or isinstance(begun, CoarseMesh) else begun.mesh(fillings)
+    return on_root_only(comm, _finished, begun, fill_together(tiles, comm))
 
 
 def fill_together(tiles: list[Tile], comm: MPI.Intracomm) -> list[Filling]:
@@ -43,7 +42,7 @@ def fill_together(tiles: list[Tile], comm: MPI.Intracomm) -> list[Filling]:
     """
     ranks = dealt([len(tile.points) for tile in tiles], comm.size)
     own = deal(comm, [[(k, tiles[k]) for k in mine] for mine in ranks])
-    gathered = comm.gather(agree(comm, _fill, own)) or []
+    gathered = collect(comm, agree(comm, _fill, own))
     return [filling for _, filling in sorted(chain.from_iterable(gathered), key=itemgetter(0))]
 
 
@@ -62,6 +61,11 @@ def _begun(case: Case, policy: TilePolicy) -> Drawing | CoarseMesh:
         begun = draw(replace(case.cell, tip_size=tips.size(case)), tips.marks(case), policy)
     cases.check_phases(case, begun.phases)
     return begun
+
+
+def _finished(begun: Drawing | CoarseMesh, fillings: list[Filling]) -> CoarseMesh:
+    """The mesh of these filled tiles, if it is not there already."""
+    return begun if isinstance(begun, CoarseMesh) else begun.mesh(fillings)
 
 
 def dealt(loads: list[int], n_ranks: int) -> list[list[int]]:

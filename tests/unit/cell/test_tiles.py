@@ -12,13 +12,14 @@ from support.circular_cells import cell
 from unit.cell.test_gmsh_mesher import least_angle
 
 from feti_homog.cell import filling
-from feti_homog.cell.arrangement import arrange
+from feti_homog.cell.arrangement import Arrangement, arrange
 from feti_homog.cell.bridges import CLEAR, LEAST_ANGLE
 from feti_homog.cell.coarse_mesh import areas
 from feti_homog.cell.curves import MATRIX, OUTSIDE
 from feti_homog.cell.gmsh_mesher import draw, generate
+from feti_homog.cell.outline import images
 from feti_homog.cell.periodic_topology import Torus
-from feti_homog.cell.tiles import TilePolicy, is_tiled
+from feti_homog.cell.tiles import TilePolicy, is_tiled, tiling
 from feti_homog.errors import MeshError
 
 VOIDS = {"voids": 0.05, "void_radius": 0.7}
@@ -124,6 +125,26 @@ def test_marks_become_nodes_and_bridges_keep_away():
     torus = Torus.of(mesh)
     assert np.all(np.bincount(torus.triangle_torus_edges.ravel()) == 2)
     assert least_angle(mesh.points, mesh.triangles).min() > 15
+
+
+def test_bridges_keep_away_from_all_of_some_near_marks():
+    """The second in the direction of a bridge that is there without them."""
+    case = CELLS["dense"]
+    arrangement = arrange(case)
+    disc = images(arrangement)[1]
+    found = tiling(arrangement, case.mesh_size, {}, SMALL).bridges
+    ends, angles = found.on_circles
+    fibre, angle = int(disc[ends[0]]), float(np.degrees(angles[0]))
+    marked = tiling(arrangement, case.mesh_size, {fibre: (angle - 10, angle, angle + 10)}, SMALL).bridges
+    ends, angles = marked.on_circles
+    away = np.degrees(angles[disc[ends] == fibre]) - angle
+    assert np.all(np.abs((away + 180) % 360 - 180) > np.degrees(LEAST_ANGLE) - 1e-9)
+
+
+def test_fibres_in_a_row_are_one_tile():
+    """No three of their centres make a triangle."""
+    row = Arrangement(1.0, 0.2, np.array([[(k + 0.5) / 8, 0.1] for k in range(8)]), np.full(8, 0.04), ("fibre",) * 8)
+    assert is_tiled(row, SMALL) and tiling(row, 0.05, {}, SMALL) is None
 
 
 def test_what_is_in_a_tile_is_of_it_alone():
