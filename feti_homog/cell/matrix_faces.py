@@ -13,6 +13,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from feti_homog.cell.bridges import TURN, Bridges, CentreLines
+from feti_homog.cell.circle_arcs import on_circles
 from feti_homog.typing import Float, Int
 
 NOWHERE = -1
@@ -119,7 +120,9 @@ def matrix_tiles(
     nodes, starts = sides
     corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]]) * size
     centres = np.concatenate([circles[:, :2], corners])
-    facing = np.stack([_on(circles, bridges.ends[:, end], bridges.angle + end * np.pi) for end in (0, 1)], axis=1)
+    facing = np.stack(
+        [on_circles(circles, bridges.ends[:, end], bridges.angle + end * np.pi) for end in (0, 1)], axis=1
+    )
     half = HalfLines.of(np.concatenate([nodes, bridges.ends]), centres, np.concatenate([starts, facing]))
     after, loop = half.faces()
     lone = np.setdiff1d(outer, half.node)
@@ -146,11 +149,6 @@ def grid_cell(points: Float, size: Float, grid: Int) -> Int:
     share = (points / size).round(PLACE_DECIMALS)
     column, row = np.clip((share * grid).astype(np.int64), 0, grid - 1).T
     return np.asarray(column * grid[1] + row)
-
-
-def _on(circles: Float, which: Int, angle: Float) -> Float:
-    """Points (k, 2) on circles (k,) at these angles."""
-    return np.asarray(circles[which, :2] + circles[which, 2:] * np.stack([np.cos(angle), np.sin(angle)], axis=1))
 
 
 def _areas_and_moments(half: HalfLines, after: Int, loop: Int) -> tuple[Float, Float]:
