@@ -78,6 +78,13 @@ class Torus:
         return np.asarray(np.bincount(self.triangle_torus_edges.ravel()) == 1)
 
     @cached_property
+    def debonded(self) -> Bool:
+        """(torus edges,) which are debonded from the start."""
+        debonded = np.zeros(self.torus_edge.max() + 1, bool)
+        debonded[self.torus_edge[self.plane_edges(self.mesh.debonded_edges)]] = True
+        return debonded
+
+    @cached_property
     def edge_ellipses(self) -> Ellipses:
         """The e ellipses that the plane edges lie on; those of straight edges are points."""
         n = len(self.edges)

@@ -33,6 +33,7 @@ class Submesh:
         vertex_class: (v,) class of each vertex.
         edge_class: (e,) torus edge of each edge.
         at_void: (torus edges,) whether one triangle of the whole cell has the torus edge, and a void is beside it.
+        debonded: (torus edges,) whether it is from the start.
         class_keys, edge_keys: global numbers of the classes and torus edges.
         period: (2,) width and height of the cell.
         pinned: local class that is pinned against translation of the whole cell, Eq. (15), or -1.
@@ -51,6 +52,7 @@ class Submesh:
     vertex_class: Int
     edge_class: Int
     at_void: Bool
+    debonded: Bool
     class_keys: Int
     edge_keys: Int
     period: Float
@@ -138,6 +140,7 @@ def part(submesh: Submesh, members: Int) -> Submesh:
         vertex_class=vertex_class,
         edge_class=edge_class,
         at_void=submesh.at_void[torus_edges],
+        debonded=submesh.debonded[torus_edges],
         class_keys=submesh.class_keys[classes],
         edge_keys=submesh.edge_keys[torus_edges],
         pinned=int(pinned_here[0]) if len(pinned_here) else -1,
@@ -189,6 +192,7 @@ def _submesh(torus: Torus, members: Int, pinned: int) -> Submesh:
         vertex_class=vertex_class,
         edge_class=edge_class,
         at_void=torus.at_void[edge_keys],
+        debonded=torus.debonded[edge_keys],
         class_keys=class_keys,
         edge_keys=edge_keys,
         period=np.array([mesh.width, mesh.height]),

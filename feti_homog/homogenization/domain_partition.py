@@ -21,7 +21,7 @@ from feti_homog.cell.tiles import DEFAULT_TILES, TilePolicy
 from feti_homog.config.case import Case
 from feti_homog.errors import CaseError
 from feti_homog.feti.decomposition.partition import decompose, pieces_for_count, pieces_for_size
-from feti_homog.feti.decomposition.shared_entities import SharedEntities, share_entities
+from feti_homog.feti.decomposition.sharers import SubdomainTable
 from feti_homog.homogenization import arc_selection, interface_pairs, process_zone
 from feti_homog.homogenization.arc_selection import InterfaceNodes
 from feti_homog.interface import debonded_arcs
@@ -143,11 +143,18 @@ class CellSummary:
 
 @dataclass(frozen=True)
 class RankShare:
-    """What one rank gets of the cut cell: its submeshes, and the entities that they share with others."""
+    """What one rank gets of the cut cell.
+
+    Attributes:
+        summary, table: of the whole cell.
+        pairs: (phases, phases) as in `interface_pairs.pairs_of`.
+        submeshes: those of the rank.
+    """
 
     summary: CellSummary
+    table: SubdomainTable
+    pairs: Int
     submeshes: SubmeshesOfRank
-    shared: SharedEntities
 
 
 def moved_fibres(case: Case) -> tuple[str, ...]:
@@ -191,7 +198,8 @@ def distribute(
     wanted = wanted_pieces(case, np.bincount(parts), _outer_edges(torus, parts), lattice, n_ranks, policy)
     decomposition = decompose(torus, parts, wanted, n_ranks)
     subdomain, rank = decomposition.subdomain, decomposition.rank
-    shared = share_entities(torus, pairs, subdomain, rank, lattice, n_ranks)
+    body = torus.constituent[np.unique(subdomain, return_index=True)[1]]
+    table = SubdomainTable(body, rank, torus.nesting, torus.constituent_phase)
     summary = CellSummary(
         width=mesh.width,
         height=mesh.height,
@@ -211,8 +219,7 @@ def distribute(
         voids=voids(mesh) if torus.at_void.any() else 0,
         match_distance=_match_distance(case, mesh, centres[is_fibre], circles[is_fibre, 2]),
     )
-    own = cut_for_ranks(torus, subdomain, rank, n_ranks)
-    return [RankShare(summary, *share) for share in zip(own, shared, strict=True)]
+    return [RankShare(summary, table, pairs, own) for own in cut_for_ranks(torus, subdomain, rank, n_ranks)]
 
 
 def _match_distance(case: Case, mesh: CoarseMesh, centres: Float, radii: Float) -> float | None:

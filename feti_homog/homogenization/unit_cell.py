@@ -18,7 +18,7 @@ from feti_homog.common.progress import Progress
 from feti_homog.config import element_sizes
 from feti_homog.config.case import Case
 from feti_homog.fem.problem import AXIAL
-from feti_homog.feti.decomposition.shared_entities import SharedEntities
+from feti_homog.feti.decomposition.shared_entities import SharedEntities, share_entities
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.solver import FetiSolver
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
@@ -153,13 +153,13 @@ def assemble_subdomains(
     lattice = ReferenceLattice.of(case.cell.refine, case.cell.order)
     with progress.stage("mesh") as words:
         mesh = coarse_mesh(case, comm, policy.tiles)
-        shares = on_root_only(comm, distribute, case, mesh, lattice, comm.size, policy)
-        own: RankShare = deal(comm, shares or [])
+        own = _cut(case, mesh, lattice, comm, policy)
         summary = own.summary
+        shared = share_entities(comm, own.submeshes, own.table, own.pairs, lattice)
         if mesh is not None and len(mesh.debonded_edges) and case.interface is None:
             words.append("its debonded curve is bonded, for there is no [interface]")
         words.append(f"{summary.coarse_triangles} triangles, {summary.bodies} bodies, {summary.subdomains} subdomains")
-        del mesh, shares
+        del mesh
     for line in on_root_only(comm, moved_fibres, case) or ():
         progress.say(f"remark: {line}")
     with progress.stage("assemble") as words:
@@ -169,7 +169,14 @@ def assemble_subdomains(
         if summary.voids:
             words.append(f"{summary.voids} voids, porosity {1 - meshed / summary.area:.6g},")
         words.append(f"{dofs} degrees of freedom, refine = {case.cell.refine}, order = {case.cell.order}")
-    return summary, own.shared, lattice, subdomains
+    return summary, shared, lattice, subdomains
+
+
+def _cut(
+    case: Case, mesh: CoarseMesh | None, lattice: ReferenceLattice, comm: MPI.Intracomm, policy: PartitionPolicy
+) -> RankShare:
+    """This rank's share of the mesh that rank 0 has.  Collective."""
+    return deal(comm, on_root_only(comm, distribute, case, mesh, lattice, comm.size, policy) or [])
 
 
 def _assemble(case: Case, submeshes: SubmeshesOfRank, lattice: ReferenceLattice) -> list[Subdomain]:
@@ -199,18 +206,19 @@ def describe(case: Case, comm: MPI.Intracomm) -> str:
 
     Raises as `tear`.
     """
-    mesh = coarse_mesh(case, comm)
-    return on_root_only(comm, _described, case, mesh, comm.size) or ""
-
-
-def _described(case: Case, mesh: CoarseMesh, n_ranks: int) -> str:
-    """That of `describe`."""
     lattice = ReferenceLattice.of(case.cell.refine, case.cell.order)
-    shares = distribute(case, mesh, lattice, n_ranks)
-    summary, multipliers = shares[0].summary, 2 * shares[0].shared.constraints
-    triangles = [len(share.submeshes.member) for share in shares]
-    nodes = [t * lattice.intervals**2 // 2 for t in triangles]
-    own = [len(share.submeshes.index) for share in shares]
+    own = _cut(case, coarse_mesh(case, comm), lattice, comm, DEFAULT_POLICY)
+    constraints = share_entities(comm, own.submeshes, own.table, own.pairs, lattice).constraints
+    loads = comm.gather((len(own.submeshes.index), len(own.submeshes.member)))
+    return on_root_only(comm, _described, case, own.summary, lattice, 2 * constraints, loads) or ""
+
+
+def _described(
+    case: Case, summary: CellSummary, lattice: ReferenceLattice, multipliers: int, loads: Sequence[tuple[int, int]]
+) -> str:
+    """That of `describe`; `loads` are the subdomains and the coarse triangles of each rank."""
+    own = [subdomains for subdomains, _ in loads]
+    nodes = [triangles * lattice.intervals**2 // 2 for _, triangles in loads]
     problems = {problem.components: cost_model.applications(case, problem) for problem in phase_laws.problems(case)}
     taken = cost_model.estimate(nodes, own, summary.coarse_triangles, summary.bodies, problems)
     unresolved = process_zone.warnings(case, summary.width, summary.interface_edge)
@@ -233,7 +241,7 @@ def _described(case: Case, mesh: CoarseMesh, n_ranks: int) -> str:
             f"rank {rank:<5} {count} subdomains, about {2 * n} degrees of freedom"
             for rank, (count, n) in enumerate(zip(own, nodes, strict=True))
         ),
-        *cost_model.estimate_lines(taken, n_ranks),
+        *cost_model.estimate_lines(taken, len(loads)),
         *(f"warning    {warning}" for warning in (*case.warnings(), *summary.warnings(), *unresolved)),
         *(f"remark     {remark}" for remark in (*case.remarks(), *moved_fibres(case))),
         "the case is valid",

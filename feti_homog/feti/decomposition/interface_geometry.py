@@ -5,91 +5,109 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from mpi4py import MPI
 
-from feti_homog.cell.periodic_topology import Torus
+from feti_homog.cell.submesh import Submesh, SubmeshesOfRank
+from feti_homog.common.exchange import exchange
 from feti_homog.feti.decomposition.edge_arcs import mean_speed
+from feti_homog.feti.decomposition.sharers import Sharers, SubdomainTable, entity_code
 from feti_homog.typing import Bool, Float, Int
 
 
 @dataclass(frozen=True)
 class InterfaceGeometry:
-    """Of n shared entities; the attributes are those of `SharedEntities`, 0 where no bond may break."""
+    """Of n shared entities that this rank owns; the attributes are those of `SharedEntities`, 0 of other entities and
+    where no bond may break."""
 
-    fibre: Int
-    pair: Int
     normal: Float
     turn: Float
     precracked: Bool
 
-
-def interface_geometry(
-    torus: Torus, pairs: Int, key: Int, is_edge: Bool, pointer: Int, body: Int, side: float
-) -> InterfaceGeometry:
-    """Fibre, normals, turn and precrack of n shared entities; arguments as in `SharedEntities`, and `pairs` as in
-    `share_entities`; the side of an element is the share `side` of a coarse edge."""
-    pair = _breakable_pairs(torus, pairs, pointer, body)
-    fibre = np.where(pair >= 0, body[pointer[1:] - 1], -1)
-    edge, normal, turn = _edge_geometry(torus, pairs)
-    n_edges, n_classes = torus.torus_edge.max() + 1, torus.node_class.max() + 1
-    edge_normal, edge_turn = np.zeros((n_edges, 2, 2)), np.zeros(n_edges)
-    edge_normal[edge], edge_turn[edge] = normal, turn
-    bonded = np.zeros(n_edges, bool)
-    bonded[edge] = True
-    bonded[torus.torus_edge[torus.plane_edges(torus.mesh.debonded_edges)]] = False
-    plane = np.empty(n_edges, np.int64)
-    plane[torus.torus_edge[::-1]] = np.arange(len(torus.edges))[::-1]
-    ends = torus.node_class[torus.edges[plane[edge]]]
-    vertex_normal, vertex_length = np.zeros((n_classes, 2)), np.zeros(n_classes)
-    for end, (low, high) in enumerate(((0.0, side), (1.0 - side, 1.0))):
-        length = mean_speed(normal, turn, np.full(len(edge), low), np.full(len(edge), high))
-        unit = normal[:, end] / np.maximum(np.hypot(*normal[:, end].T), 1e-300)[:, None]
-        np.add.at(vertex_normal, ends[:, end], unit * length[:, None])
-        np.add.at(vertex_length, ends[:, end], length)
-    vertex_normal *= (vertex_length / np.maximum(np.hypot(*vertex_normal.T), 1e-300))[:, None]
-    bonded_edges_at = np.bincount(ends[bonded[edge]].ravel(), minlength=n_classes)
-    vertices, edges = key[~is_edge], key[is_edge]
-    normals, turns = np.empty((len(key), 2, 2)), np.zeros(len(key))
-    normals[~is_edge], normals[is_edge] = vertex_normal[vertices][:, None], edge_normal[edges]
-    turns[is_edge] = edge_turn[edges]
-    precracked = np.empty(len(key), bool)
-    precracked[~is_edge], precracked[is_edge] = bonded_edges_at[vertices] == 0, ~bonded[edges]
-    return InterfaceGeometry(fibre, pair, normals, turns, precracked & (fibre >= 0))
+    def chosen(self, which: Int) -> InterfaceGeometry:
+        """Of the entities of these numbers (k,)."""
+        return InterfaceGeometry(self.normal[which], self.turn[which], self.precracked[which])
 
 
-def _breakable_pairs(torus: Torus, pairs: Int, pointer: Int, body: Int) -> Int:
+def breakable_pairs(table: SubdomainTable, pairs: Int, found: Sharers) -> Int:
     """(n,) the interface of the two bodies that meet there; -1 where it never parts or a third body meets them."""
-    outer, inner = body[pointer[:-1]], body[pointer[1:] - 1]
-    copies = np.diff(pointer)
+    body, copies = table.body[found.sharer], found.copies
+    outer, inner = body[found.pointer[:-1]], body[found.pointer[1:] - 1]
     third = (body != np.repeat(outer, copies)) & (body != np.repeat(inner, copies))
     thirds = np.bincount(np.repeat(np.arange(len(copies)), copies), third, len(copies))
-    phase = torus.constituent_phase
+    phase = table.phase
     return np.where((thirds == 0) & (outer != inner), pairs[phase[outer], phase[inner]], -1)
 
 
-def _edge_geometry(torus: Torus, pairs: Int) -> tuple[Int, Float, Float]:
-    """Torus edges whose bonds may break, their normals at start and end, as in `SharedEntities`, and their turns."""
-    mesh, body = torus.mesh, torus.constituent
-    left, right, edge = torus.sides
-    mixed = pairs[mesh.phase[left], mesh.phase[right]] >= 0
-    fibre = np.where(torus.nesting[body[left]] > torus.nesting[body[right]], left, right)[mixed]
-    edge = edge[mixed]
-    k = np.argmax(torus.triangle_torus_edges[fibre] == edge[:, None], axis=1)
-    start, end = mesh.triangles[fibre, k], mesh.triangles[fibre, (k + 1) % 3]
-    plane = torus.triangle_edges[fibre, k]
-    backwards = torus.edges[plane, 0] != start
-    a, b = mesh.points[start], mesh.points[end]
-    turn, own = torus.edge_turns[plane], torus.edge_ellipses[plane]
-    normal = np.repeat(_across(b - a)[:, None], 2, axis=1)
+def interface_geometry(
+    comm: MPI.Intracomm, own: SubmeshesOfRank, table: SubdomainTable, pairs: Int, found: Sharers, side: float
+) -> InterfaceGeometry:
+    """Normals, turns and precracks of shared entities; `pairs` as in `share_entities`; the side of an element is the
+    share `side` of a coarse edge.  Collective."""
+    n, owner = len(found.key), table.rank[found.innermost]
+    # The last sharer of an edge between two bodies is on the side of the fibre.
+    edges = np.flatnonzero(found.is_edge & (owner == comm.rank) & (breakable_pairs(table, pairs, found) >= 0))
+    triangle, k = _triangles_beside(own, found.key[edges], found.innermost[edges])
+    whole = own.whole
+    plane = whole.triangle_edges[triangle, k]
+    normals, turns, precracked = np.zeros((n, 2, 2)), np.zeros(n), np.zeros(n, bool)
+    normals[edges], turns[edges] = normal, turn = _edge_normals(whole, triangle, k)
+    precracked[edges] = whole.debonded[whole.edge_class[plane]]
+    ends = whole.class_keys[whole.vertex_class[whole.edges[plane]]]
+    sums = np.zeros((n, 4))
+    for end, (low, high) in enumerate(((0.0, side), (1.0 - side, 1.0))):
+        length = mean_speed(normal, turn, np.full(len(edges), low), np.full(len(edges), high))
+        unit = normal[:, end] / np.maximum(np.hypot(*normal[:, end].T), 1e-300)[:, None]
+        parts = np.column_stack([unit * length[:, None], length, ~precracked[edges]])
+        sums += _sums_at_vertices(comm, found, owner, ends[:, end], found.key[edges], parts)
+    vertices = ~found.is_edge
+    scaled = sums[:, :2] * (sums[:, 2] / np.maximum(np.hypot(*sums[:, :2].T), 1e-300))[:, None]
+    normals[vertices], precracked[vertices] = scaled[vertices, None], sums[vertices, 3] == 0
+    return InterfaceGeometry(normals, turns, precracked)
+
+
+def _sums_at_vertices(comm: MPI.Intracomm, found: Sharers, owner: Int, key: Int, edge: Int, parts: Float) -> Float:
+    """(n, k) for each entity that this rank owns, what all ranks have for it: `parts` (p, k) of these edges (p,) for
+    the vertex classes `key` (p,), each of which is an entity or the pinned class.  Collective."""
+    order, code = np.argsort(found.code), entity_code(key, False)
+    is_entity = np.isin(code, found.code)
+    columns = (column[is_entity] for column in (code, edge, parts))
+    place = order[np.searchsorted(found.code[order], code[is_entity])]
+    code, edge, parts = exchange(comm, owner[place], *columns)
+    place = order[np.searchsorted(found.code[order], code)]
+    sums = np.zeros((len(order), parts.shape[1]))
+    # Rounding depends on the order, which is that of the edges on any number of ranks.
+    sequence = np.argsort(edge, kind="stable")
+    np.add.at(sums, place[sequence], parts[sequence])
+    return sums
+
+
+def _triangles_beside(own: SubmeshesOfRank, key: Int, subdomain: Int) -> tuple[Int, Int]:
+    """The triangle (n,) of this rank's subdomain (n,), and which of its edges (n,) is the torus edge `key` (n,)."""
+    whole = own.whole
+    edge = np.searchsorted(whole.edge_keys, key)
+    wanted = np.full(len(whole.edge_keys), -1)
+    wanted[edge] = subdomain
+    beside = whole.edge_class[whole.triangle_edges]
+    triangle, k = np.nonzero(wanted[beside] == own.index[own.member][:, None])
+    order = np.argsort(beside[triangle, k])
+    place = order[np.searchsorted(beside[triangle, k][order], edge)]
+    return triangle[place], k[place]
+
+
+def _edge_normals(mesh: Submesh, triangle: Int, k: Int) -> tuple[Float, Float]:
+    """Normals (n, 2, 2) out of triangles (n,) at the start and end of their edges k (n,), as in `SharedEntities`, and
+    the turns (n,) of these."""
+    a, b = (mesh.points[mesh.triangles[triangle, (k + step) % 3]] for step in (0, 1))
+    plane = mesh.triangle_edges[triangle, k]
+    turn = mesh.turns[plane]
+    tangents = np.repeat((b - a)[:, None], 2, axis=1)
     curved = turn > 0
-    spokes = np.stack([own[curved].unit((end - own.centres)[curved]) for end in (a, b)], axis=1)
-    tangent = np.einsum("eij,epj->epi", own.frames[curved], -_across(spokes)) * turn[curved, None, None]
-    radial = _across(tangent)
-    side = np.sign((radial.sum(axis=1) * normal[curved, 0]).sum(axis=1))
-    normal[curved] = side[:, None, None] * radial
+    # On an arc about c the place y obeys y'' = -turn^2 y.
+    angle, centre = turn[curved, None], mesh.circles[plane[curved], :2]
+    start, stop = a[curved] - centre, b[curved] - centre
+    ahead = np.stack([stop - np.cos(angle) * start, np.cos(angle) * stop - start], axis=1)
+    tangents[curved] = (angle / np.sin(angle))[:, None] * ahead
+    normal = np.stack([tangents[..., 1], -tangents[..., 0]], axis=-1)
+    backwards = mesh.backwards[triangle, k]
     normal[backwards] = normal[backwards, ::-1]
-    return edge, normal, turn
-
-
-def _across(vectors: Float) -> Float:
-    """Vectors (..., 2) turned by a right angle, clockwise."""
-    return np.stack([vectors[..., 1], -vectors[..., 0]], axis=-1)
+    return normal, turn

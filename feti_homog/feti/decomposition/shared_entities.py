@@ -1,21 +1,23 @@
-"""Which subdomains share which coarse vertices and edges: found on rank 0, and sent to the ranks concerned.
+"""Which subdomains share which coarse vertices and edges, with the numbers of their constraints.
 
 An entity is a vertex class or a torus edge that belongs to several subdomains.  Each fine node on an entity of k
-subdomains needs k - 1 vector constraints, so these are numbered by arithmetic and no rank asks another.
+subdomains needs k - 1 vector constraints.  It belongs to the rank of its last sharer, which numbers these and tells the
+others.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
+from mpi4py import MPI
 
-from feti_homog.cell.periodic_topology import Torus
 from feti_homog.cell.refinement import ReferenceLattice
-from feti_homog.cell.submesh import pinned_class
-from feti_homog.feti.decomposition.interface_geometry import interface_geometry
-from feti_homog.typing import Bool, Float, Int
+from feti_homog.cell.submesh import SubmeshesOfRank
+from feti_homog.common.exchange import exchange
+from feti_homog.feti.decomposition.interface_geometry import breakable_pairs, interface_geometry
+from feti_homog.feti.decomposition.sharers import Sharers, SubdomainTable, find_sharers
+from feti_homog.typing import Array, Bool, Float, Int
 
 
 @dataclass(frozen=True)
@@ -61,122 +63,58 @@ class SharedEntities:
         """(n,) number of subdomains k that share each entity."""
         return np.diff(self.pointer)
 
-    def restricted(self, mask: Bool, owned: tuple[int, int]) -> SharedEntities:
-        """The entities where `mask` (n,) is true, for a rank that owns the constraints from owned[0] up to owned[1]."""
-        sharers = _ranges(self.pointer[:-1][mask], self.copies[mask])
-        return replace(
-            self,
-            key=self.key[mask],
-            is_edge=self.is_edge[mask],
-            nodes=self.nodes[mask],
-            first=self.first[mask],
-            pointer=np.r_[0, np.cumsum(self.copies[mask])],
-            sharer=self.sharer[sharers],
-            body=self.body[sharers],
-            fibre=self.fibre[mask],
-            pair=self.pair[mask],
-            normal=self.normal[mask],
-            turn=self.turn[mask],
-            precracked=self.precracked[mask],
-            owned=owned,
-        )
-
-
-@dataclass(frozen=True)
-class _Sharers:
-    """The n entities that several subdomains share: their keys, whether they are edges, and who shares them."""
-
-    key: Int
-    is_edge: Bool
-    pointer: Int
-    sharer: Int
-
-    def reordered(self, order: Int) -> _Sharers:
-        """The same entities in another order (n,)."""
-        copies = np.diff(self.pointer)[order]
-        sharer = self.sharer[_ranges(self.pointer[:-1][order], copies)]
-        return _Sharers(self.key[order], self.is_edge[order], np.r_[0, np.cumsum(copies)], sharer)
-
 
 def share_entities(
-    torus: Torus, pairs: Int, subdomain: Int, rank: Int, lattice: ReferenceLattice, n_ranks: int
-) -> Iterator[SharedEntities]:
-    """The shared entities of each rank, in the order of ranks.
-
-    An entity belongs to the rank of its last sharer; constraints are numbered rank by rank.
+    comm: MPI.Intracomm, own: SubmeshesOfRank, table: SubdomainTable, pairs: Int, lattice: ReferenceLattice
+) -> SharedEntities:
+    """The shared entities of this rank; constraints are numbered rank by rank.  Collective.
 
     Args:
         pairs: (phases, phases) the interface of the case between two phases, -1 where they never part.
-        subdomain: (m,) of each triangle.
-        rank: (s,) rank of each subdomain.
         lattice: of the coarse triangles.
     """
-    body = torus.constituent[np.unique(subdomain, return_index=True)[1]]
-    found = _find_sharers(torus, subdomain, torus.nesting[body], edges_have_nodes=lattice.intervals > 1)
-    owner = rank[found.sharer[found.pointer[1:] - 1]] if len(found.key) else np.zeros(0, np.int64)
-    order = np.argsort(owner, kind="stable")
-    found, owner = found.reordered(order), owner[order]
-    copies = np.diff(found.pointer)
+    found = find_sharers(comm, own, table)
+    geometry = interface_geometry(comm, own, table, pairs, found, lattice.order / lattice.intervals)
+    if lattice.intervals == 1:
+        vertices = np.flatnonzero(~found.is_edge)
+        found, geometry = found.chosen(vertices), geometry.chosen(vertices)
     nodes = np.where(found.is_edge, lattice.intervals - 1, 1)
-    ends = np.r_[0, np.cumsum(nodes * (copies - 1))]
-    body = body[found.sharer]
-    side = lattice.order / lattice.intervals
-    interface = interface_geometry(torus, pairs, found.key, found.is_edge, found.pointer, body, side)
-    whole = SharedEntities(
+    owner = table.rank[found.innermost]
+    constraints = np.where(owner == comm.rank, nodes * (found.copies - 1), 0)
+    begin, own_constraints = comm.exscan(int(constraints.sum())) or 0, int(constraints.sum())
+    numbers = begin + np.cumsum(constraints) - constraints
+    first, normal, turn, precracked = _told_by_owners(
+        comm, found, table, numbers, geometry.normal, geometry.turn, geometry.precracked
+    )
+    order = np.argsort(first)
+    found = found.chosen(order)
+    pair = breakable_pairs(table, pairs, found)
+    return SharedEntities(
         key=found.key,
         is_edge=found.is_edge,
-        nodes=nodes,
-        first=ends[:-1],
+        nodes=nodes[order],
+        first=first[order],
         pointer=found.pointer,
         sharer=found.sharer,
-        body=body,
-        fibre=interface.fibre,
-        pair=interface.pair,
-        normal=interface.normal,
-        turn=interface.turn,
-        precracked=interface.precracked,
-        owned=(0, int(ends[-1])),
-        constraints=int(ends[-1]),
+        body=table.body[found.sharer],
+        fibre=np.where(pair >= 0, table.body[found.innermost], -1),
+        pair=pair,
+        normal=normal[order],
+        turn=turn[order],
+        precracked=precracked[order] & (pair >= 0),
+        owned=(begin, begin + own_constraints),
+        constraints=comm.allreduce(own_constraints),
     )
-    limits = ends[np.searchsorted(owner, np.arange(n_ranks + 1))].tolist()
-    entity = np.repeat(np.arange(len(found.key)), copies)
-    for r in range(n_ranks):
-        takes_part = np.zeros(len(found.key), bool)
-        takes_part[entity[rank[found.sharer] == r]] = True
-        yield whole.restricted(takes_part, (limits[r], limits[r + 1]))
 
 
-def _find_sharers(torus: Torus, subdomain: Int, nesting: Int, edges_have_nodes: bool) -> _Sharers:
-    """The vertex classes, but for the pinned one, and the torus edges that several subdomains share; `subdomain` (m,)
-    is that of each triangle, `nesting` (s,) the place of the body of each."""
-    key, copies, sharer = _several(torus.node_class[torus.mesh.triangles], subdomain, nesting)
-    kept = key != pinned_class(torus)
-    kinds = [(key[kept], copies[kept], sharer[np.repeat(kept, copies)])]
-    if edges_have_nodes:
-        kinds.append(_several(torus.triangle_torus_edges, subdomain, nesting))
-    key, copies, sharer = (np.concatenate(a) for a in zip(*kinds, strict=True))
-    is_edge = np.repeat([False, True][: len(kinds)], [len(k[0]) for k in kinds])
-    return _Sharers(key, is_edge, np.r_[0, np.cumsum(copies)], sharer)
-
-
-def _several(keys: Int, subdomain: Int, nesting: Int) -> tuple[Int, Int, Int]:
-    """Which of the keys (m, 3) of triangles several subdomains have, how many, and which: sorted by key, then place
-    (s,) of the body, then subdomain."""
-    n = len(nesting)
-    low, high = np.full(keys.max() + 1, n), np.full(keys.max() + 1, -1)
-    for corner in keys.T:
-        np.minimum.at(low, corner, subdomain)
-        np.maximum.at(high, corner, subdomain)
-    shared = low[keys] != high[keys]
-    both = np.unique(keys[shared] * n + np.broadcast_to(subdomain[:, None], keys.shape)[shared])
-    key, whose = both // n, both % n
-    order = np.lexsort((whose, nesting[whose], key))
-    unique, count = np.unique(key, return_counts=True)
-    return unique, count, whose[order]
-
-
-def _ranges(start: Int, count: Int) -> Int:
-    """start[0] .. start[0] + count[0] - 1, start[1] .. and so on."""
-    ends = np.cumsum(count)
-    shift: Int = np.repeat(start - ends + count, count)
-    return shift + np.arange(count.sum(), dtype=np.int64)
+def _told_by_owners(comm: MPI.Intracomm, found: Sharers, table: SubdomainTable, *columns: Array) -> list[Array]:
+    """The columns (n,) or (n, ...) of the entities, each row as the owner of the entity has it.  Collective."""
+    rank = table.rank[found.sharer]
+    mine = np.repeat(table.rank[found.innermost] == comm.rank, found.copies)
+    entity = np.repeat(np.arange(len(found.key)), found.copies)
+    pairs = np.unique(entity[mine] * comm.size + rank[mine])
+    entity, to = pairs // comm.size, pairs % comm.size
+    code, *received = exchange(comm, to, found.code[entity], *(column[entity] for column in columns))
+    order = np.argsort(code)
+    place = order[np.searchsorted(code[order], found.code)]
+    return [column[place] for column in received]

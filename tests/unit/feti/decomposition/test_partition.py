@@ -7,11 +7,9 @@ import pytest
 
 from feti_homog.cell.gmsh_mesher import generate
 from feti_homog.cell.periodic_topology import Torus, components, edge_pairs
-from feti_homog.cell.refinement import ReferenceLattice
-from feti_homog.cell.submesh import cut_for_ranks, pinned_class
+from feti_homog.cell.submesh import cut_for_ranks
 from feti_homog.config.cell_section import Cell
 from feti_homog.feti.decomposition.partition import decompose, pieces_for_count, pieces_for_size
-from feti_homog.feti.decomposition.shared_entities import share_entities
 
 
 def torus_of(fibres, seed, mesh_size):
@@ -126,23 +124,3 @@ def test_subdomains_that_ranks_cut_are_those_of_the_whole_cell(torus):
         assert np.array_equal(edges, torus.triangle_torus_edges[members])
         starts = submesh.edges[submesh.triangle_edges, submesh.backwards.astype(int)]
         assert np.array_equal(starts, submesh.triangles)
-
-
-def test_shared_entities_are_those_of_several_subdomains(torus):
-    """Counted triangle by triangle; each constraint belongs to one rank."""
-    decomposition, pairs = fine(torus, 3), np.array([[-1, 0], [0, -1]])
-    subdomain, rank = decomposition.subdomain, decomposition.rank
-    lattice = ReferenceLattice.of(1, 1)
-    shares = list(share_entities(torus, pairs, subdomain, rank, lattice, 3))
-    expected = {}
-    for kind, keys in ((False, torus.node_class[torus.mesh.triangles]), (True, torus.triangle_torus_edges)):
-        for key, owner in zip(keys.tolist(), subdomain.tolist(), strict=True):
-            for k in key:
-                expected.setdefault((kind, k), set()).add(owner)
-    expected = {key: owners for key, owners in expected.items() if len(owners) > 1}
-    expected.pop((False, pinned_class(torus)), None)
-    assert sum(share.owned[1] - share.owned[0] for share in shares) == shares[0].constraints
-    for r, share in enumerate(shares):
-        owners = [set(own.tolist()) for own in np.split(share.sharer, share.pointer[1:-1])]
-        found = dict(zip(zip(share.is_edge.tolist(), share.key.tolist(), strict=True), owners, strict=True))
-        assert found == {key: own for key, own in expected.items() if any(rank[k] == r for k in own)}

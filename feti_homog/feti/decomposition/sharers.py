@@ -1,0 +1,136 @@
+"""Who shares which coarse vertices and edges, found by all ranks.
+
+Each key has a home rank, key modulo ranks.  Every rank tells the homes which of its subdomains have a key that others
+may have, too; the home puts the subdomains in order, and tells them to the ranks that have one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+
+from feti_homog.cell.submesh import SubmeshesOfRank
+from feti_homog.common.exchange import exchange
+from feti_homog.typing import Bool, Int
+
+
+@dataclass(frozen=True)
+class SubdomainTable:
+    """What every rank knows of the s subdomains of all.
+
+    Attributes:
+        body: (s,) constituent that each is a piece of.
+        rank: (s,) that has it.
+        nesting: (constituents,) places from the outermost to the innermost, as `Torus.nesting`.
+        phase: (constituents,) number of the material phase of each.
+    """
+
+    body: Int
+    rank: Int
+    nesting: Int
+    phase: Int
+
+
+@dataclass(frozen=True)
+class Sharers:
+    """n entities that several subdomains share, some of them this rank's: vertices, then edges, each by key.
+
+    Attributes:
+        key, is_edge, pointer, sharer: as in `SharedEntities`.
+    """
+
+    key: Int
+    is_edge: Bool
+    pointer: Int
+    sharer: Int
+
+    @property
+    def copies(self) -> Int:
+        """(n,) number of subdomains that share each."""
+        return np.diff(self.pointer)
+
+    @property
+    def innermost(self) -> Int:
+        """(n,) the last sharer of each."""
+        return np.asarray(self.sharer[self.pointer[1:] - 1])
+
+    @property
+    def code(self) -> Int:
+        """(n,) one number for each, in no order."""
+        return entity_code(self.key, self.is_edge)
+
+    def chosen(self, which: Int) -> Sharers:
+        """The entities of these numbers (k,), in that order."""
+        copies = self.copies[which]
+        sharer = self.sharer[ranges(self.pointer[which], copies)]
+        return Sharers(self.key[which], self.is_edge[which], np.r_[0, np.cumsum(copies)], sharer)
+
+
+def entity_code(key: Int, is_edge: Bool | bool) -> Int:
+    """(n,) one number for each class or torus edge of these keys (n,)."""
+    return np.asarray(2 * key + is_edge)
+
+
+def ranges(start: Int, count: Int) -> Int:
+    """start[0] .. start[0] + count[0] - 1, start[1] .. and so on."""
+    ends = np.cumsum(count)
+    shift: Int = np.repeat(start - ends + count, count)
+    return shift + np.arange(count.sum(), dtype=np.int64)
+
+
+def find_sharers(comm: MPI.Intracomm, own: SubmeshesOfRank, table: SubdomainTable) -> Sharers:
+    """The vertex classes, but for the pinned one, and the torus edges that several subdomains share, one of them of
+    this rank.  Collective."""
+    code, subdomain = _told(own)
+    code, subdomain = exchange(comm, code // 2 % comm.size, code, subdomain)
+    order = np.lexsort((subdomain, table.nesting[table.body[subdomain]], code))
+    code, subdomain = code[order], subdomain[order]
+    _, entity, copies = np.unique(code, return_inverse=True, return_counts=True)
+    shared = copies[entity] > 1
+    code, subdomain = code[shared], subdomain[shared]
+    code, first, copies = np.unique(code, return_index=True, return_counts=True)
+    # Each rank that has one of the sharers is told of all.
+    entity = np.repeat(np.arange(len(code)), copies)
+    pairs = np.unique(entity * comm.size + table.rank[subdomain])
+    entity, to = pairs // comm.size, pairs % comm.size
+    code, count = exchange(comm, to, code[entity], copies[entity])
+    whose = ranges(first[entity], copies[entity])
+    (sharer,) = exchange(comm, np.repeat(to, copies[entity]), subdomain[whose])
+    found = Sharers(code // 2, code % 2 == 1, np.r_[0, np.cumsum(count)], sharer)
+    return found.chosen(np.lexsort((found.key, found.is_edge)))
+
+
+def _told(own: SubmeshesOfRank) -> tuple[Int, Int]:
+    """Codes of what others may have too, and the subdomains of this rank that have it; each pair once."""
+    whole = own.whole
+    corner, side = whole.vertex_class[whole.triangles], whole.edge_class[whole.triangle_edges]
+    one_sided = np.bincount(side.ravel(), minlength=len(whole.edge_keys)) == 1
+    at_border = np.zeros(len(whole.class_keys), bool)
+    at_border[whole.vertex_class[whole.edges[one_sided[whole.edge_class]]]] = True
+    if whole.pinned >= 0:
+        corner = np.where(corner == whole.pinned, -1, corner)
+    kinds = [
+        (entity_code(keys[local], is_edge), own.index[member])
+        for is_edge, keys, (local, member) in (
+            (False, whole.class_keys, _several(corner, own.member, at_border)),
+            (True, whole.edge_keys, _several(side, own.member, one_sided)),
+        )
+    ]
+    code, subdomain = (np.concatenate(some) for some in zip(*kinds, strict=True))
+    return code, subdomain
+
+
+def _several(keys: Int, member: Int, at_border: Bool) -> tuple[Int, Int]:
+    """The keys of triangles (t, 3), negative ones left out, that several members (t,) have or that are at the border
+    of all, and these members."""
+    n = int(member.max(initial=0)) + 1
+    low, high = np.full(len(at_border) + 1, n), np.full(len(at_border) + 1, -1)
+    for corner in keys.T:
+        np.minimum.at(low, corner, member)
+        np.maximum.at(high, corner, member)
+    told = (low[:-1] < high[:-1]) | at_border
+    chosen = (keys >= 0) & told[keys]
+    pairs = np.unique(keys[chosen] * n + np.broadcast_to(member[:, None], keys.shape)[chosen])
+    return pairs // n, pairs % n
