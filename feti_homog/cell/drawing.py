@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from feti_homog.cell.arrangement import Arrangement
 from feti_homog.cell.coarse_mesh import CoarseMesh, representatives
 from feti_homog.cell.filling import Filling, Tile, arc_edges, fill
 from feti_homog.cell.outline import Outline
+from feti_homog.cell.tile_torus import Regions
 from feti_homog.cell.void_holes import without_voids
 from feti_homog.config.phase_names import VOID
 from feti_homog.typing import Float, Int, Int32
@@ -45,12 +47,8 @@ class Drawing:
         """The mesh of which these are the filled tiles, in their order."""
         arrangement, lines, scale = self.arrangement, self.lines, self.scale
         points, triangles, circle = self._joined(fillings)
-        in_disc, in_ring = arrangement.within
-        within = [(in_ring if ring else in_disc)[disc] for disc, ring in zip(lines.disc, lines.is_coating, strict=True)]
-        place = {name: number for number, name in enumerate((*arrangement.phases, VOID))}
-        phase = np.array([place[name] for name in (*within, arrangement.phases[0])], np.int32)[circle]
-        is_coating = lines.is_coating & ~arrangement.is_hollow[lines.disc]
-        number = lines.disc + 1 + np.where(is_coating, arrangement.fibres, 0)
+        phase, precedence = self._within
+        void = len(self.phases)
         arcs, arc_circle = arc_edges(lines.curves)
         known = arrangement.frames is not None
         filled = CoarseMesh(
@@ -58,9 +56,9 @@ class Drawing:
             height=scale * arrangement.height,
             points=scale * points,
             triangles=triangles,
-            phase=phase,
+            phase=phase[circle],
             phases=arrangement.phases,
-            precedence=np.append(number, 0)[circle].astype(np.int32),
+            precedence=precedence[circle],
             representative=representatives(points, arrangement.width, arrangement.height),
             ellipses=lines.ellipses.scaled(scale),
             arc_edges=arcs,
@@ -68,7 +66,39 @@ class Drawing:
             debonded_edges=np.zeros((0, 2), np.int32),
             centres=scale * arrangement.centres[: arrangement.fibres] if known else None,
         )
-        return without_voids(filled, place[VOID]) if VOID in within else filled
+        return without_voids(filled, void) if np.any(phase == void) else filled
+
+    @cached_property
+    def _within(self) -> tuple[Int32, Int32]:
+        """(k + 1,) the phase next within each circle, a number behind all for a void, and the precedence, as in
+        `CoarseMesh`; last those of the matrix."""
+        arrangement, lines = self.arrangement, self.lines
+        in_disc, in_ring = arrangement.within
+        within = [(in_ring if ring else in_disc)[disc] for disc, ring in zip(lines.disc, lines.is_coating, strict=True)]
+        place = {name: number for number, name in enumerate((*arrangement.phases, VOID))}
+        phase = np.array([place[name] for name in (*within, arrangement.phases[0])], np.int32)
+        is_coating = lines.is_coating & ~arrangement.is_hollow[lines.disc]
+        precedence = lines.disc + 1 + np.where(is_coating, arrangement.fibres, 0)
+        return phase, np.append(precedence, 0).astype(np.int32)
+
+    @cached_property
+    def regions(self) -> Regions:
+        """What is where.  The matrix of round fibres is one constituent: the plane without discs that do not touch."""
+        phase, precedence = self._within
+        solid = phase < len(self.phases)
+        _, first, constituent = np.unique(precedence[solid], return_index=True, return_inverse=True)
+        of_circle = np.full(len(phase), -1)
+        of_circle[solid] = constituent
+        return Regions(
+            width=self.scale * self.arrangement.width,
+            height=self.scale * self.arrangement.height,
+            scale=self.scale,
+            phases=self.phases,
+            ellipses=self.lines.ellipses.scaled(self.scale),
+            constituent=of_circle,
+            phase=phase[solid][first].astype(np.int64),
+            nodes=len(self.lines.points),
+        )
 
     def _joined(self, fillings: Sequence[Filling]) -> tuple[Float, Int32, Int]:
         """Nodes, those of the outline first, triangles and the circle around each."""

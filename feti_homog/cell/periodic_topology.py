@@ -1,4 +1,4 @@
-"""The coarse cell as a torus: node classes, torus edges and constituents, on rank 0.
+"""The coarse cell as a torus: node classes, torus edges and constituents.
 
 Two plane nodes that differ by a period are one class, two boundary edges that differ by a period one
 torus edge.  A constituent is a connected component of equal phase on the torus, so a fibre that the
@@ -23,7 +23,7 @@ from feti_homog.typing import Bool, Float, Int, Int32
 
 @dataclass(frozen=True)
 class Torus:
-    """Identities on the torus of a `CoarseMesh` with m triangles.
+    """Identities on the torus of a `CoarseMesh` with m triangles, or of some tiles of a larger one.
 
     Attributes:
         mesh: the plane mesh.
@@ -32,6 +32,8 @@ class Torus:
         triangle_edges: (m, 3) plane edge from vertex k to vertex k + 1 (mod 3).
         torus_edge: (e,) torus edge of each plane edge.
         constituent: (m,) constituent of each triangle; those of the matrix come first.
+        class_keys, edge_keys: ascending numbers in the whole cell of the classes and of the torus edges.
+        at_void: (torus edges,) whether one triangle of the whole cell has it, and a void is beside it.
     """
 
     mesh: CoarseMesh
@@ -40,17 +42,22 @@ class Torus:
     triangle_edges: Int
     torus_edge: Int
     constituent: Int
+    class_keys: Int
+    edge_keys: Int
+    at_void: Bool
 
     @classmethod
     def of(cls, mesh: CoarseMesh) -> Torus:
         """Identify the periodic images of `mesh` and find its constituents."""
         node_class = np.unique(mesh.representative, return_inverse=True)[1]
-        edges, triangle_edges = _plane_edges(mesh)
+        edges, triangle_edges = plane_edges_of(mesh)
         torus_edge = _identify_edges(mesh, edges)
         left, right = edge_pairs(torus_edge[triangle_edges])
         same = mesh.phase[left] == mesh.phase[right]
         label = components(len(mesh.triangles), left[same], right[same])
-        torus = cls(mesh, node_class, edges, triangle_edges, torus_edge, label)
+        keys = np.arange(node_class.max() + 1), np.arange(torus_edge.max() + 1)
+        at_void = np.bincount(torus_edge[triangle_edges].ravel()) == 1
+        torus = cls(mesh, node_class, edges, triangle_edges, torus_edge, label, *keys, at_void)
         # Where the precedence leaves it open, fibres on circles are numbered in the order of the circles.
         circle = np.full(len(edges), len(mesh.ellipses))
         circle[torus.arcs] = mesh.arc_circle
@@ -73,14 +80,9 @@ class Torus:
         return order[twice] // 3, order[twice + 1] // 3, flat[order[twice]]
 
     @cached_property
-    def at_void(self) -> Bool:
-        """(torus edges,) whether a triangle is on one side of each only."""
-        return np.asarray(np.bincount(self.triangle_torus_edges.ravel()) == 1)
-
-    @cached_property
     def debonded(self) -> Bool:
         """(torus edges,) which are debonded from the start."""
-        debonded = np.zeros(self.torus_edge.max() + 1, bool)
+        debonded = np.zeros(len(self.edge_keys), bool)
         debonded[self.torus_edge[self.plane_edges(self.mesh.debonded_edges)]] = True
         return debonded
 
@@ -113,7 +115,7 @@ class Torus:
     def edge_lengths(self) -> Float:
         """Length of each torus edge, of its chord if it lies on a circle."""
         ends = self.mesh.points[self.edges]
-        lengths = np.empty(self.torus_edge.max() + 1)
+        lengths = np.empty(len(self.edge_keys))
         lengths[self.torus_edge] = np.hypot(*(ends[:, 1] - ends[:, 0]).T)
         return lengths
 
@@ -180,7 +182,7 @@ def _renumber(label: Int, order: Int) -> Int:
     return np.asarray(rank[label])
 
 
-def _plane_edges(mesh: CoarseMesh) -> tuple[Int, Int]:
+def plane_edges_of(mesh: CoarseMesh) -> tuple[Int, Int]:
     """Edges (e, 2) and those of each triangle (m, 3), as in `Torus`."""
     triangles = mesh.triangles.astype(np.int64)
     ends = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)

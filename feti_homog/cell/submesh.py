@@ -59,9 +59,33 @@ class Submesh:
     pinned: int
 
 
+@dataclass(frozen=True)
+class SubdomainTable:
+    """What every rank knows of the s subdomains of all.
+
+    Attributes:
+        body: (s,) constituent that each is a piece of.
+        rank: (s,) that has it.
+        nesting: (constituents,) places from the outermost to the innermost, as `Torus.nesting`.
+        phase: (constituents,) number of the material phase of each.
+    """
+
+    body: Int
+    rank: Int
+    nesting: Int
+    phase: Int
+
+    @classmethod
+    def of(cls, torus: Torus, subdomain: Int, rank: Int) -> SubdomainTable:
+        """That of a whole cell whose triangles are in these subdomains (m,), numbered from 0 without gaps."""
+        first = np.unique(subdomain, return_index=True)[1]
+        return cls(torus.constituent[first], rank, torus.nesting, torus.constituent_phase)
+
+
 def cut(torus: Torus, subdomain: Int) -> Iterator[Submesh]:
     """Cut the coarse cell into its subdomains; `subdomain` (m,) numbers each triangle's, from 0 without gaps."""
-    for own in cut_for_ranks(torus, subdomain, np.zeros(subdomain.max() + 1, np.int64), 1):
+    table = SubdomainTable.of(torus, subdomain, np.zeros(subdomain.max() + 1, np.int64))
+    for own in cut_for_ranks(torus, subdomain, table, 1, pinned_class(torus)):
         yield from own.cut()
 
 
@@ -95,21 +119,21 @@ class SubmeshesOfRank:
         return [replace(piece, index=index, body=body, phase=phase) for piece, index, body, phase in own]
 
 
-def cut_for_ranks(torus: Torus, subdomain: Int, rank: Int, n_ranks: int) -> Iterator[SubmeshesOfRank]:
-    """What each rank gets of the coarse cell: `subdomain` (m,) numbers that of each triangle, from 0 without gaps, and
-    `rank` (s,) is that of each subdomain."""
-    pinned = pinned_class(torus)
-    first = np.unique(subdomain, return_index=True)[1]
-    body, phase = torus.constituent[first], torus.mesh.phase[first]
+def cut_for_ranks(
+    torus: Torus, subdomain: Int, table: SubdomainTable, n_ranks: int, pinned: int
+) -> Iterator[SubmeshesOfRank]:
+    """What each rank gets of these triangles, which are in the subdomains `subdomain` (m,); `pinned` is the key of the
+    pinned class."""
     for r in range(n_ranks):
-        index = np.flatnonzero(rank == r)
-        members = np.flatnonzero(rank[subdomain] == r)
+        members = np.flatnonzero(table.rank[subdomain] == r)
+        index, member = np.unique(subdomain[members], return_inverse=True)
+        body = table.body[index]
         yield SubmeshesOfRank(
             whole=_submesh(torus, members, pinned),
-            member=np.searchsorted(index, subdomain[members]),
+            member=member,
             index=index,
-            body=body[index],
-            phase=tuple(torus.mesh.phases[k] for k in phase[index].tolist()),
+            body=body,
+            phase=tuple(torus.mesh.phases[k] for k in table.phase[body].tolist()),
         )
 
 
@@ -169,15 +193,15 @@ def pinned_class(torus: Torus) -> int:
 
 
 def _submesh(torus: Torus, members: Int, pinned: int) -> Submesh:
-    """The triangles `members` (t,) of the cell as one submesh, of no body and phase; `pinned` is the pinned class."""
+    """The triangles `members` (t,) as one submesh, of no body and phase; `pinned` is the key of the pinned class."""
     mesh = torus.mesh
     vertices, triangles = np.unique(mesh.triangles[members], return_inverse=True)
     edges, triangle_edges = np.unique(torus.triangle_edges[members], return_inverse=True)
     ends = np.searchsorted(vertices, torus.edges[edges])
     triangles, triangle_edges = triangles.reshape(-1, 3), triangle_edges.reshape(-1, 3)
-    class_keys, vertex_class = np.unique(torus.node_class[vertices], return_inverse=True)
-    edge_keys, edge_class = np.unique(torus.torus_edge[edges], return_inverse=True)
-    pinned_here = np.flatnonzero(class_keys == pinned)
+    classes, vertex_class = np.unique(torus.node_class[vertices], return_inverse=True)
+    torus_edges, edge_class = np.unique(torus.torus_edge[edges], return_inverse=True)
+    pinned_here = np.flatnonzero(torus.class_keys[classes] == pinned)
     return Submesh(
         index=0,
         body=0,
@@ -191,10 +215,10 @@ def _submesh(torus: Torus, members: Int, pinned: int) -> Submesh:
         turns=torus.edge_turns[edges],
         vertex_class=vertex_class,
         edge_class=edge_class,
-        at_void=torus.at_void[edge_keys],
-        debonded=torus.debonded[edge_keys],
-        class_keys=class_keys,
-        edge_keys=edge_keys,
+        at_void=torus.at_void[torus_edges],
+        debonded=torus.debonded[torus_edges],
+        class_keys=torus.class_keys[classes],
+        edge_keys=torus.edge_keys[torus_edges],
         period=np.array([mesh.width, mesh.height]),
         pinned=int(pinned_here[0]) if len(pinned_here) else -1,
     )

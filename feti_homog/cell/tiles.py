@@ -47,7 +47,7 @@ class Tiling:
         beside: (b, 2) the tiles on the left and on the right of each.
         matrix: the faces of the matrix, with the tile of each.
         sides: (s,) the tile beside each piece of a side in the matrix, in the order of the outline's.
-        within: (k,) the tile of what is in each circle.
+        within: (k,) the tile of what is in each circle; all images of a disc are in one.
     """
 
     bridges: Bridges
@@ -94,7 +94,7 @@ def tiling(
         beside=np.stack([matrix.tile[bridge], matrix.tile[half.twin[bridge]]], axis=1),
         matrix=matrix,
         sides=matrix.tile[:n_sides],
-        within=grid_cell(np.clip(circles[:, :2], 0, size), size, grid),
+        within=grid_cell(np.mod(arrangement.centres, size), size, grid)[disc],
     )
 
 

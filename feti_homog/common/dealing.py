@@ -1,4 +1,4 @@
-"""Parts of what rank 0 has, one for each rank, and parts that it gets from them."""
+"""Parts of what rank 0 has, one for each rank, parts that it gets from them, and parts that all have for all."""
 
 from __future__ import annotations
 
@@ -32,3 +32,15 @@ def collect(comm: MPI.Intracomm, part: T) -> list[T]:
         large.send(part, dest=0)
         return []
     return [part, *(large.recv(source=r) for r in range(1, comm.size))]
+
+
+def swap(comm: MPI.Intracomm, parts: list[T]) -> list[T]:
+    """Part r on rank r, of the parts of each rank; those of all ranks in their order.  Collective; of any size."""
+    large = pkl5.Intracomm(comm)
+    received = list(parts)
+    for step in range(1, comm.size):
+        to, source = (comm.rank + step) % comm.size, (comm.rank - step) % comm.size
+        request = large.isend(parts[to], dest=to)
+        received[source] = large.recv(source=source)
+        request.wait()
+    return received

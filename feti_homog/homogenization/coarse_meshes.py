@@ -6,6 +6,7 @@ import heapq
 from dataclasses import replace
 from itertools import chain
 from operator import itemgetter
+from typing import TypeVar
 
 from mpi4py import MPI
 
@@ -19,6 +20,8 @@ from feti_homog.config import case as cases
 from feti_homog.config.case import Case
 from feti_homog.homogenization import tips
 
+T = TypeVar("T")
+
 
 def coarse_mesh(case: Case, comm: MPI.Intracomm, policy: TilePolicy = DEFAULT_TILES) -> CoarseMesh | None:
     """The coarse mesh of the case, its phases checked against the materials; None but on rank 0.  Collective.
@@ -26,46 +29,63 @@ def coarse_mesh(case: Case, comm: MPI.Intracomm, policy: TilePolicy = DEFAULT_TI
     The ranks fill its tiles together; who fills one does not change the mesh.
 
     Raises:
-        CaseError: on every rank, if a phase has no material, or a material no phase.
-        MeshError: on every rank, if the cell cannot be meshed, or its mesh file is faulty.
+        CaseError, MeshError: on every rank, as `begun` and `finished`.
     """
-    begun = on_root_only(comm, _begun, case, policy)
-    tiles = [] if begun is None or isinstance(begun, CoarseMesh) else [tile for _, tile in begun.parts]
-    return on_root_only(comm, _finished, begun, fill_together(tiles, comm))
+    return finished(on_root_only(comm, begun, case, policy), comm)
 
 
-def fill_together(tiles: list[Tile], comm: MPI.Intracomm) -> list[Filling]:
-    """The filled tiles of rank 0, in their order, there; an empty list on others.  Collective.
+def begun(case: Case, policy: TilePolicy) -> Drawing | CoarseMesh:
+    """A user's mesh, or the cell with its tiles still to be filled.
 
     Raises:
-        MeshError: on every rank, if one cannot fill a tile of its.
+        CaseError: a phase has no material, or a material no phase.
+        MeshError: the cell cannot be drawn, or its mesh file is faulty.
     """
-    ranks = dealt([len(tile.points) for tile in tiles], comm.size)
-    own = deal(comm, [[(k, tiles[k]) for k in mine] for mine in ranks])
-    gathered = collect(comm, agree(comm, _fill, own))
-    return [filling for _, filling in sorted(chain.from_iterable(gathered), key=itemgetter(0))]
-
-
-def _begun(case: Case, policy: TilePolicy) -> Drawing | CoarseMesh:
-    """A user's mesh, or the cell with its tiles still to be filled."""
     # gmsh is imported where it is needed.
-    begun: Drawing | CoarseMesh
+    found: Drawing | CoarseMesh
     if case.cell.has_own_mesh:
         from feti_homog.cell.msh_reader import read
 
         assert case.cell.file is not None
-        begun = read(case.cell.file, case.cell.snap_tolerance if case.cell.repair == "snap" else None)
+        found = read(case.cell.file, case.cell.snap_tolerance if case.cell.repair == "snap" else None)
     else:
         from feti_homog.cell.gmsh_mesher import draw
 
-        begun = draw(replace(case.cell, tip_size=tips.size(case)), tips.marks(case), policy)
-    cases.check_phases(case, begun.phases)
-    return begun
+        found = draw(replace(case.cell, tip_size=tips.size(case)), tips.marks(case), policy)
+    cases.check_phases(case, found.phases)
+    return found
 
 
-def _finished(begun: Drawing | CoarseMesh, fillings: list[Filling]) -> CoarseMesh:
+def finished(found: Drawing | CoarseMesh | None, comm: MPI.Intracomm) -> CoarseMesh | None:
+    """The mesh that rank 0 has begun, there; its tiles are filled by all ranks.  Collective.
+
+    Raises:
+        MeshError: on every rank, if one cannot fill a tile of its.
+    """
+    tiles = [] if found is None or isinstance(found, CoarseMesh) else [tile for _, tile in found.parts]
+    gathered = collect(comm, agree(comm, fill_own, deal_tiles(tiles, [len(tile.points) for tile in tiles], comm)))
+    fillings = [filling for _, filling in sorted(chain.from_iterable(gathered), key=itemgetter(0))]
+    return on_root_only(comm, _joined, found, fillings)
+
+
+def deal_tiles(tiles: list[T], loads: list[int], comm: MPI.Intracomm) -> list[tuple[int, T]]:
+    """Those of the tiles of rank 0 that this rank fills, with their numbers; `loads` says how large they are.
+    Collective."""
+    return deal(comm, [[(k, tiles[k]) for k in mine] for mine in dealt(loads, comm.size)])
+
+
+def fill_own(tiles: list[tuple[int, Tile]]) -> list[tuple[int, Filling]]:
+    """Fill them; each keeps its number.
+
+    Raises:
+        MeshError: gmsh cannot fill one.
+    """
+    return [(k, fill(tile)) for k, tile in tiles]
+
+
+def _joined(found: Drawing | CoarseMesh, fillings: list[Filling]) -> CoarseMesh:
     """The mesh of these filled tiles, if it is not there already."""
-    return begun if isinstance(begun, CoarseMesh) else begun.mesh(fillings)
+    return found if isinstance(found, CoarseMesh) else found.mesh(fillings)
 
 
 def dealt(loads: list[int], n_ranks: int) -> list[list[int]]:
@@ -77,8 +97,3 @@ def dealt(loads: list[int], n_ranks: int) -> list[list[int]]:
         ranks[rank].append(tile)
         heapq.heapreplace(heap, (total + loads[tile], rank))
     return ranks
-
-
-def _fill(tiles: list[tuple[int, Tile]]) -> list[tuple[int, Filling]]:
-    """These numbered tiles, filled."""
-    return [(number, fill(tile)) for number, tile in tiles]

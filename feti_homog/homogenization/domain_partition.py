@@ -16,12 +16,11 @@ from feti_homog.cell.interface_edges import voids
 from feti_homog.cell.matched_arrangement import distance_of
 from feti_homog.cell.periodic_topology import Torus
 from feti_homog.cell.refinement import ReferenceLattice
-from feti_homog.cell.submesh import SubmeshesOfRank, cut_for_ranks
+from feti_homog.cell.submesh import SubdomainTable, SubmeshesOfRank, cut_for_ranks, pinned_class
 from feti_homog.cell.tiles import DEFAULT_TILES, TilePolicy
 from feti_homog.config.case import Case
 from feti_homog.errors import CaseError
 from feti_homog.feti.decomposition.partition import decompose, pieces_for_count, pieces_for_size
-from feti_homog.feti.decomposition.sharers import SubdomainTable
 from feti_homog.homogenization import arc_selection, interface_pairs, process_zone
 from feti_homog.homogenization.arc_selection import InterfaceNodes
 from feti_homog.interface import debonded_arcs
@@ -185,8 +184,9 @@ def distribute(
     numbers, is_fibre = fibre_numbers(torus)
     pairs = interface_pairs.pairs_of(case, mesh.phases)
     circles = fibre_circles(torus)
-    centres = _in_cell(circles[:, :2], mesh.period)
-    faults = interface_pairs.faults(case, torus) + arc_selection.fibre_faults(case, centres[is_fibre])
+    centres = in_cell(circles[:, :2], mesh.period)
+    touching = (mesh.phase[each] for each in torus.sides[:2])
+    faults = interface_pairs.faults(case, mesh.phases, *touching) + arc_selection.fibre_faults(case, centres[is_fibre])
     moved = (debonded_arcs.NOT_MOVED,) * len(case.interfaces)
     if case.arcs and not faults:
         nodes = InterfaceNodes.of(torus, lattice, pairs, numbers, centres)
@@ -198,8 +198,7 @@ def distribute(
     wanted = wanted_pieces(case, np.bincount(parts), _outer_edges(torus, parts), lattice, n_ranks, policy)
     decomposition = decompose(torus, parts, wanted, n_ranks)
     subdomain, rank = decomposition.subdomain, decomposition.rank
-    body = torus.constituent[np.unique(subdomain, return_index=True)[1]]
-    table = SubdomainTable(body, rank, torus.nesting, torus.constituent_phase)
+    table = SubdomainTable.of(torus, subdomain, rank)
     summary = CellSummary(
         width=mesh.width,
         height=mesh.height,
@@ -217,16 +216,15 @@ def distribute(
         moved_tips=tuple(map(dict, moved)),
         snapped=mesh.snapped,
         voids=voids(mesh) if torus.at_void.any() else 0,
-        match_distance=_match_distance(case, mesh, centres[is_fibre], circles[is_fibre, 2]),
+        match_distance=match_distance(case, mesh.width, mesh.height, centres[is_fibre], circles[is_fibre, 2]),
     )
-    return [RankShare(summary, table, pairs, own) for own in cut_for_ranks(torus, subdomain, rank, n_ranks)]
+    shares = cut_for_ranks(torus, subdomain, table, n_ranks, pinned_class(torus))
+    return [RankShare(summary, table, pairs, own) for own in shares]
 
 
-def _match_distance(case: Case, mesh: CoarseMesh, centres: Float, radii: Float) -> float | None:
-    """That of `CellSummary`."""
-    if case.cell.match is None:
-        return None
-    return distance_of(case.cell.match, mesh.width, mesh.height, centres, radii)
+def match_distance(case: Case, width: float, height: float, centres: Float, radii: Float) -> float | None:
+    """That of `CellSummary`, for fibres of these centres (n, 2) and radii (n,)."""
+    return None if case.cell.match is None else distance_of(case.cell.match, width, height, centres, radii)
 
 
 def wanted_pieces(
@@ -264,7 +262,7 @@ def wanted_pieces(
     return pieces if pieces.sum() >= n_ranks else pieces_for_count(load, n_ranks)
 
 
-def _in_cell(points: Float, period: Float) -> Float:
+def in_cell(points: Float, period: Float) -> Float:
     """The images of points (k, 2) in [0, period); those that rounding puts at its end are at 0."""
     inside = np.mod(points, period)
     return np.where(inside > (1 - ROUNDING) * period, 0.0, inside)

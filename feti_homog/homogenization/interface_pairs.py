@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from feti_homog.cell.periodic_topology import Torus
 from feti_homog.config.case import Case
 from feti_homog.config.interface_rules import interface_label
 from feti_homog.config.wording import toml_value
-from feti_homog.typing import Int
+from feti_homog.typing import AnyInt, Int
 
 
 def pairs_of(case: Case, phases: tuple[str, ...]) -> Int:
@@ -28,10 +27,10 @@ def pairs_of(case: Case, phases: tuple[str, ...]) -> Int:
     return pairs
 
 
-def faults(case: Case, torus: Torus) -> list[str]:
-    """Faults of interfaces between phases that the cell does not have, or that touch nowhere in it."""
-    phases, found = torus.mesh.phases, []
-    left, right = (torus.mesh.phase[each] for each in torus.sides[:2])
+def faults(case: Case, phases: tuple[str, ...], left: AnyInt, right: AnyInt) -> list[str]:
+    """Faults of interfaces between phases that the cell does not have, or that touch nowhere in it: those numbered
+    `left` (n,) touch those numbered `right` (n,)."""
+    found = []
     touching = np.zeros((len(phases), len(phases)), bool)
     touching[left, right] = touching[right, left] = True
     for number, interface in enumerate(case.interfaces):

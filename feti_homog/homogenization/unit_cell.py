@@ -10,6 +10,7 @@ import numpy as np
 from mpi4py import MPI
 
 from feti_homog.cell.coarse_mesh import CoarseMesh
+from feti_homog.cell.drawing import Drawing
 from feti_homog.cell.refinement import ReferenceLattice
 from feti_homog.cell.submesh import SubmeshesOfRank
 from feti_homog.common.dealing import deal
@@ -23,7 +24,7 @@ from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.solver import FetiSolver
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 from feti_homog.homogenization import bonds, cost_model, phase_laws, process_zone
-from feti_homog.homogenization.coarse_meshes import coarse_mesh
+from feti_homog.homogenization.coarse_meshes import begun, finished
 from feti_homog.homogenization.domain_partition import (
     DEFAULT_POLICY,
     CellSummary,
@@ -32,6 +33,7 @@ from feti_homog.homogenization.domain_partition import (
     distribute,
     moved_fibres,
 )
+from feti_homog.homogenization.tile_tearing import can_be_torn_by_tiles, tear_by_tiles
 from feti_homog.interface import debonded_arcs
 from feti_homog.typing import Bool, Float, Int
 
@@ -152,14 +154,12 @@ def assemble_subdomains(
     """
     lattice = ReferenceLattice.of(case.cell.refine, case.cell.order)
     with progress.stage("mesh") as words:
-        mesh = coarse_mesh(case, comm, policy.tiles)
-        own = _cut(case, mesh, lattice, comm, policy)
+        own = _cut(case, lattice, comm, policy)
         summary = own.summary
         shared = share_entities(comm, own.submeshes, own.table, own.pairs, lattice)
-        if mesh is not None and len(mesh.debonded_edges) and case.interface is None:
+        if comm.allreduce(bool(own.submeshes.whole.debonded.any()), MPI.LOR) and case.interface is None:
             words.append("its debonded curve is bonded, for there is no [interface]")
         words.append(f"{summary.coarse_triangles} triangles, {summary.bodies} bodies, {summary.subdomains} subdomains")
-        del mesh
     for line in on_root_only(comm, moved_fibres, case) or ():
         progress.say(f"remark: {line}")
     with progress.stage("assemble") as words:
@@ -172,10 +172,13 @@ def assemble_subdomains(
     return summary, shared, lattice, subdomains
 
 
-def _cut(
-    case: Case, mesh: CoarseMesh | None, lattice: ReferenceLattice, comm: MPI.Intracomm, policy: PartitionPolicy
-) -> RankShare:
-    """This rank's share of the mesh that rank 0 has.  Collective."""
+def _cut(case: Case, lattice: ReferenceLattice, comm: MPI.Intracomm, policy: PartitionPolicy) -> RankShare:
+    """This rank's share of the cell, meshed and cut.  Collective."""
+    drawn = on_root_only(comm, begun, case, policy.tiles)
+    if comm.bcast(isinstance(drawn, Drawing) and can_be_torn_by_tiles(case, drawn)):
+        assert not isinstance(drawn, CoarseMesh)
+        return tear_by_tiles(case, drawn, lattice, comm, policy)
+    mesh = finished(drawn, comm)
     return deal(comm, on_root_only(comm, distribute, case, mesh, lattice, comm.size, policy) or [])
 
 
@@ -207,7 +210,7 @@ def describe(case: Case, comm: MPI.Intracomm) -> str:
     Raises as `tear`.
     """
     lattice = ReferenceLattice.of(case.cell.refine, case.cell.order)
-    own = _cut(case, coarse_mesh(case, comm), lattice, comm, DEFAULT_POLICY)
+    own = _cut(case, lattice, comm, DEFAULT_POLICY)
     constraints = share_entities(comm, own.submeshes, own.table, own.pairs, lattice).constraints
     loads = comm.gather((len(own.submeshes.index), len(own.submeshes.member)))
     return on_root_only(comm, _described, case, own.summary, lattice, 2 * constraints, loads) or ""

@@ -8,11 +8,10 @@ import pytest
 from feti_homog.cell.gmsh_mesher import generate
 from feti_homog.cell.periodic_topology import Torus
 from feti_homog.cell.refinement import ReferenceLattice
-from feti_homog.cell.submesh import cut_for_ranks, pinned_class
+from feti_homog.cell.submesh import SubdomainTable, cut_for_ranks, pinned_class
 from feti_homog.config.cell_section import Cell
 from feti_homog.feti.decomposition.partition import decompose, pieces_for_size
 from feti_homog.feti.decomposition.shared_entities import share_entities
-from feti_homog.feti.decomposition.sharers import SubdomainTable
 
 pytestmark = [pytest.mark.parallel, pytest.mark.quick]
 PAIRS = np.array([[-1, 0], [0, -1]])
@@ -28,9 +27,8 @@ def shared_by_ranks(torus, comm, intervals=2):
     """The decomposition into pieces of about 20 triangles, and what this rank's share."""
     pieces = pieces_for_size(np.bincount(torus.constituent), 1, 20)
     cut = decompose(torus, torus.constituent, pieces, comm.size)
-    body = torus.constituent[np.unique(cut.subdomain, return_index=True)[1]]
-    table = SubdomainTable(body, cut.rank, torus.nesting, torus.constituent_phase)
-    own = list(cut_for_ranks(torus, cut.subdomain, cut.rank, comm.size))[comm.rank]
+    table = SubdomainTable.of(torus, cut.subdomain, cut.rank)
+    own = list(cut_for_ranks(torus, cut.subdomain, table, comm.size, pinned_class(torus)))[comm.rank]
     lattice = ReferenceLattice.of({1: 0, 2: 1}[intervals], 1)
     return cut, share_entities(comm, own, table, PAIRS, lattice)
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 
-from feti_homog.cell.submesh import Submesh, SubmeshesOfRank
+from feti_homog.cell.submesh import SubdomainTable, Submesh, SubmeshesOfRank
 from feti_homog.common.exchange import exchange
 from feti_homog.feti.decomposition.edge_arcs import mean_speed
-from feti_homog.feti.decomposition.sharers import Sharers, SubdomainTable, entity_code
+from feti_homog.feti.decomposition.sharers import Sharers, entity_code
 from feti_homog.typing import Bool, Float, Int
 
 

@@ -1,4 +1,4 @@
-"""Bodies cut into subdomains, and subdomains assigned to ranks; decided on rank 0 from the coarse mesh."""
+"""Bodies cut into subdomains, and subdomains assigned to ranks."""
 
 from __future__ import annotations
 
@@ -25,23 +25,30 @@ class Decomposition:
 def decompose(
     torus: Torus, parts: Int, pieces: Int, n_ranks: int, length_classes: int = LENGTH_CLASSES
 ) -> Decomposition:
-    """Cut the bodies into pieces and assign these to ranks.
+    """Cut the bodies of a whole cell into pieces, see `cut_into_pieces`, and assign these to ranks, see
+    `assign_ranks`."""
+    left, right, edge = torus.sides
+    subdomain = cut_into_pieces(torus, parts, pieces, torus.edge_lengths[edge].max(), length_classes)
+    apart = subdomain[left] != subdomain[right]
+    neighbours = subdomain[left[apart]], subdomain[right[apart]]
+    return Decomposition(subdomain, assign_ranks(np.bincount(subdomain), *neighbours, n_ranks))
+
+
+def cut_into_pieces(torus: Torus, parts: Int, pieces: Int, longest: float, length_classes: int = LENGTH_CLASSES) -> Int:
+    """(m,) subdomain of each triangle, connected through edges: pieces that METIS leaves in several parts are split.
 
     Args:
         parts: (m,) body of each triangle: `torus.constituent`, or `torus.plane_parts()`.
         pieces: (b,) wanted pieces of each body; METIS cuts a body that has more than one, by short cuts: so
             they rather cross narrow gaps than run along them, which converges better.
-        n_ranks: ranks to share the subdomains; some get none if there are more ranks than subdomains.
+        longest: edge of the whole cell.
         length_classes: number of lengths of edges that METIS distinguishes; with 1 all count alike.
-
-    Every subdomain is connected through edges: pieces that METIS leaves in several parts are split.
     """
     left, right, edge = torus.sides
     inside = parts[left] == parts[right]
-    length = torus.edge_lengths[edge]
-    weight = np.ceil(length_classes * length / length.max()).astype(np.int64)
+    weight = np.ceil(length_classes * torus.edge_lengths[edge] / longest).astype(np.int64)
     piece = _cut(parts, pieces, left[inside], right[inside], weight[inside])
-    key = parts * (piece.max() + 1) + piece
+    key = parts * (piece.max(initial=0) + 1) + piece
     together = key[left] == key[right]
     connected = components(len(parts), left[together], right[together])
     # Numbered body by body, so that neighbours in number are neighbours in place.
@@ -49,9 +56,7 @@ def decompose(
     first = np.unique(connected[order], return_index=True)[1]
     number = np.empty_like(first)
     number[np.argsort(first)] = np.arange(len(first))
-    subdomain = number[connected]
-    load, apart = np.bincount(subdomain), ~together
-    return Decomposition(subdomain, _assign_ranks(load, subdomain[left[apart]], subdomain[right[apart]], n_ranks))
+    return np.asarray(number[connected])
 
 
 def pieces_for_count(load: Int, wanted: int) -> Int:
@@ -107,8 +112,9 @@ def _metis(graph: csr_matrix, count: int, load: Int | None = None) -> Int:
     return np.asarray(part, np.int64)
 
 
-def _assign_ranks(load: Int, left: Int, right: Int, n_ranks: int) -> Int:
-    """Rank of each subdomain: neighbours (left, right) on the same one as far as the loads stay even."""
+def assign_ranks(load: Int, left: Int, right: Int, n_ranks: int) -> Int:
+    """(s,) rank of each subdomain of so many triangles (s,): neighbours (left, right), in a row for each edge that they
+    share, on the same one as far as the loads stay even; some get none if there are more ranks than subdomains."""
     even = _balanced(load, n_ranks)
     if n_ranks == 1 or len(load) <= n_ranks:
         return even

@@ -13,10 +13,10 @@ import numpy as np
 from mpi4py import MPI
 
 from feti_homog.cell.refinement import ReferenceLattice
-from feti_homog.cell.submesh import SubmeshesOfRank
+from feti_homog.cell.submesh import SubdomainTable, SubmeshesOfRank
 from feti_homog.common.exchange import exchange
 from feti_homog.feti.decomposition.interface_geometry import breakable_pairs, interface_geometry
-from feti_homog.feti.decomposition.sharers import Sharers, SubdomainTable, find_sharers
+from feti_homog.feti.decomposition.sharers import Sharers, find_sharers
 from feti_homog.typing import Array, Bool, Float, Int
 
 

@@ -11,26 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 
-from feti_homog.cell.submesh import SubmeshesOfRank
+from feti_homog.cell.submesh import SubdomainTable, SubmeshesOfRank
 from feti_homog.common.exchange import exchange
 from feti_homog.typing import Bool, Int
-
-
-@dataclass(frozen=True)
-class SubdomainTable:
-    """What every rank knows of the s subdomains of all.
-
-    Attributes:
-        body: (s,) constituent that each is a piece of.
-        rank: (s,) that has it.
-        nesting: (constituents,) places from the outermost to the innermost, as `Torus.nesting`.
-        phase: (constituents,) number of the material phase of each.
-    """
-
-    body: Int
-    rank: Int
-    nesting: Int
-    phase: Int
 
 
 @dataclass(frozen=True)

@@ -56,5 +56,5 @@ def test_a_coating_without_a_fibre_is_a_fibre(tmp_path):
 )
 def test_pairs_that_the_cell_does_not_have_are_told(coated, pair, words):
     case = Case.parse(document({"normal_strength": 1.0, "between": pair}))
-    (fault,) = interface_pairs.faults(case, Torus.of(coated))
+    (fault,) = interface_pairs.faults(case, coated.phases, *(coated.phase[each] for each in Torus.of(coated).sides[:2]))
     assert fault.startswith("[interface] between = [") and words in fault

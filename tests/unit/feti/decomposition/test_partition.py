@@ -7,7 +7,7 @@ import pytest
 
 from feti_homog.cell.gmsh_mesher import generate
 from feti_homog.cell.periodic_topology import Torus, components, edge_pairs
-from feti_homog.cell.submesh import cut_for_ranks
+from feti_homog.cell.submesh import SubdomainTable, cut_for_ranks, pinned_class
 from feti_homog.config.cell_section import Cell
 from feti_homog.feti.decomposition.partition import decompose, pieces_for_count, pieces_for_size
 
@@ -105,12 +105,13 @@ def cut_length(torus, **options):
 def test_subdomains_that_ranks_cut_are_those_of_the_whole_cell(torus):
     """Each against the triangles, classes and edges of the torus that it has."""
     decomposition = fine(torus, 3)
+    table, pinned = SubdomainTable.of(torus, decomposition.subdomain, decomposition.rank), pinned_class(torus)
     found = {}
-    for r, own in enumerate(cut_for_ranks(torus, decomposition.subdomain, decomposition.rank, 3)):
+    for r, own in enumerate(cut_for_ranks(torus, decomposition.subdomain, table, 3, pinned)):
         assert np.all(decomposition.rank[own.index] == r) and own.loads.sum() == len(own.member)
         found |= {submesh.index: submesh for submesh in own.cut()}
     assert sorted(found) == list(range(len(decomposition.rank)))
-    *_, idle = cut_for_ranks(torus, decomposition.subdomain, decomposition.rank, 4)
+    *_, idle = cut_for_ranks(torus, decomposition.subdomain, table, 4, pinned)
     assert idle.cut() == [] and len(idle.loads) == 0
     assert sum(submesh.pinned >= 0 for submesh in found.values()) >= 1
     mesh = torus.mesh

@@ -1,0 +1,139 @@
+"""Large cells torn where they are meshed: each rank cuts the tiles that it has filled, and no rank has them all.
+
+Pieces of the matrix are within tiles, and a fibre is in one tile, so subdomains depend on the case and on what it asks
+of so many ranks, not on who filled which tile.
+"""
+
+from __future__ import annotations
+
+from itertools import chain
+
+import numpy as np
+from mpi4py import MPI
+
+from feti_homog.cell.drawing import Drawing
+from feti_homog.cell.joined_submeshes import joined
+from feti_homog.cell.periodic_topology import Torus, components
+from feti_homog.cell.refinement import ReferenceLattice
+from feti_homog.cell.submesh import SubdomainTable, SubmeshesOfRank, cut_for_ranks
+from feti_homog.cell.tile_torus import FilledTile, Regions, tile_torus
+from feti_homog.common.dealing import swap
+from feti_homog.common.mpi_errors import agree, on_root, on_root_only
+from feti_homog.config.case import Case
+from feti_homog.feti.decomposition.partition import assign_ranks, cut_into_pieces
+from feti_homog.homogenization.coarse_meshes import deal_tiles, fill_own
+from feti_homog.homogenization.domain_partition import PartitionPolicy, RankShare, wanted_pieces
+from feti_homog.homogenization.drawn_cell import drawn_cell, summary_of, tiles_to_fill
+from feti_homog.typing import Float, Int
+
+
+def can_be_torn_by_tiles(case: Case, drawing: Drawing) -> bool:
+    """Whether no choice of the case needs the whole mesh: tips of arcs, bodies cut by the sides, the matrix in fewer
+    pieces than there are tiles."""
+    whole = case.arcs or case.cell.bodies == "plane" or case.decomposition.subdomains is not None
+    return len(drawing.parts) > 1 and not whole
+
+
+def tear_by_tiles(
+    case: Case, drawing: Drawing | None, lattice: ReferenceLattice, comm: MPI.Intracomm, policy: PartitionPolicy
+) -> RankShare:
+    """This rank's share of the cell that is drawn on rank 0.  Collective.
+
+    Raises:
+        CaseError, MeshError: on every rank, as `drawn_cell` and `filling.fill`.
+    """
+    facts = on_root(comm, drawn_cell, case, drawing)
+    regions: Regions = comm.bcast(None if drawing is None else drawing.regions)
+    torus, tile = _filled(drawing, regions, comm)
+    load = np.bincount(torus.constituent, minlength=len(regions.phase))
+    comm.Allreduce(MPI.IN_PLACE, load)
+    wanted = wanted_pieces(case, load, facts.edges, lattice, comm.size, policy)
+    longest = comm.allreduce(float(torus.edge_lengths.max(initial=0.0)), MPI.MAX)
+    local = agree(comm, _cut, torus, tile, wanted / load, longest)
+    subdomain, body, loads = _numbered(torus, tile, local, comm)
+    neighbours = comm.gather(agree(comm, _neighbours, torus, subdomain))
+    rank = on_root(comm, _assigned, loads, neighbours or [], comm.size)
+    table = SubdomainTable(body, rank, facts.nesting, regions.phase)
+    shares = agree(comm, _shares, torus, subdomain, table, comm.size, _pinned(torus, comm))
+    summary = comm.bcast(on_root_only(comm, summary_of, case, drawing, len(body), int(load.sum())))
+    return RankShare(summary, table, facts.pairs, joined(swap(comm, shares)))
+
+
+def _filled(drawing: Drawing | None, regions: Regions, comm: MPI.Intracomm) -> tuple[Torus, Int]:
+    """The torus of the tiles that this rank fills, and the tile (m,) of each triangle.  Collective."""
+    tiles = on_root_only(comm, tiles_to_fill, drawing) or []
+    own = deal_tiles(tiles, [len(tile.nodes) for tile in tiles], comm)
+    fillings = agree(comm, fill_own, [(k, tile.tile) for k, tile in own])
+    inner = dict(chain.from_iterable(comm.allgather([(k, len(filling.inner)) for k, filling in fillings])))
+    ends = regions.nodes + np.cumsum([0, *(inner[k] for k in range(len(inner)))])
+    filled = [FilledTile(k, tile, filling, int(ends[k])) for (k, tile), (_, filling) in zip(own, fillings, strict=True)]
+    return agree(comm, tile_torus, regions, filled, int(ends[-1]))
+
+
+def _cut(torus: Torus, tile: Int, pieces_per_triangle: Float, longest: float) -> Int:
+    """(m,) the subdomain of each triangle of this rank, numbered from 0 tile by tile within a constituent."""
+    left, right, _ = torus.sides
+    within = (tile[left] == tile[right]) & (torus.constituent[left] == torus.constituent[right])
+    label = components(len(tile), left[within], right[within])
+    first = np.unique(label, return_index=True)[1]
+    order = np.lexsort((first, tile[first], torus.constituent[first]))
+    place = np.empty_like(order)
+    place[order] = np.arange(len(order))
+    parts = place[label]
+    size = np.bincount(parts)
+    pieces = np.round(pieces_per_triangle[torus.constituent[first[order]]] * size).astype(np.int64)
+    return cut_into_pieces(torus, parts, np.clip(pieces, 1, size), longest)
+
+
+def _numbered(torus: Torus, tile: Int, local: Int, comm: MPI.Intracomm) -> tuple[Int, Int, Int]:
+    """The subdomain (m,) of each triangle, numbered body by body and tile by tile in the whole cell, from those of this
+    rank; the body (s,) and the triangles (s,) of each subdomain.  Collective."""
+    first = np.unique(local, return_index=True)[1]
+    parts = comm.allgather((torus.constituent[first], tile[first], np.bincount(local)))
+    body, tiles, load = (np.concatenate(some) for some in zip(*parts, strict=True))
+    order = np.lexsort((np.arange(len(body)), tiles, body))
+    number = np.empty_like(order)
+    number[order] = np.arange(len(order))
+    before = sum(len(own) for own, *_ in parts[: comm.rank])
+    return number[before + local], body[order], load[order]
+
+
+def _neighbours(torus: Torus, subdomain: Int) -> tuple[Int, Int, Int, Int]:
+    """Subdomains (n,) and (n,) that meet here, in a row for each edge; and the edges (k,) that have a triangle here and
+    another one elsewhere, with its subdomain (k,)."""
+    left, right, _ = torus.sides
+    apart = subdomain[left] != subdomain[right]
+    edges = torus.triangle_torus_edges
+    alone = (np.bincount(edges.ravel(), minlength=len(torus.edge_keys)) == 1) & ~torus.at_void
+    triangle, k = np.nonzero(alone[edges])
+    return subdomain[left[apart]], subdomain[right[apart]], torus.edge_keys[edges[triangle, k]], subdomain[triangle]
+
+
+def _assigned(load: Int, neighbours: list[tuple[Int, Int, Int, Int]], n_ranks: int) -> Int:
+    """(s,) rank of each subdomain, for what `_neighbours` found on all ranks."""
+    left, right, edge, beside = (np.concatenate(some) for some in zip(*neighbours, strict=True))
+    beside = beside[np.argsort(edge, kind="stable")]
+    return assign_ranks(load, np.append(left, beside[::2]), np.append(right, beside[1::2]), n_ranks)
+
+
+def _shares(torus: Torus, subdomain: Int, table: SubdomainTable, n_ranks: int, pinned: int) -> list[SubmeshesOfRank]:
+    """What each rank gets of the triangles of this one."""
+    return list(cut_for_ranks(torus, subdomain, table, n_ranks, pinned))
+
+
+def _pinned(torus: Torus, comm: MPI.Intracomm) -> int:
+    """Key of the class that is pinned, as `submesh.pinned_class`.  Collective."""
+    mesh, classes = torus.mesh, len(torus.class_keys)
+    at_interface, in_matrix = np.zeros(classes, bool), np.zeros(classes, bool)
+    at_interface[torus.node_class[mesh.arc_edges]] = True
+    in_matrix[torus.node_class[mesh.triangles[torus.constituent == 0]]] = True
+    distance = np.full(classes, np.inf)
+    np.minimum.at(
+        distance, torus.node_class, np.hypot(*(mesh.points - np.round(mesh.points / mesh.period) * mesh.period).T)
+    )
+    order = np.lexsort((torus.class_keys, distance, ~in_matrix, at_interface))[:1]
+    best = [
+        (bool(at_interface[k]), not in_matrix[k], float(distance[k]), int(torus.class_keys[k])) for k in order.tolist()
+    ]
+    key: int = min(chain.from_iterable(comm.allgather(best)))[-1]
+    return key
