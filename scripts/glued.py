@@ -65,15 +65,19 @@ def _keys(comm: MPI.Intracomm, subdomains: list[Subdomain], lattice: ReferenceLa
     """A key for each class of each subdomain, the same wherever the node is, and from which on keys are not shared."""
     inner = lattice.intervals - 1
     inside = [s.mesh.n_classes - len(s.submesh.class_keys) - len(s.submesh.edge_keys) * inner for s in subdomains]
-    vertices = comm.allreduce(max(int(s.submesh.class_keys.max()) + 1 for s in subdomains), MPI.MAX)
-    edges = comm.allreduce(max(int(s.submesh.edge_keys.max()) + 1 for s in subdomains), MPI.MAX)
-    several = vertices + edges * inner
+    classes, edges = (
+        np.unique(np.concatenate(comm.allgather(np.unique(np.concatenate(own)))))
+        for own in ([s.submesh.class_keys for s in subdomains], [s.submesh.edge_keys for s in subdomains])
+    )
+    several = len(classes) + len(edges) * inner
     ends = several + comm.scan(sum(inside)) - sum(inside) + np.cumsum(inside)
     keys = [
         np.concatenate(
             [
-                s.submesh.class_keys,
-                (vertices + s.submesh.edge_keys[:, None] * inner + np.arange(inner)).ravel(),
+                np.searchsorted(classes, s.submesh.class_keys),
+                (
+                    len(classes) + np.searchsorted(edges, s.submesh.edge_keys)[:, None] * inner + np.arange(inner)
+                ).ravel(),
                 np.arange(end - count, end),
             ]
         )

@@ -13,48 +13,50 @@ from feti_homog.typing import Array, Int
 
 def joined(parts: Sequence[SubmeshesOfRank]) -> SubmeshesOfRank:
     """The subdomains of all of these, each of which is in one of them."""
-    index = np.concatenate([part.index for part in parts])
+    index = _all(parts, "index")
     order = np.argsort(index)
     place = np.empty_like(order)
     place[order] = np.arange(len(order))
     phase = [name for part in parts for name in part.phase]
     return SubmeshesOfRank(
         whole=_joined_meshes([part.whole for part in parts]),
-        member=place[_shifted([part.member for part in parts], [part.index for part in parts])],
+        member=place[_numbers(parts, "member", "index")],
         index=index[order],
-        body=np.concatenate([part.body for part in parts])[order],
+        body=_all(parts, "body")[order],
         phase=tuple(phase[k] for k in order.tolist()),
     )
 
 
 def _joined_meshes(meshes: list[Submesh]) -> Submesh:
     """All triangles of these; plane vertices and edges are not identified, classes and torus edges are."""
-    points, edges = [mesh.points for mesh in meshes], [mesh.edges for mesh in meshes]
-    class_keys, edge_keys = [mesh.class_keys for mesh in meshes], [mesh.edge_keys for mesh in meshes]
-    classes, class_of = np.unique(np.concatenate(class_keys), return_inverse=True)
-    torus_edges, first, edge_of = np.unique(np.concatenate(edge_keys), return_index=True, return_inverse=True)
-    vertex_class = class_of[_shifted([mesh.vertex_class for mesh in meshes], class_keys)]
-    pinned = [np.searchsorted(classes, mesh.class_keys[mesh.pinned]) for mesh in meshes if mesh.pinned >= 0]
+    class_keys, class_of = np.unique(_all(meshes, "class_keys"), return_inverse=True)
+    edge_keys, first, edge_of = np.unique(_all(meshes, "edge_keys"), return_index=True, return_inverse=True)
+    pinned = [np.searchsorted(class_keys, mesh.class_keys[mesh.pinned]) for mesh in meshes if mesh.pinned >= 0]
     return replace(
         meshes[0],
-        points=np.concatenate(points),
-        triangles=_shifted([mesh.triangles for mesh in meshes], points),
-        triangle_edges=_shifted([mesh.triangle_edges for mesh in meshes], edges),
-        backwards=np.concatenate([mesh.backwards for mesh in meshes]),
-        edges=_shifted(edges, points),
-        circles=np.concatenate([mesh.circles for mesh in meshes]),
-        turns=np.concatenate([mesh.turns for mesh in meshes]),
-        vertex_class=vertex_class,
-        edge_class=edge_of[_shifted([mesh.edge_class for mesh in meshes], edge_keys)],
-        at_void=np.concatenate([mesh.at_void for mesh in meshes])[first],
-        debonded=np.concatenate([mesh.debonded for mesh in meshes])[first],
-        class_keys=classes,
-        edge_keys=torus_edges,
+        points=_all(meshes, "points"),
+        triangles=_numbers(meshes, "triangles", "points"),
+        triangle_edges=_numbers(meshes, "triangle_edges", "edges"),
+        backwards=_all(meshes, "backwards"),
+        edges=_numbers(meshes, "edges", "points"),
+        circles=_all(meshes, "circles"),
+        turns=_all(meshes, "turns"),
+        vertex_class=class_of[_numbers(meshes, "vertex_class", "class_keys")],
+        edge_class=edge_of[_numbers(meshes, "edge_class", "edge_keys")],
+        at_void=_all(meshes, "at_void")[first],
+        debonded=_all(meshes, "debonded")[first],
+        class_keys=class_keys,
+        edge_keys=edge_keys,
         pinned=int(pinned[0]) if pinned else -1,
     )
 
 
-def _shifted(numbers: Sequence[Int], of: Sequence[Array]) -> Int:
-    """Numbers of things, list after list, in the list of all of them, one list `of` them after the other."""
-    ends = np.cumsum([0, *map(len, of)])
-    return np.concatenate([own + end for own, end in zip(numbers, ends, strict=False)])
+def _all(parts: Sequence[object], name: str) -> Array:
+    """What each of the parts has of that name, one after the other."""
+    return np.concatenate([getattr(part, name) for part in parts])
+
+
+def _numbers(parts: Sequence[object], name: str, of: str) -> Int:
+    """The same for numbers of what is called `of`, which become numbers in the list of all of these."""
+    ends = np.cumsum([0, *(len(getattr(part, of)) for part in parts)])
+    return np.concatenate([getattr(part, name) + end for part, end in zip(parts, ends, strict=False)])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -9,24 +10,34 @@ import pytest
 from mpi4py import MPI
 from support.cases import FIBRE, MATRIX, monolithic_stiffness, relative_error, solve
 
+from feti_homog.cell.refinement import ReferenceLattice
 from feti_homog.cell.tiles import TilePolicy
+from feti_homog.common.mpi_errors import on_root_only
 from feti_homog.config import case as cases
 from feti_homog.errors import MeshError
 from feti_homog.homogenization import coarse_meshes
 from feti_homog.homogenization.coarse_meshes import coarse_mesh, dealt
-from feti_homog.homogenization.domain_partition import PartitionPolicy
+from feti_homog.homogenization.domain_partition import PartitionPolicy, distribute
+from feti_homog.homogenization.tile_tearing import can_be_torn_by_tiles, tear_by_tiles
 
 pytestmark = pytest.mark.parallel
 
 
 SMALL = TilePolicy(least_discs=16, discs=4)
 TILED = PartitionPolicy(tiles=SMALL)
+LATTICE = ReferenceLattice.of(1, 1)
+KINDS = {
+    "plain": {},
+    "coated, voids": {"fibre_fraction": 0.3, "min_gap": 0.15, "coating": 0.1, "voids": 0.04, "void_radius": 0.6},
+}
 
 
-def case_of(**keys):
+def case_of(interface=None, decomposition=None, **keys):
     document = {
         "cell": {"geometry": "random", "fibres": 16, "fibre_fraction": 0.5, "mesh_size": 0.08, **keys},
-        "material": {"matrix": MATRIX, "fibre": FIBRE},
+        "material": {"matrix": MATRIX, "fibre": FIBRE} | ({"coating": FIBRE} if "coating" in keys else {}),
+        **({"interface": interface} if interface else {}),
+        "decomposition": decomposition or {},
         "analysis": {"type": "stiffness", "plane": "strain"},
         "petsc": {"feti_ksp_rtol": 1e-11},
         "output": {"pictures": False},
@@ -44,10 +55,59 @@ def test_the_mesh_is_that_of_one_rank(comm):
             assert np.array_equal(getattr(mesh, name), getattr(alone, name))
 
 
+def share_of(case, comm):
+    """This rank's share of the cell, torn by tiles."""
+    drawing = on_root_only(comm, coarse_meshes.begun, case, SMALL)
+    assert drawing is None or can_be_torn_by_tiles(case, drawing)
+    return tear_by_tiles(case, drawing, LATTICE, comm, TILED)
+
+
+@pytest.mark.parametrize("keys", KINDS.values(), ids=KINDS)
+def test_the_summary_is_that_of_the_whole_mesh(comm, keys):
+    """But for the number of subdomains: here they end with the tiles."""
+    case = case_of(**keys)
+    found = share_of(case, comm)
+    (whole,) = distribute(case, coarse_mesh(case, MPI.COMM_SELF, SMALL), LATTICE, 1, TILED)
+    for field in fields(found.summary):
+        mine, other = (getattr(share.summary, field.name) for share in (found, whole))
+        if isinstance(mine, np.ndarray):
+            np.testing.assert_allclose(mine, other, rtol=1e-12, atol=1e-12)
+        elif field.name != "subdomains":
+            assert mine == other, field.name
+    for name in ("nesting", "phase"):
+        assert np.array_equal(getattr(found.table, name), getattr(whole.table, name))
+    assert comm.allreduce(len(found.submeshes.member)) == found.summary.coarse_triangles
+
+
 @pytest.mark.quick
-def test_the_stiffness_is_that_of_a_direct_solve_on_the_mesh(comm):
-    cell, L, _ = solve(case_of(refine=1), comm, policy=TILED)
+def test_subdomains_are_those_of_one_rank(comm):
+    """Each has the same triangles, whoever filled its tile; an entity has the same sharers."""
+    case = case_of(**KINDS["coated, voids"], decomposition={"max_dofs": 500})
+    own, alone = share_of(case, comm), share_of(case, MPI.COMM_SELF)
+    assert np.array_equal(own.table.body, alone.table.body) and own.table.rank.max() == comm.size - 1
+    expected = {submesh.index: submesh for submesh in alone.submeshes.cut()}
+    for submesh in own.submeshes.cut():
+        other = expected[submesh.index]
+        assert np.array_equal(submesh.points[submesh.triangles], other.points[other.triangles])
+        assert np.array_equal(submesh.class_keys, other.class_keys)
+        assert (submesh.pinned >= 0) == (other.pinned >= 0)
+
+
+@pytest.mark.quick
+@pytest.mark.parametrize("keys", KINDS.values(), ids=KINDS)
+def test_the_stiffness_is_that_of_a_direct_solve_on_the_mesh(comm, keys):
+    cell, L, _ = solve(case_of(**keys, refine=1), comm, policy=TILED)
     assert relative_error(L, monolithic_stiffness(cell)) < 1e-9
+
+
+def test_what_needs_the_whole_mesh_is_torn_on_rank_0(comm):
+    contact = {"debonded": [{"fibre": 1, "centre": 0.0, "angle": 90.0}], "contact": True}
+    for more in ({"interface": contact}, {"decomposition": {"subdomains": 17}}, {"bodies": "plane"}):
+        case = case_of(**more)
+        drawing = on_root_only(comm, coarse_meshes.begun, case, SMALL)
+        assert drawing is None or not can_be_torn_by_tiles(case, drawing)
+    cell, *_ = solve(case_of(decomposition={"subdomains": 17}), comm, policy=TILED)
+    assert cell.summary.subdomains == 17
 
 
 def test_the_stiffness_is_that_of_the_cell_meshed_at_once(comm):
@@ -63,8 +123,9 @@ def test_a_tile_that_one_rank_cannot_fill_ends_the_job_on_all(comm, monkeypatch)
 
     if comm.rank == comm.size - 1:
         monkeypatch.setattr(coarse_meshes, "fill", broken)
-    with pytest.raises(MeshError, match="gmsh cannot fill it"):
-        coarse_mesh(case_of(), comm, SMALL)
+    for mesh in (share_of, lambda case, comm: coarse_mesh(case, comm, SMALL)):
+        with pytest.raises(MeshError, match="gmsh cannot fill it"):
+            mesh(case_of(), comm)
 
 
 def test_tiles_are_dealt_evenly():

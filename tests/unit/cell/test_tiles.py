@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
 
 import gmsh
 import numpy as np
 import pytest
-from support.circular_cells import cell
+from support.tiled_cells import CELLS, SMALL, drawn, mesh_of
 from unit.cell.test_gmsh_mesher import least_angle
 
 from feti_homog.cell import filling
@@ -22,33 +21,9 @@ from feti_homog.cell.periodic_topology import Torus
 from feti_homog.cell.tiles import TilePolicy, is_tiled, tiling
 from feti_homog.errors import MeshError
 
-VOIDS = {"voids": 0.05, "void_radius": 0.7}
-CELLS = {
-    "dense": cell(fibres=36, fraction=0.6, gap=0.04),
-    "narrow": cell(fibres=36, fraction=0.7, gap=0.01),
-    "dilute": cell(fibres=64, fraction=0.06, gap=0.1),
-    "spread": cell(fibres=49, fraction=0.5, spread=0.45),
-    "coated": cell(fibres=36, fraction=0.4, gap=0.1, coating=0.05),
-    "voids": cell(fibres=36, fraction=0.4, gap=0.1, **VOIDS),
-    "coated, voids": cell(fibres=36, fraction=0.4, gap=0.1, coating=0.1, **VOIDS),
-    "fine interfaces": cell(fibres=25, fraction=0.5, interface_size=0.01),
-    "wide": cell(fibres=30, fraction=0.5, seed=3, size=0.1),
-}
-SMALL, NONE = TilePolicy(least_discs=4, discs=4), TilePolicy(least_discs=10**6)
+NONE = TilePolicy(least_discs=10**6)
 MARKS = {0: (20.0, 100.0), 7: (0.0, 180.0)}
 named = pytest.mark.parametrize("name", CELLS)
-
-
-@cache
-def drawn(name):
-    found = draw(CELLS[name], policy=SMALL)
-    assert len(found.parts) >= 4
-    return found
-
-
-@cache
-def mesh_of(name):
-    return drawn(name).filled()
 
 
 @named

@@ -1,0 +1,35 @@
+"""Cells cut into small tiles."""
+
+from __future__ import annotations
+
+from functools import cache
+
+from feti_homog.cell.gmsh_mesher import draw
+from feti_homog.cell.tiles import TilePolicy
+from support.circular_cells import cell
+
+VOIDS = {"voids": 0.05, "void_radius": 0.7}
+CELLS = {
+    "dense": cell(fibres=36, fraction=0.6, gap=0.04),
+    "narrow": cell(fibres=36, fraction=0.7, gap=0.01),
+    "dilute": cell(fibres=64, fraction=0.06, gap=0.1),
+    "spread": cell(fibres=49, fraction=0.5, spread=0.45),
+    "coated": cell(fibres=36, fraction=0.4, gap=0.1, coating=0.05),
+    "voids": cell(fibres=36, fraction=0.4, gap=0.1, **VOIDS),
+    "coated, voids": cell(fibres=36, fraction=0.4, gap=0.1, coating=0.1, **VOIDS),
+    "fine interfaces": cell(fibres=25, fraction=0.5, interface_size=0.01),
+    "wide": cell(fibres=30, fraction=0.5, seed=3, size=0.1),
+}
+SMALL = TilePolicy(least_discs=4, discs=4)
+
+
+@cache
+def drawn(name):
+    found = draw(CELLS[name], policy=SMALL)
+    assert len(found.parts) >= 4
+    return found
+
+
+@cache
+def mesh_of(name):
+    return drawn(name).filled()
