@@ -221,6 +221,7 @@ class FetiSolver:
         """
         self._destroy_krylov()
         self.coarse.destroy()
+        self.natural.destroy()
 
     def _solve_with_restarts(self, krylov: Krylov, lam: Float, right: Float) -> tuple[Iterate, int, int]:
         """Multipliers, iterations, and why they ended.

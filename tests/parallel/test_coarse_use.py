@@ -12,6 +12,7 @@ from support import torn_cells
 from support.cases import make_case, monolithic_stiffness, relative_error, solve
 from support.coarse_space_cells import BOUND, BREAKING, NARROW, STRAINS, of_all, solve_many
 
+from feti_homog.common.distributed_arrays import allreduce_sum
 from feti_homog.errors import CaseError
 from feti_homog.feti.coarse.adaptive import AdaptiveCoarseSpace
 from feti_homog.feti.linalg.distributed_direct import DistributedDirectSolver
@@ -135,6 +136,32 @@ def test_a_distributed_coarse_problem_gives_the_same(comm, contrast):
     for one, other in zip(*found, strict=True):
         assert one.reason > 0 and other.reason > 0 and abs(one.iterations - other.iterations) <= 1
         assert relative_error(*(dense_feti.gathered(cell, s.lam) for s in (one, other))) < 1e-7
+
+
+def test_one_factor_of_the_kernels_projects_as_one_on_each_rank(comm):
+    """With all rows, with every seventh one away, and with none on the first fibre, which then can move freely."""
+    found = []
+    for largest in (10**6, 0):
+        cell = torn_cells.tear(comm, **BREAKING, thresholds=Thresholds(replicated_vectors=largest))
+        natural, rows = cell.solver.natural, cell.solver.rows
+        first = cell.solver.jump_operator.owned[0]
+        number = np.arange(first, first + rows)
+        nodes = cell.solver.jump_operator.nodes
+        free = np.ones(rows)
+        for row in nodes.row[nodes.fibre == cell.summary.fibre_bodies[0]]:
+            free[row : row + 2] = 0.0
+        for active in (np.ones(rows), (number % 7 > 0).astype(float), free):
+            natural.activate(active)
+            x = active * np.cos(number + 1.0)
+            projected = natural.project(x)
+            work = allreduce_sum(comm, natural.GT_active @ projected)
+            assert np.abs(work).max() < 1e-10 * np.abs(allreduce_sum(comm, natural.GT_active @ x)).max()
+            found.append((projected, natural.unconstrained_modes.shape[1]))
+        cell.destroy()
+    for (one, free), (other, also_free) in zip(found[:3], found[3:], strict=True):
+        assert free == also_free
+        assert comm.allreduce(float(np.abs(one - other).max(initial=0.0)), MPI.MAX) < 1e-10
+    assert found[2][1] > 0
 
 
 @pytest.mark.parametrize("petsc", [{"feti_dual_operator": "implicit"}, {"feti_pc_type": "lumped"}])

@@ -200,7 +200,7 @@ class AdaptiveCoarseSpace:
         nonzero = allreduce_sum(self.comm, abs(U.T) @ self._active) > 0.0
         mask = diags(nonzero.astype(float))
         E, K = mask @ self.operator.E @ mask, (GT @ U).tocsr() @ mask
-        unconstrained = csr_matrix(self.natural.unconstrained_modes @ self.natural.unconstrained_modes.T)
+        unconstrained = self.natural.unconstrained_projector
         if self.comm.rank == 0:
             E = E + diags((~nonzero).astype(float))
         if self._includes_G:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from mpi4py import MPI
@@ -13,10 +13,11 @@ from feti_homog.common.distributed_arrays import allreduce_sum
 from feti_homog.feti.coarse.gram_matrix import GramMatrix
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.linalg.collectives import allreduce_sparse
+from feti_homog.feti.linalg.distributed_direct import DistributedDirectSolver, direct_solver
 from feti_homog.feti.linalg.distributed_matrix import assemble_owned_rows
 from feti_homog.feti.linalg.sparse_direct import DirectSolver
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
-from feti_homog.feti.thresholds import UNCONSTRAINED_EIGENVALUE
+from feti_homog.feti.thresholds import DEFAULTS, UNCONSTRAINED_EIGENVALUE
 from feti_homog.typing import Float, Int
 
 
@@ -24,7 +25,8 @@ class NaturalCoarseSpace:
     """Solvability of all subdomains on the active multipliers: G^T lam = 0.
 
     The load of a macroscopic strain does no work on rigid-body motions, so e = R^T f vanishes.  G has a row for each
-    multiplier and a column for each kernel mode; every rank holds its own rows and a factor of G^T G.
+    multiplier and a column for each kernel mode; every rank holds its own rows, and a factor of G^T G, or its part of
+    one that all ranks share.
 
     Attributes:
         kernel_dimension: kernel modes of all subdomains, m.
@@ -37,9 +39,15 @@ class NaturalCoarseSpace:
         factorizations: of G^T G so far.
     """
 
-    def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators) -> None:
-        """Assemble G and factor for all rows.  Options under `feti_natural_` (default: cholesky by CHOLMOD).
-        Collective."""
+    def __init__(
+        self,
+        comm: MPI.Intracomm,
+        jump_operator: JumpOperator,
+        operators: InterfaceOperators,
+        replicated_vectors: int = DEFAULTS.replicated_vectors,
+    ) -> None:
+        """Assemble G and factor for all rows: each rank for itself up to so many kernel modes.  Options under
+        `feti_natural_` (default: cholesky by CHOLMOD, on all ranks together by MUMPS).  Collective."""
         subdomains = operators.subdomains
         kernels = [s.R[dofs] for s, dofs in zip(subdomains, operators.dofs, strict=True)]
         modes = sum(R.shape[1] for R in kernels)
@@ -60,7 +68,10 @@ class NaturalCoarseSpace:
         squares = np.asarray(self.G.power(2).sum(axis=0)).ravel()
         self._largest_diagonal = float(comm.allreduce(squares).max(initial=0.0))
         self.unconstrained_modes = np.zeros((self.kernel_dimension, 0))
-        self._factor(allreduce_sparse(comm, (self.GT_active @ self.G).tocsr()))
+        self._is_shared = comm.size > 1 and self.kernel_dimension > replicated_vectors
+        self._solver: DirectSolver | DistributedDirectSolver | None = None
+        part = (self.GT_active @ self.G).tocsr()
+        self._factor(part if self._is_shared else allreduce_sparse(comm, part))
 
     def activate(self, active: Float) -> None:
         """Factor G^T G for the owned rows of which `active` is 1; the others, 0, carry no multiplier.  Collective.
@@ -71,13 +82,23 @@ class NaturalCoarseSpace:
         self.GT_active = self.G_active.T.tocsr()
         entries = self._gram.entries(active)
         self.unconstrained_modes = self._null_space(entries)
-        gram, Z = self._gram.matrix(entries), self.unconstrained_modes
-        self._factor((gram + self._largest_diagonal * csr_matrix(Z @ Z.T)).tocsr() if Z.shape[1] else gram)
+        gram = (self.GT_active @ self.G_active).tocsr() if self._is_shared else self._gram.matrix(entries)
+        if self.unconstrained_modes.shape[1] and not (self._is_shared and self.comm.rank):
+            gram = (gram + self._largest_diagonal * self.unconstrained_projector).tocsr()
+        self._factor(gram)
+
+    @property
+    def unconstrained_projector(self) -> csr_matrix:
+        """(m, m) orthogonal projector Z Z^T to the amplitudes that no active row resists."""
+        Z = csr_matrix(self.unconstrained_modes)
+        return (Z @ Z.T).tocsr()
 
     def _factor(self, gram: csr_matrix) -> None:
-        """Solve with G^T G from now on."""
+        """Solve with G^T G from now on: `gram`, or where ranks share the factor, the sum of theirs.  Collective."""
         if self.kernel_dimension:
-            self._solver = DirectSolver(gram, "feti_natural_")
+            self.destroy()
+            make = partial(direct_solver, self.comm, definite=True) if self._is_shared else DirectSolver
+            self._solver = make(gram, prefix="feti_natural_")
             self.factorizations += 1
 
     @cached_property
@@ -120,6 +141,7 @@ class NaturalCoarseSpace:
 
     def amplitudes(self, x: Float) -> Float:
         """(G^T G)^-1 G^T x on every rank, for the owned rows x (rows,) or (rows, k).  Collective."""
+        assert self._solver is not None, "there are no kernels, or the factor is destroyed"
         return self._solver.solve(allreduce_sum(self.comm, self.GT_active @ x))
 
     def project(self, x: Float) -> Float:
@@ -159,4 +181,7 @@ class NaturalCoarseSpace:
         return False
 
     def destroy(self) -> None:
-        """The factor is this rank's own and goes with the object."""
+        """Free the factor.  Collective."""
+        if self._solver is not None:
+            self._solver.destroy()
+            self._solver = None
