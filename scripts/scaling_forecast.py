@@ -46,7 +46,7 @@ def assumptions(rates: Rates, machine: Machine) -> list[str]:
         "the factor, and of a solve of one load:",
         "              by every rank for itself, which solves for its loads: "
         + ", ".join(f"{f.factor:.2g} n^{f.exponent:.2f}" for f in alone),
-        f"              from {DEFAULTS.replicated_vectors / r.vectors / 1e6:.0f} million dofs by all together: "
+        f"              from {DEFAULTS.replicated_vectors / r.vectors / 1e6:.0f} million dofs / p by all together: "
         + ", ".join(f"({s.serial:.2g} + {s.parallel:.2g} / p) n^{f.exponent:.2f}" for s, f in shared),
         f"              of {STRONG_DOFS / 1e6:g} million dofs n is {r.coarse * STRONG_DOFS / r.largest_coarse:.1f} "
         "times the largest that was timed: the further, the less these powers are worth (`sizes` times larger ones)",

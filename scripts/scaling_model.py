@@ -201,11 +201,6 @@ class Prediction:
         return sum(self.parts.values())
 
 
-def is_together(vectors: float) -> bool:
-    """Whether ranks share one coarse factor for so many vectors."""
-    return vectors > DEFAULTS.replicated_vectors
-
-
 def predict(rates: Rates, machine: Machine, dofs: float, ranks: int, together: bool | None = None) -> Prediction:
     """What a cell of `dofs` takes on `ranks`; with one coarse factor on all if `together`, by default as the program
     chooses."""
@@ -215,7 +210,7 @@ def predict(rates: Rates, machine: Machine, dofs: float, ranks: int, together: b
     own = dofs / ranks * max(rates.imbalance if ranks > 1 else 1.0, whole)
     coarse = max(rates.coarse * dofs, 2.0)
     if together is None:
-        together = is_together(rates.vectors * dofs) and ranks > 1
+        together = ranks > 1 and not DEFAULTS.replicates(rates.vectors * dofs, ranks)
     if together:
         factor = rates.factor_together.seconds(coarse**rates.factor.exponent, ranks)
         solve = rates.loads * rates.solve_together.seconds(coarse**rates.solve.exponent, ranks)

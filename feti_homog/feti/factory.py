@@ -76,7 +76,7 @@ def build(
     )  # fmt: skip
     plan = choose(_sizes(comm, jump_operator, operators, applications), options, thresholds)
     preconditioner = CLASSES[plan.preconditioner](comm, jump_operator, operators)
-    natural = NaturalCoarseSpace(comm, jump_operator, operators, thresholds.replicated_vectors)
+    natural = NaturalCoarseSpace(comm, jump_operator, operators, thresholds)
     coarse: CoarseSpace = natural
     if plan.adaptive and isinstance(preconditioner, Dirichlet):
         coarse = AdaptiveCoarseSpace(

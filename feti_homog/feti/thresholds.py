@@ -35,8 +35,9 @@ class Thresholds:
             decay within few fibres.  Measured [1e-3, 1e-5, 1e-7]: 20 iterations each.
         whole_boundary_dofs: boundary degrees of freedom of a whole body above which its soft modes come from a dense
             eigenproblem for each face, not from one.  Measured [1000, 5000] with a boundary of 3644: 4.6 and 15.9 s.
-        replicated_vectors: coarse vectors up to which every rank factors the whole coarse matrix and solves for some
-            of the load cases; above, all ranks factor it together (`scripts/scaling sizes`).
+        replicated_vectors: coarse vectors, times the ranks that would each have them all, up to which every rank
+            factors the whole coarse matrix and solves for some of the load cases; above, all ranks factor it together.
+            With 5 209 vectors a copy takes 310 MB; of one factor on 16 ranks each has 93 MB (`scripts/scaling`).
         influence_applications: applications of the dual operator from which on influence columns pay
             (`scripts/benchmark_path`).
         assembled_schur_dofs: largest cell that is factored for influence columns, in degrees of freedom on shared nodes
@@ -51,9 +52,13 @@ class Thresholds:
     rows_per_vector: int = 4
     drop_tolerance: float = 1e-5
     whole_boundary_dofs: int = 2000
-    replicated_vectors: int = 20_000
+    replicated_vectors: int = 40_000
     influence_applications: int = 1000
     assembled_schur_dofs: int = 40_000
+
+    def replicates(self, vectors: float, ranks: int) -> bool:
+        """Whether each of several ranks has a factor of so many coarse vectors or kernel modes of its own."""
+        return ranks > 1 and vectors * ranks <= self.replicated_vectors
 
 
 DEFAULTS = Thresholds()

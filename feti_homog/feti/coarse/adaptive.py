@@ -211,9 +211,10 @@ class AdaptiveCoarseSpace:
             if self.comm.rank == 0:
                 E = E + csr_matrix((stiffness * at.data, (at.row + first, at.col + first)), shape=E.shape)
         process_memory.trim()
-        largest = self._thresholds.replicated_vectors
         try:
-            self._saddle = coarse_saddle_point(self.comm, E.tocsr(), K.tocsr(), unconstrained, "feti_coarse_", largest)
+            self._saddle = coarse_saddle_point(
+                self.comm, E.tocsr(), K.tocsr(), unconstrained, "feti_coarse_", self._thresholds
+            )
         except np.linalg.LinAlgError:
             return False
         return True

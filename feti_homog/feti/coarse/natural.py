@@ -17,7 +17,7 @@ from feti_homog.feti.linalg.distributed_direct import DistributedDirectSolver, d
 from feti_homog.feti.linalg.distributed_matrix import assemble_owned_rows
 from feti_homog.feti.linalg.sparse_direct import DirectSolver
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
-from feti_homog.feti.thresholds import DEFAULTS, UNCONSTRAINED_EIGENVALUE
+from feti_homog.feti.thresholds import DEFAULTS, UNCONSTRAINED_EIGENVALUE, Thresholds
 from feti_homog.typing import Float, Int
 
 
@@ -44,9 +44,9 @@ class NaturalCoarseSpace:
         comm: MPI.Intracomm,
         jump_operator: JumpOperator,
         operators: InterfaceOperators,
-        replicated_vectors: int = DEFAULTS.replicated_vectors,
+        thresholds: Thresholds = DEFAULTS,
     ) -> None:
-        """Assemble G and factor for all rows: each rank for itself up to so many kernel modes.  Options under
+        """Assemble G and factor for all rows: each rank for itself unless there are many modes.  Options under
         `feti_natural_` (default: cholesky by CHOLMOD, on all ranks together by MUMPS).  Collective."""
         subdomains = operators.subdomains
         kernels = [s.R[dofs] for s, dofs in zip(subdomains, operators.dofs, strict=True)]
@@ -68,7 +68,7 @@ class NaturalCoarseSpace:
         squares = np.asarray(self.G.power(2).sum(axis=0)).ravel()
         self._largest_diagonal = float(comm.allreduce(squares).max(initial=0.0))
         self.unconstrained_modes = np.zeros((self.kernel_dimension, 0))
-        self._is_shared = comm.size > 1 and self.kernel_dimension > replicated_vectors
+        self._is_shared = comm.size > 1 and not thresholds.replicates(self.kernel_dimension, comm.size)
         self._solver: DirectSolver | DistributedDirectSolver | None = None
         part = (self.GT_active @ self.G).tocsr()
         self._factor(part if self._is_shared else allreduce_sparse(comm, part))

@@ -8,7 +8,7 @@ from scipy.sparse import csr_matrix
 
 from feti_homog.feti.linalg.collectives import allreduce_sparse
 from feti_homog.feti.linalg.saddle_point import SaddlePoint
-from feti_homog.feti.thresholds import COARSE_ACCURACY, DEFAULTS
+from feti_homog.feti.thresholds import COARSE_ACCURACY, DEFAULTS, Thresholds
 from feti_homog.typing import Float
 
 
@@ -68,8 +68,8 @@ def coarse_saddle_point(
     K: csr_matrix,
     null_projector: csr_matrix,
     prefix: str,
-    replicated_vectors: int = DEFAULTS.replicated_vectors,
+    thresholds: Thresholds = DEFAULTS,
 ) -> SaddlePoint | ReplicatedSaddlePoint:
-    """The coarse problem of these parts, replicated up to so many vectors.  Collective; see `SaddlePoint`."""
-    replicated = comm.size > 1 and E.shape[0] <= replicated_vectors
-    return (ReplicatedSaddlePoint if replicated else SaddlePoint)(comm, E, K, null_projector, prefix)
+    """The coarse problem of these parts, replicated or not as the thresholds say.  Collective; see `SaddlePoint`."""
+    kind = ReplicatedSaddlePoint if thresholds.replicates(E.shape[0], comm.size) else SaddlePoint
+    return kind(comm, E, K, null_projector, prefix)
