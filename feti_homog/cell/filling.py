@@ -117,7 +117,11 @@ def fill(tile: Tile) -> Filling:
 
 
 def _unfilled(tile: Tile, why: str) -> MeshError:
-    (x, y), (right, top) = tile.points.min(axis=0), tile.points.max(axis=0)
+    curves = tile.curves
+    # A disc that a side cuts has pieces on the other side of the cell.
+    in_matrix = np.flatnonzero((curves.inside == MATRIX) | (curves.outside == MATRIX))
+    points = tile.points[curves.chosen(in_matrix).node] if len(in_matrix) else tile.points
+    (x, y), (right, top) = points.min(axis=0), points.max(axis=0)
     return MeshError(
         f"[cell] gmsh cannot fill the part from ({x:.4g}, {y:.4g}) to ({right:.4g}, {top:.4g}) of the cell of width 1: "
         f"{why}; expected another seed, mesh_size or interface_size"

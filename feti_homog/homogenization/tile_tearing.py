@@ -55,7 +55,7 @@ def tear_by_tiles(
     rank = on_root(comm, _assigned, loads, neighbours or [], comm.size)
     table = SubdomainTable(body, rank, facts.nesting, regions.phase)
     shares = agree(comm, _shares, torus, subdomain, table, comm.size, _pinned(torus, comm))
-    summary = comm.bcast(on_root_only(comm, summary_of, case, drawing, len(body), int(load.sum())))
+    summary = on_root(comm, summary_of, case, drawing, len(body), int(load.sum()))
     return RankShare(summary, table, facts.pairs, joined(swap(comm, shares)))
 
 
