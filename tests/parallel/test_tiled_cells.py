@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import fields
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
 import pytest
 from mpi4py import MPI
+from support import torn_cells
 from support.cases import FIBRE, MATRIX, monolithic_stiffness, relative_error, solve
+from support.loads import strains
 
 from feti_homog.cell.refinement import ReferenceLattice
 from feti_homog.cell.tiles import TilePolicy
@@ -19,6 +22,11 @@ from feti_homog.homogenization import coarse_meshes
 from feti_homog.homogenization.coarse_meshes import coarse_mesh, dealt
 from feti_homog.homogenization.domain_partition import PartitionPolicy, distribute
 from feti_homog.homogenization.tile_tearing import can_be_torn_by_tiles, tear_by_tiles
+from feti_homog.interface.contact import BONDED
+from feti_homog.interface.loaded_cell import LoadedCell
+from feti_homog.interface.path_following import events
+from feti_homog.interface.path_points import unloaded
+from feti_homog.interface.strength_criterion import StrengthCriterion
 
 pytestmark = pytest.mark.parallel
 
@@ -98,6 +106,23 @@ def test_subdomains_are_those_of_one_rank(comm):
 def test_the_stiffness_is_that_of_a_direct_solve_on_the_mesh(comm, keys):
     cell, L, _ = solve(case_of(**keys, refine=1), comm, policy=TILED)
     assert relative_error(L, monolithic_stiffness(cell)) < 1e-9
+
+
+def test_a_path_is_that_of_the_cell_torn_on_rank_0(comm):
+    """With the matrix whole, on the same mesh: loads and stresses of the first bonds that break, without contact."""
+    found = []
+    for pieces in ({}, {"subdomains": 17}):
+        cell = {"geometry": "random", "fibres": 16, "fibre_fraction": 0.5, "mesh_size": 0.1, "decomposition": pieces}
+        torn = torn_cells.tear(comm, springs=(500.0, 300.0), policy=TILED, **cell)
+        assert (torn.summary.subdomains > 17) == (not pieces)
+        loaded = LoadedCell(torn_cells.interface(torn, contact=True))
+        bonded = np.full(len(torn.solver.jump_operator.nodes.row), BONDED, np.int8)
+        law = StrengthCriterion(20.0, 30.0, "quadratic")
+        path = events(loaded, law, strains(np.array([[1.0, -0.2, 0.4]])), unloaded(loaded, bonded))
+        points = list(islice(path, 8))
+        found.append([[p.load_factor, *(p.scale * torn_cells.stress(torn, p.state.solution))] for p in points])
+    assert len(found[0]) == 8 and np.ptp([load for load, *_ in found[0]]) > 0
+    assert relative_error(np.array(found[0]), np.array(found[1])) < 1e-7
 
 
 def test_what_needs_the_whole_mesh_is_torn_on_rank_0(comm):

@@ -14,6 +14,7 @@ from feti_homog.common.progress import Progress
 from feti_homog.config import sections
 from feti_homog.feti.thresholds import DEFAULTS
 from feti_homog.homogenization import unit_cell
+from feti_homog.homogenization.domain_partition import DEFAULT_POLICY
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface.contact import BONDED, OPEN, Interface
 from support.cases import make_case
@@ -55,7 +56,7 @@ class ReferencedCell:
         return np.zeros(self.cell.solver.rows)
 
 
-def tear(comm, arcs=(), thresholds=DEFAULTS, springs=(None, None), **case):
+def tear(comm, arcs=(), thresholds=DEFAULTS, springs=(None, None), policy=DEFAULT_POLICY, **case):
     """The torn cell of the case that `make_case` makes, the tips of arcs at its nodes, with elastic interfaces of the
     stiffnesses `springs`.  Collective."""
     PETSc.garbage_cleanup(comm)
@@ -63,7 +64,7 @@ def tear(comm, arcs=(), thresholds=DEFAULTS, springs=(None, None), **case):
     bonding = sections.InterfaceSection(debonded=tuple(arcs), normal_stiffness=normal, tangential_stiffness=tangential)
     case = replace(make_case(**case), interfaces=() if bonding is None else (bonding,))
     with case_options(case.petsc):
-        return unit_cell.tear(case, comm, Progress(comm, quiet=True), thresholds)
+        return unit_cell.tear(case, comm, Progress(comm, quiet=True), thresholds, policy)
 
 
 def printed(comm, capfd, **case):
