@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
+from feti_homog.common.dividing import ranges
 from feti_homog.typing import Bool, Float, Int
 
 # Regions: what is beside a curve where that is no disc or coating.
@@ -75,8 +76,7 @@ def rows_of(first: Int, those: Int) -> tuple[Int, Int]:
     """Where the rows of the groups `those` (k,) are, and where each of these groups begins among them; group i has the
     rows from first[i] up to first[i + 1]."""
     counts = np.diff(first)[those]
-    begin = np.concatenate([[0], np.cumsum(counts)])
-    return np.arange(begin[-1]) + np.repeat(first[those] - begin[:-1], counts), begin
+    return ranges(first[those], counts), np.concatenate([[0], np.cumsum(counts)])
 
 
 def backwards(node: Int, first: Int, turned: Bool) -> Int:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import heapq
 from dataclasses import replace
 from itertools import chain
 from operator import itemgetter
 from typing import TypeVar
 
+import numpy as np
 from mpi4py import MPI
 
 from feti_homog.cell.coarse_mesh import CoarseMesh
@@ -15,6 +15,7 @@ from feti_homog.cell.drawing import Drawing
 from feti_homog.cell.filling import Filling, Tile, fill
 from feti_homog.cell.tiles import DEFAULT_TILES, TilePolicy
 from feti_homog.common.dealing import collect, deal
+from feti_homog.common.dividing import balanced
 from feti_homog.common.mpi_errors import agree, on_root_only
 from feti_homog.config import case as cases
 from feti_homog.config.case import Case
@@ -71,7 +72,10 @@ def finished(found: Drawing | CoarseMesh | None, comm: MPI.Intracomm) -> CoarseM
 def deal_tiles(tiles: list[T], loads: list[int], comm: MPI.Intracomm) -> list[tuple[int, T]]:
     """Those of the tiles of rank 0 that this rank fills, with their numbers; `loads` says how large they are.
     Collective."""
-    return deal(comm, [[(k, tiles[k]) for k in mine] for mine in dealt(loads, comm.size)])
+    parts: list[list[tuple[int, T]]] = [[] for _ in range(comm.size)]
+    for k, rank in enumerate(balanced(np.array(loads, np.int64), comm.size).tolist()):
+        parts[rank].append((k, tiles[k]))
+    return deal(comm, parts)
 
 
 def fill_own(tiles: list[tuple[int, Tile]]) -> list[tuple[int, Filling]]:
@@ -86,14 +90,3 @@ def fill_own(tiles: list[tuple[int, Tile]]) -> list[tuple[int, Filling]]:
 def _joined(found: Drawing | CoarseMesh, fillings: list[Filling]) -> CoarseMesh:
     """The mesh of these filled tiles, if it is not there already."""
     return found if isinstance(found, CoarseMesh) else found.mesh(fillings)
-
-
-def dealt(loads: list[int], n_ranks: int) -> list[list[int]]:
-    """The numbers of the tiles of each rank: the largest goes first, each to the least loaded rank."""
-    ranks: list[list[int]] = [[] for _ in range(n_ranks)]
-    heap = [(0, rank) for rank in range(n_ranks)]
-    for tile in sorted(range(len(loads)), key=lambda k: -loads[k]):
-        total, rank = heap[0]
-        ranks[rank].append(tile)
-        heapq.heapreplace(heap, (total + loads[tile], rank))
-    return ranks

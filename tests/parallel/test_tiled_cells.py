@@ -19,7 +19,7 @@ from feti_homog.common.mpi_errors import on_root_only
 from feti_homog.config import case as cases
 from feti_homog.errors import MeshError
 from feti_homog.homogenization import coarse_meshes
-from feti_homog.homogenization.coarse_meshes import coarse_mesh, dealt
+from feti_homog.homogenization.coarse_meshes import coarse_mesh
 from feti_homog.homogenization.domain_partition import PartitionPolicy, distribute
 from feti_homog.homogenization.tile_tearing import can_be_torn_by_tiles, tear_by_tiles
 from feti_homog.interface.contact import BONDED
@@ -151,12 +151,3 @@ def test_a_tile_that_one_rank_cannot_fill_ends_the_job_on_all(comm, monkeypatch)
     for mesh in (share_of, lambda case, comm: coarse_mesh(case, comm, SMALL)):
         with pytest.raises(MeshError, match="gmsh cannot fill it"):
             mesh(case_of(), comm)
-
-
-def test_tiles_are_dealt_evenly():
-    loads = np.random.default_rng(0).integers(50, 100, 40).tolist()
-    ranks = dealt(loads, 3)
-    assert sorted(k for own in ranks for k in own) == list(range(40))
-    sums = [sum(loads[k] for k in own) for own in ranks]
-    assert max(sums) - min(sums) <= max(loads)
-    assert dealt([], 2) == [[], []]

@@ -10,6 +10,7 @@ import pymetis
 from scipy.sparse import coo_matrix, csr_matrix
 
 from feti_homog.cell.periodic_topology import Torus, components
+from feti_homog.common.dividing import balanced
 from feti_homog.feti.thresholds import LENGTH_CLASSES, MAX_IMBALANCE
 from feti_homog.typing import Int
 
@@ -115,20 +116,9 @@ def _metis(graph: csr_matrix, count: int, load: Int | None = None) -> Int:
 def assign_ranks(load: Int, left: Int, right: Int, n_ranks: int) -> Int:
     """(s,) rank of each subdomain of so many triangles (s,): neighbours (left, right), in a row for each edge that they
     share, on the same one as far as the loads stay even; some get none if there are more ranks than subdomains."""
-    even = _balanced(load, n_ranks)
+    even = balanced(load, n_ranks)
     if n_ranks == 1 or len(load) <= n_ranks:
         return even
     near = _metis(_graph(len(load), left, right, np.ones_like(left)), n_ranks, load)
     most = [np.bincount(ranks, load, n_ranks).max() for ranks in (near, even)]
     return near if most[0] <= MAX_IMBALANCE * most[1] and len(np.unique(near)) == n_ranks else even
-
-
-def _balanced(load: Int, n_ranks: int) -> Int:
-    """Rank of each subdomain: the largest goes first, each to the least loaded rank."""
-    ranks = np.zeros(len(load), np.int64)
-    heap = [(0, rank) for rank in range(n_ranks)]
-    for subdomain in np.argsort(-load, kind="stable"):
-        total, rank = heap[0]
-        ranks[subdomain] = rank
-        heapq.heapreplace(heap, (total + int(load[subdomain]), rank))
-    return ranks

@@ -12,6 +12,7 @@ import numpy as np
 from mpi4py import MPI
 
 from feti_homog.cell.submesh import SubdomainTable, SubmeshesOfRank
+from feti_homog.common.dividing import ranges
 from feti_homog.common.exchange import exchange
 from feti_homog.typing import Bool, Int
 
@@ -54,13 +55,6 @@ class Sharers:
 def entity_code(key: Int, is_edge: Bool | bool) -> Int:
     """(n,) one number for each class or torus edge of these keys (n,)."""
     return np.asarray(2 * key + is_edge)
-
-
-def ranges(start: Int, count: Int) -> Int:
-    """start[0] .. start[0] + count[0] - 1, start[1] .. and so on."""
-    ends = np.cumsum(count)
-    shift: Int = np.repeat(start - ends + count, count)
-    return shift + np.arange(count.sum(), dtype=np.int64)
 
 
 def find_sharers(comm: MPI.Intracomm, own: SubmeshesOfRank, table: SubdomainTable) -> Sharers:
