@@ -198,8 +198,10 @@ class AdaptiveCoarseSpace:
         """Factor the coarse matrix, its zero rows and unconstrained motions made regular; whether it could be."""
         U, GT = self.operator.U, self.natural.GT_active
         nonzero = allreduce_sum(self.comm, abs(U.T) @ self._active) > 0.0
-        mask = diags(nonzero.astype(float))
-        E, K = mask @ self.operator.E @ mask, (GT @ U).tocsr() @ mask
+        E, K = self.operator.E, (GT @ U).tocsr()
+        if not nonzero.all():
+            mask = diags(nonzero.astype(float))
+            E, K = mask @ E @ mask, K @ mask
         unconstrained = self.natural.unconstrained_projector
         if self.comm.rank == 0:
             E = E + diags((~nonzero).astype(float))

@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
-from scipy.sparse import bmat, csr_matrix, diags, vstack
+from scipy.sparse import bmat, csr_matrix, vstack
 
 from feti_homog.common.distributed_arrays import allreduce_sum
 from feti_homog.feti.linalg.collectives import allgather_rows
 from feti_homog.feti.linalg.distributed_direct import DistributedDirectSolver, direct_solver
 from feti_homog.feti.linalg.distributed_matrix import reduce_scatter_rows
+from feti_homog.feti.linalg.scaled_sparse import scaled
 from feti_homog.feti.linalg.sparse_direct import DirectSolver
 from feti_homog.feti.thresholds import (
     AUGMENTATION_WEIGHT,
@@ -56,12 +57,12 @@ class SaddlePoint:
             CaseError: the library that the options name cannot factor the matrix on that many ranks.
         """
         self._columns = 1.0 / np.sqrt(allreduce_sum(comm, E.diagonal()))
-        K = reduce_scatter_rows(comm, (K @ diags(self._columns)).tocsr())
+        K = reduce_scatter_rows(comm, scaled(K, columns=self._columns))
         length = np.sqrt(np.asarray(K.multiply(K).sum(axis=1)).ravel())
         length = np.where(length > 0, length, 1.0)
         self._rows = 1.0 / np.concatenate(comm.allgather(length))
-        E = (diags(self._columns) @ E @ diags(self._columns)).tocsr()
-        self._system = _System(comm, E, (diags(1.0 / length) @ K).tocsr())
+        E = scaled(E, self._columns, self._columns)
+        self._system = _System(comm, E, scaled(K, 1.0 / length))
         self._solves = MIN_COARSE_SOLVES
         self._inner: _Augmented | _Indefinite
         augmented = self._system.augmented()
