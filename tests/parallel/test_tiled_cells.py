@@ -70,6 +70,7 @@ def share_of(case, comm):
     return tear_by_tiles(case, drawing, LATTICE, comm, TILED)
 
 
+@pytest.mark.few_ranks
 @pytest.mark.parametrize("keys", KINDS.values(), ids=KINDS)
 def test_the_summary_is_that_of_the_whole_mesh(comm, keys):
     """But for the number of subdomains: here they end with the tiles."""
@@ -108,6 +109,7 @@ def test_the_stiffness_is_that_of_a_direct_solve_on_the_mesh(comm, keys):
     assert relative_error(L, monolithic_stiffness(cell)) < 1e-9
 
 
+@pytest.mark.few_ranks
 def test_a_path_is_that_of_the_cell_torn_on_rank_0(comm):
     """With the matrix whole, on the same mesh: loads and stresses of the first bonds that break, without contact."""
     found = []
@@ -135,6 +137,7 @@ def test_what_needs_the_whole_mesh_is_torn_on_rank_0(comm):
     assert cell.summary.subdomains == 17
 
 
+@pytest.mark.few_ranks
 def test_the_stiffness_is_that_of_the_cell_meshed_at_once(comm):
     """To the difference between two refinements of it."""
     _, tiled, _ = solve(case_of(refine=1), comm, policy=TILED)
