@@ -19,6 +19,8 @@ from feti_homog.cell.gmsh_mesher import generate
 from feti_homog.cell.size_field import MAX_GROWTH
 from feti_homog.errors import MeshError
 
+pytestmark = pytest.mark.slow
+
 SQUARE, WIDE_GAPS = cell("square"), cell(fibres=9, fraction=0.35, gap=0.3, spread=0.4)
 CROWDED = cell(fibres=20, fraction=0.6, gap=0.02)
 

@@ -6,6 +6,8 @@ import pytest
 from support.falsifications import broken
 from support.verified_results import falsified
 
+pytestmark = pytest.mark.slow
+
 STRESS, ENERGY, SPACE = "envelope", "envelope by energy", "envelope in space"
 
 

@@ -15,6 +15,8 @@ from support.falsifications import (
 )
 from support.verified_results import falsified
 
+pytestmark = pytest.mark.slow
+
 ENERGIES = ("work", "dissipated", "dissipated_strain_controlled")
 TARGET = ("case", "load", "to")
 

@@ -21,6 +21,8 @@ from feti_homog.verification.certificate import verify
 from feti_homog.verification.discrete_cell import DiscreteCell, gradient
 from feti_homog.verification.reading import opened
 
+pytestmark = pytest.mark.slow
+
 MATERIAL = {"stress", "stress 33", "equilibrium", "mean stress", "Hill"}
 SPRINGS = {"bond", "penetration", "complementarity"}
 PATHS = ("path", "thinned", "peaks", "energy", "pairs", "springs' energy", "increments", *MIXED_PATHS)

@@ -6,6 +6,8 @@ import pytest
 from support.falsifications import MATRIX, attribute, broken, document, free_axial_traction, scale, shift
 from support.verified_results import falsified
 
+pytestmark = pytest.mark.slow
+
 MATERIAL = {"stress", "equilibrium", "mean stress", "Hill"}
 
 

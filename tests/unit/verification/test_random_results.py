@@ -10,6 +10,8 @@ from support.random_results import random_document, random_mixed_document
 from feti_homog import Case, run
 from feti_homog.verification.certificate import verify
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize("seed", [1, 3, 5, 6, 10, 15])
 def test_random_cases_obey_every_law(tmp_path, seed):
