@@ -15,12 +15,10 @@ def joined(parts: Sequence[SubmeshesOfRank]) -> SubmeshesOfRank:
     """The subdomains of all of these, each of which is in one of them."""
     index = _all(parts, "index")
     order = np.argsort(index)
-    place = np.empty_like(order)
-    place[order] = np.arange(len(order))
     phase = [name for part in parts for name in part.phase]
     return SubmeshesOfRank(
         whole=_joined_meshes([part.whole for part in parts]),
-        member=place[_numbers(parts, "member", "index")],
+        member=np.argsort(order)[_numbers(parts, "member", "index")],
         index=index[order],
         body=_all(parts, "body")[order],
         phase=tuple(phase[k] for k in order.tolist()),

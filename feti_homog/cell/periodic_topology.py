@@ -147,10 +147,7 @@ class Torus:
         phase, n = self.constituent_phase, len(self.constituent_phase)
         touching = csr_matrix((np.ones(len(a)), (a, b)), shape=(n, n))
         depth = dijkstra(touching, False, np.flatnonzero(phase == 0), unweighted=True, min_only=True)
-        coats = np.array([name == COATING for name in self.mesh.phases])[phase]
-        place = np.empty(n, np.int64)
-        place[np.lexsort((np.arange(n), ~coats, depth))] = np.arange(n)
-        return place
+        return places_by_depth(depth, phase, self.mesh.phases)
 
     def plane_parts(self) -> Int:
         """(m,) constituents cut by the cell's boundary, as the paper's Fig. 2a does (`bodies = "plane"`)."""
@@ -158,6 +155,13 @@ class Torus:
         same = self.constituent[left] == self.constituent[right]
         label = components(len(self.constituent), left[same], right[same])
         return _renumber(label, np.argsort(self.constituent, kind="stable"))
+
+
+def places_by_depth(depth: Float | Int, phase: Int, phases: tuple[str, ...]) -> Int:
+    """(n,) places from the outermost to the innermost of constituents of these depths (n,) in the matrix, a coating
+    before what it coats, and then by number; `phase` (n,) is the number of the phase of each."""
+    coats = np.array([name == COATING for name in phases])[phase]
+    return np.argsort(np.lexsort((~coats, depth)))
 
 
 def edge_pairs(triangle_edges: Int) -> tuple[Int, Int]:

@@ -172,24 +172,33 @@ def part(submesh: Submesh, members: Int) -> Submesh:
 
 
 def pinned_class(torus: Torus) -> int:
-    """The class that is pinned, Eq. (15): the one inside the matrix nearest to the cell's corner.
+    """The class of a whole cell that is pinned, Eq. (15): the one inside the matrix nearest to the cell's corner.
 
     A pinned class on an interface would hold faces together that must be able to part, and one in a fibre would keep
     that from moving when all of its bonds are broken.  u* is the same up to a constant.
     """
-    mesh = torus.mesh
     body = np.repeat(torus.constituent, 3)
-    corner = torus.node_class[mesh.triangles].ravel()
-    n = torus.node_class.max() + 1
+    corner = torus.node_class[torus.mesh.triangles].ravel()
+    n = len(torus.class_keys)
     low, high = np.full(n, body.max()), np.zeros(n, np.int64)
     np.minimum.at(low, corner, body)
     np.maximum.at(high, corner, body)
-    away = mesh.points - np.round(mesh.points / [mesh.width, mesh.height]) * [mesh.width, mesh.height]
-    distance = np.full(n, np.inf)
-    np.minimum.at(distance, torus.node_class, np.hypot(*away.T))
-    in_matrix = torus.constituent_phase[high] == 0
     # By preference inside the matrix, else inside any body.
-    return int(np.lexsort((distance, ~in_matrix, low != high))[0])
+    ((*_, key),) = pinning(torus, low != high, torus.constituent_phase[high] == 0)
+    return key
+
+
+def pinning(torus: Torus, at_interface: Bool, in_matrix: Bool) -> list[tuple[bool, bool, float, int]]:
+    """Of the class that is best pinned, by which the least of several is: whether it is at an interface, whether it is
+    outside the matrix, its distance from the cell's corner, its key; of the classes (n,) each of which is or is not
+    `at_interface` and `in_matrix`.  Nothing of no classes."""
+    mesh = torus.mesh
+    away = mesh.points - np.round(mesh.points / mesh.period) * mesh.period
+    distance = np.full(len(torus.class_keys), np.inf)
+    np.minimum.at(distance, torus.node_class, np.hypot(*away.T))
+    best = np.lexsort((distance, ~in_matrix, at_interface))[:1].tolist()
+    keys = torus.class_keys
+    return [(bool(at_interface[k]), not in_matrix[k], float(distance[k]), int(keys[k])) for k in best]
 
 
 def _submesh(torus: Torus, members: Int, pinned: int) -> Submesh:

@@ -37,7 +37,8 @@ class Thresholds:
             eigenproblem for each face, not from one.  Measured [1000, 5000] with a boundary of 3644: 4.6 and 15.9 s.
         replicated_vectors: coarse vectors, times the ranks that would each have them all, up to which every rank
             factors the whole coarse matrix and solves for some of the load cases; above, all ranks factor it together.
-            With 5 209 vectors a copy takes 310 MB; of one factor on 16 ranks each has 93 MB (`scripts/scaling`).
+            With 5 209 vectors a copy takes 311 MB; of one factor on 16 ranks each has 92 MB (`scripts/scaling strong
+            --fibres 25 --dofs 150000`).
         influence_applications: applications of the dual operator from which on influence columns pay
             (`scripts/benchmark_path`).
         assembled_schur_dofs: largest cell that is factored for influence columns, in degrees of freedom on shared nodes

@@ -1,4 +1,4 @@
-"""The coarse mesh of a case, on rank 0; of large cells all ranks make a part of the triangles."""
+"""The coarse mesh of a case: begun on rank 0; the tiles of large cells are filled by all ranks."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from mpi4py import MPI
 from feti_homog.cell.coarse_mesh import CoarseMesh
 from feti_homog.cell.drawing import Drawing
 from feti_homog.cell.filling import Filling, Tile, fill
-from feti_homog.cell.tiles import DEFAULT_TILES, TilePolicy
+from feti_homog.cell.tiles import TilePolicy
 from feti_homog.common.dealing import collect, deal
 from feti_homog.common.dividing import balanced
 from feti_homog.common.mpi_errors import agree, on_root_only
@@ -22,17 +22,6 @@ from feti_homog.config.case import Case
 from feti_homog.homogenization import tips
 
 T = TypeVar("T")
-
-
-def coarse_mesh(case: Case, comm: MPI.Intracomm, policy: TilePolicy = DEFAULT_TILES) -> CoarseMesh | None:
-    """The coarse mesh of the case, its phases checked against the materials; None but on rank 0.  Collective.
-
-    The ranks fill its tiles together; who fills one does not change the mesh.
-
-    Raises:
-        CaseError, MeshError: on every rank, as `begun` and `finished`.
-    """
-    return finished(on_root_only(comm, begun, case, policy), comm)
 
 
 def begun(case: Case, policy: TilePolicy) -> Drawing | CoarseMesh:

@@ -10,9 +10,9 @@ from feti_homog.cell.coarse_mesh import representatives
 from feti_homog.cell.curves import MATRIX
 from feti_homog.cell.drawing import Drawing
 from feti_homog.cell.filling import arc_edges
+from feti_homog.cell.periodic_topology import places_by_depth
 from feti_homog.cell.tile_torus import NumberedTile
 from feti_homog.config.case import Case
-from feti_homog.config.phase_names import COATING
 from feti_homog.errors import CaseError
 from feti_homog.homogenization import interface_pairs
 from feti_homog.homogenization.domain_partition import CellSummary, in_cell, match_distance
@@ -50,9 +50,7 @@ def drawn_cell(case: Case, drawing: Drawing) -> DrawnCell:
     n = len(regions.phase)
     depth = np.zeros(n, np.int64)
     depth[inside[inside >= 0]] = np.where(around == MATRIX, 1, 2)[inside >= 0]
-    coats = np.array([name == COATING for name in regions.phases])[regions.phase]
-    nesting = np.empty(n, np.int64)
-    nesting[np.lexsort((np.arange(n), ~coats, depth))] = np.arange(n)
+    nesting = places_by_depth(depth, regions.phase, regions.phases)
     arcs = np.flatnonzero(curves.circle != MATRIX)
     beside = np.stack([regions.constituent[side[arcs]] for side in (curves.inside, curves.outside)])
     shared = (beside >= 0).all(axis=0)

@@ -15,7 +15,7 @@ from feti_homog.cell.drawing import Drawing
 from feti_homog.cell.joined_submeshes import joined
 from feti_homog.cell.periodic_topology import Torus, components
 from feti_homog.cell.refinement import ReferenceLattice
-from feti_homog.cell.submesh import SubdomainTable, SubmeshesOfRank, cut_for_ranks
+from feti_homog.cell.submesh import SubdomainTable, SubmeshesOfRank, cut_for_ranks, pinning
 from feti_homog.cell.tile_torus import FilledTile, Regions, tile_torus
 from feti_homog.common.dealing import swap
 from feti_homog.common.mpi_errors import agree, on_root, on_root_only
@@ -77,9 +77,7 @@ def _cut(torus: Torus, tile: Int, pieces_per_triangle: Float, longest: float) ->
     label = components(len(tile), left[within], right[within])
     first = np.unique(label, return_index=True)[1]
     order = np.lexsort((first, tile[first], torus.constituent[first]))
-    place = np.empty_like(order)
-    place[order] = np.arange(len(order))
-    parts = place[label]
+    parts = np.argsort(order)[label]
     size = np.bincount(parts)
     pieces = np.round(pieces_per_triangle[torus.constituent[first[order]]] * size).astype(np.int64)
     return cut_into_pieces(torus, parts, np.clip(pieces, 1, size), longest)
@@ -92,10 +90,8 @@ def _numbered(torus: Torus, tile: Int, local: Int, comm: MPI.Intracomm) -> tuple
     parts = comm.allgather((torus.constituent[first], tile[first], np.bincount(local)))
     body, tiles, load = (np.concatenate(some) for some in zip(*parts, strict=True))
     order = np.lexsort((np.arange(len(body)), tiles, body))
-    number = np.empty_like(order)
-    number[order] = np.arange(len(order))
     before = sum(len(own) for own, *_ in parts[: comm.rank])
-    return number[before + local], body[order], load[order]
+    return np.argsort(order)[before + local], body[order], load[order]
 
 
 def _neighbours(torus: Torus, subdomain: Int) -> tuple[Int, Int, Int, Int]:
@@ -122,18 +118,10 @@ def _shares(torus: Torus, subdomain: Int, table: SubdomainTable, n_ranks: int, p
 
 
 def _pinned(torus: Torus, comm: MPI.Intracomm) -> int:
-    """Key of the class that is pinned, as `submesh.pinned_class`.  Collective."""
-    mesh, classes = torus.mesh, len(torus.class_keys)
-    at_interface, in_matrix = np.zeros(classes, bool), np.zeros(classes, bool)
-    at_interface[torus.node_class[mesh.arc_edges]] = True
-    in_matrix[torus.node_class[mesh.triangles[torus.constituent == 0]]] = True
-    distance = np.full(classes, np.inf)
-    np.minimum.at(
-        distance, torus.node_class, np.hypot(*(mesh.points - np.round(mesh.points / mesh.period) * mesh.period).T)
-    )
-    order = np.lexsort((torus.class_keys, distance, ~in_matrix, at_interface))[:1]
-    best = [
-        (bool(at_interface[k]), not in_matrix[k], float(distance[k]), int(torus.class_keys[k])) for k in order.tolist()
-    ]
-    key: int = min(chain.from_iterable(comm.allgather(best)))[-1]
-    return key
+    """Key of the class of all ranks that is pinned, see `submesh.pinned_class`.  Collective."""
+    at_interface, in_matrix = np.zeros((2, len(torus.class_keys)), bool)
+    at_interface[torus.node_class[torus.mesh.arc_edges]] = True
+    in_matrix[torus.node_class[torus.mesh.triangles[torus.constituent == 0]]] = True
+    found = comm.allgather(pinning(torus, at_interface, in_matrix))
+    best: tuple[bool, bool, float, int] = min(chain.from_iterable(found))
+    return best[-1]

@@ -10,13 +10,13 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from support.cases import FIBRE, MATRIX
 from support.ranks import parallel_assert
+from support.whole_meshes import coarse_mesh
 from unit.cell.faulty_meshes import ALL_SIDES, RIGHT_SIDE, grid
 
 from feti_homog.cell.arrangement import arrange
 from feti_homog.common.progress import Progress
 from feti_homog.config import case as cases
 from feti_homog.errors import CaseError
-from feti_homog.homogenization.coarse_meshes import coarse_mesh
 from feti_homog.homogenization.unit_cell import tear
 
 pytestmark = pytest.mark.parallel

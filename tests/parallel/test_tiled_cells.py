@@ -12,6 +12,7 @@ from mpi4py import MPI
 from support import torn_cells
 from support.cases import FIBRE, MATRIX, monolithic_stiffness, relative_error, solve
 from support.loads import strains
+from support.whole_meshes import coarse_mesh
 
 from feti_homog.cell.refinement import ReferenceLattice
 from feti_homog.cell.tiles import TilePolicy
@@ -19,7 +20,6 @@ from feti_homog.common.mpi_errors import on_root_only
 from feti_homog.config import case as cases
 from feti_homog.errors import MeshError
 from feti_homog.homogenization import coarse_meshes
-from feti_homog.homogenization.coarse_meshes import coarse_mesh
 from feti_homog.homogenization.domain_partition import PartitionPolicy, distribute
 from feti_homog.homogenization.tile_tearing import can_be_torn_by_tiles, tear_by_tiles
 from feti_homog.interface.contact import BONDED

@@ -53,31 +53,31 @@ def interface_geometry(
     normals[edges], turns[edges] = normal, turn = _edge_normals(whole, triangle, k)
     precracked[edges] = whole.debonded[whole.edge_class[plane]]
     ends = whole.class_keys[whole.vertex_class[whole.edges[plane]]]
-    sums = np.zeros((n, 4))
+    parts = []
     for end, (low, high) in enumerate(((0.0, side), (1.0 - side, 1.0))):
         length = mean_speed(normal, turn, np.full(len(edges), low), np.full(len(edges), high))
         unit = normal[:, end] / np.maximum(np.hypot(*normal[:, end].T), 1e-300)[:, None]
-        parts = np.column_stack([unit * length[:, None], length, ~precracked[edges]])
-        sums += _sums_at_vertices(comm, found, owner, ends[:, end], found.key[edges], parts)
+        parts.append(np.column_stack([unit * length[:, None], length, ~precracked[edges]]))
+    sums = _sums_at_vertices(comm, found, owner, ends, found.key[edges], np.stack(parts, axis=1))
     vertices = ~found.is_edge
     scaled = sums[:, :2] * (sums[:, 2] / np.maximum(np.hypot(*sums[:, :2].T), 1e-300))[:, None]
     normals[vertices], precracked[vertices] = scaled[vertices, None], sums[vertices, 3] == 0
     return InterfaceGeometry(normals, turns, precracked)
 
 
-def _sums_at_vertices(comm: MPI.Intracomm, found: Sharers, owner: Int, key: Int, edge: Int, parts: Float) -> Float:
-    """(n, k) for each entity that this rank owns, what all ranks have for it: `parts` (p, k) of these edges (p,) for
-    the vertex classes `key` (p,), each of which is an entity or the pinned class.  Collective."""
-    order, code = np.argsort(found.code), entity_code(key, False)
-    is_entity = np.isin(code, found.code)
-    columns = (column[is_entity] for column in (code, edge, parts))
-    place = order[np.searchsorted(found.code[order], code[is_entity])]
-    code, edge, parts = exchange(comm, owner[place], *columns)
-    place = order[np.searchsorted(found.code[order], code)]
+def _sums_at_vertices(comm: MPI.Intracomm, found: Sharers, owner: Int, ends: Int, edge: Int, parts: Float) -> Float:
+    """(n, k) for each entity that this rank owns, what all ranks have for it: `parts` (p, 2, k) of these edges (p,) for
+    the classes at their `ends` (p, 2), each of which is an entity or the pinned class.  Collective."""
+    order, code = np.argsort(found.code), entity_code(ends, False)
+    ordered = found.code[order]
+    is_entity = np.isin(code, ordered)
+    at = np.stack(np.broadcast_arrays(edge[:, None], np.arange(2)), axis=-1)
+    to = owner[order[np.searchsorted(ordered, code[is_entity])]]
+    code, at, parts = exchange(comm, to, code[is_entity], at[is_entity], parts[is_entity])
     sums = np.zeros((len(order), parts.shape[1]))
     # Rounding depends on the order, which is that of the edges on any number of ranks.
-    sequence = np.argsort(edge, kind="stable")
-    np.add.at(sums, place[sequence], parts[sequence])
+    sequence = np.lexsort(at.T)
+    np.add.at(sums, order[np.searchsorted(ordered, code[sequence])], parts[sequence])
     return sums
 
 

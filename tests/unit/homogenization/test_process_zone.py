@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mpi4py import MPI
+from support.whole_meshes import coarse_mesh
 from unit.cell.faulty_meshes import grid
 
 from feti_homog.config import case as cases
 from feti_homog.homogenization import process_zone
-from feti_homog.homogenization.coarse_meshes import coarse_mesh
 from feti_homog.homogenization.unit_cell import describe
 
 # Glass and epoxy in MPa and micrometres, G_Ic = 2 J/m2, fibres of 7.5 micrometres: Tavara and others, Eng. Anal. Bound.
