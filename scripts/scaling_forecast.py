@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from scaling_model import COARSE, LOCAL, MESH, Machine, Prediction, Rates, predict
-from scaling_report import COARSE_SUMS, GATHERS, SCALARS, SUMS, SUMS_TOGETHER, Row
+from scaling_report import COARSE_SUMS, GATHERS, SCALARS, SUMS, Row
 
 from feti_homog.feti.thresholds import DEFAULTS
 
@@ -53,7 +53,7 @@ def assumptions(rates: Rates, machine: Machine) -> list[str]:
         f"  messages    {1e6 * machine.latency:.2g} microseconds each and {machine.bandwidth / 1e9:.2g} GB/s; "
         f"{GATHERS + SUMS} exchanges an iteration, each of {r.neighbours} messages and {r.surface:.1f} values",
         f"              times the root of the rank's dofs (most that were counted); {COARSE_SUMS} sums over ranks of "
-        f"{r.loads} n values ({SUMS_TOGETHER} where ranks solve together) and {SCALARS} of single ones,",
+        f"{r.loads} n values and {SCALARS} of single ones,",
         f"              log2 p messages deep; once {r.coarse_bytes:.1f} bytes a dof of coarse matrices for every rank",
         f"  iterations  {r.iterations} at any size, the most of all runs",
         "  memory      not in the model: neither whether each rank can hold the coarse factor, nor rank 0 the mesh; "

@@ -14,7 +14,7 @@ from statistics import median
 from typing import Any
 
 from scaling_fit import Power, Shares, fit_power, fit_shares
-from scaling_report import COARSE_SUMS, GATHERS, SCALARS, SUMS, SUMS_TOGETHER, VALUE_BYTES, Row
+from scaling_report import COARSE_SUMS, GATHERS, SCALARS, SUMS, VALUE_BYTES, Row
 
 from feti_homog.cell.tiles import DEFAULT_TILES
 from feti_homog.feti.thresholds import DEFAULTS
@@ -217,7 +217,6 @@ def predict(rates: Rates, machine: Machine, dofs: float, ranks: int, together: b
     else:
         factor = rates.factor.seconds(coarse)
         solve = ceil(rates.loads / ranks) * rates.solve.seconds(coarse)
-    sums = SUMS_TOGETHER if together else COARSE_SUMS
     return Prediction(
         dofs=dofs,
         ranks=ranks,
@@ -227,16 +226,16 @@ def predict(rates: Rates, machine: Machine, dofs: float, ranks: int, together: b
         coarse_factor=factor,
         apply=rates.iterations * rates.apply * own,
         coarse_solve=rates.iterations * solve,
-        messages=_messages(rates, machine, dofs, ranks, sums) if ranks > 1 else 0.0,
+        messages=_messages(rates, machine, dofs, ranks) if ranks > 1 else 0.0,
     )
 
 
-def _messages(rates: Rates, machine: Machine, dofs: float, ranks: int, sums: int) -> float:
+def _messages(rates: Rates, machine: Machine, dofs: float, ranks: int) -> float:
     """Seconds of all messages: those of the iterations, and the coarse matrix that every rank is told."""
     values = rates.surface * sqrt(dofs / ranks)
     exchange = machine.latency * rates.neighbours + VALUE_BYTES * values / machine.bandwidth
     tree = machine.latency * ceil(log2(ranks))
     # A sum of a long vector over ranks moves it twice.
     coarse_sum = tree + 2 * VALUE_BYTES * rates.coarse * dofs * rates.loads / machine.bandwidth
-    iteration = (GATHERS + SUMS) * exchange + sums * coarse_sum + SCALARS * tree
+    iteration = (GATHERS + SUMS) * exchange + COARSE_SUMS * coarse_sum + SCALARS * tree
     return rates.iterations * iteration + rates.coarse_bytes * dofs / machine.bandwidth

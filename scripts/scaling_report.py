@@ -14,12 +14,9 @@ COLUMNS = (
 )  # fmt: skip
 VALUE_BYTES = 8
 # What one iteration does: exchanges of multipliers (a gather and a sum each for the operator and the preconditioner,
-# a gather for the coarse problem), sums over ranks of coarse vectors (of its right-hand side and solution, and of the
-# projection), and of single numbers by the Krylov method.
-GATHERS, SUMS, COARSE_SUMS, SCALARS = 3, 2, 3, 3
-# Where ranks solve the coarse problem together its three solves take two sums each; its right-hand side, the forces of
-# the constraints and the projection one.
-SUMS_TOGETHER = 9
+# a gather for the coarse problem), sums over ranks of coarse vectors (of its right-hand side, of the forces of the
+# constraints, of the projection, and two for each of its two solves), and of single numbers by the Krylov method.
+GATHERS, SUMS, COARSE_SUMS, SCALARS = 3, 2, 7, 3
 
 
 @dataclass(frozen=True)
@@ -98,8 +95,7 @@ class Row:
     @property
     def summed(self) -> int:
         """Bytes that every rank puts into the sums over ranks of an iteration."""
-        sums = SUMS_TOGETHER if self.together else COARSE_SUMS
-        return VALUE_BYTES * (sums * self.coarse * self.loads + SCALARS)
+        return VALUE_BYTES * (COARSE_SUMS * self.coarse * self.loads + SCALARS)
 
     @property
     def miscounted(self) -> float:

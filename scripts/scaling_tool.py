@@ -187,21 +187,27 @@ def ping(comm: MPI.Intracomm, size: int, times: int) -> float:
 
 
 def _coarse(coarse: AdaptiveCoarseSpace, comm: MPI.Intracomm, asked: bool) -> dict[str, Any]:
-    """Seconds to sum and factor the coarse matrices and to solve with them once, bytes that every rank is told, and
-    by how many megabytes the factorization lets the memory of each rank grow at its peak."""
+    """Seconds to sum and factor the coarse matrices, of which each rank has made its part, and to solve with them once,
+    bytes that ranks tell of them, and by how many megabytes the factorization lets the memory of each rank grow."""
     right = np.ones((coarse.coarse_dimension, LOADS)), np.ones((coarse.natural.kernel_dimension, LOADS))
     solve = min(_seconds(lambda: coarse.saddle.solve(*right)) for _ in range(TIMED))
-    together = isinstance(coarse.saddle, SaddlePoint) and comm.size > 1
+    entries = coarse.saddle.entries
     coarse.destroy()
+    matrices = coarse.matrices()
     process_memory.forget_peak()
     before = peak()
-    factor = _seconds(coarse.factor)
+    comm.Barrier()
+    start = time.perf_counter()
+    saddle = SaddlePoint(comm, *matrices, "feti_coarse_", coarse.is_replicated)
+    factor = time.perf_counter() - start
+    grown = peak() - before
+    saddle.destroy()
     return {
-        "together": asked or together,
-        "coarse_memory": comm.allgather(peak() - before),
+        "together": asked or (comm.size > 1 and not coarse.is_replicated),
+        "coarse_memory": comm.allgather(grown),
         "coarse_factor": comm.allreduce(factor, MPI.MAX),
         "coarse_solve": comm.allreduce(solve, MPI.MAX),
-        "coarse_bytes": ENTRY_BYTES * coarse.saddle.entries,
+        "coarse_bytes": ENTRY_BYTES * comm.allreduce(entries),
     }
 
 

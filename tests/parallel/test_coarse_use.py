@@ -15,10 +15,8 @@ from support.coarse_space_cells import BOUND, BREAKING, NARROW, STRAINS, of_all,
 from feti_homog.common.distributed_arrays import allreduce_sum
 from feti_homog.errors import CaseError
 from feti_homog.feti.coarse.adaptive import AdaptiveCoarseSpace
-from feti_homog.feti.linalg.distributed_direct import DistributedDirectSolver
-from feti_homog.feti.linalg.replicated_saddle_point import ReplicatedSaddlePoint
-from feti_homog.feti.linalg.saddle_point import SaddlePoint, _Augmented
-from feti_homog.feti.linalg.sparse_direct import DirectSolver
+from feti_homog.feti.linalg.distributed_direct import DistributedDirectSolver, ReplicatedDirectSolver
+from feti_homog.feti.linalg.saddle_point import _Augmented
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 
 pytestmark = pytest.mark.parallel
@@ -121,17 +119,12 @@ def test_wrong_options_of_the_coarse_space_are_refused(comm, petsc, words):
 def test_a_distributed_coarse_problem_gives_the_same(comm, contrast):
     case = NARROW | {"fibre": {"young": 3.0 * contrast, "poisson": 0.3}, "decomposition": {"subdomains": 50}}
     found = []
-    alone = comm.size == 1
-    for largest, kind, solver in (
-        (10**6, SaddlePoint if alone else ReplicatedSaddlePoint, DirectSolver),
-        (0, SaddlePoint, DirectSolver if alone else DistributedDirectSolver),
-    ):
+    shared = DistributedDirectSolver if comm.size > 1 else ReplicatedDirectSolver
+    for largest, solver in ((10**6, ReplicatedDirectSolver), (0, shared)):
         cell = torn_cells.tear(comm, **case, thresholds=Thresholds(replicated_vectors=largest))
         saddle = cell.solver.coarse.saddle
-        assert isinstance(saddle, kind)
-        inner = saddle.local if isinstance(saddle, ReplicatedSaddlePoint) else saddle
-        assert isinstance(inner._inner.solver, solver)
-        assert isinstance(inner._inner, _Augmented) == (contrast < 1e3)
+        assert isinstance(saddle._inner.solver, solver)
+        assert isinstance(saddle._inner, _Augmented) == (contrast < 1e3)
         found.append(solve_many(cell))
     for one, other in zip(*found, strict=True):
         assert one.reason > 0 and other.reason > 0 and abs(one.iterations - other.iterations) <= 1

@@ -9,12 +9,14 @@ from scipy.sparse import csr_matrix
 from feti_homog.common.petsc_ctypes import option_was_used
 from feti_homog.common.petsc_options import case_options
 from feti_homog.errors import CaseError
-from feti_homog.feti.linalg.replicated_saddle_point import ReplicatedSaddlePoint
+from feti_homog.feti.linalg.distributed_direct import ReplicatedDirectSolver
 from feti_homog.feti.linalg.saddle_point import SaddlePoint
+from feti_homog.feti.thresholds import INDEFINITE_COARSE_SOLVES
 
 pytestmark = pytest.mark.parallel
 
-KINDS = [SaddlePoint, ReplicatedSaddlePoint]
+KINDS = pytest.mark.parametrize("replicate", [False, True])
+FEW = [(2, 1e-11)]
 N, M = 40, 7
 
 
@@ -35,13 +37,13 @@ def parts(comm, matrix):
     return csr_matrix(matrix * weights[comm.rank] / weights.sum())
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@KINDS
 @pytest.mark.parametrize("columns", [(), (1,), (2,), (3,), (5,)])
-def test_solve_returns_the_unknowns_that_made_the_right_hand_side_on_every_rank(comm, system, kind, columns):
+def test_solve_returns_the_unknowns_that_made_the_right_hand_side_on_every_rank(comm, system, replicate, columns):
     E, K, free = system
     rng = np.random.default_rng(2)
     c, a = rng.standard_normal((N, *columns)), rng.standard_normal((M, *columns))
-    saddle = kind(comm, parts(comm, E), parts(comm, K), csr_matrix(free), "test_")
+    saddle = SaddlePoint(comm, parts(comm, E), parts(comm, K), csr_matrix(free), "test_", replicate)
     found, work = saddle.solve(E @ c + K.T @ a, K @ c)
     assert found.shape == c.shape and work.shape == a.shape
     np.testing.assert_allclose(found, c, atol=1e-10)
@@ -51,37 +53,35 @@ def test_solve_returns_the_unknowns_that_made_the_right_hand_side_on_every_rank(
     saddle.destroy()
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_singular_systems_are_told_on_every_rank(comm, kind):
+@KINDS
+def test_singular_systems_are_told_on_every_rank(comm, replicate):
     E, K, free = (csr_matrix(np.full(shape, value)) for shape, value in (((3, 3), 1.0), ((1, 3), 0.0), ((1, 1), 0.0)))
     with pytest.raises(np.linalg.LinAlgError, match="singular"):
-        kind(comm, E, K, free, "test_")
+        SaddlePoint(comm, E, K, free, "test_", replicate)
 
 
-def test_a_fault_of_one_rank_is_told_on_every_rank(comm):
-    """An indefinite factor, since no accuracy is enough; its matrix is singular on the last rank alone."""
-    null_projector = csr_matrix([[0.0 if comm.rank == comm.size - 1 else 1.0]])
-    E, K = parts(comm, np.eye(3)), csr_matrix((1, 3))
-    with pytest.raises(np.linalg.LinAlgError, match="singular"):
-        ReplicatedSaddlePoint(comm, E, K, null_projector, "test_", accuracy=-1.0)
-
-
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize(("accuracy", "expected"), [(1e-11, True), (0.0, False)])
-def test_well_conditioned_where_few_solves_are_enough(comm, system, kind, accuracy, expected):
+@KINDS
+@pytest.mark.parametrize(
+    ("enough", "solves", "expected"),
+    [
+        ([(2, 1e-11), (3, 1e-14)], 2, True),
+        ([(2, -1.0), (3, 1e-11)], 3, True),
+        ([(2, -1.0), (4, 1e-11)], 4, False),
+        ([(3, -1.0)], INDEFINITE_COARSE_SOLVES, False),
+    ],
+)
+def test_well_conditioned_where_few_solves_are_enough(comm, system, replicate, enough, solves, expected):
     E, K, free = system
-    # One rank that wants more is enough.
-    own = accuracy if comm.rank == 0 or kind is SaddlePoint else 1e-11
-    saddle = kind(comm, parts(comm, E), parts(comm, K), csr_matrix(free), "test_", own)
-    assert saddle.well_conditioned == expected
+    saddle = SaddlePoint(comm, parts(comm, E), parts(comm, K), csr_matrix(free), "test_", replicate, enough)
+    assert (saddle._solves, saddle.well_conditioned) == (solves, expected)
     saddle.destroy()
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_without_constraints_only_the_definite_block_is_solved(comm, system, kind):
+@KINDS
+def test_without_constraints_only_the_definite_block_is_solved(comm, system, replicate):
     E, _, _ = system
     c = np.random.default_rng(3).standard_normal((N, 2))
-    saddle = kind(comm, parts(comm, E), csr_matrix((0, N)), csr_matrix((0, 0)), "test_")
+    saddle = SaddlePoint(comm, parts(comm, E), csr_matrix((0, N)), csr_matrix((0, 0)), "test_", replicate)
     found, work = saddle.solve(E @ c, np.zeros((0, 2)))
     np.testing.assert_allclose(found, c, atol=1e-10)
     assert work.shape == (0, 2)
@@ -91,16 +91,15 @@ def test_without_constraints_only_the_definite_block_is_solved(comm, system, kin
 LIBRARY = "test_pc_factor_mat_solver_type"
 
 
-@pytest.mark.parametrize(
-    ("kind", "library"), [*((kind, "mumps") for kind in KINDS), (ReplicatedSaddlePoint, "cholmod")]
-)
-def test_the_library_of_the_factor_is_an_option(comm, system, kind, library):
+@pytest.mark.parametrize(("replicate", "library"), [(False, "mumps"), (True, "mumps"), (True, "cholmod")])
+def test_the_library_of_the_factor_is_an_option(comm, system, replicate, library):
     E, K, free = system
     with case_options({LIBRARY: library}):
-        saddle = kind(comm, parts(comm, E), parts(comm, K), csr_matrix(free), "test_", 1e-11)
+        saddle = SaddlePoint(comm, parts(comm, E), parts(comm, K), csr_matrix(free), "test_", replicate, FEW)
         assert option_was_used(LIBRARY)
-    inner = saddle.local if kind is ReplicatedSaddlePoint else saddle
-    assert inner._inner.solver._ksp.getPC().getFactorSolverType() == library
+    solver = saddle._inner.solver
+    own = solver.local if isinstance(solver, ReplicatedDirectSolver) else solver
+    assert own._ksp.getPC().getFactorSolverType() == library
     c = np.arange(N) + 1.0
     np.testing.assert_allclose(saddle.solve(E @ c, K @ c)[0], c, rtol=1e-9)
     saddle.destroy()
@@ -108,7 +107,7 @@ def test_the_library_of_the_factor_is_an_option(comm, system, kind, library):
 
 def test_cholmod_factors_no_distributed_matrix(comm, system):
     E, K, free = system
-    arguments = comm, parts(comm, E), parts(comm, K), csr_matrix(free), "test_", 1e-11
+    arguments = comm, parts(comm, E), parts(comm, K), csr_matrix(free), "test_", False, FEW
     with case_options({LIBRARY: "cholmod"}):
         if comm.size == 1:
             SaddlePoint(*arguments).destroy()
@@ -126,4 +125,4 @@ def test_a_library_that_petsc_does_not_have_is_refused(comm, system):
         case_options({LIBRARY: "cholmud"}),
         pytest.raises(CaseError, match="cholmud: it has no cholesky factorization"),
     ):
-        SaddlePoint(comm, parts(comm, E), parts(comm, K), csr_matrix(free), "test_")
+        SaddlePoint(comm, parts(comm, E), parts(comm, K), csr_matrix(free), "test_", False)

@@ -28,7 +28,6 @@ from feti_homog.feti.coarse.natural import NaturalCoarseSpace
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.neighbours import Neighbours
 from feti_homog.feti.linalg.distributed_matrix import add_shared_rows
-from feti_homog.feti.linalg.replicated_saddle_point import ReplicatedSaddlePoint, coarse_saddle_point
 from feti_homog.feti.linalg.saddle_point import SaddlePoint
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.preconditioners.scaled import StiffnessScaled
@@ -92,7 +91,7 @@ class AdaptiveCoarseSpace:
         self._is_exact = not comm.allreduce(any(operators.facewise) or bool(operators.compliance.any()), MPI.LOR)
         self._includes_G = False
         self._G_local = _local_motions(operators, natural)
-        self._saddle: SaddlePoint | ReplicatedSaddlePoint | None = None
+        self._saddle: SaddlePoint | None = None
         self.state = Deflation.OFF
         U = deflation_vectors(comm, jump_operator, blocks, neighbours, V, thresholds.drop_tolerance)
         process_memory.trim()
@@ -111,7 +110,7 @@ class AdaptiveCoarseSpace:
         return self.state is not Deflation.OFF
 
     @property
-    def saddle(self) -> SaddlePoint | ReplicatedSaddlePoint:
+    def saddle(self) -> SaddlePoint:
         """The factored coarse problem.
 
         Raises:
@@ -195,7 +194,23 @@ class AdaptiveCoarseSpace:
         return self.saddle.solve(right[: self.coarse_dimension], right[self.coarse_dimension :])
 
     def _factor_saddle(self) -> bool:
-        """Factor the coarse matrix, its zero rows and unconstrained motions made regular; whether it could be."""
+        """Factor the coarse matrix; whether it could be."""
+        matrices = self.matrices()
+        process_memory.trim()
+        try:
+            self._saddle = SaddlePoint(self.comm, *matrices, "feti_coarse_", self.is_replicated)
+        except np.linalg.LinAlgError:
+            return False
+        return True
+
+    @property
+    def is_replicated(self) -> bool:
+        """Whether every rank has a factor of its own."""
+        return self._thresholds.replicates(self.coarse_dimension, self.comm.size)
+
+    def matrices(self) -> tuple[csr_matrix, csr_matrix, csr_matrix]:
+        """This rank's parts of E and K = G^T U, zero rows and unconstrained motions made regular, and the projector to
+        those motions.  Collective."""
         U, GT = self.operator.U, self.natural.GT_active
         nonzero = allreduce_sum(self.comm, abs(U.T) @ self._active) > 0.0
         E, K = self.operator.E, (GT @ U).tocsr()
@@ -212,14 +227,7 @@ class AdaptiveCoarseSpace:
             at = unconstrained.tocoo()
             if self.comm.rank == 0:
                 E = E + csr_matrix((stiffness * at.data, (at.row + first, at.col + first)), shape=E.shape)
-        process_memory.trim()
-        try:
-            self._saddle = coarse_saddle_point(
-                self.comm, E.tocsr(), K.tocsr(), unconstrained, "feti_coarse_", self._thresholds
-            )
-        except np.linalg.LinAlgError:
-            return False
-        return True
+        return E.tocsr(), K.tocsr(), unconstrained
 
     def _deflation_is_projector(self) -> bool:
         """Whether T T z = T z and G^T T z = 0 for some z, to MAX_PROJECTOR_ERROR.

@@ -13,7 +13,7 @@ from feti_homog.common.distributed_arrays import allreduce_sum
 from feti_homog.feti.coarse.gram_matrix import GramMatrix
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.linalg.collectives import allreduce_sparse
-from feti_homog.feti.linalg.distributed_direct import DistributedDirectSolver, direct_solver
+from feti_homog.feti.linalg.distributed_direct import DistributedDirectSolver, ReplicatedDirectSolver, direct_solver
 from feti_homog.feti.linalg.distributed_matrix import assemble_owned_rows
 from feti_homog.feti.linalg.sparse_direct import DirectSolver
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
@@ -69,7 +69,7 @@ class NaturalCoarseSpace:
         self._largest_diagonal = float(comm.allreduce(squares).max(initial=0.0))
         self.unconstrained_modes = np.zeros((self.kernel_dimension, 0))
         self._is_shared = comm.size > 1 and not thresholds.replicates(self.kernel_dimension, comm.size)
-        self._solver: DirectSolver | DistributedDirectSolver | None = None
+        self._solver: DirectSolver | ReplicatedDirectSolver | DistributedDirectSolver | None = None
         part = (self.GT_active @ self.G).tocsr()
         self._factor(part if self._is_shared else allreduce_sparse(comm, part))
 
@@ -97,8 +97,8 @@ class NaturalCoarseSpace:
         """Solve with G^T G from now on: `gram`, or where ranks share the factor, the sum of theirs.  Collective."""
         if self.kernel_dimension:
             self.destroy()
-            make = partial(direct_solver, self.comm, definite=True) if self._is_shared else DirectSolver
-            self._solver = make(gram, prefix="feti_natural_")
+            share = partial(direct_solver, self.comm, definite=True, replicate=False)
+            self._solver = (share if self._is_shared else DirectSolver)(gram, prefix="feti_natural_")
             self.factorizations += 1
 
     @cached_property

@@ -1,4 +1,7 @@
-"""Direct solves with a matrix that is the sum over ranks of parts, for right-hand sides that every rank has."""
+"""Direct solves with a matrix that is the sum over ranks of parts, for right-hand sides that every rank has.
+
+Either every rank has a factor of its own, or all ranks have one together.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix
 
-from feti_homog.feti.linalg.collectives import allgather_rows
+from feti_homog.feti.linalg.collectives import allgather_rows, allreduce_sparse, share_columns
 from feti_homog.feti.linalg.distributed_matrix import assemble_distributed
 from feti_homog.feti.linalg.sparse_direct import DirectSolver, IndefiniteSolver, factor_by_mumps
 from feti_homog.feti.thresholds import MUMPS_COLUMNS_ONE_BY_ONE
@@ -55,10 +58,40 @@ class DistributedDirectSolver:
             petsc_object.destroy()
 
 
+class ReplicatedDirectSolver:
+    """A factorization by every rank, which solves for some of the right-hand sides."""
+
+    def __init__(self, comm: MPI.Intracomm, part: csr_matrix, prefix: str, definite: bool) -> None:
+        """Factor the sum of the parts (n, n).  Options and errors as of `DirectSolver`, or where the matrix is not
+        `definite`, of `IndefiniteSolver`.  Collective."""
+        self.comm = comm
+        self.local = (DirectSolver if definite else IndefiniteSolver)(allreduce_sparse(comm, part), prefix)
+
+    def solve(self, B: Float) -> Float:
+        """A^-1 B for B (n,) or (n, k), the same on every rank.  Collective."""
+        return share_columns(self.comm, self.local.solve, B)
+
+    def destroy(self) -> None:
+        """Free the factor."""
+        self.local.destroy()
+
+
 def direct_solver(
-    comm: MPI.Intracomm, part: csr_matrix, prefix: str, definite: bool
-) -> DirectSolver | DistributedDirectSolver:
-    """Solves with the sum over ranks of the parts.  Collective; options and errors as of the solvers."""
-    if comm.size > 1:
-        return DistributedDirectSolver(comm, part, prefix, definite)
-    return (DirectSolver if definite else IndefiniteSolver)(part, prefix)
+    comm: MPI.Intracomm, part: csr_matrix, prefix: str, definite: bool, replicate: bool
+) -> ReplicatedDirectSolver | DistributedDirectSolver:
+    """Solves with the sum over ranks of the parts, with a factor on each rank to `replicate`.  Collective.
+
+    Raises:
+        LinAlgError: the matrix is singular, or not definite as it should be; on all ranks if it is so on one, for
+            rounding may differ where their processors do.
+        CaseError: the library that the options name has no such factorization.
+    """
+    kind = ReplicatedDirectSolver if replicate or comm.size == 1 else DistributedDirectSolver
+    solver, error = None, None
+    try:
+        solver = kind(comm, part, prefix, definite)
+    except PETSc.Error as caught:
+        error = caught
+    if comm.allreduce(error is not None, MPI.LOR) or solver is None:
+        raise np.linalg.LinAlgError(f"a coarse matrix is singular: {error or 'on another rank'}") from error
+    return solver

@@ -2,27 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from mpi4py import MPI
-from petsc4py import PETSc
 from scipy.sparse import bmat, csr_matrix, vstack
 
 from feti_homog.common.distributed_arrays import allreduce_sum
 from feti_homog.feti.linalg.collectives import allgather_rows
-from feti_homog.feti.linalg.distributed_direct import DistributedDirectSolver, direct_solver
+from feti_homog.feti.linalg.distributed_direct import DistributedDirectSolver, ReplicatedDirectSolver, direct_solver
 from feti_homog.feti.linalg.distributed_matrix import reduce_scatter_rows
 from feti_homog.feti.linalg.scaled_sparse import scaled
-from feti_homog.feti.linalg.sparse_direct import DirectSolver
 from feti_homog.feti.thresholds import (
     AUGMENTATION_WEIGHT,
-    COARSE_ACCURACY,
+    COARSE_SOLVES,
     INDEFINITE_COARSE_SOLVES,
-    MAX_COARSE_SOLVES,
-    MIN_COARSE_SOLVES,
+    WELL_CONDITIONED_SOLVES,
 )
 from feti_homog.typing import Float
 
-Solver = DirectSolver | DistributedDirectSolver
+Solver = ReplicatedDirectSolver | DistributedDirectSolver
 
 
 class SaddlePoint:
@@ -42,7 +41,8 @@ class SaddlePoint:
         K: csr_matrix,
         null_projector: csr_matrix,
         prefix: str,
-        accuracy: float = COARSE_ACCURACY,
+        replicate: bool,
+        enough: Sequence[tuple[int, float]] = COARSE_SOLVES,
     ) -> None:
         """Factor the sums over ranks of E and K.  Collective.
 
@@ -50,11 +50,12 @@ class SaddlePoint:
             E, K: this rank's parts, of one shape on all ranks.
             null_projector: (m, m) orthogonal projector to all a with K^T a = 0.
             prefix: of the options of the definite factor; those of the indefinite one have `indefinite_` behind it.
-            accuracy: relative residual that a solve must reach.
+            replicate: whether every rank has a factor of its own.
+            enough: solves with the definite factor, and the relative residual with which no more are made.
 
         Raises:
             LinAlgError: the matrix is singular.
-            CaseError: the library that the options name cannot factor the matrix on that many ranks.
+            CaseError: the library that the options name cannot factor the matrix, or not on that many ranks.
         """
         self._columns = 1.0 / np.sqrt(allreduce_sum(comm, E.diagonal()))
         K = reduce_scatter_rows(comm, scaled(K, columns=self._columns))
@@ -63,23 +64,21 @@ class SaddlePoint:
         self._rows = 1.0 / np.concatenate(comm.allgather(length))
         E = scaled(E, self._columns, self._columns)
         self._system = _System(comm, E, scaled(K, 1.0 / length))
-        self._solves = MIN_COARSE_SOLVES
         self._inner: _Augmented | _Indefinite
         augmented = self._system.augmented()
         self.entries = int(augmented.nnz)
         try:
-            self._inner = _Augmented(self._system, direct_solver(comm, augmented, prefix, definite=True))
-            if self._reaches(accuracy):
-                return
+            definite = direct_solver(comm, augmented, prefix, definite=True, replicate=replicate)
+            self._inner = _Augmented(self._system, definite)
+            for self._solves, residual in enough:
+                if self._error() <= residual:
+                    return
             self.destroy()
-        except PETSc.Error:
+        except np.linalg.LinAlgError:
             pass
         self._solves = INDEFINITE_COARSE_SOLVES
-        try:
-            bordered = self._system.bordered(null_projector)
-            indefinite = direct_solver(comm, bordered, f"{prefix}indefinite_", definite=False)
-        except PETSc.Error as error:
-            raise np.linalg.LinAlgError(f"a coarse matrix is singular: {error}") from error
+        bordered = self._system.bordered(null_projector)
+        indefinite = direct_solver(comm, bordered, f"{prefix}indefinite_", definite=False, replicate=replicate)
         self._inner = _Indefinite(self._system, indefinite)
 
     def solve(self, f: Float, g: Float) -> tuple[Float, Float]:
@@ -90,27 +89,21 @@ class SaddlePoint:
 
     @property
     def well_conditioned(self) -> bool:
-        """Whether the fewest solves with the augmented matrix were accurate enough."""
-        return isinstance(self._inner, _Augmented) and self._solves == MIN_COARSE_SOLVES
+        """Whether a few solves with the augmented matrix were accurate enough."""
+        return isinstance(self._inner, _Augmented) and self._solves <= WELL_CONDITIONED_SOLVES
 
     def destroy(self) -> None:
         """Free the factor.  Collective."""
         self._inner.solver.destroy()
 
-    def _reaches(self, accuracy: float) -> bool:
-        """Make as many solves as that accuracy takes; whether they were enough."""
-        while self._error() > accuracy:
-            self._solves += 1
-            if self._solves > MAX_COARSE_SOLVES:
-                return False
-        return True
-
     def _error(self) -> float:
-        """Relative residual after solving for the right-hand sides of some known c and a."""
+        """Relative residual after solving for the right-hand sides of some known c and a, the largest of any rank.
+        Collective."""
         c, a = (np.cos(np.arange(n) + 1.0) for n in (len(self._columns), len(self._rows)))
         f, g = self._system.residuals(np.zeros_like(c), np.zeros_like(a), c, a)
         rests = self._system.residuals(f, g, *self._inner.solve(f, g, self._solves))
-        return float(max(np.linalg.norm(r) / (np.linalg.norm(b) or 1.0) for r, b in zip(rests, (f, g), strict=True)))
+        error = max(np.linalg.norm(r) / (np.linalg.norm(b) or 1.0) for r, b in zip(rests, (f, g), strict=True))
+        return float(self._system.comm.allreduce(error, MPI.MAX))
 
 
 class _System:
