@@ -70,10 +70,10 @@ DEFAULTS = Thresholds()
 # Each solve shrinks the error of the constraints by about rho, and the factor loses about log10(rho) digits.
 AUGMENTATION_WEIGHT = 1e7
 # Solves with the augmented factor, and the relative residual with which no more are made.  The projector takes away
-# nearly all of what it is applied to where materials differ much, so what is left has few digits.  With contrasts of
-# 23, 1e3, 1e4 two solves leave 5e-14, 9e-13, 1e-11 (and 2e-12 with 23 and 15 805 vectors), and where that is enough,
-# no cell took an iteration more than with 1e-14; with 1e4 some do.
-COARSE_SOLVES = ((2, 1e-11), (3, 1e-14), (4, 1e-14))
+# nearly all of what it is applied to where materials differ much, so what is left has few digits.  Two solves leave
+# 2e-13 with a contrast of 23 (2e-12 with 15 805 vectors) and cost no iteration; with 1e3 they leave 5e-12 and more in
+# `scripts/robustness --fibres 16 --pieces 4 --contrasts 1000 --refine 1`, and 2 to 4 iterations.
+COARSE_SOLVES = ((2, 2e-12), (3, 1e-14), (4, 1e-14))
 # Most of them for a coarse matrix that is called well conditioned.
 WELL_CONDITIONED_SOLVES = 3
 # Solves with the indefinite factor, one of them iterative refinement.
