@@ -15,8 +15,8 @@ COLUMNS = (
 VALUE_BYTES = 8
 # What one iteration does: exchanges of multipliers (a gather and a sum each for the operator and the preconditioner,
 # a gather for the coarse problem), sums over ranks of coarse vectors (of its right-hand side, of the forces of the
-# constraints, of the projection, and two for each of its two solves), and of single numbers by the Krylov method.
-GATHERS, SUMS, COARSE_SUMS, SCALARS = 3, 2, 7, 3
+# constraints, of the projection, and two for each of its three solves), and of single numbers by the Krylov method.
+GATHERS, SUMS, COARSE_SUMS, SCALARS = 3, 2, 9, 3
 
 
 @dataclass(frozen=True)
