@@ -191,7 +191,7 @@ def measure(cell: Cell, space: str, comm: MPI.Intracomm, thresholds: Thresholds 
     dofs = torn.sum_over_ranks(len(solver.Q))
     iterations = solutions[0].iterations if solutions[0].reason > 0 else 9999
     seconds = time.perf_counter() - start
-    vectors = solver.coarse.coarse_dimension / torn.summary.subdomains
+    vectors = solver.coarse_dimension / torn.summary.subdomains
     solver.destroy()
     PETSc.garbage_cleanup(comm)
     return Row(**asdict(cell), dofs=dofs, subdomains=torn.summary.subdomains, boundary=boundary, vectors=vectors,

@@ -32,8 +32,8 @@ from feti_homog.common.progress import Progress  # noqa: E402
 from feti_homog.config import case as cases  # noqa: E402
 from feti_homog.config.case import Case  # noqa: E402
 from feti_homog.feti.coarse.adaptive import AdaptiveCoarseSpace  # noqa: E402
+from feti_homog.feti.coarse.natural import NaturalCoarseSpace  # noqa: E402
 from feti_homog.feti.decomposition.jump_operator import JumpOperator  # noqa: E402
-from feti_homog.feti.linalg.saddle_point import SaddlePoint  # noqa: E402
 from feti_homog.feti.thresholds import DEFAULTS  # noqa: E402
 from feti_homog.homogenization.unit_cell import TornCell, tear  # noqa: E402
 from feti_homog.typing import Int  # noqa: E402
@@ -119,7 +119,7 @@ def measure(case: Case, progress: StagePeaks, together: bool) -> dict[str, Any]:
         by_stage["set-up"] = by_stage.pop("factor")
     with progress.stage("solve"):
         solutions = solver.solve_many(np.eye(LOADS), np.zeros((solver.rows, LOADS)))
-    if not isinstance(solver.coarse, AdaptiveCoarseSpace):
+    if solver.adaptive is None:
         raise TypeError("the study is of the adaptive coarse space")
     own = comm.allgather(len(solver.Q))
     report = {
@@ -128,7 +128,7 @@ def measure(case: Case, progress: StagePeaks, together: bool) -> dict[str, Any]:
         "fullest": max(own),
         "triangles": cell.summary.coarse_triangles,
         "subdomains": cell.summary.subdomains,
-        "vectors": solver.coarse.coarse_dimension,
+        "vectors": solver.coarse_dimension,
         "kernel": solver.natural.kernel_dimension,
         "iterations": solutions[0].iterations,
         "converged": solutions[0].reason > 0,
@@ -137,7 +137,7 @@ def measure(case: Case, progress: StagePeaks, together: bool) -> dict[str, Any]:
         "latency": network["latency"] / 2,
         "bandwidth": 2 * PINGS["bandwidth"][0] / network["bandwidth"] if comm.size > 1 else 0.0,
         **_messages(cell),
-        **_coarse(solver.coarse, comm, together),
+        **_coarse(solver.adaptive, solver.natural, comm, together),
     }
     solver.destroy()
     return report
@@ -186,28 +186,28 @@ def ping(comm: MPI.Intracomm, size: int, times: int) -> float:
     return comm.bcast(seconds)
 
 
-def _coarse(coarse: AdaptiveCoarseSpace, comm: MPI.Intracomm, asked: bool) -> dict[str, Any]:
-    """Seconds to sum and factor the coarse matrices, of which each rank has made its part, and to solve with them once,
-    bytes that ranks tell of them, and by how many megabytes the factorization lets the memory of each rank grow."""
-    right = np.ones((coarse.coarse_dimension, LOADS)), np.ones((coarse.natural.kernel_dimension, LOADS))
-    solve = min(_seconds(lambda: coarse.saddle.solve(*right)) for _ in range(TIMED))
-    entries = coarse.saddle.entries
+def _coarse(
+    coarse: AdaptiveCoarseSpace, natural: NaturalCoarseSpace, comm: MPI.Intracomm, asked: bool
+) -> dict[str, Any]:
+    """Seconds to sum and factor the coarse matrices, of which each rank has made its part, and to solve with them as an
+    iteration does, bytes that ranks tell of them, and by how many megabytes the factors let the memory of each rank
+    grow.  There is one of the averaged modes, and one of the rigid-body motions, which is used twice."""
+    work, rows = np.ones((coarse.coarse_dimension, LOADS)), np.ones((natural.G.shape[0], LOADS))
+    solve = min(_seconds(lambda: (coarse.solve(work), natural.project(natural.project(rows)))) for _ in range(TIMED))
     coarse.destroy()
-    matrices = coarse.matrices()
+    natural.destroy()
+    part = coarse.part()
     process_memory.forget_peak()
     before = peak()
     comm.Barrier()
-    start = time.perf_counter()
-    saddle = SaddlePoint(comm, *matrices, "feti_coarse_", coarse.is_replicated)
-    factor = time.perf_counter() - start
+    factor = _seconds(lambda: (coarse.factor(part), natural.factor()))
     grown = peak() - before
-    saddle.destroy()
     return {
         "together": asked or (comm.size > 1 and not coarse.is_replicated),
         "coarse_memory": comm.allgather(grown),
         "coarse_factor": comm.allreduce(factor, MPI.MAX),
         "coarse_solve": comm.allreduce(solve, MPI.MAX),
-        "coarse_bytes": ENTRY_BYTES * comm.allreduce(entries),
+        "coarse_bytes": ENTRY_BYTES * comm.allreduce(int(part.nnz)),
     }
 
 

@@ -122,7 +122,7 @@ def _solver_info(context: AnalysisContext) -> SolverInfo:
         multipliers=sum(s.jump_operator.global_rows for s in solvers),
         interface_nodes=cell.sum_over_ranks(len(solver.jump_operator.nodes.row)),
         kernel_dim=sum(s.natural.kernel_dimension for s in solvers),
-        coarse_dim=sum(s.coarse.coarse_dimension for s in solvers),
+        coarse_dim=sum(s.coarse_dimension for s in solvers),
         factorizations=cell.sum_over_ranks(sum(len(s.interface_operators.operators) for s in solvers)),
         coarse_factorizations=sum(s.natural.factorizations for s in solvers),
         rtol=solver.rtol,

@@ -52,7 +52,7 @@ OPTIONS = (
         "auto",
         "rigid-body motions only, or soft modes of the subdomains too",
     ),
-    Option("feti_coarse_threshold", "<real>", "0.24", "softer modes are deflated; fewer iterations if larger"),
+    Option("feti_coarse_threshold", "<real>", "0.24", "softer modes join the coarse space; fewer iterations if larger"),
     Option("feti_influence_columns", "<integer>", "400", "changed rows after which influence columns begin anew"),
     Option("feti_view", "", "", "print subdomains, coarse space and estimated condition numbers"),
     Option("feti_schur_mat_mumps_icntl_7", "0|2|3|4|5|6|7", "7", "MUMPS' ordering in the partial factorizations"),
@@ -62,18 +62,16 @@ OPTIONS = (
     *_direct_solver("feti_interior_", "interiors, of implicit subdomains and for fields"),
     *_direct_solver("feti_natural_", "the rigid-body coarse problem"),
     *_direct_solver("feti_coarse_", "the adaptive coarse problem; mumps where all ranks factor it together"),
-    *_direct_solver("feti_coarse_indefinite_", "badly conditioned adaptive coarse problems", "mumps"),
     *_direct_solver("feti_bonded_", "the cell with all bonds intact, for influence columns"),
 )
 """Every option that a run accepts whether or not it makes the solver which reads it."""
 
 DIRECT_PREFIXES = (
-    "feti_sub_", "feti_interior_", "feti_schur_", "feti_natural_", "feti_coarse_", "feti_coarse_indefinite_",
-    "feti_bonded_",
+    "feti_sub_", "feti_interior_", "feti_schur_", "feti_natural_", "feti_coarse_", "feti_bonded_",
 )  # fmt: skip
 """Prefixes of PETSc's direct solvers."""
 
-MUMPS_PREFIXES = ("feti_schur_", "feti_coarse_indefinite_")
+MUMPS_PREFIXES = ("feti_schur_",)
 """Those of them that are MUMPS by default."""
 
 PREFIXES = ("feti_ksp_", "feti_pc_", *DIRECT_PREFIXES)

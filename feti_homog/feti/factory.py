@@ -12,7 +12,7 @@ from petsc4py import PETSc
 from feti_homog.common.mpi_errors import agree
 from feti_homog.config.phase_names import COATING
 from feti_homog.feti.coarse.adaptive import AdaptiveCoarseSpace
-from feti_homog.feti.coarse.coarse_space import CoarseSpace
+from feti_homog.feti.coarse.balanced import Balanced
 from feti_homog.feti.coarse.natural import NaturalCoarseSpace
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.subdomain import Subdomain
@@ -21,6 +21,7 @@ from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.preconditioners.assembled_schur import shared_dofs
 from feti_homog.feti.preconditioners.influence import Influence
 from feti_homog.feti.preconditioners.scaled import Dirichlet, Identity, Lumped, Preconditioner
+from feti_homog.feti.preconditioners.spring_update import WithSprings
 from feti_homog.feti.solver_plan import ProblemSizes, SolverOptions, choose
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 from feti_homog.typing import Float
@@ -36,12 +37,17 @@ CLASSES: dict[str, Callable[[MPI.Intracomm, JumpOperator, InterfaceOperators], P
 
 @dataclass(frozen=True)
 class SolverParts:
-    """What the Krylov method works with; `coarse` is `natural` itself where nothing else is deflated."""
+    """What the Krylov method works with; `adaptive` is the coarse space of the preconditioner, if it has one."""
 
     operators: InterfaceOperators
     preconditioner: Preconditioner
     natural: NaturalCoarseSpace
-    coarse: CoarseSpace
+    adaptive: AdaptiveCoarseSpace | None
+
+    @property
+    def coarse_dimension(self) -> int:
+        """Coarse displacements, or where only rigid-body motions are, these."""
+        return self.natural.kernel_dimension if self.adaptive is None else self.adaptive.coarse_dimension
 
 
 def build(
@@ -77,12 +83,13 @@ def build(
     plan = choose(_sizes(comm, jump_operator, operators, applications), options, thresholds)
     preconditioner = CLASSES[plan.preconditioner](comm, jump_operator, operators)
     natural = NaturalCoarseSpace(comm, jump_operator, operators, thresholds)
-    coarse: CoarseSpace = natural
+    adaptive = None
     if plan.adaptive and isinstance(preconditioner, Dirichlet):
-        coarse = AdaptiveCoarseSpace(
-            comm, jump_operator, operators, preconditioner, natural, options.threshold, compliance, thresholds
-        )
-    return SolverParts(operators, preconditioner, natural, coarse)
+        adaptive = AdaptiveCoarseSpace(comm, jump_operator, operators, preconditioner, options.threshold, thresholds)
+        preconditioner = Balanced(preconditioner, adaptive)
+    if plan.preconditioner == "dirichlet" and comm.allreduce(bool(operators.compliance.any()), MPI.LOR):
+        preconditioner = WithSprings(comm, preconditioner, jump_operator.owned[0], operators.compliance)
+    return SolverParts(operators, preconditioner, natural, adaptive)
 
 
 def _sizes(

@@ -12,7 +12,7 @@ from petsc4py import PETSc
 
 from feti_homog.common.callback_errors import CallbackErrors
 from feti_homog.common.distributed_arrays import allreduce_sum, scale_rows
-from feti_homog.feti.coarse.coarse_space import CoarseSpace
+from feti_homog.feti.coarse.natural import NaturalCoarseSpace
 from feti_homog.feti.operators.dual_operator import DualOperator
 from feti_homog.feti.preconditioners.scaled import Preconditioner
 from feti_homog.feti.thresholds import FORCE_STALL_ITERATIONS, MAX_ITERATIONS, RTOL, STALL_ITERATIONS
@@ -35,57 +35,62 @@ class ActiveRows:
 
 
 class ProjectedOperator:
-    """y = T^T F x on the active rows; x is in the range of T (of P, if the coarse space is the natural one)."""
+    """y = P F x on the active rows."""
 
     def __init__(
-        self, errors: CallbackErrors, operator: DualOperator, coarse: CoarseSpace, active: ActiveRows, columns: int
+        self,
+        errors: CallbackErrors,
+        operator: DualOperator,
+        natural: NaturalCoarseSpace,
+        active: ActiveRows,
+        columns: int,
     ) -> None:
         """For vectors of so many columns."""
         self._errors = errors
-        self.operator, self.coarse, self.active = operator, coarse, active
+        self.operator, self.natural, self.active = operator, natural, active
         self.shape = (-1, columns)
         self.event = PETSc.Log.Event("FETIDual")
 
     def mult(self, mat: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """y = T^T F x.  Collective."""
+        """y = P F x.  Collective."""
         with self.event:
             values = x.getArray(readonly=True).reshape(self.shape)
             y.setArray(self._errors.call(lambda: self._apply(values), np.full(values.shape, np.nan)).ravel())
 
     def _apply(self, x: Float) -> Float:
-        return self.coarse.project_residual(self.active.restrict(self.operator.apply(x)))
+        return self.natural.project(self.active.restrict(self.operator.apply(x)))
 
 
 class ProjectedPreconditioner:
-    """z = T M^-1 r; keeps r, which tells the interface jump B u of the iterate."""
+    """z = P M^-1 r; keeps r, which tells the interface jump B u of the iterate."""
 
     def __init__(
         self,
         comm: MPI.Intracomm,
         errors: CallbackErrors,
         preconditioner: Preconditioner,
-        coarse: CoarseSpace,
+        natural: NaturalCoarseSpace,
         columns: int,
     ) -> None:
         """For vectors of so many columns."""
         self._errors = errors
-        self.comm, self.preconditioner, self.coarse = comm, preconditioner, coarse
+        self.comm, self.preconditioner, self.natural = comm, preconditioner, natural
         self.shape = (-1, columns)
         self.event = PETSc.Log.Event("FETIPrecond")
         self._residual = np.zeros((0, columns))
 
     def apply(self, pc: PETSc.PC, r: PETSc.Vec, z: PETSc.Vec) -> None:
-        """z = T M^-1 r.  Collective."""
+        """z = P M^-1 r.  Collective."""
         with self.event:
             self._residual = r.getArray(readonly=True).reshape(self.shape)
             z.setArray(self._errors.call(self._apply, np.full(self._residual.shape, np.nan)).ravel())
 
     def _apply(self) -> Float:
-        return self.coarse.deflate(self.preconditioner.apply(self._residual))
+        return self.natural.project(self.preconditioner.apply(self._residual))
 
     def jump_norm(self) -> float:
         """|P r| of the last r: the jump that the best rigid-body motions leave.  Collective."""
-        r = self.coarse.project(self._residual)
+        r = self.natural.project(self._residual)
         return float(np.sqrt(allreduce_sum(self.comm, np.array([(r * r).sum()]))[0]))
 
 
@@ -109,13 +114,14 @@ class Stall:
 class PrimalTest:
     """PETSc's convergence test: converged when both primal residuals, the jump and the forces, are below rtol.
 
-    The jump is |P r| relative to that of the torn cell; the forces that would close it are |T M^-1 r| relative to the
-    torn cell's.  A small dual residual alone can hide a large one of these.  Rounding puts part of the residual where
-    the coarse space, and no iteration, takes it away; the test ends with a breakdown when only that is left.
+    The jump is |P r| relative to that of the torn cell; the forces that would close it are |P M^-1 r| relative to the
+    torn cell's.  A small dual residual alone can hide a large one of these.  Where the condition number is bounded,
+    nothing but rounding can hold the residual; the test then ends with a breakdown.
     """
 
-    def __init__(self, errors: CallbackErrors, preconditioner: ProjectedPreconditioner) -> None:
-        self._errors, self.preconditioner = errors, preconditioner
+    def __init__(self, errors: CallbackErrors, preconditioner: ProjectedPreconditioner, is_bounded: bool) -> None:
+        """`is_bounded` tells whether the condition number is."""
+        self._errors, self.preconditioner, self._is_bounded = errors, preconditioner, is_bounded
         self._jump_scale, self._force_scale = 1.0, 1.0
         self._jump_stall, self._force_stall = Stall(STALL_ITERATIONS), Stall(FORCE_STALL_ITERATIONS)
 
@@ -128,7 +134,7 @@ class PrimalTest:
         return jump <= rtol * self._jump_scale and (forces <= rtol * self._force_scale or jump == 0.0)
 
     def __call__(self, ksp: PETSc.KSP, iteration: int, residual: float) -> PETSc.KSP.ConvergedReason:
-        """Whether to go on; `residual` is the norm of the preconditioned one, |T M^-1 r|.  Collective."""
+        """Whether to go on; `residual` is the norm of the preconditioned one, |P M^-1 r|.  Collective."""
         ended = PETSc.KSP.ConvergedReason.DIVERGED_NANORINF
         return self._errors.call(lambda: self._judge(ksp, iteration, residual), ended)
 
@@ -157,8 +163,8 @@ class PrimalTest:
         return self._go_on(self._jump_stall.is_reached(iteration, jump))
 
     def _go_on(self, stalled: bool) -> PETSc.KSP.ConvergedReason:
-        """Iterating, or a breakdown where the coarse space is the reason that it stalls."""
-        if stalled and self.preconditioner.coarse.deflates:
+        """Iterating, or a breakdown where rounding is the reason that it stalls."""
+        if stalled and self._is_bounded:
             return PETSc.KSP.ConvergedReason.DIVERGED_BREAKDOWN
         return PETSc.KSP.ConvergedReason.ITERATING
 
@@ -176,17 +182,18 @@ class Krylov:
         vector: PETSc.Vec,
         operator: DualOperator,
         preconditioner: Preconditioner,
-        coarse: CoarseSpace,
+        natural: NaturalCoarseSpace,
         active: ActiveRows,
         columns: int,
+        is_bounded: bool,
     ) -> None:
-        """Set up; `vector` is one of the multiplier vectors.  Collective."""
+        """Set up; `vector` is one of the multiplier vectors, `is_bounded` as of `PrimalTest`.  Collective."""
         own, whole = vector.getSizes()
         sizes = (own * columns, whole * columns)
         self._errors = CallbackErrors(comm)
-        self._preconditioner = ProjectedPreconditioner(comm, self._errors, preconditioner, coarse, columns)
-        self.test = PrimalTest(self._errors, self._preconditioner)
-        context = ProjectedOperator(self._errors, operator, coarse, active, columns)
+        self._preconditioner = ProjectedPreconditioner(comm, self._errors, preconditioner, natural, columns)
+        self.test = PrimalTest(self._errors, self._preconditioner, is_bounded)
+        context = ProjectedOperator(self._errors, operator, natural, active, columns)
         A = PETSc.Mat().createPython((sizes, sizes), context, comm=vector.comm)
         A.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         A.setUp()

@@ -34,7 +34,7 @@ from feti_homog.feti.operators.inner_loads import CondensedLoads
 from feti_homog.feti.thresholds import DEFAULTS, MAX_RESTARTS, ZERO_JUMP, Thresholds
 from feti_homog.typing import Float
 
-# What a coarse space that is accurate to too few digits can end in.
+# What rounding can end in.
 BREAKDOWNS = (
     PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_PC,
     PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_MAT,
@@ -62,7 +62,8 @@ class FetiSolver:
         operator: F + C.
         preconditioner: M^-1.
         natural: the rigid-body motions, G and P.
-        coarse: what is deflated: `natural` itself, or soft modes beside it.
+        adaptive: the coarse space of the preconditioner, if it has one.
+        coarse_dimension: coarse displacements, or where only rigid-body motions are, these.
         active: which rows carry multipliers.
         solves: dual problems so far, one for each load.
     """
@@ -88,7 +89,7 @@ class FetiSolver:
         compliance = springs.compliance(self.jump_operator)
         parts = factory.build(comm, self.jump_operator, subdomains, applications, compliance, thresholds)
         self.interface_operators, self.preconditioner = parts.operators, parts.preconditioner
-        self.natural, self.coarse = parts.natural, parts.coarse
+        self.natural, self.adaptive, self.coarse_dimension = parts.natural, parts.adaptive, parts.coarse_dimension
         self.operator = DualOperator(self.jump_operator, self.interface_operators, compliance)
         process_memory.trim()
         self.active = ActiveRows(self.rows)
@@ -158,7 +159,7 @@ class FetiSolver:
         Collective."""
         if self.comm.allreduce(bool((active != self.active.mask).any()), MPI.LOR):
             self.active.mask = active
-            self.coarse.activate(active)
+            self.natural.activate(active)
             self.preconditioner.activate(active)
 
     def solve(self, strain: Float, start: Float) -> DualSolution:
@@ -220,31 +221,27 @@ class FetiSolver:
         Without this call the Krylov methods go with the solver, on each rank when it drops it.
         """
         self._destroy_krylov()
-        self.coarse.destroy()
         self.natural.destroy()
+        if self.adaptive is not None:
+            self.adaptive.destroy()
 
     def _solve_with_restarts(self, krylov: Krylov, lam: Float, right: Float) -> tuple[Iterate, int, int]:
         """Multipliers, iterations, and why they ended.
 
-        If coarse vectors depend on each other, rounding makes the preconditioner indefinite or the iteration
-        stagnate.  A restart removes what the coarse space can; if MAX_RESTARTS of them are not enough, deflation is
-        disabled.
+        Where rounding holds the iteration, it begins anew from where it is, with what is left computed anew.
         """
         iterations = 0
-        for restart in range(MAX_RESTARTS + 2):
-            if restart > MAX_RESTARTS and not self.coarse.disable_deflation():
-                break
+        for _ in range(MAX_RESTARTS + 1):
             first = self._first_iterate(lam, right)
             left = float(np.linalg.norm(self._norms(first.residual)))
             if krylov.test.is_met(self.rtol, left, self.preconditioner.norm * left):
                 return first, iterations, int(PETSc.KSP.ConvergedReason.CONVERGED_RTOL)
-            lam, residual = self.coarse.coarse_initial_guess(first.lam, first.residual, self._apply_active)
-            lam = lam + krylov.solve(residual)
+            lam = first.lam + krylov.solve(first.residual)
             iterations += krylov.ksp.getIterationNumber()
             reason = int(krylov.ksp.getConvergedReason())
             if reason not in BREAKDOWNS:
                 break
-        return Iterate(lam, self.operator.apply(lam), residual), iterations, reason
+        return Iterate(lam, self.operator.apply(lam), first.residual), iterations, reason
 
     def _first_iterate(self, lam: Float, right: Float) -> Iterate:
         """Multipliers to begin with, 0 where `lam` leave more than was there."""
@@ -255,10 +252,6 @@ class FetiSolver:
         is_better = self._norms(residual) <= self._norms(right)
         lam, applied = np.where(is_better, lam, 0.0), np.where(is_better, applied, 0.0)
         return Iterate(lam, applied, np.where(is_better, residual, right))
-
-    def _apply_active(self, x: Float) -> Float:
-        """F x on the active rows."""
-        return self.active.restrict(self.operator.apply(x))
 
     def _solutions(
         self, strains: Float, lam: Float, jump: Float, iterations: int, reason: int, scale: Float
@@ -285,8 +278,8 @@ class FetiSolver:
     def _krylov_for(self, columns: int) -> Krylov:
         """The Krylov method for so many load cases, set up when first asked for."""
         if columns not in self._krylov:
-            vector, parts = self.jump_operator.vector, (self.operator, self.preconditioner, self.coarse, self.active)
-            self._krylov[columns] = Krylov(self.comm, vector, *parts, columns)
+            vector, parts = self.jump_operator.vector, (self.operator, self.preconditioner, self.natural, self.active)
+            self._krylov[columns] = Krylov(self.comm, vector, *parts, columns, self.adaptive is not None)
             if self._view:
                 self._krylov[columns].ksp.setComputeSingularValues(True)
         return self._krylov[columns]

@@ -90,7 +90,7 @@ class SolverPlan:
 
     Attributes:
         preconditioner: of PRECONDITIONERS, not auto.
-        adaptive: whether soft modes are deflated beside the rigid-body motions.
+        adaptive: whether the coarse space has soft modes beside the rigid-body motions.
     """
 
     preconditioner: str
@@ -109,10 +109,10 @@ def choose(sizes: ProblemSizes, options: SolverOptions, thresholds: Thresholds =
     if preconditioner == "auto":
         pays = options.coarse_space != "adaptive" and _influence_pays(sizes, thresholds)
         preconditioner = "influence" if pays else "dirichlet"
-    can_deflate = sizes.all_searchable and preconditioner == "dirichlet"
-    if options.coarse_space == "adaptive" and not can_deflate:
+    can_balance = sizes.all_searchable and preconditioner == "dirichlet"
+    if options.coarse_space == "adaptive" and not can_balance:
         raise CaseError("-feti_coarse_space adaptive: needs -feti_pc_type dirichlet, -feti_dual_operator not implicit")
-    return SolverPlan(preconditioner, can_deflate and options.want_soft_modes(sizes.bodies_are_cut))
+    return SolverPlan(preconditioner, can_balance and options.want_soft_modes(sizes.bodies_are_cut))
 
 
 def _influence_pays(sizes: ProblemSizes, thresholds: Thresholds) -> bool:

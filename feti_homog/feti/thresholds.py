@@ -20,21 +20,20 @@ class Thresholds:
     Attributes:
         dense_boundary_dofs: boundary degrees of freedom of a subdomain up to which `-feti_dual_operator auto` ever
             makes dense matrices, of 8 n^2 bytes.
-        soft_mode: tau, no unit; displacements p with S p = theta N p, theta < tau, are deflated.  The default of
-            `-feti_coarse_threshold`; the condition number is about 1 / tau.  Measured [0.1, 0.24, 0.5]: 29, 19, 14
-            iterations, 4.4, 5.6, 7.4 vectors a subdomain; at 0.2 some packings of `scripts/robustness` took 26.
+        soft_mode: tau, no unit; displacements p with S p = theta N p, theta < tau, are soft.  The default of
+            `-feti_coarse_threshold`; the condition number is about 1 / tau.  Measured [0.1, 0.24, 0.5]: 29, 20, 14
+            iterations, 4.4, 5.5, 7.2 vectors a subdomain.
         face_factor: tau of a face's own eigenproblem over tau, no unit: the energy that other faces and the rest of
-            the body add is not in it.  Measured [0.8, 1, 1.25, 1.6]: 24, 22, 20, 18 iterations, 7.2, 8.0, 8.9, 9.9
-            vectors; one eigenproblem of the whole boundary takes 21 with 5.8.
-        face_layers: coarse triangles from a face to the far side of its neighbourhood.  Measured [1, 2, 3]: 17, 20, 21
-            iterations, 11.8, 8.9, 8.5 vectors: one layer finds modes that are none of the body's, three cost more.
+            the body add is not in it.  Measured [0.6, 0.8, 1, 1.25]: 23, 20, 18, 17 iterations; 6.4, 7.2, 7.9, 8.9
+            vectors.
+        face_layers: coarse triangles from a face to the far side of its neighbourhood.  Measured [1, 2, 3]: 17
+            iterations each, 11.8, 8.9, 8.5 vectors: one layer finds modes that are none of the body's.
+        decayed: displacements on the rest of the boundary, relative to the largest of a face's mode, that are taken for
+            0.  Measured [1e-3, 0.01, 0.03, 0.1]: 17, 17, 18, 20 iterations.
         min_trace_dofs: degrees of freedom that a trace space of a boundary or a face keeps at least.  Measured
-            [30, 60, 100, 250]: 21, 21, 21, 19 iterations; 5.9, 6.0, 6.0, 6.3 vectors.
-        rows_per_vector: active rows per coarse vector below which the vectors are taken to depend on each other.
-        drop_tolerance: entries of a coarse vector of a large body, relative to its largest, that are dropped: they
-            decay within few fibres.  Measured [1e-3, 1e-5, 1e-7]: 20 iterations each.
+            [30, 60, 100, 250]: 21, 21, 21, 19 iterations; 6.0, 6.0, 6.1, 6.4 vectors.
         whole_boundary_dofs: boundary degrees of freedom of a whole body above which its soft modes come from a dense
-            eigenproblem for each face, not from one.  Measured [1000, 5000] with a boundary of 3644: 4.6 and 15.9 s.
+            eigenproblem for each face, not from one.  Measured [1000, 5000] with a boundary of 3644: 1.1 and 5.0 s.
         replicated_vectors: coarse vectors, times the ranks that would each have them all, up to which every rank
             factors the whole coarse matrix and solves for some of the load cases; above, all ranks factor it together.
             With 5 209 vectors a copy takes 311 MB; of one factor on 16 ranks each has 92 MB (`scripts/scaling strong
@@ -49,9 +48,8 @@ class Thresholds:
     soft_mode: float = 0.24
     face_factor: float = 1.25
     face_layers: int = 2
+    decayed: float = 0.01
     min_trace_dofs: int = 100
-    rows_per_vector: int = 4
-    drop_tolerance: float = 1e-5
     whole_boundary_dofs: int = 2000
     replicated_vectors: int = 40_000
     influence_applications: int = 1000
@@ -66,20 +64,6 @@ DEFAULTS = Thresholds()
 
 # linalg
 
-# Weight rho of the constraints in the augmented matrix E + rho K^T K, with a unit diagonal of E and unit rows of K.
-# Each solve shrinks the error of the constraints by about rho, and the factor loses about log10(rho) digits.
-AUGMENTATION_WEIGHT = 1e7
-# Solves with the augmented factor, and the relative residual with which no more are made.  The projector takes away
-# nearly all of what it is applied to where materials differ much, so what is left has few digits.  Two solves leave
-# 1e-13 to 1e-11: of `scripts/robustness --fibres 16 --pieces 4 --contrasts 1000 --refine 1` some cells then take 23
-# iterations, 19 with three, and a nearly incompressible matrix 39, not 31, though two leave 2e-13 there.
-COARSE_SOLVES = ((3, 1e-14), (4, 1e-14))
-# Most of them for a coarse matrix that is called well conditioned.
-WELL_CONDITIONED_SOLVES = 3
-# Solves with the indefinite factor, one of them iterative refinement.
-INDEFINITE_COARSE_SOLVES = 2
-# Per cent more workspace than MUMPS estimates, which the pivoting of an indefinite matrix may use up.
-MUMPS_EXTRA_WORKSPACE_PERCENT = 200
 # Entries of dense blocks that wait to be added to a sparse sum, at least: 16 bytes each.
 MAX_BUFFERED_ENTRIES = 4_000_000
 # Right-hand sides up to which the library is faster with one after the other than with all at once.
@@ -125,9 +109,9 @@ MAX_ITERATIONS = 2000
 # begun anew from where it is.  Without rounding CG at a condition number of 10 halves it in one or two.
 STALL_ITERATIONS = 4
 # Iterations in which the forces must halve before they are small enough: plateaus of CG are shorter where the coarse
-# space deflates, which leaves a condition number of about 1 / tau (`scripts/robustness`: at most 23 iterations in all).
+# space leaves a condition number of about 1 / tau (`scripts/robustness`: at most 23 iterations in all).
 FORCE_STALL_ITERATIONS = 50
-# Such new beginnings with the coarse space, before it is left out.
+# Such new beginnings, before the solve is given up.
 MAX_RESTARTS = 2
 # A jump that the active rows see, relative to that of the torn cell, is rounding if it is as small as this.
 ZERO_JUMP = 1e-13
@@ -163,7 +147,8 @@ UNCONSTRAINED_EIGENVALUE = 1e-10
 MIN_FACE_NODES = 2
 # Eigenvalues of a matrix in single precision, relative to its largest, that are rounding.
 SINGLE_PRECISION_NULL = 1e-6
-# Coarse vectors M^-1 B V found at once: bounds the memory of their jumps, (rows of a subdomain, this).
-VECTOR_CHUNK = 128
-# |T T z - T z| / |T z| and |G^T T z| / |G^T z| above which the coarse matrix is too badly conditioned to be used.
-MAX_PROJECTOR_ERROR = 1e-6
+# Multiple of the identity that the coarse matrix, scaled to a unit diagonal, gets: averaged modes may depend on each
+# other, and rounding leaves about 1e-15.
+COARSE_REGULARISATION = 1e-12
+# Energy of an averaged mode, relative to that with all rows active, below which it is a free motion.
+FREE_MODE_ENERGY = 1e-10

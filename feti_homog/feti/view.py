@@ -6,7 +6,6 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from feti_homog.feti.coarse.adaptive import AdaptiveCoarseSpace
 from feti_homog.feti.factory import SolverParts
 from feti_homog.feti.operators.explicit import ExplicitInterfaceOperator
 from feti_homog.feti.preconditioners.influence import Influence
@@ -16,7 +15,7 @@ ESTIMATES_SINGULAR_VALUES = (PETSc.KSP.Type.CG, PETSc.KSP.Type.GMRES, PETSc.KSP.
 
 def describe_setup(comm: MPI.Intracomm, parts: SolverParts) -> str:
     """Subdomains, their operators, the preconditioner and the coarse space; collective."""
-    operators, preconditioner, coarse = parts.operators, parts.preconditioner, parts.coarse
+    operators, preconditioner, adaptive = parts.operators, parts.preconditioner, parts.adaptive
     sizes = np.array([n for part in comm.allgather([len(d) for d in operators.dofs]) for n in part])
     dense = comm.allreduce(sum(isinstance(o, ExplicitInterfaceOperator) for o in operators.operators))
     lines = [
@@ -27,17 +26,15 @@ def describe_setup(comm: MPI.Intracomm, parts: SolverParts) -> str:
     if isinstance(preconditioner, Influence):
         size = preconditioner.reference.assembled.size
         lines.append(f"  influence columns by the bonded cell, {size} dofs on its shared nodes")
-    if isinstance(coarse, AdaptiveCoarseSpace):
-        counts = np.array([n for part in comm.allgather(coarse.counts) for n in part])
+    if adaptive is not None:
+        counts = np.array([n for part in comm.allgather(adaptive.counts) for n in part])
         lines.append(
-            f"  soft modes below {coarse.threshold:g}: {counts.sum()}, at most {counts.max()} of a subdomain, "
+            f"  soft modes below {adaptive.threshold:g}: {counts.sum()}, at most {counts.max()} of a subdomain, "
             f"mean {counts.mean():.2f}"
         )
         facewise = comm.allreduce(sum(operators.facewise))
         lines += [f"  {facewise} examined face by face"] if facewise else []
-    lines.append(
-        f"  coarse dimension {coarse.coarse_dimension}, {coarse.coarse_dimension / len(sizes):.2f} a subdomain"
-    )
+    lines.append(f"  coarse dimension {parts.coarse_dimension}, {parts.coarse_dimension / len(sizes):.2f} a subdomain")
     return "\n".join(lines)
 
 

@@ -125,7 +125,7 @@ def tear(
     with progress.stage("factor") as words:
         applications, springs = cost_model.applications(case, problem), bonds.springs(case)
         solver = FetiSolver(comm, shared, subdomains, lattice, applications, thresholds, springs, problem)
-        multipliers, dimension = solver.jump_operator.global_rows, solver.coarse.coarse_dimension
+        multipliers, dimension = solver.jump_operator.global_rows, solver.coarse_dimension
         words.append(f"{multipliers} multipliers, coarse dimension {dimension}")
     cell = TornCell(comm, case, summary, lattice, subdomains, solver)
     if not phase_laws.is_generalized(case):

@@ -14,9 +14,7 @@ from support.coarse_space_cells import BOUND, BREAKING, NARROW, STRAINS, of_all,
 
 from feti_homog.common.distributed_arrays import allreduce_sum
 from feti_homog.errors import CaseError
-from feti_homog.feti.coarse.adaptive import AdaptiveCoarseSpace
 from feti_homog.feti.linalg.distributed_direct import DistributedDirectSolver, ReplicatedDirectSolver
-from feti_homog.feti.linalg.saddle_point import _Augmented
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 
 pytestmark = pytest.mark.parallel
@@ -54,10 +52,8 @@ def test_soft_modes_and_stress_do_not_depend_on_the_ranks(comm):
     for some in (comm, MPI.COMM_SELF):
         cell = torn_cells.tear(some, **NARROW)
         solution = cell.solver.solve(np.array([1.0, -0.5, 0.3]), np.zeros(cell.solver.rows))
-        soft = of_all(some, cell.solver.coarse, cell)
-        found.append(
-            (cell.solver.coarse.coarse_dimension, soft, solution.iterations, torn_cells.stress(cell, solution))
-        )
+        soft = of_all(some, cell.solver.adaptive, cell)
+        found.append((cell.solver.coarse_dimension, soft, solution.iterations, torn_cells.stress(cell, solution)))
     (vectors, soft, iterations, stress), (of_one, soft_of_one, iterations_of_one, stress_of_one) = found
     assert vectors == of_one
     assert soft == soft_of_one
@@ -73,7 +69,7 @@ def test_iterations_stay_few_at_any_contrast(comm, contrast, pieces):
         "petsc": {"feti_ksp_rtol": 1e-8}, "decomposition": {"subdomains": pieces},
     }  # fmt: skip
     torn, L, responses = solve(make_case(**case), comm)
-    assert isinstance(torn.solver.coarse, AdaptiveCoarseSpace)
+    assert torn.solver.adaptive is not None
     assert all(r.state.solution.reason > 0 for r in responses)
     assert max(r.state.iterations for r in responses) <= 30
     # The tolerance is on the three load cases together.
@@ -94,8 +90,8 @@ def test_iterations_stay_few_at_any_contrast(comm, contrast, pieces):
     ],
 )
 def test_the_coarse_space_is_the_one_asked_for_or_that_pays(comm, case, space, adaptive):
-    coarse = torn_cells.tear(comm, **case, petsc={"feti_coarse_space": space}).solver.coarse
-    assert isinstance(coarse, AdaptiveCoarseSpace) == adaptive
+    solver = torn_cells.tear(comm, **case, petsc={"feti_coarse_space": space}).solver
+    assert (solver.adaptive is not None) == adaptive
 
 
 @pytest.mark.parametrize(
@@ -115,16 +111,14 @@ def test_wrong_options_of_the_coarse_space_are_refused(comm, petsc, words):
     assert fault.startswith(words)
 
 
-@pytest.mark.parametrize("contrast", [23.0, 1e6], ids=["augmented", "indefinite"])
+@pytest.mark.parametrize("contrast", [23.0, 1e6])
 def test_a_distributed_coarse_problem_gives_the_same(comm, contrast):
     case = NARROW | {"fibre": {"young": 3.0 * contrast, "poisson": 0.3}, "decomposition": {"subdomains": 50}}
     found = []
     shared = DistributedDirectSolver if comm.size > 1 else ReplicatedDirectSolver
     for largest, solver in ((10**6, ReplicatedDirectSolver), (0, shared)):
         cell = torn_cells.tear(comm, **case, thresholds=Thresholds(replicated_vectors=largest))
-        saddle = cell.solver.coarse.saddle
-        assert isinstance(saddle._inner.solver, solver)
-        assert isinstance(saddle._inner, _Augmented) == (contrast < 1e3)
+        assert isinstance(cell.solver.adaptive._solver, solver)
         found.append(solve_many(cell))
     for one, other in zip(*found, strict=True):
         assert one.reason > 0 and other.reason > 0 and abs(one.iterations - other.iterations) <= 1
@@ -160,7 +154,7 @@ def test_one_factor_of_the_kernels_projects_as_one_on_each_rank(comm):
 @pytest.mark.parametrize("petsc", [{"feti_dual_operator": "implicit"}, {"feti_pc_type": "lumped"}])
 def test_the_natural_space_is_taken_where_the_adaptive_one_cannot_be(comm, petsc):
     cell = torn_cells.tear(comm, **BREAKING, petsc=petsc)
-    assert not isinstance(cell.solver.coarse, AdaptiveCoarseSpace)
+    assert cell.solver.adaptive is None
 
 
 def number(pattern, text):
@@ -169,19 +163,19 @@ def number(pattern, text):
 
 def test_view_shows_the_adaptive_space_and_the_condition_number(comm, narrow, capfd):
     cell, text = torn_cells.printed(comm, capfd, **NARROW, petsc={"feti_view": True})
-    assert number("coarse dimension", text) == narrow.coarse.coarse_dimension
-    assert number("kernels:", text) == narrow.coarse.natural.kernel_dimension
+    assert number("coarse dimension", text) == narrow.solver.coarse_dimension
+    assert number("kernels:", text) == narrow.solver.natural.kernel_dimension
     assert number("soft modes below", text) == THRESHOLD
-    soft = narrow.coarse.coarse_dimension - narrow.coarse.natural.kernel_dimension
+    soft = narrow.solver.coarse_dimension - narrow.solver.natural.kernel_dimension
     assert f"soft modes below {THRESHOLD:g}: {soft}," in text
     assert f"{cell.summary.subdomains} subdomains, {cell.summary.subdomains} with dense boundary operators" in text
-    least, largest = dense_feti.extreme_eigenvalues(narrow.T, narrow.dense.F, narrow.M)
+    least, largest = dense_feti.extreme_eigenvalues(narrow.dense.F, narrow.H)
     assert 0.7 * largest / least < number("condition number about", text) < 1.01 * largest / least
 
 
 def test_view_shows_the_natural_space_without_soft_modes(comm, narrow, capfd):
     _, text = torn_cells.printed(comm, capfd, **NARROW, petsc={"feti_view": True, "feti_coarse_space": "natural"})
-    assert number("coarse dimension", text) == narrow.coarse.natural.kernel_dimension
+    assert number("coarse dimension", text) == narrow.solver.natural.kernel_dimension
     assert "soft modes" not in text
     assert number("condition number about", text) > 10 * BOUND / THRESHOLD
 

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_matrix, diags, kronsum
 
+from feti_homog.common.petsc_ctypes import option_was_used
 from feti_homog.common.petsc_options import case_options
+from feti_homog.errors import CaseError
 from feti_homog.feti.linalg import distributed_direct
 from feti_homog.feti.linalg.distributed_direct import (
     DistributedDirectSolver,
@@ -24,15 +26,14 @@ def parts(comm, matrix):
 
 
 @pytest.mark.parametrize("kind", [DistributedDirectSolver, ReplicatedDirectSolver])
-@pytest.mark.parametrize("definite", [True, False])
 @pytest.mark.parametrize("ksp", ["preonly", "cg"])
 @pytest.mark.parametrize("columns", [(), (1,), (2,), (7,)])
-def test_columns_are_solved_for_as_each_alone(comm, kind, definite, ksp, columns):
+def test_columns_are_solved_for_as_each_alone(comm, kind, ksp, columns):
     line = diags([-1.0, 2.1, -1.0], [-1, 0, 1], (9, 9))
     A = kronsum(line, line).tocsr()
     x = np.random.default_rng(3).standard_normal((A.shape[0], *columns))
     with case_options({"test_ksp_type": ksp, "test_ksp_rtol": 1e-13}):
-        solver = kind(comm, parts(comm, A), "test_", definite)
+        solver = kind(comm, parts(comm, A), "test_")
         found = solver.solve(A @ x)
         solver.destroy()
     assert found.shape == x.shape
@@ -41,7 +42,7 @@ def test_columns_are_solved_for_as_each_alone(comm, kind, definite, ksp, columns
 
 
 def test_a_rank_may_have_no_rows(comm):
-    solver = DistributedDirectSolver(comm, parts(comm, np.array([[4.0]])), "test_", definite=True)
+    solver = DistributedDirectSolver(comm, parts(comm, np.array([[4.0]])), "test_")
     np.testing.assert_allclose(solver.solve(np.array([[2.0, 6.0]])), [[0.5, 1.5]])
     solver.destroy()
 
@@ -49,7 +50,7 @@ def test_a_rank_may_have_no_rows(comm):
 @pytest.mark.parametrize("replicate", [True, False])
 def test_a_singular_matrix_is_told_on_every_rank(comm, replicate):
     with pytest.raises(np.linalg.LinAlgError, match="singular"):
-        direct_solver(comm, parts(comm, np.ones((2, 2))), "test_", definite=True, replicate=replicate)
+        direct_solver(comm, parts(comm, np.ones((2, 2))), "test_", replicate=replicate)
 
 
 def test_a_fault_of_one_rank_is_told_on_every_rank(comm, monkeypatch):
@@ -58,4 +59,40 @@ def test_a_fault_of_one_rank_is_told_on_every_rank(comm, monkeypatch):
         solver = distributed_direct.DirectSolver
         monkeypatch.setattr(distributed_direct, "DirectSolver", lambda A, prefix: solver(0.0 * A, prefix))
     with pytest.raises(np.linalg.LinAlgError, match="singular"):
-        direct_solver(comm, parts(comm, np.eye(2)), "test_", definite=True, replicate=True)
+        direct_solver(comm, parts(comm, np.eye(2)), "test_", replicate=True)
+
+
+LIBRARY = "test_pc_factor_mat_solver_type"
+
+
+@pytest.mark.parametrize(("replicate", "library"), [(False, "mumps"), (True, "mumps"), (True, "cholmod")])
+def test_the_library_of_the_factor_is_an_option(comm, replicate, library):
+    A = np.array([[2.0, 1.0], [1.0, 3.0]])
+    with case_options({LIBRARY: library}):
+        solver = direct_solver(comm, parts(comm, A), "test_", replicate)
+        assert option_was_used(LIBRARY)
+    own = solver.local if isinstance(solver, ReplicatedDirectSolver) else solver
+    assert own._ksp.getPC().getFactorSolverType() == library
+    np.testing.assert_allclose(solver.solve(A @ [1.0, 2.0]), [1.0, 2.0], rtol=1e-12)
+    solver.destroy()
+
+
+def test_cholmod_factors_no_distributed_matrix(comm):
+    arguments = comm, parts(comm, np.eye(2)), "test_", False
+    with case_options({LIBRARY: "cholmod"}):
+        if comm.size == 1:
+            direct_solver(*arguments).destroy()
+            return
+        with pytest.raises(CaseError) as caught:
+            direct_solver(*arguments)
+    assert caught.value.faults == (
+        f"-{LIBRARY} cholmod: it has no cholesky factorization of a matrix on {comm.size} ranks; mumps has",
+    )
+
+
+def test_a_library_that_petsc_does_not_have_is_refused(comm):
+    with (
+        case_options({LIBRARY: "cholmud"}),
+        pytest.raises(CaseError, match="cholmud: it has no cholesky factorization"),
+    ):
+        direct_solver(comm, parts(comm, np.eye(2)), "test_", False)

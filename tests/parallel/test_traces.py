@@ -65,7 +65,7 @@ def test_coarser_traces_find_as_good_modes(comm, pieces, seeds):
             case = traced(enough, seed=seed, decomposition={"subdomains": pieces}, petsc=ADAPTIVE)
             cell = torn_cells.tear(comm, **case)
             solutions = solve_many(cell)
-            vectors = cell.solver.coarse.coarse_dimension
+            vectors = cell.solver.coarse_dimension
             found.append((vectors, solutions[0].iterations, [cell.solver.stress_integral(s) for s in solutions]))
         (every, most, stress), (fewer, iterations, same) = found
         more.append(iterations - most)

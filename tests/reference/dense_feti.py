@@ -1,4 +1,4 @@
-"""The dual problem with dense matrices: Schur complements, preconditioner, deflation by NumPy alone, on every rank.
+"""The dual problem with dense matrices: Schur complements, preconditioners by NumPy alone, on every rank.
 
 It takes K and B of each subdomain from the program, nothing else.
 """
@@ -6,6 +6,7 @@ It takes K and B of each subdomain from the program, nothing else.
 from __future__ import annotations
 
 import numpy as np
+from scipy.linalg import block_diag
 
 KERNEL = 1e-9
 
@@ -68,12 +69,29 @@ class DenseDual:
         self.F = sum(B @ X @ B.T for B, X in zip(self.B, inverse, strict=True))
 
     def preconditioner(self, active):
-        """(total, total) M^-1 = W^-1 B D^-1 S D^-1 B^T W^-1, W = B D^-1 B^T, of the rows where `active` is true."""
+        """(total, total) M^-1 = B_D S B_D^T of the rows where `active` is true."""
+        return sum(A @ S @ A.T for A, S in zip(self.scaled(active), self.S, strict=True))
+
+    def scaled(self, active):
+        """Of each subdomain (total, n) B_D = W^-1 B D^-1, W = B D^-1 B^T, of the rows where `active` is true."""
         W = sum(B / d @ B.T for B, d in zip(self.B, self.D, strict=True))
         inverse = np.zeros_like(W)
         inverse[np.ix_(active, active)] = np.linalg.inv(W[np.ix_(active, active)])
-        scaled = [inverse @ (B / d) for B, d in zip(self.B, self.D, strict=True)]
-        return sum(A @ S @ A.T for A, S in zip(scaled, self.S, strict=True))
+        return [inverse @ (B / d) for B, d in zip(self.B, self.D, strict=True)]
+
+    def balanced(self, active, V):
+        """(total, total) B_D S_0 B_D^T with S_0 = S - S Z (Z^T S Z)^+ Z^T S and Z = (I - B_D^T B) V, V (n, m) of each
+        subdomain."""
+        S, modes = block_diag(*self.S), block_diag(*V)
+        BD = np.hstack(self.scaled(active))
+        Z = modes - BD.T @ (np.hstack(self.B) @ modes)
+        Z /= np.linalg.norm(Z, axis=0)
+        SZ = S @ Z
+        energy = Z.T @ SZ
+        scale = 1 / np.sqrt(np.maximum(np.diag(energy), 1e-12 * np.diag(energy).max()))
+        inverse = np.linalg.pinv(scale[:, None] * energy * scale, rcond=1e-10, hermitian=True)
+        SZ *= scale
+        return BD @ (S - SZ @ inverse @ SZ.T) @ BD.T
 
 
 def projector(G):
@@ -81,26 +99,10 @@ def projector(G):
     return np.eye(len(G)) - G @ np.linalg.pinv(G)
 
 
-def deflation(F, U, G):
-    """T: of all z - U c with G^T (z - U c) = 0 that of least energy; U is to contain vectors that work on G."""
-    GU = G.T @ U
-    particular = np.linalg.pinv(GU, rcond=1e-11) @ G.T
-    rank = np.linalg.matrix_rank(GU, tol=1e-11 * np.linalg.norm(GU, 2))
-    V = U @ np.linalg.svd(GU)[2][rank:].T
-    T = np.eye(len(F)) - U @ particular
-    return T - V @ np.linalg.pinv(V.T @ F @ V, rcond=1e-13, hermitian=True) @ (V.T @ F @ T)
-
-
-def extreme_eigenvalues(T, F, M):
-    """Least and largest eigenvalues of T M^-1 T^T F on the range of T; `M` is M^-1."""
-    root = T @ np.linalg.cholesky(M)
+def extreme_eigenvalues(F, H):
+    """Least and largest eigenvalues of H F that are not 0, for a positive semidefinite H."""
+    values, vectors = np.linalg.eigh(H)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
     values = np.linalg.eigvalsh(root.T @ F @ root)
     values = values[values > 1e-7 * values[-1]]
     return values[0], values[-1]
-
-
-def distance(U, V):
-    """The largest sine of an angle from a column of U to the range of V."""
-    U, V = (X / np.linalg.norm(X, axis=0) for X in (U, V))
-    Q = np.linalg.svd(V, full_matrices=False)[0][:, : np.linalg.matrix_rank(V, tol=1e-10)]
-    return np.linalg.norm(U - Q @ (Q.T @ U), axis=0).max()

@@ -27,18 +27,19 @@ SINGLE = 2e-6
 
 
 class Narrow:
-    """The narrow cell at one threshold, its dense dual problem, U, T and the preconditioner as dense matrices."""
+    """The narrow cell at one threshold, its dense dual problem, and as dense matrices the preconditioner without coarse
+    space, M, that of dense modes, and what the program applies, H."""
 
     def __init__(self, threshold, dense=None):
         """The dense dual problem does not depend on the threshold.  Collective."""
         self.threshold = threshold
         self.cell = torn_cells.tear(MPI.COMM_WORLD, **NARROW, petsc={"feti_coarse_threshold": threshold})
         self.solver = self.cell.solver
-        self.coarse = self.solver.coarse
+        self.coarse = self.solver.adaptive
         self.dense = dense or dense_feti.DenseDual(self.cell)
-        self.M = self.dense.preconditioner(np.ones(self.dense.total, bool))
-        self.U = dense_feti.gathered(self.cell, self.coarse.operator.U.toarray())
-        self.T = dense_feti.deflation(self.dense.F, self.U, self.dense.G)
+        self.all = np.ones(self.dense.total, bool)
+        self.M = self.dense.preconditioner(self.all)
+        self.H = dense_feti.matrix(self.cell, self.solver.preconditioner.apply)
 
     def soft_modes(self):
         """For each subdomain: (n,) all theta of S p = theta N p, rising, and (n, n) the modes."""

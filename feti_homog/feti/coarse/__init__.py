@@ -1,4 +1,4 @@
 """Coarse spaces: rigid-body motions (natural) and soft modes of the subdomains beside them (adaptive, GenEO).
 
-May use `preconditioners`, `operators`, `decomposition` and `linalg`.  Main entries: `natural` and `adaptive`.
+May use `preconditioners`, `operators`, `decomposition` and `linalg`.  Main entries: `natural` and `balanced`.
 """

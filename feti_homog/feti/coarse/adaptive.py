@@ -1,69 +1,46 @@
-"""The adaptive coarse space: soft modes of the subdomains deflated beside the rigid-body motions.
+"""The adaptive coarse space: rigid-body motions and soft modes of the subdomains, averaged over copies of each node.
 
-U = M^-1 B V for the kernels and the soft modes V of all subdomains, so U holds Q G with Q = M^-1.  A correction z keeps
-what no coarse vector can do better,
+With the coarse displacements Z of `averaged_modes`, the stiffness S of the boundaries becomes
 
-    T z = z - U c,   [U^T F U   U^T G] [c]   [U^T F z]
-                     [G^T U     0    ] [a] = [G^T z  ],
+    S_0 = S - S Z (Z^T S Z)^-1 Z^T S,
 
-and a residual r loses the rigid-body part that makes U^T r vanish (Spillane & Rixen, IJNME 95, 2013, Section 5).
-Once some rows are inactive, M^-1 is another and Q G no longer in its range; then G itself joins U.
+what is left of it where the coarse displacements have found their equilibrium.  As B Z = 0, S_0 in place of S in the
+preconditioner M^-1 = B_D S B_D^T makes the exact inverse of the dual operator if Z spans all displacements of the glued
+cell (T9), and takes the soft modes away from the Krylov method if it spans theirs (Spillane & Rixen, IJNME 95, 2013).
+Z^T S Z is definite, and couples a subdomain with those that share a neighbour with it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from enum import Enum, auto
+from collections.abc import Sequence
 
 import numpy as np
 from mpi4py import MPI
-from scipy.sparse import csr_matrix, diags, hstack
+from scipy.sparse import csr_matrix, diags
 
 from feti_homog.common import process_memory
 from feti_homog.common.distributed_arrays import allreduce_sum, scale_rows
-from feti_homog.feti.coarse.coarse_operator import CoarseOperator
-from feti_homog.feti.coarse.deflation_vectors import deflation_vectors
-from feti_homog.feti.coarse.geneo import kernels_and_soft_modes, subdomain_blocks
-from feti_homog.feti.coarse.natural import NaturalCoarseSpace
+from feti_homog.feti.coarse.averaged_modes import AveragedModes
+from feti_homog.feti.coarse.geneo import kernels_and_soft_modes, local_columns, scaled_constraints, subdomain_blocks
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.neighbours import Neighbours
-from feti_homog.feti.linalg.distributed_matrix import add_shared_rows
-from feti_homog.feti.linalg.saddle_point import SaddlePoint
+from feti_homog.feti.linalg.dense_block_sum import DenseBlockSum
+from feti_homog.feti.linalg.distributed_direct import DistributedDirectSolver, ReplicatedDirectSolver, direct_solver
+from feti_homog.feti.linalg.scaled_sparse import scaled
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.preconditioners.scaled import StiffnessScaled
-from feti_homog.feti.thresholds import DEFAULTS, MAX_PROJECTOR_ERROR, Thresholds
-from feti_homog.typing import Float
-
-
-class Deflation(Enum):
-    """What the coarse vectors are used for.
-
-    Every change of rows ends in one of the three:
-
-        any -> OFF         too few active rows, a singular coarse matrix, or a T that is no projector
-        any -> ORTHOGONAL  no row has been inactive yet, U is exact and the coarse matrix well conditioned
-        any -> OBLIQUE     else
-
-    and `disable_deflation` or `destroy` leads from any to OFF, which holds no factor.
-    """
-
-    OFF = auto()
-    """T = P for corrections and residuals."""
-    ORTHOGONAL = auto()
-    """T for corrections, P for residuals: U has M^-1 G in its range, so T M^-1 takes away what P leaves."""
-    OBLIQUE = auto()
-    """T for corrections, r - G a with U^T (r - G a) = 0 for residuals."""
+from feti_homog.feti.thresholds import COARSE_REGULARISATION, DEFAULTS, FREE_MODE_ENERGY, Thresholds
+from feti_homog.typing import Float, Int
 
 
 class AdaptiveCoarseSpace:
-    """The coarse space of this module, a `CoarseSpace`.  Every rank holds its rows of U and a factor.
+    """The coarse space of this module.  Every rank has S Z on its subdomains, and a factor or its part of one.
 
     Attributes:
-        natural: the rigid-body motions, G and P.
         threshold: tau.
         counts: soft modes of each of this rank's subdomains.
-        operator: U, and E = U^T F U.
-        state: what they are used for.
+        coarse_dimension: coarse displacements, n.
+        factorizations: of Z^T S Z so far.
     """
 
     def __init__(
@@ -72,179 +49,95 @@ class AdaptiveCoarseSpace:
         jump_operator: JumpOperator,
         operators: InterfaceOperators,
         scaling: StiffnessScaled,
-        natural: NaturalCoarseSpace,
         threshold: float,
-        compliance: Float,
         thresholds: Thresholds = DEFAULTS,
     ) -> None:
         """Find the modes below the threshold tau and factor.  All boundary operators must be dense but of large
         bodies.  Options under `feti_coarse_` (default: cholesky by CHOLMOD, on all ranks together by MUMPS).
         Collective."""
-        self.comm, self.jump_operator, self.natural = comm, jump_operator, natural
-        self.threshold, self._thresholds = threshold, thresholds
-        neighbours = Neighbours(comm, jump_operator, operators.subdomains)
-        blocks = subdomain_blocks(comm, jump_operator, operators, scaling, neighbours.rows)
-        V = kernels_and_soft_modes(blocks, neighbours, threshold, thresholds)
+        self.comm, self.threshold = comm, threshold
+        self._jump_operator, self._operators, self._scaling = jump_operator, operators, scaling
+        self._neighbours = Neighbours(comm, jump_operator, operators.subdomains)
+        blocks = subdomain_blocks(comm, jump_operator, operators, scaling, self._neighbours.rows)
+        V = kernels_and_soft_modes(blocks, self._neighbours, threshold, thresholds)
         process_memory.trim()
         self.counts = [v.shape[1] - b.R.shape[1] for v, b in zip(V, blocks, strict=True)]
-        # The smallest entries of U are dropped for large bodies, and U knows no springs where all bodies are cut.
-        self._is_exact = not comm.allreduce(any(operators.facewise) or bool(operators.compliance.any()), MPI.LOR)
-        self._includes_G = False
-        self._G_local = _local_motions(operators, natural)
-        self._saddle: SaddlePoint | None = None
-        self.state = Deflation.OFF
-        U = deflation_vectors(comm, jump_operator, blocks, neighbours, V, thresholds.drop_tolerance)
+        self._modes = AveragedModes(comm, blocks, self._neighbours, V)
+        self.coarse_dimension = self._modes.total
+        self.is_replicated = thresholds.replicates(self.coarse_dimension, comm.size)
+        # Of each subdomain S Z on its boundary dofs, and Z^T S Z.
+        self._forces: list[Float] = [np.zeros((0, 0)) for _ in blocks]
+        self._energies: list[Float] = [np.zeros((0, 0)) for _ in blocks]
+        self._mask = np.ones(len(jump_operator.rows))
+        self._update(range(len(blocks)), [block.BW for block in blocks])
         process_memory.trim()
-        self.operator = CoarseOperator(jump_operator, operators, blocks, neighbours.rows, U, compliance)
-        self._active = np.ones(self.operator.U.shape[0])
-        self.factor()
-
-    @property
-    def coarse_dimension(self) -> int:
-        """Dimension of the space that every residual is orthogonal to."""
-        return self.operator.vectors
-
-    @property
-    def deflates(self) -> bool:
-        """Whether the coarse vectors are in use."""
-        return self.state is not Deflation.OFF
-
-    @property
-    def saddle(self) -> SaddlePoint:
-        """The factored coarse problem.
-
-        Raises:
-            RuntimeError: deflation is off.
-        """
-        if self._saddle is None:
-            raise RuntimeError("the coarse problem is not factored: deflation is off")
-        return self._saddle
+        self.factorizations = 0
+        self._solver: ReplicatedDirectSolver | DistributedDirectSolver | None = None
+        part = self.part()
+        self._bonded_energy = allreduce_sum(comm, part.diagonal())
+        self.factor(part)
 
     def activate(self, active: Float) -> None:
-        """Factor for the owned rows of which `active` is 1; U is restricted to them.  Collective."""
-        self.natural.activate(active)
-        if not self._includes_G:
-            jump_operator = self.jump_operator
-            G = add_shared_rows(self.comm, self._G_local, jump_operator.rows, jump_operator.is_shared_row, len(active))
-            self._includes_G = True
-            self.operator.set_vectors(hstack([self.operator.U_local, G]).tocsr())
-        self.operator.activate(active)
-        self._active = active
-        self.factor()
+        """Average over the copies that the owned rows hold together of which `active` is 1, those of the scaling, and
+        factor.  Collective."""
+        mask = self._jump_operator.gather(active).copy()
+        changed = mask != self._mask
+        touched = [i for i, rows in enumerate(self._neighbours.rows) if changed[rows].any()]
+        BW = scaled_constraints(self.comm, self._jump_operator, self._scaling)
+        of = [local_columns(BW, self._operators.slices[i], self._neighbours.rows[i]) for i in touched]
+        self._update(touched, of)
+        self._mask = mask
+        self.factor(self.part())
 
-    def factor(self) -> None:
-        """Factor the coarse matrix of the active rows, and choose the state.  Collective."""
-        self.destroy()
-        rows = int(allreduce_sum(self.comm, np.array([self._active.sum()]))[0])
-        few = rows < self._thresholds.rows_per_vector * self.coarse_dimension
-        if not self.coarse_dimension or few or not self._factor_saddle():
-            return
-        self.state = Deflation.OBLIQUE
-        if not self._deflation_is_projector():
-            self.destroy()
-        elif self._is_exact and self.saddle.well_conditioned and not self._includes_G:
-            self.state = Deflation.ORTHOGONAL
+    def _update(self, which: Sequence[int], BW: Sequence[csr_matrix]) -> None:
+        """S Z and Z^T S Z of some subdomains, for their scaled constraints."""
+        for i, constraints in zip(which, BW, strict=True):
+            Z = self._modes.of_subdomain(i, constraints)
+            self._forces[i] = self._operators.skins[i].apply_schur(Z)
+            self._energies[i] = Z.T @ self._forces[i]
 
-    def disable_deflation(self) -> bool:
-        """Leave it at rigid-body motions until rows change; whether that is a change.  Collective."""
-        deflated = self.deflates
+    def part(self) -> csr_matrix:
+        """(n, n) this rank's part of Z^T S Z."""
+        total = DenseBlockSum((self.coarse_dimension, self.coarse_dimension))
+        for columns, energy in zip(self._modes.columns, self._energies, strict=True):
+            total.add(columns, columns, energy)
+        return total.matrix()
+
+    def factor(self, part: csr_matrix) -> None:
+        """Factor Z^T S Z, the sum of all parts, scaled to a unit diagonal, with a small multiple of the identity.
+        Collective.
+
+        Averaged modes may depend on each other, and those of a fibre that nothing holds have no energy.  What is added
+        makes the sum definite, and S_0 greater by as little.
+        """
         self.destroy()
-        return deflated
+        energy = allreduce_sum(self.comm, part.diagonal())
+        self._weights = 1.0 / np.sqrt(np.maximum(energy, FREE_MODE_ENERGY * self._bonded_energy))
+        matrix = scaled(part, self._weights) + diags(COARSE_REGULARISATION * self._modes.is_own)
+        self._solver = direct_solver(self.comm, matrix.tocsr(), "feti_coarse_", self.is_replicated)
+        self.factorizations += 1
+
+    def balanced(self, x: Float) -> Float:
+        """The forces S_0 x (boundary dofs,) or (boundary dofs, k) of displacements x of that shape.  Collective."""
+        work = np.zeros((self.coarse_dimension, *x.shape[1:]))
+        for columns, SZ, span in self._parts():
+            work[columns] += SZ.T @ x[span]
+        c, forces = self.solve(allreduce_sum(self.comm, work)), self._operators.apply_skin(x)
+        for columns, SZ, span in self._parts():
+            forces[span] -= SZ @ c[columns]
+        return forces
+
+    def solve(self, work: Float) -> Float:
+        """c with Z^T S Z c = work, (n,) or (n, k) on every rank.  Collective."""
+        assert self._solver is not None, "the factor is destroyed"
+        return scale_rows(self._weights, self._solver.solve(scale_rows(self._weights, work)))
+
+    def _parts(self) -> zip[tuple[Int, Float, slice]]:
+        """Of each subdomain the modes that reach it, S Z, and where it is among the boundary dofs."""
+        return zip(self._modes.columns, self._forces, self._operators.slices, strict=True)
 
     def destroy(self) -> None:
-        """Free the factor and turn deflation off.  Collective."""
-        self.state = Deflation.OFF
-        if self._saddle is not None:
-            self._saddle.destroy()
-            self._saddle = None
-
-    def project(self, x: Float) -> Float:
-        """P x."""
-        return self.natural.project(x)
-
-    def deflate(self, z: Float) -> Float:
-        """T z."""
-        if self.state is Deflation.OFF:
-            return self.natural.project(z)
-        c, _ = self._solve(self.operator.energy(z), self.natural.GT_active @ z)
-        return z - scale_rows(self._active, self.operator.U @ c)
-
-    def project_residual(self, r: Float) -> Float:
-        """r - G a with U^T (r - G a) = 0 as far as that can be; or P r, where that does as well."""
-        if self.state is not Deflation.OBLIQUE:
-            return self.natural.project(r)
-        _, a = self._solve(self.operator.U.T @ r, np.zeros((self.natural.kernel_dimension, *r.shape[1:])))
-        projected: Float = r - self.natural.G_active @ a
-        return projected
-
-    def coarse_initial_guess(
-        self, lam: Float, residual: Float, apply_dual: Callable[[Float], Float]
-    ) -> tuple[Float, Float]:
-        """lam + U c with U^T (r - F U c - G a) = 0 and G^T U c = 0, and its residual."""
-        if self.state is Deflation.OFF:
-            return lam, residual
-        no_work = np.zeros((self.natural.kernel_dimension, *residual.shape[1:]))
-        c, _ = self._solve(self.operator.U.T @ residual, no_work)
-        z = scale_rows(self._active, self.operator.U @ c)
-        return lam + z, self.project_residual(residual - apply_dual(z))
-
-    def _solve(self, f: Float, g: Float) -> tuple[Float, Float]:
-        """c and a of the coarse problem whose right-hand sides are the sums over ranks of f and g."""
-        right = allreduce_sum(self.comm, np.concatenate([f, g]))
-        return self.saddle.solve(right[: self.coarse_dimension], right[self.coarse_dimension :])
-
-    def _factor_saddle(self) -> bool:
-        """Factor the coarse matrix; whether it could be."""
-        matrices = self.matrices()
-        process_memory.trim()
-        try:
-            self._saddle = SaddlePoint(self.comm, *matrices, "feti_coarse_", self.is_replicated)
-        except np.linalg.LinAlgError:
-            return False
-        return True
-
-    @property
-    def is_replicated(self) -> bool:
-        """Whether every rank has a factor of its own."""
-        return self._thresholds.replicates(self.coarse_dimension, self.comm.size)
-
-    def matrices(self) -> tuple[csr_matrix, csr_matrix, csr_matrix]:
-        """This rank's parts of E and K = G^T U, zero rows and unconstrained motions made regular, and the projector to
-        those motions.  Collective."""
-        U, GT = self.operator.U, self.natural.GT_active
-        nonzero = allreduce_sum(self.comm, abs(U.T) @ self._active) > 0.0
-        E, K = self.operator.E, (GT @ U).tocsr()
-        if not nonzero.all():
-            mask = diags(nonzero.astype(float))
-            E, K = mask @ E @ mask, K @ mask
-        unconstrained = self.natural.unconstrained_projector
-        if self.comm.rank == 0:
-            E = E + diags((~nonzero).astype(float))
-        if self._includes_G:
-            # No force acts on the columns of G that nothing resists.
-            first = self.coarse_dimension - self.natural.kernel_dimension
-            stiffness = allreduce_sum(self.comm, E.diagonal())[first:].mean()
-            at = unconstrained.tocoo()
-            if self.comm.rank == 0:
-                E = E + csr_matrix((stiffness * at.data, (at.row + first, at.col + first)), shape=E.shape)
-        return E.tocsr(), K.tocsr(), unconstrained
-
-    def _deflation_is_projector(self) -> bool:
-        """Whether T T z = T z and G^T T z = 0 for some z, to MAX_PROJECTOR_ERROR.
-
-        With few active rows the columns of U depend on each other and the coarse matrix is singular.
-        """
-        z = self._active * np.cos(np.arange(len(self._active)) + 1.0)
-        once = self.deflate(z)
-        twice = self.deflate(once)
-        GT = self.natural.GT_active
-        before, after = (np.abs(allreduce_sum(self.comm, GT @ x)).max(initial=0.0) for x in (z, once))
-        size, change = allreduce_sum(self.comm, np.array([once @ once, (twice - once) @ (twice - once)]))
-        return bool(after <= MAX_PROJECTOR_ERROR * before and change <= MAX_PROJECTOR_ERROR**2 * size)
-
-
-def _local_motions(operators: InterfaceOperators, natural: NaturalCoarseSpace) -> csr_matrix:
-    """(local rows, kernel modes) this rank's part of G = B R."""
-    own = (operators.B @ natural.R).tocsr()
-    shape = (own.shape[0], natural.kernel_dimension)
-    return csr_matrix((own.data, own.indices + natural.owned_modes.start, own.indptr), shape=shape)
+        """Free the factor.  Collective."""
+        if self._solver is not None:
+            self._solver.destroy()
+            self._solver = None

@@ -66,7 +66,7 @@ class SubdomainEigenproblem:
         min_trace_dofs: int = DEFAULTS.min_trace_dofs,
     ) -> None:
         """`common` names the rows that it has in common with each subdomain, itself among them."""
-        self.block, self.common = block, common
+        self.block, self.common, self._operator = block, common, operator
         subdomain, S = block.subdomain, operator.S
         nodes = np.unique(subdomain.problem.nodes(block.dofs))
         self._P = trace_space(subdomain.submesh, subdomain.mesh.lattice, subdomain.problem, nodes, min_trace_dofs)
@@ -88,14 +88,16 @@ class SubdomainEigenproblem:
         for s, share in sorted(shares, key=itemgetter(0)):
             M[np.ix_(self.common[s], self.common[s])] += share
         N = jump_energy(self.block.B, self._P, self.block.R, M)
-        return np.asarray(self._P @ soft_modes(self._regular_S, N, threshold))
+        modes = np.asarray(self._P @ soft_modes(self._regular_S, N, threshold))
+        return self._operator.apply_flexibility(jump_forces(self.block.B, modes, self.block.R, M))
 
 
 class FaceEigenproblems:
     """One eigenproblem on each face; see `SubdomainEigenproblem`."""
 
     def __init__(self, block: SubdomainBlocks, common: Mapping[int, Int], thresholds: Thresholds = DEFAULTS) -> None:
-        self.block, self.common, self._factor = block, common, thresholds.face_factor
+        self.block, self.common = block, common
+        self._factor, self._decayed = thresholds.face_factor, thresholds.decayed
         problem = block.subdomain.problem
         faces = {s: np.unique(problem.nodes(block.B[rows].indices)) for s, rows in common.items()}
         self._neighbourhoods = {
@@ -114,8 +116,11 @@ class FaceEigenproblems:
             yield s, share.astype(np.float32)
 
     def modes(self, shares: Sequence[tuple[int, Float32]], threshold: float) -> Float:
-        """(n, m) soft modes of the faces, for the shares of other subdomains in M^-1."""
-        modes = [np.zeros((len(self.block.dofs), 0))]
+        """(n, m) soft modes of the faces, for the shares of other subdomains in M^-1.
+
+        The rest of the boundary follows as it does in the whole body, until the mode has decayed.
+        """
+        forces = [np.zeros((len(self.block.dofs), 0))]
         for s, share in shares:
             for near in self._neighbourhoods[s]:
                 B = self.block.B[self.common[s]][:, near.at]
@@ -123,9 +128,11 @@ class FaceEigenproblems:
                 soft = near.P @ soft_modes(
                     congruent(near.P, near.operator.regularised_schur), N, self._factor * threshold
                 )
-                modes.append(np.zeros((len(self.block.dofs), soft.shape[1])))
-                modes[-1][near.at] = soft
-        return np.hstack(modes)
+                forces.append(np.zeros((len(self.block.dofs), soft.shape[1])))
+                forces[-1][near.at] = jump_forces(B, soft, near.R, share)
+        modes = self.block.operator.apply_flexibility(np.asfortranarray(np.hstack(forces)))
+        largest = np.abs(modes).max(axis=0, initial=0.0)
+        return np.where(np.abs(modes) < self._decayed * largest, 0.0, modes)
 
 
 def eigenproblem(
@@ -141,6 +148,17 @@ def eigenproblem(
     if not isinstance(block.operator, ExplicitInterfaceOperator):
         raise TypeError("soft modes of small boundaries need dense operators")
     return SubdomainEigenproblem(block, block.operator, common, thresholds.min_trace_dofs)
+
+
+def jump_forces(B: csr_matrix, p: Float, R: Float, M: Float32) -> Float:
+    """(n, m) N p with N = B^T M B, as precise as M, of displacements p (n, m), less what works on the kernel R (n, k).
+
+    S+ N p is a step of inverse iteration: it bends an eigenvector that was sought among traces as the body does.
+    """
+    NR, Np = (np.asarray(B.T @ (M @ (B @ x).astype(np.float32)).astype(float)) for x in (R, p))
+    return np.asfortranarray(
+        Np - NR @ (np.linalg.pinv(R.T @ NR, rcond=SINGLE_PRECISION_NULL, hermitian=True) @ (R.T @ Np))
+    )
 
 
 def congruent(T: csr_matrix | Float, A: Float | Float32) -> Float:

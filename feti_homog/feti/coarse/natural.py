@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import cached_property, partial
 
 import numpy as np
@@ -70,8 +69,7 @@ class NaturalCoarseSpace:
         self.unconstrained_modes = np.zeros((self.kernel_dimension, 0))
         self._is_shared = comm.size > 1 and not thresholds.replicates(self.kernel_dimension, comm.size)
         self._solver: DirectSolver | ReplicatedDirectSolver | DistributedDirectSolver | None = None
-        part = (self.GT_active @ self.G).tocsr()
-        self._factor(part if self._is_shared else allreduce_sparse(comm, part))
+        self.factor()
 
     def activate(self, active: Float) -> None:
         """Factor G^T G for the owned rows of which `active` is 1; the others, 0, carry no multiplier.  Collective.
@@ -87,6 +85,11 @@ class NaturalCoarseSpace:
             gram = (gram + self._largest_diagonal * self.unconstrained_projector).tocsr()
         self._factor(gram)
 
+    def factor(self) -> None:
+        """Factor G^T G of all rows.  Collective."""
+        part = (self.G.T @ self.G).tocsr()
+        self._factor(part if self._is_shared else allreduce_sparse(self.comm, part))
+
     @property
     def unconstrained_projector(self) -> csr_matrix:
         """(m, m) orthogonal projector Z Z^T to the amplitudes that no active row resists."""
@@ -97,7 +100,7 @@ class NaturalCoarseSpace:
         """Solve with G^T G from now on: `gram`, or where ranks share the factor, the sum of theirs.  Collective."""
         if self.kernel_dimension:
             self.destroy()
-            share = partial(direct_solver, self.comm, definite=True, replicate=False)
+            share = partial(direct_solver, self.comm, replicate=False)
             self._solver = (share if self._is_shared else DirectSolver)(gram, prefix="feti_natural_")
             self.factorizations += 1
 
@@ -129,16 +132,6 @@ class NaturalCoarseSpace:
                 null.append(Z)
         return np.hstack(null)
 
-    @property
-    def coarse_dimension(self) -> int:
-        """Dimension of the space that every residual is orthogonal to."""
-        return self.kernel_dimension
-
-    @property
-    def deflates(self) -> bool:
-        """Whether more than rigid-body motions is taken out of the Krylov method."""
-        return False
-
     def amplitudes(self, x: Float) -> Float:
         """(G^T G)^-1 G^T x on every rank, for the owned rows x (rows,) or (rows, k).  Collective."""
         assert self._solver is not None, "there are no kernels, or the factor is destroyed"
@@ -159,26 +152,6 @@ class NaturalCoarseSpace:
         """R alpha on the boundary dofs, for alpha (m,) or (m, k)."""
         motion: Float = self.R @ amplitudes[self.owned_modes]
         return motion
-
-    # As a `CoarseSpace` of its own: T = P.
-
-    def deflate(self, z: Float) -> Float:
-        """P z."""
-        return self.project(z)
-
-    def project_residual(self, r: Float) -> Float:
-        """P r."""
-        return self.project(r)
-
-    def coarse_initial_guess(
-        self, lam: Float, residual: Float, apply_dual: Callable[[Float], Float]
-    ) -> tuple[Float, Float]:
-        """lam and its residual as they are."""
-        return lam, residual
-
-    def disable_deflation(self) -> bool:
-        """Nothing is deflated: False."""
-        return False
 
     def destroy(self) -> None:
         """Free the factor.  Collective."""

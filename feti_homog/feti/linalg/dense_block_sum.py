@@ -25,25 +25,16 @@ class DenseBlockSum:
 
     def add(self, rows: Int, columns: Int, values: Float) -> None:
         """Add the block `values` (rows, columns)."""
-        counts = np.full(len(rows), len(columns))
-        self._add(rows, counts, np.tile(columns.astype(np.int32), len(rows)), values.ravel())
-
-    def add_entries_above(self, rows: Int, columns: Int, values: Float, limit: Float) -> None:
-        """Add those of `values` (rows, columns) whose modulus is above the `limit` (columns,) of their column."""
-        large = np.abs(values) > limit
-        self._add(rows, large.sum(axis=1), columns.astype(np.int32)[np.nonzero(large)[1]], values[large])
+        counts, wide = np.full(len(rows), len(columns)), np.tile(columns.astype(np.int32), len(rows))
+        self._buffer.append((rows, counts, wide, values.ravel()))
+        self._buffered_entries += values.size
+        if self._buffered_entries > max(self._max_buffered_entries, self._sum.nnz):
+            self._flush()
 
     def matrix(self) -> csr_matrix:
         """The sum of all blocks so far."""
         self._flush()
         return self._sum
-
-    def _add(self, rows: Int, counts: Int, columns: Int32, values: Float) -> None:
-        """Buffer rows with `counts` entries each, whose columns and values come row by row."""
-        self._buffer.append((rows, counts, columns, values))
-        self._buffered_entries += len(values)
-        if self._buffered_entries > max(self._max_buffered_entries, self._sum.nnz):
-            self._flush()
 
     def _flush(self) -> None:
         """Add the buffer to the sum."""

@@ -12,7 +12,7 @@ from scipy.sparse import csr_matrix
 
 from feti_homog.feti.linalg.collectives import allgather_rows, allreduce_sparse, share_columns
 from feti_homog.feti.linalg.distributed_matrix import assemble_distributed
-from feti_homog.feti.linalg.sparse_direct import DirectSolver, IndefiniteSolver, factor_by_mumps
+from feti_homog.feti.linalg.sparse_direct import DirectSolver, factor_by_mumps
 from feti_homog.feti.thresholds import MUMPS_COLUMNS_ONE_BY_ONE
 from feti_homog.typing import Float
 
@@ -20,15 +20,15 @@ from feti_homog.typing import Float
 class DistributedDirectSolver:
     """One factorization by all ranks, none of which ever has the whole matrix (n, n)."""
 
-    def __init__(self, comm: MPI.Intracomm, part: csr_matrix, prefix: str, definite: bool) -> None:
+    def __init__(self, comm: MPI.Intracomm, part: csr_matrix, prefix: str) -> None:
         """Factor the sum of the parts (n, n).  Options under `prefix` (default: cholesky by MUMPS).  Collective.
 
         Raises:
-            PETSc.Error: the matrix is singular, or not definite as it should be.
+            PETSc.Error: the matrix is not definite.
             CaseError: the library that the options name cannot factor distributed matrices, as CHOLMOD cannot.
         """
         self.comm = comm
-        self._ksp = factor_by_mumps(assemble_distributed(comm, part), prefix, definite)
+        self._ksp = factor_by_mumps(assemble_distributed(comm, part), prefix)
         self._x, self._b = self._ksp.getOperators()[0].createVecs()
 
     def solve(self, B: Float) -> Float:
@@ -61,11 +61,9 @@ class DistributedDirectSolver:
 class ReplicatedDirectSolver:
     """A factorization by every rank, which solves for some of the right-hand sides."""
 
-    def __init__(self, comm: MPI.Intracomm, part: csr_matrix, prefix: str, definite: bool) -> None:
-        """Factor the sum of the parts (n, n).  Options and errors as of `DirectSolver`, or where the matrix is not
-        `definite`, of `IndefiniteSolver`.  Collective."""
-        self.comm = comm
-        self.local = (DirectSolver if definite else IndefiniteSolver)(allreduce_sparse(comm, part), prefix)
+    def __init__(self, comm: MPI.Intracomm, part: csr_matrix, prefix: str) -> None:
+        """Factor the sum of the parts (n, n).  Options and errors as of `DirectSolver`.  Collective."""
+        self.comm, self.local = comm, DirectSolver(allreduce_sparse(comm, part), prefix)
 
     def solve(self, B: Float) -> Float:
         """A^-1 B for B (n,) or (n, k), the same on every rank.  Collective."""
@@ -77,19 +75,19 @@ class ReplicatedDirectSolver:
 
 
 def direct_solver(
-    comm: MPI.Intracomm, part: csr_matrix, prefix: str, definite: bool, replicate: bool
+    comm: MPI.Intracomm, part: csr_matrix, prefix: str, replicate: bool
 ) -> ReplicatedDirectSolver | DistributedDirectSolver:
     """Solves with the sum over ranks of the parts, with a factor on each rank to `replicate`.  Collective.
 
     Raises:
-        LinAlgError: the matrix is singular, or not definite as it should be; on all ranks if it is so on one, for
-            rounding may differ where their processors do.
+        LinAlgError: the matrix is not definite; on all ranks if it is so on one, for rounding may differ where their
+            processors do.
         CaseError: the library that the options name has no such factorization.
     """
     kind = ReplicatedDirectSolver if replicate or comm.size == 1 else DistributedDirectSolver
     solver, error = None, None
     try:
-        solver = kind(comm, part, prefix, definite)
+        solver = kind(comm, part, prefix)
     except PETSc.Error as caught:
         error = caught
     if comm.allreduce(error is not None, MPI.LOR) or solver is None:

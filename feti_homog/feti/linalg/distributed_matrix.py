@@ -68,16 +68,6 @@ def assemble_distributed(comm: MPI.Intracomm, part: csr_matrix) -> PETSc.Mat:
     return _assemble(comm, part[rows][:, columns], rows, columns, shares)
 
 
-def reduce_scatter_rows(comm: MPI.Intracomm, part: csr_matrix) -> csr_matrix:
-    """This rank's rows of the sum over ranks of parts of one shape; all ranks get about as many.  Collective."""
-    if comm.size == 1:
-        return part
-    A = assemble_distributed(comm, part)
-    indptr, indices, values = A.getValuesCSR()
-    A.destroy()
-    return csr_matrix((values, indices, indptr), shape=(len(indptr) - 1, part.shape[1]))
-
-
 def _even_share(comm: MPI.Intracomm, n: int) -> int:
     """How many of n rows this rank gets if all ranks get about as many."""
     return n // comm.size + (comm.rank < n % comm.size)

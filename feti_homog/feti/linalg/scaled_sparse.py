@@ -1,4 +1,4 @@
-"""Sparse matrices with scaled rows and columns."""
+"""Symmetrically scaled sparse matrices."""
 
 from __future__ import annotations
 
@@ -8,13 +8,11 @@ from scipy.sparse import csr_matrix
 from feti_homog.typing import Float
 
 
-def scaled(A: csr_matrix, rows: Float | None = None, columns: Float | None = None) -> csr_matrix:
-    """diag(rows) A diag(columns) for rows (n,) and columns (m,), in the pattern of A (n, m).
+def scaled(A: csr_matrix, weights: Float) -> csr_matrix:
+    """diag(weights) A diag(weights) for weights (n,), in the pattern of A (n, n).
 
     Products with diagonal matrices would look for that pattern anew.
     """
-    data = A.data.copy() if columns is None else A.data * columns[A.indices]
-    if rows is not None:
-        data *= np.repeat(rows, np.diff(A.indptr))
+    data = A.data * weights[A.indices] * np.repeat(weights, np.diff(A.indptr))
     # Indices of its own: sorting one matrix must not shuffle the other.
     return csr_matrix((data, A.indices.copy(), A.indptr.copy()), shape=A.shape)

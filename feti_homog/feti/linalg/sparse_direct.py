@@ -9,11 +9,7 @@ from petsc4py import PETSc
 from scipy.sparse import csr_matrix
 
 from feti_homog.errors import CaseError
-from feti_homog.feti.thresholds import (
-    CHOLMOD_COLUMNS_ONE_BY_ONE,
-    MUMPS_COLUMNS_ONE_BY_ONE,
-    MUMPS_EXTRA_WORKSPACE_PERCENT,
-)
+from feti_homog.feti.thresholds import CHOLMOD_COLUMNS_ONE_BY_ONE
 from feti_homog.typing import Float
 
 # PETSc's error code for a factorization that the chosen library does not have (PETSC_ERR_MISSING_FACTOR).
@@ -23,8 +19,6 @@ MISSING_FACTOR = 92
 class DirectSolver:
     """X = A^-1 B for one symmetric definite matrix A (n, n) and any number of right-hand sides."""
 
-    max_columns_one_by_one = CHOLMOD_COLUMNS_ONE_BY_ONE
-
     def __init__(self, matrix: csr_matrix, prefix: str) -> None:
         """Factorize.  Options under `prefix` (default: cholesky by CHOLMOD).
 
@@ -32,17 +26,13 @@ class DirectSolver:
             PETSc.Error: the matrix is not positive definite.
             CaseError: the library that the options name has no such factorization.
         """
-        self._use(factor_by_cholmod(matrix, prefix))
-
-    def _use(self, ksp: PETSc.KSP) -> None:
-        """Solve with this factorization from now on."""
-        self._ksp = ksp
-        self._x, self._b = ksp.getOperators()[0].createVecs()
-        self._destroy = weakref.finalize(self, _destroy, ksp, self._x, self._b)
+        self._ksp = factor_by_cholmod(matrix, prefix)
+        self._x, self._b = self._ksp.getOperators()[0].createVecs()
+        self._destroy = weakref.finalize(self, _destroy, self._ksp, self._x, self._b)
 
     def solve(self, B: Float) -> Float:
         """A^-1 B for B (n,) or (n, k)."""
-        if B.size <= self.max_columns_one_by_one * len(B):
+        if B.size <= CHOLMOD_COLUMNS_ONE_BY_ONE * len(B):
             X = np.empty_like(B)
             for x, b in zip(X.reshape(len(B), -1).T, B.reshape(len(B), -1).T, strict=True):
                 self._b.setArray(b)
@@ -62,21 +52,6 @@ class DirectSolver:
         self._destroy()
 
 
-class IndefiniteSolver(DirectSolver):
-    """The same for an indefinite matrix, by L D L^T; its rows and columns should be scaled to similar size."""
-
-    max_columns_one_by_one = MUMPS_COLUMNS_ONE_BY_ONE
-
-    def __init__(self, matrix: csr_matrix, prefix: str) -> None:
-        """Factorize.  Options under `prefix` (default: cholesky, which then is L D L^T, by MUMPS).
-
-        Raises:
-            PETSc.Error: the matrix is singular.
-            CaseError: the library that the options name has no such factorization.
-        """
-        self._use(factor_by_mumps(_sequential(matrix), prefix, definite=False))
-
-
 def factor_by_cholmod(matrix: csr_matrix, prefix: str) -> PETSc.KSP:
     """A KSP with the factorization of a symmetric definite matrix; options under `prefix`, CHOLMOD by default."""
     A = _sequential(matrix)
@@ -86,18 +61,18 @@ def factor_by_cholmod(matrix: csr_matrix, prefix: str) -> PETSc.KSP:
     return ksp
 
 
-def factor_by_mumps(A: PETSc.Mat, prefix: str, definite: bool) -> PETSc.KSP:
-    """A KSP with the factorization of a symmetric matrix on any communicator; options under `prefix`, MUMPS by default.
+def factor_by_mumps(A: PETSc.Mat, prefix: str) -> PETSc.KSP:
+    """A KSP with the factorization of a symmetric definite matrix on any communicator; options under `prefix`, MUMPS by
+    default.
 
     The matrix should have rows and columns of similar size: MUMPS does not scale it here, for its own scaling loses
     all digits of coarse problems with contrasts of 1e6.
     """
-    A.setOption(PETSc.Mat.Option.SPD if definite else PETSc.Mat.Option.SYMMETRIC, True)
+    A.setOption(PETSc.Mat.Option.SPD, True)
     ksp = _direct_ksp(A, prefix, PETSc.Mat.SolverType.MUMPS)
     pc = ksp.getPC()
     if pc.getFactorSolverType() == PETSc.Mat.SolverType.MUMPS:
         pc.getFactorMatrix().setMumpsIcntl(8, 0)
-        pc.getFactorMatrix().setMumpsIcntl(14, MUMPS_EXTRA_WORKSPACE_PERCENT)
     ksp.setUp()
     return ksp
 

@@ -19,11 +19,11 @@ from feti_homog.typing import Bool, Float, Int
 
 
 class DenseSoftSkin(ExplicitInterfaceOperator):
-    """The boundary operators of a body, with the stiffness of its skin; the flexibility is that of the body alone."""
+    """The boundary operators of a body with its skin."""
 
     def __init__(self, body: ExplicitInterfaceOperator, T: csr_matrix) -> None:
         """`T` (n, r) is the root of the springs' compliance on the boundary dofs."""
-        self._body, self.n = body, body.n
+        self._body, self._T, self.n = body, T, body.n
         S = body.S
         half = _half(T, T.T @ S)
         self._S = np.asfortranarray(S - half.T @ half)
@@ -37,8 +37,10 @@ class DenseSoftSkin(ExplicitInterfaceOperator):
         return out
 
     def apply_flexibility(self, x: Float, out: Float | None = None) -> Float:
-        """S+ x of the body: the springs' part of the dual operator is a diagonal."""
-        return self._body.apply_flexibility(x, out)
+        """(S+ + C) x for x (n,) or (n, k), into `out` if it is given."""
+        y = self._body.apply_flexibility(x, out)
+        y += self._T @ (self._T.T @ x)
+        return y
 
     @property
     def S(self) -> Float:
@@ -54,7 +56,7 @@ class SparseSoftSkin(ImplicitInterfaceOperator):
     """The same of a body whose operators are sparse factors, for few springs."""
 
     def __init__(self, body: ImplicitInterfaceOperator, T: csr_matrix) -> None:
-        self._body = body
+        self._body, self._T = body, T
         self._half = _half(T, body.apply_schur(T.toarray(order="F")).T)
 
     def apply_schur(self, x: Float, out: Float | None = None) -> Float:
@@ -64,8 +66,10 @@ class SparseSoftSkin(ImplicitInterfaceOperator):
         return y
 
     def apply_flexibility(self, x: Float, out: Float | None = None) -> Float:
-        """S+ x of the body."""
-        return self._body.apply_flexibility(x, out)
+        """(S+ + C) x for x (n,) or (n, k), into `out` if it is given."""
+        y = self._body.apply_flexibility(x, out)
+        y += self._T @ (self._T.T @ x)
+        return y
 
 
 def soft_skin(

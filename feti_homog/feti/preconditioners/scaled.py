@@ -16,7 +16,6 @@ from scipy.sparse import csr_matrix, diags
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.operators.node_blocks import NodeBlocks
-from feti_homog.feti.preconditioners.spring_update import SpringUpdate
 from feti_homog.typing import Float
 
 
@@ -116,23 +115,10 @@ class StiffnessScaled:
 
 
 class Dirichlet(StiffnessScaled):
-    """Around the Schur complements, with the springs of nodes where fibre and matrix are both cut."""
+    """Around the Schur complements."""
 
     def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators) -> None:
-        self._comm, self._first, self._compliance = comm, jump_operator.owned[0], operators.compliance
-        self._has_springs = bool(comm.allreduce(bool(operators.compliance.any()), MPI.LOR))
         super().__init__(comm, jump_operator, operators, operators.apply_skin)
-
-    def activate(self, active: Float) -> None:
-        """Invert the active part of W, and update."""
-        super().activate(active)
-        if self._has_springs:
-            self._springs = SpringUpdate(self._comm, self._first, active * self._compliance, super().apply)
-
-    def apply(self, r: Float) -> Float:
-        """M^-1 r with all springs."""
-        z = super().apply(r)
-        return self._springs.apply(z) if self._has_springs else z
 
 
 class Lumped(StiffnessScaled):

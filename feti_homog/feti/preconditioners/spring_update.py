@@ -14,6 +14,7 @@ from mpi4py import MPI
 from scipy.linalg import cho_factor, cho_solve
 
 from feti_homog.common.distributed_arrays import gather_rows
+from feti_homog.feti.preconditioners.scaled import Preconditioner
 from feti_homog.typing import Float
 
 
@@ -40,3 +41,31 @@ class SpringUpdate:
         if not len(self.rows):
             return z
         return np.asarray(z - self._columns @ cho_solve(self._factor, gather_rows(self.comm, z, self.first, self.rows)))
+
+
+class WithSprings:
+    """A preconditioner with the update for the springs of all active rows."""
+
+    norm = np.inf
+
+    def __init__(self, comm: MPI.Intracomm, inner: Preconditioner, first: int, compliance: Float) -> None:
+        """Arguments as of `SpringUpdate`; `inner` is M^-1, for all rows active.  Collective."""
+        self._comm, self._inner, self._first, self._compliance = comm, inner, first, compliance
+        self._update = SpringUpdate(comm, first, compliance, inner.apply)
+
+    def activate(self, active: Float) -> None:
+        """Restrict to the rows where `active` is 1, and update.  Collective."""
+        self._inner.activate(active)
+        self._update = SpringUpdate(self._comm, self._first, active * self._compliance, self._inner.apply)
+
+    def apply(self, r: Float) -> Float:
+        """The updated inverse times r.  Collective."""
+        return self._update.apply(self._inner.apply(r))
+
+    def close(self, right: Float, d: Float, E: Float) -> Float:
+        """The updated inverse times `right`."""
+        return self.apply(right)
+
+    def initial_multipliers(self, previous: Float, closing: Float) -> Float:
+        """The previous ones."""
+        return previous

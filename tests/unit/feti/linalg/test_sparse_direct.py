@@ -7,13 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mpi4py import MPI
-from scipy.sparse import csr_matrix, diags, kronsum
+from scipy.sparse import diags, kronsum
 
 from feti_homog.common import process_memory
 from feti_homog.feti.linalg.dense_block_sum import DenseBlockSum
 from feti_homog.feti.linalg.distributed_matrix import assemble_owned_rows
-from feti_homog.feti.linalg.saddle_point import SaddlePoint, _Augmented, _Indefinite
-from feti_homog.feti.linalg.sparse_direct import DirectSolver, IndefiniteSolver
+from feti_homog.feti.linalg.sparse_direct import DirectSolver
 
 PAGE, MEGABYTE = 4096, 2**20
 
@@ -28,12 +27,11 @@ def resident():
     return int(Path("/proc/self/statm").read_text().split()[1]) * PAGE
 
 
-@pytest.mark.parametrize("solver", [DirectSolver, IndefiniteSolver])
 @pytest.mark.parametrize("columns", [(), (1,), (3,), (40,)])
-def test_solvers_return_the_unknowns_that_made_the_right_hand_side(solver, columns):
+def test_solvers_return_the_unknowns_that_made_the_right_hand_side(columns):
     A = laplacian(12)
     x = np.random.default_rng(0).standard_normal((A.shape[0], *columns))
-    np.testing.assert_allclose(solver(A, "test_").solve(A @ x), x, atol=1e-10)
+    np.testing.assert_allclose(DirectSolver(A, "test_").solve(A @ x), x, atol=1e-10)
 
 
 @pytest.mark.slow
@@ -41,10 +39,9 @@ def test_solvers_return_the_unknowns_that_made_the_right_hand_side(solver, colum
     "make",
     [
         lambda A: DirectSolver(A, "test_").solve(np.ones((A.shape[0], 20))),
-        lambda A: IndefiniteSolver(A, "test_").solve(np.ones((A.shape[0], 20))),
         lambda A: assemble_owned_rows(MPI.COMM_WORLD, A, np.arange(A.shape[0]), np.arange(A.shape[0]), A.shape),
     ],
-    ids=["definite", "indefinite", "assembled"],
+    ids=["factored", "assembled"],
 )
 def test_nothing_is_left_of_a_factor(make):
     """A path makes one at every event."""
@@ -67,28 +64,6 @@ def test_a_factor_can_be_freed_before_its_owner():
     assert resident() - before < 8 * MEGABYTE
 
 
-@pytest.mark.parametrize(("residual", "inner"), [(1e-11, _Augmented), (0.0, _Indefinite)])
-@pytest.mark.parametrize("spread", [1.0, 1e7])
-def test_both_factors_solve_saddle_points(spread, residual, inner):
-    """Both factors solve [E K^T; K 0], also where rows of K depend on each other and a motion is free."""
-    rng = np.random.default_rng(1)
-    n, m = 30, 6
-    basis = np.linalg.qr(rng.standard_normal((n, n)))[0]
-    E = basis @ np.diag(np.geomspace(1.0, spread, n)) @ basis.T
-    K = rng.standard_normal((m, n))
-    K[-1] = K[0] + K[1]
-    null = np.array([1.0, 1, 0, 0, 0, -1]) / np.sqrt(3)
-    c, a = rng.standard_normal((n, 2)), rng.standard_normal((m, 2))
-    matrices = (csr_matrix(x) for x in (E, K, np.outer(null, null)))
-    saddle = SaddlePoint(MPI.COMM_WORLD, *matrices, "test_", replicate=True, enough=[(3, residual), (4, residual)])
-    found, work = saddle.solve(E @ c + K.T @ a, K @ c)
-    np.testing.assert_allclose(found, c, atol=1e-6)
-    np.testing.assert_allclose(K.T @ work, K.T @ a, rtol=1e-6, atol=1e-6 * spread)
-    alone, _ = saddle.solve((E @ c + K.T @ a)[:, 0], (K @ c)[:, 0])
-    np.testing.assert_allclose(alone, found[:, 0], atol=1e-6)
-    assert isinstance(saddle._inner, inner)
-
-
 def test_sum_of_blocks_does_not_depend_on_the_buffer():
     rng = np.random.default_rng(2)
     for entries in (1, 50, 10**6):
@@ -99,11 +74,3 @@ def test_sum_of_blocks_does_not_depend_on_the_buffer():
             blocks.add(rows, columns, values)
             expected[np.ix_(rows, columns)] += values
         np.testing.assert_allclose(blocks.matrix().toarray(), expected, atol=1e-12)
-
-
-def test_small_entries_of_blocks_are_left_out():
-    blocks = DenseBlockSum((4, 3))
-    values = np.array([[1.0, -2.0], [0.1, -5.0]])
-    blocks.add_entries_above(np.array([2, 0]), np.array([1, 2]), values, np.array([0.5, 2.0]))
-    np.testing.assert_array_equal(blocks.matrix().toarray(), [[0, 0, -5.0], [0, 0, 0], [0, 1.0, 0], [0, 0, 0]])
-    assert blocks.matrix().nnz == 2

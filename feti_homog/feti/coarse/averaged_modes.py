@@ -1,0 +1,97 @@
+"""Modes of the subdomains, averaged over the copies of each node: Z = (I - B_D^T B) V, the coarse displacements.
+
+B Z = 0, for B B_D^T = I, so they are displacements of the cell whose active rows are glued.  A mode of a subdomain
+reaches those that share nodes with it, and no further.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from mpi4py import MPI
+from scipy.sparse import csr_matrix
+
+from feti_homog.feti.coarse.local_eigenproblems import SubdomainBlocks
+from feti_homog.feti.decomposition.neighbours import Neighbours
+from feti_homog.typing import Float, Int
+
+
+class _Jumps(NamedTuple):
+    """What the modes of one subdomain, itself or a neighbour, open on the rows of a subdomain: B V there.
+
+    `rows` (r,) are positions among the subdomain's rows, `columns` (c,) numbers of coarse modes, `values` (r, c).
+    """
+
+    rows: Int
+    columns: Int
+    values: Float
+
+
+class AveragedModes:
+    """Z on this rank's subdomains, for any active rows.
+
+    Attributes:
+        total: coarse modes of all subdomains, n.
+        columns: of each subdomain the numbers (m,) of the modes that reach it, ascending.
+        is_own: (n,) whether each mode is of a subdomain of this rank.
+    """
+
+    def __init__(
+        self, comm: MPI.Intracomm, blocks: Sequence[SubdomainBlocks], neighbours: Neighbours, V: Sequence[Float]
+    ) -> None:
+        """`V` are of each subdomain its kernel, then its soft modes, on its boundary dofs.  Collective."""
+        self._blocks, self._V, self._sizes = blocks, V, [len(rows) for rows in neighbours.rows]
+        self._jumps, ends = _exchange_jumps(comm, blocks, neighbours, V)
+        self.total = int(ends[-1]) if len(ends) else 0
+        self._first = [int(ends[s]) - v.shape[1] for s, v in zip(neighbours.index, V, strict=True)]
+        self.is_own = np.zeros(self.total, bool)
+        for first, v in zip(self._first, V, strict=True):
+            self.is_own[first : first + v.shape[1]] = True
+        self.columns = [np.unique(np.concatenate([jumps.columns for jumps in of])) for of in self._jumps]
+
+    def of_subdomain(self, i: int, BW: csr_matrix) -> Float:
+        """(boundary dofs, m) Z on subdomain i, less its own kernel, which has no energy there.
+
+        Without the kernel, what is left of a rigid-body motion in a stiff subdomain has all its digits.
+
+        Args:
+            BW: (rows, boundary dofs) its scaled constraints W^-1 B D^-1 of the active rows.
+        """
+        columns, kernel = self.columns[i], self._blocks[i].R.shape[1]
+        jump = np.zeros((self._sizes[i], len(columns)))
+        for rows, numbers, values in self._jumps[i]:
+            jump[np.ix_(rows, np.searchsorted(columns, numbers))] = values
+        Z = np.asfortranarray(-(BW.T @ jump))
+        soft = self._V[i][:, kernel:]
+        at = np.searchsorted(columns, self._first[i] + kernel + np.arange(soft.shape[1]))
+        Z[:, at] += soft
+        return Z
+
+
+def _exchange_jumps(
+    comm: MPI.Intracomm, blocks: Sequence[SubdomainBlocks], neighbours: Neighbours, V: Sequence[Float]
+) -> tuple[list[list[_Jumps]], Int]:
+    """For each subdomain of this rank the jumps on its rows, and where the coarse modes of each subdomain of the cell
+    end.  Collective."""
+    counts = np.zeros(len(neighbours.rank), np.int64)
+    counts[neighbours.index] = [v.shape[1] for v in V]
+    comm.Allreduce(MPI.IN_PLACE, counts)
+    ends = np.cumsum(counts)
+
+    def messages() -> Iterator[tuple[int, int, tuple[Int, Float]]]:
+        for i, (block, v) in enumerate(zip(blocks, V, strict=True)):
+            Z, s = block.B @ v, neighbours.index[i]
+            first = ends[s] - v.shape[1]
+            for t, common in neighbours.common[i].items():
+                # All of its own, though a mode may open nothing.
+                some = np.arange(v.shape[1]) if t == s else np.flatnonzero(Z[common].any(axis=0))
+                yield i, t, (first + some, Z[np.ix_(common, some)])
+
+    received: list[list[_Jumps]] = [[] for _ in blocks]
+    neighbours.exchange(
+        messages(),
+        lambda i, sender, message: received[i].append(_Jumps(neighbours.common[i][sender], *message)),
+    )
+    return received, ends
