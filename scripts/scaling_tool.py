@@ -192,8 +192,10 @@ def _coarse(
     """Seconds to sum and factor the coarse matrices, of which each rank has made its part, and to solve with them as an
     iteration does, bytes that ranks tell of them, and by how many megabytes the factors let the memory of each rank
     grow.  There is one of the averaged modes, and one of the rigid-body motions, which is used twice."""
-    work, rows = np.ones((coarse.coarse_dimension, LOADS)), np.ones((natural.G.shape[0], LOADS))
-    solve = min(_seconds(lambda: (coarse.solve(work), natural.project(natural.project(rows)))) for _ in range(TIMED))
+    right = [np.ones((n, LOADS)) for n in (coarse.coarse_dimension, natural.kernel_dimension)]
+    solve = min(
+        _seconds(lambda: (coarse.solve(right[0]), natural.solve(natural.solve(right[1])))) for _ in range(TIMED)
+    )
     coarse.destroy()
     natural.destroy()
     part = coarse.part()

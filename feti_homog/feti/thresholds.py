@@ -36,8 +36,8 @@ class Thresholds:
             eigenproblem for each face, not from one.  Measured [1000, 5000] with a boundary of 3644: 1.1 and 5.0 s.
         replicated_vectors: coarse vectors, times the ranks that would each have them all, up to which every rank
             factors the whole coarse matrix and solves for some of the load cases; above, all ranks factor it together.
-            With 5 209 vectors a copy takes 311 MB; of one factor on 16 ranks each has 92 MB (`scripts/scaling strong
-            --fibres 25 --dofs 150000`).
+            Of 5 209 vectors both take as long on two ranks; a copy takes 92 MB, of one factor each of 16 ranks has 22
+            (`scripts/scaling strong together --fibres 25 --dofs 150000`).
         influence_applications: applications of the dual operator from which on influence columns pay
             (`scripts/benchmark_path`).
         assembled_schur_dofs: largest cell that is factored for influence columns, in degrees of freedom on shared nodes
@@ -51,7 +51,7 @@ class Thresholds:
     decayed: float = 0.01
     min_trace_dofs: int = 100
     whole_boundary_dofs: int = 2000
-    replicated_vectors: int = 40_000
+    replicated_vectors: int = 20_000
     influence_applications: int = 1000
     assembled_schur_dofs: int = 40_000
 
@@ -64,6 +64,8 @@ DEFAULTS = Thresholds()
 
 # linalg
 
+# Per cent more workspace than MUMPS estimates: its own 20 were too little for a matrix of 13 084 rows on two ranks.
+MUMPS_EXTRA_WORKSPACE_PERCENT = 100
 # Entries of dense blocks that wait to be added to a sparse sum, at least: 16 bytes each.
 MAX_BUFFERED_ENTRIES = 4_000_000
 # Right-hand sides up to which the library is faster with one after the other than with all at once.

@@ -134,8 +134,12 @@ class NaturalCoarseSpace:
 
     def amplitudes(self, x: Float) -> Float:
         """(G^T G)^-1 G^T x on every rank, for the owned rows x (rows,) or (rows, k).  Collective."""
+        return self.solve(allreduce_sum(self.comm, self.GT_active @ x))
+
+    def solve(self, work: Float) -> Float:
+        """(G^T G)^-1 work for work (m,) or (m, k), the same on every rank.  Collective."""
         assert self._solver is not None, "there are no kernels, or the factor is destroyed"
-        return self._solver.solve(allreduce_sum(self.comm, self.GT_active @ x))
+        return self._solver.solve(work)
 
     def project(self, x: Float) -> Float:
         """P x for the owned rows x, whose inactive ones are 0: what no rigid-body motion works on.  Collective."""

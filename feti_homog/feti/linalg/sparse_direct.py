@@ -9,7 +9,7 @@ from petsc4py import PETSc
 from scipy.sparse import csr_matrix
 
 from feti_homog.errors import CaseError
-from feti_homog.feti.thresholds import CHOLMOD_COLUMNS_ONE_BY_ONE
+from feti_homog.feti.thresholds import CHOLMOD_COLUMNS_ONE_BY_ONE, MUMPS_EXTRA_WORKSPACE_PERCENT
 from feti_homog.typing import Float
 
 # PETSc's error code for a factorization that the chosen library does not have (PETSC_ERR_MISSING_FACTOR).
@@ -73,6 +73,7 @@ def factor_by_mumps(A: PETSc.Mat, prefix: str) -> PETSc.KSP:
     pc = ksp.getPC()
     if pc.getFactorSolverType() == PETSc.Mat.SolverType.MUMPS:
         pc.getFactorMatrix().setMumpsIcntl(8, 0)
+        pc.getFactorMatrix().setMumpsIcntl(14, MUMPS_EXTRA_WORKSPACE_PERCENT)
     ksp.setUp()
     return ksp
 
