@@ -12,13 +12,15 @@ from collections.abc import Callable
 from time import perf_counter
 
 import numpy as np
+from mpi4py import MPI
 from scipy.linalg.blas import dsymm, dsymv, dtrmm
 from scipy.linalg.lapack import dtrtri
 from scipy.sparse import csr_matrix, diags, kronsum
 
 from feti_homog.feti import thresholds
+from feti_homog.feti.linalg.distributed_direct import DistributedDirectSolver
 from feti_homog.feti.linalg.packed_symmetric import full_from_lower
-from feti_homog.feti.linalg.sparse_direct import DirectSolver, IndefiniteSolver
+from feti_homog.feti.linalg.sparse_direct import DirectSolver
 
 COLUMNS = (1, 2, 3, 4, 6, 8, 12)
 
@@ -40,9 +42,11 @@ def compare(title: str, pairs: list[tuple[int, float, float]], small: str, large
         print(f"{size:6}{first:16.1f}{second:16.1f}")
 
 
-def sparse_columns(kind: type[DirectSolver], matrix: csr_matrix) -> list[tuple[int, float, float]]:
+def sparse_columns(
+    solver: DirectSolver | DistributedDirectSolver, matrix: csr_matrix
+) -> list[tuple[int, float, float]]:
     """Solves for columns one after the other, and all at once."""
-    solver, found = kind(matrix, "measure_"), []
+    found = []
     for k in COLUMNS:
         B = np.asfortranarray(np.random.default_rng(0).random((matrix.shape[0], k)))
         times = []
@@ -87,9 +91,10 @@ def main() -> None:
     m = round(dofs**0.5)
     line = diags([-1, 2.1, -1], [-1, 0, 1], (m, m))
     matrix = kronsum(line, line).tocsr()
-    for kind, name in ((DirectSolver, "CHOLMOD"), (IndefiniteSolver, "MUMPS")):
-        title = f"{name}_COLUMNS_ONE_BY_ONE = {kind.max_columns_one_by_one}"
-        compare(title, sparse_columns(kind, matrix), "one by one", "at once")
+    cholmod, mumps = DirectSolver(matrix, "measure_"), DistributedDirectSolver(MPI.COMM_SELF, matrix, "measure_")
+    for solver, name in ((cholmod, "CHOLMOD"), (mumps, "MUMPS")):
+        title = f"{name}_COLUMNS_ONE_BY_ONE = {solver.max_columns_one_by_one}"
+        compare(title, sparse_columns(solver, matrix), "one by one", "at once")
     title = f"DENSE_COLUMNS_ONE_BY_ONE = {thresholds.DENSE_COLUMNS_ONE_BY_ONE}"
     compare(title, dense_columns(max(dofs // 10, 1)), "one by one", "at once")
     compare(f"TRIANGLE_INVERSE_ROWS = {thresholds.TRIANGLE_INVERSE_ROWS}", triangles(), "dtrtri", "halves")

@@ -61,7 +61,14 @@ OPTIONS = (
     *_direct_solver("feti_sub_", "implicit subdomains"),
     *_direct_solver("feti_interior_", "interiors, of implicit subdomains and for fields"),
     *_direct_solver("feti_natural_", "the rigid-body coarse problem"),
-    *_direct_solver("feti_coarse_", "the adaptive coarse problem; mumps where all ranks factor it together"),
+    Option("feti_coarse_ksp_type", "preonly|cg|...", "preonly", "solves with the adaptive coarse problem"),
+    Option("feti_coarse_pc_type", "cholesky|lu|gamg|...", "cholesky", "its factorization; gamg for cg on many ranks"),
+    Option(
+        "feti_coarse_pc_factor_mat_solver_type",
+        "cholmod|mumps|...",
+        "cholmod",
+        "its library; mumps where all ranks factor it together",
+    ),
     *_direct_solver("feti_bonded_", "the cell with all bonds intact, for influence columns"),
 )
 """Every option that a run accepts whether or not it makes the solver which reads it."""

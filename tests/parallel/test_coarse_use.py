@@ -125,6 +125,35 @@ def test_a_distributed_coarse_problem_gives_the_same(comm, contrast):
         assert relative_error(*(dense_feti.gathered(cell, s.lam) for s in (one, other))) < 1e-7
 
 
+MULTIGRID = {
+    "feti_coarse_ksp_type": "cg", "feti_coarse_ksp_rtol": 1e-10, "feti_coarse_pc_type": "gamg",
+    "feti_coarse_mg_levels_pc_type": "sor",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("largest", [0, 10**6], ids=["shared", "copies"])
+def test_an_iterative_coarse_solve_gives_the_same(comm, largest):
+    case = NARROW | {"decomposition": {"subdomains": 50}}
+    found = []
+    for petsc in ({}, MULTIGRID):
+        cell = torn_cells.tear(comm, **case, thresholds=Thresholds(replicated_vectors=largest), petsc=petsc)
+        found.append(solve_many(cell))
+    for one, other in zip(*found, strict=True):
+        assert one.reason > 0 and other.reason > 0 and abs(one.iterations - other.iterations) <= 1
+        assert relative_error(*(dense_feti.gathered(cell, s.lam) for s in (one, other))) < 1e-7
+
+
+def test_translations_of_the_cell_have_little_energy(comm, narrow):
+    """They meet a resistance at the pinned class alone."""
+    part, translations = narrow.coarse.part(), narrow.coarse._translations
+    energy, bound = (
+        comm.allreduce(np.einsum("ik,ik->k", translations, product))
+        for product in (part @ translations, part.diagonal()[:, None] * translations)
+    )
+    assert translations.shape[1] == 2
+    assert (energy < 0.05 * bound).all()
+
+
 def test_one_factor_of_the_kernels_projects_as_one_on_each_rank(comm):
     """With all rows, with every seventh one away, and with none on the first fibre, which then can move freely."""
     found = []

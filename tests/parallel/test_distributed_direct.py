@@ -57,7 +57,7 @@ def test_a_fault_of_one_rank_is_told_on_every_rank(comm, monkeypatch):
     """As rounding may be where processors differ: the last rank alone finds its copy of the matrix singular."""
     if comm.rank == comm.size - 1:
         solver = distributed_direct.DirectSolver
-        monkeypatch.setattr(distributed_direct, "DirectSolver", lambda A, prefix: solver(0.0 * A, prefix))
+        monkeypatch.setattr(distributed_direct, "DirectSolver", lambda A, *options: solver(0.0 * A, *options))
     with pytest.raises(np.linalg.LinAlgError, match="singular"):
         direct_solver(comm, parts(comm, np.eye(2)), "test_", replicate=True)
 

@@ -65,6 +65,7 @@ class AdaptiveCoarseSpace:
         self._modes = AveragedModes(comm, blocks, self._neighbours, V)
         self.coarse_dimension = self._modes.total
         self.is_replicated = thresholds.replicates(self.coarse_dimension, comm.size)
+        self._translations = self._modes.translations(comm)
         # Of each subdomain S Z on its boundary dofs, and Z^T S Z.
         self._forces: list[Float] = [np.zeros((0, 0)) for _ in blocks]
         self._energies: list[Float] = [np.zeros((0, 0)) for _ in blocks]
@@ -114,7 +115,8 @@ class AdaptiveCoarseSpace:
         energy = allreduce_sum(self.comm, part.diagonal())
         self._weights = 1.0 / np.sqrt(np.maximum(energy, FREE_MODE_ENERGY * self._bonded_energy))
         matrix = scaled(part, self._weights) + diags(COARSE_REGULARISATION * self._modes.is_own)
-        self._solver = direct_solver(self.comm, matrix.tocsr(), "feti_coarse_", self.is_replicated)
+        near_kernel = np.linalg.qr(self._translations / self._weights[:, None])[0]
+        self._solver = direct_solver(self.comm, matrix.tocsr(), "feti_coarse_", self.is_replicated, near_kernel)
         self.factorizations += 1
 
     def balanced(self, x: Float) -> Float:

@@ -13,6 +13,7 @@ import numpy as np
 from mpi4py import MPI
 from scipy.sparse import csr_matrix
 
+from feti_homog.common.distributed_arrays import allreduce_sum
 from feti_homog.feti.coarse.local_eigenproblems import SubdomainBlocks
 from feti_homog.feti.decomposition.neighbours import Neighbours
 from feti_homog.typing import Float, Int
@@ -68,6 +69,15 @@ class AveragedModes:
         at = np.searchsorted(columns, self._first[i] + kernel + np.arange(soft.shape[1]))
         Z[:, at] += soft
         return Z
+
+    def translations(self, comm: MPI.Intracomm) -> Float:
+        """(n, c) amplitudes of the translations of the whole cell, which have little energy.  Collective."""
+        subdomains = [block.subdomain for block in self._blocks]
+        c = subdomains[0].problem.components if subdomains else 0
+        amplitudes = np.zeros((self.total, comm.allreduce(c, MPI.MAX)))
+        for first, s in zip(self._first, subdomains, strict=True):
+            amplitudes[first : first + s.R.shape[1]] = np.stack([s.R[i::c].sum(axis=0) for i in range(c)], axis=1)
+        return allreduce_sum(comm, amplitudes)
 
 
 def _exchange_jumps(

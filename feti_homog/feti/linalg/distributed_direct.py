@@ -20,22 +20,25 @@ from feti_homog.typing import Float
 class DistributedDirectSolver:
     """One factorization by all ranks, none of which ever has the whole matrix (n, n)."""
 
-    def __init__(self, comm: MPI.Intracomm, part: csr_matrix, prefix: str) -> None:
-        """Factor the sum of the parts (n, n).  Options under `prefix` (default: cholesky by MUMPS).  Collective.
+    max_columns_one_by_one = MUMPS_COLUMNS_ONE_BY_ONE
+
+    def __init__(self, comm: MPI.Intracomm, part: csr_matrix, prefix: str, near_kernel: Float | None = None) -> None:
+        """Factor the sum of the parts (n, n).  Options under `prefix` (default: cholesky by MUMPS); `near_kernel` as of
+        `DirectSolver`.  Collective.
 
         Raises:
             PETSc.Error: the matrix is not definite.
             CaseError: the library that the options name cannot factor distributed matrices, as CHOLMOD cannot.
         """
         self.comm = comm
-        self._ksp = factor_by_mumps(assemble_distributed(comm, part), prefix)
+        self._ksp = factor_by_mumps(assemble_distributed(comm, part), prefix, near_kernel)
         self._x, self._b = self._ksp.getOperators()[0].createVecs()
 
     def solve(self, B: Float) -> Float:
         """A^-1 B for B (n,) or (n, k), the same on every rank.  Collective."""
         right = B.reshape(len(B), -1)[slice(*self._b.getOwnershipRange())]
         X = np.empty(right.shape, order="F")
-        if right.shape[1] > MUMPS_COLUMNS_ONE_BY_ONE and self._ksp.getType() == PETSc.KSP.Type.PREONLY:
+        if right.shape[1] > self.max_columns_one_by_one and self._ksp.getType() == PETSc.KSP.Type.PREONLY:
             self._solve_at_once(np.asfortranarray(right), X)
         else:
             for x, b in zip(X.T, right.T, strict=True):
@@ -61,9 +64,9 @@ class DistributedDirectSolver:
 class ReplicatedDirectSolver:
     """A factorization by every rank, which solves for some of the right-hand sides."""
 
-    def __init__(self, comm: MPI.Intracomm, part: csr_matrix, prefix: str) -> None:
+    def __init__(self, comm: MPI.Intracomm, part: csr_matrix, prefix: str, near_kernel: Float | None = None) -> None:
         """Factor the sum of the parts (n, n).  Options and errors as of `DirectSolver`.  Collective."""
-        self.comm, self.local = comm, DirectSolver(allreduce_sparse(comm, part), prefix)
+        self.comm, self.local = comm, DirectSolver(allreduce_sparse(comm, part), prefix, near_kernel)
 
     def solve(self, B: Float) -> Float:
         """A^-1 B for B (n,) or (n, k), the same on every rank.  Collective."""
@@ -75,7 +78,7 @@ class ReplicatedDirectSolver:
 
 
 def direct_solver(
-    comm: MPI.Intracomm, part: csr_matrix, prefix: str, replicate: bool
+    comm: MPI.Intracomm, part: csr_matrix, prefix: str, replicate: bool, near_kernel: Float | None = None
 ) -> ReplicatedDirectSolver | DistributedDirectSolver:
     """Solves with the sum over ranks of the parts, with a factor on each rank to `replicate`.  Collective.
 
@@ -87,7 +90,7 @@ def direct_solver(
     kind = ReplicatedDirectSolver if replicate or comm.size == 1 else DistributedDirectSolver
     solver, error = None, None
     try:
-        solver = kind(comm, part, prefix)
+        solver = kind(comm, part, prefix, near_kernel)
     except PETSc.Error as caught:
         error = caught
     if comm.allreduce(error is not None, MPI.LOR) or solver is None:

@@ -19,20 +19,23 @@ MISSING_FACTOR = 92
 class DirectSolver:
     """X = A^-1 B for one symmetric definite matrix A (n, n) and any number of right-hand sides."""
 
-    def __init__(self, matrix: csr_matrix, prefix: str) -> None:
-        """Factorize.  Options under `prefix` (default: cholesky by CHOLMOD).
+    max_columns_one_by_one = CHOLMOD_COLUMNS_ONE_BY_ONE
+
+    def __init__(self, matrix: csr_matrix, prefix: str, near_kernel: Float | None = None) -> None:
+        """Factorize.  Options under `prefix` (default: cholesky by CHOLMOD), also for an iterative method: multigrid
+        then learns of the `near_kernel` (n, k), orthonormal vectors of little energy.
 
         Raises:
             PETSc.Error: the matrix is not positive definite.
             CaseError: the library that the options name has no such factorization.
         """
-        self._ksp = factor_by_cholmod(matrix, prefix)
+        self._ksp = factor_by_cholmod(matrix, prefix, near_kernel)
         self._x, self._b = self._ksp.getOperators()[0].createVecs()
         self._destroy = weakref.finalize(self, _destroy, self._ksp, self._x, self._b)
 
     def solve(self, B: Float) -> Float:
         """A^-1 B for B (n,) or (n, k)."""
-        if B.size <= CHOLMOD_COLUMNS_ONE_BY_ONE * len(B):
+        if B.size <= self.max_columns_one_by_one * len(B) or self._ksp.getType() != PETSc.KSP.Type.PREONLY:
             X = np.empty_like(B)
             for x, b in zip(X.reshape(len(B), -1).T, B.reshape(len(B), -1).T, strict=True):
                 self._b.setArray(b)
@@ -52,22 +55,24 @@ class DirectSolver:
         self._destroy()
 
 
-def factor_by_cholmod(matrix: csr_matrix, prefix: str) -> PETSc.KSP:
+def factor_by_cholmod(matrix: csr_matrix, prefix: str, near_kernel: Float | None = None) -> PETSc.KSP:
     """A KSP with the factorization of a symmetric definite matrix; options under `prefix`, CHOLMOD by default."""
     A = _sequential(matrix)
+    _tell(A, near_kernel)
     A.setOption(PETSc.Mat.Option.SPD, True)
     ksp = _direct_ksp(A, prefix, PETSc.Mat.SolverType.CHOLMOD)
     ksp.setUp()
     return ksp
 
 
-def factor_by_mumps(A: PETSc.Mat, prefix: str) -> PETSc.KSP:
+def factor_by_mumps(A: PETSc.Mat, prefix: str, near_kernel: Float | None = None) -> PETSc.KSP:
     """A KSP with the factorization of a symmetric definite matrix on any communicator; options under `prefix`, MUMPS by
     default.
 
     The matrix should have rows and columns of similar size: MUMPS does not scale it here, for its own scaling loses
-    all digits of coarse problems with contrasts of 1e6.
+    all digits of coarse problems with contrasts of 1e6.  `near_kernel` (n, k) as of `DirectSolver`.
     """
+    _tell(A, near_kernel)
     A.setOption(PETSc.Mat.Option.SPD, True)
     ksp = _direct_ksp(A, prefix, PETSc.Mat.SolverType.MUMPS)
     pc = ksp.getPC()
@@ -76,6 +81,16 @@ def factor_by_mumps(A: PETSc.Mat, prefix: str) -> PETSc.KSP:
         pc.getFactorMatrix().setMumpsIcntl(14, MUMPS_EXTRA_WORKSPACE_PERCENT)
     ksp.setUp()
     return ksp
+
+
+def _tell(A: PETSc.Mat, near_kernel: Float | None) -> None:
+    """Let the matrix know of its near-kernel (n, k), the same on all of its ranks."""
+    if near_kernel is None:
+        return
+    vectors = [A.createVecLeft() for _ in near_kernel.T]
+    for vector, values in zip(vectors, near_kernel.T, strict=True):
+        vector.setArray(values[slice(*vector.getOwnershipRange())])
+    A.setNearNullSpace(PETSc.NullSpace().create(vectors=vectors, comm=A.comm))
 
 
 def _direct_ksp(A: PETSc.Mat, prefix: str, library: str) -> PETSc.KSP:
