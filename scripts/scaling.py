@@ -1,10 +1,10 @@
 """Weak and strong scaling by ranks, cost by size, and a model of what 64 and 1 024 ranks would do.
 
 Each run is an MPI job of its own: a random cell of fibre fraction 0.6 with gaps of 4 %, cut as by default, three unit
-strains together to 1e-8.  `together` is the strong study with one coarse factor by MUMPS on all ranks, also where the
-program would have each factor for itself, on as many ranks as there are cores.  `events` are the first ones of paths of
-random cells that debond.  More ranks than cores take turns: their
-iterations and messages count, their times do not.
+strains together to 1e-8.  `shared` and `multigrid` are the strong study with one coarse factor by MUMPS on all ranks,
+also where the program would have each factor for itself, and with the coarse problem solved by multigrid (PETSc's GAMG
+in CG), on as many ranks as there are cores.  `events` are the first ones of paths of random cells that debond.  More
+ranks than cores take turns: their iterations and messages count, their times do not.
 A run whose report is in DIR/scaling is not made again, so that a long list can be worked off in parts.  The tables,
 the picture and the model are of all runs of the studies that are there.  Remove the folder to measure anew.
 """
@@ -25,14 +25,15 @@ from scaling_events import study as study_events
 from scaling_forecast import assumptions, checks, forecast, table, verdict
 from scaling_model import Machine, Prediction, measured, network
 from scaling_plot import plot
-from scaling_report import Row, by_ranks, by_size, memory, speedups, write
+from scaling_report import COPIES, MULTIGRID, SHARED, Row, by_ranks, by_size, memory, speedups, write
 
 HERE = Path(__file__).parent
 EVENTS = "events"
 STUDIES = {
     "weak": "weak scaling: as many dofs on every rank",
     "strong": "strong scaling: one cell",
-    "together": "strong scaling with one coarse factor by all ranks",
+    SHARED: "strong scaling with one coarse factor by all ranks",
+    MULTIGRID: "strong scaling with the coarse problem solved by multigrid",
     "sizes": "cost by size: microseconds of a rank per dof",
 }
 
@@ -44,12 +45,12 @@ class Run(NamedTuple):
     dofs: int
     refine: int
     ranks: int
-    together: bool = False
+    way: str | None = None
 
     def report(self, out: Path) -> Path:
         """Where its report is."""
         name = f"{self.fibres}_fibres_{self.dofs}_dofs_refine_{self.refine}_ranks_{self.ranks}"
-        return out / "scaling" / f"{name}{'_together' if self.together else ''}.json"
+        return out / "scaling" / f"{name}{f'_{self.way}' if self.way else ''}.json"
 
 
 def main() -> int:
@@ -80,9 +81,10 @@ def planned(arguments: argparse.Namespace) -> dict[str, list[Run]]:
     return {
         "weak": [Run(fibres * p, dofs * p, refine, p) for p in arguments.ranks],
         "strong": [Run(fibres * most, dofs * most, refine, p) for p in arguments.ranks],
-        "together": [
-            Run(fibres * most, dofs * most, refine, p, together=True) for p in arguments.ranks if p <= arguments.cores
-        ],
+        **{
+            way: [Run(fibres * most, dofs * most, refine, p, way) for p in arguments.ranks if p <= arguments.cores]
+            for way in (SHARED, MULTIGRID)
+        },
         "sizes": [Run(*cell, refine, arguments.size_ranks) for cell in ladder],
     }
 
@@ -98,7 +100,7 @@ def work_off(run: Run, arguments: argparse.Namespace) -> bool:
         report = Path(folder) / path.name
         for _ in range(times):
             words = [HERE / "scaling_tool.py", report, "--fibres", run.fibres, "--dofs", run.dofs]
-            words += ["--refine", run.refine, *(["--together"] if run.together else [])]
+            words += ["--refine", run.refine, *(["--way", run.way] if run.way else [])]
             fault = job(run.ranks, words, arguments.timeout)
             if fault:
                 print(f"{run.ranks} ranks, {run.dofs} dofs: {fault}", flush=True)
@@ -127,9 +129,9 @@ def rows_of(study: str, runs: Sequence[Run], arguments: argparse.Namespace) -> l
 def report(found: dict[str, list[Row]], arguments: argparse.Namespace) -> list[str]:
     """All tables and what the model says; draws the picture."""
     lines = [line for study, rows in found.items() if rows for line in study_tables(study, rows, arguments.cores)]
-    rows = list({(row.dofs, row.ranks, row.together): row for some in found.values() for row in some}.values())
+    rows = list({(row.dofs, row.ranks, row.way): row for some in found.values() for row in some}.values())
     # PETSc counts the messages of a factor that ranks share among those of multipliers.
-    miscounted = max((row.miscounted for row in rows if not row.together), default=0.0)
+    miscounted = max((row.miscounted for row in rows if row.way == COPIES), default=0.0)
     try:
         rates, here = measured(rows, arguments.cores), network(rows, arguments.cores)
     except ValueError as error:
@@ -138,14 +140,14 @@ def report(found: dict[str, list[Row]], arguments: argparse.Namespace) -> list[s
     machine = Machine(
         here.latency if latency is None else 1e-6 * latency, here.bandwidth if bandwidth is None else 1e9 * bandwidth
     )
-    futures = forecast(rates, machine)
+    futures, by_multigrid = forecast(rates, machine), forecast(rates, machine, MULTIGRID) if rates.multigrid else {}
     picture = arguments.out / "scaling.png"
     plot(picture, found, futures)
     return [
         *lines,
         *("", f"counted bytes of multipliers and PETSc's log differ by {miscounted:.1%} at most"),
         *("", *assumptions(rates, machine), "", *checks(rates, here, rows, arguments.cores)),
-        *forecast_lines(futures),
+        *forecast_lines(futures | by_multigrid),
         *("", f"{picture} {arguments.out / 'scaling.csv'}"),
     ]
 
@@ -167,8 +169,8 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "studies",
         nargs="*",
-        default=["weak", "strong", "together"],
-        help="of weak, strong, together, events, sizes; by default the first three",
+        default=["weak", "strong", SHARED],
+        help="of weak, strong, shared, multigrid, events, sizes; by default the first three",
     )
     parser.add_argument("--ranks", type=int, nargs="+", default=[1, 2, 4, 8, 16])
     parser.add_argument("--dofs", type=int, default=40_000, help="of a rank in weak scaling")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from scaling_fit import Shares
 from scaling_model import COARSE, LOCAL, MESH, Machine, Prediction, Rates, predict
 from scaling_report import COARSE_SUMS, GATHERS, SCALARS, SUMS, Row
 
@@ -16,14 +17,15 @@ LARGE = 0.1
 STRONG_DOFS, WEAK_DOFS = 10_000_000, 1_000_000
 
 
-def forecast(rates: Rates, machine: Machine) -> dict[str, list[Prediction]]:
-    """Strong and weak scaling over RANKS."""
+def forecast(rates: Rates, machine: Machine, way: str | None = None) -> dict[str, list[Prediction]]:
+    """Strong and weak scaling over RANKS, with that way to solve the coarse problem, by default the program's."""
+    words = f", coarse problem by {way}" if way else ""
     return {
-        f"strong scaling of {STRONG_DOFS / 1e6:g} million dofs": [
-            predict(rates, machine, STRONG_DOFS, ranks) for ranks in RANKS
+        f"strong scaling of {STRONG_DOFS / 1e6:g} million dofs{words}": [
+            predict(rates, machine, STRONG_DOFS, ranks, way) for ranks in RANKS
         ],
-        f"weak scaling of {WEAK_DOFS / 1e6:g} million dofs a rank": [
-            predict(rates, machine, WEAK_DOFS * ranks, ranks) for ranks in RANKS
+        f"weak scaling of {WEAK_DOFS / 1e6:g} million dofs a rank{words}": [
+            predict(rates, machine, WEAK_DOFS * ranks, ranks, way) for ranks in RANKS
         ],
     }
 
@@ -32,7 +34,13 @@ def assumptions(rates: Rates, machine: Machine) -> list[str]:
     """The model in words, with its constants."""
     r = rates
     mesh, alone = r.mesh, (r.factor, r.solve)
-    shared = zip((r.factor_together, r.solve_together), alone, strict=True)
+    shared = zip((r.factor_shared, r.solve_shared), alone, strict=True)
+    multigrid = []
+    if r.multigrid:
+        multigrid.append(
+            f"              by multigrid: set-up {_shares(r.multigrid.setup)}, a solve {_shares(r.multigrid.solve)} "
+            f"times n, in {r.multigrid.inner} iterations at any size"
+        )
     return [
         "cost model: seconds on p ranks = mesh + subdomains + coarse problem + messages, none behind another; all "
         "constants are of these runs",
@@ -42,18 +50,22 @@ def assumptions(rates: Rates, machine: Machine) -> list[str]:
         f"{1e6 * r.apply:.3f} microseconds a dof, measured on 1 rank; over p,",
         f"              times {r.imbalance:.2f} for the fullest rank (measured), or more where few subdomains are left "
         f"to each; {1e3 * r.subdomains:.2f} of them in 1 000 dofs",
-        f"  coarse      n = {1e3 * r.coarse:.2f} unknowns in 1 000 dofs, up to {r.largest_coarse} timed; seconds of "
+        f"  coarse      n = {1e3 * r.vectors:.2f} vectors in 1 000 dofs, up to {r.largest_coarse} timed; seconds of "
         "the factor, and of a solve of one load:",
         "              by every rank for itself, which solves for its loads: "
         + ", ".join(f"{f.factor:.2g} n^{f.exponent:.2f}" for f in alone),
         f"              from {DEFAULTS.replicated_vectors / r.vectors / 1e6:.0f} million dofs / p by all together: "
-        + ", ".join(f"({s.serial:.2g} + {s.parallel:.2g} / p) n^{f.exponent:.2f}" for s, f in shared),
-        f"              of {STRONG_DOFS / 1e6:g} million dofs n is {r.coarse * STRONG_DOFS / r.largest_coarse:.1f} "
+        + ", ".join(f"{_shares(s)} n^{f.exponent:.2f}" for s, f in shared),
+        *multigrid,
+        f"              and of m = {1e3 * r.kernel:.2f} rigid-body motions: "
+        f"{r.natural_factor.factor:.2g} m^{r.natural_factor.exponent:.2f}, of the two solves of an iteration "
+        f"{r.natural_solve.factor:.2g} m^{r.natural_solve.exponent:.2f}, on any p",
+        f"              of {STRONG_DOFS / 1e6:g} million dofs n is {r.vectors * STRONG_DOFS / r.largest_coarse:.1f} "
         "times the largest that was timed: the further, the less these powers are worth (`sizes` times larger ones)",
         f"  messages    {1e6 * machine.latency:.2g} microseconds each and {machine.bandwidth / 1e9:.2g} GB/s; "
         f"{GATHERS + SUMS} exchanges an iteration, each of {r.neighbours} messages and {r.surface:.1f} values",
         f"              times the root of the rank's dofs (most that were counted); {COARSE_SUMS} sums over ranks of "
-        f"{r.loads} n values and {SCALARS} of single ones,",
+        f"{r.loads} (n + m) values and {SCALARS} of single ones,",
         f"              log2 p messages deep; once {r.coarse_bytes:.1f} bytes a dof of coarse matrices for every rank",
         f"  iterations  {r.iterations} at any size, the most of all runs",
         "  memory      not in the model: neither whether each rank can hold the coarse factor, nor rank 0 the mesh; "
@@ -62,18 +74,23 @@ def assumptions(rates: Rates, machine: Machine) -> list[str]:
     ]
 
 
+def _shares(s: Shares) -> str:
+    """Shares in words."""
+    return f"({s.serial:.2g} + {s.parallel:.2g} / p)"
+
+
 def checks(rates: Rates, machine: Machine, rows: Sequence[Row], cores: int) -> list[str]:
     """The model beside every run that was timed: seconds of both, and its relative error."""
     names = ("mesh", "assemble", "set-up", "solve", "total")
     lines = [
-        "model, measured seconds, and the model's error; c: one coarse factor by all ranks, asked for",
-        f"{'dofs':>10}{'ranks':>6}  " + "".join(f"{name:^24}" for name in names),
+        "model, measured seconds, and the model's error",
+        f"{'dofs':>10}{'ranks':>6}  {'coarse':9}" + "".join(f"{name:^24}" for name in names),
     ]
     errors: dict[str, list[float]] = {name: [] for name in names}
-    for row in sorted(rows, key=lambda row: (row.dofs, row.ranks, row.together)):
+    for row in sorted(rows, key=lambda row: (row.dofs, row.ranks, row.way)):
         if row.ranks > cores:
             continue
-        p = predict(rates, machine, row.dofs, row.ranks, row.together)
+        p = predict(rates, machine, row.dofs, row.ranks, row.way)
         found = {
             "mesh": (p.mesh, row.seconds["mesh"]),
             "assemble": (p.assemble, row.seconds["assemble"]),
@@ -84,7 +101,7 @@ def checks(rates: Rates, machine: Machine, rows: Sequence[Row], cores: int) -> l
         for name, (model, seconds) in found.items():
             errors[name].append(model / seconds - 1.0)
         cells = "".join(f"{a:9.2f}{b:8.2f}{a / b - 1.0:+7.0%}" for a, b in found.values())
-        lines.append(f"{row.dofs:10}{row.ranks:6}{' c' if row.together else '  '}{cells}")
+        lines.append(f"{row.dofs:10}{row.ranks:6}  {row.way:9}{cells}")
     largest = ", ".join(f"{name} {max(map(abs, some)):.0%}" for name, some in errors.items())
     return [*lines, f"largest error: {largest}"]
 

@@ -7,19 +7,22 @@ it is large, and messages.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from math import ceil, log2, sqrt
 from statistics import median
 from typing import Any
 
 from scaling_fit import Power, Shares, fit_power, fit_shares
-from scaling_report import COARSE_SUMS, GATHERS, SCALARS, SUMS, VALUE_BYTES, Row
+from scaling_report import COARSE_SUMS, COPIES, GATHERS, MULTIGRID, SCALARS, SHARED, SUMS, VALUE_BYTES, Row
 
 from feti_homog.cell.tiles import DEFAULT_TILES
 from feti_homog.feti.thresholds import DEFAULTS
 
 MESH, LOCAL, COARSE, MESSAGES = "mesh", "subdomains", "coarse problem", "messages"
+# Exchanges with neighbours in one cycle of multigrid: on each of about five levels six, for the products and smoothers
+# before and after the coarser level, the residual and the transfers.
+CYCLE_EXCHANGES = 30
 
 
 @dataclass(frozen=True)
@@ -31,17 +34,28 @@ class Machine:
 
 
 @dataclass(frozen=True)
+class Multigrid:
+    """Seconds per coarse vector of set-up, and of a solve of one load, which takes `inner` iterations at any size."""
+
+    setup: Shares
+    solve: Shares
+    inner: int
+
+
+@dataclass(frozen=True)
 class Rates:
     """Measured: seconds per unit of work, and sizes per dof.
 
     Attributes:
         mesh: of a coarse triangle.
         assemble, setup, apply: seconds per dof, `apply` of an iteration.
-        factor, solve: of the coarse unknowns on one rank, `solve` of one load case.
-        factor_together, solve_together: on all ranks, per unknown to the powers of `factor` and `solve`.
+        factor, solve: of the coarse vectors on one rank, `solve` of one load case.
+        factor_shared, solve_shared: on all ranks, per vector to the powers of `factor` and `solve`.
+        natural_factor, natural_solve: of the rigid-body motions, `natural_solve` of an iteration and all loads.
+        multigrid: if it was timed.
         loads: load cases solved together.
-        triangles, subdomains, vectors, coarse, coarse_bytes: per dof.
-        largest_coarse: most coarse unknowns that were timed.
+        triangles, subdomains, vectors, kernel, coarse_bytes: per dof.
+        largest_coarse: most coarse vectors that were timed.
         iterations: most of all runs.
         surface: values that a rank tells or hears in an exchange per root of its dofs.
         neighbours: ranks told or heard of in an exchange.
@@ -54,13 +68,16 @@ class Rates:
     apply: float
     factor: Power
     solve: Power
-    factor_together: Shares
-    solve_together: Shares
+    factor_shared: Shares
+    solve_shared: Shares
+    natural_factor: Power
+    natural_solve: Power
+    multigrid: Multigrid | None
     loads: int
     triangles: float
     subdomains: float
     vectors: float
-    coarse: float
+    kernel: float
     coarse_bytes: float
     largest_coarse: int
     iterations: int
@@ -75,7 +92,7 @@ def measured(rows: Sequence[Row], cores: int) -> Rates:
     Raises:
         ValueError: the timed rows are on too few numbers of ranks, or of too few sizes.
     """
-    if not any(row.ranks == 1 and not row.together for row in rows):
+    if not any(row.ranks == 1 and row.way == COPIES for row in rows):
         raise ValueError("rates of subdomains need a run on one rank")
     return Rates(**_local_times(rows, cores), **_coarse_times(rows, cores), **_per_dof(rows), **_counts(rows, cores))
 
@@ -95,16 +112,20 @@ def network(rows: Sequence[Row], cores: int) -> Machine:
 def _local_times(rows: Sequence[Row], cores: int) -> dict[str, Any]:
     """Seconds per unit of work: of the subdomains on one rank, of the mesh on all that have a core."""
     timed = [row for row in rows if row.ranks <= cores]
-    alone = [row for row in timed if row.ranks == 1 and not row.together]
+    alone = [row for row in timed if row.ranks == 1 and row.way == COPIES]
     cells = _meshed_alike(timed)
     return dict(
         mesh=fit_shares(
             [row.triangles for row in cells], [row.ranks for row in cells], [row.seconds["mesh"] for row in cells]
         ),
         assemble=_rate((row.seconds["assemble"], row.dofs) for row in alone),
-        setup=_rate((row.seconds["set-up"] - row.coarse_factor, row.dofs) for row in alone),
+        setup=_rate((row.seconds["set-up"] - row.coarse_factor - row.natural_factor, row.dofs) for row in alone),
         apply=_rate(
-            (row.seconds["solve"] - row.iterations * row.coarse_solve, row.iterations * row.dofs) for row in alone
+            (
+                row.seconds["solve"] - row.iterations * (row.coarse_solve + row.natural_solve),
+                row.iterations * row.dofs,
+            )
+            for row in alone
         ),
     )
 
@@ -116,33 +137,50 @@ def _meshed_alike(rows: Sequence[Row]) -> Sequence[Row]:
 
 
 def _coarse_times(rows: Sequence[Row], cores: int) -> dict[str, Any]:
-    """Powers of the coarse unknowns where every rank factors, and shares that ranks deal out where all do together."""
-    timed = [row for row in rows if row.ranks <= cores]
-    single, together = ([row for row in timed if row.together is wanted] for wanted in (False, True))
-    unknowns = [row.coarse for row in single]
-    factor = fit_power(unknowns, [row.coarse_factor for row in single])
-    solve = fit_power(unknowns, [row.coarse_solve / ceil(row.loads / row.ranks) for row in single])
+    """Powers of the coarse vectors where every rank factors, and shares that ranks deal out where all do together."""
+    timed = {way: [row for row in rows if row.ranks <= cores and row.way == way] for way in (COPIES, SHARED, MULTIGRID)}
+    alone, shared = timed[COPIES], timed[SHARED]
+    factor = _power(alone, "vectors", lambda row: row.coarse_factor)
+    solve = _power(alone, "vectors", lambda row: row.coarse_solve / ceil(row.loads / row.ranks))
     return dict(
         factor=factor,
         solve=solve,
-        factor_together=_dealt(together, factor, [row.coarse_factor for row in together]),
-        solve_together=_dealt(together, solve, [row.coarse_solve / row.loads for row in together]),
+        factor_shared=_dealt(shared, factor.exponent, lambda row: row.coarse_factor),
+        solve_shared=_dealt(shared, solve.exponent, lambda row: row.coarse_solve / row.loads),
+        natural_factor=_power(alone, "kernel", lambda row: row.natural_factor),
+        natural_solve=_power(alone, "kernel", lambda row: row.natural_solve),
+        multigrid=_multigrid(timed[MULTIGRID]),
     )
 
 
-def _dealt(rows: Sequence[Row], power: Power, seconds: Sequence[float]) -> Shares:
-    """Shares of what takes the runs so many seconds, for work that is this power of the coarse unknowns."""
-    return fit_shares([row.coarse**power.exponent for row in rows], [row.ranks for row in rows], seconds)
+def _multigrid(rows: Sequence[Row]) -> Multigrid | None:
+    """Of the rows by multigrid, None without any."""
+    if not rows:
+        return None
+    setup = _dealt(rows, 1.0, lambda row: row.coarse_factor)
+    return Multigrid(setup, _dealt(rows, 1.0, lambda row: row.coarse_solve / row.loads), max(r.inner for r in rows))
+
+
+def _power(rows: Sequence[Row], unknowns: str, seconds: Callable[[Row], float]) -> Power:
+    """The power of so many unknowns, an attribute of the rows, that takes them so many seconds."""
+    return fit_power([getattr(row, unknowns) for row in rows], [seconds(row) for row in rows])
+
+
+def _dealt(rows: Sequence[Row], exponent: float, seconds: Callable[[Row], float]) -> Shares:
+    """Shares of what takes the runs so many seconds, for work that is this power of the coarse vectors."""
+    return fit_shares(
+        [row.vectors**exponent for row in rows], [row.ranks for row in rows], [seconds(row) for row in rows]
+    )
 
 
 def _per_dof(rows: Sequence[Row]) -> dict[str, Any]:
     """Sizes per dof."""
-    several = [row for row in rows if row.ranks > 1 and not row.together] or rows
+    several = [row for row in rows if row.ranks > 1 and row.way == COPIES] or rows
     return dict(
         triangles=_rate((row.triangles, row.dofs) for row in rows),
         subdomains=_rate((row.subdomains, row.dofs) for row in rows),
         vectors=_rate((row.vectors, row.dofs) for row in rows),
-        coarse=_rate((row.coarse, row.dofs) for row in rows),
+        kernel=_rate((row.kernel, row.dofs) for row in rows),
         coarse_bytes=_rate((row.coarse_bytes, row.dofs) for row in several),
     )
 
@@ -152,7 +190,7 @@ def _counts(rows: Sequence[Row], cores: int) -> dict[str, Any]:
     most = max(rows, key=lambda row: (row.ranks, row.dofs))
     return dict(
         loads=rows[0].loads,
-        largest_coarse=max(row.coarse for row in rows if row.ranks <= cores),
+        largest_coarse=max(row.vectors for row in rows if row.ranks <= cores),
         iterations=max(row.iterations for row in rows),
         surface=max(row.values / sqrt(row.dofs / row.ranks) for row in rows),
         neighbours=max(max(row.neighbours) for row in rows),
@@ -201,41 +239,56 @@ class Prediction:
         return sum(self.parts.values())
 
 
-def predict(rates: Rates, machine: Machine, dofs: float, ranks: int, together: bool | None = None) -> Prediction:
-    """What a cell of `dofs` takes on `ranks`; with one coarse factor on all if `together`, by default as the program
-    chooses."""
+def predict(rates: Rates, machine: Machine, dofs: float, ranks: int, way: str | None = None) -> Prediction:
+    """What a cell of `dofs` takes on `ranks`, with that way to solve the coarse problem, by default the program's."""
     subdomains = max(rates.subdomains * dofs, 1.0)
     # A rank has whole subdomains, and none is cut for its sake.
     whole = ceil(subdomains / ranks) * ranks / subdomains
     own = dofs / ranks * max(rates.imbalance if ranks > 1 else 1.0, whole)
-    coarse = max(rates.coarse * dofs, 2.0)
-    if together is None:
-        together = ranks > 1 and not DEFAULTS.replicates(rates.vectors * dofs, ranks)
-    if together:
-        factor = rates.factor_together.seconds(coarse**rates.factor.exponent, ranks)
-        solve = rates.loads * rates.solve_together.seconds(coarse**rates.solve.exponent, ranks)
-    else:
-        factor = rates.factor.seconds(coarse)
-        solve = ceil(rates.loads / ranks) * rates.solve.seconds(coarse)
+    kernel = max(rates.kernel * dofs, 2.0)
+    factor, solve = _coarse_seconds(rates, dofs, ranks, way)
     return Prediction(
         dofs=dofs,
         ranks=ranks,
         mesh=rates.mesh.seconds(rates.triangles * dofs, ranks),
         assemble=rates.assemble * own,
         setup=rates.setup * own,
-        coarse_factor=factor,
+        coarse_factor=factor + rates.natural_factor.seconds(kernel),
         apply=rates.iterations * rates.apply * own,
-        coarse_solve=rates.iterations * solve,
-        messages=_messages(rates, machine, dofs, ranks) if ranks > 1 else 0.0,
+        coarse_solve=rates.iterations * (solve + rates.natural_solve.seconds(kernel)),
+        messages=_messages(rates, machine, dofs, ranks, way) if ranks > 1 else 0.0,
     )
 
 
-def _messages(rates: Rates, machine: Machine, dofs: float, ranks: int) -> float:
+def _coarse_seconds(rates: Rates, dofs: float, ranks: int, way: str | None) -> tuple[float, float]:
+    """Seconds of the coarse factor or of multigrid's set-up, and of a solve of all loads.
+
+    Raises:
+        ValueError: multigrid was not timed.
+    """
+    vectors = max(rates.vectors * dofs, 2.0)
+    if way == MULTIGRID:
+        if rates.multigrid is None:
+            raise ValueError("multigrid was not timed")
+        setup, solve = (shares.seconds(vectors, ranks) for shares in (rates.multigrid.setup, rates.multigrid.solve))
+        return setup, rates.loads * solve
+    is_shared = ranks > 1 and not DEFAULTS.replicates(vectors, ranks) if way is None else way == SHARED
+    if is_shared:
+        factor = rates.factor_shared.seconds(vectors**rates.factor.exponent, ranks)
+        return factor, rates.loads * rates.solve_shared.seconds(vectors**rates.solve.exponent, ranks)
+    return rates.factor.seconds(vectors), ceil(rates.loads / ranks) * rates.solve.seconds(vectors)
+
+
+def _messages(rates: Rates, machine: Machine, dofs: float, ranks: int, way: str | None) -> float:
     """Seconds of all messages: those of the iterations, and the coarse matrix that every rank is told."""
     values = rates.surface * sqrt(dofs / ranks)
     exchange = machine.latency * rates.neighbours + VALUE_BYTES * values / machine.bandwidth
     tree = machine.latency * ceil(log2(ranks))
     # A sum of a long vector over ranks moves it twice.
-    coarse_sum = tree + 2 * VALUE_BYTES * rates.coarse * dofs * rates.loads / machine.bandwidth
+    coarse = (rates.vectors + rates.kernel) * dofs
+    coarse_sum = tree + 2 * VALUE_BYTES * coarse * rates.loads / machine.bandwidth
     iteration = (GATHERS + SUMS) * exchange + COARSE_SUMS * coarse_sum + SCALARS * tree
+    if way == MULTIGRID and rates.multigrid is not None:
+        cycle = CYCLE_EXCHANGES * machine.latency * rates.neighbours + SCALARS * tree
+        iteration += rates.loads * rates.multigrid.inner * cycle
     return rates.iterations * iteration + rates.coarse_bytes * dofs / machine.bandwidth

@@ -10,7 +10,8 @@ from pathlib import Path
 STAGES = ("mesh", "assemble", "set-up", "solve")
 COLUMNS = (
     "fibres", "ranks", "dofs", "subdomains", "vectors", "kernel", "iterations", "converged", "memory", "sent",
-    "messages", "summed", "together", "coarse_factor", "coarse_solve", "coarse_bytes", "solver", "total",
+    "messages", "summed", "way", "coarse_factor", "coarse_solve", "natural_factor", "natural_solve", "coarse_bytes",
+    "inner", "solver", "total",
 )  # fmt: skip
 VALUE_BYTES = 8
 # What one iteration does: exchanges of multipliers (a gather and a sum each for the operator and the preconditioner),
@@ -18,15 +19,19 @@ VALUE_BYTES = 8
 # the n coarse vectors, and twice of the about n / 2 kernel modes, are 1.33 times all of them; their solutions are told,
 # which is half as dear.
 GATHERS, SUMS, COARSE_SUMS, SCALARS = 2, 2, 2, 3
+# How the coarse problem is solved: by a factor that every rank has, by one of all ranks, or by multigrid on all ranks.
+COPIES, SHARED, MULTIGRID = WAYS = ("copies", "shared", "multigrid")
 
 
 @dataclass(frozen=True)
 class Row:
     """A run: what was asked for, sizes, seconds of each stage, and the counts of `scaling_tool`.
 
-    `wanted` are the dofs asked for, `fullest` those of the rank with most; `together` says whether the ranks share one
-    coarse factor, by MUMPS.  `peaks` are the MB of each rank by stage, `coarse_memory` those by which the coarse
-    factorization lets them grow.  `latency` (s) and `bandwidth` (bytes / s) are those of messages between two ranks.
+    `wanted` are the dofs asked for, `fullest` those of the rank with most; `way`, of WAYS, says how the coarse problem
+    is solved, in how many iterations `inner` if by multigrid.  Seconds are those of the coarse problem, and of that of
+    the rigid-body motions, `natural`, which is solved twice in an iteration.  `peaks` are the MB of each rank by stage,
+    `coarse_memory` those by which both factors let them grow.  `latency` (s) and `bandwidth` (bytes / s) are those of
+    messages between two ranks.
     """
 
     fibres: int
@@ -51,9 +56,12 @@ class Row:
     logged: tuple[float, ...]
     coarse_factor: float
     coarse_solve: float
+    natural_factor: float
+    natural_solve: float
     coarse_bytes: int
     coarse_memory: list[float]
-    together: bool
+    inner: int
+    way: str
     latency: float
     bandwidth: float
 

@@ -24,6 +24,7 @@ import numpy as np  # noqa: E402
 from benchmark_tool import peak  # noqa: E402
 from mpi4py import MPI  # noqa: E402
 from petsc4py import PETSc  # noqa: E402
+from scaling_report import COPIES, MULTIGRID, SHARED, WAYS  # noqa: E402
 
 from feti_homog.common import process_memory  # noqa: E402
 from feti_homog.common.mpi_errors import run_main  # noqa: E402
@@ -47,6 +48,15 @@ TRIANGLES, IN_GAPS = 2.31, 6.0
 TIMED = 5
 # Messages between two ranks that are timed: bytes of one, and how many.
 PINGS = {"latency": (8, 2000), "bandwidth": (4 << 20, 50)}
+# PETSc's options of ways to solve the coarse problem.
+OPTIONS: dict[str, dict[str, str | float]] = {
+    SHARED: {"feti_coarse_pc_factor_mat_solver_type": "mumps"},
+    MULTIGRID: {
+        "feti_coarse_ksp_type": "cg", "feti_coarse_ksp_rtol": 1e-10, "feti_coarse_pc_type": "gamg",
+        "feti_coarse_pc_gamg_threshold": 0.1, "feti_coarse_mg_levels_pc_type": "asm",
+        "feti_coarse_mg_levels_sub_pc_type": "icc",
+    },
+}  # fmt: skip
 # Bytes of an entry of the coarse matrix on its way: value, row, column.
 ENTRY_BYTES = 16
 
@@ -58,13 +68,13 @@ def main() -> int:
     parser.add_argument("--fibres", type=int, required=True)
     parser.add_argument("--dofs", type=int, required=True, help="about so many degrees of freedom")
     parser.add_argument("--refine", type=int, required=True)
-    parser.add_argument("--together", action="store_true", help="one coarse factor by MUMPS, on all ranks")
+    parser.add_argument("--way", choices=WAYS, help="to solve the coarse problem; by default as the program chooses")
     arguments = parser.parse_args()
-    case = random_cell(arguments.fibres, arguments.dofs, arguments.refine, arguments.together)
+    case = random_cell(arguments.fibres, arguments.dofs, arguments.refine, arguments.way)
     PETSc.Log.begin()
     progress = StagePeaks(MPI.COMM_WORLD, quiet=True)
     with case_options(case.petsc):
-        report = measure(case, progress, arguments.together)
+        report = measure(case, progress, arguments.way)
     if progress.comm.rank == 0:
         asked = {"fibres": arguments.fibres, "wanted": arguments.dofs, "refine": arguments.refine, "loads": LOADS}
         arguments.report.write_text(json.dumps(asked | report, indent=1))
@@ -91,9 +101,8 @@ class StagePeaks(Progress):
         return {name: self.comm.allgather(megabytes) for name, megabytes in self.peaks.items()}
 
 
-def random_cell(fibres: int, dofs: int, refine: int, together: bool) -> Case:
-    """A case with about so many degrees of freedom, its coarse problem solved by MUMPS if `together`."""
-    library = {"feti_coarse_pc_factor_mat_solver_type": "mumps"} if together else {}
+def random_cell(fibres: int, dofs: int, refine: int, way: str | None) -> Case:
+    """A case with about so many degrees of freedom, its coarse problem solved in a `way` of WAYS."""
     each = dofs / fibres / 4**refine
     regular = (np.sqrt(each + (IN_GAPS / 2) ** 2) - IN_GAPS / 2) ** 2
     document = {
@@ -103,16 +112,16 @@ def random_cell(fibres: int, dofs: int, refine: int, together: bool) -> Case:
         },
         "material": {"matrix": {"young": 3.0, "poisson": 0.35}, "fibre": {"young": 70.0, "poisson": 0.2}},
         "analysis": {"type": "stiffness", "plane": "strain"},
-        "petsc": {"feti_ksp_rtol": RTOL, "feti_coarse_space": "adaptive"} | library,
+        "petsc": {"feti_ksp_rtol": RTOL, "feti_coarse_space": "adaptive"} | OPTIONS.get(way or "", {}),
     }  # fmt: skip
     return cases.parse(document, Path())
 
 
-def measure(case: Case, progress: StagePeaks, together: bool) -> dict[str, Any]:
+def measure(case: Case, progress: StagePeaks, way: str | None) -> dict[str, Any]:
     """Seconds, iterations, sizes, memory and messages of a case."""
     comm = progress.comm
     network = {name: ping(comm, *sizes) for name, sizes in PINGS.items()}
-    thresholds = replace(DEFAULTS, replicated_vectors=0) if together else DEFAULTS
+    thresholds = replace(DEFAULTS, replicated_vectors=0) if way in OPTIONS else DEFAULTS
     cell = tear(case, comm, progress, thresholds)
     solver = cell.solver
     for by_stage in (progress.seconds, progress.peaks):
@@ -137,7 +146,7 @@ def measure(case: Case, progress: StagePeaks, together: bool) -> dict[str, Any]:
         "latency": network["latency"] / 2,
         "bandwidth": 2 * PINGS["bandwidth"][0] / network["bandwidth"] if comm.size > 1 else 0.0,
         **_messages(cell),
-        **_coarse(solver.adaptive, solver.natural, comm, together),
+        **_coarse(solver.adaptive, solver.natural, comm, way),
     }
     solver.destroy()
     return report
@@ -187,30 +196,39 @@ def ping(comm: MPI.Intracomm, size: int, times: int) -> float:
 
 
 def _coarse(
-    coarse: AdaptiveCoarseSpace, natural: NaturalCoarseSpace, comm: MPI.Intracomm, asked: bool
+    coarse: AdaptiveCoarseSpace, natural: NaturalCoarseSpace, comm: MPI.Intracomm, asked: str | None
 ) -> dict[str, Any]:
-    """Seconds to sum and factor the coarse matrices, of which each rank has made its part, and to solve with them as an
-    iteration does, bytes that ranks tell of them, and by how many megabytes the factors let the memory of each rank
-    grow.  There is one of the averaged modes, and one of the rigid-body motions, which is used twice."""
-    right = [np.ones((n, LOADS)) for n in (coarse.coarse_dimension, natural.kernel_dimension)]
-    solve = min(
-        _seconds(lambda: (coarse.solve(right[0]), natural.solve(natural.solve(right[1])))) for _ in range(TIMED)
-    )
+    """Seconds to sum and factor the coarse matrix, of which each rank has made its part, and that of the rigid-body
+    motions, and to solve with them as often as an iteration does, bytes that ranks tell of the first, and by how many
+    megabytes the factors let the memory of each rank grow."""
+    right, motions = (np.ones((n, LOADS)) for n in (coarse.coarse_dimension, natural.kernel_dimension))
+    right[1::2] = -1.0
+    solve = _fastest(lambda: coarse.solve(right))
+    natural_solve = _fastest(lambda: natural.solve(natural.solve(motions)))
+    inner = coarse.inner_iterations
     coarse.destroy()
     natural.destroy()
     part = coarse.part()
     process_memory.forget_peak()
     before = peak()
     comm.Barrier()
-    factor = _seconds(lambda: (coarse.factor(part), natural.factor()))
+    factor, natural_factor = _seconds(lambda: coarse.factor(part)), _seconds(natural.factor)
     grown = peak() - before
+    chosen = COPIES if comm.size == 1 or coarse.is_replicated else SHARED
+    seconds = {
+        "coarse_factor": factor, "coarse_solve": solve, "natural_factor": natural_factor, "natural_solve": natural_solve
+    }  # fmt: skip
     return {
-        "together": asked or (comm.size > 1 and not coarse.is_replicated),
+        "way": asked or chosen,
+        "inner": inner if asked == MULTIGRID else 0,
         "coarse_memory": comm.allgather(grown),
-        "coarse_factor": comm.allreduce(factor, MPI.MAX),
-        "coarse_solve": comm.allreduce(solve, MPI.MAX),
         "coarse_bytes": ENTRY_BYTES * comm.allreduce(int(part.nnz)),
+        **{name: comm.allreduce(value, MPI.MAX) for name, value in seconds.items()},
     }
+
+
+def _fastest(work: Callable[[], object]) -> float:
+    return min(_seconds(work) for _ in range(TIMED))
 
 
 def _seconds(work: Callable[[], object]) -> float:

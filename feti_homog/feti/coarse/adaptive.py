@@ -134,6 +134,11 @@ class AdaptiveCoarseSpace:
         assert self._solver is not None, "the factor is destroyed"
         return scale_rows(self._weights, self._solver.solve(scale_rows(self._weights, work)))
 
+    @property
+    def inner_iterations(self) -> int:
+        """Iterations of the last solve, of one column: 1 with a factor."""
+        return 0 if self._solver is None else self._solver.iterations
+
     def _parts(self) -> zip[tuple[Int, Float, slice]]:
         """Of each subdomain the modes that reach it, S Z, and where it is among the boundary dofs."""
         return zip(self._modes.columns, self._forces, self._operators.slices, strict=True)

@@ -55,6 +55,11 @@ class DistributedDirectSolver:
         for matrix in matrices:
             matrix.destroy()
 
+    @property
+    def iterations(self) -> int:
+        """Of the last solve by the Krylov method, 1 with a factor."""
+        return int(self._ksp.getIterationNumber())
+
     def destroy(self) -> None:
         """Free the factor.  Collective."""
         for petsc_object in (self._ksp.getOperators()[0], self._ksp, self._x, self._b):
@@ -71,6 +76,11 @@ class ReplicatedDirectSolver:
     def solve(self, B: Float) -> Float:
         """A^-1 B for B (n,) or (n, k), the same on every rank.  Collective."""
         return share_columns(self.comm, self.local.solve, B)
+
+    @property
+    def iterations(self) -> int:
+        """Of the last solve by the Krylov method, 1 with a factor."""
+        return self.local.iterations
 
     def destroy(self) -> None:
         """Free the factor."""

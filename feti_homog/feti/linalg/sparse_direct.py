@@ -50,6 +50,11 @@ class DirectSolver:
             matrix.destroy()
         return X
 
+    @property
+    def iterations(self) -> int:
+        """Of the last solve by the Krylov method, 1 with a factor."""
+        return int(self._ksp.getIterationNumber())
+
     def destroy(self) -> None:
         """Free the factor now; otherwise it is freed with this object."""
         self._destroy()

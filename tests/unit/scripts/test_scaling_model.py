@@ -7,43 +7,47 @@ from math import ceil
 
 import pytest
 from scaling_fit import fit_power, fit_shares
-from scaling_forecast import assumptions, checks
+from scaling_forecast import assumptions, checks, forecast
 from scaling_model import LOCAL, Machine, measured, network, predict
-from scaling_report import Row, by_ranks, memory
+from scaling_report import COPIES, MULTIGRID, SHARED, Row, by_ranks, memory
 
 CORES = 2
 NETWORK = Machine(2e-6, 1e10)
 ITERATIONS, LOADS = 20, 3
 
 
-def made_up(dofs: int, ranks: int, together: bool = False) -> Row:
+def made_up(dofs: int, ranks: int, way: str = COPIES) -> Row:
     """A run whose seconds follow constants that the tests know; its messages take no time."""
-    triangles, coarse = dofs // 50, dofs // 500
+    triangles, coarse, kernel = dofs // 50, dofs // 500, dofs // 1000
     factor, solve = 1e-6 * coarse**1.5, 1e-7 * coarse**1.2
-    if together:
+    natural_factor, natural_solve = 2e-7 * kernel**1.3, 3e-8 * kernel**1.1
+    if way == SHARED:
         factor, solve = (1.0 + 4.0 / ranks) * factor, LOADS * (2.0 + 1.0 / ranks) * solve
+    elif way == MULTIGRID:
+        factor, solve = 1e-5 * coarse * (0.5 + 0.5 / ranks), LOADS * 3e-5 * coarse / ranks
     else:
         solve = ceil(LOADS / ranks) * solve
     own = dofs / ranks
     seconds = {
         "mesh": 1e-5 * triangles * (0.25 + 0.75 / ranks),
         "assemble": 2e-6 * own,
-        "set-up": 5e-6 * own + factor,
-        "solve": ITERATIONS * (3e-7 * own + solve),
+        "set-up": 5e-6 * own + factor + natural_factor,
+        "solve": ITERATIONS * (3e-7 * own + solve + natural_solve),
     }
     return Row(
         fibres=1, wanted=dofs, refine=2, loads=LOADS, ranks=ranks, dofs=dofs, fullest=dofs // ranks,
-        triangles=triangles, subdomains=dofs // 1000, vectors=coarse, kernel=0, iterations=ITERATIONS,
+        triangles=triangles, subdomains=dofs // 1000, vectors=coarse, kernel=kernel, iterations=ITERATIONS,
         converged=True, seconds=seconds, peaks={stage: [100.0 + r for r in range(ranks)] for stage in seconds},
         told=(0,) * ranks, heard=(0,) * ranks, neighbours=(0,) * ranks, exchanges=0, logged=(0.0,) * ranks,
-        coarse_factor=factor, coarse_solve=solve, coarse_bytes=0, coarse_memory=[1.0] * ranks, together=together,
+        coarse_factor=factor, coarse_solve=solve, natural_factor=natural_factor, natural_solve=natural_solve,
+        coarse_bytes=0, coarse_memory=[1.0] * ranks, inner=17 if way == MULTIGRID else 0, way=way,
         latency=NETWORK.latency, bandwidth=NETWORK.bandwidth,
     )  # fmt: skip
 
 
 ROWS = [
     *(made_up(dofs, ranks) for dofs in (100_000, 1_000_000) for ranks in (1, 2)),
-    *(made_up(1_000_000, ranks, together=True) for ranks in (1, 2)),
+    *(made_up(1_000_000, ranks, way) for way in (SHARED, MULTIGRID) for ranks in (1, 2)),
 ]
 
 
@@ -88,8 +92,13 @@ def test_constants_are_found_again():
     assert (rates.assemble, rates.setup, rates.apply) == pytest.approx((2e-6, 5e-6, 3e-7))
     assert (rates.factor.factor, rates.factor.exponent) == pytest.approx((1e-6, 1.5))
     assert (rates.solve.factor, rates.solve.exponent) == pytest.approx((1e-7, 1.2))
-    assert (rates.factor_together.serial, rates.factor_together.parallel) == pytest.approx((1e-6, 4e-6))
-    assert (rates.solve_together.serial, rates.solve_together.parallel) == pytest.approx((2e-7, 1e-7))
+    assert (rates.factor_shared.serial, rates.factor_shared.parallel) == pytest.approx((1e-6, 4e-6))
+    assert (rates.solve_shared.serial, rates.solve_shared.parallel) == pytest.approx((2e-7, 1e-7))
+    assert (rates.natural_factor.factor, rates.natural_factor.exponent) == pytest.approx((2e-7, 1.3))
+    assert (rates.natural_solve.factor, rates.natural_solve.exponent) == pytest.approx((3e-8, 1.1))
+    assert (rates.multigrid.setup.serial, rates.multigrid.setup.parallel) == pytest.approx((5e-6, 5e-6))
+    assert rates.multigrid.solve.seconds(1000, 50) == pytest.approx(3e-5 * 1000 / 50, rel=1e-2)
+    assert rates.multigrid.inner == 17
     assert network(ROWS, CORES) == NETWORK
 
 
@@ -105,10 +114,10 @@ def test_mesh_is_of_cells_that_all_ranks_mesh():
     assert measured(rows, CORES).mesh == every
 
 
-@pytest.mark.parametrize("row", ROWS, ids=lambda row: f"{row.dofs}-{row.ranks}-{row.together}")
+@pytest.mark.parametrize("row", ROWS, ids=lambda row: f"{row.dofs}-{row.ranks}-{row.way}")
 def test_model_gives_the_runs_that_it_is_of(row):
     """With messages that take no time, as in the runs that were made up."""
-    p = predict(measured(ROWS, CORES), Machine(0.0, float("inf")), row.dofs, row.ranks, row.together)
+    p = predict(measured(ROWS, CORES), Machine(0.0, float("inf")), row.dofs, row.ranks, row.way)
     assert p.total == pytest.approx(row.total, rel=1e-3)
     assert p.mesh == pytest.approx(row.seconds["mesh"])
     assert p.setup + p.coarse_factor == pytest.approx(row.seconds["set-up"], rel=1e-3)
@@ -117,8 +126,17 @@ def test_model_gives_the_runs_that_it_is_of(row):
 def test_ranks_share_a_factor_from_some_size_on():
     """The program's choice where none is asked for: by the vectors; one rank has nobody to share with."""
     rates = measured(ROWS, CORES)
-    for dofs, ranks, together in [(1e6, 16, False), (1e8, 16, True), (1e8, 1, False)]:
-        assert predict(rates, NETWORK, dofs, ranks) == predict(rates, NETWORK, dofs, ranks, together)
+    for dofs, ranks, way in [(5e5, 16, COPIES), (1e8, 16, SHARED), (1e8, 1, COPIES)]:
+        assert predict(rates, NETWORK, dofs, ranks) == predict(rates, NETWORK, dofs, ranks, way)
+
+
+def test_multigrid_is_forecast_where_it_was_timed():
+    rates = measured([row for row in ROWS if row.way != MULTIGRID], CORES)
+    assert rates.multigrid is None
+    with pytest.raises(ValueError, match="not timed"):
+        predict(rates, NETWORK, 1e6, 4, MULTIGRID)
+    futures = forecast(measured(ROWS, CORES), NETWORK, MULTIGRID)
+    assert all("multigrid" in title for title in futures)
 
 
 def test_subdomains_scale_until_each_rank_has_one():
