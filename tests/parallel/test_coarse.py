@@ -13,7 +13,7 @@ from support.coarse_space_cells import BOUND, BREAKING, NARROW, SINGLE, Narrow, 
 
 from feti_homog.feti.coarse.geneo import kernels_and_soft_modes, subdomain_blocks
 from feti_homog.feti.decomposition.neighbours import Neighbours
-from feti_homog.feti.linalg.collectives import allreduce_sparse
+from feti_homog.feti.linalg.distributed_matrix import allreduce_sparse
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.preconditioners.scaled import Dirichlet
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds

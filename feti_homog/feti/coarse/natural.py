@@ -11,9 +11,8 @@ from scipy.sparse import block_diag, csr_matrix, diags
 from feti_homog.common.distributed_arrays import allreduce_sum
 from feti_homog.feti.coarse.gram_matrix import GramMatrix
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
-from feti_homog.feti.linalg.collectives import allreduce_sparse
 from feti_homog.feti.linalg.distributed_direct import DistributedDirectSolver, ReplicatedDirectSolver, direct_solver
-from feti_homog.feti.linalg.distributed_matrix import assemble_owned_rows
+from feti_homog.feti.linalg.distributed_matrix import allreduce_sparse, assemble_owned_rows
 from feti_homog.feti.linalg.sparse_direct import DirectSolver
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.thresholds import DEFAULTS, UNCONSTRAINED_EIGENVALUE, Thresholds

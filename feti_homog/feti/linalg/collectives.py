@@ -1,4 +1,4 @@
-"""Rows of all ranks, sums of small sparse matrices, and solves that ranks share, on every rank."""
+"""Rows of all ranks, and solves that ranks share, on every rank."""
 
 from __future__ import annotations
 
@@ -6,12 +6,11 @@ from collections.abc import Callable
 
 import numpy as np
 from mpi4py import MPI
-from scipy.sparse import csr_matrix
 
-from feti_homog.typing import Float, Int
+from feti_homog.typing import Array, Float, Int
 
 
-def allgather_rows(comm: MPI.Intracomm, own: Float, counts: Int) -> Float:
+def allgather_rows(comm: MPI.Intracomm, own: Array, counts: Int) -> Array:
     """The rows of all ranks below each other, on every rank.  Collective.
 
     Args:
@@ -21,19 +20,9 @@ def allgather_rows(comm: MPI.Intracomm, own: Float, counts: Int) -> Float:
     Returns:
         (sum of counts,) or (sum of counts, k).
     """
-    whole = np.empty((int(counts.sum()), *own.shape[1:]))
+    whole = np.empty((int(counts.sum()), *own.shape[1:]), own.dtype)
     comm.Allgatherv(np.ascontiguousarray(own), (whole, counts * int(np.prod(own.shape[1:]))))
     return whole
-
-
-def allreduce_sparse(comm: MPI.Intracomm, part: csr_matrix) -> csr_matrix:
-    """The sum over ranks of small sparse matrices of one shape, on every rank.  Collective."""
-    if comm.size == 1:
-        return part
-    entries = part.tocoo()
-    parts = comm.allgather((entries.data, entries.row, entries.col))
-    data, rows, columns = (np.concatenate(p) for p in zip(*parts, strict=True))
-    return csr_matrix((data, (rows, columns)), shape=part.shape)
 
 
 def share_columns(comm: MPI.Intracomm, solve: Callable[[Float], Float], B: Float) -> Float:

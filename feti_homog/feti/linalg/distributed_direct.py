@@ -10,8 +10,8 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix
 
-from feti_homog.feti.linalg.collectives import allgather_rows, allreduce_sparse, share_columns
-from feti_homog.feti.linalg.distributed_matrix import assemble_distributed
+from feti_homog.feti.linalg.collectives import allgather_rows, share_columns
+from feti_homog.feti.linalg.distributed_matrix import allreduce_sparse, assemble_distributed
 from feti_homog.feti.linalg.sparse_direct import DirectSolver, factor_by_mumps
 from feti_homog.feti.thresholds import MUMPS_COLUMNS_ONE_BY_ONE
 from feti_homog.typing import Float

@@ -7,6 +7,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix, diags
 
+from feti_homog.feti.linalg.collectives import allgather_rows
 from feti_homog.typing import Bool, Int
 
 
@@ -66,6 +67,19 @@ def assemble_distributed(comm: MPI.Intracomm, part: csr_matrix) -> PETSc.Mat:
     rows, columns = (np.flatnonzero(np.diff(m.indptr)) for m in (part.tocsr(), part.tocsc()))
     shares = (_even_share(comm, part.shape[0]), _even_share(comm, part.shape[1]))
     return _assemble(comm, part[rows][:, columns], rows, columns, shares)
+
+
+def allreduce_sparse(comm: MPI.Intracomm, part: csr_matrix) -> csr_matrix:
+    """The sum over ranks of small sparse matrices of one shape, on every rank.  Collective."""
+    if comm.size == 1:
+        return part
+    A = assemble_distributed(comm, part)
+    own = A.getValuesCSR()
+    A.destroy()
+    counts, entries = (np.array(comm.allgather(n)) for n in (len(own[0]) - 1, len(own[1])))
+    lengths = allgather_rows(comm, np.diff(own[0]), counts)
+    indices, values = (allgather_rows(comm, x, entries) for x in own[1:])
+    return csr_matrix((values, indices, np.concatenate([[0], np.cumsum(lengths)])), shape=part.shape)
 
 
 def _even_share(comm: MPI.Intracomm, n: int) -> int:

@@ -7,8 +7,9 @@ from mpi4py import MPI
 from scipy.sparse import csr_matrix, diags, hstack
 
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
-from feti_homog.feti.linalg.collectives import allreduce_sparse, share_columns
+from feti_homog.feti.linalg.collectives import share_columns
 from feti_homog.feti.linalg.dense_block_sum import DenseBlockSum
+from feti_homog.feti.linalg.distributed_matrix import allreduce_sparse
 from feti_homog.feti.linalg.sparse_direct import DirectSolver
 from feti_homog.feti.operators.explicit import ExplicitInterfaceOperator
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
