@@ -34,8 +34,8 @@ class Balanced:
         return self.scaled.multipliers(self.coarse.balanced(self.scaled.displacement_with_jump(r)))
 
     def close(self, right: Float, d: Float, E: Float) -> Float:
-        """M^-1 of `right`."""
-        return self.apply(right)
+        """B_D S B_D^T of `right`: the forces that close the torn cell before its coarse displacements give way."""
+        return self.scaled.apply(right)
 
     def initial_multipliers(self, previous: Float, closing: Float) -> Float:
         """The previous ones."""

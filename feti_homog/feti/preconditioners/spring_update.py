@@ -63,8 +63,8 @@ class WithSprings:
         return self._update.apply(self._inner.apply(r))
 
     def close(self, right: Float, d: Float, E: Float) -> Float:
-        """The updated inverse times `right`."""
-        return self.apply(right)
+        """As without the springs."""
+        return self._inner.close(right, d, E)
 
     def initial_multipliers(self, previous: Float, closing: Float) -> Float:
         """The previous ones."""
