@@ -35,8 +35,8 @@ class Preconditioner(Protocol):
         """M^-1 r; r and the result are 0 on inactive rows."""
 
     def close(self, right: Float, d: Float, E: Float) -> Float:
-        """The forces that close the jumps r = P d E of the torn cell (owned rows, k), `right`: M^-1 r, or what that would
-        be without coarse displacements; d (owned rows, 3) is the same at every call."""
+        """The forces that close the jumps r = P d E of the torn cell (owned rows, k), `right`: M^-1 r, or what that
+        would be without coarse displacements; d (owned rows, 3) is the same at every call."""
 
     def initial_multipliers(self, previous: Float, closing: Float) -> Float:
         """First multipliers (owned rows, k) of a solve: `previous` ones, or `closing` = P M^-1 P d of the jump d."""
