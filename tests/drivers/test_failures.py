@@ -8,6 +8,7 @@ import sys
 import time
 
 import pytest
+from support.base_case import BASE
 from support.command_line import case_file, command_line
 from support.jobs import mpirun
 from unit.cell.faulty_meshes import FAULTY_MESHES
@@ -41,6 +42,28 @@ def command(words, comm):
 
 sys.exit(api.start(command))
 """
+
+
+# The command line with a fault of the last rank while it fills its tiles of a large cell.
+SABOTAGED_MESHING = """
+import os, signal, sys
+from feti_homog import api, cli
+
+def command(words, comm):
+    from feti_homog.homogenization import coarse_meshes
+    fill = coarse_meshes.fill
+
+    def sabotaged(tile):
+        if comm.rank == comm.size - 1:
+            {fault}
+        return fill(tile)
+
+    coarse_meshes.fill = sabotaged
+    return cli._command(words, comm)
+
+sys.exit(api.start(command))
+"""
+TILED_CELL = 'geometry = "random"\nfibres = 400\nmin_gap = 0.2\nfibre_fraction = 0.3\nmesh_size = 0.05'
 
 
 def assert_refused(job, expected, out):
@@ -168,6 +191,28 @@ def test_a_rank_that_raises_ends_the_job_with_its_traceback(tmp_path, ranks, app
 
 def test_a_rank_that_is_killed_ends_the_job(tmp_path):
     assert sabotaged(tmp_path, 2, 3, "os.kill(os.getpid(), signal.SIGKILL)").returncode != 0
+
+
+@pytest.mark.parametrize(
+    ("fault", "code", "words"),
+    [
+        ("raise ArithmeticError('lost my tile')", 1, "ArithmeticError: lost my tile"),
+        ("from feti_homog.errors import MeshError; raise MeshError('[cell] this tile has no mesh')", 2, "no mesh"),
+        ("os.kill(os.getpid(), signal.SIGKILL)", None, ""),
+    ],
+    ids=["defect", "unfilled", "killed"],
+)
+def test_a_rank_that_fails_while_meshing_ends_the_job(tmp_path, fault, code, words):
+    script, out = tmp_path / "sabotaged.py", tmp_path / "results"
+    script.write_text(SABOTAGED_MESHING.format(fault=fault))
+    start = time.monotonic()
+    case = tmp_path / "tiled.toml"
+    case.write_text(f"[cell]\n{TILED_CELL}\n\n" + BASE[BASE.index("[material.matrix]") :])
+    job = mpirun(2, script, "run", case, "--out", out, timeout=60.0)
+    assert time.monotonic() - start < 40.0
+    assert job.returncode == code if code else job.returncode != 0
+    assert words in job.stderr and ("Traceback" in job.stderr) == (code == 1)
+    assert not (out / "result.json").exists()
 
 
 def sabotaged(folder, ranks, application, fault):

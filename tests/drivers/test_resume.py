@@ -230,6 +230,23 @@ def test_checkpoints_of_another_case_are_refused(tmp_path, interrupted, ranks, c
     assert events(tmp_path / "out") == kept
 
 
+def test_a_path_does_not_go_on_with_another_mesh(tmp_path):
+    """A user's mesh whose file has changed since the run that left the checkpoint."""
+    meshes, mesh = Path(__file__).parents[2] / "meshes", tmp_path / "cell.msh"
+    own = CASE.replace(
+        'geometry = "square"\nfibre_fraction = 0.4\nmesh_size = 0.06', 'geometry = "mesh"\nfile = "cell.msh"'
+    )
+    (tmp_path / "case.toml").write_text(own.replace("[path]\n", "[path]\nmax_events = 2\n"))
+    words = ("run", tmp_path / "case.toml", "--out", tmp_path / "out")
+    shutil.copy(meshes / "square.msh", mesh)
+    command_line(2, *words)
+    kept = events(tmp_path / "out")
+    shutil.copy(meshes / "two_fibres.msh", mesh)
+    job = command_line(2, *words, "--resume")
+    assert kept > 0 and job.returncode == 2 and "is of another run: expected case" in job.stderr
+    assert "Traceback" not in job.stderr and events(tmp_path / "out") == kept
+
+
 @pytest.mark.parametrize("damage", ["truncated", "garbage", "missing"])
 def test_unreadable_checkpoints_are_refused(tmp_path, interrupted, damage):
     shutil.copytree(interrupted, tmp_path / "out")
