@@ -27,7 +27,7 @@ class Sampling:
 
 
 # Of a cell that one rank meshes in minutes, and of one that all ranks mesh: there an arc is a few edges long.
-WHOLE, IN_TILES = Sampling(65, 513, 17, 120_000), Sampling(33, 129, 17, 3_000_000)
+WHOLE, IN_TILES = Sampling(65, 513, 17, 120_000), Sampling(17, 129, 17, 3_000_000)
 
 
 @dataclass(frozen=True)
