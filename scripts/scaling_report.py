@@ -20,15 +20,15 @@ VALUE_BYTES = 8
 # which is half as dear.
 GATHERS, SUMS, COARSE_SUMS, SCALARS = 2, 2, 2, 3
 # How the coarse problem is solved: by a factor that every rank has, by one of all ranks, or by multigrid on all ranks.
-COPIES, SHARED, MULTIGRID = WAYS = ("copies", "shared", "multigrid")
+COPIES, SHARED, MULTIGRID = ("copies", "shared", "multigrid")
 
 
 @dataclass(frozen=True)
 class Row:
     """A run: what was asked for, sizes, seconds of each stage, and the counts of `scaling_tool`.
 
-    `wanted` are the dofs asked for, `fullest` those of the rank with most; `way`, of WAYS, says how the coarse problem
-    is solved, in how many iterations `inner` if by multigrid.  Seconds are those of the coarse problem, and of that of
+    `wanted` are the dofs asked for, `fullest` those of the rank with most; `way` says how the coarse problem is
+    solved, in how many iterations `inner`.  Seconds are those of the coarse problem, and of that of
     the rigid-body motions, `natural`, which is solved twice in an iteration.  `peaks` are the MB of each rank by stage,
     `coarse_memory` those by which both factors let them grow.  `latency` (s) and `bandwidth` (bytes / s) are those of
     messages between two ranks.

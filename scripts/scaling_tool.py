@@ -24,7 +24,7 @@ import numpy as np  # noqa: E402
 from benchmark_tool import peak  # noqa: E402
 from mpi4py import MPI  # noqa: E402
 from petsc4py import PETSc  # noqa: E402
-from scaling_report import COPIES, MULTIGRID, SHARED, WAYS  # noqa: E402
+from scaling_report import COPIES, MULTIGRID, SHARED  # noqa: E402
 
 from feti_homog.common import process_memory  # noqa: E402
 from feti_homog.common.mpi_errors import run_main  # noqa: E402
@@ -68,7 +68,7 @@ def main() -> int:
     parser.add_argument("--fibres", type=int, required=True)
     parser.add_argument("--dofs", type=int, required=True, help="about so many degrees of freedom")
     parser.add_argument("--refine", type=int, required=True)
-    parser.add_argument("--way", choices=WAYS, help="to solve the coarse problem; by default as the program chooses")
+    parser.add_argument("--way", choices=OPTIONS, help="to solve the coarse problem; by default as the program chooses")
     arguments = parser.parse_args()
     case = random_cell(arguments.fibres, arguments.dofs, arguments.refine, arguments.way)
     PETSc.Log.begin()
@@ -102,7 +102,7 @@ class StagePeaks(Progress):
 
 
 def random_cell(fibres: int, dofs: int, refine: int, way: str | None) -> Case:
-    """A case with about so many degrees of freedom, its coarse problem solved in a `way` of WAYS."""
+    """A case with about so many degrees of freedom, its coarse problem solved in a `way` of OPTIONS."""
     each = dofs / fibres / 4**refine
     regular = (np.sqrt(each + (IN_GAPS / 2) ** 2) - IN_GAPS / 2) ** 2
     document = {
@@ -220,7 +220,7 @@ def _coarse(
     }  # fmt: skip
     return {
         "way": asked or chosen,
-        "inner": inner if asked == MULTIGRID else 0,
+        "inner": inner,
         "coarse_memory": comm.allgather(grown),
         "coarse_bytes": ENTRY_BYTES * comm.allreduce(int(part.nnz)),
         **{name: comm.allreduce(value, MPI.MAX) for name, value in seconds.items()},

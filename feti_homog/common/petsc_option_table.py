@@ -62,7 +62,8 @@ OPTIONS = (
     *_direct_solver("feti_interior_", "interiors, of implicit subdomains and for fields"),
     *_direct_solver("feti_natural_", "the rigid-body coarse problem"),
     Option("feti_coarse_ksp_type", "preonly|cg|...", "preonly", "solves with the adaptive coarse problem"),
-    Option("feti_coarse_pc_type", "cholesky|lu|gamg|...", "cholesky", "its factorization; gamg for cg on many ranks"),
+    Option("feti_coarse_ksp_rtol", "<real>", "1e-10", "their relative tolerance, if they are iterative"),
+    Option("feti_coarse_pc_type", "cholesky|lu|gamg|...", "cholesky", "its factorization, or what cg is to have"),
     Option(
         "feti_coarse_pc_factor_mat_solver_type",
         "cholmod|mumps|...",

@@ -3,7 +3,7 @@
 May use `fem`, `cell` and `common`.  Main entry: `solver.FetiSolver`.  Its own floors, each on those below:
 
     solver, view, factory, solver_plan, krylov
-    coarse           natural and adaptive coarse space, projector, the preconditioner with both
+    coarse           natural and adaptive coarse space, the preconditioner with the latter, projector
     preconditioners  lumped, Dirichlet, influence columns
     operators        S and S+ of subdomains, the dual operator F
     decomposition    subdomains, kernels, the jump operator B

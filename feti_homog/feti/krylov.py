@@ -1,5 +1,7 @@
 """PETSc contexts of the projected dual problem: shell matrix, shell preconditioner, convergence test.
 
+H is the preconditioner: M^-1, or H_0 of `coarse.balanced` with coarse displacements in equilibrium.
+
 A vector holds k multiplier vectors, the k values of a row side by side, so that load cases are solved together.
 What the contexts raise is kept until PETSc has returned (`CallbackErrors`).
 """
@@ -62,7 +64,7 @@ class ProjectedOperator:
 
 
 class ProjectedPreconditioner:
-    """z = P M^-1 r; keeps r, which tells the interface jump B u of the iterate."""
+    """z = P H r; keeps r, which tells the interface jump B u of the iterate."""
 
     def __init__(
         self,
@@ -80,7 +82,7 @@ class ProjectedPreconditioner:
         self._residual = np.zeros((0, columns))
 
     def apply(self, pc: PETSc.PC, r: PETSc.Vec, z: PETSc.Vec) -> None:
-        """z = P M^-1 r.  Collective."""
+        """z = P H r.  Collective."""
         with self.event:
             self._residual = r.getArray(readonly=True).reshape(self.shape)
             z.setArray(self._errors.call(self._apply, np.full(self._residual.shape, np.nan)).ravel())
@@ -114,14 +116,15 @@ class Stall:
 class PrimalTest:
     """PETSc's convergence test: converged when both primal residuals, the jump and the forces, are below rtol.
 
-    The jump is |P r| relative to that of the torn cell; the forces that would close it are |P M^-1 r| relative to the
-    torn cell's.  A small dual residual alone can hide a large one of these.  Where the condition number is bounded,
-    nothing but rounding can hold the residual; the test then ends with a breakdown.
+    The jump is |P r| relative to that of the torn cell; the forces that would close it are |P H r| relative to those of
+    the torn cell, |P M^-1 P d|.  A small dual residual alone can hide a large one of these.
+
+    Attributes:
+        ends_on_stall: whether norms that do not fall any more are a breakdown.
     """
 
-    def __init__(self, errors: CallbackErrors, preconditioner: ProjectedPreconditioner, is_bounded: bool) -> None:
-        """`is_bounded` tells whether the condition number is."""
-        self._errors, self.preconditioner, self._is_bounded = errors, preconditioner, is_bounded
+    def __init__(self, errors: CallbackErrors, preconditioner: ProjectedPreconditioner) -> None:
+        self._errors, self.preconditioner, self.ends_on_stall = errors, preconditioner, False
         self._jump_scale, self._force_scale = 1.0, 1.0
         self._jump_stall, self._force_stall = Stall(STALL_ITERATIONS), Stall(FORCE_STALL_ITERATIONS)
 
@@ -134,7 +137,7 @@ class PrimalTest:
         return jump <= rtol * self._jump_scale and (forces <= rtol * self._force_scale or jump == 0.0)
 
     def __call__(self, ksp: PETSc.KSP, iteration: int, residual: float) -> PETSc.KSP.ConvergedReason:
-        """Whether to go on; `residual` is the norm of the preconditioned one, |P M^-1 r|.  Collective."""
+        """Whether to go on; `residual` is the norm of the preconditioned one, |P H r|.  Collective."""
         ended = PETSc.KSP.ConvergedReason.DIVERGED_NANORINF
         return self._errors.call(lambda: self._judge(ksp, iteration, residual), ended)
 
@@ -163,8 +166,8 @@ class PrimalTest:
         return self._go_on(self._jump_stall.is_reached(iteration, jump))
 
     def _go_on(self, stalled: bool) -> PETSc.KSP.ConvergedReason:
-        """Iterating, or a breakdown where rounding is the reason that it stalls."""
-        if stalled and self._is_bounded:
+        """Iterating, or a breakdown."""
+        if stalled and self.ends_on_stall:
             return PETSc.KSP.ConvergedReason.DIVERGED_BREAKDOWN
         return PETSc.KSP.ConvergedReason.ITERATING
 
@@ -185,14 +188,13 @@ class Krylov:
         natural: NaturalCoarseSpace,
         active: ActiveRows,
         columns: int,
-        is_bounded: bool,
     ) -> None:
-        """Set up; `vector` is one of the multiplier vectors, `is_bounded` as of `PrimalTest`.  Collective."""
+        """Set up; `vector` is one of the multiplier vectors.  Collective."""
         own, whole = vector.getSizes()
         sizes = (own * columns, whole * columns)
         self._errors = CallbackErrors(comm)
         self._preconditioner = ProjectedPreconditioner(comm, self._errors, preconditioner, natural, columns)
-        self.test = PrimalTest(self._errors, self._preconditioner, is_bounded)
+        self.test = PrimalTest(self._errors, self._preconditioner)
         context = ProjectedOperator(self._errors, operator, natural, active, columns)
         A = PETSc.Mat().createPython((sizes, sizes), context, comm=vector.comm)
         A.setOption(PETSc.Mat.Option.SYMMETRIC, True)

@@ -64,6 +64,8 @@ DEFAULTS = Thresholds()
 
 # linalg
 
+# Relative tolerance of an iterative method that options ask for in place of a factorization.
+ITERATIVE_RTOL = 1e-10
 # Per cent more workspace than MUMPS estimates: its own 20 were too little for a matrix of 13 084 rows on two ranks.
 MUMPS_EXTRA_WORKSPACE_PERCENT = 100
 # Entries of dense blocks that wait to be added to a sparse sum, at least: 16 bytes each.
@@ -113,7 +115,7 @@ STALL_ITERATIONS = 4
 # Iterations in which the forces must halve before they are small enough: plateaus of CG are shorter where the coarse
 # space leaves a condition number of about 1 / tau (`scripts/robustness`: at most 23 iterations in all).
 FORCE_STALL_ITERATIONS = 50
-# Such new beginnings, before the solve is given up.
+# Such new beginnings, before the iteration is left to go on.
 MAX_RESTARTS = 2
 # A jump that the active rows see, relative to that of the torn cell, is rounding if it is as small as this.
 ZERO_JUMP = 1e-13
@@ -149,8 +151,9 @@ UNCONSTRAINED_EIGENVALUE = 1e-10
 MIN_FACE_NODES = 2
 # Eigenvalues of a matrix in single precision, relative to its largest, that are rounding.
 SINGLE_PRECISION_NULL = 1e-6
-# Multiple of the identity that the coarse matrix, scaled to a unit diagonal, gets: averaged modes may depend on each
-# other, and rounding leaves about 1e-15.
-COARSE_REGULARISATION = 1e-12
+# Multiples of the identity that the coarse matrix, scaled to a unit diagonal, gets, the first with which it can be
+# factored: averaged modes may depend on each other.  Rounding leaves about 1e-15 times the contrast of the phases at
+# most; with contrasts to 1e9 and Poisson's ratios to 0.4999999 the first was enough.
+COARSE_REGULARISATIONS = (1e-12, 1e-10, 1e-8)
 # Energy of an averaged mode, relative to that with all rows active, below which it is a free motion.
 FREE_MODE_ENERGY = 1e-10

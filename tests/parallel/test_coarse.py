@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from mpi4py import MPI
 from reference import dense_feti
 from scipy.linalg import eigh
 from support import torn_cells
-from support.cases import relative_error
+from support.cases import relative_error, solve
 from support.coarse_space_cells import BOUND, BREAKING, NARROW, SINGLE, Narrow, agree, masks, of_all, solve_many
 
+from feti_homog.config import case as cases
 from feti_homog.feti.coarse.geneo import kernels_and_soft_modes, subdomain_blocks
 from feti_homog.feti.decomposition.neighbours import Neighbours
 from feti_homog.feti.linalg.distributed_matrix import allreduce_sparse
@@ -132,6 +135,27 @@ def test_all_modes_make_the_exact_inverse(comm):
     H, P = dense_feti.matrix(cell, cell.solver.preconditioner.apply), dense_feti.projector(dense.G)
     assert np.abs(H @ dense.F @ P - P).max() < 1e-5
     assert max(solution.iterations for solution in solve_many(cell)) <= 3
+
+
+def test_a_coarse_space_without_vectors(comm):
+    """Two pieces of a matrix around a void that both hold the pinned class: none can move, and none is soft."""
+    found = []
+    for space in ("adaptive", "natural"):
+        document = {
+            "cell": {
+                "geometry": "table", "width": 1.0, "height": 1.0, "mesh_size": 0.1,
+                "fibre_list": [{"x": 0.0, "y": 0.0, "radius": 0.15, "phase": "void"}],
+            },
+            "material": {"matrix": {"young": 100.0, "poisson": 0.3}},
+            "analysis": {"type": "stiffness", "plane": "strain"},
+            "decomposition": {"subdomains": 2},
+            "petsc": {"feti_coarse_space": space, "feti_ksp_rtol": 1e-10},
+        }  # fmt: skip
+        cell, L, _ = solve(cases.parse(document, Path()), comm)
+        found.append(L)
+        if comm.size <= 2:
+            assert cell.solver.coarse_dimension == 0
+    assert relative_error(*found) < 1e-9
 
 
 # Inactive rows.

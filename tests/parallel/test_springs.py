@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from mpi4py import MPI
+from reference import dense_feti
 from reference.references import BONDED as GLUED
 from reference.references import ELASTIC, VOID
 from support import torn_cells
@@ -128,3 +130,35 @@ def test_very_stiff_springs_are_glue(comm, pieces):
     L, worst, _ = stiffness(comm, **cell, springs=(stiff, stiff))
     glued, _, _ = stiffness(comm, **cell)
     assert relative_error(L, glued) < 1e-8 and worst < 1e-5
+
+
+# What the preconditioner takes for the springs.
+
+CUT = {"geometry": "hexagonal", "mesh_size": 0.12, "refine": 1, "decomposition": {"subdomains": 24}}
+
+
+@pytest.mark.parametrize("kind", ["explicit", "implicit"])
+def test_the_flexibility_of_a_skin_is_a_generalized_inverse_of_its_stiffness(comm, kind):
+    """S~ (S+ + C) S~ = S~, and S+ + C is symmetric."""
+    cell = torn_cells.tear(comm, springs=(5.0, 2.0), geometry="hexagonal", petsc={"feti_dual_operator": kind})
+    operators, found = cell.solver.interface_operators, 0
+    for dofs, body, skin in zip(operators.dofs, operators.operators, operators.skins, strict=True):
+        if skin is not body:
+            unit = np.asfortranarray(np.eye(len(dofs)))
+            S, flexibility = skin.apply_schur(unit), skin.apply_flexibility(unit)
+            assert np.abs(S @ flexibility @ S - S).max() < 1e-9 * np.abs(S).max()
+            assert np.abs(flexibility - flexibility.T).max() < 1e-9 * np.abs(flexibility).max()
+            found += 1
+    assert comm.allreduce(found) > 0
+
+
+@pytest.mark.parametrize("space", ["natural", "adaptive"])
+def test_the_preconditioner_is_no_less_than_the_inverse_with_springs(comm, space):
+    """Eigenvalues of H (F + C) are 1 at least, also where fibre and matrix are both cut."""
+    cell = torn_cells.tear(comm, springs=(50.0, 20.0), **CUT, petsc={"feti_coarse_space": space})
+    assert comm.allreduce(cell.solver.interface_operators.compliance.any(), MPI.LOR)
+    H, F = (dense_feti.matrix(cell, f) for f in (cell.solver.preconditioner.apply, cell.solver.operator.apply))
+    P = dense_feti.projector(dense_feti.gathered(cell, cell.solver.natural.G.toarray()))
+    least, largest = dense_feti.extreme_eigenvalues(F, P @ H @ P)
+    assert least > 1 - 1e-6
+    assert largest < (20 if space == "adaptive" else np.inf)

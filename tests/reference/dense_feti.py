@@ -85,7 +85,6 @@ class DenseDual:
         S, modes = block_diag(*self.S), block_diag(*V)
         BD = np.hstack(self.scaled(active))
         Z = modes - BD.T @ (np.hstack(self.B) @ modes)
-        Z /= np.linalg.norm(Z, axis=0)
         SZ = S @ Z
         energy = Z.T @ SZ
         scale = 1 / np.sqrt(np.maximum(np.diag(energy), 1e-12 * np.diag(energy).max()))

@@ -32,7 +32,6 @@ class Narrow:
 
     def __init__(self, threshold, dense=None):
         """The dense dual problem does not depend on the threshold.  Collective."""
-        self.threshold = threshold
         self.cell = torn_cells.tear(MPI.COMM_WORLD, **NARROW, petsc={"feti_coarse_threshold": threshold})
         self.solver = self.cell.solver
         self.coarse = self.solver.adaptive

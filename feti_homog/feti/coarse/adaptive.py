@@ -1,13 +1,13 @@
 """The adaptive coarse space: rigid-body motions and soft modes of the subdomains, averaged over copies of each node.
 
-With the coarse displacements Z of `averaged_modes`, the stiffness S of the boundaries becomes
+With the coarse displacements Z_0 of `averaged_modes`, the stiffness S of the boundaries becomes
 
-    S_0 = S - S Z (Z^T S Z)^-1 Z^T S,
+    S_0 = S - S Z_0 (Z_0^T S Z_0)^+ Z_0^T S,
 
-what is left of it where the coarse displacements have found their equilibrium.  As B Z = 0, S_0 in place of S in the
-preconditioner M^-1 = B_D S B_D^T makes the exact inverse of the dual operator if Z spans all displacements of the glued
-cell (T9), and takes the soft modes away from the Krylov method if it spans theirs (Spillane & Rixen, IJNME 95, 2013).
-Z^T S Z is definite, and couples a subdomain with those that share a neighbour with it.
+what is left of it where the coarse displacements have found their equilibrium.  As B Z_0 = 0, S_0 in place of S in the
+preconditioner M^-1 = B_D S B_D^T makes the exact inverse of the dual operator if Z_0 spans all displacements of the
+glued cell (T9), and takes the soft modes away from the Krylov method if it spans theirs (Spillane & Rixen, IJNME 95,
+2013).  Z_0^T S Z_0 is positive semi-definite, and couples a subdomain with those that share a neighbour with it.
 """
 
 from __future__ import annotations
@@ -29,18 +29,20 @@ from feti_homog.feti.linalg.distributed_direct import DistributedDirectSolver, R
 from feti_homog.feti.linalg.scaled_sparse import scaled
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.preconditioners.scaled import StiffnessScaled
-from feti_homog.feti.thresholds import COARSE_REGULARISATION, DEFAULTS, FREE_MODE_ENERGY, Thresholds
+from feti_homog.feti.thresholds import COARSE_REGULARISATIONS, DEFAULTS, FREE_MODE_ENERGY, Thresholds
 from feti_homog.typing import Float, Int
 
 
 class AdaptiveCoarseSpace:
-    """The coarse space of this module.  Every rank has S Z on its subdomains, and a factor or its part of one.
+    """The coarse space of this module.  Every rank has S Z_0 on its subdomains, and a factor or its part of one.
+
+    Of a subdomain S Z_0 is dense: of the matrix left whole it has a column for every mode of every fibre.
 
     Attributes:
         threshold: tau.
         counts: soft modes of each of this rank's subdomains.
         coarse_dimension: coarse displacements, n.
-        factorizations: of Z^T S Z so far.
+        factorizations: of Z_0^T S Z_0 so far.
     """
 
     def __init__(
@@ -54,7 +56,12 @@ class AdaptiveCoarseSpace:
     ) -> None:
         """Find the modes below the threshold tau and factor.  All boundary operators must be dense but of large
         bodies.  Options under `feti_coarse_` (default: cholesky by CHOLMOD, on all ranks together by MUMPS).
-        Collective."""
+        Collective.
+
+        Raises:
+            MeshError: the neighbourhood of a face, on any rank, is no subdomain.
+            LinAlgError, CaseError: as `factor`.
+        """
         self.comm, self.threshold = comm, threshold
         self._jump_operator, self._operators, self._scaling = jump_operator, operators, scaling
         self._neighbours = Neighbours(comm, jump_operator, operators.subdomains)
@@ -66,7 +73,7 @@ class AdaptiveCoarseSpace:
         self.coarse_dimension = self._modes.total
         self.is_replicated = thresholds.replicates(self.coarse_dimension, comm.size)
         self._translations = self._modes.translations(comm)
-        # Of each subdomain S Z on its boundary dofs, and Z^T S Z.
+        # Of each subdomain S Z_0 on its boundary dofs, and Z_0^T S Z_0.
         self._forces: list[Float] = [np.zeros((0, 0)) for _ in blocks]
         self._energies: list[Float] = [np.zeros((0, 0)) for _ in blocks]
         self._mask = np.ones(len(jump_operator.rows))
@@ -74,13 +81,12 @@ class AdaptiveCoarseSpace:
         process_memory.trim()
         self.factorizations = 0
         self._solver: ReplicatedDirectSolver | DistributedDirectSolver | None = None
-        part = self.part()
-        self._bonded_energy = allreduce_sum(comm, part.diagonal())
-        self.factor(part)
+        self._free_energy: Float | None = None
+        self.factor(self.part())
 
     def activate(self, active: Float) -> None:
         """Average over the copies that the owned rows hold together of which `active` is 1, those of the scaling, and
-        factor.  Collective."""
+        factor.  Collective.  Raises as `factor`."""
         mask = self._jump_operator.gather(active).copy()
         changed = mask != self._mask
         touched = [i for i, rows in enumerate(self._neighbours.rows) if changed[rows].any()]
@@ -91,56 +97,79 @@ class AdaptiveCoarseSpace:
         self.factor(self.part())
 
     def _update(self, which: Sequence[int], BW: Sequence[csr_matrix]) -> None:
-        """S Z and Z^T S Z of some subdomains, for their scaled constraints."""
+        """S Z_0 and Z_0^T S Z_0 of some subdomains, for their scaled constraints."""
         for i, constraints in zip(which, BW, strict=True):
             Z = self._modes.of_subdomain(i, constraints)
             self._forces[i] = self._operators.skins[i].apply_schur(Z)
             self._energies[i] = Z.T @ self._forces[i]
 
     def part(self) -> csr_matrix:
-        """(n, n) this rank's part of Z^T S Z."""
+        """(n, n) this rank's part of Z_0^T S Z_0."""
         total = DenseBlockSum((self.coarse_dimension, self.coarse_dimension))
         for columns, energy in zip(self._modes.columns, self._energies, strict=True):
             total.add(columns, columns, energy)
         return total.matrix()
 
     def factor(self, part: csr_matrix) -> None:
-        """Factor Z^T S Z, the sum of all parts, scaled to a unit diagonal, with a small multiple of the identity.
+        """Factor Z_0^T S Z_0, the sum of all parts, scaled to a unit diagonal, with a small multiple of the identity.
         Collective.
 
         Averaged modes may depend on each other, and those of a fibre that nothing holds have no energy.  What is added
-        makes the sum definite, and S_0 greater by as little.
+        makes the sum definite, and S_0 greater: of a coarse displacement of the scaled energy mu the share
+        eps / (mu + eps) of its forces is left, eps being what is added.
+
+        Raises:
+            LinAlgError: rounding leaves the matrix indefinite by more than all of COARSE_REGULARISATIONS.
+            CaseError: the library that the options name cannot factor the matrix, or not on that many ranks.
         """
         self.destroy()
-        energy = allreduce_sum(self.comm, part.diagonal())
-        self._weights = 1.0 / np.sqrt(np.maximum(energy, FREE_MODE_ENERGY * self._bonded_energy))
-        matrix = scaled(part, self._weights) + diags(COARSE_REGULARISATION * self._modes.is_own)
-        near_kernel = np.linalg.qr(self._translations / self._weights[:, None])[0]
-        self._solver = direct_solver(self.comm, matrix.tocsr(), "feti_coarse_", self.is_replicated, near_kernel)
         self.factorizations += 1
+        if not self.coarse_dimension:
+            return
+        energy = allreduce_sum(self.comm, part.diagonal())
+        if self._free_energy is None:
+            self._free_energy = FREE_MODE_ENERGY * np.where(energy > 0.0, energy, energy.max())
+        self._weights = 1.0 / np.sqrt(np.maximum(energy, self._free_energy))
+        matrix = scaled(part, self._weights)
+        for regularisation in COARSE_REGULARISATIONS:
+            try:
+                self._solver = self._factored((matrix + diags(regularisation * self._modes.is_own)).tocsr())
+                return
+            except np.linalg.LinAlgError:
+                if regularisation == COARSE_REGULARISATIONS[-1]:
+                    raise
+
+    def _factored(self, matrix: csr_matrix) -> ReplicatedDirectSolver | DistributedDirectSolver:
+        """Solves with the sum of all ranks' parts of the scaled matrix."""
+        near_kernel, triangle = np.linalg.qr(self._translations / self._weights[:, None])
+        near_kernel = near_kernel[:, np.diag(triangle) != 0.0]
+        return direct_solver(self.comm, matrix, "feti_coarse_", self.is_replicated, near_kernel)
 
     def balanced(self, x: Float) -> Float:
         """The forces S_0 x (boundary dofs,) or (boundary dofs, k) of displacements x of that shape.  Collective."""
+        forces = self._operators.apply_skin(x)
+        if not self.coarse_dimension:
+            return forces
         work = np.zeros((self.coarse_dimension, *x.shape[1:]))
         for columns, SZ, span in self._parts():
             work[columns] += SZ.T @ x[span]
-        c, forces = self.solve(allreduce_sum(self.comm, work)), self._operators.apply_skin(x)
+        c = self.solve(allreduce_sum(self.comm, work))
         for columns, SZ, span in self._parts():
             forces[span] -= SZ @ c[columns]
         return forces
 
     def solve(self, work: Float) -> Float:
-        """c with Z^T S Z c = work, (n,) or (n, k) on every rank.  Collective."""
+        """c with Z_0^T S Z_0 c = work, (n,) or (n, k) on every rank.  Collective."""
         assert self._solver is not None, "the factor is destroyed"
         return scale_rows(self._weights, self._solver.solve(scale_rows(self._weights, work)))
 
     @property
     def inner_iterations(self) -> int:
-        """Iterations of the last solve, of one column: 1 with a factor."""
-        return 0 if self._solver is None else self._solver.iterations
+        """Of the last solve for one column on this rank, where the options ask for an iterative method; else 1."""
+        return 1 if self._solver is None else self._solver.iterations
 
     def _parts(self) -> zip[tuple[Int, Float, slice]]:
-        """Of each subdomain the modes that reach it, S Z, and where it is among the boundary dofs."""
+        """Of each subdomain the modes that reach it, S Z_0, and where it is among the boundary dofs."""
         return zip(self._modes.columns, self._forces, self._operators.slices, strict=True)
 
     def destroy(self) -> None:

@@ -1,6 +1,6 @@
-"""Modes of the subdomains, averaged over the copies of each node: Z = (I - B_D^T B) V, the coarse displacements.
+"""Modes of the subdomains, averaged over the copies of each node: Z_0 = (I - B_D^T B) V, the coarse displacements.
 
-B Z = 0, for B B_D^T = I, so they are displacements of the cell whose active rows are glued.  A mode of a subdomain
+B Z_0 = 0, for B B_D^T = I, so they are displacements of the cell whose active rows are glued.  A mode of a subdomain
 reaches those that share nodes with it, and no further.
 """
 
@@ -31,7 +31,7 @@ class _Jumps(NamedTuple):
 
 
 class AveragedModes:
-    """Z on this rank's subdomains, for any active rows.
+    """Z_0 on this rank's subdomains, for any active rows: what it is made of is kept for changes of them.
 
     Attributes:
         total: coarse modes of all subdomains, n.
@@ -53,7 +53,7 @@ class AveragedModes:
         self.columns = [np.unique(np.concatenate([jumps.columns for jumps in of])) for of in self._jumps]
 
     def of_subdomain(self, i: int, BW: csr_matrix) -> Float:
-        """(boundary dofs, m) Z on subdomain i, less its own kernel, which has no energy there.
+        """(boundary dofs, m) Z_0 on subdomain i, less its own kernel, which has no energy there.
 
         Without the kernel, what is left of a rigid-body motion in a stiff subdomain has all its digits.
 

@@ -12,7 +12,7 @@ from scipy.sparse import csr_matrix
 
 from feti_homog.feti.linalg.collectives import allgather_rows, share_columns
 from feti_homog.feti.linalg.distributed_matrix import allreduce_sparse, assemble_distributed
-from feti_homog.feti.linalg.sparse_direct import DirectSolver, factor_by_mumps
+from feti_homog.feti.linalg.sparse_direct import DirectSolver, factor_by_mumps, iterations
 from feti_homog.feti.thresholds import MUMPS_COLUMNS_ONE_BY_ONE
 from feti_homog.typing import Float
 
@@ -57,8 +57,8 @@ class DistributedDirectSolver:
 
     @property
     def iterations(self) -> int:
-        """Of the last solve by the Krylov method, 1 with a factor."""
-        return int(self._ksp.getIterationNumber())
+        """Of the last solve for one column, if the options ask for an iterative method; else 1."""
+        return iterations(self._ksp)
 
     def destroy(self) -> None:
         """Free the factor.  Collective."""
@@ -79,7 +79,7 @@ class ReplicatedDirectSolver:
 
     @property
     def iterations(self) -> int:
-        """Of the last solve by the Krylov method, 1 with a factor."""
+        """As of `DirectSolver`."""
         return self.local.iterations
 
     def destroy(self) -> None:

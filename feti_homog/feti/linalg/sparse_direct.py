@@ -9,7 +9,7 @@ from petsc4py import PETSc
 from scipy.sparse import csr_matrix
 
 from feti_homog.errors import CaseError
-from feti_homog.feti.thresholds import CHOLMOD_COLUMNS_ONE_BY_ONE, MUMPS_EXTRA_WORKSPACE_PERCENT
+from feti_homog.feti.thresholds import CHOLMOD_COLUMNS_ONE_BY_ONE, ITERATIVE_RTOL, MUMPS_EXTRA_WORKSPACE_PERCENT
 from feti_homog.typing import Float
 
 # PETSc's error code for a factorization that the chosen library does not have (PETSC_ERR_MISSING_FACTOR).
@@ -52,12 +52,17 @@ class DirectSolver:
 
     @property
     def iterations(self) -> int:
-        """Of the last solve by the Krylov method, 1 with a factor."""
-        return int(self._ksp.getIterationNumber())
+        """Of the last solve for one column on this rank, if the options ask for an iterative method; else 1."""
+        return iterations(self._ksp)
 
     def destroy(self) -> None:
         """Free the factor now; otherwise it is freed with this object."""
         self._destroy()
+
+
+def iterations(ksp: PETSc.KSP) -> int:
+    """Of the last solve by an iterative method; 1 by a factor."""
+    return 1 if ksp.getType() == PETSc.KSP.Type.PREONLY else int(ksp.getIterationNumber())
 
 
 def factor_by_cholmod(matrix: csr_matrix, prefix: str, near_kernel: Float | None = None) -> PETSc.KSP:
@@ -90,7 +95,7 @@ def factor_by_mumps(A: PETSc.Mat, prefix: str, near_kernel: Float | None = None)
 
 def _tell(A: PETSc.Mat, near_kernel: Float | None) -> None:
     """Let the matrix know of its near-kernel (n, k), the same on all of its ranks."""
-    if near_kernel is None:
+    if near_kernel is None or not near_kernel.shape[1]:
         return
     vectors = [A.createVecLeft() for _ in near_kernel.T]
     for vector, values in zip(vectors, near_kernel.T, strict=True):
@@ -105,6 +110,7 @@ def _direct_ksp(A: PETSc.Mat, prefix: str, library: str) -> PETSc.KSP:
     ksp.setOperators(A)
     ksp.setType(PETSc.KSP.Type.PREONLY)
     ksp.setErrorIfNotConverged(True)
+    ksp.setTolerances(rtol=ITERATIVE_RTOL)
     pc = ksp.getPC()
     pc.setType(PETSc.PC.Type.CHOLESKY)
     pc.setFactorSolverType(library)

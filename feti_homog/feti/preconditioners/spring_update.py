@@ -1,8 +1,10 @@
 """Springs at the few nodes where both fibre and matrix are cut, which no single body's skin can stand for.
 
-With the compliances C of the rows X the preconditioner M becomes M + X C X^T, and its inverse
+With the compliances C of the rows X the preconditioner H, M^-1 or H_0, becomes
 
-    M^-1 - M^-1 X (C^-1 + X^T M^-1 X)^-1 X^T M^-1.
+    H - H X (C^-1 + X^T H X)^-1 X^T H,
+
+which is (H^-1 + X C X^T)^-1 where H is definite, as H_0 is on G^T lam = 0.
 """
 
 from __future__ import annotations
@@ -22,7 +24,7 @@ class SpringUpdate:
     """The update for the rows where `compliance` (owned rows,) is not 0."""
 
     def __init__(self, comm: MPI.Intracomm, first: int, compliance: Float, inverse: Callable[[Float], Float]) -> None:
-        """`inverse` is r -> M^-1 r for r (owned rows, k); `first` is this rank's first row.  Collective."""
+        """`inverse` is r -> H r for r (owned rows, k); `first` is this rank's first row.  Collective."""
         self.comm, self.first = comm, first
         own = np.flatnonzero(compliance)
         self.rows = np.concatenate(comm.allgather(first + own))
@@ -37,7 +39,7 @@ class SpringUpdate:
         self._factor = cho_factor(np.diag(stiffness) + (block + block.T) / 2)
 
     def apply(self, z: Float) -> Float:
-        """The updated inverse times r, for z = M^-1 r (owned rows,) or (owned rows, k).  Collective."""
+        """The updated H times r, for z = H r (owned rows,) or (owned rows, k).  Collective."""
         if not len(self.rows):
             return z
         return np.asarray(z - self._columns @ cho_solve(self._factor, gather_rows(self.comm, z, self.first, self.rows)))
@@ -49,7 +51,7 @@ class WithSprings:
     norm = np.inf
 
     def __init__(self, comm: MPI.Intracomm, inner: Preconditioner, first: int, compliance: Float) -> None:
-        """Arguments as of `SpringUpdate`; `inner` is M^-1, for all rows active.  Collective."""
+        """Arguments as of `SpringUpdate`; `inner` is H, for all rows active.  Collective."""
         self._comm, self._inner, self._first, self._compliance = comm, inner, first, compliance
         self._update = SpringUpdate(comm, first, compliance, inner.apply)
 
@@ -59,12 +61,12 @@ class WithSprings:
         self._update = SpringUpdate(self._comm, self._first, active * self._compliance, self._inner.apply)
 
     def apply(self, r: Float) -> Float:
-        """The updated inverse times r.  Collective."""
+        """The updated H times r.  Collective."""
         return self._update.apply(self._inner.apply(r))
 
     def close(self, right: Float, d: Float, E: Float) -> Float:
-        """As without the springs."""
-        return self._inner.close(right, d, E)
+        """The same forces with the springs."""
+        return self._update.apply(self._inner.close(right, d, E))
 
     def initial_multipliers(self, previous: Float, closing: Float) -> Float:
         """The previous ones."""
