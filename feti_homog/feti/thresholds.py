@@ -36,7 +36,7 @@ class Thresholds:
             eigenproblem for each face, not from one.  Measured [1000, 5000] with a boundary of 3644: 1.1 and 5.0 s.
         replicated_vectors: coarse vectors, times the ranks that would each have them all, up to which every rank
             factors the whole coarse matrix and solves for some of the load cases; above, all ranks factor it together.
-            Of 5 209 vectors both take as long on two ranks; a copy takes 79 MB, of one factor each of 16 ranks has 19
+            Of 5 209 vectors both take as long on two ranks; a copy takes 77 MB, of one factor each of 16 ranks has 19
             (`scripts/scaling strong shared --fibres 25 --dofs 150000`).
         influence_applications: applications of the dual operator from which on influence columns pay
             (`scripts/benchmark_path`).
