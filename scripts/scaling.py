@@ -3,8 +3,9 @@
 Each run is an MPI job of its own: a random cell of fibre fraction 0.6 with gaps of 4 %, cut as by default, three unit
 strains together to 1e-8.  `shared` and `multigrid` are the strong study with one coarse factor by MUMPS on all ranks,
 also where the program would have each factor for itself, and with the coarse problem solved by multigrid (PETSc's GAMG
-in CG), on as many ranks as there are cores.  `events` are the first ones of paths of random cells that debond.  More
-ranks than cores take turns: their iterations and messages count, their times do not.
+in CG), on as many ranks as there are cores; `large` tells what of a large coarse factor ranks share.  `events` are the
+first ones of paths of random cells that debond.  More ranks than cores take turns: their iterations and messages count,
+their times do not.
 A run whose report is in DIR/scaling is not made again, so that a long list can be worked off in parts.  The tables,
 the picture and the model are of all runs of the studies that are there.  Remove the folder to measure anew.
 """
@@ -35,6 +36,7 @@ STUDIES = {
     SHARED: "strong scaling with one coarse factor by all ranks",
     MULTIGRID: "strong scaling with the coarse problem solved by multigrid",
     "sizes": "cost by size: microseconds of a rank per dof",
+    "large": "the largest of these cells with one coarse factor by all ranks, on one rank too",
 }
 
 
@@ -86,6 +88,7 @@ def planned(arguments: argparse.Namespace) -> dict[str, list[Run]]:
             for way in (SHARED, MULTIGRID)
         },
         "sizes": [Run(*cell, refine, arguments.size_ranks) for cell in ladder],
+        "large": [Run(*ladder[-1], refine, 1, SHARED), Run(*ladder[-1], refine, arguments.size_ranks)],
     }
 
 
@@ -170,7 +173,7 @@ def _parser() -> argparse.ArgumentParser:
         "studies",
         nargs="*",
         default=["weak", "strong", SHARED],
-        help="of weak, strong, shared, multigrid, events, sizes; by default the first three",
+        help="of weak, strong, shared, multigrid, sizes, large, events; by default the first three",
     )
     parser.add_argument("--ranks", type=int, nargs="+", default=[1, 2, 4, 8, 16])
     parser.add_argument("--dofs", type=int, default=40_000, help="of a rank in weak scaling")
