@@ -141,8 +141,8 @@ class AdaptiveCoarseSpace:
 
     def _factored(self, matrix: csr_matrix) -> ReplicatedDirectSolver | DistributedDirectSolver:
         """Solves with the sum of all ranks' parts of the scaled matrix."""
-        near_kernel, triangle = np.linalg.qr(self._translations / self._weights[:, None])
-        near_kernel = near_kernel[:, np.diag(triangle) != 0.0]
+        moves = self._translations.any(axis=0)
+        near_kernel = np.linalg.qr(self._translations[:, moves] / self._weights[:, None])[0]
         return direct_solver(self.comm, matrix, "feti_coarse_", self.is_replicated, near_kernel)
 
     def balanced(self, x: Float) -> Float:
