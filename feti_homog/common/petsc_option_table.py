@@ -62,13 +62,13 @@ OPTIONS = (
     *_direct_solver("feti_interior_", "interiors, of implicit subdomains and for fields"),
     *_direct_solver("feti_natural_", "the rigid-body coarse problem"),
     Option("feti_coarse_ksp_type", "preonly|cg|...", "preonly", "solves with the adaptive coarse problem"),
-    Option("feti_coarse_ksp_rtol", "<real>", "1e-10", "their relative tolerance, if they are iterative"),
-    Option("feti_coarse_pc_type", "cholesky|lu|gamg|...", "cholesky", "its factorization, or what cg is to have"),
+    Option("feti_coarse_ksp_rtol", "<real>", "1e-10", "their relative tolerance, of an iterative method"),
+    Option("feti_coarse_pc_type", "cholesky|lu|gamg|...", "cholesky", "its factorization, or the preconditioner of cg"),
     Option(
         "feti_coarse_pc_factor_mat_solver_type",
         "cholmod|mumps|...",
         "cholmod",
-        "its library; mumps where all ranks factor it together",
+        "library of that factorization; mumps where all ranks share one",
     ),
     *_direct_solver("feti_bonded_", "the cell with all bonds intact, for influence columns"),
 )
