@@ -17,15 +17,15 @@ from feti_homog.config.phase_names import COATING
 from feti_homog.fem.problem import AXIAL, Problem
 
 # Seconds to start Python, MPI, PETSc and gmsh.
-START_SECONDS = 1.2
+START_SECONDS = 0.9
 # Seconds for each coarse triangle, on rank 0.
-MESH_SECONDS = 3.9e-5
+MESH_SECONDS = 2.7e-5
 # Seconds for each degree of freedom to assemble and factor, and for each subdomain besides.
-SETUP_SECONDS, SUBDOMAIN_SECONDS = 9.5e-6, 5.2e-3
+SETUP_SECONDS, SUBDOMAIN_SECONDS = 4.4e-6, 2.9e-3
 # Seconds for each degree of freedom in one application of operator and preconditioner.
-APPLY_SECONDS = 8.8e-8
+APPLY_SECONDS = 4.2e-8
 # Bytes of a rank without degrees of freedom, and for each of these.
-BASE_BYTES, DOF_BYTES = 2.1e8, 6.7e2
+BASE_BYTES, DOF_BYTES = 1.8e8, 6.1e2
 # Degrees of freedom of a rank; with fewer, its waiting for others takes more than it saves.
 DOFS_OF_A_RANK = 50_000
 # Typical numbers, by which a case is estimated and its operators are chosen.
