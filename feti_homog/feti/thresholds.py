@@ -24,16 +24,16 @@ class Thresholds:
             `-feti_coarse_threshold`; the condition number is about 1 / tau.  Measured [0.1, 0.24, 0.5]: 29, 20, 14
             iterations, 4.4, 5.5, 7.2 vectors a subdomain.
         face_factor: tau of a face's own eigenproblem over tau, no unit: the energy that other faces and the rest of
-            the body add is not in it.  Measured [0.6, 0.8, 1, 1.25]: 23, 20, 18, 17 iterations; 6.4, 7.2, 7.9, 8.9
+            the body add is not in it.  Measured [0.6, 0.8, 1, 1.25]: 23, 20, 19, 17 iterations; 6.4, 7.2, 7.9, 8.9
             vectors.
-        face_layers: coarse triangles from a face to the far side of its neighbourhood.  Measured [1, 2, 3]: 17
-            iterations each, 11.8, 8.9, 8.5 vectors: one layer finds modes that are none of the body's.
+        face_layers: coarse triangles from a face to the far side of its neighbourhood.  Measured [1, 2, 3]: 17,
+            17, 18 iterations; 11.8, 8.9, 8.5 vectors: one layer finds modes that are none of the body's.
         decayed: displacements on the rest of the boundary, relative to the largest of a face's mode, that are taken for
             0.  Measured [1e-3, 0.01, 0.03, 0.1]: 17, 17, 18, 20 iterations.
         min_trace_dofs: degrees of freedom that a trace space of a boundary or a face keeps at least.  Measured
-            [30, 60, 100, 250]: 21, 21, 21, 19 iterations; 6.0, 6.0, 6.1, 6.4 vectors.
+            [30, 60, 100, 250]: 21, 21, 21, 18 iterations; 6.0, 6.0, 6.1, 6.4 vectors.
         whole_boundary_dofs: boundary degrees of freedom of a whole body above which its soft modes come from a dense
-            eigenproblem for each face, not from one.  Measured [1000, 5000] with a boundary of 3644: 1.1 and 5.0 s.
+            eigenproblem for each face, not from one.  Measured [1000, 5000] with a boundary of 3644: 0.9 and 3.0 s.
         replicated_vectors: coarse vectors, times the ranks that would each have them all, up to which every rank
             factors the whole coarse matrix and solves for some of the load cases; above, all ranks factor it together.
             Of 5 209 vectors both take as long on two ranks; a copy takes 77 MB, of one factor each of 16 ranks has 19
@@ -152,8 +152,8 @@ MIN_FACE_NODES = 2
 # Eigenvalues of a matrix in single precision, relative to its largest, that are rounding.
 SINGLE_PRECISION_NULL = 1e-6
 # Multiples of the identity that the coarse matrix, scaled to a unit diagonal, gets, the first with which it can be
-# factored: averaged modes may depend on each other.  Rounding leaves about 1e-15 times the contrast of the phases at
-# most; with contrasts to 1e9 and Poisson's ratios to 0.4999999 the first was enough.
+# factored: averaged modes may depend on each other.  In the lists of `scripts/robustness`, with contrasts to 1e6, the
+# first was enough.
 COARSE_REGULARISATIONS = (1e-12, 1e-10, 1e-8)
 # Energy of an averaged mode, relative to that with all rows active, below which it is a free motion.
 FREE_MODE_ENERGY = 1e-10

@@ -50,7 +50,8 @@ class AveragedModes:
         self.is_own = np.zeros(self.total, bool)
         for first, v in zip(self._first, V, strict=True):
             self.is_own[first : first + v.shape[1]] = True
-        self.columns = [np.unique(np.concatenate([jumps.columns for jumps in of])) for of in self._jumps]
+        none = np.zeros(0, np.int64)
+        self.columns = [np.unique(np.concatenate([none, *(jumps.columns for jumps in of)])) for of in self._jumps]
 
     def of_subdomain(self, i: int, BW: csr_matrix) -> Float:
         """(boundary dofs, m) Z_0 on subdomain i, less its own kernel, which has no energy there.

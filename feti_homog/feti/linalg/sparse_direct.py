@@ -100,7 +100,11 @@ def _tell(A: PETSc.Mat, near_kernel: Float | None) -> None:
     vectors = [A.createVecLeft() for _ in near_kernel.T]
     for vector, values in zip(vectors, near_kernel.T, strict=True):
         vector.setArray(values[slice(*vector.getOwnershipRange())])
-    A.setNearNullSpace(PETSc.NullSpace().create(vectors=vectors, comm=A.comm))
+    space = PETSc.NullSpace().create(vectors=vectors, comm=A.comm)
+    A.setNearNullSpace(space)
+    # The matrix keeps them, and frees them with itself.
+    for petsc_object in (space, *vectors):
+        petsc_object.destroy()
 
 
 def _direct_ksp(A: PETSc.Mat, prefix: str, library: str) -> PETSc.KSP:

@@ -39,9 +39,10 @@ def test_solvers_return_the_unknowns_that_made_the_right_hand_side(columns):
     "make",
     [
         lambda A: DirectSolver(A, "test_").solve(np.ones((A.shape[0], 20))),
+        lambda A: DirectSolver(A, "test_", np.ones((A.shape[0], 3))).solve(np.ones((A.shape[0], 20))),
         lambda A: assemble_owned_rows(MPI.COMM_WORLD, A, np.arange(A.shape[0]), np.arange(A.shape[0]), A.shape),
     ],
-    ids=["factored", "assembled"],
+    ids=["factored", "with a near-kernel", "assembled"],
 )
 def test_nothing_is_left_of_a_factor(make):
     """A path makes one at every event."""
