@@ -1,10 +1,10 @@
 """Weak and strong scaling by ranks, cost by size, and a model of what 64 and 1 024 ranks would do.
 
 Each run is an MPI job of its own: a random cell of fibre fraction 0.6 with gaps of 4 %, cut as by default, three unit
-strains together to 1e-8.  `shared` and `multigrid` are the strong study with one coarse factor by MUMPS on all ranks,
-also where the program would have each factor for itself, and with the coarse problem solved by multigrid (PETSc's GAMG
-in CG), on as many ranks as there are cores; `large` tells what of a large coarse factor ranks share.  `events` are the
-first ones of paths of random cells that debond.  More ranks than cores take turns: their iterations and messages count,
+strains together to 1e-8.  `shared` and `multigrid` are the strong study with one coarse factor by MUMPS on all ranks in
+place of elimination, and with the coarse problem solved by multigrid (PETSc's GAMG in CG), on as many ranks as there
+are cores; `large` is the largest cell on one rank, too.  `events` are the first ones of paths of random cells that
+debond.  More ranks than cores take turns: their iterations and messages count,
 their times do not.
 A run whose report is in DIR/scaling is not made again, so that a long list can be worked off in parts.  The tables,
 the picture and the model are of all runs of the studies that are there.  Remove the folder to measure anew.
@@ -22,11 +22,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 from benchmark import job
+from scaling_elimination import FrontSize, TimedFront
 from scaling_events import study as study_events
 from scaling_forecast import assumptions, checks, forecast, table, verdict
 from scaling_model import Machine, Prediction, measured, network
 from scaling_plot import plot
-from scaling_report import COPIES, MULTIGRID, SHARED, Row, by_ranks, by_size, memory, speedups, write
+from scaling_report import ELIMINATION, MULTIGRID, SHARED, Row, by_ranks, by_size, memory, speedups, write
 
 HERE = Path(__file__).parent
 EVENTS = "events"
@@ -36,7 +37,7 @@ STUDIES = {
     SHARED: "strong scaling with one coarse factor by all ranks",
     MULTIGRID: "strong scaling with the coarse problem solved by multigrid",
     "sizes": "cost by size: microseconds of a rank per dof",
-    "large": "the largest of these cells with one coarse factor by all ranks, on one rank too",
+    "large": "the largest of these cells, on one rank too",
 }
 
 
@@ -88,7 +89,7 @@ def planned(arguments: argparse.Namespace) -> dict[str, list[Run]]:
             for way in (SHARED, MULTIGRID)
         },
         "sizes": [Run(*cell, refine, arguments.size_ranks) for cell in ladder],
-        "large": [Run(*ladder[-1], refine, 1, SHARED), Run(*ladder[-1], refine, arguments.size_ranks)],
+        "large": [Run(*ladder[-1], refine, p) for p in (1, arguments.size_ranks)],
     }
 
 
@@ -117,7 +118,12 @@ def work_off(run: Run, arguments: argparse.Namespace) -> bool:
 
 def read(path: Path) -> list[Row]:
     """The run of a report; none if there is no report."""
-    return [Row(**json.loads(path.read_text()))] if path.exists() else []
+    if not path.exists():
+        return []
+    fields = json.loads(path.read_text())
+    for name, kind in (("coarse_fronts", FrontSize), ("natural_fronts", FrontSize), ("timed_fronts", TimedFront)):
+        fields[name] = [kind(*each) for each in fields[name]]
+    return [Row(**fields)]
 
 
 def rows_of(study: str, runs: Sequence[Run], arguments: argparse.Namespace) -> list[Row]:
@@ -134,7 +140,7 @@ def report(found: dict[str, list[Row]], arguments: argparse.Namespace) -> list[s
     lines = [line for study, rows in found.items() if rows for line in study_tables(study, rows, arguments.cores)]
     rows = list({(row.dofs, row.ranks, row.way): row for some in found.values() for row in some}.values())
     # PETSc counts the messages of a factor that ranks share among those of multipliers.
-    miscounted = max((row.miscounted for row in rows if row.way == COPIES), default=0.0)
+    miscounted = max((row.miscounted for row in rows if row.way == ELIMINATION), default=0.0)
     try:
         rates, here = measured(rows, arguments.cores), network(rows, arguments.cores)
     except ValueError as error:

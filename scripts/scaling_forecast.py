@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from scaling_fit import Shares
+from scaling_fit import Power, Shares
 from scaling_model import COARSE, LOCAL, MESH, Machine, Prediction, Rates, predict
-from scaling_report import COARSE_SUMS, GATHERS, SCALARS, SUMS, Row
-
-from feti_homog.feti.thresholds import DEFAULTS
+from scaling_report import GATHERS, SCALARS, SUMS, Row
 
 RANKS = (1, 2, 16, 64, 1024)
 FAR = (64, 1024)
@@ -32,46 +30,55 @@ def forecast(rates: Rates, machine: Machine, way: str | None = None) -> dict[str
 
 def assumptions(rates: Rates, machine: Machine) -> list[str]:
     """The model in words, with its constants."""
-    r = rates
-    mesh, alone = r.mesh, (r.factor, r.solve)
-    shared = zip((r.factor_shared, r.solve_shared), alone, strict=True)
-    multigrid = []
+    r, (coarse, natural) = rates, (rates.coarse, rates.natural)
+    factor, solve = coarse.rates.factor, coarse.rates.solve
+    others = []
+    if r.factor_shared and r.solve_shared:
+        powers = (coarse.alone_factor.exponent, coarse.alone_solve.exponent)
+        shared = zip((r.factor_shared, r.solve_shared), powers, strict=True)
+        words = ", ".join(f"{_shares(s)} n^{power:.2f}" for s, power in shared)
+        others.append(f"              by one factor of PETSc's on all ranks: {words}")
     if r.multigrid:
-        multigrid.append(
+        others.append(
             f"              by multigrid: set-up {_shares(r.multigrid.setup)}, a solve {_shares(r.multigrid.solve)} "
             f"times n, in {r.multigrid.inner} iterations at any size"
         )
     return [
         "cost model: seconds on p ranks = mesh + subdomains + coarse problem + messages, none behind another; all "
         "constants are of these runs",
-        f"  mesh        {1e6 * mesh.serial:.1f} + {1e6 * mesh.parallel:.1f} / p microseconds a coarse triangle, "
+        f"  mesh        {1e6 * r.mesh.serial:.1f} + {1e6 * r.mesh.parallel:.1f} / p microseconds a coarse triangle, "
         f"{1e3 * r.triangles:.1f} of them in 1 000 dofs: meshed, torn and dealt out",
         f"  subdomains  assemble {1e6 * r.assemble:.2f}, set-up {1e6 * r.setup:.2f}, an iteration of {r.loads} loads "
         f"{1e6 * r.apply:.3f} microseconds a dof, measured on 1 rank; over p,",
         f"              times {r.imbalance:.2f} for the fullest rank (measured), or more where few subdomains are left "
         f"to each; {1e3 * r.subdomains:.2f} of them in 1 000 dofs",
-        f"  coarse      n = {1e3 * r.vectors:.2f} vectors in 1 000 dofs, up to {r.largest_coarse} timed; seconds of "
-        "the factor, and of a solve of one load:",
-        "              by every rank for itself, which solves for its loads: "
-        + ", ".join(f"{f.factor:.2g} n^{f.exponent:.2f}" for f in alone),
-        f"              from {DEFAULTS.replicated_vectors / r.vectors / 1e6:.0f} million dofs / p by all together: "
-        + ", ".join(f"{_shares(s)} n^{f.exponent:.2f}" for s, f in shared),
-        *multigrid,
-        f"              and of m = {1e3 * r.kernel:.2f} rigid-body motions: "
-        f"{r.natural_factor.factor:.2g} m^{r.natural_factor.exponent:.2f}, of the two solves of an iteration "
-        f"{r.natural_solve.factor:.2g} m^{r.natural_solve.exponent:.2f}, on any p",
+        f"  coarse      n = {1e3 * r.vectors:.2f} vectors in 1 000 dofs, up to {r.largest_coarse} timed, and m = "
+        f"{1e3 * r.kernel:.2f} rigid-body motions, eliminated on a tree of ranks; seconds of factor and solves:",
+        f"              on one rank {_powers(coarse.alone_factor, coarse.alone_solve)} of n, "
+        f"{_powers(natural.alone_factor, natural.alone_solve)} of m; of a rank's own n / p and m / p",
+        f"              {_powers(coarse.own_factor, coarse.own_solve)} and "
+        f"{_powers(natural.own_factor, natural.own_solve)}; then at each doubling of the ranks one front",
+        f"              {factor[0]:.2g} s a multiplication and {factor[1]:.2g} an entry, over the ranks that share it, "
+        f"{factor[2]:.2g} an entry told to these, {factor[3]:.2g} a front; a solve {solve[0]:.2g} an entry of L and",
+        f"              {solve[1]:.2g}.  Of n / p unknowns per rank fronts have up to {coarse.borders.front:.1f} "
+        f"times the root, leave {coarse.borders.left:.1f}; the last has {coarse.borders.last:.1f} (counted)",
+        *others,
         f"              of {STRONG_DOFS / 1e6:g} million dofs n is {r.vectors * STRONG_DOFS / r.largest_coarse:.1f} "
         "times the largest that was timed: the further, the less these powers are worth (`sizes` times larger ones)",
         f"  messages    {1e6 * machine.latency:.2g} microseconds each and {machine.bandwidth / 1e9:.2g} GB/s; "
         f"{GATHERS + SUMS} exchanges an iteration, each of {r.neighbours} messages and {r.surface:.1f} values",
-        f"              times the root of the rank's dofs (most that were counted); {COARSE_SUMS} sums over ranks of "
-        f"{r.loads} (n + m) values and {SCALARS} of single ones,",
-        f"              log2 p messages deep; once {r.coarse_bytes:.1f} bytes a dof of coarse matrices for every rank",
+        f"              times the root of the rank's dofs (most that were counted), those of fronts, and {SCALARS} "
+        "sums of single values, log2 p messages deep",
         f"  iterations  {r.iterations} at any size, the most of all runs",
-        "  memory      not in the model: neither whether each rank can hold the coarse factor, nor rank 0 the mesh; "
-        "every rank has the bandwidth",
+        "  memory      not in the model: neither what a rank has of fronts, nor whether rank 0 can hold the lines "
+        "of the cell; every rank has the bandwidth",
         "              that the single one had",
     ]
+
+
+def _powers(*powers: Power) -> str:
+    """Powers in words."""
+    return " and ".join(f"{p.factor:.2g} x^{p.exponent:.2f}" for p in powers)
 
 
 def _shares(s: Shares) -> str:

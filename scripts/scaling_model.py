@@ -1,8 +1,7 @@
 """A cost model of the solver on more ranks than there are here, with rates measured on few.
 
 Every term is one that the program has today: a mesh and a tearing of which some share is dealt to the ranks, work on
-subdomains that ranks share, a coarse problem that every rank factors to solve for some load cases, or all together if
-it is large, and messages.
+subdomains that ranks share, coarse problems that they eliminate on a tree, and messages.
 """
 
 from __future__ import annotations
@@ -13,16 +12,18 @@ from math import ceil, log2, sqrt
 from statistics import median
 from typing import Any
 
+from scaling_elimination import Borders, Elimination, FrontRates, FrontSize
 from scaling_fit import Power, Shares, fit_power, fit_shares
-from scaling_report import COARSE_SUMS, COPIES, GATHERS, MULTIGRID, SCALARS, SHARED, SUMS, VALUE_BYTES, Row
+from scaling_report import ELIMINATION, GATHERS, MULTIGRID, NATURAL_SOLVES, SCALARS, SHARED, SUMS, VALUE_BYTES, Row
 
 from feti_homog.cell.tiles import DEFAULT_TILES
-from feti_homog.feti.thresholds import DEFAULTS
 
 MESH, LOCAL, COARSE, MESSAGES = "mesh", "subdomains", "coarse problem", "messages"
 # Exchanges with neighbours in one cycle of multigrid: on each of about five levels six, for the products and smoothers
 # before and after the coarser level, the residual and the transfers.
 CYCLE_EXCHANGES = 30
+# Least share of the seconds of an elimination that a rank's own unknowns take, where its fronts seem to take all.
+LEAST_OWN_SHARE = 0.1
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,7 @@ class Machine:
 
 @dataclass(frozen=True)
 class Multigrid:
-    """Seconds per coarse vector of set-up, and of a solve of one load, which takes `inner` iterations at any size."""
+    """Seconds per coarse vector of set-up, and of a solve, which takes `inner` iterations a load at any size."""
 
     setup: Shares
     solve: Shares
@@ -49,12 +50,13 @@ class Rates:
     Attributes:
         mesh: of a coarse triangle.
         assemble, setup, apply: seconds per dof, `apply` of an iteration.
-        factor, solve: of the coarse vectors on one rank, `solve` of one load case.
-        factor_shared, solve_shared: on all ranks, per vector to the powers of `factor` and `solve`.
-        natural_factor, natural_solve: of the rigid-body motions, `natural_solve` of an iteration and all loads.
+        coarse, natural: elimination of the coarse vectors, and of the rigid-body motions; their solves are those of an
+            iteration.
+        factor_shared, solve_shared: of one coarse factor by PETSc, per vector to the powers of that on one rank; None
+            if it was not timed.
         multigrid: if it was timed.
         loads: load cases solved together.
-        triangles, subdomains, vectors, kernel, coarse_bytes: per dof.
+        triangles, subdomains, vectors, kernel: per dof.
         largest_coarse: most coarse vectors that were timed.
         iterations: most of all runs.
         surface: values that a rank tells or hears in an exchange per root of its dofs.
@@ -66,19 +68,16 @@ class Rates:
     assemble: float
     setup: float
     apply: float
-    factor: Power
-    solve: Power
-    factor_shared: Shares
-    solve_shared: Shares
-    natural_factor: Power
-    natural_solve: Power
+    coarse: Elimination
+    natural: Elimination
+    factor_shared: Shares | None
+    solve_shared: Shares | None
     multigrid: Multigrid | None
     loads: int
     triangles: float
     subdomains: float
     vectors: float
     kernel: float
-    coarse_bytes: float
     largest_coarse: int
     iterations: int
     surface: float
@@ -92,7 +91,7 @@ def measured(rows: Sequence[Row], cores: int) -> Rates:
     Raises:
         ValueError: the timed rows are on too few numbers of ranks, or of too few sizes.
     """
-    if not any(row.ranks == 1 and row.way == COPIES for row in rows):
+    if not any(row.ranks == 1 and row.way == ELIMINATION for row in rows):
         raise ValueError("rates of subdomains need a run on one rank")
     return Rates(**_local_times(rows, cores), **_coarse_times(rows, cores), **_per_dof(rows), **_counts(rows, cores))
 
@@ -112,7 +111,7 @@ def network(rows: Sequence[Row], cores: int) -> Machine:
 def _local_times(rows: Sequence[Row], cores: int) -> dict[str, Any]:
     """Seconds per unit of work: of the subdomains on one rank, of the mesh on all that have a core."""
     timed = [row for row in rows if row.ranks <= cores]
-    alone = [row for row in timed if row.ranks == 1 and row.way == COPIES]
+    alone = [row for row in timed if row.ranks == 1 and row.way == ELIMINATION]
     cells = _meshed_alike(timed)
     return dict(
         mesh=fit_shares(
@@ -138,18 +137,54 @@ def _meshed_alike(rows: Sequence[Row]) -> Sequence[Row]:
 
 def _coarse_times(rows: Sequence[Row], cores: int) -> dict[str, Any]:
     """Powers of the coarse vectors where every rank factors, and shares that ranks deal out where all do together."""
-    timed = {way: [row for row in rows if row.ranks <= cores and row.way == way] for way in (COPIES, SHARED, MULTIGRID)}
-    alone, shared = timed[COPIES], timed[SHARED]
-    factor = _power(alone, "vectors", lambda row: row.coarse_factor)
-    solve = _power(alone, "vectors", lambda row: row.coarse_solve / ceil(row.loads / row.ranks))
+    by_way = {way: [row for row in rows if row.way == way] for way in (ELIMINATION, SHARED, MULTIGRID)}
+    shared, grids = ([row for row in by_way[way] if row.ranks <= cores] for way in (SHARED, MULTIGRID))
+    coarse, natural = (_elimination(by_way[ELIMINATION], cores, *of) for of in (OF_COARSE, OF_NATURAL))
+    factor, solve = coarse.alone_factor.exponent, coarse.alone_solve.exponent
     return dict(
-        factor=factor,
-        solve=solve,
-        factor_shared=_dealt(shared, factor.exponent, lambda row: row.coarse_factor),
-        solve_shared=_dealt(shared, solve.exponent, lambda row: row.coarse_solve / row.loads),
-        natural_factor=_power(alone, "kernel", lambda row: row.natural_factor),
-        natural_solve=_power(alone, "kernel", lambda row: row.natural_solve),
-        multigrid=_multigrid(timed[MULTIGRID]),
+        coarse=coarse,
+        natural=natural,
+        factor_shared=_dealt(shared, factor, lambda row: row.coarse_factor) if shared else None,
+        solve_shared=_dealt(shared, solve, lambda row: row.coarse_solve) if shared else None,
+        multigrid=_multigrid(grids),
+    )
+
+
+# Of an elimination the unknowns, the seconds of its factor and of its solves in an iteration, the fronts, and how many
+# solves these are.
+OF_COARSE = "vectors", "coarse_factor", "coarse_solve", "coarse_fronts", 1
+OF_NATURAL = "kernel", "natural_factor", "natural_solve", "natural_fronts", NATURAL_SOLVES
+
+
+def _elimination(
+    rows: Sequence[Row], cores: int, unknowns: str, factor: str, solve: str, fronts: str, solves: int
+) -> Elimination:
+    """That of so many unknowns, attributes of the rows.
+
+    Raises:
+        ValueError: too few runs on one rank, or on several.
+    """
+    alone = [row for row in rows if row.ranks == 1]
+    several = [row for row in rows if 1 < row.ranks <= cores]
+    rates = FrontRates.of([timed for row in several for timed in row.timed_fronts])
+    own: dict[str, list[float]] = {factor: [], solve: []}
+    for row in several:
+        whole = [front for front in getattr(row, fronts) if front.ranks == row.ranks]
+        of_fronts = rates.seconds(whole)
+        for name, seconds, times in ((factor, of_fronts[0], 1), (solve, of_fronts[1], solves)):
+            all_of_it = getattr(row, name)
+            own[name].append(max(all_of_it - times * seconds, LEAST_OWN_SHARE * all_of_it))
+    each = [getattr(row, unknowns) / row.ranks for row in several]
+    counted = [
+        (getattr(row, unknowns), row.ranks, front) for row in rows if row.ranks > 1 for front in getattr(row, fronts)
+    ]
+    return Elimination(
+        alone_factor=_power(alone, unknowns, lambda row: getattr(row, factor)),
+        alone_solve=_power(alone, unknowns, lambda row: getattr(row, solve)),
+        own_factor=fit_power(each, own[factor]),
+        own_solve=fit_power(each, own[solve]),
+        borders=Borders.of(counted),
+        rates=FrontRates(rates.factor, tuple(solves * rate for rate in rates.solve)),
     )
 
 
@@ -158,7 +193,7 @@ def _multigrid(rows: Sequence[Row]) -> Multigrid | None:
     if not rows:
         return None
     setup = _dealt(rows, 1.0, lambda row: row.coarse_factor)
-    return Multigrid(setup, _dealt(rows, 1.0, lambda row: row.coarse_solve / row.loads), max(r.inner for r in rows))
+    return Multigrid(setup, _dealt(rows, 1.0, lambda row: row.coarse_solve), max(r.inner for r in rows))
 
 
 def _power(rows: Sequence[Row], unknowns: str, seconds: Callable[[Row], float]) -> Power:
@@ -175,13 +210,11 @@ def _dealt(rows: Sequence[Row], exponent: float, seconds: Callable[[Row], float]
 
 def _per_dof(rows: Sequence[Row]) -> dict[str, Any]:
     """Sizes per dof."""
-    several = [row for row in rows if row.ranks > 1 and row.way == COPIES] or rows
     return dict(
         triangles=_rate((row.triangles, row.dofs) for row in rows),
         subdomains=_rate((row.subdomains, row.dofs) for row in rows),
         vectors=_rate((row.vectors, row.dofs) for row in rows),
         kernel=_rate((row.kernel, row.dofs) for row in rows),
-        coarse_bytes=_rate((row.coarse_bytes, row.dofs) for row in several),
     )
 
 
@@ -245,7 +278,7 @@ def predict(rates: Rates, machine: Machine, dofs: float, ranks: int, way: str | 
     # A rank has whole subdomains, and none is cut for its sake.
     whole = ceil(subdomains / ranks) * ranks / subdomains
     own = dofs / ranks * max(rates.imbalance if ranks > 1 else 1.0, whole)
-    kernel = max(rates.kernel * dofs, 2.0)
+    natural = rates.natural.seconds(max(rates.kernel * dofs, 2.0), ranks)
     factor, solve = _coarse_seconds(rates, dofs, ranks, way)
     return Prediction(
         dofs=dofs,
@@ -253,9 +286,9 @@ def predict(rates: Rates, machine: Machine, dofs: float, ranks: int, way: str | 
         mesh=rates.mesh.seconds(rates.triangles * dofs, ranks),
         assemble=rates.assemble * own,
         setup=rates.setup * own,
-        coarse_factor=factor + rates.natural_factor.seconds(kernel),
+        coarse_factor=factor + natural[0],
         apply=rates.iterations * rates.apply * own,
-        coarse_solve=rates.iterations * (solve + rates.natural_solve.seconds(kernel)),
+        coarse_solve=rates.iterations * (solve + natural[1]),
         messages=_messages(rates, machine, dofs, ranks, way) if ranks > 1 else 0.0,
     )
 
@@ -264,31 +297,48 @@ def _coarse_seconds(rates: Rates, dofs: float, ranks: int, way: str | None) -> t
     """Seconds of the coarse factor or of multigrid's set-up, and of a solve of all loads.
 
     Raises:
-        ValueError: multigrid was not timed.
+        ValueError: that way was not timed.
     """
     vectors = max(rates.vectors * dofs, 2.0)
     if way == MULTIGRID:
         if rates.multigrid is None:
             raise ValueError("multigrid was not timed")
         setup, solve = (shares.seconds(vectors, ranks) for shares in (rates.multigrid.setup, rates.multigrid.solve))
-        return setup, rates.loads * solve
-    is_shared = ranks > 1 and not DEFAULTS.replicates(vectors, ranks) if way is None else way == SHARED
-    if is_shared:
-        factor = rates.factor_shared.seconds(vectors**rates.factor.exponent, ranks)
-        return factor, rates.loads * rates.solve_shared.seconds(vectors**rates.solve.exponent, ranks)
-    return rates.factor.seconds(vectors), ceil(rates.loads / ranks) * rates.solve.seconds(vectors)
+        return setup, solve
+    if way == SHARED:
+        if rates.factor_shared is None or rates.solve_shared is None:
+            raise ValueError("one factor was not timed")
+        factor = rates.factor_shared.seconds(vectors**rates.coarse.alone_factor.exponent, ranks)
+        return factor, rates.solve_shared.seconds(vectors**rates.coarse.alone_solve.exponent, ranks)
+    return rates.coarse.seconds(vectors, ranks)
 
 
 def _messages(rates: Rates, machine: Machine, dofs: float, ranks: int, way: str | None) -> float:
-    """Seconds of all messages: those of the iterations, and the coarse matrix that every rank is told."""
+    """Seconds of all messages: those of the iterations, and what fronts tell."""
     values = rates.surface * sqrt(dofs / ranks)
     exchange = machine.latency * rates.neighbours + VALUE_BYTES * values / machine.bandwidth
     tree = machine.latency * ceil(log2(ranks))
-    # A sum of a long vector over ranks moves it twice.
-    coarse = (rates.vectors + rates.kernel) * dofs
-    coarse_sum = tree + 2 * VALUE_BYTES * coarse * rates.loads / machine.bandwidth
-    iteration = (GATHERS + SUMS) * exchange + COARSE_SUMS * coarse_sum + SCALARS * tree
-    if way == MULTIGRID and rates.multigrid is not None:
+    iteration = (GATHERS + SUMS) * exchange + SCALARS * tree
+    fronts = rates.natural.borders.fronts(rates.kernel * dofs, ranks)
+    iteration += NATURAL_SOLVES * _front_messages(fronts, rates, machine)
+    told = sum(front.left**2 for front in fronts)
+    if way is None or way == ELIMINATION:
+        fronts = rates.coarse.borders.fronts(rates.vectors * dofs, ranks)
+        iteration += _front_messages(fronts, rates, machine)
+        told += sum(front.left**2 for front in fronts)
+    elif rates.multigrid is not None and way == MULTIGRID:
         cycle = CYCLE_EXCHANGES * machine.latency * rates.neighbours + SCALARS * tree
         iteration += rates.loads * rates.multigrid.inner * cycle
-    return rates.iterations * iteration + rates.coarse_bytes * dofs / machine.bandwidth
+    if way in (SHARED, MULTIGRID):
+        # A sum of a long vector over ranks moves it twice; the solution is told to all.
+        iteration += tree + 3 * VALUE_BYTES * rates.vectors * dofs * rates.loads / machine.bandwidth
+    return rates.iterations * iteration + VALUE_BYTES * told / machine.bandwidth
+
+
+def _front_messages(fronts: Sequence[FrontSize], rates: Rates, machine: Machine) -> float:
+    """Seconds of those of a solve: to and fro between the halves of each, and to those that share it and back."""
+    seconds = 0.0
+    for front in fronts:
+        messages = 2 + 4 * ceil(log2(front.sharers)) if front.sharers > 1 else 2
+        seconds += messages * machine.latency + front.bytes_of_a_solve(rates.loads) / machine.bandwidth
+    return seconds

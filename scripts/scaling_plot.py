@@ -50,13 +50,11 @@ def _iterations(axes: Axes, studies: dict[str, list[Row]]) -> None:
 
 
 def _messages(axes: Axes, studies: dict[str, list[Row]]) -> None:
-    """Multipliers sent and coarse vectors summed in an iteration by ranks."""
+    """Multipliers sent in an iteration by ranks."""
     for study, rows in studies.items():
         ink, several = STUDY_INK[study], [row for row in rows if row.ranks > 1]
         sent = [row.sent / 1e3 for row in several]
         axes.plot([row.ranks for row in several], sent, "o-", color=ink, label=f"{study}: multipliers sent")
-        summed = [row.summed / 1e3 for row in rows]
-        axes.plot([row.ranks for row in rows], summed, "s--", color=ink, label=f"{study}: coarse sums")
     axes.set(xlabel="ranks", ylabel="kB of the busiest rank in an iteration", yscale="log")
 
 

@@ -7,20 +7,21 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from scaling_elimination import FrontSize, TimedFront
+
 STAGES = ("mesh", "assemble", "set-up", "solve")
 COLUMNS = (
     "fibres", "ranks", "dofs", "subdomains", "vectors", "kernel", "iterations", "converged", "memory", "sent",
-    "messages", "summed", "way", "coarse_factor", "coarse_solve", "natural_factor", "natural_solve", "coarse_bytes",
-    "inner", "solver", "total",
+    "messages", "front", "way", "coarse_factor", "coarse_solve", "natural_factor", "natural_solve", "inner", "solver",
+    "total",
 )  # fmt: skip
 VALUE_BYTES = 8
 # What one iteration does: exchanges of multipliers (a gather and a sum each for the operator and the preconditioner),
-# sums over ranks of coarse vectors and kernel modes, and of single numbers by the Krylov method.  Right-hand sides of
-# the n coarse vectors, and twice of the about n / 2 kernel modes, are 1.33 times all of them; their solutions are told,
-# which is half as dear.
-GATHERS, SUMS, COARSE_SUMS, SCALARS = 2, 2, 2, 3
-# How the coarse problem is solved: by a factor that every rank has, by one of all ranks, or by multigrid on all ranks.
-COPIES, SHARED, MULTIGRID = ("copies", "shared", "multigrid")
+# solves with the rigid-body motions, and sums over ranks of single numbers by the Krylov method.
+GATHERS, SUMS, NATURAL_SOLVES, SCALARS = 2, 2, 2, 3
+# How the coarse problem is solved: by elimination on a tree of ranks, by PETSc with one factor of all ranks, or with
+# multigrid.
+ELIMINATION, SHARED, MULTIGRID = ("elimination", "shared", "multigrid")
 
 
 @dataclass(frozen=True)
@@ -30,8 +31,9 @@ class Row:
     `wanted` are the dofs asked for, `fullest` those of the rank with most; `way` says how the coarse problem is
     solved, in how many iterations `inner`.  Seconds are those of the coarse problem, and of that of
     the rigid-body motions, `natural`, which is solved twice in an iteration.  `peaks` are the MB of each rank by stage,
-    `coarse_memory` those by which both factors let them grow.  `latency` (s) and `bandwidth` (bytes / s) are those of
-    messages between two ranks.
+    `coarse_memory` those by which both factors let them grow.  `coarse_fronts` and `natural_fronts` are all fronts of
+    the eliminations, and `timed_fronts` made-up ones that were timed.  `latency` (s) and `bandwidth` (bytes / s) are
+    those of messages between two ranks.
     """
 
     fibres: int
@@ -58,8 +60,10 @@ class Row:
     coarse_solve: float
     natural_factor: float
     natural_solve: float
-    coarse_bytes: int
     coarse_memory: list[float]
+    coarse_fronts: list[FrontSize]
+    natural_fronts: list[FrontSize]
+    timed_fronts: list[TimedFront]
     inner: int
     way: str
     latency: float
@@ -102,9 +106,9 @@ class Row:
         return (GATHERS + SUMS) * max(self.neighbours)
 
     @property
-    def summed(self) -> int:
-        """Bytes that every rank puts into the sums over ranks of an iteration."""
-        return VALUE_BYTES * (COARSE_SUMS * self.coarse * self.loads + SCALARS)
+    def front(self) -> int:
+        """Unknowns of the largest front."""
+        return max((int(front.eliminated + front.left) for front in self.coarse_fronts), default=0)
 
     @property
     def miscounted(self) -> float:
@@ -118,14 +122,14 @@ def by_ranks(rows: Sequence[Row], cores: int) -> list[str]:
     lines = [
         f"{'':50}{'iteration of the busiest rank':^31}{'seconds':^45}",
         f"{'ranks':>5}{'fibres':>8}{'dofs':>10}{'domains':>8}{'coarse':>8}{'iterations':>11}{'kB sent':>10}"
-        f"{'messages':>10}{'kB summed':>11}" + "".join(f"{s:>9}" for s in (*STAGES, "total")),
+        f"{'messages':>10}{'front':>11}" + "".join(f"{s:>9}" for s in (*STAGES, "total")),
     ]
     for row in rows:
         times = [*(row.seconds[s] for s in STAGES), row.total]
         shown = (f"{t:9.2f}" if row.ranks <= cores else f"{'-':>9}" for t in times)
         lines.append(
             f"{row.ranks:5}{row.fibres:8}{row.dofs:10}{row.subdomains:8}{row.coarse:8}{row.iterations:11}"
-            f"{row.sent / 1e3:10.1f}{row.messages:10}{row.summed / 1e3:11.1f}{''.join(shown)}"
+            f"{row.sent / 1e3:10.1f}{row.messages:10}{row.front:11}{''.join(shown)}"
         )
     return lines
 

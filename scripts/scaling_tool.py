@@ -12,7 +12,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +24,7 @@ import numpy as np  # noqa: E402
 from benchmark_tool import peak  # noqa: E402
 from mpi4py import MPI  # noqa: E402
 from petsc4py import PETSc  # noqa: E402
-from scaling_report import COPIES, MULTIGRID, SHARED  # noqa: E402
+from scaling_report import ELIMINATION, MULTIGRID, SHARED  # noqa: E402
 
 from feti_homog.common import process_memory  # noqa: E402
 from feti_homog.common.mpi_errors import run_main  # noqa: E402
@@ -35,9 +35,14 @@ from feti_homog.config.case import Case  # noqa: E402
 from feti_homog.feti.coarse.adaptive import AdaptiveCoarseSpace  # noqa: E402
 from feti_homog.feti.coarse.natural import NaturalCoarseSpace  # noqa: E402
 from feti_homog.feti.decomposition.jump_operator import JumpOperator  # noqa: E402
-from feti_homog.feti.thresholds import DEFAULTS  # noqa: E402
+from feti_homog.feti.linalg.fronts import Front  # noqa: E402
+from feti_homog.feti.linalg.rank_tree import Meeting  # noqa: E402
+from feti_homog.feti.linalg.remainder import Remainder  # noqa: E402
+from feti_homog.feti.linalg.shared_fronts import LEAST_BLOCKS, meet  # noqa: E402
+from feti_homog.feti.linalg.tree_elimination import TreeElimination  # noqa: E402
+from feti_homog.feti.thresholds import FRONT_BLOCK  # noqa: E402
 from feti_homog.homogenization.unit_cell import TornCell, tear  # noqa: E402
-from feti_homog.typing import Int  # noqa: E402
+from feti_homog.typing import Float, Int  # noqa: E402
 
 LOADS = 3
 RTOL = 1e-8
@@ -50,15 +55,15 @@ TIMED = 5
 PINGS = {"latency": (8, 2000), "bandwidth": (4 << 20, 50)}
 # PETSc's options of ways to solve the coarse problem.
 OPTIONS: dict[str, dict[str, str | float]] = {
-    SHARED: {"feti_coarse_pc_factor_mat_solver_type": "mumps"},
+    SHARED: {"feti_coarse_pc_type": "cholesky"},
     MULTIGRID: {
         "feti_coarse_ksp_type": "cg", "feti_coarse_ksp_rtol": 1e-10, "feti_coarse_pc_type": "gamg",
         "feti_coarse_pc_gamg_threshold": 0.1, "feti_coarse_mg_levels_pc_type": "asm",
         "feti_coarse_mg_levels_sub_pc_type": "icc",
     },
 }  # fmt: skip
-# Bytes of an entry of the coarse matrix on its way: value, row, column.
-ENTRY_BYTES = 16
+# Fronts that are timed on two ranks, one after the other and together: unknowns that are eliminated, and left.
+FRONTS = ((60, 200), (200, 600), (500, 1000), (1000, 1600), (2000, 0))
 
 
 def main() -> int:
@@ -121,8 +126,7 @@ def measure(case: Case, progress: StagePeaks, way: str | None) -> dict[str, Any]
     """Seconds, iterations, sizes, memory and messages of a case."""
     comm = progress.comm
     network = {name: ping(comm, *sizes) for name, sizes in PINGS.items()}
-    thresholds = replace(DEFAULTS, replicated_vectors=0) if way in OPTIONS else DEFAULTS
-    cell = tear(case, comm, progress, thresholds)
+    cell = tear(case, comm, progress)
     solver = cell.solver
     for by_stage in (progress.seconds, progress.peaks):
         by_stage["set-up"] = by_stage.pop("factor")
@@ -199,32 +203,64 @@ def _coarse(
     coarse: AdaptiveCoarseSpace, natural: NaturalCoarseSpace, comm: MPI.Intracomm, asked: str | None
 ) -> dict[str, Any]:
     """Seconds to sum and factor the coarse matrix, of which each rank has made its part, and that of the rigid-body
-    motions, and to solve with them as often as an iteration does, bytes that ranks tell of the first, and by how many
-    megabytes the factors let the memory of each rank grow."""
-    right, motions = (np.ones((n, LOADS)) for n in (coarse.coarse_dimension, natural.kernel_dimension))
+    motions, and to solve with them as often as an iteration does, their fronts, and by how many megabytes the factors
+    let the memory of each rank grow."""
+    right, motions = (np.ones((n, LOADS)) for n in (coarse.part().shape[0], len(natural.unknowns)))
     right[1::2] = -1.0
     solve = _fastest(lambda: coarse.solve(right))
     natural_solve = _fastest(lambda: natural.solve(natural.solve(motions)))
     inner = coarse.inner_iterations
-    coarse.destroy()
-    natural.destroy()
     part = coarse.part()
     process_memory.forget_peak()
     before = peak()
     comm.Barrier()
     factor, natural_factor = _seconds(lambda: coarse.factor(part)), _seconds(natural.factor)
     grown = peak() - before
-    chosen = COPIES if comm.size == 1 or coarse.is_replicated else SHARED
     seconds = {
         "coarse_factor": factor, "coarse_solve": solve, "natural_factor": natural_factor, "natural_solve": natural_solve
     }  # fmt: skip
     return {
-        "way": asked or chosen,
+        "way": asked or ELIMINATION,
         "inner": inner,
         "coarse_memory": comm.allgather(grown),
-        "coarse_bytes": ENTRY_BYTES * comm.allreduce(int(part.nnz)),
+        "coarse_fronts": _fronts(coarse.solver, comm),
+        "natural_fronts": _fronts(natural.solver, comm),
+        "timed_fronts": timed_fronts(comm) if comm.size == 2 and not asked else [],
         **{name: comm.allreduce(value, MPI.MAX) for name, value in seconds.items()},
     }
+
+
+def _fronts(solver: object, comm: MPI.Intracomm) -> list[tuple[int, int, int]]:
+    """As `FrontSize`, those of all ranks."""
+    own = []
+    if isinstance(solver, TreeElimination):
+        first = (front for front in solver.fronts if front.meeting.comm.rank == 0)
+        own = [(len(front.L), front.left, front.meeting.comm.size) for front in first]
+    return [size for some in comm.allgather(own) for size in some]
+
+
+def timed_fronts(comm: MPI.Intracomm) -> list[tuple[int, int, int, float, float]]:
+    """As `TimedFront`, on two ranks that both have all unknowns, alone and together."""
+    found = []
+    meeting = Meeting(comm, 1)
+    for e, f in FRONTS:
+        n = e + f
+        matrix = np.full((n, n), 1e-3) + np.eye(n)
+        copies, once = np.where(np.arange(n) < e, 2, 3), np.ones(n, np.int64)
+        own = Remainder(np.arange(n), copies, once, np.arange(n), matrix)
+        left, none = np.ones((n, LOADS)), np.zeros((0 if comm.rank else f, LOADS))
+        for sharers, block in ((1, n), (2, FRONT_BLOCK)):
+            comm.Barrier()
+            seconds = [_seconds(partial(meet, meeting, own, block)) for _ in range(2)]
+            front, _ = meet(meeting, own, block)
+
+            def solve(front: Front = front, left: Float = left, none: Float = none) -> None:
+                y, _ = front.forward(left)
+                front.backward(y, none)
+
+            times = comm.allreduce(min(seconds), MPI.MAX), comm.allreduce(_fastest(solve), MPI.MAX)
+            found.append((e, f, min(sharers, max(1, n // (LEAST_BLOCKS * block))), *times))
+    return found
 
 
 def _fastest(work: Callable[[], object]) -> float:

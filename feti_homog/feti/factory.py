@@ -82,7 +82,7 @@ def build(
     )  # fmt: skip
     plan = choose(_sizes(comm, jump_operator, operators, applications), options, thresholds)
     preconditioner = CLASSES[plan.preconditioner](comm, jump_operator, operators)
-    natural = NaturalCoarseSpace(comm, jump_operator, operators, thresholds)
+    natural = NaturalCoarseSpace(comm, jump_operator, operators)
     adaptive = None
     if plan.adaptive and isinstance(preconditioner, Dirichlet):
         adaptive = AdaptiveCoarseSpace(comm, jump_operator, operators, preconditioner, options.threshold, thresholds)

@@ -34,10 +34,6 @@ class Thresholds:
             [30, 60, 100, 250]: 21, 21, 21, 18 iterations; 6.0, 6.0, 6.1, 6.4 vectors.
         whole_boundary_dofs: boundary degrees of freedom of a whole body above which its soft modes come from a dense
             eigenproblem for each face, not from one.  Measured [1000, 5000] with a boundary of 3644: 0.9 and 3.0 s.
-        replicated_vectors: coarse vectors, times the ranks that would each have them all, up to which every rank
-            factors the whole coarse matrix and solves for some of the load cases; above, all ranks factor it together.
-            Of 5 209 vectors both take as long on two ranks; a copy takes 77 MB, of one factor each of 16 ranks has 19
-            (`scripts/scaling strong shared --fibres 25 --dofs 150000`).
         influence_applications: applications of the dual operator from which on influence columns pay
             (`scripts/benchmark_path`).
         assembled_schur_dofs: largest cell that is factored for influence columns, in degrees of freedom on shared nodes
@@ -51,13 +47,8 @@ class Thresholds:
     decayed: float = 0.01
     min_trace_dofs: int = 100
     whole_boundary_dofs: int = 2000
-    replicated_vectors: int = 20_000
     influence_applications: int = 1000
     assembled_schur_dofs: int = 40_000
-
-    def replicates(self, vectors: float, ranks: int) -> bool:
-        """Whether each of several ranks has a factor of so many coarse vectors or kernel modes of its own."""
-        return ranks > 1 and vectors * ranks <= self.replicated_vectors
 
 
 DEFAULTS = Thresholds()
@@ -68,6 +59,8 @@ DEFAULTS = Thresholds()
 ITERATIVE_RTOL = 1e-10
 # Per cent more workspace than MUMPS estimates: its own 20 were too little for a matrix of 13 084 rows on two ranks.
 MUMPS_EXTRA_WORKSPACE_PERCENT = 100
+# Columns of a front that several ranks eliminate together, which each gets at once.
+FRONT_BLOCK = 64
 # Entries of dense blocks that wait to be added to a sparse sum, at least: 16 bytes each.
 MAX_BUFFERED_ENTRIES = 4_000_000
 # Right-hand sides up to which the library is faster with one after the other than with all at once.

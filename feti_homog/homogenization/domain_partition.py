@@ -38,8 +38,6 @@ class PartitionPolicy:
     Attributes:
         piece_dofs: of a piece; with smaller pieces the coarse problem takes longer, with larger ones the factors and
             the dense matrices do.
-        max_pieces: of the whole cell, above which pieces are made larger than `piece_dofs`: the coarse problem grows
-            faster than they do.
         piece_boundary_dofs: of a piece on the boundary to other bodies, at most; for pieces of narrow bodies.
         cut_factor: a bonded body is cut if it is larger than a piece by this factor, or its boundary to other bodies is
             than that of a piece.
@@ -54,7 +52,6 @@ class PartitionPolicy:
     """
 
     piece_dofs: int = 3000
-    max_pieces: int = 4000
     piece_boundary_dofs: int = 500
     cut_factor: float = 2.5
     even_cut_factor: float = 12.0
@@ -248,15 +245,14 @@ def wanted_pieces(
     if case.decomposition.subdomains is not None:
         return pieces_for_count(load, case.decomposition.subdomains)
     all_dofs = int(load.sum()) * dofs_of_triangle
-    piece_dofs = max(policy.piece_dofs, all_dofs // policy.max_pieces)
     boundary = edges * 2 * lattice.intervals
     if case.interface is None:
-        evenly_shared = min(policy.even_cut_factor * piece_dofs, policy.even_share * all_dofs / n_ranks)
-        largest = max(policy.cut_factor * piece_dofs, evenly_shared)
+        evenly_shared = min(policy.even_cut_factor * policy.piece_dofs, policy.even_share * all_dofs / n_ranks)
+        largest = max(policy.cut_factor * policy.piece_dofs, evenly_shared)
         to_cut = (load * dofs_of_triangle > largest) | (boundary > policy.cut_factor * policy.piece_boundary_dofs)
     else:
         to_cut = boundary > policy.breakable_boundary_dofs
-    by_size = pieces_for_size(load, dofs_of_triangle, piece_dofs)
+    by_size = pieces_for_size(load, dofs_of_triangle, policy.piece_dofs)
     by_boundary = np.minimum(-(-boundary // policy.piece_boundary_dofs), load)
     pieces = np.where(to_cut, np.maximum(by_size, by_boundary), 1)
     return pieces if pieces.sum() >= n_ranks else pieces_for_count(load, n_ranks)

@@ -16,7 +16,6 @@ from support.coarse_space_cells import BOUND, BREAKING, NARROW, SINGLE, Narrow, 
 from feti_homog.config import case as cases
 from feti_homog.feti.coarse.geneo import kernels_and_soft_modes, subdomain_blocks
 from feti_homog.feti.decomposition.neighbours import Neighbours
-from feti_homog.feti.linalg.distributed_matrix import allreduce_sparse
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.preconditioners.scaled import Dirichlet
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
@@ -167,8 +166,9 @@ def test_updated_coarse_matrix_equals_one_from_scratch(comm):
     for active in steps:
         cell.solver.activate(active)
     fresh.solver.activate(steps[-1])
-    found, scratch = (allreduce_sparse(comm, c.solver.adaptive.part()).toarray() for c in (cell, fresh))
-    assert relative_error(found, scratch) < 1e-12
+    found, scratch = (c.solver.adaptive.part().toarray() for c in (cell, fresh))
+    # A rank may have no subdomain.
+    assert not found.size or relative_error(found, scratch) < 1e-12
     first, second = (dense_feti.matrix(c, c.solver.preconditioner.apply) for c in (cell, fresh))
     assert relative_error(first, second) < 1e-8
     assert cell.solver.adaptive.factorizations == len(steps) + 1

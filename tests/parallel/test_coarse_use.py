@@ -14,8 +14,9 @@ from support.coarse_space_cells import BOUND, BREAKING, NARROW, STRAINS, of_all,
 
 from feti_homog.common.distributed_arrays import allreduce_sum
 from feti_homog.errors import CaseError
-from feti_homog.feti.linalg.distributed_direct import DistributedDirectSolver, ReplicatedDirectSolver
-from feti_homog.feti.thresholds import DEFAULTS, Thresholds
+from feti_homog.feti.linalg.distributed_solver import DistributedSolver
+from feti_homog.feti.linalg.tree_elimination import TreeElimination
+from feti_homog.feti.thresholds import DEFAULTS
 
 pytestmark = pytest.mark.parallel
 
@@ -111,35 +112,23 @@ def test_wrong_options_of_the_coarse_space_are_refused(comm, petsc, words):
     assert fault.startswith(words)
 
 
-@pytest.mark.parametrize("contrast", [23.0, 1e6])
-def test_a_distributed_coarse_problem_gives_the_same(comm, contrast):
-    case = NARROW | {"fibre": {"young": 3.0 * contrast, "poisson": 0.3}, "decomposition": {"subdomains": 50}}
-    found = []
-    shared = DistributedDirectSolver if comm.size > 1 else ReplicatedDirectSolver
-    for largest, solver in ((10**6, ReplicatedDirectSolver), (0, shared)):
-        cell = torn_cells.tear(comm, **case, thresholds=Thresholds(replicated_vectors=largest))
-        assert isinstance(cell.solver.adaptive._solver, solver)
-        found.append(solve_many(cell))
-    for one, other in zip(*found, strict=True):
-        assert one.reason > 0 and other.reason > 0 and abs(one.iterations - other.iterations) <= 1
-        assert relative_error(*(dense_feti.gathered(cell, s.lam) for s in (one, other))) < 1e-7
-
-
+ONE_FACTOR = {"feti_coarse_pc_type": "cholesky", "feti_natural_pc_type": "cholesky"}
 MULTIGRID = {
     "feti_coarse_ksp_type": "cg", "feti_coarse_ksp_rtol": 1e-10, "feti_coarse_pc_type": "gamg",
     "feti_coarse_mg_levels_pc_type": "sor",
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("largest", [0, 10**6], ids=["shared", "copies"])
-def test_an_iterative_coarse_solve_gives_the_same(comm, largest):
-    case = NARROW | {"decomposition": {"subdomains": 50}}
+@pytest.mark.parametrize("contrast", [23.0, 1e6])
+@pytest.mark.parametrize("petsc", [ONE_FACTOR, MULTIGRID], ids=["one factor", "multigrid"])
+def test_a_coarse_problem_solved_by_petsc_gives_the_same(comm, contrast, petsc):
+    case = NARROW | {"fibre": {"young": 3.0 * contrast, "poisson": 0.3}, "decomposition": {"subdomains": 50}}
     found = []
-    for petsc in ({}, MULTIGRID):
-        cell = torn_cells.tear(comm, **case, thresholds=Thresholds(replicated_vectors=largest), petsc=petsc)
+    for options, solver in (({}, TreeElimination), (petsc, DistributedSolver)):
+        cell = torn_cells.tear(comm, **case, petsc=options)
+        assert isinstance(cell.solver.adaptive.solver, solver)
         found.append(solve_many(cell))
-        # Where ranks have copies, some may have no column to solve for.
-        assert (comm.allreduce(cell.solver.adaptive.inner_iterations, MPI.MAX) > 1) == bool(petsc)
+        assert (cell.solver.adaptive.inner_iterations > 1) == (options is MULTIGRID)
     for one, other in zip(*found, strict=True):
         assert one.reason > 0 and other.reason > 0 and abs(one.iterations - other.iterations) <= 1
         assert relative_error(*(dense_feti.gathered(cell, s.lam) for s in (one, other))) < 1e-7
@@ -156,11 +145,11 @@ def test_translations_of_the_cell_have_little_energy(comm, narrow):
     assert (energy < 0.05 * bound).all()
 
 
-def test_one_factor_of_the_kernels_projects_as_one_on_each_rank(comm):
+def test_kernels_are_projected_by_elimination_as_by_one_factor(comm):
     """With all rows, with every seventh one away, and with none on the first fibre, which then can move freely."""
     found = []
-    for largest in (10**6, 0):
-        cell = torn_cells.tear(comm, **BREAKING, thresholds=Thresholds(replicated_vectors=largest))
+    for petsc in ({}, ONE_FACTOR):
+        cell = torn_cells.tear(comm, **BREAKING, petsc=petsc)
         natural, rows = cell.solver.natural, cell.solver.rows
         first = cell.solver.jump_operator.owned[0]
         number = np.arange(first, first + rows)
@@ -172,8 +161,10 @@ def test_one_factor_of_the_kernels_projects_as_one_on_each_rank(comm):
             natural.activate(active)
             x = active * np.cos(number + 1.0)
             projected = natural.project(x)
-            work = allreduce_sum(comm, natural.GT_active @ projected)
-            assert np.abs(work).max() < 1e-10 * np.abs(allreduce_sum(comm, natural.GT_active @ x)).max()
+            before, after = (np.abs(allreduce_sum(comm, natural.G_active.T @ y)).max() for y in (x, projected))
+            assert after < 1e-10 * before
+            amplitudes = natural.amplitudes(x)
+            np.testing.assert_allclose(x - natural.G_active @ amplitudes, projected, atol=1e-12)
             found.append((projected, natural.unconstrained_modes.shape[1]))
         cell.destroy()
     for (one, free), (other, also_free) in zip(found[:3], found[3:], strict=True):

@@ -25,8 +25,10 @@ from feti_homog.feti.coarse.geneo import kernels_and_soft_modes, local_columns, 
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.neighbours import Neighbours
 from feti_homog.feti.linalg.dense_block_sum import DenseBlockSum
-from feti_homog.feti.linalg.distributed_direct import DistributedDirectSolver, ReplicatedDirectSolver, direct_solver
+from feti_homog.feti.linalg.distributed_solver import DistributedSolver, distributed_solver
+from feti_homog.feti.linalg.rank_tree import RankTree
 from feti_homog.feti.linalg.scaled_sparse import scaled
+from feti_homog.feti.linalg.tree_elimination import TreeElimination
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.preconditioners.scaled import StiffnessScaled
 from feti_homog.feti.thresholds import COARSE_REGULARISATIONS, DEFAULTS, FREE_MODE_ENERGY, Thresholds
@@ -34,7 +36,9 @@ from feti_homog.typing import Float, Int
 
 
 class AdaptiveCoarseSpace:
-    """The coarse space of this module.  Every rank has S Z_0 on its subdomains, and a factor or its part of one.
+    """The coarse space of this module.  Every rank has S Z_0 on its subdomains, and its part of a factor.
+
+    A rank knows those u of the n coarse displacements that reach its subdomains, and no others.
 
     Of a subdomain S Z_0 is dense: of the matrix left whole it has a column for every mode of every fibre.
 
@@ -43,6 +47,7 @@ class AdaptiveCoarseSpace:
         counts: soft modes of each of this rank's subdomains.
         coarse_dimension: coarse displacements, n.
         factorizations: of Z_0^T S Z_0 so far.
+        solver: of Z_0^T S Z_0; None without coarse displacements.
     """
 
     def __init__(
@@ -55,8 +60,7 @@ class AdaptiveCoarseSpace:
         thresholds: Thresholds = DEFAULTS,
     ) -> None:
         """Find the modes below the threshold tau and factor.  All boundary operators must be dense but of large
-        bodies.  Options under `feti_coarse_` (default: cholesky by CHOLMOD, on all ranks together by MUMPS).
-        Collective.
+        bodies.  Options under `feti_coarse_` as of `distributed_solver`.  Collective.
 
         Raises:
             MeshError: the neighbourhood of a face, on any rank, is no subdomain.
@@ -71,7 +75,8 @@ class AdaptiveCoarseSpace:
         self.counts = [v.shape[1] - b.R.shape[1] for v, b in zip(V, blocks, strict=True)]
         self._modes = AveragedModes(comm, blocks, self._neighbours, V)
         self.coarse_dimension = self._modes.total
-        self.is_replicated = thresholds.replicates(self.coarse_dimension, comm.size)
+        self._tree = RankTree(comm, self.coarse_dimension, self._modes.reaching)
+        self._columns = [np.searchsorted(self._modes.reaching, columns) for columns in self._modes.columns]
         self._translations = self._modes.translations(comm)
         # Of each subdomain S Z_0 on its boundary dofs, and Z_0^T S Z_0.
         self._forces: list[Float] = [np.zeros((0, 0)) for _ in blocks]
@@ -80,7 +85,7 @@ class AdaptiveCoarseSpace:
         self._update(range(len(blocks)), [block.BW for block in blocks])
         process_memory.trim()
         self.factorizations = 0
-        self._solver: ReplicatedDirectSolver | DistributedDirectSolver | None = None
+        self.solver: TreeElimination | DistributedSolver | None = None
         self._free_energy: Float | None = None
         self.factor(self.part())
 
@@ -104,9 +109,9 @@ class AdaptiveCoarseSpace:
             self._energies[i] = Z.T @ self._forces[i]
 
     def part(self) -> csr_matrix:
-        """(n, n) this rank's part of Z_0^T S Z_0."""
-        total = DenseBlockSum((self.coarse_dimension, self.coarse_dimension))
-        for columns, energy in zip(self._modes.columns, self._energies, strict=True):
+        """(u, u) this rank's part of Z_0^T S Z_0."""
+        total = DenseBlockSum((len(self._modes.reaching),) * 2)
+        for columns, energy in zip(self._columns, self._energies, strict=True):
             total.add(columns, columns, energy)
         return total.matrix()
 
@@ -122,58 +127,70 @@ class AdaptiveCoarseSpace:
             LinAlgError: rounding leaves the matrix indefinite by more than all of COARSE_REGULARISATIONS.
             CaseError: the library that the options name cannot factor the matrix, or not on that many ranks.
         """
-        self.destroy()
+        self._destroy_factor()
         self.factorizations += 1
         if not self.coarse_dimension:
             return
-        energy = allreduce_sum(self.comm, part.diagonal())
+        energy = self._sum(part.diagonal())
         if self._free_energy is None:
-            self._free_energy = FREE_MODE_ENERGY * np.where(energy > 0.0, energy, energy.max())
+            largest = self.comm.allreduce(energy.max(initial=0.0), MPI.MAX)
+            self._free_energy = FREE_MODE_ENERGY * np.where(energy > 0.0, energy, largest)
         self._weights = 1.0 / np.sqrt(np.maximum(energy, self._free_energy))
         matrix = scaled(part, self._weights)
         for regularisation in COARSE_REGULARISATIONS:
             try:
-                self._solver = self._factored((matrix + diags(regularisation * self._modes.is_own)).tocsr())
+                self.solver = self._factored((matrix + diags(regularisation * self._modes.is_own)).tocsr())
                 return
             except np.linalg.LinAlgError:
                 if regularisation == COARSE_REGULARISATIONS[-1]:
                     raise
 
-    def _factored(self, matrix: csr_matrix) -> ReplicatedDirectSolver | DistributedDirectSolver:
+    def _sum(self, values: Float) -> Float:
+        """(u,) the sum over ranks of values (u,) of coarse displacements.  Collective."""
+        whole = np.zeros(self.coarse_dimension)
+        whole[self._modes.reaching] = values
+        summed: Float = allreduce_sum(self.comm, whole)[self._modes.reaching]
+        return summed
+
+    def _factored(self, matrix: csr_matrix) -> TreeElimination | DistributedSolver:
         """Solves with the sum of all ranks' parts of the scaled matrix."""
-        moves = self._translations.any(axis=0)
-        near_kernel = np.linalg.qr(self._translations[:, moves] / self._weights[:, None])[0]
-        return direct_solver(self.comm, matrix, "feti_coarse_", self.is_replicated, near_kernel)
+        near_kernel = self._translations / self._weights[:, None]
+        unknowns = self.coarse_dimension, self._modes.reaching
+        return distributed_solver(self._tree, *unknowns, matrix, "feti_coarse_", near_kernel)
 
     def balanced(self, x: Float) -> Float:
         """The forces S_0 x (boundary dofs,) or (boundary dofs, k) of displacements x of that shape.  Collective."""
         forces = self._operators.apply_skin(x)
         if not self.coarse_dimension:
             return forces
-        work = np.zeros((self.coarse_dimension, *x.shape[1:]))
+        work = np.zeros((len(self._modes.reaching), *x.shape[1:]))
         for columns, SZ, span in self._parts():
             work[columns] += SZ.T @ x[span]
-        c = self.solve(allreduce_sum(self.comm, work))
+        c = self.solve(work)
         for columns, SZ, span in self._parts():
             forces[span] -= SZ @ c[columns]
         return forces
 
     def solve(self, work: Float) -> Float:
-        """c with Z_0^T S Z_0 c = work, (n,) or (n, k) on every rank.  Collective."""
-        assert self._solver is not None, "the factor is destroyed"
-        return scale_rows(self._weights, self._solver.solve(scale_rows(self._weights, work)))
+        """c with Z_0^T S Z_0 c = the sum over ranks of work, (u,) or (u, k) both.  Collective."""
+        assert self.solver is not None, "the factor is destroyed"
+        return scale_rows(self._weights, self.solver.solve(scale_rows(self._weights, work)))
 
     @property
     def inner_iterations(self) -> int:
-        """Of the last solve for one column on this rank, where the options ask for an iterative method; else 1."""
-        return 1 if self._solver is None else self._solver.iterations
+        """Of the last solve for one column, where the options ask for an iterative method; else 1."""
+        return self.solver.iterations if isinstance(self.solver, DistributedSolver) else 1
 
     def _parts(self) -> zip[tuple[Int, Float, slice]]:
-        """Of each subdomain the modes that reach it, S Z_0, and where it is among the boundary dofs."""
-        return zip(self._modes.columns, self._forces, self._operators.slices, strict=True)
+        """Of each subdomain places of the modes that reach it, S Z_0, and where it is among the boundary dofs."""
+        return zip(self._columns, self._forces, self._operators.slices, strict=True)
 
     def destroy(self) -> None:
-        """Free the factor.  Collective."""
-        if self._solver is not None:
-            self._solver.destroy()
-            self._solver = None
+        """Free the factor, for good.  Collective."""
+        self._destroy_factor()
+        self._tree.destroy()
+
+    def _destroy_factor(self) -> None:
+        if self.solver is not None:
+            self.solver.destroy()
+            self.solver = None

@@ -36,7 +36,8 @@ class AveragedModes:
     Attributes:
         total: coarse modes of all subdomains, n.
         columns: of each subdomain the numbers (m,) of the modes that reach it, ascending.
-        is_own: (n,) whether each mode is of a subdomain of this rank.
+        reaching: (u,) the numbers of all that reach this rank's subdomains, ascending.
+        is_own: (u,) whether each of these is of a subdomain of this rank.
     """
 
     def __init__(
@@ -47,11 +48,11 @@ class AveragedModes:
         self._jumps, ends = _exchange_jumps(comm, blocks, neighbours, V)
         self.total = int(ends[-1]) if len(ends) else 0
         self._first = [int(ends[s]) - v.shape[1] for s, v in zip(neighbours.index, V, strict=True)]
-        self.is_own = np.zeros(self.total, bool)
-        for first, v in zip(self._first, V, strict=True):
-            self.is_own[first : first + v.shape[1]] = True
         none = np.zeros(0, np.int64)
         self.columns = [np.unique(np.concatenate([none, *(jumps.columns for jumps in of)])) for of in self._jumps]
+        self.reaching = np.unique(np.concatenate([none, *self.columns]))
+        own = [first + np.arange(v.shape[1]) for first, v in zip(self._first, V, strict=True)]
+        self.is_own = np.isin(self.reaching, np.concatenate([none, *own]))
 
     def of_subdomain(self, i: int, BW: csr_matrix) -> Float:
         """(boundary dofs, m) Z_0 on subdomain i, less its own kernel, which has no energy there.
@@ -72,13 +73,13 @@ class AveragedModes:
         return Z
 
     def translations(self, comm: MPI.Intracomm) -> Float:
-        """(n, c) amplitudes of the translations of the whole cell, which have little energy.  Collective."""
+        """(u, c) amplitudes of the translations of the whole cell, which have little energy.  Collective."""
         subdomains = [block.subdomain for block in self._blocks]
         c = subdomains[0].problem.components if subdomains else 0
         amplitudes = np.zeros((self.total, comm.allreduce(c, MPI.MAX)))
         for first, s in zip(self._first, subdomains, strict=True):
             amplitudes[first : first + s.R.shape[1]] = np.stack([s.R[i::c].sum(axis=0) for i in range(c)], axis=1)
-        return allreduce_sum(comm, amplitudes)
+        return np.asarray(allreduce_sum(comm, amplitudes)[self.reaching])
 
 
 def _exchange_jumps(

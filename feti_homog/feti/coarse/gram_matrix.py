@@ -28,15 +28,10 @@ class GramMatrix:
         entry = np.searchsorted(self._keys, key)
         self._Q = csr_matrix((G.data[a] * G.data[b], (entry, row)), shape=(len(self._keys), G.shape[0]))
         self._rows, self._columns = np.divmod(self._keys, self._m)
-        self._pointer = np.searchsorted(self._rows, np.arange(self._m + 1))
 
     def entries(self, active: Float) -> Float:
         """(entries,) of G^T A G for the owned rows of which `active` is 1, row by row.  Collective."""
         return allreduce_sum(self._comm, self._Q @ active)
-
-    def matrix(self, entries: Float) -> csr_matrix:
-        """(m, m) with these entries."""
-        return csr_matrix((entries.copy(), self._columns, self._pointer), shape=(self._m, self._m))
 
     def groups(self, some: Int) -> list[Int]:
         """The numbers `some` in groups that G^T G couples: of each size, (groups, size)."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
 from mpi4py import MPI
@@ -11,11 +11,12 @@ from scipy.sparse import block_diag, csr_matrix, diags
 from feti_homog.common.distributed_arrays import allreduce_sum
 from feti_homog.feti.coarse.gram_matrix import GramMatrix
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
-from feti_homog.feti.linalg.distributed_direct import DistributedDirectSolver, ReplicatedDirectSolver, direct_solver
-from feti_homog.feti.linalg.distributed_matrix import allreduce_sparse, assemble_owned_rows
-from feti_homog.feti.linalg.sparse_direct import DirectSolver
+from feti_homog.feti.linalg.distributed_matrix import assemble_owned_rows
+from feti_homog.feti.linalg.distributed_solver import DistributedSolver, distributed_solver
+from feti_homog.feti.linalg.rank_tree import RankTree
+from feti_homog.feti.linalg.tree_elimination import TreeElimination
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
-from feti_homog.feti.thresholds import DEFAULTS, UNCONSTRAINED_EIGENVALUE, Thresholds
+from feti_homog.feti.thresholds import UNCONSTRAINED_EIGENVALUE
 from feti_homog.typing import Float, Int
 
 
@@ -23,18 +24,19 @@ class NaturalCoarseSpace:
     """Solvability of all subdomains on the active multipliers: G^T lam = 0.
 
     The load of a macroscopic strain does no work on rigid-body motions, so e = R^T f vanishes.  G has a row for each
-    multiplier and a column for each kernel mode; every rank holds its own rows, and a factor of G^T G, or its part of
-    one that all ranks share.
+    multiplier and a column for each kernel mode; every rank holds its own rows, and its part of a factor of G^T G.
 
     Attributes:
         kernel_dimension: kernel modes of all subdomains, m.
         owned_modes: where those of this rank's subdomains are among the m.
         R: (boundary dofs, own modes) kernels on the boundaries.
-        G: (owned rows, m); `G_active` is 0 in inactive rows, and `GT_active` its transpose.
+        G: (owned rows, m); `G_active` is 0 in inactive rows.
         body: (m,) body that each mode moves.
         pinned_body: the body with the pinned class, -1 if there is none.
         unconstrained_modes: (m, z) orthonormal amplitudes of the motions that no active row resists.
+        unknowns: (u,) the modes that this rank's rows, or motions that nothing resists, concern, and its own.
         factorizations: of G^T G so far.
+        solver: of G^T G; None without kernels.
     """
 
     def __init__(
@@ -42,10 +44,9 @@ class NaturalCoarseSpace:
         comm: MPI.Intracomm,
         jump_operator: JumpOperator,
         operators: InterfaceOperators,
-        thresholds: Thresholds = DEFAULTS,
     ) -> None:
-        """Assemble G and factor for all rows: each rank for itself unless there are many modes.  Options under
-        `feti_natural_` (default: cholesky by CHOLMOD, on all ranks together by MUMPS).  Collective."""
+        """Assemble G and factor for all rows.  Options under `feti_natural_` as of `distributed_solver`.
+        Collective."""
         subdomains = operators.subdomains
         kernels = [s.R[dofs] for s, dofs in zip(subdomains, operators.dofs, strict=True)]
         modes = sum(R.shape[1] for R in kernels)
@@ -61,13 +62,13 @@ class NaturalCoarseSpace:
         owned = jump_operator.owned[1] - jump_operator.owned[0]
         columns = np.arange(first, first + modes)
         self.G = assemble_owned_rows(comm, operators.B @ self.R, jump_operator.rows, columns, (owned, modes))
-        self.GT_active: csr_matrix = self.G.T.tocsr()
         self.G_active, self.factorizations = self.G, 0
         squares = np.asarray(self.G.power(2).sum(axis=0)).ravel()
         self._largest_diagonal = float(comm.allreduce(squares).max(initial=0.0))
         self.unconstrained_modes = np.zeros((self.kernel_dimension, 0))
-        self._is_shared = comm.size > 1 and not thresholds.replicates(self.kernel_dimension, comm.size)
-        self._solver: DirectSolver | ReplicatedDirectSolver | DistributedDirectSolver | None = None
+        self._reaching = np.union1d(self.G.indices, columns).astype(np.int64)
+        self._tree = RankTree(comm, self.kernel_dimension, self._reaching)
+        self.solver: TreeElimination | DistributedSolver | None = None
         self.factor()
 
     def activate(self, active: Float) -> None:
@@ -76,32 +77,28 @@ class NaturalCoarseSpace:
         Motions that no active row resists, of a fibre that nothing holds, get a stiffness: G^T G + s Z Z^T.
         """
         self.G_active = (diags(active) @ self.G).tocsr()
-        self.GT_active = self.G_active.T.tocsr()
-        entries = self._gram.entries(active)
-        self.unconstrained_modes = self._null_space(entries)
-        gram = (self.GT_active @ self.G_active).tocsr() if self._is_shared else self._gram.matrix(entries)
-        if self.unconstrained_modes.shape[1] and not (self._is_shared and self.comm.rank):
-            gram = (gram + self._largest_diagonal * self.unconstrained_projector).tocsr()
-        self._factor(gram)
+        self.unconstrained_modes = self._null_space(self._gram.entries(active))
+        self.factor()
 
     def factor(self) -> None:
-        """Factor G^T G of all rows.  Collective."""
-        part = (self.G.T @ self.G).tocsr()
-        self._factor(part if self._is_shared else allreduce_sparse(self.comm, part))
+        """Factor G^T G of the active rows.  Collective."""
+        self._destroy_factor()
+        if not self.kernel_dimension:
+            return
+        Z = self._own_unconstrained_modes()
+        self.unknowns = np.union1d(self._reaching, Z.indices).astype(np.int64)
+        self._G = self.G_active[:, self.unknowns].tocsr()
+        self._GT = self._G.T.tocsr()
+        Z = Z[:, self.unknowns]
+        gram = (self._GT @ self._G + self._largest_diagonal * (Z.T @ Z)).tocsr()
+        self.solver = distributed_solver(self._tree, self.kernel_dimension, self.unknowns, gram, "feti_natural_")
+        self.factorizations += 1
 
-    @property
-    def unconstrained_projector(self) -> csr_matrix:
-        """(m, m) orthogonal projector Z Z^T to the amplitudes that no active row resists."""
-        Z = csr_matrix(self.unconstrained_modes)
-        return (Z @ Z.T).tocsr()
-
-    def _factor(self, gram: csr_matrix) -> None:
-        """Solve with G^T G from now on: `gram`, or where ranks share the factor, the sum of theirs.  Collective."""
-        if self.kernel_dimension:
-            self.destroy()
-            share = partial(direct_solver, self.comm, replicate=False)
-            self._solver = (share if self._is_shared else DirectSolver)(gram, prefix="feti_natural_")
-            self.factorizations += 1
+    def _own_unconstrained_modes(self) -> csr_matrix:
+        """(z, m) those of the unconstrained modes whose first subdomain is this rank's, as rows."""
+        Z = self.unconstrained_modes
+        first = (Z != 0.0).argmax(axis=0)
+        return csr_matrix(Z[:, (first >= self.owned_modes.start) & (first < self.owned_modes.stop)].T)
 
     @cached_property
     def _gram(self) -> GramMatrix:
@@ -133,18 +130,21 @@ class NaturalCoarseSpace:
 
     def amplitudes(self, x: Float) -> Float:
         """(G^T G)^-1 G^T x on every rank, for the owned rows x (rows,) or (rows, k).  Collective."""
-        return self.solve(allreduce_sum(self.comm, self.GT_active @ x))
+        own = np.searchsorted(self.unknowns, np.arange(self.kernel_dimension)[self.owned_modes])
+        whole = np.zeros((self.kernel_dimension, *x.shape[1:]))
+        whole[self.owned_modes] = self.solve(self._GT @ x)[own]
+        return allreduce_sum(self.comm, whole)
 
     def solve(self, work: Float) -> Float:
-        """(G^T G)^-1 work for work (m,) or (m, k), the same on every rank.  Collective."""
-        assert self._solver is not None, "there are no kernels, or the factor is destroyed"
-        return self._solver.solve(work)
+        """(G^T G)^-1 times the sum over ranks of work, for the `unknowns`: (u,) or (u, k) both.  Collective."""
+        assert self.solver is not None, "there are no kernels, or the factor is destroyed"
+        return self.solver.solve(work)
 
     def project(self, x: Float) -> Float:
         """P x for the owned rows x, whose inactive ones are 0: what no rigid-body motion works on.  Collective."""
         if not self.kernel_dimension:
             return x.copy()
-        projected: Float = x - self.G_active @ self.amplitudes(x)
+        projected: Float = x - self._G @ self.solve(self._GT @ x)
         return projected
 
     def free_motions(self, active: Float) -> Float:
@@ -157,7 +157,11 @@ class NaturalCoarseSpace:
         return motion
 
     def destroy(self) -> None:
-        """Free the factor.  Collective."""
-        if self._solver is not None:
-            self._solver.destroy()
-            self._solver = None
+        """Free the factor, for good.  Collective."""
+        self._destroy_factor()
+        self._tree.destroy()
+
+    def _destroy_factor(self) -> None:
+        if self.solver is not None:
+            self.solver.destroy()
+            self.solver = None

@@ -62,18 +62,19 @@ def add_shared_rows(comm: MPI.Intracomm, local: csr_matrix, rows: Int, is_shared
     return unshared + place @ csr_matrix((data, indices, indptr), shape=(len(at), n))
 
 
-def assemble_distributed(comm: MPI.Intracomm, part: csr_matrix) -> PETSc.Mat:
-    """The sum over ranks of parts of one shape as a matrix whose rows the ranks share evenly.  Collective."""
-    rows, columns = (np.flatnonzero(np.diff(m.indptr)) for m in (part.tocsr(), part.tocsc()))
-    shares = (_even_share(comm, part.shape[0]), _even_share(comm, part.shape[1]))
-    return _assemble(comm, part[rows][:, columns], rows, columns, shares)
+def assemble_distributed(comm: MPI.Intracomm, part: csr_matrix, numbers: Int, total: int) -> PETSc.Mat:
+    """(n, n) the sum over ranks of parts (k, k), whose rows and columns have these numbers (k,), as a matrix whose rows
+    the ranks share evenly.  Collective."""
+    share = _even_share(comm, total)
+    return _assemble(comm, part, numbers, numbers, (share, share))
 
 
 def allreduce_sparse(comm: MPI.Intracomm, part: csr_matrix) -> csr_matrix:
-    """The sum over ranks of small sparse matrices of one shape, on every rank.  Collective."""
+    """The sum over ranks of small sparse square matrices of one shape, on every rank.  Collective."""
     if comm.size == 1:
         return part
-    A = assemble_distributed(comm, part)
+    some = np.union1d(np.flatnonzero(np.diff(part.indptr)), part.indices)
+    A = assemble_distributed(comm, part[some][:, some], some, part.shape[0])
     own = A.getValuesCSR()
     A.destroy()
     counts, entries = (np.array(comm.allgather(n)) for n in (len(own[0]) - 1, len(own[1])))

@@ -21,15 +21,14 @@ class DirectSolver:
 
     max_columns_one_by_one = CHOLMOD_COLUMNS_ONE_BY_ONE
 
-    def __init__(self, matrix: csr_matrix, prefix: str, near_kernel: Float | None = None) -> None:
-        """Factorize.  Options under `prefix` (default: cholesky by CHOLMOD), also for an iterative method: multigrid
-        then learns of the `near_kernel` (n, k), orthonormal vectors of little energy.
+    def __init__(self, matrix: csr_matrix, prefix: str) -> None:
+        """Factorize.  Options under `prefix` (default: cholesky by CHOLMOD).
 
         Raises:
             PETSc.Error: the matrix is not positive definite.
             CaseError: the library that the options name has no such factorization.
         """
-        self._ksp = factor_by_cholmod(matrix, prefix, near_kernel)
+        self._ksp = factor_by_cholmod(matrix, prefix)
         self._x, self._b = self._ksp.getOperators()[0].createVecs()
         self._destroy = weakref.finalize(self, _destroy, self._ksp, self._x, self._b)
 
@@ -50,11 +49,6 @@ class DirectSolver:
             matrix.destroy()
         return X
 
-    @property
-    def iterations(self) -> int:
-        """Of the last solve for one column on this rank, if the options ask for an iterative method; else 1."""
-        return iterations(self._ksp)
-
     def destroy(self) -> None:
         """Free the factor now; otherwise it is freed with this object."""
         self._destroy()
@@ -65,10 +59,9 @@ def iterations(ksp: PETSc.KSP) -> int:
     return 1 if ksp.getType() == PETSc.KSP.Type.PREONLY else int(ksp.getIterationNumber())
 
 
-def factor_by_cholmod(matrix: csr_matrix, prefix: str, near_kernel: Float | None = None) -> PETSc.KSP:
+def factor_by_cholmod(matrix: csr_matrix, prefix: str) -> PETSc.KSP:
     """A KSP with the factorization of a symmetric definite matrix; options under `prefix`, CHOLMOD by default."""
     A = _sequential(matrix)
-    _tell(A, near_kernel)
     A.setOption(PETSc.Mat.Option.SPD, True)
     ksp = _direct_ksp(A, prefix, PETSc.Mat.SolverType.CHOLMOD)
     ksp.setUp()
@@ -80,7 +73,8 @@ def factor_by_mumps(A: PETSc.Mat, prefix: str, near_kernel: Float | None = None)
     default.
 
     The matrix should have rows and columns of similar size: MUMPS does not scale it here, for its own scaling loses
-    all digits of coarse problems with contrasts of 1e6.  `near_kernel` (n, k) as of `DirectSolver`.
+    all digits of coarse problems with contrasts of 1e6.  Multigrid learns of the `near_kernel` (n, k), orthonormal
+    vectors of little energy.
     """
     _tell(A, near_kernel)
     A.setOption(PETSc.Mat.Option.SPD, True)

@@ -8,14 +8,13 @@ of a macroscopic strain vanishes inside a uniform body.
 from __future__ import annotations
 
 import numpy as np
-from petsc4py import PETSc
 from scipy.linalg.blas import dsymm, dsymv
 from scipy.sparse import csr_matrix
 
-from feti_homog.common import petsc_ctypes
 from feti_homog.config.phase_names import COATING
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.linalg.packed_symmetric import full_from_lower, invert_upper
+from feti_homog.feti.linalg.schur_complement import schur_complement
 from feti_homog.feti.thresholds import DENSE_COLUMNS_ONE_BY_ONE, ILL_CONDITIONED
 from feti_homog.typing import Float, Int
 
@@ -100,29 +99,3 @@ class ExplicitInterfaceOperator:
         """(m, m) P^T rho Rf Rf^T P for P (n, m)."""
         at_fixed = P[self._fixed].toarray()
         return np.asarray(at_fixed.T @ self._term @ at_fixed)
-
-
-def schur_complement(matrix: csr_matrix, dofs: Int) -> Float:
-    """(n, n) Schur complement of a matrix on `dofs`, in Fortran order; the rest of the matrix has to be SPD.
-
-    Options have the prefix `feti_schur_`.
-    """
-    if len(dofs) == matrix.shape[0]:
-        return np.asarray(matrix.toarray(order="F"))
-    csr = matrix.indptr, matrix.indices, matrix.data
-    A = PETSc.Mat().createAIJWithArrays(matrix.shape, csr, comm=PETSc.COMM_SELF)
-    A.setOption(PETSc.Mat.Option.SPD, True)
-    pc = PETSc.PC().create(PETSc.COMM_SELF)
-    pc.setOptionsPrefix("feti_schur_")
-    pc.setOperators(A)
-    pc.setType(PETSc.PC.Type.CHOLESKY)
-    pc.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
-    pc.setFromOptions()
-    pc.setFactorSetUpSolverType()
-    rows = PETSc.IS().createGeneral(dofs.astype(PETSc.IntType), comm=PETSc.COMM_SELF)
-    petsc_ctypes.set_schur(pc.getFactorMatrix(), rows)
-    pc.setUp()
-    S = petsc_ctypes.schur_complement(pc.getFactorMatrix(), len(dofs))
-    pc.destroy()
-    A.destroy()
-    return S

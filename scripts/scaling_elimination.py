@@ -1,0 +1,146 @@
+"""What elimination on a tree of ranks takes: counted sizes of its fronts, and measured seconds of some."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import ceil, log2, sqrt
+from typing import NamedTuple
+
+import numpy as np
+from scaling_fit import Power, nonnegative
+
+from feti_homog.feti.thresholds import FRONT_BLOCK
+
+# Blocks of columns that a rank has of a front at least, as in `feti.linalg.shared_fronts`.
+LEAST_BLOCKS = 2
+VALUE_BYTES = 8
+
+
+class TimedFront(NamedTuple):
+    """Seconds in which so many ranks eliminate a front of such a size, and solve with it for all loads."""
+
+    eliminated: int
+    left: int
+    sharers: int
+    factor: float
+    solve: float
+
+
+class FrontSize(NamedTuple):
+    """A front: unknowns that are eliminated, those that are left, and the ranks that have met."""
+
+    eliminated: float
+    left: float
+    ranks: int
+
+    @property
+    def n(self) -> float:
+        """Unknowns."""
+        return self.eliminated + self.left
+
+    @property
+    def sharers(self) -> int:
+        """Ranks that eliminate it."""
+        return min(self.ranks, max(1, int(self.n / (LEAST_BLOCKS * FRONT_BLOCK))))
+
+    def work(self, sharers: int) -> tuple[float, float, float, float]:
+        """Of each sharer: multiplications, entries that are summed, entries that it is told, and one call."""
+        e, f = self.eliminated, self.left
+        told = e**2 / 2 + e * f if sharers > 1 else 0.0
+        return (e**3 / 3 + e**2 * f + e * f**2) / sharers, self.n**2 / sharers, told, 1.0
+
+    def solve_work(self, sharers: int) -> tuple[float, float]:
+        """Entries that the first sharer reads, and one call."""
+        return self.eliminated**2 / 2 + self.eliminated * self.left / sharers, 1.0
+
+    def bytes_of_a_solve(self, loads: int) -> float:
+        """That pass through its first rank: both halves' unknowns, to and fro, and what it tells its sharers."""
+        return VALUE_BYTES * loads * 2 * self.n * (2 if self.sharers > 1 else 1)
+
+
+@dataclass(frozen=True)
+class FrontRates:
+    """Seconds per unit of `FrontSize.work` and of `solve_work`."""
+
+    factor: tuple[float, ...]
+    solve: tuple[float, ...]
+
+    @classmethod
+    def of(cls, timed: Sequence[TimedFront]) -> FrontRates:
+        """By nonnegative least squares.
+
+        Raises:
+            ValueError: none was timed.
+        """
+        if not timed:
+            raise ValueError("rates of fronts need a run on two ranks")
+        sizes, none = [FrontSize(t.eliminated, t.left, t.sharers) for t in timed], np.zeros(len(timed))
+        factor = np.array([s.work(t.sharers) for s, t in zip(sizes, timed, strict=True)])
+        solve = np.array([s.solve_work(t.sharers) for s, t in zip(sizes, timed, strict=True)])
+        return cls(
+            tuple(nonnegative(factor, np.array([t.factor for t in timed]), none).tolist()),
+            tuple(nonnegative(solve, np.array([t.solve for t in timed]), none).tolist()),
+        )
+
+    def seconds(self, fronts: Sequence[FrontSize]) -> tuple[float, float]:
+        """Of the factors of all, one after the other, and of a solve."""
+        factor = sum(np.dot(self.factor, front.work(front.sharers)) for front in fronts)
+        solve = sum(np.dot(self.solve, front.solve_work(front.sharers)) for front in fronts)
+        return float(factor), float(solve)
+
+
+@dataclass(frozen=True)
+class Borders:
+    """Sizes of fronts relative to the root of the n unknowns of the ranks that meet there: `front` of all unknowns of
+    one, `left` of those left, and `last` of the unknowns of the last front relative to the root of all."""
+
+    front: float
+    left: float
+    last: float
+
+    @classmethod
+    def of(cls, counted: Sequence[tuple[int, int, FrontSize]]) -> Borders:
+        """The largest of what was counted: n, all ranks, and a front."""
+        front, left, last = 0.0, 0.0, 0.0
+        for n, ranks, size in counted:
+            root = sqrt(n * size.ranks / ranks)
+            if size.ranks == ranks:
+                last = max(last, size.n / root)
+            else:
+                front, left = max(front, size.n / root), max(left, size.left / root)
+        return cls(front, left, last)
+
+    def fronts(self, n: float, ranks: int) -> list[FrontSize]:
+        """Those at which a rank meets others, of n unknowns on so many ranks.
+
+        None has more unknowns than the last, to which those of a group's border belong, and half as many again.
+        """
+        found, most = [], self.last * sqrt(n)
+        for level in range(1, ceil(log2(ranks)) + 1):
+            met = min(2**level, ranks)
+            root = sqrt(n * met / ranks)
+            left = 0.0 if met == ranks else min(self.left * root, most)
+            whole = most if met == ranks else min(self.front * root, 1.5 * most)
+            found.append(FrontSize(max(whole - left, 0.0), left, met))
+        return found
+
+
+@dataclass(frozen=True)
+class Elimination:
+    """Seconds of the factor and of a solve for all loads: on one rank, `alone`, and on several those of a rank's `own`
+    unknowns, and of the fronts."""
+
+    alone_factor: Power
+    alone_solve: Power
+    own_factor: Power
+    own_solve: Power
+    borders: Borders
+    rates: FrontRates
+
+    def seconds(self, n: float, ranks: int) -> tuple[float, float]:
+        """Of the factor and of a solve with n unknowns."""
+        if ranks == 1:
+            return self.alone_factor.seconds(n), self.alone_solve.seconds(n)
+        factor, solve = self.rates.seconds(self.borders.fronts(n, ranks))
+        return self.own_factor.seconds(n / ranks) + factor, self.own_solve.seconds(n / ranks) + solve
