@@ -62,20 +62,17 @@ class FrontLayout(NamedTuple):
         return self.eliminated + len(self.unknowns)
 
 
-def dealt(n: int, block: int, sharers: int, rank: int) -> Int:
-    """The places below n of a rank, of which `sharers` get blocks one after the other; the others have none."""
-    places = np.arange(n)
-    return np.asarray(places[places // block % sharers == rank])
-
-
-def summed(meeting: Meeting, own: Remainder, layout: FrontLayout, block: int, sharers: int) -> Float:
-    """(r, n) the rows `dealt` to this rank of the sum of what both halves have left.  Collective in the meeting."""
+def summed(meeting: Meeting, own: Remainder, layout: FrontLayout, owner: Int) -> Float:
+    """(r, n) the rows of this rank of the sum of what both halves have left; `owner` (n,) tells whose each row is.
+    Collective in the meeting."""
     comm, second = meeting
-    mine = dealt(layout.n, block, sharers, comm.rank)
+    mine = np.flatnonzero(owner == comm.rank)
     A = np.zeros((len(mine), layout.n))
     for half, place in enumerate(layout.places):
         is_here = (comm.rank >= second) == bool(half)
         some, rows = (own.own, own.rows) if is_here else (np.zeros(0, np.int64), np.zeros((0, len(place))))
-        some, rows = exchange(comm, place[some] // block % sharers, some, rows)
-        A[np.ix_(np.searchsorted(mine, place[some]), place)] += rows
+        some, rows = exchange(comm, owner[place[some]], some, rows)
+        # Row by row: twice as fast as all at once.
+        for row, values in zip(np.searchsorted(mine, place[some]).tolist(), rows, strict=True):
+            A[row, place] += values
     return A

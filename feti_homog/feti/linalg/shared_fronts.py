@@ -6,12 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
-from scipy.linalg.blas import dtrsm
+from scipy.linalg.blas import dgemm, dtrsm
 
-from feti_homog.common.exchange import exchange
 from feti_homog.feti.linalg.fronts import Front, cholesky, eliminated_alone
 from feti_homog.feti.linalg.rank_tree import Meeting, subgroup
-from feti_homog.feti.linalg.remainder import FrontLayout, Remainder, dealt, summed
+from feti_homog.feti.linalg.remainder import FrontLayout, Remainder, summed
 from feti_homog.typing import Float, Int
 
 # Blocks of columns that a rank has of a front at least, if others have some.
@@ -70,69 +69,88 @@ def meet(meeting: Meeting, own: Remainder, block: int) -> tuple[Front, Remainder
     """
     layout = FrontLayout.of(meeting, own)
     sharers = min(meeting.comm.size, max(1, layout.n // (LEAST_BLOCKS * block)))
-    A = summed(meeting, own, layout, block, sharers)
+    starts = _starts(layout, block)
+    owner = np.repeat(np.arange(len(starts) - 1) % sharers, np.diff(starts))
+    A = summed(meeting, own, layout, owner)
     if sharers == 1:
         return eliminated_alone(meeting, layout, A)
-    return _eliminated_together(meeting, layout, A, block, sharers)
+    return _eliminated_together(meeting, layout, A, starts, sharers)
+
+
+def _starts(layout: FrontLayout, block: int) -> Int:
+    """(blocks + 1,) where blocks of columns begin, and the last ends; none has both eliminated and other ones."""
+    e, n = layout.eliminated, layout.n
+    return np.concatenate([np.arange(0, e, block), np.arange(e, n, block), [n]])
 
 
 def _eliminated_together(
-    meeting: Meeting, layout: FrontLayout, A: Float, block: int, sharers: int
+    meeting: Meeting, layout: FrontLayout, A: Float, starts: Int, sharers: int
 ) -> tuple[Front, Remainder]:
-    """The front of a symmetric matrix whose rows A (r, n) are `dealt` out."""
-    comm, e = meeting.comm, layout.eliminated
-    sharing = subgroup(comm, range(sharers)) if comm.rank < sharers else MPI.Intracomm(MPI.COMM_NULL)
-    own = dealt(layout.n, block, sharers, comm.rank)
-    columns, c = A.T, int(np.searchsorted(own, e))
-    is_definite = sharing == MPI.COMM_NULL or _factor(sharing, columns, own, e, block)
-    L = _gathered_on_first(sharing, own[:c], columns[:e, :c], e)
-    half, rest = np.asfortranarray(columns[e:, :c]), np.ascontiguousarray(columns[e:, c:].T)
-    front = SharedFront(meeting, layout.places, layout.n - e, L, half, is_definite, sharing, own[:c], e)
-    return front, Remainder(*layout[2:], own[c:] - e, rest)
+    """The front of a symmetric matrix of whose rows each of the first ranks has those of its blocks, A (r, n)."""
+    comm, e, f = meeting.comm, layout.eliminated, len(layout.unknowns)
+    takes_part = comm.rank < sharers
+    numbers = range(comm.rank, len(starts) - 1, sharers) if takes_part else range(0)
+    ends = np.cumsum([0, *(starts[k + 1] - starts[k] for k in numbers)])
+    own = np.concatenate([np.zeros(0, np.int64), *(np.arange(*starts[k : k + 2]) for k in numbers)])
+    # Of eliminated columns the rows from the diagonal on, of the others those that are left.
+    blocks = {
+        k: np.asfortranarray(A[first:last, min(starts[k], e) :].T)
+        for k, first, last in zip(numbers, ends[:-1], ends[1:], strict=True)
+    }
+    sharing = subgroup(comm, range(sharers)) if takes_part else MPI.Intracomm(MPI.COMM_NULL)
+    is_definite = not takes_part or _factor(sharing, blocks, starts, e)
+    eliminated = {int(starts[k]): block for k, block in blocks.items() if starts[k] < e}
+    half = np.hstack([np.zeros((f, 0)), *(block[len(block) - f :] for block in eliminated.values())])
+    rest = np.vstack([np.zeros((0, f)), *(block.T for k, block in blocks.items() if starts[k] >= e)])
+    L, half = _gathered_on_first(sharing, eliminated, e), np.asfortranarray(half)
+    front = SharedFront(meeting, layout.places, f, L, half, is_definite, sharing, own[own < e], e)
+    return front, Remainder(*layout[2:], own[own >= e] - e, rest)
 
 
-def _factor(comm: MPI.Intracomm, A: Float, own: Int, e: int, block: int) -> bool:
-    """Let the columns `own` (c,) of A (n, c), dealt out among ranks, become those of L and half below the diagonal, and
-    those behind the first e of what is left.  Whether all is definite, as far as this rank knows.  Collective.
+def _factor(comm: MPI.Intracomm, blocks: dict[int, Float], starts: Int, e: int) -> bool:
+    """Let the first blocks, of e columns, become those of L and half, and the others what is left.  Collective.
 
-    A panel of columns is eliminated by the rank that has it, which tells all, and taken off by each from its columns.
+    The rank that has a block eliminates it and tells it to all, and each takes it off its blocks behind it.  Whether
+    all is definite, as far as this rank knows.
     """
     is_definite = True
-    for start in range(0, e, block):
-        stop, owner = min(start + block, e), start // block % comm.size
-        panel = np.empty((len(A) - start, stop - start), order="F")
-        if comm.rank == owner:
-            at = int(np.searchsorted(own, start))
-            is_definite &= _eliminate(A[start:, at : at + stop - start], panel)
-        comm.Bcast(panel, owner)
-        first = int(np.searchsorted(own, stop))
-        while first < len(own):
-            last = min(first - first % block + block, len(own))
-            # Of the columns behind e, all rows are wanted that are left.
-            below = min(int(own[first]), e)
-            A[below:, first:last] -= panel[below - start :] @ panel[own[first:last] - start].T
-            first = last
+    for number in range(int(np.searchsorted(starts, e))):
+        start, stop = starts[number : number + 2]
+        # Transposed: so rows of it are contiguous in the order of Fortran, and BLAS copies nothing.
+        panel = np.empty((stop - start, starts[-1] - start), order="F")
+        if comm.rank == number % comm.size:
+            is_definite &= _eliminate(blocks[number])
+            panel[:] = blocks[number].T
+        comm.Bcast(panel, number % comm.size)
+        for k in blocks:
+            if k > number:
+                rows, columns = (
+                    panel[:, min(starts[k], e) - start :],
+                    panel[:, starts[k] - start : starts[k + 1] - start],
+                )
+                blocks[k] = dgemm(-1.0, rows, columns, beta=1.0, c=blocks[k], trans_a=1, overwrite_c=1)
     return is_definite
 
 
-def _eliminate(columns: Float, panel: Float) -> bool:
-    """Eliminate the panel of these columns (m, w); both become those of L.  Whether the matrix is definite."""
-    width = columns.shape[1]
-    panel[:width], is_definite = cholesky(np.array(columns[:width], order="F"))
-    if len(panel) > width:
-        L = np.asfortranarray(panel[:width])
-        panel[width:] = dtrsm(1.0, L, np.asfortranarray(columns[width:]), side=1, lower=1, trans_a=1, overwrite_b=1)
-    columns[:] = panel
+def _eliminate(block: Float) -> bool:
+    """Let a block of columns (m, w), of rows from the diagonal on, become that of L.  Whether it is definite."""
+    width = block.shape[1]
+    block[:width], is_definite = cholesky(np.array(block[:width], order="F"))
+    if len(block) > width:
+        L, below = np.asfortranarray(block[:width]), np.array(block[width:], order="F")
+        block[width:] = dtrsm(1.0, L, below, side=1, lower=1, trans_a=1, overwrite_b=1)
     return is_definite
 
 
-def _gathered_on_first(comm: MPI.Intracomm, own: Int, columns: Float, e: int) -> Float:
-    """(e, e) lower triangle whose columns `own` (c,) this rank has, (e, c), on the first rank; (0, 0) on others."""
+def _gathered_on_first(comm: MPI.Intracomm, blocks: dict[int, Float], e: int) -> Float:
+    """(e, e) L of blocks of columns, by where each begins, on the first rank; (0, 0) on the others.  Collective."""
     if comm == MPI.COMM_NULL:
         return np.zeros((0, 0))
-    which, rows = exchange(comm, np.zeros(len(own), np.int64), own, np.ascontiguousarray(columns.T))
-    if comm.rank:
+    every = comm.gather({start: block[: e - start] for start, block in blocks.items()})
+    if every is None:
         return np.zeros((0, 0))
-    L = np.empty((e, e), order="F")
-    L[:, which] = rows.T
+    L = np.zeros((e, e), order="F")
+    for some in every:
+        for start, block in some.items():
+            L[start:, start : start + block.shape[1]] = block
     return L
