@@ -47,7 +47,8 @@ class EdgeSamples:
         """
         count = len(lengths)
         curve, share = np.repeat(np.arange(count), least), np.tile(np.linspace(0, 1, least), count)
-        sizes = np.minimum(field.at(point(curve, share)), cap(curve, share))
+        along = point(curve, share).reshape(count, least, 2)
+        sizes = np.minimum(field.on_lines(along).ravel(), cap(curve, share))
         while True:
             way = np.diff(share) * lengths[curve[:-1]]
             wide = (np.diff(curve) == 0) & (way > field.step * np.minimum(sizes[:-1], sizes[1:]))

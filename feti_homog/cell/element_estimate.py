@@ -9,7 +9,8 @@ import numpy as np
 
 from feti_homog.cell.arrangement import arrange
 from feti_homog.cell.ellipses import Ellipses
-from feti_homog.cell.size_field import MAX_GROWTH, MIN_EDGES_AROUND
+from feti_homog.cell.size_field import MIN_EDGES_AROUND
+from feti_homog.cell.sourced_size import MAX_GROWTH
 from feti_homog.config.cell_section import FIBRES_OF
 from feti_homog.config.mixed_cell import fibre_counts
 

@@ -10,18 +10,9 @@ from scipy.spatial import cKDTree
 from feti_homog.cell.arrangement import Arrangement
 from feti_homog.cell.ellipses import Ellipses, directions, gaps
 from feti_homog.cell.elliptic_table import shells
-from feti_homog.cell.graded_size import SAMPLES_OF_AN_EDGE, MeshSizes, SizeField
-from feti_homog.cell.size_field import (
-    MAX_GROWTH,
-    MIN_EDGES_AROUND,
-    PASSAGE_EDGE,
-    WEDGE,
-    Source,
-    at_vertices,
-    graded,
-    passage_growth,
-    wrap,
-)
+from feti_homog.cell.graded_size import MeshSizes, SizeField
+from feti_homog.cell.size_field import MIN_EDGES_AROUND, PASSAGE_EDGE, WEDGE, at_vertices, passage_growth
+from feti_homog.cell.sourced_size import MAX_GROWTH, Source, SourcedSize, wrap
 from feti_homog.cell.torus_pairs import neighbours
 from feti_homog.typing import Float, Int
 
@@ -52,19 +43,19 @@ def size_field(
         _at_corner(points, size, largest),
         at_vertices(vertices, size, largest),
     ]
-    base = graded(sources, size, largest)
+    base = SourcedSize(sources, size, largest)
     if not sizes.are_graded(arrangement):
-        return SizeField(base)
+        return SizeField(base, base.on_lines)
     on_curves, beside = cKDTree(wrap(points, size), boxsize=size), np.minimum(sizes.interface, thin)
     tree = cKDTree(wrap(tips.reshape(-1, 2), size), boxsize=size)
 
-    def at(positions: Float) -> Float:
+    def graded(positions: Float) -> Float:
         places = wrap(positions, size)
         at_tips = sizes.tip + MAX_GROWTH * np.maximum(0.0, tree.query(places)[0] - sizes.tip)
         distance, nearest = on_curves.query(places)
-        return np.asarray(np.minimum(base(positions), np.minimum(beside[nearest] + MAX_GROWTH * distance, at_tips)))
+        return np.asarray(np.minimum(beside[nearest] + MAX_GROWTH * distance, at_tips))
 
-    return SizeField(at, 1 / SAMPLES_OF_AN_EDGE)
+    return SizeField.least(base, graded)
 
 
 def _in_mesh_order(arrangement: Arrangement, ellipses: Ellipses, disc: Int) -> tuple[Ellipses, Int]:

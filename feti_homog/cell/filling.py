@@ -13,7 +13,7 @@ import numpy as np
 
 from feti_homog.cell.coarse_mesh import areas, flip_double_arcs
 from feti_homog.cell.curves import MATRIX, OUTSIDE, Curve, Curves
-from feti_homog.cell.size_field import MAX_GROWTH
+from feti_homog.cell.sourced_size import MAX_GROWTH
 from feti_homog.errors import MeshError
 from feti_homog.typing import Float, Int, Int32
 

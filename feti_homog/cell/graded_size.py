@@ -9,7 +9,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from feti_homog.cell.arrangement import Arrangement
-from feti_homog.cell.size_field import MAX_GROWTH, coating_size, line_size, wrap
+from feti_homog.cell.size_field import coating_size, line_size
+from feti_homog.cell.sourced_size import MAX_GROWTH, SourcedSize, wrap
 from feti_homog.typing import Float
 
 # Samples of a size on a line for each of its edges, where the size is graded.
@@ -50,11 +51,24 @@ class SizeField:
 
     Attributes:
         at: sizes (n,) at positions (n, 2).
+        on_lines: sizes (c, m) at positions (c, m, 2) along c lines: the same.
         step: distance of positions on a line between which it may be interpolated / size.
     """
 
     at: Callable[[Float], Float]
+    on_lines: Callable[[Float], Float]
     step: float = np.inf
+
+    @classmethod
+    def least(cls, base: SourcedSize, graded: Callable[[Float], Float]) -> SizeField:
+        """The smaller of two sizes, of which the second grows along lines."""
+        return cls(
+            lambda points: np.asarray(np.minimum(base(points), graded(points))),
+            lambda points: np.asarray(
+                np.minimum(base.on_lines(points), graded(points.reshape(-1, 2)).reshape(points.shape[:2]))
+            ),
+            1 / SAMPLES_OF_AN_EDGE,
+        )
 
 
 def size_field(arrangement: Arrangement, sizes: MeshSizes, vertices: Float, tips: Float) -> SizeField:
@@ -62,17 +76,17 @@ def size_field(arrangement: Arrangement, sizes: MeshSizes, vertices: Float, tips
     `tips` (t, 2), so that the edges at a tip have the size h_t; the growth g is MAX_GROWTH."""
     base = line_size(arrangement, sizes.largest, vertices)
     if not sizes.are_graded(arrangement):
-        return SizeField(base)
+        return SizeField(base, base.on_lines)
     size = np.array([arrangement.width, arrangement.height])
     on_circles = _from_circles(arrangement, size, sizes.on_circles(arrangement))
     tree = cKDTree(wrap(tips.reshape(-1, 2), size), boxsize=size)
 
-    def at(points: Float) -> Float:
+    def graded(points: Float) -> Float:
         # Without tips the distance is infinite.
         at_tips = sizes.tip + MAX_GROWTH * np.maximum(0.0, tree.query(wrap(points, size))[0] - sizes.tip)
-        return np.asarray(np.minimum(base(points), np.minimum(on_circles(points), at_tips)))
+        return np.asarray(np.minimum(on_circles(points), at_tips))
 
-    return SizeField(at, 1 / SAMPLES_OF_AN_EDGE)
+    return SizeField.least(base, graded)
 
 
 def _from_circles(arrangement: Arrangement, size: Float, caps: Float) -> Callable[[Float], Float]:

@@ -11,7 +11,8 @@ from scipy.spatial import cKDTree
 from feti_homog.cell.arrangement import Arrangement
 from feti_homog.cell.graded_size import MeshSizes
 from feti_homog.cell.shaped_table import POINTS, outer_shapes
-from feti_homog.cell.size_field import MAX_GROWTH, MIN_EDGES_AROUND, PASSAGE_EDGE, wrap
+from feti_homog.cell.size_field import MIN_EDGES_AROUND, PASSAGE_EDGE
+from feti_homog.cell.sourced_size import MAX_GROWTH, wrap
 from feti_homog.typing import Float, Int
 
 # Edges of coatings / thickness; cosine of the angle between normals of outlines and sides that face each other.

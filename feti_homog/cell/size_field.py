@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from itertools import product
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from feti_homog.cell.arrangement import Arrangement
+from feti_homog.cell.sourced_size import MAX_GROWTH, Source, SourcedSize, wrap
 from feti_homog.cell.torus_pairs import neighbours
 from feti_homog.typing import Bool, Float
 
@@ -18,17 +18,10 @@ MIN_EDGES_AROUND = 16
 PASSAGE_EDGE = 1.5
 # Angle between a circle and a side that it crosses, relative to the turn of the circle along an edge there.
 WEDGE = 3
-# Growth of the edge length per distance, at most.
-MAX_GROWTH = 0.4
-# Positions whose sources are looked for at once, for the memory that this takes.
-CHUNK = 100_000
-
-# Places (k, 2), edge lengths (k,) and growths (k,).
-Source = tuple[Float, Float, Float]
 
 
-def line_size(arrangement: Arrangement, largest: float, vertices: Float) -> Callable[[Float], Float]:
-    """The function h(x) = min(largest, min_k (h_k + g_k |x - x_k|)) of positions (n, 2) on the torus.
+def line_size(arrangement: Arrangement, largest: float, vertices: Float) -> SourcedSize:
+    """The size of edges at positions on the torus.
 
     The sources (x_k, h_k) are the two faces of each narrow passage between two fibres, or between a fibre and
     a side or corner of the cell, with h_k proportional to its width, and the `vertices` (v, 2) that the mesh
@@ -44,28 +37,7 @@ def line_size(arrangement: Arrangement, largest: float, vertices: Float) -> Call
         _at_corners(circles, size, caps),
         at_vertices(vertices, size, largest),
     ]
-    return graded(sources, size, largest)
-
-
-def graded(sources: Sequence[Source], size: Float, largest: float) -> Callable[[Float], Float]:
-    """The function h(x) = min(largest, min_k (h_k + g_k |x - x_k|)) of positions (n, 2) on the torus."""
-    places, lengths, growths = (np.concatenate(parts) for parts in zip(*sources, strict=True))
-    lengths, growths = np.append(lengths, np.inf), np.append(growths, MAX_GROWTH)
-    places = wrap(places, size)
-    tree = cKDTree(places, boxsize=size)
-    count = min(16, len(places))
-
-    def near(points: Float) -> Float:
-        # Beyond the bound the tree gives the source behind the last, which is infinite.
-        distance, nearest = tree.query(points, k=count, distance_upper_bound=largest / MAX_GROWTH)
-        graded = (lengths[nearest] + growths[nearest] * distance).reshape(len(points), -1)
-        return np.asarray(np.minimum(largest, graded.min(axis=1)))
-
-    def at(points: Float) -> Float:
-        wrapped = wrap(points, size)
-        return np.concatenate([near(wrapped[k : k + CHUNK]) for k in range(0, max(1, len(points)), CHUNK)])
-
-    return at
+    return SourcedSize(sources, size, largest)
 
 
 def circle_size(arrangement: Arrangement, largest: float) -> Float:
@@ -82,12 +54,6 @@ def circle_size(arrangement: Arrangement, largest: float) -> Float:
 def coating_size(arrangement: Arrangement) -> Float:
     """sqrt(t a) (N,) of the coating of the thickness t on each disc of the radius a."""
     return np.asarray(np.sqrt(arrangement.thickness * arrangement.radii))
-
-
-def wrap(points: Float, size: Float) -> Float:
-    """Positions (n, 2) on the torus, in [0, size)."""
-    wrapped = points % size
-    return np.where(wrapped >= size, 0.0, wrapped)
 
 
 def _between_fibres(circles: Float, size: Float, caps: Float, largest: float) -> Source:

@@ -16,7 +16,7 @@ from unit.cell.test_gmsh_mesher import least_angle
 from feti_homog.cell import element_estimate
 from feti_homog.cell.arrangement import arrange
 from feti_homog.cell.gmsh_mesher import generate
-from feti_homog.cell.size_field import MAX_GROWTH
+from feti_homog.cell.sourced_size import MAX_GROWTH
 from feti_homog.errors import MeshError
 
 pytestmark = pytest.mark.slow

@@ -3,30 +3,60 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import ceil
+from math import sqrt
 
+import numpy as np
 import pytest
+from scaling_elimination import Borders, FrontRates, FrontSize, TimedFront
 from scaling_fit import fit_power, fit_shares
 from scaling_forecast import assumptions, checks, forecast
 from scaling_model import LOCAL, Machine, measured, network, predict
-from scaling_report import COPIES, MULTIGRID, SHARED, Row, by_ranks, memory
+from scaling_report import ELIMINATION, MULTIGRID, SHARED, Row, by_ranks, memory
 
 CORES = 2
 NETWORK = Machine(2e-6, 1e10)
 ITERATIONS, LOADS = 20, 3
+FRONTS = FrontRates((3e-11, 5e-9, 4e-9, 1e-4), (1e-9, 3e-5))
+# Unknowns of the last front, relative to the root of all.
+LAST = 10.0
 
 
-def made_up(dofs: int, ranks: int, way: str = COPIES) -> Row:
+def timed_fronts() -> list[TimedFront]:
+    """Fronts whose seconds follow FRONTS."""
+    found = []
+    for e, f in ((60, 200), (200, 600), (500, 1000), (1000, 1600), (2000, 0), (2000, 2000)):
+        for sharers in (1, 2):
+            size = FrontSize(e, f, 2)
+            factor, solve = np.dot(FRONTS.factor, size.work(sharers)), np.dot(FRONTS.solve, size.solve_work(sharers))
+            found.append(TimedFront(e, f, sharers, float(factor), float(solve)))
+    return found
+
+
+def eliminated(unknowns: int, ranks: int, factor: float, solve: float, solves: int) -> tuple[float, float, list]:
+    """Seconds of the factor and of the solves on several ranks, and the fronts: of a rank's own unknowns as of so many
+    on one, half as dear."""
+    if ranks == 1:
+        return factor, solve, []
+    fronts = [FrontSize(round(LAST * sqrt(unknowns)), 0, ranks)]
+    fronts += [FrontSize(70, 200, 2)] * (ranks > 2)
+    of_fronts = FRONTS.seconds(fronts)
+    return 0.5 * factor / ranks + of_fronts[0], 0.5 * solve / ranks + solves * of_fronts[1], fronts
+
+
+def made_up(dofs: int, ranks: int, way: str = ELIMINATION) -> Row:
     """A run whose seconds follow constants that the tests know; its messages take no time."""
     triangles, coarse, kernel = dofs // 50, dofs // 500, dofs // 1000
     factor, solve = 1e-6 * coarse**1.5, 1e-7 * coarse**1.2
-    natural_factor, natural_solve = 2e-7 * kernel**1.3, 3e-8 * kernel**1.1
+    natural_factor, natural_solve, natural_fronts = eliminated(kernel, ranks, 2e-5 * kernel, 3e-6 * kernel, 2)
+    coarse_fronts = []
     if way == SHARED:
-        factor, solve = (1.0 + 4.0 / ranks) * factor, LOADS * (2.0 + 1.0 / ranks) * solve
+        factor, solve = (1.0 + 4.0 / ranks) * factor, (2.0 + 1.0 / ranks) * solve
     elif way == MULTIGRID:
-        factor, solve = 1e-5 * coarse * (0.5 + 0.5 / ranks), LOADS * 3e-5 * coarse / ranks
-    else:
-        solve = ceil(LOADS / ranks) * solve
+        factor, solve = 1e-5 * coarse * (0.5 + 0.5 / ranks), 3e-5 * coarse / ranks
+    elif ranks > 1:
+        # Powers of n and of n / p: the share of own unknowns is that of so many on one rank.
+        own = 0.5 * 1e-6 * (coarse / ranks) ** 1.5, 0.5 * 1e-7 * (coarse / ranks) ** 1.2
+        factor, solve, coarse_fronts = eliminated(coarse, ranks, 2 * ranks * own[0], 2 * ranks * own[1], 1)
     own = dofs / ranks
     seconds = {
         "mesh": 1e-5 * triangles * (0.25 + 0.75 / ranks),
@@ -40,7 +70,8 @@ def made_up(dofs: int, ranks: int, way: str = COPIES) -> Row:
         converged=True, seconds=seconds, peaks={stage: [100.0 + r for r in range(ranks)] for stage in seconds},
         told=(0,) * ranks, heard=(0,) * ranks, neighbours=(0,) * ranks, exchanges=0, logged=(0.0,) * ranks,
         coarse_factor=factor, coarse_solve=solve, natural_factor=natural_factor, natural_solve=natural_solve,
-        coarse_bytes=0, coarse_memory=[1.0] * ranks, inner=17 if way == MULTIGRID else 0, way=way,
+        coarse_memory=[1.0] * ranks, inner=17 if way == MULTIGRID else 0, way=way, coarse_fronts=coarse_fronts,
+        natural_fronts=natural_fronts, timed_fronts=timed_fronts() if ranks == 2 and way == ELIMINATION else [],
         latency=NETWORK.latency, bandwidth=NETWORK.bandwidth,
     )  # fmt: skip
 
@@ -90,12 +121,21 @@ def test_constants_are_found_again():
     rates = measured([*ROWS, slow], CORES)
     assert (rates.mesh.serial, rates.mesh.parallel) == pytest.approx((2.5e-6, 7.5e-6))
     assert (rates.assemble, rates.setup, rates.apply) == pytest.approx((2e-6, 5e-6, 3e-7))
-    assert (rates.factor.factor, rates.factor.exponent) == pytest.approx((1e-6, 1.5))
-    assert (rates.solve.factor, rates.solve.exponent) == pytest.approx((1e-7, 1.2))
+    for elimination, alone, own, solves in (
+        (rates.coarse, ((1e-6, 1.5), (1e-7, 1.2)), ((5e-7, 1.5), (5e-8, 1.2)), 1),
+        (rates.natural, ((2e-5, 1.0), (3e-6, 1.0)), ((1e-5, 1.0), (1.5e-6, 1.0)), 2),
+    ):
+        for found, (factor, exponent) in zip(
+            (elimination.alone_factor, elimination.alone_solve, elimination.own_factor, elimination.own_solve),
+            (*alone, *own),
+            strict=True,
+        ):
+            assert (found.factor, found.exponent) == pytest.approx((factor, exponent), rel=1e-3)
+        assert elimination.rates.factor == pytest.approx(FRONTS.factor, rel=1e-3)
+        assert elimination.rates.solve == pytest.approx([solves * rate for rate in FRONTS.solve], rel=1e-3)
+        assert elimination.borders.last == pytest.approx(LAST, rel=0.01)
     assert (rates.factor_shared.serial, rates.factor_shared.parallel) == pytest.approx((1e-6, 4e-6))
     assert (rates.solve_shared.serial, rates.solve_shared.parallel) == pytest.approx((2e-7, 1e-7))
-    assert (rates.natural_factor.factor, rates.natural_factor.exponent) == pytest.approx((2e-7, 1.3))
-    assert (rates.natural_solve.factor, rates.natural_solve.exponent) == pytest.approx((3e-8, 1.1))
     assert (rates.multigrid.setup.serial, rates.multigrid.setup.parallel) == pytest.approx((5e-6, 5e-6))
     assert rates.multigrid.solve.seconds(1000, 50) == pytest.approx(3e-5 * 1000 / 50, rel=1e-2)
     assert rates.multigrid.inner == 17
@@ -123,11 +163,26 @@ def test_model_gives_the_runs_that_it_is_of(row):
     assert p.setup + p.coarse_factor == pytest.approx(row.seconds["set-up"], rel=1e-3)
 
 
-def test_ranks_share_a_factor_from_some_size_on():
-    """The program's choice where none is asked for: by the vectors; one rank has nobody to share with."""
-    rates = measured(ROWS, CORES)
-    for dofs, ranks, way in [(5e5, 16, COPIES), (1e8, 16, SHARED), (1e8, 1, COPIES)]:
-        assert predict(rates, NETWORK, dofs, ranks) == predict(rates, NETWORK, dofs, ranks, way)
+def test_sizes_of_fronts():
+    """Of the largest that were counted; a group's border has no more unknowns than the last front."""
+    counted = [(1600, 4, FrontSize(30, 90, 2)), (1600, 4, FrontSize(20, 70, 2)), (1600, 4, FrontSize(200, 0, 4))]
+    borders = Borders.of(counted)
+    assert (borders.front, borders.left, borders.last) == pytest.approx((120 / sqrt(800), 90 / sqrt(800), 5.0))
+    assert borders.fronts(1600, 4) == [FrontSize(pytest.approx(30), pytest.approx(90), 2), FrontSize(200, 0, 4)]
+    sizes = borders.fronts(1e6, 1024)
+    assert [size.ranks for size in sizes] == [2**k for k in range(1, 11)]
+    assert sizes[-1].n == pytest.approx(5000) and sizes[-1].left == 0
+    assert all(0 < size.left <= 3200 for size in sizes[:-1])
+
+
+def test_large_fronts_are_shared():
+    """By as many ranks as have two blocks of columns, and as have met."""
+    assert [FrontSize(e, 0, ranks).sharers for e, ranks in ((100, 8), (300, 8), (5000, 8))] == [1, 2, 8]
+
+
+def test_fronts_need_a_run_on_two_ranks():
+    with pytest.raises(ValueError, match="two ranks"):
+        FrontRates.of([])
 
 
 def test_multigrid_is_forecast_where_it_was_timed():

@@ -1,0 +1,98 @@
+"""Edge lengths that grow with the distance from places where they are known."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from feti_homog.typing import Float
+
+# Growth of the edge length per distance, at most.
+MAX_GROWTH = 0.4
+# Sources that count at a position, the nearest, and those that may at any of a line.
+NEAREST, NEAREST_OF_LINE = 16, 32
+# Positions whose sources are looked for at once, for the memory that this takes.
+CHUNK = 100_000
+
+# Places (k, 2), edge lengths (k,) and growths (k,).
+Source = tuple[Float, Float, Float]
+
+
+class SourcedSize:
+    """The function h(x) = min(largest, min_k (h_k + g_k |x - x_k|)) of positions x on the torus.
+
+    A source k counts within the distance at which one of length 0 that grows by MAX_GROWTH is at the largest.
+    """
+
+    def __init__(self, sources: Sequence[Source], size: Float, largest: float) -> None:
+        """`size` (2,) are the periods of the torus."""
+        self._size, self._largest, self._bound = size, largest, largest / MAX_GROWTH
+        places, lengths, growths = (np.concatenate(parts) for parts in zip(*sources, strict=True))
+        self._places = wrap(places, size)
+        # Where the tree finds no more, it gives the source behind the last: an infinite one.
+        self._lengths, self._growths = np.append(lengths, np.inf), np.append(growths, MAX_GROWTH)
+        self._tree = cKDTree(self._places, boxsize=size)
+
+    def __call__(self, points: Float) -> Float:
+        """(n,) at points (n, 2)."""
+        wrapped = wrap(points, self._size)
+        return np.concatenate([self._near(wrapped[k : k + CHUNK]) for k in range(0, max(1, len(points)), CHUNK)])
+
+    def _near(self, points: Float) -> Float:
+        count = min(NEAREST, len(self._places))
+        distance, nearest = self._tree.query(points, k=count, distance_upper_bound=self._bound)
+        sizes = (self._lengths[nearest] + self._growths[nearest] * distance).reshape(len(points), count)
+        return np.asarray(np.minimum(self._largest, sizes.min(axis=1)))
+
+    def on_lines(self, points: Float) -> Float:
+        """(c, m) at points (c, m, 2) of lines: as for each point, but sources are looked for once for all of a short
+        line."""
+        middle = points[:, points.shape[1] // 2]
+        half = np.sqrt(((points - middle[:, None]) ** 2).sum(axis=2).max(axis=1, initial=0.0))
+        # Longer ones have too many sources near them.
+        short = half < self._bound
+        sizes = np.empty(points.shape[:2])
+        sizes[~short] = self(points[~short].reshape(-1, 2)).reshape(-1, points.shape[1])
+        lines = np.flatnonzero(short)
+        for k in range(0, len(lines), CHUNK // NEAREST_OF_LINE):
+            some = lines[k : k + CHUNK // NEAREST_OF_LINE]
+            sizes[some] = self._on_some(points[some], middle[some], half[some])
+        return sizes
+
+    def _on_some(self, points: Float, middle: Float, half: Float) -> Float:
+        """(c, m) on short lines whose points are at most `half` (c,) from their `middle` (c, 2)."""
+        count = min(NEAREST_OF_LINE, len(self._places))
+        reach = self._bound + float(half.max(initial=0.0))
+        distance, near = self._tree.query(wrap(middle, self._size), k=count, distance_upper_bound=reach)
+        distance, near = distance.reshape(len(middle), count), near.reshape(len(middle), count)
+        length, growth = self._lengths[near], self._growths[near]
+        # What counts at all points of a line bounds it from above; sources that are above everywhere do not matter.
+        everywhere = distance + half[:, None] < self._bound
+        above = np.where(everywhere, length + growth * (distance + half[:, None]), self._largest).min(axis=1)
+        below = length + growth * np.maximum(0.0, distance - half[:, None])
+        line, which = np.nonzero(below < np.minimum(above, self._largest)[:, None])
+        source = near[line, which]
+        squares = np.zeros((len(line), points.shape[1]))
+        for axis, period in enumerate(self._size):
+            way = points[line, :, axis] - self._places[source, axis][:, None]
+            way -= period * np.round(way / period)
+            way *= way
+            squares += way
+        away = np.sqrt(squares)
+        found = self._lengths[source][:, None] + self._growths[source][:, None] * away
+        found[away >= self._bound] = self._largest
+        sizes = np.full(points.shape[:2], self._largest)
+        first = np.flatnonzero(np.diff(line, prepend=-1))
+        if len(first):
+            sizes[line[first]] = np.minimum(self._largest, np.minimum.reduceat(found, first, axis=0))
+        full = near[:, -1] < len(self._places)
+        sizes[full] = self(points[full].reshape(-1, 2)).reshape(-1, points.shape[1])
+        return sizes
+
+
+def wrap(points: Float, size: Float) -> Float:
+    """Positions (n, 2) on the torus, in [0, size)."""
+    wrapped = points % size
+    return np.where(wrapped >= size, 0.0, wrapped)
