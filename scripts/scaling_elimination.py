@@ -5,16 +5,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil, log2, sqrt
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from scaling_fit import Power, nonnegative
+from scaling_fit import Power, fit_power, nonnegative
 
 from feti_homog.feti.thresholds import FRONT_BLOCK
+
+if TYPE_CHECKING:
+    from scaling_report import Row
 
 # Blocks of columns that a rank has of a front at least, as in `feti.linalg.shared_fronts`.
 LEAST_BLOCKS = 2
 VALUE_BYTES = 8
+# Least share of the seconds of an elimination that a rank's own unknowns take, where its fronts seem to take all.
+LEAST_OWN_SHARE = 0.1
 
 
 class TimedFront(NamedTuple):
@@ -144,3 +149,54 @@ class Elimination:
             return self.alone_factor.seconds(n), self.alone_solve.seconds(n)
         factor, solve = self.rates.seconds(self.borders.fronts(n, ranks))
         return self.own_factor.seconds(n / ranks) + factor, self.own_solve.seconds(n / ranks) + solve
+
+
+class Attributes(NamedTuple):
+    """Names of what rows have of an elimination: its unknowns, seconds of the factor and of all solves of an iteration,
+    and fronts; and how many solves these are."""
+
+    unknowns: str
+    factor: str
+    solve: str
+    fronts: str
+    solves: int
+
+
+OF_COARSE = Attributes("vectors", "coarse_factor", "coarse_solve", "coarse_fronts", 1)
+OF_NATURAL = Attributes("kernel", "natural_factor", "natural_solve", "natural_fronts", 2)
+
+
+def elimination_of(rows: Sequence[Row], cores: int, of: Attributes) -> Elimination:
+    """That of these rows, of which those are timed whose ranks each have a core.
+
+    Raises:
+        ValueError: too few runs on one rank, or on several.
+    """
+    alone, several = ([row for row in rows if low <= row.ranks <= high] for low, high in ((1, 1), (2, cores)))
+    rates = FrontRates.of([timed for row in several for timed in row.timed_fronts])
+    own = [_seconds_of_own(row, rates, of) for row in several]
+    sizes = _values(alone, of.unknowns)
+    each = np.divide(_values(several, of.unknowns), _values(several, "ranks")).tolist()
+    counted = [(getattr(row, of.unknowns), row.ranks, front) for row in rows for front in getattr(row, of.fronts)]
+    return Elimination(
+        alone_factor=fit_power(sizes, _values(alone, of.factor)),
+        alone_solve=fit_power(sizes, _values(alone, of.solve)),
+        own_factor=fit_power(each, [factor for factor, _ in own]),
+        own_solve=fit_power(each, [solve for _, solve in own]),
+        borders=Borders.of(counted),
+        rates=FrontRates(rates.factor, tuple(of.solves * rate for rate in rates.solve)),
+    )
+
+
+def _values(rows: Sequence[Row], name: str) -> list[float]:
+    """An attribute of all rows."""
+    return [getattr(row, name) for row in rows]
+
+
+def _seconds_of_own(row: Row, rates: FrontRates, of: Attributes) -> tuple[float, float]:
+    """What the factor and the solves of an iteration take without the last front."""
+    last = [front for front in getattr(row, of.fronts) if front.ranks == row.ranks]
+    factor, solve = rates.seconds(last)
+    found = getattr(row, of.factor), getattr(row, of.solve)
+    own = found[0] - factor, found[1] - of.solves * solve
+    return max(own[0], LEAST_OWN_SHARE * found[0]), max(own[1], LEAST_OWN_SHARE * found[1])

@@ -12,9 +12,9 @@ from math import ceil, log2, sqrt
 from statistics import median
 from typing import Any
 
-from scaling_elimination import Borders, Elimination, FrontRates, FrontSize
-from scaling_fit import Power, Shares, fit_power, fit_shares
-from scaling_report import ELIMINATION, GATHERS, MULTIGRID, NATURAL_SOLVES, SCALARS, SHARED, SUMS, VALUE_BYTES, Row
+from scaling_elimination import OF_COARSE, OF_NATURAL, Elimination, FrontSize, elimination_of
+from scaling_fit import Shares, fit_shares
+from scaling_report import ELIMINATION, GATHERS, MULTIGRID, SCALARS, SHARED, SUMS, VALUE_BYTES, Row
 
 from feti_homog.cell.tiles import DEFAULT_TILES
 
@@ -22,8 +22,6 @@ MESH, LOCAL, COARSE, MESSAGES = "mesh", "subdomains", "coarse problem", "message
 # Exchanges with neighbours in one cycle of multigrid: on each of about five levels six, for the products and smoothers
 # before and after the coarser level, the residual and the transfers.
 CYCLE_EXCHANGES = 30
-# Least share of the seconds of an elimination that a rank's own unknowns take, where its fronts seem to take all.
-LEAST_OWN_SHARE = 0.1
 
 
 @dataclass(frozen=True)
@@ -139,7 +137,7 @@ def _coarse_times(rows: Sequence[Row], cores: int) -> dict[str, Any]:
     """Powers of the coarse vectors where every rank factors, and shares that ranks deal out where all do together."""
     by_way = {way: [row for row in rows if row.way == way] for way in (ELIMINATION, SHARED, MULTIGRID)}
     shared, grids = ([row for row in by_way[way] if row.ranks <= cores] for way in (SHARED, MULTIGRID))
-    coarse, natural = (_elimination(by_way[ELIMINATION], cores, *of) for of in (OF_COARSE, OF_NATURAL))
+    coarse, natural = (elimination_of(by_way[ELIMINATION], cores, of) for of in (OF_COARSE, OF_NATURAL))
     factor, solve = coarse.alone_factor.exponent, coarse.alone_solve.exponent
     return dict(
         coarse=coarse,
@@ -150,55 +148,12 @@ def _coarse_times(rows: Sequence[Row], cores: int) -> dict[str, Any]:
     )
 
 
-# Of an elimination the unknowns, the seconds of its factor and of its solves in an iteration, the fronts, and how many
-# solves these are.
-OF_COARSE = "vectors", "coarse_factor", "coarse_solve", "coarse_fronts", 1
-OF_NATURAL = "kernel", "natural_factor", "natural_solve", "natural_fronts", NATURAL_SOLVES
-
-
-def _elimination(
-    rows: Sequence[Row], cores: int, unknowns: str, factor: str, solve: str, fronts: str, solves: int
-) -> Elimination:
-    """That of so many unknowns, attributes of the rows.
-
-    Raises:
-        ValueError: too few runs on one rank, or on several.
-    """
-    alone = [row for row in rows if row.ranks == 1]
-    several = [row for row in rows if 1 < row.ranks <= cores]
-    rates = FrontRates.of([timed for row in several for timed in row.timed_fronts])
-    own: dict[str, list[float]] = {factor: [], solve: []}
-    for row in several:
-        whole = [front for front in getattr(row, fronts) if front.ranks == row.ranks]
-        of_fronts = rates.seconds(whole)
-        for name, seconds, times in ((factor, of_fronts[0], 1), (solve, of_fronts[1], solves)):
-            all_of_it = getattr(row, name)
-            own[name].append(max(all_of_it - times * seconds, LEAST_OWN_SHARE * all_of_it))
-    each = [getattr(row, unknowns) / row.ranks for row in several]
-    counted = [
-        (getattr(row, unknowns), row.ranks, front) for row in rows if row.ranks > 1 for front in getattr(row, fronts)
-    ]
-    return Elimination(
-        alone_factor=_power(alone, unknowns, lambda row: getattr(row, factor)),
-        alone_solve=_power(alone, unknowns, lambda row: getattr(row, solve)),
-        own_factor=fit_power(each, own[factor]),
-        own_solve=fit_power(each, own[solve]),
-        borders=Borders.of(counted),
-        rates=FrontRates(rates.factor, tuple(solves * rate for rate in rates.solve)),
-    )
-
-
 def _multigrid(rows: Sequence[Row]) -> Multigrid | None:
     """Of the rows by multigrid, None without any."""
     if not rows:
         return None
     setup = _dealt(rows, 1.0, lambda row: row.coarse_factor)
     return Multigrid(setup, _dealt(rows, 1.0, lambda row: row.coarse_solve), max(r.inner for r in rows))
-
-
-def _power(rows: Sequence[Row], unknowns: str, seconds: Callable[[Row], float]) -> Power:
-    """The power of so many unknowns, an attribute of the rows, that takes them so many seconds."""
-    return fit_power([getattr(row, unknowns) for row in rows], [seconds(row) for row in rows])
 
 
 def _dealt(rows: Sequence[Row], exponent: float, seconds: Callable[[Row], float]) -> Shares:
@@ -320,7 +275,7 @@ def _messages(rates: Rates, machine: Machine, dofs: float, ranks: int, way: str 
     tree = machine.latency * ceil(log2(ranks))
     iteration = (GATHERS + SUMS) * exchange + SCALARS * tree
     fronts = rates.natural.borders.fronts(rates.kernel * dofs, ranks)
-    iteration += NATURAL_SOLVES * _front_messages(fronts, rates, machine)
+    iteration += OF_NATURAL.solves * _front_messages(fronts, rates, machine)
     told = sum(front.left**2 for front in fronts)
     if way is None or way == ELIMINATION:
         fronts = rates.coarse.borders.fronts(rates.vectors * dofs, ranks)

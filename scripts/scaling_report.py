@@ -17,8 +17,8 @@ COLUMNS = (
 )  # fmt: skip
 VALUE_BYTES = 8
 # What one iteration does: exchanges of multipliers (a gather and a sum each for the operator and the preconditioner),
-# solves with the rigid-body motions, and sums over ranks of single numbers by the Krylov method.
-GATHERS, SUMS, NATURAL_SOLVES, SCALARS = 2, 2, 2, 3
+# and sums over ranks of single numbers by the Krylov method.
+GATHERS, SUMS, SCALARS = 2, 2, 3
 # How the coarse problem is solved: by elimination on a tree of ranks, by PETSc with one factor of all ranks, or with
 # multigrid.
 ELIMINATION, SHARED, MULTIGRID = ("elimination", "shared", "multigrid")

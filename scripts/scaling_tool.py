@@ -63,7 +63,7 @@ OPTIONS: dict[str, dict[str, str | float]] = {
     },
 }  # fmt: skip
 # Fronts that are timed on two ranks, one after the other and together: unknowns that are eliminated, and left.
-FRONTS = ((60, 200), (200, 600), (500, 1000), (1000, 1600), (2000, 0), (2000,2000))
+FRONTS = ((60, 200), (200, 600), (500, 1000), (1000, 1600), (2000, 0), (2000, 2000))
 
 
 def main() -> int:

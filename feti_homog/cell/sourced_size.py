@@ -26,9 +26,9 @@ class SourcedSize:
     A source k counts within the distance at which one of length 0 that grows by MAX_GROWTH is at the largest.
     """
 
-    def __init__(self, sources: Sequence[Source], size: Float, largest: float) -> None:
-        """`size` (2,) are the periods of the torus."""
-        self._size, self._largest, self._bound = size, largest, largest / MAX_GROWTH
+    def __init__(self, sources: Sequence[Source], size: Float, largest: float, chunk: int = CHUNK) -> None:
+        """`size` (2,) are the periods of the torus, and so many positions are looked at at once."""
+        self._size, self._largest, self._bound, self._chunk = size, largest, largest / MAX_GROWTH, chunk
         places, lengths, growths = (np.concatenate(parts) for parts in zip(*sources, strict=True))
         self._places = wrap(places, size)
         # Where the tree finds no more, it gives the source behind the last: an infinite one.
@@ -37,8 +37,8 @@ class SourcedSize:
 
     def __call__(self, points: Float) -> Float:
         """(n,) at points (n, 2)."""
-        wrapped = wrap(points, self._size)
-        return np.concatenate([self._near(wrapped[k : k + CHUNK]) for k in range(0, max(1, len(points)), CHUNK)])
+        wrapped, chunk = wrap(points, self._size), self._chunk
+        return np.concatenate([self._near(wrapped[k : k + chunk]) for k in range(0, max(1, len(points)), chunk)])
 
     def _near(self, points: Float) -> Float:
         count = min(NEAREST, len(self._places))
@@ -55,9 +55,9 @@ class SourcedSize:
         short = half < self._bound
         sizes = np.empty(points.shape[:2])
         sizes[~short] = self(points[~short].reshape(-1, 2)).reshape(-1, points.shape[1])
-        lines = np.flatnonzero(short)
-        for k in range(0, len(lines), CHUNK // NEAREST_OF_LINE):
-            some = lines[k : k + CHUNK // NEAREST_OF_LINE]
+        lines, chunk = np.flatnonzero(short), max(1, self._chunk // NEAREST_OF_LINE)
+        for k in range(0, len(lines), chunk):
+            some = lines[k : k + chunk]
             sizes[some] = self._on_some(points[some], middle[some], half[some])
         return sizes
 

@@ -25,6 +25,21 @@ def _direct_solver(prefix: str, matrix: str, library: str = "cholmod") -> tuple[
     )
 
 
+def _coarse_solver(prefix: str, matrix: str) -> tuple[Option, ...]:
+    """The options of a matrix of all ranks, eliminated on a tree of these unless a type of solver is given."""
+    return (
+        Option(f"{prefix}ksp_type", "preonly|cg|...", "", f"solves with {matrix} by PETSc, in place of elimination"),
+        Option(f"{prefix}ksp_rtol", "<real>", "1e-10", "their relative tolerance, of an iterative method"),
+        Option(f"{prefix}pc_type", "cholesky|gamg|...", "", "one factor by PETSc, or the preconditioner of cg, so too"),
+        Option(
+            f"{prefix}pc_factor_mat_solver_type",
+            "cholmod|mumps|...",
+            "cholmod",
+            "library of what a rank eliminates for itself; mumps of one factor by PETSc",
+        ),
+    )
+
+
 OPTIONS = (
     Option("feti_ksp_type", "cg|fcg|gmres|...", "cg", "Krylov method on the projected dual operator"),
     Option("feti_ksp_rtol", "<real>", "1e-8", "relative tolerance of the dual and the primal residuals"),
@@ -60,16 +75,8 @@ OPTIONS = (
     Option("feti_sub_ksp_type", "preonly|...", "preonly", "solves with implicit subdomains"),
     *_direct_solver("feti_sub_", "implicit subdomains"),
     *_direct_solver("feti_interior_", "interiors, of implicit subdomains and for fields"),
-    *_direct_solver("feti_natural_", "the rigid-body coarse problem"),
-    Option("feti_coarse_ksp_type", "preonly|cg|...", "preonly", "solves with the adaptive coarse problem"),
-    Option("feti_coarse_ksp_rtol", "<real>", "1e-10", "their relative tolerance, of an iterative method"),
-    Option("feti_coarse_pc_type", "cholesky|lu|gamg|...", "cholesky", "its factorization, or the preconditioner of cg"),
-    Option(
-        "feti_coarse_pc_factor_mat_solver_type",
-        "cholmod|mumps|...",
-        "cholmod",
-        "library of that factorization; mumps where all ranks share one",
-    ),
+    *_coarse_solver("feti_natural_", "the rigid-body coarse problem"),
+    *_coarse_solver("feti_coarse_", "the adaptive coarse problem"),
     *_direct_solver("feti_bonded_", "the cell with all bonds intact, for influence columns"),
 )
 """Every option that a run accepts whether or not it makes the solver which reads it."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from feti_homog.cell import sourced_size
 from feti_homog.cell.sourced_size import MAX_GROWTH, SourcedSize
 
 SIZE = np.array([1.0, 0.8])
@@ -37,11 +36,10 @@ def lines(length, points=9):
 
 @pytest.mark.parametrize("length", [0.01, 0.1, 0.5])
 @pytest.mark.parametrize("count", [1, 20, 150])
-def test_lines_are_as_their_points(length, count, monkeypatch):
+def test_lines_are_as_their_points(length, count):
     """Short and long ones, in several parts."""
-    monkeypatch.setattr(sourced_size, "CHUNK", 200)
     some, along = sources(count), lines(length)
-    size = SourcedSize([some], SIZE, LARGEST)
+    size = SourcedSize([some], SIZE, LARGEST, chunk=200)
     expected = brute_force(some, along.reshape(-1, 2))
     assert expected.min() < 0.9 * LARGEST or count == 1
     np.testing.assert_allclose(size(along.reshape(-1, 2)), expected, rtol=1e-13)
