@@ -7,7 +7,7 @@ from itertools import product
 import numpy as np
 from scipy.spatial import cKDTree
 
-from feti_homog.typing import Float, Int
+from feti_homog.typing import Bool, Float, Int
 
 
 def neighbours(centres: Float, size: Float, reach: float) -> tuple[Int, Int, Float]:
@@ -18,15 +18,24 @@ def neighbours(centres: Float, size: Float, reach: float) -> tuple[Int, Int, Flo
     inside = centres % size
     points, owner = [inside], [np.arange(len(centres))]
     for step in product((-1, 0, 1), repeat=2):
-        image = inside + np.array(step) * size
-        near = np.all((image > -reach) & (image < size + reach), axis=1)
         if any(step):
-            points.append(image[near])
-            owner.append(np.flatnonzero(near))
+            near = np.flatnonzero(_is_near(inside, np.array(step), size, reach))
+            points.append(inside[near] + np.array(step) * size)
+            owner.append(near)
     place, who = np.concatenate(points), np.concatenate(owner)
-    pairs = cKDTree(place).query_pairs(reach, output_type="ndarray")
-    pairs = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
-    first, second = pairs[:, 0], pairs[:, 1]
-    keep = (first < len(centres)) & (who[first] <= who[second])
+    # A tree that is used once is not worth being balanced.
+    pairs = cKDTree(place, balanced_tree=False, compact_nodes=False).query_pairs(reach, output_type="ndarray")
+    first, second = pairs.T
+    keep = np.flatnonzero((first < len(centres)) & (who[first] <= who[second]))
+    keep = keep[np.argsort(first[keep] * len(place) + second[keep])]
     first, second = first[keep], second[keep]
     return who[first], who[second], place[second] - place[first]
+
+
+def _is_near(inside: Float, step: Int, size: Float, reach: float) -> Bool:
+    """(n,) which of the points (n, 2) have an image, by so many periods, that is nearer than `reach` to the cell."""
+    near = np.ones(len(inside), bool)
+    for axis in np.flatnonzero(step):
+        image = inside[:, axis] + step[axis] * size[axis]
+        near &= (image > -reach) & (image < size[axis] + reach)
+    return near
