@@ -10,13 +10,11 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scaling_fit import Power, fit_power, nonnegative
 
-from feti_homog.feti.thresholds import FRONT_BLOCK
+from feti_homog.feti.thresholds import BLOCKS_OF_A_RANK, FRONT_BLOCK
 
 if TYPE_CHECKING:
     from scaling_report import Row
 
-# Blocks of columns that a rank has of a front at least, as in `feti.linalg.shared_fronts`.
-LEAST_BLOCKS = 2
 VALUE_BYTES = 8
 # Least share of the seconds of an elimination that a rank's own unknowns take, where its fronts seem to take all.
 LEAST_OWN_SHARE = 0.1
@@ -47,7 +45,7 @@ class FrontSize(NamedTuple):
     @property
     def sharers(self) -> int:
         """Ranks that eliminate it."""
-        return min(self.ranks, max(1, int(self.n / (LEAST_BLOCKS * FRONT_BLOCK))))
+        return min(self.ranks, max(1, int(self.n / (BLOCKS_OF_A_RANK * FRONT_BLOCK))))
 
     def work(self, sharers: int) -> tuple[float, float, float, float]:
         """Of each sharer: multiplications, entries that are summed, entries that it is told, and one call."""

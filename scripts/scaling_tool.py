@@ -38,9 +38,9 @@ from feti_homog.feti.decomposition.jump_operator import JumpOperator  # noqa: E4
 from feti_homog.feti.linalg.fronts import Front  # noqa: E402
 from feti_homog.feti.linalg.rank_tree import Meeting  # noqa: E402
 from feti_homog.feti.linalg.remainder import Remainder  # noqa: E402
-from feti_homog.feti.linalg.shared_fronts import LEAST_BLOCKS, meet  # noqa: E402
+from feti_homog.feti.linalg.shared_fronts import meet  # noqa: E402
 from feti_homog.feti.linalg.tree_elimination import TreeElimination  # noqa: E402
-from feti_homog.feti.thresholds import FRONT_BLOCK  # noqa: E402
+from feti_homog.feti.thresholds import BLOCKS_OF_A_RANK, FRONT_BLOCK  # noqa: E402
 from feti_homog.homogenization.unit_cell import TornCell, tear  # noqa: E402
 from feti_homog.typing import Float, Int  # noqa: E402
 
@@ -259,7 +259,7 @@ def timed_fronts(comm: MPI.Intracomm) -> list[tuple[int, int, int, float, float]
                 front.backward(y, none)
 
             times = comm.allreduce(min(seconds), MPI.MAX), comm.allreduce(_fastest(solve), MPI.MAX)
-            found.append((e, f, min(sharers, max(1, n // (LEAST_BLOCKS * block))), *times))
+            found.append((e, f, min(sharers, max(1, n // (BLOCKS_OF_A_RANK * block))), *times))
     return found
 
 

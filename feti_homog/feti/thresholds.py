@@ -59,8 +59,9 @@ DEFAULTS = Thresholds()
 ITERATIVE_RTOL = 1e-10
 # Per cent more workspace than MUMPS estimates: its own 20 were too little for a matrix of 13 084 rows on two ranks.
 MUMPS_EXTRA_WORKSPACE_PERCENT = 100
-# Columns of a front that several ranks eliminate together, which each gets at once.
-FRONT_BLOCK = 64
+# Columns of a front that several ranks eliminate together, which each gets at once, and blocks of so many that each has
+# of it at least (`scripts/scaling` times fronts alone and together).
+FRONT_BLOCK, BLOCKS_OF_A_RANK = 64, 2
 # Entries of dense blocks that wait to be added to a sparse sum, at least: 16 bytes each.
 MAX_BUFFERED_ENTRIES = 4_000_000
 # Right-hand sides up to which the library is faster with one after the other than with all at once.

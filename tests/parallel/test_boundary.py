@@ -138,8 +138,8 @@ def test_adaptive_space_is_refused_where_boundaries_are_too_large(comm):
         torn_cells.tear(comm, **case, petsc={"feti_coarse_space": "adaptive"}, thresholds=SMALL_DENSE)
 
 
-# Pieces of 100 dofs, at most 50 of a cell; bodies are cut above 250 dofs, or 80 of the boundary where bonds break.
-SMALL_PIECES = PartitionPolicy(piece_dofs=100, max_pieces=50, breakable_boundary_dofs=80)
+# Pieces of 100 dofs; bodies are cut above 250 dofs, or 80 of the boundary where bonds break.
+SMALL_PIECES = PartitionPolicy(piece_dofs=100, breakable_boundary_dofs=80)
 
 
 def wanted(load, edges, interface=None, n_ranks=1, refine=0, policy=SMALL_PIECES):
@@ -157,17 +157,16 @@ def test_large_bodies_are_cut():
     assert wanted([60, 65], [10, 10], refine=1) == [1, 3]
 
 
-def test_pieces_of_very_large_bodies_are_larger():
+def test_pieces_do_not_grow_with_their_body():
     assert wanted([5000], [10]) == [50]
-    assert wanted([20_000, 30], [10, 10]) == [50, 1]
+    assert wanted([20_000, 30], [10, 10]) == [200, 1]
 
 
 def test_bodies_that_can_be_shared_evenly_are_whole_up_to_a_larger_size():
-    policy = replace(SMALL_PIECES, max_pieces=1000)
     load, edges = [600] * 100 + [1300], [10] * 101
-    assert wanted(load, edges, policy=policy) == [1] * 100 + [13]
-    assert wanted(load, edges, n_ranks=16, policy=policy) == [6] * 100 + [13]
-    assert wanted([600] * 2, [400, 800], policy=policy) == [6, 6]
+    assert wanted(load, edges) == [1] * 100 + [13]
+    assert wanted(load, edges, n_ranks=16) == [6] * 100 + [13]
+    assert wanted([600] * 2, [400, 800]) == [6, 6]
 
 
 def test_bodies_that_debond_are_whole_unless_their_boundary_is_wide():

@@ -11,10 +11,8 @@ from scipy.linalg.blas import dgemm, dtrsm
 from feti_homog.feti.linalg.fronts import Front, cholesky, eliminated_alone
 from feti_homog.feti.linalg.rank_tree import Meeting, subgroup
 from feti_homog.feti.linalg.remainder import FrontLayout, Remainder, summed
+from feti_homog.feti.thresholds import BLOCKS_OF_A_RANK
 from feti_homog.typing import Float, Int
-
-# Blocks of columns that a rank has of a front at least, if others have some.
-LEAST_BLOCKS = 2
 
 
 @dataclass(frozen=True)
@@ -68,7 +66,7 @@ def meet(meeting: Meeting, own: Remainder, block: int) -> tuple[Front, Remainder
     what it leaves.
     """
     layout = FrontLayout.of(meeting, own)
-    sharers = min(meeting.comm.size, max(1, layout.n // (LEAST_BLOCKS * block)))
+    sharers = min(meeting.comm.size, max(1, layout.n // (BLOCKS_OF_A_RANK * block)))
     starts = _starts(layout, block)
     owner = np.repeat(np.arange(len(starts) - 1) % sharers, np.diff(starts))
     A = summed(meeting, own, layout, owner)
