@@ -18,7 +18,7 @@ from scipy.linalg.lapack import dtrtri
 from scipy.sparse import csr_matrix, diags, kronsum
 
 from feti_homog.feti import thresholds
-from feti_homog.feti.linalg.distributed_direct import DistributedDirectSolver
+from feti_homog.feti.linalg.distributed_solver import DistributedSolver
 from feti_homog.feti.linalg.packed_symmetric import full_from_lower
 from feti_homog.feti.linalg.sparse_direct import DirectSolver
 
@@ -42,9 +42,7 @@ def compare(title: str, pairs: list[tuple[int, float, float]], small: str, large
         print(f"{size:6}{first:16.1f}{second:16.1f}")
 
 
-def sparse_columns(
-    solver: DirectSolver | DistributedDirectSolver, matrix: csr_matrix
-) -> list[tuple[int, float, float]]:
+def sparse_columns(solver: DirectSolver | DistributedSolver, matrix: csr_matrix) -> list[tuple[int, float, float]]:
     """Solves for columns one after the other, and all at once."""
     found = []
     for k in COLUMNS:
@@ -91,7 +89,9 @@ def main() -> None:
     m = round(dofs**0.5)
     line = diags([-1, 2.1, -1], [-1, 0, 1], (m, m))
     matrix = kronsum(line, line).tocsr()
-    cholmod, mumps = DirectSolver(matrix, "measure_"), DistributedDirectSolver(MPI.COMM_SELF, matrix, "measure_")
+    n = matrix.shape[0]
+    cholmod = DirectSolver(matrix, "measure_")
+    mumps = DistributedSolver(MPI.COMM_SELF, n, np.arange(n), matrix, "measure_")
     for solver, name in ((cholmod, "CHOLMOD"), (mumps, "MUMPS")):
         title = f"{name}_COLUMNS_ONE_BY_ONE = {solver.max_columns_one_by_one}"
         compare(title, sparse_columns(solver, matrix), "one by one", "at once")
