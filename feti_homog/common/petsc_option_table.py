@@ -27,23 +27,13 @@ def _direct_solver(prefix: str, matrix: str, library: str = "cholmod") -> tuple[
 
 def _coarse_solver(prefix: str, matrix: str) -> tuple[Option, ...]:
     """The options of a matrix of all ranks, eliminated on a tree of these unless a type of solver is given."""
+    given = f"if given, PETSc solves with {matrix}, not elimination"
+    library = "library of what a rank eliminates for itself; of one factor by PETSc: mumps"
     return (
-        Option(
-            f"{prefix}ksp_type", "preonly|cg|...", "preonly", f"solves with {matrix} by PETSc, in place of elimination"
-        ),
-        Option(f"{prefix}ksp_rtol", "<real>", "1e-10", "their relative tolerance, of an iterative method"),
-        Option(
-            f"{prefix}pc_type",
-            "cholesky|gamg|...",
-            "cholesky",
-            "one factor by PETSc, or the preconditioner of cg, so too",
-        ),
-        Option(
-            f"{prefix}pc_factor_mat_solver_type",
-            "cholmod|mumps|...",
-            "cholmod",
-            "library of what a rank eliminates for itself; mumps of one factor by PETSc",
-        ),
+        Option(f"{prefix}ksp_type", "preonly|cg|...", "preonly", given),
+        Option(f"{prefix}ksp_rtol", "<real>", "1e-10", "relative tolerance of cg there"),
+        Option(f"{prefix}pc_type", "cholesky|gamg|...", "cholesky", f"{given}: one factor, or preconditioned cg"),
+        Option(f"{prefix}pc_factor_mat_solver_type", "cholmod|mumps|...", "cholmod", library),
     )
 
 
