@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scaling_fit import Power, fit_power, nonnegative
 
-from feti_homog.feti.thresholds import BLOCKS_OF_A_RANK, FRONT_BLOCK
+from feti_homog.feti.thresholds import front_sharers
 
 if TYPE_CHECKING:
     from scaling_report import Row
@@ -45,7 +45,7 @@ class FrontSize(NamedTuple):
     @property
     def sharers(self) -> int:
         """Ranks that eliminate it."""
-        return min(self.ranks, max(1, int(self.n / (BLOCKS_OF_A_RANK * FRONT_BLOCK))))
+        return front_sharers(self.n, self.ranks)
 
     def work(self, sharers: int) -> tuple[float, float, float, float]:
         """Of each sharer: multiplications, entries that are summed, entries that it is told, and one call."""

@@ -12,9 +12,9 @@ from math import ceil, log2, sqrt
 from statistics import median
 from typing import Any
 
-from scaling_elimination import OF_COARSE, OF_NATURAL, Elimination, FrontSize, elimination_of
+from scaling_elimination import OF_COARSE, OF_NATURAL, VALUE_BYTES, Elimination, FrontSize, elimination_of
 from scaling_fit import Shares, fit_shares
-from scaling_report import ELIMINATION, GATHERS, MULTIGRID, SCALARS, SHARED, SUMS, VALUE_BYTES, Row
+from scaling_report import ELIMINATION, GATHERS, MULTIGRID, SCALARS, SHARED, SUMS, Row
 
 from feti_homog.cell.tiles import DEFAULT_TILES
 

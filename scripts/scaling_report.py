@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from scaling_elimination import FrontSize, TimedFront
+from scaling_elimination import VALUE_BYTES, FrontSize, TimedFront
 
 STAGES = ("mesh", "assemble", "set-up", "solve")
 COLUMNS = (
@@ -15,7 +15,6 @@ COLUMNS = (
     "messages", "front", "way", "coarse_factor", "coarse_solve", "natural_factor", "natural_solve", "inner", "solver",
     "total",
 )  # fmt: skip
-VALUE_BYTES = 8
 # What one iteration does: exchanges of multipliers (a gather and a sum each for the operator and the preconditioner),
 # and sums over ranks of single numbers by the Krylov method.
 GATHERS, SUMS, SCALARS = 2, 2, 3

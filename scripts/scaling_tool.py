@@ -12,7 +12,6 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -35,12 +34,13 @@ from feti_homog.config.case import Case  # noqa: E402
 from feti_homog.feti.coarse.adaptive import AdaptiveCoarseSpace  # noqa: E402
 from feti_homog.feti.coarse.natural import NaturalCoarseSpace  # noqa: E402
 from feti_homog.feti.decomposition.jump_operator import JumpOperator  # noqa: E402
+from feti_homog.feti.linalg.distributed_solver import RenewedSolver  # noqa: E402
 from feti_homog.feti.linalg.fronts import Front  # noqa: E402
 from feti_homog.feti.linalg.rank_tree import Meeting  # noqa: E402
 from feti_homog.feti.linalg.remainder import Remainder  # noqa: E402
 from feti_homog.feti.linalg.shared_fronts import meet  # noqa: E402
 from feti_homog.feti.linalg.tree_elimination import TreeElimination  # noqa: E402
-from feti_homog.feti.thresholds import BLOCKS_OF_A_RANK, FRONT_BLOCK  # noqa: E402
+from feti_homog.feti.thresholds import FRONT_BLOCK, front_sharers  # noqa: E402
 from feti_homog.homogenization.unit_cell import TornCell, tear  # noqa: E402
 from feti_homog.typing import Float, Int  # noqa: E402
 
@@ -209,7 +209,7 @@ def _coarse(
     right[1::2] = -1.0
     solve = _fastest(lambda: coarse.solve(right))
     natural_solve = _fastest(lambda: natural.solve(natural.solve(motions)))
-    inner = coarse.inner_iterations
+    inner = coarse.solver.iterations
     part = coarse.part()
     process_memory.forget_peak()
     before = peak()
@@ -230,11 +230,11 @@ def _coarse(
     }
 
 
-def _fronts(solver: object, comm: MPI.Intracomm) -> list[tuple[int, int, int]]:
+def _fronts(solver: RenewedSolver, comm: MPI.Intracomm) -> list[tuple[int, int, int]]:
     """As `FrontSize`, those of all ranks."""
     own = []
-    if isinstance(solver, TreeElimination):
-        first = (front for front in solver.fronts if front.meeting.comm.rank == 0)
+    if isinstance(solver.current, TreeElimination):
+        first = (front for front in solver.current.fronts if front.meeting.comm.rank == 0)
         own = [(len(front.L), front.left, front.meeting.comm.size) for front in first]
     return [size for some in comm.allgather(own) for size in some]
 
@@ -249,17 +249,20 @@ def timed_fronts(comm: MPI.Intracomm) -> list[tuple[int, int, int, float, float]
         copies, once = np.where(np.arange(n) < e, 2, 3), np.ones(n, np.int64)
         own = Remainder(np.arange(n), copies, once, np.arange(n), matrix)
         left, none = np.ones((n, LOADS)), np.zeros((0 if comm.rank else f, LOADS))
-        for sharers, block in ((1, n), (2, FRONT_BLOCK)):
+        for block in (n, FRONT_BLOCK):
+            meet(meeting, own, block)[0].destroy()  # the first is slower
             comm.Barrier()
-            seconds = [_seconds(partial(meet, meeting, own, block)) for _ in range(2)]
+            start = time.perf_counter()
             front, _ = meet(meeting, own, block)
+            seconds = time.perf_counter() - start
 
             def solve(front: Front = front, left: Float = left, none: Float = none) -> None:
                 y, _ = front.forward(left)
                 front.backward(y, none)
 
-            times = comm.allreduce(min(seconds), MPI.MAX), comm.allreduce(_fastest(solve), MPI.MAX)
-            found.append((e, f, min(sharers, max(1, n // (BLOCKS_OF_A_RANK * block))), *times))
+            times = comm.allreduce(seconds, MPI.MAX), comm.allreduce(_fastest(solve), MPI.MAX)
+            found.append((e, f, front_sharers(n, comm.size, block), *times))
+            front.destroy()
     return found
 
 

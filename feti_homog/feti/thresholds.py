@@ -62,6 +62,13 @@ MUMPS_EXTRA_WORKSPACE_PERCENT = 100
 # Columns of a front that several ranks eliminate together, which each gets at once, and blocks of so many that each has
 # of it at least (`scripts/scaling` times fronts alone and together).
 FRONT_BLOCK, BLOCKS_OF_A_RANK = 64, 2
+
+
+def front_sharers(unknowns: float, ranks: int, block: int = FRONT_BLOCK) -> int:
+    """How many of the ranks that meet at a front of so many unknowns eliminate it, in blocks of so many columns."""
+    return min(ranks, max(1, int(unknowns // (BLOCKS_OF_A_RANK * block))))
+
+
 # Entries of dense blocks that wait to be added to a sparse sum, at least: 16 bytes each.
 MAX_BUFFERED_ENTRIES = 4_000_000
 # Right-hand sides up to which the library is faster with one after the other than with all at once.

@@ -11,7 +11,7 @@ from feti_homog.common.petsc_ctypes import option_was_used
 from feti_homog.common.petsc_options import case_options
 from feti_homog.errors import CaseError
 from feti_homog.feti.linalg import own_unknowns
-from feti_homog.feti.linalg.distributed_solver import DistributedSolver, distributed_solver
+from feti_homog.feti.linalg.distributed_solver import DistributedSolver, RenewedSolver
 from feti_homog.feti.linalg.rank_tree import RankTree
 from feti_homog.feti.linalg.tree_elimination import TreeElimination
 
@@ -43,7 +43,9 @@ def share(comm, matrix, holder):
 
 def made(comm, total, unknowns, part):
     """The solver that the options ask for."""
-    return distributed_solver(RankTree(comm, total, unknowns), total, unknowns, part, "test_")
+    solver = RenewedSolver(comm, total, unknowns, "test_")
+    solver.factor(unknowns, part)
+    return solver
 
 
 def eliminated(comm, total, unknowns, part, block):
@@ -68,7 +70,7 @@ def test_the_sum_of_the_parts_is_solved(comm, kind, columns):
     x = np.random.default_rng(3).standard_normal((A.shape[0], *columns))
     with case_options(KINDS[kind]):
         solver = made(comm, A.shape[0], unknowns, part)
-    assert isinstance(solver, DistributedSolver if kind in ("one factor", "cg") else TreeElimination)
+    assert isinstance(solver.current, DistributedSolver if kind in ("one factor", "cg") else TreeElimination)
     # The parts of the right-hand side sum to A x.
     found = solver.solve(part @ x[unknowns])
     solver.destroy()
@@ -166,7 +168,7 @@ def test_the_library_of_the_own_factor_is_an_option(comm, library):
     with case_options({LIBRARY: library}):
         solver = made(comm, 2 * comm.size, unknowns, part)
         assert option_was_used(LIBRARY)
-    assert solver._own.solver._ksp.getPC().getFactorSolverType() == library
+    assert solver.current._own.solver._ksp.getPC().getFactorSolverType() == library
     np.testing.assert_allclose(solver.solve(part @ [1.0, 2.0]), [1.0, 2.0], rtol=1e-12)
     solver.destroy()
 

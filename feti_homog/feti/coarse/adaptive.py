@@ -25,10 +25,8 @@ from feti_homog.feti.coarse.geneo import kernels_and_soft_modes, local_columns, 
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.neighbours import Neighbours
 from feti_homog.feti.linalg.dense_block_sum import DenseBlockSum
-from feti_homog.feti.linalg.distributed_solver import DistributedSolver, distributed_solver
-from feti_homog.feti.linalg.rank_tree import RankTree
+from feti_homog.feti.linalg.distributed_solver import RenewedSolver
 from feti_homog.feti.linalg.scaled_sparse import scaled
-from feti_homog.feti.linalg.tree_elimination import TreeElimination
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.preconditioners.scaled import StiffnessScaled
 from feti_homog.feti.thresholds import COARSE_REGULARISATIONS, DEFAULTS, FREE_MODE_ENERGY, Thresholds
@@ -47,7 +45,7 @@ class AdaptiveCoarseSpace:
         counts: soft modes of each of this rank's subdomains.
         coarse_dimension: coarse displacements, n.
         factorizations: of Z_0^T S Z_0 so far.
-        solver: of Z_0^T S Z_0; None without coarse displacements.
+        solver: of Z_0^T S Z_0, scaled.
     """
 
     def __init__(
@@ -60,7 +58,7 @@ class AdaptiveCoarseSpace:
         thresholds: Thresholds = DEFAULTS,
     ) -> None:
         """Find the modes below the threshold tau and factor.  All boundary operators must be dense but of large
-        bodies.  Options under `feti_coarse_` as of `distributed_solver`.  Collective.
+        bodies.  Options under `feti_coarse_` as of `RenewedSolver`.  Collective.
 
         Raises:
             MeshError: the neighbourhood of a face, on any rank, is no subdomain.
@@ -75,7 +73,7 @@ class AdaptiveCoarseSpace:
         self.counts = [v.shape[1] - b.R.shape[1] for v, b in zip(V, blocks, strict=True)]
         self._modes = AveragedModes(comm, blocks, self._neighbours, V)
         self.coarse_dimension = self._modes.total
-        self._tree = RankTree(comm, self.coarse_dimension, self._modes.reaching)
+        self.solver = RenewedSolver(comm, self.coarse_dimension, self._modes.reaching, "feti_coarse_")
         self._columns = [np.searchsorted(self._modes.reaching, columns) for columns in self._modes.columns]
         self._translations = self._modes.translations(comm)
         # Of each subdomain S Z_0 on its boundary dofs, and Z_0^T S Z_0.
@@ -85,7 +83,6 @@ class AdaptiveCoarseSpace:
         self._update(range(len(blocks)), [block.BW for block in blocks])
         process_memory.trim()
         self.factorizations = 0
-        self.solver: TreeElimination | DistributedSolver | None = None
         self._free_energy: Float | None = None
         self.factor(self.part())
 
@@ -127,7 +124,6 @@ class AdaptiveCoarseSpace:
             LinAlgError: rounding leaves the matrix indefinite by more than all of COARSE_REGULARISATIONS.
             CaseError: the library that the options name cannot factor the matrix, or not on that many ranks.
         """
-        self._destroy_factor()
         self.factorizations += 1
         if not self.coarse_dimension:
             return
@@ -136,10 +132,11 @@ class AdaptiveCoarseSpace:
             largest = self.comm.allreduce(energy.max(initial=0.0), MPI.MAX)
             self._free_energy = FREE_MODE_ENERGY * np.where(energy > 0.0, energy, largest)
         self._weights = 1.0 / np.sqrt(np.maximum(energy, self._free_energy))
-        matrix = scaled(part, self._weights)
+        matrix, near_kernel = scaled(part, self._weights), self._translations / self._weights[:, None]
         for regularisation in COARSE_REGULARISATIONS:
             try:
-                self.solver = self._factored((matrix + diags(regularisation * self._modes.is_own)).tocsr())
+                regularised = (matrix + diags(regularisation * self._modes.is_own)).tocsr()
+                self.solver.factor(self._modes.reaching, regularised, near_kernel)
                 return
             except np.linalg.LinAlgError:
                 if regularisation == COARSE_REGULARISATIONS[-1]:
@@ -151,12 +148,6 @@ class AdaptiveCoarseSpace:
         whole[self._modes.reaching] = values
         summed: Float = allreduce_sum(self.comm, whole)[self._modes.reaching]
         return summed
-
-    def _factored(self, matrix: csr_matrix) -> TreeElimination | DistributedSolver:
-        """Solves with the sum of all ranks' parts of the scaled matrix."""
-        near_kernel = self._translations / self._weights[:, None]
-        unknowns = self.coarse_dimension, self._modes.reaching
-        return distributed_solver(self._tree, *unknowns, matrix, "feti_coarse_", near_kernel)
 
     def balanced(self, x: Float) -> Float:
         """The forces S_0 x (boundary dofs,) or (boundary dofs, k) of displacements x of that shape.  Collective."""
@@ -173,24 +164,12 @@ class AdaptiveCoarseSpace:
 
     def solve(self, work: Float) -> Float:
         """c with Z_0^T S Z_0 c = the sum over ranks of work, (u,) or (u, k) both.  Collective."""
-        assert self.solver is not None, "the factor is destroyed"
         return scale_rows(self._weights, self.solver.solve(scale_rows(self._weights, work)))
-
-    @property
-    def inner_iterations(self) -> int:
-        """Of the last solve for one column, where the options ask for an iterative method; else 1."""
-        return self.solver.iterations if isinstance(self.solver, DistributedSolver) else 1
 
     def _parts(self) -> zip[tuple[Int, Float, slice]]:
         """Of each subdomain places of the modes that reach it, S Z_0, and where it is among the boundary dofs."""
         return zip(self._columns, self._forces, self._operators.slices, strict=True)
 
     def destroy(self) -> None:
-        """Free the factor, for good.  Collective."""
-        self._destroy_factor()
-        self._tree.destroy()
-
-    def _destroy_factor(self) -> None:
-        if self.solver is not None:
-            self.solver.destroy()
-            self.solver = None
+        """Free the solver.  Collective."""
+        self.solver.destroy()

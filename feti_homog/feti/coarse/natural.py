@@ -12,9 +12,7 @@ from feti_homog.common.distributed_arrays import allreduce_sum
 from feti_homog.feti.coarse.gram_matrix import GramMatrix
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.linalg.distributed_matrix import assemble_owned_rows
-from feti_homog.feti.linalg.distributed_solver import DistributedSolver, distributed_solver
-from feti_homog.feti.linalg.rank_tree import RankTree
-from feti_homog.feti.linalg.tree_elimination import TreeElimination
+from feti_homog.feti.linalg.distributed_solver import RenewedSolver
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.thresholds import UNCONSTRAINED_EIGENVALUE
 from feti_homog.typing import Float, Int
@@ -36,7 +34,7 @@ class NaturalCoarseSpace:
         unconstrained_modes: (m, z) orthonormal amplitudes of the motions that no active row resists.
         unknowns: (u,) the modes that this rank's rows, or motions that nothing resists, concern, and its own.
         factorizations: of G^T G so far.
-        solver: of G^T G; None without kernels.
+        solver: of G^T G.
     """
 
     def __init__(
@@ -45,7 +43,7 @@ class NaturalCoarseSpace:
         jump_operator: JumpOperator,
         operators: InterfaceOperators,
     ) -> None:
-        """Assemble G and factor for all rows.  Options under `feti_natural_` as of `distributed_solver`.
+        """Assemble G and factor for all rows.  Options under `feti_natural_` as of `RenewedSolver`.
         Collective."""
         subdomains = operators.subdomains
         kernels = [s.R[dofs] for s, dofs in zip(subdomains, operators.dofs, strict=True)]
@@ -67,8 +65,7 @@ class NaturalCoarseSpace:
         self._largest_diagonal = float(comm.allreduce(squares).max(initial=0.0))
         self.unconstrained_modes = np.zeros((self.kernel_dimension, 0))
         self._reaching = np.union1d(self.G.indices, columns).astype(np.int64)
-        self._tree = RankTree(comm, self.kernel_dimension, self._reaching)
-        self.solver: TreeElimination | DistributedSolver | None = None
+        self.solver = RenewedSolver(comm, self.kernel_dimension, self._reaching, "feti_natural_")
         self.factor()
 
     def activate(self, active: Float) -> None:
@@ -82,7 +79,6 @@ class NaturalCoarseSpace:
 
     def factor(self) -> None:
         """Factor G^T G of the active rows.  Collective."""
-        self._destroy_factor()
         if not self.kernel_dimension:
             return
         Z = self._own_unconstrained_modes()
@@ -91,7 +87,7 @@ class NaturalCoarseSpace:
         self._GT = self._G.T.tocsr()
         Z = Z[:, self.unknowns]
         gram = (self._GT @ self._G + self._largest_diagonal * (Z.T @ Z)).tocsr()
-        self.solver = distributed_solver(self._tree, self.kernel_dimension, self.unknowns, gram, "feti_natural_")
+        self.solver.factor(self.unknowns, gram)
         self.factorizations += 1
 
     def _own_unconstrained_modes(self) -> csr_matrix:
@@ -137,7 +133,6 @@ class NaturalCoarseSpace:
 
     def solve(self, work: Float) -> Float:
         """(G^T G)^-1 times the sum over ranks of work, for the `unknowns`: (u,) or (u, k) both.  Collective."""
-        assert self.solver is not None, "there are no kernels, or the factor is destroyed"
         return self.solver.solve(work)
 
     def project(self, x: Float) -> Float:
@@ -157,11 +152,5 @@ class NaturalCoarseSpace:
         return motion
 
     def destroy(self) -> None:
-        """Free the factor, for good.  Collective."""
-        self._destroy_factor()
-        self._tree.destroy()
-
-    def _destroy_factor(self) -> None:
-        if self.solver is not None:
-            self.solver.destroy()
-            self.solver = None
+        """Free the solver.  Collective."""
+        self.solver.destroy()

@@ -97,30 +97,56 @@ class DistributedSolver:
             petsc_object.destroy()
 
 
-def distributed_solver(
-    tree: RankTree,
-    total: int,
-    unknowns: Int,
-    part: csr_matrix,
-    prefix: str,
-    near_kernel: Float | None = None,
-) -> TreeElimination | DistributedSolver:
-    """By elimination, unless the options under `prefix` name a method of PETSc's; arguments as of `DistributedSolver`.
-    Collective.
+class RenewedSolver:
+    """Solves with a matrix that changes: by elimination, unless the options under a prefix name a method of PETSc's.
 
-    Raises:
-        LinAlgError: the matrix is not definite; on all ranks if it is so on one, for rounding may differ where their
-            processors do.
-        CaseError: the library that the options name has no such factorization.
+    Attributes:
+        current: of the matrix as it is; None before it is factored, and when it is freed.
     """
-    options = PETSc.Options()
-    if not any(options.hasName(prefix + choice) for choice in CHOICES):
-        return TreeElimination(tree, total, unknowns, part, prefix)
-    solver, error = None, None
-    try:
-        solver = DistributedSolver(tree.comm, total, unknowns, part, prefix, near_kernel)
-    except PETSc.Error as caught:
-        error = caught
-    if tree.comm.allreduce(error is not None, MPI.LOR) or solver is None:
-        raise np.linalg.LinAlgError(f"a coarse matrix is singular: {error or 'on another rank'}") from error
-    return solver
+
+    def __init__(self, comm: MPI.Intracomm, total: int, unknowns: Int, prefix: str) -> None:
+        """`total` and `unknowns` as of `TreeElimination`; the latter may change a little, see `factor`.  Collective."""
+        self._total, self._prefix = total, prefix
+        self._tree = RankTree(comm, total, unknowns)
+        self.current: TreeElimination | DistributedSolver | None = None
+
+    def factor(self, unknowns: Int, part: csr_matrix, near_kernel: Float | None = None) -> None:
+        """Factor, and free what there was before; arguments as of `DistributedSolver`.  Collective.
+
+        Raises:
+            LinAlgError: the matrix is not definite; on all ranks if it is so on one, for rounding may differ where
+                processors do.
+            CaseError: the library that the options name has no such factorization.
+        """
+        self._free()
+        options = PETSc.Options()
+        if not any(options.hasName(self._prefix + choice) for choice in CHOICES):
+            self.current = TreeElimination(self._tree, self._total, unknowns, part, self._prefix)
+            return
+        comm, error = self._tree.comm, None
+        try:
+            self.current = DistributedSolver(comm, self._total, unknowns, part, self._prefix, near_kernel)
+        except PETSc.Error as caught:
+            error = caught
+        if comm.allreduce(error is not None, MPI.LOR):
+            raise np.linalg.LinAlgError(f"a coarse matrix is singular: {error or 'on another rank'}") from error
+
+    def solve(self, B: Float) -> Float:
+        """As `TreeElimination.solve`."""
+        assert self.current is not None, "nothing is factored"
+        return self.current.solve(B)
+
+    @property
+    def iterations(self) -> int:
+        """Of the last solve for one column, if the options ask for an iterative method; else 1."""
+        return self.current.iterations if isinstance(self.current, DistributedSolver) else 1
+
+    def destroy(self) -> None:
+        """Free all, for good.  Collective."""
+        self._free()
+        self._tree.destroy()
+
+    def _free(self) -> None:
+        if self.current is not None:
+            self.current.destroy()
+            self.current = None

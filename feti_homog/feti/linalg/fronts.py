@@ -93,14 +93,14 @@ def eliminated_alone(meeting: Meeting, layout: FrontLayout, A: Float) -> tuple[F
     if meeting.comm.rank:
         nothing = np.zeros((0, 0))
         front = Front(meeting, layout.places, left, nothing, nothing, is_definite=True)
-        return front, Remainder(*layout[2:], own, np.zeros((0, left)))
+        return front, layout.remainder(own, np.zeros((0, left)))
     L, half, rest = (np.asfortranarray(block) for block in (A[:e, :e], A[e:, :e], A[e:, e:]))
     L, is_definite = cholesky(L)
     if half.size:
         half = dtrsm(1.0, L, half, side=1, lower=1, trans_a=1, overwrite_b=1)
         rest = full_from_lower(dsyrk(-1.0, half, beta=1.0, c=rest, lower=1, overwrite_c=1))
     front = Front(meeting, layout.places, left, L, half, is_definite)
-    return front, Remainder(*layout[2:], own, np.ascontiguousarray(rest))
+    return front, layout.remainder(own, np.ascontiguousarray(rest))
 
 
 def cholesky(A: Float) -> tuple[Float, bool]:

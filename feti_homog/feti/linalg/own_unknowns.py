@@ -22,14 +22,14 @@ class OwnUnknowns:
         inner, left: (i,) and (f,) positions of I and F among the rank's unknowns.
         solver: solves with A_II; None if I is empty, or if A_II is not definite.
         coupling: (i, f) A_IF.
-        is_definite: whether A_II is.
+        error: what PETSc says of an A_II that is not definite.
     """
 
     inner: Int
     left: Int
     solver: DirectSolver | None
     coupling: csr_matrix
-    is_definite: bool
+    error: PETSc.Error | None
 
     def forward(self, right: Float) -> Float:
         """(f, k) what the elimination leaves of right-hand sides (u, k)."""
@@ -58,14 +58,14 @@ def eliminate_own(unknowns: Int, copies: Int, part: csr_matrix, prefix: str) -> 
     Where their matrix is not definite, what is left is NaN.  Raises CaseError as `DirectSolver`.
     """
     inner, left = np.flatnonzero(copies == 1), np.flatnonzero(copies > 1)
-    rows, solver, is_definite = part[inner], None, True
+    rows, solver, error = part[inner], None, None
     matrix = np.zeros((len(left), len(left)))
     try:
         solver = DirectSolver(rows[:, inner].tocsr(), prefix) if len(inner) else None
         if len(left):
             matrix[:] = schur_complement(part, left)
-    except PETSc.Error:
-        matrix[:], is_definite = np.nan, False
-    own = OwnUnknowns(inner, left, solver, rows[:, left].tocsr(), is_definite)
+    except PETSc.Error as caught:
+        matrix[:], error = np.nan, caught
+    own = OwnUnknowns(inner, left, solver, rows[:, left].tocsr(), error)
     some, once = copies[left], np.ones(len(left), np.int64)
     return own, Remainder(unknowns[left], some, once, np.arange(len(left)), matrix)

@@ -10,6 +10,7 @@ import pymetis
 from mpi4py import MPI
 from scipy.sparse import csr_matrix
 
+from feti_homog.common.mpi_errors import on_root
 from feti_homog.typing import Bool, Int
 
 
@@ -32,8 +33,8 @@ class RankTree:
         Collective."""
         self.comm = comm
         every = comm.gather(unknowns[copies(comm, total, unknowns) > 1])
-        groups: list[tuple[list[int], int]] = comm.scatter(_groups(every) if every else [])
-        self.meetings = [Meeting(subgroup(comm, ranks), second) for ranks, second in groups]
+        groups = on_root(comm, nested_groups, every)
+        self.meetings = [Meeting(subgroup(comm, ranks), second) for ranks, second in groups if comm.rank in ranks]
 
     def destroy(self) -> None:
         """Free the communicators.  Collective."""
@@ -60,23 +61,22 @@ def copies(comm: MPI.Intracomm, total: int, unknowns: Int) -> Int:
     return np.asarray(count[unknowns])
 
 
-def _groups(every: Sequence[Int]) -> list[list[tuple[list[int], int]]]:
-    """Of every rank the groups of its meetings: their ranks, and where the second half begins; for the numbers of
-    unknowns that each rank shares with others."""
+def nested_groups(every: Sequence[Int]) -> list[tuple[list[int], int]]:
+    """The ranks of each group of two or more, and where the second half begins, parts before the whole; for the numbers
+    of unknowns that each rank shares with others."""
     numbers = np.unique(np.concatenate(every), return_inverse=True)[1]
     pointer = np.concatenate([[0], np.cumsum([len(some) for some in every])])
     holders = csr_matrix((np.ones(len(numbers), np.int64), numbers, pointer), (len(every), len(numbers)))
     common = (holders @ holders.T).tocsr()
-    groups: list[list[tuple[list[int], int]]] = [[] for _ in every]
+    groups: list[tuple[list[int], int]] = []
 
     def halved(ranks: Int) -> list[int]:
-        """These ranks in the order of the group, whose halves have met."""
+        """These ranks in the order of the group."""
         if len(ranks) == 1:
             return [int(ranks[0])]
         is_first = _half(common[ranks][:, ranks])
         first, second = halved(ranks[is_first]), halved(ranks[~is_first])
-        for rank in first + second:
-            groups[rank].append((first + second, len(first)))
+        groups.append((first + second, len(first)))
         return first + second
 
     halved(np.arange(len(every)))

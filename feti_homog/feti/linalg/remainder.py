@@ -61,6 +61,10 @@ class FrontLayout(NamedTuple):
         """Unknowns of the front."""
         return self.eliminated + len(self.unknowns)
 
+    def remainder(self, own: Int, rows: Float) -> Remainder:
+        """What is left, `own` and `rows` being this rank's."""
+        return Remainder(self.unknowns, self.copies, self.met, own, rows)
+
 
 def summed(meeting: Meeting, own: Remainder, layout: FrontLayout, owner: Int) -> Float:
     """(r, n) the rows of this rank of the sum of what both halves have left; `owner` (n,) tells whose each row is.
@@ -72,7 +76,7 @@ def summed(meeting: Meeting, own: Remainder, layout: FrontLayout, owner: Int) ->
         is_here = (comm.rank >= second) == bool(half)
         some, rows = (own.own, own.rows) if is_here else (np.zeros(0, np.int64), np.zeros((0, len(place))))
         some, rows = exchange(comm, owner[place[some]], some, rows)
-        # Row by row: twice as fast as all at once.
+        # Row by row: all at once would be copied twice.
         for row, values in zip(np.searchsorted(mine, place[some]).tolist(), rows, strict=True):
             A[row, place] += values
     return A

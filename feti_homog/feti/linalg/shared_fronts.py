@@ -11,7 +11,7 @@ from scipy.linalg.blas import dgemm, dtrsm
 from feti_homog.feti.linalg.fronts import Front, cholesky, eliminated_alone
 from feti_homog.feti.linalg.rank_tree import Meeting, subgroup
 from feti_homog.feti.linalg.remainder import FrontLayout, Remainder, summed
-from feti_homog.feti.thresholds import BLOCKS_OF_A_RANK
+from feti_homog.feti.thresholds import front_sharers
 from feti_homog.typing import Float, Int
 
 
@@ -66,7 +66,7 @@ def meet(meeting: Meeting, own: Remainder, block: int) -> tuple[Front, Remainder
     what it leaves.
     """
     layout = FrontLayout.of(meeting, own)
-    sharers = min(meeting.comm.size, max(1, layout.n // (BLOCKS_OF_A_RANK * block)))
+    sharers = front_sharers(layout.n, meeting.comm.size, block)
     starts = _starts(layout, block)
     owner = np.repeat(np.arange(len(starts) - 1) % sharers, np.diff(starts))
     A = summed(meeting, own, layout, owner)
@@ -102,7 +102,7 @@ def _eliminated_together(
     rest = np.vstack([np.zeros((0, f)), *(block.T for k, block in blocks.items() if starts[k] >= e)])
     L, half = _gathered_on_first(sharing, eliminated, e), np.asfortranarray(half)
     front = SharedFront(meeting, layout.places, f, L, half, is_definite, sharing, own[own < e], e)
-    return front, Remainder(*layout[2:], own[own >= e] - e, rest)
+    return front, layout.remainder(own[own >= e] - e, rest)
 
 
 def _factor(comm: MPI.Intracomm, blocks: dict[int, Float], starts: Int, e: int) -> bool:

@@ -50,10 +50,11 @@ class TreeElimination:
         for meeting in tree.meetings:
             front, remainder = meet(meeting, remainder, block)
             self.fronts.append(front)
-        is_definite = self._own.is_definite and all(front.is_definite for front in self.fronts)
+        is_definite = self._own.error is None and all(front.is_definite for front in self.fronts)
         if not tree.comm.allreduce(is_definite, MPI.LAND):
             self.destroy()
-            raise np.linalg.LinAlgError("a coarse matrix is singular: not positive definite")
+            words = self._own.error or "not positive definite"
+            raise np.linalg.LinAlgError(f"a coarse matrix is singular: {words}") from self._own.error
 
     def solve(self, B: Float) -> Float:
         """A^-1 times the sum over ranks of right-hand sides, of which each rank has a part B (u,) or (u, k), on the

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from feti_homog.feti.linalg.rank_tree import _groups
+from feti_homog.feti.linalg.rank_tree import nested_groups
 
 
 def on_a_grid(wide, high):
@@ -24,23 +24,20 @@ def on_a_grid(wide, high):
 def test_every_rank_meets_ever_larger_groups(ranks, share):
     """Halves have met before, the first rank of each stands for it, and at last all have met."""
     every = {"grid": on_a_grid(ranks, 1), "nothing": [np.zeros(0, int)] * ranks, "all": [np.arange(4)] * ranks}[share]
-    groups = _groups(every)
-    for rank, own in enumerate(groups):
-        assert all(rank in members for members, _ in own)
+    groups = nested_groups(every)
+    for rank in range(ranks):
+        own = [group for group in groups if rank in group[0]]
         sizes = [len(members) for members, _ in own]
         assert sizes == sorted(set(sizes)) and (not sizes or sizes[-1] == ranks)
         for before, (members, second) in zip([[rank], *(m for m, _ in own)], own, strict=False):
             assert before in (members[:second], members[second:])
             assert 0 < second < len(members)
-    # All members agree.
-    for own in groups:
-        for members, second in own:
-            assert all((members, second) in groups[member] for member in members)
 
 
 def test_neighbours_meet_first():
     """On a torus of 8 x 8 the two last halves share no more than two straight cuts, and halves are even."""
-    ((members, second),) = [group for group in _groups(on_a_grid(8, 8))[0] if len(group[0]) == 64]
+    members, second = nested_groups(on_a_grid(8, 8))[-1]
+    assert len(members) == 64
     shared = on_a_grid(8, 8)
     first, last = (set(np.concatenate([shared[r] for r in half])) for half in (members[:second], members[second:]))
     assert len(first & last) <= 20
