@@ -1,4 +1,4 @@
-"""Arcs of circles from vertex to vertex, bridges between circles, and the nodes on them."""
+"""Vertices of closed curves, and the arcs between them."""
 
 from __future__ import annotations
 
@@ -7,10 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from scipy.spatial import cKDTree
 
-from feti_homog.cell.bridges import TURN, Bridges, OnCircles
-from feti_homog.cell.curves import MATRIX, Curves, Numbering
-from feti_homog.cell.edge_samples import EdgeSamples, Sampling
-from feti_homog.cell.graded_size import SizeField
+from feti_homog.cell.bridges import TURN, OnCircles
 from feti_homog.typing import Float, Int
 
 # Relative distance below which two positions are one.
@@ -18,16 +15,6 @@ SAME_PLACE = 1e-9
 # A mark nearer than this many radians to another vertex of its circle is that vertex.
 MERGED = np.radians(0.05)
 QUARTER = TURN / 4
-
-
-def on_circles(circles: Float, which: Int, angles: Float) -> Float:
-    """Points (a, 2) on circles which[a] at angles in radians."""
-    return on_circle(circles[which], angles)
-
-
-def on_circle(circles: Float, angles: Float) -> Float:
-    """Points (..., 2) on circles (..., 3) at angles in radians."""
-    return np.asarray(circles[..., :2] + circles[..., 2:] * np.stack([np.cos(angles), np.sin(angles)], axis=-1))
 
 
 def vertex_angles(circles: Float, curve: Int, border: Float, marks: Mapping[int, Sequence[float]]) -> OnCircles:
@@ -68,54 +55,3 @@ def arcs_within(
     middle = at(whose, (first + last) / 2)
     within = np.all((middle > 0) & (middle < size), axis=1)
     return whose[within], first[within], last[within]
-
-
-def arc_curves(
-    circles: Float,
-    around: Int,
-    circle: Int,
-    start: Float,
-    stop: Float,
-    caps: Float,
-    field: SizeField,
-    numbering: Numbering,
-    sampling: Sampling,
-) -> Curves:
-    """The arcs (a,) from angle `start` to `stop` on their circles as curves, with edges of at most `caps` (a,)."""
-    span = stop - start
-
-    def point(arc: Int, share: Float) -> Float:
-        return on_circle(circles[circle[arc]], start[arc] + span[arc] * share)
-
-    samples = EdgeSamples.of(field, point, span * circles[circle, 2], lambda arc, share: caps[arc], sampling.arc)
-    station, first = samples.stations(np.ones(len(span), np.int64), sampling.most_nodes)
-    arc = np.repeat(np.arange(len(span)), np.diff(first))
-    return Curves(numbering.along(point(arc, station), first), first, circle, circle, around[circle])
-
-
-def bridge_curves(
-    circles: Float, bridges: Bridges, caps: Float, field: SizeField, numbering: Numbering, sampling: Sampling
-) -> Curves:
-    """The bridges between circles, on which edges are at most `caps` (k,), as curves.
-
-    Where elements are not graded, edges are no longer than the sizes at both ends, interpolated: so gmsh does it across
-    the matrix.
-    """
-    ends = [on_circles(circles, bridges.ends[:, end], bridges.angle + end * np.pi) for end in (0, 1)]
-    begin, way = ends[0], ends[1] - ends[0]
-    is_uniform = np.isinf(field.step)
-    low, high = (np.minimum(field.at(ends[k]), caps[bridges.ends[:, k]]) for k in (0, 1))
-
-    def point(bridge: Int, share: Float) -> Float:
-        return np.asarray(begin[bridge] + share[:, None] * way[bridge])
-
-    def cap(bridge: Int, share: Float) -> Float:
-        return (
-            np.asarray(low[bridge] * (1 - share) + high[bridge] * share) if is_uniform else np.full(len(share), np.inf)
-        )
-
-    samples = EdgeSamples.of(field, point, np.linalg.norm(way, axis=1), cap, sampling.bridge)
-    share, first = samples.stations(np.ones(len(way), np.int64), sampling.most_nodes)
-    bridge = np.repeat(np.arange(len(way)), np.diff(first))
-    straight = np.full(len(way), MATRIX)
-    return Curves(numbering.along(point(bridge, share), first), first, straight, straight, straight)

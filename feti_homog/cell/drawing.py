@@ -1,4 +1,4 @@
-"""A cell that is drawn but not yet filled: its outline, its tiles, and the mesh that these become."""
+"""A cell on its way to a mesh: sketched, with bare lines; drawn, with nodes on them and cut into tiles; filled."""
 
 from __future__ import annotations
 
@@ -9,13 +9,48 @@ from functools import cached_property
 import numpy as np
 
 from feti_homog.cell.arrangement import Arrangement
+from feti_homog.cell.bare_outline import BareOutline, LineStations
 from feti_homog.cell.coarse_mesh import CoarseMesh, representatives
 from feti_homog.cell.filling import Filling, Tile, arc_edges, fill
+from feti_homog.cell.graded_size import MeshSizes
 from feti_homog.cell.outline import Outline
 from feti_homog.cell.tile_torus import Regions
+from feti_homog.cell.tiles import Tiling, cut
 from feti_homog.cell.void_holes import without_voids
 from feti_homog.config.phase_names import VOID
 from feti_homog.typing import Float, Int, Int32
+
+
+@dataclass(frozen=True)
+class Sketch:
+    """What is known of a mesh before its lines have nodes.
+
+    Attributes:
+        arrangement: of the discs.
+        bare: its lines.
+        sizes: of elements.
+        tiles: those that it will be cut into; None if it is filled at once.
+        scale: as in `Drawing`.
+    """
+
+    arrangement: Arrangement
+    bare: BareOutline
+    sizes: MeshSizes
+    tiles: Tiling | None
+    scale: float
+
+    @property
+    def phases(self) -> tuple[str, ...]:
+        """Those of the mesh."""
+        return self.arrangement.phases
+
+    def drawn(self, stations: LineStations) -> Drawing:
+        """With these nodes.
+
+        Raises:
+            MeshError: the sides would have too many.
+        """
+        return drawing(self.arrangement, self.bare.outline(stations), self.sizes, self.tiles, self.scale)
 
 
 @dataclass(frozen=True)
@@ -109,3 +144,9 @@ class Drawing:
             count += len(filling.inner)
         points = np.concatenate([self.lines.points, *(filling.inner for filling in fillings)])
         return points, np.concatenate(triangles), np.concatenate([filling.circle for filling in fillings])
+
+
+def drawing(arrangement: Arrangement, lines: Outline, sizes: MeshSizes, tiles: Tiling | None, scale: float) -> Drawing:
+    """That of an arrangement with this outline, cut into tiles."""
+    whole = Tile(lines.points, lines.curves, sizes.largest, sizes.are_graded(arrangement))
+    return Drawing(arrangement, lines, tuple(cut(lines, whole, tiles)), scale)

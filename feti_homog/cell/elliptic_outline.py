@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from itertools import product
 
@@ -16,7 +17,7 @@ from feti_homog.cell.curves import MATRIX, Curves, Numbering
 from feti_homog.cell.edge_samples import WHOLE, EdgeSamples
 from feti_homog.cell.ellipses import Ellipses, directions
 from feti_homog.cell.elliptic_size import size_field
-from feti_homog.cell.graded_size import MeshSizes, SizeField
+from feti_homog.cell.graded_size import MeshSizes
 from feti_homog.cell.outline import Outline, on_side, side_curves
 from feti_homog.cell.tip_marks import marked
 from feti_homog.typing import Float, Int
@@ -26,7 +27,7 @@ LENGTH_STEPS = 256
 
 
 def outline(arrangement: Arrangement, sizes: MeshSizes, marks: Mapping[int, Sequence[float]]) -> Outline:
-    """As `outline.outline`."""
+    """As `BareOutline.of`, with the nodes on its lines."""
     size = np.array([arrangement.width, arrangement.height])
     ellipses, fibre, around = _images(arrangement, size)
     places = [_crossings(ellipses, axis, size) for axis in (0, 1)]
@@ -46,7 +47,10 @@ def outline(arrangement: Arrangement, sizes: MeshSizes, marks: Mapping[int, Sequ
     field = size_field(arrangement, sizes, outer, sharp, tips)
     find = partial(_ellipse_at, ellipses)
     curves = [side_curves(axis, places[axis], find, around, size, field, numbering, WHOLE) for axis in (0, 1)]
-    curves.append(_arc_curves(ellipses, around, which, start, stop, sizes.interface, field, numbering))
+    arcs = _EllipticArcs.of(ellipses[which], start, stop, sizes.interface)
+    stations = EdgeSamples.of(field, arcs, WHOLE.arc).stations(np.ones(len(which), np.int64), WHOLE.most_nodes)
+    node = numbering.along(arcs.points(stations.line, stations.share), stations.first)
+    curves.append(Curves(node, stations.first, which, which, around[which]))
     return Outline(numbering.points(), Curves.joined(curves), ellipses, fibre, around)
 
 
@@ -132,35 +136,41 @@ def _ellipse_at(ellipses: Ellipses, points: Float) -> Int:
     return np.where(holds.any(axis=1), np.where(holds, area, np.inf).argmin(axis=1), MATRIX)
 
 
-def _arc_curves(
-    ellipses: Ellipses,
-    around: Int,
-    which: Int,
-    start: Float,
-    stop: Float,
-    largest: float,
-    field: SizeField,
-    numbering: Numbering,
-) -> Curves:
-    """The arcs (a,) between parameters as curves, with edges of at most `largest` or what the curvature asks for."""
-    own = ellipses[which]
-    share = np.linspace(0, 1, LENGTH_STEPS + 1)
-    angle = start[:, None] + (stop - start)[:, None] * share
-    places = np.stack([own.at(angle[:, k]) for k in range(len(share))], axis=1)
-    length = np.cumsum(np.linalg.norm(np.diff(places, axis=1), axis=2), axis=1)
-    way = np.column_stack([np.zeros(len(length)), length / length[:, -1:]])
+@dataclass(frozen=True)
+class _EllipticArcs:
+    """As `Lines`.
 
-    def parameter(arc: Int, share: Float) -> Float:
-        """(n,) at the share of an arc's length."""
-        after = np.clip((way[arc] <= share[:, None]).sum(axis=1), 1, LENGTH_STEPS)
-        low, high = way[arc, after - 1], way[arc, after]
+    Attributes:
+        ellipses: that of each of a arcs.
+        angle, way: (a, k) parameters of equidistant places on each, and the shares of the arc's length there.
+        lengths: (a,) of arcs.
+        cap: longest edge, unless the curvature asks for shorter ones.
+    """
+
+    ellipses: Ellipses
+    angle: Float
+    way: Float
+    lengths: Float
+    cap: float
+
+    @classmethod
+    def of(cls, ellipses: Ellipses, start: Float, stop: Float, cap: float) -> _EllipticArcs:
+        """Between parameters (a,) of ellipses (a,)."""
+        share = np.linspace(0, 1, LENGTH_STEPS + 1)
+        angle = start[:, None] + (stop - start)[:, None] * share
+        places = np.stack([ellipses.at(angle[:, k]) for k in range(len(share))], axis=1)
+        length = np.cumsum(np.linalg.norm(np.diff(places, axis=1), axis=2), axis=1)
+        way = np.column_stack([np.zeros(len(length)), length / length[:, -1:]])
+        return cls(ellipses, angle, way, length[:, -1], cap)
+
+    def points(self, line: Int, share: Float) -> Float:
+        """As in `Lines`."""
+        after = np.clip((self.way[line] <= share[:, None]).sum(axis=1), 1, LENGTH_STEPS)
+        low, high = self.way[line, after - 1], self.way[line, after]
         part = (share - low) / (high - low)
-        return np.asarray(angle[arc, after - 1] * (1 - part) + angle[arc, after] * part)
+        parameter = self.angle[line, after - 1] * (1 - part) + self.angle[line, after] * part
+        return self.ellipses[line].at(parameter)
 
-    def point(arc: Int, share: Float) -> Float:
-        return own[arc].at(parameter(arc, share))
-
-    samples = EdgeSamples.of(field, point, length[:, -1], lambda arc, share: np.full(len(arc), largest), WHOLE.arc)
-    station, first = samples.stations(np.ones(len(own), np.int64), WHOLE.most_nodes)
-    arc = np.repeat(np.arange(len(own)), np.diff(first))
-    return Curves(numbering.along(point(arc, station), first), first, which, which, around[which])
+    def caps(self, line: Int, share: Float) -> Float:
+        """As in `Lines`."""
+        return np.full(len(line), self.cap)

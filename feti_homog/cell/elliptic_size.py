@@ -45,7 +45,7 @@ def size_field(
     ]
     base = SourcedSize(sources, size, largest)
     if not sizes.are_graded(arrangement):
-        return SizeField(base, base.on_lines)
+        return SizeField(base)
     on_curves, beside = cKDTree(wrap(points, size), boxsize=size), np.minimum(sizes.interface, thin)
     tree = cKDTree(wrap(tips.reshape(-1, 2), size), boxsize=size)
 
@@ -55,7 +55,7 @@ def size_field(
         distance, nearest = on_curves.query(places)
         return np.asarray(np.minimum(beside[nearest] + MAX_GROWTH * distance, at_tips))
 
-    return SizeField.least(base, graded)
+    return SizeField(base, graded)
 
 
 def _in_mesh_order(arrangement: Arrangement, ellipses: Ellipses, disc: Int) -> tuple[Ellipses, Int]:

@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING
 
 from feti_homog.cell import element_estimate, elliptic_outline
 from feti_homog.cell.arrangement import Arrangement, arrange
+from feti_homog.cell.bare_outline import BareOutline
 from feti_homog.cell.coarse_mesh import CoarseMesh
-from feti_homog.cell.drawing import Drawing
+from feti_homog.cell.drawing import Drawing, Sketch, drawing
 from feti_homog.cell.edge_samples import IN_TILES
-from feti_homog.cell.filling import Tile
 from feti_homog.cell.graded_size import MeshSizes
-from feti_homog.cell.outline import outline
-from feti_homog.cell.tiles import DEFAULT_TILES, TilePolicy, cut, is_tiled, tiling
+from feti_homog.cell.tiles import DEFAULT_TILES, TilePolicy, is_tiled, tiling
 from feti_homog.config.mixed_cell import fractions_in_words, mixed_width
 from feti_homog.errors import MeshError
 
@@ -32,7 +31,7 @@ NO_MARKS: Mapping[int, Sequence[float]] = MappingProxyType({})
 def generate(
     cell: Cell, marks: Mapping[int, Sequence[float]] = NO_MARKS, policy: TilePolicy = DEFAULT_TILES
 ) -> CoarseMesh:
-    """The mesh that `draw` begins, all of it made here."""
+    """The mesh that `begin` begins, all of it made here."""
     drawn = draw(cell, marks, policy)
     return drawn if isinstance(drawn, CoarseMesh) else drawn.filled()
 
@@ -40,14 +39,22 @@ def generate(
 def draw(
     cell: Cell, marks: Mapping[int, Sequence[float]] = NO_MARKS, policy: TilePolicy = DEFAULT_TILES
 ) -> Drawing | CoarseMesh:
-    """The periodic coarse mesh of a square, hexagonal or random cell, or of a table; but for the triangles, unless it
-    has polygons.
+    """What `begin` begins, with all nodes on its lines."""
+    begun = begin(cell, marks, policy)
+    return begun.drawn(begun.bare.stations()) if isinstance(begun, Sketch) else begun
+
+
+def begin(
+    cell: Cell, marks: Mapping[int, Sequence[float]] = NO_MARKS, policy: TilePolicy = DEFAULT_TILES
+) -> Sketch | Drawing | CoarseMesh:
+    """The periodic coarse mesh of a square, hexagonal or random cell, or of a table: of round fibres a sketch, of
+    ellipses all but the triangles, of polygons all.
 
     Elements have about the size mesh_size * width, on circles interface_size * width.
 
     It is made at the width 1 and then scaled, so that cells of one shape have one mesh at all sizes.
 
-    `marks` maps a curve (`outline.outline`) to angles in degrees, measured at its centre, where the mesh gets nodes:
+    `marks` maps a curve (`BareOutline.of`) to angles in degrees, measured at its centre, where the mesh gets nodes:
     tips of debonded arcs. A mark within MERGED of where the circle crosses the cell's
     boundary, or of another mark, is moved there.
 
@@ -68,7 +75,10 @@ def draw(
         from feti_homog.cell.shape_mesher import mesh_shapes  # it is made of what stands here
 
         return mesh_shapes(arrangement, sizes, arrangement_scale(cell, arrangement))
-    return _drawing(arrangement, sizes, marks, arrangement_scale(cell, arrangement), policy)
+    scale = arrangement_scale(cell, arrangement)
+    if arrangement.frames is not None:
+        return drawing(arrangement, elliptic_outline.outline(arrangement, sizes, marks), sizes, None, scale)
+    return _sketch(arrangement, sizes, marks, scale, policy)
 
 
 def mesh_arrangement(
@@ -77,27 +87,25 @@ def mesh_arrangement(
     marks: Mapping[int, Sequence[float]] = NO_MARKS,
     scale: float = 1.0,
 ) -> CoarseMesh:
-    """The periodic coarse mesh of an arrangement, with elements of these sizes, scaled at the end; see `generate`."""
-    return _drawing(arrangement, sizes, marks, scale, DEFAULT_TILES).filled()
+    """The periodic coarse mesh of round discs, with elements of these sizes, scaled at the end; see `begin`."""
+    sketch = _sketch(arrangement, sizes, marks, scale, DEFAULT_TILES)
+    return sketch.drawn(sketch.bare.stations()).filled()
 
 
-def _drawing(
+def _sketch(
     arrangement: Arrangement,
     sizes: MeshSizes,
     marks: Mapping[int, Sequence[float]],
     scale: float,
     policy: TilePolicy,
-) -> Drawing:
-    """The outline of an arrangement and its tiles; see `mesh_arrangement`."""
+) -> Sketch:
+    """The bare lines of round discs, and their tiles; see `begin`."""
     tiles = tiling(arrangement, sizes.largest, marks, policy)
-    if arrangement.frames is not None:
-        lines = elliptic_outline.outline(arrangement, sizes, marks)
-    elif tiles is None:
-        lines = outline(arrangement, sizes, marks)
+    if tiles is None:
+        bare = BareOutline.of(arrangement, sizes, marks)
     else:
-        lines = outline(arrangement, sizes, marks, tiles.bridges, IN_TILES)
-    whole = Tile(lines.points, lines.curves, sizes.largest, sizes.are_graded(arrangement))
-    return Drawing(arrangement, lines, tuple(cut(lines, whole, tiles)), scale)
+        bare = BareOutline.of(arrangement, sizes, marks, tiles.bridges, IN_TILES)
+    return Sketch(arrangement, bare, sizes, tiles, scale)
 
 
 def _sizes(cell: Cell, marks: Mapping[int, Sequence[float]]) -> MeshSizes:

@@ -9,9 +9,10 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from feti_homog.cell.arrangement import Arrangement
+from feti_homog.cell.lines import on_circles
 from feti_homog.cell.size_field import coating_size, line_size
 from feti_homog.cell.sourced_size import MAX_GROWTH, SourcedSize, wrap
-from feti_homog.typing import Float
+from feti_homog.typing import Float, Int
 
 # Samples of a size on a line for each of its edges, where the size is graded.
 SAMPLES_OF_AN_EDGE = 3
@@ -47,28 +48,27 @@ class MeshSizes:
 
 @dataclass(frozen=True)
 class SizeField:
-    """The size of edges on the lines of a cell.
+    """The size of edges on the lines of a cell: the smaller of two sizes, of which the second grows along lines."""
 
-    Attributes:
-        at: sizes (n,) at positions (n, 2).
-        on_lines: sizes (c, m) at positions (c, m, 2) along c lines: the same.
-        step: distance of positions on a line between which it may be interpolated / size.
-    """
+    base: SourcedSize
+    graded: Callable[[Float], Float] | None = None
 
-    at: Callable[[Float], Float]
-    on_lines: Callable[[Float], Float]
-    step: float = np.inf
+    @property
+    def step(self) -> float:
+        """Distance of positions on a line between which it may be interpolated / size."""
+        return np.inf if self.graded is None else 1 / SAMPLES_OF_AN_EDGE
 
-    @classmethod
-    def least(cls, base: SourcedSize, graded: Callable[[Float], Float]) -> SizeField:
-        """The smaller of two sizes, of which the second grows along lines."""
-        return cls(
-            lambda points: np.asarray(np.minimum(base(points), graded(points))),
-            lambda points: np.asarray(
-                np.minimum(base.on_lines(points), graded(points.reshape(-1, 2)).reshape(points.shape[:2]))
-            ),
-            1 / SAMPLES_OF_AN_EDGE,
-        )
+    def at(self, points: Float) -> Float:
+        """Sizes (n,) at positions (n, 2)."""
+        sizes = self.base(points)
+        return sizes if self.graded is None else np.minimum(sizes, self.graded(points))
+
+    def on_lines(self, points: Float) -> Float:
+        """Sizes (c, m) at positions (c, m, 2) along c lines: the same."""
+        sizes = self.base.on_lines(points)
+        if self.graded is None:
+            return sizes
+        return np.minimum(sizes, self.graded(points.reshape(-1, 2)).reshape(points.shape[:2]))
 
 
 def size_field(arrangement: Arrangement, sizes: MeshSizes, vertices: Float, tips: Float) -> SizeField:
@@ -76,32 +76,52 @@ def size_field(arrangement: Arrangement, sizes: MeshSizes, vertices: Float, tips
     `tips` (t, 2), so that the edges at a tip have the size h_t; the growth g is MAX_GROWTH."""
     base = line_size(arrangement, sizes.largest, vertices)
     if not sizes.are_graded(arrangement):
-        return SizeField(base, base.on_lines)
-    size = np.array([arrangement.width, arrangement.height])
-    on_circles = _from_circles(arrangement, size, sizes.on_circles(arrangement))
-    tree = cKDTree(wrap(tips.reshape(-1, 2), size), boxsize=size)
+        return SizeField(base)
+    return SizeField(base, _FromLines.of(arrangement, sizes, tips))
 
-    def graded(points: Float) -> Float:
+
+@dataclass(frozen=True)
+class _FromLines:
+    """h_i + g d and h_t + g max(0, d - h_t) as in `size_field`, whichever is smaller.
+
+    Which disc is the nearest, points h_i apart on the circles tell.
+
+    Attributes:
+        size: (2,) of the cell.
+        circles: (N, 3) the outer circle of each disc.
+        caps: (N,) h_i.
+        tip: h_t.
+        near_tips: tree of the tips.
+        spokes, disc: tree of the points on circles, and their discs (s,).
+    """
+
+    size: Float
+    circles: Float
+    caps: Float
+    tip: float
+    near_tips: cKDTree
+    spokes: cKDTree
+    disc: Int
+
+    @classmethod
+    def of(cls, arrangement: Arrangement, sizes: MeshSizes, tips: Float) -> _FromLines:
+        """That of a cell."""
+        size, caps = np.array([arrangement.width, arrangement.height]), sizes.on_circles(arrangement)
+        radii = arrangement.outer_radii
+        counts = np.ceil(2 * np.pi * radii / caps).astype(int)
+        disc = np.repeat(np.arange(len(counts)), counts)
+        angle = 2 * np.pi * (np.arange(len(disc)) - np.repeat(np.cumsum(counts) - counts, counts)) / counts[disc]
+        circles = np.column_stack([arrangement.centres, radii])
+        spokes = cKDTree(wrap(on_circles(circles, disc, angle), size), boxsize=size)
+        near_tips = cKDTree(wrap(tips.reshape(-1, 2), size), boxsize=size)
+        return cls(size, circles, caps, sizes.tip, near_tips, spokes, disc)
+
+    def __call__(self, points: Float) -> Float:
+        """(n,) at positions (n, 2) on the torus."""
+        places = wrap(points, self.size)
+        nearest = self.disc[self.spokes.query(places)[1]]
+        offset = (points - self.circles[nearest, :2] + self.size / 2) % self.size - self.size / 2
+        away = np.abs(np.linalg.norm(offset, axis=1) - self.circles[nearest, 2])
         # Without tips the distance is infinite.
-        at_tips = sizes.tip + MAX_GROWTH * np.maximum(0.0, tree.query(wrap(points, size))[0] - sizes.tip)
-        return np.asarray(np.minimum(on_circles(points), at_tips))
-
-    return SizeField.least(base, graded)
-
-
-def _from_circles(arrangement: Arrangement, size: Float, caps: Float) -> Callable[[Float], Float]:
-    """The function h_i + g d (n,) of positions (n, 2) on the torus, d the distance from the nearest outer circle and
-    h_i the one of `caps` (N,) of its disc. Which that is, points h_i apart on the circles tell."""
-    radii = arrangement.outer_radii
-    counts = np.ceil(2 * np.pi * radii / caps).astype(int)
-    circle = np.repeat(np.arange(len(counts)), counts)
-    angle = 2 * np.pi * (np.arange(len(circle)) - np.repeat(np.cumsum(counts) - counts, counts)) / counts[circle]
-    spokes = radii[circle, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    tree = cKDTree(wrap(arrangement.centres[circle] + spokes, size), boxsize=size)
-
-    def at(points: Float) -> Float:
-        nearest = circle[tree.query(wrap(points, size))[1]]
-        offset = (points - arrangement.centres[nearest] + size / 2) % size - size / 2
-        return np.asarray(caps[nearest] + MAX_GROWTH * np.abs(np.linalg.norm(offset, axis=1) - radii[nearest]))
-
-    return at
+        at_tips = self.tip + MAX_GROWTH * np.maximum(0.0, self.near_tips.query(places)[0] - self.tip)
+        return np.asarray(np.minimum(self.caps[nearest] + MAX_GROWTH * away, at_tips))

@@ -13,7 +13,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from feti_homog.cell.bridges import TURN, Bridges, CentreLines
-from feti_homog.cell.circle_arcs import on_circles
+from feti_homog.cell.lines import on_circles
 from feti_homog.typing import Float, Int
 
 NOWHERE = -1

@@ -1,35 +1,20 @@
-"""The lines of the cell: its sides and the arcs of fibres in it, cut where they meet, with nodes on them."""
+"""The lines of a cell with nodes on them, and what of them is found before: images, crossings, pieces of sides."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from itertools import product
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from feti_homog.cell.arrangement import Arrangement
-from feti_homog.cell.bridges import Bridges, OnCircles
-from feti_homog.cell.circle_arcs import (
-    SAME_PLACE,
-    arc_curves,
-    arcs_within,
-    bridge_curves,
-    on_circle,
-    on_circles,
-    vertex_angles,
-)
 from feti_homog.cell.curves import MATRIX, OUTSIDE, Curves, Numbering, backwards
-from feti_homog.cell.edge_samples import WHOLE, EdgeSamples, Sampling
+from feti_homog.cell.edge_samples import EdgeSamples, Sampling
 from feti_homog.cell.ellipses import Ellipses
-from feti_homog.cell.graded_size import MeshSizes, SizeField, size_field
-from feti_homog.cell.size_field import circle_size
-from feti_homog.cell.tip_marks import marked
+from feti_homog.cell.graded_size import SizeField
+from feti_homog.cell.lines import Segments
 from feti_homog.typing import Bool, Float, Int
-
-NO_BRIDGES = Bridges(np.zeros((0, 2), np.int64), np.zeros(0))
 
 
 @dataclass(frozen=True)
@@ -91,63 +76,6 @@ def _outer_images(arrangement: Arrangement, size: Float) -> tuple[Float, Int]:
     return np.concatenate(circles)[order], owner[order]
 
 
-def outline(
-    arrangement: Arrangement,
-    sizes: MeshSizes,
-    marks: Mapping[int, Sequence[float]],
-    bridges: Bridges = NO_BRIDGES,
-    sampling: Sampling = WHOLE,
-) -> Outline:
-    """All lines of the cell with nodes at distances of at most `sizes`, closer in narrow passages.
-
-    Opposite sides have the same nodes. `marks` maps a curve to angles in degrees, measured at its centre, that become
-    nodes: curve k is the outer one of fibre k, and ~k that within its coating. The bridges are the last curves.
-
-    Raises:
-        MeshError: there would be more nodes than the `sampling` allows.
-    """
-    size = np.array([arrangement.width, arrangement.height])
-    circles, fibre, around = images(arrangement)
-    places = [crossings(circles, axis, size) for axis in (0, 1)]
-    sides = ((axis, level) for axis in (0, 1) for level in (0.0, size[1 - axis]))
-    border = np.concatenate([on_side(places[axis], axis, level) for axis, level in sides])
-    curve = np.where(around == MATRIX, fibre, ~fibre)
-    vertices = vertex_angles(circles, curve, border, marks)
-    # Vertices within coatings are as far from each other as those on the circle around, which they face, unless marked.
-    sparse = (around != MATRIX) & ~np.isin(curve, list(marks))
-    outer = np.concatenate([np.unique(border, axis=0), _arcs(circles, border, vertices, size, ~sparse)[1]])
-    # Ends of bridges are where there is room for them, and make nothing finer.
-    vertices = tuple(np.concatenate(parts) for parts in zip(vertices, bridges.on_circles, strict=True))
-    (circle, start, stop), ends = _arcs(circles, border, vertices, size, np.ones(len(circles), bool))
-    numbering = Numbering(np.concatenate([np.unique(border, axis=0), ends]))
-    field = size_field(arrangement, sizes, outer, _tips(arrangement, marks, numbering.vertices))
-
-    find = partial(disc_at, circles)
-    curves = [side_curves(axis, places[axis], find, around, size, field, numbering, sampling) for axis in (0, 1)]
-    caps = _caps(arrangement, sizes.interface, fibre, around)
-    curves.append(arc_curves(circles, around, circle, start, stop, caps[circle], field, numbering, sampling))
-    if len(bridges.angle):
-        curves.append(bridge_curves(circles, bridges, caps, field, numbering, sampling))
-    return Outline(numbering.points(), Curves.joined(curves), Ellipses.round(circles), fibre, around)
-
-
-def _arcs(
-    circles: Float, border: Float, vertices: OnCircles, size: Float, chosen: Bool
-) -> tuple[tuple[Int, Float, Float], Float]:
-    """The arcs of `arcs_within`, and the points (v, 2) at which those of the `chosen` (k,) circles begin, but for those
-    on the border, near its points (b, 2)."""
-    arcs = arcs_within(len(circles), *vertices, partial(on_circles, circles), size)
-    ends = on_circles(circles, *arcs[:2])
-    away = cKDTree(border).query(ends)[0] > SAME_PLACE * size.max()
-    return arcs, ends[away & chosen[arcs[0]]]
-
-
-def _caps(arrangement: Arrangement, largest: float, fibre: Int, around: Int) -> Float:
-    """Largest edge length (k,) on the circles of these discs (k,) with these circles around (k,)."""
-    first = np.unique(arrangement.circles[1], return_index=True)[1]
-    return np.asarray(circle_size(arrangement, largest)[first[fibre] + (around != MATRIX)])
-
-
 def crossings(circles: Float, axis: int, size: Float) -> Float:
     """Sorted coordinates along `axis` of the vertices on the side at 0: corners and crossings of circles."""
     depth, centre, radius = circles[:, 1 - axis], circles[:, axis], circles[:, 2]
@@ -163,15 +91,6 @@ def on_side(places: Float, axis: int, level: float) -> Float:
     return points
 
 
-def _tips(arrangement: Arrangement, marks: Mapping[int, Sequence[float]], vertices: Float) -> Float:
-    """The vertices (t, 2) that the marks have become; those of curves that are not there are none."""
-    curve, angle = marked(arrangement, marks)
-    size, fibre = np.array([arrangement.width, arrangement.height]), np.where(curve < 0, ~curve, curve)
-    radii = np.where(curve < 0, arrangement.radii[fibre], arrangement.outer_radii[fibre])
-    places = on_circle(np.column_stack([arrangement.centres[fibre], radii]), angle)
-    return np.asarray(vertices[cKDTree(vertices % size, boxsize=size).query(places % size)[1]])
-
-
 def side_curves(
     axis: int,
     places: Float,
@@ -185,11 +104,9 @@ def side_curves(
     """The pieces of the two sides along `axis`, with the same nodes on both; `disc_at` tells the smallest closed curve
     around points, which is a number of `around` or MATRIX."""
     begin, span = places[:-1], np.diff(places)
-
-    def point(piece: Int, share: Float) -> Float:
-        return on_side(begin[piece] + span[piece] * share, axis, 0.0)
-
-    samples = EdgeSamples.of(field, point, span, lambda piece, share: np.full(len(piece), np.inf), sampling.side)
+    longest = np.full((len(span), 2), field.base.largest)
+    pieces = Segments(on_side(begin, axis, 0.0), on_side(span, axis, 0.0), longest)
+    samples = EdgeSamples.of(field, pieces, sampling.side)
     parts = []
     for level, low in ((0.0, True), (size[1 - axis], False)):
         inside = disc_at(on_side(begin + span / 2, axis, level))
@@ -200,9 +117,9 @@ def side_curves(
         crosses[:-1] |= into[1:] == inside[:-1]
         crosses[1:] |= into[:-1] == inside[1:]
         least = np.where((inside == MATRIX) | crosses, 1, 2)
-        station, first = samples.stations(least, sampling.most_nodes)
-        piece = np.repeat(np.arange(len(span)), np.diff(first))
-        along = begin[piece] + span[piece] * station
+        stations = samples.stations(least, sampling.most_nodes)
+        piece, first = stations.line, stations.first
+        along = begin[piece] + span[piece] * stations.share
         along[first[:-1]], along[first[1:] - 1] = begin, places[1:]
         node = numbering.along(on_side(along, axis, level), first)
         # Counter-clockwise around the cell: along the coordinate at the bottom and at the right.

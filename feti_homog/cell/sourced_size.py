@@ -28,7 +28,8 @@ class SourcedSize:
 
     def __init__(self, sources: Sequence[Source], size: Float, largest: float, chunk: int = CHUNK) -> None:
         """`size` (2,) are the periods of the torus, and so many positions are looked at at once."""
-        self._size, self._largest, self._bound, self._chunk = size, largest, largest / MAX_GROWTH, chunk
+        self.largest = largest
+        self._size, self._bound, self._chunk = size, largest / MAX_GROWTH, chunk
         places, lengths, growths = (np.concatenate(parts) for parts in zip(*sources, strict=True))
         self._places = wrap(places, size)
         # Where the tree finds no more, it gives the source behind the last: an infinite one.
@@ -44,7 +45,7 @@ class SourcedSize:
         count = min(NEAREST, len(self._places))
         distance, nearest = self._tree.query(points, k=count, distance_upper_bound=self._bound)
         sizes = (self._lengths[nearest] + self._growths[nearest] * distance).reshape(len(points), count)
-        return np.asarray(np.minimum(self._largest, sizes.min(axis=1)))
+        return np.asarray(np.minimum(self.largest, sizes.min(axis=1)))
 
     def on_lines(self, points: Float) -> Float:
         """(c, m) at points (c, m, 2) of lines: as for each point, but sources are looked for once for all of a short
@@ -70,9 +71,9 @@ class SourcedSize:
         length, growth = self._lengths[near], self._growths[near]
         # What counts at all points of a line bounds it from above; sources that are above everywhere do not matter.
         everywhere = distance + half[:, None] < self._bound
-        above = np.where(everywhere, length + growth * (distance + half[:, None]), self._largest).min(axis=1)
+        above = np.where(everywhere, length + growth * (distance + half[:, None]), self.largest).min(axis=1)
         below = length + growth * np.maximum(0.0, distance - half[:, None])
-        line, which = np.nonzero(below < np.minimum(above, self._largest)[:, None])
+        line, which = np.nonzero(below < np.minimum(above, self.largest)[:, None])
         source = near[line, which]
         squares = np.zeros((len(line), points.shape[1]))
         for axis, period in enumerate(self._size):
@@ -82,12 +83,13 @@ class SourcedSize:
             squares += way
         away = np.sqrt(squares)
         found = self._lengths[source][:, None] + self._growths[source][:, None] * away
-        found[away >= self._bound] = self._largest
-        sizes = np.full(points.shape[:2], self._largest)
+        found[away >= self._bound] = self.largest
+        sizes = np.full(points.shape[:2], self.largest)
         first = np.flatnonzero(np.diff(line, prepend=-1))
         if len(first):
-            sizes[line[first]] = np.minimum(self._largest, np.minimum.reduceat(found, first, axis=0))
-        full = near[:, -1] < len(self._places)
+            sizes[line[first]] = np.minimum(self.largest, np.minimum.reduceat(found, first, axis=0))
+        # What a line's own sources are does not depend on the lines that it is looked at with.
+        full = distance[:, -1] < self._bound + half
         sizes[full] = self(points[full].reshape(-1, 2)).reshape(-1, points.shape[1])
         return sizes
 

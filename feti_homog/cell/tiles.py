@@ -67,7 +67,7 @@ def tiling(
 ) -> Tiling | None:
     """That of a large cell of round fibres; None of others, and where there is no room for bridges.
 
-    `largest` is the size of elements, and `marks` are as in `outline.outline`.
+    `largest` is the size of elements, and `marks` are as in `BareOutline.of`.
     """
     if not is_tiled(arrangement, policy):
         return None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import heapq
+from itertools import pairwise
 
 import numpy as np
 
@@ -18,6 +19,12 @@ def balanced(load: AnyInt, n_ranks: int) -> Int:
         ranks[k] = rank
         heapq.heapreplace(heap, (total + int(load[k]), rank))
     return ranks
+
+
+def even(count: int, parts: int) -> list[slice]:
+    """Numbers 0 .. count - 1 in so many ranges, one after the other, whose lengths differ by one at most."""
+    ends = [part * count // parts for part in range(parts + 1)]
+    return [slice(begin, end) for begin, end in pairwise(ends)]
 
 
 def ranges(start: Int, count: Int) -> Int:

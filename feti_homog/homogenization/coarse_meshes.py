@@ -1,4 +1,4 @@
-"""The coarse mesh of a case: begun on rank 0; the tiles of large cells are filled by all ranks."""
+"""The coarse mesh of a case: begun on rank 0; nodes on lines, and the tiles of large cells, are made by all ranks."""
 
 from __future__ import annotations
 
@@ -10,9 +10,11 @@ from typing import TypeVar
 import numpy as np
 from mpi4py import MPI
 
+from feti_homog.cell.bare_outline import LineStations
 from feti_homog.cell.coarse_mesh import CoarseMesh
-from feti_homog.cell.drawing import Drawing
+from feti_homog.cell.drawing import Drawing, Sketch
 from feti_homog.cell.filling import Filling, Tile, fill
+from feti_homog.cell.graded_size import SizeField
 from feti_homog.cell.tiles import TilePolicy
 from feti_homog.common.dealing import collect, deal
 from feti_homog.common.dividing import balanced
@@ -24,30 +26,53 @@ from feti_homog.homogenization import tips
 T = TypeVar("T")
 
 
-def begun(case: Case, policy: TilePolicy) -> Drawing | CoarseMesh:
-    """A user's mesh, or the cell with its tiles still to be filled.
+def drawn(case: Case, comm: MPI.Intracomm, policy: TilePolicy) -> Drawing | CoarseMesh | None:
+    """On rank 0 a user's mesh, or the cell with its tiles still to be filled; the nodes on its lines are placed by all
+    ranks.  Collective.
+
+    Raises:
+        CaseError, MeshError: on every rank, as `begun`.
+    """
+    found = on_root_only(comm, begun, case, policy)
+    sketch = found if isinstance(found, Sketch) else None
+    if not comm.bcast(sketch is not None):
+        assert not isinstance(found, Sketch)
+        return found
+    field: SizeField = comm.bcast(None if sketch is None else sketch.bare.field)
+    own = deal(comm, [] if sketch is None else sketch.bare.lines.parts(comm.size))
+    stations = collect(comm, agree(comm, own.stations, field))
+    return on_root_only(comm, _with_nodes, sketch, stations)
+
+
+def _with_nodes(sketch: Sketch, stations: list[LineStations]) -> Drawing:
+    """With the nodes that ranks have placed."""
+    return sketch.drawn(LineStations.joined(stations, sketch.bare.lines.sampling))
+
+
+def begun(case: Case, policy: TilePolicy) -> Sketch | Drawing | CoarseMesh:
+    """A user's mesh, or the cell as far as rank 0 draws it alone.
 
     Raises:
         CaseError: a phase has no material, or a material no phase.
         MeshError: the cell cannot be drawn, or its mesh file is faulty.
     """
     # gmsh is imported where it is needed.
-    found: Drawing | CoarseMesh
+    found: Sketch | Drawing | CoarseMesh
     if case.cell.has_own_mesh:
         from feti_homog.cell.msh_reader import read
 
         assert case.cell.file is not None
         found = read(case.cell.file, case.cell.snap_tolerance if case.cell.repair == "snap" else None)
     else:
-        from feti_homog.cell.gmsh_mesher import draw
+        from feti_homog.cell.gmsh_mesher import begin
 
-        found = draw(replace(case.cell, tip_size=tips.size(case)), tips.marks(case), policy)
+        found = begin(replace(case.cell, tip_size=tips.size(case)), tips.marks(case), policy)
     cases.check_phases(case, found.phases)
     return found
 
 
 def finished(found: Drawing | CoarseMesh | None, comm: MPI.Intracomm) -> CoarseMesh | None:
-    """The mesh that rank 0 has begun, there; its tiles are filled by all ranks.  Collective.
+    """The mesh that rank 0 has `drawn`, there; its tiles are filled by all ranks.  Collective.
 
     Raises:
         MeshError: on every rank, if one cannot fill a tile of its.

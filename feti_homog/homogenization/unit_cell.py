@@ -24,7 +24,7 @@ from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.solver import FetiSolver
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 from feti_homog.homogenization import bonds, cost_model, phase_laws, process_zone
-from feti_homog.homogenization.coarse_meshes import begun, finished
+from feti_homog.homogenization.coarse_meshes import drawn, finished
 from feti_homog.homogenization.domain_partition import (
     DEFAULT_POLICY,
     CellSummary,
@@ -174,11 +174,11 @@ def assemble_subdomains(
 
 def _cut(case: Case, lattice: ReferenceLattice, comm: MPI.Intracomm, policy: PartitionPolicy) -> RankShare:
     """This rank's share of the cell, meshed and cut.  Collective."""
-    drawn = on_root_only(comm, begun, case, policy.tiles)
-    if comm.bcast(isinstance(drawn, Drawing) and can_be_torn_by_tiles(case, drawn)):
-        assert not isinstance(drawn, CoarseMesh)
-        return tear_by_tiles(case, drawn, lattice, comm, policy)
-    mesh = finished(drawn, comm)
+    found = drawn(case, comm, policy.tiles)
+    if comm.bcast(isinstance(found, Drawing) and can_be_torn_by_tiles(case, found)):
+        assert not isinstance(found, CoarseMesh)
+        return tear_by_tiles(case, found, lattice, comm, policy)
+    mesh = finished(found, comm)
     return deal(comm, on_root_only(comm, distribute, case, mesh, lattice, comm.size, policy) or [])
 
 

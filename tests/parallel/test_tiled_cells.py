@@ -16,7 +16,6 @@ from support.whole_meshes import coarse_mesh
 
 from feti_homog.cell.refinement import ReferenceLattice
 from feti_homog.cell.tiles import TilePolicy
-from feti_homog.common.mpi_errors import on_root_only
 from feti_homog.config import case as cases
 from feti_homog.errors import MeshError
 from feti_homog.homogenization import coarse_meshes
@@ -65,7 +64,7 @@ def test_the_mesh_is_that_of_one_rank(comm):
 
 def share_of(case, comm):
     """This rank's share of the cell, torn by tiles."""
-    drawing = on_root_only(comm, coarse_meshes.begun, case, SMALL)
+    drawing = coarse_meshes.drawn(case, comm, SMALL)
     assert drawing is None or can_be_torn_by_tiles(case, drawing)
     return tear_by_tiles(case, drawing, LATTICE, comm, TILED)
 
@@ -131,7 +130,7 @@ def test_what_needs_the_whole_mesh_is_torn_on_rank_0(comm):
     contact = {"debonded": [{"fibre": 1, "centre": 0.0, "angle": 90.0}], "contact": True}
     for more in ({"interface": contact}, {"decomposition": {"subdomains": 17}}, {"bodies": "plane"}):
         case = case_of(**more)
-        drawing = on_root_only(comm, coarse_meshes.begun, case, SMALL)
+        drawing = coarse_meshes.drawn(case, comm, SMALL)
         assert drawing is None or not can_be_torn_by_tiles(case, drawing)
     cell, *_ = solve(case_of(decomposition={"subdomains": 17}), comm, policy=TILED)
     assert cell.summary.subdomains == 17

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from feti_homog.cell.tiles import DEFAULT_TILES
-from feti_homog.common.mpi_errors import on_root_only
-from feti_homog.homogenization.coarse_meshes import begun, finished
+from feti_homog.homogenization.coarse_meshes import drawn, finished
 
 
 def coarse_mesh(case, comm, policy=DEFAULT_TILES):
     """That of rank 0, filled by all; None on others.  Collective."""
-    return finished(on_root_only(comm, begun, case, policy), comm)
+    return finished(drawn(case, comm, policy), comm)

@@ -11,11 +11,11 @@ import pytest
 from support.circular_cells import cell
 
 from feti_homog.cell.arrangement import arrange
+from feti_homog.cell.bare_outline import BareOutline
 from feti_homog.cell.coarse_mesh import areas, flip_double_arcs
 from feti_homog.cell.filling import Tile, fill
 from feti_homog.cell.gmsh_mesher import generate
 from feti_homog.cell.graded_size import MeshSizes
-from feti_homog.cell.outline import outline
 
 CELLS = {
     "square": cell("square"),
@@ -169,7 +169,8 @@ def test_the_last_bits_of_the_outline_do_not_change_the_mesh(name, seed):
     """They are another machine's."""
     case, chance = CELLS[name], np.random.default_rng(seed)
     sizes = MeshSizes.uniform(case.mesh_size)
-    lines = outline(arrange(case), sizes, {})
+    bare = BareOutline.of(arrange(case), sizes, {})
+    lines = bare.outline(bare.stations())
     tile = Tile(lines.points, lines.curves, sizes.largest, False)
     ends = lines.points + chance.choice([-1.0, 1.0], lines.points.shape)
     here, elsewhere = fill(tile), fill(replace(tile, points=np.nextafter(lines.points, ends)))
