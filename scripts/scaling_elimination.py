@@ -50,12 +50,15 @@ class FrontSize(NamedTuple):
     def work(self, sharers: int) -> tuple[float, float, float, float]:
         """Of each sharer: multiplications, entries that are summed, entries that it is told, and one call."""
         e, f = self.eliminated, self.left
-        told = e**2 / 2 + e * f if sharers > 1 else 0.0
-        return (e**3 / 3 + e**2 * f + e * f**2) / sharers, self.n**2 / sharers, told, 1.0
+        alone = e**3 / 3 + e**2 * f + e * f**2
+        if sharers == 1:
+            return alone, self.n**2, 0.0, 1.0
+        inverse = e**3 / 3 + e**2 * f
+        return (alone + inverse) / sharers, self.n**2 / sharers, e**2 / 2 + e * f, 1.0
 
     def solve_work(self, sharers: int) -> tuple[float, float]:
-        """Entries that the first sharer reads, and one call."""
-        return self.eliminated**2 / 2 + self.eliminated * self.left / sharers, 1.0
+        """Entries that each sharer reads, and one call."""
+        return (self.eliminated**2 / 2 + self.eliminated * self.left) / sharers, 1.0
 
     def bytes_of_a_solve(self, loads: int) -> float:
         """That pass through its first rank: both halves' unknowns, to and fro, and what it tells its sharers."""

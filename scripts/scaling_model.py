@@ -112,8 +112,9 @@ def _local_times(rows: Sequence[Row], cores: int) -> dict[str, Any]:
     alone = [row for row in timed if row.ranks == 1 and row.way == ELIMINATION]
     cells = _meshed_alike(timed)
     return dict(
-        mesh=fit_shares(
-            [row.triangles for row in cells], [row.ranks for row in cells], [row.seconds["mesh"] for row in cells]
+        mesh=Shares(
+            serial=_rate((row.alone, row.triangles) for row in cells),
+            parallel=_rate((row.ranks * (row.seconds["mesh"] - row.alone), row.triangles) for row in cells),
         ),
         assemble=_rate((row.seconds["assemble"], row.dofs) for row in alone),
         setup=_rate((row.seconds["set-up"] - row.coarse_factor - row.natural_factor, row.dofs) for row in alone),
@@ -128,9 +129,8 @@ def _local_times(rows: Sequence[Row], cores: int) -> dict[str, Any]:
 
 
 def _meshed_alike(rows: Sequence[Row]) -> Sequence[Row]:
-    """Those of cells so large that all ranks mesh them, as those of the forecast; all rows, if there are too few."""
-    large = [row for row in rows if row.fibres >= DEFAULT_TILES.least_discs]
-    return large if len({row.ranks for row in large}) > 1 else rows
+    """Those of cells so large that all ranks mesh them, as those of the forecast; all rows, if there are none."""
+    return [row for row in rows if row.fibres >= DEFAULT_TILES.least_discs] or rows
 
 
 def _coarse_times(rows: Sequence[Row], cores: int) -> dict[str, Any]:

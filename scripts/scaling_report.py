@@ -32,7 +32,7 @@ class Row:
     the rigid-body motions, `natural`, which is solved twice in an iteration.  `peaks` are the MB of each rank by stage,
     `coarse_memory` those by which both factors let them grow.  `coarse_fronts` and `natural_fronts` are all fronts of
     the eliminations, and `timed_fronts` made-up ones that were timed.  `latency` (s) and `bandwidth` (bytes / s) are
-    those of messages between two ranks.
+    those of messages between two ranks.  Of the seconds of the mesh rank 0 is `alone` for some, while others wait.
     """
 
     fibres: int
@@ -67,6 +67,7 @@ class Row:
     way: str
     latency: float
     bandwidth: float
+    alone: float
 
     @property
     def solver(self) -> float:

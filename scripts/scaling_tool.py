@@ -25,8 +25,10 @@ from mpi4py import MPI  # noqa: E402
 from petsc4py import PETSc  # noqa: E402
 from scaling_report import ELIMINATION, MULTIGRID, SHARED  # noqa: E402
 
+from feti_homog.cell.drawing import Sketch  # noqa: E402
+from feti_homog.cell.tiles import TilePolicy  # noqa: E402
 from feti_homog.common import process_memory  # noqa: E402
-from feti_homog.common.mpi_errors import run_main  # noqa: E402
+from feti_homog.common.mpi_errors import on_root, run_main  # noqa: E402
 from feti_homog.common.petsc_options import case_options  # noqa: E402
 from feti_homog.common.progress import Progress  # noqa: E402
 from feti_homog.config import case as cases  # noqa: E402
@@ -41,6 +43,9 @@ from feti_homog.feti.linalg.remainder import Remainder  # noqa: E402
 from feti_homog.feti.linalg.shared_fronts import meet  # noqa: E402
 from feti_homog.feti.linalg.tree_elimination import TreeElimination  # noqa: E402
 from feti_homog.feti.thresholds import FRONT_BLOCK, front_sharers  # noqa: E402
+from feti_homog.homogenization import coarse_meshes  # noqa: E402
+from feti_homog.homogenization.domain_partition import DEFAULT_POLICY  # noqa: E402
+from feti_homog.homogenization.drawn_cell import drawn_cell, summary_of, tiles_to_fill  # noqa: E402
 from feti_homog.homogenization.unit_cell import TornCell, tear  # noqa: E402
 from feti_homog.typing import Float, Int  # noqa: E402
 
@@ -153,7 +158,25 @@ def measure(case: Case, progress: StagePeaks, way: str | None) -> dict[str, Any]
         **_coarse(solver.adaptive, solver.natural, comm, way),
     }
     solver.destroy()
+    report["alone"] = on_root(comm, seconds_alone, case, DEFAULT_POLICY.tiles)
     return report
+
+
+def seconds_alone(case: Case, policy: TilePolicy) -> float:
+    """In which rank 0 draws a cell, but for the nodes that all place, and fills one that is not cut into tiles."""
+    start = time.perf_counter()
+    sketch = coarse_meshes.begun(case, policy)
+    assert isinstance(sketch, Sketch)
+    begun = time.perf_counter()
+    stations = sketch.bare.stations()
+    placed = time.perf_counter()
+    drawing = sketch.drawn(stations)
+    if len(drawing.parts) == 1:
+        drawing.filled()
+    drawn_cell(case, drawing)
+    tiles_to_fill(drawing)
+    summary_of(case, drawing, 0, 0)
+    return begun - start + time.perf_counter() - placed
 
 
 def _messages(cell: TornCell) -> dict[str, Any]:
@@ -235,7 +258,7 @@ def _fronts(solver: RenewedSolver, comm: MPI.Intracomm) -> list[tuple[int, int, 
     own = []
     if isinstance(solver.current, TreeElimination):
         first = (front for front in solver.current.fronts if front.meeting.comm.rank == 0)
-        own = [(len(front.L), front.left, front.meeting.comm.size) for front in first]
+        own = [(front.eliminated, front.left, front.meeting.comm.size) for front in first]
     return [size for some in comm.allgather(own) for size in some]
 
 

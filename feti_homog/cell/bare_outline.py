@@ -172,8 +172,10 @@ def _arcs(
     """The arcs of `arcs_within`, and the points (v, 2) at which those of the `chosen` (k,) circles begin, but for those
     on the border, near its points (b, 2)."""
     arcs = arcs_within(len(circles), *vertices, partial(on_circles, circles), size)
-    ends = on_circles(circles, *arcs[:2])
-    away = cKDTree(border).query(ends)[0] > SAME_PLACE * size.max()
+    ends, same = on_circles(circles, *arcs[:2]), SAME_PLACE * size.max()
+    away = np.all((ends > same) & (ends < size - same), axis=1)
+    beside = np.flatnonzero(~away)
+    away[beside] = cKDTree(border).query(ends[beside])[0] > same
     return arcs, ends[away & chosen[arcs[0]]]
 
 

@@ -1,4 +1,10 @@
-"""Large fronts, which the ranks of a meeting share: blocks of columns are dealt out, and eliminated one by one."""
+"""Large fronts, which the ranks of a meeting share: blocks of columns are dealt out, and eliminated one by one.
+
+Triangular solves would be done by one rank after the other.  So the ranks invert L as they find it (Raghavan, Parallel
+Process. Lett. 8, 1998), and have columns of X above -H, where
+
+    X = L^-1,  H = A_FE A_EE^-1:  y = X f_E,  f_F - H f_E is left,  and x_E = X^T y - H^T x_F.
+"""
 
 from __future__ import annotations
 
@@ -17,28 +23,33 @@ from feti_homog.typing import Float, Int
 
 @dataclass(frozen=True)
 class SharedFront(Front):
-    """A front of which each of the first ranks of a meeting has some columns of half.
+    """A front of the first ranks of a meeting.
 
     Attributes:
         sharers: these ranks; null on the others.
-        own: (c,) the columns of this rank; its `half` is (f, c).
-        eliminated: e.
+        inverse: by the number of the first, some of its columns that this rank has, transposed, from the diagonal on.
     """
 
     sharers: MPI.Intracomm
-    own: Int
-    eliminated: int
+    inverse: dict[int, Float]
 
-    def _half_times(self, y: Float) -> Float:
+    def _eliminate(self, f: Float) -> tuple[Float, Float]:
+        e = self.eliminated
         if self.sharers == MPI.COMM_NULL:
-            return y
-        return self._sum_on_first(self.half @ self._tell(y, self.eliminated)[self.own])
+            return f, f
+        told, product = self._tell(f[:e], e), np.zeros((e + self.left, f.shape[1]))
+        for first, columns in self.inverse.items():
+            product[first:] += columns.T @ told[first : first + len(columns)]
+        found = self._sum_on_first(product)
+        return found[:e], f[e:] + found[e:]
 
-    def _transposed_half_times(self, x: Float) -> Float:
+    def _substitute(self, y: Float, x: Float) -> Float:
         if self.sharers == MPI.COMM_NULL:
             return x
+        told = self._tell(np.concatenate([y, x]), self.eliminated + self.left)
         product = np.zeros((self.eliminated, x.shape[1]))
-        product[self.own] = self.half.T @ self._tell(x, self.left)
+        for first, columns in self.inverse.items():
+            product[first : first + len(columns)] = columns @ told[first:]
         return self._sum_on_first(product)
 
     def _tell(self, x: Float, rows: int) -> Float:
@@ -92,63 +103,53 @@ def _eliminated_together(
     own = np.concatenate([np.zeros(0, np.int64), *(np.arange(*starts[k : k + 2]) for k in numbers)])
     # Of eliminated columns the rows from the diagonal on, of the others those that are left.
     blocks = {
-        k: np.asfortranarray(A[first:last, min(starts[k], e) :].T)
+        k: np.asfortranarray(A[first:last, min(starts[k], e) :])
         for k, first, last in zip(numbers, ends[:-1], ends[1:], strict=True)
     }
     sharing = subgroup(comm, range(sharers)) if takes_part else MPI.Intracomm(MPI.COMM_NULL)
     is_definite = not takes_part or _factor(sharing, blocks, starts, e)
-    eliminated = {int(starts[k]): block for k, block in blocks.items() if starts[k] < e}
-    half = np.hstack([np.zeros((f, 0)), *(block[len(block) - f :] for block in eliminated.values())])
-    rest = np.vstack([np.zeros((0, f)), *(block.T for k, block in blocks.items() if starts[k] >= e)])
-    L, half = _gathered_on_first(sharing, eliminated, e), np.asfortranarray(half)
-    front = SharedFront(meeting, layout.places, f, L, half, is_definite, sharing, own[own < e], e)
+    inverse = {int(starts[k]): block for k, block in blocks.items() if starts[k] < e}
+    rest = np.vstack([np.zeros((0, f)), *(block for k, block in blocks.items() if starts[k] >= e)])
+    front = SharedFront(meeting, layout.places, e, f, is_definite, sharing, inverse)
     return front, layout.remainder(own[own >= e] - e, rest)
 
 
 def _factor(comm: MPI.Intracomm, blocks: dict[int, Float], starts: Int, e: int) -> bool:
-    """Let the first blocks, of e columns, become those of L and half, and the others what is left.  Collective.
+    """Let the first blocks, of e columns, become those of the inverse, and the others what is left.  Collective.
 
-    The rank that has a block eliminates it and tells it to all, and each takes it off its blocks behind it.  Whether
-    all is definite, as far as this rank knows.
+    Blocks are transposed: so rows of a column are contiguous in the order of Fortran, and BLAS copies nothing.  The
+    rank that has one eliminates it and tells all of it, and each takes it off its blocks behind it, and off those
+    before it that are becoming columns of the inverse.  Whether all is definite, as far as this rank knows.
     """
     is_definite = True
     for number in range(int(np.searchsorted(starts, e))):
         start, stop = starts[number : number + 2]
-        # Transposed: so rows of it are contiguous in the order of Fortran, and BLAS copies nothing.
         panel = np.empty((stop - start, starts[-1] - start), order="F")
         if comm.rank == number % comm.size:
-            is_definite &= _eliminate(blocks[number])
-            panel[:] = blocks[number].T
+            panel[:] = blocks[number]
+            is_definite &= _eliminate(panel)
+            blocks[number] = np.eye(len(panel), panel.shape[1], order="F")
         comm.Bcast(panel, number % comm.size)
-        for k in blocks:
+        L, below = np.asfortranarray(panel[:, : stop - start].T), panel[:, stop - start :]
+        for k, block in blocks.items():
             if k > number:
-                rows, columns = (
-                    panel[:, min(starts[k], e) - start :],
-                    panel[:, starts[k] - start : starts[k + 1] - start],
-                )
-                blocks[k] = dgemm(-1.0, rows, columns, beta=1.0, c=blocks[k], trans_a=1, overwrite_c=1)
+                columns = panel[:, starts[k] - start : starts[k + 1] - start]
+                rows = panel[:, min(starts[k], e) - start :]
+                dgemm(-1.0, columns, rows, beta=1.0, c=block, trans_a=1, overwrite_c=1)
+            else:
+                here, after = np.split(block[:, start - starts[k] :], [stop - start], axis=1)
+                dtrsm(1.0, L, here, side=1, lower=1, trans_a=1, overwrite_b=1)
+                if after.size:
+                    dgemm(-1.0, here, below, beta=1.0, c=after, overwrite_c=1)
     return is_definite
 
 
-def _eliminate(block: Float) -> bool:
-    """Let a block of columns (m, w), of rows from the diagonal on, become that of L.  Whether it is definite."""
-    width = block.shape[1]
-    block[:width], is_definite = cholesky(np.array(block[:width], order="F"))
-    if len(block) > width:
-        L, below = np.asfortranarray(block[:width]), np.array(block[width:], order="F")
-        block[width:] = dtrsm(1.0, L, below, side=1, lower=1, trans_a=1, overwrite_b=1)
+def _eliminate(panel: Float) -> bool:
+    """Let a block of columns (w, m), transposed, of rows from the diagonal on, become that of L.  Whether it is
+    definite."""
+    width = len(panel)
+    L, is_definite = cholesky(np.array(panel[:, :width], order="F"))
+    panel[:, :width] = L.T
+    if panel.shape[1] > width:
+        dtrsm(1.0, L, panel[:, width:], lower=1, overwrite_b=1)
     return is_definite
-
-
-def _gathered_on_first(comm: MPI.Intracomm, blocks: dict[int, Float], e: int) -> Float:
-    """(e, e) L of blocks of columns, by where each begins, on the first rank; (0, 0) on the others.  Collective."""
-    if comm == MPI.COMM_NULL:
-        return np.zeros((0, 0))
-    every = comm.gather({start: block[: e - start] for start, block in blocks.items()})
-    if every is None:
-        return np.zeros((0, 0))
-    L = np.zeros((e, e), order="F")
-    for some in every:
-        for start, block in some.items():
-            L[start:, start : start + block.shape[1]] = block
-    return L
