@@ -10,7 +10,7 @@ import argparse
 import json
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -23,6 +23,7 @@ import numpy as np  # noqa: E402
 from benchmark_tool import peak  # noqa: E402
 from mpi4py import MPI  # noqa: E402
 from petsc4py import PETSc  # noqa: E402
+from scaling_fronts import fastest, fronts_of, seconds_of, timed_fronts  # noqa: E402
 from scaling_report import ELIMINATION, MULTIGRID, SHARED  # noqa: E402
 
 from feti_homog.cell.drawing import Sketch  # noqa: E402
@@ -36,26 +37,17 @@ from feti_homog.config.case import Case  # noqa: E402
 from feti_homog.feti.coarse.adaptive import AdaptiveCoarseSpace  # noqa: E402
 from feti_homog.feti.coarse.natural import NaturalCoarseSpace  # noqa: E402
 from feti_homog.feti.decomposition.jump_operator import JumpOperator  # noqa: E402
-from feti_homog.feti.linalg.distributed_solver import RenewedSolver  # noqa: E402
-from feti_homog.feti.linalg.fronts import Front  # noqa: E402
-from feti_homog.feti.linalg.rank_tree import Meeting  # noqa: E402
-from feti_homog.feti.linalg.remainder import Remainder  # noqa: E402
-from feti_homog.feti.linalg.shared_fronts import meet  # noqa: E402
-from feti_homog.feti.linalg.tree_elimination import TreeElimination  # noqa: E402
-from feti_homog.feti.thresholds import FRONT_BLOCK, front_sharers  # noqa: E402
 from feti_homog.homogenization import coarse_meshes  # noqa: E402
 from feti_homog.homogenization.domain_partition import DEFAULT_POLICY  # noqa: E402
 from feti_homog.homogenization.drawn_cell import drawn_cell, summary_of, tiles_to_fill  # noqa: E402
 from feti_homog.homogenization.unit_cell import TornCell, tear  # noqa: E402
-from feti_homog.typing import Float, Int  # noqa: E402
+from feti_homog.typing import Int  # noqa: E402
 
 LOADS = 3
 RTOL = 1e-8
 # Triangles of a mesh with equal sides h in a unit square are 2.31 / h^2; the narrow gaps add about so many times the
 # root of a fibre's share of them.
 TRIANGLES, IN_GAPS = 2.31, 6.0
-# Solves of the coarse problem that are timed; the fastest counts.
-TIMED = 5
 # Messages between two ranks that are timed: bytes of one, and how many.
 PINGS = {"latency": (8, 2000), "bandwidth": (4 << 20, 50)}
 # PETSc's options of ways to solve the coarse problem.
@@ -67,8 +59,6 @@ OPTIONS: dict[str, dict[str, str | float]] = {
         "feti_coarse_mg_levels_sub_pc_type": "icc",
     },
 }  # fmt: skip
-# Fronts that are timed on two ranks, one after the other and together: unknowns that are eliminated, and left.
-FRONTS = ((60, 200), (200, 600), (500, 1000), (1000, 1600), (2000, 0), (2000, 2000))
 
 
 def main() -> int:
@@ -230,14 +220,14 @@ def _coarse(
     let the memory of each rank grow."""
     right, motions = (np.ones((n, LOADS)) for n in (coarse.part().shape[0], len(natural.unknowns)))
     right[1::2] = -1.0
-    solve = _fastest(lambda: coarse.solve(right))
-    natural_solve = _fastest(lambda: natural.solve(natural.solve(motions)))
+    solve = fastest(lambda: coarse.solve(right))
+    natural_solve = fastest(lambda: natural.solve(natural.solve(motions)))
     inner = coarse.solver.iterations
     part = coarse.part()
     process_memory.forget_peak()
     before = peak()
     comm.Barrier()
-    factor, natural_factor = _seconds(lambda: coarse.factor(part)), _seconds(natural.factor)
+    factor, natural_factor = seconds_of(lambda: coarse.factor(part)), seconds_of(natural.factor)
     grown = peak() - before
     seconds = {
         "coarse_factor": factor, "coarse_solve": solve, "natural_factor": natural_factor, "natural_solve": natural_solve
@@ -246,57 +236,11 @@ def _coarse(
         "way": asked or ELIMINATION,
         "inner": inner,
         "coarse_memory": comm.allgather(grown),
-        "coarse_fronts": _fronts(coarse.solver, comm),
-        "natural_fronts": _fronts(natural.solver, comm),
-        "timed_fronts": timed_fronts(comm) if comm.size == 2 and not asked else [],
+        "coarse_fronts": fronts_of(coarse.solver, comm),
+        "natural_fronts": fronts_of(natural.solver, comm),
+        "timed_fronts": timed_fronts(comm, LOADS) if comm.size == 2 and not asked else [],
         **{name: comm.allreduce(value, MPI.MAX) for name, value in seconds.items()},
     }
-
-
-def _fronts(solver: RenewedSolver, comm: MPI.Intracomm) -> list[tuple[int, int, int]]:
-    """As `FrontSize`, those of all ranks."""
-    own = []
-    if isinstance(solver.current, TreeElimination):
-        first = (front for front in solver.current.fronts if front.meeting.comm.rank == 0)
-        own = [(front.eliminated, front.left, front.meeting.comm.size) for front in first]
-    return [size for some in comm.allgather(own) for size in some]
-
-
-def timed_fronts(comm: MPI.Intracomm) -> list[tuple[int, int, int, float, float]]:
-    """As `TimedFront`, on two ranks that both have all unknowns, alone and together."""
-    found = []
-    meeting = Meeting(comm, 1)
-    for e, f in FRONTS:
-        n = e + f
-        matrix = np.full((n, n), 1e-3) + np.eye(n)
-        copies, once = np.where(np.arange(n) < e, 2, 3), np.ones(n, np.int64)
-        own = Remainder(np.arange(n), copies, once, np.arange(n), matrix)
-        left, none = np.ones((n, LOADS)), np.zeros((0 if comm.rank else f, LOADS))
-        for block in (n, FRONT_BLOCK):
-            meet(meeting, own, block)[0].destroy()  # the first is slower
-            comm.Barrier()
-            start = time.perf_counter()
-            front, _ = meet(meeting, own, block)
-            seconds = time.perf_counter() - start
-
-            def solve(front: Front = front, left: Float = left, none: Float = none) -> None:
-                y, _ = front.forward(left)
-                front.backward(y, none)
-
-            times = comm.allreduce(seconds, MPI.MAX), comm.allreduce(_fastest(solve), MPI.MAX)
-            found.append((e, f, front_sharers(n, comm.size, block), *times))
-            front.destroy()
-    return found
-
-
-def _fastest(work: Callable[[], object]) -> float:
-    return min(_seconds(work) for _ in range(TIMED))
-
-
-def _seconds(work: Callable[[], object]) -> float:
-    start = time.perf_counter()
-    work()
-    return time.perf_counter() - start
 
 
 if __name__ == "__main__":
