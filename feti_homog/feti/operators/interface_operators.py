@@ -99,7 +99,7 @@ class InterfaceOperators:
         comm = jump_operator.vector.comm.tompi4py()
         return bool(comm.allreduce(bool(compliance.any()), MPI.LOR))
 
-    @property
+    @cached_property
     def slices(self) -> list[slice]:
         """The dofs of each subdomain among the n."""
         return [slice(a, b) for a, b in pairwise(self.offsets.tolist())]
@@ -139,8 +139,8 @@ class InterfaceOperators:
         """The operators of the subdomains, each applied to its part of x (n,) or (n, k)."""
         x = np.asfortranarray(x)
         y = np.empty(x.shape, order="F")
-        for apply, (first, last) in zip(applied, pairwise(self.offsets.tolist()), strict=True):
-            apply(x[first:last], y[first:last])
+        for apply, own in zip(applied, self.slices, strict=True):
+            apply(x[own], y[own])
         return y
 
     @cached_property
