@@ -17,7 +17,7 @@ import json
 import os
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -68,7 +68,7 @@ def main() -> int:
     arguments.out.joinpath("scaling").mkdir(parents=True, exist_ok=True)
     runs = planned(arguments)
     wanted = dict.fromkeys(run for study in arguments.studies if study != EVENTS for run in runs[study])
-    use_memory([run for run in wanted if not run.report(arguments.out).exists()])
+    use_memory(wanted, arguments.out)
     done = [work_off(run, arguments) for run in wanted]
     found = {study: rows_of(study, some, arguments) for study, some in runs.items()}
     if any(found.values()):
@@ -97,12 +97,15 @@ def planned(arguments: argparse.Namespace) -> dict[str, list[Run]]:
     }
 
 
-def use_memory(runs: Sequence[Run]) -> None:
-    """Write once to as much memory as these runs take, as far as it is there: to a virtual machine each gigabyte that it
-    has not used before may come in seconds, which would count as those of the largest runs."""
-    page = os.sysconf("SC_PAGE_SIZE")
+def use_memory(runs: Iterable[Run], out: Path) -> None:
+    """Write once to as much memory as the runs that have no report take, as far as it is there.
+
+    To a virtual machine each gigabyte that it has not used before may come in seconds, which would count as those of
+    the largest runs.
+    """
+    page, most = os.sysconf("SC_PAGE_SIZE"), max((run.dofs for run in runs if not run.report(out).exists()), default=0)
     there = int(SHARE_USED * page * os.sysconf("SC_AVPHYS_PAGES"))
-    np.empty(min(there, BYTES_OF_A_DOF * max((run.dofs for run in runs), default=0)), np.uint8)[::page] = 1
+    np.empty(min(there, BYTES_OF_A_DOF * most), np.uint8)[::page] = 1
 
 
 def work_off(run: Run, arguments: argparse.Namespace) -> bool:

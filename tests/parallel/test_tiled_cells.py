@@ -53,11 +53,12 @@ def case_of(interface=None, decomposition=None, **keys):
 
 
 @pytest.mark.quick
-def test_the_mesh_is_that_of_one_rank(comm):
-    mesh = coarse_mesh(case_of(), comm, SMALL)
+@pytest.mark.parametrize("keys", [{}, {"interface_size": 0.01}], ids=["uniform", "fine interfaces"])
+def test_the_mesh_is_that_of_one_rank(comm, keys):
+    mesh = coarse_mesh(case_of(**keys), comm, SMALL)
     assert (mesh is None) == (comm.rank > 0)
     if mesh is not None:
-        alone = coarse_mesh(case_of(), MPI.COMM_SELF, SMALL)
+        alone = coarse_mesh(case_of(**keys), MPI.COMM_SELF, SMALL)
         for name in ("points", "triangles", "phase", "representative", "arc_edges"):
             assert np.array_equal(getattr(mesh, name), getattr(alone, name))
 

@@ -53,5 +53,13 @@ def test_many_sources_beside_a_line():
     np.testing.assert_array_equal(size.on_lines(along).ravel(), size(along.reshape(-1, 2)))
 
 
+def test_a_line_does_not_see_the_others():
+    """To the last bit; a long one among them has another way to look for its sources."""
+    size = SourcedSize([sources(600)], SIZE, LARGEST)
+    along = np.concatenate([lines(0.02), lines(0.09), lines(0.5)])
+    alone = np.concatenate([size.on_lines(line[None]) for line in along])
+    np.testing.assert_array_equal(size.on_lines(along), alone)
+
+
 def test_no_lines():
     assert SourcedSize([sources(3)], SIZE, LARGEST).on_lines(np.zeros((0, 5, 2))).shape == (0, 5)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from feti_homog.common.dividing import balanced, ranges
+from feti_homog.common.dividing import balanced, even, ranges
 
 
 def test_loads_are_balanced():
@@ -14,6 +14,13 @@ def test_loads_are_balanced():
     assert len(sums) == 3 and sums.max() - sums.min() <= loads.max()
     assert balanced(np.array([5, 5, 9]), 2).tolist() == [1, 1, 0]
     assert len(balanced(np.zeros(0, np.int64), 2)) == 0
+
+
+def test_even_ranges():
+    for count, parts in ((10, 3), (2, 5), (0, 2), (7, 1)):
+        found = [list(range(count))[part] for part in even(count, parts)]
+        assert len(found) == parts and [n for part in found for n in part] == list(range(count))
+        assert max(map(len, found)) - min(map(len, found)) <= 1
 
 
 def test_ranges_follow_each_other():

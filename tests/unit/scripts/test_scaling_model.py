@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+import json
+from dataclasses import asdict, replace
 from math import sqrt
 
 import numpy as np
 import pytest
+from scaling import read
 from scaling_elimination import Borders, FrontRates, FrontSize, TimedFront
 from scaling_fit import fit_power, fit_shares
 from scaling_forecast import assumptions, checks, forecast
@@ -218,3 +220,20 @@ def test_tables_of_runs():
     assert by_ranks(rows, cores=1)[-1].split()[-1] == "-"
     assert ROWS[1].memory == 201.0
     assert memory(rows)[-1].split()[-1] == "201"
+
+
+def test_a_report_is_read_again_and_one_of_another_version_refused(tmp_path):
+    """With a field more, or one less."""
+    report = tmp_path / "report.json"
+    fields = asdict(ROWS[1])
+    fields["timed_fronts"], fields["coarse_fronts"] = (
+        [tuple(t) for t in fields[k]] for k in ("timed_fronts", "coarse_fronts")
+    )
+    report.write_text(json.dumps(fields))
+    (row,) = read(report)
+    assert row.timed_fronts == ROWS[1].timed_fronts and row.coarse_fronts[0].ranks == 2
+    for other in (fields | {"more": 1}, {name: value for name, value in fields.items() if name != "alone"}):
+        report.write_text(json.dumps(other))
+        with pytest.raises(SystemExit, match=r"report\.json: a report of another version"):
+            read(report)
+    assert read(tmp_path / "none.json") == []
