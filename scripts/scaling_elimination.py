@@ -47,14 +47,15 @@ class FrontSize(NamedTuple):
         """Ranks that eliminate it."""
         return front_sharers(self.n, self.ranks)
 
-    def work(self, sharers: int) -> tuple[float, float, float, float]:
-        """Of each sharer: multiplications, entries that are summed, entries that it is told, and one call."""
+    def work(self, sharers: int) -> tuple[float, float, float, float, float]:
+        """Of each sharer: multiplications of a whole front, multiplications block by block, entries that are summed,
+        entries that it is told, and one call."""
         e, f = self.eliminated, self.left
         alone = e**3 / 3 + e**2 * f + e * f**2
         if sharers == 1:
-            return alone, self.n**2, 0.0, 1.0
+            return alone, 0.0, self.n**2, 0.0, 1.0
         inverse = e**3 / 3 + e**2 * f
-        return (alone + inverse) / sharers, self.n**2 / sharers, e**2 / 2 + e * f, 1.0
+        return 0.0, (alone + inverse) / sharers, self.n**2 / sharers, e**2 / 2 + e * f, 1.0
 
     def solve_work(self, sharers: int) -> tuple[float, float]:
         """Entries that each sharer reads, and one call."""

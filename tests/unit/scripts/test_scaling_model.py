@@ -18,7 +18,7 @@ from scaling_report import ELIMINATION, MULTIGRID, SHARED, Row, by_ranks, memory
 CORES = 2
 NETWORK = Machine(2e-6, 1e10)
 ITERATIONS, LOADS = 20, 3
-FRONTS = FrontRates((3e-11, 5e-9, 4e-9, 1e-4), (1e-9, 3e-5))
+FRONTS = FrontRates((3e-11, 5e-11, 5e-9, 4e-9, 1e-4), (1e-9, 3e-5))
 # Unknowns of the last front, relative to the root of all.
 LAST = 10.0
 
