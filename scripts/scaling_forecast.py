@@ -58,11 +58,11 @@ def assumptions(rates: Rates, machine: Machine) -> list[str]:
         f"{_powers(natural.alone_factor, natural.alone_solve)} of m; of a rank's own n / p and m / p",
         f"              {_powers(coarse.own_factor, coarse.own_solve)} and "
         f"{_powers(natural.own_factor, natural.own_solve)}; then at each doubling of the ranks one front",
-        f"              {factor[0]:.2g} s a multiplication, {factor[1]:.2g} over the ranks that share it, {factor[2]:.2g} "
-        f"an entry over these, {factor[3]:.2g} an entry told to them, {factor[4]:.2g} a front;",
-        f"              a solve {solve[0]:.2g} an entry and {solve[1]:.2g}.  Of n / p unknowns per rank fronts have up to "
-        f"{coarse.borders.front:.1f} times the root, leave {coarse.borders.left:.1f};",
-        f"              the last has {coarse.borders.last:.1f} (counted)",
+        f"              {factor[0]:.2g} s a multiplication, {factor[1]:.2g} over the ranks that share it, "
+        f"{factor[2]:.2g} an entry over these, {factor[3]:.2g} an entry told to them,",
+        f"              {factor[4]:.2g} a front; a solve {solve[0]:.2g} an entry and {solve[1]:.2g}.  Of the unknowns "
+        f"of ranks fronts have up to {coarse.borders.front:.1f} times the root,",
+        f"              leave {coarse.borders.left:.1f}; the last has {coarse.borders.last:.1f} (counted)",
         *others,
         f"              of {STRONG_DOFS / 1e6:g} million dofs n is {r.vectors * STRONG_DOFS / r.largest_coarse:.1f} "
         "times the largest that was timed: the further, the less these powers are worth (`sizes` times larger ones)",

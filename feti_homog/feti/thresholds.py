@@ -21,19 +21,19 @@ class Thresholds:
         dense_boundary_dofs: boundary degrees of freedom of a subdomain up to which `-feti_dual_operator auto` ever
             makes dense matrices, of 8 n^2 bytes.
         soft_mode: tau, no unit; displacements p with S p = theta N p, theta < tau, are soft.  The default of
-            `-feti_coarse_threshold`; the condition number is about 1 / tau.  Measured [0.1, 0.24, 0.5]: 29, 20, 14
-            iterations, 4.4, 5.5, 7.2 vectors a subdomain.
+            `-feti_coarse_threshold`; the condition number is about 1 / tau.  Measured [0.1, 0.24, 0.35, 0.5]:
+            30, 20, 17, 14 iterations, 4.4, 5.4, 6.3, 7.3 vectors a subdomain.
         face_factor: tau of a face's own eigenproblem over tau, no unit: the energy that other faces and the rest of
-            the body add is not in it.  Measured [0.6, 0.8, 1, 1.25]: 23, 20, 19, 17 iterations; 6.4, 7.2, 7.9, 8.9
+            the body add is not in it.  Measured [0.6, 0.8, 1, 1.25]: 20, 17, 16, 16 iterations; 7.5, 8.8, 9.5, 10.7
             vectors.
-        face_layers: coarse triangles from a face to the far side of its neighbourhood.  Measured [1, 2, 3]: 17,
-            17, 18 iterations; 11.8, 8.9, 8.5 vectors: one layer finds modes that are none of the body's.
+        face_layers: coarse triangles from a face to the far side of its neighbourhood.  Measured [1, 2, 3]: 15,
+            16, 17 iterations; 14.5, 10.7, 10.2 vectors: one layer finds modes that are none of the body's.
         decayed: displacements on the rest of the boundary, relative to the largest of a face's mode, that are taken for
-            0.  Measured [1e-3, 0.01, 0.03, 0.1]: 17, 17, 18, 20 iterations.
+            0.  Measured [1e-3, 0.01, 0.03, 0.1]: 16, 16, 16, 18 iterations.
         min_trace_dofs: degrees of freedom that a trace space of a boundary or a face keeps at least.  Measured
-            [30, 60, 100, 250]: 21, 21, 21, 18 iterations; 6.0, 6.0, 6.1, 6.4 vectors.
+            [30, 60, 100, 250]: 18, 18, 18, 16 iterations; 6.7, 6.8, 6.9, 7.3 vectors.
         whole_boundary_dofs: boundary degrees of freedom of a whole body above which its soft modes come from a dense
-            eigenproblem for each face, not from one.  Measured [1000, 5000] with a boundary of 3644: 0.9 and 3.0 s.
+            eigenproblem for each face, not from one.  Measured [1000, 5000] with a boundary of 3644: 1.0 and 3.4 s.
         influence_applications: applications of the dual operator from which on influence columns pay
             (`scripts/benchmark_path`).
         assembled_schur_dofs: largest cell that is factored for influence columns, in degrees of freedom on shared nodes
@@ -41,7 +41,7 @@ class Thresholds:
     """
 
     dense_boundary_dofs: int = 6000
-    soft_mode: float = 0.24
+    soft_mode: float = 0.35
     face_factor: float = 1.25
     face_layers: int = 2
     decayed: float = 0.01

@@ -51,10 +51,10 @@ class PartitionPolicy:
     the last.
     """
 
-    piece_dofs: int = 3000
+    piece_dofs: int = 2200
     piece_boundary_dofs: int = 500
     cut_factor: float = 2.5
-    even_cut_factor: float = 12.0
+    even_cut_factor: float = 16.0
     even_share: float = 1 / 16
     breakable_boundary_dofs: int = 2500
     tiles: TilePolicy = DEFAULT_TILES

@@ -163,9 +163,9 @@ def test_pieces_do_not_grow_with_their_body():
 
 
 def test_bodies_that_can_be_shared_evenly_are_whole_up_to_a_larger_size():
-    load, edges = [600] * 100 + [1300], [10] * 101
-    assert wanted(load, edges) == [1] * 100 + [13]
-    assert wanted(load, edges, n_ranks=16) == [6] * 100 + [13]
+    load, edges = [600] * 100 + [1700], [10] * 101
+    assert wanted(load, edges) == [1] * 100 + [17]
+    assert wanted(load, edges, n_ranks=16) == [6] * 100 + [17]
     assert wanted([600] * 2, [400, 800]) == [6, 6]
 
 

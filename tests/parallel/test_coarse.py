@@ -58,8 +58,8 @@ def test_soft_modes_solve_the_eigenproblem(comm, narrow):
         theta = np.einsum("ik,ij,jk->k", p, S, p) / np.einsum("ik,ij,jk->k", p, N, p)
         assert (theta < THRESHOLD).all() and (theta > 1e-8).all()
         residual = S @ p - (N @ p) * theta
-        # N takes part twice: in the eigenproblem, and in the step of inverse iteration.
-        assert np.abs(residual).max(initial=0.0) < 2 * SINGLE * np.abs(S @ p).max(initial=1.0)
+        # Entries of N are rounded, and cancel each other in N p.
+        assert np.abs(residual).max(initial=0.0) <= SINGLE * (np.abs(N) @ np.abs(p) * theta).max(initial=0.0)
 
 
 # The balanced preconditioner.
