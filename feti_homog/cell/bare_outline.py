@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -36,9 +37,9 @@ class SizedLines:
 
     def parts(self, count: int) -> list[SizedLines]:
         """So many parts, in order and of equal numbers of lines."""
-        arcs, bridges = (even(len(lines), count) for lines in (self.arcs, self.bridges))
+        arcs, bridges = (pairwise(even(len(lines), count)) for lines in (self.arcs, self.bridges))
         return [
-            SizedLines(self.arcs.chosen(own), self.bridges.chosen(other), self.sampling)
+            SizedLines(self.arcs.chosen(slice(*own)), self.bridges.chosen(slice(*other)), self.sampling)
             for own, other in zip(arcs, bridges, strict=True)
         ]
 

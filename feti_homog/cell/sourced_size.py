@@ -24,6 +24,9 @@ class SourcedSize:
     """The function h(x) = min(largest, min_k (h_k + g_k |x - x_k|)) of positions x on the torus.
 
     A source k counts within the distance at which one of length 0 that grows by MAX_GROWTH is at the largest.
+
+    Attributes:
+        largest: size anywhere.
     """
 
     def __init__(self, sources: Sequence[Source], size: Float, largest: float, chunk: int = CHUNK) -> None:

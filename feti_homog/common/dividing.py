@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import heapq
-from itertools import pairwise
 
 import numpy as np
 
@@ -21,10 +20,10 @@ def balanced(load: AnyInt, n_ranks: int) -> Int:
     return ranks
 
 
-def even(count: int, parts: int) -> list[slice]:
-    """Numbers 0 .. count - 1 in so many ranges, one after the other, whose lengths differ by one at most."""
-    ends = [part * count // parts for part in range(parts + 1)]
-    return [slice(begin, end) for begin, end in pairwise(ends)]
+def even(count: int, parts: int) -> Int:
+    """(parts + 1,) where ranges of the numbers 0 .. count - 1 begin, and the last ends; their lengths differ by one at
+    most."""
+    return np.arange(parts + 1) * count // parts
 
 
 def ranges(start: Int, count: Int) -> Int:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from mpi4py import MPI
 
+from feti_homog.common.dividing import even
 from feti_homog.typing import Array, Float, Int
 
 
@@ -30,7 +31,7 @@ def share_columns(comm: MPI.Intracomm, solve: Callable[[Float], Float], B: Float
     columns = B.shape[1] if B.ndim == 2 else 1
     if comm.size == 1 or columns == 1:
         return solve(B)
-    ends = np.arange(comm.size + 1) * columns // comm.size
+    ends = even(columns, comm.size)
     own = slice(*ends[comm.rank : comm.rank + 2])
     part = solve(B[:, own]).T if own.start < own.stop else np.zeros((0, len(B)))
     return allgather_rows(comm, part, np.diff(ends)).T

@@ -18,9 +18,9 @@ def test_loads_are_balanced():
 
 def test_even_ranges():
     for count, parts in ((10, 3), (2, 5), (0, 2), (7, 1)):
-        found = [list(range(count))[part] for part in even(count, parts)]
-        assert len(found) == parts and [n for part in found for n in part] == list(range(count))
-        assert max(map(len, found)) - min(map(len, found)) <= 1
+        ends = even(count, parts)
+        assert len(ends) == parts + 1 and ends[0] == 0 and ends[-1] == count
+        assert np.diff(ends).min() >= 0 and np.ptp(np.diff(ends)) <= 1
 
 
 def test_ranges_follow_each_other():
