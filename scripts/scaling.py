@@ -6,6 +6,7 @@ place of elimination, and with the coarse problem solved by multigrid (PETSc's G
 are cores; `large` is the largest cell on one rank, too.  `events` are the first ones of paths of random cells that
 debond.  More ranks than cores take turns: their iterations and messages count,
 their times do not.
+`--threshold` is for all runs of the studies; give it a folder of its own.
 A run whose report is in DIR/scaling is not made again, so that a long list can be worked off in parts.  The tables,
 the picture and the model are of all runs of the studies that are there.  Remove the folder to measure anew.
 """
@@ -120,6 +121,7 @@ def work_off(run: Run, arguments: argparse.Namespace) -> bool:
         for _ in range(times):
             words = [HERE / "scaling_tool.py", report, "--fibres", run.fibres, "--dofs", run.dofs]
             words += ["--refine", run.refine, *(["--way", run.way] if run.way else [])]
+            words += [] if arguments.threshold is None else ["--threshold", arguments.threshold]
             fault = job(run.ranks, words, arguments.timeout)
             if fault:
                 print(f"{run.ranks} ranks, {run.dofs} dofs: {fault}", flush=True)
@@ -207,6 +209,7 @@ def _parser() -> argparse.ArgumentParser:
         "--sizes", type=int, nargs="+", default=[100_000, 300_000, 1_000_000, 3_000_000, 10_000_000], help="dofs"
     )
     parser.add_argument("--size-ranks", type=int, default=2, help="ranks for sizes")
+    parser.add_argument("--threshold", type=float, metavar="TAU", help="of the coarse space; else the program's")
     parser.add_argument("--event-fibres", type=int, nargs="+", default=[12, 48], help="of the cells that debond")
     parser.add_argument("--events", type=int, default=40, help="of each path, the first so many")
     parser.add_argument("--cores", type=int, default=os.cpu_count(), help="ranks up to which times count")

@@ -12,9 +12,12 @@ from scaling_elimination import VALUE_BYTES, FrontSize, TimedFront
 STAGES = ("mesh", "assemble", "set-up", "solve")
 COLUMNS = (
     "fibres", "ranks", "dofs", "subdomains", "vectors", "kernel", "iterations", "converged", "memory", "sent",
-    "messages", "front", "way", "coarse_factor", "coarse_solve", "natural_factor", "natural_solve", "inner", "solver",
-    "total",
+    "messages", "front", "way", "coarse_setup", "coarse_factor", "coarse_solve", "natural_factor", "natural_solve",
+    "inner", "solver", "total",
 )  # fmt: skip
+COARSE_TIMES = {
+    "coarse set-up": "coarse_setup", "of which its factor": "coarse_factor", "a coarse solve": "coarse_solve"
+}  # fmt: skip
 # What one iteration does: exchanges of multipliers (a gather and a sum each for the operator and the preconditioner),
 # and sums over ranks of single numbers by the Krylov method.
 GATHERS, SUMS, SCALARS = 2, 2, 3
@@ -28,11 +31,12 @@ class Row:
     """A run: what was asked for, sizes, seconds of each stage, and the counts of `scaling_tool`.
 
     `wanted` are the dofs asked for, `fullest` those of the rank with most; `way` says how the coarse problem is
-    solved, in how many iterations `inner`.  Seconds are those of the coarse problem, and of that of
-    the rigid-body motions, `natural`, which is solved twice in an iteration.  `peaks` are the MB of each rank by stage,
-    `coarse_memory` those by which both factors let them grow.  `coarse_fronts` and `natural_fronts` are all fronts of
-    the eliminations, and `timed_fronts` made-up ones that were timed.  `latency` (s) and `bandwidth` (bytes / s) are
-    those of messages between two ranks.  Of the seconds of the mesh rank 0 is `alone` for some, while others wait.
+    solved, in how many iterations `inner`.  Seconds are those of the coarse problem, of its set-up with the modes and
+    the factor, and of that of the rigid-body motions, `natural`, which is solved twice in an iteration.  `peaks` are
+    the MB of each rank by stage, `coarse_memory` those by which both factors let them grow.  `coarse_fronts` and
+    `natural_fronts` are all fronts of the eliminations, and `timed_fronts` made-up ones that were timed.  `latency`
+    (s) and `bandwidth` (bytes / s) are those of messages between two ranks.  Of the seconds of the mesh rank 0 is
+    `alone` for some, while others wait.
     """
 
     fibres: int
@@ -55,6 +59,7 @@ class Row:
     neighbours: tuple[int, ...]
     exchanges: int
     logged: tuple[float, ...]
+    coarse_setup: float
     coarse_factor: float
     coarse_solve: float
     natural_factor: float
@@ -179,6 +184,7 @@ def speedups(rows: Sequence[Row], cores: int) -> list[str]:
         for row in (row for row in rows if 1 < row.ranks <= cores):
             pairs = {s: (one.seconds[s], row.seconds[s]) for s in STAGES}
             pairs |= {"set-up and solve": (one.solver, row.solver), "all": (one.total, row.total)}
+            pairs |= {name: (getattr(one, at), getattr(row, at)) for name, at in COARSE_TIMES.items()}
             words = (f"{name} {row.dofs / one.dofs * a / b:.2f}" for name, (a, b) in pairs.items())
             lines.append(f"{row.ranks} ranks against one, times the dofs per second: {', '.join(words)}")
     return lines

@@ -69,8 +69,12 @@ def main() -> int:
     parser.add_argument("--dofs", type=int, required=True, help="about so many degrees of freedom")
     parser.add_argument("--refine", type=int, required=True)
     parser.add_argument("--way", choices=OPTIONS, help="to solve the coarse problem; by default as the program chooses")
+    parser.add_argument("--threshold", type=float, help="of the coarse space; by default the program's")
     arguments = parser.parse_args()
-    case = random_cell(arguments.fibres, arguments.dofs, arguments.refine, arguments.way)
+    options = OPTIONS.get(arguments.way or "", {})
+    if arguments.threshold is not None:
+        options = options | {"feti_coarse_threshold": arguments.threshold}
+    case = random_cell(arguments.fibres, arguments.dofs, arguments.refine, options)
     PETSc.Log.begin()
     progress = StagePeaks(MPI.COMM_WORLD, quiet=True)
     with case_options(case.petsc):
@@ -101,8 +105,8 @@ class StagePeaks(Progress):
         return {name: self.comm.allgather(megabytes) for name, megabytes in self.peaks.items()}
 
 
-def random_cell(fibres: int, dofs: int, refine: int, way: str | None) -> Case:
-    """A case with about so many degrees of freedom, its coarse problem solved in a `way` of OPTIONS."""
+def random_cell(fibres: int, dofs: int, refine: int, options: dict[str, str | float]) -> Case:
+    """A case with about so many degrees of freedom, and PETSc's options of its coarse space."""
     each = dofs / fibres / 4**refine
     regular = (np.sqrt(each + (IN_GAPS / 2) ** 2) - IN_GAPS / 2) ** 2
     document = {
@@ -112,7 +116,7 @@ def random_cell(fibres: int, dofs: int, refine: int, way: str | None) -> Case:
         },
         "material": {"matrix": {"young": 3.0, "poisson": 0.35}, "fibre": {"young": 70.0, "poisson": 0.2}},
         "analysis": {"type": "stiffness", "plane": "strain"},
-        "petsc": {"feti_ksp_rtol": RTOL, "feti_coarse_space": "adaptive"} | OPTIONS.get(way or "", {}),
+        "petsc": {"feti_ksp_rtol": RTOL, "feti_coarse_space": "adaptive"} | options,
     }  # fmt: skip
     return cases.parse(document, Path())
 
@@ -215,9 +219,9 @@ def ping(comm: MPI.Intracomm, size: int, times: int) -> float:
 def _coarse(
     coarse: AdaptiveCoarseSpace, natural: NaturalCoarseSpace, comm: MPI.Intracomm, asked: str | None
 ) -> dict[str, Any]:
-    """Seconds to sum and factor the coarse matrix, of which each rank has made its part, and that of the rigid-body
-    motions, and to solve with them as often as an iteration does, their fronts, and by how many megabytes the factors
-    let the memory of each rank grow."""
+    """Seconds to set up the coarse space, to sum and factor the coarse matrix, of which each rank has made its part,
+    and that of the rigid-body motions, and to solve with them as often as an iteration does, their fronts, and by how
+    many megabytes the factors let the memory of each rank grow."""
     right, motions = (np.ones((n, LOADS)) for n in (coarse.part().shape[0], len(natural.unknowns)))
     right[1::2] = -1.0
     solve = fastest(lambda: coarse.solve(right))
@@ -229,8 +233,10 @@ def _coarse(
     comm.Barrier()
     factor, natural_factor = seconds_of(lambda: coarse.factor(part)), seconds_of(natural.factor)
     grown = peak() - before
+    setup = PETSc.Log.Event("FETICoarseSetUp").getPerfInfo(PETSc.Log.Stage("factor").id)["time"]
     seconds = {
-        "coarse_factor": factor, "coarse_solve": solve, "natural_factor": natural_factor, "natural_solve": natural_solve
+        "coarse_setup": setup, "coarse_factor": factor, "coarse_solve": solve,
+        "natural_factor": natural_factor, "natural_solve": natural_solve,
     }  # fmt: skip
     return {
         "way": asked or ELIMINATION,

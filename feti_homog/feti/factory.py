@@ -69,23 +69,28 @@ def build(
     database = PETSc.Options("feti_")
     options = SolverOptions.read(database.getString, database.getReal, thresholds)
     soft = options.want_soft_modes(_are_cut(comm, subdomains))
-    operators = agree(
-        comm,
-        InterfaceOperators,
-        jump_operator,
-        subdomains,
-        options.operator,
-        applications,
-        soft,
-        thresholds,
-        compliance,
-    )  # fmt: skip
+    with PETSc.Log.Event("FETISubdomains"):
+        operators = agree(
+            comm,
+            InterfaceOperators,
+            jump_operator,
+            subdomains,
+            options.operator,
+            applications,
+            soft,
+            thresholds,
+            compliance,
+        )
     plan = choose(_sizes(comm, jump_operator, operators, applications), options, thresholds)
     preconditioner = CLASSES[plan.preconditioner](comm, jump_operator, operators)
-    natural = NaturalCoarseSpace(comm, jump_operator, operators)
+    with PETSc.Log.Event("FETINatural"):
+        natural = NaturalCoarseSpace(comm, jump_operator, operators)
     adaptive = None
     if plan.adaptive and isinstance(preconditioner, Dirichlet):
-        adaptive = AdaptiveCoarseSpace(comm, jump_operator, operators, preconditioner, options.threshold, thresholds)
+        with PETSc.Log.Event("FETICoarseSetUp"):
+            adaptive = AdaptiveCoarseSpace(
+                comm, jump_operator, operators, preconditioner, options.threshold, thresholds
+            )
         preconditioner = Balanced(preconditioner, adaptive)
     if plan.preconditioner == "dirichlet" and comm.allreduce(bool(operators.compliance.any()), MPI.LOR):
         preconditioner = WithSprings(comm, preconditioner, jump_operator.owned[0], operators.compliance)

@@ -170,7 +170,7 @@ def test_petscs_monitor_and_log_are_printed(tmp_path):
     assert job.stdout.count("Linear feti_ solve converged due to CONVERGED_RTOL") == 1
     stages = re.findall(r"^ *\d+: +([\w ]+): +\S+ +[\d.]+%", job.stdout, re.MULTILINE)
     assert set(STAGES) <= set(stages)
-    for event in ("FETIDual", "FETIPrecond"):
+    for event in ("FETISubdomains", "FETINatural", "FETIDual", "FETIPrecond"):
         assert re.search(rf"^{event} +[1-9]", job.stdout, re.MULTILINE)
 
 

@@ -16,6 +16,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from mpi4py import MPI
+from petsc4py import PETSc
 from scipy.sparse import csr_matrix, diags
 
 from feti_homog.common import process_memory
@@ -80,6 +81,7 @@ class AdaptiveCoarseSpace:
         self._forces: list[Float] = [np.zeros((0, 0)) for _ in blocks]
         self._energies: list[Float] = [np.zeros((0, 0)) for _ in blocks]
         self._mask = np.ones(len(jump_operator.rows))
+        self._solve_event = PETSc.Log.Event("FETICoarseSolve")
         self._update(range(len(blocks)), [block.BW for block in blocks])
         process_memory.trim()
         self.factorizations = 0
@@ -164,7 +166,8 @@ class AdaptiveCoarseSpace:
 
     def solve(self, work: Float) -> Float:
         """c with Z_0^T S Z_0 c = the sum over ranks of work, (u,) or (u, k) both.  Collective."""
-        return scale_rows(self._weights, self.solver.solve(scale_rows(self._weights, work)))
+        with self._solve_event:
+            return scale_rows(self._weights, self.solver.solve(scale_rows(self._weights, work)))
 
     def _parts(self) -> zip[tuple[Int, Float, slice]]:
         """Of each subdomain places of the modes that reach it, S Z_0, and where it is among the boundary dofs."""
