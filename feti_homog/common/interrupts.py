@@ -18,8 +18,9 @@ from feti_homog.common.standard_streams import complain
 ENDING = (signal.SIGINT, signal.SIGTERM)
 # Where launchers say the rank of a process before MPI has started.
 RANK_VARIABLES = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID")
-# How long the others wait: after a rank has ended, Open MPI drops what rank 0 prints.
-SILENT_SECONDS = 0.5
+# How long the others wait: after a rank has ended, Open MPI drops what rank 0 prints, and a call of a library may keep
+# rank 0 from hearing the signal for a while.
+SILENT_SECONDS = 5.0
 
 
 def end_on_signals() -> None:
