@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import csv
 import io
-import shutil
+import re
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from enum import StrEnum
@@ -29,6 +29,10 @@ from feti_homog.sweep.plan import Sweep, SweepCase, identity_of
 INDEX_FILE, TABLE_FILE, ERROR_FILE, CASE_FILE, LOCK_FILE = (
     "sweep.json", "cases.csv", "error.txt", "case.toml", "lock",
 )  # fmt: skip
+# What a sweep, its collection and its report write beside sweep.json.
+SWEEP_ENTRY = re.compile(
+    r"cases\.csv|lock|sweep\.(csv|h5)|(moduli|cell_size|curves|match)\.png|report\.html|case-\d{4,}"
+)
 INDEX_LOCK_FILE, INDEX_LOCK_TIMEOUT_S = "index.lock", 30.0
 
 
@@ -74,24 +78,27 @@ def prepare_folder(directory: Path, sweep: Sweep) -> None:
     """Make the folder of a sweep, or find that it is already that, perhaps with fewer cases.  On one rank.
 
     Raises:
-        CaseError: the folder is that of another sweep.
+        CaseError: the folder is that of another sweep, or holds what no sweep wrote under names of its files.
         FetiHomogError: it cannot be written.
     """
     try:
         directory.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise CaseError(f"--out {directory}: cannot be made: {error.strerror}") from error
-    if _existing_entries(directory) == sweep.entries:
+    if _existing_entries(directory) == sweep.entries and (directory / TABLE_FILE).exists():
         return
     try:
         with TemporaryLock(directory / INDEX_LOCK_FILE, timeout=INDEX_LOCK_TIMEOUT_S):
             known = _existing_entries(directory)
             _refuse_another(directory, known, sweep.entries)
+            if not known:
+                _refuse_files_of_others(directory)
+            atomic.remove_unfinished(directory, re.compile(rf"{INDEX_FILE}|{TABLE_FILE}"))
             if known != sweep.entries:
-                atomic.replace_text(directory / TABLE_FILE, _table(sweep.entries))
                 document = {"version": __version__, "name": sweep.name, "stress_unit": sweep.stress_unit}
                 entries = [asdict(entry) for entry in sweep.entries]
                 atomic.replace_text(directory / INDEX_FILE, sealed_json.dumps(document | {"cases": entries}))
+            atomic.replace_text(directory / TABLE_FILE, _table(sweep.entries))
     except LockHeld as error:
         raise CaseError(f"--out {directory}: {error} has been writing its list of cases for long") from error
 
@@ -152,7 +159,9 @@ def write_case_file(directory: Path, entry: SweepCase, case: Case) -> None:
         FetiHomogError: the folder cannot be written.
     """
     document = {name: table for name, table in case.resolved().items() if table != {}}
-    atomic.replace_text(directory / entry.folder / CASE_FILE, tomli_w.dumps(document))
+    folder = directory / entry.folder
+    atomic.remove_unfinished(folder, re.compile(rf"{CASE_FILE}|{ERROR_FILE}"))
+    atomic.replace_text(folder / CASE_FILE, tomli_w.dumps(document))
 
 
 def reset(directory: Path, entry: SweepCase, status: Status) -> None:
@@ -164,9 +173,9 @@ def reset(directory: Path, entry: SweepCase, status: Status) -> None:
     folder = directory / entry.folder
     try:
         (folder / ERROR_FILE).unlink(missing_ok=True)
-        shutil.rmtree(folder / checkpoint.FOLDER, ignore_errors=True)
     except OSError as error:
         raise FetiHomogError(f"cannot write {folder}: {error.strerror}") from error
+    checkpoint.remove(folder)
     set_aside(directory, entry, status)
 
 
@@ -201,6 +210,16 @@ def _refuse_another(directory: Path, known: Sequence[SweepCase], wanted: Sequenc
             f"--out {directory} holds another sweep: it has {len(known)} cases, this file {len(wanted)}; "
             "choose another folder"
         )
+
+
+def _refuse_files_of_others(directory: Path) -> None:
+    """Raises CaseError if something stands where a sweep would write its own, in a folder without a list of cases."""
+    for path in sorted(directory.iterdir()):
+        if SWEEP_ENTRY.fullmatch(path.name) and (any(path.iterdir()) if path.is_dir() else path.lstat().st_size):
+            raise CaseError(
+                f"--out {directory}: no sweep of this program wrote {path.name}, and this one would replace it; "
+                "move it away or choose another folder"
+            )
 
 
 def _table(entries: Sequence[SweepCase]) -> str:

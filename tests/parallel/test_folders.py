@@ -39,6 +39,14 @@ REFUSED = {
     "result.h5 is a folder": (lambda path: make(path, "result.h5", None), "result.h5 is a folder there"),
     "result.lock is a folder": (lambda path: make(path, "result.lock", None), "result.lock is a folder there"),
     "path.csv is a folder": (lambda path: make(path, "path.csv", None), "path.csv is a folder there"),
+    "checkpoint of others": (
+        lambda path: path.mkdir() or make(path / "checkpoint", "model.pt", "mine"),
+        "no run of this program wrote checkpoint/model.pt",
+    ),
+    "result leads nowhere": (
+        lambda path: path.mkdir() or (path / "result.json").symlink_to("none"),
+        "result.json is a link there that leads nowhere",
+    ),
     "checkpoint is a file": (lambda path: make(path, "checkpoint", "mine"), "checkpoint is a file there"),
     "somebody's picture": (lambda path: make(path, "cell.png", "mine"), "no run of this program wrote cell.png"),
     "somebody's table": (lambda path: make(path, "path.csv", "mine"), "no run of this program wrote path.csv"),

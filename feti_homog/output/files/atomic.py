@@ -14,8 +14,6 @@ from pathlib import Path
 
 from feti_homog.errors import FetiHomogError
 
-UNFINISHED = re.compile(r".+\.\d+\.part")
-
 
 def replace(path: Path, write: Callable[[Path], object]) -> Path:
     """Let `write` make a file beside `path`, which then takes its place in one step; returns `path`.
@@ -58,10 +56,11 @@ def rename(old: Path, new: Path) -> None:
         _synchronise(new.parent)
 
 
-def remove_unfinished(folder: Path) -> None:
-    """Remove what writers that were killed have left in a folder; for whoever alone may write there."""
+def remove_unfinished(folder: Path, names: re.Pattern[str]) -> None:
+    """Remove what writers of files of these names that were killed have left; for whoever alone may write there."""
+    unfinished = re.compile(rf"({names.pattern})\..+\.\d+\.part")
     for path in folder.glob("*.part"):
-        if UNFINISHED.fullmatch(path.name):
+        if unfinished.fullmatch(path.name):
             with contextlib.suppress(OSError):
                 path.unlink()
 

@@ -6,9 +6,9 @@ without gaps; each carries the run that it belongs to and, ahead of what HDF5 re
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import re
-import shutil
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -22,11 +22,12 @@ from feti_homog.common.mpi_errors import on_root, on_root_only
 from feti_homog.errors import CaseError
 from feti_homog.output.files import atomic
 
-FOLDER = "checkpoint"
+FOLDER, DROPPED = "checkpoint", "checkpoint.dropped"  # the second while it is removed
 FORMAT = 4  # of an event's file: to be raised when what an event holds changes
 # HDF5 leaves so many bytes at the beginning of a file to its writer; there stands the header.
 USER_BLOCK = 512
 HEADER = re.compile(rb"feti-homog checkpoint, format (\d+), sha256 ([0-9a-f]{64})\n")
+EVENT_FILE = re.compile(r"\d{6,}\.h5(\..+\.\d+\.part)?")  # also of a writer that was killed
 UNMARKED = re.compile(rb"\x89HDF\r\n\x1a\n")  # HDF5's own first bytes, as in format 1
 
 Arrays = dict[str, NDArray[Any]]
@@ -78,12 +79,8 @@ class Checkpoint:
         on_root(self.comm, self._write, number, whole, gathered)
 
     def _clear(self) -> int:
-        """Under its own name the folder is there as a whole or not at all."""
-        count, dropped = len(self._files()), self.folder.with_suffix(".dropped")
-        shutil.rmtree(dropped, ignore_errors=True)
-        if self.folder.is_dir():
-            atomic.rename(self.folder, dropped)
-            shutil.rmtree(dropped, ignore_errors=True)
+        count = len(self._files())
+        remove(self.folder.parent)
         return count
 
     def _files(self) -> list[Path]:
@@ -160,6 +157,56 @@ class EventsInMemory(NoCheckpoint):
 
     def write(self, number: int, whole: Mapping[str, Any], distributed: Mapping[str, NDArray[Any]]) -> None:
         self._events[number] = {name: np.asarray(value) for name, value in {**whole, **distributed}.items()}
+
+
+def refuse_others(directory: Path) -> None:
+    """Check that a run may write its events to `directory`/checkpoint, and remove them.  Call on one rank.
+
+    Raises:
+        CaseError: it is no folder, or something else than events stands in it.
+        OSError: it cannot be read.
+    """
+    for folder in (directory / FOLDER, directory / DROPPED):
+        if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
+            kind = "link" if folder.is_symlink() else "file"
+            raise CaseError(
+                f"--out {directory}: {folder.name} is a {kind} there, and a run makes a folder of that name"
+            )
+        others = [path.name for path in folder.iterdir() if not _is_event(path)] if folder.is_dir() else []
+        if others:
+            raise CaseError(
+                f"--out {directory}: no run of this program wrote {folder.name}/{min(others)}, and a run removes "
+                f"{folder.name}; move it away or choose another folder"
+            )
+
+
+def remove(directory: Path) -> None:
+    """Remove the events in `directory`: under its own name their folder is there as a whole or not at all.
+
+    Call on one rank.
+
+    Raises:
+        FetiHomogError: the folder cannot be renamed.
+    """
+    folder, dropped = directory / FOLDER, directory / DROPPED
+    _remove_events(dropped)
+    if folder.is_dir():
+        with atomic.file_errors("remove", folder):
+            atomic.rename(folder, dropped)
+        _remove_events(dropped)
+
+
+def _remove_events(folder: Path) -> None:
+    """As far as it can be: what stays, the next run removes."""
+    with contextlib.suppress(OSError):
+        for path in folder.iterdir():
+            if _is_event(path):
+                path.unlink()
+        folder.rmdir()
+
+
+def _is_event(path: Path) -> bool:
+    return EVENT_FILE.fullmatch(path.name) is not None and path.is_file()
 
 
 def _digest(path: Path) -> str:

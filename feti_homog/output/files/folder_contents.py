@@ -35,12 +35,11 @@ def refuse_files_of_others(directory: Path) -> None:
 
 
 def _refuse_wrong_kinds(directory: Path, names: list[str]) -> None:
-    for name in names:
-        is_folder = (directory / name).is_dir()
-        if is_folder and (name in SIGNS or output_folder.RESULT_FILE.fullmatch(name)):
-            raise CaseError(f"--out {directory}: {name} is a folder there, and a run writes a file of that name")
-        if not is_folder and name == checkpoint.FOLDER:
-            raise CaseError(f"--out {directory}: {name} is a file there, and a run makes a folder of that name")
+    for path in (directory / name for name in names if name in SIGNS or output_folder.RESULT_FILE.fullmatch(name)):
+        kind = "a folder there" if path.is_dir() else "a link there that leads nowhere" if not path.exists() else ""
+        if kind:
+            raise CaseError(f"--out {directory}: {path.name} is {kind}, and a run writes a file of that name")
+    checkpoint.refuse_others(directory)
 
 
 def _refuse_foreign(directory: Path, names: list[str]) -> None:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from feti_homog.common.file_locks import LockHeld, LocksUnsupported, TemporaryLock, holder
 from feti_homog.common.mpi_errors import on_root
+from feti_homog.config.load_names import SPATIAL_STRAINS
 from feti_homog.errors import CaseError, FetiHomogError
 from feti_homog.output.files import atomic
 
@@ -19,12 +20,12 @@ if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
 
 LOCK = "result.lock"
-LONGEST = "case_minus_gamma12.png"  # of a run's files the one of the longest name
+LONGEST = "case_minus_temperature.png"  # of a run's files the one of the longest name
 # The files of a result, those of all analyses and of what `plot` draws.
 RESULT_FILE = re.compile(
     r"report\.html|events\.log|result\.(json|h5|xdmf)|interface\.xdmf"
-    r"|(angle|path|envelope)\.csv|(cell|interface|envelope|(angle|path)(_states)?)\.png|path\.gif"
-    r"|case_(minus_)?(E11|E22|gamma12)\.png|state_\d+\.png"
+    r"|(angle|path|load|envelope)\.csv|(cell|interface|load|envelope|(angle|path)(_states)?)\.png|path\.gif"
+    rf"|case_(minus_)?({'|'.join(SPATIAL_STRAINS)}|temperature)\.png|state_\d+\.png"
 )
 
 
@@ -101,7 +102,7 @@ def _hold(lock: TemporaryLock, directory: Path) -> tuple[list[Path], str]:
     except FetiHomogError:
         _remove_empty(made)
         raise
-    atomic.remove_unfinished(directory)
+    atomic.remove_unfinished(directory, RESULT_FILE)
     return made, ""
 
 

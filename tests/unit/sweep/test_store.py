@@ -7,10 +7,12 @@ import sys
 from pathlib import Path
 
 import pytest
+from support.sweep_files import sweep_file
 
 from feti_homog.common.file_locks import Lock, LockHeld, is_locked
-from feti_homog.errors import FetiHomogError
+from feti_homog.errors import CaseError, FetiHomogError
 from feti_homog.output.files import atomic
+from feti_homog.sweep import plan, store
 
 HOLDER = """
 import sys, time
@@ -74,3 +76,29 @@ def test_a_file_is_replaced_whole_or_not_at_all(tmp_path):
 def test_a_full_device_is_told():
     with pytest.raises(FetiHomogError, match="No space left on device"):
         atomic.replace(Path("/dev/shm/feti_homog_none"), lambda part: Path("/dev/full").write_text("x"))
+
+
+@pytest.mark.parametrize("name", ["cases.csv", "lock", "sweep.csv", "sweep.h5", "match.png", "case-0001/notes.txt"])
+def test_files_that_no_sweep_wrote_are_not_replaced(tmp_path, name):
+    sweep, out = plan.load(sweep_file(tmp_path, '"cell.order" = [1, 2]\n')), tmp_path / "out"
+    (out / name).parent.mkdir(parents=True)
+    (out / name).write_text("mine")
+    with pytest.raises(CaseError, match=f"no sweep of this program wrote {Path(name).parts[0]}, and this one would"):
+        store.prepare_folder(out, sweep)
+    assert [path.read_text() for path in out.rglob("*") if path.is_file()] == ["mine"]
+
+
+def test_the_folder_of_a_sweep_is_made_whole_again(tmp_path):
+    """A sweep may be killed when it has written its list and not yet the table."""
+    sweep, out = plan.load(sweep_file(tmp_path, '"cell.order" = [1, 2]\n')), tmp_path / "out"
+    store.prepare_folder(out, sweep)
+    table = (out / "cases.csv").read_text()
+    (out / "cases.csv").unlink()
+    (out / "sweep.csv").write_text("collected")
+    atomic.part_of(out / "cases.csv").write_text("half")
+    store.prepare_folder(out, sweep)
+    assert {path.name: path.read_text() for path in out.glob("*.csv*")} == {
+        "cases.csv": table,
+        "sweep.csv": "collected",
+    }
+    assert store.read_index(out).entries == sweep.entries

@@ -8,8 +8,9 @@ from feti_homog.output.files import atomic, output_folder
 
 
 def test_unfinished_files_are_removed(tmp_path):
-    kept = [tmp_path / name for name in ("result.json", "my.part", "cases.csv")]
-    for path in [*kept, atomic.part_of(tmp_path / "result.h5")]:
+    kept = [tmp_path / name for name in ("result.json", "my.part", "cases.csv", "notes.host.12.part")]
+    unfinished = ("result.h5", "case_minus_temperature.png", "load.csv")
+    for path in [*kept, *(atomic.part_of(tmp_path / name) for name in unfinished)]:
         path.write_text("")
     with output_folder.held(tmp_path, MPI.COMM_SELF, print):
         assert {path.name for path in tmp_path.iterdir()} == {path.name for path in kept} | {output_folder.LOCK}

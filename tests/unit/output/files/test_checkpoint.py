@@ -12,7 +12,7 @@ from mpi4py import MPI
 
 from feti_homog.errors import CaseError
 from feti_homog.output.files import atomic
-from feti_homog.output.files.checkpoint import FORMAT, USER_BLOCK, Checkpoint
+from feti_homog.output.files.checkpoint import FORMAT, USER_BLOCK, Checkpoint, refuse_others
 
 EVENTS = 4
 
@@ -112,3 +112,29 @@ def test_a_copy_of_another_event_is_refused(tmp_path, old, new):
     path.write_bytes((tmp_path / "checkpoint" / f"{old:06d}.h5").read_bytes())
     with pytest.raises(CaseError, match=rf"{new:06d}\.h5 is a copy of event {old:06d}: expected event {new:06d}"):
         checkpoint.count()
+
+
+def test_nothing_but_events_is_removed(tmp_path):
+    checkpoint = written(tmp_path)
+    (tmp_path / "checkpoint" / "weights.pt").write_text("mine")
+    assert checkpoint.clear() == EVENTS
+    assert [path.name for path in tmp_path.rglob("*") if path.is_file()] == ["weights.pt"]
+
+
+@pytest.mark.parametrize("name", ["checkpoint", "checkpoint.dropped"])
+@pytest.mark.parametrize("content", ["weights.pt", "000000.h5.old", "000009.h5/mine"])
+def test_a_folder_of_others_is_refused(tmp_path, name, content):
+    written(tmp_path)
+    refuse_others(tmp_path)
+    path = tmp_path / name / content
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text("mine")
+    with pytest.raises(CaseError, match=f"no run of this program wrote {name}/"):
+        refuse_others(tmp_path)
+
+
+@pytest.mark.parametrize(("make", "kind"), [(Path.touch, "file"), (lambda path: path.symlink_to("."), "link")])
+def test_a_checkpoint_that_is_no_folder_is_refused(tmp_path, make, kind):
+    make(tmp_path / "checkpoint")
+    with pytest.raises(CaseError, match=f"checkpoint is a {kind} there, and a run makes a folder of that name"):
+        refuse_others(tmp_path)

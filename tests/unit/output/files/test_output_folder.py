@@ -41,7 +41,7 @@ def test_a_folder_that_cannot_be_made_is_refused():
 
 def test_files_of_an_earlier_result_are_removed_and_nothing_else(tmp_path):
     earlier = ["result.h5", "result.xdmf", "path.csv", "angle.csv", "path.gif", "path.png", "angle_states.png"]
-    earlier += ["envelope.csv", "envelope.png"]
+    earlier += ["envelope.csv", "envelope.png", "load.csv", "load.png", "case_E33.png", "case_minus_temperature.png"]
     earlier += [
         "interface.xdmf",
         "cell.png",
