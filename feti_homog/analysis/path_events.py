@@ -9,6 +9,7 @@ import numpy as np
 
 from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.interface.contact import Equilibrium
+from feti_homog.interface.load import Load
 from feti_homog.interface.macroscopic import Macroscopic
 from feti_homog.interface.path_points import NO_ENERGIES, Energies, PathState, Point
 from feti_homog.output.files.checkpoint import Arrays
@@ -97,6 +98,7 @@ def _taken_apart(state: Equilibrium) -> tuple[dict[str, Any], Arrays]:
     solution = state.solution
     whole: dict[str, Any] = {
         "numbers": [state.iterations, state.solves, state.free_motions, solution.iterations, solution.reason],
+        "load": np.stack([state.load.values, state.load.by_stress]),
         "strain": solution.strain,
         "alpha": solution.alpha,
         "residual": solution.residual,
@@ -111,4 +113,6 @@ def _put_together(event: Arrays, suffix: str) -> Equilibrium:
     iterations, solves, free_motions, last, reason = event[f"numbers{suffix}"].tolist()
     solution = DualSolution(strain, lam, jump, alpha, last, reason, float(event[f"residual{suffix}"]))
     certificate = dict(zip(KKT_LAWS, event[f"certificate{suffix}"].tolist(), strict=True))
-    return Equilibrium(event[f"status{suffix}"], solution, iterations, solves, free_motions, certificate)
+    values, by_stress = event[f"load{suffix}"]
+    load = Load(values, by_stress.astype(bool))
+    return Equilibrium(load, event[f"status{suffix}"], solution, iterations, solves, free_motions, certificate)

@@ -21,6 +21,7 @@ from feti_homog.config.interface_section import Arc, InterfaceSection
 from feti_homog.config.load_rules import expansion_faults, read_load, read_path, stress_free
 from feti_homog.config.load_section import LoadPath, SingleLoad
 from feti_homog.config.matched_cell import with_match
+from feti_homog.config.material_contrast import contrast_faults, contrast_warnings
 from feti_homog.config.material_forms import Isotropic, Material
 from feti_homog.config.material_sections import coating_faults, phase_faults, provider, read_materials
 from feti_homog.config.mixed_cell import mix_faults, void_faults
@@ -106,8 +107,9 @@ class Case:
 
     def warnings(self) -> tuple[str, ...]:
         """What is allowed but probably not wanted, one line each."""
+        contrast = contrast_warnings(self.materials, self.analysis.plane)
         if self.analysis.plane == "stress":
-            return ()
+            return tuple(contrast)
         solids = {phase: material for phase, material in self.materials.items() if isinstance(material, Isotropic)}
         lines = {
             f"[material.{toml_key(phase)}] poisson = {material.poisson}: ": material.poisson
@@ -123,7 +125,7 @@ class Case:
             for line, poisson in lines.items()
             if poisson > ROUNDING_POISSON
         ]
-        return (*locking, *rounding)
+        return (*locking, *rounding, *contrast)
 
     def remarks(self) -> tuple[str, ...]:
         """What is not said but assumed, one line each."""
@@ -202,6 +204,8 @@ def parse(values: Mapping[str, Any], folder: Path) -> Case:
     bonding = sections["envelope"], sections["interfaces"], sections["materials"]
     faults += envelope_faults(*bonding, document, reader.selected)
     faults += expansion_faults(sections["path"], sections["single_load"], sections["materials"])
+    if not faults:
+        faults += contrast_faults(sections["materials"], sections["analysis"].plane)
     if not faults:
         sections["cell"] = _sized_cell(document["cell"], sections, faults)
     if faults:

@@ -36,9 +36,11 @@ class Response:
         checks: relative errors of the laws: `strain` <eps> = E, Eq. (3), with the opening of debonded faces and
             the strain of voids, which is that of their boundaries, as parts of <eps>;
             `hill` <sigma:eps> = Sigma:E, Eq. (8), springs included, relative to <sigma:eps> or, if
-            that is less, to what a bonded cell stores at least, E:<L^-1>^-1:E (Reuss), for a debonded one may store
-            nothing; `jump`, the largest opening of a glued node relative to the largest displacement, which does not
-            vanish where forces do; and the KKT certificate of contact.
+            that is less, to what a bonded cell stores at least by Reuss' bound, for a debonded one may store nothing;
+            `jump`, the largest opening of a glued node relative to the largest displacement, which does not vanish
+            where forces do; the KKT certificate of contact; and if stresses are prescribed `stress`, the
+            largest error of one relative to the largest stress or, if that is less, to what the strains would make in a
+            bonded cell at least.
         counts: numbers of `bonded`, `open` and `closed` interface nodes.
     """
 
@@ -98,17 +100,26 @@ class Homogenization:
         opening = allreduce_sum(cell.comm, self._strain_of_jumps.T @ opened)
         stretched = float(cell.comm.allreduce(float(state.solution.lam @ springs))) / cell.summary.area
         energy += stretched
-        least = float(strain @ self.interface.least_bonded_stiffness @ strain)
-        largest = (self._largest(u) + self.interface.imposed(strain)) or 1.0
-        imposed = self.interface.imposed_strain(strain).max() or 1.0
+        largest = (self._largest(u) + self.interface.scales.imposed(strain)) or 1.0
+        imposed = float(self.interface.scales.imposed_strain(strain).max()) or 1.0
+        least = self.interface.scales.stress_scale(strain) * imposed
         checks = {
             "strain": float(np.abs(star - opening / cell.summary.area).max() / imposed) + self._strain_inside,
             "hill": float(abs(energy - stress @ strain) / (max(abs(energy), least) or 1.0)),
             "jump": self._largest(active * state.solution.jump) / largest,
         }
+        if state.load.by_stress.any():
+            checks["stress"] = self._unmet_stress(state, stress)
         counts = self.counts(state.status)
         means, energies = (scale * strain, scale * stress), (scale**2 * energy / 2, scale**2 * stretched / 2)
         return Response(*means, scale, *energies, state, scale * u, checks | state.certificate, counts)
+
+    def _unmet_stress(self, state: Equilibrium, stress: Float) -> float:
+        """The error of the prescribed stresses.  Collective."""
+        load, stresses = state.load, self.cell.solver.problem.stresses
+        off = np.abs(stress - load.values)[load.by_stress].max()
+        scale = max(np.abs(stress[:stresses]).max(), self.interface.scales.stress_scale(state.solution.strain))
+        return float(off / (scale or 1.0))
 
     def counts(self, status: Status) -> dict[str, int]:
         """Interface nodes in each state; collective."""

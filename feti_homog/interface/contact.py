@@ -22,9 +22,9 @@ from feti_homog.interface import mixed_load
 from feti_homog.interface.block_pivoting import BlockPivoting
 from feti_homog.interface.contact_certificate import kkt_errors
 from feti_homog.interface.load import Load
+from feti_homog.interface.load_scales import LoadScales
 from feti_homog.interface.rigid_placement import place
 from feti_homog.interface.solutions import Multipliers, Solutions
-from feti_homog.mechanics.bounds import reuss, voigt
 from feti_homog.typing import Bool, Float, Int
 
 Status = NDArray[np.int8]
@@ -47,6 +47,7 @@ class Equilibrium:
     """The cell under one load with the contact states that hold there.
 
     Attributes:
+        load: what is prescribed.
         status: (k,) BONDED, CLOSED or OPEN of the interface nodes that this rank owns.
         solution: of the last dual problem; its multipliers and jumps are those of the state.
         iterations, solves: Krylov iterations and dual problems that it took.
@@ -56,6 +57,7 @@ class Equilibrium:
         axial: the same of the displacement along the fibres with these bonds, where that is a problem.
     """
 
+    load: Load
     status: Status
     solution: DualSolution
     iterations: int
@@ -133,45 +135,9 @@ class Interface:
         return np.asarray(self.solver.stress_integral(solution) / self.size.prod())
 
     @cached_property
-    def least_bonded_stiffness(self) -> Float:
-        """(v, v) Reuss' bound <L^-1>^-1 of the strains, and <L> of the other loads, collective: a scale of stress and
-        energy that debonding does not make zero."""
-        shares, stiffnesses = self._phases
-        m, least = self.solver.problem.strains, voigt(shares, stiffnesses)
-        least[:m, m:] = least[m:, :m] = 0.0
-        least[:m, :m] = reuss(shares, stiffnesses[:, :m, :m])
-        return least
-
-    @cached_property
-    def _phases(self) -> tuple[Float, Float]:
-        """Shares (n,) and stiffnesses (n, v, v) of all subdomains.  Collective."""
-        parts = self.solver.comm.allgather([(s.area, s.L) for s in self.solver.subdomains])
-        areas, stiffnesses = zip(*(part for own in parts for part in own), strict=True)
-        return np.array(areas) / sum(areas), np.stack(stiffnesses)
-
-    @cached_property
-    def largest_stiffness(self) -> float:
-        """The largest entry of Reuss' bound.  Collective."""
-        m = self.solver.problem.strains
-        return float(np.abs(self.least_bonded_stiffness[:m, :m]).max())
-
-    @cached_property
-    def _free_strains(self) -> Float:
-        """(m, v) sizes of the strains that the loads make: their own, and of the others the largest of free bodies.
-
-        A soft body that expands hardly moves a stiff one, but its free motion is what the dual problem has to close.
-        Collective."""
-        m, stiffnesses = self.solver.problem.strains, self._phases[1]
-        free = np.linalg.solve(stiffnesses[:, :m, :m], stiffnesses[:, :m, m:])
-        return np.hstack([np.eye(m), np.abs(free).max(axis=0)])
-
-    def _caused_stress(self, loads: Float) -> float:
-        """A stress that the loads (v,) cause at least if all is bonded.  Collective."""
-        problem = self.solver.problem
-        mean, caused = voigt(*self._phases), self.least_bonded_stiffness.copy()
-        caused[:, problem.strains :] = mean[:, problem.strains :]
-        # What works on a temperature is no stress.
-        return float(np.abs(caused[: problem.stresses] @ loads).max())
+    def scales(self) -> LoadScales:
+        """Of what loads make.  Its properties are collective when first used, and so are its methods."""
+        return LoadScales(self.solver, self.size)
 
     @property
     def _pairs(self) -> Int:
@@ -185,8 +151,8 @@ class Interface:
             NotCarriedError: nothing carries the stresses of the load.
         """
         self.solver.activate(self.active(status))
-        least = self.sign_noise * self.largest_stiffness
-        given = self.imposed_strain(np.where(load.by_stress, 0.0, load.values)).max()
+        least = self.sign_noise * self.scales.largest_stiffness
+        given = self.scales.imposed_strain(np.where(load.by_stress, 0.0, load.values)).max()
         return mixed_load.solve(self.solver, load, start, float(self.size.prod()), (least, least * given))
 
     def is_linear(self, status: Status) -> bool:
@@ -197,7 +163,10 @@ class Interface:
         """Solve a linear problem for every strain of (k, 3) together.  Collective."""
         self.solver.activate(self.active(status))
         solutions = self.solver.solve_many(strains, np.stack(starts, axis=1))
-        return [self._equilibrium(status, solution, solution.iterations, 1) for solution in solutions]
+        return [
+            self._equilibrium(Load.strain(strain), status, solution, solution.iterations, 1)
+            for strain, solution in zip(strains, solutions, strict=True)
+        ]
 
     def equilibrium(self, load: Load, status: Status, start: Float) -> Equilibrium:
         """Solve for the load, with `status` a first guess of who is in contact.  Collective; raises as `linear`."""
@@ -220,14 +189,14 @@ class Interface:
             solution, wrong = self._placed(status, solution)
             count = self.solver.comm.allreduce(int(wrong.sum()))
             if count == 0 or solves == MAX_CONTACT_SOLVES or solution.reason < 0:
-                return self._equilibrium(status, solution, iterations, solves)
+                return self._equilibrium(load, status, solution, iterations, solves)
             flip = pivoting.choose(wrong, count)
             status = np.where(flip, CLOSED + OPEN - status, status).astype(np.int8)
             start = solution.lam
 
     def gap_noise(self, strain: Float) -> float:
         """Gaps smaller than this may be the solver's error."""
-        return self.sign_noise * self.imposed(strain)
+        return self.sign_noise * self.scales.imposed(strain)
 
     def force_noise(self, solution: DualSolution) -> float:
         """Nodal forces of the interface smaller than this may be the solver's error; collective.
@@ -237,16 +206,7 @@ class Interface:
         forces, lengths = np.abs(solution.lam[self._pairs]), self.nodes.length
         largest = np.array([forces.max(initial=0.0), lengths.max(initial=0.0)])
         self.solver.comm.Allreduce(MPI.IN_PLACE, largest, MPI.MAX)
-        return self.sign_noise * float(max(largest[0], self._caused_stress(solution.strain) * largest[1]))
-
-    def imposed(self, loads: Float) -> float:
-        """Largest displacement E y that the loads (v,) impose on the cell, or would on a free one.  Collective."""
-        corners = self.size * np.array([[1, 0], [0, 1], [1, 1]])
-        return float(np.abs(corners @ self.solver.problem.gradient(self.imposed_strain(loads)).T).max())
-
-    def imposed_strain(self, loads: Float) -> Float:
-        """(m,) sizes of the strains that the loads (v,) make.  Collective."""
-        return np.asarray(self._free_strains @ np.abs(loads))
+        return self.sign_noise * float(max(largest[0], self.scales.caused_stress(solution.strain) * largest[1]))
 
     def _placed(self, status: Status, solution: DualSolution) -> tuple[DualSolution, Bool]:
         """The solution with free fibres where they have room, and which nodes (k,) break the KKT conditions."""
@@ -263,7 +223,9 @@ class Interface:
         overlaps = (status == OPEN) & (gap < -noise)
         return solution, pulled | overlaps | squeezed
 
-    def _equilibrium(self, status: Status, solution: DualSolution, iterations: int, solves: int) -> Equilibrium:
+    def _equilibrium(
+        self, load: Load, status: Status, solution: DualSolution, iterations: int, solves: int
+    ) -> Equilibrium:
         """The state that a search ended with, its free motions and its certificate."""
         certificate = kkt_errors(
             self.solver.comm,
@@ -272,10 +234,10 @@ class Interface:
             solution.jump[self.nodes.row],
             (status != BONDED) & self.contact,
             status == CLOSED,
-            (self.imposed(solution.strain), self._caused_stress(solution.strain)),
+            (self.scales.imposed(solution.strain), self.scales.caused_stress(solution.strain)),
         )
         status, motions = self._without_idle(status, solution)
-        return Equilibrium(status, solution, iterations, solves, motions, certificate)
+        return Equilibrium(load, status, solution, iterations, solves, motions, certificate)
 
     def _without_idle(self, status: Status, solution: DualSolution) -> tuple[Status, int]:
         """The status and the number of rigid motions that neither a bond nor a face under compression resists.

@@ -144,7 +144,7 @@ class LaterLeg:
 
     def _response(self, state: Macroscopic) -> Float:
         """(n,) what the load leaves open: stresses, and strains times a stiffness."""
-        return np.where(self.end.by_stress, self.cell.plane.largest_stiffness * state.strain, state.stress)
+        return np.where(self.end.by_stress, self.cell.plane.scales.largest_stiffness * state.strain, state.stress)
 
     def _change(self, beyond: float) -> Iterator[Point]:
         """Report the state in which the contact begins to change, and go on to where the change is beyond doubt.

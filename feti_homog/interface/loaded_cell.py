@@ -95,4 +95,4 @@ class LoadedCell:
         """(m, n) stresses under strains (m, n) of the least stiffness with all bonds.  Collective."""
         parts = np.split(strains, [len(self.plane.solver.problem.loads)], axis=1)
         pairs = zip(parts, self.problems, strict=False)
-        return np.hstack([own @ each.least_bonded_stiffness for own, each in pairs])
+        return np.hstack([own @ each.scales.least_bonded_stiffness for own, each in pairs])

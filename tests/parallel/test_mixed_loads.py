@@ -61,6 +61,17 @@ def test_equilibria_in_space_are_those_of_the_condensed_cell(comm, phases, kind)
     compare(comm, loads, cell=cell, phases=phases, plane="generalized", interface=interface)
 
 
+@pytest.mark.parametrize("bonding", [None, ARCS], ids=["bonded", "contact"])
+def test_stresses_that_rounding_misses_are_no_result(comm, bonding):
+    """Fibres of such stiffness expand: what is left of the stresses are differences of numbers 1e10 times as large."""
+    stiff = EPOXY_GLASS[0], EPOXY_GLASS[1] | {"young": 1e14}
+    case = {"cell": CELLS["hexagonal"], "plane": "generalized", "interface": bonding}
+    case["load"] = {"to": {"S11": 1e-3, "temperature": -50.0}}
+    assert solved(comm, phases=EPOXY_GLASS, **case).checks.stress < EXACT
+    with pytest.raises(ConvergenceError, match=r"check stress: .*expected at most"):
+        solved(comm, phases=stiff, **case)
+
+
 def compare(comm, loads, **case):
     """The results are the oracle's, which has the stress of the other oracles under the strain that it finds last."""
     twin, closed, state = LoadedTwin(comm, **case, load={"to": next(iter(loads.values()))}), 0, None

@@ -33,6 +33,18 @@ FAULTY_MATERIALS: dict[str, tuple[str, tuple[str, ...]]] = {
         ended("[material]\nyoung = 3.0\n"),
         ("[material.young]: unknown phase; it belongs to [material.PHASE]",),
     ),
+    "nearly_rigid_fibres": (
+        fibre("young = 1e17\npoisson = 0.2\n"),
+        ("[material.fibre], [material.matrix]: stiffnesses that differ by a factor of 9.4e+14: expected at most",),
+    ),
+    "nearly_void_matrix": (
+        fibre(
+            "stiffness = [[1e20, 0, 0, 0, 0, 0], [0, 1, 0, 0, 0, 0], [0, 0, 1, 0, 0, 0], "
+            "[0, 0, 0, 1, 0, 0], [0, 0, 0, 0, 1, 0], [0, 0, 0, 0, 0, 1]]\n",
+            "generalized",
+        ),
+        ("[material.fibre], [material.matrix]: stiffnesses that differ by a factor of 8.5e+17: expected at most",),
+    ),
     "american_phase": (
         cell("material.fibre", "material.fiber"),
         ("[material.fiber]: unknown phase; did you mean fibre?", "[material.fibre]: missing section"),

@@ -39,6 +39,7 @@ BETWEEN_NUMBERS = {
     "path_to_a_load_of_zero", "waypoint_of_a_load_of_zero", "waypoint_that_names_what_it_is",
     "waypoint_of_the_strain_that_a_load_is", "increments_too_few_for_loads",
     "accuracy_of_linear_elements_that_nearly_lock", "fibre_with_a_coating",
+    "nearly_rigid_fibres", "nearly_void_matrix",
 }  # fmt: skip
 NOT_IN_JSON = {"fraction_is_nan", "strength_is_nan", "path_strain_nan", "load_nan"}
 INTEGER_TO_JSON = {"refine_is_real"}
