@@ -12,6 +12,7 @@ from support import torn_cells
 from support.cases import FIBRE, MATRIX, relative_error
 from support.random_cells import random_bonded, random_cell, random_strain
 
+from feti_homog.errors import ConvergenceError
 from feti_homog.homogenization.averaging import Homogenization
 from feti_homog.interface.contact import BONDED, CLOSED, OPEN
 from feti_homog.interface.load import Load
@@ -130,6 +131,12 @@ def test_very_stiff_springs_are_glue(comm, pieces):
     L, worst, _ = stiffness(comm, **cell, springs=(stiff, stiff))
     glued, _, _ = stiffness(comm, **cell)
     assert relative_error(L, glued) < 1e-8 and worst < 1e-5
+
+
+@pytest.mark.parametrize("dual_operator", ["explicit", "implicit"])
+def test_springs_that_rounding_hides_are_refused(comm, dual_operator):
+    with pytest.raises(ConvergenceError, match="times as soft as the body that they hold: rounding hides them"):
+        stiffness(comm, geometry="hexagonal", springs=(1e-16, 1e-16), petsc={"feti_dual_operator": dual_operator})
 
 
 # What the preconditioner takes for the springs.

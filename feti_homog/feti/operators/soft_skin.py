@@ -10,9 +10,10 @@ which is exact however stiff or soft the springs are.
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import cholesky, solve_triangular
+from scipy.linalg import LinAlgError, cholesky, solve_triangular
 from scipy.sparse import csr_matrix, diags
 
+from feti_homog.errors import ConvergenceError
 from feti_homog.feti.operators.explicit import ExplicitInterfaceOperator
 from feti_homog.feti.operators.implicit import ImplicitInterfaceOperator
 from feti_homog.typing import Bool, Float, Int
@@ -80,9 +81,20 @@ def soft_skin(
 
 
 def _half(T: csr_matrix, TS: Float) -> Float:
-    """(r, n) H with H^T H = S T (I + T^T S T)^-1 T^T S, for T^T S (r, n)."""
+    """(r, n) H with H^T H = S T (I + T^T S T)^-1 T^T S, for T^T S (r, n).
+
+    Raises:
+        ConvergenceError: the springs are so soft beside the body that rounding of S hides them.
+    """
     middle = np.eye(T.shape[1]) + np.asarray(T.T @ TS.T)
-    return np.asarray(solve_triangular(cholesky(middle, lower=True), TS, lower=True))
+    try:
+        factor = cholesky(middle, lower=True)
+    except LinAlgError as error:
+        ratio = np.abs(middle.diagonal()).max()
+        raise ConvergenceError(
+            f"[interface] springs {ratio:.1e} times as soft as the body that they hold: rounding hides them"
+        ) from error
+    return np.asarray(solve_triangular(factor, TS, lower=True))
 
 
 def compliance_root(B: csr_matrix, compliance: Float, copies: Int, of_fibre: Bool) -> csr_matrix:
