@@ -10,12 +10,15 @@ from scipy.spatial import cKDTree
 
 from feti_homog.cell.arrangement import Arrangement
 from feti_homog.cell.lines import on_circles
-from feti_homog.cell.size_field import coating_size, line_size
+from feti_homog.cell.size_field import MIN_EDGES_AROUND, coating_size, line_size
 from feti_homog.cell.sourced_size import MAX_GROWTH, SourcedSize, wrap
 from feti_homog.typing import Float, Int
 
 # Samples of a size on a line for each of its edges, where the size is graded.
 SAMPLES_OF_AN_EDGE = 3
+# Size of edges on a circle / largest size, below which elements grow from it: between tiny discs far apart, gmsh would
+# interpolate the sizes on their circles.
+FINE_CIRCLE = 0.1
 
 
 @dataclass(frozen=True)
@@ -38,12 +41,14 @@ class MeshSizes:
         return cls(largest, largest, largest)
 
     def are_graded(self, arrangement: Arrangement) -> bool:
-        """Whether the mesh is finer on circles or at tips than elsewhere, as it is on thin coatings."""
+        """Whether the mesh is finer on circles or at tips than elsewhere, as it is on thin coatings and tiny discs."""
         return bool(min(self.tip, self.on_circles(arrangement).min()) < self.largest)
 
     def on_circles(self, arrangement: Arrangement) -> Float:
         """(N,) on the circles of each disc."""
-        return np.where(arrangement.coated, np.minimum(self.interface, coating_size(arrangement)), self.interface)
+        sizes = np.where(arrangement.coated, np.minimum(self.interface, coating_size(arrangement)), self.interface)
+        around = 2 * np.pi * arrangement.radii / MIN_EDGES_AROUND
+        return np.where(around < FINE_CIRCLE * self.largest, np.minimum(sizes, around), sizes)
 
 
 @dataclass(frozen=True)

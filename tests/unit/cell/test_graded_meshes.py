@@ -16,6 +16,7 @@ from unit.cell.test_gmsh_mesher import least_angle
 from feti_homog.cell import element_estimate
 from feti_homog.cell.arrangement import arrange
 from feti_homog.cell.gmsh_mesher import generate
+from feti_homog.cell.size_field import MIN_EDGES_AROUND
 from feti_homog.cell.sourced_size import MAX_GROWTH
 from feti_homog.errors import MeshError
 
@@ -64,6 +65,17 @@ def test_elements_grow_with_the_distance_from_the_interface(case, size):
     mean = sides(mesh).mean(axis=1)
     assert (mean < 1.5 * asked).all() and 0.8 < np.mean(mean / asked) < 1.05
     assert sides(mesh).max() < 1.5 * case.mesh_size
+
+
+@pytest.mark.parametrize("fraction", [1e-4, 1e-6, 1e-9])
+def test_elements_grow_from_tiny_fibres(fraction):
+    """Between them, too, however far they are apart."""
+    case = cell(fibres=4, fraction=fraction, gap=0.3)
+    arrangement = arrange(case)
+    mesh, size = generate(case), 2 * np.pi * arrangement.radii.max() / MIN_EDGES_AROUND
+    away = circle_distance(mesh.points[mesh.triangles].mean(axis=1), arrangement)
+    asked = np.minimum(case.mesh_size, size + MAX_GROWTH * away)
+    assert 0.8 < np.mean(sides(mesh).mean(axis=1) / asked) < 1.2
 
 
 @pytest.mark.parametrize("case", [SQUARE, WIDE_GAPS], ids=["square", "random"])
