@@ -29,14 +29,23 @@ CELLS = (
     {"geometry": "random", "fibre_fraction": 0.5, "mesh_size": 0.05, "fibres": 64},
     {"geometry": "random", "fibre_fraction": 0.6, "mesh_size": 0.03, "fibres": 20, "min_gap": 0.04},
 )
-REFINEMENTS = (0, 1, 2, 3)
+COATED = (
+    {"geometry": "hexagonal", "fibre_fraction": 0.4, "mesh_size": 0.1, "coating": 0.05},
+    {"geometry": "random", "fibre_fraction": 0.5, "mesh_size": 0.1, "fibres": 10, "coating": 0.05},
+    {"geometry": "random", "fibre_fraction": 0.5, "mesh_size": 0.05, "fibres": 30, "coating": 0.1},
+)
+REFINEMENTS, OF_COATED = (0, 1, 2, 3), (0, 1, 2)
+WITHOUT_FIELDS, WITH_FIELDS = STIFFNESS["output"], {"pictures": False}
+COATING = {"young": 20.0, "poisson": 0.3}
 STAGES = ("mesh", "assemble", "factor", "solve")
 
 
 def main() -> None:
-    """Run the cases, each in a process of its own, and fit."""
+    """Run the cases, each in a process of its own, and fit: times without fields, memory with them."""
     runs = [document(cell, refine) for cell in CELLS for refine in REFINEMENTS]
-    for names, (constants, ratios) in fits(runs).items():
+    written = [document(cell, refine, WITH_FIELDS) for cell in CELLS for refine in REFINEMENTS]
+    coated = [document(cell, refine, WITH_FIELDS) for cell in COATED for refine in OF_COATED]
+    for names, (constants, ratios) in (fits(runs) | memory_fit(written, coated)).items():
         for name, value in zip(names.split(", "), constants, strict=True):
             print(f"{name} = {value:.1e}")
         print(f"    estimates are {ratios.min():.2f} to {ratios.max():.2f} times what was measured")
@@ -47,22 +56,31 @@ def fits(runs: list[dict[str, Any]]) -> dict[str, tuple[Any, Any]]:
     dofs, subdomains, iterations = (np.array([cost_of(run)[k] for run in runs]) for k in range(3))
     mesh, assemble, factor, solve = (np.array([run["timings"][name] for run in runs]) for name in STAGES)
     coarse = np.array([run["cell"]["elements"] / 4 ** run["case"]["cell"]["refine"] for run in runs])
-    wall, memory = (np.array([run[name] for run in runs]) for name in ("wall", "memory"))
+    wall = np.array([run["wall"] for run in runs])
     one = np.ones(len(runs))
     return {
         "START_SECONDS": fitted(wall - mesh - assemble - factor - solve, one),
         "MESH_SECONDS": fitted(mesh, coarse),
         "SETUP_SECONDS, SUBDOMAIN_SECONDS": fitted(assemble + factor, dofs, subdomains),
         "APPLY_SECONDS": fitted(solve, dofs * iterations),
-        "BASE_BYTES, DOF_BYTES": fitted(memory, one, dofs),
     }
 
 
-def document(cell: dict[str, Any], refine: int) -> dict[str, Any]:
-    """result.json of one run, and the seconds of its whole process as `wall`."""
+def memory_fit(runs: list[dict[str, Any]], coated: list[dict[str, Any]]) -> dict[str, tuple[Any, Any]]:
+    """The same for the memory of all runs, by twice the nodes of their meshes; those with coatings have influence
+    columns."""
+    memory, dofs = np.array([(run["memory"], 2 * run["cell"]["nodes"]) for run in [*runs, *coated]]).T
+    columns = np.array([*(0 for _ in runs), *(run["solver"]["multipliers"] for run in coated)])
+    return {"BASE_BYTES, DOF_BYTES, COLUMN_BYTES": fitted(memory, np.ones(len(memory)), dofs, columns)}
+
+
+def document(cell: dict[str, Any], refine: int, output: Any = WITHOUT_FIELDS) -> dict[str, Any]:
+    """result.json of one run with this section [output], and the seconds of its whole process as `wall`."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "case.toml"
-        path.write_text(tomli_w.dumps({"cell": cell | {"refine": refine}} | STIFFNESS))
+        materials = STIFFNESS["material"] | ({"coating": COATING} if "coating" in cell else {})
+        own = {"cell": cell | {"refine": refine}, "material": materials, "output": output}
+        path.write_text(tomli_w.dumps(STIFFNESS | own))
         words = ["-m", "feti_homog", "run", path, "--out", folder, "--quiet"]
         start = time.perf_counter()
         subprocess.run([sys.executable, *map(str, words)], check=True)
@@ -78,7 +96,7 @@ def cost_of(run: dict[str, Any]) -> tuple[int, int, int]:
 def fitted(values: Any, *columns: Any) -> tuple[Any, Any]:
     """Positive constants with values about the sum of constant * column, and that sum over the values."""
     matrix = np.stack(columns, axis=1) / values[:, None]
-    first = np.log(1.0 / np.median(matrix, axis=0) / len(columns))
+    first = np.log(1.0 / np.array([np.median(column[column > 0]) for column in matrix.T]) / len(columns))
     constants = np.exp(least_squares(lambda logarithms: np.log(matrix @ np.exp(logarithms)), first).x)
     return constants, matrix @ constants
 

@@ -50,6 +50,16 @@ class SolverParts:
         return self.natural.kernel_dimension if self.adaptive is None else self.adaptive.coarse_dimension
 
 
+def database_options(thresholds: Thresholds = DEFAULTS) -> SolverOptions:
+    """What PETSc's database says.
+
+    Raises:
+        CaseError: an option has no such value.
+    """
+    database = PETSc.Options("feti_")
+    return SolverOptions.read(database.getString, database.getReal, thresholds)
+
+
 def build(
     comm: MPI.Intracomm,
     jump_operator: JumpOperator,
@@ -66,8 +76,7 @@ def build(
     Raises:
         CaseError: an option has no such value, or two exclude each other; a library has no such factorization.
     """
-    database = PETSc.Options("feti_")
-    options = SolverOptions.read(database.getString, database.getReal, thresholds)
+    options = database_options(thresholds)
     soft = options.want_soft_modes(_are_cut(comm, subdomains))
     with PETSc.Log.Event("FETISubdomains"):
         operators = agree(

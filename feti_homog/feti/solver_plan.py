@@ -96,6 +96,13 @@ class SolverPlan:
     preconditioner: str
     adaptive: bool
 
+    @property
+    def in_words(self) -> str:
+        """For the lines of `check`."""
+        if self.preconditioner == "influence":
+            return "influence columns, an inverse of the bonded cell"
+        return f"{self.preconditioner} preconditioner, {'adaptive' if self.adaptive else 'natural'} coarse space"
+
 
 def choose(sizes: ProblemSizes, options: SolverOptions, thresholds: Thresholds = DEFAULTS) -> SolverPlan:
     """The parts for a problem of these sizes.

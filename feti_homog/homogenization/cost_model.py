@@ -24,8 +24,8 @@ MESH_SECONDS = 2.7e-5
 SETUP_SECONDS, SUBDOMAIN_SECONDS = 4.4e-6, 2.9e-3
 # Seconds for each degree of freedom in one application of operator and preconditioner.
 APPLY_SECONDS = 4.2e-8
-# Bytes of a rank without degrees of freedom, and for each of these.
-BASE_BYTES, DOF_BYTES = 1.8e8, 6.1e2
+# Bytes of a rank without degrees of freedom, for each of these, and for each multiplier that has influence columns.
+BASE_BYTES, DOF_BYTES, COLUMN_BYTES = 1.8e8, 1.5e3, 2.0e4
 # Degrees of freedom of a rank; with fewer, its waiting for others takes more than it saves.
 DOFS_OF_A_RANK = 50_000
 # Typical numbers, by which a case is estimated and its operators are chosen.
@@ -71,10 +71,16 @@ def _asks_for_tips(case: Case) -> bool:
 
 
 def estimate(
-    nodes: Sequence[int], subdomains: Sequence[int], coarse_triangles: int, bodies: int, problems: Mapping[int, int]
+    nodes: Sequence[int],
+    subdomains: Sequence[int],
+    coarse_triangles: int,
+    bodies: int,
+    problems: Mapping[int, int],
+    columns: int,
 ) -> Estimate:
     """What a case takes with `nodes` and `subdomains` on each rank; `problems` has for each problem, by its
-    displacements of a node, how many times it applies its dual operator.
+    displacements of a node, how many times it applies its dual operator, and `columns` multipliers have influence
+    columns.
 
     As many ranks are suggested as there are bodies at most, for more would cut bodies, which costs iterations.
     """
@@ -84,7 +90,7 @@ def estimate(
     dofs = [sum(problems) * n for n in nodes]
     return Estimate(
         seconds=START_SECONDS + coarse_triangles * MESH_SECONDS + slowest,
-        memory=BASE_BYTES + max(dofs) * DOF_BYTES,
+        memory=BASE_BYTES + max(dofs) * DOF_BYTES + columns / len(nodes) * COLUMN_BYTES,
         ranks=max(1, min(bodies, ceil(sum(dofs) / DOFS_OF_A_RANK))),
     )
 

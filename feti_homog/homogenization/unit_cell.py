@@ -16,14 +16,13 @@ from feti_homog.cell.submesh import SubmeshesOfRank
 from feti_homog.common.dealing import deal
 from feti_homog.common.mpi_errors import agree, on_root_only
 from feti_homog.common.progress import Progress
-from feti_homog.config import element_sizes
 from feti_homog.config.case import Case
 from feti_homog.fem.problem import AXIAL
 from feti_homog.feti.decomposition.shared_entities import SharedEntities, share_entities
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.solver import FetiSolver
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
-from feti_homog.homogenization import bonds, cost_model, phase_laws, process_zone
+from feti_homog.homogenization import bonds, cost_model, phase_laws
 from feti_homog.homogenization.coarse_meshes import drawn, finished
 from feti_homog.homogenization.domain_partition import (
     DEFAULT_POLICY,
@@ -154,7 +153,7 @@ def assemble_subdomains(
     """
     lattice = ReferenceLattice.of(case.cell.refine, case.cell.order)
     with progress.stage("mesh") as words:
-        own = _cut(case, lattice, comm, policy)
+        own = cut(case, lattice, comm, policy)
         summary = own.summary
         shared = share_entities(comm, own.submeshes, own.table, own.pairs, lattice)
         if comm.allreduce(bool(own.submeshes.whole.debonded.any()), MPI.LOR) and case.interface is None:
@@ -172,7 +171,7 @@ def assemble_subdomains(
     return summary, shared, lattice, subdomains
 
 
-def _cut(case: Case, lattice: ReferenceLattice, comm: MPI.Intracomm, policy: PartitionPolicy) -> RankShare:
+def cut(case: Case, lattice: ReferenceLattice, comm: MPI.Intracomm, policy: PartitionPolicy) -> RankShare:
     """This rank's share of the cell, meshed and cut.  Collective."""
     found = drawn(case, comm, policy.tiles)
     if comm.bcast(isinstance(found, Drawing) and can_be_torn_by_tiles(case, found)):
@@ -186,67 +185,3 @@ def _assemble(case: Case, submeshes: SubmeshesOfRank, lattice: ReferenceLattice)
     """The subdomains of this rank, refined and assembled."""
     problem = phase_laws.plane_problem(case)
     return [Subdomain.build(s, lattice, phase_laws.plane_law(case, s.phase), problem) for s in submeshes.cut()]
-
-
-def _match_lines(case: Case, summary: CellSummary) -> list[str]:
-    if case.cell.match is None:
-        return []
-    words = "mean diameters, the distance of the distributions of nearest and second neighbours"
-    return [f"match      {case.cell.match.name}, to {summary.match_distance:.4f} {words}"]
-
-
-def _mix_lines(case: Case, summary: CellSummary) -> list[str]:
-    """How many fibres each phase of a mix has got, and how large they are."""
-    if case.cell.mix is None:
-        return []
-    phase, radii = summary.constituent_phase[summary.is_fibre], summary.radii[summary.is_fibre]
-    own = [(name, radii[phase == k]) for k, name in enumerate(summary.phases) if name in case.cell.mix]
-    return [f"mix        {', '.join(f'{len(r)} of {name}, mean radius {r.mean():.6g}' for name, r in own)}"]
-
-
-def describe(case: Case, comm: MPI.Intracomm) -> str:
-    """What a run of the case on these ranks would do, in words; empty but on rank 0.  Collective.
-
-    Raises as `tear`.
-    """
-    lattice = ReferenceLattice.of(case.cell.refine, case.cell.order)
-    own = _cut(case, lattice, comm, DEFAULT_POLICY)
-    constraints = share_entities(comm, own.submeshes, own.table, own.pairs, lattice).constraints
-    loads = comm.gather((len(own.submeshes.index), len(own.submeshes.member)))
-    return on_root_only(comm, _described, case, own.summary, lattice, 2 * constraints, loads) or ""
-
-
-def _described(
-    case: Case, summary: CellSummary, lattice: ReferenceLattice, multipliers: int, loads: Sequence[tuple[int, int]]
-) -> str:
-    """That of `describe`; `loads` are the subdomains and the coarse triangles of each rank."""
-    own = [subdomains for subdomains, _ in loads]
-    nodes = [triangles * lattice.intervals**2 // 2 for _, triangles in loads]
-    problems = {problem.components: cost_model.applications(case, problem) for problem in phase_laws.problems(case)}
-    taken = cost_model.estimate(nodes, own, summary.coarse_triangles, summary.bodies, problems)
-    unresolved = process_zone.warnings(case, summary.width, summary.interface_edge)
-    lines = [
-        f"case       {case.name}: {case.analysis.type}, plane {case.analysis.plane}",
-        f"cell       {summary.width:g} x {summary.height:g}, phases {', '.join(summary.phases)}",
-        *([f"voids      {summary.voids}"] if summary.voids else []),
-        f"mesh       {summary.coarse_triangles} coarse triangles, {summary.coarse_triangles * len(lattice.triangles)} "
-        f"elements of order {case.cell.order}, about {2 * sum(nodes)} degrees of freedom",
-        *(
-            [f"sizes      mesh_size = {case.cell.mesh_size:g}, refine = {case.cell.refine}, as asked for by {asked}"]
-            if (asked := element_sizes.asked(case.cell))
-            else []
-        ),
-        *([f"fibres     {summary.fibres}, numbered from 1"] if case.interface else []),
-        *_mix_lines(case, summary),
-        *_match_lines(case, summary),
-        f"tearing    {summary.bodies} bodies, {summary.subdomains} subdomains, {multipliers} multipliers",
-        *(
-            f"rank {rank:<5} {count} subdomains, about {2 * n} degrees of freedom"
-            for rank, (count, n) in enumerate(zip(own, nodes, strict=True))
-        ),
-        *cost_model.estimate_lines(taken, len(loads)),
-        *(f"warning    {warning}" for warning in (*case.warnings(), *summary.warnings(), *unresolved)),
-        *(f"remark     {remark}" for remark in (*case.remarks(), *moved_fibres(case))),
-        "the case is valid",
-    ]
-    return "\n".join(lines)

@@ -10,7 +10,7 @@ from feti_homog.common.petsc_options import case_options
 from feti_homog.config import case as cases
 from feti_homog.config.document import read_document
 from feti_homog.config.sweep_section import SWEEP
-from feti_homog.homogenization.unit_cell import describe
+from feti_homog.homogenization.cell_description import describe
 from feti_homog.sweep import plan
 from feti_homog.sweep.option_checks import check_options
 

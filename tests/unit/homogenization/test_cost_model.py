@@ -13,8 +13,8 @@ from feti_homog.homogenization import cost_model
 from feti_homog.homogenization.phase_laws import problems
 
 
-def estimate(dofs=(100_000,), subdomains=(9,), bodies=9, applications=36):
-    return cost_model.estimate([n // 2 for n in dofs], subdomains, 10_000, bodies, {2: applications})
+def estimate(dofs=(100_000,), subdomains=(9,), bodies=9, applications=36, columns=0):
+    return cost_model.estimate([n // 2 for n in dofs], subdomains, 10_000, bodies, {2: applications}, columns)
 
 
 def solves(case, problem):
@@ -36,13 +36,14 @@ def test_all_unit_loads_of_both_problems_are_counted():
 
 
 def test_a_problem_more_takes_more():
-    one, both = (cost_model.estimate([50_000], [9], 10_000, 99, counts) for counts in ({2: 60}, {2: 60, 1: 40}))
+    one, both = (cost_model.estimate([50_000], [9], 10_000, 99, counts, 0) for counts in ({2: 60}, {2: 60, 1: 40}))
     assert one.seconds < both.seconds < 2 * one.seconds and one.memory < both.memory and one.ranks < both.ranks
 
 
 def test_more_work_takes_more_time_and_memory():
     base = estimate()
     assert estimate(applications=72).seconds > base.seconds and estimate(dofs=(200_000,)).memory > base.memory
+    assert estimate(columns=10_000).memory - base.memory == pytest.approx(10_000 * cost_model.COLUMN_BYTES)
     halves = estimate(dofs=(50_000, 50_000), subdomains=(5, 4))
     assert halves.seconds < base.seconds and halves.memory < base.memory and halves.ranks == base.ranks
 

@@ -9,7 +9,7 @@ from mpi4py import MPI
 from unit.config.valid_cases import VALID_CASES
 
 from feti_homog.config.case import Case
-from feti_homog.homogenization.unit_cell import describe
+from feti_homog.homogenization.cell_description import describe
 
 
 @pytest.mark.parametrize(

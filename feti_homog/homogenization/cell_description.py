@@ -1,0 +1,102 @@
+"""What a run of a case would do, in words, before anything is solved."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from mpi4py import MPI
+
+from feti_homog.cell.refinement import ReferenceLattice
+from feti_homog.common.mpi_errors import on_root_only
+from feti_homog.config import element_sizes
+from feti_homog.config.case import Case
+from feti_homog.config.phase_names import COATING
+from feti_homog.feti import solver_plan
+from feti_homog.feti.decomposition.shared_entities import share_entities
+from feti_homog.feti.factory import database_options
+from feti_homog.feti.solver_plan import ProblemSizes, SolverOptions, SolverPlan
+from feti_homog.homogenization import cost_model, phase_laws, process_zone
+from feti_homog.homogenization.domain_partition import DEFAULT_POLICY, CellSummary, moved_fibres
+from feti_homog.homogenization.unit_cell import cut
+
+
+def describe(case: Case, comm: MPI.Intracomm) -> str:
+    """What a run of the case on these ranks would do, in words; empty but on rank 0.  Collective.
+
+    Raises as `tear`.
+    """
+    lattice = ReferenceLattice.of(case.cell.refine, case.cell.order)
+    own = cut(case, lattice, comm, DEFAULT_POLICY)
+    constraints = share_entities(comm, own.submeshes, own.table, own.pairs, lattice).constraints
+    options = database_options()
+    loads = comm.gather((len(own.submeshes.index), len(own.submeshes.member)))
+    return on_root_only(comm, _described, case, own.summary, lattice, 2 * constraints, loads, options) or ""
+
+
+def _described(
+    case: Case,
+    summary: CellSummary,
+    lattice: ReferenceLattice,
+    multipliers: int,
+    loads: Sequence[tuple[int, int]],
+    options: SolverOptions,
+) -> str:
+    """That of `describe`; `loads` are the subdomains and the coarse triangles of each rank."""
+    own = [subdomains for subdomains, _ in loads]
+    nodes = [triangles * lattice.intervals**2 // 2 for _, triangles in loads]
+    problems = {problem.components: cost_model.applications(case, problem) for problem in phase_laws.problems(case)}
+    plan = _plan(case, summary, multipliers, max(problems.values()), options)
+    columns = multipliers if plan.preconditioner == "influence" else 0
+    taken = cost_model.estimate(nodes, own, summary.coarse_triangles, summary.bodies, problems, columns)
+    unresolved = process_zone.warnings(case, summary.width, summary.interface_edge)
+    lines = [
+        f"case       {case.name}: {case.analysis.type}, plane {case.analysis.plane}",
+        f"cell       {summary.width:g} x {summary.height:g}, phases {', '.join(summary.phases)}",
+        *([f"voids      {summary.voids}"] if summary.voids else []),
+        f"mesh       {summary.coarse_triangles} coarse triangles, {summary.coarse_triangles * len(lattice.triangles)} "
+        f"elements of order {case.cell.order}, about {2 * sum(nodes)} degrees of freedom",
+        *(
+            [f"sizes      mesh_size = {case.cell.mesh_size:g}, refine = {case.cell.refine}, as asked for by {asked}"]
+            if (asked := element_sizes.asked(case.cell))
+            else []
+        ),
+        *([f"fibres     {summary.fibres}, numbered from 1"] if case.interface else []),
+        *_mix_lines(case, summary),
+        *_match_lines(case, summary),
+        f"tearing    {summary.bodies} bodies, {summary.subdomains} subdomains, {multipliers} multipliers",
+        f"solver     {plan.in_words}",
+        *(
+            f"rank {rank:<5} {count} subdomains, about {2 * n} degrees of freedom"
+            for rank, (count, n) in enumerate(zip(own, nodes, strict=True))
+        ),
+        *cost_model.estimate_lines(taken, len(loads)),
+        *(f"warning    {warning}" for warning in (*case.warnings(), *summary.warnings(), *unresolved)),
+        *(f"remark     {remark}" for remark in (*case.remarks(), *moved_fibres(case))),
+        "the case is valid",
+    ]
+    return "\n".join(lines)
+
+
+def _plan(case: Case, summary: CellSummary, multipliers: int, applications: int, options: SolverOptions) -> SolverPlan:
+    """How the plane problem will be solved, if its operators are of the kind asked for; pieces are dense by default."""
+    dense = options.operator != "implicit"
+    sizes = ProblemSizes(
+        applications, summary.subdomains > summary.bodies, dense, dense, multipliers, COATING in case.materials
+    )
+    return solver_plan.choose(sizes, options)
+
+
+def _match_lines(case: Case, summary: CellSummary) -> list[str]:
+    if case.cell.match is None:
+        return []
+    words = "mean diameters, the distance of the distributions of nearest and second neighbours"
+    return [f"match      {case.cell.match.name}, to {summary.match_distance:.4f} {words}"]
+
+
+def _mix_lines(case: Case, summary: CellSummary) -> list[str]:
+    """How many fibres each phase of a mix has got, and how large they are."""
+    if case.cell.mix is None:
+        return []
+    phase, radii = summary.constituent_phase[summary.is_fibre], summary.radii[summary.is_fibre]
+    own = [(name, radii[phase == k]) for k, name in enumerate(summary.phases) if name in case.cell.mix]
+    return [f"mix        {', '.join(f'{len(r)} of {name}, mean radius {r.mean():.6g}' for name, r in own)}"]

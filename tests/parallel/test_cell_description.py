@@ -1,0 +1,42 @@
+"""What `check` says of the solver of a case is what a run makes."""
+
+from __future__ import annotations
+
+import tomllib
+
+import pytest
+from support.base_case import changed
+
+from feti_homog.common.petsc_options import case_options
+from feti_homog.common.progress import Progress
+from feti_homog.config.case import Case
+from feti_homog.feti.preconditioners.influence import Influence
+from feti_homog.homogenization.cell_description import describe
+from feti_homog.homogenization.unit_cell import tear
+
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
+
+COATED = (("mesh_size = 0.05", "mesh_size = 0.2\ncoating = 0.1"),)
+COATING = "[material.coating]\nyoung = 20.0\npoisson = 0.3\n"
+PATH = (("mesh_size = 0.05", "mesh_size = 0.2"), ('type = "stiffness"', 'type = "path"'))
+STRENGTH = "[path]\nstrain = [0.01, 0, 0]\n[interface]\nnormal_strength = 1.0\ntangential_strength = 1.0\n"
+CASES = {
+    "bonded": changed(("mesh_size = 0.05", "mesh_size = 0.2")),
+    "cut": changed(("mesh_size = 0.05", "mesh_size = 0.05\nrefine = 1")),
+    "coated": changed(*COATED, end=COATING),
+    "path": changed(*PATH, end=STRENGTH),
+    "coated, implicit": changed(*COATED, end=f'{COATING}[petsc]\nfeti_dual_operator = "implicit"\n'),
+    "bonded, influence": changed(end='[petsc]\nfeti_pc_type = "influence"\n'),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_the_solver_is_the_one_that_is_told(comm, name):
+    case = Case.parse(tomllib.loads(CASES[name]))
+    with case_options(case.petsc):
+        said = comm.bcast(describe(case, comm))
+        cell = tear(case, comm, Progress(comm, quiet=True))
+    (line,) = [line for line in said.splitlines() if line.startswith("solver")]
+    assert ("influence columns" in line) == isinstance(cell.solver.preconditioner, Influence)
+    assert ("adaptive coarse space" in line) == (cell.solver.adaptive is not None)
+    cell.destroy()
