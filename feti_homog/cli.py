@@ -121,8 +121,8 @@ def command_parser() -> Parser:
 
 def _add_export(export: argparse.ArgumentParser) -> None:
     _of_results(export, _export)
-    programs = ("abaqus", "calculix", "ansys", "moose", "csv")
-    export.add_argument("--format", choices=programs, required=True, help="what is to read the card")
+    programs = "abaqus, calculix, ansys, moose, csv"
+    export.add_argument("--format", default="", metavar="PROGRAM", help=f"what is to read the card: {programs}")
     export.add_argument("--out", type=Path, metavar="FILE", help="write the card to a file instead of printing it")
     export.add_argument(
         "--transversely-isotropic",

@@ -11,6 +11,7 @@ import numpy as np
 
 from feti_homog.cell.element_blocks import Block, assembled
 from feti_homog.cell.mesh_checks import RawMesh
+from feti_homog.config.wording import toml_value
 from feti_homog.errors import MeshError
 
 TRIANGLE = re.compile(r"(CPE|CPS|CPEG|DC2D|M3D|S|STRI)(3|6|65)[A-Z]*")
@@ -52,7 +53,9 @@ def load(path: Path) -> RawMesh:
             _take(content, words, rows)
         except KeyError as error:
             raise MeshError(f"{path.name}: line {number}, *{words['']}: no {error.args[0]}") from None
-        except (ValueError, IndexError) as error:
+        except IndexError:
+            raise MeshError(f"{path.name}: line {number}, *{words['']}: a line below it ends too early") from None
+        except ValueError as error:
             raise MeshError(f"{path.name}: line {number}, *{words['']}: {error}") from None
     faults = _faults(content)
     if faults:
@@ -88,6 +91,20 @@ def _words(line: str) -> dict[str, str]:
     return {"": re.sub(r"\s+", " ", keyword.upper()), **{k.strip().upper(): _name(v) for k, _, v in pairs}}
 
 
+def _integer(word: str) -> int:
+    try:
+        return int(word)
+    except ValueError:
+        raise ValueError(f"{toml_value(word)}: expected a whole number") from None
+
+
+def _real(word: str) -> float:
+    try:
+        return float(word)
+    except ValueError:
+        raise ValueError(f"{toml_value(word)}: expected a number") from None
+
+
 def _name(word: str) -> str:
     word = word.strip()
     return word[1:-1] if word[:1] == '"' else word.lower()
@@ -101,7 +118,7 @@ def _take(content: _Content, words: dict[str, str], rows: list[list[str]]) -> No
         case "INCLUDE":
             raise ValueError("other files are not read: expected all in one file")
         case "NODE":
-            content.nodes |= {int(row[0]): [*map(float, row[1:4]), 0.0, 0.0][:3] for row in rows}
+            content.nodes |= {_integer(row[0]): [*map(_real, row[1:4]), 0.0, 0.0][:3] for row in rows}
         case "ELEMENT":
             _take_elements(content, words, rows)
         case "ELSET" if "INSTANCE" not in words:
@@ -118,7 +135,7 @@ def _take_elements(content: _Content, words: dict[str, str], rows: list[list[str
     if not found:
         return
     count = 3 if found[2] == "3" else 6
-    elements = {int(row[0]): [int(word) for word in row[1:]] for row in rows}
+    elements = {_integer(row[0]): [_integer(word) for word in row[1:]] for row in rows}
     for tag in elements:
         if len(elements[tag]) != count:
             raise ValueError(f"element {tag} has {len(elements[tag])} nodes: expected {count}")
@@ -133,11 +150,11 @@ def _take_set(content: _Content, words: dict[str, str], rows: list[list[str]]) -
     members = content.members(BY_SET, words["ELSET"])
     for row in rows:
         if "GENERATE" in words:
-            first, last, step = (int(word) for word in [*row, "1"][:3])
-            members.update(range(first, last + 1, step))
+            numbers = [_integer(word) for word in [*row, "1"]]
+            members.update(range(numbers[0], numbers[1] + 1, numbers[2] or 1))
             continue
         for word in row:
-            members.update([int(word)] if word.isdecimal() else _members(content, _name(word)))
+            members.update([_integer(word)] if word.isdecimal() else _members(content, _name(word)))
 
 
 def _members(content: _Content, name: str) -> set[int]:

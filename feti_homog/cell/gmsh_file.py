@@ -47,7 +47,7 @@ def load(path: Path) -> RawMesh:
         try:
             gmsh.open(str(path))
         except Exception as error:  # gmsh raises nothing more specific
-            raise MeshError(f"{path.name}: gmsh cannot read it: {error}") from None
+            raise MeshError(f"{path.name}: gmsh cannot read it: {str(error).strip() or 'it is damaged'}") from None
         faults = _other_kinds(gmsh)
         if faults:
             raise MeshError(*(f"{path.name}: {fault}" for fault in faults))

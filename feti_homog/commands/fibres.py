@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from feti_homog.api import folder
 from feti_homog.common.standard_streams import print_product, say
 
 if TYPE_CHECKING:
@@ -20,7 +21,7 @@ HELP = (
 def add(actions: argparse._SubParsersAction[Any]) -> None:
     """Add the command to those of a parser."""
     parser = actions.add_parser("fibres", help="print the fibres of a cell as a table", description=HELP)
-    parser.add_argument("source", type=Path, metavar="CASE.toml|DIR", help="a case file, or a folder of results")
+    parser.add_argument("source", type=folder, metavar="CASE.toml|DIR", help="a case file, or a folder of results")
     parser.add_argument("--out", type=Path, metavar="FILE.csv", help="write the table to a file instead of printing it")
     parser.set_defaults(action=_fibres)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import math
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from feti_homog.api import folder
@@ -27,7 +26,7 @@ def add(actions: argparse._SubParsersAction[Any]) -> None:
         "statistics", help="measure how the fibres of a cross-section are placed", description=HELP
     )
     words = "a table of fibres in a window of a micrograph; or a folder of results, or a case file: periodic cells"
-    parser.add_argument("source", type=Path, metavar="FILE.csv|DIR|CASE.toml", help=words)
+    parser.add_argument("source", type=folder, metavar="FILE.csv|DIR|CASE.toml", help=words)
     parser.add_argument("--out", type=folder, metavar="DIR", help="folder of the tables and the picture")
     parser.add_argument(
         "--model",

@@ -226,7 +226,9 @@ def _top_level_faults(document: Mapping[str, Any]) -> list[str]:
     for name, value in document.items():
         hint = suggestion(name, TOP_LEVEL, KEY_OWNERS)
         if name == SWEEP:
-            faults.append("[sweep]: this file describes many cases; `feti-homog sweep` runs them")
+            words = f"{SWEEP} = {toml_value(value)}: expected a section [{SWEEP}]"
+            many = "[sweep]: this file describes many cases; `feti-homog sweep` runs them"
+            faults.append(many if isinstance(value, dict) else words)
         elif name not in TOP_LEVEL and isinstance(value, dict):
             faults.append(f"[{toml_key(name)}]: unknown section; {hint}")
         elif name not in TOP_LEVEL:

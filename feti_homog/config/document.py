@@ -22,21 +22,29 @@ TomlPath = tuple[str, ...]
 def read_document(path: str | Path) -> dict[str, Any]:
     """The TOML document in a file, named after the file. Raises CaseError if it is none."""
     path = Path(path)
+    if "\0" in str(path):
+        raise CaseError(f"{str(path)!r}: no file has a name with a null character")
     try:
         content = _bytes_of(path).decode("utf-8-sig")
         document = tomllib.loads(content)
     except UnicodeDecodeError as error:
         line = error.object.count(b"\n", 0, error.start) + 1
         raise CaseError(f"{path}: not UTF-8 text (line {line})") from None
-    except (ValueError, RecursionError) as error:  # of too long a number and too deep an array too
+    except RecursionError:
+        raise _too_deep(path) from None
+    except ValueError as error:  # of too long a number too
         place = f"line {content.count(chr(10)) + 1}, the end"
         raise CaseError(f"{path}: not TOML: {str(error).replace('end of document', place)}") from None
     except OSError as error:
         raise CaseError(f"{path}: cannot be read: {error.strerror}") from None
     if _is_deeper(document, MAX_DEPTH):
-        raise CaseError(f"{path}: tables and arrays are nested more than {MAX_DEPTH} deep")
+        raise _too_deep(path)
     # Where the locale knows no UTF-8, Python escapes the bytes of names of files.
     return {"name": os.fsencode(path.stem).decode("utf-8", "replace")} | document
+
+
+def _too_deep(path: Path) -> CaseError:
+    return CaseError(f"{path}: tables and arrays are nested more than {MAX_DEPTH} deep")
 
 
 def _bytes_of(path: Path) -> bytes:

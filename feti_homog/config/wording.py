@@ -27,8 +27,9 @@ def _line(value: object) -> str:
 
 
 def toml_key(name: str) -> str:
-    """A key as TOML writes it: quoted if it is not bare."""
-    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else toml_value(name)
+    """A key nearly as TOML writes it, in one short line: quoted if it is not bare."""
+    is_bare = re.fullmatch(rf"[A-Za-z0-9_-]{{1,{LONGEST_VALUE}}}", name)
+    return name if is_bare else toml_value(name)
 
 
 def dotted_key(path: Iterable[str]) -> str:

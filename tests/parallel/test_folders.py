@@ -103,12 +103,13 @@ def test_folders_that_cannot_be_used_are_refused_and_left_as_they_are(comm, shar
     ("out", "message"),
     [
         ("", '"" is no name of a folder'),
+        ("a\0b", "names have no null characters"),
         ("/proc/results", "--out /proc/results: cannot be made"),
         ("/dev/null/results", "is a file"),
         (f"/tmp/{LONG}", "File name too long"),
         ("/tmp/" + "/".join(["a" * 100] * 41), "File name too long"),
     ],
-    ids=["empty", "proc", "device", "long component", "long path"],
+    ids=["empty", "null", "proc", "device", "long component", "long path"],
 )
 def test_names_that_no_folder_can_have_are_refused(comm, shared_path, capsys, out, message):
     refused(comm, shared_path, out, capsys, message)

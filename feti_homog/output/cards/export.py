@@ -32,8 +32,11 @@ def card(directory: Path, form: str, symmetry: str) -> str:
     """The card, in one of `FORMATS`, of the material of one of `SYMMETRIES` of the result in a folder.
 
     Raises:
-        CaseError: there is no result, it is damaged, or it has no material that the format can carry; one line.
+        CaseError: there is no such format or result, it is damaged, or it has no material that the format can carry;
+            one line.
     """
+    if form not in FORMATS:
+        raise CaseError(f"--format {form}".rstrip() + f": expected one of {', '.join(FORMATS)}")
     document = result_json.read(directory)
     path = directory / result_json.NAME
     try:

@@ -7,6 +7,7 @@ from unit.config.faulty_materials import FAULTY_MATERIALS
 
 # name: (content of the file, words that must stand in its faults)
 FAULTY_CASES: dict[str, tuple[str, tuple[str, ...]]] = {
+    "sweep_is_no_section": (f"sweep = 3\n{BASE}", ("sweep = 3: expected a section [sweep]",)),
     # the file
     "empty": ("", ("[cell]: missing section", "[material]: missing section", "[analysis]: missing section")),
     "syntax": (cell("mesh_size = 0.05", "mesh_size 0.05"), ("not TOML", "line 4")),

@@ -113,3 +113,8 @@ def test_wrong_types_are_faults_in_a_sentence(name):
         Case.parse(document_of(BASE) | values)
     assert any(fault.startswith(expected) for fault in caught.value.faults), caught.value.faults
     assert all(len(fault.splitlines()) == 1 for fault in caught.value.faults)
+
+
+def test_names_that_no_file_can_have_are_refused():
+    with pytest.raises(CaseError, match="no file has a name with a null character"):
+        Case.load("a\0b")
