@@ -27,6 +27,7 @@ from feti_homog.verification.point_laws import check_points
 from feti_homog.verification.reading import ResultFiles, altered, opened
 from feti_homog.verification.spatial_laws import check_spatial
 from feti_homog.verification.summary_laws import check_summary
+from feti_homog.verification.table_laws import check_tables
 
 
 @dataclass(frozen=True)
@@ -75,7 +76,7 @@ def _of(directory: Path) -> Certificate:
     with opened(directory) as files:
         try:
             with np.errstate(all="ignore"):  # numbers that are not finite break the laws that they are in
-                return _verified(files)
+                return _verified(files, directory)
         except (KeyError, TypeError, IndexError, ValueError, AttributeError, MemoryError) as error:
             words = f"{type(error).__name__} {error}"
             raise CaseError(
@@ -83,7 +84,7 @@ def _of(directory: Path) -> Certificate:
             ) from error
 
 
-def _verified(files: ResultFiles) -> Certificate:
+def _verified(files: ResultFiles, directory: Path) -> Certificate:
     rtol, users_mesh = float(files.document["solver"]["rtol"]), files.case["cell"]["geometry"] == "mesh"
     ledger = Ledger(laws(rtol, users_mesh, has_coatings=COATING in files.case["material"]))
     ledger.record("files", len(files.altered), ", ".join(files.altered))
@@ -108,6 +109,7 @@ def _verified(files: ResultFiles) -> Certificate:
     if "envelope" in files.document:
         check_envelope(ledger, cell, states)
     check_summary(ledger, cell)
+    check_tables(ledger, directory, files.document)
     if files.is_spatial:
         check_spatial(ledger, cell, states)
     return Certificate(ledger.findings(), _title(files, states), _status(files))

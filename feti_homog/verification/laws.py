@@ -69,6 +69,7 @@ def laws(rtol: float, users_mesh: bool, has_coatings: bool) -> tuple[Law, ...]:
         ),
         Law("stress load", "the states have the stresses that the case asks for, relative to the largest", solver),
         Law("tables", "points and columns in result.json are the states in result.h5, relative to the largest", 1e-12),
+        Law("CSV", "the tables of points beside result.json say what that says", 0.0),
         Law("symmetry", "stiffnesses of bonded or free faces are symmetric, relative to the largest entry", solver),
         Law("breaks", "bonds break as the points say and never heal, in numbers of bonds", 0.0),
         Law("strength", "bonds that hold are within their strength, those that break are at it", STRENGTH),

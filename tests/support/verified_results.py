@@ -190,7 +190,7 @@ def falsified(folder: Path, copy: Path, edit: Callable[[dict[str, Any], Any], ob
     """
     import h5py
 
-    shutil.copytree(folder, copy)
+    shutil.copytree(folder, copy, ignore=shutil.ignore_patterns("*.csv"))
     path = copy / "result.json"
     content = json.loads(path.read_text())
     case = json.dumps(content["case"])
