@@ -15,6 +15,7 @@ from feti_homog.common.command_words import named_values, petsc_words, split_arg
 from feti_homog.common.interrupts import end_on_signals, launched_rank
 from feti_homog.common.matplotlib_toolkits import prefer_own_toolkits
 from feti_homog.common.petsc_option_values import faulty_values
+from feti_homog.common.petsc_system_options import unknown_to_petsc
 from feti_homog.config.case import Case
 from feti_homog.errors import EXIT_DONE, CaseError, LibraryError
 
@@ -169,7 +170,7 @@ def _start_petsc(words: Sequence[str], comm: Intracomm) -> None:
         LibraryError: petsc4py does not fit NumPy.
     """
     options = named_values(words)
-    faults = faulty_values(options)
+    faults = [*faulty_values(options), *unknown_to_petsc(options)]
     if faults:
         raise CaseError(*faults)
     try:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import importlib
 import re
 import sys
@@ -9,7 +10,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from feti_homog.errors import LibraryError
+from feti_homog.common.standard_streams import complain
+from feti_homog.errors import EXIT_DEFECT, LibraryError
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
@@ -34,8 +36,9 @@ def require() -> None:
 def start_petsc(words: Sequence[str], comm: Intracomm) -> None:
     """Start PETSc with the words of a command line, the program's name first.  Collective over `comm`.
 
-    At its end PETSc does not list options that nobody read, unless -options_left asks for it: the program refuses
-    misspelt ones, and one set of options serves all runs.
+    PETSc ends when Python does; a rank on which it cannot, for its logs cannot be written, ends the job: the others
+    would wait for it.  At its end PETSc does not list options that nobody read, unless -options_left asks for it: the
+    program refuses misspelt ones, and one set of options serves all runs.
 
     Raises:
         LibraryError: petsc4py was built for another NumPy.
@@ -48,9 +51,19 @@ def start_petsc(words: Sequence[str], comm: Intracomm) -> None:
         raise LibraryError(_unfit("petsc4py", error, petsc4py_advice())) from error
     from petsc4py import PETSc
 
+    atexit.register(_end_petsc, comm)
     options = PETSc.Options()
     if not options.hasName("options_left"):
         options.setValue("options_left", "no")
+
+
+def _end_petsc(comm: Intracomm) -> None:
+    from feti_homog.common import petsc_ctypes
+
+    code = petsc_ctypes.finalize()
+    if code:
+        complain(f"error: PETSc cannot end (error code {code}); results are written")
+        comm.Abort(EXIT_DEFECT)
 
 
 def petsc4py_advice(debian: Path = DEBIAN_PETSC, path: Sequence[str] = sys.path) -> str:

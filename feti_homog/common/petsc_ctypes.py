@@ -23,6 +23,11 @@ def option_was_used(name: str) -> bool:
     return bool(used.value)
 
 
+def finalize() -> int:
+    """End PETSc, which prints its logs; the error code, 0 if it could.  Collective over all ranks."""
+    return int(_library().PetscFinalize())
+
+
 def set_schur(factor: PETSc.Mat, rows: PETSc.IS) -> None:
     """Ask the factor matrix, before it is factored, to leave the Schur complement on `rows`."""
     _call("MatFactorSetSchurIS", Pointer(factor.handle), Pointer(rows.handle))

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-import os
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
-from feti_homog.common.petsc_option_table import OPTIONS
+from feti_homog.common.petsc_option_table import DIRECT_PREFIXES, OPTIONS
+from feti_homog.common.writable_files import can_be_read, can_be_written
 
 Value = str | int | float | bool
 
@@ -90,26 +89,26 @@ def _names(known: list[str]) -> Rule:
 def _is_viewer(text: str) -> bool:
     """Whether the text says where to print, in a folder that exists."""
     match = VIEWER.fullmatch(text)
-    return match is not None and (not match["file"] or _can_be_written(match["file"]))
-
-
-def _can_be_written(file: str) -> bool:
-    folder = Path(file).parent
-    return folder.is_dir() and os.access(folder, os.W_OK) and not Path(file).is_dir()
+    return match is not None and (not match["file"] or can_be_written(match["file"]))
 
 
 def _is_new_file(text: str) -> bool:
     """Whether the text is empty, or what may stand before its first colon is a file that can be written."""
     file = text.partition(":")[0]
-    return not file or SWITCH.holds(file) or _can_be_written(file)
+    return not file or SWITCH.holds(file) or can_be_written(file)
 
 
 def _never(text: str) -> bool:
     return text.lower() in FALSE
 
 
-def _can_be_read(file: str) -> bool:
-    return os.path.isfile(file) and os.access(file, os.R_OK)
+def _has_options(file: str) -> bool:
+    """Whether a file can be read, and its lines are options, comments or aliases."""
+    if not can_be_read(file):
+        return False
+    with open(file, encoding="utf-8", errors="replace") as stream:
+        lines = [line.strip() for line in stream]
+    return all(not line or line.startswith(("-", "#", "!", "%", "alias ")) for line in lines)
 
 
 SWITCH = Rule("true or false, or no value", lambda text: text.lower() in ("", *TRUE, *FALSE))
@@ -120,7 +119,10 @@ PRINTS = Rule(
 SHARE = _real("a number above 0 and below 1", lambda number: 0.0 < number < 1.0)
 NOT_NEGATIVE = _real("a number of at least 0", lambda number: 0.0 <= number < math.inf)
 
-FLAGS = ("feti_view", "malloc_debug", "options_left", "on_error_abort")
+FLAGS = (
+    *("feti_view", "malloc_debug", "malloc_test", "log_view_memory", "log_view_gpu_time"),
+    *("options_left", "skip_petscrc", "on_error_abort", "on_error_mpiabort", "no_signal_handler"),
+)
 VIEWERS = (
     *(option.name for option in OPTIONS if not option.value and option.name != "feti_view"),
     *(f"feti_ksp_{name}" for name in ("monitor_true_residual", "monitor_singular_value", "view_final_residual")),
@@ -139,7 +141,7 @@ RULES: dict[str, Rule] = {
         for option in OPTIONS
         if "|" in option.value and not option.value.endswith("...")
     },
-    "feti_ksp_rtol": SHARE,
+    **{f"{prefix}ksp_rtol": SHARE for prefix in ("feti_", *DIRECT_PREFIXES)},
     "feti_coarse_threshold": SHARE,
     "feti_ksp_atol": NOT_NEGATIVE,
     "feti_ksp_divtol": _real("a number above 1", lambda number: 1.0 < number < math.inf),
@@ -148,8 +150,9 @@ RULES: dict[str, Rule] = {
     "feti_ksp_error_if_not_converged": Rule("nothing: the run says it itself, and keeps what it computed", _never),
     "fp_trap": Rule("nothing: numbers that are not finite are checked where they may occur", _never),
     "info": Rule("a file of an existing folder, or no value", _is_new_file),
+    "malloc_dump": Rule("a file of an existing folder, or no value", _is_new_file),
     "malloc_view": Rule("a file of an existing folder, or no value", _is_new_file),
-    "options_file": Rule("a file that can be read", _can_be_read),
-    "log_trace": Rule("a file of an existing folder, or no value", lambda text: not text or _can_be_written(text)),
+    "options_file": Rule("a file with an option of PETSc in each line", _has_options),
+    "log_trace": Rule("a file of an existing folder, or no value", lambda text: not text or can_be_written(text)),
 }
 """For each of these options, what is expected in words, and whether a text is that."""

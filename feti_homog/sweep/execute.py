@@ -14,6 +14,7 @@ from feti_homog.errors import CaseError, ConvergenceError, FetiHomogError
 from feti_homog.output.text.point_tables import sweep_failures, sweep_table
 from feti_homog.sweep import store
 from feti_homog.sweep.case_runner import CaseRunner, Outcome
+from feti_homog.sweep.option_checks import check_options
 from feti_homog.sweep.plan import Sweep
 from feti_homog.sweep.store import LOCK_FILE, CaseState, Status
 
@@ -32,13 +33,14 @@ def run_all(sweep: Sweep, directory: Path, comm: Intracomm, ranks_per_case: int,
     """Run all cases, each on so many ranks; as many at once as there are such groups.  Collective.
 
     Raises:
-        CaseError: `ranks_per_case` does not divide the number of ranks, or the folder cannot be used: it holds
-            another sweep, or another process runs this one.
+        CaseError: options of PETSc are faulty, `ranks_per_case` does not divide the number of ranks, or the folder
+            cannot be used: it holds another sweep, or another process runs this one.
         ConvergenceError: cases failed; they are printed.
         FetiHomogError: a result could not be written; the finished ones are kept.
     """
     if ranks_per_case < 1 or comm.size % ranks_per_case:
         raise CaseError(f"--ranks-per-case {ranks_per_case}: expected a divisor of the {comm.size} ranks")
+    check_options(sweep)
     with _sweep_lock(directory, comm, sweep, shared=False):
         group = comm if ranks_per_case == comm.size else _group(comm, ranks_per_case)
         if retry:
@@ -66,6 +68,7 @@ def run_one(sweep: Sweep, number: int, directory: Path, comm: Intracomm, retry: 
     """
     if not 1 <= number <= len(sweep.entries):
         raise CaseError(f"--index {number}: expected the number of a case, 1 to {len(sweep.entries)}")
+    check_options(sweep)
     entry, case = sweep.entries[number - 1], sweep.cases[number - 1]
     with _sweep_lock(directory, comm, sweep, shared=True):
         outcome, holder = CaseRunner(comm, directory, retry, quiet).run(entry, case, len(sweep.entries))

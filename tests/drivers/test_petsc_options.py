@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import time
 
 import numpy as np
 import pytest
 from support.command_line import case_file, command_line
+from support.jobs import launched
 
 from feti_homog.common.petsc_option_table import OPTIONS
 
 PREFIXES = ("natural", "coarse", "bonded", "sub", "interior")
 WITHOUT_CHOLMOD = [word for p in PREFIXES for word in (f"-feti_{p}_pc_factor_mat_solver_type", "mumps")]
 CUT = "[output]\npictures = false\n[decomposition]\nsubdomains = 6\n"
+TEXTS = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
 # A value that each kind of option takes; what is listed takes its default.
 VALUES = {"<real>": "1e-8", "<integer>": "50", "": None}
 
@@ -113,6 +117,36 @@ def test_options_are_checked_before_the_work(tmp_path, words, fault):
     job = command_line(1, "check", case_file(tmp_path, CUT), *words)
     assert (job.returncode, job.stdout) == (2, "")
     assert fault in job.stderr and job.stderr.count("error: ") == 1
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["-log_view", "ascii:none/"], ["-log_view", ":none/"], ["-feti_ksp_monitor", "ascii:none/"], ["-info", "none/"],
+        ["-malloc_view", "none/"], ["-malloc_test", "maybe"], ["-log_vieww"], ["-mat_type", "foo"],
+        ["-prefix_push", "a"], ["-feti_natural_ksp_rtol", "2"], ["-options_file", "pyproject.toml"], ["-skip_petscrc", "maybe"],
+    ],
+    ids=" ".join,
+)  # fmt: skip
+def test_options_that_nobody_could_take_are_one_line(tmp_path, words):
+    job = command_line(2, "run", case_file(tmp_path, CUT), "--out", tmp_path / "out", *words)
+    assert job.returncode == 2 and not (tmp_path / "out").exists()
+    assert job.stderr.startswith(f"error: {words[0]}")
+    assert job.stderr.count("error: ") == 1 and "PETSC ERROR" not in job.stderr
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_log_that_cannot_be_written_any_more_hangs_no_rank(tmp_path, ranks):
+    """Its folder goes while the case runs; PETSc opens the file when it ends, the others wait for that."""
+    case, log, out = case_file(tmp_path, CUT), tmp_path / "logs", tmp_path / "out"
+    log.mkdir()
+    process = launched(ranks, "-m", "feti_homog", "run", case, "--out", out, "-log_view", f":{log}/log.txt", **TEXTS)
+    while not (out / "result.lock").exists() and process.poll() is None:
+        time.sleep(0.01)
+    log.rmdir()
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 1 and "error: PETSc cannot end" in errors
+    assert json.loads((out / "result.json").read_text())["status"] == "done"
 
 
 def test_options_that_petsc_alone_knows_pass(tmp_path):

@@ -53,6 +53,20 @@ def test_a_damaged_list_of_cases_is_told(tmp_path):
     assert len(results(out)) == 2
 
 
+@pytest.mark.parametrize(
+    ("lines", "fault"),
+    [
+        ('"petsc.feti_ksp_rtol" = [1e-3, 2.0]', "case-0002: -feti_ksp_rtol 2.0: expected a number above 0 and below 1"),
+        ('"cell.order" = [1, 2]\n[petsc]\nfeti_ksp_rtoll = 1e-3', "case-0001, case-0002: -feti_ksp_rtoll: no solver"),
+    ],
+)
+@pytest.mark.parametrize("words", [[], ["--index", "1"]], ids=["all", "one"])
+def test_faulty_options_are_told_before_anything_is_written(tmp_path, lines, fault, words):
+    out = tmp_path / "out"
+    job = command_line(2, "sweep", sweep_file(tmp_path, f"{lines}\n"), "--out", out, *words)
+    assert job.returncode == 2 and job.stderr.startswith(f"error: {fault}") and not out.exists()
+
+
 @pytest.mark.parametrize("limit", [1500, 200])
 def test_a_full_disk_is_told_and_the_sweep_goes_on_later(tmp_path, limit):
     """No file may be longer than the limit: below 1500 bytes no result can be written, below 200 not even the list."""
