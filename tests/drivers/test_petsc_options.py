@@ -122,9 +122,10 @@ def test_options_are_checked_before_the_work(tmp_path, words, fault):
 @pytest.mark.parametrize(
     "words",
     [
-        ["-log_view", "ascii:none/"], ["-log_view", ":none/"], ["-feti_ksp_monitor", "ascii:none/"], ["-info", "none/"],
-        ["-malloc_view", "none/"], ["-malloc_test", "maybe"], ["-log_vieww"], ["-mat_type", "foo"],
-        ["-prefix_push", "a"], ["-feti_natural_ksp_rtol", "2"], ["-options_file", "pyproject.toml"], ["-skip_petscrc", "maybe"],
+        ["-log_view", "ascii:none/"], ["-log_view", ":none/"], ["-feti_ksp_monitor", "ascii:none/"],
+        ["-info", "none/"], ["-malloc_view", "none/"], ["-malloc_test", "maybe"], ["-log_vieww"], ["-mat_type", "foo"],
+        ["-prefix_push", "a"], ["-feti_natural_ksp_rtol", "2"], ["-options_file", "pyproject.toml"],
+        ["-skip_petscrc", "maybe"],
     ],
     ids=" ".join,
 )  # fmt: skip
