@@ -90,8 +90,8 @@ class Output:
     )
     deformation_scale: float | None = key(
         real(least=0.0),
-        "Factor of the displacements drawn; by default such that displacements and openings are seen, and at least 1 "
-        "under a given strain.",
+        "Factor of the displacements drawn; by default such that displacements and openings are seen and no element "
+        "turns over, but at least 1 under a given strain.",
         default=None,
         default_words="automatic",
     )

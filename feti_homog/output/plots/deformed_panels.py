@@ -17,13 +17,8 @@ from PIL import Image
 
 from feti_homog.errors import FetiHomogError
 from feti_homog.output.files import atomic, field_file
-from feti_homog.output.plots.decimation import (
-    BLOCK_ROWS,
-    DrawnMesh,
-    drawn_mesh,
-    nodal_values,
-    outline_edges,
-)
+from feti_homog.output.plots.decimation import DrawnMesh, drawn_mesh, outline_edges
+from feti_homog.output.plots.drawn_displacement import drawn_displacement, largest_scale
 from feti_homog.output.plots.interface_marks import STATE_NAMES, InterfaceEdges, state_legend
 from feti_homog.output.plots.load_labels import LoadLabels
 from feti_homog.output.plots.plot_helpers import (
@@ -31,6 +26,7 @@ from feti_homog.output.plots.plot_helpers import (
     draw_segments,
     drawn_stress,
     fill_triangles,
+    largest_length,
     magnification,
     pixels_of,
     plain,
@@ -75,8 +71,7 @@ class DeformedCell:
 
     def moved(self, number: int) -> Array:
         """(p, 2) places of the drawn nodes."""
-        displacement = nodal_values(self.file[f"state/{number}/displacement"], self.drawn)
-        places: Array = self.drawn.points + self.scale * displacement
+        places: Array = self.drawn.points + self.scale * drawn_displacement(self.file[f"state/{number}"], self.drawn)
         return places
 
     def draw(self, axes: Axes, number: int, moved: Array) -> None:
@@ -150,18 +145,28 @@ def plot(directory: Path, file: Any, document: Document) -> list[Path]:
 
 def shown_scale(file: Any, document: Mapping[str, Any]) -> float:
     """The factor of displacements in all pictures of an angle or a path and in the report: that of the case or, by
-    default, one at which the largest displacement and opening are seen, at least 1 under a given load."""
+    default, one at which the largest displacement and opening are seen and no triangle turns over, but at least 1 under
+    a given load."""
     chosen = document.get("case", {}).get("output", {}).get("deformation_scale")
     if chosen is not None:
         return float(chosen)
-    states = [file[f"state/{number}"] for number in _frames(document, len(file["state"]))]
-    displacement = max(_largest_length(state["displacement"]) for state in states)
-    opening = max(float(state["jump"][:, 0].max(initial=0.0)) for state in states)
-    scale = magnification(displacement, float(min(file.attrs["width"], file.attrs["height"])), opening)
-    given = (
-        "path" in document or "load" in document or document.get("case", {}).get("angle", {}).get("strain") is not None
-    )
-    return max(scale, 1.0) if given else scale
+    drawn = drawn_mesh(file, PANEL_LIMIT)
+    displacement = opening = 0.0
+    largest = math.inf
+    for number in _frames(document, len(file["state"])):
+        state = file[f"state/{number}"]
+        u = drawn_displacement(state, drawn)
+        displacement, largest = max(displacement, largest_length(u)), min(largest, largest_scale(u, drawn))
+        opening = max(opening, float(state["jump"][:, 0].max(initial=0.0)))
+    size = float(min(file.attrs["width"], file.attrs["height"]))
+    scale = magnification(displacement, size, opening, largest)
+    return max(scale, 1.0) if _is_load_given(document) else scale
+
+
+def _is_load_given(document: Mapping[str, Any]) -> bool:
+    """Whether states are under a load of the case, not under unit strains."""
+    angle = document.get("case", {}).get("angle", {})
+    return "path" in document or "load" in document or angle.get("strain") is not None
 
 
 def _frames(document: Mapping[str, Any], count: int) -> list[int]:
@@ -169,12 +174,6 @@ def _frames(document: Mapping[str, Any], count: int) -> list[int]:
     if "path" in document:
         return point_tables.chosen_states(document, MAX_FRAMES, count)
     return sorted({round(k) for k in np.linspace(0, count - 1, min(MAX_FRAMES, count))})
-
-
-def _largest_length(table: Any) -> float:
-    """The largest length of the rows (n, 2) of a table, which is read in blocks."""
-    blocks = (table[start : start + BLOCK_ROWS] for start in range(0, len(table), BLOCK_ROWS))
-    return max((float(np.linalg.norm(rows, axis=1).max()) for rows in blocks), default=0.0)
 
 
 def _side_by_side(file: Any, numbers: Sequence[int], document: Document, scale: float) -> Figure:

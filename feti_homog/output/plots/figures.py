@@ -18,7 +18,8 @@ from feti_homog.errors import FetiHomogError
 from feti_homog.mechanics.voigt import voigt_names
 from feti_homog.output.files import field_file, result_json
 from feti_homog.output.plots import axial_shear, deformed_panels, response_curves, traction_plots
-from feti_homog.output.plots.decimation import DrawnMesh, drawn_mesh, nodal_values, outline_edges
+from feti_homog.output.plots.decimation import DrawnMesh, drawn_mesh, outline_edges
+from feti_homog.output.plots.drawn_displacement import drawn_displacement, largest_scale
 from feti_homog.output.plots.fibre_numbers import write_fibre_numbers
 from feti_homog.output.plots.interface_marks import InterfaceEdges
 from feti_homog.output.plots.load_labels import LoadLabels
@@ -138,8 +139,9 @@ def _deformed(
     document: Mapping[str, Any],
 ) -> Figure:
     """The magnified deformed cell with a stress component in colour, and the outline it has left."""
-    displacement = nodal_values(state["displacement"], drawn)
-    seen = magnification(largest_length(displacement), float(np.ptp(drawn.points, axis=0).min()))
+    displacement = drawn_displacement(state, drawn)
+    size = float(np.ptp(drawn.points, axis=0).min())
+    seen = magnification(largest_length(displacement), size, largest=largest_scale(displacement, drawn))
     chosen = _output(document).get("deformation_scale")
     scale = seen if chosen is None else chosen
     moved = drawn.points + scale * displacement

@@ -147,8 +147,8 @@ def _outside(values: Array, least: float, most: float) -> str:
     return {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}[ends]
 
 
-def magnification(displacement: float, size: float, opening: float = 0.0) -> float:
-    """1, 2 or 5 times a power of ten, at which both are seen in a cell of this size.
+def magnification(displacement: float, size: float, opening: float = 0.0, largest: float = math.inf) -> float:
+    """1, 2 or 5 times a power of ten, at most `largest`, at which both are seen in a cell of this size.
 
     The largest displacement is drawn as about a tenth of the cell; if there is a narrow opening, as more than that.
     """
@@ -158,8 +158,9 @@ def magnification(displacement: float, size: float, opening: float = 0.0) -> flo
     if opening > 0.0:
         most = MOST_DISPLACEMENT * size / displacement
         wanted = max(wanted, min(SEEN_OPENING * size / opening, most))
-    power = 10.0 ** math.floor(math.log10(wanted))
-    return power * min((1, 2, 5, 10), key=lambda factor: abs(math.log(factor * power / wanted)))
+    power = 10.0 ** math.floor(math.log10(min(wanted, largest)))
+    rounded = [factor * power for factor in (1, 2, 5, 10) if factor * power <= largest]
+    return min(rounded, key=lambda scale: abs(math.log(scale / wanted)))
 
 
 def largest_length(vectors: Array) -> float:

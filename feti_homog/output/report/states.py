@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from feti_homog.mechanics.response import FAINT, components_above
 from feti_homog.mechanics.voigt import voigt_names
-from feti_homog.output.plots.decimation import DrawnMesh, drawn_mesh, nodal_values, outline_edges
+from feti_homog.output.plots.decimation import DrawnMesh, drawn_mesh, outline_edges
 from feti_homog.output.plots.deformed_panels import shown_scale
+from feti_homog.output.plots.drawn_displacement import drawn_displacement
 from feti_homog.output.plots.interface_marks import STATE_COLOURS, STATE_NAMES, STATE_WIDTHS, InterfaceEdges
 from feti_homog.output.plots.plot_helpers import drawn_stress, stress_component, value_range
 from feti_homog.output.text import point_tables
@@ -62,7 +63,7 @@ def _numbers(file: Any, document: Document) -> list[int]:
 
 def _state(file: Any, number: int, drawn: DrawnMesh, edges: InterfaceEdges, document: Document) -> dict[str, Any]:
     state = file[f"state/{number}"]
-    displacement = nodal_values(state["displacement"], drawn)
+    displacement = drawn_displacement(state, drawn)
     unit = float(np.abs(displacement).max()) / LARGEST_SHORT or 1.0
     status = state["status"][:]
     attributes = state.attrs
