@@ -29,7 +29,7 @@ from feti_homog.mechanics import response
 from feti_homog.mechanics.bounds import Moduli
 from feti_homog.mechanics.estimates.fibre_bounds import FibreBounds
 from feti_homog.mechanics.estimates.methods import Estimates
-from feti_homog.mechanics.spatial_constants import EngineeringConstants, TransverselyIsotropic
+from feti_homog.mechanics.spatial_constants import EngineeringConstants, TransverselyIsotropic, TransverseModuli
 from feti_homog.output.files.file_seal import FileSeal
 from feti_homog.output.files.result_json import SCHEMA
 from feti_homog.output.text.summary import short_summary
@@ -98,6 +98,9 @@ class Result:
     )
     transversely_isotropic: TransverselyIsotropic | None = described(
         "constants of the nearest transversely isotropic stiffness about x3", default=None
+    )
+    transverse_moduli: TransverseModuli | None = described(
+        "what Young's and shear moduli across the fibres range over", default=None
     )
     estimates: Estimates | None = described("closed estimates of the same, of a cell without debonding", default=None)
     fibre_bounds: FibreBounds | None = described("bounds of the same, of rigid bonds", default=None)

@@ -44,7 +44,7 @@ def _constants(document: Document, unit: str, label: str) -> list[str]:
     """Moduli of the plane state; constants in space, with what closed estimates and bounds say of them."""
     blocks = [
         _table(key, None, ([with_unit(name, unit), _number(value)] for name, value in document[key].items()))
-        for key in ("moduli", "constants")
+        for key in ("moduli", "constants", "transverse_moduli")
         if key in document
     ]
     if "transversely_isotropic" in document:

@@ -18,6 +18,7 @@ from feti_homog.mechanics.spatial_constants import (
     TransverselyIsotropic,
     engineering_constants,
     is_transversely_isotropic,
+    transverse_moduli,
     transversely_isotropic_part,
 )
 from feti_homog.typing import Bool, Float
@@ -41,6 +42,7 @@ def constants(cell: TornCell, analysis: Mapping[str, Any], fractions: Mapping[st
         "compliance": compliance,
         "constants": engineering_constants(stiffness),
         "transversely_isotropic": transversely_isotropic_part(stiffness, strains),
+        "transverse_moduli": transverse_moduli(stiffness),
     }
     if strains is not None:
         found["thermal_expansion"] = strains

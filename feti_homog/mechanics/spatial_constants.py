@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from feti_homog.common.records import STRESS, described
 from feti_homog.typing import Float
 
+DIRECTIONS = 720  # across the fibres
 PER_TEMPERATURE = "1 / temperature"
 TRANSVERSELY_ISOTROPIC = 1e-9  # relative distance to the nearest transversely isotropic stiffness, from rounding
 
@@ -54,6 +55,30 @@ class TransverselyIsotropic:
     deviation: float = described(
         "relative distance of the stiffness, as a fourth-order tensor, to the nearest transversely isotropic one"
     )
+
+
+@dataclass(frozen=True)
+class TransverseModuli:
+    """What moduli across the fibres range over, of 720 directions in half a turn about x3."""
+
+    E_least: float = described("least Young's modulus across the fibres", STRESS)
+    E_largest: float = described("the largest one", STRESS)
+    G_least: float = described("least shear modulus in the plane across the fibres", STRESS)
+    G_largest: float = described("the largest one", STRESS)
+
+
+def transverse_moduli(stiffness: ArrayLike) -> TransverseModuli:
+    """What 1/E = sigma:S:sigma, sigma = n n, and 1/G, sigma = n t + t n, range over with n across x3, t across both.
+
+    Raises numpy.linalg.LinAlgError if C is singular.
+    """
+    angle = np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+    c, s, zero = np.cos(angle), np.sin(angle), np.zeros(DIRECTIONS)
+    compliance = np.linalg.inv(np.asarray(stiffness, dtype=float))
+    pulled = np.stack([c * c, s * s, zero, zero, zero, c * s])
+    sheared = np.stack([-2 * c * s, 2 * c * s, zero, zero, zero, c * c - s * s])
+    E, G = (1 / np.einsum("in,ij,jn->n", stress, compliance, stress) for stress in (pulled, sheared))
+    return TransverseModuli(*(float(value) for value in (E.min(), E.max(), G.min(), G.max())))
 
 
 def engineering_constants(stiffness: ArrayLike) -> EngineeringConstants:

@@ -14,6 +14,7 @@ from feti_homog.verification.interface_laws import BONDED
 from feti_homog.verification.ledger import Ledger, relative
 from feti_homog.verification.load_laws import StateNumbers
 
+DIRECTIONS = 720  # across the fibres, in half a turn
 RATIOS = ("nu", "deviation")  # beginnings of the names of numbers whose scale is 1
 Section = Mapping[str, Any]
 
@@ -46,6 +47,7 @@ def _check_stiffness(ledger: Ledger, document: Section) -> None:
     for section, values in (
         ("constants", _constants(stiffness)),
         ("transversely_isotropic", _about_fibres(stiffness, strains)),
+        ("transverse_moduli", _across_fibres(stiffness)),
     ):
         if document.get(section) is not None:
             _check_numbers(ledger, section, document[section], values)
@@ -84,6 +86,16 @@ def _about_fibres(stiffness: Float, strains: Float | None) -> dict[str, float | 
         "K_transverse": float(mean[0, 0] + mean[0, 1]) / 2, "deviation": float(norms[0] / norms[1]),
         "expansion_axial": None if strains is None else float(strains[2]),
         "expansion_transverse": None if strains is None else float(strains[:2].mean()),
+    }  # fmt: skip
+
+
+def _across_fibres(stiffness: Float) -> dict[str, float]:
+    """What E1 and G12 range over in axes that are turned about x3."""
+    turned = [_constants(_turned(stiffness, angle)) for angle in np.pi * np.arange(DIRECTIONS) / DIRECTIONS]
+    E, G = (np.array([own[name] for own in turned]) for name in ("E1", "G12"))
+    return {
+        "E_least": float(E.min()), "E_largest": float(E.max()),
+        "G_least": float(G.min()), "G_largest": float(G.max()),
     }  # fmt: skip
 
 

@@ -146,6 +146,9 @@ def _constants(document: Document, label: str) -> list[Table]:
     if (constants := document.get("constants")) is not None:
         rows = [[name, _number(value)] for name, value in constants.items()]
         found.append(Table(f"Engineering constants in the axes of the cell{label}", ["", "computed"], rows))
+    if (across := document.get("transverse_moduli")) is not None:
+        rows = [[name, *(_number(across[f"{name}_{end}"]) for end in ("least", "largest"))] for name in ("E", "G")]
+        found.append(Table(f"Over all directions across the fibres{label}", ["", "least", "largest"], rows))
     if document.get("transversely_isotropic") is not None:
         names, sources = comparison(document)
         compared = [[title, *numbers] for title, numbers in sources]

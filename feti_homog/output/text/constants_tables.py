@@ -44,6 +44,8 @@ def _estimates(document: Document, unit: str) -> list[str]:
         return []
     names, rows = comparison(document)
     lines = [f"Along the fibres and across them{unit}; {100 * cell['deviation']:.2g} % from transversely isotropic"]
+    if (across := document.get("transverse_moduli")) is not None:
+        lines.append(f"  over all directions across: {_range('E', across)}, {_range('G', across)}")
     for first in range(0, len(names), ABREAST):
         part = slice(first, first + ABREAST)
         lines.append(" " * NAME + "".join(f"{SHORT[name]:>{COLUMN + 1}}" for name in names[part]))
@@ -66,6 +68,10 @@ def _sources(document: Document) -> dict[str, Document]:
     sources = {THIS_CELL: document["transversely_isotropic"]}
     sources |= {name.replace("_", " "): row for name, row in (document.get("estimates") or {}).items()}
     return sources | {word: {name: bounds[name][k] for name in bounds} for k, word in enumerate((LOWER, UPPER))}
+
+
+def _range(modulus: str, across: Document) -> str:
+    return f"{modulus} from {_number(across[f'{modulus}_least'])} to {_number(across[f'{modulus}_largest'])}"
 
 
 def _known(row: Document) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from feti_homog.mechanics.spatial_constants import (
     EngineeringConstants,
     engineering_constants,
     is_transversely_isotropic,
+    transverse_moduli,
     transversely_isotropic_part,
     transversely_isotropic_stiffness,
 )
@@ -130,3 +131,31 @@ def test_expansion_is_the_mean_over_all_turns():
 def test_singular_stiffness_has_no_constants():
     with pytest.raises(np.linalg.LinAlgError):
         engineering_constants(np.zeros((6, 6)))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_transverse_moduli_are_those_in_turned_axes(seed):
+    stiffness = random_stiffness(seed)
+    constants = [engineering_constants(turned(stiffness, degrees)) for degrees in np.arange(0.0, 180.0, 0.25)]
+    expected = {
+        f"{name[0]}_{end}": choose([getattr(own, name) for own in constants])
+        for name in ("E1", "G12") for end, choose in (("least", min), ("largest", max))
+    }  # fmt: skip
+    assert dataclasses.asdict(transverse_moduli(stiffness)) == pytest.approx(expected, rel=1e-10)
+
+
+def test_transverse_moduli_of_a_transversely_isotropic_stiffness_do_not_depend_on_the_direction():
+    constants = transversely_isotropic_part(random_stiffness(7))
+    across = transverse_moduli(transversely_isotropic_stiffness(constants))
+    assert (across.E_least, across.E_largest) == pytest.approx((constants.E_transverse,) * 2, rel=1e-12)
+    assert (across.G_least, across.G_largest) == pytest.approx((constants.G_transverse,) * 2, rel=1e-12)
+
+
+def test_crossed_fibres_are_softest_between_them():
+    """1/E at 45 degrees is (2 S11 + 2 S12 + S66)/4, 1/G there 2 (S11 - S12) where S11 = S22."""
+    square = orthotropic(CONSTANTS | {"E2": CONSTANTS["E1"], "nu23": CONSTANTS["nu13"], "G23": CONSTANTS["G13"]})
+    E, nu, G = CONSTANTS["E1"], CONSTANTS["nu12"], CONSTANTS["G12"]
+    across = transverse_moduli(square)
+    ends = sorted([E, 4 / (2 / E - 2 * nu / E + 1 / G)])
+    assert (across.E_least, across.E_largest) == pytest.approx(ends)
+    assert sorted([G, E / (2 * (1 + nu))]) == pytest.approx([across.G_least, across.G_largest])
