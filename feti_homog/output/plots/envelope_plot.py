@@ -11,7 +11,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from feti_homog.output.plots.plot_helpers import interfaces_of, plain
+from feti_homog.output.plots.plot_helpers import bond_limits, plain
 from feti_homog.typing import Array
 
 # Loads beyond so many times the median are outside of the picture: those of directions that hardly open a bond.
@@ -43,7 +43,7 @@ def figure(document: Document) -> Figure:
     axes.set_aspect("equal", adjustable="box")
     axes.xaxis.set_major_locator(MaxNLocator(5))  # labels of small stresses are long
     title = f"{plain(case.get('name', ''))}: onset of debonding, plane {case['analysis']['plane']}".lstrip(": ")
-    axes.set_title("\n".join([title, ", ".join(notes)]))
+    axes.set_title("\n".join([title, *bond_limits(case), *([", ".join(notes)] if notes else [])]))
     axes.grid(color="0.92", linewidth=0.6)
     axes.set_axisbelow(True)
     return picture
@@ -107,9 +107,8 @@ def _limit(axes: Axes, places: Array) -> list[str]:
 
 
 def _notes(case: Document, without: int) -> list[str]:
-    """Criterion, temperature and how many directions have no onset."""
-    temperature = case["envelope"].get("temperature")
-    notes = [f"criterion {interfaces_of(case)[0]['criterion']}"]
+    """Temperature and how many directions have no onset."""
+    temperature, notes = case["envelope"].get("temperature"), list[str]()
     if temperature is not None:
         notes.append(f"$\\Delta T = {{{temperature:g}}}$ first")
     return [*notes, f"no onset in {without} directions"] if without else notes

@@ -195,6 +195,22 @@ def interfaces_of(case: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
     return sections if isinstance(sections, list) else [sections]
 
 
+def bond_limits(case: Mapping[str, Any]) -> list[str]:
+    """What breaks the bonds of each interface of a case, a line each; of several with the phases that it is between."""
+    bonds, unit = interfaces_of(case) or [{}], case.get("output", {}).get("stress_unit", "")
+    if len(bonds) == 1:
+        return [_limits(bonds[0], unit)]
+    return [f"{plain('-'.join(bond['between']))}: {_limits(bond, unit)}" for bond in bonds]
+
+
+def _limits(bond: Mapping[str, Any], unit: str) -> str:
+    if bond.get("criterion") == "energy":
+        return rf"criterion energy, $G_\mathrm{{Ic}} = {bond['toughness']:g}$"
+    limits = ((r"R^\mathrm{n}", "normal_strength"), (r"R^\mathrm{t}", "tangential_strength"))
+    words = [f"${name} = {bond[key]:g}$ {plain(unit)}".rstrip() for name, key in limits if bond.get(key)]
+    return ", ".join([f"criterion {bond['criterion']}", *words]) if words else "no debonding by load"
+
+
 def plain(text: str) -> str:
     """A user's text for Matplotlib, which would read formulas between dollars."""
     return text.replace("$", r"\$")

@@ -15,7 +15,7 @@ from feti_homog.mechanics import response
 from feti_homog.mechanics.voigt import STRESSES, voigt_names
 from feti_homog.output.plots import envelope_plot
 from feti_homog.output.plots.interface_marks import BONDED, CLOSED, OPEN, STATE_COLOURS, STATE_NAMES
-from feti_homog.output.plots.plot_helpers import interfaces_of, plain, save, strain_symbols, unit_label
+from feti_homog.output.plots.plot_helpers import bond_limits, interfaces_of, plain, save, strain_symbols, unit_label
 from feti_homog.output.text import point_tables
 from feti_homog.typing import Array
 
@@ -109,11 +109,11 @@ def _path(document: Document) -> Figure:
 def _stress_curves(
     axes: Axes, document: Document, strain: Array, shown: Sequence[int], style: Mapping[str, Any]
 ) -> None:
-    """The first leg with its snap-back, thick what a rising load follows, and the later legs."""
+    """The first leg with its snap-back, and thick what a load that is controlled follows on it and on later legs."""
     points, first = document["path"], response.first_leg(document)
     stress = np.array([point["stress"] for point in points])
     names = voigt_names(stress.shape[1])[1]
-    rising = response.load_controlled(points) if response.is_proportional(document) else None
+    rising = response.load_controlled(points[:first]) if document["case"]["path"]["method"] == "events" else None
     along = stress.shape[1] + response.leading_component(document)
     for i in shown:
         name, ink = _symbol(names[i]), INK[i]
@@ -121,14 +121,15 @@ def _stress_curves(
         from_zero = np.append(0.0, strain[:first]), np.append(0.0, stress[:first, i])
         axes.plot(*from_zero, color=ink, alpha=0.8, **thin, **style)
         if first < len(points):
-            axes.plot(strain[first - 1 :], stress[first - 1 :, i], color=ink, linewidth=0.8, marker="o", ms=2)
+            axes.plot(strain[first - 1 :], stress[first - 1 :, i], color=ink, linewidth=2.0, marker="o", ms=3.5)
         if rising is not None:
             axes.plot(rising[:, along], rising[:, i], color=ink, linewidth=2.0, label=f"${name}$")
     if rising is not None:
-        axes.plot([], [], color="0.3", linewidth=0.8, **style, label="all equilibria")
+        of_some = "\nof the first leg" if first < len(points) else ""
+        axes.plot([], [], color="0.3", linewidth=0.8, **style, label=f"all equilibria{of_some}")
         axes.plot([], [], color="0.3", linewidth=2.0, label=f"rising {response.what_rises(document)}")
     if first < len(points):
-        axes.plot([], [], color="0.3", linewidth=0.8, marker="o", ms=2, label="later legs")
+        axes.plot([], [], color="0.3", linewidth=2.0, marker="o", ms=3.5, label="later legs")
     axes.xaxis.set_major_locator(MaxNLocator(7))
 
 
@@ -164,7 +165,7 @@ def _number_points(upper: Axes, below: Sequence[Axes], curve: Array, numbers: Se
             axes.axvline(number, color="0.7", linewidth=0.7, linestyle=":", zorder=0)
         above = (number, 1.05)
         below[0].annotate(str(number), above, xycoords=below[0].get_xaxis_transform(), annotation_clip=False, **style)
-    pointer = {"arrowstyle": "-|>", "color": ink, "linewidth": 0, "shrinkB": 0}
+    pointer = {"arrowstyle": "-|>", "color": ink, "linewidth": 0, "shrinkB": 0, "mutation_scale": 15}
     for (x0, y0), (x1, y1) in _direction_marks(curve):
         upper.annotate("", (x1, y1), (x0, y0), arrowprops=pointer)
 
@@ -182,20 +183,8 @@ def _direction_marks(curve: Array) -> list[tuple[Array, Array]]:
 
 def _path_title(case: Mapping[str, Any]) -> str:
     """What the case is and what breaks its bonds; of several interfaces a line for each."""
-    bonds, unit = interfaces_of(case) or [{}], case.get("output", {}).get("stress_unit", "")
     title = f"{plain(case.get('name', ''))}: plane {case['analysis']['plane']}".lstrip(": ")
-    if len(bonds) == 1:
-        return f"{title}, {_strengths_of(bonds[0], unit)}"
-    lines = [f"{plain('-'.join(bond['between']))}: {_strengths_of(bond, unit)}" for bond in bonds]
-    return "\n".join([title, *lines])
-
-
-def _strengths_of(bond: Mapping[str, Any], unit: str) -> str:
-    if bond.get("criterion") == "energy":
-        return rf"$G_\mathrm{{Ic}} = {bond['toughness']:g}$"
-    limits = ((r"R^\mathrm{n}", "normal_strength"), (r"R^\mathrm{t}", "tangential_strength"))
-    words = [f"${name} = {bond[key]:g}$ {unit}".rstrip() for name, key in limits if bond.get(key)]
-    return ", ".join(words) or "no debonding by load"
+    return "\n".join([title, *bond_limits(case)])
 
 
 def _stress_unit(case: Mapping[str, Any]) -> str:

@@ -145,7 +145,8 @@ def _path_energies(document: Mapping[str, Any], stress: str) -> list[str]:
     """What the loads have done along a path, what is stored at its end, what breaks have lost, also if the load only
     rose, and what debonded."""
     last = document["path"][-1]
-    rising = f"{last['dissipated_strain_controlled']:.6g} if the {response.what_rises(document)} only rises"
+    where = " on the first leg" if response.legs(document) > 1 else ""
+    rising = f"{last['dissipated_strain_controlled']:.6g} if the {response.what_rises(document)} only rises{where}"
     lines = [
         f"Work per area{stress}: {last['work']:.6g}",
         *_energies(last, stress),

@@ -212,15 +212,22 @@ def test_points_of_a_path_are_numbered_where_its_curve_folds_back(tmp_path: Path
 
 def test_several_interfaces_have_lines_of_the_title_that_are_within_the_picture():
     document = path_of([0.0, 0.1])
+    bond = {"contact": True, "criterion": "max", "normal_strength": 0.03125, "tangential_strength": 0.05125}
     document["case"] |= {
         "name": "a_case_of_several_interfaces",
-        "interface": [
-            {"contact": True, "between": pair, "normal_strength": 0.03125, "tangential_strength": 0.05125}
-            for pair in (["coating", "matrix"], ["glass", "coating"])
-        ],
+        "interface": [bond | {"between": pair} for pair in (["coating", "matrix"], ["glass", "coating"])],
     }
     figure = response_curves._path(document)
     FigureCanvasAgg(figure).draw()
     title = figure.axes[0].title
     assert title.get_text().count("\n") == 2
     assert figure.bbox.x0 <= title.get_window_extent().x0 and title.get_window_extent().x1 <= figure.bbox.x1
+
+
+def test_what_breaks_the_bonds_is_in_the_title():
+    case = {"interface": {"criterion": "quadratic", "normal_strength": 0.06}, "output": {"stress_unit": "GPa"}}
+    assert plot_helpers.bond_limits(case) == ["criterion quadratic, $R^\\mathrm{n} = 0.06$ GPa"]
+    assert plot_helpers.bond_limits({"interface": {"criterion": "energy", "toughness": 3e-5}}) == [
+        "criterion energy, $G_\\mathrm{Ic} = 3e-05$"
+    ]
+    assert plot_helpers.bond_limits({}) == ["no debonding by load"]
