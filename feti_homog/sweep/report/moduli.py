@@ -14,7 +14,8 @@ from feti_homog.config.material_sections import read_materials
 from feti_homog.config.materials import plane_stiffness, spatial_stiffness
 from feti_homog.config.schema import TableReader
 from feti_homog.mechanics import bounds as mechanics
-from feti_homog.mechanics.voigt import SPATIAL_STRESSES
+from feti_homog.mechanics.estimates.fibre_bounds import fibre_bounds
+from feti_homog.mechanics.spatial_constants import is_transversely_isotropic, transversely_isotropic_part
 from feti_homog.output.plots.plot_helpers import plain
 from feti_homog.sweep.report.series import Series, series_over
 from feti_homog.sweep.report.style import COLOURS, label_axes, legend, plot_series
@@ -23,26 +24,31 @@ from feti_homog.typing import Float
 
 FRACTION = "cell.fibre_fraction"
 PANELS = ("C11", "C33", "bulk", "shear")
-SPATIAL_PANELS = ("C11", "C33", "C44", "C66")  # of generalized plane strain
+SPATIAL_PANELS = ("E_axial", "E_transverse", "G_axial", "G_transverse")  # of generalized plane strain
+SECANTS = ("C11", "C33", "C44", "C66")  # of that where faces may touch: there are no constants
 COMMON_PANELS = ("C11", "C66")  # of that and of plane states
 FRACTIONS, MARGIN = 201, 1.05  # of the bounds: points, and how far they go beyond the largest fibre fraction
-X_FACTOR = 0.98
+# Where the fractions drawn begin: at none, or before the smallest by this share of their range if that is far away.
+BEFORE = 0.25
+X_FACTOR, HASHIN_SHTRIKMAN = 0.98, "Hashin-Shtrikman"
 
 
 @dataclass(frozen=True)
 class PanelBounds:
-    """Fibre fractions (n,) and the bounds of each panel over them: rows Reuss, Voigt, and the two of
-    Hashin and Shtrikman if they apply, (2 or 4, n)."""
+    """Fibre fractions (n,) and the bounds of each panel over them: rows Reuss, Voigt, and the two tighter ones if they
+    apply, (2 or 4, n); whose these are."""
 
     fractions: Float
     rows: dict[str, Float]
+    tight: str
 
 
 def panels_of(table: SweepTable) -> tuple[str, ...]:
     """The outputs that are drawn; none if the cases have no moduli."""
     planes = {document["case"]["analysis"]["plane"] for document in table.finished}
-    names = SPATIAL_PANELS if planes == {"generalized"} else COMMON_PANELS if "generalized" in planes else PANELS
-    return names if all(name in table.outputs for name in names) else ()
+    in_space = (SPATIAL_PANELS, SECANTS) if planes == {"generalized"} else (COMMON_PANELS,)
+    choices = in_space if "generalized" in planes else (PANELS,)
+    return next((names for names in choices if all(name in table.outputs for name in names)), ())
 
 
 def figure(table: SweepTable) -> Figure:
@@ -53,41 +59,64 @@ def figure(table: SweepTable) -> Figure:
     panels = picture.subplots(2 if bounds else 1, len(names), sharex=True, squeeze=False)
     for k, name in enumerate(names):
         if bounds is not None:
-            _draw_bounds(panels[0, k], bounds.fractions, bounds.rows[name])
+            _draw_bounds(panels[0, k], bounds.fractions, bounds.rows[name], bounds.tight)
         for style, each in enumerate(series):
             plot_series(panels[0, k], table, each, name, style)
         label_axes(panels[0, k], name, table, "" if bounds else "fibre fraction")
         if bounds is not None:
             _draw_above_reuss(panels[1, k], table, series, bounds, name)
     planes = sorted({document["case"]["analysis"]["plane"] for document in table.finished})
-    picture.suptitle(f"{plain(table.name)}: plane {' and '.join(planes)}", fontsize=12)
+    without = "" if bounds else f"; no bounds, for {_why_no_bounds(table)}"
+    picture.suptitle(f"{plain(table.name)}: plane {' and '.join(planes)}{without}", fontsize=12)
     legend(picture, list(panels.flat)[::-1])
     return picture
 
 
 def _draw_above_reuss(axes: Axes, table: SweepTable, series: list[Series], bounds: PanelBounds, name: str) -> None:
     c, rows = bounds.fractions, bounds.rows[name]
-    _draw_bounds(axes, c, 100.0 * (rows / rows[0] - 1.0))
+    _draw_bounds(axes, c, 100.0 * (rows / rows[0] - 1.0), bounds.tight)
     for style, each in enumerate(series):
         plot_series(axes, table, each, name, style, baseline=lambda x: np.interp(x, c, rows[0]), x_factor=X_FACTOR)
     label_axes(axes, name, table, "fibre fraction")
     axes.set_ylabel("above Reuss (%)")
 
 
+def _why_no_bounds(table: SweepTable) -> str:
+    """Why bounds are not drawn, in words; empty if they are."""
+    cases = [document["case"] for document in table.finished]
+    if len({case["analysis"]["plane"] for case in cases}) != 1:
+        return "plane states differ"
+    if len({repr(case["material"]) for case in cases}) != 1:
+        return "materials vary"
+    if set(cases[0]["material"]) != {"matrix", "fibre"}:
+        return "phases are others than matrix and fibre"
+    if panels_of(table) == SECANTS:
+        return "faces may touch"
+    return "there are voids" if _has_voids(table) else ""
+
+
 def _bounds(table: SweepTable) -> PanelBounds | None:
-    """The bounds; None if the materials or plane states of the cases differ, or there are more than two phases."""
-    described = {repr((d["case"]["material"], d["case"]["analysis"]["plane"])) for d in table.finished}
-    case = table.finished[0]["case"]
-    if len(described) != 1 or set(case["material"]) != {"matrix", "fibre"} or _has_voids(table):
+    """The bounds, if there are any."""
+    if _why_no_bounds(table):
         return None
+    case = table.finished[0]["case"]
     plane = case["analysis"]["plane"]
     reader = TableReader({GEOMETRY: case["cell"]["geometry"]})
     materials = read_materials(case["material"], case["cell"], plane, reader)
     phases = [_stiffness(materials[phase], plane) for phase in ("matrix", "fibre")]
-    largest = max(float(document["cell"]["fibre_fraction"]) for document in table.finished)
-    c = np.linspace(0.0, min(1.0, MARGIN * largest), FRACTIONS)
-    columns = [_bounds_at([1 - share, share], phases) for share in c]
-    return PanelBounds(c, {name: np.array([column[name] for column in columns]).T for name in columns[0]})
+    c = _fractions([float(document["cell"]["fibre_fraction"]) for document in table.finished])
+    bounds_at, tight = (
+        (_spatial_bounds_at, "Hill, Hashin") if plane == "generalized" else (_bounds_at, HASHIN_SHTRIKMAN)
+    )
+    columns = [bounds_at([1 - share, share], phases) for share in c]
+    return PanelBounds(c, {name: np.array([column[name] for column in columns]).T for name in columns[0]}, tight)
+
+
+def _fractions(meshed: list[float]) -> Float:
+    """(n,) over which bounds are drawn."""
+    least, largest = min(meshed), max(meshed)
+    first = 0.0 if least <= largest / 2 else least - BEFORE * (largest - least or least)
+    return np.linspace(first, min(1.0, MARGIN * largest), FRACTIONS)
 
 
 def _stiffness(material: Material, plane: str) -> Float:
@@ -100,10 +129,7 @@ def _has_voids(table: SweepTable) -> bool:
 
 
 def _bounds_at(shares: list[float], phases: list[Float]) -> dict[str, list[float]]:
-    """Of each panel Reuss, Voigt, and in the plane the two of Hashin and Shtrikman for isotropic phases."""
-    if len(phases[0]) == len(SPATIAL_STRESSES):
-        pair = np.stack([bound(shares, phases).diagonal() for bound in (mechanics.reuss, mechanics.voigt)])
-        return {name: pair[:, int(name[1]) - 1].tolist() for name in SPATIAL_PANELS}
+    """Of each panel Reuss, Voigt, and the two of Hashin and Shtrikman for isotropic phases."""
     found: dict[str, list[float]] = {name: [] for name in PANELS}
     for stiffness in (mechanics.reuss(shares, phases), mechanics.voigt(shares, phases)):
         bulk, shear = mechanics.isotropic_part(stiffness)
@@ -116,9 +142,25 @@ def _bounds_at(shares: list[float], phases: list[Float]) -> dict[str, list[float
     return found
 
 
-def _draw_bounds(axes: Axes, c: Float, rows: Float) -> None:
+def _spatial_bounds_at(shares: list[float], phases: list[Float]) -> dict[str, list[float]]:
+    """Of each panel Reuss, Voigt, and the two of fibres of any section for phases that are alike across them."""
+    ends = [transversely_isotropic_part(bound(shares, phases)) for bound in (mechanics.reuss, mechanics.voigt)]
+    found = {name: [float(getattr(end, name)) for end in ends] for name in SPATIAL_PANELS}
+    own = [transversely_isotropic_part(phase) for phase in phases]
+    if all(map(is_transversely_isotropic, own)):
+        tight = fibre_bounds(shares, own)
+        for name, pair in (
+            ("G_axial", tight.G_axial),
+            ("G_transverse", tight.G_transverse),
+            ("E_axial", tight.E_axial),
+        ):
+            found[name] += pair
+    return found
+
+
+def _draw_bounds(axes: Axes, c: Float, rows: Float, whose: str) -> None:
     reuss, voigt, *tight = rows
     axes.fill_between(c, reuss, voigt, color="0.92", linewidth=0.0, label="Reuss to Voigt")
     if tight:
-        axes.fill_between(c, *tight, color="0.78", linewidth=0.0, label="Hashin-Shtrikman")
+        axes.fill_between(c, *tight, color="0.78", linewidth=0.0, label=whose)
     axes.set_xlim(c[0], c[-1])

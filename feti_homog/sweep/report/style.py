@@ -17,9 +17,12 @@ from feti_homog.typing import Float
 COLOURS = ("#1f4e9c", "#c44e00", "#2a7f3f", "#7a3e9d", "#8c6d1f", "#c2185b")
 MARKERS = ("o", "s", "^", "D", "v", "P")
 REALISATION_STYLE: dict[str, Any] = {"markersize": 3.5, "alpha": 0.4, "markeredgewidth": 0}
+WAYS = {"axial": "along", "transverse": "across"}
 NAMES = {
     "C11": "$C_{11}$",
     **{name: f"$C_{{{name[1:]}}}$" for name in ("C33", "C44", "C66")},
+    **{f"E_{way}": f"$E$ {words} the fibres" for way, words in WAYS.items()},
+    **{f"G_{way}": f"$G$ {words} the fibres" for way, words in WAYS.items()},
     "bulk": "plane bulk modulus $k$",
     "shear": "shear modulus $\\mu$",
     **{f"onset_{name}": f"$\\Sigma_{{{name[1:]}}}$ at the first break" for name in SPATIAL_STRESSES},

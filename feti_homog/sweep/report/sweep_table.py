@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.mechanics import response
+from feti_homog.output.text.units import unit
 from feti_homog.sweep.report.outputs import Document
 from feti_homog.sweep.report.statistics import Statistics
 from feti_homog.typing import Float
@@ -75,8 +76,10 @@ class SweepTable:
         """The inputs of a point in words, but for some keys and for what its realisations differ by."""
         keys = [name for name in self.inputs if name not in without and name != "cell.seed"]
         varied = [name for name in keys if len({repr(value) for value in self.inputs[name]}) > 1]
-        values = [(name.rpartition(".")[2], self.input_of(point, name)) for name in varied]
-        return ", ".join(_in_words(name.replace("_", " "), value) for name, value in values if value is not None)
+        values = [(name, self.input_of(point, name)) for name in varied]
+        known = [(name, value) for name, value in values if value is not None]
+        words = [(_in_words(_short(name), value), unit(name, self.stress_unit)) for name, value in known]
+        return ", ".join(f"{text} {own}".rstrip() for text, own in words)
 
     def curves(self, point: int) -> tuple[Float, Float]:
         """Strains (g,), g = CURVE_POINTS, and the c stresses of each finished realisation there, (n, g, c).
@@ -90,6 +93,13 @@ class SweepTable:
         stresses = range(paths[0].shape[1] - 1)
         found = np.array([[np.interp(strain, p[:, -1], p[:, k]) for k in stresses] for p in paths])
         return strain, found.swapaxes(1, 2)
+
+
+def _short(key: str) -> str:
+    """A dotted key without its section, but of a material with the phase and of an interface with its number."""
+    section, _, rest = key.partition(".")
+    words = rest if section == "material" else key.partition("interface.")[2] or key.rpartition(".")[2]
+    return words.replace(".", " ").replace("_", " ")
 
 
 def _in_words(name: str, value: Any) -> str:

@@ -12,7 +12,7 @@ from matplotlib.image import imread
 from scipy import stats
 
 from feti_homog.output.text.units import unit, with_unit
-from feti_homog.sweep.report import figures, tables
+from feti_homog.sweep.report import figures, moduli, tables
 from feti_homog.sweep.report.outputs import numbers, outputs
 from feti_homog.sweep.report.series import series_over
 from feti_homog.sweep.report.statistics import Statistics
@@ -209,7 +209,8 @@ def spatial_document(fraction, shift):
     C = np.diag([150.0 + shift, 150.0, 210.0, 50.0, 50.0, 45.0]) + 1e-3 * np.arange(36).reshape(6, 6)
     thermal = {"thermal_stress": [-1.0] * 6, "thermal_expansion": [1e-5] * 6}
     case = found["case"] | {"analysis": {"type": "stiffness", "plane": "generalized"}}
-    constants = {"constants": {"E3": 200.0}, "transversely_isotropic": {"G_axial": 50.0, "expansion_axial": None}}
+    about_fibres = {"E_axial": 200.0, "E_transverse": 120.0, "G_axial": 50.0, "G_transverse": 46.0}
+    constants = {"constants": {"E3": 200.0}, "transversely_isotropic": about_fibres | {"expansion_axial": None}}
     del found["moduli"]
     return found | {"case": case, "effective_stiffness": C} | thermal | constants
 
@@ -223,6 +224,30 @@ def test_stiffnesses_in_space_fill_columns_and_are_drawn(tmp_path):
     assert table.outputs["thermal_S33"].tolist() == [-1.0] * 4 and table.outputs["expansion_gamma12"][0] == 1e-5
     assert (table.outputs["E3"][0], table.outputs["G_axial"][0]) == (200.0, 50.0)
     assert "expansion_axial" not in table.outputs and "bulk" not in table.outputs
+    assert moduli.panels_of(table) == ("E_axial", "E_transverse", "G_axial", "G_transverse")
+    assert_drawn(tmp_path, table, ["moduli.png"])
+
+
+def test_bounds_in_space_enclose_each_other_and_what_is_between():
+    """At any fraction the tighter ones lie between Reuss and Voigt; all meet where there is one phase."""
+    documents = [spatial_document(c, 0.0) for c in (0.2, 0.6)]
+    bounds = moduli._bounds(collected({"cell.fibre_fraction": [0.2, 0.6]}, documents, [1, 2], [1, 1]))
+    assert bounds.tight == "Hill, Hashin" and bounds.fractions[0] == 0.0
+    for rows in bounds.rows.values():
+        assert (rows[1] >= rows[0] * (1 - 1e-12)).all() and np.ptp(rows[:, 0]) < 1e-9 * rows[0, 0]
+        if len(rows) == 4:
+            assert (rows[0] <= rows[2] * (1 + 1e-12)).all() and (rows[2] <= rows[3] * (1 + 1e-12)).all()
+            assert (rows[3] <= rows[1] * (1 + 1e-12)).all()
+    assert [len(rows) for rows in bounds.rows.values()] == [4, 2, 4, 4]
+
+
+def test_secants_in_space_are_drawn_without_bounds(tmp_path):
+    documents = [spatial_document(c, 0.0) for c in (0.2, 0.4)]
+    for each in documents:
+        del each["constants"], each["transversely_isotropic"]
+    table = collected({"cell.fibre_fraction": [0.2, 0.4]}, documents, [1, 2], [1, 1])
+    assert moduli.panels_of(table) == ("C11", "C33", "C44", "C66")
+    assert moduli.figure(table).get_suptitle().endswith("plane generalized; no bounds, for faces may touch")
     assert_drawn(tmp_path, table, ["moduli.png"])
 
 
@@ -238,7 +263,7 @@ def test_what_varies_along_is_no_other_series():
     inputs = {"cell.fibres": [4, 8, 4, 8], "cell.mesh_size": [0.3, 0.2, 0.3, 0.2], "material.fibre.young": [1, 1, 2, 2]}
     found = series_over(collected(inputs, documents, [1, 2, 3, 4], [1] * 4), "cell.fibres")
     assert [(one.label, one.points, one.x.tolist()) for one in found] == [
-        ("young 1", [1, 2], [4.0, 8.0]), ("young 2", [3, 4], [4.0, 8.0]),
+        ("fibre young 1 GPa", [1, 2], [4.0, 8.0]), ("fibre young 2 GPa", [3, 4], [4.0, 8.0]),
     ]  # fmt: skip
 
 
