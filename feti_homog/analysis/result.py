@@ -65,6 +65,7 @@ class Result:
     check_tolerance: float = described("largest error of a check that passes")
     kkt_tolerance: float = described("the same of the checks of contact")
     warnings: tuple[str, ...] = described("what is allowed but probably not wanted")
+    remarks: tuple[str, ...] = described("what the case does not say but is assumed", default=())
     faults: tuple[str, ...] = described("what did not converge or hold")
     status: str = described("`done`, or `not converged` if there are faults")
     moduli: Moduli | None = described("engineering moduli of a perfectly bonded cell", default=None)

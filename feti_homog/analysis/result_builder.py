@@ -25,8 +25,9 @@ from feti_homog.analysis.result_records import (
 )
 from feti_homog.cell.ellipses import Ellipses
 from feti_homog.common.mpi_errors import on_root
+from feti_homog.config.case import Case
 from feti_homog.config.materials import plane_stiffness
-from feti_homog.homogenization.domain_partition import CellSummary
+from feti_homog.homogenization.domain_partition import CellSummary, moved_fibres
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.mechanics import bounds
 from feti_homog.mechanics.bounds import Moduli
@@ -34,6 +35,8 @@ from feti_homog.typing import Float
 
 # Phases that are no fibres.
 AROUND_FIBRES = ("matrix", "coating")
+# Share of the fibres' area that polygons may lose without a remark.
+REMARKABLE_LOSS = 0.005
 
 
 def result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Fields | None) -> Result:
@@ -64,6 +67,7 @@ def result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Fields
         check_tolerance=context.tolerance("jump"),
         kkt_tolerance=CONTACT_TOLERANCE,
         warnings=(*cell.case.warnings(), *cell.summary.warnings(), *context.warnings()),
+        remarks=(*cell.case.remarks(), *on_root(cell.comm, moved_fibres, cell.case), *_lost_area(cell.case, fractions)),
         faults=tuple(context.faults),
         status="not converged" if context.faults else "done",
         timings=progress.timings(),
@@ -71,6 +75,16 @@ def result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Fields
         fields=fields,
         **{**analysis, **points},
     )
+
+
+def _lost_area(case: Case, fractions: Mapping[str, float]) -> tuple[str, ...]:
+    """A remark if straight edges cut off much of the fibres that the case asks for."""
+    asked = sum(case.cell.fractions.values())
+    meshed = sum(share for phase, share in fractions.items() if phase not in AROUND_FIBRES)
+    lost = 1.0 - meshed / asked if asked else 0.0
+    if case.cell.order != 1 or lost <= REMARKABLE_LOSS:
+        return ()
+    return (f"[cell] order = 1: polygons have {lost:.1%} less area than the fibres asked for; refine, or order = 2",)
 
 
 def _cell_info(cell: TornCell, fractions: dict[str, float]) -> CellInfo:

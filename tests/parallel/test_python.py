@@ -36,6 +36,14 @@ def test_run_gives_the_same_arrays_on_every_rank_and_writes_no_file(comm, shared
     parallel_assert(comm, not list(shared_path.iterdir()))
 
 
+def test_what_polygons_lose_is_remarked(comm):
+    """A circle of n edges has lost 1 - sin(2 pi / n) / (2 pi / n) of its area."""
+    (remark,) = run(with_fraction(0.4, order=1), comm).remarks
+    assert remark == "[cell] order = 1: polygons have 2.6% less area than the fibres asked for; refine, or order = 2"
+    assert run(with_fraction(0.4, order=1, refine=3), comm).remarks == ()
+    assert run(with_fraction(0.4, order=2), comm).remarks == ()
+
+
 def test_points_of_path_and_angle_have_their_shapes(comm):
     document = with_fraction(0.4, geometry="square").resolved()
     document |= {"interface": {"normal_strength": 5.0}, "path": {"strain": [0.2, 0.0, 0.0]}}

@@ -11,6 +11,7 @@ from feti_homog.output.text.constants_tables import SHORT, comparison
 from feti_homog.output.text.envelope_table import components
 from feti_homog.output.text.point_tables import chosen, shown_entries
 from feti_homog.output.text.spatial_tables import THERMAL
+from feti_homog.output.text.summary import check_applies
 from feti_homog.output.text.units import with_unit
 
 ENVELOPE_NUMBERS = ("fibre", "interface", "bond_angle", "normal", "tangential", "axial", "psi")
@@ -127,7 +128,9 @@ def checks(document: Document) -> list[Check]:
     """Every law that was checked."""
     tolerance, contact = document["check_tolerance"], document["kkt_tolerance"]
     return [
-        Check(law, error, contact if law.startswith("kkt_") else tolerance) for law, error in document["checks"].items()
+        Check(law, error, contact if law.startswith("kkt_") else tolerance)
+        for law, error in document["checks"].items()
+        if check_applies(law, document)
     ]
 
 

@@ -51,7 +51,11 @@ def summary(document: Document) -> str:
             *_timings(document["timings"]),
             *_field("Memory", [f"{_bytes(document['memory'])} per rank at most"]),
         ],
-        [*_remarks("Warning", document.get("warnings", ())), *_remarks("Fault", document.get("faults", ()))],
+        [
+            *_remarks("Remark", document.get("remarks", ())),
+            *_remarks("Warning", document.get("warnings", ())),
+            *_remarks("Fault", document.get("faults", ())),
+        ],
         _field("Status", [str(document["status"])]),
     ]
     return _joined(blocks)
@@ -159,13 +163,15 @@ def _solver(solver: Document) -> list[str]:
 def _factorized(solver: Document) -> list[str]:
     if "factorizations" not in solver:
         return []
-    coarse = _number(solver.get("coarse_factorizations", 0), "coarse one")
+    coarse = f"coarse problem {_number(solver.get('coarse_factorizations', 0), 'time')}"
     return _field("Factorized", [_number(solver["factorizations"], "subdomain"), coarse])
 
 
 def _iterations(counts: Sequence[int]) -> list[str]:
     if len(counts) <= LISTED:
         return [str(count) for count in counts]
+    if not any(counts):
+        return [f"0 in each of {len(counts)} states, for the preconditioner is an inverse"]
     return [f"{min(counts)} to {max(counts)} a state", f"{sum(counts)} for {len(counts)} states"]
 
 
@@ -207,7 +213,7 @@ def _between(label: str, lower: float, value: float, upper: float) -> str:
 
 def _checks(document: Document) -> list[str]:
     """The checks that say anything."""
-    shown = {name: error for name, error in document["checks"].items() if _applies(name, document)}
+    shown = {name: error for name, error in document["checks"].items() if check_applies(name, document)}
     tolerance = document.get("check_tolerance")
     limit = "" if tolerance is None else f" (relative, at most {tolerance:.1e})"
     lines = [f"Checks{limit}"]
@@ -221,11 +227,9 @@ def _checks(document: Document) -> list[str]:
     return lines
 
 
-def _applies(check: str, document: Document) -> bool:
+def check_applies(check: str, document: Document) -> bool:
     """Whether a check says anything: those of contact do not where all is bonded."""
-    return (
-        not check.startswith("kkt_") or "effective_stiffness" not in document or bool(document["case"].get("interface"))
-    )
+    return not check.startswith("kkt_") or bool(document["case"].get("interface"))
 
 
 def _timings(timings: Document) -> list[str]:

@@ -154,7 +154,7 @@ def test_a_path_is_a_table_of_chosen_points() -> None:
     document = changed(path=points, kkt_tolerance=1e-6)
     del document["effective_stiffness"], document["moduli"], document["bounds"]
     document["case"]["analysis"]["type"] = "path"
-    document["case"]["path"] = {"strain": [0.0, -0.2, 1e-3]}
+    document["case"] |= {"path": {"strain": [0.0, -0.2, 1e-3]}, "interface": {"contact": True}}
     document["checks"] |= {"kkt_tension": 9e-7, "kkt_penetration": 2e-6}
     document["solver"] |= {"iterations": [*range(5, 30)], "factorizations": 3, "coarse_factorizations": 30}
     text = summary(document)
@@ -170,7 +170,7 @@ def test_a_path_is_a_table_of_chosen_points() -> None:
     assert rows[0] == ["0", "0.000000", "0", "0", "0", "-2", "100", "9", "1"]
     assert rows[-1] == ["100", "1.000000", "-0.2", "0", "-350", "-2", "0", "9", "1"]
     assert line(text, "Iterations").endswith("5 to 29 a state, 425 for 25 states")
-    assert line(text, "Factorized").split(maxsplit=1)[1] == "3 subdomains, 30 coarse ones"
+    assert line(text, "Factorized").split(maxsplit=1)[1] == "3 subdomains, coarse problem 30 times"
     assert line(text, "kkt_tension").endswith("pass") and line(text, "kkt_penetration").endswith("FAIL")
     assert "at most 1.0e-07; of contact 1.0e-06" in text
 
@@ -269,3 +269,25 @@ def test_energy_release_rates_against_the_angle() -> None:
     lines = summary(bonding(angle=given)).splitlines()
     where = lines.index("Largest energy release rate (GPa mm)")
     assert lines[where + 2].split() == ["60", "5", "1.6667", "3.3333", "54.7", "2", "60"]
+
+
+def test_remarks_stand_before_warnings_and_faults() -> None:
+    text = summary(changed(remarks=["a stress is free"], warnings=["it locks"], faults=["no convergence"]))
+    places = [text.index(word) for word in ("a stress is free", "it locks", "no convergence")]
+    assert places == sorted(places)
+
+
+def test_checks_of_contact_are_those_of_interfaces() -> None:
+    document = changed()
+    document["checks"] |= {"kkt_tension": 0.0}
+    assert "kkt_tension" not in summary(document)
+    document["case"] |= {"interface": {"contact": True}}
+    assert "kkt_tension" in summary(document)
+
+
+def test_states_without_iterations_are_told() -> None:
+    document = changed()
+    document["solver"] |= {"iterations": [0] * 30}
+    assert line(summary(document), "Iterations").endswith(
+        "0 in each of 30 states, for the preconditioner is an inverse"
+    )
