@@ -27,6 +27,8 @@ from feti_homog.typing import Array
 
 MAX_FIBRES = 4
 LOADS_IN_LINE = 7
+# Nodes are all around a fibre if the distance of the first and the last is not so many times that of others.
+MOST_UNEVEN = 2.0
 INK = ("#1f4e9c", "#2a7f3f", "#c44e00")
 NAMES = {"traction": (r"$t_\mathrm{n}$", r"$t_\mathrm{t}$", r"$t_\mathrm{a}$"), "jump": ("gap", "slip", "axial slip")}
 
@@ -62,11 +64,16 @@ def _figure(file: Any, edges: InterfaceEdges, names: list[str], labels: LoadLabe
             _shade(axes, place, status[place.nodes])
             for name in names:
                 values = _values(file[f"state/{name}"], quantity)[place.nodes]
-                _curves(axes, quantity, place.values, values, name == names[-1])
+                _curves(axes, quantity, place, values, name == names[-1])
             _finish(axes, place)
         row[0].set_title(_name(file, body, place), fontsize=10, loc="left")
     _labels(file, figure, grid, status[np.isin(fibre, chosen)])
-    figure.suptitle(_title(file, names, labels), fontsize=10)
+    which = (
+        f"\nthe {len(chosen)} of {len(bodies)} debonded interfaces that are so most"
+        if len(bodies) > len(chosen)
+        else ""
+    )
+    figure.suptitle(_title(file, names, labels) + which, fontsize=10)
     return figure
 
 
@@ -83,10 +90,17 @@ def _values(state: Any, quantity: str) -> Array:
     return np.column_stack([values, axial])
 
 
-def _curves(axes: Axes, quantity: str, place: Array, values: Array, last: bool) -> None:
+def _curves(axes: Axes, quantity: str, place: Coordinate, values: Array, last: bool) -> None:
+    """The values at the nodes of a fibre, around it if they are all around."""
+    at, turn = place.values, place.ends[1] - place.ends[0]
+    if place.ends == DEGREES and len(at) > 1 and at[0] + turn - at[-1] < MOST_UNEVEN * np.diff(at).max():
+        at, values = (
+            np.concatenate([at[-1:] - turn, at, at[:1] + turn]),
+            np.concatenate([values[-1:], values, values[:1]]),
+        )
     for label, column, ink in zip(NAMES[quantity], values.T, INK, strict=False):
         width, style = (1.5, "-") if last else (0.9, "--")
-        axes.plot(place, column, style, color=ink, linewidth=width, label=label if last else None)
+        axes.plot(at, column, style, color=ink, linewidth=width, label=label if last else None)
 
 
 def _shade(axes: Axes, place: Coordinate, status: Array) -> None:

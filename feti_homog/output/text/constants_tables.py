@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from feti_homog.config.phase_names import COATING
+
 NAME, COLUMN, ABREAST = 22, 12, 5  # columns of the names and of each number; constants beside each other
 THIS_CELL, LOWER, UPPER, UNKNOWN = "this cell", "lower bound", "upper bound", "-"
 SHORT = {
@@ -52,7 +54,24 @@ def _estimates(document: Document, unit: str) -> list[str]:
         told = [(title, numbers[part]) for title, numbers in rows if set(numbers[part]) != {UNKNOWN}]
         for title, numbers in told:
             lines.append(f"  {title:<{NAME - 2}}" + "".join(f"{number:>{COLUMN + 1}}" for number in numbers))
-    return lines
+    if any(UNKNOWN in numbers for _, numbers in rows):
+        lines.append(f"  {UNKNOWN}: the method, or bounds of fibres of any section, say nothing of it")
+    why = _why_no_estimates(document)
+    return [*lines, *([f"  no closed estimates, which are of {why}"] if why else [])]
+
+
+def _why_no_estimates(document: Document) -> str:
+    """Of what cells there are estimates, where there are none of this one; empty if there are."""
+    case, cell = document.get("case", {}), document.get("cell", {})
+    if document.get("estimates") is not None:
+        return ""
+    if len(cell.get("fractions", ())) == 1:
+        return "composites"
+    if cell.get("porosity"):
+        return "cells without voids"
+    if COATING in case.get("material", {}):
+        return "fibres without coatings"
+    return "round fibres that are bonded, all alike" if case.get("interface") else "round fibres"
 
 
 def comparison(document: Document) -> tuple[list[str], list[tuple[str, list[str]]]]:
