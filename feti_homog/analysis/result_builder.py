@@ -27,7 +27,7 @@ from feti_homog.cell.ellipses import Ellipses
 from feti_homog.common.mpi_errors import on_root
 from feti_homog.config.case import Case
 from feti_homog.config.materials import plane_stiffness
-from feti_homog.homogenization.domain_partition import CellSummary, moved_fibres
+from feti_homog.homogenization.domain_partition import CellSummary, table_remarks
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.mechanics import bounds
 from feti_homog.mechanics.bounds import Moduli
@@ -67,7 +67,11 @@ def result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Fields
         check_tolerance=context.tolerance("jump"),
         kkt_tolerance=CONTACT_TOLERANCE,
         warnings=(*cell.case.warnings(), *cell.summary.warnings(), *context.warnings()),
-        remarks=(*cell.case.remarks(), *on_root(cell.comm, moved_fibres, cell.case), *_lost_area(cell.case, fractions)),
+        remarks=(
+            *cell.case.remarks(),
+            *on_root(cell.comm, table_remarks, cell.case),
+            *_lost_area(cell.case, fractions),
+        ),
         faults=tuple(context.faults),
         status="not converged" if context.faults else "done",
         timings=progress.timings(),

@@ -19,6 +19,7 @@ from feti_homog.cell.refinement import ReferenceLattice
 from feti_homog.cell.submesh import SubdomainTable, SubmeshesOfRank, cut_for_ranks, pinned_class
 from feti_homog.cell.tiles import DEFAULT_TILES, TilePolicy
 from feti_homog.config.case import Case
+from feti_homog.config.fibre_window import read_window
 from feti_homog.errors import CaseError
 from feti_homog.feti.decomposition.partition import decompose, pieces_for_count, pieces_for_size
 from feti_homog.homogenization import arc_selection, interface_pairs, process_zone
@@ -28,6 +29,7 @@ from feti_homog.interface.debonded_arcs import MovedTips
 from feti_homog.typing import Bool, Float, Int
 
 MOST_LISTED = 30  # moved fibres that are told one by one
+SAME_FRACTION = 0.01  # of a matched table and its cell, relative
 ROUNDING = 1e-9  # of coordinates, relative to the cell
 
 
@@ -153,12 +155,31 @@ class RankShare:
     submeshes: SubmeshesOfRank
 
 
-def moved_fibres(case: Case) -> tuple[str, ...]:
-    """Which rows of a table its cut window moves, and how far, in one line; none of other cells.
+def table_remarks(case: Case) -> tuple[str, ...]:
+    """What a cell has otherwise than its table of fibres, a line each.
 
     Raises:
-        MeshError: the table is faulty.
+        CaseError, MeshError: the table is faulty.
     """
+    return (*_moved_fibres(case), *_other_fraction(case))
+
+
+def _other_fraction(case: Case) -> tuple[str, ...]:
+    """That a cell has another fibre fraction than the table that it matches."""
+    cell = case.cell
+    if cell.match is None or cell.fibre_fraction is None:
+        return ()
+    fraction = read_window(cell.match).fibre_fraction
+    if abs(cell.fibre_fraction / fraction - 1.0) <= SAME_FRACTION:
+        return ()
+    return (
+        f"[cell] fibre_fraction = {cell.fibre_fraction:g}: {cell.match.name} has {fraction:.4g}; neighbours are as far "
+        "away as there, in diameters",
+    )
+
+
+def _moved_fibres(case: Case) -> tuple[str, ...]:
+    """Which rows of a table its cut window moves, and how far, in one line; none of other cells."""
     table = case.cell.table
     if table is None or case.cell.window != "cut":
         return ()

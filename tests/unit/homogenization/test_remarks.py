@@ -6,10 +6,12 @@ import tomllib
 
 import pytest
 from mpi4py import MPI
+from support.jobs import ROOT
 from unit.config.valid_cases import VALID_CASES
 
 from feti_homog.config.case import Case
 from feti_homog.homogenization.cell_description import describe
+from feti_homog.homogenization.domain_partition import table_remarks
 
 
 @pytest.mark.parametrize(
@@ -25,3 +27,13 @@ def test_check_tells_what_is_free_of_stress(name, expected):
     content = VALID_CASES[name].replace("mesh_size = 0.05", "mesh_size = 0.3")
     lines = describe(Case.parse(tomllib.loads(content)), MPI.COMM_SELF).splitlines()
     assert [line for line in lines if line.startswith("remark")] == expected
+
+
+@pytest.mark.parametrize("fraction", [None, 0.3])
+def test_another_fraction_than_that_of_a_matched_table_is_told(fraction):
+    content = tomllib.loads((ROOT / "drivers/matched.toml").read_text(encoding="utf-8"))
+    if fraction is not None:
+        content["cell"]["fibre_fraction"] = fraction
+    found = table_remarks(Case.parse(content, ROOT / "drivers"))
+    assert len(found) == (fraction is not None)
+    assert all(line.startswith("[cell] fibre_fraction = 0.3: clustered.csv has 0.") for line in found)
