@@ -29,6 +29,8 @@ def envelope_table(document: Document, stress: str) -> list[str]:
     for words, point in (("least", min(known, key=_load)), ("largest", max(known, key=_load))):
         lines.append(f"  {words:<9}{_load(point):.7g} at {point['angle']:g} degrees")
     names = [name for name in (*SHARES, "psi") if name in known[0]]
+    used = "psi of its traction" if names == ["psi"] else "traction / strength"
+    lines.append(f"  first bond: its fibre, its direction there (degrees), {used}")
     lines.append(
         f"{'angle':>8}{axes[0]:>12}{axes[1]:>12}{'fibre':>6}{'at':>9}{_interface(known[0], 'interface')}"
         + "".join(f"{HEADS.get(name, name):>10}" for name in names)

@@ -25,16 +25,18 @@ def test_the_least_and_the_largest_load_and_some_directions():
     assert lines[0] == "Onset of debonding in the plane S22, S12 (MPa): 72 directions"
     assert lines[1].split() == ["least", "10", "at", "0", "degrees"]
     assert lines[2].split() == ["largest", "81", "at", "355", "degrees"]
-    assert len(lines) == 4 + 12 and max(map(len, lines)) < 80
-    assert lines[3].split() == ["angle", "S22", "S12", "fibre", "at", "normal", "tangent", "axial"]
-    assert lines[4].split() == ["0", "10", "0", "2", "-12.50", "0.25", "0.25", "0.25"]
+    assert len(lines) == 5 + 12 and max(map(len, lines)) < 80
+    assert lines[3].endswith(" (degrees), traction / strength")
+    assert lines[4].split() == ["angle", "S22", "S12", "fibre", "at", "normal", "tangent", "axial"]
+    assert lines[5].split() == ["0", "10", "0", "2", "-12.50", "0.25", "0.25", "0.25"]
 
 
 def test_directions_without_an_onset_are_counted():
     lines = envelope_table(document(8, ("psi",), without=(0, 3), temperature=-50.0), "")
     assert lines[0].endswith("8 directions, after a temperature of -50")
     assert lines[1].strip() == "no load breaks a bond in 2 of them"
-    assert lines[5].split() == ["0", "none", "none"] and lines[4].split()[-1] == "psi"
+    assert lines[6].split() == ["0", "none", "none"] and lines[5].split()[-1] == "psi"
+    assert lines[4].endswith(" (degrees), psi of its traction")
 
 
 def test_nothing_may_break():
