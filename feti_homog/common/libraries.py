@@ -58,9 +58,12 @@ def start_petsc(words: Sequence[str], comm: Intracomm) -> None:
 
 
 def _end_petsc(comm: Intracomm) -> None:
+    from petsc4py import PETSc
+
     from feti_homog.common import petsc_ctypes
 
-    code = petsc_ctypes.finalize()
+    # Each start asks for its end.
+    code = 0 if PETSc.Sys.isFinalized() else petsc_ctypes.finalize()
     if code:
         complain(f"error: PETSc cannot end (error code {code}); results are written")
         comm.Abort(EXIT_DEFECT)
