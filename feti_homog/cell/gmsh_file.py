@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from mmap import ACCESS_READ, mmap
 from pathlib import Path
+from struct import unpack
 from types import ModuleType
 
 import numpy as np
@@ -28,6 +30,7 @@ REMEDY = {
 # gmsh's types of elements of second order; how many nodes a triangle of each type has.
 LINE_2, TRIANGLE_2 = 8, 9
 NODES_OF_TRIANGLES = {TRIANGLE: 3, TRIANGLE_2: 6}
+COUNTS_BYTES = 100  # at the beginning of the section of elements, in which their number is
 
 
 def load(path: Path) -> RawMesh:
@@ -48,10 +51,36 @@ def load(path: Path) -> RawMesh:
             gmsh.open(str(path))
         except Exception as error:  # gmsh raises nothing more specific
             raise MeshError(f"{path.name}: gmsh cannot read it: {str(error).strip() or 'it is damaged'}") from None
-        faults = _other_kinds(gmsh)
+        faults = _other_kinds(gmsh) or _dropped(gmsh, path)
         if faults:
             raise MeshError(*(f"{path.name}: {fault}" for fault in faults))
         return triangles_of_model(gmsh)
+
+
+def _dropped(gmsh: ModuleType, path: Path) -> list[str]:
+    """That the file has elements which gmsh leaves out without a word, for their numbers were there before."""
+    listed = _listed_elements(path)
+    read = sum(len(tags) for tags in gmsh.model.mesh.getElements()[1])
+    if listed is None or listed == read:
+        return []
+    return [f"it says that it has {listed} elements, and {read} can be read: others are missing, or have numbers twice"]
+
+
+def _listed_elements(path: Path) -> int | None:
+    """How many elements a file says that it has; None if it does not say so where its format has it."""
+    with path.open("rb") as file, mmap(file.fileno(), 0, access=ACCESS_READ) as content:
+        is_binary = content[: content.find(b"$EndMeshFormat")].split()[2:3] == [b"1"]
+        place = content.find(b"$Elements")
+        start = content.find(b"\n", place) + 1
+        return None if place < 0 else _first_count(content[start : start + COUNTS_BYTES], is_binary)
+
+
+def _first_count(content: bytes, is_binary: bool) -> int | None:
+    """The number of elements in the line, or in the four binary numbers, that begin their section."""
+    line = content.partition(b"\n")[0].split()
+    if len(line) in (1, 2, 4) and all(word.isdigit() for word in line):  # of formats 2, 4.0 and 4.1
+        return int(line[min(len(line), 2) - 1])
+    return int(unpack("4Q", content[:32])[1]) if is_binary and len(content) >= 32 else None
 
 
 def _other_kinds(gmsh: ModuleType) -> list[str]:

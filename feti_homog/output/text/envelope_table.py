@@ -29,13 +29,17 @@ def envelope_table(document: Document, stress: str) -> list[str]:
     for words, point in (("least", min(known, key=_load)), ("largest", max(known, key=_load))):
         lines.append(f"  {words:<9}{_load(point):.7g} at {point['angle']:g} degrees")
     names = [name for name in (*SHARES, "psi") if name in known[0]]
-    used = "psi of its traction" if names == ["psi"] else "traction / strength"
-    lines.append(f"  first bond: its fibre, its direction there (degrees), {used}")
-    lines.append(
-        f"{'angle':>8}{axes[0]:>12}{axes[1]:>12}{'fibre':>6}{'at':>9}{_interface(known[0], 'interface')}"
-        + "".join(f"{HEADS.get(name, name):>10}" for name in names)
-    )
-    return lines + [_row(point, names) for point in _chosen(points)]
+    return [*lines, *_head(axes, names, known[0]), *(_row(point, names) for point in _chosen(points))]
+
+
+def _head(axes: Sequence[str], names: Sequence[str], point: Document) -> list[str]:
+    """What the columns of the table are."""
+    used = "psi of its traction" if list(names) == ["psi"] else "traction / strength"
+    return [
+        f"  first bond: its fibre, its direction there (degrees), {used}",
+        f"{'angle':>8}{axes[0]:>12}{axes[1]:>12}{'fibre':>6}{'at':>9}{_interface(point, 'interface')}"
+        + "".join(f"{HEADS.get(name, name):>10}" for name in names),
+    ]
 
 
 def components(point: Document) -> tuple[float, float]:

@@ -183,6 +183,15 @@ def _unknown_node(path: Path) -> None:
     grid().with_element(1, 2, 1, (1, 2, 77)).write(path)
 
 
+def _line_twice(path: Path) -> None:
+    """The line of element 12 in place of that of 13, which gmsh takes for one element and says nothing of."""
+    grid().write(path)
+    lines = path.read_text().splitlines()
+    own = {line.split()[0]: number for number, line in enumerate(lines) if len(line.split()) == 8}
+    lines[own["13"]] = lines[own["12"]]
+    path.write_text("\n".join([*lines, ""]))
+
+
 def _missing(path: Path) -> None:
     path.unlink(missing_ok=True)
 
@@ -195,6 +204,7 @@ FAULTY_MESHES: dict[str, tuple[Callable[[Path], None], str]] = {
     "header only": (_text("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n"), "no triangles"),
     "broken off": (_broken, "gmsh cannot read it"),
     "unknown node": (_unknown_node, "gmsh cannot read it"),
+    "a line twice": (_line_twice, "it says that it has 32 elements, and 31 can be read"),
     "no elements": (_mesh(lambda: grid().without(*range(1, 33))), "no triangles"),
     "only lines": (_mesh(lambda: MshFile(grid().nodes, {1: (1, 1, 1, (1, 2))})), "no triangles"),
     "quadrilaterals": (
