@@ -138,11 +138,11 @@ def test_options_that_nobody_could_take_are_one_line(tmp_path, words):
 
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_a_log_that_cannot_be_written_any_more_hangs_no_rank(tmp_path, ranks):
-    """Its folder goes while the case runs; PETSc opens the file when it ends, the others wait for that."""
-    case, log, out = case_file(tmp_path, CUT), tmp_path / "logs", tmp_path / "out"
+    """Its folder goes while pictures are drawn; PETSc opens the file when it ends, the others wait for that."""
+    case, log, out = case_file(tmp_path, ""), tmp_path / "logs", tmp_path / "out"
     log.mkdir()
     process = launched(ranks, "-m", "feti_homog", "run", case, "--out", out, "-log_view", f":{log}/log.txt", **TEXTS)
-    while not (out / "result.lock").exists() and process.poll() is None:
+    while not (out / "result.json").exists() and process.poll() is None:
         time.sleep(0.01)
     log.rmdir()
     _, errors = process.communicate(timeout=60)
