@@ -1,0 +1,35 @@
+"""Schur complements by MUMPS against dense algebra; what MUMPS cannot make is no zeros."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from petsc4py import PETSc
+from scipy.sparse import csr_matrix, diags, identity, kron
+
+from feti_homog.feti.linalg.schur_complement import schur_complement
+
+
+def laplacian(n: int) -> csr_matrix:
+    """(n^2, n^2), positive definite."""
+    one = diags([-1.0, 2.0, -1.0], [-1, 0, 1], shape=(n, n))
+    return csr_matrix(kron(one, identity(n)) + kron(identity(n), one))
+
+
+def test_it_is_that_of_dense_algebra():
+    A, rows = laplacian(12), np.arange(0, 144, 7)
+    rest = np.setdiff1d(np.arange(144), rows)
+    D = A.toarray()
+    expected = D[np.ix_(rows, rows)] - D[np.ix_(rows, rest)] @ np.linalg.solve(D[np.ix_(rest, rest)], D[rest][:, rows])
+    np.testing.assert_allclose(schur_complement(A, rows), expected, atol=1e-12)
+
+
+def test_a_failure_of_mumps_is_told():
+    """It may have a megabyte."""
+    options = PETSc.Options("feti_schur_")
+    options.setValue("mat_mumps_icntl_23", 1)
+    try:
+        with pytest.raises(MemoryError, match=r"MUMPS cannot make a Schur complement: INFOG\(1\) = -"):
+            schur_complement(laplacian(60), np.arange(60))
+    finally:
+        options.delValue("mat_mumps_icntl_23")
