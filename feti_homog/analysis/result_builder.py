@@ -27,7 +27,7 @@ from feti_homog.cell.ellipses import Ellipses
 from feti_homog.common.mpi_errors import on_root
 from feti_homog.config.case import Case
 from feti_homog.config.materials import plane_stiffness
-from feti_homog.homogenization.domain_partition import CellSummary, table_remarks
+from feti_homog.homogenization.domain_partition import CellSummary
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.mechanics import bounds
 from feti_homog.mechanics.bounds import Moduli
@@ -69,7 +69,7 @@ def result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Fields
         warnings=(*cell.case.warnings(), *cell.summary.warnings(), *context.warnings()),
         remarks=(
             *cell.case.remarks(),
-            *on_root(cell.comm, table_remarks, cell.case),
+            *cell.summary.remarks,
             *_lost_area(cell.case, fractions),
         ),
         faults=tuple(context.faults),

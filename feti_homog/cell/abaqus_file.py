@@ -1,9 +1,9 @@
-"""The triangles of an Abaqus input file (.inp)."""
+"""Read the triangles and the lines of an Abaqus input file (.inp)."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -13,19 +13,22 @@ from feti_homog.cell.element_blocks import Block, assembled
 from feti_homog.cell.mesh_checks import RawMesh
 from feti_homog.config.wording import toml_value
 from feti_homog.errors import MeshError
+from feti_homog.typing import Int
 
 TRIANGLE = re.compile(r"(CPE|CPS|CPEG|DC2D|M3D|S|STRI)(3|6|65)[A-Z]*")
 LINE = re.compile(r"(T2D|T3D|B2|B3|DC1D)\w*")
+LINE_NODES = (2, 3)
 # From which of its sets an element has its phase: those before come first.
 BY_SECTION, BY_SET, BY_ELEMENTS = range(3)
 
 
 @dataclass
 class _Content:
-    """What has been read: nodes, triangles (each with its nodes), and sets with their elements."""
+    """Nodes, triangles and lines (each with its nodes) of a file, and its sets with their elements."""
 
     nodes: dict[int, list[float]] = field(default_factory=dict)
     triangles: dict[int, list[int]] = field(default_factory=dict)
+    lines: dict[int, list[int]] = field(default_factory=dict)
     sets: dict[tuple[int, str], set[int]] = field(default_factory=dict)
     sections: list[str] = field(default_factory=list)
     parts: int = 0
@@ -35,10 +38,10 @@ class _Content:
 
 
 def load(path: Path) -> RawMesh:
-    """The triangles of three or six nodes in an input file with one part.
+    """Read the triangles of three or six nodes, and the lines of two or three, of an input file with one part.
 
-    The phase of an element is its set that a *SOLID SECTION names, else that of an *ELSET, else the ELSET of *ELEMENT;
-    names are in lower case unless quoted.  Elements of lines are ignored.
+    The phase of a triangle and the curve of a line is its set that a *SOLID SECTION names, else that of an *ELSET, else
+    the ELSET of *ELEMENT; names are in lower case unless quoted.
 
     Raises:
         MeshError: the file cannot be read, or has other elements.
@@ -129,21 +132,26 @@ def _take(content: _Content, words: dict[str, str], rows: list[list[str]]) -> No
 
 def _take_elements(content: _Content, words: dict[str, str], rows: list[list[str]]) -> None:
     kind = words.get("TYPE", "").upper()
-    found = TRIANGLE.fullmatch(kind)
-    if not found and not LINE.fullmatch(kind):
-        raise ValueError(f"elements are {kind or 'of no TYPE'}: only triangles of three or six nodes can be used")
-    if not found:
-        return
-    count = 3 if found[2] == "3" else 6
+    counts = _node_counts(kind)
     elements = {_integer(row[0]): [_integer(word) for word in row[1:]] for row in rows}
-    for tag in elements:
-        if len(elements[tag]) != count:
-            raise ValueError(f"element {tag} has {len(elements[tag])} nodes: expected {count}")
-        if tag in content.triangles:
+    for tag, nodes in elements.items():
+        if len(nodes) not in counts:
+            raise ValueError(f"element {tag} has {len(nodes)} nodes: expected {' or '.join(map(str, counts))}")
+        if tag in content.triangles or tag in content.lines:
             raise ValueError(f"element {tag} is there twice")
-    content.triangles |= elements
+    (content.lines if counts == LINE_NODES else content.triangles).update(elements)
     if "ELSET" in words:
         content.members(BY_ELEMENTS, words["ELSET"]).update(elements)
+
+
+def _node_counts(kind: str) -> tuple[int, ...]:
+    """How many nodes an element of this type may have."""
+    if LINE.fullmatch(kind):
+        return LINE_NODES
+    triangle = TRIANGLE.fullmatch(kind)
+    if triangle is None:
+        raise ValueError(f"elements are {kind or 'of no TYPE'}: only triangles of three or six nodes can be used")
+    return (3,) if triangle[2] == "3" else (6,)
 
 
 def _take_set(content: _Content, words: dict[str, str], rows: list[list[str]]) -> None:
@@ -172,7 +180,8 @@ def _faults(content: _Content) -> list[str]:
         faults.append(f"{content.parts} parts: expected one")
     if not content.triangles:
         faults.append("no triangles in it")
-    lost = ((tag, node) for tag, nodes in content.triangles.items() for node in nodes if node not in content.nodes)
+    elements = content.triangles | content.lines
+    lost = ((tag, node) for tag, nodes in elements.items() for node in nodes if node not in content.nodes)
     faults += [f"element {tag}: there is no node {node}" for tag, node in list(lost)[:1]]
     named = {name for _, name in content.sets}
     unknown = (name for name in content.sections if name not in named)
@@ -193,7 +202,17 @@ def _raw(content: _Content) -> RawMesh:
         group = np.array([place[labels.get(tag, ())] for tag in own])
         blocks.append(Block(np.fromiter(own, np.int64), np.array(list(own.values()), np.int64), group))
     numbers, points = np.fromiter(content.nodes, np.int64), np.array(list(content.nodes.values()))
-    return assembled(numbers, points, blocks, groups, container="element set")
+    return assembled(numbers, points, blocks, groups, _curves(content, labels), ("element set", "element set"))
+
+
+def _curves(content: _Content, labels: Mapping[int, tuple[str, ...]]) -> dict[str, Int]:
+    """Numbers (d, 2) of the nodes at the ends of the lines in each set that has no triangles."""
+    with_triangles = {name for tag in content.triangles for name in labels.get(tag, ())}
+    curves: dict[str, list[list[int]]] = {}
+    for tag, nodes in content.lines.items():
+        for name in labels.get(tag, ()):
+            curves.setdefault(name, []).append([nodes[0], nodes[-1]])
+    return {name: np.array(ends, np.int64) for name, ends in curves.items() if name not in with_triangles}
 
 
 def _labels(content: _Content, level: int) -> dict[int, tuple[str, ...]]:

@@ -29,6 +29,7 @@ class CoarseMesh:
         arc_circle: (a,) that one.
         debonded_edges: (d, 2) edges between a fibre and the matrix that are debonded from the start.
         snapped: how far a node of a user's mesh was moved to make sides match, at most.
+        unused_curves: the curves of a user's mesh that nothing uses, in a line.
         centres: (fibres, 2) of fibres whose precedence is their number from 1, where they are known, else None; those
             of their coatings are behind them in the same order.
     """
@@ -46,6 +47,7 @@ class CoarseMesh:
     arc_circle: Int32
     debonded_edges: Int32
     snapped: float = 0.0
+    unused_curves: tuple[str, ...] = ()
     centres: Float | None = None
 
     @property

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,8 +27,8 @@ def assembled(
     points: Float,
     blocks: Sequence[Block],
     groups: Sequence[tuple[str, ...]],
-    debonded: Int | None = None,
-    container: str = "physical surface",
+    curves: Mapping[str, Int],
+    containers: tuple[str, str] = ("physical surface", "physical curve"),
 ) -> RawMesh:
     """The mesh of the blocks, one at least, with the corner nodes that they use.
 
@@ -36,8 +36,7 @@ def assembled(
         node_tags, points: (n,) and (n, 3) numbers and positions of the file's nodes, all that the blocks have among
             them.
         groups: the names of each group.
-        debonded: (d, 2) numbers of the nodes at the ends of debonded lines.
-        container: what the file calls a group.
+        curves, containers: as in `RawMesh`, surfaces first.
     """
     order = np.argsort(node_tags)
     points, known = points[order], node_tags[order]
@@ -52,11 +51,12 @@ def assembled(
         triangles=triangles.reshape(-1, 3).astype(np.int32),
         group=np.concatenate([block.group for block in blocks]),
         groups=tuple(groups),
-        debonded=np.zeros((0, 2), np.int64) if debonded is None else debonded,
+        curves=curves,
         middles=MiddleNodes(
             edges=np.searchsorted(used, six[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)).astype(np.int32),
             tags=middles,
             points=points[np.searchsorted(known, middles)],
         ),
-        container=container,
+        container=containers[0],
+        curve_container=containers[1],
     )

@@ -114,16 +114,16 @@ def triangles_of_model(gmsh: ModuleType) -> RawMesh:
                 physical = gmsh.model.getPhysicalGroupsForEntity(2, entity)
                 groups.append(tuple(gmsh.model.getPhysicalName(2, tag) or f"number {tag}" for tag in physical))
     node_tags, coordinates, _ = gmsh.model.mesh.getNodes()
-    return assembled(node_tags.astype(np.int64), coordinates.reshape(-1, 3), blocks, groups, _debonded_lines(gmsh))
+    return assembled(node_tags.astype(np.int64), coordinates.reshape(-1, 3), blocks, groups, _curves(gmsh))
 
 
-def _debonded_lines(gmsh: ModuleType) -> Int:
-    """Node tags (d, 2) of the lines in the physical curve "debonded"."""
-    lines = [np.zeros(0, np.int64)]
-    for _, entity in gmsh.model.getEntities(1):
-        groups = gmsh.model.getPhysicalGroupsForEntity(1, entity)
-        if any(gmsh.model.getPhysicalName(1, tag) == mesh_checks.DEBONDED for tag in groups):
+def _curves(gmsh: ModuleType) -> dict[str, Int]:
+    """Node tags (d, 2) of the ends of the lines in each physical curve."""
+    lines: dict[str, list[Int]] = {}
+    for dimension, group in gmsh.model.getPhysicalGroups(1):
+        own = lines.setdefault(gmsh.model.getPhysicalName(dimension, group) or f"number {group}", [])
+        for entity in gmsh.model.getEntitiesForPhysicalGroup(dimension, group):
             for kind, count in ((LINE, 2), (LINE_2, 3)):
                 nodes = gmsh.model.mesh.getElementsByType(kind, entity)[1].astype(np.int64)
-                lines.append(nodes.reshape(-1, count)[:, :2].ravel())
-    return np.concatenate(lines).reshape(-1, 2)
+                own.append(nodes.reshape(-1, count)[:, :2])
+    return {name: np.concatenate(ends) for name, ends in lines.items()}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,9 +36,9 @@ class RawMesh:
         element_tags: (m,) the file's numbers of the elements.
         triangles: (m, 3) nodes, numbered from 0.
         group: (m,) index into `groups`, the names of the physical surfaces or sets that the elements belong to.
-        debonded: (d, 2) node tags of the lines in the physical curve DEBONDED.
+        curves: (d, 2) node tags of the ends of the lines in each physical curve or set of lines, by its name.
         middles: the middle nodes of second-order triangles.
-        container: what the file calls a group.
+        container, curve_container: what the file calls a group, and an entry of `curves`.
     """
 
     node_tags: Int
@@ -47,9 +47,15 @@ class RawMesh:
     triangles: Int32
     group: Int
     groups: tuple[tuple[str, ...], ...]
-    debonded: Int
+    curves: Mapping[str, Int]
     middles: MiddleNodes
     container: str
+    curve_container: str
+
+    @property
+    def debonded(self) -> Int:
+        """(d, 2) node tags of the ends of the lines in the curve DEBONDED."""
+        return self.curves.get(DEBONDED, np.zeros((0, 2), np.int64))
 
     def node(self, number: int) -> str:
         """A node in words."""
@@ -236,15 +242,26 @@ def stray_lines(mesh: RawMesh) -> list[str]:
     """Debonded lines whose ends are not nodes of triangles."""
     bad = mesh.debonded[~np.isin(mesh.debonded, mesh.node_tags).all(axis=1)]
     names = (f"that between nodes {start} and {stop}" for start, stop in bad)
-    what = f'lines in the physical curve "{DEBONDED}" that are no edges of triangles'
+    what = f'lines in the {mesh.curve_container} "{DEBONDED}" that are no edges of triangles'
     return [f"{what}: {first_of(names, len(bad))}"] if len(bad) else []
 
 
 def cannot_debond(mesh: RawMesh, pairs: Int32, fit: Bool) -> list[str]:
     """Debonded lines (d, 2) that are not edges between a fibre and the matrix; `fit` (d,) says which are."""
     bad = pairs[~fit]
-    what = f'lines in the physical curve "{DEBONDED}" that are not between a fibre and the matrix'
+    what = f'lines in the {mesh.curve_container} "{DEBONDED}" that are not between a fibre and the matrix'
     return [f"{what}: {first_of(map(mesh.edge, bad), len(bad))}"] if len(bad) else []
+
+
+def unused_curves(mesh: RawMesh) -> tuple[str, ...]:
+    """List the curves that are not DEBONDED, in one line."""
+    names = [f'"{name}"' for name in mesh.curves if name != DEBONDED]
+    if not names:
+        return ()
+    return (
+        f"{mesh.curve_container} {first_of(names, len(names))}: not used; lines that are debonded from the start "
+        f'belong in "{DEBONDED}"',
+    )
 
 
 def not_periodic(mesh: RawMesh, plane: Float, size: Float) -> list[str]:

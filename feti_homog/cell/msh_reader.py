@@ -28,7 +28,7 @@ def read(path: Path, snap: float | None = None) -> CoarseMesh:
     """The coarse mesh in a file of one of the LOADERS, moved to [0, width] x [0, height].
 
     It consists of triangles of three or six nodes in physical surfaces "matrix", "fibre", "glass", ..., fills a
-    rectangle but for voids, and has matching nodes on opposite sides. Lines in the physical curve "debonded" are
+    rectangle but for voids, and has matching nodes on opposite sides. Lines in the curve "debonded" are
     edges between a fibre and the matrix that are debonded. Round interfaces become circles (`with_circles`), elliptic
     ones ellipses (`with_ellipses`); others follow their middle nodes (`with_bent_edges`).
     With `snap`, nodes on sides are first moved by up to that / width to where they should be (`snapped`).
@@ -42,7 +42,8 @@ def read(path: Path, snap: float | None = None) -> CoarseMesh:
     _refuse(path.name, mesh_checks.not_finite(raw))
     if snap is not None:
         raw, moved = snapped(raw, snap)
-    return replace(made(raw, path.name), snapped=moved)
+    unused = tuple(f"{path.name}: {line}" for line in mesh_checks.unused_curves(raw))
+    return replace(made(raw, path.name), snapped=moved, unused_curves=unused)
 
 
 def made(raw: RawMesh, path: str) -> CoarseMesh:

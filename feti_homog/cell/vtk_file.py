@@ -1,4 +1,4 @@
-"""The triangles of a file of VTK, as meshio reads it."""
+"""Read the triangles and the lines of a file of VTK by meshio."""
 
 from __future__ import annotations
 
@@ -9,22 +9,23 @@ from typing import Any
 import numpy as np
 
 from feti_homog.cell.element_blocks import Block, assembled
-from feti_homog.cell.mesh_checks import RawMesh
+from feti_homog.cell.mesh_checks import DEBONDED, RawMesh
 from feti_homog.errors import MeshError
 from feti_homog.typing import Int
 
 # Readers of meshio, and how many nodes its triangles have.
 READERS = {".vtu": "meshio.vtu", ".vtk": "meshio.vtk"}
 NODES = {"triangle": 3, "triangle6": 6}
-# Cells without an area.
-IGNORED = ("vertex", "line", "line3")
+LINES = ("line", "line3")
+VERTEX = "vertex"
 PHASE = "phase"
 
 
 def load(path: Path) -> RawMesh:
-    """The triangles of a .vtu or .vtk file; its cell data `phase` are 0 in the matrix, 1 in phase fibre, k in fibre:k.
+    """Read the triangles and the lines of a .vtu or .vtk file.
 
-    Nodes and elements have the numbers of the file, from 0.
+    Its cell data `phase` are 0 in the matrix, 1 in phase fibre, k in fibre:k; its cell data `debonded`, if it has them,
+    are 1 on lines that are debonded from the start.  Nodes and elements have the numbers of the file, from 0.
 
     Raises:
         MeshError: meshio is not installed or cannot read the file, it has other elements, or no phases.
@@ -49,7 +50,7 @@ def load(path: Path) -> RawMesh:
 def _faults(mesh: Any) -> list[str]:
     """Elements that are not triangles, the lack of these, and of their phases."""
     kinds = [block.type for block in mesh.cells]
-    others = [f"{len(block.data)} {block.type}" for block in mesh.cells if block.type not in (*NODES, *IGNORED)]
+    others = [f"{len(block.data)} {block.type}" for block in mesh.cells if block.type not in (*NODES, *LINES, VERTEX)]
     faults = [f"elements are {kind}: only triangles of three or six nodes can be used" for kind in others]
     if not others and not set(kinds) & set(NODES):
         faults.append("no triangles in it")
@@ -75,7 +76,21 @@ def _raw(mesh: Any) -> RawMesh:
     points = np.zeros((len(mesh.points), 3))
     points[:, : mesh.points.shape[1]] = mesh.points
     names = ["matrix", "fibre", *(f"fibre:{k}" for k in range(2, most + 1))]
-    return assembled(np.arange(len(points)), points, *_used(blocks, names), container=f"value of {PHASE}")
+    containers = (f"value of {PHASE}", "cells")
+    return assembled(np.arange(len(points)), points, *_used(blocks, names), _curves(mesh), containers)
+
+
+def _curves(mesh: Any) -> dict[str, Int]:
+    """Nodes (d, 2) at the ends of the lines that cell data `debonded` mark, and of the others, by the cells' type."""
+    curves: dict[str, list[Int]] = {}
+    marks = mesh.cell_data.get(DEBONDED, [np.zeros(len(cells.data)) for cells in mesh.cells])
+    for cells, mark in zip(mesh.cells, marks, strict=True):
+        if cells.type in LINES:
+            ends, is_debonded = np.asarray(cells.data, np.int64)[:, :2], np.ravel(mark) != 0
+            for name, own in ((DEBONDED, ends[is_debonded]), (cells.type, ends[~is_debonded])):
+                if len(own):
+                    curves.setdefault(name, []).append(own)
+    return {name: np.concatenate(ends) for name, ends in curves.items()}
 
 
 def _used(blocks: list[Block], names: list[str]) -> tuple[list[Block], list[tuple[str, ...]]]:

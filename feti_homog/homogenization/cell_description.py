@@ -16,7 +16,7 @@ from feti_homog.feti.decomposition.shared_entities import share_entities
 from feti_homog.feti.factory import database_options
 from feti_homog.feti.solver_plan import ProblemSizes, SolverOptions, SolverPlan
 from feti_homog.homogenization import cost_model, phase_laws, process_zone
-from feti_homog.homogenization.domain_partition import DEFAULT_POLICY, CellSummary, table_remarks
+from feti_homog.homogenization.domain_partition import DEFAULT_POLICY, CellSummary
 from feti_homog.homogenization.unit_cell import cut
 
 
@@ -71,7 +71,7 @@ def _described(
         ),
         *cost_model.estimate_lines(taken, len(loads)),
         *(f"warning    {warning}" for warning in (*case.warnings(), *summary.warnings(), *unresolved)),
-        *(f"remark     {remark}" for remark in (*case.remarks(), *table_remarks(case))),
+        *(f"remark     {remark}" for remark in (*case.remarks(), *summary.remarks)),
         "the case is valid",
     ]
     return "\n".join(lines)

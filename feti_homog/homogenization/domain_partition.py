@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from feti_homog.cell import tabulated
 from feti_homog.cell.coarse_mesh import CoarseMesh
 from feti_homog.cell.ellipses import Ellipses
 from feti_homog.cell.fibre_centres import fibre_circles
@@ -19,17 +18,15 @@ from feti_homog.cell.refinement import ReferenceLattice
 from feti_homog.cell.submesh import SubdomainTable, SubmeshesOfRank, cut_for_ranks, pinned_class
 from feti_homog.cell.tiles import DEFAULT_TILES, TilePolicy
 from feti_homog.config.case import Case
-from feti_homog.config.fibre_window import read_window
 from feti_homog.errors import CaseError
 from feti_homog.feti.decomposition.partition import decompose, pieces_for_count, pieces_for_size
 from feti_homog.homogenization import arc_selection, interface_pairs, process_zone
 from feti_homog.homogenization.arc_selection import InterfaceNodes
+from feti_homog.homogenization.cell_remarks import mesh_remarks, table_remarks
 from feti_homog.interface import debonded_arcs
 from feti_homog.interface.debonded_arcs import MovedTips
 from feti_homog.typing import Bool, Float, Int
 
-MOST_LISTED = 30  # moved fibres that are told one by one
-SAME_FRACTION = 0.01  # of a matched table and its cell, relative
 ROUNDING = 1e-9  # of coordinates, relative to the cell
 
 
@@ -83,6 +80,7 @@ class CellSummary:
         snapped: how far a node of a user's mesh was moved to make sides match, at most.
         voids: how many there are.
         match_distance: how far the fibres are from the table that they match, see `neighbour_match`; None without one.
+        remarks: how the cell differs from what the case may lead to expect, a line each.
     """
 
     width: float
@@ -102,6 +100,7 @@ class CellSummary:
     snapped: float
     voids: int
     match_distance: float | None
+    remarks: tuple[str, ...]
 
     @property
     def fibres(self) -> int:
@@ -155,41 +154,6 @@ class RankShare:
     submeshes: SubmeshesOfRank
 
 
-def table_remarks(case: Case) -> tuple[str, ...]:
-    """What a cell has otherwise than its table of fibres, a line each.
-
-    Raises:
-        CaseError, MeshError: the table is faulty.
-    """
-    return (*_moved_fibres(case), *_other_fraction(case))
-
-
-def _other_fraction(case: Case) -> tuple[str, ...]:
-    """That a cell has another fibre fraction than the table that it matches."""
-    cell = case.cell
-    if cell.match is None or cell.fibre_fraction is None:
-        return ()
-    fraction = read_window(cell.match).fibre_fraction
-    if abs(cell.fibre_fraction / fraction - 1.0) <= SAME_FRACTION:
-        return ()
-    return (
-        f"[cell] fibre_fraction = {cell.fibre_fraction:g}: {cell.match.name} has {fraction:.4g}; neighbours are as far "
-        "away as there, in diameters",
-    )
-
-
-def _moved_fibres(case: Case) -> tuple[str, ...]:
-    """Which rows of a table its cut window moves, and how far, in one line; none of other cells."""
-    table = case.cell.table
-    if table is None or case.cell.window != "cut":
-        return ()
-    rows, far = tabulated.moved_rows(table, case.cell.window)
-    listed = [f"row {rows[k]} by {far[k]:.3g}" for k in np.argsort(-far, kind="stable")[:MOST_LISTED]]
-    rest = [f"and {len(rows) - MOST_LISTED} others by less"] if len(rows) > MOST_LISTED else []
-    which = f": {', '.join(listed + rest)}" if listed else ""
-    return (f'[cell] window = "cut": {len(rows)} of {len(table.radius)} fibres moved{which}',)
-
-
 def distribute(
     case: Case, mesh: CoarseMesh, lattice: ReferenceLattice, n_ranks: int, policy: PartitionPolicy = DEFAULT_POLICY
 ) -> list[RankShare]:
@@ -235,6 +199,7 @@ def distribute(
         snapped=mesh.snapped,
         voids=voids(mesh) if torus.at_void.any() else 0,
         match_distance=match_distance(case, mesh.width, mesh.height, centres[is_fibre], circles[is_fibre, 2]),
+        remarks=(*table_remarks(case), *mesh_remarks(case, mesh)),
     )
     shares = cut_for_ranks(torus, subdomain, table, n_ranks, pinned_class(torus))
     return [RankShare(summary, table, pairs, own) for own in shares]

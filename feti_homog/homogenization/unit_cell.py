@@ -30,7 +30,6 @@ from feti_homog.homogenization.domain_partition import (
     PartitionPolicy,
     RankShare,
     distribute,
-    table_remarks,
 )
 from feti_homog.homogenization.tile_tearing import can_be_torn_by_tiles, tear_by_tiles
 from feti_homog.interface import debonded_arcs
@@ -156,10 +155,8 @@ def assemble_subdomains(
         own = cut(case, lattice, comm, policy)
         summary = own.summary
         shared = share_entities(comm, own.submeshes, own.table, own.pairs, lattice)
-        if comm.allreduce(bool(own.submeshes.whole.debonded.any()), MPI.LOR) and case.interface is None:
-            words.append("its debonded curve is bonded, for there is no [interface]")
         words.append(f"{summary.coarse_triangles} triangles, {summary.bodies} bodies, {summary.subdomains} subdomains")
-    for line in on_root_only(comm, table_remarks, case) or ():
+    for line in summary.remarks:
         progress.say(f"remark: {line}")
     with progress.stage("assemble") as words:
         subdomains = agree(comm, _assemble, case, own.submeshes, lattice)

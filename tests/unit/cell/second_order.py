@@ -10,10 +10,13 @@ from unit.cell.faulty_meshes import FIBRE, MshFile, grid
 
 
 def second_order(mesh: MshFile, bent: Callable[[float, float], Sequence[float]] | None = None) -> MshFile:
-    """The mesh with triangles of six nodes; `bent` moves the middles (x, y) of edges."""
+    """The mesh with triangles of six nodes and lines of three; `bent` moves the middles (x, y) of edges."""
     nodes, elements = dict(mesh.nodes), {}
     middle: dict[frozenset[int], int] = {}
-    for tag, (_, physical, entity, corners) in mesh.elements.items():
+    for tag, (kind, physical, entity, corners) in mesh.elements.items():
+        if kind == 1:
+            elements[tag] = (8, physical, entity, (*corners, middle[frozenset(corners)]))
+            continue
         for pair in zip(corners, (*corners[1:], corners[0]), strict=True):
             if frozenset(pair) not in middle:
                 x, y = np.mean([mesh.nodes[end][:2] for end in pair], axis=0).tolist()

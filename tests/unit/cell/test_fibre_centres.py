@@ -98,11 +98,6 @@ def test_debonded_lines_come_back(lines, tmp_path):
     assert found == expected
 
 
-def test_other_curves_mean_nothing(tmp_path):
-    grid().with_curve([(node(0, 0), node(1, 0))], name="bottom").write(tmp_path / "good.msh")
-    assert len(read(tmp_path / "good.msh").debonded_edges) == 0
-
-
 @pytest.mark.parametrize("side", [0, 4])
 def test_debonded_lines_on_either_side_of_the_cell(side, tmp_path):
     """A fibre that ends at the right side, where the matrix begins at the left one."""

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.abaqus import write_inp
-from unit.cell.faulty_meshes import grid, node
+from unit.cell.faulty_meshes import CURVE, RIGHT_SIDE, grid, node
 from unit.cell.second_order import second_order
 
 from feti_homog.cell import vtk_file
@@ -55,6 +55,41 @@ def test_sets_of_element_lines_and_of_sections_are_phases_too(tmp_path):
     assert np.array_equal(read(path).phase, expected.phase)
 
 
+@pytest.mark.parametrize("mesh", [grid(), second_order(grid())], ids=["first", "second"])
+@pytest.mark.parametrize("suffix", [".inp", ".vtu", ".vtk"])
+def test_debonded_lines_of_every_format_are_those_of_gmsh(suffix, mesh, tmp_path):
+    raw = grid().with_curve(RIGHT_SIDE)
+    raw = raw if mesh.elements == grid().elements else second_order(raw)
+    expected = read(_written(raw, tmp_path / "one.msh"))
+    result = read(_written(raw, tmp_path / f"one{suffix}"))
+    assert np.array_equal(_edges(result), _edges(expected)) and len(_edges(result)) == len(RIGHT_SIDE)
+    assert result.unused_curves == ()
+
+
+@pytest.mark.parametrize(
+    ("suffix", "name", "expected"),
+    [
+        (".msh", "Debonded", 'one.msh: physical curve "Debonded": not used; lines that are debonded from the start '),
+        (".inp", "crack", 'one.inp: element set "crack": not used; lines that are debonded from the start belong in '),
+        (".vtu", "crack", 'one.vtu: cells "line": not used; lines that are debonded from the start belong in "debonde'),
+    ],
+)
+def test_curves_that_nothing_uses_are_remarked(suffix, name, expected, tmp_path):
+    result = read(_written(grid().with_curve(RIGHT_SIDE, name), tmp_path / f"one{suffix}"))
+    assert len(result.debonded_edges) == 0
+    assert [line.startswith(expected) for line in result.unused_curves] == [True]
+
+
+def test_debonded_lines_may_be_the_set_of_an_element_line(tmp_path):
+    path = write_inp(tmp_path / "one.inp", grid().with_curve(RIGHT_SIDE), sets=False)
+    assert len(read(path).debonded_edges) == len(RIGHT_SIDE)
+
+
+def test_lines_in_a_set_of_a_phase_are_not_remarked(tmp_path):
+    path = write_inp(tmp_path / "one.inp", grid().with_curve(RIGHT_SIDE, "matrix"))
+    assert read(path).unused_curves == ()
+
+
 def _text(content: str) -> Callable[[Path], Path]:
     def write(path: Path) -> Path:
         path.write_text(content)
@@ -88,6 +123,16 @@ FAULTS = {
     "a long word": ("a.inp", _text(SQUARE.replace("3, 1, 1", f"3, {'1' * 1000}x, 1")), "1111...: expected a number"),
     "number of a node": ("a.inp", _text(SQUARE.replace("3, 1, 1", "3.5, 1, 1")), '"3.5": expected a whole number'),
     "no numbers": ("a.inp", _text(SQUARE.replace("3, 1, 1", ", ,")), "line 1, *NODE: a line below it ends too early"),
+    "short line": (
+        "a.inp",
+        _text(SQUARE + "*ELEMENT, TYPE=T3D2, ELSET=debonded\n7, 1\n"),
+        "line 9, *ELEMENT: element 7 has 1 nodes: expected 2 or 3",
+    ),
+    "stray line": (
+        "a.inp",
+        _text(SQUARE.replace("4, 0, 1\n", "4, 0, 1\n5, 2, 2\n") + "*ELEMENT, TYPE=B21, ELSET=debonded\n7, 1, 5\n"),
+        'lines in the element set "debonded" that are no edges of triangles: that between nodes 1 and 5',
+    ),
     "twice": ("a.inp", _text(SQUARE + "*ELEMENT, TYPE=CPS3\n2, 1, 3, 4\n"), "element 2 is there twice"),
     "unknown node": ("a.inp", _text(SQUARE.replace("2, 1, 3, 4", "2, 1, 3, 9")), "element 2: there is no node 9"),
     "unknown set": ("a.inp", _text(SQUARE + "*ELSET, ELSET=fibre\nother\n"), 'there is no element set "other"'),
@@ -167,13 +212,21 @@ def _written(mesh, path: Path) -> Path:
         return path
     if path.suffix == ".inp":
         return write_inp(path, mesh)
-    tags = sorted(mesh.nodes)
-    elements = [mesh.elements[tag] for tag in sorted(mesh.elements)]
-    kind = {2: "triangle", 9: "triangle6"}[elements[0][0]]
-    cells = [(kind, np.searchsorted(tags, [e[3] for e in elements]))]
-    phase = np.array([e[1] - 1 for e in elements])
-    meshio.Mesh(np.array([mesh.nodes[tag] for tag in tags]), cells, cell_data={"phase": [phase]}).write(path)
+    tags, kinds = sorted(mesh.nodes), {1: "line", 8: "line3", 2: "triangle", 9: "triangle6"}
+    cells, phases, debonded = [], [], []
+    for kind in sorted({e[0] for e in mesh.elements.values()}):
+        own = [mesh.elements[tag] for tag in sorted(mesh.elements) if mesh.elements[tag][0] == kind]
+        cells.append((kinds[kind], np.searchsorted(tags, [e[3] for e in own])))
+        is_line = kinds[kind].startswith("line")
+        phases.append(np.array([0 if is_line else e[1] - 1 for e in own]))
+        debonded.append(np.full(len(own), int(is_line and mesh.curves[CURVE] == "debonded")))
+    data = {"phase": phases} | ({"debonded": debonded} if mesh.curves else {})
+    meshio.Mesh(np.array([mesh.nodes[tag] for tag in tags]), cells, cell_data=data).write(path)
     return path
+
+
+def _edges(mesh):
+    return np.unique(np.sort(mesh.debonded_edges, axis=1), axis=0)
 
 
 def _sorted(mesh):

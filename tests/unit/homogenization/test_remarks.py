@@ -7,11 +7,13 @@ import tomllib
 import pytest
 from mpi4py import MPI
 from support.jobs import ROOT
+from unit.cell.faulty_meshes import RIGHT_SIDE, grid
 from unit.config.valid_cases import VALID_CASES
 
+from feti_homog import run
 from feti_homog.config.case import Case
 from feti_homog.homogenization.cell_description import describe
-from feti_homog.homogenization.domain_partition import table_remarks
+from feti_homog.homogenization.cell_remarks import table_remarks
 
 
 @pytest.mark.parametrize(
@@ -38,3 +40,35 @@ def test_another_fraction_than_that_of_a_matched_table_is_told(fraction):
     found = table_remarks(Case.parse(content, ROOT / "drivers"))
     assert len(found) == (fraction is not None)
     assert all(line.startswith("[cell] fibre_fraction = 0.3: clustered.csv has 0.") for line in found)
+
+
+@pytest.mark.parametrize(
+    ("curve", "sections", "expected"),
+    [
+        (None, {}, []),
+        ("debonded", {"interface": {}}, []),
+        (None, {"interface": {"normal_stiffness": 1.0}}, []),
+        (None, {"interface": {}}, ["[interface]: nothing is debonded, and no bond is elastic: the bonding is perfect"]),
+        ("debonded", {}, ['the curve "debonded" of the mesh is bonded: there is no [interface]']),
+        (
+            "Debonded",
+            {"interface": {}},
+            ['cell.msh: physical curve "Debonded": not used', "[interface]: nothing is debonded"],
+        ),
+    ],
+    ids=str,
+)
+def test_bonding_that_a_mesh_does_not_have_is_remarked(curve, sections, expected, tmp_path):
+    mesh = grid() if curve is None else grid().with_curve(RIGHT_SIDE, curve)
+    mesh.write(tmp_path / "cell.msh")
+    phase = {"young": 1.0, "poisson": 0.3}
+    document = {
+        "cell": {"geometry": "mesh", "file": "cell.msh"},
+        "material": {"matrix": phase, "fibre": phase},
+        "analysis": {"type": "stiffness", "plane": "strain"},
+    }
+    lines = describe(Case.parse(document | sections, tmp_path), MPI.COMM_SELF).splitlines()
+    found = [line.removeprefix("remark     ") for line in lines if line.startswith("remark")]
+    assert len(found) == len(expected) and all(map(str.startswith, found, expected)), found
+    result = run(Case.parse(document | sections, tmp_path), MPI.COMM_SELF)
+    assert list(result.remarks) == found

@@ -1,0 +1,65 @@
+"""Compare a cell with what its case may lead to expect, in remarks of a line each."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from feti_homog.cell import tabulated
+from feti_homog.cell.coarse_mesh import CoarseMesh
+from feti_homog.config.case import Case
+from feti_homog.config.fibre_window import read_window
+from feti_homog.config.selectors import BREAKING
+from feti_homog.homogenization import bonds
+
+MOST_LISTED = 30  # moved fibres that are listed one by one
+SAME_FRACTION = 0.01  # of a matched table and its cell, relative
+
+
+def mesh_remarks(case: Case, mesh: CoarseMesh) -> tuple[str, ...]:
+    """List the curves of a user's mesh that nothing uses, and an [interface] without an effect, a line each."""
+    return (*mesh.unused_curves, *_bonding(case, len(mesh.debonded_edges) > 0))
+
+
+def _bonding(case: Case, has_debonded_curve: bool) -> tuple[str, ...]:
+    """Mention a debonded curve without an [interface], and an [interface] under which every bond is perfect."""
+    if case.interface is None:
+        return ('the curve "debonded" of the mesh is bonded: there is no [interface]',) if has_debonded_curve else ()
+    can_open = case.arcs or has_debonded_curve or bonds.has_springs(case) or case.analysis.type in BREAKING.values
+    if can_open or not case.cell.has_own_mesh:
+        return ()
+    return ("[interface]: nothing is debonded, and no bond is elastic: the bonding is perfect",)
+
+
+def table_remarks(case: Case) -> tuple[str, ...]:
+    """List how the cell differs from its table of fibres, a line each.
+
+    Raises:
+        CaseError, MeshError: the table is faulty.
+    """
+    return (*_moved_fibres(case), *_other_fraction(case))
+
+
+def _other_fraction(case: Case) -> tuple[str, ...]:
+    """Mention a fibre fraction other than that of the table that the cell matches."""
+    cell = case.cell
+    if cell.match is None or cell.fibre_fraction is None:
+        return ()
+    fraction = read_window(cell.match).fibre_fraction
+    if abs(cell.fibre_fraction / fraction - 1.0) <= SAME_FRACTION:
+        return ()
+    return (
+        f"[cell] fibre_fraction = {cell.fibre_fraction:g}: {cell.match.name} has {fraction:.4g}; neighbours are as far "
+        "away as there, in diameters",
+    )
+
+
+def _moved_fibres(case: Case) -> tuple[str, ...]:
+    """List the rows of a table that its cut window moves, and how far, in one line."""
+    table = case.cell.table
+    if table is None or case.cell.window != "cut":
+        return ()
+    rows, far = tabulated.moved_rows(table, case.cell.window)
+    listed = [f"row {rows[k]} by {far[k]:.3g}" for k in np.argsort(-far, kind="stable")[:MOST_LISTED]]
+    rest = [f"and {len(rows) - MOST_LISTED} others by less"] if len(rows) > MOST_LISTED else []
+    which = f": {', '.join(listed + rest)}" if listed else ""
+    return (f'[cell] window = "cut": {len(rows)} of {len(table.radius)} fibres moved{which}',)
