@@ -18,12 +18,12 @@ from operator import itemgetter
 
 import numpy as np
 from scipy.linalg import eigh
-from scipy.linalg.lapack import dpotrf
 from scipy.sparse import csr_matrix
 
 from feti_homog.feti.coarse.face_neighbourhoods import face_neighbourhoods
 from feti_homog.feti.coarse.trace_spaces import trace_space
 from feti_homog.feti.decomposition.subdomain import Subdomain
+from feti_homog.feti.linalg.dense_cholesky import cholesky
 from feti_homog.feti.operators.explicit import ExplicitInterfaceOperator
 from feti_homog.feti.operators.implicit import ImplicitInterfaceOperator
 from feti_homog.feti.thresholds import DEFAULTS, SINGLE_PRECISION_NULL, Thresholds
@@ -185,6 +185,8 @@ def soft_modes(S: Float, N: Float, threshold: float) -> Float:
     # Without the kernel's part, N has eigenvectors N-orthogonal to the kernel, where the definite matrix is S.
     rest = N[:m, :m] - NR @ np.linalg.pinv(RNR, rcond=SINGLE_PRECISION_NULL, hermitian=True) @ NR.T
     # A Cholesky factorization tells at a tenth of the cost whether there are any.
-    if not dpotrf(S - threshold * rest, lower=1)[1]:
-        return np.zeros((m, 0))
-    return np.asarray(eigh(rest, S, subset_by_value=(1.0 / threshold, np.inf), overwrite_a=True)[1])
+    try:
+        cholesky(S - threshold * rest)
+    except np.linalg.LinAlgError:
+        return np.asarray(eigh(rest, S, subset_by_value=(1.0 / threshold, np.inf), overwrite_a=True)[1])
+    return np.zeros((m, 0))

@@ -155,7 +155,8 @@ def _pinned(K: csr_matrix, problem: Problem, pinned: int) -> csr_matrix:
 def _check_kernel(submesh: Submesh, K: csr_matrix, R: Float) -> None:
     """Refuse a subdomain whose rigid-body modes R (cn, k) are not in the kernel of K (cn, cn)."""
     residual = abs(K @ R).max(initial=0.0) / abs(K.data).max()
-    if residual > KERNEL_TOLERANCE:
+    # NaN is above any tolerance.
+    if not residual <= KERNEL_TOLERANCE:
         raise MeshError(
             f"subdomain {submesh.index} ({submesh.phase}) near "
             f"({submesh.points[0, 0]:.6g}, {submesh.points[0, 1]:.6g}): "
@@ -168,7 +169,7 @@ def _check_corners(submesh: Submesh, mesh: FineMesh) -> None:
     triangles = mesh.nodes[mesh.curved][:, mesh.lattice.triangles[:, :3]].reshape(-1, 3)
     a, b, c = (mesh.points[triangles[:, k]] for k in range(3))
     doubled = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
-    inverted = np.flatnonzero(doubled <= 0)
+    inverted = np.flatnonzero(~(doubled > 0))
     if len(inverted):
         x, y = mesh.points[triangles[inverted[0]]].mean(axis=0)
         raise MeshError(

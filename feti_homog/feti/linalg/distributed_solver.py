@@ -13,6 +13,7 @@ from scipy.sparse import csr_matrix
 from feti_homog.common.distributed_arrays import allreduce_sum
 from feti_homog.feti.linalg.collectives import allgather_rows
 from feti_homog.feti.linalg.distributed_matrix import assemble_distributed
+from feti_homog.feti.linalg.factor_status import power_of_two
 from feti_homog.feti.linalg.rank_tree import RankTree
 from feti_homog.feti.linalg.sparse_direct import factor_by_mumps, iterations
 from feti_homog.feti.linalg.tree_elimination import TreeElimination
@@ -44,11 +45,13 @@ class DistributedSolver:
             near_kernel: (u, c) vectors of little energy, of which multigrid learns.
 
         Raises:
-            PETSc.Error: the matrix is not definite.
+            LinAlgError, MemoryError: as `factor_by_mumps`.
             CaseError: the library that the options name cannot factor distributed matrices, as CHOLMOD cannot.
         """
         self.comm, self.total, self.unknowns = comm, total, unknowns
         matrix = assemble_distributed(comm, part, unknowns, total)
+        self._scale = power_of_two(matrix.getDiagonal().getArray(readonly=True), comm)
+        matrix.scale(self._scale)
         self._ksp = factor_by_mumps(matrix, prefix, None if near_kernel is None else self._orthonormal(near_kernel))
         self._x, self._b = self._ksp.getOperators()[0].createVecs()
 
@@ -69,6 +72,7 @@ class DistributedSolver:
                 self._b.setArray(b)
                 self._ksp.solve(self._b, self._x)
                 x[:] = self._x.getArray(readonly=True)
+        X *= self._scale
         whole = allgather_rows(self.comm, X, np.diff(self._b.getOwnershipRanges()))
         return np.asarray(whole[self.unknowns]).reshape(B.shape)
 
@@ -126,7 +130,7 @@ class RenewedSolver:
         comm, error = self._tree.comm, None
         try:
             self.current = DistributedSolver(comm, self._total, unknowns, part, self._prefix, near_kernel)
-        except PETSc.Error as caught:
+        except np.linalg.LinAlgError as caught:
             error = caught
         if comm.allreduce(error is not None, MPI.LOR):
             raise np.linalg.LinAlgError(f"a coarse matrix is singular: {error or 'on another rank'}") from error

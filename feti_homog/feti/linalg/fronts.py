@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg.blas import dsyrk, dtrsm
-from scipy.linalg.lapack import dpotrf
 
+from feti_homog.feti.linalg import dense_cholesky
 from feti_homog.feti.linalg.packed_symmetric import full_from_lower
 from feti_homog.feti.linalg.rank_tree import Meeting
 from feti_homog.feti.linalg.remainder import FrontLayout, Remainder
@@ -127,10 +127,10 @@ def eliminated_alone(meeting: Meeting, layout: FrontLayout, A: Float) -> tuple[F
 
 def cholesky(A: Float) -> tuple[Float, bool]:
     """Lower L with L L^T = A (n, n), which is overwritten, and whether A is positive definite; else L is NaN."""
-    if not len(A):
-        return A, True
-    L, info = dpotrf(A, lower=1, overwrite_a=1)
-    return (L, True) if info == 0 else (np.full_like(A, np.nan), False)
+    try:
+        return dense_cholesky.cholesky(A), True
+    except np.linalg.LinAlgError:
+        return np.full_like(A, np.nan), False
 
 
 def _triangular(L: Float, f: Float, transposed: bool = False) -> Float:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from petsc4py import PETSc
 from scipy.sparse import csr_matrix
 
 from feti_homog.feti.linalg.remainder import Remainder
@@ -22,14 +21,14 @@ class OwnUnknowns:
         inner, left: (i,) and (f,) positions of I and F among the rank's unknowns.
         solver: solves with A_II; None if I is empty, or if A_II is not definite.
         coupling: (i, f) A_IF.
-        error: what PETSc says of an A_II that is not definite.
+        error: why A_II is not definite, if it is not.
     """
 
     inner: Int
     left: Int
     solver: DirectSolver | None
     coupling: csr_matrix
-    error: PETSc.Error | None
+    error: np.linalg.LinAlgError | None
 
     def forward(self, right: Float) -> Float:
         """(f, k) what the elimination leaves of right-hand sides (u, k)."""
@@ -64,7 +63,7 @@ def eliminate_own(unknowns: Int, copies: Int, part: csr_matrix, prefix: str) -> 
         solver = DirectSolver(rows[:, inner].tocsr(), prefix) if len(inner) else None
         if len(left):
             matrix[:] = schur_complement(part, left)
-    except PETSc.Error as caught:
+    except np.linalg.LinAlgError as caught:
         matrix[:], error = np.nan, caught
     own = OwnUnknowns(inner, left, solver, rows[:, left].tocsr(), error)
     some, once = copies[left], np.ones(len(left), np.int64)

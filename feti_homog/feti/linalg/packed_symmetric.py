@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.linalg.blas import dtrmm
-from scipy.linalg.lapack import dlauum, dpotrf, dtrtri
+from scipy.linalg.lapack import dlauum, dtrtri
 
+from feti_homog.feti.linalg.dense_cholesky import check_lapack, cholesky
 from feti_homog.feti.thresholds import MIRRORED_BLOCK_ROWS, TRIANGLE_INVERSE_ROWS
 from feti_homog.typing import Float
 
@@ -18,18 +19,17 @@ def invert_upper(A: Float) -> None:
     Raises:
         LinAlgError: A is not positive definite.
     """
-    info = dpotrf(A, lower=0, clean=0, overwrite_a=1)[1]
-    if info:
-        raise np.linalg.LinAlgError(f"not positive definite (LAPACK info {info})")
+    cholesky(A, lower=False, clean=False)
     _invert_triangle(A)
-    dlauum(A, lower=0, overwrite_c=1)
+    check_lapack("dlauum", dlauum(A, lower=0, overwrite_c=1)[1])
 
 
 def _invert_triangle(U: Float) -> None:
     """U <- U^-1 for the upper triangle of U, by halves: OpenBLAS inverts large ones column by column."""
     n = len(U)
     if n <= TRIANGLE_INVERSE_ROWS:
-        U[:] = dtrtri(U, lower=0)[0]
+        U[:], info = dtrtri(U, lower=0)
+        check_lapack("dtrtri", info)
         return
     first, corner, last = U[: n // 2, : n // 2], U[: n // 2, n // 2 :], U[n // 2 :, n // 2 :]
     _invert_triangle(first)

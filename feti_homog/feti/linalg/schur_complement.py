@@ -7,6 +7,7 @@ from petsc4py import PETSc
 from scipy.sparse import csr_matrix
 
 from feti_homog.common import petsc_ctypes
+from feti_homog.feti.linalg.factor_status import check_factor, mumps_error, power_of_two
 from feti_homog.typing import Float, Int
 
 # What MUMPS says of a workspace that is smaller than it needs, and per cent more than its estimate that it then gets.
@@ -19,29 +20,49 @@ def schur_complement(matrix: csr_matrix, rows: Int) -> Float:
     Options have the prefix `feti_schur_`.
 
     Raises:
+        LinAlgError: the rest of the matrix is not positive definite, or has entries that are not finite.
         MemoryError: MUMPS cannot factor it, for want of memory as a rule.
     """
     if len(rows) == matrix.shape[0]:
         return np.asarray(matrix.toarray(order="F"))
+    scale = power_of_two(matrix.diagonal())
     matrix.sort_indices()
+    # In place and back, which changes no digit: a copy would be as large as the matrix.
+    matrix.data *= scale
+    try:
+        schur = _by_mumps(matrix, rows)
+    finally:
+        matrix.data /= scale
+    schur /= scale
+    return schur
+
+
+def _by_mumps(matrix: csr_matrix, rows: Int) -> Float:
+    """The same of a matrix whose largest entry is about 1."""
     csr = matrix.indptr, matrix.indices, matrix.data
     A = PETSc.Mat().createAIJWithArrays(matrix.shape, csr, comm=PETSc.COMM_SELF)
     A.setOption(PETSc.Mat.Option.SPD, True)
     some = PETSc.IS().createGeneral(rows.astype(PETSc.IntType), comm=PETSc.COMM_SELF)
     try:
-        for workspace in MORE_WORKSPACE:
-            pc = _factored(A, some, workspace)
-            try:
-                error = _error(pc)
-                if not error[0]:
-                    return petsc_ctypes.schur_complement(pc.getFactorMatrix(), len(rows))
-            finally:
-                pc.destroy()
-            if error[0] not in TOO_SMALL:
-                break
+        pc = _with_room(A, some)
+        try:
+            check_factor(pc)
+            return petsc_ctypes.schur_complement(pc.getFactorMatrix(), len(rows))
+        finally:
+            pc.destroy()
     finally:
         A.destroy()
-    raise MemoryError(f"MUMPS cannot make a Schur complement: INFOG(1) = {error[0]}, INFOG(2) = {error[1]}")
+
+
+def _with_room(A: PETSc.Mat, rows: PETSc.IS) -> PETSc.PC:
+    """The partial factorization, with the first of MORE_WORKSPACE that is enough, or the last."""
+    *fewer, last = MORE_WORKSPACE
+    for workspace in fewer:
+        pc = _factored(A, rows, workspace)
+        if mumps_error(pc.getFactorMatrix())[0] not in TOO_SMALL:
+            return pc
+        pc.destroy()
+    return _factored(A, rows, last)
 
 
 def _factored(A: PETSc.Mat, rows: PETSc.IS, workspace: int | None) -> PETSc.PC:
@@ -53,19 +74,10 @@ def _factored(A: PETSc.Mat, rows: PETSc.IS, workspace: int | None) -> PETSc.PC:
     pc.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
     pc.setFromOptions()
     pc.setFactorSetUpSolverType()
-    if pc.getFactorSolverType() == PETSc.Mat.SolverType.MUMPS:
-        # MUMPS' own scaling loses digits of coarse matrices, which are scaled.
-        pc.getFactorMatrix().setMumpsIcntl(8, 0)
-        if workspace is not None:
-            pc.getFactorMatrix().setMumpsIcntl(14, workspace)
+    # MUMPS' own scaling loses digits of coarse matrices, which are scaled.
+    pc.getFactorMatrix().setMumpsIcntl(8, 0)
+    if workspace is not None:
+        pc.getFactorMatrix().setMumpsIcntl(14, workspace)
     petsc_ctypes.set_schur(pc.getFactorMatrix(), rows)
     pc.setUp()
     return pc
-
-
-def _error(pc: PETSc.PC) -> tuple[int, int]:
-    """MUMPS' INFOG(1) and INFOG(2) if the first is an error, of which PETSc says nothing; else zeros."""
-    if pc.getFactorSolverType() != PETSc.Mat.SolverType.MUMPS:
-        return 0, 0
-    first, second = (int(pc.getFactorMatrix().getMumpsInfog(k)) for k in (1, 2))
-    return (first, second) if first < 0 else (0, 0)

@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 import weakref
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import numpy as np
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix
 
 from feti_homog.errors import CaseError
+from feti_homog.feti.linalg.factor_status import check_factor, power_of_two
 from feti_homog.feti.thresholds import CHOLMOD_COLUMNS_ONE_BY_ONE, ITERATIVE_RTOL, MUMPS_EXTRA_WORKSPACE_PERCENT
 from feti_homog.typing import Float
 
 # PETSc's error code for a factorization that the chosen library does not have (PETSC_ERR_MISSING_FACTOR).
 MISSING_FACTOR = 92
+# With these CHOLMOD makes L L^T of small matrices too, which those that are indefinite do not have: D of its own
+# L D L^T may have any sign.
+DEFINITE = {"mat_cholmod_final_asis": False, "mat_cholmod_final_ll": True}
 
 
 class DirectSolver:
@@ -25,10 +31,11 @@ class DirectSolver:
         """Factorize.  Options under `prefix` (default: cholesky by CHOLMOD).
 
         Raises:
-            PETSc.Error: the matrix is not positive definite.
-            CaseError: the library that the options name has no such factorization.
+            LinAlgError, MemoryError, CaseError: as `factor_by_mumps`.
         """
-        self._ksp = factor_by_cholmod(matrix, prefix)
+        self._scale = power_of_two(matrix.diagonal())
+        scaled = csr_matrix((self._scale * matrix.data, matrix.indices, matrix.indptr), shape=matrix.shape)
+        self._ksp = factor_by_cholmod(scaled, prefix)
         self._x, self._b = self._ksp.getOperators()[0].createVecs()
         self._destroy = weakref.finalize(self, _destroy, self._ksp, self._x, self._b)
 
@@ -39,7 +46,7 @@ class DirectSolver:
             for x, b in zip(X.reshape(len(B), -1).T, B.reshape(len(B), -1).T, strict=True):
                 self._b.setArray(b)
                 self._ksp.solve(self._b, self._x)
-                x[:] = self._x.getArray(readonly=True)
+                np.multiply(self._x.getArray(readonly=True), self._scale, out=x)
             return X
         X = np.empty(B.shape, order="F")
         right = np.asfortranarray(B)
@@ -47,6 +54,7 @@ class DirectSolver:
         self._ksp.getPC().matApply(*matrices)
         for matrix in matrices:
             matrix.destroy()
+        X *= self._scale
         return X
 
     def destroy(self) -> None:
@@ -60,11 +68,15 @@ def iterations(ksp: PETSc.KSP) -> int:
 
 
 def factor_by_cholmod(matrix: csr_matrix, prefix: str) -> PETSc.KSP:
-    """A KSP with the factorization of a symmetric definite matrix; options under `prefix`, CHOLMOD by default."""
+    """A KSP with the factorization of a symmetric definite matrix; options under `prefix`, CHOLMOD by default.
+
+    Raises as `factor_by_mumps`.
+    """
     A = _sequential(matrix)
     A.setOption(PETSc.Mat.Option.SPD, True)
-    ksp = _direct_ksp(A, prefix, PETSc.Mat.SolverType.CHOLMOD)
-    ksp.setUp()
+    with _refusing_indefinite(prefix):
+        ksp = _direct_ksp(A, prefix, PETSc.Mat.SolverType.CHOLMOD)
+        _set_up(ksp)
     return ksp
 
 
@@ -75,6 +87,11 @@ def factor_by_mumps(A: PETSc.Mat, prefix: str, near_kernel: Float | None = None)
     The matrix should have rows and columns of similar size: MUMPS does not scale it here, for its own scaling loses
     all digits of coarse problems with contrasts of 1e6.  Multigrid learns of the `near_kernel` (n, k), orthonormal
     vectors of little energy.
+
+    Raises:
+        LinAlgError: the matrix is not positive definite, or too near to one that is singular.
+        MemoryError: MUMPS could not factor.
+        CaseError: the library that the options name has no such factorization.
     """
     _tell(A, near_kernel)
     A.setOption(PETSc.Mat.Option.SPD, True)
@@ -83,8 +100,32 @@ def factor_by_mumps(A: PETSc.Mat, prefix: str, near_kernel: Float | None = None)
     if pc.getFactorSolverType() == PETSc.Mat.SolverType.MUMPS:
         pc.getFactorMatrix().setMumpsIcntl(8, 0)
         pc.getFactorMatrix().setMumpsIcntl(14, MUMPS_EXTRA_WORKSPACE_PERCENT)
-    ksp.setUp()
+    _set_up(ksp)
     return ksp
+
+
+def _set_up(ksp: PETSc.KSP) -> None:
+    """Factor, and read what the library says of it."""
+    try:
+        ksp.setUp()
+    except PETSc.Error as error:
+        words = str(error).splitlines()[-1].split("] ", 1)[-1]
+        raise np.linalg.LinAlgError(f"not positive definite ({words})") from error
+    check_factor(ksp.getPC())
+
+
+@contextmanager
+def _refusing_indefinite(prefix: str) -> Iterator[None]:
+    """Have the options DEFINITE, those that are given excepted."""
+    database = PETSc.Options(prefix)
+    added = {name: value for name, value in DEFINITE.items() if not database.hasName(name)}
+    for name, value in added.items():
+        database.setValue(name, value)
+    try:
+        yield
+    finally:
+        for name in added:
+            database.delValue(name)
 
 
 def _tell(A: PETSc.Mat, near_kernel: Float | None) -> None:

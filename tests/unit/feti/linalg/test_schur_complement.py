@@ -29,7 +29,7 @@ def test_a_failure_of_mumps_is_told():
     options = PETSc.Options("feti_schur_")
     options.setValue("mat_mumps_icntl_23", 1)
     try:
-        with pytest.raises(MemoryError, match=r"MUMPS cannot make a Schur complement: INFOG\(1\) = -"):
+        with pytest.raises(MemoryError, match=r"MUMPS cannot factor: INFOG\(1\) = -"):
             schur_complement(laplacian(60), np.arange(60))
     finally:
         options.delValue("mat_mumps_icntl_23")

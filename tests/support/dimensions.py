@@ -1,0 +1,121 @@
+"""Physical dimensions of a case's entries and of those of result.json, and both in other units."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from feti_homog.analysis.result import Result, schema_keys
+
+# Powers of stress, length and temperature by the words that the reference of result.json has for a unit.
+OF_UNITS = {
+    "": (0, 0, 0),
+    "degrees": (0, 0, 0),
+    "unit of the moduli": (1, 0, 0),
+    "1 / unit of the moduli": (-1, 0, 0),
+    "unit of the cell": (0, 1, 0),
+    "unit of the cell squared": (0, 2, 0),
+    "unit of the moduli times that of the cell": (1, 1, 0),
+    "unit of the moduli per unit of temperature": (1, 0, -1),
+    "1 / temperature": (0, 0, -1),
+    "1 / unit of temperature": (0, 0, -1),
+}
+# Entries whose unit the reference gives in words, or that are temperatures.
+OF_PATHS = {
+    "path[].temperature": (0, 0, 1),
+    "load.temperature": (0, 0, 1),
+    "envelope[].temperature": (0, 0, 1),
+}
+# What is no number of the response: where and when it was computed, and the case itself.
+APART = {"case", "digest", "version", "timings", "memory", "checksum", "result_h5"}
+
+# The same of the entries of a case, by their names.
+OF_CASE = {
+    r"young|E\d|E_\w+|G\d\d|G_\w+|stiffness|\w+_strength|S\d\d|stress": (1, 0, 0),
+    r"(normal|tangential|axial)_stiffness": (1, -1, 0),
+    r"toughness\w*": (1, 1, 0),
+    r"width|height|radius|x|y": (0, 1, 0),
+    r"expansion\w*": (0, 0, -1),
+    r"temperature": (0, 0, 1),
+}
+# Strains have the form of moduli there.
+STRAINS = re.compile(r"E\d\d")
+
+
+@dataclass(frozen=True)
+class Units:
+    """What the numbers of each dimension are multiplied by."""
+
+    stress: float = 1.0
+    length: float = 1.0
+    temperature: float = 1.0
+
+    def of(self, powers: tuple[int, int, int]) -> float:
+        """The factor of numbers with these powers of stress, length and temperature."""
+        return self.stress ** powers[0] * self.length ** powers[1] * self.temperature ** powers[2]
+
+    def case(self, document: Mapping[str, Any]) -> dict[str, Any]:
+        """A case in these units."""
+        return {name: value if name == "petsc" else self._entry(name, value) for name, value in document.items()}
+
+    def _entry(self, name: str, value: Any) -> Any:
+        if isinstance(value, dict):
+            return {key: self._entry(key, item) for key, item in value.items()}
+        if isinstance(value, list):
+            return [self._entry(name, item) for item in value]
+        found = [powers for words, powers in OF_CASE.items() if re.fullmatch(words, name)]
+        is_number = isinstance(value, float | int) and not isinstance(value, bool)
+        if not is_number or not found or STRAINS.fullmatch(name):
+            return value
+        return value * self.of(found[0])
+
+
+def numbers(result: Result) -> Iterator[tuple[str, tuple[int, int, int], np.ndarray]]:
+    """Place, powers and values of all numbers of result.json that belong to the response."""
+    units = {key.path: key.unit for key in schema_keys()}
+    for path, value in _leaves(result.document, ""):
+        if path.split(".")[0] in APART:
+            continue
+        general = re.sub(r"\[\d+\]", "[]", path)
+        words = units.get(general, units.get(re.sub(r"\.[^.]+$", "", general), None))
+        assert words is not None, f"result.json's {path} is not described"
+        powers = OF_PATHS.get(general, OF_UNITS.get(words))
+        assert powers is not None, f"{path}: no dimension of '{words}'"
+        yield path, powers, value
+
+
+def _leaves(value: Any, path: str) -> Iterator[tuple[str, np.ndarray]]:
+    """The numbers of a document by their places; texts and what is absent are none."""
+    if isinstance(value, Mapping):
+        for name, item in value.items():
+            yield from _leaves(item, f"{path}.{name}" if path else name)
+    elif isinstance(value, list | tuple) and any(isinstance(item, Mapping) for item in value):
+        for k, item in enumerate(value):
+            yield from _leaves(item, f"{path}[{k}]")
+    elif value is not None:
+        array = np.asarray(value)
+        if array.dtype.kind in "ifb":
+            yield path, array
+
+
+def compare(one: Result, other: Result, units: Units) -> dict[str, float]:
+    """By the place of every number the largest difference of `other` from `one` in its units, relative to the largest
+    entry there; inf where one has none."""
+    ours, theirs = ({path: (powers, v) for path, powers, v in numbers(result)} for result in (one, other))
+    off = dict.fromkeys(ours.keys() ^ theirs.keys(), np.inf)
+    for path in ours.keys() & theirs.keys():
+        (powers, expected), (_, found) = ours[path], theirs[path]
+        if expected.shape != found.shape:
+            off[path] = np.inf
+            continue
+        with np.errstate(all="ignore"):
+            difference = np.abs(found / units.of(powers) - expected)
+            size = np.abs(expected).max(initial=0.0)
+        off[path] = 0.0 if np.array_equal(found / units.of(powers), expected, equal_nan=True) else float(
+            difference.max(initial=0.0) / size if size else np.inf
+        )
+    return off
