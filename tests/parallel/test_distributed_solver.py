@@ -129,7 +129,8 @@ def test_a_matrix_that_is_not_definite_is_told_on_every_rank(comm, kind):
     """Of unknowns that all ranks have, and of those that the last has for itself."""
     shared = np.arange(2), csr_matrix(np.ones((2, 2)) / comm.size)
     u = 2 if comm.rank == comm.size - 1 else 0
-    for unknowns, part in (shared, (np.arange(u), csr_matrix(np.ones((u, u))))):
+    own = [(np.arange(u), csr_matrix(wrong[:u, :u])) for wrong in (np.ones((2, 2)), np.array([[1.0, 2.0], [2.0, 1.0]]))]
+    for unknowns, part in (shared, *own):
         with case_options(KINDS[kind]), pytest.raises(np.linalg.LinAlgError):
             made(comm, 2, unknowns, part)
 
@@ -150,11 +151,9 @@ def test_a_front_that_is_not_definite_is_told_on_every_rank(comm, block):
     """Where the first two ranks meet, and, of unknowns that every rank has, the last front."""
     wrong = grid(8).toarray()
     first = -(-len(wrong) // comm.size) % len(wrong)
-    wrong[first, first] = -1.0 if comm.size > 1 else 0.0
+    wrong[first, first] = -1.0
     everywhere = np.arange(len(wrong)), csr_matrix(wrong / comm.size)
     for unknowns, part in (share(comm, wrong, by_blocks(comm, len(wrong))), everywhere):
-        if comm.size == 1:  # CHOLMOD takes what is indefinite, but not what is singular.
-            part = csr_matrix(np.ones(wrong.shape))
         with pytest.raises(np.linalg.LinAlgError):
             eliminated(comm, len(wrong), unknowns, part, block)
 

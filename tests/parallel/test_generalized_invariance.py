@@ -1,4 +1,4 @@
-"""What generalized plane strain must not depend on: axes, units, ranks, cuts, operators and coarse spaces."""
+"""What generalized plane strain must not depend on: axes, ranks, cuts, operators and coarse spaces."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import pytest
 from mpi4py import MPI
 from reference.spatial_forms import IN_PLANE, rotated, rotated_strain
 from support.cases import make_case, solve
-from support.generalized_phases import CARBON, CRYSTAL, WOOD
+from support.generalized_phases import CRYSTAL, WOOD
 from support.ranks import parallel_assert
 from support.spatial_cells import EPOXY, GLASS, error, solved
 from unit.cell.faulty_meshes import MshFile, grid
@@ -99,29 +99,6 @@ def test_plane_strain_is_a_block(comm):
     _, L, _ = solve(make_case(**phases, **cell), comm)
     C = solved(comm, **PHASES, **cell).effective_stiffness
     assert error(C[np.ix_(IN_PLANE, IN_PLANE)], L) < EXACT
-
-
-def scaled(phase, stress, temperature):
-    """A phase in other units of stress and temperature."""
-    moduli = {k: v * stress for k, v in phase.items() if k in ("young", "stiffness") or k[0] in "EG"}
-    expansions = {k: v for k, v in phase.items() if k.startswith("expansion")}
-    return phase | moduli | {k: v * temperature for k, v in expansions.items()}
-
-
-@pytest.mark.parametrize("width", [1e-5, 7.0])
-def test_units_of_length_stress_and_temperature(comm, width):
-    """A cell of metres, Pa and 1/K, and one of micrometres, GPa and 1e-6/K: on springs, debonded, in contact."""
-    stress, temperature, stiffness = 1e9, 1e-6, 20.0
-    results = []
-    for L, s, t in ((1.0, 1.0, 1.0), (width, stress, temperature)):
-        phases = {"matrix": scaled(EPOXY, s, t), "fibre": scaled(CARBON, s, t)}
-        keys = {"normal_stiffness": stiffness * s / L, "tangential_stiffness": 0.3 * stiffness * s / L}
-        results.append(solved(comm, **phases, width=L, sections={"interface": ARC["interface"] | keys}))
-    one, other = results
-    assert error(other.effective_stiffness / stress, one.effective_stiffness) < EXACT
-    assert error(other.effective_stiffness_compression / stress, one.effective_stiffness_compression) < EXACT
-    for name in ("thermal_stress", "thermal_stress_compression"):
-        assert error(getattr(other, name) / (stress * temperature), getattr(one, name)) < EXACT
 
 
 @pytest.mark.parametrize("keys", [{"width": 3.0}, {"fibre_radius": 5e-6}], ids=str)

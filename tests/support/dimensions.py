@@ -24,12 +24,8 @@ OF_UNITS = {
     "1 / temperature": (0, 0, -1),
     "1 / unit of temperature": (0, 0, -1),
 }
-# Entries whose unit the reference gives in words, or that are temperatures.
-OF_PATHS = {
-    "path[].temperature": (0, 0, 1),
-    "load.temperature": (0, 0, 1),
-    "envelope[].temperature": (0, 0, 1),
-}
+# The same of entries whose unit the reference leaves to the case.
+OF_PATHS = {"path[].temperature": (0, 0, 1), "load.temperature": (0, 0, 1)}
 # What is no number of the response: where and when it was computed, and the case itself.
 APART = {"case", "digest", "version", "timings", "memory", "checksum", "result_h5"}
 
@@ -77,15 +73,14 @@ class Units:
 def numbers(result: Result) -> Iterator[tuple[str, tuple[int, int, int], np.ndarray]]:
     """Place, powers and values of all numbers of result.json that belong to the response."""
     units = {key.path: key.unit for key in schema_keys()}
+    axes = result.case.get("envelope", {}).get("plane", [""])
+    of_paths = OF_PATHS | {"envelope[].factor": (int(axes[0].startswith("S")), 0, 0)}
     for path, value in _leaves(result.document, ""):
         if path.split(".")[0] in APART:
             continue
-        general = re.sub(r"\[\d+\]", "[]", path)
-        words = units.get(general, units.get(re.sub(r"\.[^.]+$", "", general), None))
-        assert words is not None, f"result.json's {path} is not described"
-        powers = OF_PATHS.get(general, OF_UNITS.get(words))
-        assert powers is not None, f"{path}: no dimension of '{words}'"
-        yield path, powers, value
+        general = _kind(path)
+        name = general if general in units else general.rpartition(".")[0] + ".PHASE"
+        yield path, of_paths[general] if general in of_paths else OF_UNITS[units[name]], value
 
 
 def _leaves(value: Any, path: str) -> Iterator[tuple[str, np.ndarray]]:
@@ -102,20 +97,23 @@ def _leaves(value: Any, path: str) -> Iterator[tuple[str, np.ndarray]]:
             yield path, array
 
 
-def compare(one: Result, other: Result, units: Units) -> dict[str, float]:
-    """By the place of every number the largest difference of `other` from `one` in its units, relative to the largest
-    entry there; inf where one has none."""
+def differences(one: Result, other: Result, units: Units) -> dict[str, float]:
+    """By the place of each number of `other` that is not that of `one` in its units the largest difference, relative
+    to the largest number of that kind in the result, of checks absolute; inf where one of the results has none."""
     ours, theirs = ({path: (powers, v) for path, powers, v in numbers(result)} for result in (one, other))
-    off = dict.fromkeys(ours.keys() ^ theirs.keys(), np.inf)
+    off, sizes = dict.fromkeys(ours.keys() ^ theirs.keys(), np.inf), {}
+    for path, (_, values) in ours.items():
+        sizes[_kind(path)] = max(sizes.get(_kind(path), 0.0), np.abs(values).max(initial=0.0))
     for path in ours.keys() & theirs.keys():
-        (powers, expected), (_, found) = ours[path], theirs[path]
+        expected, found = ours[path][1], theirs[path][1] / units.of(ours[path][0])
         if expected.shape != found.shape:
             off[path] = np.inf
-            continue
-        with np.errstate(all="ignore"):
-            difference = np.abs(found / units.of(powers) - expected)
-            size = np.abs(expected).max(initial=0.0)
-        off[path] = 0.0 if np.array_equal(found / units.of(powers), expected, equal_nan=True) else float(
-            difference.max(initial=0.0) / size if size else np.inf
-        )
+        elif not np.array_equal(expected, found, equal_nan=True):
+            size = 1.0 if path.startswith("checks.") else sizes[_kind(path)]
+            off[path] = float(np.abs(found - expected).max() / size) if size else np.inf
     return off
+
+
+def _kind(path: str) -> str:
+    """A place without the numbers in lists."""
+    return re.sub(r"\[\d+\]", "[]", path)

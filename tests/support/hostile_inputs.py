@@ -66,6 +66,14 @@ CASES: dict[str, tuple[str, str]] = {
         "-feti_ksp_initial_guess_nonzero maybe: ",
     ),
     "no such factorization": (petsc('feti_sub_pc_type = "lux"'), "-feti_sub_pc_type lux: expected one of cholesky, lu"),
+    "factors that leave nothing": (
+        petsc('feti_schur_pc_type = "lu"'),
+        "-feti_schur_pc_type lu: expected cholesky, for",
+    ),
+    "library that leaves nothing": (
+        petsc('feti_schur_pc_factor_mat_solver_type = "cholmod"'),
+        "-feti_schur_pc_factor_mat_solver_type cholmod: expected mumps",
+    ),
     "no such ordering": (petsc("feti_schur_mat_mumps_icntl_7 = 99"), "-feti_schur_mat_mumps_icntl_7 99: expected one"),
     "tolerance of true": (petsc("feti_ksp_rtol = true"), "-feti_ksp_rtol true: expected a number above 0"),
     "denormal modulus": (

@@ -1,7 +1,7 @@
 """Powers of two by which matrices are scaled for their factorization, and the statuses that libraries return of one.
 
-Libraries have thresholds without a unit: MUMPS replaces pivots below about 1e-16.  So each matrix is factored with its
-largest diagonal entry between 1 and 2.  A power of two changes no digit.
+Libraries have thresholds without a unit: where MUMPS leaves a Schur complement, it replaces pivots below about 1e-16.
+So each matrix is factored with its largest diagonal entry between 1 and 2.  A power of two changes no digit.
 """
 
 from __future__ import annotations
