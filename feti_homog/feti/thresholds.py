@@ -131,15 +131,15 @@ INFLUENCE_COLUMNS = 400
 # Influence columns that each rank finds together at least, with those of bonds near the one that breaks: fewer and
 # larger batches, but columns that may not be needed (`scripts/benchmark_path --to-the-end`).
 INFLUENCE_BATCH = 32
-# Stiffness of the fibres over that of the matrix, as the diagonals of K have them, above which influence columns take
-# the forces of the matrix: those of the fibres lose as many digits as this has.
+# Stiffness of a fibre over that of what is around it, as the diagonals of K have them, above which influence columns
+# take the forces of the latter: those of the fibre lose as many digits as this has.
 STIFF_FIBRES = 1e3
 # Relative error of the bordered inverse above which it is made anew: borders that pass by a singular block lose digits.
 INVERSE_ERROR = 1e-7
 # Steps of the power method for the norm of the inverse of the dual operator, which find it from below, and by how much
 # what they find is multiplied.
 NORM_ITERATIONS, NORM_MARGIN = 30, 1.2
-# Pivots of H on inactive rows, relative to its largest diagonal entry, that are rounding: forces on a free fibre as a
+# Pivots of H on inactive rows, relative to the stiffness beside each, that are rounding: forces on a free fibre as a
 # whole have none.
 SINGULAR_PIVOT = 1e-10
 

@@ -14,14 +14,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from feti_homog.errors import ConvergenceError
 from feti_homog.feti.preconditioners.influence import Influence
-from feti_homog.interface.contact import BONDED, Status
+from feti_homog.interface.contact import BONDED, Interface, Status
 from feti_homog.interface.energy_criterion import EnergyCriterion
 from feti_homog.interface.loaded_cell import LoadedCell
 from feti_homog.typing import Bool, Float, Int
 
-# Share of a spring's stiffness that the inverse of the dual operator is where only rounding is left of it.
+# Share of the stiffness beside a bond that the inverse of the dual operator is where only rounding is left of it.
 RIGID = 1e-9
+# Largest rounding of the inverse of the dual operator with which energies are told: bonds whose utilisation differs by
+# less break together.
+MOST_ROUNDING = 1e-6
 
 
 @dataclass(frozen=True)
@@ -32,7 +36,7 @@ class Tips:
         node: (t,) their numbers.
         H: (t, 2, 2) their blocks of the inverse of the dual operator.
         length: (t,) that they stand for.
-        stiffness: (t, c) the most that H can be, of a spring its own.
+        stiffness: (t, c) the most that H can be, as `Influence.stiffness`.
         axial: (t,) the same blocks for slip along the fibres; empty where there is none.
     """
 
@@ -90,21 +94,33 @@ class TipCriterion:
         return utilisation
 
     def tips(self, cell: LoadedCell, status: Status) -> Tips:
-        """The tips that this rank owns.  Collective."""
-        cell.plane.solver.activate(cell.plane.active(status))
+        """The tips that this rank owns.  Collective.
+
+        Raises:
+            ConvergenceError: rounding hides what breaks release.
+        """
+        self._activate(self.influence, cell.plane, status)
         numbers, mine = self._own(status)
-        H = self.influence.inverse_blocks(self.influence.neighbours.rows[numbers][:, None] + np.arange(2))
-        own, H = numbers[mine] - self.influence.neighbours.first, H[mine]
-        length, springs = cell.nodes.length[own], self.springs.at(own)
-        stiffness = np.stack([length * springs.normal_stiffness, length * springs.tangential_stiffness], axis=1)
-        stiffness, axial = np.minimum(stiffness, self.influence.norm), np.zeros(0)
+        rows = self.influence.neighbours.rows[numbers][:, None] + np.arange(2)
+        H, stiffness, axial = self.influence.inverse_blocks(rows)[mine], self.influence.stiffness[rows[mine]], np.zeros(0)
+        own = numbers[mine] - self.influence.neighbours.first
         if self.axial is not None and cell.axial is not None:
-            cell.axial.solver.activate(cell.axial.active(status))
+            self._activate(self.axial, cell.axial, status)
             rows = self.axial.neighbours.rows[numbers]
             axial = self.axial.inverse_blocks(np.stack([rows, rows], axis=1))[mine, 0, 0]
-            most = np.minimum(length * springs.axial_stiffness, self.axial.norm)
-            stiffness = np.column_stack([stiffness, most])
-        return Tips(own, H, length, stiffness, axial)
+            stiffness = np.column_stack([stiffness, self.axial.stiffness[rows[mine]]])
+        return Tips(own, H, cell.nodes.length[own], stiffness, axial)
+
+    @staticmethod
+    def _activate(influence: Influence, interface: Interface, status: Status) -> None:
+        """Let the inverse be that with these bonds.  Collective; raises as `tips`."""
+        interface.solver.activate(interface.active(status))
+        if not influence.rounding <= MOST_ROUNDING:
+            raise ConvergenceError(
+                f'[interface] growth = "released": rounding hides {influence.rounding:.1e} of what breaks release, '
+                f"expected at most {MOST_ROUNDING:g}: springs are too soft beside bodies that are cut or coated, or "
+                'phases too far apart; growth = "springs" bears more'
+            )
 
     def _own(self, status: Status) -> tuple[Int, Bool]:
         """(n,) numbers of the tips of all ranks, and which are this rank's.  Collective."""
@@ -117,7 +133,7 @@ class TipCriterion:
 def released_energy(H: Float, lam: Float, stiffness: Float, contact: bool) -> Float:
     """(m,) energies that the breaks of single bonds release, for their blocks H (m, 2, 2) and forces lam (m, 2).
 
-    `stiffness` (m, 2) is the most that H can be, of a spring its own: where H is rounding beside it, as at the last
+    `stiffness` (m, 2) is the most that H can be: where H is rounding beside it, as at the last
     bond of a fibre, no force can act.  With `contact` faces that would overlap keep their normal force.
     """
     root = np.sqrt(stiffness)

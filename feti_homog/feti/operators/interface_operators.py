@@ -38,8 +38,10 @@ class InterfaceOperators:
         facewise: whether the soft modes of each are to be looked for face by face.
         B: (local rows, n) the constraints on them, and `BT` its transpose.
         of_fibre: (n,) whether each boundary dof is a fibre's, or the inner of two bodies'.
-        diagonal: (n,) of K, with springs that of their chain.
-        compliance: (owned rows,) of the springs that no skin stands for, where fibre and matrix are both cut.
+        body_diagonal: (n,) of K.
+        diagonal: (n,) the same, with springs that of their chain.
+        springs: (owned rows,) compliance of the springs.
+        compliance: the same of those that no skin stands for, where fibre and matrix are both cut.
     """
 
     def __init__(
@@ -66,7 +68,8 @@ class InterfaceOperators:
         self.BT = self.B.T.tocsr()
         sizes = _sizes(jump_operator.shared, subdomains, self.dofs)
         can_condense = bool(PETSc.Sys.hasExternalPackage("mumps"))
-        self.compliance = _of_cut_nodes(jump_operator, compliance)
+        self.springs = np.zeros(jump_operator.owned[1] - jump_operator.owned[0]) if compliance is None else compliance
+        self.compliance = _of_cut_nodes(jump_operator, self.springs)
         self.of_fibre = self._inner_dofs(jump_operator)
         roots = self._compliance_roots(jump_operator, compliance)
         springs = [s.submesh.phase != MATRIX and root is not None for s, root in zip(subdomains, roots, strict=True)]
@@ -75,16 +78,17 @@ class InterfaceOperators:
         self.facewise = [choice.facewise for choice in chosen]
         self.operators: list[InterfaceOperator] = []
         self.skins: list[InterfaceOperator] = []
-        diagonals = [np.zeros(0)]
+        bodies, diagonals = [np.zeros(0)], [np.zeros(0)]
         for subdomain, dofs, choice, root in zip(subdomains, self.dofs, chosen, roots, strict=True):
             operator, diagonal = _factor(subdomain, dofs, choice.explicit)
             self.operators.append(operator)
+            bodies.append(diagonal)
             if root is not None:
-                operator = soft_skin(operator, root)
+                operator = soft_skin(operator, root, subdomain.R[dofs])
                 diagonal = 1.0 / (1.0 / diagonal + np.asarray(root.multiply(root).sum(axis=1)).ravel())
             self.skins.append(operator)
             diagonals.append(diagonal)
-        self.diagonal = np.concatenate(diagonals)
+        self.body_diagonal, self.diagonal = np.concatenate(bodies), np.concatenate(diagonals)
 
     def _compliance_roots(self, jump_operator: JumpOperator, compliance: Float | None) -> list[csr_matrix | None]:
         """Of each subdomain the root of the compliance of its skin, None without springs.  Collective."""
@@ -180,12 +184,12 @@ def _factor(subdomain: Subdomain, dofs: Int, explicit: bool) -> tuple[InterfaceO
     return operator, K.diagonal()[dofs]
 
 
-def _of_cut_nodes(jump_operator: JumpOperator, compliance: Float | None) -> Float:
+def _of_cut_nodes(jump_operator: JumpOperator, compliance: Float) -> Float:
     """(owned rows,) the compliance of the rows where neither fibre nor matrix is whole."""
     first, last = jump_operator.owned
     at = np.searchsorted(jump_operator.rows, first)
     own = jump_operator.copies[at : at + last - first]
-    return np.zeros(len(own)) if compliance is None else np.where((own > 1).all(axis=1), compliance, 0.0)
+    return np.where((own > 1).all(axis=1), compliance, 0.0)
 
 
 def _constrained_dofs(B: csr_matrix, subdomains: Sequence[Subdomain]) -> list[Int]:

@@ -1,33 +1,81 @@
 """A fibre that its matrix holds by springs, as the matrix sees it: a fibre with a soft skin.
 
-At the skin the flexibility is S+ + C and the stiffness
+At the skin the flexibility is S+ + C, with C = T T^T, and the stiffness is S~ = G - G R (R^T G R)^-1 R^T G,
 
-    S~ = S - S T (I + T^T S T)^-1 T^T S,  T T^T = C,
+    G = A - A T (I + T^T A T)^-1 T^T A,  A = S + s R R^T,
 
-which is exact however stiff or soft the springs are.
+for the kernel R, orthonormal, and a stiffness s of the size of S.  However soft the springs are, nothing cancels: A has
+no kernel, R is that of S~ but for rounding of S~, and along the springs
+
+    T^T G = (I + T^T A T)^-1 T^T A
+
+takes the place of the difference.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import LinAlgError, cholesky, solve_triangular
+from scipy.linalg import cho_solve, cholesky, solve_triangular
 from scipy.sparse import csr_matrix, diags
 
-from feti_homog.errors import ConvergenceError
 from feti_homog.feti.operators.explicit import ExplicitInterfaceOperator
 from feti_homog.feti.operators.implicit import ImplicitInterfaceOperator
 from feti_homog.typing import Bool, Float, Int
 
 
+class _Softening:
+    """From products with S to those with S~.
+
+    Attributes:
+        kernel: (n, k) orthonormal.
+        stiffness: s, the mean of S along the springs.
+    """
+
+    def __init__(self, T: csr_matrix, ST: Float, kernel: Float) -> None:
+        """`T` (n, r) has orthogonal columns, S T is `ST`, and `kernel` (n, k) spans that of S."""
+        self.kernel, squares = np.linalg.qr(kernel)[0], np.asarray(T.power(2).sum(axis=0)).ravel()
+        # Unit directions of the springs; each is T's own times the root of a compliance.
+        self._directions = (T @ diags(1.0 / squares)).tocsr()
+        self.stiffness = float(np.mean(np.asarray(T.multiply(ST).sum(axis=0)).ravel() / squares))
+        self._T, self._AT = T, ST + self.stiffness * self.kernel @ (T.T @ self.kernel).T
+        self._factor = cholesky(np.eye(T.shape[1]) + np.asarray(T.T @ self._AT), lower=True), True
+        GR = self._relaxed(self.stiffness * self.kernel)
+        root = np.linalg.cholesky((self.kernel.T @ GR + GR.T @ self.kernel) / 2)
+        self._root_of_kernel = np.asarray(solve_triangular(root, GR.T, lower=True))
+
+    def _along_springs(self, y: Float) -> Float:
+        """T^T G x for y = A x."""
+        return np.asarray(cho_solve(self._factor, self._T.T @ y))
+
+    def _relaxed(self, y: Float) -> Float:
+        """G x for y = A x."""
+        along = self._along_springs(y)
+        z = y - self._AT @ along
+        return np.asarray(z + self._directions @ (along - self._T.T @ z))
+
+    def apply(self, x: Float, Sx: Float) -> Float:
+        """S~ x for x (n,) or (n, k) and S x."""
+        y = Sx + self.stiffness * self.kernel @ (self.kernel.T @ x)
+        return np.asarray(self._relaxed(y) - self._root_of_kernel.T @ (self._root_of_kernel @ x))
+
+    def matrix(self, S: Float) -> Float:
+        """(n, n) S~, symmetric."""
+        A = S + self.stiffness * self.kernel @ self.kernel.T
+        G = self._relaxed(A)
+        # Where only rows are along springs, the columns are no differences either.
+        G += (self._directions @ (self._T.T @ G - (G @ self._T).T)).T
+        return np.asarray((G + G.T) / 2 - self._root_of_kernel.T @ self._root_of_kernel, order="F")
+
+
 class DenseSoftSkin(ExplicitInterfaceOperator):
     """The boundary operators of a body with its skin."""
 
-    def __init__(self, body: ExplicitInterfaceOperator, T: csr_matrix) -> None:
-        """`T` (n, r) is the root of the springs' compliance on the boundary dofs."""
+    def __init__(self, body: ExplicitInterfaceOperator, T: csr_matrix, kernel: Float) -> None:
+        """`T` (n, r) is the root of the springs' compliance on the boundary dofs, `kernel` (n, k) of S there."""
         self._body, self._T, self.n = body, T, body.n
         S = body.S
-        half = _half(T, T.T @ S)
-        self._S = np.asfortranarray(S - half.T @ half)
+        self._S = _Softening(T, (T.T @ S).T, kernel).matrix(S)
+        self._softer = float(self._S.diagonal().mean() / S.diagonal().mean())
 
     def apply_schur(self, x: Float, out: Float | None = None) -> Float:
         """S~ x for x (n,) or (n, k), into `out` if it is given."""
@@ -49,21 +97,23 @@ class DenseSoftSkin(ExplicitInterfaceOperator):
         return self._S
 
     def regularisation(self, P: csr_matrix) -> Float:
-        """(m, m) P^T rho Rf Rf^T P for P (n, m): what makes S~ definite, whose kernel is that of S."""
-        return self._body.regularisation(P)
+        """(m, m) P^T rho Rf Rf^T P for P (n, m), rho as soft as the skin: what makes S~ definite, whose kernel is that
+        of S."""
+        return self._softer * self._body.regularisation(P)
 
 
 class SparseSoftSkin(ImplicitInterfaceOperator):
     """The same of a body whose operators are sparse factors, for few springs."""
 
-    def __init__(self, body: ImplicitInterfaceOperator, T: csr_matrix) -> None:
+    def __init__(self, body: ImplicitInterfaceOperator, T: csr_matrix, kernel: Float) -> None:
+        """Arguments as of `DenseSoftSkin`."""
         self._body, self._T = body, T
-        self._half = _half(T, body.apply_schur(T.toarray(order="F")).T)
+        self._softening = _Softening(T, body.apply_schur(T.toarray(order="F")), kernel)
 
     def apply_schur(self, x: Float, out: Float | None = None) -> Float:
         """S~ x for x (n,) or (n, k), into `out` if it is given."""
         y = self._body.apply_schur(x, out)
-        y -= self._half.T @ (self._half @ x)
+        y[:] = self._softening.apply(x, y)
         return y
 
     def apply_flexibility(self, x: Float, out: Float | None = None) -> Float:
@@ -74,27 +124,11 @@ class SparseSoftSkin(ImplicitInterfaceOperator):
 
 
 def soft_skin(
-    body: ExplicitInterfaceOperator | ImplicitInterfaceOperator, T: csr_matrix
+    body: ExplicitInterfaceOperator | ImplicitInterfaceOperator, T: csr_matrix, kernel: Float
 ) -> ExplicitInterfaceOperator | ImplicitInterfaceOperator:
-    """The operators of a body whose springs have the compliance T T^T on its boundary dofs."""
-    return DenseSoftSkin(body, T) if isinstance(body, ExplicitInterfaceOperator) else SparseSoftSkin(body, T)
-
-
-def _half(T: csr_matrix, TS: Float) -> Float:
-    """(r, n) H with H^T H = S T (I + T^T S T)^-1 T^T S, for T^T S (r, n).
-
-    Raises:
-        ConvergenceError: the springs are so soft beside the body that rounding of S hides them.
-    """
-    middle = np.eye(T.shape[1]) + np.asarray(T.T @ TS.T)
-    try:
-        factor = cholesky(middle, lower=True)
-    except LinAlgError as error:
-        ratio = np.abs(middle.diagonal()).max()
-        raise ConvergenceError(
-            f"[interface] springs {ratio:.1e} times as soft as the body that they hold: rounding hides them"
-        ) from error
-    return np.asarray(solve_triangular(factor, TS, lower=True))
+    """The operators of a body with the kernel R (n, k) whose springs have the compliance T T^T on its boundary dofs."""
+    make = DenseSoftSkin if isinstance(body, ExplicitInterfaceOperator) else SparseSoftSkin
+    return make(body, T, kernel)  # type: ignore[arg-type]
 
 
 def compliance_root(B: csr_matrix, compliance: Float, copies: Int, of_fibre: Bool) -> csr_matrix:

@@ -13,6 +13,8 @@ from feti_homog.typing import Float, Int
 class BorderedInverse:
     """N = M[C, C]^-1 for members C of a quasi-definite matrix M, the same on all ranks.
 
+    Rows may differ in unit and by many orders: each has a size of its own, and what is rounding is so beside that.
+
     Attributes:
         members: (k,) C, in the order of the rows of N.
         N: (k, k).
@@ -24,11 +26,13 @@ class BorderedInverse:
         self._comm = comm
         self.members: Int = np.zeros(0, np.int64)
         self.N = self.M = np.zeros((0, 0))
+        self._root = np.zeros(0)
 
-    def append(self, M: Float, new: Int, sign: int) -> None:
+    def append(self, M: Float, size: Float, new: Int, sign: int) -> None:
         """Border with the members `new`, on which `sign` M, Schur's complement of the others, is semi-definite.
 
-        Those that depend on others, as rank 0 finds, are left out.  With s the pivots, b = M[C, new], w = N b,
+        `size` (n,) is what the diagonal of `sign` M may be; less than a share SINGULAR_PIVOT of it is rounding.  Those
+        that depend on others, as rank 0 finds, are left out.  With s the pivots, b = M[C, new], w = N b,
 
             N <- [ N + w s^-1 w^T    -w s^-1 ]
                  [ -s^-1 w^T          s^-1   ].
@@ -39,14 +43,14 @@ class BorderedInverse:
             return
         border = M[self.members[:, None], new]
         w = self.N @ border
-        pivots = sign * (M[new[:, None], new] - border.T @ w)
-        rounding = SINGULAR_PIVOT * max((sign * M.diagonal()).max(), 0.0)
-        factor, order, rank, _ = dpstrf(pivots, tol=rounding, lower=1)
+        own = np.sqrt(np.maximum(size[new], sign * M[new, new]))
+        pivots = sign * (M[new[:, None], new] - border.T @ w) / np.outer(own, own)
+        factor, order, rank, _ = dpstrf(pivots, tol=SINGULAR_PIVOT, lower=1)
         # The first pivot is taken whatever it is.
-        rank = min(rank, int((factor.diagonal() ** 2 > rounding).sum()))
+        rank = min(rank, int((factor.diagonal() ** 2 > SINGULAR_PIVOT).sum()))
         # Other ranks may round another way, pivot in another order, or find no root where one is nearly singular.
         kept, root = self._comm.bcast((order[:rank] - 1, np.tril(factor[:rank, :rank])))
-        half = np.linalg.inv(root)
+        half = np.linalg.inv(root) / own[kept]
         inverse, w = sign * half.T @ half, w[:, kept]
         k, rank, scaled = len(self.members), len(kept), w @ inverse
         N = np.empty((k + rank, k + rank))
@@ -54,7 +58,7 @@ class BorderedInverse:
         N[:k, :k] += self.N
         N[:k, k:], N[k:, :k], N[k:, k:] = -scaled, -scaled.T, inverse
         self.N, self.members = N, np.concatenate([self.members, new[kept]])
-        self.M = M[self.members[:, None], self.members]
+        self.M, self._root = M[self.members[:, None], self.members], np.concatenate([self._root, own[kept]])
 
     def remove(self, gone: Int) -> None:
         """Take members out: N <- N_cc - N_cg N_gg^-1 N_gc."""
@@ -62,9 +66,10 @@ class BorderedInverse:
             return
         leaves = np.isin(self.members, gone)
         c, g = np.flatnonzero(~leaves), np.flatnonzero(leaves)
-        coupling = self.N[c[:, None], g]
-        self.N = self.N[c[:, None], c] - coupling @ np.linalg.solve(self.N[g[:, None], g], coupling.T)
-        self.members, self.M = self.members[c], self.M[c[:, None], c]
+        coupling = self.N[c[:, None], g] * self._root[g]
+        block = self.N[g[:, None], g] * np.outer(self._root[g], self._root[g])
+        self.N = self.N[c[:, None], c] - coupling @ np.linalg.solve(block, coupling.T)
+        self.members, self.M, self._root = self.members[c], self.M[c[:, None], c], self._root[c]
 
     def solve(self, b: Float) -> Float:
         """M[C, C]^-1 b for b (k,) or (k, n), with one step of iterative refinement: borders add up rounding."""
@@ -72,7 +77,7 @@ class BorderedInverse:
         return np.asarray(x + self.N @ (b - self.M @ x))
 
     def holds(self) -> bool:
-        """Whether M[C, C] N x = x for a vector x, but for rounding, as rank 0 finds.  Collective."""
-        x = np.cos(np.arange(float(len(self.members))))
-        off = self.M @ (self.N @ x) - x
+        """Whether M[C, C] N x = x for a vector x of the rows' sizes, but for rounding, as rank 0 finds.  Collective."""
+        x = np.cos(np.arange(float(len(self.members)))) * self._root
+        off = (self.M @ (self.N @ x) - x) / self._root
         return bool(self._comm.bcast(bool(np.abs(off).max(initial=0.0) <= INVERSE_ERROR)))

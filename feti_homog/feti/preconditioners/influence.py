@@ -36,6 +36,10 @@ class Influence:
         neighbours: which bonds lie beside each other.
         reference: the reference cell.
         norm: |H| with all bonds intact, which is the largest, as the power method finds it, with a margin.
+        stiffness: (all rows,) the most that each diagonal entry of H can be: that of a node of either side and of the
+            spring between them, in a row, while all others are held.
+        rounding: the largest force, relative to `stiffness`, that jumps of rigid-body motions of size 1 make in the
+            reference cell, where bodies that follow leave none: a relative error of H.
         factorizations: reference cells so far.
     """
 
@@ -53,6 +57,7 @@ class Influence:
         self._most_columns = PETSc.Options("feti_").getInt("influence_columns", INFLUENCE_COLUMNS)
         if self._most_columns < 1:
             raise CaseError(f"-feti_influence_columns {self._most_columns}: expected a whole number above 0")
+        self.stiffness = np.concatenate(comm.allgather(_stiffness_of_rows(jump_operator, operators)))
         self._BD = one_sided_jumps(comm, jump_operator, operators)
         self._ties = BodyTies(comm, jump_operator)
         self.neighbours = InterfaceNeighbours(comm, jump_operator, operators.subdomains)
@@ -126,7 +131,7 @@ class Influence:
         owned = self._jump_operator.owned
         self._columns = ResponseColumns(self.comm, self.reference, owned, self._jump_operator.global_rows)
         self._inverse, self._dependent = BorderedInverse(self.comm), np.zeros(0, np.int64)
-        self._answer, self._tied = None, 0
+        self._answer, self._tied, self.rounding = None, 0, self._force_of_rigid_motions()
 
     def _find(self, rows: Int) -> None:
         """Find the columns that these rows lack; with few also those of bonds near them, which break next, for columns
@@ -157,15 +162,26 @@ class Influence:
         """Take the columns that are not `changed` out of N, and the others in.  Collective."""
         inverse, M = self._inverse, self._columns.block
         returned = gather_rows(self.comm, self.reference.active, self._first, self._columns.rows[changed]) == 0
+        size = self.stiffness[self._columns.rows]
         gone = np.setdiff1d(inverse.members, changed)
         inverse.remove(gone)
         taken_in = np.setdiff1d(changed[returned], inverse.members)
-        inverse.append(M, taken_in, -1)
+        inverse.append(M, 1.0 / size, taken_in, -1)
         if len(gone) or len(taken_in):
             self._dependent = np.zeros(0, np.int64)
         left_out = np.setdiff1d(changed[~returned], np.concatenate([inverse.members, self._dependent]))
-        inverse.append(M, left_out, 1)
+        inverse.append(M, size, left_out, 1)
         self._dependent = np.setdiff1d(changed, inverse.members)
+
+    def _force_of_rigid_motions(self) -> float:
+        """`rounding`.  Collective."""
+        bodies = zip(self._operators.subdomains, self._operators.dofs, strict=True)
+        motions = [s.R[dofs].sum(axis=1) for s, dofs in bodies]
+        moved = np.concatenate([np.zeros(0), *(own / (np.abs(own).max(initial=0.0) or 1.0) for own in motions)])
+        active = self.reference.active
+        jump = scale_rows(active, self._jump_operator.sum(self._operators.B @ moved))
+        force = scale_rows(active, self.reference.respond(jump)) / self.stiffness[self._first :][: self._rows]
+        return float(self.comm.allreduce(np.abs(force).max(initial=0.0), MPI.MAX))
 
     def _largest_eigenvalue(self) -> float:
         """|H| of the reference cell, as some steps of the power method find it.  Collective."""
@@ -195,3 +211,10 @@ class Influence:
             taken_in = mine[outside[rows[mine] - self._first] > 0]
             z[rows[taken_in] - self._first] = -c[taken_in]
         return scale_rows(self._active, z)
+
+
+def _stiffness_of_rows(jump_operator: JumpOperator, operators: InterfaceOperators) -> Float:
+    """(owned rows,) 1 / (B D^-1 B^T + C) of each row, for the diagonal D of the bodies' stiffness and the compliance C
+    of the springs.  Collective."""
+    flexibility = jump_operator.sum(operators.B.power(2) @ (1.0 / operators.body_diagonal))
+    return np.asarray(1.0 / (flexibility + operators.springs))

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 from mpi4py import MPI
-from scipy.sparse import csr_matrix, diags
+from scipy.sparse import csr_matrix
 
 from feti_homog.common.distributed_arrays import allreduce_sum, scale_rows
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
@@ -78,17 +78,19 @@ class ReferenceCell:
 
 
 def one_sided_jumps(comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators) -> csr_matrix:
-    """(local rows, boundary dofs) B_D with B B_D^T = I that leaves one side of the interfaces at rest, so that forces
-    are wanted of the other alone: of the fibres, if they are not so stiff that rounding would tell.  Collective."""
-    of_fibre = operators.of_fibre
-    side = [operators.diagonal[of_fibre], operators.diagonal[~of_fibre]]
-    sums = allreduce_sum(comm, np.array([[x.sum(), len(x)] for x in side]))
-    fibre, matrix = sums[:, 0] / np.maximum(sums[:, 1], 1.0)
-    moved = of_fibre if fibre <= STIFF_FIBRES * matrix else ~of_fibre
-    copies = jump_operator.copies[:, 1 if moved is of_fibre else 0]
-    is_bond = jump_operator.copies[:, 1] > 0
-    bonds = diags(np.where(is_bond, copies, 0.0)) @ operators.B @ diags(moved.astype(float))
-    others = diags((~is_bond).astype(float)) @ operators.B
-    BD = (bonds + others).tocsr()
-    BD.eliminate_zeros()
-    return BD
+    """(local rows, boundary dofs) B_D with B B_D^T = I that leaves one side of each interface at rest, so that forces
+    are wanted of the other alone: of the inner body, if it is not so stiff that rounding would tell.  Collective."""
+    inside, B = jump_operator.inside, operators.B.tocoo()
+    is_bond = inside >= 0
+    inner, mine = inside[B.row], is_bond[B.row]
+    # Of each inner body and what is around it: the mean diagonal stiffness.
+    side = 2 * inner + operators.of_fibre[B.col]
+    most = 2 * (comm.allreduce(int(inside.max(initial=-1)), MPI.MAX) + 1)
+    weights = B.data[mine] ** 2
+    sums = [np.bincount(side[mine], values, most) for values in (weights * operators.diagonal[B.col[mine]], weights)]
+    total, count = allreduce_sum(comm, np.stack(sums))
+    outer_mean, inner_mean = (total / np.maximum(count, 1.0)).reshape(-1, 2).T
+    moves_inner = np.append(inner_mean <= STIFF_FIBRES * outer_mean, False)[inside]
+    moved = ~mine | (operators.of_fibre[B.col] == moves_inner[B.row])
+    copies = np.where(is_bond, jump_operator.copies[np.arange(len(inside)), moves_inner.astype(int)], 1)
+    return csr_matrix(((copies[B.row] * B.data)[moved], (B.row[moved], B.col[moved])), shape=B.shape)

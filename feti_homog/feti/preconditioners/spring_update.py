@@ -4,7 +4,11 @@ With the compliances C of the rows X the preconditioner H, M^-1 or H_0, becomes
 
     H - H X (C^-1 + X^T H X)^-1 X^T H,
 
-which is (H^-1 + X C X^T)^-1 where H is definite, as H_0 is on G^T lam = 0.
+which is (H^-1 + X C X^T)^-1 where H is definite, as H_0 is on G^T lam = 0.  On the rows X this is
+
+    C^-1 (C^-1 + X^T H X)^-1 X^T H,
+
+of which, however soft the springs, nothing cancels.
 """
 
 from __future__ import annotations
@@ -13,9 +17,11 @@ from collections.abc import Callable
 
 import numpy as np
 from mpi4py import MPI
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
-from feti_homog.common.distributed_arrays import gather_rows
+from feti_homog.common.distributed_arrays import gather_rows, scale_rows
+from feti_homog.common.mpi_errors import agree
+from feti_homog.errors import ConvergenceError
 from feti_homog.feti.preconditioners.scaled import Preconditioner
 from feti_homog.typing import Float
 
@@ -24,7 +30,11 @@ class SpringUpdate:
     """The update for the rows where `compliance` (owned rows,) is not 0."""
 
     def __init__(self, comm: MPI.Intracomm, first: int, compliance: Float, inverse: Callable[[Float], Float]) -> None:
-        """`inverse` is r -> H r for r (owned rows, k); `first` is this rank's first row.  Collective."""
+        """`inverse` is r -> H r for r (owned rows, k); `first` is this rank's first row.  Collective.
+
+        Raises:
+            ConvergenceError: the springs are so soft beside the bodies that rounding of H hides them.
+        """
         self.comm, self.first = comm, first
         own = np.flatnonzero(compliance)
         self.rows = np.concatenate(comm.allgather(first + own))
@@ -36,13 +46,29 @@ class SpringUpdate:
         self._columns = inverse(unit)
         stiffness = 1.0 / np.concatenate(comm.allgather(compliance[own]))
         block = gather_rows(comm, self._columns, first, self.rows)
-        self._factor = cho_factor(np.diag(stiffness) + (block + block.T) / 2)
+        self._factor = agree(comm, _factored, np.diag(stiffness) + (block + block.T) / 2)
+        self._own, self._mine, self._stiffness = own, mine, stiffness[mine]
 
     def apply(self, z: Float) -> Float:
         """The updated H times r, for z = H r (owned rows,) or (owned rows, k).  Collective."""
         if not len(self.rows):
             return z
-        return np.asarray(z - self._columns @ cho_solve(self._factor, gather_rows(self.comm, z, self.first, self.rows)))
+        stretch = cho_solve(self._factor, gather_rows(self.comm, z, self.first, self.rows))
+        updated = np.asarray(z - self._columns @ stretch)
+        updated[self._own] = scale_rows(self._stiffness, stretch[self._mine])
+        return updated
+
+
+def _factored(block: Float) -> tuple[Float, bool]:
+    """The factor of C^-1 + X^T H X.  Raises ConvergenceError if it is not definite."""
+    try:
+        factor: tuple[Float, bool] = cho_factor(block)
+    except LinAlgError as error:
+        raise ConvergenceError(
+            "[interface] springs too soft beside the pieces of cut fibres, rounding hides them: expected whole fibres, "
+            "by fewer [decomposition] subdomains, or -feti_pc_type dirichlet"
+        ) from error
+    return factor
 
 
 class WithSprings:
