@@ -104,7 +104,7 @@ class _Finder:
         """`responses` are those to the unit loads.  Collective."""
         cell = context.homogenization.cell
         self._comm, self._onset, self._loads = cell.comm, onset, context.unit_loads
-        self._noise = context.homogenization.interface.sign_noise
+        self._problems, self._noise = context.loaded_cell.problems, context.homogenization.interface.sign_noise
         self._unit = _tractions(context, responses)
         self._most = max(1, self._comm.allreduce(self._unit.shape[1], MPI.MAX))
         nodes = cell.solver.jump_operator.nodes
@@ -125,7 +125,7 @@ class _Finder:
             rows = slice(first, first + size)
             ahead = self._tractions(rays.strain[rows], 0.0, names)
             if most < 1.0:
-                factors = self._onset.factors(ahead, self._least(rays.stress[rows], ahead.shape[2]), before)
+                factors = self._onset.factors(ahead, self._least(rays.strain[rows], names, ahead.shape[2]), before)
             else:
                 factors = np.tile(np.where(used >= most * (1.0 - UTILISATION_TIE), 0.0, np.inf), (len(ahead), 1))
             for row, bond in enumerate(self._first(factors, at_start, ahead), first):
@@ -133,14 +133,26 @@ class _Finder:
 
     def _tractions(self, strain: Float, temperature: float, names: Sequence[str]) -> Float:
         """(n, k, c) under strains (n, m) of these names and a change of temperature."""
+        return np.tensordot(self._unit_loads(strain, temperature, names), self._unit, axes=1)
+
+    def _unit_loads(self, strain: Float, temperature: float, names: Sequence[str]) -> Float:
+        """(n, l) how much of each unit load these are."""
         column = {name: strain[:, number] for number, name in enumerate(names)}
         column["temperature"] = np.full(len(strain), temperature)
-        return np.tensordot(np.stack([column[load] for load in self._loads], axis=1), self._unit, axes=1)
+        return np.stack([column[load] for load in self._loads], axis=1)
 
-    def _least(self, stress: Float, components: int) -> Float:
-        """(n, k) utilisations that the solver's error makes under stresses (n, m)."""
-        of_one = self._onset.bonds.utilisation(np.ones((len(self._fibre), components)))
-        return np.asarray(self._noise * np.abs(stress).max(axis=1)[:, None] * of_one)
+    def _least(self, strain: Float, names: Sequence[str], components: int) -> Float:
+        """(n, k) utilisations that the solver's error makes under strains (n, m) of these names: of tractions that each
+        problem has an error of at each bond.  Collective."""
+        loads, first, total = self._unit_loads(strain, 0.0, names), 0, np.zeros((len(strain), len(self._fibre)))
+        parts = ((0, 1), (2,))[: len(self._problems)]
+        for problem, part in zip(self._problems, parts, strict=True):
+            end = first + len(problem.solver.problem.loads)
+            of_one = np.zeros((len(self._fibre), components))
+            of_one[:, part] = 1.0
+            total += problem.scales.bond_stress(loads[:, first:end].T).T * self._onset.bonds.utilisation(of_one)
+            first = end
+        return self._noise * total
 
     def _first(self, factors: Float, before: Float, ahead: Float) -> Float:
         """(n, 4 + d) least factor of each ray, fibre, interface and direction of its bond, and how it breaks; of those

@@ -100,7 +100,7 @@ class EnergyReleaseRates:
         jump = self._gathered(self.interface.jump(solution))
         force = self._gathered(self.interface.traction(solution)) * self.length[:, None]
         jump[np.abs(jump) < self.interface.gap_noise(solution.strain)] = 0.0
-        force[np.abs(force) < self.interface.force_noise(solution)] = 0.0
+        force[np.abs(force) < self._gathered(self.interface.force_noise(solution))[:, None]] = 0.0
         closing, length = self._closing(tips, status, force, jump)
         modes = self._modes(tips, response, force, closing)
         return EnergyRelease(

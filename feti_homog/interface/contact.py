@@ -151,9 +151,11 @@ class Interface:
             NotCarriedError: nothing carries the stresses of the load.
         """
         self.solver.activate(self.active(status))
-        least = self.sign_noise * self.scales.largest_stiffness
-        given = self.scales.imposed_strain(np.where(load.by_stress, 0.0, load.values)).max()
-        return mixed_load.solve(self.solver, load, start, float(self.size.prod()), (least, least * given))
+        stiffness = self.scales.least_bonded_stiffness.diagonal()
+        given = self.scales.imposed_strain(np.where(load.by_stress, 0.0, load.values))
+        root = float((np.sqrt(stiffness[: len(given)]) * given).max())
+        noise = mixed_load.Noise(stiffness, self.sign_noise, root)
+        return mixed_load.solve(self.solver, load, start, float(self.size.prod()), noise)
 
     def is_linear(self, status: Status) -> bool:
         """Whether no face can come to touch another; collective."""
@@ -198,15 +200,16 @@ class Interface:
         """Gaps smaller than this may be the solver's error."""
         return self.sign_noise * self.scales.imposed(strain)
 
-    def force_noise(self, solution: DualSolution) -> float:
-        """Nodal forces of the interface smaller than this may be the solver's error; collective.
+    def force_noise(self, solution: DualSolution) -> Float:
+        """(k,) nodal forces at each node of this rank smaller than which may be the solver's error; collective.
 
-        It is a share of the largest of them, or of what the imposed stress makes: an error of the jumps moves forces by
-        the stiffness of the softer side.  Forces between the pieces of a cut body say nothing here, however large."""
-        forces, lengths = np.abs(solution.lam[self._pairs]), self.nodes.length
-        largest = np.array([forces.max(initial=0.0), lengths.max(initial=0.0)])
-        self.solver.comm.Allreduce(MPI.IN_PLACE, largest, MPI.MAX)
-        return self.sign_noise * float(max(largest[0], self.scales.caused_stress(solution.strain) * largest[1]))
+        It is a share of the largest of the same interface, or of what the imposed strain makes: an error of the jumps
+        moves forces by the stiffness of the softer side.  Forces between the pieces of a cut body say nothing here,
+        however large, nor do those of other interfaces."""
+        forces = np.abs(solution.lam[self._pairs]).max(axis=1, initial=0.0)
+        longest = self.scales.over_interface(self.nodes.length)
+        caused = self.scales.bond_stress(solution.strain) * longest
+        return np.asarray(self.sign_noise * np.maximum(self.scales.over_interface(forces), caused))
 
     def _placed(self, status: Status, solution: DualSolution) -> tuple[DualSolution, Bool]:
         """The solution with free fibres where they have room, and which nodes (k,) break the KKT conditions."""
@@ -234,7 +237,9 @@ class Interface:
             solution.jump[self.nodes.row],
             (status != BONDED) & self.contact,
             status == CLOSED,
-            (self.scales.imposed(solution.strain), self.scales.caused_stress(solution.strain)),
+            self.scales.imposed(solution.strain),
+            self.scales.bond_stress(solution.strain),
+            self.scales.over_interface,
         )
         status, motions = self._without_idle(status, solution)
         return Equilibrium(load, status, solution, iterations, solves, motions, certificate)

@@ -42,9 +42,9 @@ def first_change(interface: Interface, state: Equilibrium, ahead: DualSolution) 
     if not interface.contact:
         return 1.0, 1.0
     solver, nodes = interface.solver, interface.nodes
-    noise = max(interface.force_noise(state.solution), interface.force_noise(ahead))
+    tension = np.maximum(interface.force_noise(state.solution), interface.force_noise(ahead))
     closed = state.status == CLOSED
-    shares = [shares_to_zero(-state.solution.lam[nodes.row][closed], -ahead.lam[nodes.row][closed], noise)]
+    shares = [shares_to_zero(-state.solution.lam[nodes.row][closed], -ahead.lam[nodes.row][closed], tension[closed])]
     is_open, here, there = state.status == OPEN, state.solution.jump[nodes.row], ahead.jump[nodes.row]
     noise = max(interface.gap_noise(state.solution.strain), interface.gap_noise(ahead.strain))
     if solver.natural.unconstrained_modes.shape[1]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
+from mpi4py import MPI
 
 from feti_homog.feti.solver import FetiSolver
 from feti_homog.mechanics.bounds import reuss, voigt
@@ -42,6 +43,38 @@ class LoadScales:
         return float(np.abs(self.least_bonded_stiffness[:m, :m]).max())
 
     @cached_property
+    def _bond_stiffness(self) -> Float:
+        """(k,) stress at each bond of this rank per strain of the cell: of the softer body, its springs in a row.
+        Collective."""
+        solver, nodes = self._solver, self._solver.jump_operator.nodes
+        m, own = solver.problem.strains, np.zeros(self._bodies)
+        for s in solver.subdomains:
+            own[s.submesh.body] = np.abs(s.L[:m, :m]).max()
+        solver.comm.Allreduce(MPI.IN_PLACE, own, MPI.MAX)
+        rows = nodes.row[:, None] + np.arange(solver.jump_operator.components)
+        give = solver.operator.compliance[rows].min(axis=1, initial=np.inf) * nodes.length / self._size.max()
+        return np.asarray(1.0 / (1.0 / own[nodes.bodies].min(axis=1, initial=np.inf) + give))
+
+    @cached_property
+    def _bodies(self) -> int:
+        """Number of bodies.  Collective."""
+        last = max((s.submesh.body for s in self._solver.subdomains), default=-1)
+        return int(self._solver.comm.allreduce(last, MPI.MAX)) + 1
+
+    def over_interface(self, values: Float) -> Float:
+        """(k,) of each bond of this rank the largest of values (k,), 0 at least, on all of its inner body.
+        Collective."""
+        inner, largest = self._solver.jump_operator.nodes.bodies[:, 1], np.zeros(self._bodies)
+        np.maximum.at(largest, inner, values)
+        self._solver.comm.Allreduce(MPI.IN_PLACE, largest, MPI.MAX)
+        return largest[inner]
+
+    def bond_stress(self, loads: Float) -> Float:
+        """(k,) or (k, n) stress that the loads (v,) or (v, n) make at each bond of this rank, or would if nothing else
+        bore them.  Collective."""
+        return np.multiply.outer(self._bond_stiffness, self.imposed_strain(loads).max(axis=0))
+
+    @cached_property
     def _free_strains(self) -> Float:
         """(m, v) sizes of the strains that the loads make: their own, and of the others the largest of free bodies.
 
@@ -50,14 +83,6 @@ class LoadScales:
         m, stiffnesses = self._solver.problem.strains, self._phases[1]
         free = np.linalg.solve(stiffnesses[:, :m, :m], stiffnesses[:, :m, m:])
         return np.hstack([np.eye(m), np.abs(free).max(axis=0)])
-
-    def caused_stress(self, loads: Float) -> float:
-        """A stress that the loads (v,) cause at least if all is bonded.  Collective."""
-        problem = self._solver.problem
-        mean, caused = voigt(*self._phases), self.least_bonded_stiffness.copy()
-        caused[:, problem.strains :] = mean[:, problem.strains :]
-        # What works on a temperature is no stress.
-        return float(np.abs(caused[: problem.stresses] @ loads).max())
 
     def imposed(self, loads: Float) -> float:
         """Largest displacement E y that the loads (v,) impose on the cell, or would on a free one.  Collective."""
@@ -70,5 +95,5 @@ class LoadScales:
         return float(np.abs(self.least_bonded_stiffness[:m, :m] @ self.imposed_strain(loads)).max())
 
     def imposed_strain(self, loads: Float) -> Float:
-        """(m,) sizes of the strains that the loads (v,) make.  Collective."""
+        """(m,) or (m, n) sizes of the strains that the loads (v,) or (v, n) make.  Collective."""
         return np.asarray(self._free_strains @ np.abs(loads))

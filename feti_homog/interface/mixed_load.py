@@ -7,6 +7,7 @@ others are superposed such that the stresses are met.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,11 +22,25 @@ from feti_homog.typing import Float
 UNCARRIED_SHARE = 1e-6
 
 
-def solve(solver: FetiSolver, load: Load, start: Float, area: float, noise: tuple[float, float]) -> DualSolution:
+@dataclass(frozen=True)
+class Noise:
+    """What may be the solver's error.
+
+    Attributes:
+        stiffness: (v,) of each load, with all bonds: a scale.
+        share: of it that the error is.
+        root: the largest product of the root of a stiffness and its given strain.
+    """
+
+    stiffness: Float
+    share: float
+    root: float
+
+
+def solve(solver: FetiSolver, load: Load, start: Float, area: float, noise: Noise) -> DualSolution:
     """The solution under a load on the cell of this area, beginning with the multipliers `start` (owned rows,).
 
-    `noise` are a stiffness and a stress below which there is only the solver's error: strains that meet no more stay
-    zero.  Collective.
+    Strains that meet no more than noise stay zero.  Collective.
 
     Raises:
         NotCarriedError: nothing carries the stresses.
@@ -42,20 +57,23 @@ def solve(solver: FetiSolver, load: Load, start: Float, area: float, noise: tupl
     if strains[0].any():
         missing = missing - stresses[0]
     # Rank 0 decides: rounding on other processors may part the ranks where a stiffness is nearly none.
-    factors = solver.comm.bcast(_strains(stresses[-len(unknown) :], missing, *noise))
+    own = replace(noise, stiffness=noise.stiffness[unknown])
+    factors = solver.comm.bcast(_strains(stresses[-len(unknown) :], missing, own))
     if factors is None:
         raise NotCarriedError("nothing in the cell carries the stresses of the load")
     return superposed(solver, found, np.concatenate([np.ones(len(found) - len(unknown)), factors]))
 
 
-def _strains(stiffness: Float, stress: Float, least: float, rounding: float) -> Float | None:
+def _strains(stiffness: Float, stress: Float, noise: Noise) -> Float | None:
     """(u,) the strains that make the stresses (u,) by a stiffness (u, u) that may be singular; None if it carries them
-    not."""
-    eigenvalues, vectors = np.linalg.eigh((stiffness + stiffness.T) / 2)
-    along, resists = vectors.T @ stress, eigenvalues > least
-    if np.abs(along[~resists]).max(initial=0.0) > max(UNCARRIED_SHARE * np.abs(stress).max(), rounding):
+    not.  Each is scaled by the root of its own stiffness, so that none is small beside another."""
+    root = np.sqrt(noise.stiffness)
+    eigenvalues, vectors = np.linalg.eigh((stiffness + stiffness.T) / (2 * np.outer(root, root)))
+    along, resists = vectors.T @ (stress / root), eigenvalues > noise.share
+    largest = max(UNCARRIED_SHARE * np.abs(stress / root).max(), noise.share * noise.root)
+    if np.abs(along[~resists]).max(initial=0.0) > largest:
         return None
-    return np.asarray(vectors[:, resists] @ (along[resists] / eigenvalues[resists]))
+    return np.asarray(vectors[:, resists] @ (along[resists] / eigenvalues[resists]) / root)
 
 
 def superposed(solver: FetiSolver, solutions: Sequence[DualSolution], factors: Float) -> DualSolution:

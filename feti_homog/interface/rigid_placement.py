@@ -113,14 +113,15 @@ def room_ahead(
     return _decided_on_root(comm, coarse, nodes, is_open, _shares_of_all, [here, ahead], noise)
 
 
-def shares_to_zero(here: Float, ahead: Float, noise: float) -> tuple[float, float]:
-    """Shares of the way from values here (k,) to ahead (k,) at which the first is 0, and is -2 noise; else 1, 1.
+def shares_to_zero(here: Float, ahead: Float, noise: float | Float) -> tuple[float, float]:
+    """Shares of the way from values here (k,) to ahead (k,) at which the first is 0, and is -2 noise, a number or (k,);
+    else 1, 1.
 
     Values that end above -2 noise may be the solver's error and do not count.
     """
     falls = ahead < -2 * noise
-    a, b = here[falls], ahead[falls]
-    begins, certain = (np.maximum(a + slack, 0.0) / (a - b) for slack in (0.0, 2 * noise))
+    a, b, doubt = here[falls], ahead[falls], np.broadcast_to(2 * noise, falls.shape)[falls]
+    begins, certain = (np.maximum(a + slack, 0.0) / (a - b) for slack in (0.0, doubt))
     return float(begins.min(initial=1.0)), float(certain.min(initial=1.0))
 
 
