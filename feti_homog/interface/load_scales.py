@@ -67,12 +67,13 @@ class LoadScales:
         inner, largest = self._solver.jump_operator.nodes.bodies[:, 1], np.zeros(self._bodies)
         np.maximum.at(largest, inner, values)
         self._solver.comm.Allreduce(MPI.IN_PLACE, largest, MPI.MAX)
-        return largest[inner]
+        return np.asarray(largest[inner])
 
     def bond_stress(self, loads: Float) -> Float:
         """(k,) or (k, n) stress that the loads (v,) or (v, n) make at each bond of this rank, or would if nothing else
         bore them.  Collective."""
-        return np.multiply.outer(self._bond_stiffness, self.imposed_strain(loads).max(axis=0))
+        largest: Float = np.multiply.outer(self._bond_stiffness, self.imposed_strain(loads).max(axis=0))
+        return largest
 
     @cached_property
     def _free_strains(self) -> Float:

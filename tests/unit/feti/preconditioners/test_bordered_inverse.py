@@ -8,7 +8,6 @@ from mpi4py import MPI
 
 from feti_homog.feti.preconditioners.bordered_inverse import BorderedInverse
 
-
 # Below all diagonals.
 SMALL = 1e-3
 # Rows that come, rows that go, and the sign of those that come.
