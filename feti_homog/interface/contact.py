@@ -200,6 +200,10 @@ class Interface:
         """Gaps smaller than this may be the solver's error."""
         return self.sign_noise * self.scales.imposed(strain)
 
+    def stress_noise(self, strain: Float) -> float:
+        """Macroscopic stresses smaller than this may be the solver's error.  Collective."""
+        return self.sign_noise * self.scales.stress_scale(strain)
+
     def force_noise(self, solution: DualSolution) -> Float:
         """(k,) nodal forces at each node of this rank smaller than which may be the solver's error; collective.
 

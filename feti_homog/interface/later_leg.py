@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -54,13 +54,13 @@ class LaterLeg:
     """
 
     def __init__(
-        self, cell: LoadedCell, criterion: BondCriterion, end: Load, number: tuple[int, int], begin: PathState
+        self, cell: LoadedCell, criterion: BondCriterion, waypoints: Sequence[Load], leg: int, begin: PathState
     ) -> None:
-        """Stand where `begin` says on the way from its origin to `end`; `number` is (leg, legs).  Collective."""
-        self.cell, self.criterion, self.end = cell, criterion, end
-        self.leg, self.legs = number
+        """Stand where `begin` says on the way from its origin to waypoint `leg`.  Collective."""
+        self.cell, self.criterion, self.end = cell, criterion, waypoints[leg]
+        self.leg, self.legs = leg, len(waypoints)
         self.origin = begin.last if begin.position == 0.0 else begin.origin
-        self.start = self.origin.load(end.by_stress)
+        self.start = cell.leg_start(self.origin, waypoints[leg - 1], self.end)
         # Where the last point is, up to where the line is known to bend, and whether a predicted change did not come.
         self._reported, self._bends_before, self._false_alarm = begin.position, np.inf, False
         self._from, self._energies = begin, NO_ENERGIES

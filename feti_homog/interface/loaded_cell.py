@@ -76,6 +76,17 @@ class LoadedCell:
             return state
         return replace(state, axial=self.axial.equilibrium(along, state.status, start.axial))
 
+    def leg_start(self, origin: Macroscopic, before: Load | None, end: Load) -> Load:
+        """Where a leg begins: at the waypoint before, which the last point, `origin`, need not meet; components that
+        are given in another way now are as that has them, stresses without the solver's error.  Collective."""
+        parts = np.split(origin.strain, [len(self.plane.solver.problem.loads)])
+        noise = [np.full(len(own), each.stress_noise(own)) for own, each in zip(parts, self.problems, strict=False)]
+        stress = np.where(np.abs(origin.stress) > np.concatenate(noise), origin.stress, 0.0)
+        values = np.where(end.by_stress, stress, origin.strain)
+        if before is not None:
+            values = np.where(before.by_stress == end.by_stress, before.values, values)
+        return Load(values, end.by_stress)
+
     def traction(self, found: Solutions) -> Float:
         """(k, 2) normal and tangential traction, tension positive, or (k, 3) with that along the fibre."""
         in_plane = self.plane.traction(found.plane)

@@ -64,7 +64,7 @@ def increments(
         leg = (step * len(waypoints) - 1) // steps
         begins_here = ((step - 1) * len(waypoints) - 1) // steps < leg
         origin, end = begin.last if begins_here else begin.origin, waypoints[leg]
-        start = _start(origin, waypoints[leg - 1] if leg else None, end)
+        start = cell.leg_start(origin, waypoints[leg - 1] if leg else None, end)
         load = start.after(step * len(waypoints) / steps - leg, end)
         point = _increment(cell, criterion, load, worst_only, begin)
         after = PathState(step, 0.0, point.state.status, point.state.multipliers, origin, point.after.last)
@@ -72,15 +72,6 @@ def increments(
         yield Point(step / steps, 1.0, point.state, point.broke, point.energies, point.used, after)
         if not point.state.converged:
             return
-
-
-def _start(origin: Macroscopic, before: Load | None, end: Load) -> Load:
-    """Where a leg of increments begins: at the waypoint before, which no step need meet; with the components that are
-    given in another way now as the last point has them."""
-    has = origin.load(end.by_stress)
-    if before is None:
-        return has
-    return Load(np.where(before.by_stress == end.by_stress, before.values, has.values), end.by_stress)
 
 
 def _increment(cell: LoadedCell, criterion: BondCriterion, load: Load, worst_only: bool, begin: PathState) -> Point:
@@ -110,7 +101,7 @@ def _legs(cell: LoadedCell, criterion: BondCriterion, waypoints: Sequence[Load],
             yield point
             begin = point.after
     for leg in range(max(begin.leg, 1), legs):
-        for point in LaterLeg(cell, criterion, waypoints[leg], (leg, legs), begin).points():
+        for point in LaterLeg(cell, criterion, waypoints, leg, begin).points():
             yield point
             begin = point.after
 
