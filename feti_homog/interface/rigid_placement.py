@@ -52,7 +52,7 @@ class Placement:
 @dataclass(frozen=True)
 class _Fibres:
     """On rank 0, of all open nodes: the change of gap and slip with each free motion, (k, motions), and the fibre; a
-    fibre and its coating, which may part too, are one."""
+    fibre and its coating, which may part too, are one, and so are layers with others between them."""
 
     is_open: Bool
     opening: Float
@@ -141,17 +141,19 @@ def _decided_on_root(
 
     def decided() -> T:
         whole = [np.concatenate(p) for p in zip(*(parts or []), strict=True)]
-        return decide(_Fibres(whole[0], whole[1], whole[2], _moving_together(whole[3])), *whole[4:], noise)
+        groups = _moving_together(whole[3], coarse.pinned_body)
+        return decide(_Fibres(whole[0], whole[1], whole[2], groups), *whole[4:], noise)
 
     return on_root(comm, decided)
 
 
-def _moving_together(bodies: Array) -> Array:
-    """(k,) labels of the inner of the two bodies (k, 2) of each node; those whose gaps depend on each other's motions
-    have the same."""
+def _moving_together(bodies: Array, fixed: int) -> Array:
+    """(k,) labels of the two bodies (k, 2) of each node, of which one may be the body that is `fixed`: those whose
+    gaps depend on each other's motions have the same."""
     outer, inner = bodies.T
-    between = np.isin(outer, inner)
-    return np.asarray(components(int(bodies.max(initial=0)) + 1, outer[between], inner[between])[inner])
+    between = (bodies != fixed).all(axis=1)
+    labels = components(int(bodies.max(initial=0)) + 1, outer[between], inner[between])
+    return np.asarray(labels[np.where(inner == fixed, outer, inner)])
 
 
 def _place_all(fibres: _Fibres, gap: Float, noise: float) -> tuple[Float, Bool]:
@@ -191,10 +193,15 @@ def _largest_gap(gap: Float, motion: Float) -> tuple[Float, float, Float]:
 
 
 def _last_share(here: Float, ahead: Float, motion: Float, slack: float) -> float:
-    """max w <= 1 with (1 - w) here + w ahead + motion a >= -slack; w = 0 is possible."""
+    """max w <= 1 with (1 - w) here + w ahead + motion a >= -slack; w = 0 is possible.
+
+    The multipliers f >= 0 of the inequalities are forces in balance, f motion = 0: they give w to rounding, the
+    programme only to its tolerance."""
     scale, size = np.abs([here, ahead]).max(), np.abs(motion).max(axis=0)
     result = _maximised(-motion / size, (here - ahead) / scale, (here + slack) / scale, (0.0, 1.0))
-    return float(result.x[-1])
+    forces = -result.ineqlin.marginals
+    closing = float(forces @ (here - ahead))
+    return float(np.clip(forces @ (here + slack) / closing, 0.0, 1.0)) if closing > 0.0 else float(result.x[-1])
 
 
 def _maximised(motions: Float, last: Float, limits: Float, bounds: tuple[float | None, float]) -> OptimizeResult:

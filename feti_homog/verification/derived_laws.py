@@ -6,9 +6,9 @@ import numpy as np
 
 from feti_homog.typing import Float
 from feti_homog.verification.constitutive_law import VOIGT, out_of_plane
-from feti_homog.verification.discrete_cell import DiscreteCell
+from feti_homog.verification.discrete_cell import ROUNDED_TERMS, DiscreteCell
 from feti_homog.verification.elements import ElementFields
-from feti_homog.verification.field_laws import ROUNDED_TERMS, in_axes, largest_displacement
+from feti_homog.verification.field_laws import in_axes, largest_displacement
 from feti_homog.verification.ledger import Ledger, relative
 from feti_homog.verification.reading import State
 

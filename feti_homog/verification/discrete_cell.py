@@ -18,6 +18,8 @@ from feti_homog.verification.torus import TornNodes, TornSides, constituents, to
 
 # Scales of a state are no less than this share of those of the run: a path may come back to zero strain.
 LEAST_SHARE = 1e-9
+# So much of the terms that a number is summed of counts as its scale: 1e-15 of the terms are rounding.
+ROUNDED_TERMS = 1e-5
 
 
 class Loaded(Protocol):
@@ -180,6 +182,15 @@ class DiscreteCell:
         """A stress that a state makes in the bonded cell at least, for scales that debonding does not make zero."""
         own, most = np.abs(self.reuss @ self.loads(state)).max(), np.abs(self.reuss).max() * self.largest_strain
         return float(max(own, LEAST_SHARE * most))
+
+    @property
+    def rounded_energy(self) -> float:
+        """Energy per area to add to the largest, for scales: where all has parted what is stored is rounding."""
+        return ROUNDED_TERMS * float(np.abs(self.reuss).max()) * self.largest_strain**2
+
+    def energy_terms(self, state: Loaded) -> float:
+        """Energy per area of which what is stored is summed at least, be it none: that of the bonded cell."""
+        return self.least_stress(state) * self.strain_size(state)
 
     def strain_size(self, state: Loaded) -> float:
         """The largest of the strains that the loads of a state make."""

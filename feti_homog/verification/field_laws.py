@@ -5,13 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from feti_homog.typing import Float, Int
-from feti_homog.verification.discrete_cell import DiscreteCell, gradient
+from feti_homog.verification.discrete_cell import ROUNDED_TERMS, DiscreteCell, gradient
 from feti_homog.verification.elements import PLACES, ElementFields
 from feti_homog.verification.ledger import Ledger, relative
 from feti_homog.verification.reading import State
-
-# So much of the terms that forces and stresses are summed of counts as their scale: 1e-15 of the terms are rounding.
-ROUNDED_TERMS = 1e-5
 
 
 def check_fields(ledger: Ledger, cell: DiscreteCell, state: State, fields: ElementFields) -> None:

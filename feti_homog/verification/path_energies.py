@@ -22,7 +22,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -34,7 +34,16 @@ from feti_homog.verification.prescribed import SAME_SHARE, TEMPERATURE, Prescrib
 
 # Loads whose components differ by so much, relatively, are in proportion.
 SAME_RATIO = 1e-9
+# A share of the energy of the bonded cell below which what a parted one stores is rounding.
+NO_ENERGY = 1e-9
 Point = Mapping[str, Any]
+
+
+class Loads(NamedTuple):
+    """Strains (v,) and a change of temperature."""
+
+    strain: Float
+    temperature: float
 
 
 @dataclass(frozen=True)
@@ -45,6 +54,7 @@ class PointNumbers:
         strain, stress: (n,) with the temperature and what works on it, which is NaN where no file tells of it.
         stored: per area.
         load: what is prescribed.
+        terms: energy per area of which the stored one is summed at least.
     """
 
     name: str
@@ -52,6 +62,7 @@ class PointNumbers:
     stress: Float
     stored: float
     load: Prescribed
+    terms: float = 0.0
 
     @property
     def potential(self) -> float:
@@ -76,7 +87,7 @@ def check_path_energies(
 ) -> None:
     """`work`, `stored` and what was dissipated at all points; fields are kept of those of `states`."""
     numbers = _numbers(cell, states, points)
-    scale = max(*(each.stored for each in numbers), 1e-300)
+    scale = max(each.stored for each in numbers) + cell.rounded_energy or 1e-300
     for each, point in zip(numbers, points, strict=True):
         off = point["work"] - each.stored - point["dissipated"]
         ledger.record("energy", abs(off) / scale, f"{each.name}, work less stored and dissipated")
@@ -101,8 +112,9 @@ def _numbers(cell: DiscreteCell, states: Sequence[StateNumbers], points: Sequenc
             heat = (2 * stored - float(strain @ stress)) / warmer
         else:
             stored, heat = float(strain @ stress) / 2, 0.0 if cell.expansions is None else np.nan
-        n = len(load.values)
-        found.append(PointNumbers(name, np.array([*strain, warmer][:n]), np.array([*stress, heat][:n]), stored, load))
+        n, terms = len(load.values), cell.energy_terms(Loads(strain, warmer))
+        pairs = np.array([*strain, warmer][:n]), np.array([*stress, heat][:n])
+        found.append(PointNumbers(name, *pairs, stored, load, terms))
     return found
 
 
@@ -140,8 +152,9 @@ def potentials(load: Prescribed, other: PointNumbers) -> tuple[float, float]:
         return -np.inf, np.inf
     (strains, stresses), (forces, answers) = other.given, other.answered
     own_strains, own_forces = load.values[~load.by_stress], load.values[load.by_stress]
-    least = _largest(_work(own_strains, stresses), other.stored, own_forces, forces)
-    return least, -_largest(_work(own_forces, answers), other.stored, own_strains, strains)
+    energy = other.stored if abs(other.stored) > NO_ENERGY * other.terms else 0.0
+    least = _largest(_work(own_strains, stresses), energy, own_forces, forces)
+    return least, -_largest(_work(own_forces, answers), energy, own_strains, strains)
 
 
 def _largest(power: float, energy: float, one: Float, other: Float) -> float:

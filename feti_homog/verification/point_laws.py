@@ -27,7 +27,7 @@ def check_points(ledger: Ledger, cell: DiscreteCell, states: Sequence[StateNumbe
     single = [document["load"]] if "load" in document else []
     points: Sequence[Point] = document.get("path") or document.get("angle") or single
     known = [state for state in states if 0 <= state.point < len(points)]
-    scale = max([state.stored for state in known], default=0.0)
+    scale = max([state.stored for state in known], default=0.0) + cell.rounded_energy
     for state in known:
         point = points[state.point]
         _check_debonding(ledger, cell, state, point)
