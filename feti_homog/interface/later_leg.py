@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from mpi4py import MPI
 
+from feti_homog.errors import NotCarriedError
 from feti_homog.interface.bond_criterion import BondCriterion
 from feti_homog.interface.contact import Equilibrium
 from feti_homog.interface.leg_prediction import first_break, first_change
@@ -79,7 +80,11 @@ class LaterLeg:
     def _advance(self) -> Iterator[Point]:
         """Go to the next event, or as far towards it as the response is straight, and past it."""
         before, share = self._state, self._share
-        ahead = self.cell.linear(self.end, before.status, before.multipliers)
+        try:
+            ahead = self.cell.linear(self.end, before.status, before.multipliers)
+        except NotCarriedError:
+            yield from self._touch()
+            return
         breaks, begins, certain = self._predict(ahead)
         target = min(breaks, begins, 1.0)
         is_here = target - share <= LEAST_SHARE and (target == begins or (target == breaks and self._is_due()))
@@ -159,6 +164,20 @@ class LaterLeg:
         self._false_alarm = not self._differs(before)
         if there_is_one and not self._false_alarm:
             yield self._turn(self._share)
+
+    def _touch(self) -> Iterator[Point]:
+        """Report the state in which open faces touch, which carry no more than there is here, and go on from there.
+
+        Raises:
+            NotCarriedError: touching faces do not carry it either.
+        """
+        state, beyond = self._state, min(self._share + LEAST_SHARE, 1.0)
+        there = self.cell.equilibrium(self._load_at(beyond), state.status, state.multipliers)
+        here = self.cell.equilibrium(self._load_at(self._share), there.status, there.multipliers)
+        self._stand(self._share, here)
+        yield self._turn(beyond)
+        self._stand(beyond, there)
+        self._false_alarm = False
 
     def _turn(self, position: float) -> Point:
         """The state here as a point at which nothing breaks and from which the path goes on at `position`."""
