@@ -1,0 +1,112 @@
+"""Paths on which all layers part and close again, against the closed form of layers that touch or part."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from reference.parted_layers import PartedLayers
+from support.layered_meshes import layers
+from support.loaded_twins import EPOXY_GLASS, compare_paths, document
+from support.ranks import parallel_assert
+
+from feti_homog import Case, run
+from feti_homog.errors import ConvergenceError
+from feti_homog.verification.certificate import verify
+from feti_homog.verification.prescribed import at_points
+
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
+
+EXACT = 1e-10
+STRENGTH = {"normal_strength": 0.03, "tangential_strength": 0.04}
+SPRINGS = {"normal_stiffness": 100.0, "tangential_stiffness": 30.0}
+ENERGY = SPRINGS | {"criterion": "energy", "toughness": 1e-5}
+PARTED = STRENGTH | {"debonded": [{"fibre": "all", "angle": 360.0}]}
+INFLUENCE, LOOSE = {"feti_pc_type": "influence"}, {"feti_ksp_rtol": 1e-8}
+TWO, SIX, NINE = "MFMM", "MMFFMMFM", "MMFMMFMMF"
+BACK = [{"E11": 0.2}, {"E11": -0.1}]
+AGAIN = [{"E22": 0.2}, {"E22": -0.1}, {"E22": 0.15}, {"E22": -0.05}]
+PULLED = [{"E22": 0.2}, {"E22": -0.1, "S11": 0.1}]
+PRESSED = [{"E11": 0.2}, {"S11": -0.1}, {"E11": 0.1}]
+HELD = [{"E11": 0.2}, {"S22": 0.1}, {"S22": -0.1}, {"E11": -0.05}]
+COOLED = [{"temperature": -50.0}, {"E11": 0.2}, {"E11": -0.1}]
+STEPS = {"method": "increments", "increments": 12}
+
+PATHS = {
+    "back": (TWO, 0, "strain", STRENGTH, None, {"waypoints": BACK}),
+    "back, to the default tolerance": (TWO, 0, "strain", STRENGTH, LOOSE, {"waypoints": BACK}),
+    "far beyond the strength": (TWO, 0, "strain", STRENGTH, LOOSE, {"waypoints": [{"E11": 20.0}, {"E11": -1e-3}]}),
+    "again and again": (SIX, 1, "stress", STRENGTH | SPRINGS, None, {"waypoints": AGAIN}),
+    "parted from the start": (NINE, 1, "strain", PARTED, None, {"waypoints": AGAIN}),
+    "pulled along": (SIX, 1, "generalized", ENERGY, INFLUENCE, {"waypoints": PULLED}),
+    "pressed": (NINE, 0, "strain", STRENGTH, None, {"waypoints": PRESSED}),
+    "pressed on springs": (TWO, 0, "stress", ENERGY | {"growth": "springs"}, None, {"waypoints": PRESSED}),
+    "held and loaded along": (SIX, 0, "generalized", STRENGTH, None, {"waypoints": HELD}),
+    "cooled": (TWO, 0, "generalized", STRENGTH, None, {"waypoints": COOLED}),
+    "in steps": (SIX, 0, "stress", ENERGY, INFLUENCE, {"waypoints": BACK} | STEPS),
+    "pressed in steps": (TWO, 0, "generalized", STRENGTH | SPRINGS, None, {"waypoints": PRESSED} | STEPS),
+}
+
+
+def solved(comm, folder, phases, across, plane, interface, petsc, **analysis):
+    """The result of a case of layers, with its files in the folder.  Collective."""
+    if comm.rank == 0:
+        layers(phases, across).write(folder / "layers.msh")
+    comm.barrier()
+    cell = {"geometry": "mesh", "file": "layers.msh"}
+    case = document(cell, EPOXY_GLASS, plane, interface, petsc, **analysis)
+    case["output"]["fields"] = True
+    return run(Case.parse(case, folder), comm, out=folder / "out")
+
+
+def closed_form(phases, across, plane, interface):
+    """Layers without bonds, whose faces touch through the springs of two interfaces each, if there are some."""
+    share = phases.count("F") / len(phases)
+    faces = 2 * sum(a != "F" and b == "F" for a, b in zip(phases, phases[1:] + phases[0], strict=True))
+    give = faces / interface["normal_stiffness"] if "normal_stiffness" in interface else 0.0
+    return PartedLayers(EPOXY_GLASS, (1 - share, share), plane, across, give)
+
+
+@pytest.mark.parametrize("name", PATHS)
+def test_layers_part_close_and_part_again_exactly(comm, shared_path, name):
+    phases, across, plane, interface, petsc, path = PATHS[name]
+    result = solved(comm, shared_path, phases, across, plane, interface, petsc, path=path)
+    oracle = closed_form(phases, across, plane, interface)
+    points = [{"load_factor": p.load_factor, "strain": p.strain, "stress": p.stress, "broke": p.broke}
+              | ({} if p.temperature is None else {"temperature": p.temperature}) for p in result.path]  # fmt: skip
+    largest = [max(np.abs(getattr(p, what)).max() for p in result.path) for what in ("strain", "stress")]
+    parted = touching = 0
+    for point, load in zip(result.path, at_points(result.case, points), strict=True):
+        if point.bonded:
+            continue
+        n = len(oracle.along) + 1
+        given = {("S" if by_stress else "E") + f"{k}{k}": value for k, value, by_stress
+                 in zip((1, 2, 3)[:n], load.values, load.by_stress, strict=False)}  # fmt: skip
+        strain, stress, touch = oracle.state(given, point.temperature or 0.0)
+        strain = np.where(np.isnan(strain), point.strain[:n], strain)
+        assert np.abs(point.strain[:n] - strain).max() < EXACT * largest[0]
+        assert np.abs(point.stress - np.pad(stress, (0, len(point.stress) - n))).max() < EXACT * largest[1]
+        parted, touching = parted + (not touch), touching + touch
+    assert result.status == "done" and parted and touching and result.path[-1].bonded == 0
+    certificate = verify(shared_path / "out") if comm.rank == 0 else None
+    parallel_assert(comm, certificate is None or certificate.holds, certificate and certificate.text)
+
+
+@pytest.mark.parametrize("phases", [TWO, NINE])
+def test_layers_touch_where_the_strain_is_zero(comm, shared_path, phases):
+    result = solved(comm, shared_path, phases, 0, "strain", STRENGTH, None, path={"waypoints": BACK})
+    _, _, turn, last = result.path
+    assert abs(turn.load_factor - 5 / 6) < 1e-12 and last.open == 0
+
+
+def test_a_pull_on_parted_layers_is_told_with_what_was_found(comm, shared_path):
+    path = {"waypoints": [{"E11": 0.2}, {"S11": 0.1}]}
+    with pytest.raises(ConvergenceError, match="nothing in the cell carries"):
+        solved(comm, shared_path, TWO, 0, "strain", STRENGTH, None, path=path)
+
+
+@pytest.mark.parametrize("back", [{"E11": -0.01}, {"S11": -0.01}], ids=str)
+def test_a_fibre_that_comes_free_is_pressed_again(comm, back):
+    weak = {"normal_strength": 1e-4, "tangential_strength": 1e-4}
+    case = {"cell": {"mesh_size": 0.45}, "phases": EPOXY_GLASS, "plane": "strain", "interface": weak}
+    result, _ = compare_paths(comm, **case, path={"waypoints": [{"E11": 0.02}, back]})
+    assert result.path[-1].bonded == 0 and result.path[-1].closed
