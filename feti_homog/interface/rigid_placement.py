@@ -193,15 +193,10 @@ def _largest_gap(gap: Float, motion: Float) -> tuple[Float, float, Float]:
 
 
 def _last_share(here: Float, ahead: Float, motion: Float, slack: float) -> float:
-    """max w <= 1 with (1 - w) here + w ahead + motion a >= -slack; w = 0 is possible.
-
-    The multipliers f >= 0 of the inequalities are forces in balance, f motion = 0: they give w to rounding, the
-    programme only to its tolerance."""
+    """max w <= 1 with (1 - w) here + w ahead + motion a >= -slack; w = 0 is possible."""
     scale, size = np.abs([here, ahead]).max(), np.abs(motion).max(axis=0)
     result = _maximised(-motion / size, (here - ahead) / scale, (here + slack) / scale, (0.0, 1.0))
-    forces = -result.ineqlin.marginals
-    closing = float(forces @ (here - ahead))
-    return float(np.clip(forces @ (here + slack) / closing, 0.0, 1.0)) if closing > 0.0 else float(result.x[-1])
+    return float(result.x[-1])
 
 
 def _maximised(motions: Float, last: Float, limits: Float, bounds: tuple[float | None, float]) -> OptimizeResult:
