@@ -27,7 +27,7 @@ def joined(parts: Sequence[SubmeshesOfRank]) -> SubmeshesOfRank:
 
 def _joined_meshes(meshes: list[Submesh]) -> Submesh:
     """All triangles of these; plane vertices and edges are not identified, classes and torus edges are."""
-    class_keys, class_of = np.unique(_all(meshes, "class_keys"), return_inverse=True)
+    class_keys, first_class, class_of = np.unique(_all(meshes, "class_keys"), return_index=True, return_inverse=True)
     edge_keys, first, edge_of = np.unique(_all(meshes, "edge_keys"), return_index=True, return_inverse=True)
     pinned = [np.searchsorted(class_keys, mesh.class_keys[mesh.pinned]) for mesh in meshes if mesh.pinned >= 0]
     return replace(
@@ -43,6 +43,7 @@ def _joined_meshes(meshes: list[Submesh]) -> Submesh:
         edge_class=edge_of[_numbers(meshes, "edge_class", "edge_keys")],
         at_void=_all(meshes, "at_void")[first],
         debonded=_all(meshes, "debonded")[first],
+        touching=_all(meshes, "touching")[first_class],
         class_keys=class_keys,
         edge_keys=edge_keys,
         pinned=int(pinned[0]) if pinned else -1,

@@ -34,6 +34,7 @@ class Torus:
         constituent: (m,) constituent of each triangle; those of the matrix come first.
         class_keys, edge_keys: ascending numbers in the whole cell of the classes and of the torus edges.
         at_void: (torus edges,) whether one triangle of the whole cell has it, and a void is beside it.
+        is_whole: whether it has all triangles of the cell.
     """
 
     mesh: CoarseMesh
@@ -45,6 +46,7 @@ class Torus:
     class_keys: Int
     edge_keys: Int
     at_void: Bool
+    is_whole: bool = True
 
     @classmethod
     def of(cls, mesh: CoarseMesh) -> Torus:
@@ -110,6 +112,42 @@ class Torus:
         sine = start[:, 0] * stop[:, 1] - start[:, 1] * stop[:, 0]
         turns[self.arcs] = np.arctan2(np.abs(sine), (start * stop).sum(axis=1))
         return turns
+
+    @cached_property
+    def edge_ends(self) -> Int:
+        """(torus edges, 2) classes of the ends of each."""
+        plane = np.unique(self.torus_edge, return_index=True)[1]
+        return np.asarray(self.node_class[self.edges[plane]])
+
+    @cached_property
+    def meeting(self) -> Int:
+        """(classes,) number of the constituents that meet in each."""
+        corner, n = self.node_class[self.mesh.triangles], int(self.constituent.max(initial=0)) + 1
+        pairs = np.unique(corner * n + self.constituent[:, None])
+        return np.bincount(pairs // n, minlength=len(self.class_keys))
+
+    @cached_property
+    def touching(self) -> Bool:
+        """(classes,) where two constituents meet, but not along one line: more than once, or without an edge.
+
+        On a line each has one sector of the triangles around.  Round fibres, all that is torn by tiles, touch nowhere.
+        """
+        if not self.is_whole:
+            return np.zeros(len(self.class_keys), bool)
+        left, right, edge = self.sides
+        between = edge[self.constituent[left] != self.constituent[right]]
+        shared, free = (
+            np.bincount(self.edge_ends[some].ravel(), minlength=len(self.class_keys))
+            for some in (between, np.flatnonzero(self.at_void))
+        )
+        # Each edge between constituents ends a sector, and so do both sides of a void together.
+        sectors = shared + free // 2
+        return np.asarray((self.meeting == 2) & ((sectors != 2) | (shared == 0)))
+
+    @cached_property
+    def never_part(self) -> Bool:
+        """(classes,) where constituents are held together whatever their interface: three meet, or two touch."""
+        return np.asarray((self.meeting > 2) | self.touching)
 
     @cached_property
     def edge_lengths(self) -> Float:

@@ -34,6 +34,7 @@ class Submesh:
         edge_class: (e,) torus edge of each edge.
         at_void: (torus edges,) whether one triangle of the whole cell has the torus edge, and a void is beside it.
         debonded: (torus edges,) whether it is from the start.
+        touching: (classes,) as `Torus.touching`.
         class_keys, edge_keys: global numbers of the classes and torus edges.
         period: (2,) width and height of the cell.
         pinned: local class that is pinned against translation of the whole cell, Eq. (15), or -1.
@@ -53,6 +54,7 @@ class Submesh:
     edge_class: Int
     at_void: Bool
     debonded: Bool
+    touching: Bool
     class_keys: Int
     edge_keys: Int
     period: Float
@@ -165,6 +167,7 @@ def part(submesh: Submesh, members: Int) -> Submesh:
         edge_class=edge_class,
         at_void=submesh.at_void[torus_edges],
         debonded=submesh.debonded[torus_edges],
+        touching=submesh.touching[classes],
         class_keys=submesh.class_keys[classes],
         edge_keys=submesh.edge_keys[torus_edges],
         pinned=int(pinned_here[0]) if len(pinned_here) else -1,
@@ -177,28 +180,22 @@ def pinned_class(torus: Torus) -> int:
     A pinned class on an interface would hold faces together that must be able to part, and one in a fibre would keep
     that from moving when all of its bonds are broken.  u* is the same up to a constant.
     """
-    body = np.repeat(torus.constituent, 3)
-    corner = torus.node_class[torus.mesh.triangles].ravel()
-    n = len(torus.class_keys)
-    low, high = np.full(n, body.max()), np.zeros(n, np.int64)
-    np.minimum.at(low, corner, body)
-    np.maximum.at(high, corner, body)
-    # By preference inside the matrix, else inside any body.
-    ((*_, key),) = pinning(torus, low != high, torus.constituent_phase[high] == 0)
+    outside = np.zeros(len(torus.class_keys), bool)
+    outside[torus.node_class[torus.mesh.triangles[torus.constituent_phase[torus.constituent] > 0]]] = True
+    # By preference inside the matrix, else where bodies never part, else inside any body.
+    ((*_, key),) = pinning(torus, np.select([torus.never_part, torus.meeting == 2, outside], [1, 3, 2], 0))
     return key
 
 
-def pinning(torus: Torus, at_interface: Bool, in_matrix: Bool) -> list[tuple[bool, bool, float, int]]:
-    """Of the class that is best pinned, by which the least of several is: whether it is at an interface, whether it is
-    outside the matrix, its distance from the cell's corner, its key; of the classes (n,) each of which is or is not
-    `at_interface` and `in_matrix`.  Nothing of no classes."""
+def pinning(torus: Torus, unfit: Int) -> list[tuple[int, float, int]]:
+    """Of the class that is best pinned, by which the least of several is: how unfit it is, its distance from the cell's
+    corner, its key; `unfit` (classes,) is the larger, the less fit each is.  Nothing of no classes."""
     mesh = torus.mesh
     away = mesh.points - np.round(mesh.points / mesh.period) * mesh.period
     distance = np.full(len(torus.class_keys), np.inf)
     np.minimum.at(distance, torus.node_class, np.hypot(*away.T))
-    best = np.lexsort((distance, ~in_matrix, at_interface))[:1].tolist()
-    keys = torus.class_keys
-    return [(bool(at_interface[k]), not in_matrix[k], float(distance[k]), int(keys[k])) for k in best]
+    best = np.lexsort((distance, unfit))[:1].tolist()
+    return [(int(unfit[k]), float(distance[k]), int(torus.class_keys[k])) for k in best]
 
 
 def _submesh(torus: Torus, members: Int, pinned: int) -> Submesh:
@@ -226,6 +223,7 @@ def _submesh(torus: Torus, members: Int, pinned: int) -> Submesh:
         edge_class=edge_class,
         at_void=torus.at_void[torus_edges],
         debonded=torus.debonded[torus_edges],
+        touching=torus.touching[classes],
         class_keys=torus.class_keys[classes],
         edge_keys=torus.edge_keys[torus_edges],
         period=np.array([mesh.width, mesh.height]),

@@ -110,7 +110,7 @@ def tile_torus(regions: Regions, tiles: Sequence[FilledTile], all_nodes: int) ->
     at_void = np.zeros(len(keys), bool)
     at_void[torus_edge[torus.plane_edges(mesh.arc_edges[regions.constituent[arc_circle] < 0])]] = True
     tile = np.repeat([own.number for own in tiles], [len(own.filling.triangles) for own in tiles])
-    return replace(torus, at_void=at_void), tile[solid]
+    return replace(torus, at_void=at_void, is_whole=False), tile[solid]
 
 
 def _arcs(tiles: Sequence[FilledTile], number: Int, triangles: Int32) -> tuple[Int32, Int]:

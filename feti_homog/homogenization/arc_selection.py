@@ -33,8 +33,8 @@ class InterfaceNodes:
 
     @classmethod
     def of(cls, torus: Torus, lattice: ReferenceLattice, pairs: Int, numbers: Int, centres: Float) -> InterfaceNodes:
-        """Those on edges that may debond, on their chords; `pairs` as in `share_entities`, `numbers` (constituents,)
-        those of fibres."""
+        """Those on edges that may debond, on their chords, but for vertices that never part; `pairs` as in
+        `share_entities`, `numbers` (constituents,) those of fibres."""
         left, right, edge = torus.sides
         pair = pairs[torus.mesh.phase[left], torus.mesh.phase[right]]
         sides = torus.constituent[np.stack([left, right])][:, pair >= 0]
@@ -43,14 +43,15 @@ class InterfaceNodes:
         plane = np.unique(torus.torus_edge, return_index=True)[1][between]
         share = np.linspace(0.0, 1.0, lattice.intervals + 1)[None, :, None]
         ends = torus.mesh.points[torus.edges[plane]]
-        points = (ends[:, :1] * (1 - share) + ends[:, 1:] * share).reshape(-1, 2)
-        fibre = np.repeat(inner, lattice.intervals + 1)
-        is_vertex = np.tile(np.isin(share.ravel(), (0.0, 1.0)), len(between))
+        points = ends[:, :1] * (1 - share) + ends[:, 1:] * share
+        parts = np.ones(points.shape[:2], bool)
+        parts[:, [0, -1]] = ~torus.never_part[torus.node_class[torus.edges[plane]]]
+        own, step = np.nonzero(parts)
         return cls(
-            numbers[fibre],
-            np.repeat(pair[pair >= 0], lattice.intervals + 1),
-            debonded_arcs.angles(points, fibre, centres, torus.mesh.period),
-            is_vertex,
+            numbers[inner[own]],
+            pair[pair >= 0][own],
+            debonded_arcs.angles(points[parts], inner[own], centres, torus.mesh.period),
+            (step == 0) | (step == lattice.intervals),
         )
 
     def moved_tips(self, case: Case) -> tuple[MovedTips, ...]:

@@ -5,19 +5,37 @@ from __future__ import annotations
 import numpy as np
 
 from feti_homog.cell import tabulated
-from feti_homog.cell.coarse_mesh import CoarseMesh
+from feti_homog.cell.periodic_topology import Torus
 from feti_homog.config.case import Case
 from feti_homog.config.fibre_window import read_window
 from feti_homog.config.selectors import BREAKING
 from feti_homog.homogenization import bonds
+from feti_homog.typing import Int
 
 MOST_LISTED = 30  # moved fibres that are listed one by one
 SAME_FRACTION = 0.01  # of a matched table and its cell, relative
 
 
-def mesh_remarks(case: Case, mesh: CoarseMesh) -> tuple[str, ...]:
-    """List the curves of a user's mesh that nothing uses, and an [interface] without an effect, a line each."""
-    return (*mesh.unused_curves, *_bonding(case, len(mesh.debonded_edges) > 0))
+def mesh_remarks(case: Case, torus: Torus, pairs: Int) -> tuple[str, ...]:
+    """List unused curves of a user's mesh, an [interface] without an effect, and nodes that never part, a line each.
+
+    `pairs` as in `share_entities`.
+    """
+    return (
+        *torus.mesh.unused_curves,
+        *_bonding(case, len(torus.mesh.debonded_edges) > 0),
+        *(_held_nodes(torus, pairs) if case.interfaces else ()),
+    )
+
+
+def _held_nodes(torus: Torus, pairs: Int) -> tuple[str, ...]:
+    """Count the nodes of interfaces that never part: where three bodies meet, and where two meet more than once."""
+    left, right, edge = torus.sides
+    may_part = pairs[torus.mesh.phase[left], torus.mesh.phase[right]] >= 0
+    ends = np.unique(torus.edge_ends[edge[may_part & (torus.constituent[left] != torus.constituent[right])]])
+    kinds = ((torus.meeting[ends] > 2, "three bodies meet"), (torus.touching[ends], "two bodies meet more than once"))
+    words = [f"at {which.sum()} {what}" for which, what in kinds if which.any()]
+    return (f"[interface] nodes that never part: {', '.join(words)}",) if words else ()
 
 
 def _bonding(case: Case, has_debonded_curve: bool) -> tuple[str, ...]:

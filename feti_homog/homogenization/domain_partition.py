@@ -199,7 +199,7 @@ def distribute(
         snapped=mesh.snapped,
         voids=voids(mesh) if torus.at_void.any() else 0,
         match_distance=match_distance(case, mesh.width, mesh.height, centres[is_fibre], circles[is_fibre, 2]),
-        remarks=(*table_remarks(case), *mesh_remarks(case, mesh)),
+        remarks=(*table_remarks(case), *mesh_remarks(case, torus, pairs)),
     )
     shares = cut_for_ranks(torus, subdomain, table, n_ranks, pinned_class(torus))
     return [RankShare(summary, table, pairs, own) for own in shares]

@@ -122,6 +122,6 @@ def _pinned(torus: Torus, comm: MPI.Intracomm) -> int:
     at_interface, in_matrix = np.zeros((2, len(torus.class_keys)), bool)
     at_interface[torus.node_class[torus.mesh.arc_edges]] = True
     in_matrix[torus.node_class[torus.mesh.triangles[torus.constituent == 0]]] = True
-    found = comm.allgather(pinning(torus, at_interface, in_matrix))
-    best: tuple[bool, bool, float, int] = min(chain.from_iterable(found))
+    found = comm.allgather(pinning(torus, np.select([at_interface, in_matrix], [2, 0], 1)))
+    best: tuple[int, float, int] = min(chain.from_iterable(found))
     return best[-1]

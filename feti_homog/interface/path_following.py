@@ -13,13 +13,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-import numpy as np
-
 from feti_homog.interface.bond_criterion import BondCriterion
 from feti_homog.interface.later_leg import LaterLeg
 from feti_homog.interface.load import Load
 from feti_homog.interface.loaded_cell import LoadedCell
-from feti_homog.interface.macroscopic import Macroscopic
 from feti_homog.interface.path_points import (
     NO_ENERGIES,
     UTILISATION_TIE,

@@ -14,7 +14,7 @@ from feti_homog.verification.bonds import inwardness, pairs_of
 from feti_homog.verification.constitutive_law import expansions, plane_stiffnesses, spatial_stiffnesses
 from feti_homog.verification.elements import Elements
 from feti_homog.verification.reading import ResultFiles
-from feti_homog.verification.torus import TornNodes, TornSides, constituents, torn, wrapped
+from feti_homog.verification.torus import TornNodes, TornSides, along_one_line, constituents, torn, wrapped
 
 # Scales of a state are no less than this share of those of the run: a path may come back to zero strain.
 LEAST_SHARE = 1e-9
@@ -41,7 +41,8 @@ class Faces:
         is_fibre: (b,) whether the torn node belongs to a fibre, the inner of the two bodies.
         copies: (b,) how many copies of the torn node its subdomain has, periodic images of each other.
         distance: (k,) of each interface node from its place, infinite if there is no such place.
-        pair: (places,) place of the section of the two bodies that meet there alone; -1 where they never part.
+        pair: (places,) place of the section of the two bodies that meet there alone, along one line; -1 where they never
+            part.
         place: (k,) of each interface node, -1 if there is none.
     """
 
@@ -102,7 +103,8 @@ class DiscreteCell:
         sides, nodes, radius = torn(mesh, files.size)
         parts = constituents(mesh, sides)
         inwards = inwardness(mesh, files.phases, sides, parts)
-        faces = _faces(files, nodes, parts, inwards, radius)
+        on_line = along_one_line(sides, nodes, parts[mesh.subdomain])
+        faces = _faces(files, nodes, on_line, parts, inwards, radius)
         inner = _inner_sides(files, sides, inwards[parts[mesh.subdomain]])
         areas = np.bincount(mesh.phase, elements.area, len(files.phases))
         strains = [np.abs(state.attrs["strain"]).max() for state in files.file.get("state", {}).values()]
@@ -211,11 +213,12 @@ def _inner_sides(files: ResultFiles, sides: TornSides, inwards: Int) -> Bool:
     return np.asarray(may_part & (inwards[sides.element] > inwards[other]))
 
 
-def _faces(files: ResultFiles, nodes: TornNodes, parts: Int, inwards: Int, radius: float) -> Faces:
-    """Where the interface nodes of a result are on its mesh; `inwards` (parts,) as `inwardness` has it."""
+def _faces(files: ResultFiles, nodes: TornNodes, on_line: Bool, parts: Int, inwards: Int, radius: float) -> Faces:
+    """Where the interface nodes of a result are on its mesh; `inwards` (parts,) as `inwardness` has it, `on_line`
+    (places,) as `along_one_line`."""
     depth = inwards[parts[nodes.subdomain]]
     members = np.unique(np.column_stack([nodes.place, depth, nodes.phase]), axis=0)
-    two = np.flatnonzero(np.bincount(members[:, 0], minlength=nodes.places) == 2)
+    two = np.flatnonzero((np.bincount(members[:, 0], minlength=nodes.places) == 2) & on_line)
     outer, inner = np.searchsorted(members[:, 0], two), np.searchsorted(members[:, 0], two, side="right") - 1
     pair = np.full(nodes.places, -1)
     pair[two] = pairs_of(files)[members[outer, 2], members[inner, 2]]

@@ -94,6 +94,21 @@ def same_places(points: Float, size: Float, radius: float) -> Int:
     return np.asarray(connected_components(graph, directed=False)[1], np.int64)
 
 
+def along_one_line(sides: TornSides, nodes: TornNodes, part: Int) -> Bool:
+    """(places,) whether two bodies meet there along one line, if two do; `part` (m,) is the body of each element.
+
+    Then either body ends there at two sides, and not all of these are at voids.  A middle node is on one line.
+    """
+    apart = ~sides.at_void & (part[sides.element] != part[sides.element[sides.partner]])
+    place = np.full(int(nodes.node.max(initial=-1)) + 1, -1)
+    place[nodes.node] = nodes.place
+    facing, at_void, middle = (
+        np.bincount(place[own].ravel(), minlength=nodes.places)
+        for own in (sides.nodes[apart, :2], sides.nodes[sides.at_void, :2], sides.nodes[:, 2:])
+    )
+    return np.asarray((middle > 0) | ((facing + at_void == 4) & (facing > 0)))
+
+
 def constituents(mesh: Mesh, sides: TornSides) -> Int:
     """(subdomains,) number of the connected part of a phase on the torus that each subdomain lies in."""
     paired = np.flatnonzero(sides.partner >= 0)

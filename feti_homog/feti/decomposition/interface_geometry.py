@@ -9,9 +9,14 @@ from mpi4py import MPI
 
 from feti_homog.cell.submesh import SubdomainTable, Submesh, SubmeshesOfRank
 from feti_homog.common.exchange import exchange
+from feti_homog.common.mpi_errors import agree
+from feti_homog.errors import MeshError
 from feti_homog.feti.decomposition.edge_arcs import mean_speed
 from feti_homog.feti.decomposition.sharers import Sharers, entity_code
 from feti_homog.typing import Bool, Float, Int
+
+# Two sides at a node are folded onto each other if their normals add up to no more than this share of their lengths.
+FOLDED = 1e-9
 
 
 @dataclass(frozen=True)
@@ -28,14 +33,17 @@ class InterfaceGeometry:
         return InterfaceGeometry(self.normal[which], self.turn[which], self.precracked[which])
 
 
-def breakable_pairs(table: SubdomainTable, pairs: Int, found: Sharers) -> Int:
-    """(n,) the interface of the two bodies that meet there; -1 where it never parts or a third body meets them."""
+def breakable_pairs(own: SubmeshesOfRank, table: SubdomainTable, pairs: Int, found: Sharers) -> Int:
+    """(n,) the interface of the two bodies that meet there; -1 where it never parts, where a third body meets them, and
+    where they do not meet along one line."""
     body, copies = table.body[found.sharer], found.copies
     outer, inner = body[found.pointer[:-1]], body[found.pointer[1:] - 1]
     third = (body != np.repeat(outer, copies)) & (body != np.repeat(inner, copies))
     thirds = np.bincount(np.repeat(np.arange(len(copies)), copies), third, len(copies))
+    on_line, vertices = np.ones(len(copies), bool), np.flatnonzero(~found.is_edge)
+    on_line[vertices] = ~own.whole.touching[np.searchsorted(own.whole.class_keys, found.key[vertices])]
     phase = table.phase
-    return np.where((thirds == 0) & (outer != inner), pairs[phase[outer], phase[inner]], -1)
+    return np.where((thirds == 0) & (outer != inner) & on_line, pairs[phase[outer], phase[inner]], -1)
 
 
 def interface_geometry(
@@ -44,8 +52,9 @@ def interface_geometry(
     """Normals, turns and precracks of shared entities; `pairs` as in `share_entities`; the side of an element is the
     share `side` of a coarse edge.  Collective."""
     n, owner = len(found.key), table.rank[found.innermost]
+    can_part = (owner == comm.rank) & (breakable_pairs(own, table, pairs, found) >= 0)
     # The last sharer of an edge between two bodies is on the side of the fibre.
-    edges = np.flatnonzero(found.is_edge & (owner == comm.rank) & (breakable_pairs(table, pairs, found) >= 0))
+    edges = np.flatnonzero(found.is_edge & can_part)
     triangle, k = _triangles_beside(own, found.key[edges], found.innermost[edges])
     whole = own.whole
     plane = whole.triangle_edges[triangle, k]
@@ -62,7 +71,24 @@ def interface_geometry(
     vertices = ~found.is_edge
     scaled = sums[:, :2] * (sums[:, 2] / np.maximum(np.hypot(*sums[:, :2].T), 1e-300))[:, None]
     normals[vertices], precracked[vertices] = scaled[vertices, None], sums[vertices, 3] == 0
+    agree(comm, _check, own, found.chosen(np.flatnonzero(can_part)), normals[can_part], sums[can_part])
     return InterfaceGeometry(normals, turns, precracked)
+
+
+def _check(own: SubmeshesOfRank, found: Sharers, normals: Float, sums: Float) -> None:
+    """Raise MeshError where a normal is not finite, is zero, or is that of sides folded onto each other, whose directions
+    cancel; `normals` (n, 2, 2) and `sums` (n, 4) as in `interface_geometry`."""
+    length = np.linalg.norm(normals, axis=2)
+    folded = ~found.is_edge & ~(np.hypot(*sums[:, :2].T) > FOLDED * sums[:, 2])
+    bad = np.flatnonzero(~(np.isfinite(length) & (length > 0)).all(axis=1) | folded)
+    if len(bad):
+        whole, first = own.whole, bad[0]
+        keys = whole.edge_keys[whole.edge_class] if found.is_edge[first] else whole.class_keys[whole.vertex_class]
+        plane = int(np.flatnonzero(keys == found.key[first])[0])
+        x, y = whole.points[whole.edges[plane] if found.is_edge[first] else [plane]].mean(axis=0)
+        raise MeshError(
+            f"the interface has no normal at ({x:.9g}, {y:.9g}): its sides there are folded or of no length"
+        )
 
 
 def _sums_at_vertices(comm: MPI.Intracomm, found: Sharers, owner: Int, ends: Int, edge: Int, parts: Float) -> Float:

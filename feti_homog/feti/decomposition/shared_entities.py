@@ -88,7 +88,7 @@ def share_entities(
     )
     order = np.argsort(first)
     found = found.chosen(order)
-    pair = breakable_pairs(table, pairs, found)
+    pair = breakable_pairs(own, table, pairs, found)
     return SharedEntities(
         key=found.key,
         is_edge=found.is_edge,
