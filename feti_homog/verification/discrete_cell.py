@@ -41,8 +41,8 @@ class Faces:
         is_fibre: (b,) whether the torn node belongs to a fibre, the inner of the two bodies.
         copies: (b,) how many copies of the torn node its subdomain has, periodic images of each other.
         distance: (k,) of each interface node from its place, infinite if there is no such place.
-        pair: (places,) place of the section of the two bodies that meet there alone, along one line; -1 where they never
-            part.
+        pair: (places,) place of the section of the two bodies that meet there alone and along one line; -1 where they
+            never part.
         place: (k,) of each interface node, -1 if there is none.
     """
 

@@ -15,10 +15,22 @@ SYMMETRIES = [
 ]  # fmt: skip
 
 
-def random_image(size: int, seed: int, share: float = 0.4, phases: int = 1) -> np.ndarray:
-    """(size, size) phases of pixels [row, column], 0 the matrix, of which about that `share` are others."""
+def random_image(size: int, seed: int, share: float = 0.4, phases: int = 1, voids: float = 0.0) -> np.ndarray:
+    """(size, size) phases of pixels [row, column], 0 the matrix, of which about that `share` are others; one body of
+    each phase, grown pixel by pixel in thin branches that touch, and -1 of that share of inner pixels."""
     rng = np.random.default_rng(seed)
-    return np.where(rng.random((size, size)) < share, rng.integers(1, phases + 1, (size, size)), 0)
+    image = np.zeros((size, size), int)
+    for phase in range(1, phases + 1):
+        image[tuple(rng.choice(np.argwhere(image == 0)))] = phase
+        while np.count_nonzero(image == phase) < share / phases * size**2:
+            beside = sum(np.roll(image == phase, step, axis).astype(int) for step in (-1, 1) for axis in (0, 1))
+            beside[image > 0] = 0
+            thin = np.argwhere(beside == 1)
+            if not beside.any():
+                break
+            image[tuple(rng.choice(thin if len(thin) else np.argwhere(beside > 0)))] = phase
+    image[1:-1, 1:-1][rng.random((size - 2, size - 2)) < voids] = -1
+    return image
 
 
 def pixel_mesh(image: np.ndarray, jitter: float = 0.0, symmetry: np.ndarray = SYMMETRIES[0], seed: int = 0) -> MshFile:
@@ -45,8 +57,11 @@ def pixel_mesh(image: np.ndarray, jitter: float = 0.0, symmetry: np.ndarray = SY
     return MshFile(nodes, elements, {tag: names[tag] for tag in range(1, int(image.max()) + 2)})
 
 
-def turned_stiffness(stiffness: np.ndarray, symmetry: np.ndarray) -> np.ndarray:
-    """(3, 3) in the order [11, 22, 12] with engineering shear, of a body that is turned or mirrored."""
+def turned(symmetry: np.ndarray, of_strain: bool = False) -> np.ndarray:
+    """(3, 3) what makes of the stresses [11, 22, 12] of a body, or of its strains with engineering shear, those of the
+    body turned or mirrored."""
     (a, b), (c, d) = symmetry
-    stress = np.array([[a * a, b * b, 2 * a * b], [c * c, d * d, 2 * c * d], [a * c, b * d, a * d + b * c]])
-    return np.asarray(stress @ stiffness @ stress.T)
+    two, half = (1, 2) if of_strain else (2, 1)
+    return np.array(
+        [[a * a, b * b, two * a * b], [c * c, d * d, two * c * d], [half * a * c, half * b * d, a * d + b * c]]
+    )

@@ -76,8 +76,8 @@ def interface_geometry(
 
 
 def _check(own: SubmeshesOfRank, found: Sharers, normals: Float, sums: Float) -> None:
-    """Raise MeshError where a normal is not finite, is zero, or is that of sides folded onto each other, whose directions
-    cancel; `normals` (n, 2, 2) and `sums` (n, 4) as in `interface_geometry`."""
+    """Raise MeshError where a normal is not finite, is zero, or is that of sides folded onto each other, whose
+    directions cancel; `normals` (n, 2, 2) and `sums` (n, 4) as in `interface_geometry`."""
     length = np.linalg.norm(normals, axis=2)
     folded = ~found.is_edge & ~(np.hypot(*sums[:, :2].T) > FOLDED * sums[:, 2])
     bad = np.flatnonzero(~(np.isfinite(length) & (length > 0)).all(axis=1) | folded)
@@ -86,9 +86,7 @@ def _check(own: SubmeshesOfRank, found: Sharers, normals: Float, sums: Float) ->
         keys = whole.edge_keys[whole.edge_class] if found.is_edge[first] else whole.class_keys[whole.vertex_class]
         plane = int(np.flatnonzero(keys == found.key[first])[0])
         x, y = whole.points[whole.edges[plane] if found.is_edge[first] else [plane]].mean(axis=0)
-        raise MeshError(
-            f"the interface has no normal at ({x:.9g}, {y:.9g}): its sides there are folded or of no length"
-        )
+        raise MeshError(f"the interface has no normal at ({x:.9g}, {y:.9g}): its sides are folded or of no length")
 
 
 def _sums_at_vertices(comm: MPI.Intracomm, found: Sharers, owner: Int, ends: Int, edge: Int, parts: Float) -> Float:
