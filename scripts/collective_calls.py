@@ -1,7 +1,8 @@
-"""The collective calls that Python makes by mpi4py, counted; those of PETSc and MUMPS are not among them."""
+"""Calls that communicate: those that Python makes by mpi4py counted, and any refused where none may be."""
 
 from __future__ import annotations
 
+import contextlib
 import sys
 from collections import Counter
 from collections.abc import Iterator
@@ -9,26 +10,83 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Any
 
+import h5py
 from mpi4py import MPI
+from petsc4py import PETSc
 
 COLLECTIVES = frozenset(
     {"Barrier", "barrier", "Bcast", "bcast", "Allreduce", "allreduce", "Reduce", "reduce", "Allgather", "allgather"}
     | {"Allgatherv", "Gather", "gather", "Gatherv", "Scatter", "scatter", "Scatterv", "Alltoall", "alltoall"}
     | {"Alltoallv", "Reduce_scatter", "Exscan", "exscan", "Scan", "scan"}
 )
+# Methods that look at an object, of mpi4py and PETSc, by how their names begin.
+LOCAL = ("Get_", "Is_", "py2f", "tompi4py", "get", "is", "__")
+
+
+class CommunicationError(AssertionError):
+    """A guarded section communicates."""
 
 
 @contextmanager
 def collective_calls() -> Iterator[Counter[str]]:
-    """Calls of this rank in the block, by name.  The block gets slower: no time of it is worth anything."""
+    """Calls of this rank in the block, by name, without those that PETSc and MUMPS make themselves.
+
+    The block gets slower: no time of it is worth anything.
+    """
     calls: Counter[str] = Counter()
 
     def note(frame: FrameType, event: str, function: Any) -> None:
         if event == "c_call" and function.__name__ in COLLECTIVES and isinstance(function.__self__, MPI.Comm):
             calls[function.__name__] += 1
 
+    with _profiled(note):
+        yield calls
+
+
+@contextmanager
+def no_communication() -> Iterator[None]:
+    """A block in which mpi4py, PETSc's objects and HDF5's files of several ranks raise CommunicationError before they
+    communicate, or after PETSc has made such an object."""
+
+    def refuse(frame: FrameType, event: str, function: Any) -> None:
+        if event == "call":
+            name = frame.f_code.co_name if _is_shared_file(frame) else ""
+        else:
+            name = function.__name__ if event in ("c_call", "c_return") and _is_of_ranks(function) else ""
+        if name:
+            raise CommunicationError(f"{name} is called in a guarded section, from {frame.f_code.co_qualname}")
+
+    with _profiled(refuse):
+        yield
+
+
+@contextmanager
+def _profiled(note: Any) -> Iterator[None]:
+    before = sys.getprofile()
     sys.setprofile(note)
     try:
-        yield calls
+        yield
     finally:
-        sys.setprofile(None)
+        sys.setprofile(before)
+
+
+def _is_of_ranks(function: Any) -> bool:
+    """Whether a method belongs to an object of mpi4py or PETSc that several ranks have, and does more than look."""
+    thing = getattr(function, "__self__", None)
+    if not isinstance(thing, MPI.Comm | PETSc.Object) or function.__name__.startswith(LOCAL):
+        return False
+    comm = thing if isinstance(thing, MPI.Comm) else thing.comm if thing.handle else MPI.COMM_NULL
+    return comm != MPI.COMM_NULL and bool(comm.size > 1)
+
+
+def _is_shared_file(frame: FrameType) -> bool:
+    """Whether a function of h5py that begins opens, or has to do with, a file that several ranks have open."""
+    if not frame.f_globals.get("__name__", "").startswith("h5py."):
+        return False
+    values = frame.f_locals
+    if frame.f_code.co_name == "__init__":
+        return values.get("driver") == "mpio" and bool(values["kwds"].get("comm", MPI.COMM_SELF).size > 1)
+    with contextlib.suppress(AttributeError, KeyError, TypeError, ValueError, RuntimeError):  # not open, or no object of a file
+        plist = h5py.h5i.get_file_id(values["self"].id).get_access_plist()
+        return bool(plist.get_driver() == h5py.h5fd.MPIO and plist.get_fapl_mpio()[0].size > 1)
+    return False

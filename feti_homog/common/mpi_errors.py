@@ -61,6 +61,24 @@ def agree(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs: Any) 
     return result  # type: ignore[return-value]
 
 
+def agree_after(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs: Any) -> T:
+    """function(...) of all ranks, which communicates, as a library's collective call; a FetiHomogError is raised by all.
+
+    Any other exception is raised by its rank alone, without a word to the others, which may be waiting for it within
+    `function`: it must end the job, as does a FetiHomogError for which the others do not come in time.  Collective.
+    """
+    result, error = None, None
+    try:
+        result = function(*args, **kwargs)
+    except FetiHomogError as met:
+        if not others_come(comm, ARRIVAL_TIMEOUT_S):
+            end_job(comm, met)
+        error = met
+    else:
+        comm.Ibarrier().Wait()
+    return agree(comm, _returned, result, error)  # type: ignore[return-value]
+
+
 def run_main(comm: Comm, main: Callable[[], int]) -> int:
     """The exit code of main(), run by every rank.
 
@@ -123,6 +141,12 @@ def _attempt(function: Callable[..., T], *args: Any, **kwargs: Any) -> tuple[T |
         return function(*args, **kwargs), None
     except Exception as error:
         return None, error
+
+
+def _returned(result: T, error: Exception | None) -> T:
+    if error is not None:
+        raise error
+    return result
 
 
 def _portable(comm: Comm, error: Exception | None) -> Exception | None:

@@ -78,6 +78,7 @@ def build(
     """
     options = database_options(thresholds)
     soft = options.want_soft_modes(_are_cut(comm, subdomains))
+    springs = jump_operator.gather(compliance) if comm.allreduce(bool(compliance.any()), MPI.LOR) else None
     with PETSc.Log.Event("FETISubdomains"):
         operators = agree(
             comm,
@@ -88,7 +89,7 @@ def build(
             applications,
             soft,
             thresholds,
-            compliance,
+            springs,
         )
     plan = choose(_sizes(comm, jump_operator, operators, applications), options, thresholds)
     preconditioner = CLASSES[plan.preconditioner](comm, jump_operator, operators)

@@ -8,7 +8,6 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.sparse import block_diag, csr_matrix
 
@@ -56,7 +55,8 @@ class InterfaceOperators:
     ) -> None:
         """Factor every subdomain, once, as `choose` says; takes the stiffness of each.  Arguments as of `choose`.
 
-        `compliance` (owned rows,) is that of the springs of the interfaces, none by default.  Collective.
+        `compliance` (local rows,) is that of the springs of the interfaces, None where no rank has any.  Nothing is
+        communicated: a rank may fail alone.
         """
         self.subdomains = subdomains
         self.dofs = _constrained_dofs(jump_operator.B, subdomains)
@@ -68,10 +68,11 @@ class InterfaceOperators:
         self.BT = self.B.T.tocsr()
         sizes = _sizes(jump_operator.shared, subdomains, self.dofs)
         can_condense = bool(PETSc.Sys.hasExternalPackage("mumps"))
-        self.springs = np.zeros(jump_operator.owned[1] - jump_operator.owned[0]) if compliance is None else compliance
-        self.compliance = _of_cut_nodes(jump_operator, self.springs)
+        own = _own_rows(jump_operator)
+        self.springs = np.zeros(own.stop - own.start) if compliance is None else compliance[own]
+        self.compliance = np.where((jump_operator.copies[own] > 1).all(axis=1), self.springs, 0.0)
         self.of_fibre = self._inner_dofs(jump_operator)
-        roots = self._compliance_roots(jump_operator, compliance)
+        roots = self._compliance_roots(jump_operator.copies, compliance)
         springs = [s.submesh.phase != MATRIX and root is not None for s, root in zip(subdomains, roots, strict=True)]
         sizes = [replace(size, has_springs=has) for size, has in zip(sizes, springs, strict=True)]
         chosen = choose(sizes, kind, applications, soft_modes, can_condense, thresholds)
@@ -90,18 +91,12 @@ class InterfaceOperators:
             diagonals.append(diagonal)
         self.body_diagonal, self.diagonal = np.concatenate(bodies), np.concatenate(diagonals)
 
-    def _compliance_roots(self, jump_operator: JumpOperator, compliance: Float | None) -> list[csr_matrix | None]:
-        """Of each subdomain the root of the compliance of its skin, None without springs.  Collective."""
-        if compliance is None or not self._any(jump_operator, compliance):
+    def _compliance_roots(self, copies: Int, compliance: Float | None) -> list[csr_matrix | None]:
+        """Of each subdomain the root of the compliance of its skin, None without springs."""
+        if compliance is None:
             return [None for _ in self.subdomains]
-        local, copies = jump_operator.gather(compliance), jump_operator.copies
-        found = [compliance_root(self.B[:, span], local, copies, self.of_fibre[span]) for span in self.slices]
+        found = [compliance_root(self.B[:, span], compliance, copies, self.of_fibre[span]) for span in self.slices]
         return [root if root.shape[1] else None for root in found]
-
-    @staticmethod
-    def _any(jump_operator: JumpOperator, compliance: Float) -> bool:
-        comm = jump_operator.vector.comm.tompi4py()
-        return bool(comm.allreduce(bool(compliance.any()), MPI.LOR))
 
     @cached_property
     def slices(self) -> list[slice]:
@@ -184,12 +179,11 @@ def _factor(subdomain: Subdomain, dofs: Int, explicit: bool) -> tuple[InterfaceO
     return operator, K.diagonal()[dofs]
 
 
-def _of_cut_nodes(jump_operator: JumpOperator, compliance: Float) -> Float:
-    """(owned rows,) the compliance of the rows where neither fibre nor matrix is whole."""
+def _own_rows(jump_operator: JumpOperator) -> slice:
+    """The owned rows among the local rows."""
     first, last = jump_operator.owned
-    at = np.searchsorted(jump_operator.rows, first)
-    own = jump_operator.copies[at : at + last - first]
-    return np.where((own > 1).all(axis=1), compliance, 0.0)
+    at = int(np.searchsorted(jump_operator.rows, first))
+    return slice(at, at + last - first)
 
 
 def _constrained_dofs(B: csr_matrix, subdomains: Sequence[Subdomain]) -> list[Int]:

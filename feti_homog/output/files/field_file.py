@@ -14,7 +14,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from feti_homog.common.mpi_errors import agree, all_raise, on_root
+from feti_homog.common.mpi_errors import agree, agree_after, all_raise, on_root
 from feti_homog.common.records import LENGTH, STRESS, Description
 from feti_homog.errors import FetiHomogError
 from feti_homog.output.files import atomic
@@ -93,8 +93,9 @@ class FieldFile:
         on_root(comm, _with_write_errors, self.path, _create, self.part, size)
         self._is_open = True
         self._opened = contextlib.ExitStack()
-        self._file = self._collectively(_open, self.part, comm, self._opened)
-        self._collectively(_set_attributes, self._file, attributes(header) | {"created_by": PROGRAM})
+        path = self._each(_path_for_mpi, self.part, self._opened)
+        self._file = self._together(_open, path, comm, self._opened)
+        self._together(_set_attributes, self._file, "/", attributes(header) | {"created_by": PROGRAM})
         self._write_part("mesh", replace(mesh, triangles=mesh.triangles + np.int64(self._rows["n"].start)))
         self._write_part("fibre", fibres)
         self._write_part("interface", interface)
@@ -103,13 +104,13 @@ class FieldFile:
         """Adds state `number` (0, 1, ...) and flushes. The cell's own numbers are the same on all ranks."""
         group = f"state/{number}"
         self._write_part(group, state)
-        self._collectively(_set_attributes, self._file[group], attributes(state))
-        self._collectively(self._file.flush)
+        self._together(_set_attributes, self._file, group, attributes(state))
+        self._together(self._file.flush)
 
     def close(self) -> Path:
         """Completes the file, gives it its final name, and returns its path."""
-        self._collectively(self._opened.close)
-        self._collectively(_complete, self._comm.rank, self.part, self.path)
+        self._together(self._opened.close)
+        self._each(_complete, self._comm.rank, self.part, self.path)
         self._is_open = False
         return self.path
 
@@ -139,7 +140,7 @@ class FieldFile:
     def _write_part(self, group: str, part: Any) -> None:
         """Makes the tables of a group, each rank giving its rows."""
         size = self._bytes(part)
-        self._collectively(_reserve, self._comm.rank, self.part, self._reserved, size)
+        self._each(_reserve, self._comm.rank, self.part, self._reserved, size)
         self._reserved += size
         described = tables(part)
         for symbol, rows in self._rows.items():
@@ -152,17 +153,24 @@ class FieldFile:
         arrays = agree(self._comm, _arrays, group, rows.count, part, described)
         for name, array in arrays.items():
             words = self._words(described[name])
-            self._collectively(_write_rows, self._file, f"{group}/{name}", rows, array, words)
+            self._together(_write_rows, self._file, f"{group}/{name}", rows, array, words)
 
     def _words(self, described: Description) -> dict[str, str]:
         """The attributes of a dataset: what it holds, and in which unit, by its label if the case gives one."""
         unit = self._units.get(described.unit) or described.unit or PURE_NUMBER
         return {"meaning": described.meaning, "unit": unit}
 
-    def _collectively(self, function: Callable[..., Any], *args: Any) -> Any:
-        """function(*args) on all ranks; if any cannot write, the file is removed and all raise."""
+    def _each(self, function: Callable[..., Any], *args: Any) -> Any:
+        """function(*args) of each rank for itself; if any cannot write, the file is removed and all raise."""
+        return self._or_removed(agree, function, *args)
+
+    def _together(self, function: Callable[..., Any], *args: Any) -> Any:
+        """function(*args), collective calls of HDF5; if any rank cannot write, the file is removed and all raise."""
+        return self._or_removed(agree_after, function, *args)
+
+    def _or_removed(self, agreed: Callable[..., Any], function: Callable[..., Any], *args: Any) -> Any:
         try:
-            return agree(self._comm, _with_write_errors, self.path, function, *args)
+            return agreed(self._comm, _with_write_errors, self.path, function, *args)
         except FetiHomogError:
             self._remove()
             raise
@@ -207,14 +215,15 @@ def _empty_file() -> bytes:
         return bytes(file.id.get_file_image())
 
 
-def _open(part: Path, comm: Comm, opened: contextlib.ExitStack) -> Any:
-    """The file, opened by all ranks until `opened` is closed.
-
-    MPI-IO keeps names in short buffers: it has the folder by its descriptor, while the file is open.
-    """
+def _path_for_mpi(part: Path, opened: contextlib.ExitStack) -> str:
+    """A short name of the file until `opened` is closed, its folder by a descriptor: MPI-IO has short buffers for names."""
     folder = os.open(part.parent, os.O_RDONLY)
     opened.callback(os.close, folder)
-    path = f"/proc/self/fd/{folder}/{part.name}"
+    return f"/proc/self/fd/{folder}/{part.name}"
+
+
+def _open(path: str, comm: Comm, opened: contextlib.ExitStack) -> Any:
+    """The file, opened by all ranks until `opened` is closed."""
     return opened.enter_context(h5py.File(path, "r+", driver="mpio", comm=comm))
 
 
@@ -231,7 +240,8 @@ def _complete(rank: int, part: Path, path: Path) -> None:
     atomic.commit(part, path)
 
 
-def _set_attributes(target: Any, attributes: Mapping[str, Any]) -> None:
+def _set_attributes(file: Any, name: str, attributes: Mapping[str, Any]) -> None:
+    target = file[name]
     for key, value in attributes.items():
         target.attrs[key] = value
 
@@ -254,7 +264,7 @@ def _reserve(rank: int, part: Path, start: int, size: int) -> None:
 def _write_rows(file: Any, name: str, rows: _Rows, array: NDArray[Any], words: Mapping[str, str]) -> None:
     """Makes a table and writes this rank's rows. An empty rank takes part with an empty selection."""
     table = file.create_dataset(name, (rows.total, *array.shape[1:]), array.dtype)
-    _set_attributes(table, words)
+    _set_attributes(file, name, words)
     memory, place = h5py.h5s.create_simple(array.shape), table.id.get_space()
     if rows.count:
         place.select_hyperslab((rows.start,) + (0,) * (array.ndim - 1), array.shape)
