@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
+import sys
 from functools import partial
 
 import pytest
 
 
 @pytest.fixture(scope="session", autouse=True)
-def guarded_sections_are_silent():
-    """On several ranks what `agree`, `on_root` and `on_root_only` call fails where it communicates."""
+def agreement_is_silent():
+    """On several ranks what `agree` calls fails where it communicates; what rank 0 alone calls would hang there."""
     from collective_calls import no_communication
     from mpi4py import MPI
 
     from feti_homog.common import mpi_errors
 
     attempt = mpi_errors._attempt
+
+    def watched(function, *args, **kwargs):
+        is_agreed = sys._getframe(1).f_code is mpi_errors.agree.__code__
+        return attempt(no_communication()(function) if is_agreed else function, *args, **kwargs)
+
     with pytest.MonkeyPatch.context() as patch:
         if MPI.COMM_WORLD.size > 1:
-            patch.setattr(mpi_errors, "_attempt", lambda function, *a, **k: attempt(no_communication()(function), *a, **k))
+            patch.setattr(mpi_errors, "_attempt", watched)
         yield
 
 

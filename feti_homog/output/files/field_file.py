@@ -14,7 +14,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from feti_homog.common.mpi_errors import agree, agree_after, all_raise, on_root
+from feti_homog.common.mpi_errors import agree, agree_after, all_raise, on_root, on_root_only
 from feti_homog.common.records import LENGTH, STRESS, Description
 from feti_homog.errors import FetiHomogError
 from feti_homog.output.files import atomic
@@ -93,9 +93,9 @@ class FieldFile:
         on_root(comm, _with_write_errors, self.path, _create, self.part, size)
         self._is_open = True
         self._opened = contextlib.ExitStack()
-        path = self._each(_path_for_mpi, self.part, self._opened)
-        self._file = self._together(_open, path, comm, self._opened)
-        self._together(_set_attributes, self._file, "/", attributes(header) | {"created_by": PROGRAM})
+        path = self._agreed(agree, _path_for_mpi, self.part, self._opened)
+        self._file = self._agreed(agree_after, _open, path, comm, self._opened)
+        self._agreed(agree_after, _set_attributes, self._file, "/", attributes(header) | {"created_by": PROGRAM})
         self._write_part("mesh", replace(mesh, triangles=mesh.triangles + np.int64(self._rows["n"].start)))
         self._write_part("fibre", fibres)
         self._write_part("interface", interface)
@@ -104,13 +104,13 @@ class FieldFile:
         """Adds state `number` (0, 1, ...) and flushes. The cell's own numbers are the same on all ranks."""
         group = f"state/{number}"
         self._write_part(group, state)
-        self._together(_set_attributes, self._file, group, attributes(state))
-        self._together(self._file.flush)
+        self._agreed(agree_after, _set_attributes, self._file, group, attributes(state))
+        self._agreed(agree_after, self._file.flush)
 
     def close(self) -> Path:
         """Completes the file, gives it its final name, and returns its path."""
-        self._together(self._opened.close)
-        self._each(_complete, self._comm.rank, self.part, self.path)
+        self._agreed(agree_after, self._opened.close)
+        self._agreed(on_root_only, _complete, self.part, self.path)
         self._is_open = False
         return self.path
 
@@ -140,7 +140,7 @@ class FieldFile:
     def _write_part(self, group: str, part: Any) -> None:
         """Makes the tables of a group, each rank giving its rows."""
         size = self._bytes(part)
-        self._each(_reserve, self._comm.rank, self.part, self._reserved, size)
+        self._agreed(on_root_only, _reserve, self.part, self._reserved, size)
         self._reserved += size
         described = tables(part)
         for symbol, rows in self._rows.items():
@@ -153,22 +153,16 @@ class FieldFile:
         arrays = agree(self._comm, _arrays, group, rows.count, part, described)
         for name, array in arrays.items():
             words = self._words(described[name])
-            self._together(_write_rows, self._file, f"{group}/{name}", rows, array, words)
+            self._agreed(agree_after, _write_rows, self._file, f"{group}/{name}", rows, array, words)
 
     def _words(self, described: Description) -> dict[str, str]:
         """The attributes of a dataset: what it holds, and in which unit, by its label if the case gives one."""
         unit = self._units.get(described.unit) or described.unit or PURE_NUMBER
         return {"meaning": described.meaning, "unit": unit}
 
-    def _each(self, function: Callable[..., Any], *args: Any) -> Any:
-        """function(*args) of each rank for itself; if any cannot write, the file is removed and all raise."""
-        return self._or_removed(agree, function, *args)
-
-    def _together(self, function: Callable[..., Any], *args: Any) -> Any:
-        """function(*args), collective calls of HDF5; if any rank cannot write, the file is removed and all raise."""
-        return self._or_removed(agree_after, function, *args)
-
-    def _or_removed(self, agreed: Callable[..., Any], function: Callable[..., Any], *args: Any) -> Any:
+    def _agreed(self, agreed: Callable[..., Any], function: Callable[..., Any], *args: Any) -> Any:
+        """function(*args) by `agree_after` where HDF5 communicates; if it cannot write, the file is removed and all
+        raise."""
         try:
             return agreed(self._comm, _with_write_errors, self.path, function, *args)
         except FetiHomogError:
@@ -227,14 +221,12 @@ def _open(path: str, comm: Comm, opened: contextlib.ExitStack) -> Any:
     return opened.enter_context(h5py.File(path, "r+", driver="mpio", comm=comm))
 
 
-def _complete(rank: int, part: Path, path: Path) -> None:
-    """Adds the views and gives the file its name, by rank 0: on all ranks each view would cost as much as a table."""
-    if rank:
-        return
+def _complete(part: Path, path: Path) -> None:
+    """Adds the views and gives the file its name, on one rank: on all each view would cost as much as a table."""
     # Nobody else has the file, and some file systems cannot lock.
     with h5py.File(part, "r", locking=False) as file:
         size = bytes_of_views(file)
-    _reserve(rank, part, part.stat().st_size, size)
+    _reserve(part, part.stat().st_size, size)
     with h5py.File(part, "r+", locking=False) as file:
         add_views(file)
     atomic.commit(part, path)
@@ -254,11 +246,10 @@ def _arrays(group: str, count: int, part: Any, described: Mapping[str, Descripti
     return arrays
 
 
-def _reserve(rank: int, part: Path, start: int, size: int) -> None:
+def _reserve(part: Path, start: int, size: int) -> None:
     """Takes the space on the disk: were it to end while MPI-IO writes, some ranks might wait for ever."""
-    if rank == 0:
-        with part.open("r+b") as stream:
-            os.posix_fallocate(stream.fileno(), start, size)
+    with part.open("r+b") as stream:
+        os.posix_fallocate(stream.fileno(), start, size)
 
 
 def _write_rows(file: Any, name: str, rows: _Rows, array: NDArray[Any], words: Mapping[str, str]) -> None:
