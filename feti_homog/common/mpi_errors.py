@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import time
 import traceback
+from array import array
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
@@ -12,7 +13,7 @@ from feti_homog.common.standard_streams import complain
 from feti_homog.errors import EXIT_DEFECT, FetiHomogError
 
 if TYPE_CHECKING:
-    from mpi4py.MPI import Comm
+    from mpi4py.MPI import Comm, Request
 
 T = TypeVar("T")
 # Seconds that a rank with an error waits for the others to come with theirs, before it ends the job.
@@ -71,12 +72,14 @@ def agree_after(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs:
     try:
         result = function(*args, **kwargs)
     except FetiHomogError as met:
-        if not others_come(comm, ARRIVAL_TIMEOUT_S):
-            end_job(comm, met)
         error = met
-    else:
-        comm.Ibarrier().Wait()
-    return agree(comm, _returned, result, error)  # type: ignore[return-value]
+    own, some = array("i", [error is not None]), array("i", [0])
+    request = comm.Iallreduce(own, some)
+    if error is None:
+        request.Wait()
+    elif not _comes(request, ARRIVAL_TIMEOUT_S):
+        end_job(comm, error)
+    return agree(comm, _returned, result, error) if some[0] else result  # type: ignore[return-value]
 
 
 def run_main(comm: Comm, main: Callable[[], int]) -> int:
@@ -116,11 +119,7 @@ def abort(comm: Comm, exit_code: int) -> NoReturn:
 
 def others_come(comm: Comm, timeout: float) -> bool:
     """Whether every rank calls this within `timeout` seconds of this one."""
-    barrier = comm.Ibarrier()
-    deadline = time.monotonic() + timeout
-    while not (all_came := barrier.Test()) and time.monotonic() < deadline:
-        time.sleep(0.001)
-    return all_came
+    return _comes(comm.Ibarrier(), timeout)
 
 
 def all_raise(comm: Comm, error: BaseException) -> bool:
@@ -129,6 +128,14 @@ def all_raise(comm: Comm, error: BaseException) -> bool:
     Each rank with such an error calls it, and waits ARRIVAL_TIMEOUT_S for the others; a defect is one rank's own.
     """
     return isinstance(error, FetiHomogError) and others_come(comm, ARRIVAL_TIMEOUT_S)
+
+
+def _comes(request: Request, timeout: float) -> bool:
+    """Whether a request is fulfilled within `timeout` seconds."""
+    deadline = time.monotonic() + timeout
+    while not (is_fulfilled := request.Test()) and time.monotonic() < deadline:
+        time.sleep(0.001)
+    return is_fulfilled
 
 
 def _told(error: FetiHomogError) -> str:

@@ -5,64 +5,21 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-import time
 
 import pytest
 from support.base_case import BASE
 from support.command_line import case_file, command_line
-from support.jobs import mpirun
+from support.hooks import KILL, NO_MEMORY, Hook, hooked
+from support.small_path import PATH
 from unit.cell.faulty_meshes import FAULTY_MESHES
 from unit.config.faulty_cases import FAULTY_CASES
 
+PIPES = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
 CASES = ("empty", "syntax", "unknown_key", "many")
 MESH_CASE = 'geometry = "mesh"\nfile = "faulty.msh"'
 
-# The command line with a fault in the dual operator of the last rank, at the application of a given number.
-SABOTAGED = """
-import os, signal, sys
-from feti_homog import api, cli
-
-def launch():
-    from feti_homog.feti.operators.dual_operator import DualOperator
-    from mpi4py import MPI
-    comm, apply, count = MPI.COMM_WORLD, DualOperator.apply, 0
-
-    def sabotaged(self, x):
-        nonlocal count
-        count += 1
-        if comm.rank == comm.size - 1 and count == {application}:
-            {fault}
-        return apply(self, x)
-
-    DualOperator.apply = sabotaged
-
-def command(words, comm):
-    launch()
-    return cli._command(words, comm)
-
-sys.exit(api.start(command))
-"""
-
-
-# The command line with a fault of the last rank while it fills its tiles of a large cell.
-SABOTAGED_MESHING = """
-import os, signal, sys
-from feti_homog import api, cli
-
-def command(words, comm):
-    from feti_homog.homogenization import coarse_meshes
-    fill = coarse_meshes.fill
-
-    def sabotaged(tile):
-        if comm.rank == comm.size - 1:
-            {fault}
-        return fill(tile)
-
-    coarse_meshes.fill = sabotaged
-    return cli._command(words, comm)
-
-sys.exit(api.start(command))
-"""
+IMPLICIT = ("-feti_dual_operator", "implicit")
+CUT = "[decomposition]\nsubdomains = 4\n[petsc]\nfeti_pc_type = 'influence'\n"
 TILED_CELL = 'geometry = "random"\nfibres = 400\nmin_gap = 0.2\nfibre_fraction = 0.3\nmesh_size = 0.05'
 
 
@@ -129,12 +86,12 @@ def test_a_file_in_the_place_of_the_folder_is_left_alone(tmp_path, ranks):
 
 
 HOLDER = """
-import sys, time
+import sys
 from pathlib import Path
 from feti_homog.common.file_locks import TemporaryLock
 TemporaryLock(Path(sys.argv[1])).acquire()
 print("held", flush=True)
-time.sleep(60)
+sys.stdin.read()
 """
 
 
@@ -142,7 +99,7 @@ time.sleep(60)
 def test_a_folder_that_another_run_writes_to(tmp_path, ranks):
     out = tmp_path / "results"
     out.mkdir()
-    other = subprocess.Popen([sys.executable, "-c", HOLDER, out / "result.lock"], stdout=subprocess.PIPE)
+    other = subprocess.Popen([sys.executable, "-c", HOLDER, out / "result.lock"], **PIPES)
     try:
         assert other.stdout.readline() == b"held\n"
         job = command_line(ranks, "run", case_file(tmp_path), "--out", out)
@@ -151,8 +108,7 @@ def test_a_folder_that_another_run_writes_to(tmp_path, ranks):
         assert f"process {other.pid}" in job.stderr
         assert [path.name for path in out.iterdir()] == ["result.lock"]
     finally:
-        other.kill()
-        other.wait()
+        other.communicate()
     assert command_line(ranks, "run", case_file(tmp_path), "--out", out).returncode == 0
     assert not (out / "result.lock").exists()
 
@@ -180,47 +136,64 @@ def test_loose_tolerance(tmp_path):
     assert job.returncode == 3 and document["status"] == "not converged"
 
 
-@pytest.mark.parametrize("ranks", [1, 2, 4])
-@pytest.mark.parametrize("application", [1, 3], ids=["outside PETSc", "inside PETSc's callback"])
-def test_a_rank_that_raises_ends_the_job_with_its_traceback(tmp_path, ranks, application):
-    job = sabotaged(tmp_path, ranks, application, "raise ArithmeticError('lost my way')")
+DUAL_OPERATOR = "feti_homog.feti.operators.dual_operator:DualOperator.apply"
+
+
+@pytest.mark.parametrize(("ranks", "call"), [(1, 1), (3, 1), (3, 3)], ids=["alone", "outside PETSc", "in its callback"])
+def test_a_rank_that_raises_ends_the_job_with_its_traceback(tmp_path, ranks, call):
+    fault = Hook(DUAL_OPERATOR, "raise ArithmeticError('lost my way')", rank=ranks - 1, call=call)
+    job = hooked(ranks, [fault], "run", case_file(tmp_path), "--out", tmp_path / "results", *IMPLICIT)
     assert job.returncode not in (0, 2, 3)
     assert "Traceback" in job.stderr and "ArithmeticError: lost my way" in job.stderr
     assert f"rank {ranks - 1} of {ranks}:" in job.stderr
 
 
 def test_a_rank_that_is_killed_ends_the_job(tmp_path):
-    assert sabotaged(tmp_path, 2, 3, "os.kill(os.getpid(), signal.SIGKILL)").returncode != 0
+    hook = Hook(DUAL_OPERATOR, KILL, rank=1, call=3)
+    job = hooked(2, [hook], "run", case_file(tmp_path), "--out", tmp_path / "results", *IMPLICIT)
+    assert job.returncode != 0
+
+
+# Where one of three ranks finds no memory: the rank, and the function at whose beginning it does, in the order of a run.
+WITHOUT_MEMORY = {
+    "assembly": (2, "feti.decomposition.subdomain:Subdomain.build"),
+    "factorization": (1, "feti.operators.interface_operators:_factor"),
+    "Schur complement": (2, "feti.operators.explicit:schur_complement"),
+    "coarse space": (1, "feti.coarse.natural:assemble_owned_rows"),
+    "field file": (1, "output.files.field_file:_write_rows"),
+    "contact": (2, "interface.contact:kkt_errors"),
+    "influence columns": (1, "feti.preconditioners.response_columns:ResponseColumns._append"),
+    "checkpoint": (0, "output.files.checkpoint:Checkpoint._write"),
+    "table": (0, "output.files.csv_tables:write"),
+    "picture": (0, "output.plots.figures:plot"),
+}
+
+
+@pytest.mark.parametrize("name", WITHOUT_MEMORY)
+def test_a_rank_without_memory_ends_the_job(tmp_path, name):
+    """All ranks are gone when `hooked` returns."""
+    rank, place = WITHOUT_MEMORY[name]
+    case, out = tmp_path / "path.toml", tmp_path / "out"
+    case.write_text(PATH.replace("pictures = false", "").replace("[path]\n", "[path]\nmax_events = 2\n") + CUT)
+    job = hooked(3, [Hook(f"feti_homog.{place}", NO_MEMORY, rank=rank)], "run", case, "--out", out)
+    assert job.returncode == 1 and "MemoryError: none left" in job.stderr, job.stderr
+    assert (out / "result.json").exists() == (name in ("table", "picture"))
 
 
 @pytest.mark.parametrize(
     ("fault", "code", "words"),
     [
-        ("raise ArithmeticError('lost my tile')", 1, "ArithmeticError: lost my tile"),
+        (NO_MEMORY, 1, "MemoryError: none left"),
         ("from feti_homog.errors import MeshError; raise MeshError('[cell] this tile has no mesh')", 2, "no mesh"),
-        ("os.kill(os.getpid(), signal.SIGKILL)", None, ""),
+        (KILL, None, ""),
     ],
-    ids=["defect", "unfilled", "killed"],
+    ids=["no memory", "unfilled", "killed"],
 )
 def test_a_rank_that_fails_while_meshing_ends_the_job(tmp_path, fault, code, words):
-    script, out = tmp_path / "sabotaged.py", tmp_path / "results"
-    script.write_text(SABOTAGED_MESHING.format(fault=fault))
-    start = time.monotonic()
-    case = tmp_path / "tiled.toml"
+    case, out = tmp_path / "tiled.toml", tmp_path / "results"
     case.write_text(f"[cell]\n{TILED_CELL}\n\n" + BASE[BASE.index("[material.matrix]") :])
-    job = mpirun(2, script, "run", case, "--out", out, timeout=60.0)
-    assert time.monotonic() - start < 40.0
+    hook = Hook("feti_homog.homogenization.coarse_meshes:fill", fault, rank=1)
+    job = hooked(2, [hook], "run", case, "--out", out)
     assert job.returncode == code if code else job.returncode != 0
     assert words in job.stderr and ("Traceback" in job.stderr) == (code == 1)
     assert not (out / "result.json").exists()
-
-
-def sabotaged(folder, ranks, application, fault):
-    """The job, which must end soon."""
-    script = folder / "sabotaged.py"
-    script.write_text(SABOTAGED.format(application=application, fault=fault))
-    start = time.monotonic()
-    words = ["run", case_file(folder), "--out", folder / "results", "-feti_dual_operator", "implicit"]
-    job = mpirun(ranks, script, *words, timeout=30.0)
-    assert time.monotonic() - start < 20.0
-    return job

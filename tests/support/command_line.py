@@ -18,9 +18,9 @@ def case_file(folder: Path, end: str = "[output]\npictures = false\n") -> Path:
     return path
 
 
-def command_line(ranks: int, *words: str | Path, timeout: float = 150.0):
+def command_line(ranks: int, *words: str | Path):
     """`python -m feti_homog words...` on so many ranks; none: without mpirun."""
-    return mpirun(ranks, "-m", "feti_homog", *words, timeout=timeout)
+    return mpirun(ranks, "-m", "feti_homog", *words)
 
 
 def assert_verified(*folders: Path) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 
 ROOT = Path(__file__).parents[2]
 LAUNCHER_VARIABLES = ("OMPI_", "PMIX_", "ORTE_", "PMI_")
+PATIENCE = 900.0  # seconds, also on a busy machine more than any job takes: what takes longer hangs
 RUN_VARIABLES = {
     "OMPI_ALLOW_RUN_AS_ROOT": "1",
     "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
@@ -24,6 +25,10 @@ RUN_VARIABLES = {
 }
 
 
+# For jobs that are interrupted: seconds until mpirun kills what does not end, 1 by default.
+UNHURRIED = {"OMPI_MCA_odls_base_sigkill_timeout": "300", "PRTE_MCA_odls_base_sigkill_timeout": "300"}
+
+
 def environment() -> dict[str, str]:
     """Of a job of its own: without what the launcher of these tests has set."""
     return {k: v for k, v in os.environ.items() if not k.startswith(LAUNCHER_VARIABLES)} | RUN_VARIABLES
@@ -35,14 +40,14 @@ def launched(ranks: int, *args: str | Path, cwd: Path = ROOT, **options: Any) ->
     return subprocess.Popen([*launcher, sys.executable, *map(str, args)], cwd=cwd, env=environment(), **options)
 
 
-def mpirun(ranks: int, *args: str | Path, timeout: float = 120.0, cwd: Path = ROOT) -> subprocess.CompletedProcess[str]:
+def mpirun(ranks: int, *args: str | Path, cwd: Path = ROOT) -> subprocess.CompletedProcess[str]:
     """As `launched`, to its end, with its output as text.
 
-    Raises subprocess.TimeoutExpired if it takes longer than `timeout` seconds; nothing is left running.
+    Raises subprocess.TimeoutExpired if it takes longer than PATIENCE; nothing is left running.
     """
     process = launched(ranks, *args, cwd=cwd, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     try:
-        output, errors = process.communicate(timeout=timeout)
+        output, errors = process.communicate(timeout=PATIENCE)
     except subprocess.TimeoutExpired:
         process.terminate()  # mpirun ends its ranks
         process.communicate()
