@@ -89,6 +89,10 @@ MAX_IMBALANCE = 1.03
 # Largest |K R| relative to |K|.  Rounding leaves about 1e-16; a rotation that is wrong by 1 % gives 1e-7 and more.
 KERNEL_TOLERANCE = 1e-10
 
+# Counts of columns whose vectors for an exchange between ranks are kept: of one load, of all unit loads, and of a full
+# batch of influence columns; batches that are not full have any count up to INFLUENCE_CHUNK.
+KEPT_EXCHANGES = 4
+
 # operators
 
 # Seconds, up to a common factor, for the choice: of a dense inverse per n^3 of n boundary dofs, and of one application
@@ -145,8 +149,8 @@ SINGULAR_PIVOT = 1e-10
 
 # coarse
 
-# Eigenvalues of G^T G, relative to its largest diagonal entry, of motions that no active row resists: rounding leaves
-# about 1e-15, and one resisting row of n about 1 / n.
+# Eigenvalues of G^T G, relative to the largest diagonal entry of their body with all rows active, of motions that no
+# active row resists: rounding leaves about 1e-15, and one resisting row of n about 1 / n.
 UNCONSTRAINED_EIGENVALUE = 1e-10
 # Nodes of a face below which its neighbourhood has no eigenproblem of its own: a single node can only translate.
 MIN_FACE_NODES = 2

@@ -262,7 +262,8 @@ class Interface:
             return status, motions.shape[1]
         more = coarse.free_motions(self.active(np.where(idle, OPEN, status).astype(np.int8)))
         # The squares are the diagonal of the projector on the motions, which rises where a body comes free.
-        risen = np.square(more).sum(axis=1) - np.square(motions).sum(axis=1) > LEAST_SHARE_OF_MOTION
+        shares, before = (np.asarray(Z.power(2).sum(axis=1)).ravel() for Z in (more, motions))
+        risen = shares - before > LEAST_SHARE_OF_MOTION
         freed = np.isin(coarse.body, coarse.body[risen])
         idle &= (abs(coarse.G[self.nodes.row]) + abs(coarse.G[self.nodes.row + 1])) @ freed > 0
         return np.where(idle, OPEN, status).astype(np.int8), more.shape[1]

@@ -6,13 +6,13 @@ there are amplitudes a with gap + M a >= 0: a linear programme for each fibre, s
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from mpi4py import MPI
-from scipy.sparse import csr_matrix
+from scipy.sparse import csr_matrix, issparse, vstack
 
 from feti_homog.cell.periodic_topology import components
 from feti_homog.common.mpi_errors import on_root
@@ -55,19 +55,23 @@ class _Fibres:
     fibre and its coating, which may part too, are one, and so are layers with others between them."""
 
     is_open: Bool
-    opening: Float
-    slip: Float
+    opening: csr_matrix
+    slip: csr_matrix
     fibre: Array
 
-    def nodes_and_motions(self, of: Bool) -> list[tuple[Array, Float, Float]]:
-        """For each fibre with an open node in `of` (k,): its open nodes (n,), their motions M (n, m), and the
-        motions' combinations of the free ones (motions, m); m = 0 where nothing that is free opens a gap."""
-        found = []
-        for f in np.unique(self.fibre[self.is_open & of]):
-            own = np.flatnonzero((self.fibre == f) & self.is_open)
-            modes = _opening_modes(self.opening[own], self.slip[own])
-            found.append((own, self.opening[own] @ modes, modes))
-        return found
+    def nodes_and_motions(self, of: Bool) -> Iterator[tuple[Array, Float, Array, Float]]:
+        """For each fibre with an open node in `of` (k,): its open nodes (n,), their motions M (n, m), the numbers of
+        the free motions (c,) that move them and the combinations (c, m) of these; m = 0 where nothing that is free
+        opens a gap."""
+        nodes = np.flatnonzero(self.is_open & np.isin(self.fibre, self.fibre[self.is_open & of]))
+        nodes = nodes[np.argsort(self.fibre[nodes], kind="stable")]
+        ends = np.flatnonzero(np.diff(self.fibre[nodes])) + 1
+        for own in np.split(nodes, ends) if len(nodes) else []:
+            opening, slip = self.opening[own], self.slip[own]
+            columns = np.union1d(opening.indices, slip.indices)
+            motions = opening[:, columns].toarray()
+            modes = _opening_modes(motions, slip)
+            yield own, motions @ modes, columns, modes
 
 
 def place(
@@ -135,12 +139,13 @@ def _decided_on_root(
     noise: float,
 ) -> T:
     """decide(fibres, *gaps, noise) of rank 0, with the gaps of all nodes, on every rank; collective."""
-    free = csr_matrix(coarse.unconstrained_modes)
-    opening, slip = (np.asarray((coarse.G[nodes.row + i] @ free).todense()) for i in range(2))
+    free = coarse.unconstrained_modes.tocsr()
+    opening, slip = ((coarse.G[nodes.row + i] @ free).tocsr() for i in range(2))
     parts = comm.gather((is_open, opening, slip, nodes.bodies, *gaps))
 
     def decided() -> T:
-        whole = [np.concatenate(p) for p in zip(*(parts or []), strict=True)]
+        each = zip(*(parts or []), strict=True)
+        whole = [vstack(p).tocsr() if issparse(p[0]) else np.concatenate(p) for p in each]
         groups = _moving_together(whole[3], coarse.pinned_body)
         return decide(_Fibres(whole[0], whole[1], whole[2], groups), *whole[4:], noise)
 
@@ -158,10 +163,10 @@ def _moving_together(bodies: Array, fixed: int) -> Array:
 
 def _place_all(fibres: _Fibres, gap: Float, noise: float) -> tuple[Float, Bool]:
     squeezed, amplitudes = np.zeros(len(gap), bool), np.zeros(fibres.opening.shape[1])
-    for own, motion, modes in fibres.nodes_and_motions(gap < -noise):
+    for own, motion, columns, modes in fibres.nodes_and_motions(gap < -noise):
         if modes.shape[1]:
             a, room, forces = _largest_gap(gap[own], motion)
-            amplitudes += modes @ a
+            amplitudes[columns] += modes @ a
             if room < -noise:
                 squeezed[own[forces > LEAST_FORCE_SHARE * forces.max()]] = True
     return amplitudes, squeezed
@@ -169,7 +174,7 @@ def _place_all(fibres: _Fibres, gap: Float, noise: float) -> tuple[Float, Bool]:
 
 def _shares_of_all(fibres: _Fibres, here: Float, ahead: Float, noise: float) -> tuple[float, float]:
     shares = [(1.0, 1.0)]
-    for own, motion, _ in fibres.nodes_and_motions(ahead < -2 * noise):
+    for own, motion, *_ in fibres.nodes_and_motions(ahead < -2 * noise):
         a, b = here[own], ahead[own]
         if not motion.shape[1]:
             shares.append(shares_to_zero(a, b, noise))
@@ -179,10 +184,12 @@ def _shares_of_all(fibres: _Fibres, here: Float, ahead: Float, noise: float) -> 
     return float(begins), float(certain)
 
 
-def _opening_modes(opening: Float, slip: Float) -> Float:
-    """(modes, m) the combinations of modes that open gaps: neither those of other fibres nor those that slide."""
+def _opening_modes(opening: Float, slip: csr_matrix) -> Float:
+    """(modes, m) the combinations of modes that open gaps: not those that slide."""
+    if not opening.size:
+        return np.zeros((opening.shape[1], 0))
     _, size, basis = np.linalg.svd(opening, full_matrices=False)
-    return np.asarray(basis[size > LARGEST_GAP_OF_SLIDING * max(size[0], np.abs(slip).max())].T)
+    return np.asarray(basis[size > LARGEST_GAP_OF_SLIDING * max(size[0], abs(slip).max())].T)
 
 
 def _largest_gap(gap: Float, motion: Float) -> tuple[Float, float, Float]:

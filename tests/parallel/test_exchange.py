@@ -1,4 +1,4 @@
-"""Rows and objects that all ranks send to all."""
+"""Rows and objects that all ranks send to all, and multipliers that neighbours exchange."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import pytest
 
 from feti_homog.common.dealing import swap
 from feti_homog.common.exchange import exchange
+from feti_homog.feti.thresholds import KEPT_EXCHANGES
 
 pytestmark = [pytest.mark.parallel, pytest.mark.quick]
 
@@ -32,3 +33,19 @@ def test_parts_are_swapped(comm):
     parts = [{"from": comm.rank, "to": r, "array": np.arange(r)} for r in range(comm.size)]
     for source, part in enumerate(swap(comm, parts)):
         assert (part["from"], part["to"], len(part["array"])) == (source, comm.rank, comm.rank)
+
+
+def test_vectors_of_few_counts_of_columns_are_kept(comm, torn):
+    """The columns of influence come in batches of any size; those that were used last stay."""
+    jump = torn(geometry="square", mesh_size=0.3).solver.jump_operator
+    copies = np.bincount(np.concatenate(comm.allgather(jump.rows)), minlength=jump.global_rows)
+    own = np.arange(*jump.owned)
+    first = jump._exchange(own)
+    for columns in (1, 3, 7, 2, 3, 5, 9, 3):
+        wave = np.arange(1.0, columns + 1)
+        local = jump.gather(np.cos(np.outer(own, wave)))
+        assert np.array_equal(local, np.cos(np.outer(jump.rows, wave)))
+        np.testing.assert_allclose(jump.sum(local), copies[own, None] * np.cos(np.outer(own, wave)), atol=1e-13)
+        assert len(jump._exchanges) <= KEPT_EXCHANGES
+    assert 1 not in jump._exchanges and 3 in jump._exchanges
+    assert comm.size == 1 or not (first._owned or first._local or first._scatter)

@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 from mpi4py import MPI
-from scipy.sparse import block_diag, csr_matrix, diags
+from scipy.sparse import block_diag, csc_matrix, csr_matrix, diags
 
 from feti_homog.common.distributed_arrays import allreduce_sum
 from feti_homog.feti.coarse.gram_matrix import GramMatrix
@@ -31,7 +31,7 @@ class NaturalCoarseSpace:
         G: (owned rows, m); `G_active` is 0 in inactive rows.
         body: (m,) body that each mode moves.
         pinned_body: the body with the pinned class, -1 if there is none.
-        unconstrained_modes: (m, z) orthonormal amplitudes of the motions that no active row resists.
+        unconstrained_modes: (m, z) orthonormal amplitudes of the motions that no active row resists, sparse.
         unknowns: (u,) the modes that this rank's rows, or motions that nothing resists, concern, and its own.
         factorizations: of G^T G so far.
         solver: of G^T G.
@@ -61,9 +61,9 @@ class NaturalCoarseSpace:
         columns = np.arange(first, first + modes)
         self.G = assemble_owned_rows(comm, operators.B @ self.R, jump_operator.rows, columns, (owned, modes))
         self.G_active, self.factorizations = self.G, 0
-        squares = np.asarray(self.G.power(2).sum(axis=0)).ravel()
-        self._largest_diagonal = float(comm.allreduce(squares).max(initial=0.0))
-        self.unconstrained_modes = np.zeros((self.kernel_dimension, 0))
+        self._diagonal = allreduce_sum(comm, np.asarray(self.G.power(2).sum(axis=0)).ravel())
+        self._largest_diagonal = float(self._diagonal.max(initial=0.0))
+        self.unconstrained_modes = csc_matrix((self.kernel_dimension, 0))
         self._reaching = np.union1d(self.G.indices, columns).astype(np.int64)
         self.solver = RenewedSolver(comm, self.kernel_dimension, self._reaching, "feti_natural_")
         self.factor()
@@ -93,8 +93,8 @@ class NaturalCoarseSpace:
     def _own_unconstrained_modes(self) -> csr_matrix:
         """(z, m) those of the unconstrained modes whose first subdomain is this rank's, as rows."""
         Z = self.unconstrained_modes
-        first = (Z != 0.0).argmax(axis=0)
-        return csr_matrix(Z[:, (first >= self.owned_modes.start) & (first < self.owned_modes.stop)].T)
+        first = Z.indices[Z.indptr[:-1]]
+        return Z[:, (first >= self.owned_modes.start) & (first < self.owned_modes.stop)].T.tocsr()
 
     @cached_property
     def _gram(self) -> GramMatrix:
@@ -111,18 +111,23 @@ class NaturalCoarseSpace:
         movable = np.flatnonzero(self.body != self.pinned_body)
         return [(members, self._gram.places(members)) for members in self._gram.groups(movable)]
 
-    def _null_space(self, entries: Float) -> Float:
+    def _null_space(self, entries: Float) -> csc_matrix:
         """(m, z) orthonormal null space of G^T G with these entries: eigenvectors whose eigenvalues are rounding."""
-        tolerance, padded = UNCONSTRAINED_EIGENVALUE * self._largest_diagonal, np.append(entries, 0.0)
-        null = [np.zeros((self.kernel_dimension, 0))]
+        padded, columns, none = np.append(entries, 0.0), 0, np.zeros(0, np.int64)
+        rows, numbers, values = [none], [none], [np.zeros(0)]
         for members, places in self._groups:
-            values, vectors = np.linalg.eigh(padded[places])
-            which, mode = np.nonzero(values < tolerance)
-            if len(which):
-                Z = np.zeros((self.kernel_dimension, len(which)))
-                Z[members[which].T, np.arange(len(which))] = vectors[which, :, mode].T
-                null.append(Z)
-        return np.hstack(null)
+            eigenvalues, vectors = np.linalg.eigh(padded[places])
+            tolerance = UNCONSTRAINED_EIGENVALUE * self._diagonal[members].max(axis=1, keepdims=True)
+            which, mode = np.nonzero(eigenvalues <= tolerance)
+            rows.append(members[which].ravel())
+            numbers.append(np.repeat(columns + np.arange(len(which)), members.shape[1]))
+            values.append(vectors[which, :, mode].ravel())
+            columns += len(which)
+        entry = np.concatenate(values), (np.concatenate(rows), np.concatenate(numbers))
+        Z = csc_matrix(entry, shape=(self.kernel_dimension, columns))
+        Z.eliminate_zeros()
+        Z.sort_indices()
+        return Z
 
     def amplitudes(self, x: Float) -> Float:
         """(G^T G)^-1 G^T x on every rank, for the owned rows x (rows,) or (rows, k).  Collective."""
@@ -142,7 +147,7 @@ class NaturalCoarseSpace:
         projected: Float = x - self._G @ self.solve(self._GT @ x)
         return projected
 
-    def free_motions(self, active: Float) -> Float:
+    def free_motions(self, active: Float) -> csc_matrix:
         """(m, z) as `unconstrained_modes`, if those owned rows were active of which `active` is 1.  Collective."""
         return self._null_space(self._gram.entries(active))
 

@@ -19,6 +19,7 @@ from feti_homog.fem.problem import PLANE, Problem
 from feti_homog.feti.decomposition.constraint_layout import ConstraintLayout, expand
 from feti_homog.feti.decomposition.shared_entities import SharedEntities
 from feti_homog.feti.decomposition.subdomain import Subdomain
+from feti_homog.feti.thresholds import KEPT_EXCHANGES
 from feti_homog.typing import Float, Int
 
 
@@ -87,11 +88,13 @@ class JumpOperator:
         return self.sum(local)[self.nodes.row].astype(np.int64)
 
     def _exchange(self, x: Float) -> _Exchange:
-        """The exchange for vectors of as many columns as x, made at the first use."""
+        """The exchange for vectors of as many columns as x; the KEPT_EXCHANGES that were used last are kept."""
         columns = x.size // len(x) if len(x) else int(np.prod(x.shape[1:]))
-        if columns not in self._exchanges:
-            self._exchanges[columns] = _Exchange(self.vector, self.rows, columns)
-        return self._exchanges[columns]
+        exchange = self._exchanges.pop(columns, None) or _Exchange(self.vector, self.rows, columns)
+        self._exchanges[columns] = exchange
+        if len(self._exchanges) > KEPT_EXCHANGES:
+            self._exchanges.pop(next(iter(self._exchanges))).destroy()
+        return exchange
 
 
 class _Exchange:
@@ -106,6 +109,7 @@ class _Exchange:
         self._local = PETSc.Vec().createSeq(columns * len(rows), bsize=columns)
         here = PETSc.IS().createBlock(columns, rows.astype(PETSc.IntType), comm=PETSc.COMM_SELF)
         self._scatter = PETSc.Scatter().create(self._owned, here, self._local, None)
+        here.destroy()
 
     def gather(self, owned: Float) -> Float:
         """The local rows of x (owned rows,) or (owned rows, k)."""
@@ -125,3 +129,9 @@ class _Exchange:
         self._scatter.scatter(self._local, self._owned, addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
         owned: Float = self._owned.getArray(readonly=True).reshape(-1, *local.shape[1:])
         return owned.copy()
+
+    def destroy(self) -> None:
+        """Free vectors and scatter.  Collective."""
+        if not self._same:
+            for petsc_object in (self._scatter, self._owned, self._local):
+                petsc_object.destroy()

@@ -1,0 +1,110 @@
+"""A thousand fibres that nothing holds: motions and gaps take memory of each for itself, not of all for all."""
+
+from __future__ import annotations
+
+import tracemalloc
+from contextlib import contextmanager
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from scipy.sparse import diags, identity
+
+from feti_homog.feti.coarse.natural import NaturalCoarseSpace
+from feti_homog.interface.rigid_placement import place
+
+FIBRES, NODES = 1000, 8
+ROWS = 2 * NODES * FIBRES
+MEGABYTES = 2**20
+# Dense, the motions (3 * FIBRES)^2 and their gaps (NODES * FIBRES, 3 * FIBRES) would take 72 and 192 MB.
+MOST = 30 * MEGABYTES
+
+
+def around(nodes=NODES):
+    """(nodes, 2) normals of a round fibre of radius 1."""
+    angle = 2 * np.pi * (np.arange(nodes) + 0.5) / nodes
+    return np.stack([np.cos(angle), np.sin(angle)], axis=1)
+
+
+def fibre_modes(length, nodes=NODES):
+    """(2 nodes, 3) orthonormal rigid motions of an ellipse's nodes, in the directions of rows (n, t)."""
+    n = around(nodes)
+    t = np.stack([-n[:, 1], n[:, 0]], axis=1)
+    points = n * [length, 1.0]
+    turn = np.stack([-points[:, 1], points[:, 0]], axis=1)
+    motions = [np.tile(e, (nodes, 1)) for e in np.eye(2)] + [turn]
+    rows = np.stack([[(m * n).sum(axis=1), (m * t).sum(axis=1)] for m in motions])
+    return np.linalg.qr(rows.transpose(2, 1, 0).reshape(2 * nodes, 3))[0]
+
+
+def loose_fibres(weights=1.0):
+    """Fibres in a matrix that is pinned, with pairs of rows (n, t) at each node, which have weights."""
+    bodies = [
+        SimpleNamespace(R=-fibre_modes(1.0 + k / FIBRES), submesh=SimpleNamespace(body=k + 1, pinned=-1))
+        for k in range(FIBRES)
+    ]
+    bodies.append(SimpleNamespace(R=np.zeros((0, 0)), submesh=SimpleNamespace(body=0, pinned=0)))
+    dofs = [np.arange(len(body.R)) for body in bodies]
+    operators = SimpleNamespace(subdomains=bodies, dofs=dofs, B=diags(weights * np.ones(ROWS)).tocsr())
+    return NaturalCoarseSpace(MPI.COMM_SELF, SimpleNamespace(owned=(0, ROWS), rows=np.arange(ROWS)), operators)
+
+
+@pytest.fixture(scope="module")
+def coarse():
+    space = loose_fibres()
+    yield space
+    space.destroy()
+
+
+@contextmanager
+def at_most(limit):
+    """A block that allocates no more at a time than so many bytes."""
+    tracemalloc.start()
+    yield
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < limit
+
+
+def test_motions_of_many_fibres_that_nothing_holds(coarse):
+    active = np.ones(ROWS)
+    free = np.arange(FIBRES) % 10 > 0
+    active[np.repeat(free, 2 * NODES)] = 0.0
+    with at_most(MOST):
+        coarse.activate(active)
+    Z = coarse.unconstrained_modes
+    assert Z.shape == (3 * FIBRES, 3 * free.sum())
+    assert abs(Z.T @ Z - identity(Z.shape[1])).max() < 1e-12
+    assert abs(coarse.G_active @ Z).max() < 1e-12
+    assert np.array_equal(np.flatnonzero(abs(Z).sum(axis=1)), np.flatnonzero(np.repeat(free, 3)))
+    x = active * np.cos(np.arange(len(active)))
+    assert np.abs(coarse.G_active.T @ coarse.project(x)).max() < 1e-12
+
+
+def test_the_resistance_to_a_motion_is_compared_with_that_of_its_own_body():
+    """A large body's rows are small beside those of others."""
+    small, active = np.ones(ROWS), np.ones(ROWS)
+    small[: 2 * NODES] = 1e-6
+    coarse = loose_fibres(small)
+    active[3 : 2 * NODES] = 0.0
+    assert coarse.free_motions(active).shape[1] == 0
+    active[0] = 0.0
+    assert coarse.free_motions(active).shape[1] == 1
+    coarse.destroy()
+
+
+def test_one_of_many_loose_fibres_that_overlaps_is_moved(coarse):
+    """By the overlap, for it has room on the other side; the others stay."""
+    coarse.activate(np.zeros(ROWS))
+    row, moved = 2 * np.arange(NODES * FIBRES), 7
+    amplitudes = np.zeros(3 * FIBRES)
+    amplitudes[3 * moved : 3 * moved + 3] = [0.3, -0.2, 0.1]
+    jump = coarse.G @ amplitudes + np.where(np.arange(2 * len(row)) % 2 == 0, 0.01, 0.0)
+    bodies = np.stack([np.zeros(len(row), np.int64), 1 + np.repeat(np.arange(FIBRES), NODES)], axis=1)
+    nodes, solution = SimpleNamespace(row=row, bodies=bodies), SimpleNamespace(jump=jump)
+    with at_most(MOST):
+        found = place(MPI.COMM_SELF, coarse, nodes, np.ones(len(row), bool), solution, 1e-9)
+    assert jump[row].min() < 0.0 and not found.squeezed.any()
+    placed = (jump + found.jump(coarse))[row].reshape(FIBRES, NODES)
+    assert placed.min() > 0.01 - 1e-9 and np.abs(np.delete(placed, moved, axis=0) - 0.01).max() < 1e-12
