@@ -1,0 +1,36 @@
+"""Subdomains that no factorization should see."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from support import torn_cells
+
+from feti_homog.errors import MeshError
+from feti_homog.feti.decomposition.subdomain import Subdomain
+
+
+@pytest.fixture(scope="module")
+def subdomain():
+    cell = torn_cells.tear(MPI.COMM_SELF, geometry="square", mesh_size=0.3)
+    yield next(s for s in cell.subdomains if s.R.shape[1])
+    cell.solver.destroy()
+
+
+@pytest.mark.parametrize("component", [(0, 0), (2, 2)])
+def test_a_stiffness_that_is_no_number_is_refused(subdomain, component):
+    L = subdomain.L.copy()
+    L[component] = np.nan
+    with pytest.raises(MeshError, match=r"\|K R\| / \|K\| = nan, expected at most"):
+        Subdomain.on(subdomain.submesh, subdomain.mesh, L, subdomain.problem)
+
+
+def test_a_corner_that_is_nowhere_is_refused(subdomain):
+    submesh = subdomain.submesh
+    points = submesh.points.copy()
+    points[submesh.triangles[0, 0]] = np.nan
+    with pytest.raises(MeshError, match="refined elements of .* are inverted"):
+        Subdomain.build(replace(submesh, points=points), subdomain.mesh.lattice, subdomain.L, subdomain.problem)
