@@ -32,5 +32,5 @@ def test_a_corner_that_is_nowhere_is_refused(subdomain):
     submesh = subdomain.submesh
     points = submesh.points.copy()
     points[submesh.triangles[0, 0]] = np.nan
-    with pytest.raises(MeshError, match="refined elements of .* are inverted"):
+    with pytest.raises(MeshError, match=r"refined elements of .* are inverted"):
         Subdomain.build(replace(submesh, points=points), subdomain.mesh.lattice, subdomain.L, subdomain.problem)
