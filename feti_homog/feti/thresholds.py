@@ -149,8 +149,8 @@ SINGULAR_PIVOT = 1e-10
 
 # coarse
 
-# Eigenvalues of G^T G, relative to the largest diagonal entry of their body with all rows active, of motions that no
-# active row resists: rounding leaves about 1e-15, and one resisting row of n about 1 / n.
+# Eigenvalues of G^T G, relative to the largest diagonal entry of the bodies that are coupled, of motions that no active
+# row resists: rounding leaves about 1e-15, and one resisting row of n about 1 / n.
 UNCONSTRAINED_EIGENVALUE = 1e-10
 # Nodes of a face below which its neighbourhood has no eigenproblem of its own: a single node can only translate.
 MIN_FACE_NODES = 2

@@ -116,10 +116,12 @@ class Homogenization:
 
     def _unmet_stress(self, state: Equilibrium, stress: Float) -> float:
         """The error of the prescribed stresses.  Collective."""
-        load, stresses = state.load, self.cell.solver.problem.stresses
-        off = np.abs(stress - load.values)[load.by_stress].max()
-        scale = max(np.abs(stress[:stresses]).max(), self.interface.scales.stress_scale(state.solution.strain))
-        return float(off / (scale or 1.0))
+        load, scales = state.load, self.interface.scales
+        # Scaled by the roots of their stiffnesses, so that none is small beside another.
+        root, imposed = scales.roots, scales.imposed_strain(state.solution.strain)
+        off = np.abs((stress - load.values)[load.by_stress] / root[load.by_stress]).max()
+        largest = max(np.abs(stress / root)[: len(imposed)].max(), (root[: len(imposed)] * imposed).max())
+        return float(off / (largest or 1.0))
 
     def counts(self, status: Status) -> dict[str, int]:
         """Interface nodes in each state; collective."""

@@ -151,10 +151,9 @@ class Interface:
             NotCarriedError: nothing carries the stresses of the load.
         """
         self.solver.activate(self.active(status))
-        stiffness = self.scales.least_bonded_stiffness.diagonal()
         given = self.scales.imposed_strain(np.where(load.by_stress, 0.0, load.values))
-        root = float((np.sqrt(stiffness[: len(given)]) * given).max())
-        noise = mixed_load.Noise(stiffness, self.sign_noise, root)
+        roots = self.scales.roots
+        noise = mixed_load.Noise(roots, self.sign_noise, float((roots[: len(given)] * given).max()))
         return mixed_load.solve(self.solver, load, start, float(self.size.prod()), noise)
 
     def is_linear(self, status: Status) -> bool:

@@ -8,7 +8,7 @@ import numpy as np
 
 from feti_homog.typing import Bool, Float
 
-# What is smaller than this, relative to the values at the ends of its leg, is what rounding leaves of zero.
+# What is smaller than this, relative to its values at the ends of its leg, is what rounding leaves of zero.
 LOAD_ROUNDING = 1e-13
 
 
@@ -40,8 +40,5 @@ class Load:
         """The load after a share of the way to another one of the same kinds; what is left of zero by rounding is
         zero."""
         values = (1.0 - share) * self.values + share * end.values
-        for kind in (self.by_stress, ~self.by_stress):
-            largest = np.abs([self.values[kind], end.values[kind]]).max(initial=0.0)
-            if np.abs(values[kind]).max(initial=0.0) <= LOAD_ROUNDING * largest:
-                values[kind] = 0.0
-        return Load(values, self.by_stress)
+        largest = np.abs([self.values, end.values]).max(axis=0)
+        return Load(np.where(np.abs(values) <= LOAD_ROUNDING * largest, 0.0, values), self.by_stress)

@@ -37,6 +37,15 @@ class LoadScales:
         return np.array(areas) / sum(areas), np.stack(stiffnesses)
 
     @cached_property
+    def roots(self) -> Float:
+        """(v,) of the diagonal of `least_bonded_stiffness`: by these strains are multiplied and stresses divided that
+        are compared with each other; inf of what works on no stress.  Collective."""
+        diagonal = np.full(len(self.least_bonded_stiffness), np.inf)
+        stresses = slice(self._solver.problem.stresses)
+        diagonal[stresses] = self.least_bonded_stiffness.diagonal()[stresses]
+        return np.asarray(np.sqrt(diagonal))
+
+    @cached_property
     def largest_stiffness(self) -> float:
         """The largest entry of Reuss' bound.  Collective."""
         m = self._solver.problem.strains

@@ -27,14 +27,14 @@ class Noise:
     """What may be the solver's error.
 
     Attributes:
-        stiffness: (v,) of each load, with all bonds: a scale.
-        share: of it that the error is.
-        root: the largest product of the root of a stiffness and its given strain.
+        roots: (v,) of a stiffness of each load, with all bonds.
+        share: the error of stresses over these and of strains times these, relative to the largest.
+        given: the largest of the given strains times these.
     """
 
-    stiffness: Float
+    roots: Float
     share: float
-    root: float
+    given: float
 
 
 def solve(solver: FetiSolver, load: Load, start: Float, area: float, noise: Noise) -> DualSolution:
@@ -57,7 +57,7 @@ def solve(solver: FetiSolver, load: Load, start: Float, area: float, noise: Nois
     if strains[0].any():
         missing = missing - stresses[0]
     # Rank 0 decides: rounding on other processors may part the ranks where a stiffness is nearly none.
-    own = replace(noise, stiffness=noise.stiffness[unknown])
+    own = replace(noise, roots=noise.roots[unknown])
     factors = solver.comm.bcast(_strains(stresses[-len(unknown) :], missing, own))
     if factors is None:
         raise NotCarriedError("nothing in the cell carries the stresses of the load")
@@ -67,13 +67,13 @@ def solve(solver: FetiSolver, load: Load, start: Float, area: float, noise: Nois
 def _strains(stiffness: Float, stress: Float, noise: Noise) -> Float | None:
     """(u,) the strains that make the stresses (u,) by a stiffness (u, u) that may be singular; None if it carries them
     not.  Each is scaled by the root of its own stiffness, so that none is small beside another."""
-    root = np.sqrt(noise.stiffness)
-    eigenvalues, vectors = np.linalg.eigh((stiffness + stiffness.T) / (2 * np.outer(root, root)))
-    along, resists = vectors.T @ (stress / root), eigenvalues > noise.share
-    largest = max(UNCARRIED_SHARE * np.abs(stress / root).max(), noise.share * noise.root)
+    roots = noise.roots
+    eigenvalues, vectors = np.linalg.eigh((stiffness + stiffness.T) / (2 * np.outer(roots, roots)))
+    along, resists = vectors.T @ (stress / roots), eigenvalues > noise.share
+    largest = max(UNCARRIED_SHARE * np.abs(stress / roots).max(), noise.share * noise.given)
     if np.abs(along[~resists]).max(initial=0.0) > largest:
         return None
-    return np.asarray(vectors[:, resists] @ (along[resists] / eigenvalues[resists]) / root)
+    return np.asarray(vectors[:, resists] @ (along[resists] / eigenvalues[resists]) / roots)
 
 
 def superposed(solver: FetiSolver, solutions: Sequence[DualSolution], factors: Float) -> DualSolution:

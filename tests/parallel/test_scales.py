@@ -16,6 +16,7 @@ from support.loads import strains
 from feti_homog import Case, run
 from feti_homog.errors import ConvergenceError
 from feti_homog.feti.preconditioners.bordered_inverse import BorderedInverse
+from feti_homog.interface import mixed_load
 from feti_homog.interface.contact import BONDED, OPEN
 from feti_homog.interface.energy_criterion import EnergyCriterion
 from feti_homog.interface.load import Load
@@ -34,7 +35,7 @@ STIFF_ARC, SOFT_ARC = ({"debonded": [{"fibre": f, "centre": a, "angle": 60.0}]} 
 SPRINGS = {"criterion": "energy", "normal_stiffness": 20.0, "tangential_stiffness": 5.0, "mode_sensitivity": 0.25}
 
 
-def two_inclusions(softness, stiff, soft, unit=1.0, **analysis):
+def two_inclusions(softness, stiff, soft, unit=1.0, young=10.0, **analysis):
     """A stiff and a soft fibre, with the interfaces `stiff` and `soft`; `unit` is that of their moduli."""
     (kind,) = analysis
     return Case.parse(
@@ -42,8 +43,8 @@ def two_inclusions(softness, stiff, soft, unit=1.0, **analysis):
             "cell": {"geometry": "table", "width": 1.0, "height": 1.0, "mesh_size": 0.2, "fibre_list": FIBRES},
             "material": {
                 "matrix": {"young": unit, "poisson": 0.3},
-                "fibre": {"young": 10.0 * unit, "poisson": 0.2},
-                "fibre:2": {"young": 10.0 * softness * unit, "poisson": 0.2},
+                "fibre": {"young": young * unit, "poisson": 0.2},
+                "fibre:2": {"young": young * softness * unit, "poisson": 0.2},
             },
             "interface": [stiff | {"between": ["matrix", "fibre"]}, soft | {"between": ["matrix", "fibre:2"]}],
             "analysis": {"type": kind, "plane": "strain"},
@@ -110,6 +111,12 @@ STIFF_ALONG = {"stiffness": np.diag([1e9, 2.0, 3.0, 1.0, 1.0, 1.0]).tolist()}
 @pytest.mark.parametrize("bonded", [True, False])
 def test_a_component_far_softer_than_another_carries_its_stress(comm, bonded):
     """Uniform, so the strains are the stresses over the stiffnesses."""
+    strain = np.array(run(loaded_along(bonded), comm).load.strain)
+    assert strain == pytest.approx([1e-3, 0.0, 0.01, 0.0, 0.0, 0.01], rel=1e-6, abs=1e-9)
+
+
+def loaded_along(bonded):
+    """A uniform cell, with its fibre glued or bonded, under stresses that are far apart."""
     document = {
         "cell": {"geometry": "square", "fibre_fraction": 0.3, "mesh_size": 0.3},
         "material": {"matrix": STIFF_ALONG, "fibre": STIFF_ALONG},
@@ -119,8 +126,15 @@ def test_a_component_far_softer_than_another_carries_its_stress(comm, bonded):
     }
     if not bonded:
         document["interface"] = {"debonded": []}
-    strain = np.array(run(Case.parse(document), comm).load.strain)
-    assert strain == pytest.approx([1e-3, 0.0, 0.01, 0.0, 0.0, 0.01], rel=1e-6, abs=1e-9)
+    return Case.parse(document)
+
+
+def test_a_stress_that_is_missed_beside_a_far_larger_one_is_no_result(comm, monkeypatch):
+    strains_of = mixed_load._strains
+    lose = np.array([1.0, 1.0, 0.0])
+    monkeypatch.setattr(mixed_load, "_strains", lambda *args: strains_of(*args) * lose[: len(args[1])])
+    with pytest.raises(ConvergenceError, match="check stress"):
+        run(loaded_along(True), comm)
 
 
 # Springs so soft that neither fibre nor matrix feels them: the jumps are those without bonds, but for rigid motions.
@@ -205,6 +219,21 @@ def test_springs_too_soft_beside_a_cut_fibre_are_refused(comm):
         softly_held(comm, 1e-6, 1e6, 2, **pieces)
     with pytest.raises(ConvergenceError, match="springs too soft beside the pieces of cut fibres"):
         softly_held(comm, 1e-16, 1e6, 2, **pieces)
+
+
+@pytest.mark.parametrize("stiffness", [1e-9, 1e-12])
+def test_soft_springs_break_alike_beside_a_glued_stiff_fibre(comm, stiffness):
+    """Its forces are found on the side of the matrix, theirs on that of the fibre."""
+
+    def path(k):
+        own, stiff = ({"normal_stiffness": own, "tangential_stiffness": RATIO * own} for own in (k, 1e8))
+        law = {"criterion": "energy", "mode_sensitivity": SENSITIVITY}
+        bonds = law | stiff | {"toughness": 1e9}, law | own | {"toughness": TOUGHNESS * k}
+        case = two_inclusions(1e-6, *bonds, young=1e6, path={"to": {"E11": 0.2, "gamma12": 0.1}})
+        return [point.load_factor for point in run(case, comm).path]
+
+    expected, found = path(1e-6), path(stiffness)
+    assert found == pytest.approx(expected, rel=3e-5) and len(found) > 10
 
 
 @pytest.mark.parametrize("unit", [1e-12, 1e9])

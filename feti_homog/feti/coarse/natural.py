@@ -62,7 +62,6 @@ class NaturalCoarseSpace:
         self.G = assemble_owned_rows(comm, operators.B @ self.R, jump_operator.rows, columns, (owned, modes))
         self.G_active, self.factorizations = self.G, 0
         self._diagonal = allreduce_sum(comm, np.asarray(self.G.power(2).sum(axis=0)).ravel())
-        self._largest_diagonal = float(self._diagonal.max(initial=0.0))
         self.unconstrained_modes = csc_matrix((self.kernel_dimension, 0))
         self._reaching = np.union1d(self.G.indices, columns).astype(np.int64)
         self.solver = RenewedSolver(comm, self.kernel_dimension, self._reaching, "feti_natural_")
@@ -86,7 +85,7 @@ class NaturalCoarseSpace:
         self._G = self.G_active[:, self.unknowns].tocsr()
         self._GT = self._G.T.tocsr()
         Z = Z[:, self.unknowns]
-        gram = (self._GT @ self._G + self._largest_diagonal * (Z.T @ Z)).tocsr()
+        gram = (self._GT @ self._G + self._diagonal.max(initial=0.0) * (Z.T @ Z)).tocsr()
         self.solver.factor(self.unknowns, gram)
         self.factorizations += 1
 

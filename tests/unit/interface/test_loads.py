@@ -68,6 +68,11 @@ def test_rounding_of_a_load_that_returns_to_zero_is_none_of_either_kind():
     assert start.after(1.0, end).values.tolist() == [-0.6, -6e-4]
 
 
+def test_a_component_far_smaller_than_another_is_no_rounding():
+    start, end = Load(np.array([1e6, 0.0]), np.ones(2, bool)), Load(np.array([0.0, 1e-8]), np.ones(2, bool))
+    assert start.after(1.0, end).values.tolist() == [0.0, 1e-8]
+
+
 def test_a_load_of_two_problems_is_parted():
     load = Load(np.arange(5.0), np.array([True, False, False, True, False]))
     first, second = load.parts(3)
