@@ -210,8 +210,7 @@ class Interface:
         moves forces by the stiffness of the softer side.  Forces between the pieces of a cut body say nothing here,
         however large, nor do those of other interfaces."""
         forces = np.abs(solution.lam[self._pairs]).max(axis=1, initial=0.0)
-        longest = self.scales.over_interface(self.nodes.length)
-        caused = self.scales.bond_stress(solution.strain) * longest
+        caused = self.scales.bond_stress(solution.strain) * self.scales.longest
         return np.asarray(self.sign_noise * np.maximum(self.scales.over_interface(forces), caused))
 
     def _placed(self, status: Status, solution: DualSolution) -> tuple[DualSolution, Bool]:

@@ -78,6 +78,11 @@ class LoadScales:
         self._solver.comm.Allreduce(MPI.IN_PLACE, largest, MPI.MAX)
         return np.asarray(largest[inner])
 
+    @cached_property
+    def longest(self) -> Float:
+        """(k,) the largest tributary length on the interface of each bond of this rank.  Collective."""
+        return self.over_interface(self._solver.jump_operator.nodes.length)
+
     def bond_stress(self, loads: Float) -> Float:
         """(k,) or (k, n) stress that the loads (v,) or (v, n) make at each bond of this rank, or would if nothing else
         bore them.  Collective."""

@@ -102,11 +102,8 @@ class TipCriterion:
         self._activate(self.influence, cell.plane, status)
         numbers, mine = self._own(status)
         rows = self.influence.neighbours.rows[numbers][:, None] + np.arange(2)
-        H, stiffness, axial = (
-            self.influence.inverse_blocks(rows)[mine],
-            self.influence.stiffness[rows[mine]],
-            np.zeros(0),
-        )
+        H, axial = self.influence.inverse_blocks(rows)[mine], np.zeros(0)
+        stiffness = self.influence.stiffness[rows[mine]]
         own = numbers[mine] - self.influence.neighbours.first
         if self.axial is not None and cell.axial is not None:
             self._activate(self.axial, cell.axial, status)
