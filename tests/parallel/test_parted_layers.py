@@ -8,6 +8,7 @@ from reference.parted_layers import PartedLayers
 from support.layered_meshes import layers
 from support.loaded_twins import EPOXY_GLASS, compare_paths, document
 from support.ranks import parallel_assert
+from support.verified_results import falsified
 
 from feti_homog import Case, run
 from feti_homog.errors import ConvergenceError
@@ -97,6 +98,23 @@ def test_layers_touch_where_the_strain_is_zero(comm, shared_path, phases):
     result = solved(comm, shared_path, phases, 0, "strain", STRENGTH, None, path={"waypoints": BACK})
     _, _, turn, last = result.path
     assert abs(turn.load_factor - 5 / 6) < 1e-12 and last.open == 0
+
+
+@pytest.mark.parametrize("factor", [1.0, 1 - 1e-4, 1 + 1e-4])
+def test_a_loss_at_parting_that_is_none_is_noticed(comm, shared_path, factor):
+    solved(comm, shared_path, TWO, 0, "strain", STRENGTH, None, path={"waypoints": BACK})
+
+    def edit(document, _):
+        for point in document["path"][1:]:
+            lost = point["dissipated"] * (factor - 1)
+            for name in ("work", "dissipated", "dissipated_strain_controlled"):
+                point[name] += lost
+
+    held = None
+    if comm.rank == 0:
+        findings = verify(falsified(shared_path / "out", shared_path / "copy", edit)).findings
+        held = next(finding.holds for finding in findings if finding.law.name == "energy")
+    parallel_assert(comm, comm.bcast(held) == (factor == 1.0))
 
 
 def test_a_pull_on_parted_layers_is_told_with_what_was_found(comm, shared_path):
