@@ -32,6 +32,7 @@ def criterion_of(cell: TornCell) -> BondCriterion:
     if bonds[0].criterion != "energy":
         return _strengths(bonds, pair)
     has_tips = cell.case.path is not None or cell.sum_over_ranks(int(cell.debonded(None).sum())) > 0
+    has_tips &= cell.solver.jump_operator.global_rows > 0
     springs = _springs(bonds, pair)
     return _at_tips(cell, springs) if bonds[0].growth == "released" and has_tips else springs
 

@@ -111,6 +111,8 @@ def choose(sizes: ProblemSizes, options: SolverOptions, thresholds: Thresholds =
         CaseError: two options exclude each other.
     """
     preconditioner = options.preconditioner
+    if preconditioner == "influence" and not sizes.shared_dofs:
+        preconditioner = "none"  # a whole body by itself has no multipliers
     if preconditioner == "influence" and not sizes.all_dense:
         raise CaseError("-feti_pc_type influence: needs -feti_dual_operator explicit")
     if preconditioner == "auto":

@@ -52,6 +52,7 @@ def _check_fibres(ledger: Ledger, cell: DiscreteCell, told: Sequence[Section]) -
     ledger.record("tables", np.where(listed == expected, 0.0, np.inf), "fibres")
     if listed == expected:
         circles = np.array([[*fibre.get("centre", (None, None)), fibre.get("radius")] for fibre in told], float)
+        circles = circles.reshape(-1, 3)  # of a cell without fibres too
         stored = np.column_stack([fibres.centre, fibres.radius])
         off = np.where(np.isnan(circles) & np.isnan(stored), 0.0, circles - stored)
         ledger.record("tables", relative(off, cell.files.size.max()).max(axis=1), lambda i: f"fibres[{i}]")

@@ -69,6 +69,11 @@ def test_options_have_their_way(options, plan):
     assert choose(PATH, SolverOptions(**options)) == plan
 
 
+def test_a_whole_body_by_itself_needs_no_influence_columns():
+    alone = replace(PATH, bodies_are_cut=False, all_dense=False, shared_dofs=0)
+    assert choose(alone, SolverOptions(preconditioner="influence")) == SolverPlan("none", False)
+
+
 @pytest.mark.parametrize(
     ("sizes", "options", "words"),
     [
