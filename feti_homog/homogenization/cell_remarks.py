@@ -48,6 +48,19 @@ def _bonding(case: Case, has_debonded_curve: bool) -> tuple[str, ...]:
     return ("[interface]: nothing is debonded, and no bond is elastic: the bonding is perfect",)
 
 
+def subdomain_remarks(case: Case, bodies: int, subdomains: int, coarse_triangles: int) -> tuple[str, ...]:
+    """Mention that there are more or fewer subdomains than the case asks for, and why."""
+    asked = case.decomposition.subdomains
+    if asked is None or asked == subdomains:
+        return ()
+    if subdomains > asked:
+        whole = f"each of the {bodies} bodies is at least one"
+        why = whole if bodies > asked else "pieces that METIS leaves in several parts were split"
+    else:
+        why = f"METIS makes no more of {coarse_triangles} coarse triangles; a smaller mesh_size has more"
+    return (f"[decomposition] subdomains = {asked}: {subdomains} were made: {why}",)
+
+
 def table_remarks(case: Case) -> tuple[str, ...]:
     """List how the cell differs from its table of fibres, a line each.
 

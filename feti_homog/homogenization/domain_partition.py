@@ -22,7 +22,7 @@ from feti_homog.errors import CaseError
 from feti_homog.feti.decomposition.partition import decompose, pieces_for_count, pieces_for_size
 from feti_homog.homogenization import arc_selection, interface_pairs, process_zone
 from feti_homog.homogenization.arc_selection import InterfaceNodes
-from feti_homog.homogenization.cell_remarks import mesh_remarks, table_remarks
+from feti_homog.homogenization.cell_remarks import mesh_remarks, subdomain_remarks, table_remarks
 from feti_homog.interface import debonded_arcs
 from feti_homog.interface.debonded_arcs import MovedTips
 from feti_homog.typing import Bool, Float, Int
@@ -181,13 +181,14 @@ def distribute(
     decomposition = decompose(torus, parts, wanted, n_ranks)
     subdomain, rank = decomposition.subdomain, decomposition.rank
     table = SubdomainTable.of(torus, subdomain, rank)
+    bodies, triangles = int(parts.max()) + 1, len(mesh.triangles)
     summary = CellSummary(
         width=mesh.width,
         height=mesh.height,
         phases=mesh.phases,
-        bodies=int(parts.max()) + 1,
+        bodies=bodies,
         subdomains=len(rank),
-        coarse_triangles=len(mesh.triangles),
+        coarse_triangles=triangles,
         interface_edge=process_zone.longest_edge(mesh),
         numbers=numbers,
         is_fibre=is_fibre,
@@ -199,7 +200,11 @@ def distribute(
         snapped=mesh.snapped,
         voids=voids(mesh) if torus.at_void.any() else 0,
         match_distance=match_distance(case, mesh.width, mesh.height, centres[is_fibre], circles[is_fibre, 2]),
-        remarks=(*table_remarks(case), *mesh_remarks(case, torus, pairs)),
+        remarks=(
+            *table_remarks(case),
+            *mesh_remarks(case, torus, pairs),
+            *subdomain_remarks(case, bodies, len(rank), triangles),
+        ),
     )
     shares = cut_for_ranks(torus, subdomain, table, n_ranks, pinned_class(torus))
     return [RankShare(summary, table, pairs, own) for own in shares]

@@ -15,7 +15,7 @@ from feti_homog.cell.tile_torus import NumberedTile
 from feti_homog.config.case import Case
 from feti_homog.errors import CaseError
 from feti_homog.homogenization import interface_pairs
-from feti_homog.homogenization.cell_remarks import table_remarks
+from feti_homog.homogenization.cell_remarks import subdomain_remarks, table_remarks
 from feti_homog.homogenization.domain_partition import CellSummary, in_cell, match_distance
 from feti_homog.typing import Int
 
@@ -97,5 +97,5 @@ def summary_of(case: Case, drawing: Drawing, subdomains: int, triangles: int) ->
         snapped=0.0,
         voids=int(arrangement.is_void.sum() + hollow.sum()),
         match_distance=match_distance(case, regions.width, regions.height, centres[is_fibre], radii[is_fibre]),
-        remarks=table_remarks(case),
+        remarks=(*table_remarks(case), *subdomain_remarks(case, len(regions.phase), subdomains, triangles)),
     )

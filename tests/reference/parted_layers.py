@@ -1,6 +1,6 @@
 """Layers of isotropic phases whose faces have all parted: without friction they touch or part, in closed form.
 
-Of a state the strains E_b along the layers are common to all, and the stress s_a across them is; a is the axis across.
+Of a state the strains E_b along the layers are common to all, and so is the stress s_a across them, a the axis across.
 Each layer has e_a = A (s_a - C_ab (E_b - alpha_b T)) + alpha_a T, A = 1 / C_aa.  They touch where that makes s_a <= 0
 with E_a = <e_a> + s_a / k, k the springs of all faces in a row; else s_a = 0 and E_a is theirs only at its least,
 <e_a>.  Shears do no work.
@@ -68,8 +68,7 @@ class PartedLayers:
         matrix[a, v + a] = 1.0 if not touch else -self.give
         if touch:
             matrix[a, a] = 1.0
-        for row in b:
-            matrix[row, v + row] = 1.0
+        matrix[b, v + np.array(b)] = 1.0
         for c, C, alpha in zip(self.fractions, self.stiffnesses, self.expansions, strict=True):
             soft = 1.0 / C[a, a]
             if touch:  # E_a = <e_a> + give s_a

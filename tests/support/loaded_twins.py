@@ -34,7 +34,7 @@ def document(cell, phases, plane, interface=None, petsc=None, **analysis):
     sections = {key: value for key, value in (analysis | {"interface": interface}).items() if value is not None}
     return {
         "cell": circular | cell,
-        "material": dict(zip(("matrix", "fibre"), phases, strict=True)),
+        "material": dict(zip(("matrix", "fibre"), phases, strict=False)),
         "analysis": {"type": name, "plane": plane},
         "petsc": TIGHT | (petsc or {}),
         "output": {"pictures": False, "fields": False},

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 
 import pytest
@@ -72,3 +73,23 @@ def test_bonding_that_a_mesh_does_not_have_is_remarked(curve, sections, expected
     assert len(found) == len(expected) and all(map(str.startswith, found, expected)), found
     result = run(Case.parse(document | sections, tmp_path), MPI.COMM_SELF)
     assert list(result.remarks) == found
+
+
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        (1000, r"(\d+) were made: METIS makes no more of \d+ coarse triangles; a smaller mesh_size has more"),
+        (1, r"(\d+) were made: each of the 2 bodies is at least one"),
+        (2, None),
+    ],
+)
+def test_another_number_of_subdomains_than_asked_for_is_remarked(asked, words):
+    content = tomllib.loads(VALID_CASES["base"].replace("mesh_size = 0.05", "mesh_size = 0.3"))
+    case = Case.parse(content | {"decomposition": {"subdomains": asked}})
+    lines = describe(case, MPI.COMM_SELF).splitlines()
+    result = run(case, MPI.COMM_SELF)
+    told = [line for line in lines if line.startswith("remark     [decomposition]")]
+    assert [line.removeprefix("remark     ") for line in told] == [r for r in result.remarks if "[decomp" in r]
+    assert len(told) == (words is not None)
+    for line in told:
+        assert int(re.search(f"subdomains = {asked}: {words}$", line)[1]) == result.solver.subdomains != asked
