@@ -49,6 +49,7 @@ class AnalysisContext:
         iterations, reasons: of every dual solve so far.
         checks: largest error of each law so far.
         faults: what did not converge or hold, in words.
+        undetermined: of every point under one load, the strains that nothing determines.
         states: which points of a path to keep, `kept_points.kept`.
         keeps_fields: whether states are to be recorded.
         log: called with a line about each event of a path.
@@ -62,6 +63,7 @@ class AnalysisContext:
     reasons: list[int] = field(default_factory=list)
     checks: dict[str, float] = field(default_factory=dict)
     faults: list[str] = field(default_factory=list)
+    undetermined: list[list[str]] = field(default_factory=list)
     states: int | str = "all"
     axial: Homogenization | None = None
     keeps_fields: bool = False
@@ -101,6 +103,9 @@ class AnalysisContext:
     def loaded_point(self, responses: Sequence[Response]) -> dict[str, Any]:
         """What result.json says of a state under one load, whose responses these are.  Collective."""
         plane, *others = responses
+        pairs = zip(self._problems, responses, strict=True)
+        masks = np.concatenate([problem.interface.undetermined(own.state) for problem, own in pairs])
+        self.undetermined.append([name for name, found in zip(self.unit_loads, masks, strict=True) if found])
         strain, stress = plane.strain, plane.stress
         spatial = {}
         if others:
@@ -162,6 +167,18 @@ class AnalysisContext:
         if law.startswith("kkt_"):
             return CONTACT_TOLERANCE
         return min(CHECK_ERROR_PER_RTOL * self.homogenization.cell.solver.rtol, MAX_CHECK_ERROR)
+
+    def remarks(self) -> list[str]:
+        """What the loads leave open, in words."""
+        points = sum(map(bool, self.undetermined))
+        names = [name for name in SPATIAL_STRAINS if any(name in each for each in self.undetermined)]
+        if not names:
+            return []
+        where = "" if self.case.path is None else f" at {points} of {len(self.undetermined)} points"
+        return [
+            f"[{self.case.analysis.type}] {', '.join(names)}: undetermined{where}: with a given stress nothing resists "
+            "them, and the result has one value of many"
+        ]
 
     def warnings(self) -> list[str]:
         """What a user may have meant otherwise, in words."""

@@ -71,6 +71,7 @@ def result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Fields
             *cell.case.remarks(),
             *cell.summary.remarks,
             *_lost_area(cell.case, fractions),
+            *context.remarks(),
         ),
         faults=tuple(context.faults),
         status="not converged" if context.faults else "done",

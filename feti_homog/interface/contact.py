@@ -158,7 +158,7 @@ class Interface:
 
     def is_linear(self, status: Status) -> bool:
         """Whether no face can come to touch another; collective."""
-        return not (self.contact and self.solver.comm.allreduce(bool((status != BONDED).any()), MPI.LOR))
+        return not (self.contact and self._any(status != BONDED))
 
     def equilibria(self, strains: Float, status: Status, starts: Sequence[Float]) -> list[Equilibrium]:
         """Solve a linear problem for every strain of (k, 3) together.  Collective."""
@@ -175,7 +175,7 @@ class Interface:
             return self._searched(load, status, start)
         except NotCarriedError:
             closed = np.where(status == OPEN, CLOSED, status).astype(np.int8)
-            if not self.contact or not self.solver.comm.allreduce(bool((closed != status).any()), MPI.LOR):
+            if not self.contact or not self._any(closed != status):
                 raise
         # Faces that come to touch may carry what open ones do not.
         return self._searched(load, closed, start)
@@ -194,6 +194,19 @@ class Interface:
             flip = pivoting.choose(wrong, count)
             status = np.where(flip, CLOSED + OPEN - status, status).astype(np.int8)
             start = solution.lam
+
+    def undetermined(self, state: Equilibrium) -> Bool:
+        """(v,) strains that nothing determines: their stresses are given, and what is open lets them be any.
+        Collective."""
+        if not state.load.by_stress.any() or not self._any(state.status != BONDED):
+            return np.zeros(len(state.load.values), bool)
+        self.solver.activate(self.active(state.status))
+        held = self.scales.mean_stiffness * float(self.size.prod())
+        return mixed_load.unresisted(self.solver, state.load.by_stress, held)
+
+    def _any(self, which: Bool) -> bool:
+        """Whether there is one on any rank; collective."""
+        return bool(self.solver.comm.allreduce(bool(which.any()), MPI.LOR))
 
     def gap_noise(self, strain: Float) -> float:
         """Gaps smaller than this may be the solver's error."""
@@ -256,7 +269,7 @@ class Interface:
         motions = coarse.unconstrained_modes
         if self.contact:
             idle = (status == CLOSED) & (solution.lam[self.nodes.row] >= -self.force_noise(solution))
-        if not self.solver.comm.allreduce(bool(idle.any()), MPI.LOR):
+        if not self._any(idle):
             return status, motions.shape[1]
         more = coarse.free_motions(self.active(np.where(idle, OPEN, status).astype(np.int8)))
         # The squares are the diagonal of the projector on the motions, which rises where a body comes free.

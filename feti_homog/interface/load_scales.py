@@ -24,10 +24,15 @@ class LoadScales:
         """(v, v) Reuss' bound <L^-1>^-1 of the strains, and <L> of the other loads, collective: a scale of stress and
         energy that debonding does not make zero."""
         shares, stiffnesses = self._phases
-        m, least = self._solver.problem.strains, voigt(shares, stiffnesses)
+        m, least = self._solver.problem.strains, self.mean_stiffness.copy()
         least[:m, m:] = least[m:, :m] = 0.0
         least[:m, :m] = reuss(shares, stiffnesses[:, :m, :m])
         return least
+
+    @cached_property
+    def mean_stiffness(self) -> Float:
+        """(v, v) <L>, Voigt's bound of the strains.  Collective."""
+        return voigt(*self._phases)
 
     @cached_property
     def _phases(self) -> tuple[Float, Float]:

@@ -16,10 +16,12 @@ from feti_homog.errors import NotCarriedError
 from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.feti.solver import FetiSolver
 from feti_homog.interface.load import Load
-from feti_homog.typing import Float
+from feti_homog.typing import Bool, Float
 
 # Share of the stresses that may act on what resists nothing: rounding of directions.
 UNCARRIED_SHARE = 1e-6
+# Squares of jumps, and stresses, relative to those of the torn cell and of its bodies held, that are rounding.
+UNRESISTED = 1e-12
 
 
 @dataclass(frozen=True)
@@ -74,6 +76,25 @@ def _strains(stiffness: Float, stress: Float, noise: Noise) -> Float | None:
     if np.abs(along[~resists]).max(initial=0.0) > largest:
         return None
     return np.asarray(vectors[:, resists] @ (along[resists] / eigenvalues[resists]) / roots)
+
+
+def unresisted(solver: FetiSolver, by_stress: Bool, voigt: Float) -> Bool:
+    """(v,) which of the strains with given stresses (v,) have a share in one that strains no body: it opens faces
+    without multipliers alone; `voigt` (v, v) is the stress integral of bodies that do not move.  Collective.
+
+    Of such a strain rigid motions close all jumps of the torn cell, and the torn bodies bear no stress.
+    """
+    unknown, found = np.flatnonzero(by_stress), np.zeros(len(by_stress), bool)
+    torn = solver.d[:, unknown]
+    left = solver.natural.project(solver.active.restrict(torn))
+    sizes, open_jumps = (allreduce_sum(solver.comm, each.T @ each) for each in (torn, left))
+    largest = np.array([np.diag(sizes), np.abs(voigt[unknown, unknown])])
+    scales = np.sqrt(np.where(largest > 0.0, largest, 1.0))
+    pairs = zip((open_jumps, solver.torn_stiffness[np.ix_(unknown, unknown)]), scales, strict=True)
+    values, vectors = np.linalg.eigh(sum(matrix / np.outer(scale, scale) for matrix, scale in pairs))
+    shares = np.abs(vectors[:, values < UNRESISTED]) > UNCARRIED_SHARE
+    found[unknown] = shares.any(axis=1)
+    return np.asarray(solver.comm.bcast(found))
 
 
 def superposed(solver: FetiSolver, solutions: Sequence[DualSolution], factors: Float) -> DualSolution:
