@@ -21,7 +21,8 @@ EXACT = 1e-10
 STRENGTH = {"normal_strength": 0.03, "tangential_strength": 0.04}
 SPRINGS = {"normal_stiffness": 100.0, "tangential_stiffness": 30.0}
 ENERGY = SPRINGS | {"criterion": "energy", "toughness": 1e-5}
-PARTED = STRENGTH | {"debonded": [{"fibre": "all", "angle": 360.0}]}
+WHOLE = {"debonded": [{"fibre": "all", "angle": 360.0}]}
+PARTED = STRENGTH | WHOLE
 INFLUENCE, LOOSE = {"feti_pc_type": "influence"}, {"feti_ksp_rtol": 1e-8}
 TWO, SIX, NINE = "MFMM", "MMFFMMFM", "MMFMMFMMF"
 BACK = [{"E11": 0.2}, {"E11": -0.1}]
@@ -49,13 +50,13 @@ PATHS = {
 }
 
 
-def solved(comm, folder, phases, across, plane, interface, petsc, **analysis):
+def solved(comm, folder, phases, across, plane, interface, petsc, materials=EPOXY_GLASS, **analysis):
     """The result of a case of layers, with its files in the folder.  Collective."""
     if comm.rank == 0:
         layers(phases, across).write(folder / "layers.msh")
     comm.barrier()
     cell = {"geometry": "mesh", "file": "layers.msh"}
-    case = document(cell, EPOXY_GLASS, plane, interface, petsc, **analysis)
+    case = document(cell, materials, plane, interface, petsc, **analysis)
     case["output"]["fields"] = True
     return run(Case.parse(case, folder), comm, out=folder / "out")
 
@@ -121,6 +122,32 @@ def test_a_pull_on_parted_layers_is_told_with_what_was_found(comm, shared_path):
     path = {"waypoints": [{"E11": 0.2}, {"S11": 0.1}]}
     with pytest.raises(ConvergenceError, match="nothing in the cell carries"):
         solved(comm, shared_path, TWO, 0, "strain", STRENGTH, None, path=path)
+
+
+UNDETERMINED = {
+    "pulled along": ("strain", {"S22": 0.1}, "E11, gamma12"),
+    "pressed along, so that layers touch without a force": ("stress", {"S22": -0.1}, "E11, gamma12"),
+    "pressed": ("strain", {"S11": -0.1}, "gamma12"),
+    "in space": ("generalized", {"E11": 0.1, "E33": 0.01, "S22": 0.1}, "gamma13, gamma12"),
+    "all named": ("generalized", {"E11": 0.1, "gamma12": 0.0, "gamma13": 0.0, "S22": 0.1}, None),
+    "along the fibres too": ("generalized", {"S22": 0.1}, "E11, gamma13, gamma12"),
+}
+
+
+@pytest.mark.parametrize("name", UNDETERMINED)
+@pytest.mark.parametrize(("phases", "materials"), [(TWO, EPOXY_GLASS), (SIX, EPOXY_GLASS[:1] * 2)])
+def test_strains_that_nothing_determines_are_named(comm, shared_path, phases, materials, name):
+    plane, to, names = UNDETERMINED[name]
+    result = solved(comm, shared_path, phases, 0, plane, WHOLE, None, materials, load={"to": to})
+    told = [remark for remark in result.remarks if "undetermined" in remark]
+    assert [line.split(":")[0] for line in told] == ([] if names is None else [f"[load] {names}"])
+
+
+def test_undetermined_strains_of_a_path_are_counted_and_a_loose_fibre_leaves_none(comm, shared_path):
+    result = solved(comm, shared_path, TWO, 0, "strain", STRENGTH, None, path={"waypoints": BACK})
+    assert any("[path] gamma12: undetermined at 3 of 4 points" in remark for remark in result.remarks)
+    case = document({}, EPOXY_GLASS, "strain", WHOLE, load={"to": {"S22": 0.01}})
+    assert not any("undetermined" in remark for remark in run(Case.parse(case), comm).remarks)
 
 
 @pytest.mark.parametrize("back", [{"E11": -0.01}, {"S11": -0.01}], ids=str)
