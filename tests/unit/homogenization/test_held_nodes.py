@@ -1,0 +1,58 @@
+"""Nodes that never part: what a run and `feti-homog check` say of them, and arcs that select no other."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from support.cases import FIBRE, MATRIX
+from support.pixel_images import pixel_mesh
+from unit.cell.test_touching import BRANCHES, TWO_FIBRES
+
+from feti_homog import Case, run
+from feti_homog.common.progress import Progress
+from feti_homog.errors import CaseError
+from feti_homog.homogenization.cell_description import describe
+from feti_homog.homogenization.unit_cell import assemble_subdomains
+
+TOUCHES = "[interface] nodes that never part: at 1 two bodies meet more than once"
+MEET = "[interface] nodes that never part: at 1 three bodies meet"
+
+
+def case_of(folder: Path, image: np.ndarray, **interface: Any) -> Case:
+    pixel_mesh(image).write(folder / "pixels.msh")
+    document = {
+        "cell": {"geometry": "mesh", "file": "pixels.msh"},
+        "material": {"matrix": MATRIX, "fibre": FIBRE},
+        "analysis": {"type": "stiffness", "plane": "strain"},
+        "output": {"pictures": False},
+    }
+    return Case.parse(document | interface, folder)
+
+
+@pytest.mark.parametrize(("image", "remark"), [(BRANCHES, TOUCHES), (TWO_FIBRES, MEET)], ids=["touching", "triple"])
+def test_they_are_remarked_where_there_are_interfaces(tmp_path: Path, image: np.ndarray, remark: str) -> None:
+    bonded, debonding = case_of(tmp_path, image), case_of(tmp_path, image, interface={})
+    assert f"remark     {remark}" in describe(debonding, MPI.COMM_SELF).splitlines()
+    assert "never part" not in describe(bonded, MPI.COMM_SELF)
+    assert run(debonding, MPI.COMM_SELF).remarks == (remark,) and run(bonded, MPI.COMM_SELF).remarks == ()
+
+
+def test_they_are_told_by_the_log_and_the_summary(tmp_path: Path, capfd: Any) -> None:
+    case = case_of(tmp_path, BRANCHES, interface={})
+    assemble_subdomains(case, MPI.COMM_SELF, Progress(MPI.COMM_SELF))
+    assert f"remark: {TOUCHES}" in "".join(capfd.readouterr())
+    run(case, MPI.COMM_SELF, out=tmp_path / "out")
+    assert "two bodies meet more than once" in (tmp_path / "out/summary.txt").read_text()
+
+
+def test_an_arc_that_selects_no_other_node_is_faulty(tmp_path: Path) -> None:
+    """The corner of the first fibre at which it touches the second."""
+    arc = {"fibre": [1], "centre": 45.0, "angle": 20.0}
+    with pytest.raises(CaseError, match="no node of fibre 1 is within the arc of 20"):
+        describe(case_of(tmp_path, TWO_FIBRES, interface={"debonded": [arc]}), MPI.COMM_SELF)
+    other = arc | {"centre": 135.0}
+    assert describe(case_of(tmp_path, TWO_FIBRES, interface={"debonded": [other]}), MPI.COMM_SELF)
