@@ -129,20 +129,13 @@ def not_planar(mesh: RawMesh) -> list[str]:
     return [f"the mesh is not planar: {where}"]
 
 
-def flat_or_inverted(mesh: RawMesh) -> list[str]:
-    """Triangles of zero area, and those that run against the others."""
+def flat(mesh: RawMesh) -> list[str]:
+    """Triangles of zero area."""
     plane = mesh.points[:, :2]
-    area = areas(plane, mesh.triangles)
     ends = plane[edges(mesh.triangles)]
     longest = ((ends[:, 1] - ends[:, 0]) ** 2).sum(axis=1).reshape(-1, 3).max(axis=1)
-    flat = np.abs(area) <= FLAT_AREA * longest
-    sense = 1 if np.count_nonzero(area > 0) >= np.count_nonzero(area < 0) else -1
-    faults = []
-    for bad, what in ((flat, "zero area"), (~flat & (sense * area < 0), "inverted")):
-        found = np.flatnonzero(bad)
-        if len(found):
-            faults.append(f"{first_of(map(mesh.element, found), len(found))}: {what}")
-    return faults
+    found = np.flatnonzero(np.abs(areas(plane, mesh.triangles)) <= FLAT_AREA * longest)
+    return [f"{first_of(map(mesh.element, found), len(found))}: zero area"] if len(found) else []
 
 
 def duplicate_nodes(mesh: RawMesh) -> list[str]:

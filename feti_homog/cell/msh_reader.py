@@ -27,10 +27,10 @@ LOADERS = {".msh": gmsh_file.load, ".inp": abaqus_file.load, ".vtu": vtk_file.lo
 def read(path: Path, snap: float | None = None) -> CoarseMesh:
     """The coarse mesh in a file of one of the LOADERS, moved to [0, width] x [0, height].
 
-    It consists of triangles of three or six nodes in physical surfaces "matrix", "fibre", "glass", ..., fills a
-    rectangle but for voids, and has matching nodes on opposite sides. Lines in the curve "debonded" are
-    edges between a fibre and the matrix that are debonded. Round interfaces become circles (`with_circles`), elliptic
-    ones ellipses (`with_ellipses`); others follow their middle nodes (`with_bent_edges`).
+    It consists of triangles of three or six nodes, in either sense, in physical surfaces "matrix", "fibre", "glass",
+    ..., fills a rectangle but for voids, and has matching nodes on opposite sides. Lines in the curve
+    "debonded" are edges between a fibre and the matrix that are debonded. Round interfaces become circles
+    (`with_circles`), elliptic ones ellipses (`with_ellipses`); others follow their middle nodes (`with_bent_edges`).
     With `snap`, nodes on sides are first moved by up to that / width to where they should be (`snapped`).
 
     Raises:
@@ -48,7 +48,8 @@ def read(path: Path, snap: float | None = None) -> CoarseMesh:
 
 def made(raw: RawMesh, path: str) -> CoarseMesh:
     """The coarse mesh of triangles in phases; `path` names them in faults. Raises as `read`."""
-    _refuse(path, mesh_checks.not_planar(raw), mesh_checks.flat_or_inverted(raw), mesh_checks.duplicate_nodes(raw))
+    _refuse(path, mesh_checks.not_planar(raw), mesh_checks.flat(raw), mesh_checks.duplicate_nodes(raw))
+    raw = _turned(raw)
     _refuse(path, bent_edges.faults(raw))
     origin, size, plane = _on_rectangle(raw.points[:, :2])
     corners = mesh_checks.missing_corners(plane, origin, size)
@@ -74,6 +75,12 @@ def _refuse(path: str, *faults: list[str]) -> None:
         raise MeshError(*found)
 
 
+def _turned(raw: RawMesh) -> RawMesh:
+    """The mesh with all triangles counter-clockwise; middle nodes are those of edges, whichever way these run."""
+    clockwise = areas(raw.points[:, :2], raw.triangles) < 0
+    return replace(raw, triangles=np.where(clockwise[:, None], raw.triangles[:, ::-1], raw.triangles))
+
+
 def _on_rectangle(plane: Float) -> tuple[Float, Float, Float]:
     """Origin and size (2,) of the bounding rectangle, and positions (n, 2) in it, exactly on its sides."""
     origin = plane.min(axis=0)
@@ -93,18 +100,16 @@ def _matched(plane: Float, size: Float) -> Float:
 
 
 def _coarse_mesh(raw: RawMesh, plane: Float, size: Float) -> CoarseMesh:
-    """A checked mesh, counter-clockwise, without circles."""
+    """A checked mesh without circles."""
     names = [group[0] for group in raw.groups]
     phases = ("matrix", *sorted(set(names) - {"matrix"}))
     number = np.array([phases.index(name) for name in names], dtype=np.int32)
-    clockwise = areas(plane, raw.triangles) < 0
-    triangles = np.where(clockwise[:, None], raw.triangles[:, ::-1], raw.triangles)
     width, height = size.tolist()
     return CoarseMesh(
         width=width,
         height=height,
         points=plane,
-        triangles=triangles,
+        triangles=raw.triangles,
         phase=number[raw.group],
         phases=phases,
         precedence=number[raw.group],

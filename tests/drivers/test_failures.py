@@ -42,7 +42,7 @@ def test_faulty_cases_end_with_2_and_write_nothing(tmp_path, name, ranks):
 
 
 @pytest.mark.parametrize("ranks", [1, 2])
-@pytest.mark.parametrize("name", ["hanging", "not periodic, right", "inverted", "no matrix"])
+@pytest.mark.parametrize("name", ["hanging", "not periodic, right", "tangled", "no matrix"])
 def test_faulty_meshes_end_with_2_and_write_nothing(tmp_path, name, ranks):
     write, message = FAULTY_MESHES[name]
     write(tmp_path / "faulty.msh")

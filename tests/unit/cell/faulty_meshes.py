@@ -88,11 +88,11 @@ ALL_SIDES = (
 )
 
 
-def _reversed(*tags: int) -> MshFile:
-    mesh = grid()
+def turned(mesh: MshFile, *tags: int) -> MshFile:
+    """The mesh with these elements, of three or six nodes, in the other sense."""
     for tag in tags:
         kind, physical, _, nodes = mesh.elements[tag]
-        mesh = mesh.with_element(tag, kind, physical, nodes[::-1])
+        mesh = mesh.with_element(tag, kind, physical, [nodes[k] for k in (0, 2, 1, 5, 4, 3)[: len(nodes)]])
     return mesh
 
 
@@ -234,9 +234,10 @@ FAULTY_MESHES: dict[str, tuple[Callable[[Path], None], str]] = {
     ),
     "infinite": (_mesh(lambda: grid().moved(n7=(0.25, float("inf")))), "coordinates are not finite"),
     "not planar": (_mesh(lambda: grid().moved(n7=(0.25, 0.25, 0.1))), "node 7 (0.25, 0.25) has z = 0.1"),
-    "inverted": (_mesh(lambda: _reversed(3)), "element 3 at (0.416666667, 0.0833333333): inverted"),
-    "inverted matrix": (_mesh(lambda: _reversed(*range(1, 9))), "and 5 more: inverted"),
-    "tangled": (_mesh(lambda: grid().moved(n7=(0.6, 0.25))), "inverted"),
+    "tangled": (
+        _mesh(lambda: grid().moved(n7=(0.6, 0.25))),
+        "overlapping elements on the same side of an edge: the edge between node 2 (0.25, 0) and node 7",
+    ),
     "zero area": (_mesh(lambda: grid().moved(n7=(0.25, 0.0))), "zero area"),
     "repeated corner": (_mesh(lambda: grid().with_element(1, 2, 1, (1, 2, 2))), "element 1 at"),
     "duplicate nodes": (
@@ -249,6 +250,10 @@ FAULTY_MESHES: dict[str, tuple[Callable[[Path], None], str]] = {
     ),
     "folded": (
         _mesh(lambda: grid().without(12).with_element(77, 2, 1, (13, 7, 9))),
+        "overlapping elements",
+    ),
+    "folded, clockwise": (
+        _mesh(lambda: turned(grid().without(12).with_element(77, 2, 1, (13, 7, 9)), 77)),
         "overlapping elements",
     ),
     "hanging": (

@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.abaqus import write_inp
-from unit.cell.faulty_meshes import CURVE, RIGHT_SIDE, grid, node
+from unit.cell.faulty_meshes import CURVE, RIGHT_SIDE, grid, node, turned
 from unit.cell.second_order import second_order
 
 from feti_homog.cell import vtk_file
+from feti_homog.cell.coarse_mesh import areas
 from feti_homog.cell.msh_reader import read
 from feti_homog.errors import MeshError
 
@@ -40,6 +41,17 @@ def test_every_format_gives_the_same_mesh(suffix, mesh, tmp_path):
     assert np.array_equal(_sorted(result), _sorted(expected))
     assert result.circles == pytest.approx(expected.circles) and len(result.circles) == (mesh is BENT)
     assert np.array_equal(np.sort(result.arc_edges), np.sort(expected.arc_edges))
+
+
+@pytest.mark.parametrize("mesh", [grid(), BENT], ids=["first", "second"])
+@pytest.mark.parametrize("suffix", [".msh", ".inp", ".vtu", ".vtk"])
+def test_clockwise_elements_among_others_are_turned(suffix, mesh, tmp_path):
+    expected = read(_written(mesh, tmp_path / f"one{suffix}"))
+    result = read(_written(turned(mesh, 3, 11, 12, 30), tmp_path / f"other{suffix}"))
+    assert np.array_equal(_sorted(result), _sorted(expected)) and np.array_equal(result.points, expected.points)
+    assert areas(result.points, result.triangles) == pytest.approx(areas(expected.points, expected.triangles))
+    assert np.array_equal(np.sort(result.arc_edges), np.sort(expected.arc_edges))
+    assert result.circles == pytest.approx(expected.circles)
 
 
 def test_sets_of_element_lines_and_of_sections_are_phases_too(tmp_path):
