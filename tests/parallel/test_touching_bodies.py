@@ -159,15 +159,16 @@ def test_results_of_every_kind_obey_their_laws(comm: Any, shared_path: Any, kind
     assert result.status == "done" and certificate.holds, certificate.text
 
 
-def test_sides_folded_onto_each_other_are_refused(comm: Any, shared_path: Any):
-    """Their normals cancel: on all ranks, though one has the node."""
+@pytest.mark.parametrize("apart", [0.0, 1e-12])
+def test_sides_folded_onto_each_other_are_refused(comm: Any, shared_path: Any, apart: float):
+    """Their normals cancel, exactly or nearly: on all ranks, though one has the node."""
 
     def folded() -> Torus:
         pixel_mesh(np.pad(np.ones((2, 2), int), ((1, 5), (1, 5)))).write(shared_path / "square.msh")
         torus = Torus.of(read(shared_path / "square.msh"))
         points = torus.mesh.points.copy()
         ends = [np.flatnonzero((8 * points == place).all(axis=1))[0] for place in ((1, 2), (2, 1))]
-        points[ends[1]] = points[ends[0]]
+        points[ends[1]] = points[ends[0]] + [apart, 0.0]
         return replace(torus, mesh=replace(torus.mesh, points=points))
 
     torus = on_root(comm, folded)
