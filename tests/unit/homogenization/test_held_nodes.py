@@ -35,14 +35,14 @@ def case_of(folder: Path, image: np.ndarray, **interface: Any) -> Case:
 
 @pytest.mark.parametrize(("image", "remark"), [(BRANCHES, TOUCHES), (TWO_FIBRES, MEET)], ids=["touching", "triple"])
 def test_they_are_remarked_where_there_are_interfaces(tmp_path: Path, image: np.ndarray, remark: str) -> None:
-    bonded, debonding = case_of(tmp_path, image), case_of(tmp_path, image, interface={})
+    bonded, debonding = case_of(tmp_path, image), case_of(tmp_path, image, interface={"normal_stiffness": 1.0})
     assert f"remark     {remark}" in describe(debonding, MPI.COMM_SELF).splitlines()
     assert "never part" not in describe(bonded, MPI.COMM_SELF)
     assert run(debonding, MPI.COMM_SELF).remarks == (remark,) and run(bonded, MPI.COMM_SELF).remarks == ()
 
 
 def test_they_are_told_by_the_log(tmp_path: Path, capfd: Any) -> None:
-    case = case_of(tmp_path, BRANCHES, interface={})
+    case = case_of(tmp_path, BRANCHES, interface={"normal_stiffness": 1.0})
     assemble_subdomains(case, MPI.COMM_SELF, Progress(MPI.COMM_SELF, quiet=False))
     assert f"remark: {TOUCHES}" in "".join(capfd.readouterr())
 
