@@ -7,18 +7,17 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
 from support.base_case import changed
 from support.command_line import case_file, command_line
 from support.hostile_inputs import of_mesh, write_grid
-from support.jobs import ROOT, environment, launched
+from support.hooks import WAIT, Hook, HookedJob
+from support.jobs import PATIENCE, ROOT, environment
 
-LARGE = changed(("mesh_size = 0.05", "mesh_size = 0.01\nrefine = 3"))
-WAIT = 60.0  # seconds
-TEXTS = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+# A rank waits where a mesher would keep it for long.
+MESHING = "feti_homog.homogenization.coarse_meshes:begun"
 
 
 @pytest.fixture(autouse=True)
@@ -29,45 +28,33 @@ def attentive():
     signal.signal(signal.SIGINT, before)
 
 
-def listens(process):
-    """Whether a process waits for SIGINT in a thread, so that no other gets it."""
-    lines = Path(f"/proc/{process.pid}/status").read_text().splitlines()
-    blocked = next(line for line in lines if line.startswith("SigBlk:")).split()[1]
-    return int(blocked, 16) >> (signal.SIGINT - 1) & 1
-
-
-def interrupted(process, is_ready):
-    """Exit code, outputs and the seconds that it took after SIGINT."""
-    deadline = time.monotonic() + WAIT
-    while not is_ready() and process.poll() is None and time.monotonic() < deadline:
-        time.sleep(0.01)
-    start = time.monotonic()
-    process.send_signal(signal.SIGINT)
-    output, errors = process.communicate(timeout=WAIT)
-    return process.returncode, output, errors, time.monotonic() - start
-
-
 @pytest.mark.parametrize("command", ["check", "run", "sweep"])
 def test_ctrl_c_is_one_line_and_130(tmp_path, command):
-    path, out = tmp_path / "large.toml", tmp_path / "out"
-    path.write_text(LARGE + ('[sweep]\n"cell.order" = [1, 2]\n' if command == "sweep" else ""))
-    words = [command, path] + ([] if command == "check" else ["--out", out])
-    process = launched(0, "-m", "feti_homog", *words, **TEXTS)
-    code, _, errors, seconds = interrupted(process, lambda: listens(process))
-    assert (code, errors) == (130, "interrupted by SIGINT\n") and seconds < WAIT / 2
+    path = case_file(tmp_path, '[sweep]\n"cell.order" = [1, 2]\n' if command == "sweep" else "")
+    words = [command, path] + ([] if command == "check" else ["--out", tmp_path / "out"])
+    with HookedJob(0, [Hook(MESHING, WAIT)], *words) as job:
+        assert job.told() == "0 here"
+        job.process.send_signal(signal.SIGINT)
+        ended = job.ended()
+    assert (ended.returncode, ended.stderr) == (130, "interrupted by SIGINT\n")
     assert not list(tmp_path.rglob("*lock"))
 
 
-def test_ctrl_c_under_mpirun_is_one_line(tmp_path):
-    """mpirun passes it on as SIGTERM, and ends with 1; that of Open MPI 5 drops what ranks say from then on."""
-    version = subprocess.run(["mpirun", "--version"], capture_output=True, text=True, check=True).stdout
-    told = [] if "(Open MPI) 5" in version else ["interrupted by SIGTERM"]
-    (tmp_path / "large.toml").write_text(LARGE)
+def test_the_order_to_end_is_one_line_of_all_ranks(tmp_path):
+    """As mpirun gives it some seconds after Ctrl-C.  Rank 1, here the first, ends after rank 0, whose line is read."""
     out = tmp_path / "out"
-    process = launched(2, "-m", "feti_homog", "run", tmp_path / "large.toml", "--out", out, **TEXTS)
-    code, _, errors, _ = interrupted(process, (out / "result.lock").exists)
-    assert (code, errors.splitlines()) == (1, told)
-    assert not list(out.glob("*lock"))
+    here = Hook("feti_homog.homogenization.unit_cell:drawn", "tell(os.getpid()); wait()", rank=None)
+    last = Hook("feti_homog.common.interrupts:time.sleep", "tell('ends'); outlive(0)", rank=1)
+    with HookedJob(2, [here, last], "run", case_file(tmp_path), "--out", out) as job:
+        said = [job.told().split() for _ in range(4)]
+        assert [line for line in sorted(said) if not line[1].isdecimal()] == [["0", "here"], ["1", "here"]]
+        pids = {rank: int(word) for rank, word in said if word.isdecimal()}
+        os.kill(pids["1"], signal.SIGTERM)
+        assert job.told() == "1 ends" and (out / "result.lock").exists()
+        os.kill(pids["0"], signal.SIGTERM)
+        ended = job.ended()
+    assert ended.returncode == 143 and ended.stderr.count("interrupted by SIGTERM\n") == 1, ended.stderr
+    assert "Traceback" not in ended.stderr and not list(out.glob("*lock"))
 
 
 def test_a_refused_case_is_one_line_under_a_quiet_mpirun(tmp_path):
@@ -75,7 +62,7 @@ def test_a_refused_case_is_one_line_under_a_quiet_mpirun(tmp_path):
     faulty = tmp_path / "faulty.toml"
     faulty.write_text(changed(("fibre_fraction = 0.4", "fibre_fraction = 1.4")))
     job = subprocess.run(
-        [*words, faulty], cwd=ROOT, env=environment(), capture_output=True, text=True, timeout=WAIT, check=False
+        [*words, faulty], cwd=ROOT, env=environment(), capture_output=True, text=True, timeout=PATIENCE, check=False
     )
     assert job.returncode == 2 and job.stdout == ""
     (line,) = job.stderr.splitlines()
@@ -85,7 +72,7 @@ def test_a_refused_case_is_one_line_under_a_quiet_mpirun(tmp_path):
 def run_into(stdout, *words):
     return subprocess.run(
         [sys.executable, "-m", "feti_homog", *map(str, words)],
-        cwd=ROOT, env=environment(), stdout=stdout, stderr=subprocess.PIPE, text=True, timeout=WAIT,
+        cwd=ROOT, env=environment(), stdout=stdout, stderr=subprocess.PIPE, text=True, timeout=PATIENCE,
     )  # fmt: skip
 
 
@@ -111,7 +98,7 @@ def test_a_reader_that_leaves_costs_no_results(tmp_path, words):
 
 def test_a_closed_output_costs_no_results(tmp_path):
     command = f'"{sys.executable}" -m feti_homog run {case_file(tmp_path)} --out {tmp_path / "out"} >&-'
-    assert subprocess.run(["bash", "-c", command], cwd=ROOT, env=environment(), timeout=WAIT).returncode == 0
+    assert subprocess.run(["bash", "-c", command], cwd=ROOT, env=environment(), timeout=PATIENCE).returncode == 0
     assert (tmp_path / "out/result.json").exists()
 
 
@@ -120,7 +107,7 @@ def test_names_that_the_locale_cannot_write(tmp_path):
     path.write_bytes(case_file(tmp_path).read_bytes())
     words = [sys.executable, "-m", "feti_homog", "run", path, "--out", tmp_path / "öut"]
     locale = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
-    job = subprocess.run(words, cwd=ROOT, env=environment() | locale, capture_output=True, timeout=WAIT)
+    job = subprocess.run(words, cwd=ROOT, env=environment() | locale, capture_output=True, timeout=PATIENCE)
     assert (job.returncode, job.stderr) == (0, b"")
     assert json.loads((tmp_path / "öut/result.json").read_text(encoding="utf-8"))["case"]["name"] == "größe"
 

@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from support.jobs import ROOT, environment
+from support.jobs import PATIENCE, ROOT, environment
 from support.sweep_files import CASE, FAILING, FAILING_POINTS, rows, sweep_file
 
 SCRIPTS = sorted([*(ROOT / "scripts/slurm").iterdir(), *(ROOT / "scripts/pbs").iterdir()])
@@ -106,7 +106,7 @@ def scheduler(tmp_path):
 def submitted(scheduler, script, *words, code=0, cwd=ROOT):
     """What the script says, and what the stand-ins noted."""
     job = subprocess.run(
-        [str(script), *map(str, words)], cwd=cwd, env=scheduler, capture_output=True, text=True, timeout=120
+        [str(script), *map(str, words)], cwd=cwd, env=scheduler, capture_output=True, text=True, timeout=PATIENCE
     )
     assert job.returncode == code, job.stderr
     notes = Path(scheduler["NOTES"])

@@ -34,7 +34,7 @@ def answers(request, tmp_path_factory):
     commands = write_inputs(folder)
     (folder / "commands.json").write_text(json.dumps({name: words for name, (words, _) in commands.items()}))
     (folder / "every.py").write_text(EVERY)
-    job = mpirun(request.param, folder / "every.py", folder / "commands.json", timeout=100.0)
+    job = mpirun(request.param, folder / "every.py", folder / "commands.json")
     said = dict(re.findall(r"== (.*?)\n(.*?-> \S+)\n", job.stderr, re.DOTALL))
     assert "the case is valid" not in job.stdout
     return {name: (said.get(name, job.stderr).splitlines(), words) for name, (_, words) in commands.items()}

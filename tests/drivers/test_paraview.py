@@ -12,6 +12,7 @@ from xml.etree import ElementTree
 import h5py
 import numpy as np
 import pytest
+from support.jobs import PATIENCE
 from mpi4py import MPI
 from support.cases import FIBRE, MATRIX
 
@@ -41,7 +42,7 @@ pytestmark = pytest.mark.skipif(shutil.which("pvpython") is None, reason="needs 
 
 def check(directory: Path, *options: str | Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        ["pvpython", str(SCRIPT), str(directory), *map(str, options)], capture_output=True, text=True, timeout=300
+        ["pvpython", str(SCRIPT), str(directory), *map(str, options)], capture_output=True, text=True, timeout=PATIENCE
     )
 
 

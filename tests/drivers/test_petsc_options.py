@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import time
 
 import numpy as np
 import pytest
 from support.command_line import case_file, command_line
-from support.jobs import launched
+from support.hooks import Hook, hooked
 
 from feti_homog.common.petsc_option_table import OPTIONS
 
 PREFIXES = ("natural", "coarse", "bonded", "sub", "interior")
 WITHOUT_CHOLMOD = [word for p in PREFIXES for word in (f"-feti_{p}_pc_factor_mat_solver_type", "mumps")]
 CUT = "[output]\npictures = false\n[decomposition]\nsubdomains = 6\n"
-TEXTS = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
 # A value that each kind of option takes; what is listed takes its default.
 VALUES = {"<real>": "1e-8", "<integer>": "50", "": None}
 
@@ -138,15 +135,12 @@ def test_options_that_nobody_could_take_are_one_line(tmp_path, words):
 
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_a_log_that_cannot_be_written_any_more_hangs_no_rank(tmp_path, ranks):
-    """Its folder goes while pictures are drawn; PETSc opens the file when it ends, the others wait for that."""
+    """Its folder goes when pictures are drawn; PETSc opens the file when it ends, the others wait for that."""
     case, log, out = case_file(tmp_path, ""), tmp_path / "logs", tmp_path / "out"
     log.mkdir()
-    process = launched(ranks, "-m", "feti_homog", "run", case, "--out", out, "-log_view", f":{log}/log.txt", **TEXTS)
-    while not (out / "result.json").exists() and process.poll() is None:
-        time.sleep(0.01)
-    log.rmdir()
-    _, errors = process.communicate(timeout=60)
-    assert process.returncode == 1 and "error: PETSc cannot end" in errors
+    hook = Hook("feti_homog.output.plots.figures:plot", f"os.rmdir({str(log)!r})")
+    job = hooked(ranks, [hook], "run", case, "--out", out, "-log_view", f":{log}/log.txt")
+    assert job.returncode == 1 and "error: PETSc cannot end" in job.stderr
     assert json.loads((out / "result.json").read_text())["status"] == "done"
 
 

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.background_jobs import kill_when, started
 from support.command_line import command_line
+from support.hooks import WAIT, Hook, HookedJob
 
 CASE = """\
 [cell]
@@ -86,6 +86,7 @@ feti_pc_type = "influence"
 """
 INCREMENTS = 'waypoints = [[0.1, 0.0, 0.0], [-0.05, 0.02, 0.0]]\nmethod = "increments"\nincrements = 24'
 LATER_LEGS = "waypoints = [[0.02, 0.0, 0.0], [-0.05, 0.02, 0.0], [0.1, 0.0, 0.0]]"
+SOLVE = "feti_homog.feti.solver:FetiSolver.solve"
 
 
 def case_file(folder: Path, name: str = "case", **changes: str) -> Path:
@@ -105,10 +106,26 @@ def events(out: Path) -> int:
     return len(list((out / "checkpoint").glob("[0-9]*.h5")))
 
 
-def killed(ranks: int, case: Path, out: Path, at: int, later: float, *words: str) -> int:
-    """Run until there are `at` events and so many seconds longer, then kill -9; returns how many events are there."""
-    kill_when(started(ranks, "run", case, "--out", out, *words), lambda: events(out) >= at, later)
+def killed(ranks: int, case: Path, out: Path, at: int, *words: str, moment: str = "kept") -> int:
+    """Run until there are `at` events, and in the moment of `MOMENTS`, then kill -9; returns how many are there."""
+    with HookedJob(ranks, [MOMENTS[moment](out, at)], "run", case, "--out", out, *words) as job:
+        assert job.told() == "0 here"
+        job.killed()
     return events(out)
+
+
+def committed(at: int, after: bool) -> Hook:
+    """When the file of the `at`-th event gets its name."""
+    when = f"args[1].name == '{at - 1:06d}.h5'"
+    return Hook("feti_homog.output.files.atomic:commit", WAIT, when=when, after=after)
+
+
+# When a path is killed: the last of so many events has just been kept, or the next is written or computed.
+MOMENTS = {
+    "kept": lambda _, at: committed(at, after=True),
+    "written": lambda _, at: committed(at + 1, after=False),
+    "computed": lambda out, at: Hook(SOLVE, WAIT, when=f"os.path.exists('{out}/checkpoint/{at - 1:06d}.h5')"),
+}
 
 
 def assert_same_curve(found, expected):
@@ -133,7 +150,7 @@ def reference(tmp_path_factory):
 def interrupted(tmp_path_factory):
     """A folder with some events of an ended run."""
     folder = tmp_path_factory.mktemp("interrupted")
-    assert killed(2, case_file(folder), folder / "out", 5, 0.0) >= 5
+    assert killed(2, case_file(folder), folder / "out", 5) == 5
     return folder / "out"
 
 
@@ -142,11 +159,10 @@ def interrupted(tmp_path_factory):
 def test_a_path_killed_again_and_again_ends_as_one_left_in_peace(tmp_path, reference, ranks):
     chance, case, out = random.Random(ranks), case_file(tmp_path), tmp_path / "out"
     expected, last = document(reference), 0
-    for _ in range(3):
-        at = last + chance.randint(1, 12)
-        kept = killed(ranks, case, out, at, chance.uniform(0.0, 0.05), *(["--resume"] if last else []))
-        assert kept >= last and not (out / "result.json").exists()
-        last = kept
+    for moment in MOMENTS:
+        last += chance.randint(1, 12)
+        assert killed(ranks, case, out, last, *(["--resume"] if moment != "kept" else []), moment=moment) == last
+        assert not (out / "result.json").exists()
     job = command_line(ranks, "run", case, "--out", out, "--resume")
     assert job.returncode == 0, job.stderr
     found = document(out)
@@ -164,10 +180,10 @@ def test_a_path_killed_again_and_again_ends_as_one_left_in_peace(tmp_path, refer
 def test_paths_of_every_kind_resume(tmp_path, ranks, path):
     case = case_file(tmp_path, strain=path)
     assert command_line(ranks, "run", case, "--out", tmp_path / "whole").returncode == 0
-    kept = killed(ranks, case, tmp_path / "out", 8, 0.0)
+    kept = killed(ranks, case, tmp_path / "out", 8)
     job = command_line(ranks, "run", case, "--out", tmp_path / "out", "--resume")
     assert job.returncode == 0, job.stderr
-    assert document(tmp_path / "out")["resumed"] == kept >= 8
+    assert document(tmp_path / "out")["resumed"] == kept == 8
     assert_same_curve(document(tmp_path / "out")["path"], document(tmp_path / "whole")["path"])
 
 
@@ -178,7 +194,7 @@ def test_a_cooled_path_in_space_resumes(tmp_path):
     job = command_line(1, "run", case, "--out", tmp_path / "whole")
     assert job.returncode == 0, job.stderr
     expected = document(tmp_path / "whole")["path"]
-    kept = killed(1, case, tmp_path / "out", len(expected) // 2, 0.0)
+    kept = killed(1, case, tmp_path / "out", len(expected) // 2)
     assert expected[kept - 1]["load_factor"] > 0.34 and kept < len(expected)
     job = command_line(1, "run", case, "--out", tmp_path / "out", "--resume")
     assert job.returncode == 0, job.stderr

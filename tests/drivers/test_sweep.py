@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 import json
-import signal
 import subprocess
 import sys
 import tomllib
-from functools import partial
 from pathlib import Path
 
 import pytest
 from matplotlib.image import imread
-from support.background_jobs import kill_when, started, wait_until
 from support.command_line import command_line
-from support.jobs import ROOT
+from support.hooks import WAIT, Hook, HookedJob
+from support.jobs import PATIENCE, ROOT, launched
 from support.sweep_files import CASE, FAILING, FAILING_POINTS, RANDOM, rows, sweep_file
 from support.sweep_runs import TWO, collected, contents, results, swept
 
 FORTY = "cell.fibre_fraction = {from = 0.1, to = 0.4, count = 20}\nmaterial.fibre.young = [150.0, 200.0]\n"
+
+
+def after_results(count, rank=None):
+    """Every rank, or one, waits when it has written so many results."""
+    return Hook("feti_homog.output.files.atomic:commit", WAIT, rank, count, "args[1].name == 'result.json'", after=True)
 
 
 @pytest.mark.parametrize(("ranks", "words"), [(0, []), (1, []), (2, []), (4, ["--ranks-per-case", "2"])])
@@ -135,10 +138,11 @@ def test_a_killed_sweep_goes_on_to_the_same_table(tmp_path):
     swept(whole, path)
     assert len(results(whole)) == 40
     kept: dict[str, int] = {}
-    for ranks, words, wanted in ((2, ["--ranks-per-case", "1"], 10), (1, [], 24)):
-        process = started(ranks, "sweep", path, "--out", out, *words)
-        kill_when(process, partial(lambda count: len(results(out)) >= count, wanted))
-        assert kept.items() <= results(out).items() and wanted <= len(results(out)) < 40
+    for ranks, words, each in ((2, ["--ranks-per-case", "1"], 5), (1, [], 14)):
+        with HookedJob(ranks, [after_results(each)], "sweep", path, "--out", out, *words) as job:
+            assert {job.told() for _ in range(ranks)} == {f"{rank} here" for rank in range(ranks)}
+            job.killed()
+        assert kept.items() <= results(out).items() and len(results(out)) == len(kept) + ranks * each
         kept = results(out)
         assert f"{len(kept)} done" in collected(out).stdout
     job = swept(out, path, "--ranks-per-case", "1", ranks=2)
@@ -151,18 +155,17 @@ def test_a_killed_sweep_goes_on_to_the_same_table(tmp_path):
 
 def test_a_second_sweep_in_the_folder_is_refused_while_the_first_runs(tmp_path):
     """The second is refused while the first runs, even for one case; the first is not disturbed."""
-    path, out = sweep_file(tmp_path, FORTY), tmp_path / "out"
-    first = started(0, "sweep", path, "--out", out)
-    wait_until(first, lambda: len(results(out)) >= 2)
-    first.send_signal(signal.SIGSTOP)
-    kept = results(out)
-    for words in ([], ["--index", "40"]):
-        job = command_line(1, "sweep", path, "--out", out, *words)
-        assert job.returncode == 2 and "this sweep is being run by" in job.stderr
-        assert f"process {first.pid}" in job.stderr
-    assert results(out) == kept and len(kept) < 40
-    first.send_signal(signal.SIGCONT)
-    assert first.wait(60) == 0 and len(results(out)) == 40
+    path, out = sweep_file(tmp_path, TWO), tmp_path / "out"
+    with HookedJob(0, [after_results(1)], "sweep", path, "--out", out) as first:
+        first.told()
+        kept = results(out)
+        for words in ([], ["--index", "2"]):
+            job = command_line(1, "sweep", path, "--out", out, *words)
+            assert job.returncode == 2 and "this sweep is being run by" in job.stderr
+            assert f"process {first.process.pid}" in job.stderr
+        assert results(out) == kept and len(kept) == 1
+        first.release()
+        assert first.ended().returncode == 0 and len(results(out)) == 2
 
 
 def test_the_folder_of_another_sweep_is_refused(tmp_path):
@@ -189,20 +192,21 @@ def test_more_realisations_keep_those_that_are_there(tmp_path):
 def test_jobs_of_an_array_share_the_folder_but_no_case(tmp_path):
     """Different cases of an array share the folder; the same one twice does not."""
     path, out = sweep_file(tmp_path, TWO, CASE + "[petsc]\nfeti_ksp_rtol = 1e-9\n"), tmp_path / "out"
-    jobs = [started(0, "sweep", path, "--out", out, "--index", str(k)) for k in (1, 2)]
-    assert [job.wait(60) for job in jobs] == [0, 0] and len(results(out)) == 2
+    words = ("-m", "feti_homog", "sweep", path, "--out", out, "--index")
+    jobs = [launched(0, *words, str(k), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) for k in (1, 2)]
+    assert [job.wait(PATIENCE) for job in jobs] == [0, 0] and len(results(out)) == 2
     held = subprocess.Popen(
-        [sys.executable, "-c", f"from feti_homog.common.file_locks import Lock; from pathlib import Path; import time\n"
-         f"Lock(Path({str(out / 'case-0001/lock')!r})).acquire(); print('held', flush=True); time.sleep(60)"],
-        stdout=subprocess.PIPE,
+        [sys.executable, "-c", f"from feti_homog.common.file_locks import Lock; from pathlib import Path; import sys\n"
+         f"Lock(Path({str(out / 'case-0001/lock')!r})).acquire(); print('held', flush=True); sys.stdin.read()"],
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE,
     )  # fmt: skip
     assert held.stdout is not None and held.stdout.readline() == b"held\n"
     (out / "case-0001/result.json").unlink()
     job = swept(out, path, "--index", "1", code=2)
     assert "--index 1: case-0001 is being computed by" in job.stderr and str(held.pid) in job.stderr
     assert "1 running, 1 done" in collected(out).stdout
-    held.send_signal(signal.SIGKILL)
-    held.wait()
+    held.kill()
+    held.communicate()
     swept(out, path, "--index", "1")
 
 

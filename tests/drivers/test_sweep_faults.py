@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 from support.command_line import command_line
-from support.jobs import ROOT, RUN_VARIABLES, mpirun
+from support.jobs import PATIENCE, ROOT, RUN_VARIABLES, mpirun
 from support.sweep_files import rows, sweep_file
 from support.sweep_runs import TWO, collected, results, swept
 
@@ -72,7 +72,7 @@ def test_a_full_disk_is_told_and_the_sweep_goes_on_later(tmp_path, limit):
     """No file may be longer than the limit: below 1500 bytes no result can be written, below 200 not even the list."""
     out, path, script = tmp_path / "out", sweep_file(tmp_path, TWO), tmp_path / "limited.py"
     script.write_text(LIMITED.format(limit=limit))
-    job = mpirun(0, script, "sweep", path, "--out", out, timeout=60)
+    job = mpirun(0, script, "sweep", path, "--out", out)
     assert job.returncode == 1 and "Traceback" not in job.stderr, job.stderr
     assert "cannot write" in job.stderr and "File too large" in job.stderr
     assert not results(out) and not list(out.rglob("*.part"))
@@ -86,7 +86,7 @@ def test_a_full_disk_while_collecting_leaves_the_old_table(tmp_path):
     collected(out)
     before = (out / "sweep.csv").read_bytes()
     script.write_text(LIMITED.format(limit=300))
-    job = mpirun(0, script, "collect", out, timeout=60)
+    job = mpirun(0, script, "collect", out)
     assert job.returncode == 1 and "cannot write" in job.stderr and "Traceback" not in job.stderr
     assert (out / "sweep.csv").read_bytes() == before
 
@@ -101,7 +101,7 @@ def test_an_unwritable_folder_is_told(tmp_path):
         words = [*user, sys.executable, *program, path, "--out", folder / "out"]
         environment = {"PATH": os.environ["PATH"], "HOME": "/nonexistent", "MPLCONFIGDIR": "/tmp"} | RUN_VARIABLES
         job = subprocess.run(
-            list(map(str, words)), cwd=ROOT, env=environment, text=True, capture_output=True, timeout=60
+            list(map(str, words)), cwd=ROOT, env=environment, text=True, capture_output=True, timeout=PATIENCE
         )
         assert job.returncode == 2, job.stderr
         assert f"--out {folder / 'out'}: expected a folder that can be written to" in job.stderr

@@ -196,7 +196,7 @@ def test_a_run_on_one_rank_does_not_wait_for_the_others(comm, shared_path):
 
         path = shared_path / "case.toml"
         path.write_text(tomli_w.dumps({k: v for k, v in with_fraction(0.4).resolved().items() if v != {}}))
-        job = mpirun(2, "-c", ALONE.format(path=str(path)), timeout=60.0)
+        job = mpirun(2, "-c", ALONE.format(path=str(path)))
         expected = BONDED["hexagonal", "strain"].value[0]
         found = job.returncode == 0 and float(job.stdout) == pytest.approx(expected, rel=0.02)
     else:

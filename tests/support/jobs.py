@@ -25,10 +25,6 @@ RUN_VARIABLES = {
 }
 
 
-# For jobs that are interrupted: seconds until mpirun kills what does not end, 1 by default.
-UNHURRIED = {"OMPI_MCA_odls_base_sigkill_timeout": "300", "PRTE_MCA_odls_base_sigkill_timeout": "300"}
-
-
 def environment() -> dict[str, str]:
     """Of a job of its own: without what the launcher of these tests has set."""
     return {k: v for k, v in os.environ.items() if not k.startswith(LAUNCHER_VARIABLES)} | RUN_VARIABLES

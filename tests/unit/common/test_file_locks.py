@@ -6,6 +6,7 @@ import os
 import threading
 
 import pytest
+from support.jobs import PATIENCE
 
 from feti_homog.common.file_locks import LockHeld, TemporaryLock, holder, this_process
 
@@ -36,7 +37,7 @@ def test_one_at_a_time(tmp_path):
     def work() -> None:
         nonlocal inside, most
         for _ in range(20):
-            with TemporaryLock(tmp_path / "lock", timeout=60.0):
+            with TemporaryLock(tmp_path / "lock", timeout=PATIENCE):
                 with mutex:
                     inside += 1
                     most = max(most, inside)

@@ -7,6 +7,7 @@ import subprocess
 import sys
 
 import pytest
+from support.jobs import PATIENCE
 from petsc4py import PETSc
 
 from feti_homog.common.libraries import DEBIAN_MODULES, petsc4py_advice
@@ -28,7 +29,7 @@ def faults(folder, **modules: str) -> list[str]:
         env={**environment, "PYTHONPATH": str(folder)},
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=PATIENCE,
     )
     assert job.returncode == EXIT_INPUT and job.stdout == ""
     return job.stderr.splitlines()
@@ -71,7 +72,7 @@ def test_the_advice_names_debians_newest_folder_with_petsc4py(tmp_path):
 @pytest.mark.parametrize("asked", [False, True])
 def test_petsc_lists_options_that_nobody_read_only_if_asked(asked):
     words = ["options", "-feti_pc_type", "lumped", *(["-options_left"] if asked else [])]
-    job = subprocess.run([sys.executable, "-m", "feti_homog", *words], capture_output=True, text=True, timeout=60)
+    job = subprocess.run([sys.executable, "-m", "feti_homog", *words], capture_output=True, text=True, timeout=PATIENCE)
     assert job.returncode == EXIT_DONE
     assert ("name:-feti_pc_type" in job.stdout) == asked
 

@@ -15,19 +15,19 @@ from feti_homog.output.files import atomic
 from feti_homog.sweep import plan, store
 
 HOLDER = """
-import sys, time
+import sys
 from pathlib import Path
 from feti_homog.common.file_locks import Lock
 Lock(Path(sys.argv[1]), shared={shared}).acquire()
 print("held", flush=True)
-time.sleep(60)
+sys.stdin.read()
 """
 
 
 def holder(path: Path, shared: bool = False) -> subprocess.Popen[bytes]:
     """Another process that holds the lock."""
     program = [sys.executable, "-c", HOLDER.format(shared=shared), str(path)]
-    process = subprocess.Popen(program, stdout=subprocess.PIPE)
+    process = subprocess.Popen(program, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
     assert process.stdout is not None and process.stdout.readline() == b"held\n"
     return process
 
@@ -48,8 +48,7 @@ def test_a_lock_excludes_unless_both_share_it(tmp_path, theirs, ours, free):
                 lock.acquire()
         assert is_locked(path) != theirs
     finally:
-        process.kill()
-        process.wait()
+        process.communicate()
     with Lock(path):
         assert is_locked(path)
     assert not is_locked(path)

@@ -8,6 +8,7 @@ import subprocess
 
 import numpy as np
 import pytest
+from support.jobs import PATIENCE
 from support.effective_results import BORON_ALUMINIUM, COSINES, DISTINCT, TURNED, document, turned_stiffness
 
 from feti_homog.output.cards import calculix
@@ -47,7 +48,7 @@ def strains(folder, card):
     (folder / "cube.inp").write_text(deck(card))
     environment = os.environ | {"OMP_NUM_THREADS": "1"}
     run = subprocess.run(
-        ["ccx", "cube"], cwd=folder, env=environment, capture_output=True, text=True, timeout=60, check=False
+        ["ccx", "cube"], cwd=folder, env=environment, capture_output=True, text=True, timeout=PATIENCE, check=False
     )
     assert run.returncode == 0 and "*ERROR" not in run.stdout and "*WARNING" not in run.stdout, run.stdout[-2000:]
     rows = [line.split() for line in (folder / "cube.dat").read_text().splitlines()]
