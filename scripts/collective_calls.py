@@ -86,7 +86,9 @@ def _is_shared_file(frame: FrameType) -> bool:
     values = frame.f_locals
     if frame.f_code.co_name == "__init__":
         return values.get("driver") == "mpio" and bool(values["kwds"].get("comm", MPI.COMM_SELF).size > 1)
-    with contextlib.suppress(AttributeError, KeyError, TypeError, ValueError, RuntimeError):  # not open, or no object of a file
+    with contextlib.suppress(
+        AttributeError, KeyError, TypeError, ValueError, RuntimeError
+    ):  # not open, or no object of a file
         plist = h5py.h5i.get_file_id(values["self"].id).get_access_plist()
         return bool(plist.get_driver() == h5py.h5fd.MPIO and plist.get_fapl_mpio()[0].size > 1)
     return False

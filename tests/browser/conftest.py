@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import pytest
 from selenium import webdriver
 from selenium.webdriver.chrome.service import Service
 from support.base_case import BASE
+from support.held_ports import held_ports
 from support.jobs import mpirun
 
 # Nothing listens there: whatever the page would ask a network for fails, and is in the log.
@@ -73,6 +75,8 @@ def chromium() -> Iterator[Any]:
     for argument in ARGUMENTS:
         options.add_argument(argument)
     options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
-    browser = webdriver.Chrome(service=Service(shutil.which("chromedriver")), options=options)
-    yield browser
-    browser.quit()
+    with ExitStack() as stack:
+        (port,) = held_ports(stack, 1)
+        browser = webdriver.Chrome(service=Service(shutil.which("chromedriver"), port=port), options=options)
+        yield browser
+        browser.quit()

@@ -7,13 +7,12 @@ import os
 import signal
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 from support.base_case import changed
 from support.command_line import case_file, command_line
-from support.hostile_inputs import of_mesh, write_grid
 from support.hooks import WAIT, Hook, HookedJob
+from support.hostile_inputs import of_mesh, write_grid
 from support.jobs import PATIENCE, ROOT, environment
 
 # A rank waits where a mesher would keep it for long.

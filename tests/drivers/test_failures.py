@@ -154,7 +154,7 @@ def test_a_rank_that_is_killed_ends_the_job(tmp_path):
     assert job.returncode != 0
 
 
-# Where one of three ranks finds no memory: the rank, and the function at whose beginning it does, in the order of a run.
+# Where one of three ranks finds no memory: the rank, and the function that it begins then, in the order of a run.
 WITHOUT_MEMORY = {
     "assembly": (2, "feti.decomposition.subdomain:Subdomain.build"),
     "factorization": (1, "feti.operators.interface_operators:_factor"),

@@ -12,9 +12,9 @@ from xml.etree import ElementTree
 import h5py
 import numpy as np
 import pytest
-from support.jobs import PATIENCE
 from mpi4py import MPI
 from support.cases import FIBRE, MATRIX
+from support.jobs import PATIENCE
 
 from feti_homog import Case, run
 from feti_homog.output.files import xdmf

@@ -15,11 +15,12 @@ from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from support.jobs import environment
+from support.held_ports import held_ports
+from support.jobs import PATIENCE, environment
 
 PROGRAMS = ("munged", "slurmctld", "slurmd", "sbatch", "scontrol", "sinfo", "scancel", "setpriv")
 PATH = f"{os.environ['PATH']}:/usr/sbin"  # Debian's place of the daemons
-STARTED_S, ENDED_S, CANCELLED_S = 20.0, 120.0, 8.0  # limits: of the start, of jobs, of their end when cancelled
+STARTED_S, ENDED_S, CANCELLED_S = 120.0, 900.0, 60.0  # limits: of the start, of jobs, of their end when cancelled
 OPEN = {"PENDING", "CONFIGURING", "RUNNING", "COMPLETING", "SUSPENDED"}
 MUNGE_FILES = {"key-file": "key", "socket": "socket", "pid-file": "pid", "log-file": "log", "seed-file": "seed"}
 
@@ -90,7 +91,7 @@ class OneNodeSlurm:
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
-            timeout=60,
+            timeout=PATIENCE,
         )
         assert job.returncode == code, f"{words}: exit code {job.returncode}\n{job.stdout}"
         return job.stdout
@@ -140,7 +141,7 @@ def one_node_slurm() -> Iterator[OneNodeSlurm]:
     with ExitStack() as stack:
         stack.callback(shutil.rmtree, folder, ignore_errors=True)
         stack.callback(_kill, slurm)
-        _configure(folder)
+        _configure(folder, stack)
         munge = [f"--{option}={folder}/munge.{name}" for option, name in MUNGE_FILES.items()]
         _start(slurm, stack, "munged", "--foreground", "--force", *munge)
         _await_start((folder / "munge.socket").exists, folder)
@@ -151,7 +152,7 @@ def one_node_slurm() -> Iterator[OneNodeSlurm]:
         yield slurm
 
 
-def _configure(folder: Path) -> None:
+def _configure(folder: Path, stack: ExitStack) -> None:
     folder.chmod(0o755)
     for name in ("state", "spool"):
         (folder / name).mkdir()
@@ -160,11 +161,8 @@ def _configure(folder: Path) -> None:
     version = subprocess.run(["slurmd", "-V"], env=os.environ | {"PATH": PATH}, capture_output=True, text=True).stdout
     plugin = "disabled" if re.findall(r"\d+", version)[0] >= "23" else "cgroup/v1"  # neither looks for cgroups
     (folder / "cgroup.conf").write_text(f"CgroupPlugin={plugin}\n")
-    with ExitStack() as stack:
-        sockets = [stack.enter_context(socket.create_server(("127.0.0.1", 0))) for _ in range(2)]
-        ports = [each.getsockname()[1] for each in sockets]
     host = socket.gethostname().partition(".")[0]
-    words = {"host": host, "user": os.geteuid(), "folder": folder, "ports": ports}
+    words = {"host": host, "user": os.geteuid(), "folder": folder, "ports": held_ports(stack, 2)}
     (folder / "slurm.conf").write_text(CONFIGURATION.format(**words))
 
 
@@ -184,7 +182,7 @@ def _end(process: subprocess.Popen[bytes]) -> None:
 
 def _node_state(slurm: OneNodeSlurm) -> str:
     words = ["sinfo", "--noheader", "--format=%T"]
-    return subprocess.run(words, env=slurm.environment, capture_output=True, text=True, timeout=30).stdout.strip()
+    return subprocess.run(words, env=slurm.environment, capture_output=True, text=True, timeout=PATIENCE).stdout.strip()
 
 
 def _await_start(reached: Callable[[], bool], folder: Path) -> None:

@@ -210,7 +210,7 @@ def _empty_file() -> bytes:
 
 
 def _path_for_mpi(part: Path, opened: contextlib.ExitStack) -> str:
-    """A short name of the file until `opened` is closed, its folder by a descriptor: MPI-IO has short buffers for names."""
+    """Names the file by a descriptor of its folder, until `opened` is closed: MPI-IO keeps names in short buffers."""
     folder = os.open(part.parent, os.O_RDONLY)
     opened.callback(os.close, folder)
     return f"/proc/self/fd/{folder}/{part.name}"

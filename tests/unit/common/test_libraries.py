@@ -7,8 +7,8 @@ import subprocess
 import sys
 
 import pytest
-from support.jobs import PATIENCE
 from petsc4py import PETSc
+from support.jobs import PATIENCE
 
 from feti_homog.common.libraries import DEBIAN_MODULES, petsc4py_advice
 from feti_homog.common.petsc_options import case_options

@@ -8,8 +8,8 @@ import subprocess
 
 import numpy as np
 import pytest
-from support.jobs import PATIENCE
 from support.effective_results import BORON_ALUMINIUM, COSINES, DISTINCT, TURNED, document, turned_stiffness
+from support.jobs import PATIENCE
 
 from feti_homog.output.cards import calculix
 from feti_homog.output.cards.effective_material import in_axes_of_the_cell
