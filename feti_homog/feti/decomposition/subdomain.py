@@ -142,6 +142,12 @@ def kernel(problem: Problem, positions: Float, rotates: bool, pinned: int) -> Fl
     return np.linalg.qr(free.reshape(c * n, free.shape[2]))[0]
 
 
+def label(submesh: Submesh) -> str:
+    """The subdomain in messages."""
+    x, y = submesh.points[0]
+    return f"subdomain {submesh.index} ({submesh.phase}) near ({x:.6g}, {y:.6g})"
+
+
 def _pinned(K: csr_matrix, problem: Problem, pinned: int) -> csr_matrix:
     """K with the rows and columns of the node `pinned` those of a multiple of the identity; K itself for -1."""
     if pinned < 0:
@@ -158,9 +164,8 @@ def _check_kernel(submesh: Submesh, K: csr_matrix, R: Float) -> None:
     # NaN is above any tolerance.
     if not residual <= KERNEL_TOLERANCE:
         raise MeshError(
-            f"subdomain {submesh.index} ({submesh.phase}) near "
-            f"({submesh.points[0, 0]:.6g}, {submesh.points[0, 1]:.6g}): "
-            f"|K R| / |K| = {residual:.1e}, expected at most {KERNEL_TOLERANCE:.0e}; its elements are degenerate"
+            f"{label(submesh)}: |K R| / |K| = {residual:.1e}, expected at most {KERNEL_TOLERANCE:.0e}; "
+            "its elements are degenerate"
         )
 
 

@@ -11,9 +11,10 @@ import numpy as np
 from petsc4py import PETSc
 from scipy.sparse import block_diag, csr_matrix
 
+from feti_homog.errors import MeshError
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.shared_entities import SharedEntities
-from feti_homog.feti.decomposition.subdomain import Subdomain
+from feti_homog.feti.decomposition.subdomain import Subdomain, label
 from feti_homog.feti.operators.choice import SubdomainSize, choose
 from feti_homog.feti.operators.explicit import ExplicitInterfaceOperator
 from feti_homog.feti.operators.implicit import ImplicitInterfaceOperator, Interior
@@ -173,9 +174,17 @@ class InterfaceOperators:
 
 
 def _factor(subdomain: Subdomain, dofs: Int, explicit: bool) -> tuple[InterfaceOperator, Float]:
-    """The boundary operator of a subdomain and the diagonal of K on its boundary `dofs`; K is freed at the end."""
+    """The boundary operator of a subdomain and the diagonal of K on its boundary `dofs`; K is freed at the end.
+
+    Raises:
+        MeshError: rounding leaves K no factor.
+    """
     K = subdomain.take_stiffness()
-    operator = (ExplicitInterfaceOperator if explicit else ImplicitInterfaceOperator)(subdomain, K, dofs)
+    try:
+        operator = (ExplicitInterfaceOperator if explicit else ImplicitInterfaceOperator)(subdomain, K, dofs)
+    except np.linalg.LinAlgError as error:
+        faults = f"its stiffness cannot be factored, {error}; its elements are degenerate"
+        raise MeshError(f"{label(subdomain.submesh)}: {faults}") from error
     return operator, K.diagonal()[dofs]
 
 

@@ -7,10 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from mpi4py import MPI
+from scipy.sparse import diags
 from support import torn_cells
 
 from feti_homog.errors import MeshError
 from feti_homog.feti.decomposition.subdomain import Subdomain
+from feti_homog.feti.operators import interface_operators
 
 
 @pytest.fixture(scope="module")
@@ -34,3 +36,13 @@ def test_a_corner_that_is_nowhere_is_refused(subdomain):
     points[submesh.triangles[0, 0]] = np.nan
     with pytest.raises(MeshError, match=r"refined elements of .* are inverted"):
         Subdomain.build(replace(submesh, points=points), subdomain.mesh.lattice, subdomain.L, subdomain.problem)
+
+
+@pytest.mark.parametrize("explicit", [True, False])
+@pytest.mark.parametrize("inside", [True, False])
+def test_a_stiffness_without_a_factor_is_one_line_that_names_its_subdomain(subdomain, explicit, inside):
+    K, dofs = subdomain.assemble_stiffness(), np.arange(subdomain.n_dofs // 2)
+    inner = np.isin(np.arange(subdomain.n_dofs), dofs) != inside
+    spoilt = replace(subdomain, _built_stiffness=(K - 1e9 * diags(1.0 * inner)).tocsr())
+    with pytest.raises(MeshError, match=r"subdomain \d+ \(fibre\) near \(.*not positive definite.*are degenerate$"):
+        interface_operators._factor(spoilt, dofs, explicit)
