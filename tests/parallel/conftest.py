@@ -40,6 +40,25 @@ def narrow():
     cell.solver.destroy()
 
 
+@pytest.fixture
+def shared_interfaces(comm, monkeypatch):
+    """Assert that no rank of several owns all interface nodes of a cell that the test makes on all ranks."""
+    from feti_homog.feti.decomposition.jump_operator import JumpOperator
+
+    made, make = [], JumpOperator.__init__
+
+    def counted(self, ranks, *arguments):
+        make(self, ranks, *arguments)
+        made.append((ranks.size, len(self.nodes.row)))
+
+    monkeypatch.setattr(JumpOperator, "__init__", counted)
+    yield
+    owned = comm.allgather([nodes for ranks, nodes in made if ranks == comm.size])
+    for cell in zip(*owned, strict=True):
+        owners = sum(nodes > 0 for nodes in cell)
+        assert comm.size == 1 or owners != 1, f"interface nodes of ranks: {cell}"
+
+
 @pytest.fixture(scope="module")
 def torn():
     """torn(**case): the torn cell of a case, made at the first call of the module and shared by its tests."""

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from support import torn_cells
 from support.loads import strains
-from support.ranks import parallel_assert
+from support.ranks import PIECES, parallel_assert
 
 from feti_homog import Case, run
 from feti_homog.feti.decomposition.interface_neighbours import InterfaceNeighbours
@@ -21,14 +21,14 @@ from feti_homog.interface.path_following import events
 from feti_homog.interface.path_points import unloaded
 from feti_homog.interface.tip_criterion import TipCriterion
 
-pytestmark = pytest.mark.parallel
+pytestmark = [pytest.mark.parallel, pytest.mark.usefixtures("shared_interfaces")]
 
 # Glass and epoxy, MPa and micrometres; sigma_c = 90 MPa, G_Ic = 2 J/m2, fibres of 7.5 micrometres, 40 %.
 GLASS_EPOXY = {"matrix": {"young": 2790.0, "poisson": 0.33}, "fibre": {"young": 70800.0, "poisson": 0.22}}
 NORMAL, TANGENTIAL, TOUGHNESS, SENSITIVITY = 2025.0, 506.25, 2.0, 0.25
 SPRINGS = EnergyCriterion(NORMAL, TANGENTIAL, TOUGHNESS, SENSITIVITY)
 INFLUENCE = {"feti_pc_type": "influence", "feti_dual_operator": "explicit"}
-CELL = {"springs": (NORMAL, TANGENTIAL), "petsc": INFLUENCE} | GLASS_EPOXY
+CELL = {"springs": (NORMAL, TANGENTIAL), "petsc": INFLUENCE, "decomposition": PIECES} | GLASS_EPOXY
 SQUARE = {"geometry": "square", "fibre_fraction": 0.4, "fibre_radius": 7.5, "order": 2, "mesh_size": 0.1} | CELL
 ONSET_STRAIN, ONSET_STRESS = 0.01175333, 66.83636
 # Sigma11 in MPa at these multiples of the onset strain, of the finest mesh (elements of 0.105 micrometres).
@@ -150,6 +150,7 @@ def test_onset_of_one_fibre_in_much_matrix(comm, strength, radius):
         mesh_size=0.1,
         interface_size=2 * np.pi / 48 / CELL_PER_RADIUS,
         springs=(stiffness, stiffness / 4),
+        decomposition=PIECES,
         **GLASS_EPOXY,
     )
     interface = torn_cells.interface(cell, True)
@@ -195,10 +196,10 @@ def test_a_tip_releases_its_toughness(comm):
 @pytest.mark.parametrize(
     "case",
     [
-        {"geometry": "hexagonal", "mesh_size": 0.2},
+        {"geometry": "hexagonal", "mesh_size": 0.2, "decomposition": PIECES},
         {"geometry": "hexagonal", "mesh_size": 0.2, "order": 2, "refine": 1, "decomposition": {"subdomains": 12}},
-        {"geometry": "hexagonal", "mesh_size": 0.2, "bodies": "plane"},
-        {"geometry": "random", "fibres": 3, "min_gap": 0.2, "mesh_size": 0.2},
+        {"geometry": "hexagonal", "mesh_size": 0.2, "bodies": "plane", "decomposition": PIECES},
+        {"geometry": "random", "fibres": 3, "min_gap": 0.2, "mesh_size": 0.2, "decomposition": PIECES},
     ],
 )
 def test_every_interface_node_has_a_neighbour_on_either_side(comm, case):

@@ -21,7 +21,7 @@ from feti_homog.output.files import result_json
 from feti_homog.output.plots import response_curves
 from feti_homog.verification.certificate import verify
 
-pytestmark = pytest.mark.parallel
+pytestmark = [pytest.mark.parallel, pytest.mark.usefixtures("shared_interfaces")]
 
 BONDS = {"max": MAX, "quadratic": QUADRATIC, "energy": ENERGY}
 RANDOM = {

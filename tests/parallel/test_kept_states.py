@@ -10,7 +10,7 @@ import h5py
 import numpy as np
 import pytest
 from mpi4py import MPI
-from support.ranks import parallel_assert
+from support.ranks import PIECES, parallel_assert
 
 from feti_homog import Case, run
 from feti_homog.common.mpi_errors import on_root
@@ -18,7 +18,7 @@ from feti_homog.errors import ConvergenceError
 from feti_homog.output.files import field_file
 from feti_homog.verification.certificate import verify
 
-pytestmark = pytest.mark.parallel
+pytestmark = [pytest.mark.parallel, pytest.mark.usefixtures("shared_interfaces")]
 
 EXACT = 1e-12
 PATHS: dict[str, dict[str, Any]] = {
@@ -41,6 +41,7 @@ def case(kind: str, states: int | str, **path: Any) -> Case:
             "analysis": {"type": "path", "plane": "stress"},
             "interface": ENERGY if kind == "energy" else STRENGTHS,
             "path": PATHS[kind] | path,
+            "decomposition": PIECES,
             "output": {"pictures": False, "states": states},
         }
     )

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from support import torn_cells
 from support.loads import strains
+from support.ranks import PIECES
 
 from feti_homog.interface.contact import BONDED, OPEN
 from feti_homog.interface.load import Load
@@ -16,16 +17,17 @@ from feti_homog.interface.path_following import events
 from feti_homog.interface.path_points import unloaded
 from feti_homog.interface.strength_criterion import StrengthCriterion
 
-pytestmark = pytest.mark.parallel
+pytestmark = [pytest.mark.parallel, pytest.mark.usefixtures("shared_interfaces")]
 
 STRAIGHT = 1e-7
 FREE = {
-    "square": {"geometry": "square", "mesh_size": 0.25},
-    "quadratic": {"geometry": "square", "mesh_size": 0.45, "order": 2, "plane": "stress"},
+    "square": {"geometry": "square", "mesh_size": 0.2, "decomposition": PIECES},
+    "quadratic": {"geometry": "square", "mesh_size": 0.3, "order": 2, "plane": "stress", "decomposition": PIECES},
     "hexagonal": {"geometry": "hexagonal", "mesh_size": 0.3, "decomposition": {"subdomains": 9}},
-    "plane": {"geometry": "hexagonal", "mesh_size": 0.3, "bodies": "plane", "petsc": {"feti_pc_type": "influence"}},
+    "plane": {"geometry": "hexagonal", "mesh_size": 0.3, "bodies": "plane", "petsc": {"feti_pc_type": "influence"}}
+    | {"decomposition": PIECES},
 }
-THREE = {"geometry": "random", "fibres": 3, "min_gap": 0.1, "seed": 4, "mesh_size": 0.2, "radius_spread": 0.3}
+THREE = {"geometry": "random", "fibres": 3, "min_gap": 0.1, "seed": 4, "mesh_size": 0.2, "decomposition": PIECES}
 # Through zero, beside it, and from squeezed fibres to others with room.
 WAYPOINTS = [
     [[0.05, 0.05, 0.0], [-0.05, -0.05, 0.0]],
@@ -88,7 +90,7 @@ def test_partly_free_and_breaking_fibres_are_straight_between_points(comm):
 
 def test_a_fibre_that_breaks_bond_by_bond_takes_few_solves(comm):
     material = {"matrix": {"young": 100.0, "poisson": 0.4}, "fibre": {"young": 500.0, "poisson": 0.2}}
-    cell = torn_cells.tear(comm, geometry="square", mesh_size=0.2, plane="stress", **material)
+    cell = torn_cells.tear(comm, geometry="square", mesh_size=0.2, plane="stress", decomposition=PIECES, **material)
     interface, begin = interface_with(cell, False)
     waypoints = np.array([[0.02, 0.0, 0.0], [-0.05, 0.02, 0.0], [0.1, 0.0, 0.0]])
     solves = cell.solver.solves

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from support import torn_cells
 from support.loads import strains
+from support.ranks import PIECES
 
 from feti_homog.analysis.path_events import Work
 from feti_homog.interface.contact import BONDED
@@ -14,10 +15,10 @@ from feti_homog.interface.path_following import events
 from feti_homog.interface.path_points import unloaded
 from feti_homog.interface.strength_criterion import StrengthCriterion
 
-pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks, pytest.mark.usefixtures("shared_interfaces")]
 
 THREE = {"geometry": "random", "fibres": 3, "min_gap": 0.1, "seed": 4, "mesh_size": 0.25, "radius_spread": 0.3}
-TIGHT = {"petsc": {"feti_pc_type": "influence", "feti_ksp_rtol": 1e-11}}
+TIGHT = {"petsc": {"feti_pc_type": "influence", "feti_ksp_rtol": 1e-11}, "decomposition": PIECES}
 WAYPOINTS = np.array([[1.0, 0.1, 0.2], [-0.5, 0.0, 0.1]])
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from petsc4py import PETSc
 from support.cases import relative_error
-from support.ranks import parallel_assert
+from support.ranks import PIECES, parallel_assert
 
 from feti_homog import Case, run
 from feti_homog.analysis.criteria import criterion_of
@@ -21,7 +21,7 @@ from feti_homog.interface.loaded_cell import LoadedCell
 from feti_homog.interface.path_following import events
 from feti_homog.interface.path_points import unloaded
 
-pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks, pytest.mark.usefixtures("shared_interfaces")]
 
 EXACT = 1e-9
 ALONG = {"normal_strength": 0.02, "tangential_strength": 0.03, "axial_strength": 0.015}
@@ -50,6 +50,7 @@ def case_of(bonds, axes, temperature):
             "interface": bonds,
             "envelope": {"plane": list(axes), "directions": 8} | cooling,
             "petsc": {"feti_ksp_rtol": 1e-12, "feti_pc_type": "influence"},
+            "decomposition": PIECES,
         }
     )  # fmt: skip
 

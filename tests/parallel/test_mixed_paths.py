@@ -9,10 +9,10 @@ from unit.cell.faulty_meshes import grid
 
 from feti_homog.errors import ConvergenceError
 
-pytestmark = pytest.mark.parallel
+pytestmark = [pytest.mark.parallel, pytest.mark.usefixtures("shared_interfaces")]
 
 EXACT = 1e-9
-SQUARE, HEXAGONAL, CURVED = {}, {"geometry": "hexagonal"}, {"order": 2, "mesh_size": 0.45}
+SQUARE, HEXAGONAL, CURVED = {}, {"geometry": "hexagonal"}, {"order": 2, "mesh_size": 0.3}
 THREE = {"geometry": "random", "fibres": 3, "min_gap": 0.1, "seed": 4}
 STRENGTH = {"normal_strength": 0.03, "tangential_strength": 0.04}
 QUADRATIC = STRENGTH | {"criterion": "quadratic"}

@@ -11,7 +11,7 @@ from reference.references import LARGEST_TRACTIONS, ONSET
 from support import torn_cells
 from support.cases import relative_error
 from support.loads import strains
-from support.ranks import parallel_assert
+from support.ranks import PIECES, parallel_assert
 
 from feti_homog.common.mpi_errors import on_root
 from feti_homog.interface.contact import BONDED, OPEN
@@ -20,16 +20,19 @@ from feti_homog.interface.path_following import events, increments
 from feti_homog.interface.path_points import unloaded
 from feti_homog.interface.strength_criterion import StrengthCriterion
 
-pytestmark = pytest.mark.parallel
+pytestmark = [pytest.mark.parallel, pytest.mark.usefixtures("shared_interfaces")]
 
-SQUARE = {"geometry": "square", "mesh_size": 0.2}
+SQUARE = {"geometry": "square", "mesh_size": 0.2, "decomposition": PIECES}
 HEXAGONAL = {"geometry": "hexagonal", "mesh_size": 0.4, "order": 2, "plane": "stress"}
-THREE = {"geometry": "random", "fibres": 3, "min_gap": 0.1, "seed": 4, "mesh_size": 0.2, "radius_spread": 0.3}
+THREE = {
+    "geometry": "random", "fibres": 3, "min_gap": 0.1, "seed": 4, "mesh_size": 0.2, "radius_spread": 0.3,
+    "decomposition": PIECES,
+}  # fmt: skip
 PHASES = {"matrix": {"young": 1.0, "poisson": 0.35}, "fibre": {"young": 5.0, "poisson": 0.2}}
 INFLUENCE = {"petsc": {"feti_pc_type": "influence"}}
 CELLS = [
     SQUARE,
-    SQUARE | {"order": 2, "mesh_size": 0.35, "plane": "stress"} | INFLUENCE,
+    SQUARE | {"order": 2, "mesh_size": 0.3, "plane": "stress"} | INFLUENCE,
     HEXAGONAL | {"bodies": "plane", "decomposition": {"subdomains": 7}} | INFLUENCE,
     THREE,
 ]
@@ -111,7 +114,7 @@ def test_events_of_later_legs_are_those_of_small_steps_and_bisection(comm, built
 
 
 def test_debonding_begins_at_the_load_of_the_series_solution(comm):
-    cell = torn_cells.tear(comm, geometry="square", order=2, mesh_size=0.07, refine=1)
+    cell = torn_cells.tear(comm, geometry="square", order=2, mesh_size=0.07, refine=1, decomposition=PIECES)
     interface = torn_cells.interface(cell, True)
     first = next(
         events(
@@ -200,7 +203,11 @@ def test_a_path_goes_on_from_any_of_its_points_with_the_same_events(comm):
 
 def test_events_do_not_depend_on_bodies_and_pieces(comm):
     law, curves = StrengthCriterion(20.0, 30.0, "max"), []
-    for variant in ({}, {"bodies": "plane"}, {"decomposition": {"subdomains": 9}}):
+    for variant in (
+        {"decomposition": {"subdomains": 4}},
+        {"bodies": "plane", "decomposition": PIECES},
+        {"decomposition": {"subdomains": 9}},
+    ):
         cell = torn_cells.tear(comm, geometry="hexagonal", mesh_size=0.25, **variant)
         curves.append(curve(cell, follow(cell, True, law, [MIXED])))
     for other in curves[1:]:
@@ -239,6 +246,7 @@ def test_infinite_strengths_never_break(torn):
 @pytest.mark.few_ranks
 def test_twenty_fibres_debond_to_the_end_certified_and_dissipating(comm):
     many = {"geometry": "random", "fibres": 20, "fibre_fraction": 0.4, "min_gap": 0.1, "seed": 2, "mesh_size": 0.08}
+    many |= {"decomposition": {"subdomains": 22}}
     cell = torn_cells.tear(comm, **many, **INFLUENCE)
     points = follow(cell, True, StrengthCriterion(30.0, 15.0, "max"), [[1.0, -0.3, 0.4]])
     assert is_certified(points)

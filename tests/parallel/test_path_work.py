@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from support.loaded_twins import EPOXY_GLASS, is_end, relative, solved
 
-pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks, pytest.mark.usefixtures("shared_interfaces")]
 
 EXACT = 1e-9
 HEXAGONAL = {"geometry": "hexagonal"}

@@ -10,7 +10,7 @@ import pytest
 from mpi4py import MPI
 from reference.closed_forms import bulk_and_shear
 from support.loads import strains
-from support.ranks import parallel_assert
+from support.ranks import PIECES, parallel_assert
 from unit.cell.faulty_meshes import grid
 
 from feti_homog import Case, run
@@ -26,14 +26,17 @@ from feti_homog.interface.path_points import unloaded
 from feti_homog.interface.strength_criterion import StrengthCriterion
 from feti_homog.interface.tip_criterion import TipCriterion
 
-pytestmark = pytest.mark.parallel
+pytestmark = [pytest.mark.parallel, pytest.mark.usefixtures("shared_interfaces")]
 
 EXACT = 1e-9
 PHASES = {"matrix": {"young": 2790.0, "poisson": 0.33}, "fibre": {"young": 70800.0, "poisson": 0.22}}
 NORMAL, TANGENTIAL, TOUGHNESS = 2025.0, 506.25, 2.0
 SPRINGS = {"normal_stiffness": NORMAL, "tangential_stiffness": TANGENTIAL}
 BY_ENERGY = SPRINGS | {"criterion": "energy", "toughness": TOUGHNESS}
-TIGHT = {"petsc": {"feti_pc_type": "influence", "feti_ksp_rtol": 1e-11, "feti_dual_operator": "explicit"}}
+TIGHT = {
+    "petsc": {"feti_pc_type": "influence", "feti_ksp_rtol": 1e-11, "feti_dual_operator": "explicit"},
+    "decomposition": PIECES,
+}
 THREE = {"geometry": "random", "fibres": 3, "fibre_fraction": 0.35, "min_gap": 0.15, "seed": 4, "fibre_radius": 7.5}
 SQUARE = {"geometry": "square", "fibre_fraction": 0.4, "fibre_radius": 7.5, "mesh_size": 0.1}
 STRAIGHT = [0.04, 0.004, 0.01]
@@ -115,6 +118,7 @@ def path_of(cell: dict[str, Any], interface: dict[str, Any], folder: Any = ".", 
             "interface": interface,
             "path": path,
             "output": output,
+            "decomposition": PIECES,
         },
         folder,
     )

@@ -7,7 +7,7 @@ import pytest
 from support.generalized_phases import CRYSTAL, WOOD
 from support.loaded_twins import EPOXY_GLASS, compare_paths
 
-pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks, pytest.mark.usefixtures("shared_interfaces")]
 
 STRESS_OF = {
     "E11": "S11", "E22": "S22", "gamma12": "S12", "E33": "S33", "gamma13": "S13", "gamma23": "S23",
@@ -34,7 +34,7 @@ def test_random_paths_are_those_of_brute_force(comm, number):
 
 def random_cell(rng):
     """Keys of a cell of one or two fibres."""
-    cell = ({}, {"geometry": "hexagonal"}, {"order": 2, "mesh_size": 0.45})[rng.integers(3)]
+    cell = ({}, {"geometry": "hexagonal"}, {"order": 2, "mesh_size": 0.3})[rng.integers(3)]
     return cell | {"bodies": str(rng.choice(["torus", "plane"]))}
 
 

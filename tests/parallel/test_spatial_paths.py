@@ -13,7 +13,7 @@ from unit.cell.faulty_meshes import MshFile, grid
 
 from feti_homog import Case, run
 
-pytestmark = pytest.mark.parallel
+pytestmark = [pytest.mark.parallel, pytest.mark.usefixtures("shared_interfaces")]
 
 EXACT = 1e-9
 SQUARE, HEXAGONAL = {}, {"geometry": "hexagonal"}

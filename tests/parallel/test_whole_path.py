@@ -8,6 +8,7 @@ from reference.energy_path import SlowEnergyPath
 from support import torn_cells
 from support.cases import relative_error
 from support.loads import strains
+from support.ranks import PIECES
 
 from feti_homog.common.mpi_errors import on_root
 from feti_homog.interface.contact import BONDED
@@ -17,7 +18,7 @@ from feti_homog.interface.path_following import events
 from feti_homog.interface.path_points import unloaded
 from feti_homog.interface.tip_criterion import TipCriterion
 
-pytestmark = pytest.mark.parallel
+pytestmark = [pytest.mark.parallel, pytest.mark.usefixtures("shared_interfaces")]
 
 SPRINGS, TOUGHNESS, SENSITIVITY = (30.0, 12.0), 1e-4, 0.3
 FOUR = {
@@ -30,6 +31,7 @@ FOUR = {
     "matrix": {"young": 1.0, "poisson": 0.35},
     "fibre": {"young": 20.0, "poisson": 0.2},
     "springs": SPRINGS,
+    "decomposition": PIECES,
 }
 STRAIN = np.array([1.0, 0.1, 0.05])
 

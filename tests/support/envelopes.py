@@ -21,6 +21,7 @@ from feti_homog.interface.path_following import events
 from feti_homog.interface.path_points import unloaded
 from support import torn_cells
 from support.loads import strains
+from support.ranks import PIECES
 
 TIGHT = {"feti_ksp_rtol": 1e-12}
 MAX = {"normal_strength": 3.0, "tangential_strength": 2.0}
@@ -38,6 +39,7 @@ def document(plane: str, interface: dict[str, Any], **sections: dict[str, Any]) 
         "interface": interface,
         "output": {"fields": False, "pictures": False},
         "petsc": TIGHT,
+        "decomposition": PIECES,
     }
     own = {"analysis", "output", "petsc"}  # the others are replaced as a whole
     return base | {name: ({**base[name], **c} if name in own else c) for name, c in sections.items()}

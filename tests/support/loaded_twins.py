@@ -18,6 +18,7 @@ from feti_homog.common.mpi_errors import on_root
 from feti_homog.common.petsc_options import case_options
 from feti_homog.common.progress import Progress
 from feti_homog.homogenization import unit_cell
+from support.ranks import PIECES
 
 GENERALIZED = "generalized"
 TIGHT = {"feti_ksp_rtol": 1e-12}
@@ -37,6 +38,7 @@ def document(cell, phases, plane, interface=None, petsc=None, **analysis):
         "material": dict(zip(("matrix", "fibre"), phases, strict=False)),
         "analysis": {"type": name, "plane": plane},
         "petsc": TIGHT | (petsc or {}),
+        "decomposition": PIECES,
         "output": {"pictures": False, "fields": False},
     } | sections
 
