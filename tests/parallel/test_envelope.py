@@ -78,15 +78,6 @@ def test_in_a_plane_of_stresses_the_other_stress_is_none(comm):
             parallel_assert(comm, np.abs(stress - point.stress).max() < 1e-9 * point.factor)
 
 
-def test_any_number_of_ranks_finds_the_same_bonds(comm):
-    here, alone = (
-        envelope(each, "strain", MAX, ["S11", "S22"], RANDOM, directions=24) for each in (comm, comm.Split(comm.rank))
-    )
-    parallel_assert(comm, np.abs(factors(here) / factors(alone) - 1).max() < 1e-10)
-    for one, other in zip(here.envelope, alone.envelope, strict=True):
-        parallel_assert(comm, one.fibre == other.fibre and abs(one.bond_angle - other.bond_angle) < 1e-9)
-
-
 @pytest.mark.parametrize("name", BONDS)
 def test_onsets_grow_with_the_strength(comm, name):
     stronger = {

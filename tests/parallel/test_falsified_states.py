@@ -121,7 +121,7 @@ def test_a_glued_node_that_parts(falsified):
 
 
 def test_slip_that_no_strain_has(falsified):
-    """A jump g of a node adds the symmetric part of g a / |UC| to the mean strain, a being half of the sides beside it."""
+    """A jump g of a node adds the symmetric part of g a / |UC| to the mean strain, a half of the sides beside it."""
     status, slip = falsified.status(OPEN), 1e-3
     solution, which = falsified.solution(PULLED, status), falsified.chosen(3)
     jump = solution.jump.copy()

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from mpi4py import MPI
 from reference.closed_forms import bulk_and_shear
 from support.loads import strains
 from support.ranks import PIECES, parallel_assert
@@ -197,35 +196,6 @@ def test_without_sensitivity_to_the_mode_toughness_times_length_is_counted_exact
         assert point.debonded_share == pytest.approx(broken / (2 * np.pi * 7.5), rel=1e-9)
         if point.fracture_energy:
             assert point.dissipation_ratio == pytest.approx(point.dissipated / point.fracture_energy)
-
-
-def plain(point):
-    """A point's numbers as arrays, None as NaN."""
-    return {name: np.array(value, float) for name, value in vars(point).items() if name not in ("tips", "iterations")}
-
-
-def tips_of(point):
-    """(5, tips) of a point."""
-    return np.array([point.tips.fibre, point.tips.angle, point.tips.G_I, point.tips.G_II, point.tips.psi])
-
-
-@pytest.mark.parametrize("growth", ["springs", "released"])
-@pytest.mark.parametrize("path", PATHS)
-def test_ranks_agree(comm, growth, path):
-    cell = THREE | {"mesh_size": 0.2, "radius_spread": 0.2}
-    case = path_of(cell, BY_ENERGY | {"growth": growth}, **PATHS[path])
-    found, alone = run(case, comm).path, run(case, MPI.COMM_SELF).path
-    parallel_assert(comm, len(found) == len(alone))
-    largest = plain(alone[-1])
-    for point, expected in zip(found, alone, strict=True):
-        for name, value in plain(expected).items():
-            scale = max(np.abs(each).max() for each in (value, largest[name])) if np.isfinite(value).all() else 1.0
-            same = np.isclose(plain(point)[name], value, rtol=0, atol=1e-6 * scale, equal_nan=True).all()
-            parallel_assert(comm, bool(same), name)
-        scales = np.array([1.0, 360.0, TOUGHNESS, TOUGHNESS, 90.0])[:, None]
-        close = tips_of(point).shape == tips_of(expected).shape
-        close = close and (np.abs(tips_of(point) - tips_of(expected)) < 1e-5 * scales).all()
-        parallel_assert(comm, bool(close), "tips")
 
 
 def test_the_tips_of_one_debond(comm):

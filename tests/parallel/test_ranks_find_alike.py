@@ -1,0 +1,81 @@
+"""Results on several ranks, each with interface nodes, are those of one rank alone: every number of result.json."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from support.ranks import PIECES
+from support.verified_results import document
+
+from feti_homog import Case, run
+
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks, pytest.mark.usefixtures("shared_interfaces")]
+
+# What the solver took, and what is left of its errors.
+OF_THE_RUN = {"version", "solver", "timings", "memory", "checks", "iterations"}
+ALIKE = 1e-6
+
+
+def numbers(content, name=""):
+    """Name and value of all that is in a document, names without the places in lists."""
+    if isinstance(content, dict):
+        pairs = [(f"{name}.{key}", value) for key, value in content.items() if key not in OF_THE_RUN]
+    elif isinstance(content, list | tuple | np.ndarray):
+        pairs = [(name, value) for value in content]
+    else:
+        return [(name, content)]
+    return [number for key, value in pairs for number in numbers(value, key)]
+
+
+def by_name(content):
+    found = defaultdict(list)
+    for name, value in numbers(content):
+        found[name].append(value)
+    return found
+
+
+def assert_alike(comm, kind, **more):
+    if comm.size == 1:
+        pytest.skip("one rank is alone")
+    case = document(kind) | {"decomposition": PIECES, "petsc": {"feti_ksp_rtol": 1e-11}} | more
+    found, alone = (by_name(run(Case.parse(case), each).document) for each in (comm, MPI.COMM_SELF))
+    assert found.keys() == alone.keys()
+    for name, expected in alone.items():
+        if all(isinstance(value, float) for value in expected):
+            assert len(found[name]) == len(expected), name
+            error = np.abs(np.array(found[name]) - expected).max()
+            assert error <= ALIKE * np.abs(expected).max(), f"{name}: {error:.1e}"
+        else:
+            assert found[name] == expected, name
+
+
+def test_a_path_of_several_legs_by_released_energy(comm):
+    assert_alike(comm, "energy")
+
+
+def test_a_path_of_two_pairs_of_phases(comm):
+    assert_alike(comm, "pairs")
+
+
+def test_increments_of_strains_and_stresses(comm):
+    assert_alike(comm, "uneven steps")
+
+
+def test_debonding_angles(comm):
+    assert_alike(comm, "loaded angle")
+
+
+def test_unit_loads_beside_an_arc(comm):
+    assert_alike(comm, "overlap")
+
+
+def test_envelopes(comm):
+    for kind in ("envelope", "envelope by energy"):
+        assert_alike(comm, kind)
+
+
+def test_one_load_with_contact(comm):
+    assert_alike(comm, "load with contact")
