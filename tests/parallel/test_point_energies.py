@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from reference.closed_forms import bulk_and_shear
 from support.loads import strains
-from support.ranks import PIECES, parallel_assert
+from support.ranks import PIECES
 from unit.cell.faulty_meshes import grid
 
 from feti_homog import Case, run
