@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import csv
 import subprocess
 import sys
+from itertools import product
 from pathlib import Path
 
 import pytest
@@ -89,9 +91,16 @@ def test_files_that_no_sweep_wrote_are_not_replaced(tmp_path, name):
 
 def test_the_folder_of_a_sweep_is_made_whole_again(tmp_path):
     """A sweep may be killed when it has written its list and not yet the table."""
-    sweep, out = plan.load(sweep_file(tmp_path, '"cell.order" = [1, 2]\n')), tmp_path / "out"
+    axes = '"cell.order" = [1, 2]\n"material.fibre.young" = [300.0, 400.0, 500.0]\n'
+    sweep, out = plan.load(sweep_file(tmp_path, axes)), tmp_path / "out"
     store.prepare_folder(out, sweep)
     table = (out / "cases.csv").read_text()
+    expected = [
+        {"case": f"{k}", "folder": f"case-000{k}", "point": f"{k}", "realisation": "1", "cell.order": order,
+         "material.fibre.young": young}
+        for k, (order, young) in enumerate(product("12", ("300.0", "400.0", "500.0")), start=1)
+    ]  # fmt: skip
+    assert list(csv.DictReader(table.splitlines())) == expected
     (out / "cases.csv").unlink()
     (out / "sweep.csv").write_text("collected")
     atomic.part_of(out / "cases.csv").write_text("half")

@@ -16,21 +16,23 @@ from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
 from PIL import Image
-from support.sample_output import Sample, sample
+from support.figure_words import curves, panels
+from support.sample_output import Sample, in_space, sample
 
 from feti_homog.output.files.field_file import FieldFile
 from feti_homog.output.files.result_json import SCHEMA
 from feti_homog.output.plots import deformed_panels, figures, plot_helpers, response_curves, traction_plots
 from feti_homog.output.plots.interface_marks import BONDED, CLOSED
 from feti_homog.output.plots.load_labels import LoadLabels
+from feti_homog.output.report import curves as interactive
 
 DRAWING = (figures, deformed_panels, response_curves, traction_plots)
 
 
 def path_of(strains: list[float]) -> dict[str, Any]:
     """The document of a path whose points have these strains E11."""
-    counts = {"bonded": 4, "open": 3, "closed": 3, "broke": 1}
-    points = [counts | {"load_factor": e, "strain": [e, 0, 0], "stress": [3 * e, e, 0]} for e in strains]
+    counts = {"bonded": 5, "open": 3, "closed": 2, "broke": 1}
+    points = [counts | {"load_factor": e, "strain": [e, 0, 0], "stress": [3 * e, e, 0.5 * e]} for e in strains]
     section = {"strain": [1.0, 0.0, 0.0], "method": "events"}
     case = {"analysis": {"type": "path", "plane": "strain"}, "interface": {"contact": True}, "path": section}
     return {"schema": SCHEMA, "case": case | {"output": {"stress_unit": "GPa"}}, "path": points}
@@ -203,11 +205,42 @@ def test_a_single_load_has_a_picture_that_says_what_it_gives(tmp_path: Path, mon
 
 def test_points_of_a_path_are_numbered_where_its_curve_folds_back(tmp_path: Path, monkeypatch: Any) -> None:
     write(tmp_path, sample(4), path_of([0.5, 0.2, 1.0]))
-    upper, middle, lower = drawn(tmp_path, monkeypatch)["path.png"].axes
+    figure = drawn(tmp_path, monkeypatch)["path.png"]
+    upper, middle, lower = figure.axes
     for axes in (upper, middle):
         assert {"0", "1", "2"} <= {text.get_text() for text in axes.texts if isinstance(text, Annotation)}
     np.testing.assert_allclose(lower.lines[0].get_xdata(), [0, 1, 2])
-    np.testing.assert_allclose(middle.lines[0].get_ydata(), [1.5, 0.6, 3.0])
+    stresses = {r"$\Sigma_{11}$": 3.0, r"$\Sigma_{22}$": 1.0, r"$\Sigma_{12}$": 0.5}
+    for line, factor in zip(middle.lines, stresses.values(), strict=False):
+        np.testing.assert_allclose(line.get_ydata(), factor * np.array([0.5, 0.2, 1.0]))
+    (strain, stress, named), (_, beside, _), (number, nodes, counted) = panels(figure)
+    assert (strain, stress, beside) == ("macroscopic strain $E_{11}$", "macroscopic stress (GPa)", "stress (GPa)")
+    for name, factor in stresses.items():
+        np.testing.assert_allclose(named[name][-1], factor)
+    assert (number, nodes) == ("number of the point, in the order of the path", "interface nodes")
+    assert [counted[name].tolist() for name in ("bonded", "in contact", "open")] == [[5] * 3, [2] * 3, [3] * 3]
+
+
+def test_curves_of_the_page_have_their_names_and_units() -> None:
+    found = {name: curves(figure) for name, figure in interactive.figures(path_of([0.5, 0.2, 1.0])).items()}
+    assert found["curve"][:2] == ("macroscopic strain E11", "macroscopic stress (GPa)")
+    for name, factor in (("S11", 3.0), ("S22", 1.0), ("S12", 0.5)):
+        assert found["along"][2][name] == pytest.approx([factor * t for t in (0.5, 0.2, 1.0)])
+    names = ("bonded", "in contact", "open")
+    assert [found["counts"][2][name].tolist() for name in names] == [[5] * 3, [2] * 3, [3] * 3]
+
+
+def test_tractions_and_jumps_have_their_names_and_units(tmp_path: Path, monkeypatch: Any) -> None:
+    """Beside half of the fibre, from its lower left corner: where each of the sample's ten nodes is."""
+    whole = sample(4)
+    write(tmp_path, in_space(whole), None)
+    traction, jump = panels(drawn(tmp_path, monkeypatch)["interface.png"])
+    assert (traction[1], jump[1]) == ("traction (GPa)", "jump (mm)")
+    k = np.arange(10.0)
+    values = {r"$t_\mathrm{n}$": k, r"$t_\mathrm{t}$": -k, r"$t_\mathrm{a}$": k}
+    for (_, _, found), expected in ((traction, values), (jump, {"gap": 0.1 * k, "slip": 0.2 * k, "axial slip": -k})):
+        for name, numbers in expected.items():
+            assert sorted(set(found[name].tolist())) == pytest.approx(sorted(numbers)), name
 
 
 def test_several_interfaces_have_lines_of_the_title_that_are_within_the_picture():
