@@ -77,5 +77,10 @@ def test_envelopes(comm):
         assert_alike(comm, kind)
 
 
+def test_bonds_that_cooling_alone_breaks(comm):
+    envelope = {"plane": ["S22", "S12"], "directions": 3, "temperature": -1e5}
+    assert_alike(comm, "envelope in space", envelope=envelope)
+
+
 def test_one_load_with_contact(comm):
     assert_alike(comm, "load with contact")

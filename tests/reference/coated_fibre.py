@@ -91,3 +91,26 @@ def hill(phase):
     strains = [phase.expansion_transverse, phase.expansion_transverse, phase.expansion_axial]
     heat = C @ [0.0 if strain is None else strain for strain in strains]
     return (C[0, 0] + C[0, 1]) / 2, C[0, 2], C[2, 2], heat[0], heat[2]
+
+
+def tractions_of_fibre(matrix, fibre, radius, springs):
+    """p0, N and T of a fibre alone in the matrix: t_n = s p0 + d N cos 2t and t_t = d T sin 2t under the far stresses
+    s11 = s + d and s22 = s - d."""
+    (normal, tangential), stiff, soft = springs, 2 * fibre.K_transverse, 2 * matrix.K_transverse
+    # u = p r / stiff in the fibre, r / soft + C / r in the matrix, where the radial stress is 1 - 2 m C / r^2.
+    m = 2 * matrix.G_transverse / radius**2
+    p0 = (radius / soft + 1 / (m * radius)) / (1 / normal + radius / stiff + 1 / (m * radius))
+    inner = across_springs((1 / normal, 1 / tangential)) @ michell(fibre, radius)[:, :2]
+    outer = michell(matrix, radius)
+    N, T, *_ = inner @ np.linalg.solve(np.hstack([inner, -outer[:, 2:]]), -0.5 * outer[:, 0])[:2]
+    return p0, N, T
+
+
+def onset_of_fibre(matrix, fibre, radius, springs, toughness, sensitivity, far):
+    """How many times the far stresses (2,) break the first bond, by the energy of its springs."""
+    p0, N, T = tractions_of_fibre(matrix, fibre, radius, springs)
+    (s, d), t = (far[0] + far[1], far[0] - far[1]), np.radians(np.linspace(0.0, 90.0, 9001))
+    normal, tangential = (s * p0 + d * N * np.cos(2 * t)) / 2, d * T * np.sin(2 * t) / 2
+    opening, sliding = np.maximum(normal, 0.0) ** 2 / (2 * springs[0]), tangential**2 / (2 * springs[1])
+    mode = 1 + np.tan((1 - sensitivity) * np.arctan2(np.sqrt(sliding), np.sqrt(opening))) ** 2
+    return 1 / np.sqrt(((opening + sliding) / (toughness * mode)).max())

@@ -91,6 +91,26 @@ DEBONDED_FIBRE_TOTAL = {
     100: Reference((0.3563,), 4e-4, "the same"),
 }
 
+# Glass in epoxy (70 800 MPa, 0.22; 2790 MPa, 0.33), square cell, plane strain, 40 % of fibres of 7.5 um, strained along
+# x1: bonds by energy, springs of 2025 and 506.25 MPa/um, toughness 2 J/m2, sensitivity to the mode 0.25.
+# Strain and stress S11 in MPa where the first bond breaks.
+GLASS_EPOXY_ONSET = Reference((0.01175333, 66.83636), 5e-6, SERIES)
+PROTOTYPE = "independent prototype, straight linear triangles, exact events; the error is the difference of two meshes"
+# (growth, length of elements in um): S11 in MPa at these multiples of the strain at onset, rising.
+GLASS_EPOXY_MULTIPLES = (1.05, 1.2, 1.5, 2.0, 3.0)
+GLASS_EPOXY_CURVES = {
+    ("springs", 0.21): Reference((25.66, 27.11, 30.43, 37.50, 52.40), 1.1, PROTOTYPE),
+    ("released", 0.21): Reference((24.51, 26.01, 29.91, 36.99, 52.15), 0.5, PROTOTYPE),
+    ("released", 0.105): Reference((24.18, 25.81, 29.71, 36.91, 52.06), 0.4, PROTOTYPE),
+}
+# Debonded share of the interface at three times the strain at onset, elements of 0.21 and 0.105 um.
+GLASS_EPOXY_DEBONDED = Reference((0.542, 0.543), 2e-3, PROTOTYPE)
+# Dissipated energy over toughness times length along the snap-back, elements of 0.84, 0.42 and 0.21 um.
+GLASS_EPOXY_DISSIPATED = {
+    "released": Reference((1.042, 1.013, 1.004), 0.03, PROTOTYPE),
+    "springs": Reference((1.85, 1.51, 1.29), 0.35, PROTOTYPE),
+}
+
 # Long fibres in space, axis 1 the fibre: E1, E2, G12, G23, nu12, nu23 in GPa, and expansions along 1 and 2 in 1e-6 / K.
 # (composite, cell, fibre fraction).
 ENGINEERING_CONSTANTS = {

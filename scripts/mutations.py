@@ -1,0 +1,79 @@
+"""Put deliberate errors of one line into copies of the program, and show which of them the tests notice.
+
+`python scripts/mutations.py [WORD ...]` tries those of tests/mutations.toml whose file or new line has one of the words,
+or all; it ends with 1 if one survives, or if tests fail without any.
+"""
+
+from __future__ import annotations
+
+import os
+import shlex
+import shutil
+import subprocess
+import sys
+import tempfile
+import tomllib
+from functools import cache
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+TABLE = ROOT / "tests" / "mutations.toml"
+LIMIT_S = 300  # ranks that wait for each other have noticed the error, too
+PASSED, FAILED, LATE = 0, 1, 124
+
+
+def copied(folder: Path) -> Path:
+    """Copy the files that git has, or would have; returns the folder."""
+    listed = subprocess.run(
+        ["git", "ls-files", "--cached", "--others", "--exclude-standard"], cwd=ROOT, capture_output=True, check=True
+    )
+    for name in listed.stdout.decode().splitlines():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy2(ROOT / name, folder / name)
+    return folder
+
+
+def run_tests(folder: Path, tests: str, ranks: int) -> int:
+    """The exit status of tests in a folder at this number of ranks."""
+    words = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *shlex.split(tests)]
+    command = words if ranks == 1 else ["mpirun", "--oversubscribe", "-n", str(ranks), *words, "-m", "parallel"]
+    environment = os.environ | {"PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1"}
+    job = ["timeout", "--kill-after=10", str(LIMIT_S), *command]
+    return subprocess.run(job, cwd=folder, env=environment, capture_output=True).returncode
+
+
+def outcome(folder: Path, mutation: tuple[str, str, str], tests: str, ranks: int) -> str:
+    """Put an error in, run the tests and take it out again; returns what became of it."""
+    name, old, new = mutation
+    path = folder / name
+    text = path.read_text(encoding="utf-8")
+    if text.count(old) != 1:
+        return f"not tried: {text.count(old)} such lines"
+    path.write_text(text.replace(old, new), encoding="utf-8")
+    try:
+        status = run_tests(folder, tests, ranks)
+    finally:
+        path.write_text(text, encoding="utf-8")
+    return "SURVIVED" if status == PASSED else "killed" if status in (FAILED, LATE) else f"not tried: status {status}"
+
+
+def main(words: list[str]) -> int:
+    groups = tomllib.loads(TABLE.read_text(encoding="utf-8"))["group"]
+    alive = tried = 0
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = copied(Path(temporary))
+        passes = cache(lambda tests, ranks: run_tests(folder, tests, ranks) == PASSED)
+        for group in groups:
+            tests, ranks = group["tests"], group.get("ranks", 1)
+            for mutation in group["lines"]:
+                if words and not any(word in part for word in words for part in (mutation[0], mutation[2])):
+                    continue
+                found = outcome(folder, mutation, tests, ranks) if passes(tests, ranks) else "not tried: tests fail"
+                tried, alive = tried + 1, alive + (found != "killed")
+                print(f"{found:10} {mutation[0]}: {mutation[2].strip()}   [{ranks}: {tests}]", flush=True)
+    print(f"{tried - alive} of {tried} killed")
+    return int(alive > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
