@@ -18,8 +18,9 @@ def test_small_fibres_are_stronger_by_energy(tmp_path):
     onset, exact = column(rows, "onset"), column(rows, "exact onset")
     assert np.abs(onset / exact - 1.0).max() < 0.01
     assert onset[0] > 1.1 * onset[1]
+    # Each debond runs on where the bonds were pulled most, towards the flanks, which are pressed.
     angle = column(rows, "debonding angle")
-    assert (angle > 20.0).all() and (angle < 80.0).all() and angle[0] < angle[1]
+    assert 0.0 < angle[0] < angle[1] < 90.0
 
 
 def test_curves_by_energy_that_is_released_depend_little_on_the_mesh(tmp_path):
@@ -31,12 +32,22 @@ def test_curves_by_energy_that_is_released_depend_little_on_the_mesh(tmp_path):
     assert spread["released"] < 0.05 < spread["springs"] < spread["strength"]
 
 
+def of_its_path(row, folder, component, name=""):
+    """The result in a folder, whose path has the first break and, where its load is the highest so far, the peak."""
+    result = json.loads((folder / "result.json").read_text())
+    load, stress = np.array([[point["load_factor"], point["stress"][component]] for point in result["path"]]).T
+    first = next(k for k, point in enumerate(result["path"]) if point["broke"])
+    assert float(row[f"first break{name}"]) == pytest.approx(stress[first])
+    assert float(row[f"peak{name}"]) == pytest.approx(stress[load >= np.maximum.accumulate(load)].max())
+    assert result["status"] == "done"
+    return result
+
+
 def test_cells_of_random_fibres_scatter(tmp_path):
     rows = driven("transverse_strength", tmp_path)
-    peak, first = column(rows, "peak S11"), column(rows, "first break S11")
-    assert (peak >= first).all() and (peak > 40.0).all() and (peak < 100.0).all() and peak[0] != peak[1]
-    results = [json.loads(path.read_text()) for path in tmp_path.glob("seed_*/result.json")]
-    assert len(results) == 2 and all(result["status"] == "done" for result in results)
+    assert float(rows[0]["peak S11"]) != float(rows[1]["peak S11"])
+    for row, folder in zip(rows, sorted(tmp_path.glob("seed_*")), strict=True):
+        of_its_path(row, folder, 0, " S11")
 
 
 def test_plies_break_by_tension_across_and_by_shear_along_the_fibres(tmp_path):
@@ -47,11 +58,11 @@ def test_plies_break_by_tension_across_and_by_shear_along_the_fibres(tmp_path):
         ("shear", 0.0),
         ("shear", -100.0),
     ]
-    modulus, peak = column(rows, "modulus"), column(rows, "peak")
+    modulus = column(rows, "modulus")
     # Until a bond breaks the temperature changes no stiffness.
     assert modulus[0] == pytest.approx(modulus[1], rel=1e-6) and modulus[2] == pytest.approx(modulus[3], rel=1e-6)
-    assert (peak > 40.0).all() and (peak < 150.0).all()
-    results = [json.loads(path.read_text()) for path in tmp_path.glob("*K/result.json")]
-    assert len(results) == 4 and all(result["status"] == "done" for result in results)
+    folders = [tmp_path / f"{row['test']}_{abs(float(row['temperature'])):g}K" for row in rows]
+    component = {"tension": 1, "shear": 3}
+    results = [of_its_path(row, folder, component[row["test"]]) for row, folder in zip(rows, folders, strict=True)]
     cooled = [result for result in results if len(result["case"]["path"]["waypoints"]) == 2]
     assert all(result["path"][-1]["temperature"] == -100.0 for result in cooled)

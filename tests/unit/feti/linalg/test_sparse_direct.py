@@ -35,7 +35,6 @@ def test_solvers_return_the_unknowns_that_made_the_right_hand_side(columns):
     np.testing.assert_allclose(DirectSolver(A, "test_").solve(A @ x), x, atol=1e-10)
 
 
-@pytest.mark.slow
 def solved_with_a_near_kernel(A, numbers):
     """By the solver of all ranks."""
     solver = DistributedSolver(MPI.COMM_WORLD, len(numbers), numbers, A, "test_", np.ones((len(numbers), 3)))
@@ -43,6 +42,7 @@ def solved_with_a_near_kernel(A, numbers):
     solver.destroy()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "make",
     [
