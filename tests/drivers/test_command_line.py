@@ -126,7 +126,10 @@ def test_plot_draws_what_the_run_did_not_and_needs_the_fields_alone(tmp_path):
 def test_plot_of_an_empty_folder_names_the_missing_file(tmp_path):
     job = command_line(1, "plot", tmp_path)
     assert job.returncode == 2 and job.stdout == ""
-    assert re.fullmatch(rf"error: cannot read {tmp_path}/result\.h5: .*\n", job.stderr)
+    assert (
+        job.stderr.startswith(f"error: cannot read {tmp_path}/result.h5: No such file")
+        and "Traceback" not in job.stderr
+    )
 
 
 def test_without_fields_only_the_json_is_written_and_nothing_drawn(tmp_path):

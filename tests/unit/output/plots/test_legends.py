@@ -230,6 +230,34 @@ def test_curves_of_the_page_have_their_names_and_units() -> None:
     assert [found["counts"][2][name].tolist() for name in names] == [[5] * 3, [2] * 3, [3] * 3]
 
 
+@pytest.mark.parametrize("kind", ["stiffness", "stress"])
+def test_curves_against_the_angle_have_their_names_and_units(kind: str) -> None:
+    """C11 and so on are the entries of that place, in the picture and on the page."""
+    numbers = 10.0 * np.arange(1.0, 4.0)[:, None] + np.arange(1.0, 4.0) if kind == "stiffness" else [11.0, 22.0, 12.0]
+    document = path_of([])
+    points = [{"angle": a, kind: ((1 + a) * np.array(numbers)).tolist(), "strain": [0.1, 0, 0]} for a in (0, 1)]
+    counts = {"bonded": 5, "open": 3, "closed": 2}
+    document |= {"angle": [counts | point for point in points], "path": None}
+    document["case"] |= {"angle": {}, "analysis": {"type": "angle", "plane": "strain"}}
+    what = {"stiffness": "effective stiffness", "stress": "macroscopic stress"}[kind]
+    ((_, label, found),) = panels(response_curves._angle(document))
+    _, beside, interactive_ones = curves(interactive.figures(document)["curve"])
+    assert (label, beside) == (f"{what} (GPa)",) * 2
+    named = {name: values for name, values in found.items() if name.startswith("$")}
+    assert len(named) == len(interactive_ones) >= 3
+    for name, values in (named | interactive_ones).items():
+        place = float("".join(letter for letter in name if letter.isdigit()))
+        assert list(values) == [place, 2 * place], name
+
+
+def test_youngs_modulus_of_an_isotropic_material_is_the_same_in_all_directions() -> None:
+    bulk, shear = 5.0, 2.0
+    C = [[bulk + shear, bulk - shear, 0.0], [bulk - shear, bulk + shear, 0.0], [0.0, 0.0, shear]]
+    case = {"case": {"output": {"stress_unit": "GPa"}}, "moduli": {}, "effective_stiffness": C}
+    _, label, found = curves(interactive.figures(case)["young"])
+    assert label == "E (GPa)" and found["E"] == pytest.approx(4 * bulk * shear / (bulk + shear))
+
+
 def test_tractions_and_jumps_have_their_names_and_units(tmp_path: Path, monkeypatch: Any) -> None:
     """Beside half of the fibre, from its lower left corner: where each of the sample's ten nodes is."""
     whole = sample(4)
