@@ -1,0 +1,148 @@
+"""Cases that say the same in other words: in other units, in another order, with a path cut in two."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from differential.random_cells import MESH
+from differential.random_loads import NAMES, components
+from differential.random_phases import Document
+
+# Exponents of the units of stress and length of the keys that have one.
+STRESSES = {
+    "young", "E1", "E2", "E3", "G12", "G13", "G23", "E_axial", "E_transverse", "G_axial", "stiffness",
+    "normal_strength", "tangential_strength", "axial_strength", *NAMES[6][1],
+}  # fmt: skip
+SPRINGS = {"normal_stiffness", "tangential_stiffness", "axial_stiffness"}
+LENGTHS = {"width", "height", "fibre_radius", "radii", "x", "y", "radius", "a", "b", "inner_radius"}
+EXPONENTS = (
+    dict.fromkeys(STRESSES, (1, 0)) | dict.fromkeys(SPRINGS, (1, -1)) | dict.fromkeys(LENGTHS, (0, 1))
+    | {"toughness": (1, 1)}
+)  # fmt: skip
+
+
+def in_units(value: Any, stress: float, length: float, name: str = "") -> Any:
+    """A case in units in which a stress of 1 is `stress`."""
+    if isinstance(value, Mapping):
+        inner = {k: in_units(v, stress, length, k if name != "radii" else name) for k, v in value.items()}
+        if name == "cell" and not value.keys() & {"width", "fibre_radius", "file"} and length != 1.0:
+            inner["width"] = length  # of 1, which is no key
+        return inner
+    if isinstance(value, list) and name not in EXPONENTS:
+        return [in_units(item, stress, length, name) for item in value]
+    if name not in EXPONENTS or isinstance(value, str):
+        return value
+    a, b = EXPONENTS[name]
+    return (np.asarray(value, float) * stress**a * length**b).tolist()
+
+
+def scale_mesh(source: Path, target: Path, length: float) -> None:
+    """Write the mesh of a folder to another one, `length` times as large."""
+    lines = (source / MESH).read_text().splitlines()
+    first = lines.index("$Nodes") + 2
+    for row in range(first, first + int(lines[first - 1])):
+        number, x, y, z = lines[row].split()
+        lines[row] = f"{number} {float(x) * length!r} {float(y) * length!r} {z}"
+    (target / MESH).write_text("\n".join([*lines, ""]))
+
+
+def sections(document: Mapping[str, Any]) -> list[Document]:
+    """The sections of interfaces."""
+    given = document.get("interface", [])
+    return given if isinstance(given, list) else [given]
+
+
+def reordered(rng: np.random.Generator, document: Document) -> tuple[Document, list[int], list[int]]:
+    """The case with keys, fibres, arcs and sections of interfaces in another order; of each fibre, and of each section,
+    the place that it had."""
+    case = copy.deepcopy(document)
+    fibres, places = _shuffled_rows(rng, case["cell"])
+    for section in sections(case):
+        if "between" in section:
+            section["between"] = section["between"][::-1]
+        arcs = section.get("debonded", [])
+        for arc in arcs:
+            if places and arc["fibre"] != "all":
+                arc["fibre"] = places.index(arc["fibre"] - 1) + 1
+        if arcs:
+            section["debonded"] = [arcs[k] for k in rng.permutation(len(arcs))]
+    order = rng.permutation(len(sections(case))).tolist()
+    if len(order) > 1:
+        case["interface"] = [case["interface"][k] for k in order]
+    return _reversed_keys(case), fibres, order
+
+
+def _shuffled_rows(rng: np.random.Generator, cell: Document) -> tuple[list[int], list[int]]:
+    """Reorder the rows of a table; of each fibre the number, from 0, that it had, twice."""
+    rows = cell.get("fibre_list", [])
+    order = rng.permutation(len(rows)).tolist()
+    if rows:
+        cell["fibre_list"] = [rows[k] for k in order]
+    solid = [k for k, row in enumerate(rows) if row.get("phase") != "void"]
+    own = [solid.index(k) for k in order if k in solid]
+    return own, own
+
+
+def _reversed_keys(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {k: _reversed_keys(v) for k, v in reversed(value.items())}
+    return [_reversed_keys(item) for item in value] if isinstance(value, list) else value
+
+
+def relabelled(result: Any, fibres: Sequence[int], order: Sequence[int]) -> Any:
+    """A result of `reordered` whose fibres and sections have the numbers that they had."""
+    if isinstance(result, list | tuple):
+        return [relabelled(item, fibres, order) for item in result]
+    if not isinstance(result, Mapping):
+        return result
+    found = {k: relabelled(v, fibres, order) for k, v in result.items()}
+    if fibres and {"debonded_length", "debonding_angle"} <= found.keys():
+        back = np.argsort(fibres)
+        found |= {name: [found[name][k] for k in back] for name in ("debonded_length", "debonding_angle")}
+    if "debonded_shares" in found:
+        found["debonded_shares"] = [found["debonded_shares"][k] for k in np.argsort(order)]
+    if isinstance(found.get("fibres"), list) and fibres:
+        found["fibres"] = [found["fibres"][k] | {"number": n + 1} for n, k in enumerate(np.argsort(fibres).tolist())]
+    if "G_I" in found:
+        found = _relabelled_tips(found, fibres, order)
+    return found
+
+
+def _relabelled_tips(tips: Document, fibres: Sequence[int], order: Sequence[int]) -> Document:
+    """The tips in the order of load, fibre, section, and within these as they are."""
+    own = [(fibres[f - 1] if fibres else f - 1) + 1 for f in tips["fibre"]]
+    section = [order[i - 1] + 1 for i in tips.get("interface", [1] * len(own))]
+    load = tips.get("load", [""] * len(own))
+    seen = {name: k for k, name in enumerate(dict.fromkeys(load))}
+    rows = sorted(range(len(own)), key=lambda k: (seen[load[k]], own[k], section[k] if "interface" in tips else 0, k))
+    new = tips | {"fibre": own} | ({"interface": section} if "interface" in tips else {})
+    return {name: [values[k] for k in rows] for name, values in new.items()}
+
+
+def full(load: Any, before: Mapping[str, float], plane: str, expands: bool) -> dict[str, float]:
+    """A load of a path with a value of every component, given strain or stress; `before` is the one before."""
+    strains, stresses = NAMES[components(plane)]
+    named = dict(zip(strains, load, strict=True)) if isinstance(load, list) else dict(load)
+    result = dict(before) or dict.fromkeys(stresses, 0.0)
+    for strain, stress in zip(strains, stresses, strict=True):
+        for name, other in ((strain, stress), (stress, strain)):
+            if name in named:
+                result.pop(other, None)
+                result[name] = named[name]
+    if expands:
+        result["temperature"] = named.get("temperature", before.get("temperature", 0.0))
+    return result
+
+
+def waypoints(path: Mapping[str, Any]) -> list[Any]:
+    """The loads of a section [path]."""
+    return list(path["waypoints"]) if "waypoints" in path else [path["strain"] if "strain" in path else path["to"]]
+
+
+def between(begin: Mapping[str, float], end: Mapping[str, float], share: float) -> dict[str, float]:
+    """The load after a share of the way to `end`; `begin` has strains and stresses of all components."""
+    return {name: (1 - share) * begin.get(name, 0.0) + share * value for name, value in end.items()}

@@ -1,0 +1,240 @@
+"""Solve the states of a result once more by SciPy: bodies, bonds and contact assembled anew from result.h5 and the case.
+
+It shares with the program the mesh, normals and lengths of the interfaces, which `verify` checks, and which bonds hold
+and which faces touch.  u = (u1, u2, u3) is u* of all nodes, one for each constituent at each place of the torus.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from differential.transforms import sections
+from reference.spatial_forms import law
+from reference.spatial_programme import elements
+from scipy.sparse import block_diag, bmat, coo_matrix, csr_matrix, diags, identity
+from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import splu
+from scipy.spatial import cKDTree
+
+IN_PLANE = [0, 1, 5]
+NEAR = 1e-7  # of places / size of the cell
+FREE = 1e-9  # a stiffness, relative to the largest, of motions that nothing resists
+REFINEMENTS = 6
+OPEN, CLOSED, BONDED = 2, 1, 0
+
+
+@dataclass(frozen=True)
+class Twin:
+    """Deviations of a state: stress and energy relative to their largest; contact, what opens or overlaps wrongly."""
+
+    stress: float
+    energy: float
+    contact: float
+
+
+def phase_law(material: Any, plane: str) -> tuple[np.ndarray, np.ndarray]:
+    """C (6, 6) and expansion (6,); of a plane state what acts in the plane, and anything along x3."""
+    alpha = np.zeros(6)
+    if len(np.shape(material.get("stiffness", np.eye(6)))) and np.shape(material.get("stiffness", np.eye(6))) == (3, 3):
+        L = np.array(material["stiffness"], float)
+    else:
+        C, own = law(material)
+        if plane == "generalized":
+            return C, alpha if own is None else own
+        L = C[np.ix_(IN_PLANE, IN_PLANE)]
+        if plane == "stress":
+            L = np.linalg.inv(np.linalg.inv(C)[np.ix_(IN_PLANE, IN_PLANE)])
+    C = np.eye(6) * L.max()
+    C[np.ix_(IN_PLANE, IN_PLANE)] = L
+    return C, alpha
+
+
+class SolvedAnew:
+    """The cell of a folder of results."""
+
+    def __init__(self, folder: Path) -> None:
+        self.document = json.loads((folder / "result.json").read_text())
+        self.file = h5py.File(folder / "result.h5", "r")
+        self.size = np.array([self.file.attrs["width"], self.file.attrs["height"]], float)
+        self.plane = self.document["case"]["analysis"]["plane"]
+        self._number_nodes()
+        self._assemble()
+        self._join_faces()
+
+    def _number_nodes(self) -> None:
+        """One number for each constituent at each place: nodes are joined by elements of a phase, and where they meet."""
+        mesh = {name: self.file[f"mesh/{name}"][()] for name in ("points", "triangles", "phase")}
+        self.points, self.triangles, self.phase = mesh["points"], mesh["triangles"], mesh["phase"]
+        n = len(self.points)
+        wrapped = np.mod(self.points / self.size, 1.0) % 1.0
+        pairs = cKDTree(wrapped, boxsize=1.0).query_pairs(NEAR, output_type="ndarray")
+        of_phase = np.zeros(n, int)
+        of_phase[self.triangles] = self.phase[:, None]
+        alike = pairs[of_phase[pairs[:, 0]] == of_phase[pairs[:, 1]]]
+        self.place = _components(n, pairs)
+        self.node = _components(n, alike)
+        edges = np.concatenate([self.node[self.triangles[:, [0, k]]] for k in range(1, self.triangles.shape[1])])
+        count = int(self.node.max()) + 1
+        body = _components(count, edges)
+        # Where one body touches itself its nodes are one; so they are where a body has been cut.
+        self.n, self.body = count, body
+
+    def _assemble(self) -> None:
+        case, plane = self.document["case"], self.plane
+        names = [str(name) for name in self.file.attrs["phases"]]
+        K, Q, rows = [], np.zeros((3 * self.n, 7)), []
+        self.mean = np.zeros((7, 7))
+        for number, name in enumerate(names):
+            own = self.triangles[self.phase == number]
+            if not len(own):
+                continue
+            C, alpha = phase_law(case["material"].get(name, case["material"].get(name.split(":")[0])), plane)
+            k, q, area = elements(self.points[own], C, alpha)
+            dofs = (3 * self.node[own][:, :, None] + np.arange(3)).reshape(len(own), -1)
+            np.add.at(Q, dofs, q)
+            K.append(k.ravel())
+            width = dofs.shape[1]
+            rows.append((np.repeat(dofs, width, axis=1).ravel(), np.tile(dofs, width).ravel()))
+            imposed = np.column_stack([np.eye(6), -alpha])
+            self.mean += area.sum() * imposed.T @ C @ imposed
+        entries = np.concatenate(K), tuple(np.concatenate(x) for x in zip(*rows, strict=True))
+        self.K = coo_matrix(entries, shape=(3 * self.n,) * 2).tocsr()
+        self.Q = Q
+
+    def _join_faces(self) -> None:
+        """The faces of the interface nodes, and which other nodes at one place are one."""
+        own = self.file["interface"]
+        self.fibre, self.matrix = (self.node[own[f"{side}_node"][()]] for side in ("fibre", "matrix"))
+        normal, self.length = own["normal"][()], own["length"][()]
+        self.k = len(self.length)
+        zero = np.zeros(self.k)
+        n, t = np.column_stack([normal, zero]), np.column_stack([-normal[:, 1], normal[:, 0], zero])
+        self.frame = np.stack([n, t, np.tile([0.0, 0.0, 1.0], (self.k, 1))], axis=1).reshape(self.k, 3, 3)
+        place_of = np.zeros(self.n, int)
+        place_of[self.node] = self.place
+        parted = np.isin(place_of, place_of[self.fibre])
+        first = np.full(place_of.max() + 1, -1)
+        first[place_of] = np.arange(self.n)
+        self.joined = np.where(parted, np.arange(self.n), first[place_of])
+        pair = own["pair"][()] if "pair" in own else np.zeros(self.k, int)
+        self.springs = self._springs()[pair] if self.k else np.zeros((0, 3))
+
+    def _springs(self) -> np.ndarray:
+        """(sections, 3) stiffnesses of bonds, inf of glue."""
+        found = []
+        for section in sections(self.document["case"]) or [{}]:
+            n, t = (section.get(f"{side}_stiffness") or np.inf for side in ("normal", "tangential"))
+            found.append([n, t, section.get("axial_stiffness") or t])
+        return np.array([[float(x) for x in row] for row in found])
+
+    def compare(self, number: int) -> Twin:
+        """The deviations of state `number`."""
+        state = self.file[f"state/{number}"]
+        status = state["status"][()]
+        load, stress = self._loads(state)
+        holds = np.column_stack([status != OPEN, status == BONDED, status == BONDED])
+        glued, sprung = holds & np.isinf(self.springs), holds & np.isfinite(self.springs)
+        whole = glued.all(axis=1)
+        jumps = self._jumps()
+        stiff = diags((np.where(sprung, self.springs, 0.0) * self.length[:, None]).ravel())
+        T = self._together(whole)
+        held = (glued & ~whole[:, None]).ravel()
+        C = (jumps[held] @ T).tocsr()
+        K = self.K + jumps.T @ stiff @ jumps
+        u, force = _solved((T.T @ K @ T).tocsr(), C, -T.T @ (self.Q @ load))
+        u = T @ u
+        area = float(self.size.prod())
+        found = (self.mean @ load + self.Q.T @ u) / area
+        energy = (load @ self.mean @ load / 2 + load @ self.Q.T @ u + u @ (K @ u) / 2) / area
+        v = len(stress)
+        found = found[:6] if v == 6 else found[IN_PLANE]
+        size = max(np.abs(stress).max(), self._least(load))
+        entry = self._entry(state)
+        stored = entry.get("stored") if entry else None
+        off = 0.0 if stored is None else abs(energy - stored) / max(abs(stored), self._least(load) * _largest(load))
+        return Twin(float(np.abs(found - stress).max() / size), off, self._contact(status, jumps @ u, held, force, entry))
+
+    def _loads(self, state: Any) -> tuple[np.ndarray, np.ndarray]:
+        strain, stress = (np.array(state.attrs[name], float) for name in ("strain", "stress"))
+        load = np.zeros(7)
+        load[:6] = strain if len(strain) == 6 else 0.0
+        if len(strain) == 3:
+            load[IN_PLANE] = strain
+        load[6] = float(state.attrs.get("temperature", 0.0))
+        return load, stress
+
+    def _least(self, load: np.ndarray) -> float:
+        """A stress by which those that are next to nothing are measured."""
+        return 1e-9 * float(np.abs(self.mean[:6] @ load).max() / self.size.prod()) or 1.0
+
+    def _entry(self, state: Any) -> Any:
+        """What result.json says of a state, if it is of a path or a load."""
+        if "path" in self.document:
+            return self.document["path"][int(state.attrs["point"])]
+        return self.document.get("load")
+
+    def _jumps(self) -> csr_matrix:
+        """(3k, 3n) rows n, t and x3 of u_matrix - u_fibre."""
+        rows = np.repeat(np.arange(3 * self.k), 3)
+        parts = []
+        for node, sign in ((self.matrix, 1.0), (self.fibre, -1.0)):
+            columns = np.repeat(3 * node[:, None] + np.arange(3), 3, axis=0).ravel()
+            parts.append(csr_matrix((sign * self.frame.ravel(), (rows, columns)), shape=(3 * self.k, 3 * self.n)))
+        return parts[0] + parts[1]
+
+    def _together(self, whole: np.ndarray) -> csr_matrix:
+        """(3n, free) displacements of all nodes from those of one of each joined set."""
+        pairs = np.concatenate(
+            [np.column_stack([np.arange(self.n), self.joined]), np.column_stack([self.fibre, self.matrix])[whole]]
+        )
+        number = _components(self.n, pairs)
+        count = int(number.max()) + 1
+        one = csr_matrix((np.ones(self.n), (np.arange(self.n), number)), shape=(self.n, count))
+        return block_diag([one] * 3).tocsr()[_interleaved(self.n)][:, _interleaved(count)]
+
+    def _contact(self, status: Any, jump: Any, held: Any, force: Any, entry: Any) -> float:
+        """How far open faces overlap / largest jump, or closed ones pull / largest force; of no free fibre."""
+        contact = any(section.get("contact", False) for section in sections(self.document["case"]))
+        if not contact or not self.k or not entry or entry.get("free_motions", 0):
+            return 0.0
+        forces = np.zeros(3 * self.k)
+        forces[held] = -force
+        pull = (forces + np.where(np.isfinite(self.springs), self.springs, 0.0).ravel() * np.repeat(self.length, 3) * jump)
+        gap, normal = jump.reshape(-1, 3)[:, 0], pull.reshape(-1, 3)[:, 0]
+        largest_gap, largest_pull = np.abs(jump).max(initial=0.0), np.abs(pull).max(initial=0.0)
+        overlap = float(np.max(-gap[status == OPEN], initial=0.0)) / (largest_gap or 1.0)
+        return max(overlap, float(np.max(normal[status == CLOSED], initial=0.0)) / (largest_pull or 1.0))
+
+
+def _largest(load: np.ndarray) -> float:
+    return float(np.abs(load[:6]).max()) or 1.0
+
+
+def _components(n: int, pairs: np.ndarray) -> np.ndarray:
+    """(n,) number of the connected component of each of n."""
+    ones = np.ones(len(pairs))
+    return np.asarray(connected_components(coo_matrix((ones, pairs.T), shape=(n, n)), directed=False)[1])
+
+
+def _interleaved(n: int) -> np.ndarray:
+    """(3n,) places in [all u1, all u2, all u3] of dofs node by node."""
+    return np.asarray((np.arange(n)[:, None] + n * np.arange(3)).ravel())
+
+
+def _solved(K: Any, C: Any, f: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """K u - C^T force = f, C u = 0, and motions that nothing resists are small: by refinement with a little stiffness."""
+    m, n = C.shape
+    scale = K.diagonal().max()
+    borders = bmat([[K, -C.T * scale], [-C * scale, csr_matrix((m, m))]]).tocsc() if m else K.tocsc()
+    more = block_diag([FREE * scale * identity(n), csr_matrix((m, m))]).tocsc() if m else FREE * scale * identity(n)
+    factor = splu((borders + more).tocsc())
+    b = np.r_[f, np.zeros(m)]
+    x = np.zeros(len(b))
+    for _ in range(REFINEMENTS):
+        x += factor.solve(b - borders @ x)
+    return x[:n], x[n:] * scale
