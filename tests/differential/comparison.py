@@ -111,10 +111,14 @@ def group(path: str) -> str:
     return path
 
 
+def _in_words(value: Any) -> bool:
+    return isinstance(value, str | bool) or (isinstance(value, list) and any(isinstance(item, str) for item in value))
+
+
 def _sizes(kinds: Mapping[str, Sequence[Any]]) -> dict[str, float]:
     sizes: dict[str, float] = {}
     for path, values in kinds.items():
-        if not isinstance(values[0], str | bool):
+        if not any(map(_in_words, values)):
             largest = max(np.abs(np.asarray(value, float)).max(initial=0.0) for value in values)
             sizes[group(path)] = max(sizes.get(group(path), 0.0), float(largest))
     return sizes
@@ -123,13 +127,13 @@ def _sizes(kinds: Mapping[str, Sequence[Any]]) -> dict[str, float]:
 def _deviation(path: str, base: Any, other: Any, sizes: Mapping[str, float]) -> float:
     ours, theirs = base[path], other[path]
     record, _, name = path.rpartition(".")
-    if isinstance(ours[0], str | bool) or (isinstance(ours[0], list) and ours[0] and isinstance(ours[0][0], str)):
+    if any(map(_in_words, ours)):
         return 0.0 if ours == theirs else DIFFERENT
     shapes = [[np.shape(value) for value in values] for values in (ours, theirs)]
     if shapes[0] != shapes[1]:
         return DIFFERENT
     a, b = (np.concatenate([np.ravel(np.asarray(v, float)) for v in values]) for values in (ours, theirs))
-    if name in COUNTS:
+    if name in COUNTS and not record.endswith("fractions"):  # of phases, which may be fibres
         return 0.0 if np.array_equal(a, b) else DIFFERENT
     off = np.abs(a - b)
     if name in DIRECTIONS or name == "psi":

@@ -23,6 +23,7 @@ from scipy.spatial import cKDTree
 
 IN_PLANE = [0, 1, 5]
 NEAR = 1e-7  # of places / size of the cell
+LEAST = 1e-3  # share of the stress of a uniform strain
 FREE = 1e-9  # a stiffness, relative to the largest, of motions that nothing resists
 REFINEMENTS = 6
 OPEN, CLOSED, BONDED = 2, 1, 0
@@ -169,8 +170,8 @@ class SolvedAnew:
         return load, stress
 
     def _least(self, load: np.ndarray) -> float:
-        """A stress by which those that are next to nothing are measured."""
-        return 1e-9 * float(np.abs(self.mean[:6] @ load).max() / self.size.prod()) or 1.0
+        """A stress by which small ones are measured, which are what is left of larger ones."""
+        return LEAST * float(np.abs(self.mean[:6] @ load).max() / self.size.prod()) or 1.0
 
     def _entry(self, state: Any) -> Any:
         """What result.json says of a state, if it is of a path or a load."""

@@ -1,0 +1,174 @@
+"""Run random cases on all ranks of a job and check the relations that each draws.
+
+First each rank takes cases for itself, as it comes to them; then all solve every case together.
+"""
+
+from __future__ import annotations
+
+import os
+import traceback
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomli_w
+from differential.paths import document_of
+from differential.random_cases import RELATIONS, Drawn, draw, stream
+from differential.relations import ALWAYS, DRAWN, RANKS, Relation, Setting
+
+from feti_homog import run
+from feti_homog.common.mpi_errors import end_job, on_root
+from feti_homog.errors import CaseError, FetiHomogError, MeshError, NotCarriedError
+
+# Relations that a case draws, and the share of cases that try one of these on all ranks.
+DRAWN_PER_CASE = 2
+SHARE_ON_ALL_RANKS = 0.25
+NOT_CARRIED = "prescribe strains there"  # of a path that ends since nothing carries the stresses any more
+HELD, REFUSED, FAILED = "held", "refused", "FAILED"
+RUNS = "runs"
+
+
+@dataclass(frozen=True)
+class Row:
+    """What came of a relation of a case; `verdict` is HELD, REFUSED or FAILED."""
+
+    number: int
+    relation: str
+    verdict: str
+    deviation: float = 0.0
+    tolerance: float = 0.0
+    words: str = ""
+    note: str = ""
+
+
+def examine(comm: Any, seed: int, numbers: Sequence[int], folder: Path, of_each: int = DRAWN_PER_CASE) -> list[Row]:
+    """The rows of all cases, on every rank.  Collective; `folder` is one that all ranks see."""
+    from mpi4py import MPI
+
+    own = [row for number in numbers if _claimed(folder, number)
+           for row in _alone(MPI.COMM_SELF, seed, number, folder / f"case-{number}", of_each)]  # fmt: skip
+    rows = [row for of_rank in comm.allgather(own) for row in of_rank]
+    ran = {row.number for row in rows if row.relation == RUNS and row.verdict == HELD}
+    for number in (n for n in numbers if n in ran):
+        try:
+            rows += _together(comm, seed, number, folder / f"case-{number}")
+        except Exception as error:  # of one rank, perhaps: the others wait
+            print(f"case {number} of seed {seed}, on {comm.size} ranks", flush=True)
+            end_job(comm, error)
+    return sorted(rows, key=lambda row: row.number)
+
+
+def _claimed(folder: Path, number: int) -> bool:
+    """Whether this rank is the first that comes to a case."""
+    try:
+        os.close(os.open(folder / f"claimed-{number}", os.O_CREAT | os.O_EXCL))
+    except FileExistsError:
+        return False
+    return True
+
+
+def _alone(comm: Any, seed: int, number: int, folder: Path, of_each: int) -> list[Row]:
+    """The rows of a case on one rank."""
+    folder.mkdir()
+    try:
+        drawn = draw(seed, number, folder)
+        run(drawn.case, comm, out=folder / "out")
+    except Exception as error:
+        return [_of_error(number, RUNS, error, (CaseError, MeshError, NotCarriedError))]
+    rows, base = [Row(number, RUNS, HELD)], document_of(folder / "out")
+    for relation in (*ALWAYS, *chosen(drawn, base, of_each)):
+        rows.append(_checked(comm, relation, drawn, base, folder))
+    return rows
+
+
+def chosen(drawn: Drawn, base: Any, count: int) -> list[Relation]:
+    """The relations that a case draws of those that it has, by their weights."""
+    rng = stream(drawn.seed, drawn.number, RELATIONS)
+    having = [relation for relation in DRAWN if relation.applies(drawn, base)]
+    weights = np.array([relation.weight for relation in having], float)
+    count = min(count, len(having))
+    return [having[k] for k in sorted(rng.choice(len(having), count, replace=False, p=weights / weights.sum()))]
+
+
+def _together(comm: Any, seed: int, number: int, folder: Path) -> list[Row]:
+    """The rows of a case on all ranks.  Collective."""
+    drawn, base = Drawn(seed, number, on_root(comm, lambda: draw(seed, number, folder).document), folder), None
+    base = on_root(comm, document_of, folder / "out")
+    rows = [_checked(comm, RANKS, drawn, base, folder)]
+    if stream(seed, number, RELATIONS).random() < SHARE_ON_ALL_RANKS:
+        rows += [_checked(comm, relation, drawn, base, folder) for relation in chosen(drawn, base, 1)]
+    return rows
+
+
+def _checked(comm: Any, relation: Relation, drawn: Drawn, base: Any, folder: Path) -> Row:
+    """The row of a relation; random numbers are those of its name.  Collective over `comm`."""
+    name = f"{relation.name}, {comm.size} ranks" if comm.size > 1 and relation is not RANKS else relation.name
+    work = folder / name.replace(" ", "-")
+    on_root(comm, lambda: work.mkdir())
+    rng = np.random.default_rng([drawn.seed, drawn.number, *relation.name.encode()])
+    try:
+        found = relation.check(Setting(drawn, base, folder / "out", comm, rng, work))
+    except FetiHomogError as error:
+        return _of_error(drawn.number, name, error, relation.refusals)
+    except Exception as error:
+        if comm.size > 1:
+            raise
+        return _of_error(drawn.number, name, error, ())
+    tolerance = relation.tolerance(drawn.rtol)
+    verdict = HELD if found.deviation <= tolerance else FAILED
+    return Row(drawn.number, name, verdict, found.deviation, tolerance, found.what, found.note)
+
+
+def _of_error(number: int, relation: str, error: Exception, refusals: tuple[type[Exception], ...]) -> Row:
+    """The row of a relation, or a case, whose run raised."""
+    refused = isinstance(error, refusals) or (isinstance(error, FetiHomogError) and NOT_CARRIED in str(error))
+    words = f"{type(error).__name__}: {error}"
+    if not isinstance(error, FetiHomogError):
+        words = "".join(traceback.format_exception(error))
+    return Row(number, relation, REFUSED if refused else FAILED, np.inf, 0.0, words)
+
+
+def complaints(seed: int, rows: Sequence[Row], documents: Callable[[int], str]) -> str:
+    """What failed: seed, relation, deviation and the case file."""
+    failed = [row for row in rows if row.verdict == FAILED]
+    return "\n".join(
+        f"== case {row.number} of seed {seed}: {row.relation}: {row.words}: {row.deviation:.1e}, "
+        f"at most {row.tolerance:.1e}\n{documents(row.number)}"
+        for row in failed
+    )
+
+
+def case_text(seed: int, number: int, folder: Path) -> str:
+    """The case file of a case, as TOML."""
+    return tomli_w.dumps(_plain(draw(seed, number, folder).document))
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {k: _plain(v) for k, v in value.items()}
+    if isinstance(value, list):
+        return [_plain(v) for v in value]
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def table(rows: Sequence[Row]) -> str:
+    """The worst deviation of each relation, how many cases were compared, in part, or not at all."""
+    lines = ["| relation | compared | in part | refused | failed | worst deviation | of its tolerance | case | in |",
+             "|---|---|---|---|---|---|---|---|---|"]  # fmt: skip
+    for name in dict.fromkeys([RUNS, *(relation.name for relation in (*ALWAYS, RANKS, *DRAWN)), *sorted({row.relation for row in rows})]):
+        own = [row for row in rows if row.relation == name]
+        if not own:
+            lines.append(f"| {name} | 0 | | | | | | | |")
+            continue
+        compared = [row for row in own if row.verdict != REFUSED]
+        counts = [len(compared), sum(bool(row.note) for row in compared), len(own) - len(compared),
+                  sum(row.verdict == FAILED for row in own)]  # fmt: skip
+        worst = max(compared, key=lambda row: row.deviation, default=None)
+        words = "" if worst is None or worst.deviation == 0 else (
+            f"{worst.deviation:.0e} | {worst.deviation / (worst.tolerance or 1):.0e} | {worst.number} | "
+            f"{worst.words.splitlines()[0][:60] if worst.words else ''}"
+        )  # fmt: skip
+        lines.append(f"| {name} | {' | '.join(map(str, counts))} | {words or '0 | | |'} |")
+    return "\n".join(lines)
