@@ -1,6 +1,6 @@
-"""`mpirun -n 3 python -m differential [--cases N] [--seed S] [--only NUMBER] [--keep FOLDER]`, with tests/ on PYTHONPATH.
+"""Run random cases on all ranks of this job and print what failed, and the worst deviation of each relation.
 
-Exit code 1 if a relation fails, or none of a kind was compared in a run of the default length or more.
+Exit code 1 if a relation fails, too many cases are refused, or of a relation no case of CASES or more was compared.
 """
 
 from __future__ import annotations
@@ -9,13 +9,13 @@ import argparse
 import sys
 import tempfile
 import warnings
+from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from differential.job import FAILED, RUNS, case_text, complaints, examine, table
-from differential.relations import DRAWN
-
+from differential.job import DRAWN_PER_CASE, FAILED, REFUSED, RUNS, Row, case_text, complaints, examine, table
+from differential.relations import ALWAYS, DRAWN, RANKS
 from feti_homog.api import launch
 from feti_homog.common.mpi_errors import on_root
 
@@ -35,25 +35,30 @@ def parser() -> argparse.ArgumentParser:
 
 
 def main(words: argparse.Namespace, comm: Any) -> None:
-    """Examine the cases and tell.  Collective."""
+    """Examine the cases and print what came of them.  Collective."""
     warnings.filterwarnings("ignore", category=RuntimeWarning)
-    numbers = [words.only] if words.only is not None else range(words.first, words.first + words.cases)
-    of_each = len(DRAWN) if words.only is not None else None
+    alone = words.only is not None
+    numbers = [words.only] if alone else range(words.first, words.first + words.cases)
     with ExitStack() as stack:
         folder = Path(on_root(comm, lambda: _folder(stack, words.keep)))
-        rows = examine(comm, words.seed, numbers, folder, **({} if of_each is None else {"of_each": of_each}))
+        rows = examine(comm, words.seed, numbers, folder, len(DRAWN) if alone else DRAWN_PER_CASE)
         comm.barrier()
         if comm.rank == 0:
             print(complaints(words.seed, rows, lambda number: case_text(words.seed, number, folder)))
             print(table(rows), flush=True)
-    refused = sum(row.relation == RUNS and row.verdict != "held" for row in rows)
-    missing = {relation.name for relation in DRAWN} - {row.relation for row in rows}
-    if comm.rank == 0 and (refused > MOST_REFUSED * len(numbers) + 1 or (missing and len(numbers) >= CASES)):
-        print(f"{refused} cases were refused; nothing was compared of: {', '.join(missing) or 'none'}")
-    if any(row.verdict == FAILED for row in rows) or refused > MOST_REFUSED * len(numbers) + 1 or (
-        missing and len(numbers) >= CASES
-    ):  # fmt: skip
+    faults = too_little(rows, len(numbers))
+    if comm.rank == 0 and faults:
+        print("\n".join(faults))
+    if faults or any(row.verdict == FAILED for row in rows):
         raise SystemExit(1)
+
+
+def too_little(rows: Sequence[Row], cases: int) -> list[str]:
+    """What so many cases left out."""
+    refused = sum(row.relation == RUNS and row.verdict == REFUSED for row in rows)
+    missing = {relation.name for relation in (*ALWAYS, RANKS, *DRAWN)} - {row.relation for row in rows}
+    faults = [f"{refused} of {cases} cases were refused"] if refused > MOST_REFUSED * cases + 1 else []
+    return faults + [f"no case was compared: {name}" for name in sorted(missing) if cases >= CASES]
 
 
 def _folder(stack: ExitStack, keep: Path | None) -> str:

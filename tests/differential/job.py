@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 import tomli_w
+
 from differential.paths import document_of
 from differential.random_cases import RELATIONS, Drawn, draw, stream
 from differential.relations import ALWAYS, DRAWN, RANKS, Relation, Setting
-
 from feti_homog import run
 from feti_homog.common.mpi_errors import end_job, on_root
 from feti_homog.errors import CaseError, FetiHomogError, MeshError, NotCarriedError
@@ -47,11 +47,12 @@ def examine(comm: Any, seed: int, numbers: Sequence[int], folder: Path, of_each:
     """The rows of all cases, on every rank.  Collective; `folder` is one that all ranks see."""
     from mpi4py import MPI
 
-    own = [row for number in numbers if _claimed(folder, number)
-           for row in _alone(MPI.COMM_SELF, seed, number, folder / f"case-{number}", of_each)]  # fmt: skip
+    own: list[Row] = []
+    for number in numbers:
+        if _claimed(folder, number):
+            own += _alone(MPI.COMM_SELF, seed, number, folder / f"case-{number}", of_each)
     rows = [row for of_rank in comm.allgather(own) for row in of_rank]
-    ran = {row.number for row in rows if row.relation == RUNS and row.verdict == HELD}
-    for number in (n for n in numbers if n in ran):
+    for number in sorted(row.number for row in rows if row.relation == RUNS and row.verdict == HELD):
         try:
             rows += _together(comm, seed, number, folder / f"case-{number}")
         except Exception as error:  # of one rank, perhaps: the others wait
@@ -154,21 +155,21 @@ def _plain(value: Any) -> Any:
 
 
 def table(rows: Sequence[Row]) -> str:
-    """The worst deviation of each relation, how many cases were compared, in part, or not at all."""
-    lines = ["| relation | compared | in part | refused | failed | worst deviation | of its tolerance | case | in |",
-             "|---|---|---|---|---|---|---|---|---|"]  # fmt: skip
-    for name in dict.fromkeys([RUNS, *(relation.name for relation in (*ALWAYS, RANKS, *DRAWN)), *sorted({row.relation for row in rows})]):
-        own = [row for row in rows if row.relation == name]
-        if not own:
-            lines.append(f"| {name} | 0 | | | | | | | |")
-            continue
-        compared = [row for row in own if row.verdict != REFUSED]
-        counts = [len(compared), sum(bool(row.note) for row in compared), len(own) - len(compared),
-                  sum(row.verdict == FAILED for row in own)]  # fmt: skip
-        worst = max(compared, key=lambda row: row.deviation, default=None)
-        words = "" if worst is None or worst.deviation == 0 else (
-            f"{worst.deviation:.0e} | {worst.deviation / (worst.tolerance or 1):.0e} | {worst.number} | "
-            f"{worst.words.splitlines()[0][:60] if worst.words else ''}"
-        )  # fmt: skip
-        lines.append(f"| {name} | {' | '.join(map(str, counts))} | {words or '0 | | |'} |")
-    return "\n".join(lines)
+    """The worst deviation of each relation, and how many cases were compared, in part, or not at all."""
+    head = ("relation", "compared", "in part", "refused", "failed", "worst deviation", "/ tolerance", "case", "of")
+    known = [RUNS, *(relation.name for relation in (*ALWAYS, RANKS, *DRAWN))]
+    names = dict.fromkeys([*known, *sorted({row.relation for row in rows})])
+    lines = [head, ("---",) * len(head), *(_line(name, [r for r in rows if r.relation == name]) for name in names)]
+    return "\n".join(f"| {' | '.join(map(str, line))} |" for line in lines)
+
+
+def _line(name: str, rows: Sequence[Row]) -> tuple[Any, ...]:
+    """The line of a relation."""
+    compared = [row for row in rows if row.verdict != REFUSED]
+    in_part, failed = (sum(map(bool, of)) for of in ([r.note for r in compared], [r.verdict == FAILED for r in rows]))
+    counts = (name, len(compared), in_part, len(rows) - len(compared), failed)
+    worst = max(compared, key=lambda row: row.deviation, default=None)
+    if worst is None or not worst.deviation:
+        return (*counts, 0, "", "", "")
+    share = worst.deviation / worst.tolerance if worst.tolerance else np.inf
+    return (*counts, f"{worst.deviation:.0e}", f"{share:.0e}", worst.number, worst.words.split("\n")[0][:60])

@@ -9,6 +9,7 @@ from typing import Any
 
 import h5py
 import numpy as np
+
 from differential.comparison import DIFFERENT, apart
 from differential.transforms import sections, waypoints
 
@@ -34,18 +35,17 @@ def keyed(path: Sequence[Point], legs: int, by_steps: bool) -> dict[tuple[Any, .
 
 
 def paths_apart(base: Any, other: Any, folder: Path) -> tuple[list[tuple[float, str]], str]:
-    """Deviations of the points that both have, and in words where they part because loads tie; `folder` has the files of
-    the base."""
-    section = base["case"]["path"]
+    """The deviations of the points that both have, and in words where they part because loads tie.
+
+    `folder` has the files of the base."""
+    section, note = base["case"]["path"], ""
     legs, by_steps = len(waypoints(section)), section.get("method") == "increments"
     ours, theirs = (keyed(document["path"], legs, by_steps) for document in (base, other))
     common = list(ours)
-    note = ""
-    first = next((k for k, key in enumerate(common) if not _alike(ours[key], theirs.get(key))), None)
-    if first is None and len(ours) == len(theirs):
-        pass
-    else:
-        place = base["path"].index(ours[common[first if first is not None else -1]])
+    alike = [_alike(ours[key], theirs.get(key)) for key in common]
+    if not all(alike) or len(ours) != len(theirs):
+        first = alike.index(False) if not all(alike) else len(common) - 1
+        place = base["path"].index(ours[common[first]])
         if not any(ties(base, folder, number) for number in range(max(place - 1, 0), place + 1)):
             return [(DIFFERENT, f"path: other breaks from point {place}")], ""
         note, common = f"loads tie at point {place}", common[:first]

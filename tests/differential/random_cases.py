@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+
 from differential.random_cells import random_cell
 from differential.random_loads import random_bonds, random_loads
 from differential.random_phases import Document, random_phases
-
 from feti_homog import Case
 
 ANALYSES = {"stiffness": 0.2, "angle": 0.1, "path": 0.4, "load": 0.15, "envelope": 0.15}
@@ -20,6 +20,12 @@ SOLVERS: tuple[Document, ...] = (
     {"feti_pc_type": "lumped"},
     {"feti_coarse_space": "adaptive"},
     {"feti_dual_operator": "implicit"},
+)
+DECOMPOSITIONS: tuple[Document, ...] = (
+    {},
+    {"decomposition": {"subdomains": 4}},
+    {"decomposition": {"subdomains": 7}},
+    {"decomposition": {"max_dofs": 200}},
 )
 # Streams of random numbers of a case: those of one do not depend on how many others draw.
 CASE, RELATIONS = 0, 1
@@ -68,7 +74,6 @@ def draw(seed: int, number: int, folder: Path) -> Drawn:
     """Case `number` of a seed; a user's mesh is written to `folder`."""
     rng = stream(seed, number, CASE)
     analysis, plane = (str(rng.choice([*of], p=[*of.values()])) for of in (ANALYSES, PLANES))
-    breaks = analysis in ("path", "envelope")
     cell = random_cell(rng, folder, small=analysis == "path")
     names = [*cell.phases, *(["coating"] if cell.coated else [])]
     phases = random_phases(rng, cell.section, names, plane)
@@ -81,14 +86,11 @@ def draw(seed: int, number: int, folder: Path) -> Drawn:
         "petsc": {"feti_ksp_rtol": float(rng.choice(TOLERANCES))},
     }
     length = cell.section.get("width", 3 * cell.section.get("fibre_radius", 1 / 3))
-    if breaks or analysis == "angle" or rng.random() < 0.65:
+    if analysis in ("path", "envelope", "angle") or rng.random() < 0.65:
         document |= random_bonds(rng, analysis, plane, cell, length)
     expands = all(material.keys() & {"expansion", "expansion_axial"} for material in phases.values())
     document |= random_loads(rng, analysis, plane, expands)
-    if rng.random() < 0.3:
-        document["decomposition"] = {"subdomains": int(rng.integers(2, 9))}
-    elif rng.random() < 0.1:
-        document["decomposition"] = {"max_dofs": 200}
+    document |= DECOMPOSITIONS[rng.choice(len(DECOMPOSITIONS), p=[0.6, 0.2, 0.15, 0.05])]
     if analysis in ("stiffness", "load") and rng.random() < 0.4:
         document["petsc"] |= SOLVERS[rng.integers(len(SOLVERS))]
     return Drawn(seed, number, document, folder)

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from differential.random_phases import Document
 from support.void_cells import write_part
 
+from differential.random_phases import Document
 from feti_homog.cell.gmsh_mesher import generate
 from feti_homog.config.cell_section import Cell
 
@@ -16,12 +16,12 @@ GEOMETRIES = {"square": 0.2, "hexagonal": 0.15, "random": 0.25, "table": 0.3, "m
 MOST_FIBRES = 3
 GAP = 0.06  # least distance of fibres / width
 TRIES = 400
-MESH = "cell.msh"
+MESH, VOID = "cell.msh", "void"
 
 
 @dataclass(frozen=True)
 class DrawnCell:
-    """[cell], the names of its phases beside the matrix, and whether what they debond has an inside: polygons do."""
+    """[cell], the names of its fibres' phases, whether there are coatings, and how many fibres there are."""
 
     section: Document
     phases: list[str]
@@ -37,9 +37,7 @@ def random_cell(rng: np.random.Generator, folder: Path, small: bool) -> DrawnCel
     size = order * (rng.uniform(0.28, 0.4) if small else rng.uniform(0.16, 0.24))
     section: Document = {"geometry": geometry, "order": order, "bodies": str(rng.choice(["torus", "plane"]))}
     made = {"square": _square, "hexagonal": _hexagonal, "random": _random, "table": _table, "mesh": _mesh}
-    drawn = made[geometry](
-        rng, 2 if small else MOST_FIBRES, folder
-    )
+    drawn = made[geometry](rng, 2 if small else MOST_FIBRES, folder)
     section |= drawn.section
     if geometry != "mesh":
         section["mesh_size"] = min(size, 0.5)
@@ -93,20 +91,16 @@ def _random(rng: np.random.Generator, most: int, folder: Path) -> DrawnCell:
 def _table(rng: np.random.Generator, most: int, folder: Path) -> DrawnCell:
     width, height = rng.uniform(0.8, 1.2, 2).tolist()
     phases = ["fibre"] if rng.random() < 0.6 else ["glass", "carbon"]
-    coated = rng.random() < 0.2
-    rows: list[Document] = []
-    for x, y, radius in _placed(rng, width, height, int(rng.integers(1, most + 1))):
-        row = {"x": x, "y": y} | _shape(rng, radius, coated)
-        if phases != ["fibre"]:
-            row["phase"] = phases[len(rows) % 2]
-        rows.append(row)
-    used = sorted({row.get("phase", "fibre") for row in rows})
-    if len(rows) > 1 and rng.random() < 0.25 and {"coating"}.isdisjoint(rows[-1]):
-        rows[-1] = {k: v for k, v in rows[-1].items() if k != "inner_radius"} | {"phase": "void"}
-        used = sorted({row.get("phase", "fibre") for row in rows[:-1]})
-    coated = any("coating" in row for row in rows)
+    coated, void = rng.random() < 0.2, rng.random() < 0.25
+    places = _placed(rng, width, height, int(rng.integers(1, most + 1)))
+    rows = [{"x": x, "y": y, "phase": phases[k % len(phases)]} | _shape(rng, radius, coated)
+            for k, (x, y, radius) in enumerate(places)]  # fmt: skip
+    if void and len(rows) > 1 and rows[-1].keys().isdisjoint({"coating", "inner_radius"}):
+        rows[-1]["phase"] = VOID
+    used = {row["phase"] for row in rows} - {VOID}
     section = {"width": width, "height": height, "fibre_list": rows}
-    return DrawnCell(section, used, coated, sum(row.get("phase") != "void" for row in rows))
+    coated = any("coating" in row for row in rows)
+    return DrawnCell(section, sorted(used), coated, sum(row["phase"] != VOID for row in rows))
 
 
 def _placed(rng: np.random.Generator, width: float, height: float, count: int) -> list[tuple[float, float, float]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+
 from differential.random_cells import DrawnCell
 from differential.random_phases import Document
 
@@ -27,24 +28,20 @@ def components(plane: str) -> int:
 def random_bonds(rng: np.random.Generator, analysis: str, plane: str, cell: DrawnCell, length: float) -> Document:
     """`interface`: one section, or of coated cells sometimes one for each pair of phases."""
     breaks = analysis in ("path", "envelope")
-    common: Document = {"contact": bool(rng.random() < 0.7)}
+    has_arcs = not breaks or rng.random() < 0.4
+    common: Document = {"contact": bool(rng.random() < 0.7) and not (analysis == "envelope" and has_arcs)}
     if breaks:
         common["criterion"] = str(rng.choice(["max", "quadratic", "energy"], p=[0.35, 0.25, 0.4]))
-        if common["criterion"] == "energy":
-            common["growth"] = str(rng.choice(["released", "springs"]))
-    has_arcs = not breaks or rng.random() < 0.4
-    if analysis == "envelope" and has_arcs:
-        common["contact"] = False
-    pairs = [None]
+    if common.get("criterion") == "energy":
+        common["growth"] = str(rng.choice(["released", "springs"]))
+    pairs: list[Document] = [{}]
     if cell.coated and rng.random() < 0.6:
-        pairs = [["coating", "matrix"], [cell.phases[0], "coating"]]
+        pairs = [{"between": ["coating", "matrix"]}, {"between": ["coating", cell.phases[0]]}]
         rng.shuffle(pairs)
-    sections = [common | _law(rng, common, breaks, plane, length) for _ in pairs]
-    for section, pair in zip(sections, pairs, strict=True):
-        if pair is not None:
-            section["between"] = pair
-        if has_arcs:
-            section["debonded"] = _arcs(rng, analysis, cell.fibres)
+    sections = []
+    for pair in pairs:
+        arcs = {"debonded": _arcs(rng, analysis, cell.fibres)} if has_arcs else {}
+        sections.append(common | _law(rng, common, breaks, plane, length) | pair | arcs)
     return {"interface": sections[0] if len(sections) == 1 else sections}
 
 

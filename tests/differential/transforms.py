@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+
 from differential.random_cells import MESH
 from differential.random_loads import NAMES, components
 from differential.random_phases import Document
@@ -18,26 +19,28 @@ STRESSES = {
     "normal_strength", "tangential_strength", "axial_strength", *NAMES[6][1],
 }  # fmt: skip
 SPRINGS = {"normal_stiffness", "tangential_stiffness", "axial_stiffness"}
-LENGTHS = {"width", "height", "fibre_radius", "radii", "x", "y", "radius", "a", "b", "inner_radius"}
+LENGTHS = {"width", "height", "fibre_radius", "x", "y", "radius", "a", "b", "inner_radius"}
 EXPONENTS = (
     dict.fromkeys(STRESSES, (1, 0)) | dict.fromkeys(SPRINGS, (1, -1)) | dict.fromkeys(LENGTHS, (0, 1))
     | {"toughness": (1, 1)}
 )  # fmt: skip
 
 
-def in_units(value: Any, stress: float, length: float, name: str = "") -> Any:
-    """A case in units in which a stress of 1 is `stress`."""
+def in_units(document: Document, stress: float, length: float) -> Document:
+    """A case in units in which a stress of 1 is `stress`, and a length of 1 `length`."""
+    scaled: Document = _scaled(document, "", stress, length)
+    if not document["cell"].keys() & {"width", "fibre_radius", "file"}:
+        scaled["cell"]["width"] = length  # of 1, the default
+    return scaled
+
+
+def _scaled(value: Any, name: str, stress: float, length: float) -> Any:
     if isinstance(value, Mapping):
-        inner = {k: in_units(v, stress, length, k if name != "radii" else name) for k, v in value.items()}
-        if name == "cell" and not value.keys() & {"width", "fibre_radius", "file"} and length != 1.0:
-            inner["width"] = length  # of 1, which is no key
-        return inner
-    if isinstance(value, list) and name not in EXPONENTS:
-        return [in_units(item, stress, length, name) for item in value]
-    if name not in EXPONENTS or isinstance(value, str):
-        return value
+        return {key: _scaled(item, key, stress, length) for key, item in value.items()}
+    if name not in EXPONENTS:
+        return [_scaled(item, name, stress, length) for item in value] if isinstance(value, list) else value
     a, b = EXPONENTS[name]
-    return (np.asarray(value, float) * stress**a * length**b).tolist()
+    return (np.asarray(value, float) * (stress**a * length**b)).tolist()
 
 
 def scale_mesh(source: Path, target: Path, length: float) -> None:
@@ -95,32 +98,34 @@ def _reversed_keys(value: Any) -> Any:
 
 def relabelled(result: Any, fibres: Sequence[int], order: Sequence[int]) -> Any:
     """A result of `reordered` whose fibres and sections have the numbers that they had."""
-    if isinstance(result, list | tuple):
+    if isinstance(result, list):
         return [relabelled(item, fibres, order) for item in result]
     if not isinstance(result, Mapping):
         return result
     found = {k: relabelled(v, fibres, order) for k, v in result.items()}
-    if fibres and {"debonded_length", "debonding_angle"} <= found.keys():
-        back = np.argsort(fibres)
-        found |= {name: [found[name][k] for k in back] for name in ("debonded_length", "debonding_angle")}
-    if "debonded_shares" in found:
-        found["debonded_shares"] = [found["debonded_shares"][k] for k in np.argsort(order)]
-    if isinstance(found.get("fibres"), list) and fibres:
-        found["fibres"] = [found["fibres"][k] | {"number": n + 1} for n, k in enumerate(np.argsort(fibres).tolist())]
-    if "G_I" in found:
-        found = _relabelled_tips(found, fibres, order)
-    return found
+    for name, places in (("debonded_length", fibres), ("debonding_angle", fibres), ("debonded_shares", order)):
+        if name in found and places:
+            found[name] = [found[name][k] for k in np.argsort(places)]
+    if "solver" in found:  # the whole result
+        found["fibres"] = _renumbered(found["fibres"], fibres)
+    return _relabelled_tips(found, fibres, order) if "G_I" in found else found
+
+
+def _renumbered(fibres: Sequence[Document], places: Sequence[int]) -> list[Document]:
+    records = [fibres[k] for k in np.argsort(places)] if places else fibres
+    return [record | {"number": number} for number, record in enumerate(records, 1)]
 
 
 def _relabelled_tips(tips: Document, fibres: Sequence[int], order: Sequence[int]) -> Document:
     """The tips in the order of load, fibre, section, and within these as they are."""
-    own = [(fibres[f - 1] if fibres else f - 1) + 1 for f in tips["fibre"]]
-    section = [order[i - 1] + 1 for i in tips.get("interface", [1] * len(own))]
-    load = tips.get("load", [""] * len(own))
-    seen = {name: k for k, name in enumerate(dict.fromkeys(load))}
-    rows = sorted(range(len(own)), key=lambda k: (seen[load[k]], own[k], section[k] if "interface" in tips else 0, k))
-    new = tips | {"fibre": own} | ({"interface": section} if "interface" in tips else {})
-    return {name: [values[k] for k in rows] for name, values in new.items()}
+    own = {"fibre": [fibres[f - 1] + 1 if fibres else f for f in tips["fibre"]]}
+    if "interface" in tips:
+        own["interface"] = [order[i - 1] + 1 for i in tips["interface"]]
+    seen = {name: k for k, name in enumerate(dict.fromkeys(tips.get("load", [])))}
+    loads = [[seen[name] for name in tips["load"]]] if "load" in tips else []
+    columns = [*loads, *own.values()]
+    rows = sorted(range(len(own["fibre"])), key=lambda k: [column[k] for column in columns])
+    return {name: [values[k] for k in rows] for name, values in (tips | own).items()}
 
 
 def full(load: Any, before: Mapping[str, float], plane: str, expands: bool) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""Solve the states of a result once more by SciPy: bodies, bonds and contact assembled anew from result.h5 and the case.
+"""Solve the states of a result once more by SciPy: bodies, bonds and contact, assembled anew from result.h5.
 
 It shares with the program the mesh, normals and lengths of the interfaces, which `verify` checks, and which bonds hold
 and which faces touch.  u = (u1, u2, u3) is u* of all nodes, one for each constituent at each place of the torus.
@@ -13,13 +13,14 @@ from typing import Any
 
 import h5py
 import numpy as np
-from differential.transforms import sections
 from reference.spatial_forms import law
 from reference.spatial_programme import elements
 from scipy.sparse import block_diag, bmat, coo_matrix, csr_matrix, diags, identity
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 from scipy.spatial import cKDTree
+
+from differential.transforms import sections
 
 IN_PLANE = [0, 1, 5]
 NEAR = 1e-7  # of places / size of the cell
@@ -41,7 +42,7 @@ class Twin:
 def phase_law(material: Any, plane: str) -> tuple[np.ndarray, np.ndarray]:
     """C (6, 6) and expansion (6,); of a plane state what acts in the plane, and anything along x3."""
     alpha = np.zeros(6)
-    if len(np.shape(material.get("stiffness", np.eye(6)))) and np.shape(material.get("stiffness", np.eye(6))) == (3, 3):
+    if np.shape(material.get("stiffness", ())) == (3, 3):
         L = np.array(material["stiffness"], float)
     else:
         C, own = law(material)
@@ -68,7 +69,7 @@ class SolvedAnew:
         self._join_faces()
 
     def _number_nodes(self) -> None:
-        """One number for each constituent at each place: nodes are joined by elements of a phase, and where they meet."""
+        """Number the nodes: one for each phase at each place of the torus."""
         mesh = {name: self.file[f"mesh/{name}"][()] for name in ("points", "triangles", "phase")}
         self.points, self.triangles, self.phase = mesh["points"], mesh["triangles"], mesh["phase"]
         n = len(self.points)
@@ -79,11 +80,7 @@ class SolvedAnew:
         alike = pairs[of_phase[pairs[:, 0]] == of_phase[pairs[:, 1]]]
         self.place = _components(n, pairs)
         self.node = _components(n, alike)
-        edges = np.concatenate([self.node[self.triangles[:, [0, k]]] for k in range(1, self.triangles.shape[1])])
-        count = int(self.node.max()) + 1
-        body = _components(count, edges)
-        # Where one body touches itself its nodes are one; so they are where a body has been cut.
-        self.n, self.body = count, body
+        self.n = int(self.node.max()) + 1
 
     def _assemble(self) -> None:
         case, plane = self.document["case"], self.plane
@@ -158,7 +155,9 @@ class SolvedAnew:
         entry = self._entry(state)
         stored = entry.get("stored") if entry else None
         off = 0.0 if stored is None else abs(energy - stored) / max(abs(stored), self._least(load) * _largest(load))
-        return Twin(float(np.abs(found - stress).max() / size), off, self._contact(status, jumps @ u, held, force, entry))
+        return Twin(
+            float(np.abs(found - stress).max() / size), off, self._contact(status, jumps @ u, held, force, entry)
+        )
 
     def _loads(self, state: Any) -> tuple[np.ndarray, np.ndarray]:
         strain, stress = (np.array(state.attrs[name], float) for name in ("strain", "stress"))
@@ -205,7 +204,9 @@ class SolvedAnew:
             return 0.0
         forces = np.zeros(3 * self.k)
         forces[held] = -force
-        pull = (forces + np.where(np.isfinite(self.springs), self.springs, 0.0).ravel() * np.repeat(self.length, 3) * jump)
+        pull = (
+            forces + np.where(np.isfinite(self.springs), self.springs, 0.0).ravel() * np.repeat(self.length, 3) * jump
+        )
         gap, normal = jump.reshape(-1, 3)[:, 0], pull.reshape(-1, 3)[:, 0]
         largest_gap, largest_pull = np.abs(jump).max(initial=0.0), np.abs(pull).max(initial=0.0)
         overlap = float(np.max(-gap[status == OPEN], initial=0.0)) / (largest_gap or 1.0)
@@ -228,7 +229,7 @@ def _interleaved(n: int) -> np.ndarray:
 
 
 def _solved(K: Any, C: Any, f: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """K u - C^T force = f, C u = 0, and motions that nothing resists are small: by refinement with a little stiffness."""
+    """Solve K u - C^T force = f, C u = 0 by refinement from a little stiffness, which keeps free motions small."""
     m, n = C.shape
     scale = K.diagonal().max()
     borders = bmat([[K, -C.T * scale], [-C * scale, csr_matrix((m, m))]]).tocsc() if m else K.tocsc()

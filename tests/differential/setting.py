@@ -1,0 +1,59 @@
+"""A random case with its result on one rank, and how the result of the same case, found otherwise, is measured."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from differential.comparison import apart, envelopes_apart
+from differential.paths import paths_apart
+from differential.random_cases import Drawn
+from differential.random_phases import Document
+from feti_homog import run
+
+
+@dataclass(frozen=True)
+class Compared:
+    """How far the two sides of a relation are apart, in what, and a note of what was not compared."""
+
+    deviation: float
+    what: str
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A case with its result on one rank, and what a relation may use.
+
+    Attributes:
+        comm: the ranks that solve, all of which call.
+        base: result.json of the case, and `files` its folder.
+        rng: the same on all ranks.
+        work: an empty folder.
+    """
+
+    drawn: Drawn
+    base: Any
+    files: Path
+    comm: Any
+    rng: np.random.Generator
+    work: Path
+
+    def solved(self, document: Document, **keys: Any) -> Any:
+        """result.json of another case.  Collective."""
+        result = run(self.drawn.parsed(document), self.comm, **keys)
+        return json.loads(json.dumps(result.document, default=lambda array: array.tolist()))
+
+    def compared(self, other: Any) -> Compared:
+        """The result of the same case, found otherwise, against the base."""
+        found, note = apart(self.base, other), ""
+        if self.drawn.analysis == "path":
+            points, note = paths_apart(self.base, other, self.files)
+            found += points
+        if self.drawn.analysis == "envelope":
+            found += envelopes_apart(self.base["envelope"], other["envelope"])
+        return Compared(*max(found), note)
