@@ -63,48 +63,50 @@ def _points_apart(ours: Any, theirs: Any) -> list[tuple[float, str]]:
 
 
 def ties(document: Any, folder: Path, number: int) -> bool:
-    """Whether at a point of a path bonds that do not break come within TIE of breaking, or within TIE of a tie."""
+    """Whether at a point of a path more bonds are within TIE of breaking than break."""
     states = document.get("states") or []
     if number not in states:
         return False
-    point = document["path"][number]
     with h5py.File(folder / "result.h5", "r") as file:
         state = file[f"state/{states.index(number)}"]
         traction, status = state["traction"][()], state["status"][()]
-        if "axial_traction" in state:
-            traction = np.column_stack([traction, state["axial_traction"][()]])
+        along = state["axial_traction"][()] if "axial_traction" in state else np.zeros(len(status))
         pair = file["interface/pair"][()] if "interface/pair" in file else np.zeros(len(status), int)
-    used = _used(document["case"], traction, pair)[status == 0]
-    used = np.concatenate([used, _used_by_tips(document["case"], point)])
-    largest = np.sort(used)[::-1] / max(used.max(initial=0.0), 1e-300)
-    return bool(np.count_nonzero(largest > 1 - TIE) > point["broke"])
+    point = document["path"][number]
+    used = [_used(section, np.column_stack([traction, along])[(pair == k) & (status == 0)])
+            for k, section in enumerate(sections(document["case"]))]  # fmt: skip
+    close = np.abs(np.concatenate([*used, _used_by_tips(document["case"], point)]) - 1) < TIE
+    return bool(np.count_nonzero(close) > point["broke"])
 
 
-def _used(case: Any, traction: np.ndarray, pair: np.ndarray) -> np.ndarray:
-    """(k,) share of their strength, or root of that of their toughness, that tractions (k, c) use."""
-    shares = []
-    for section in sections(case):
-        limits = [section.get(f"{side}_strength") or np.inf for side in ("normal", "tangential", "axial")]
-        if section.get("criterion") == "energy":
-            limits = [np.sqrt(2 * section["toughness"] * float(section.get(f"{side}_stiffness") or np.inf))
-                      for side in ("normal", "tangential", "tangential")]  # fmt: skip
-        shares.append(np.array(limits, float)[: traction.shape[1]])
+def _used(section: Any, traction: np.ndarray) -> np.ndarray:
+    """(k,) share of their strength, or root of that of their toughness, that tractions (k, 3) use."""
     pulls = np.column_stack([np.maximum(traction[:, 0], 0.0), np.abs(traction[:, 1:])])
-    own = pulls / np.array(shares)[pair]
-    return np.asarray(own.max(axis=1) if sections(case)[0].get("criterion") == "max" else np.hypot.reduce(own, axis=1))
+    if section["criterion"] == "energy":
+        n, t = (float(section[f"{side}_stiffness"]) for side in ("normal", "tangential"))
+        rates = pulls**2 / (2 * np.array([n, t, float(section.get("axial_stiffness") or t)]))
+        return _root_of_share(section, rates[:, 0], rates[:, 1] + rates[:, 2])
+    n, t = (float(section.get(f"{side}_strength") or np.inf) for side in ("normal", "tangential"))
+    shares = pulls / np.array([n, t, float(section.get("axial_strength") or t)])
+    return np.asarray(
+        shares.max(axis=1, initial=0.0) if section["criterion"] == "max" else np.hypot.reduce(shares, axis=1)
+    )
+
+
+def _root_of_share(section: Any, opening: Any, shear: Any) -> np.ndarray:
+    """(k,) root of G / G_c of rates G_I and G_II."""
+    psi = np.arctan2(np.sqrt(shear), np.sqrt(opening))
+    toughness = section["toughness"] * (1 + np.tan((1 - section["mode_sensitivity"]) * psi) ** 2)
+    return np.asarray(np.sqrt((opening + shear) / toughness))
 
 
 def _used_by_tips(case: Any, point: Point) -> np.ndarray:
     """(t,) the same of tips, by the energy that they would release."""
-    tips = point.get("tips")
-    if not tips:
+    tips, found = point.get("tips"), sections(case)
+    if not tips or found[0].get("growth") != "released":
         return np.zeros(0)
-    own = [sections(case)[i - 1] for i in tips.get("interface", [1] * len(tips["fibre"]))]
-    psi = np.radians(np.asarray(tips["psi"], float))
-    least = np.array([section["toughness"] for section in own])
-    mode = np.array([section.get("mode_sensitivity", 0.25) for section in own])
-    toughness = least * (1 + np.tan((1 - mode) * psi) ** 2)
-    return np.asarray(np.sqrt((np.asarray(tips["G_I"]) + np.asarray(tips["G_II"])) / toughness))
+    rates = zip(tips.get("interface", [1] * len(tips["fibre"])), tips["G_I"], tips["G_II"], strict=True)
+    return np.array([_root_of_share(found[i - 1], opening, shear) for i, opening, shear in rates])
 
 
 def document_of(folder: Path) -> Any:

@@ -125,13 +125,6 @@ def test_stiffness_of_a_users_mesh_reaches_the_reference(comm, geometry, order):
     assert entry_errors(L, cubic(*BONDED[geometry, "strain"].value)).max() < {1: 3e-4, 2: 1e-5}[order]
 
 
-@pytest.mark.parametrize("cell", [{"order": 1, "refine": 2}, {"order": 2, "refine": 1}])
-@pytest.mark.parametrize("geometry", ["square", "hexagonal"])
-def test_bodies_cut_by_the_cell_change_nothing(comm, geometry, cell):
-    L = [solve(make_case(geometry=geometry, bodies=bodies, **cell), comm)[1] for bodies in ("torus", "plane")]
-    assert relative_error(*L) < 1e-9
-
-
 @pytest.mark.parametrize("cell", [{"refine": 2}, {"order": 2}])
 def test_stiffness_with_a_square_fibre_is_the_monolithic_one(comm, shared_path, cell):
     if comm.rank == 0:

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mpi4py import MPI
 from reference.references import DEBONDED_FIBRE_BEM, DEBONDED_FIBRE_FEM, DEBONDED_FIBRE_TOTAL
 from support.cases import FIBRE, MATRIX, relative_error
 from support.ranks import parallel_assert
@@ -112,20 +111,6 @@ def test_the_energy_lost_edge_by_edge_is_the_integral_of_the_rate(comm, bond, st
     debonded = np.array([point.open + point.closed for point in points])
     parallel_assert(comm, np.isin(np.diff(debonded), (4, 8)).all())
     parallel_assert(comm, np.abs(lost / expected - 1).max() < 0.04 and abs(lost.sum() / expected.sum() - 1) < 8e-3)
-
-
-def test_all_numbers_of_ranks_bodies_and_pieces_agree(comm):
-    """The fibre at the corner of the hexagonal cell, in four parts on the plane, one tip beside its cut."""
-    case = {"geometry": "hexagonal", "arc": {"centre": 40.0}, "fibre_fraction": 0.4}
-    strain, openings = [0.3, -0.5, 0.4], [98.0]
-    (alone,), _ = solved(MPI.COMM_SELF, strain, openings, TOUCHING, **case)
-    for variant in ({}, {"bodies": "plane"}, {"pieces": {"subdomains": 9}}):
-        (point,), _ = solved(comm, strain, openings, TOUCHING, **case, **variant)
-        found, expected = point.tips, alone.tips
-        parallel_assert(comm, (found.fibre, found.load) == (expected.fibre, expected.load) == ((1, 1), ("strain",) * 2))
-        for name in ("angle", "G", "G_I", "G_II", "psi", "length"):
-            same = np.allclose(getattr(found, name), getattr(expected, name), rtol=1e-5, atol=1e-6 * expected.G.max())
-            parallel_assert(comm, same, f"{variant} {name}")
 
 
 def test_energy_release_rates_are_of_degree_two_and_symmetric(comm):

@@ -201,19 +201,6 @@ def test_a_path_goes_on_from_any_of_its_points_with_the_same_events(comm):
     assert follow(case.cell, True, law, waypoints, points[-1].after) == []
 
 
-def test_events_do_not_depend_on_bodies_and_pieces(comm):
-    law, curves = StrengthCriterion(20.0, 30.0, "max"), []
-    for variant in (
-        {"decomposition": {"subdomains": 4}},
-        {"bodies": "plane", "decomposition": PIECES},
-        {"decomposition": {"subdomains": 9}},
-    ):
-        cell = torn_cells.tear(comm, geometry="hexagonal", mesh_size=0.25, **variant)
-        curves.append(curve(cell, follow(cell, True, law, [MIXED])))
-    for other in curves[1:]:
-        assert relative_error(other, curves[0]) < 1e-7
-
-
 @pytest.mark.parametrize("worst_only", [True, False])
 def test_increments_stop_at_a_solve_that_does_not_converge(comm, worst_only):
     loose = {"petsc": {"feti_ksp_max_it": 1, "feti_pc_type": "none"}}

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from reference.spatial_forms import about_x3
-from support import envelopes
 from support.generalized_phases import CRYSTAL, WOOD
 from support.loaded_twins import EPOXY_GLASS, compare_paths, document, is_end, relative, solved
 from support.ranks import parallel_assert
@@ -145,33 +144,3 @@ TOWARDS = {
     "energy": (ENERGY | {"growth": "springs"}, ["E22", "gamma13"], None),
     "tips": (ENERGY | ARC | {"contact": False}, ["S11", "S13"], -20.0),
 }
-
-
-@pytest.mark.parametrize("name", TOWARDS)
-def test_the_envelope_is_where_paths_break_first(comm, name):
-    """After cooling at zero stress or, in a plane of strains, at zero strain."""
-    interface, axes, temperature = TOWARDS[name]
-    phases = dict(zip(("matrix", "fibre"), UNLIKE, strict=True))
-    petsc = envelopes.TIGHT | ({"feti_pc_type": "influence"} if "toughness" in interface else {})
-    cell = {"geometry": "hexagonal", "fibre_fraction": 0.4, "mesh_size": 0.3}
-    sections = {"cell": cell, "material": phases, "petsc": petsc}
-    own = {"directions": 4} | ({} if temperature is None else {"temperature": temperature})
-    onsets = envelopes.envelope(comm, "generalized", interface, axes, sections, **own).envelope
-    rest = (
-        {"E11": 0.0, "E22": 0.0, "E33": 0.0, "gamma23": 0.0, "gamma13": 0.0, "gamma12": 0.0}
-        if axes[0][0] == "E"
-        else {}
-    )
-    for onset in onsets[:2]:
-        angle = np.radians(onset.angle)
-        far = {
-            axis: 1.5 * onset.factor * float(part)
-            for axis, part in zip(axes, (np.cos(angle), np.sin(angle)), strict=True)
-        }
-        waypoints = [rest | far] if temperature is None else [rest | {"temperature": temperature}, far]
-        case = {"cell": HEXAGONAL, "phases": UNLIKE, "plane": "generalized", "interface": interface, "petsc": petsc}
-        path = solved(comm, **case, path={"waypoints": waypoints}).path
-        first = next(p for p in path if p.broke)
-        start = 0.0 if temperature is None else 0.5
-        assert (first.load_factor - start) / (1 - start) == pytest.approx(1 / 1.5, rel=EXACT)
-        assert relative(first.stress, onset.stress) < EXACT and relative(first.strain, onset.strain) < EXACT

@@ -1,0 +1,177 @@
+"""The random cases cover the language of case files, and what compares them notices a wrong number of any kind."""
+
+from __future__ import annotations
+
+import copy
+from collections import Counter
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from differential import result_units, transforms
+from differential.__main__ import CASES, SEED
+from differential.comparison import DIFFERENT, apart, envelopes_apart, leaves
+from differential.paths import document_of, paths_apart
+from differential.random_cases import draw, stream
+from differential.twin import SolvedAnew
+from mpi4py import MPI
+
+from feti_homog import run
+
+WRONG = 1e-6
+STATE = "state/0"
+SHAPES = {"ellipses": "a", "polygons": "sides", "hollow fibres": "inner_radius", "coatings": "coating"}
+
+
+def kinds(drawn):
+    """What a case has of the language."""
+    document, cell = drawn.document, drawn.document["cell"]
+    rows, sections = cell.get("fibre_list", [{}]), transforms.sections(document)
+    path = document.get("path", {})
+    has = {cell["geometry"], drawn.analysis, f"plane {drawn.plane}", f"order {cell['order']}", cell["bodies"]}
+    has |= {name for name, key in SHAPES.items() if key in cell or any(key in row for row in rows)}
+    has |= {"voids"} if "voids" in cell or any(row.get("phase") == "void" for row in rows) else set()
+    has |= {"refined"} & {"refined" * cell.get("refine", 0)}
+    has |= {"pieces"} & {"pieces" * ("decomposition" in document)}
+    for section in sections:
+        has |= {f"contact {section['contact']}", str(section.get("criterion")), str(section.get("growth"))}
+        has |= {"springs" if "normal_stiffness" in section else "glue", "arcs" * bool(section.get("debonded"))}
+    has |= {"bonded"} if not sections else {f"{len(sections)} interfaces"}
+    has |= {path.get("method", "events")} if path else set()
+    loads = [load for load in transforms.waypoints(path) if isinstance(load, dict)] if path else []
+    has |= {"legs"} if path and len(transforms.waypoints(path)) > 1 else set()
+    has |= {"stresses"} if any(name[0] == "S" for load in loads for name in load) else set()
+    return has | ({"temperature"} if any("temperature" in load for load in loads) else set())
+
+
+def test_the_cases_of_ci_cover_the_language(tmp_path):
+    found = Counter[str]()
+    for number in range(CASES):
+        (folder := tmp_path / str(number)).mkdir()
+        drawn = draw(SEED, number, folder)
+        assert drawn.case.name and draw(SEED, number, folder).document == drawn.document
+        found.update(kinds(drawn))
+    expected = {
+        "square", "hexagonal", "random", "table", "mesh", "stiffness", "angle", "path", "load", "envelope",
+        "plane strain", "plane stress", "plane generalized", "order 1", "order 2", "torus", "plane", *SHAPES, "voids",
+        "refined", "pieces", "contact True", "contact False", "max", "quadratic", "energy", "released", "springs",
+        "glue", "arcs", "bonded", "1 interfaces", "2 interfaces", "events", "increments", "legs", "stresses",
+        "temperature",
+    }  # fmt: skip
+    assert expected <= found.keys(), expected - found.keys()
+
+
+@pytest.fixture(scope="module")
+def solved(tmp_path_factory):
+    """number -> case and folder of its result."""
+    made = {}
+
+    def of(wanted):
+        """The first case that `wanted` takes."""
+        for number in range(500):
+            folder = tmp_path_factory.mktemp("case")
+            drawn = draw(SEED, number, folder)
+            if wanted(drawn):
+                break
+        if number not in made:
+            run(drawn.case, MPI.COMM_SELF, out=folder / "out")
+            made[number] = drawn, folder / "out"
+        return made[number]
+
+    return of
+
+
+def is_small_path(drawn):
+    return drawn.analysis == "path" and drawn.document["cell"]["geometry"] == "square" and drawn.plane == "generalized"
+
+
+def is_load(drawn):
+    return drawn.analysis == "load" and "interface" in drawn.document
+
+
+def put(document, path, place=0):
+    """A copy of a document in which the largest number of a kind is wrong."""
+    wrong = copy.deepcopy(document)
+    value, names = wrong, path.split(".")
+    for name in names[:-1]:
+        value = value[name.removesuffix("[]")]
+        value = value[place] if name.endswith("[]") else value
+    own = np.atleast_1d(np.asarray(value[names[-1]], float))
+    own.flat[np.abs(own).argmax()] *= 1 + WRONG
+    value[names[-1]] = own.tolist() if np.ndim(value[names[-1]]) else float(own[0])
+    return wrong
+
+
+@pytest.mark.parametrize("wanted", [is_load, is_small_path])
+def test_every_number_that_is_wrong_is_noticed(solved, wanted):
+    drawn, folder = solved(wanted)
+    document, noticed = document_of(folder), 0
+    assert not max(off for off, _ in apart(document, document))
+    for record in ("load", "path", "cell"):
+        for path, value in leaves({record: document.get(record) or {}}):
+            size = np.abs(value).max(initial=0.0) if not isinstance(value, str | list) or value else 0.0
+            if record == "path" or not size or isinstance(value, int):
+                continue
+            assert max(off for off, _ in apart(document, put(document, path))) > 1e-4 * WRONG or "tips" in path, path
+            noticed += 1
+    if "path" in document:
+        for name in ("load_factor", "strain", "stress", "stored", "work"):
+            place = max(range(len(document["path"])), key=lambda k: np.abs(document["path"][k][name]).max())
+            (found, note) = paths_apart(document, put(document, f"path[].{name}", place), folder)
+            assert not note and max(found)[0] > 0.1 * WRONG, name
+            noticed += 1
+        less = document | {"path": [p | {"broke": p["broke"] + 1} for p in document["path"]]}
+        assert max(paths_apart(document, less, folder)[0])[0] == DIFFERENT
+    assert noticed > 5
+
+
+def test_envelopes_that_differ_are_noticed():
+    points = [{"factor": f, "strain": [f, 0.0], "stress": [2 * f, f]} for f in (1.0, 3.0)] + [{"factor": None}]
+    for name in ("factor", "strain", "stress"):
+        other = copy.deepcopy(points)
+        other[1][name] = (np.asarray(other[1][name]) * (1 + WRONG)).tolist()
+        assert max(envelopes_apart(points, other))[0] == pytest.approx(WRONG / 3, rel=1e-3)
+    assert max(envelopes_apart(points, points))[0] == 0.0
+    assert max(envelopes_apart(points, [*points[:2], points[0]]))[0] == DIFFERENT
+
+
+@pytest.mark.parametrize("wanted", [is_load, is_small_path])
+def test_results_go_to_other_units_and_back(solved, wanted):
+    document = document_of(solved(wanted)[1])
+    there = result_units.in_units(document, 1e9, 1e-3)
+    back = result_units.in_units(there, 1e-9, 1e3)
+    assert max(off for off, _ in apart(document, back)) < 1e-14
+    assert max(off for off, _ in apart(document, there)) > 0.9
+    assert there["cell"]["area"] == pytest.approx(1e-6 * document["cell"]["area"])
+
+
+def test_the_solve_by_scipy_notices_a_wrong_stress_and_energy(solved):
+    _, folder = solved(is_load)
+    cell = SolvedAnew(folder)
+    right = cell.compare(0)
+    cell.file.close()
+    assert max(right.stress, right.energy, right.contact) < 1e-8
+    with h5py.File(folder / "result.h5", "r+") as file:
+        file[STATE].attrs["stress"] = file[STATE].attrs["stress"] * (1 + WRONG)
+    cell = SolvedAnew(folder)
+    cell.document["load"]["stored"] *= 1 + WRONG
+    wrong = cell.compare(0)
+    assert wrong.stress == pytest.approx(WRONG, rel=0.01) and wrong.energy == pytest.approx(WRONG, rel=0.01)
+
+
+def test_streams_of_a_case_do_not_depend_on_others():
+    assert stream(1, 2, 0).random() == stream(1, 2, 0).random() != stream(1, 2, 1).random()
+
+
+def test_a_case_in_other_units_and_in_another_order(tmp_path: Path):
+    document = draw(SEED, 0, tmp_path).document | {
+        "cell": {"geometry": "table", "width": 2.0, "fibre_list": [{"x": 1.0, "a": 0.5}, {"x": 0.5, "phase": "void"}]},
+        "interface": {"toughness": 3.0, "normal_stiffness": 5.0, "debonded": [{"fibre": 1, "centre": 7.0}]},
+    }
+    other = transforms.in_units(document, 10.0, 100.0)
+    assert other["cell"]["fibre_list"][0] == {"x": 100.0, "a": 50.0} and other["cell"]["width"] == 200.0
+    assert other["interface"]["toughness"] == 3000.0 and other["interface"]["normal_stiffness"] == 0.5
+    assert other["interface"]["debonded"] == document["interface"]["debonded"]
+    same, fibres, _ = transforms.reordered(np.random.default_rng(1), document)
+    assert fibres == [0] and same["interface"]["debonded"][0]["fibre"] == 1
