@@ -14,7 +14,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from differential.job import DRAWN_PER_CASE, FAILED, REFUSED, RUNS, Row, case_text, complaints, examine, table
+from differential.job import DRAWN_PER_CASE, FAILED, REFUSED, RUNS, Row, examine, table
 from differential.relations import ALWAYS, DRAWN, RANKS
 from feti_homog.api import launch
 from feti_homog.common.mpi_errors import on_root
@@ -44,19 +44,18 @@ def main(words: argparse.Namespace, comm: Any) -> None:
         rows = examine(comm, words.seed, numbers, folder, len(DRAWN) if alone else DRAWN_PER_CASE)
         comm.barrier()
         if comm.rank == 0:
-            print(complaints(words.seed, rows, lambda number: case_text(words.seed, number, folder)))
             print(table(rows), flush=True)
-    faults = too_little(rows, len(numbers))
+    faults = too_little(rows, len(numbers), comm.size)
     if comm.rank == 0 and faults:
         print("\n".join(faults))
     if faults or any(row.verdict == FAILED for row in rows):
         raise SystemExit(1)
 
 
-def too_little(rows: Sequence[Row], cases: int) -> list[str]:
+def too_little(rows: Sequence[Row], cases: int, ranks: int) -> list[str]:
     """What so many cases left out."""
     refused = sum(row.relation == RUNS and row.verdict == REFUSED for row in rows)
-    missing = {relation.name for relation in (*ALWAYS, RANKS, *DRAWN)} - {row.relation for row in rows}
+    missing = {relation.name for relation in (*ALWAYS, *DRAWN, *[RANKS][: ranks - 1])} - {row.relation for row in rows}
     faults = [f"{refused} of {cases} cases were refused"] if refused > MOST_REFUSED * cases + 1 else []
     return faults + [f"no case was compared: {name}" for name in sorted(missing) if cases >= CASES]
 

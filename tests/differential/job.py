@@ -1,13 +1,14 @@
 """Run random cases on all ranks of a job and check the relations that each draws.
 
-First each rank takes cases for itself, as it comes to them; then all solve every case together.
+First each rank takes cases for itself, as it comes to them; then all ranks, if there are more, solve every case
+together.
 """
 
 from __future__ import annotations
 
 import os
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -50,11 +51,17 @@ def examine(comm: Any, seed: int, numbers: Sequence[int], folder: Path, of_each:
     own: list[Row] = []
     for number in numbers:
         if _claimed(folder, number):
-            own += _alone(MPI.COMM_SELF, seed, number, folder / f"case-{number}", of_each)
+            found = _alone(MPI.COMM_SELF, seed, number, folder / f"case-{number}", of_each)
+            tell(seed, found, folder)
+            own += found
     rows = [row for of_rank in comm.allgather(own) for row in of_rank]
-    for number in sorted(row.number for row in rows if row.relation == RUNS and row.verdict == HELD):
+    ran = sorted(row.number for row in rows if row.relation == RUNS and row.verdict == HELD)
+    for number in ran if comm.size > 1 else []:
         try:
-            rows += _together(comm, seed, number, folder / f"case-{number}")
+            found = _together(comm, seed, number, folder / f"case-{number}")
+            if comm.rank == 0:
+                tell(seed, found, folder)
+            rows += found
         except Exception as error:  # of one rank, perhaps: the others wait
             print(f"case {number} of seed {seed}, on {comm.size} ranks", flush=True)
             end_job(comm, error)
@@ -131,14 +138,14 @@ def _of_error(number: int, relation: str, error: Exception, refusals: tuple[type
     return Row(number, relation, REFUSED if refused else FAILED, np.inf, 0.0, words)
 
 
-def complaints(seed: int, rows: Sequence[Row], documents: Callable[[int], str]) -> str:
-    """What failed: seed, relation, deviation and the case file."""
+def tell(seed: int, rows: Sequence[Row], folder: Path) -> None:
+    """Print what failed of one case: seed, relation, deviation, and the case file."""
     failed = [row for row in rows if row.verdict == FAILED]
-    return "\n".join(
-        f"== case {row.number} of seed {seed}: {row.relation}: {row.words}: {row.deviation:.1e}, "
-        f"at most {row.tolerance:.1e}\n{documents(row.number)}"
-        for row in failed
-    )
+    for row in failed:
+        off = f"{row.words}: {row.deviation:.1e}, at most {row.tolerance:.1e}"
+        print(f"== case {row.number} of seed {seed}: {row.relation}: {off}", flush=True)
+    if failed:
+        print(case_text(seed, failed[0].number, folder), flush=True)
 
 
 def case_text(seed: int, number: int, folder: Path) -> str:

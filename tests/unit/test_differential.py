@@ -105,15 +105,12 @@ def put(document, path, place=0):
 
 @pytest.mark.parametrize("wanted", [is_load, is_small_path])
 def test_every_number_that_is_wrong_is_noticed(solved, wanted):
-    drawn, folder = solved(wanted)
+    _, folder = solved(wanted)
     document, noticed = document_of(folder), 0
     assert not max(off for off, _ in apart(document, document))
-    for record in ("load", "path", "cell"):
-        for path, value in leaves({record: document.get(record) or {}}):
-            size = np.abs(value).max(initial=0.0) if not isinstance(value, str | list) or value else 0.0
-            if record == "path" or not size or isinstance(value, int):
-                continue
-            assert max(off for off, _ in apart(document, put(document, path))) > 1e-4 * WRONG or "tips" in path, path
+    for path, value in leaves({name: document[name] for name in ("load", "cell") if name in document}):
+        if np.asarray(value).dtype.kind == "f" and np.any(value) and "tips" not in path:
+            assert max(off for off, _ in apart(document, put(document, path))) > 1e-4 * WRONG, path
             noticed += 1
     if "path" in document:
         for name in ("load_factor", "strain", "stress", "stored", "work"):
