@@ -20,6 +20,7 @@ from feti_homog.verification.prescribed import TEMPERATURE, Prescribed, at_point
 from feti_homog.verification.reading import State
 
 COUNTS = {"bonded": BONDED, "closed": CLOSED, "open": OPEN}
+LAST_OF_PLANE = 2  # place of gamma12 among the unit loads: the state that the counts of an angle are of
 SPATIAL_ORDER = [0, 1, 5, 2, 4, 3]  # of the unit strains of generalized plane strain; the fifth load is a temperature
 
 
@@ -237,9 +238,9 @@ def _entries(document: Mapping[str, Any], unit: Sequence[UnitLoad]) -> Iterator[
     elif "angle" in document:
         for point in document["angle"]:
             if "stiffness" in point:
-                *others, last = (load.entries(point, "stiffness", "", 1.0) for load in unit)
-                yield from others
-                yield last | {name: point[name] for name in COUNTS}
+                for number, load in enumerate(unit):
+                    counts = {name: point[name] for name in COUNTS} if number == LAST_OF_PLANE else {}
+                    yield load.entries(point, "stiffness", "", 1.0) | counts
             else:
                 yield point
     else:

@@ -22,6 +22,8 @@ ENERGIES = {"stored", "stored_in_springs", "work", "dissipated", "dissipated_str
 RATES = {"G", "G_I", "G_II"}
 DIRECTIONS = {"angle", "bond_angle", "psi"}
 COUNTS = {"broke", "bonded", "open", "closed", "free_motions", "fibre", "interface", "number", "elements"}
+# Of moduli, measured by 1: they may vanish.
+RATIOS = {"eta1", "eta2", "deviation", "nu12", "nu21", "nu13", "nu23", "nu_axial", "nu_transverse"}
 # Modes of tips are less sure where the rate is a smaller share of the largest.
 LEAST_RATE = 1e-2
 DIFFERENT = math.inf  # deviation of counts and words
@@ -93,7 +95,7 @@ def _deviation(path: str, base: Kinds, other: Kinds, sizes: Mapping[str, float])
     if name in DIRECTIONS:
         off = np.minimum(off % 360, -off % 360) / 360 * _certainty(record, name, base, sizes)
         return _largest(off, 1.0)
-    return _largest(off, sizes[group(path)])
+    return _largest(off, max(sizes[group(path)], 1.0) if name in RATIOS else sizes[group(path)])
 
 
 def _certainty(record: str, name: str, base: Kinds, sizes: Mapping[str, float]) -> Any:

@@ -107,7 +107,7 @@ CASES: dict[str, dict[str, Any]] = {
         "matrix": WARM,
         "fibre": CARBON,
         "plane": "generalized",
-        "interface": SPRINGS | {"contact": False, "debonded": [ARC]},
+        "interface": SPRINGS | {"debonded": [ARC]},
         "angle": {"values": [0, 120]},
     },
     "increments": {

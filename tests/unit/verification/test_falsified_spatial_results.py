@@ -49,6 +49,7 @@ FALSE = {
     "an entry of a spatial stiffness": (
         "spatial", document("effective_stiffness", 3, 3), {"tables", "moduli", "compliance"},
     ),
+    "a count of an angle": ("spatial springs", document("angle", 1, "open", factor=2), {"tables"}),
     "an axial entry of an angle": ("spatial springs", document("angle", 1, "stiffness", 4, 4), {"tables"}),
     "a compliance": ("spatial", document("compliance", 2, 2), {"compliance"}),
     "a thermal stress": ("spatial", document("thermal_stress", 2), {"tables", "compliance", "moduli"}),
