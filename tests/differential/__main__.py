@@ -6,11 +6,13 @@ Exit code 1 if a relation fails, too many cases are refused, or of a relation no
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 import tempfile
 import warnings
 from collections.abc import Sequence
 from contextlib import ExitStack
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +22,7 @@ from feti_homog.api import launch
 from feti_homog.common.mpi_errors import on_root
 
 CASES, SEED = 40, 1
+ROWS = "rows.json"
 MOST_REFUSED = 0.1  # share of cases that may be refused
 
 
@@ -31,12 +34,17 @@ def parser() -> argparse.ArgumentParser:
     words.add_argument("--seed", type=int, default=SEED, help="of all cases")
     words.add_argument("--only", type=int, help="one case by its number, with all its relations")
     words.add_argument("--keep", type=Path, help="a new folder in which the files stay")
+    words.add_argument("--merge", type=Path, nargs="+", help="print the table of what runs with --keep left, no more")
     return words
 
 
 def main(words: argparse.Namespace, comm: Any) -> None:
     """Examine the cases and print what came of them.  Collective."""
     warnings.filterwarnings("ignore", category=RuntimeWarning)
+    if words.merge:
+        if comm.rank == 0:
+            print(table([row for folder in words.merge for row in read(folder)]))
+        return
     alone = words.only is not None
     numbers = [words.only] if alone else range(words.first, words.first + words.cases)
     with ExitStack() as stack:
@@ -45,6 +53,7 @@ def main(words: argparse.Namespace, comm: Any) -> None:
         comm.barrier()
         if comm.rank == 0:
             print(table(rows), flush=True)
+            write(rows, folder)
     faults = too_little(rows, len(numbers), comm.size)
     if comm.rank == 0 and faults:
         print("\n".join(faults))
@@ -58,6 +67,16 @@ def too_little(rows: Sequence[Row], cases: int, ranks: int) -> list[str]:
     missing = {relation.name for relation in (*ALWAYS, *DRAWN, *[RANKS][: ranks - 1])} - {row.relation for row in rows}
     faults = [f"{refused} of {cases} cases were refused"] if refused > MOST_REFUSED * cases + 1 else []
     return faults + [f"no case was compared: {name}" for name in sorted(missing) if cases >= CASES]
+
+
+def write(rows: Sequence[Row], folder: Path) -> None:
+    """Leave the rows in a folder."""
+    (folder / ROWS).write_text(json.dumps([asdict(row) for row in rows]))
+
+
+def read(folder: Path) -> list[Row]:
+    """The rows that a run left."""
+    return [Row(**row) for row in json.loads((folder / ROWS).read_text())]
 
 
 def _folder(stack: ExitStack, keep: Path | None) -> str:

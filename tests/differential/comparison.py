@@ -22,6 +22,7 @@ ENERGIES = {"stored", "stored_in_springs", "work", "dissipated", "dissipated_str
 RATES = {"G", "G_I", "G_II"}
 DIRECTIONS = {"angle", "bond_angle", "psi"}
 COUNTS = {"broke", "bonded", "open", "closed", "free_motions", "fibre", "interface", "number", "elements"}
+PLACES = "fibres[].centre"  # on the torus
 # Of moduli, measured by 1: they may vanish.
 RATIOS = {"eta1", "eta2", "deviation", "nu12", "nu21", "nu13", "nu23", "nu_axial", "nu_transverse"}
 # Modes of tips are less sure where the rate is a smaller share of the largest.
@@ -92,6 +93,9 @@ def _deviation(path: str, base: Kinds, other: Kinds, sizes: Mapping[str, float])
         return 0.0 if ours == theirs else DIFFERENT
     a, b = _flat(ours), _flat(theirs)
     off = np.abs(a - b)
+    if path == PLACES:
+        share = off.reshape(-1, 2) / _flat([base["cell.width"], base["cell.height"]])
+        return _largest(np.minimum(share % 1.0, -share % 1.0), 1.0)
     if name in DIRECTIONS:
         off = np.minimum(off % 360, -off % 360) / 360 * _certainty(record, name, base, sizes)
         return _largest(off, 1.0)

@@ -17,6 +17,8 @@ from feti_homog.errors import NotCarriedError
 from feti_homog.verification.certificate import verify
 
 STATES = 4  # of a result are solved anew
+# What the checks of a run demand: the solver's tolerance times the condition of a cell.  Rounding has less than LEAST.
+SHARE, LEAST = 1e3, 1e-8
 
 
 def certificate(setting: Setting) -> Compared:
@@ -68,37 +70,33 @@ def _is_envelope(drawn: Drawn, base: Any) -> bool:
 
 @dataclass(frozen=True)
 class Relation:
-    """A relation, the cases that have it, and its tolerance: so many times that of the solver, at least `least`.
+    """A relation, the cases that have it, and how often it is drawn; one of weight 0 is always tried.
 
-    Of those that cost a solve `weight` says how often they are drawn; the others, of weight 0, are always tried.
+    `exact` ones have limits of their own; others hold to SHARE times the tolerance of the solver, at least LEAST.
     """
 
     name: str
     check: Callable[[Setting], Compared]
-    applies: Applies
-    weight: float
-    share: float
-    least: float
+    applies: Applies = _always
+    weight: float = 0.0
+    exact: bool = False
     refusals: tuple[type[Exception], ...] = ()
 
     def tolerance(self, rtol: float) -> float:
         """The largest deviation that holds."""
-        return max(self.share * rtol, self.least)
+        return 0.0 if self.exact else max(SHARE * rtol, LEAST)
 
 
-ALWAYS = (
-    Relation("verify", certificate, _always, 0, 0.0, 0.0),
-    Relation("solved anew by SciPy", solved_anew, _always, 0, 1e3, 1e-7),
-)
-RANKS = Relation("ranks", same_results.ranks, _always, 0, 1e3, 1e-7)
+ALWAYS = (Relation("verify", certificate, exact=True), Relation("solved anew by SciPy", solved_anew))
+RANKS = Relation("ranks", same_results.ranks)
 DRAWN = (
-    Relation("unit of stress", same_results.unit_of_stress, _always, 1, 1e3, 1e-7),
-    Relation("unit of length", same_results.unit_of_length, _always, 1, 1e3, 1e-7),
-    Relation("order of input", same_results.order_of_input, _always, 1, 1e3, 1e-7),
-    Relation("pieces", same_results.pieces, _always, 1, 1e3, 1e-7),
-    Relation("influence columns", same_results.influence_columns, _has_interface, 1, 1e3, 1e-7),
-    Relation("split way", other_results.split_way, _is_path_of_events, 2, 1e3, 1e-7),
-    Relation("resume", same_results.resume, _is_path, 2, 1e3, 1e-7),
-    Relation("stress back", other_results.stress_back, _is_linear, 1, 1e3, 1e-7, (NotCarriedError,)),
-    Relation("onset", other_results.onset, _is_envelope, 2, 1e3, 1e-7),
+    Relation("unit of stress", same_results.unit_of_stress, weight=1),
+    Relation("unit of length", same_results.unit_of_length, weight=1),
+    Relation("order of input", same_results.order_of_input, weight=1),
+    Relation("pieces", same_results.pieces, weight=1),
+    Relation("influence columns", same_results.influence_columns, _has_interface, weight=1),
+    Relation("split way", other_results.split_way, _is_path_of_events, weight=4),
+    Relation("resume", same_results.resume, _is_path, weight=4),
+    Relation("stress back", other_results.stress_back, _is_linear, weight=2, refusals=(NotCarriedError,)),
+    Relation("onset", other_results.onset, _is_envelope, weight=6),
 )
