@@ -17,7 +17,7 @@ import numpy as np
 import tomli_w
 
 from differential.paths import document_of
-from differential.random_cases import RELATIONS, Drawn, draw, stream
+from differential.random_cases import ON_ALL_RANKS, RELATIONS, Drawn, draw, stream
 from differential.relations import ALWAYS, DRAWN, RANKS, Relation, Setting
 from feti_homog import run
 from feti_homog.common.mpi_errors import end_job, on_root
@@ -86,14 +86,13 @@ def _alone(comm: Any, seed: int, number: int, folder: Path, of_each: int) -> lis
     except Exception as error:
         return [_of_error(number, RUNS, error, (CaseError, MeshError, NotCarriedError))]
     rows, base = [Row(number, RUNS, HELD)], document_of(folder / "out")
-    for relation in (*ALWAYS, *chosen(drawn, base, of_each)):
+    for relation in (*ALWAYS, *chosen(stream(seed, number, RELATIONS), drawn, base, of_each)):
         rows.append(_checked(comm, relation, drawn, base, folder))
     return rows
 
 
-def chosen(drawn: Drawn, base: Any, count: int) -> list[Relation]:
+def chosen(rng: np.random.Generator, drawn: Drawn, base: Any, count: int) -> list[Relation]:
     """The relations that a case draws of those that it has, by their weights."""
-    rng = stream(drawn.seed, drawn.number, RELATIONS)
     having = [relation for relation in DRAWN if relation.applies(drawn, base)]
     weights = np.array([relation.weight for relation in having], float)
     count = min(count, len(having))
@@ -105,8 +104,9 @@ def _together(comm: Any, seed: int, number: int, folder: Path) -> list[Row]:
     drawn, base = Drawn(seed, number, on_root(comm, lambda: draw(seed, number, folder).document), folder), None
     base = on_root(comm, document_of, folder / "out")
     rows = [_checked(comm, RANKS, drawn, base, folder)]
-    if stream(seed, number, RELATIONS).random() < SHARE_ON_ALL_RANKS:
-        rows += [_checked(comm, relation, drawn, base, folder) for relation in chosen(drawn, base, 1)]
+    rng = stream(seed, number, ON_ALL_RANKS)
+    if rng.random() < SHARE_ON_ALL_RANKS:
+        rows += [_checked(comm, relation, drawn, base, folder) for relation in chosen(rng, drawn, base, 1)]
     return rows
 
 

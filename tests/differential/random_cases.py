@@ -28,7 +28,7 @@ DECOMPOSITIONS: tuple[Document, ...] = (
     {"decomposition": {"max_dofs": 200}},
 )
 # Streams of random numbers of a case: those of one do not depend on how many others draw.
-CASE, RELATIONS = 0, 1
+CASE, RELATIONS, ON_ALL_RANKS = 0, 1, 2
 
 
 @dataclass(frozen=True)
