@@ -9,7 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 from reference.condensed_cell import CondensedCell, MixedLoad
+from reference.dense_feti import DenseDual, gathered, matrix
 from reference.touching_bodies import TouchingBodies
+from scipy.linalg import null_space
+from support import torn_cells
 from support.cases import FIBRE, MATRIX, make_case, monolithic_stiffness, relative_error, solve
 from support.pixel_images import SYMMETRIES, pixel_mesh, random_image, turned
 from unit.cell.faulty_meshes import MshFile
@@ -30,6 +33,7 @@ pytestmark = pytest.mark.parallel
 TRIPLE, TOUCHING = {1: 1, 2: 2, 3: 1}, {1: 1, 2: 2, 3: 2}
 STRAIN = np.array([0.02, -0.01, 0.015])
 SPRINGS = {"normal_stiffness": 900.0, "tangential_stiffness": 300.0}
+INFLUENCE = {"feti_pc_type": "influence"}
 STRENGTHS = {"normal_strength": 5.0, "tangential_strength": 5.0}
 KINDS: dict[str, dict[str, Any]] = {
     "path": {"interface": STRENGTHS, "path": {"strain": [0.06, 0.0, 0.02]}},
@@ -61,7 +65,7 @@ def test_bonded_bodies_that_touch_are_one_solid(comm: Any, shared_path: Any, siz
     for jitter in (0.0, 1e-9, 1e-3) if size == 8 else (0.0,):
         mesh = pixel_mesh(random_image(size, 1), jitter)
         torn, L, _ = solve(make_case(**cell_of(comm, shared_path, mesh, refine=refine, order=order)), comm)
-        assert torn.summary.held.touching > 0
+        assert Torus.of(read(shared_path / "pixels.msh")).touching.any()
         assert relative_error(L, monolithic_stiffness(torn)) < 1e-9
         torn.destroy()
         stiffness.append(L)
@@ -157,6 +161,31 @@ def test_results_of_every_kind_obey_their_laws(comm: Any, shared_path: Any, kind
     result = run(Case.parse(document | sections), comm, out=shared_path / "out")
     certificate = on_root(comm, verify, shared_path / "out")
     assert result.status == "done" and certificate.holds, certificate.text
+
+
+def test_tips_do_not_cross_voids(comm: Any, shared_path: Any):
+    """A fibre's side at a void ends at interface nodes, and is no interface."""
+    image = random_image(8, 208, 0.5, 2, 0.1)
+    document = {
+        "cell": cell_of(comm, shared_path, pixel_mesh(image)),
+        "material": {"matrix": MATRIX, "fibre": FIBRE},
+        "analysis": {"type": "path", "plane": "strain"},
+        "interface": SPRINGS | {"criterion": "energy", "toughness": 0.02},
+        "path": {"strain": [0.06, 0.0, 0.02], "method": "increments", "increments": 4},
+    }
+    run(Case.parse(document), comm, out=shared_path / "out")
+    certificate = on_root(comm, verify, shared_path / "out")
+    assert certificate.holds, certificate.text
+
+
+@pytest.mark.parametrize("springs", [{}, SPRINGS], ids=["rigid", "springs"])
+def test_influence_columns_are_the_inverse_where_three_bodies_meet(comm: Any, shared_path: Any, springs: Any):
+    section = cell_of(comm, shared_path, pixel_mesh(random_image(8, 2)))
+    cell = torn_cells.tear(comm, springs=tuple(springs.values()) or (None, None), petsc=INFLUENCE, **section)
+    dense = DenseDual(cell)
+    F, N = dense.F + np.diag(gathered(cell, cell.solver.operator.compliance)), null_space(dense.G.T)
+    expected = N @ np.linalg.solve(N.T @ F @ N, N.T)
+    assert relative_error(matrix(cell, cell.solver.preconditioner.apply), expected) < 1e-10
 
 
 @pytest.mark.parametrize("apart", [0.0, 1e-12])

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import block_diag, helmert
 from scipy.sparse import coo_matrix, csr_matrix
 
 from feti_homog.cell.refinement import ReferenceLattice, edge_node
@@ -237,20 +238,13 @@ def expand(entities: Int, nodes: Int) -> tuple[Int, Int]:
 
 
 def _contrasts(sizes: Int) -> Float:
-    """(k - 1, k) orthonormal contrasts (Helmert) within each body, then differences of the bodies' means."""
-    k = int(sizes.sum())
-    ends = np.cumsum(sizes)
-    rows = []
-    for end, size in zip(ends, sizes, strict=True):
-        for i in range(1, size):
-            row = np.zeros(k)
-            row[end - size : end - size + i], row[end - size + i] = 1.0, -i
-            rows.append(row / np.sqrt(i * (i + 1)))
-    for (b, nb), (c, nc) in zip(zip(ends, sizes, strict=True), zip(ends[1:], sizes[1:], strict=True), strict=False):
-        row = np.zeros(k)
-        row[b - nb : b], row[c - nc : c] = 1.0 / nb, -1.0 / nc
-        rows.append(row)
-    return np.array(rows)
+    """(k - 1, k) orthonormal contrasts (Helmert) of copies in each of two bodies, and the difference of their means.
+
+    Bodies of another number never part, and count as one.
+    """
+    if len(sizes) != 2:
+        return np.asarray(helmert(int(sizes.sum())))
+    return np.vstack([block_diag(*map(helmert, sizes)), np.repeat([1.0, -1.0] / sizes, sizes)])
 
 
 def _frames(normal: Float) -> Float:

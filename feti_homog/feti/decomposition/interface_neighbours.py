@@ -33,28 +33,13 @@ class InterfaceNeighbours:
         self.comm = comm
         self.rows: Int = np.concatenate(comm.allgather(own))
         self.first = int(np.searchsorted(self.rows, own[0])) if len(own) else 0
-        fibre = np.concatenate(comm.allgather(jump_operator.nodes.fibre))
-        pairs = np.concatenate(comm.allgather(self._pairs(jump_operator, subdomains, fibre)))
-        # A side between two pieces of a fibre is no interface, though both its ends may be.
-        pairs, count = np.unique(pairs, axis=0, return_counts=True)
-        a, b = pairs[count == 1].T
-        n = len(self.rows)
+        bodies, n = np.concatenate(comm.allgather(jump_operator.nodes.bodies)), len(self.rows)
+        number = self._node_numbers(jump_operator)
+        # Both bodies have the side of an interface once: twice is within a body that is cut, and a void has none.
+        outer, inner = (np.concatenate(comm.allgather(_sides(subdomains, number, body, n))) for body in bodies.T)
+        a, b = np.divmod(np.intersect1d(_once(outer), _once(inner)), n)
         entries = np.ones(2 * len(a)), (np.concatenate([a, b]), np.concatenate([b, a]))
         self.adjacency: csr_matrix = coo_matrix(entries, shape=(n, n)).tocsr()
-
-    def _pairs(self, jump_operator: JumpOperator, subdomains: Sequence[Subdomain], fibre: Int) -> Int:
-        """(e, 2) numbers, the lower first, of neighbours on the outer sides of this rank's fibres; `fibre` (n,) is that
-        of each node."""
-        number = self._node_numbers(jump_operator)
-        found, first = [np.zeros((0, 2), np.int64)], 0
-        for s in subdomains:
-            nodes = first + s.mesh.node_class[s.mesh.triangles]
-            first += s.mesh.n_classes
-            own = np.where((number >= 0) & (fibre[number] == s.submesh.body), number, -1) if len(fibre) else number
-            sides = np.sort(own[nodes[:, SIDES[nodes.shape[1]]].reshape(-1, 2)], axis=1)
-            pairs, count = np.unique(sides[sides[:, 0] >= 0], axis=0, return_counts=True)
-            found.append(pairs[count == 1])
-        return np.concatenate(found)
 
     def _node_numbers(self, jump_operator: JumpOperator) -> Int:
         """(fine nodes of this rank,) number of the interface node that each is a copy of, or -1."""
@@ -65,3 +50,25 @@ class InterfaceNeighbours:
         B = jump_operator.B[normal[here]].tocoo()
         number[B.col // jump_operator.components] = here[B.row]
         return number
+
+
+def _sides(subdomains: Sequence[Subdomain], number: Int, body: Int, n: int) -> Int:
+    """(e,) codes a n + b, a < b, of the outer sides of these subdomains between interface nodes a and b of n.
+
+    `body` (n,) is the one of each node whose subdomains count, `number` as of `_node_numbers`.
+    """
+    found, first = [np.zeros(0, np.int64)], 0
+    for s in subdomains:
+        nodes = number[first + s.mesh.node_class[s.mesh.triangles]]
+        first += s.mesh.n_classes
+        ends = nodes[:, SIDES[nodes.shape[1]]].reshape(-1, 2)
+        ends = ends[(ends >= 0).all(axis=1)]
+        low, high = np.sort(ends[(body[ends] == s.submesh.body).all(axis=1)], axis=1).T
+        found.append(_once(low * n + high))
+    return np.concatenate(found)
+
+
+def _once(values: Int) -> Int:
+    """The values that are there once."""
+    different, count = np.unique(values, return_counts=True)
+    return np.asarray(different[count == 1])
