@@ -48,6 +48,7 @@ class LaterLeg:
           a break    the worst bonds break: a point; equilibrium at the same s without them;
           a change   a point; equilibrium a little further, where the change is beyond doubt;
           less       a point if contact states are others than before.
+        touch        Open faces carry nothing of what the stresses of the load become: a point where they touch.
         end          s = 1: a point.
 
     A change that was predicted and does not come is a false alarm: up to the next change predictions are not used, and
@@ -74,17 +75,20 @@ class LaterLeg:
         """The points of the leg; if a solve does not converge, up to there.  Collective."""
         yield from self._break_overloaded()
         while self._share < 1.0 and self._state.converged:
-            yield from self._advance()
+            ahead = self._ahead()
+            yield from self._touch() if ahead is None else self._advance(ahead)
         yield self._point(0, self._path_state(self.leg + 1, 0.0))
 
-    def _advance(self) -> Iterator[Point]:
+    def _ahead(self) -> Solutions | None:
+        """The end of the leg with the contact states as they are; None if they do not carry its stresses."""
+        try:
+            return self.cell.linear(self.end, self._state.status, self._state.multipliers)
+        except NotCarriedError:
+            return None
+
+    def _advance(self, ahead: Solutions) -> Iterator[Point]:
         """Go to the next event, or as far towards it as the response is straight, and past it."""
         before, share = self._state, self._share
-        try:
-            ahead = self.cell.linear(self.end, before.status, before.multipliers)
-        except NotCarriedError:
-            yield from self._touch()
-            return
         breaks, begins, certain = self._predict(ahead)
         target = min(breaks, begins, 1.0)
         is_here = target - share <= LEAST_SHARE and (target == begins or (target == breaks and self._is_due()))

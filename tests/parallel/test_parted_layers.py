@@ -50,14 +50,14 @@ PATHS = {
 }
 
 
-def solved(comm, folder, phases, across, plane, interface, petsc, materials=EPOXY_GLASS, **analysis):
+def solved(comm, folder, phases, across, plane, interface, petsc, materials=EPOXY_GLASS, pieces=None, **analysis):
     """The result of a case of layers, with its files in the folder.  Collective."""
     if comm.rank == 0:
         layers(phases, across).write(folder / "layers.msh")
     comm.barrier()
     cell = {"geometry": "mesh", "file": "layers.msh"}
     case = document(cell, materials, plane, interface, petsc, **analysis)
-    case["output"]["fields"] = True
+    case["output"]["fields"], case["decomposition"] = True, {} if pieces is None else {"subdomains": pieces}
     return run(Case.parse(case, folder), comm, out=folder / "out")
 
 
@@ -135,10 +135,10 @@ UNDETERMINED = {
 
 
 @pytest.mark.parametrize("name", UNDETERMINED)
-@pytest.mark.parametrize(("phases", "materials"), [(TWO, EPOXY_GLASS), (SIX, EPOXY_GLASS[:1] * 2)])
+@pytest.mark.parametrize(("phases", "materials"), [(TWO, EPOXY_GLASS), (SIX, EPOXY_GLASS[:1] * 2)], ids=["two", "six"])
 def test_strains_that_nothing_determines_are_named(comm, shared_path, phases, materials, name):
     plane, to, names = UNDETERMINED[name]
-    result = solved(comm, shared_path, phases, 0, plane, WHOLE, None, materials, load={"to": to})
+    result = solved(comm, shared_path, phases, 0, plane, WHOLE, None, materials, len(phases), load={"to": to})
     told = [remark for remark in result.remarks if "undetermined" in remark]
     assert [line.split(":")[0] for line in told] == ([] if names is None else [f"[load] {names}"])
 
