@@ -12,17 +12,15 @@ import tempfile
 import warnings
 from collections.abc import Sequence
 from contextlib import ExitStack
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from differential.job import DRAWN_PER_CASE, FAILED, REFUSED, RUNS, Row, examine, table
+from differential.job import DRAWN_PER_CASE, FAILED, REFUSED, ROWS, RUNS, Row, examine, table
 from differential.relations import ALWAYS, DRAWN, RANKS
 from feti_homog.api import launch
 from feti_homog.common.mpi_errors import on_root
 
 CASES, SEED = 40, 1
-ROWS = "rows.json"
 MOST_REFUSED = 0.1  # share of cases that may be refused
 
 
@@ -53,7 +51,6 @@ def main(words: argparse.Namespace, comm: Any) -> None:
         comm.barrier()
         if comm.rank == 0:
             print(table(rows), flush=True)
-            write(rows, folder)
     faults = too_little(rows, len(numbers), comm.size)
     if comm.rank == 0 and faults:
         print("\n".join(faults))
@@ -69,14 +66,9 @@ def too_little(rows: Sequence[Row], cases: int, ranks: int) -> list[str]:
     return faults + [f"no case was compared: {name}" for name in sorted(missing) if cases >= CASES]
 
 
-def write(rows: Sequence[Row], folder: Path) -> None:
-    """Leave the rows in a folder."""
-    (folder / ROWS).write_text(json.dumps([asdict(row) for row in rows]))
-
-
 def read(folder: Path) -> list[Row]:
-    """The rows that a run left."""
-    return [Row(**row) for row in json.loads((folder / ROWS).read_text())]
+    """The rows of the cases that a run in this folder finished."""
+    return [Row(**row) for path in sorted(folder.glob(f"case-*/{ROWS}")) for row in json.loads(path.read_text())]
 
 
 def _folder(stack: ExitStack, keep: Path | None) -> str:

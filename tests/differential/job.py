@@ -6,10 +6,11 @@ together.
 
 from __future__ import annotations
 
+import json
 import os
 import traceback
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,7 @@ SHARE_ON_ALL_RANKS = 0.25
 NOT_CARRIED = "prescribe strains there"  # of a path that ends since nothing carries the stresses any more
 HELD, REFUSED, FAILED = "held", "refused", "FAILED"
 RUNS = "runs"
+ROWS = "rows*.json"  # of a case, in its folder
 
 
 @dataclass(frozen=True)
@@ -139,7 +141,9 @@ def _of_error(number: int, relation: str, error: Exception, refusals: tuple[type
 
 
 def tell(seed: int, rows: Sequence[Row], folder: Path) -> None:
-    """Print what failed of one case: seed, relation, deviation, and the case file."""
+    """Leave the rows of one case in its folder, and print what failed: seed, relation, deviation, and the case file."""
+    name = "rows.json" if any(row.relation == RUNS for row in rows) else "rows-of-all.json"
+    (folder / f"case-{rows[0].number}" / name).write_text(json.dumps([asdict(row) for row in rows]))
     failed = [row for row in rows if row.verdict == FAILED]
     for row in failed:
         off = f"{row.words}: {row.deviation:.1e}, at most {row.tolerance:.1e}"
