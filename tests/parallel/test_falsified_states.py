@@ -233,3 +233,9 @@ def test_noise_is_a_share_of_the_largest_force_of_all_ranks(falsified):
         interface.force_noise(solution) == pytest.approx(share * max(np.abs(forces).max(), caused), rel=1e-9),
     )
     assert interface.gap_noise(PULLED) == pytest.approx(share * falsified.imposed(PULLED), rel=1e-9)
+
+
+def test_a_node_that_one_rank_has_debonded_may_touch_on_all(falsified):
+    status = np.where(falsified.chosen(0), OPEN, BONDED).astype(np.int8)
+    parallel_assert(falsified.comm, not falsified.interface.is_linear(status))
+    assert falsified.interface.is_linear(np.full(len(status), BONDED, np.int8))

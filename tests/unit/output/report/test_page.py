@@ -166,7 +166,8 @@ def test_a_case_without_fields_has_its_curves(tmp_path: Path) -> None:
 
 def test_the_viewer_draws_the_fields(tmp_path: Path) -> None:
     """Displacements to 1 / 32767 of the largest, stresses to 1 / 255 of their range."""
-    with h5py.File(written(tmp_path, path()) / "result.h5") as file:
+    with h5py.File(written(tmp_path, path()) / "result.h5", "a") as file:
+        file["state/1/status"][0] = 2  # then no two kinds of nodes are as many
         shown, drawn = states.viewer_data(file, path()), drawn_mesh(file, states.TRIANGLES)
         for number, state in enumerate(shown["states"]):
             steps = np.frombuffer(base64.b64decode(state["displacement"]), "<i2").reshape(-1, 2)
@@ -180,6 +181,14 @@ def test_the_viewer_draws_the_fields(tmp_path: Path) -> None:
                 np.testing.assert_allclose(field["low"] + width * values / 255, clipped, atol=0.6 * width / 255)
             assert state["nodes"] == np.bincount(file[f"state/{number}/status"][:], minlength=3).tolist()
     assert shown["component"] == 0 and shown["points"]
+
+
+def test_the_table_of_a_load() -> None:
+    point = COUNTS | {"strain": [0.1, 0.2, 0.3], "stress": [4.0, 5.0, 6.0], "stored": 7.0}
+    (table,) = tables.answers(document("load", load=point))
+    expected = {"E11": "0.1", "E22": "0.2", "gamma12": "0.3", "S11": "4", "S22": "5", "S12": "6", "stored": "7"}
+    found = dict(table.rows)
+    assert {name: found[name] for name in expected} == expected and (found["open"], found["closed"]) == ("3", "2")
 
 
 def test_many_points_are_some_rows(tmp_path: Path) -> None:
