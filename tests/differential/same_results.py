@@ -7,8 +7,10 @@ from typing import Any
 from unittest import mock
 
 import numpy as np
+from support import dimensions
+from support.dimensions import Units
 
-from differential import comparison, result_units, transforms
+from differential import comparison, transforms
 from differential.random_cases import Drawn
 from differential.setting import Compared, Setting
 from feti_homog.common.mpi_errors import on_root
@@ -16,7 +18,7 @@ from feti_homog.errors import FetiHomogError
 from feti_homog.output.files.checkpoint import Checkpoint
 
 # Units that a case's own are multiplied by.
-STRESS_UNITS = (1e-9, 1e9)
+STRESS_UNITS = (1e-20, 1e20)
 LENGTH_UNITS = (1e-7, 1e7)  # widths are between 0.1 and 10 before, and a case file's between 1e-9 and 1e9
 MOST_SUBDOMAINS = 12
 
@@ -33,20 +35,20 @@ def ranks(setting: Setting) -> Compared:
 def unit_of_stress(setting: Setting) -> Compared:
     """All stresses in another unit.  Collective."""
     unit = _unit(setting, STRESS_UNITS)
-    other = setting.solved(transforms.in_units(setting.drawn.document, unit, 1.0))
-    return setting.compared(result_units.in_units(other, 1 / unit, 1.0))
+    other = setting.solved(transforms.in_units(setting.drawn.document, Units(stress=unit)))
+    return setting.compared(dimensions.in_units(other, Units(stress=1 / unit)))
 
 
 def unit_of_length(setting: Setting) -> Compared:
     """All lengths in another unit.  Collective."""
     unit = _unit(setting, LENGTH_UNITS)
     drawn = setting.drawn
-    document = transforms.in_units(drawn.document, 1.0, unit)
+    document = transforms.in_units(drawn.document, Units(length=unit))
     if "file" in document["cell"]:
         on_root(setting.comm, transforms.scale_mesh, drawn.folder, setting.work, unit)
         drawn = Drawn(drawn.seed, drawn.number, document, setting.work)
     other = Setting(drawn, setting.base, setting.files, setting.comm, setting.rng, setting.work).solved(document)
-    return setting.compared(result_units.in_units(other, 1.0, 1 / unit))
+    return setting.compared(dimensions.in_units(other, Units(length=1 / unit)))
 
 
 def _unit(setting: Setting, within: tuple[float, float]) -> float:

@@ -8,39 +8,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from support.dimensions import Units
 
 from differential.random_cells import MESH
 from differential.random_loads import NAMES, components
 from differential.random_phases import Document
 
-# Exponents of the units of stress and length of the keys that have one.
-STRESSES = {
-    "young", "E1", "E2", "E3", "G12", "G13", "G23", "E_axial", "E_transverse", "G_axial", "stiffness",
-    "normal_strength", "tangential_strength", "axial_strength", *NAMES[6][1],
-}  # fmt: skip
-SPRINGS = {"normal_stiffness", "tangential_stiffness", "axial_stiffness"}
-LENGTHS = {"width", "height", "fibre_radius", "x", "y", "radius", "a", "b", "inner_radius"}
-EXPONENTS = (
-    dict.fromkeys(STRESSES, (1, 0)) | dict.fromkeys(SPRINGS, (1, -1)) | dict.fromkeys(LENGTHS, (0, 1))
-    | {"toughness": (1, 1)}
-)  # fmt: skip
 
-
-def in_units(document: Document, stress: float, length: float) -> Document:
-    """A case in units in which a stress of 1 is `stress`, and a length of 1 `length`."""
-    scaled: Document = _scaled(document, "", stress, length)
+def in_units(document: Document, units: Units) -> Document:
+    """A case in other units."""
+    scaled = units.case(document)
     if not document["cell"].keys() & {"width", "fibre_radius", "file"}:
-        scaled["cell"]["width"] = length  # of 1, the default
+        scaled["cell"]["width"] = units.length  # of 1, the default
     return scaled
-
-
-def _scaled(value: Any, name: str, stress: float, length: float) -> Any:
-    if isinstance(value, Mapping):
-        return {key: _scaled(item, key, stress, length) for key, item in value.items()}
-    if name not in EXPONENTS:
-        return [_scaled(item, name, stress, length) for item in value] if isinstance(value, list) else value
-    a, b = EXPONENTS[name]
-    return (np.asarray(value, float) * (stress**a * length**b)).tolist()
 
 
 def scale_mesh(source: Path, target: Path, length: float) -> None:

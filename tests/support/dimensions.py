@@ -13,8 +13,7 @@ from feti_homog.analysis.result import Result, schema_keys
 
 # Powers of stress, length and temperature by the words that the reference of result.json has for a unit.
 OF_UNITS = {
-    "": (0, 0, 0),
-    "degrees": (0, 0, 0),
+    **dict.fromkeys(("", "degrees", "s", "bytes"), (0, 0, 0)),
     "unit of the moduli": (1, 0, 0),
     "1 / unit of the moduli": (-1, 0, 0),
     "unit of the cell": (0, 1, 0),
@@ -34,7 +33,7 @@ OF_CASE = {
     r"young|E\d|E_\w+|G\d\d|G_\w+|stiffness|\w+_strength|S\d\d|stress": (1, 0, 0),
     r"(normal|tangential|axial)_stiffness": (1, -1, 0),
     r"toughness\w*": (1, 1, 0),
-    r"width|height|radius|x|y": (0, 1, 0),
+    r"width|height|(fibre_|inner_)?radius|x|y|a|b": (0, 1, 0),
     r"expansion\w*": (0, 0, -1),
     r"temperature": (0, 0, 1),
 }
@@ -72,15 +71,36 @@ class Units:
 
 def numbers(result: Result) -> Iterator[tuple[str, tuple[int, int, int], np.ndarray]]:
     """Place, powers and values of all numbers of result.json that belong to the response."""
-    units = {key.path: key.unit for key in schema_keys()}
-    axes = result.case.get("envelope", {}).get("plane", [""])
-    of_paths = OF_PATHS | {"envelope[].factor": (int(axes[0].startswith("S")), 0, 0)}
+    powers = powers_of_keys(result.document)
     for path, value in _leaves(result.document, ""):
-        if path.split(".")[0] in APART:
-            continue
-        general = _kind(path)
-        name = general if general in units else general.rpartition(".")[0] + ".PHASE"
-        yield path, of_paths[general] if general in of_paths else OF_UNITS[units[name]], value
+        if path.split(".")[0] not in APART:
+            kind = _kind(path)
+            yield path, powers[kind if kind in powers else kind.rpartition(".")[0] + ".PHASE"], value
+
+
+def powers_of_keys(document: Mapping[str, Any]) -> dict[str, tuple[int, int, int]]:
+    """Powers of each key of a result.json; the factor of an envelope is a stress or a strain.
+
+    Raises KeyError for a unit that is new.
+    """
+    axes = document["case"].get("envelope", {}).get("plane", [""])
+    factor = int(axes[0].startswith("S")), 0, 0
+    return {key.path: OF_UNITS[key.unit] for key in schema_keys()} | OF_PATHS | {"envelope[].factor": factor}
+
+
+def in_units(document: Mapping[str, Any], units: Units) -> dict[str, Any]:
+    """A result.json in other units; its case stays as it is."""
+    powers = powers_of_keys(document)
+    return {name: v if name == "case" else _scaled(v, name, powers, units) for name, v in document.items()}
+
+
+def _scaled(value: Any, path: str, powers: Mapping[str, tuple[int, int, int]], units: Units) -> Any:
+    if isinstance(value, Mapping):
+        return {name: _scaled(item, f"{path}.{name}", powers, units) for name, item in value.items()}
+    if isinstance(value, list) and value and isinstance(value[0], Mapping):
+        return [_scaled(item, f"{path}[]", powers, units) for item in value]
+    own = powers.get(path, (0, 0, 0))
+    return value if not any(own) or value is None else (np.asarray(value) * units.of(own)).tolist()
 
 
 def _leaves(value: Any, path: str) -> Iterator[tuple[str, np.ndarray]]:

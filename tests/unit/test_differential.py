@@ -9,13 +9,15 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from differential import result_units, transforms
+from differential import transforms
 from differential.__main__ import CASES, SEED
 from differential.comparison import DIFFERENT, apart, envelopes_apart, leaves
 from differential.paths import document_of, paths_apart
 from differential.random_cases import draw, stream
 from differential.twin import SolvedAnew
 from mpi4py import MPI
+from support import dimensions
+from support.dimensions import Units
 
 from feti_homog import run
 
@@ -136,8 +138,8 @@ def test_envelopes_that_differ_are_noticed():
 @pytest.mark.parametrize("wanted", [is_load, is_small_path])
 def test_results_go_to_other_units_and_back(solved, wanted):
     document = document_of(solved(wanted)[1])
-    there = result_units.in_units(document, 1e9, 1e-3)
-    back = result_units.in_units(there, 1e-9, 1e3)
+    there = dimensions.in_units(document, Units(1e9, 1e-3))
+    back = dimensions.in_units(there, Units(1e-9, 1e3))
     assert max(off for off, _ in apart(document, back)) < 1e-14
     assert max(off for off, _ in apart(document, there)) > 0.9
     assert there["cell"]["area"] == pytest.approx(1e-6 * document["cell"]["area"])
@@ -166,7 +168,7 @@ def test_a_case_in_other_units_and_in_another_order(tmp_path: Path):
         "cell": {"geometry": "table", "width": 2.0, "fibre_list": [{"x": 1.0, "a": 0.5}, {"x": 0.5, "phase": "void"}]},
         "interface": {"toughness": 3.0, "normal_stiffness": 5.0, "debonded": [{"fibre": 1, "centre": 7.0}]},
     }
-    other = transforms.in_units(document, 10.0, 100.0)
+    other = transforms.in_units(document, Units(10.0, 100.0))
     assert other["cell"]["fibre_list"][0] == {"x": 100.0, "a": 50.0} and other["cell"]["width"] == 200.0
     assert other["interface"]["toughness"] == 3000.0 and other["interface"]["normal_stiffness"] == 0.5
     assert other["interface"]["debonded"] == document["interface"]["debonded"]
