@@ -78,7 +78,7 @@ def test_envelopes(comm):
 
 
 def test_bonds_that_cooling_alone_breaks(comm):
-    envelope = {"plane": ["S22", "S12"], "directions": 3, "temperature": -1e5}
+    envelope = {"plane": ["S22", "S12"], "directions": 4, "temperature": -1e5}
     assert_alike(comm, "envelope in space", envelope=envelope)
 
 

@@ -120,6 +120,23 @@ def test_the_state_under_a_load_has_columns():
     assert unit("load_S11", "GPa") == "GPa" == unit("load_stored", "GPa") and unit("load_E11", "GPa") == ""
 
 
+def test_columns_of_a_path_are_its_first_point_its_peaks_and_its_end():
+    path = path_document(2, 0.0)
+    path["path"][-1] |= {"stress": [-7.0, 1.0, 0.5], "bonded": 5, "open": 3, "closed": 2}
+    found = outputs(path)
+    assert [found[f"{place}_S11"] for place in ("onset", "peak", "end")] == [4.0, -7.0, -7.0]
+    assert [found[f"peak_{name}"] for name in ("S22", "S12")] == pytest.approx([5.0 / 3, 0.5])
+    assert (found["onset_E11"], found["end_E11"]) == pytest.approx((0.02, 0.2))
+    assert [found[f"end_{state}"] for state in ("bonded", "open", "closed")] == [5.0, 3.0, 2.0]
+
+
+def test_columns_of_bounds_are_the_lower_and_the_upper():
+    sides = {"reuss": np.diag([1.0, 2.0, 3.0]), "voigt": np.diag([4.0, 5.0, 6.0])}
+    found = outputs(document(0.4, 2, 0.0) | {"bounds": sides | {"hashin_shtrikman": {"bulk": [7.0, 8.0]}}})
+    assert [found[f"C{i}{i}_{side}"] for side in sides for i in (1, 2, 3)] == [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
+    assert (found["bulk_lower"], found["bulk_upper"]) == (7.0, 8.0)
+
+
 def fractions():
     """Two fractions with three realisations each, of which one still waits."""
     documents = [document(c, 8, shift) for shift in (0.0, 0.5, 1.0) for c in (0.2, 0.4)]
