@@ -18,7 +18,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 TABLE = ROOT / "tests" / "mutations.toml"
-LIMIT_S = 240  # ranks that wait for each other have noticed the error, too
+LIMIT_S = 90  # ranks that wait for each other have noticed the error, too
 PASSED, FAILED, LATE = 0, 1, 124
 
 
