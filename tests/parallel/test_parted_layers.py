@@ -24,7 +24,6 @@ ENERGY = SPRINGS | {"criterion": "energy", "toughness": 1e-5}
 WHOLE = {"debonded": [{"fibre": "all", "angle": 360.0}]}
 PARTED = STRENGTH | WHOLE
 INFLUENCE, LOOSE = {"feti_pc_type": "influence"}, {"feti_ksp_rtol": 1e-8}
-NATURAL = {"feti_coarse_space": "natural"}
 TWO, SIX, NINE = "MFMM", "MMFFMMFM", "MMFMMFMMF"
 BACK = [{"E11": 0.2}, {"E11": -0.1}]
 AGAIN = [{"E22": 0.2}, {"E22": -0.1}, {"E22": 0.15}, {"E22": -0.05}]
@@ -139,7 +138,7 @@ UNDETERMINED = {
 @pytest.mark.parametrize(("phases", "materials"), [(TWO, EPOXY_GLASS), (SIX, EPOXY_GLASS[:1] * 2)], ids=["two", "six"])
 def test_strains_that_nothing_determines_are_named(comm, shared_path, phases, materials, name):
     plane, to, names = UNDETERMINED[name]
-    result = solved(comm, shared_path, phases, 0, plane, WHOLE, NATURAL, materials, len(phases), load={"to": to})
+    result = solved(comm, shared_path, phases, 0, plane, WHOLE, None, materials, len(phases), load={"to": to})
     told = [remark for remark in result.remarks if "undetermined" in remark]
     assert [line.split(":")[0] for line in told] == ([] if names is None else [f"[load] {names}"])
 

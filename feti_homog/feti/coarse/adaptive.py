@@ -118,8 +118,8 @@ class AdaptiveCoarseSpace:
         """Factor Z_0^T S Z_0, the sum of all parts, scaled to a unit diagonal, with a small multiple of the identity.
         Collective.
 
-        Averaged modes may depend on each other, and those of a fibre that nothing holds have no energy.  What is added
-        makes the sum definite, and S_0 greater: of a coarse displacement of the scaled energy mu the share
+        Modes of a fibre that nothing holds have no energy, and are left out; others may depend on each other.  What is
+        added makes the sum definite, and S_0 greater: of a coarse displacement of the scaled energy mu the share
         eps / (mu + eps) of its forces is left, eps being what is added.
 
         Raises:
@@ -133,8 +133,11 @@ class AdaptiveCoarseSpace:
         if self._free_energy is None:
             largest = self.comm.allreduce(energy.max(initial=0.0), MPI.MAX)
             self._free_energy = FREE_MODE_ENERGY * np.where(energy > 0.0, energy, largest)
-        self._weights = 1.0 / np.sqrt(np.maximum(energy, self._free_energy))
-        matrix, near_kernel = scaled(part, self._weights), self._translations / self._weights[:, None]
+        # What a free motion has of energy is rounding, which would be scaled up to more than what is added.
+        is_held = energy > self._free_energy
+        root = np.sqrt(np.where(is_held, energy, 0.0))
+        self._weights = np.divide(1.0, root, out=np.zeros_like(root), where=is_held)
+        matrix, near_kernel = scaled(part, self._weights), self._translations * root[:, None]
         for regularisation in COARSE_REGULARISATIONS:
             try:
                 regularised = (matrix + diags(regularisation * self._modes.is_own)).tocsr()
