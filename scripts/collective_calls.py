@@ -71,7 +71,7 @@ def _profiled(note: Any) -> Iterator[None]:
 
 
 def _is_of_ranks(function: Any) -> bool:
-    """Whether a method belongs to an object of mpi4py or PETSc that several ranks have, and does more than look."""
+    """Return True if a method changes an object of mpi4py or PETSc that several ranks have."""
     thing = getattr(function, "__self__", None)
     if not isinstance(thing, MPI.Comm | PETSc.Object) or function.__name__.startswith(LOCAL):
         return False
@@ -80,15 +80,14 @@ def _is_of_ranks(function: Any) -> bool:
 
 
 def _is_shared_file(frame: FrameType) -> bool:
-    """Whether a function of h5py that begins opens, or has to do with, a file that several ranks have open."""
+    """Return True if a function of h5py that begins opens a file for several ranks, or works on one."""
     if not frame.f_globals.get("__name__", "").startswith("h5py."):
         return False
     values = frame.f_locals
     if frame.f_code.co_name == "__init__":
         return values.get("driver") == "mpio" and bool(values["kwds"].get("comm", MPI.COMM_SELF).size > 1)
-    with contextlib.suppress(
-        AttributeError, KeyError, TypeError, ValueError, RuntimeError
-    ):  # not open, or no object of a file
+    # These are raised where it is not open, or the object is none of a file.
+    with contextlib.suppress(AttributeError, KeyError, TypeError, ValueError, RuntimeError):
         plist = h5py.h5i.get_file_id(values["self"].id).get_access_plist()
         return bool(plist.get_driver() == h5py.h5fd.MPIO and plist.get_fapl_mpio()[0].size > 1)
     return False

@@ -169,7 +169,7 @@ class AnalysisContext:
         return min(CHECK_ERROR_PER_RTOL * self.homogenization.cell.solver.rtol, MAX_CHECK_ERROR)
 
     def remarks(self) -> list[str]:
-        """What the loads leave open, in words."""
+        """Name the strains that nothing determines, in one line."""
         points = sum(map(bool, self.undetermined))
         names = [name for name in SPATIAL_STRAINS if any(name in each for each in self.undetermined)]
         if not names:

@@ -145,7 +145,7 @@ def _take_elements(content: _Content, words: dict[str, str], rows: list[list[str
 
 
 def _node_counts(kind: str) -> tuple[int, ...]:
-    """How many nodes an element of this type may have."""
+    """Return the numbers of nodes that an element of this type may have."""
     if LINE.fullmatch(kind):
         return LINE_NODES
     triangle = TRIANGLE.fullmatch(kind)

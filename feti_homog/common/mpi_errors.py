@@ -131,7 +131,7 @@ def all_raise(comm: Comm, error: BaseException) -> bool:
 
 
 def _comes(request: Request, timeout: float) -> bool:
-    """Whether a request is fulfilled within `timeout` seconds."""
+    """Wait for a request, `timeout` seconds at most; return True if it is fulfilled."""
     deadline = time.monotonic() + timeout
     while not (is_fulfilled := request.Test()) and time.monotonic() < deadline:
         time.sleep(0.001)

@@ -33,7 +33,7 @@ class InterfaceNodes:
 
     @classmethod
     def of(cls, torus: Torus, lattice: ReferenceLattice, pairs: Int, numbers: Int, centres: Float) -> InterfaceNodes:
-        """Those on edges that may debond, on their chords, but for vertices that never part; `pairs` as in
+        """Place the nodes on edges that may debond, on their chords, but for vertices that never part; `pairs` as in
         `share_entities`, `numbers` (constituents,) those of fibres."""
         left, right, edge = torus.sides
         pair = pairs[torus.mesh.phase[left], torus.mesh.phase[right]]

@@ -205,7 +205,7 @@ class Interface:
         return mixed_load.unresisted(self.solver, state.load.by_stress, held)
 
     def _any(self, which: Bool) -> bool:
-        """Whether there is one on any rank; collective."""
+        """Return True if a node of any rank is one of `which`; collective."""
         return bool(self.solver.comm.allreduce(bool(which.any()), MPI.LOR))
 
     def gap_noise(self, strain: Float) -> float:

@@ -26,7 +26,7 @@ UNRESISTED = 1e-12
 
 @dataclass(frozen=True)
 class Noise:
-    """What may be the solver's error.
+    """Sizes of the solver's error.
 
     Attributes:
         roots: (v,) of a stiffness of each load, with all bonds.

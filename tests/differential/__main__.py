@@ -59,7 +59,7 @@ def main(words: argparse.Namespace, comm: Any) -> None:
 
 
 def too_little(rows: Sequence[Row], cases: int, ranks: int) -> list[str]:
-    """What so many cases left out."""
+    """List the relations that so many cases left out, and too many refusals."""
     refused = sum(row.relation == RUNS and row.verdict == REFUSED for row in rows)
     missing = {relation.name for relation in (*ALWAYS, *DRAWN, *[RANKS][: ranks - 1])} - {row.relation for row in rows}
     faults = [f"{refused} of {cases} cases were refused"] if refused > MOST_REFUSED * cases + 1 else []

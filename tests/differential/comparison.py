@@ -1,4 +1,4 @@
-"""How far the numbers of two results are apart, each relative to the largest of its kind in the result.
+"""Compare the numbers of two results, each relative to the largest of its kind in the result.
 
 Kinds are the paths of `schema_keys`: `path[].stress` are the stresses of all points.  What a result holds of its solver
 is not compared.
@@ -83,7 +83,7 @@ def _flat(values: Sequence[Any]) -> np.ndarray:
 
 
 def _deviation(path: str, base: Kinds, other: Kinds, sizes: Mapping[str, float]) -> float:
-    """That of one kind; of directions and modes the share of a circle."""
+    """Compute the deviation of one kind of number; of directions and modes the share of a circle."""
     record, _, name = path.rpartition(".")
     ours, theirs = base[path], other[path]
     if [np.shape(value) for value in ours] != [np.shape(value) for value in theirs]:
@@ -103,7 +103,7 @@ def _deviation(path: str, base: Kinds, other: Kinds, sizes: Mapping[str, float])
 
 
 def _certainty(record: str, name: str, base: Kinds, sizes: Mapping[str, float]) -> Any:
-    """How sure the modes of tips are: a mode is a ratio of rates."""
+    """Weight the modes of tips by their rates: a mode is a ratio of rates."""
     if name != "psi" or f"{record}.G_I" not in base:
         return 1.0
     rates = _flat(base[f"{record}.G_I"]) + _flat(base[f"{record}.G_II"])
@@ -119,7 +119,7 @@ def _largest(off: np.ndarray, size: float) -> float:
 
 
 def envelopes_apart(base: Sequence[Any], other: Sequence[Any]) -> list[tuple[float, str]]:
-    """The same of envelopes: loads at onset by their inverses, which are linear in the share of the strength in use.
+    """Compare envelopes: loads at onset by their inverses, which are linear in the share of the strength in use.
 
     Which bond breaks first is not compared: those of symmetric cells tie.
     """

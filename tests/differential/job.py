@@ -35,7 +35,7 @@ ROWS = "rows*.json"  # of a case, in its folder
 
 @dataclass(frozen=True)
 class Row:
-    """What came of a relation of a case; `verdict` is HELD, REFUSED or FAILED."""
+    """The outcome of a relation of a case; `verdict` is HELD, REFUSED or FAILED."""
 
     number: int
     relation: str
@@ -71,7 +71,7 @@ def examine(comm: Any, seed: int, numbers: Sequence[int], folder: Path, of_each:
 
 
 def _claimed(folder: Path, number: int) -> bool:
-    """Whether this rank is the first that comes to a case."""
+    """Return True if this rank is the first that comes to a case."""
     try:
         os.close(os.open(folder / f"claimed-{number}", os.O_CREAT | os.O_EXCL))
     except FileExistsError:

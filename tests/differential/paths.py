@@ -63,7 +63,7 @@ def _points_apart(ours: Any, theirs: Any) -> list[tuple[float, str]]:
 
 
 def ties(document: Any, folder: Path, number: int) -> bool:
-    """Whether at a point of a path more bonds are within TIE of breaking than break."""
+    """Return True if more bonds are within TIE of breaking at a point of a path than break."""
     states = document.get("states") or []
     if number not in states:
         return False

@@ -21,7 +21,7 @@ STEPS = 6  # of a path by increments
 
 
 def components(plane: str) -> int:
-    """How many strains a plane state has."""
+    """Number of strains of a plane state."""
     return 6 if plane == "generalized" else 3
 
 
@@ -104,7 +104,7 @@ def _path(rng: np.random.Generator, plane: str, expands: bool) -> Document:
 
 
 def random_load(rng: np.random.Generator, plane: str, expands: bool) -> dict[str, Any]:
-    """Of some components a strain or a stress, of a temperature its change."""
+    """Draw a strain or a stress of some components, and a change of temperature."""
     strains, stresses = NAMES[components(plane)]
     load: dict[str, Any] = {}
     for strain, stress in zip(strains, stresses, strict=True):

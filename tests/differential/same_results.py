@@ -28,7 +28,7 @@ class Killed(FetiHomogError):
 
 
 def ranks(setting: Setting) -> Compared:
-    """The same case on the ranks of `comm`.  Collective."""
+    """Solve the case on the ranks of `comm`.  Collective."""
     return setting.compared(setting.solved(setting.drawn.document))
 
 

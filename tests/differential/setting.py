@@ -18,7 +18,7 @@ from feti_homog import run
 
 @dataclass(frozen=True)
 class Compared:
-    """How far the two sides of a relation are apart, in what, and a note of what was not compared."""
+    """The deviation of the two sides of a relation, its kind, and a note of what was not compared."""
 
     deviation: float
     what: str

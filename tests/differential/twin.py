@@ -173,7 +173,7 @@ class SolvedAnew:
         return LEAST * float(np.abs(self.mean[:6] @ load).max() / self.size.prod()) or 1.0
 
     def _entry(self, state: Any) -> Any:
-        """What result.json says of a state, if it is of a path or a load."""
+        """The entry of result.json for a state of a path or a load."""
         if "path" in self.document:
             return self.document["path"][int(state.attrs["point"])]
         return self.document.get("load")
@@ -198,7 +198,7 @@ class SolvedAnew:
         return block_diag([one] * 3).tocsr()[_interleaved(self.n)][:, _interleaved(count)]
 
     def _contact(self, status: Any, jump: Any, held: Any, force: Any, entry: Any) -> float:
-        """How far open faces overlap / largest jump, or closed ones pull / largest force; of no free fibre."""
+        """Compute overlap / largest jump of open faces and pull / largest force of closed ones, without free fibres."""
         contact = any(section.get("contact", False) for section in sections(self.document["case"]))
         if not contact or not self.k or not entry or entry.get("free_motions", 0):
             return 0.0

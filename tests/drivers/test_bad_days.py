@@ -40,7 +40,7 @@ def test_ctrl_c_is_one_line_and_130(tmp_path, command):
 
 
 def test_the_order_to_end_is_one_line_of_all_ranks(tmp_path):
-    """As mpirun gives it some seconds after Ctrl-C.  Rank 1, here the first, ends after rank 0, whose line is read."""
+    """SIGTERM, which mpirun sends some seconds after Ctrl-C.  Rank 1, here the first, outlives rank 0."""
     out = tmp_path / "out"
     here = Hook("feti_homog.homogenization.unit_cell:drawn", "tell(os.getpid()); wait()", rank=None)
     last = Hook("feti_homog.common.interrupts:time.sleep", "tell('ends'); outlive(0)", rank=1)

@@ -34,7 +34,7 @@ class Falsified:
         self.row = self.interface.nodes.row
 
     def status(self, kind, where=None):
-        """Of the nodes of the arc, or of some of them, the others of it open."""
+        """Give the nodes of the arc, or some of them, this status, and open the others of the arc."""
         return np.select([self.arc if where is None else where, self.arc], [kind, OPEN], BONDED).astype(np.int8)
 
     def solution(self, strain, status):

@@ -1,4 +1,4 @@
-"""What generalized plane strain must not depend on: axes, ranks, cuts, operators and coarse spaces."""
+"""Generalized plane strain does not depend on axes, ranks, cuts, operators and coarse spaces."""
 
 from __future__ import annotations
 

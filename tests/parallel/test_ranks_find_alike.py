@@ -78,7 +78,7 @@ def test_envelopes(comm):
 
 
 def test_bonds_that_cooling_alone_breaks(comm):
-    """Of one fibre, though bonds of all are over their strength."""
+    """One fibre has the first bond, though bonds of all are over their strength."""
     envelope = {"plane": ["S22", "S12"], "directions": 4, "temperature": -1e5}
     cell = {"geometry": "random", "fibres": 3, "fibre_fraction": 0.3, "min_gap": 0.1, "mesh_size": 0.2, "seed": 2}
     assert_alike(comm, "envelope in space", envelope=envelope, cell=cell)

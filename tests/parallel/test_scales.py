@@ -75,7 +75,7 @@ def test_interfaces_far_apart_break_at_the_same_loads(comm, softness):
 
 @pytest.mark.parametrize("what", ["fibre", "springs"])
 def test_a_soft_inclusion_touches_where_any_does(comm, what):
-    """What the faces of a stiff one bear is no measure of its forces, nor is a body beside soft springs."""
+    """Neither the forces of a stiff fibre nor the body beside soft springs are a scale of its forces."""
 
     def load(softness):
         bonds = [{"debonded": [{"fibre": f, "centre": 30.0, "angle": 240.0}]} for f in (1, 2)]
@@ -160,7 +160,7 @@ class RigidFibre:
         return self.normal[:, ::-1] * [-1.0, 1.0]
 
     def load_factors(self, count):
-        """Of the first breaks, in units in which the normal stiffness is 1."""
+        """Load factors of the first breaks, in units in which the normal stiffness is 1."""
         around = np.argsort(np.arctan2(*self.arm.T[::-1]))
         bonded, found = np.ones(len(around), bool), []
         while len(found) < count:

@@ -107,7 +107,7 @@ def tractions_of_fibre(matrix, fibre, radius, springs):
 
 
 def onset_of_fibre(matrix, fibre, radius, springs, toughness, sensitivity, far):
-    """How many times the far stresses (2,) break the first bond, by the energy of its springs."""
+    """Compute the factor of the far stresses (2,) at which the first bond breaks by the energy of its springs."""
     p0, N, T = tractions_of_fibre(matrix, fibre, radius, springs)
     (s, d), t = (far[0] + far[1], far[0] - far[1]), np.radians(np.linspace(0.0, 90.0, 9001))
     normal, tangential = (s * p0 + d * N * np.cos(2 * t)) / 2, d * T * np.sin(2 * t) / 2

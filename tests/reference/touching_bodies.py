@@ -63,7 +63,7 @@ class TouchingBodies(QuadraticProgramme):
         return body
 
     def _parts(self, key, around):
-        """Whether the triangles `around` a place are of two bodies, one sector each, that have an edge in common."""
+        """Return True if the triangles `around` a place are of two bodies, a sector each, with an edge in common."""
         sector = {t: t for t in around}
         for t, s in self._beside[key]:
             if self._body[t] == self._body[s]:

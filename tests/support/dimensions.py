@@ -43,7 +43,7 @@ STRAINS = re.compile(r"E\d\d")
 
 @dataclass(frozen=True)
 class Units:
-    """What the numbers of each dimension are multiplied by."""
+    """Factors of the numbers of each dimension."""
 
     stress: float = 1.0
     length: float = 1.0

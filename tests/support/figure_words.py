@@ -1,4 +1,4 @@
-"""What a picture says: the labels of its axes with their units, and the values that the legend names."""
+"""Read the labels of a picture's axes with their units, and the values that its legend names."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 
 def panels(figure: Any) -> list[tuple[str, str, dict[str, np.ndarray]]]:
-    """Of each panel of a Matplotlib figure its two labels, and by name the heights of its curves."""
+    """Read the two labels of each panel of a Matplotlib figure, and by name the heights of its curves."""
     return [
         (
             axes.get_xlabel(),
@@ -20,7 +20,7 @@ def panels(figure: Any) -> list[tuple[str, str, dict[str, np.ndarray]]]:
 
 
 def curves(figure: Any) -> tuple[str, str, dict[str, np.ndarray]]:
-    """The same of a Bokeh figure."""
+    """Read labels and curves of a Bokeh figure."""
     named = {item.label.value: item.renderers[0] for item in figure.legend[0].items}
     heights = {name: np.asarray(drawn.data_source.data[drawn.glyph.y]) for name, drawn in named.items()}
     return figure.xaxis[0].axis_label, figure.yaxis[0].axis_label, heights

@@ -28,7 +28,7 @@ WAIT = "wait()"
 
 @dataclass(frozen=True)
 class Hook:
-    """What a rank does when a function is called.
+    """Code that a rank runs when a function is called.
 
     Attributes:
         place: "module:name" under which the function is called.
@@ -125,7 +125,7 @@ class HookedJob:
 
 
 def hooked(ranks: int, hooks: Sequence[Hook], *words: str | Path) -> subprocess.CompletedProcess[str]:
-    """The same, to its end and to that of all its processes."""
+    """Run such a job to its end and to that of all its processes."""
     with HookedJob(ranks, hooks, *words) as job:
         return job.ended()
 

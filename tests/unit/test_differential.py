@@ -27,7 +27,7 @@ SHAPES = {"ellipses": "a", "polygons": "sides", "hollow fibres": "inner_radius",
 
 
 def kinds(drawn):
-    """What a case has of the language."""
+    """List the parts of the language that a case has."""
     document, cell = drawn.document, drawn.document["cell"]
     rows, sections = cell.get("fibre_list", [{}]), transforms.sections(document)
     path = document.get("path", {})

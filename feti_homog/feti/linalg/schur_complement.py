@@ -38,7 +38,7 @@ def schur_complement(matrix: csr_matrix, rows: Int) -> Float:
 
 
 def _by_mumps(matrix: csr_matrix, rows: Int) -> Float:
-    """The same of a matrix whose largest entry is about 1."""
+    """Compute the Schur complement of a matrix whose largest entry is about 1."""
     csr = matrix.indptr, matrix.indices, matrix.data
     A = PETSc.Mat().createAIJWithArrays(matrix.shape, csr, comm=PETSc.COMM_SELF)
     A.setOption(PETSc.Mat.Option.SPD, True)

@@ -93,7 +93,7 @@ class InterfaceOperators:
         self.body_diagonal, self.diagonal = np.concatenate(bodies), np.concatenate(diagonals)
 
     def _compliance_roots(self, copies: Int, compliance: Float | None) -> list[csr_matrix | None]:
-        """Of each subdomain the root of the compliance of its skin, None without springs."""
+        """Compute the root of the compliance of each subdomain's skin, None without springs."""
         if compliance is None:
             return [None for _ in self.subdomains]
         found = [compliance_root(self.B[:, span], compliance, copies, self.of_fibre[span]) for span in self.slices]

@@ -77,7 +77,7 @@ class BorderedInverse:
         return np.asarray(x + self.N @ (b - self.M @ x))
 
     def holds(self) -> bool:
-        """Whether M[C, C] N x = x for a vector x of the rows' sizes, but for rounding, as rank 0 finds.  Collective."""
+        """Check M[C, C] N x = x but for rounding, for a vector x of the rows' sizes, on rank 0.  Collective."""
         x = np.cos(np.arange(float(len(self.members)))) * self._root
         off = (self.M @ (self.N @ x) - x) / self._root
         return bool(self._comm.bcast(bool(np.abs(off).max(initial=0.0) <= INVERSE_ERROR)))

@@ -29,7 +29,7 @@ def grid(n):
 
 
 def spoilt(n, value):
-    """The same with another diagonal entry in the middle."""
+    """A matrix with another diagonal entry in the middle."""
     A = grid(n).tolil()
     A[n * n // 2, n * n // 2] = value
     return csr_matrix(A)
@@ -82,7 +82,7 @@ def test_mumps_refuses_it_on_all_ranks(name):
 
 
 def test_pivots_that_mumps_would_replace_are_refused():
-    """Of what a Schur complement condenses it replaces those below about 1e-16, and only counts them."""
+    """Where it condenses it replaces pivots below about 1e-16, and only counts them."""
     rows = np.array([0, 8])
     with pytest.raises(np.linalg.LinAlgError, match=r"nearly singular \(MUMPS: INFOG\(25\) = 1 "):
         schur_complement(with_zero_row(1e-18), rows)
