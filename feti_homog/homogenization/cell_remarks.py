@@ -6,6 +6,7 @@ import numpy as np
 
 from feti_homog.cell import tabulated
 from feti_homog.cell.periodic_topology import Torus
+from feti_homog.cell.submesh import pinned_class
 from feti_homog.config.case import Case
 from feti_homog.config.fibre_window import read_window
 from feti_homog.config.selectors import BREAKING
@@ -24,7 +25,7 @@ def mesh_remarks(case: Case, torus: Torus, pairs: Int) -> tuple[str, ...]:
     return (
         *torus.mesh.unused_curves,
         *_bonding(case, len(torus.mesh.debonded_edges) > 0),
-        *(_held_nodes(torus, pairs) if case.interfaces else ()),
+        *((*_held_nodes(torus, pairs), *_pinned_bond(torus)) if case.interfaces else ()),
     )
 
 
@@ -36,6 +37,18 @@ def _held_nodes(torus: Torus, pairs: Int) -> tuple[str, ...]:
     kinds = ((torus.meeting[ends] > 2, "three bodies meet"), (torus.touching[ends], "two bodies meet more than once"))
     words = [f"at {which.sum()} {what}" for which, what in kinds if which.any()]
     return (f"[interface] nodes that never part: {', '.join(words)}",) if words else ()
+
+
+def _pinned_bond(torus: Torus) -> tuple[str, ...]:
+    """Mention that the node which is pinned against translation, Eq. (15), is a bond, and so never parts."""
+    at = np.searchsorted(torus.class_keys, pinned_class(torus))
+    if torus.never_part[at] or torus.meeting[at] < 2:
+        return ()
+    x, y = torus.mesh.points[np.flatnonzero(torus.node_class == at)[0]]
+    return (
+        f"[interface] the node at ({x:.6g}, {y:.6g}) never parts: it holds the cell, for all nodes of the mesh are on "
+        "interfaces; use a finer mesh",
+    )
 
 
 def _bonding(case: Case, has_debonded_curve: bool) -> tuple[str, ...]:

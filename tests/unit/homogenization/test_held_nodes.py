@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 from support.cases import FIBRE, MATRIX
+from support.layered_meshes import layers
 from support.pixel_images import pixel_mesh
 from unit.cell.test_touching import BRANCHES, TWO_FIBRES
 
@@ -45,6 +46,20 @@ def test_they_are_told_by_the_log(tmp_path: Path, capfd: Any) -> None:
     case = case_of(tmp_path, BRANCHES, interface={"normal_stiffness": 1.0})
     assemble_subdomains(case, MPI.COMM_SELF, Progress(MPI.COMM_SELF, quiet=False))
     assert f"remark: {TOUCHES}" in "".join(capfd.readouterr())
+
+
+@pytest.mark.parametrize(("phases", "pinned"), [("MF", True), ("MMF", False)])
+def test_a_bond_that_holds_the_cell_is_remarked(tmp_path: Path, phases: str, pinned: bool) -> None:
+    """Layers one element thick have no other node."""
+    layers(phases, 0).write(tmp_path / "layers.msh")
+    document = {
+        "cell": {"geometry": "mesh", "file": "layers.msh"},
+        "material": {"matrix": MATRIX, "fibre": FIBRE},
+        "analysis": {"type": "stiffness", "plane": "strain"},
+        "interface": {"normal_stiffness": 1.0},
+    }
+    told = describe(Case.parse(document, tmp_path), MPI.COMM_SELF)
+    assert ("never parts: it holds the cell" in told) == pinned
 
 
 def test_an_arc_that_selects_no_other_node_is_faulty(tmp_path: Path) -> None:
