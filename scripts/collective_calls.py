@@ -19,8 +19,9 @@ COLLECTIVES = frozenset(
     | {"Allgatherv", "Gather", "gather", "Gatherv", "Scatter", "scatter", "Scatterv", "Alltoall", "alltoall"}
     | {"Alltoallv", "Reduce_scatter", "Exscan", "exscan", "Scan", "scan"}
 )
-# Methods that look at an object, of mpi4py and PETSc, by how their names begin.
-LOCAL = ("Get_", "Is_", "py2f", "tompi4py", "get", "is", "__")
+# Methods that look at an object, of mpi4py and PETSc, by how their names begin; and `destroy`, which Python's garbage
+# collection may call anywhere.
+LOCAL = ("Get_", "Is_", "py2f", "tompi4py", "get", "is", "__", "destroy")
 
 
 class CommunicationError(AssertionError):

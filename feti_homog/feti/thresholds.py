@@ -162,3 +162,5 @@ SINGLE_PRECISION_NULL = 1e-6
 COARSE_REGULARISATIONS = (1e-12, 1e-10, 1e-8)
 # Energy of an averaged mode, relative to that with all rows active, below which it is a free motion.
 FREE_MODE_ENERGY = 1e-10
+# The same with all rows active, relative to the largest, that is rounding of displacements: the square of their 1e-14.
+ROUNDED_MODE_ENERGY = 1e-28

@@ -30,7 +30,13 @@ from feti_homog.feti.linalg.distributed_solver import RenewedSolver
 from feti_homog.feti.linalg.scaled_sparse import scaled
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.preconditioners.scaled import StiffnessScaled
-from feti_homog.feti.thresholds import COARSE_REGULARISATIONS, DEFAULTS, FREE_MODE_ENERGY, Thresholds
+from feti_homog.feti.thresholds import (
+    COARSE_REGULARISATIONS,
+    DEFAULTS,
+    FREE_MODE_ENERGY,
+    ROUNDED_MODE_ENERGY,
+    Thresholds,
+)
 from feti_homog.typing import Float, Int
 
 
@@ -132,7 +138,7 @@ class AdaptiveCoarseSpace:
         energy = self._sum(part.diagonal())
         if self._free_energy is None:
             largest = self.comm.allreduce(energy.max(initial=0.0), MPI.MAX)
-            self._free_energy = FREE_MODE_ENERGY * np.where(energy > 0.0, energy, largest)
+            self._free_energy = FREE_MODE_ENERGY * np.where(energy > ROUNDED_MODE_ENERGY * largest, energy, largest)
         # What a free motion has of energy is rounding, which would be scaled up to more than what is added.
         is_held = energy > self._free_energy
         root = np.sqrt(np.where(is_held, energy, 0.0))
