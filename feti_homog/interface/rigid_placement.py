@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
@@ -65,13 +66,12 @@ class _Fibres:
         opens a gap."""
         nodes = np.flatnonzero(self.is_open & np.isin(self.fibre, self.fibre[self.is_open & of]))
         nodes = nodes[np.argsort(self.fibre[nodes], kind="stable")]
-        ends = np.flatnonzero(np.diff(self.fibre[nodes])) + 1
-        for own in np.split(nodes, ends) if len(nodes) else []:
-            opening, slip = self.opening[own], self.slip[own]
-            columns = np.union1d(opening.indices, slip.indices)
-            motions = opening[:, columns].toarray()
-            modes = _opening_modes(motions, slip)
-            yield own, motions @ modes, columns, modes
+        opening, slip = self.opening[nodes], self.slip[nodes]
+        ends = [0, *(np.flatnonzero(np.diff(self.fibre[nodes])) + 1), len(nodes)]
+        for first, last in pairwise(ends) if len(nodes) else ():
+            columns, (motions, slips) = _block(first, last, opening, slip)
+            modes = _opening_modes(motions, slips)
+            yield nodes[first:last], motions @ modes, columns, modes
 
 
 def place(
@@ -184,12 +184,25 @@ def _shares_of_all(fibres: _Fibres, here: Float, ahead: Float, noise: float) -> 
     return float(begins), float(certain)
 
 
-def _opening_modes(opening: Float, slip: csr_matrix) -> Float:
+def _block(first: int, last: int, *matrices: csr_matrix) -> tuple[Array, list[Float]]:
+    """The columns (c,) in which rows of these matrices have entries, and the rows there, dense (rows, c) each."""
+    spans = [slice(*matrix.indptr[[first, last]]) for matrix in matrices]
+    parts = [(matrix.indices[span], matrix.data[span]) for matrix, span in zip(matrices, spans, strict=True)]
+    columns, dense = np.unique(np.concatenate([indices for indices, _ in parts])), []
+    for matrix, (indices, data) in zip(matrices, parts, strict=True):
+        block = np.zeros((last - first, len(columns)))
+        row = np.repeat(np.arange(last - first), np.diff(matrix.indptr[first : last + 1]))
+        block[row, np.searchsorted(columns, indices)] = data
+        dense.append(block)
+    return columns, dense
+
+
+def _opening_modes(opening: Float, slip: Float) -> Float:
     """(modes, m) the combinations of modes that open gaps: not those that slide."""
     if not opening.size:
         return np.zeros((opening.shape[1], 0))
     _, size, basis = np.linalg.svd(opening, full_matrices=False)
-    return np.asarray(basis[size > LARGEST_GAP_OF_SLIDING * max(size[0], abs(slip).max())].T)
+    return np.asarray(basis[size > LARGEST_GAP_OF_SLIDING * max(size[0], np.abs(slip).max())].T)
 
 
 def _largest_gap(gap: Float, motion: Float) -> tuple[Float, float, Float]:
