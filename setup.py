@@ -10,7 +10,7 @@ README = HERE / "README.md"
 
 setup(
     name="feti_homog",
-    version=re.search(r'__version__ = "(.+)"', (HERE / "feti_homog/__init__.py").read_text())[1],
+    version=re.search(r'__version__ = "(.+)"', (HERE / "feti_homog/version.py").read_text())[1],
     description="Parallel FETI homogenization of fibre composites with bonded and debonded constituents",
     long_description=README.read_text(encoding="utf-8") if README.exists() else "",
     long_description_content_type="text/markdown",
@@ -18,7 +18,7 @@ setup(
     license="MIT",
     python_requires=">=3.11",
     packages=find_packages(include=["feti_homog", "feti_homog.*"]),
-    package_data={"feti_homog.output.report": ["templates/*"]},
+    package_data={"feti_homog.report.html": ["templates/*"]},
     install_requires=[
         "numpy>=1.23",  # of the major version that petsc4py was built for: scripts/bootstrap takes that one
         "scipy>=1.10",

@@ -21,17 +21,16 @@ import importlib
 import os
 from typing import TYPE_CHECKING, Any
 
-__version__ = "0.1.0"
-
 # Debian's h5py is the build with MPI only if it is told so before its first import.
 os.environ.setdefault("H5PY_ALWAYS_USE_MPI", "1")
 
 from feti_homog.errors import CaseError, ConvergenceError, FetiHomogError, MeshError
+from feti_homog.version import __version__
 
 if TYPE_CHECKING:
     from feti_homog.analysis.result import Result
     from feti_homog.api import collect_sweep, draw_state, launch, run, run_sweep
-    from feti_homog.config.case import Case
+    from feti_homog.case.case import Case
 
 __all__ = [
     "Case",
@@ -49,7 +48,7 @@ __all__ = [
 ]
 
 
-HOMES = {"Result": "analysis.result", "Case": "config.case"}
+HOMES = {"Result": "analysis.result", "Case": "case.case"}
 
 
 def __getattr__(name: str) -> Any:

@@ -10,14 +10,15 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from feti_homog.common import libraries, standard_streams
-from feti_homog.common.command_words import named_values, petsc_words, split_argv
-from feti_homog.common.interrupts import end_on_signals, launched_rank
-from feti_homog.common.matplotlib_toolkits import prefer_own_toolkits
-from feti_homog.common.petsc_option_values import faulty_values
-from feti_homog.common.petsc_system_options import unknown_to_petsc
-from feti_homog.config.case import Case
+from feti_homog.case.case import Case
 from feti_homog.errors import EXIT_DONE, CaseError, LibraryError
+from feti_homog.petsc import libraries
+from feti_homog.petsc.command_words import named_values, petsc_words, split_argv
+from feti_homog.petsc.option_values import faulty_values
+from feti_homog.petsc.system_options import unknown_to_petsc
+from feti_homog.runtime import standard_streams
+from feti_homog.runtime.interrupts import end_on_signals, launched_rank
+from feti_homog.runtime.matplotlib_toolkits import prefer_own_toolkits
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -88,7 +89,7 @@ def run_sweep(
         ConvergenceError: cases failed; `collect_sweep` makes the table of the others.
     """
     comm = _started(comm)
-    from feti_homog.common.mpi_errors import on_root
+    from feti_homog.parallel.mpi_errors import on_root
     from feti_homog.sweep import collect, execute
 
     expanded = on_root(comm, _expanded, cases)
@@ -106,7 +107,7 @@ def collect_sweep(out: str | Path, comm: Intracomm | None = None, *, pictures: b
         CaseError: `out` is no folder of a sweep.
     """
     comm = _started(comm)
-    from feti_homog.common.mpi_errors import on_root
+    from feti_homog.parallel.mpi_errors import on_root
     from feti_homog.sweep import collect
 
     return on_root(comm, collect.collect, Path(out), pictures)
@@ -118,7 +119,7 @@ def draw_state(axes: Axes, out: str | Path, number: int = 0, **choices: Any) -> 
     `choices`: `stress` ("S11", "S22" or "S12"; by default that of the largest strain) and `scale` of the displacements
     (default 1).  Call it on one rank.
     """
-    from feti_homog.output.plots import deformed_panels
+    from feti_homog.report.plots import deformed_panels
 
     return deformed_panels.draw_state(axes, Path(out), number, **choices)
 
@@ -153,7 +154,7 @@ def start(command: Callable[[Sequence[str], Intracomm], int], argv: Sequence[str
         return error.exit_code
     from mpi4py import MPI
 
-    from feti_homog.common.mpi_errors import run_main
+    from feti_homog.parallel.mpi_errors import run_main
 
     def main() -> int:
         _start_petsc(petsc, MPI.COMM_WORLD)
@@ -191,7 +192,7 @@ def folder(name: str | Path) -> Path:
 
 def parsed(parser: argparse.ArgumentParser, words: Sequence[str], comm: Intracomm) -> argparse.Namespace:
     """The arguments; help, version and argparse's own complaints are printed by rank 0.  Collective."""
-    from feti_homog.common.mpi_errors import on_root_only
+    from feti_homog.parallel.mpi_errors import on_root_only
 
     printed = io.StringIO()
     try:

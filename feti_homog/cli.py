@@ -15,14 +15,14 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
-from feti_homog import __version__
 from feti_homog.api import folder, parsed, start
 from feti_homog.commands import fibres, statistics
-from feti_homog.common.command_words import split_argv
-from feti_homog.common.interrupts import end_on_signals, launched_rank
-from feti_homog.common.petsc_option_table import help_text
-from feti_homog.common.standard_streams import complain, prepare, print_product, say
 from feti_homog.errors import EXIT_DONE, EXIT_UNCONVERGED, CaseError, FetiHomogError
+from feti_homog.petsc.command_words import split_argv
+from feti_homog.petsc.option_table import help_text
+from feti_homog.runtime.interrupts import end_on_signals, launched_rank
+from feti_homog.runtime.standard_streams import complain, prepare, print_product, say
+from feti_homog.version import __version__
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
@@ -168,9 +168,9 @@ def _add_sweep(sweep: argparse.ArgumentParser) -> None:
 
 def _run(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.analysis.runner import run
-    from feti_homog.common.mpi_errors import on_root
-    from feti_homog.config import case as cases
-    from feti_homog.output.files import output_folder
+    from feti_homog.case import case as cases
+    from feti_homog.parallel.mpi_errors import on_root
+    from feti_homog.results import output_folder
 
     case = on_root(comm, cases.load, arguments.case)
     if arguments.resume and case.path is None:
@@ -187,8 +187,8 @@ def _check(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 def _plot(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.analysis import stored_result
-    from feti_homog.common.mpi_errors import on_root_only
-    from feti_homog.output.plots import figures
+    from feti_homog.parallel.mpi_errors import on_root_only
+    from feti_homog.report.plots import figures
 
     on_root_only(comm, stored_result.check_to_draw, arguments.directory)
     paths = on_root_only(comm, figures.plot, arguments.directory)
@@ -200,7 +200,7 @@ def _plot(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 def _report(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.analysis import stored_result
-    from feti_homog.common.mpi_errors import on_root_only
+    from feti_homog.parallel.mpi_errors import on_root_only
 
     on_root_only(comm, stored_result.read, arguments.directory)
     path = on_root_only(comm, _written_report, arguments.directory)
@@ -210,15 +210,15 @@ def _report(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 def _written_report(directory: Path) -> Path:
     """The report; only a rank that writes it loads Bokeh."""
-    from feti_homog.output.report import page
+    from feti_homog.report.html import page
 
     return page.write(directory)
 
 
 def _export(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    from feti_homog.common.mpi_errors import on_root
-    from feti_homog.output.cards import export
-    from feti_homog.output.files import product_file
+    from feti_homog.parallel.mpi_errors import on_root
+    from feti_homog.report.cards import export
+    from feti_homog.results import product_file
 
     text = on_root(comm, export.card, arguments.directory, arguments.format, arguments.symmetry)
     if arguments.out is not None:
@@ -232,7 +232,7 @@ def _verify(words: Sequence[str]) -> int:
     end_on_signals()
     prints = launched_rank() == 0
     os.environ.pop("H5PY_ALWAYS_USE_MPI", None)  # the serial h5py reads the files
-    from feti_homog.verification.certificate import verify
+    from feti_homog.verify.certificate import verify
 
     try:
         arguments = command_parser().parse_args(words)
@@ -247,8 +247,8 @@ def _verify(words: Sequence[str]) -> int:
 
 
 def _sweep(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    from feti_homog.common.mpi_errors import on_root, on_root_only
-    from feti_homog.output.files import output_folder
+    from feti_homog.parallel.mpi_errors import on_root, on_root_only
+    from feti_homog.results import output_folder
     from feti_homog.sweep import execute, plan
 
     if arguments.out is None and not arguments.list:
@@ -266,7 +266,7 @@ def _sweep(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def _collect(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    from feti_homog.common.mpi_errors import on_root_only
+    from feti_homog.parallel.mpi_errors import on_root_only
     from feti_homog.sweep import collect
 
     for line in on_root_only(comm, collect.collect, arguments.directory, not arguments.no_pictures) or []:
@@ -274,8 +274,8 @@ def _collect(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def _keys(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    from feti_homog.common.mpi_errors import on_root_only
-    from feti_homog.config import reference
+    from feti_homog.case import reference
+    from feti_homog.parallel.mpi_errors import on_root_only
 
     section = arguments.section
     tables = on_root_only(comm, reference.tables if section is None else partial(reference.tables_of, section))
@@ -283,7 +283,7 @@ def _keys(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def _schema(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    from feti_homog.config.json_schema import json_schema
+    from feti_homog.case.json_schema import json_schema
 
     _print_product(comm, json.dumps(json_schema(), indent=2))
 
@@ -294,6 +294,6 @@ def _options(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 def _print_product(comm: Intracomm, text: str) -> None:
     """Print the text of rank 0, which is all that a command makes.  Collective."""
-    from feti_homog.common.mpi_errors import on_root_only
+    from feti_homog.parallel.mpi_errors import on_root_only
 
     on_root_only(comm, print_product, text)

@@ -21,7 +21,7 @@ from pathlib import Path
 from benchmark_report import Row, compare, notes, plot, table, write
 from peers import PEERS
 
-from feti_homog.config import case as cases
+from feti_homog.case import case as cases
 
 HERE = Path(__file__).parent
 TOOLS = "feti,cholmod,mumps@1,mumps,gamg,hypre,hypre_rigid,fetidp,bddc"

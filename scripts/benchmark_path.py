@@ -22,19 +22,19 @@ from composite import MATERIAL  # noqa: E402
 from monolithic import factor_and_solve, glued  # noqa: E402
 from mpi4py import MPI  # noqa: E402
 
-from feti_homog.common import process_memory  # noqa: E402
-from feti_homog.common.petsc_options import case_options  # noqa: E402
-from feti_homog.common.progress import Progress  # noqa: E402
-from feti_homog.config import case as cases  # noqa: E402
+from feti_homog.case import case as cases  # noqa: E402
 from feti_homog.feti.preconditioners.influence import Influence  # noqa: E402
 from feti_homog.homogenization.averaging import Homogenization  # noqa: E402
 from feti_homog.homogenization.unit_cell import tear  # noqa: E402
-from feti_homog.interface.contact import BONDED  # noqa: E402
-from feti_homog.interface.load import Load  # noqa: E402
-from feti_homog.interface.loaded_cell import LoadedCell  # noqa: E402
-from feti_homog.interface.path_following import events  # noqa: E402
-from feti_homog.interface.path_points import unloaded  # noqa: E402
-from feti_homog.interface.strength_criterion import StrengthCriterion  # noqa: E402
+from feti_homog.interface.contact.contact_problem import BONDED  # noqa: E402
+from feti_homog.interface.contact.loaded_cell import LoadedCell  # noqa: E402
+from feti_homog.interface.laws.strength_criterion import StrengthCriterion  # noqa: E402
+from feti_homog.interface.loads.load import Load  # noqa: E402
+from feti_homog.interface.path.path_following import events  # noqa: E402
+from feti_homog.interface.path.path_points import unloaded  # noqa: E402
+from feti_homog.petsc.options import case_options  # noqa: E402
+from feti_homog.runtime import process_memory  # noqa: E402
+from feti_homog.runtime.progress import Progress  # noqa: E402
 
 STRAIN = [0.2, 0.0, 0.0]
 STRENGTH = 10.0

@@ -26,14 +26,14 @@ from peers import PEERS, Peer  # noqa: E402
 from petsc4py import PETSc  # noqa: E402
 
 from feti_homog.analysis.context import AnalysisContext  # noqa: E402
-from feti_homog.common import process_memory  # noqa: E402
-from feti_homog.common.mpi_errors import agree, run_main  # noqa: E402
-from feti_homog.common.petsc_options import case_options  # noqa: E402
-from feti_homog.common.progress import Progress  # noqa: E402
-from feti_homog.config import case as cases  # noqa: E402
-from feti_homog.config.case import Case  # noqa: E402
+from feti_homog.case import case as cases  # noqa: E402
+from feti_homog.case.case import Case  # noqa: E402
 from feti_homog.homogenization import phase_laws, unit_cell  # noqa: E402
 from feti_homog.homogenization.averaging import Homogenization  # noqa: E402
+from feti_homog.parallel.mpi_errors import agree, run_main  # noqa: E402
+from feti_homog.petsc.options import case_options  # noqa: E402
+from feti_homog.runtime import process_memory  # noqa: E402
+from feti_homog.runtime.progress import Progress  # noqa: E402
 from feti_homog.typing import Float  # noqa: E402
 
 PREFIX = "peer_"

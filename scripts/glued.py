@@ -13,9 +13,9 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from feti_homog.cell.refinement import ReferenceLattice
 from feti_homog.fem.problem import Problem
 from feti_homog.feti.decomposition.subdomain import Subdomain
+from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.typing import Float, Int
 
 ADD = PETSc.InsertMode.ADD_VALUES

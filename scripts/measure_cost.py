@@ -21,7 +21,7 @@ from composite import STIFFNESS
 from scipy.optimize import least_squares
 
 from feti_homog.homogenization import cost_model
-from feti_homog.output.files import result_json
+from feti_homog.results import result_json
 
 CELLS = (
     {"geometry": "hexagonal", "fibre_fraction": 0.4, "mesh_size": 0.05},

@@ -24,12 +24,12 @@ import numpy as np  # noqa: E402
 from mpi4py import MPI  # noqa: E402
 from petsc4py import PETSc  # noqa: E402
 
-from feti_homog.common.petsc_options import case_options  # noqa: E402
-from feti_homog.common.progress import Progress  # noqa: E402
-from feti_homog.config import case as cases  # noqa: E402
-from feti_homog.config.case import Case  # noqa: E402
+from feti_homog.case import case as cases  # noqa: E402
+from feti_homog.case.case import Case  # noqa: E402
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds  # noqa: E402
 from feti_homog.homogenization.unit_cell import tear  # noqa: E402
+from feti_homog.petsc.options import case_options  # noqa: E402
+from feti_homog.runtime.progress import Progress  # noqa: E402
 
 # Columns that are no whole numbers.
 REAL = (

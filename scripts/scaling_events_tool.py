@@ -23,13 +23,13 @@ from petsc4py import PETSc  # noqa: E402
 from scaling_events import EventRow  # noqa: E402
 from scaling_tool import PINGS, foreign, ping  # noqa: E402
 
-from feti_homog.common.mpi_errors import run_main  # noqa: E402
-from feti_homog.common.petsc_options import case_options  # noqa: E402
-from feti_homog.common.progress import Progress  # noqa: E402
-from feti_homog.config import case as cases  # noqa: E402
-from feti_homog.config.case import Case  # noqa: E402
+from feti_homog.case import case as cases  # noqa: E402
+from feti_homog.case.case import Case  # noqa: E402
 from feti_homog.homogenization.averaging import Homogenization  # noqa: E402
 from feti_homog.homogenization.unit_cell import tear  # noqa: E402
+from feti_homog.parallel.mpi_errors import run_main  # noqa: E402
+from feti_homog.petsc.options import case_options  # noqa: E402
+from feti_homog.runtime.progress import Progress  # noqa: E402
 
 
 def main() -> int:

@@ -16,7 +16,7 @@ from scaling_elimination import OF_COARSE, OF_NATURAL, VALUE_BYTES, Elimination,
 from scaling_fit import Shares, fit_shares
 from scaling_report import ELIMINATION, GATHERS, MULTIGRID, SCALARS, SHARED, SUMS, Row
 
-from feti_homog.cell.tiles import DEFAULT_TILES
+from feti_homog.mesh.tiles.tiles import DEFAULT_TILES
 
 MESH, LOCAL, COARSE, MESSAGES = "mesh", "subdomains", "coarse problem", "messages"
 # Exchanges with neighbours in one cycle of multigrid: on each of about five levels six, for the products and smoothers

@@ -26,14 +26,8 @@ from petsc4py import PETSc  # noqa: E402
 from scaling_fronts import fastest, fronts_of, seconds_of, timed_fronts  # noqa: E402
 from scaling_report import ELIMINATION, MULTIGRID, SHARED  # noqa: E402
 
-from feti_homog.cell.drawing import Sketch  # noqa: E402
-from feti_homog.cell.tiles import TilePolicy  # noqa: E402
-from feti_homog.common import process_memory  # noqa: E402
-from feti_homog.common.mpi_errors import on_root, run_main  # noqa: E402
-from feti_homog.common.petsc_options import case_options  # noqa: E402
-from feti_homog.common.progress import Progress  # noqa: E402
-from feti_homog.config import case as cases  # noqa: E402
-from feti_homog.config.case import Case  # noqa: E402
+from feti_homog.case import case as cases  # noqa: E402
+from feti_homog.case.case import Case  # noqa: E402
 from feti_homog.feti.coarse.adaptive import AdaptiveCoarseSpace  # noqa: E402
 from feti_homog.feti.coarse.natural import NaturalCoarseSpace  # noqa: E402
 from feti_homog.feti.decomposition.jump_operator import JumpOperator  # noqa: E402
@@ -41,6 +35,12 @@ from feti_homog.homogenization import coarse_meshes  # noqa: E402
 from feti_homog.homogenization.domain_partition import DEFAULT_POLICY  # noqa: E402
 from feti_homog.homogenization.drawn_cell import drawn_cell, summary_of, tiles_to_fill  # noqa: E402
 from feti_homog.homogenization.unit_cell import TornCell, tear  # noqa: E402
+from feti_homog.mesh.fill.drawing import Sketch  # noqa: E402
+from feti_homog.mesh.tiles.tiles import TilePolicy  # noqa: E402
+from feti_homog.parallel.mpi_errors import on_root, run_main  # noqa: E402
+from feti_homog.petsc.options import case_options  # noqa: E402
+from feti_homog.runtime import process_memory  # noqa: E402
+from feti_homog.runtime.progress import Progress  # noqa: E402
 from feti_homog.typing import Int  # noqa: E402
 
 LOADS = 3

@@ -11,16 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feti_homog.analysis.result_records import TipRates
-from feti_homog.common.progress import Progress
-from feti_homog.config.case import Case
+from feti_homog.case.case import Case
 from feti_homog.homogenization import phase_laws, process_zone
 from feti_homog.homogenization.averaging import Homogenization, Response
 from feti_homog.homogenization.energy_release import EnergyReleaseRates
 from feti_homog.homogenization.fibre_debonding import FibreInterfaces
-from feti_homog.interface.contact import OPEN, Equilibrium, Status
-from feti_homog.interface.load import Load
-from feti_homog.interface.loaded_cell import LoadedCell
-from feti_homog.mechanics.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES, STRAINS
+from feti_homog.interface.contact.contact_problem import OPEN, Equilibrium, Status
+from feti_homog.interface.contact.loaded_cell import LoadedCell
+from feti_homog.interface.loads.load import Load
+from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES, STRAINS
+from feti_homog.runtime.progress import Progress
 from feti_homog.typing import Float
 
 EMPTY = np.zeros(0)

@@ -7,15 +7,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from feti_homog.config.interface_section import InterfaceSection
+from feti_homog.case.interface_section import InterfaceSection
 from feti_homog.errors import CaseError
 from feti_homog.feti.preconditioners.influence import Influence
 from feti_homog.homogenization.bonds import axial_stiffness
 from feti_homog.homogenization.unit_cell import TornCell
-from feti_homog.interface.bond_criterion import BondCriterion
-from feti_homog.interface.energy_criterion import EnergyCriterion
-from feti_homog.interface.strength_criterion import StrengthCriterion
-from feti_homog.interface.tip_criterion import TipCriterion
+from feti_homog.interface.laws.bond_criterion import BondCriterion
+from feti_homog.interface.laws.energy_criterion import EnergyCriterion
+from feti_homog.interface.laws.strength_criterion import StrengthCriterion
+from feti_homog.interface.laws.tip_criterion import TipCriterion
 from feti_homog.typing import Float, Int
 
 

@@ -14,14 +14,14 @@ from mpi4py import MPI
 
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.tip_records import DIRECTION_DIGITS, bond_directions
-from feti_homog.config.envelope_section import Envelope
+from feti_homog.case.envelope_section import Envelope
 from feti_homog.errors import CaseError
 from feti_homog.homogenization.averaging import Response, asymmetry
-from feti_homog.interface.bond_criterion import BondCriterion
-from feti_homog.interface.energy_criterion import EnergyCriterion
-from feti_homog.interface.onset import OnsetCriterion
-from feti_homog.interface.path_points import UTILISATION_TIE
-from feti_homog.mechanics.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES, STRAINS, STRESSES
+from feti_homog.interface.laws.bond_criterion import BondCriterion
+from feti_homog.interface.laws.energy_criterion import EnergyCriterion
+from feti_homog.interface.path.onset import OnsetCriterion
+from feti_homog.interface.path.path_points import UTILISATION_TIE
+from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES, STRAINS, STRESSES
 from feti_homog.typing import Float, Int
 
 # Bonds times directions that are looked at together.

@@ -6,18 +6,18 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from feti_homog.analysis.context import AnalysisContext
+from feti_homog.analysis.event_progress import EVENTS_BAR, STEPS_BAR, EventProgress
 from feti_homog.analysis.path_events import Work, restored, stored
 from feti_homog.analysis.tip_records import TipRecorder
-from feti_homog.common.event_progress import EVENTS_BAR, STEPS_BAR, EventProgress
-from feti_homog.config.load_section import LoadPath
+from feti_homog.case.load_section import LoadPath
 from feti_homog.errors import NotCarriedError
 from feti_homog.homogenization.averaging import Response
-from feti_homog.interface.bond_criterion import BondCriterion, spring_criterion
-from feti_homog.interface.path_following import events, increments
-from feti_homog.interface.path_points import Energies, Point, unloaded
-from feti_homog.mechanics.kept_points import kept
-from feti_homog.output.files import event_log
-from feti_homog.output.files.checkpoint import Checkpoint
+from feti_homog.interface.laws.bond_criterion import BondCriterion, spring_criterion
+from feti_homog.interface.path.path_following import events, increments
+from feti_homog.interface.path.path_points import Energies, Point, unloaded
+from feti_homog.results import event_log
+from feti_homog.results.checkpoint import Checkpoint
+from feti_homog.results.kept_points import kept
 
 BARS = {"events": EVENTS_BAR, "increments": STEPS_BAR}
 

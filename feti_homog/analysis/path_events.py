@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from feti_homog.feti.dual_solution import DualSolution
-from feti_homog.interface.contact import Equilibrium
-from feti_homog.interface.load import Load
-from feti_homog.interface.macroscopic import Macroscopic
-from feti_homog.interface.path_points import NO_ENERGIES, Energies, PathState, Point
-from feti_homog.output.files.checkpoint import Arrays
+from feti_homog.interface.contact.contact_problem import Equilibrium
+from feti_homog.interface.loads.load import Load
+from feti_homog.interface.loads.macroscopic import Macroscopic
+from feti_homog.interface.path.path_points import NO_ENERGIES, Energies, PathState, Point
+from feti_homog.results.checkpoint import Arrays
 
 KKT_LAWS = ("kkt_complementarity", "kkt_penetration", "kkt_tension")
 # Behind the names of what belongs to the problem along the fibres.

@@ -24,15 +24,15 @@ from feti_homog.analysis.result_records import (
     StiffnessBounds,
     TipRates,
 )
-from feti_homog.common.records import BYTES, SECONDS, STRESS, Key, described, keys, plain, restored
-from feti_homog.mechanics import response
-from feti_homog.mechanics.bounds import Moduli
-from feti_homog.mechanics.estimates.fibre_bounds import FibreBounds
-from feti_homog.mechanics.estimates.methods import Estimates
-from feti_homog.mechanics.spatial_constants import EngineeringConstants, TransverselyIsotropic, TransverseModuli
-from feti_homog.output.files.file_seal import FileSeal
-from feti_homog.output.files.result_json import SCHEMA
-from feti_homog.output.text.summary import short_summary
+from feti_homog.materials.bounds import Moduli
+from feti_homog.materials.estimates.fibre_bounds import FibreBounds
+from feti_homog.materials.estimates.methods import Estimates
+from feti_homog.materials.spatial_constants import EngineeringConstants, TransverselyIsotropic, TransverseModuli
+from feti_homog.report.text.summary import short_summary
+from feti_homog.results import path_curves
+from feti_homog.results.file_seal import FileSeal
+from feti_homog.results.result_json import SCHEMA
+from feti_homog.runtime.records import BYTES, SECONDS, STRESS, Key, described, keys, plain, restored
 from feti_homog.typing import Float
 
 
@@ -158,7 +158,7 @@ class Result:
 
         Raises ValueError for any other result, and where that strain does not rise with the load.
         """
-        curve = response.rising_strain(self.document)
+        curve = path_curves.rising_strain(self.document)
         if curve is None:
             raise ValueError("only a path of one leg whose leading strain rises has a response to a rising strain")
         return curve
@@ -167,9 +167,9 @@ class Result:
         """(3,) or (6,) stress left after the first break of a path of one leg, the load being held there, and the
         number of the point whose branch it is on.  Raises ValueError for any other result."""
         document = self.document
-        if not self.path or not response.is_proportional(document):
+        if not self.path or not path_curves.is_proportional(document):
             raise ValueError("only a path of one leg, followed by events, has a first drop")
-        return response.first_drop(document["path"])
+        return path_curves.first_drop(document["path"])
 
     def __str__(self) -> str:
         return short_summary(self.document)

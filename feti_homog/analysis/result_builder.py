@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog import __version__
 from feti_homog.analysis import spatial_constants
 from feti_homog.analysis.context import CONTACT_TOLERANCE, AnalysisContext
 from feti_homog.analysis.result import Result
@@ -23,15 +22,16 @@ from feti_homog.analysis.result_records import (
     SolverInfo,
     StiffnessBounds,
 )
-from feti_homog.cell.ellipses import Ellipses
-from feti_homog.common.mpi_errors import on_root
-from feti_homog.config.case import Case
-from feti_homog.config.materials import plane_stiffness
+from feti_homog.case.case import Case
+from feti_homog.case.materials import plane_stiffness
+from feti_homog.fibres.ellipses import Ellipses
 from feti_homog.homogenization.domain_partition import CellSummary
 from feti_homog.homogenization.unit_cell import TornCell
-from feti_homog.mechanics import bounds
-from feti_homog.mechanics.bounds import Moduli
+from feti_homog.materials import bounds
+from feti_homog.materials.bounds import Moduli
+from feti_homog.parallel.mpi_errors import on_root
 from feti_homog.typing import Float
+from feti_homog.version import __version__
 
 # Phases that are no fibres.
 AROUND_FIBRES = ("matrix", "coating")

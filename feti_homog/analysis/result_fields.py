@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from feti_homog.output.files.field_layout import FibrePart, Header, InterfacePart, MeshPart, StatePart, tables
+from feti_homog.results.field_layout import FibrePart, Header, InterfacePart, MeshPart, StatePart, tables
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm

@@ -6,11 +6,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from typing import Any
 
-from feti_homog.mechanics.voigt import SPATIAL_STRESSES, voigt_names
-from feti_homog.output.text.constants_tables import SHORT, comparison
-from feti_homog.output.text.spatial_tables import THERMAL
-from feti_homog.output.text.summary import title_of
-from feti_homog.output.text.units import with_unit
+from feti_homog.materials.voigt import SPATIAL_STRESSES, voigt_names
+from feti_homog.report.text.constants_tables import SHORT, comparison
+from feti_homog.report.text.spatial_tables import THERMAL
+from feti_homog.report.text.summary import title_of
+from feti_homog.report.text.units import with_unit
 
 Document = Mapping[str, Any]
 

@@ -9,9 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from feti_homog.common.records import DEGREES, LENGTH, STRESS, described, plain
-from feti_homog.mechanics.bounds import Bounds
-from feti_homog.mechanics.voigt import (
+from feti_homog.materials.bounds import Bounds
+from feti_homog.materials.voigt import (
     SPATIAL_STIFFNESSES,
     SPATIAL_STRAINS,
     SPATIAL_STRESSES,
@@ -19,6 +18,7 @@ from feti_homog.mechanics.voigt import (
     STRAINS,
     STRESSES,
 )
+from feti_homog.runtime.records import DEGREES, LENGTH, STRESS, described, plain
 from feti_homog.typing import Float
 
 EITHER, EITHER_STIFFNESS = "(3,) or (6,)", "(3, 3) or (6, 6)"

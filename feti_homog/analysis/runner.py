@@ -17,15 +17,14 @@ from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.criteria import criterion_of
 from feti_homog.analysis.result import Result
 from feti_homog.analysis.state_recorder import StateRecorder
-from feti_homog.common import process_memory
-from feti_homog.common.mpi_errors import all_raise, on_root, on_root_only
-from feti_homog.common.petsc_options import case_options, refuse_unused
-from feti_homog.common.progress import Progress
-from feti_homog.config.case import Case
+from feti_homog.case.case import Case
 from feti_homog.errors import ConvergenceError
 from feti_homog.homogenization.averaging import Homogenization
 from feti_homog.homogenization.unit_cell import TornCell, tear
-from feti_homog.output.files import (
+from feti_homog.parallel.mpi_errors import all_raise, on_root, on_root_only
+from feti_homog.petsc.options import case_options, refuse_unused
+from feti_homog.report.text.summary import summary
+from feti_homog.results import (
     csv_tables,
     event_log,
     field_file,
@@ -35,10 +34,11 @@ from feti_homog.output.files import (
     result_json,
     xdmf,
 )
-from feti_homog.output.files.checkpoint import Checkpoint, EventsInMemory, NoCheckpoint
-from feti_homog.output.files.event_log import EventLog
-from feti_homog.output.files.field_file import FieldFile
-from feti_homog.output.text.summary import summary
+from feti_homog.results.checkpoint import Checkpoint, EventsInMemory, NoCheckpoint
+from feti_homog.results.event_log import EventLog
+from feti_homog.results.field_file import FieldFile
+from feti_homog.runtime import process_memory
+from feti_homog.runtime.progress import Progress
 
 
 def run(
@@ -209,13 +209,13 @@ def _write(result: Result, directory: Path, cell: TornCell) -> None:
 
 def _draw(directory: Path) -> list[Path]:
     """The pictures; only a rank that draws loads Matplotlib."""
-    from feti_homog.output.plots import figures
+    from feti_homog.report.plots import figures
 
     return figures.plot(directory)
 
 
 def _report(directory: Path) -> list[Path]:
     """report.html; only a rank that writes it loads Bokeh."""
-    from feti_homog.output.report import page
+    from feti_homog.report.html import page
 
     return [page.write(directory)]

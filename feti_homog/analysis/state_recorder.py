@@ -6,14 +6,14 @@ from collections.abc import Callable
 from itertools import count
 
 from feti_homog.analysis.result_fields import Fields
-from feti_homog.common.mpi_errors import on_root
 from feti_homog.errors import FetiHomogError
 from feti_homog.homogenization.averaging import Response
 from feti_homog.homogenization.unit_cell import TornCell
-from feti_homog.output.files import field_parts, file_seal, state_parts
-from feti_homog.output.files.field_file import FieldFile
-from feti_homog.output.files.field_layout import StatePart
-from feti_homog.output.files.file_seal import FileSeal
+from feti_homog.parallel.mpi_errors import on_root
+from feti_homog.results import field_parts, file_seal, state_parts
+from feti_homog.results.field_file import FieldFile
+from feti_homog.results.field_layout import StatePart
+from feti_homog.results.file_seal import FileSeal
 
 
 class StateRecorder:

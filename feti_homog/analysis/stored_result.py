@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from feti_homog.analysis.result import Result
-from feti_homog.config.case import Case
+from feti_homog.case.case import Case
 from feti_homog.errors import CaseError
-from feti_homog.output.files import checkpoint, field_file, file_seal, result_json
+from feti_homog.results import checkpoint, field_file, file_seal, result_json
 
 
 def read(directory: Path) -> dict[str, Any]:

@@ -7,10 +7,10 @@ import numpy as np
 from feti_homog.analysis.result_records import Tips
 from feti_homog.feti.decomposition.interface_neighbours import InterfaceNeighbours
 from feti_homog.homogenization.unit_cell import TornCell
-from feti_homog.interface.energy_criterion import EnergyCriterion
-from feti_homog.interface.loaded_cell import LoadedCell
-from feti_homog.interface.path_points import Point
-from feti_homog.interface.tip_energies import tip_energies
+from feti_homog.interface.contact.loaded_cell import LoadedCell
+from feti_homog.interface.laws.energy_criterion import EnergyCriterion
+from feti_homog.interface.laws.tip_energies import tip_energies
+from feti_homog.interface.path.path_points import Point
 from feti_homog.typing import Float
 
 # Directions of nodes differ by rounding from rank to rank, and so would their order.

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from feti_homog.api import folder
-from feti_homog.common.standard_streams import print_product, say
+from feti_homog.runtime.standard_streams import print_product, say
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
@@ -27,9 +27,9 @@ def add(actions: argparse._SubParsersAction[Any]) -> None:
 
 
 def _fibres(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    from feti_homog.analysis import fibre_rows
-    from feti_homog.common.mpi_errors import on_root_only
-    from feti_homog.output.files import product_file
+    from feti_homog.commands import fibre_rows
+    from feti_homog.parallel.mpi_errors import on_root_only
+    from feti_homog.results import product_file
 
     text = on_root_only(comm, fibre_rows.table, arguments.source)
     if arguments.out is None:

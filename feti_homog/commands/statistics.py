@@ -7,7 +7,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from feti_homog.api import folder
-from feti_homog.common.standard_streams import say
+from feti_homog.runtime.standard_streams import say
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
@@ -59,8 +59,8 @@ def _length(word: str) -> float:
 
 
 def _statistics(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    from feti_homog.analysis import fibre_statistics
-    from feti_homog.common.mpi_errors import on_root_only
+    from feti_homog.commands import fibre_statistics
+    from feti_homog.parallel.mpi_errors import on_root_only
 
     size = None if arguments.size is None else tuple(arguments.size)
     words = arguments.source, arguments.out, arguments.model, arguments.simulations, size

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 
-from feti_homog.cell.refinement import FineMesh
 from feti_homog.fem.macro_element import MacroElement, integrals, products
 from feti_homog.fem.problem import PLANE, Problem
 from feti_homog.fem.shape_functions import gradients
+from feti_homog.mesh.refinement import FineMesh
 from feti_homog.typing import Float, Int, Int32
 
 # Elements that are integrated at once: bounds the memory of their gradients, about 100 MB of quadratic ones.

@@ -7,8 +7,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from feti_homog.cell.refinement import ReferenceLattice
 from feti_homog.fem.shape_functions import gradients
+from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.typing import Float, Int
 
 

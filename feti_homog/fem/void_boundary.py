@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from feti_homog.cell.refinement import FineMesh, ReferenceLattice
-from feti_homog.cell.submesh import Submesh
+from feti_homog.mesh.refinement import FineMesh, ReferenceLattice
+from feti_homog.mesh.submesh import Submesh
 from feti_homog.typing import Bool, Float, Int
 
 # int N_i dN_j along a side: of two nodes, and of two and the one between them.

@@ -1,6 +1,6 @@
 """The dual problem of the torn cell: subdomains, multipliers, dual operator, coarse spaces, preconditioners, solver.
 
-May use `fem`, `cell` and `common`.  Main entry: `solver.FetiSolver`.  Its own floors, each on those below:
+May use `fem`, `mesh`, `parallel` and `petsc`.  Main entry: `solver.FetiSolver`.  Its own floors, each on those below:
 
     solver, view, factory, solver_plan, krylov
     coarse           natural and adaptive coarse space, the preconditioner with the latter, projector

@@ -9,8 +9,7 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from feti_homog.common.mpi_errors import agree
-from feti_homog.config.phase_names import COATING
+from feti_homog.case.phase_names import COATING
 from feti_homog.feti.coarse.adaptive import AdaptiveCoarseSpace
 from feti_homog.feti.coarse.balanced import Balanced
 from feti_homog.feti.coarse.natural import NaturalCoarseSpace
@@ -24,6 +23,7 @@ from feti_homog.feti.preconditioners.scaled import Dirichlet, Identity, Lumped, 
 from feti_homog.feti.preconditioners.spring_update import WithSprings
 from feti_homog.feti.solver_plan import ProblemSizes, SolverOptions, choose
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
+from feti_homog.parallel.mpi_errors import agree
 from feti_homog.typing import Float
 
 CLASSES: dict[str, Callable[[MPI.Intracomm, JumpOperator, InterfaceOperators], Preconditioner]] = {

@@ -12,12 +12,12 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from feti_homog.common.callback_errors import CallbackErrors
-from feti_homog.common.distributed_arrays import allreduce_sum, scale_rows
 from feti_homog.feti.coarse.natural import NaturalCoarseSpace
 from feti_homog.feti.operators.dual_operator import DualOperator
 from feti_homog.feti.preconditioners.scaled import Preconditioner
 from feti_homog.feti.thresholds import FORCE_STALL_ITERATIONS, MAX_ITERATIONS, RTOL, STALL_ITERATIONS
+from feti_homog.parallel.distributed_arrays import allreduce_sum, scale_rows
+from feti_homog.petsc.callback_errors import CallbackErrors
 from feti_homog.typing import Float
 
 # Methods that apply the preconditioner to the residual itself, so that the jump can be read off there.  With the

@@ -18,9 +18,6 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from feti_homog.cell.refinement import ReferenceLattice
-from feti_homog.common import process_memory
-from feti_homog.common.distributed_arrays import allreduce_sum
 from feti_homog.fem.problem import PLANE, Problem
 from feti_homog.feti import factory, view
 from feti_homog.feti.decomposition.interface_springs import GLUE, InterfaceSprings
@@ -32,6 +29,9 @@ from feti_homog.feti.krylov import ActiveRows, Krylov
 from feti_homog.feti.operators.dual_operator import DualOperator
 from feti_homog.feti.operators.inner_loads import CondensedLoads
 from feti_homog.feti.thresholds import DEFAULTS, MAX_RESTARTS, ZERO_JUMP, Thresholds
+from feti_homog.mesh.refinement import ReferenceLattice
+from feti_homog.parallel.distributed_arrays import allreduce_sum
+from feti_homog.runtime import process_memory
 from feti_homog.typing import Float
 
 # What rounding can end in.

@@ -8,15 +8,15 @@ from itertools import product
 
 import numpy as np
 
-from feti_homog.cell.circle_arcs import MERGED
-from feti_homog.cell.periodic_topology import Torus
-from feti_homog.cell.refinement import ReferenceLattice
-from feti_homog.config.case import Case
-from feti_homog.config.interface_rules import interface_label
-from feti_homog.config.interface_section import Arc
+from feti_homog.case.case import Case
+from feti_homog.case.interface_rules import interface_label
+from feti_homog.case.interface_section import Arc
 from feti_homog.homogenization import tips
-from feti_homog.interface import debonded_arcs
-from feti_homog.interface.debonded_arcs import MovedTips
+from feti_homog.interface.tips import debonded_arcs
+from feti_homog.interface.tips.debonded_arcs import MovedTips
+from feti_homog.mesh.outline.circle_arcs import MERGED
+from feti_homog.mesh.periodic_topology import Torus
+from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.typing import Bool, Float, Int
 
 

@@ -12,12 +12,19 @@ from functools import cached_property
 import numpy as np
 from mpi4py import MPI
 
-from feti_homog.common.distributed_arrays import allreduce_sum
 from feti_homog.errors import ConvergenceError
 from feti_homog.feti.operators.node_blocks import NodeBlocks
 from feti_homog.homogenization.unit_cell import TornCell
-from feti_homog.interface.contact import BONDED, CLOSED, OPEN, Equilibrium, Interface, Status
-from feti_homog.interface.load import Load
+from feti_homog.interface.contact.contact_problem import (
+    BONDED,
+    CLOSED,
+    OPEN,
+    Equilibrium,
+    Interface,
+    Status,
+)
+from feti_homog.interface.loads.load import Load
+from feti_homog.parallel.distributed_arrays import allreduce_sum
 from feti_homog.typing import Float
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from feti_homog.config.case import Case
-from feti_homog.config.interface_section import InterfaceSection
+from feti_homog.case.case import Case
+from feti_homog.case.interface_section import InterfaceSection
 from feti_homog.feti.decomposition.interface_springs import InterfaceSprings
 
 

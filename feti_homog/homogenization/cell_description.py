@@ -6,11 +6,9 @@ from collections.abc import Sequence
 
 from mpi4py import MPI
 
-from feti_homog.cell.refinement import ReferenceLattice
-from feti_homog.common.mpi_errors import on_root_only
-from feti_homog.config import element_sizes
-from feti_homog.config.case import Case
-from feti_homog.config.phase_names import COATING
+from feti_homog.case import element_sizes
+from feti_homog.case.case import Case
+from feti_homog.case.phase_names import COATING
 from feti_homog.feti import solver_plan
 from feti_homog.feti.decomposition.shared_entities import share_entities
 from feti_homog.feti.factory import database_options
@@ -18,6 +16,8 @@ from feti_homog.feti.solver_plan import ProblemSizes, SolverOptions, SolverPlan
 from feti_homog.homogenization import cost_model, phase_laws, process_zone
 from feti_homog.homogenization.domain_partition import DEFAULT_POLICY, CellSummary
 from feti_homog.homogenization.unit_cell import cut
+from feti_homog.mesh.refinement import ReferenceLattice
+from feti_homog.parallel.mpi_errors import on_root_only
 
 
 def describe(case: Case, comm: MPI.Intracomm) -> str:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from feti_homog.cell import tabulated
-from feti_homog.cell.periodic_topology import Torus
-from feti_homog.cell.submesh import pinned_class
-from feti_homog.config.case import Case
-from feti_homog.config.fibre_window import read_window
-from feti_homog.config.selectors import BREAKING
+from feti_homog.case.case import Case
+from feti_homog.case.fibre_window import read_window
+from feti_homog.case.selectors import BREAKING
+from feti_homog.fibres import periodic_table
 from feti_homog.homogenization import bonds
+from feti_homog.mesh.periodic_topology import Torus
+from feti_homog.mesh.submesh import pinned_class
 from feti_homog.typing import Int
 
 MOST_LISTED = 30  # moved fibres that are listed one by one
@@ -102,7 +102,7 @@ def _moved_fibres(case: Case) -> tuple[str, ...]:
     table = case.cell.table
     if table is None or case.cell.window != "cut":
         return ()
-    rows, far = tabulated.moved_rows(table, case.cell.window)
+    rows, far = periodic_table.moved_rows(table, case.cell.window)
     listed = [f"row {rows[k]} by {far[k]:.3g}" for k in np.argsort(-far, kind="stable")[:MOST_LISTED]]
     rest = [f"and {len(rows) - MOST_LISTED} others by less"] if len(rows) > MOST_LISTED else []
     which = f": {', '.join(listed + rest)}" if listed else ""

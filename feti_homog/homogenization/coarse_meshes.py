@@ -10,18 +10,18 @@ from typing import TypeVar
 import numpy as np
 from mpi4py import MPI
 
-from feti_homog.cell.bare_outline import LineStations
-from feti_homog.cell.coarse_mesh import CoarseMesh
-from feti_homog.cell.drawing import Drawing, Sketch
-from feti_homog.cell.filling import Filling, Tile, fill
-from feti_homog.cell.graded_size import SizeField
-from feti_homog.cell.tiles import TilePolicy
-from feti_homog.common.dealing import collect, deal
-from feti_homog.common.dividing import balanced
-from feti_homog.common.mpi_errors import agree, on_root_only
-from feti_homog.config import case as cases
-from feti_homog.config.case import Case
+from feti_homog.case import case as cases
+from feti_homog.case.case import Case
 from feti_homog.homogenization import tips
+from feti_homog.mesh.coarse_mesh import CoarseMesh
+from feti_homog.mesh.fill.drawing import Drawing, Sketch
+from feti_homog.mesh.outline.bare_outline import LineStations
+from feti_homog.mesh.sizes.graded_size import SizeField
+from feti_homog.mesh.tiles.filling import Filling, Tile, fill
+from feti_homog.mesh.tiles.tiles import TilePolicy
+from feti_homog.parallel.dealing import collect, deal
+from feti_homog.parallel.dividing import balanced
+from feti_homog.parallel.mpi_errors import agree, on_root_only
 
 T = TypeVar("T")
 
@@ -59,12 +59,12 @@ def begun(case: Case, policy: TilePolicy) -> Sketch | Drawing | CoarseMesh:
     # gmsh is imported where it is needed.
     found: Sketch | Drawing | CoarseMesh
     if case.cell.has_own_mesh:
-        from feti_homog.cell.msh_reader import read
+        from feti_homog.mesh.readers.msh_reader import read
 
         assert case.cell.file is not None
         found = read(case.cell.file, case.cell.snap_tolerance if case.cell.repair == "snap" else None)
     else:
-        from feti_homog.cell.gmsh_mesher import begin
+        from feti_homog.mesh.fill.gmsh_mesher import begin
 
         found = begin(replace(case.cell, tip_size=tips.size(case)), tips.marks(case), policy)
     cases.check_phases(case, found.phases)

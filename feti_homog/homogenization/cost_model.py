@@ -12,8 +12,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil
 
-from feti_homog.config.case import Case
-from feti_homog.config.phase_names import COATING
+from feti_homog.case.case import Case
+from feti_homog.case.phase_names import COATING
 from feti_homog.fem.problem import AXIAL, Problem
 
 # Seconds to start Python, MPI, PETSc and gmsh.

@@ -6,25 +6,25 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from feti_homog.cell.coarse_mesh import CoarseMesh
-from feti_homog.cell.ellipses import Ellipses
-from feti_homog.cell.fibre_centres import fibre_circles
-from feti_homog.cell.fibre_numbers import coating_thickness, fibre_numbers
-from feti_homog.cell.fibre_shapes import fibre_frames
-from feti_homog.cell.interface_edges import voids
-from feti_homog.cell.matched_arrangement import distance_of
-from feti_homog.cell.periodic_topology import Torus
-from feti_homog.cell.refinement import ReferenceLattice
-from feti_homog.cell.submesh import SubdomainTable, SubmeshesOfRank, cut_for_ranks, pinned_class
-from feti_homog.cell.tiles import DEFAULT_TILES, TilePolicy
-from feti_homog.config.case import Case
+from feti_homog.case.case import Case
 from feti_homog.errors import CaseError
 from feti_homog.feti.decomposition.partition import decompose, pieces_for_count, pieces_for_size
+from feti_homog.fibres.ellipses import Ellipses
+from feti_homog.fibres.matched_arrangement import distance_of
 from feti_homog.homogenization import arc_selection, interface_pairs, process_zone
 from feti_homog.homogenization.arc_selection import InterfaceNodes
 from feti_homog.homogenization.cell_remarks import mesh_remarks, subdomain_remarks, table_remarks
-from feti_homog.interface import debonded_arcs
-from feti_homog.interface.debonded_arcs import MovedTips
+from feti_homog.interface.tips import debonded_arcs
+from feti_homog.interface.tips.debonded_arcs import MovedTips
+from feti_homog.mesh.coarse_mesh import CoarseMesh
+from feti_homog.mesh.fibre_centres import fibre_circles
+from feti_homog.mesh.fibre_numbers import coating_thickness, fibre_numbers
+from feti_homog.mesh.fibre_shapes import fibre_frames
+from feti_homog.mesh.interface_edges import voids
+from feti_homog.mesh.periodic_topology import Torus
+from feti_homog.mesh.refinement import ReferenceLattice
+from feti_homog.mesh.submesh import SubdomainTable, SubmeshesOfRank, cut_for_ranks, pinned_class
+from feti_homog.mesh.tiles.tiles import DEFAULT_TILES, TilePolicy
 from feti_homog.typing import Bool, Float, Int
 
 ROUNDING = 1e-9  # of coordinates, relative to the cell

@@ -6,17 +6,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from feti_homog.cell.coarse_mesh import representatives
-from feti_homog.cell.curves import MATRIX
-from feti_homog.cell.drawing import Drawing
-from feti_homog.cell.filling import arc_edges
-from feti_homog.cell.periodic_topology import places_by_depth
-from feti_homog.cell.tile_torus import NumberedTile
-from feti_homog.config.case import Case
+from feti_homog.case.case import Case
 from feti_homog.errors import CaseError
 from feti_homog.homogenization import interface_pairs
 from feti_homog.homogenization.cell_remarks import subdomain_remarks, table_remarks
 from feti_homog.homogenization.domain_partition import CellSummary, in_cell, match_distance
+from feti_homog.mesh.coarse_mesh import representatives
+from feti_homog.mesh.fill.drawing import Drawing
+from feti_homog.mesh.outline.curves import MATRIX
+from feti_homog.mesh.periodic_topology import places_by_depth
+from feti_homog.mesh.tiles.filling import arc_edges
+from feti_homog.mesh.tiles.tile_torus import NumberedTile
 from feti_homog.typing import Int
 
 

@@ -15,7 +15,6 @@ from typing import TypeVar
 import numpy as np
 from scipy.spatial import cKDTree
 
-from feti_homog.common.distributed_arrays import allreduce_sum
 from feti_homog.feti.decomposition.interface_neighbours import InterfaceNeighbours
 from feti_homog.homogenization.averaging import Response
 from feti_homog.homogenization.crack_extension import (
@@ -26,9 +25,10 @@ from feti_homog.homogenization.crack_extension import (
     wrapped,
 )
 from feti_homog.homogenization.unit_cell import TornCell
-from feti_homog.interface.contact import BONDED, Interface, Status
-from feti_homog.interface.crack_tips import CrackTips, InterfaceChains, closing_work
-from feti_homog.mechanics.voigt import strain_tensor
+from feti_homog.interface.contact.contact_problem import BONDED, Interface, Status
+from feti_homog.interface.tips.crack_tips import CrackTips, InterfaceChains, closing_work
+from feti_homog.materials.voigt import strain_tensor
+from feti_homog.parallel.distributed_arrays import allreduce_sum
 from feti_homog.typing import Bool, Float, Int
 
 Array = TypeVar("Array", Float, Int, Status)

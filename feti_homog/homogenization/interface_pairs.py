@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from feti_homog.config.case import Case
-from feti_homog.config.interface_rules import interface_label
-from feti_homog.config.wording import toml_value
+from feti_homog.case.case import Case
+from feti_homog.case.interface_rules import interface_label
+from feti_homog.case.wording import toml_value
 from feti_homog.typing import AnyInt, Int
 
 

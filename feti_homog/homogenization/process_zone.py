@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 
-from feti_homog.cell.coarse_mesh import CoarseMesh
-from feti_homog.cell.interface_edges import interface_edges
-from feti_homog.config.case import Case
-from feti_homog.config.materials import plane_stiffness
-from feti_homog.mechanics.bounds import engineering_moduli
+from feti_homog.case.case import Case
+from feti_homog.case.materials import plane_stiffness
+from feti_homog.materials.bounds import engineering_moduli
+from feti_homog.mesh.coarse_mesh import CoarseMesh
+from feti_homog.mesh.interface_edges import interface_edges
 
 # Largest element on an interface / length of the process zone. With 0.54 of it the stresses of the square cell of
 # tests/parallel/test_energy.py are within 1.4 % of those with elements a quarter as long, with 1.1 of it within 4.3 %.

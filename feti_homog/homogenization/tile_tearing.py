@@ -11,19 +11,19 @@ from itertools import chain
 import numpy as np
 from mpi4py import MPI
 
-from feti_homog.cell.drawing import Drawing
-from feti_homog.cell.joined_submeshes import joined
-from feti_homog.cell.periodic_topology import Torus, components
-from feti_homog.cell.refinement import ReferenceLattice
-from feti_homog.cell.submesh import SubdomainTable, SubmeshesOfRank, cut_for_ranks, pinning
-from feti_homog.cell.tile_torus import FilledTile, Regions, tile_torus
-from feti_homog.common.dealing import swap
-from feti_homog.common.mpi_errors import agree, on_root, on_root_only
-from feti_homog.config.case import Case
+from feti_homog.case.case import Case
 from feti_homog.feti.decomposition.partition import assign_ranks, cut_into_pieces
 from feti_homog.homogenization.coarse_meshes import deal_tiles, fill_own
 from feti_homog.homogenization.domain_partition import PartitionPolicy, RankShare, wanted_pieces
 from feti_homog.homogenization.drawn_cell import drawn_cell, summary_of, tiles_to_fill
+from feti_homog.mesh.fill.drawing import Drawing
+from feti_homog.mesh.joined_submeshes import joined
+from feti_homog.mesh.periodic_topology import Torus, components
+from feti_homog.mesh.refinement import ReferenceLattice
+from feti_homog.mesh.submesh import SubdomainTable, SubmeshesOfRank, cut_for_ranks, pinning
+from feti_homog.mesh.tiles.tile_torus import FilledTile, Regions, tile_torus
+from feti_homog.parallel.dealing import swap
+from feti_homog.parallel.mpi_errors import agree, on_root, on_root_only
 from feti_homog.typing import Float, Int
 
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from feti_homog.cell import element_estimate
-from feti_homog.config.case import Case
-from feti_homog.config.interface_section import InterfaceSection
-from feti_homog.config.phase_names import COATING, MATRIX
-from feti_homog.config.selectors import BREAKING
-from feti_homog.interface import debonded_arcs
+from feti_homog.case.case import Case
+from feti_homog.case.interface_section import InterfaceSection
+from feti_homog.case.phase_names import COATING, MATRIX
+from feti_homog.case.selectors import BREAKING
+from feti_homog.interface.tips import debonded_arcs
+from feti_homog.mesh.sizes import element_estimate
 
 # The stress at a tip is singular, so that the energy errs by about the size of the elements there, elsewhere by
 # h^(2 order). At this share of a balance the tips err no more than the rest (`scripts/measure_tips.py`).

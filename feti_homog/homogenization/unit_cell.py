@@ -9,14 +9,7 @@ from functools import cached_property
 import numpy as np
 from mpi4py import MPI
 
-from feti_homog.cell.coarse_mesh import CoarseMesh
-from feti_homog.cell.drawing import Drawing
-from feti_homog.cell.refinement import ReferenceLattice
-from feti_homog.cell.submesh import SubmeshesOfRank
-from feti_homog.common.dealing import deal
-from feti_homog.common.mpi_errors import agree, on_root_only
-from feti_homog.common.progress import Progress
-from feti_homog.config.case import Case
+from feti_homog.case.case import Case
 from feti_homog.fem.problem import AXIAL
 from feti_homog.feti.decomposition.shared_entities import SharedEntities, share_entities
 from feti_homog.feti.decomposition.subdomain import Subdomain
@@ -32,7 +25,14 @@ from feti_homog.homogenization.domain_partition import (
     distribute,
 )
 from feti_homog.homogenization.tile_tearing import can_be_torn_by_tiles, tear_by_tiles
-from feti_homog.interface import debonded_arcs
+from feti_homog.interface.tips import debonded_arcs
+from feti_homog.mesh.coarse_mesh import CoarseMesh
+from feti_homog.mesh.fill.drawing import Drawing
+from feti_homog.mesh.refinement import ReferenceLattice
+from feti_homog.mesh.submesh import SubmeshesOfRank
+from feti_homog.parallel.dealing import deal
+from feti_homog.parallel.mpi_errors import agree, on_root_only
+from feti_homog.runtime.progress import Progress
 from feti_homog.typing import Bool, Float, Int
 
 

@@ -1,4 +1,5 @@
 """Imperfect bonding: debonded arcs, contact, strengths, and the states along a path of load.
 
-May use `feti` and the floors below it.  Main entries: `contact`, `loaded_cell` and `path_following`.
+May use `feti` and the floors below it.  Main entries: `contact.contact_problem`, `loaded_cell` and
+`path.path_following`.
 """

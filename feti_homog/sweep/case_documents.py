@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from feti_homog.config.sweep_section import SWEEP
-from feti_homog.config.wording import dotted_key, toml_value
+from feti_homog.case.sweep_section import SWEEP
+from feti_homog.case.wording import dotted_key, toml_value
 from feti_homog.sweep.points import Assignment
 
 

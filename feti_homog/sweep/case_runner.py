@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from feti_homog.analysis.runner import run
-from feti_homog.common.file_locks import LockHeld, TemporaryLock
-from feti_homog.common.mpi_errors import ARRIVAL_TIMEOUT_S, on_root, on_root_only, others_come
-from feti_homog.common.standard_streams import say
-from feti_homog.config.case import Case
+from feti_homog.case.case import Case
 from feti_homog.errors import CaseError, ConvergenceError, FetiHomogError, MeshError
+from feti_homog.parallel.mpi_errors import ARRIVAL_TIMEOUT_S, on_root, on_root_only, others_come
+from feti_homog.runtime.file_locks import LockHeld, TemporaryLock
+from feti_homog.runtime.standard_streams import say
 from feti_homog.sweep import store
 from feti_homog.sweep.plan import SweepCase
 from feti_homog.sweep.store import LOCK_FILE, Status

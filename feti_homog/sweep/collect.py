@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.output.text.point_tables import sweep_failures
+from feti_homog.report.text.point_tables import sweep_failures
 from feti_homog.sweep import store
 from feti_homog.sweep.plan import SweepCase
 from feti_homog.sweep.report import figures, tables

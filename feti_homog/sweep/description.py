@@ -5,12 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from feti_homog.common.mpi_errors import on_root
-from feti_homog.common.petsc_options import case_options
-from feti_homog.config import case as cases
-from feti_homog.config.document import read_document
-from feti_homog.config.sweep_section import SWEEP
+from feti_homog.case import case as cases
+from feti_homog.case.document import read_document
+from feti_homog.case.sweep_section import SWEEP
 from feti_homog.homogenization.cell_description import describe
+from feti_homog.parallel.mpi_errors import on_root
+from feti_homog.petsc.options import case_options
 from feti_homog.sweep import plan
 from feti_homog.sweep.option_checks import check_options
 

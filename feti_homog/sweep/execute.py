@@ -7,11 +7,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from feti_homog.common.file_locks import LockHeld, TemporaryLock
-from feti_homog.common.mpi_errors import ARRIVAL_TIMEOUT_S, on_root, on_root_only, others_come
-from feti_homog.common.standard_streams import complain, say
 from feti_homog.errors import CaseError, ConvergenceError, FetiHomogError
-from feti_homog.output.text.point_tables import sweep_failures, sweep_table
+from feti_homog.parallel.mpi_errors import ARRIVAL_TIMEOUT_S, on_root, on_root_only, others_come
+from feti_homog.report.text.point_tables import sweep_failures, sweep_table
+from feti_homog.runtime.file_locks import LockHeld, TemporaryLock
+from feti_homog.runtime.standard_streams import complain, say
 from feti_homog.sweep import store
 from feti_homog.sweep.case_runner import CaseRunner, Outcome
 from feti_homog.sweep.option_checks import check_options

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 
-from feti_homog.common.petsc_options import case_options
 from feti_homog.errors import CaseError
+from feti_homog.petsc.options import case_options
 from feti_homog.sweep.plan import Sweep, case_names
 
 

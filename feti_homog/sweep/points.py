@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from scipy.stats import qmc
 
-from feti_homog.config.document import TomlPath
-from feti_homog.config.schema import TableReader, keys_of
-from feti_homog.config.sweep_section import AXIS_EXPECTED, MAX_CASES, SWEEP, SweepSection
-from feti_homog.config.wording import dotted_key
+from feti_homog.case.document import TomlPath
+from feti_homog.case.schema import TableReader, keys_of
+from feti_homog.case.sweep_section import AXIS_EXPECTED, MAX_CASES, SWEEP, SweepSection
+from feti_homog.case.wording import dotted_key
 from feti_homog.sweep.axes import Axis, AxisReader
 
 Assignment = dict[TomlPath, Any]

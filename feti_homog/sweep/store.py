@@ -19,12 +19,12 @@ from typing import Any
 
 import tomli_w
 
-from feti_homog import __version__
-from feti_homog.common.file_locks import LockHeld, TemporaryLock, is_locked
-from feti_homog.config.case import Case
+from feti_homog.case.case import Case
 from feti_homog.errors import CaseError, FetiHomogError
-from feti_homog.output.files import atomic, checkpoint, output_folder, result_json, sealed_json
+from feti_homog.results import atomic, checkpoint, output_folder, result_json, sealed_json
+from feti_homog.runtime.file_locks import LockHeld, TemporaryLock, is_locked
 from feti_homog.sweep.plan import Sweep, SweepCase, identity_of
+from feti_homog.version import __version__
 
 INDEX_FILE, TABLE_FILE, ERROR_FILE, CASE_FILE, LOCK_FILE = (
     "sweep.json", "cases.csv", "error.txt", "case.toml", "lock",

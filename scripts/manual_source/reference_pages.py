@@ -11,10 +11,10 @@ from markdown_text import capitalised, code, page, plain, table
 from results_page import results
 
 from feti_homog import errors
+from feti_homog.case import reference
+from feti_homog.case.json_schema import json_schema
 from feti_homog.cli import command_parser
-from feti_homog.common.petsc_option_table import OPTIONS
-from feti_homog.config import reference
-from feti_homog.config.json_schema import json_schema
+from feti_homog.petsc.option_table import OPTIONS
 
 SCHEMA = "case.schema.json"
 ERRORS = (errors.FetiHomogError, errors.CaseError, errors.MeshError, errors.ConvergenceError)

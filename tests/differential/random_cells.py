@@ -9,8 +9,8 @@ import numpy as np
 from support.void_cells import write_part
 
 from differential.random_phases import Document
-from feti_homog.cell.gmsh_mesher import generate
-from feti_homog.config.cell_section import Cell
+from feti_homog.case.cell_section import Cell
+from feti_homog.mesh.fill.gmsh_mesher import generate
 
 GEOMETRIES = {"square": 0.2, "hexagonal": 0.15, "random": 0.25, "table": 0.3, "mesh": 0.1}
 MOST_FIBRES = 3

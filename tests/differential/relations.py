@@ -14,7 +14,7 @@ from differential.random_cases import Drawn
 from differential.setting import Compared, Setting
 from differential.twin import SolvedAnew
 from feti_homog.errors import NotCarriedError
-from feti_homog.verification.certificate import verify
+from feti_homog.verify.certificate import verify
 
 STATES = 4  # of a result are solved anew
 # What the checks of a run demand: the solver's tolerance times the condition of a cell.  Rounding has less than LEAST.

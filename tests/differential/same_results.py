@@ -13,9 +13,9 @@ from support.dimensions import Units
 from differential import comparison, transforms
 from differential.random_cases import Drawn
 from differential.setting import Compared, Setting
-from feti_homog.common.mpi_errors import on_root
 from feti_homog.errors import FetiHomogError
-from feti_homog.output.files.checkpoint import Checkpoint
+from feti_homog.parallel.mpi_errors import on_root
+from feti_homog.results.checkpoint import Checkpoint
 
 # Units that a case's own are multiplied by.
 STRESS_UNITS = (1e-20, 1e20)

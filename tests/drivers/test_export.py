@@ -7,8 +7,8 @@ from support.card_readers import READERS
 from support.command_line import command_line
 from support.effective_results import DISTINCT, document
 
-from feti_homog.output.cards import export
-from feti_homog.output.files import result_json
+from feti_homog.report.cards import export
+from feti_homog.results import result_json
 
 
 @pytest.fixture

@@ -11,8 +11,8 @@ from support.base_case import BASE
 from support.command_line import case_file, command_line
 from support.hooks import KILL, NO_MEMORY, Hook, hooked
 from support.small_path import PATH
-from unit.cell.faulty_meshes import FAULTY_MESHES
-from unit.config.faulty_cases import FAULTY_CASES
+from unit.case.faulty_cases import FAULTY_CASES
+from unit.mesh.faulty_meshes import FAULTY_MESHES
 
 PIPES = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
 CASES = ("empty", "syntax", "unknown_key", "many")
@@ -88,7 +88,7 @@ def test_a_file_in_the_place_of_the_folder_is_left_alone(tmp_path, ranks):
 HOLDER = """
 import sys
 from pathlib import Path
-from feti_homog.common.file_locks import TemporaryLock
+from feti_homog.runtime.file_locks import TemporaryLock
 TemporaryLock(Path(sys.argv[1])).acquire()
 print("held", flush=True)
 sys.stdin.read()

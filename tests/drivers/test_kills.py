@@ -8,8 +8,8 @@ from support.command_line import command_line
 from support.hooks import KILL, Hook, hooked
 from support.small_path import PATH
 
-COMMIT = "feti_homog.output.files.atomic:commit"
-WRITE_STATE = "feti_homog.output.files.field_file:FieldFile.write_state"
+COMMIT = "feti_homog.results.atomic:commit"
+WRITE_STATE = "feti_homog.results.field_file:FieldFile.write_state"
 # In the order in which a run comes to them, and how many events are kept then: all (None) when fields are written.
 MOMENTS = {"000001.h5": 1, "000003.h5": 3, "state 2": None, "result.h5": None, "result.json": None, "path.csv": None}
 

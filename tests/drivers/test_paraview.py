@@ -17,7 +17,7 @@ from support.cases import FIBRE, MATRIX
 from support.jobs import PATIENCE
 
 from feti_homog import Case, run
-from feti_homog.output.files import xdmf
+from feti_homog.results import xdmf
 
 SCRIPT = Path(__file__).parents[2] / "scripts" / "paraview_check.py"
 CASE = {

@@ -9,7 +9,7 @@ import pytest
 from support.command_line import case_file, command_line
 from support.hooks import Hook, hooked
 
-from feti_homog.common.petsc_option_table import OPTIONS
+from feti_homog.petsc.option_table import OPTIONS
 
 PREFIXES = ("natural", "coarse", "bonded", "sub", "interior")
 WITHOUT_CHOLMOD = [word for p in PREFIXES for word in (f"-feti_{p}_pc_factor_mat_solver_type", "mumps")]
@@ -138,7 +138,7 @@ def test_a_log_that_cannot_be_written_any_more_hangs_no_rank(tmp_path, ranks):
     """Its folder goes when pictures are drawn; PETSc opens the file when it ends, the others wait for that."""
     case, log, out = case_file(tmp_path, ""), tmp_path / "logs", tmp_path / "out"
     log.mkdir()
-    hook = Hook("feti_homog.output.plots.figures:plot", f"os.rmdir({str(log)!r})")
+    hook = Hook("feti_homog.report.plots.figures:plot", f"os.rmdir({str(log)!r})")
     job = hooked(ranks, [hook], "run", case, "--out", out, "-log_view", f":{log}/log.txt")
     assert job.returncode == 1 and "error: PETSc cannot end" in job.stderr
     assert json.loads((out / "result.json").read_text())["status"] == "done"

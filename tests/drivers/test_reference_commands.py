@@ -6,7 +6,7 @@ import json
 
 from support.command_line import command_line
 
-from feti_homog.config.json_schema import json_schema
+from feti_homog.case.json_schema import json_schema
 
 
 def test_keys_of_all_sections():

@@ -117,7 +117,7 @@ def killed(ranks: int, case: Path, out: Path, at: int, *words: str, moment: str 
 def committed(at: int, after: bool) -> Hook:
     """When the file of the `at`-th event gets its name."""
     when = f"args[1].name == '{at - 1:06d}.h5'"
-    return Hook("feti_homog.output.files.atomic:commit", WAIT, when=when, after=after)
+    return Hook("feti_homog.results.atomic:commit", WAIT, when=when, after=after)
 
 
 # When a path is killed: the last of so many events has just been kept, or the next is written or computed.

@@ -21,7 +21,7 @@ FORTY = "cell.fibre_fraction = {from = 0.1, to = 0.4, count = 20}\nmaterial.fibr
 
 def after_results(count, rank=None):
     """Every rank, or one, waits when it has written so many results."""
-    return Hook("feti_homog.output.files.atomic:commit", WAIT, rank, count, "args[1].name == 'result.json'", after=True)
+    return Hook("feti_homog.results.atomic:commit", WAIT, rank, count, "args[1].name == 'result.json'", after=True)
 
 
 @pytest.mark.parametrize(("ranks", "words"), [(0, []), (1, []), (2, []), (4, ["--ranks-per-case", "2"])])
@@ -196,7 +196,7 @@ def test_jobs_of_an_array_share_the_folder_but_no_case(tmp_path):
     jobs = [launched(0, *words, str(k), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) for k in (1, 2)]
     assert [job.wait(PATIENCE) for job in jobs] == [0, 0] and len(results(out)) == 2
     held = subprocess.Popen(
-        [sys.executable, "-c", f"from feti_homog.common.file_locks import Lock; from pathlib import Path; import sys\n"
+        [sys.executable, "-c", f"from feti_homog.runtime.file_locks import Lock; from pathlib import Path; import sys\n"
          f"Lock(Path({str(out / 'case-0001/lock')!r})).acquire(); print('held', flush=True); sys.stdin.read()"],
         stdin=subprocess.PIPE, stdout=subprocess.PIPE,
     )  # fmt: skip

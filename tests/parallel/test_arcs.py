@@ -11,13 +11,13 @@ from petsc4py import PETSc
 from support.cases import FIBRE, MATRIX
 from support.ranks import parallel_assert
 from support.whole_meshes import coarse_mesh
-from unit.cell.faulty_meshes import ALL_SIDES, RIGHT_SIDE, grid
+from unit.mesh.faulty_meshes import ALL_SIDES, RIGHT_SIDE, grid
 
-from feti_homog.cell.arrangement import arrange
-from feti_homog.common.progress import Progress
-from feti_homog.config import case as cases
+from feti_homog.case import case as cases
 from feti_homog.errors import CaseError
+from feti_homog.fibres.arrangement import arrange
 from feti_homog.homogenization.unit_cell import tear
+from feti_homog.runtime.progress import Progress
 
 pytestmark = pytest.mark.parallel
 

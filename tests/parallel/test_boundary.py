@@ -11,9 +11,7 @@ from reference.dense_feti import DenseDual, boundary_of, gathered, matrix, proje
 from support import torn_cells
 from support.cases import make_case, relative_error, solve
 
-from feti_homog.cell.refinement import ReferenceLattice
-from feti_homog.common.progress import Progress
-from feti_homog.config import sections
+from feti_homog.case import sections
 from feti_homog.errors import CaseError
 from feti_homog.feti.operators.explicit import ExplicitInterfaceOperator
 from feti_homog.feti.operators.implicit import ImplicitInterfaceOperator
@@ -21,6 +19,8 @@ from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 from feti_homog.homogenization import unit_cell
 from feti_homog.homogenization.domain_partition import PartitionPolicy, wanted_pieces
+from feti_homog.mesh.refinement import ReferenceLattice
+from feti_homog.runtime.progress import Progress
 
 pytestmark = pytest.mark.parallel
 

@@ -9,18 +9,18 @@ import pytest
 from support import torn_cells
 from support.cases import make_case
 from support.ranks import parallel_assert
-from unit.cell.faulty_meshes import grid
+from unit.mesh.faulty_meshes import grid
 
 from feti_homog.analysis import load_path
 from feti_homog.analysis.context import AnalysisContext
-from feti_homog.common.petsc_options import case_options
-from feti_homog.common.progress import Progress
-from feti_homog.config.load_section import LoadPath
+from feti_homog.case.load_section import LoadPath
 from feti_homog.errors import CaseError, ConvergenceError
 from feti_homog.homogenization.averaging import Homogenization
-from feti_homog.interface.contact import OPEN
-from feti_homog.interface.strength_criterion import StrengthCriterion
-from feti_homog.output.files.checkpoint import NoCheckpoint
+from feti_homog.interface.contact.contact_problem import OPEN
+from feti_homog.interface.laws.strength_criterion import StrengthCriterion
+from feti_homog.petsc.options import case_options
+from feti_homog.results.checkpoint import NoCheckpoint
+from feti_homog.runtime.progress import Progress
 
 pytestmark = pytest.mark.parallel
 

@@ -12,11 +12,11 @@ from support import torn_cells
 from support.cases import make_case, monolithic_stiffness, relative_error, solve
 from support.coarse_space_cells import BOUND, BREAKING, NARROW, STRAINS, of_all, solve_many
 
-from feti_homog.common.distributed_arrays import allreduce_sum
 from feti_homog.errors import CaseError
 from feti_homog.feti.linalg.distributed_solver import DistributedSolver
 from feti_homog.feti.linalg.tree_elimination import TreeElimination
 from feti_homog.feti.thresholds import DEFAULTS
+from feti_homog.parallel.distributed_arrays import allreduce_sum
 
 pytestmark = pytest.mark.parallel
 

@@ -9,7 +9,7 @@ import pytest
 from support.ranks import parallel_assert
 
 from feti_homog import Case, run
-from feti_homog.verification.certificate import verify
+from feti_homog.verify.certificate import verify
 
 pytestmark = pytest.mark.parallel
 

@@ -13,15 +13,15 @@ from support.loads import strains
 
 from feti_homog import Case
 from feti_homog.analysis.criteria import criterion_of
-from feti_homog.common.mpi_errors import on_root
-from feti_homog.common.petsc_options import case_options
-from feti_homog.common.progress import Progress
 from feti_homog.homogenization import unit_cell
-from feti_homog.interface.contact import BONDED, CLOSED, OPEN
-from feti_homog.interface.load import Load
-from feti_homog.interface.loaded_cell import LoadedCell
-from feti_homog.interface.path_following import events
-from feti_homog.interface.path_points import unloaded
+from feti_homog.interface.contact.contact_problem import BONDED, CLOSED, OPEN
+from feti_homog.interface.contact.loaded_cell import LoadedCell
+from feti_homog.interface.loads.load import Load
+from feti_homog.interface.path.path_following import events
+from feti_homog.interface.path.path_points import unloaded
+from feti_homog.parallel.mpi_errors import on_root
+from feti_homog.petsc.options import case_options
+from feti_homog.runtime.progress import Progress
 
 pytestmark = pytest.mark.parallel
 

@@ -13,9 +13,9 @@ from support.cases import relative_error
 from support.random_cells import random_bonded, random_cell, random_strain
 from support.ranks import parallel_assert
 
-from feti_homog.config.interface_section import Arc
-from feti_homog.interface.contact import BONDED, CLOSED, OPEN
-from feti_homog.interface.load import Load
+from feti_homog.case.interface_section import Arc
+from feti_homog.interface.contact.contact_problem import BONDED, CLOSED, OPEN
+from feti_homog.interface.loads.load import Load
 
 pytestmark = pytest.mark.parallel
 

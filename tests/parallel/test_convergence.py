@@ -11,7 +11,7 @@ from mpi4py import MPI
 from reference.closed_forms import bulk_and_shear, cubic, dilute_slopes, hashin_shtrikman, lame, laminate
 from reference.references import BONDED
 from support.cases import FIBRE, MATRIX, make_case, monolithic_stiffness, relative_error, solve
-from unit.cell.faulty_meshes import grid
+from unit.mesh.faulty_meshes import grid
 
 pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 

@@ -12,12 +12,12 @@ from support.loads import strains
 from support.ranks import PIECES
 
 from feti_homog.analysis.path_events import Work
-from feti_homog.interface.contact import BONDED
-from feti_homog.interface.load import Load
-from feti_homog.interface.loaded_cell import LoadedCell
-from feti_homog.interface.path_following import events, increments
-from feti_homog.interface.path_points import unloaded
-from feti_homog.interface.strength_criterion import StrengthCriterion
+from feti_homog.interface.contact.contact_problem import BONDED
+from feti_homog.interface.contact.loaded_cell import LoadedCell
+from feti_homog.interface.laws.strength_criterion import StrengthCriterion
+from feti_homog.interface.loads.load import Load
+from feti_homog.interface.path.path_following import events, increments
+from feti_homog.interface.path.path_points import unloaded
 
 pytestmark = [pytest.mark.parallel, pytest.mark.usefixtures("shared_interfaces")]
 

@@ -7,13 +7,13 @@ import pytest
 from mpi4py import MPI
 from scipy.sparse import coo_matrix, csr_matrix, kronsum, spdiags
 
-from feti_homog.common.petsc_ctypes import option_was_used
-from feti_homog.common.petsc_options import case_options
 from feti_homog.errors import CaseError
 from feti_homog.feti.linalg import own_unknowns
 from feti_homog.feti.linalg.distributed_solver import DistributedSolver, RenewedSolver
 from feti_homog.feti.linalg.rank_tree import RankTree
 from feti_homog.feti.linalg.tree_elimination import TreeElimination
+from feti_homog.petsc.c_functions import option_was_used
+from feti_homog.petsc.options import case_options
 
 pytestmark = pytest.mark.parallel
 

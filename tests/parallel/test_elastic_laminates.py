@@ -12,15 +12,15 @@ from reference.closed_forms import lame
 from support import torn_cells
 from support.cases import FIBRE, MATRIX
 from support.loads import strains
-from unit.cell.faulty_meshes import grid
+from unit.mesh.faulty_meshes import grid
 
 from feti_homog.homogenization.averaging import Homogenization
-from feti_homog.interface.contact import BONDED
-from feti_homog.interface.energy_criterion import EnergyCriterion
-from feti_homog.interface.loaded_cell import LoadedCell
-from feti_homog.interface.path_following import events
-from feti_homog.interface.path_points import unloaded
-from feti_homog.interface.tip_criterion import TipCriterion
+from feti_homog.interface.contact.contact_problem import BONDED
+from feti_homog.interface.contact.loaded_cell import LoadedCell
+from feti_homog.interface.laws.energy_criterion import EnergyCriterion
+from feti_homog.interface.laws.tip_criterion import TipCriterion
+from feti_homog.interface.path.path_following import events
+from feti_homog.interface.path.path_points import unloaded
 
 pytestmark = pytest.mark.parallel
 

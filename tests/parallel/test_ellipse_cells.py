@@ -14,8 +14,8 @@ from support.cases import FIBRE, MATRIX, monolithic_stiffness, relative_error, s
 from support.ranks import parallel_assert
 
 from feti_homog import Case, run
-from feti_homog.config import case as cases
-from feti_homog.verification.certificate import verify
+from feti_homog.case import case as cases
+from feti_homog.verify.certificate import verify
 
 pytestmark = pytest.mark.parallel
 

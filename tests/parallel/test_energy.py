@@ -22,13 +22,13 @@ from support.ranks import PIECES, parallel_assert
 
 from feti_homog import Case, run
 from feti_homog.feti.decomposition.interface_neighbours import InterfaceNeighbours
-from feti_homog.interface.contact import BONDED
-from feti_homog.interface.energy_criterion import EnergyCriterion
-from feti_homog.interface.load import Load
-from feti_homog.interface.loaded_cell import LoadedCell
-from feti_homog.interface.path_following import events
-from feti_homog.interface.path_points import unloaded
-from feti_homog.interface.tip_criterion import TipCriterion
+from feti_homog.interface.contact.contact_problem import BONDED
+from feti_homog.interface.contact.loaded_cell import LoadedCell
+from feti_homog.interface.laws.energy_criterion import EnergyCriterion
+from feti_homog.interface.laws.tip_criterion import TipCriterion
+from feti_homog.interface.loads.load import Load
+from feti_homog.interface.path.path_following import events
+from feti_homog.interface.path.path_points import unloaded
 
 pytestmark = [pytest.mark.parallel, pytest.mark.usefixtures("shared_interfaces")]
 

@@ -11,7 +11,7 @@ from reference.references import DEBONDED_FIBRE_BEM, DEBONDED_FIBRE_FEM, DEBONDE
 from support.cases import FIBRE, MATRIX, relative_error
 from support.ranks import parallel_assert
 from support.void_cells import write_voids
-from unit.cell.faulty_meshes import RIGHT_SIDE, grid
+from unit.mesh.faulty_meshes import RIGHT_SIDE, grid
 
 from feti_homog import Case, run
 

@@ -8,18 +8,18 @@ import numpy as np
 import pytest
 from support.envelopes import ENERGY, MAX, QUADRATIC, document, envelope, path_onset, torn
 from support.ranks import parallel_assert
-from unit.cell.faulty_meshes import RIGHT_SIDE, grid
+from unit.mesh.faulty_meshes import RIGHT_SIDE, grid
 
 from feti_homog import Case, run
 from feti_homog.analysis.criteria import criterion_of
 from feti_homog.errors import CaseError
 from feti_homog.homogenization.averaging import Homogenization
-from feti_homog.interface.contact import OPEN
-from feti_homog.interface.loaded_cell import LoadedCell
-from feti_homog.interface.onset import OnsetCriterion
-from feti_homog.output.files import result_json
-from feti_homog.output.plots import response_curves
-from feti_homog.verification.certificate import verify
+from feti_homog.interface.contact.contact_problem import OPEN
+from feti_homog.interface.contact.loaded_cell import LoadedCell
+from feti_homog.interface.path.onset import OnsetCriterion
+from feti_homog.report.plots import response_curves
+from feti_homog.results import result_json
+from feti_homog.verify.certificate import verify
 
 pytestmark = [pytest.mark.parallel, pytest.mark.usefixtures("shared_interfaces")]
 

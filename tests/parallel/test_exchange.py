@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from feti_homog.common.dealing import swap
-from feti_homog.common.exchange import exchange
 from feti_homog.feti.thresholds import KEPT_EXCHANGES
+from feti_homog.parallel.dealing import swap
+from feti_homog.parallel.exchange import exchange
 
 pytestmark = [pytest.mark.parallel, pytest.mark.quick]
 

@@ -11,11 +11,11 @@ from support.ranks import PIECES, parallel_assert
 
 from feti_homog.analysis import stiffness
 from feti_homog.analysis.context import AnalysisContext
-from feti_homog.common.progress import Progress
-from feti_homog.config.interface_section import Arc
+from feti_homog.case.interface_section import Arc
 from feti_homog.homogenization.averaging import Homogenization
-from feti_homog.interface.contact import BONDED, CLOSED, OPEN
-from feti_homog.interface.load import Load
+from feti_homog.interface.contact.contact_problem import BONDED, CLOSED, OPEN
+from feti_homog.interface.loads.load import Load
+from feti_homog.runtime.progress import Progress
 
 pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks, pytest.mark.usefixtures("shared_interfaces")]
 

@@ -15,10 +15,10 @@ import pytest
 from mpi4py import MPI
 from support.base_case import BASE
 from support.ranks import parallel_assert
-from unit.cell.faulty_meshes import FAULTY_MESHES
-from unit.config.faulty_bonding import FAULTY_BONDINGS
-from unit.config.faulty_cases import FAULTY_CASES
-from unit.config.faulty_envelopes import FAULTY_ENVELOPES
+from unit.case.faulty_bonding import FAULTY_BONDINGS
+from unit.case.faulty_cases import FAULTY_CASES
+from unit.case.faulty_envelopes import FAULTY_ENVELOPES
+from unit.mesh.faulty_meshes import FAULTY_MESHES
 
 from feti_homog import cli
 

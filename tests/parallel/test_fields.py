@@ -13,7 +13,7 @@ from support.ranks import parallel_assert
 from support.sample_output import Sample, part_of, sample, without_interface
 
 from feti_homog.errors import FetiHomogError
-from feti_homog.output.files.field_file import FieldFile
+from feti_homog.results.field_file import FieldFile
 
 pytestmark = pytest.mark.parallel
 

@@ -11,7 +11,7 @@ from support.base_case import BASE
 from support.ranks import parallel_assert
 
 from feti_homog import cli
-from feti_homog.output.files import folder_contents
+from feti_homog.results import folder_contents
 
 pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 

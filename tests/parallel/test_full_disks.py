@@ -17,8 +17,8 @@ from support.small_path import PATH
 
 from feti_homog import cli
 from feti_homog.errors import FetiHomogError
-from feti_homog.output.files import atomic
-from feti_homog.output.files.field_file import RESERVE, FieldFile
+from feti_homog.results import atomic
+from feti_homog.results.field_file import RESERVE, FieldFile
 
 pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 

@@ -10,7 +10,7 @@ from support.cases import make_case, solve
 from support.generalized_phases import CRYSTAL, WOOD
 from support.ranks import parallel_assert
 from support.spatial_cells import EPOXY, GLASS, error, solved
-from unit.cell.faulty_meshes import MshFile, grid
+from unit.mesh.faulty_meshes import MshFile, grid
 
 pytestmark = pytest.mark.parallel
 

@@ -24,7 +24,7 @@ from reference.spatial_forms import (
 )
 from support.generalized_phases import CARBON, CRYSTAL, WOOD
 from support.spatial_cells import EPOXY, GLASS, error, solved
-from unit.cell.faulty_meshes import FIBRE, MATRIX, N, grid
+from unit.mesh.faulty_meshes import FIBRE, MATRIX, N, grid
 
 pytestmark = pytest.mark.parallel
 

@@ -10,10 +10,10 @@ from support.cases import FIBRE, MATRIX, monolithic_stiffness, relative_error, s
 from support.void_cells import write_part
 
 from feti_homog import run
-from feti_homog.cell.arrangement import arrange
-from feti_homog.cell.gmsh_mesher import generate
-from feti_homog.config import case as cases
-from feti_homog.verification.certificate import verify
+from feti_homog.case import case as cases
+from feti_homog.fibres.arrangement import arrange
+from feti_homog.mesh.fill.gmsh_mesher import generate
+from feti_homog.verify.certificate import verify
 
 pytestmark = pytest.mark.parallel
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from feti_homog.common.dealing import collect, deal
-from feti_homog.common.mpi_errors import RemoteError, agree, on_root, on_root_only
 from feti_homog.errors import CaseError, MeshError
+from feti_homog.parallel.dealing import collect, deal
+from feti_homog.parallel.mpi_errors import RemoteError, agree, on_root, on_root_only
 
 pytestmark = pytest.mark.parallel
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from support import coated_cells
-from unit.cell.faulty_meshes import MATRIX, grid, node
+from unit.mesh.faulty_meshes import MATRIX, grid, node
 
 from feti_homog import Case, run
-from feti_homog.common.mpi_errors import on_root
-from feti_homog.verification.certificate import verify
+from feti_homog.parallel.mpi_errors import on_root
+from feti_homog.verify.certificate import verify
 
 EPOXY, GLASS = {"young": 2.79, "poisson": 0.33}, {"young": 70.8, "poisson": 0.22}
 BETWEEN = {"young": 10.0, "poisson": 0.3}

@@ -13,10 +13,10 @@ from mpi4py import MPI
 from support.ranks import PIECES, parallel_assert
 
 from feti_homog import Case, run
-from feti_homog.common.mpi_errors import on_root
 from feti_homog.errors import ConvergenceError
-from feti_homog.output.files import field_file
-from feti_homog.verification.certificate import verify
+from feti_homog.parallel.mpi_errors import on_root
+from feti_homog.results import field_file
+from feti_homog.verify.certificate import verify
 
 pytestmark = [pytest.mark.parallel, pytest.mark.usefixtures("shared_interfaces")]
 

@@ -10,12 +10,12 @@ from support import torn_cells
 from support.loads import strains
 from support.ranks import PIECES
 
-from feti_homog.interface.contact import BONDED, OPEN
-from feti_homog.interface.load import Load
-from feti_homog.interface.loaded_cell import LoadedCell
-from feti_homog.interface.path_following import events
-from feti_homog.interface.path_points import unloaded
-from feti_homog.interface.strength_criterion import StrengthCriterion
+from feti_homog.interface.contact.contact_problem import BONDED, OPEN
+from feti_homog.interface.contact.loaded_cell import LoadedCell
+from feti_homog.interface.laws.strength_criterion import StrengthCriterion
+from feti_homog.interface.loads.load import Load
+from feti_homog.interface.path.path_following import events
+from feti_homog.interface.path.path_points import unloaded
 
 pytestmark = [pytest.mark.parallel, pytest.mark.usefixtures("shared_interfaces")]
 

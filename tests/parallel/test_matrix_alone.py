@@ -8,10 +8,10 @@ import pytest
 from support.layered_meshes import layers
 from support.loaded_twins import EPOXY_GLASS, document
 from support.ranks import parallel_assert
-from unit.cell.faulty_meshes import MATRIX
+from unit.mesh.faulty_meshes import MATRIX
 
 from feti_homog import Case, run
-from feti_homog.verification.certificate import verify
+from feti_homog.verify.certificate import verify
 
 pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from support.cases import FIBRE, MATRIX, monolithic_stiffness, relative_error, solve
 
-from feti_homog.cell.arrangement import arrange
-from feti_homog.config import case as cases
+from feti_homog.case import case as cases
+from feti_homog.fibres.arrangement import arrange
 
 pytestmark = pytest.mark.parallel
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support.generalized_phases import CRYSTAL, WOOD
 from support.loaded_twins import EPOXY_GLASS, LoadedTwin, loads_of, relative, solved
-from unit.cell.faulty_meshes import grid, node
+from unit.mesh.faulty_meshes import grid, node
 
 from feti_homog.errors import ConvergenceError
 

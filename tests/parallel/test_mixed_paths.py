@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from support.loaded_twins import EPOXY_GLASS, LoadedTwin, compare_paths, relative, solved
-from unit.cell.faulty_meshes import grid
+from unit.mesh.faulty_meshes import grid
 
 from feti_homog.errors import ConvergenceError
 

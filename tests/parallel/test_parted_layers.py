@@ -12,8 +12,8 @@ from support.verified_results import falsified
 
 from feti_homog import Case, run
 from feti_homog.errors import ConvergenceError
-from feti_homog.verification.certificate import verify
-from feti_homog.verification.prescribed import at_points
+from feti_homog.verify.certificate import verify
+from feti_homog.verify.prescribed import at_points
 
 pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 

@@ -13,12 +13,12 @@ from support.cases import relative_error
 from support.loads import strains
 from support.ranks import PIECES, parallel_assert
 
-from feti_homog.common.mpi_errors import on_root
-from feti_homog.interface.contact import BONDED, OPEN
-from feti_homog.interface.loaded_cell import LoadedCell
-from feti_homog.interface.path_following import events, increments
-from feti_homog.interface.path_points import unloaded
-from feti_homog.interface.strength_criterion import StrengthCriterion
+from feti_homog.interface.contact.contact_problem import BONDED, OPEN
+from feti_homog.interface.contact.loaded_cell import LoadedCell
+from feti_homog.interface.laws.strength_criterion import StrengthCriterion
+from feti_homog.interface.path.path_following import events, increments
+from feti_homog.interface.path.path_points import unloaded
+from feti_homog.parallel.mpi_errors import on_root
 
 pytestmark = [pytest.mark.parallel, pytest.mark.usefixtures("shared_interfaces")]
 

@@ -11,20 +11,20 @@ from reference.closed_forms import bulk_and_shear
 from reference.references import GLASS_EPOXY_DISSIPATED, GLASS_EPOXY_ONSET
 from support.loads import strains
 from support.ranks import PIECES
-from unit.cell.faulty_meshes import grid
+from unit.mesh.faulty_meshes import grid
 
 from feti_homog import Case, run
 from feti_homog.analysis.path_events import Work
-from feti_homog.common.mpi_errors import on_root
 from feti_homog.homogenization.averaging import Homogenization
-from feti_homog.interface.contact import BONDED
-from feti_homog.interface.energy_criterion import EnergyCriterion
-from feti_homog.interface.load import Load
-from feti_homog.interface.loaded_cell import LoadedCell
-from feti_homog.interface.path_following import events
-from feti_homog.interface.path_points import unloaded
-from feti_homog.interface.strength_criterion import StrengthCriterion
-from feti_homog.interface.tip_criterion import TipCriterion
+from feti_homog.interface.contact.contact_problem import BONDED
+from feti_homog.interface.contact.loaded_cell import LoadedCell
+from feti_homog.interface.laws.energy_criterion import EnergyCriterion
+from feti_homog.interface.laws.strength_criterion import StrengthCriterion
+from feti_homog.interface.laws.tip_criterion import TipCriterion
+from feti_homog.interface.loads.load import Load
+from feti_homog.interface.path.path_following import events
+from feti_homog.interface.path.path_points import unloaded
+from feti_homog.parallel.mpi_errors import on_root
 
 pytestmark = [pytest.mark.parallel, pytest.mark.usefixtures("shared_interfaces")]
 

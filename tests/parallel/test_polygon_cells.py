@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.cases import FIBRE, MATRIX, monolithic_stiffness, relative_error, solve
-from unit.cell.faulty_meshes import grid
+from unit.mesh.faulty_meshes import grid
 
 from feti_homog import run
-from feti_homog.config import case as cases
-from feti_homog.verification.certificate import verify
+from feti_homog.case import case as cases
+from feti_homog.verify.certificate import verify
 
 pytestmark = pytest.mark.parallel
 

@@ -12,7 +12,7 @@ from support.jobs import mpirun
 from support.ranks import parallel_assert
 
 from feti_homog import Case, CaseError, ConvergenceError, collect_sweep, run, run_sweep
-from feti_homog.output.files.field_layout import tables
+from feti_homog.results.field_layout import tables
 
 pytestmark = pytest.mark.parallel
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from feti_homog.cell.gmsh_mesher import generate
-from feti_homog.cell.periodic_topology import Torus
-from feti_homog.cell.refinement import ReferenceLattice
-from feti_homog.cell.submesh import SubdomainTable, cut_for_ranks, pinned_class
-from feti_homog.config.cell_section import Cell
+from feti_homog.case.cell_section import Cell
 from feti_homog.feti.decomposition.partition import decompose, pieces_for_size
 from feti_homog.feti.decomposition.shared_entities import share_entities
+from feti_homog.mesh.fill.gmsh_mesher import generate
+from feti_homog.mesh.periodic_topology import Torus
+from feti_homog.mesh.refinement import ReferenceLattice
+from feti_homog.mesh.submesh import SubdomainTable, cut_for_ranks, pinned_class
 
 pytestmark = [pytest.mark.parallel, pytest.mark.quick]
 PAIRS = np.array([[-1, 0], [0, -1]])

@@ -11,7 +11,7 @@ from support.ranks import parallel_assert
 from support.verified_results import document
 
 from feti_homog import Case, run
-from feti_homog.verification.certificate import verify
+from feti_homog.verify.certificate import verify
 
 pytestmark = pytest.mark.parallel
 

@@ -8,7 +8,7 @@ from reference.spatial_forms import about_x3
 from support.generalized_phases import CRYSTAL, WOOD
 from support.loaded_twins import EPOXY_GLASS, compare_paths, document, is_end, relative, solved
 from support.ranks import parallel_assert
-from unit.cell.faulty_meshes import MshFile, grid
+from unit.mesh.faulty_meshes import MshFile, grid
 
 from feti_homog import Case, run
 

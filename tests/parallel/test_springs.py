@@ -14,8 +14,8 @@ from support.cases import FIBRE, MATRIX, relative_error
 from support.random_cells import random_bonded, random_cell, random_strain
 
 from feti_homog.homogenization.averaging import Homogenization
-from feti_homog.interface.contact import BONDED, CLOSED, OPEN
-from feti_homog.interface.load import Load
+from feti_homog.interface.contact.contact_problem import BONDED, CLOSED, OPEN
+from feti_homog.interface.loads.load import Load
 
 pytestmark = pytest.mark.parallel
 

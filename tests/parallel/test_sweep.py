@@ -13,8 +13,8 @@ from support.ranks import parallel_assert
 from support.sweep_files import CASE, RANDOM
 
 from feti_homog import run
-from feti_homog.common.mpi_errors import on_root
 from feti_homog.errors import ConvergenceError
+from feti_homog.parallel.mpi_errors import on_root
 from feti_homog.sweep import collect, execute, plan, store
 
 pytestmark = pytest.mark.parallel

@@ -14,18 +14,18 @@ from support.cases import FIBRE, MATRIX, monolithic_stiffness, relative_error, s
 from support.loads import strains
 from support.whole_meshes import coarse_mesh
 
-from feti_homog.cell.refinement import ReferenceLattice
-from feti_homog.cell.tiles import TilePolicy
-from feti_homog.config import case as cases
+from feti_homog.case import case as cases
 from feti_homog.errors import MeshError
 from feti_homog.homogenization import coarse_meshes
 from feti_homog.homogenization.domain_partition import PartitionPolicy, distribute
 from feti_homog.homogenization.tile_tearing import can_be_torn_by_tiles, tear_by_tiles
-from feti_homog.interface.contact import BONDED
-from feti_homog.interface.loaded_cell import LoadedCell
-from feti_homog.interface.path_following import events
-from feti_homog.interface.path_points import unloaded
-from feti_homog.interface.strength_criterion import StrengthCriterion
+from feti_homog.interface.contact.contact_problem import BONDED
+from feti_homog.interface.contact.loaded_cell import LoadedCell
+from feti_homog.interface.laws.strength_criterion import StrengthCriterion
+from feti_homog.interface.path.path_following import events
+from feti_homog.interface.path.path_points import unloaded
+from feti_homog.mesh.refinement import ReferenceLattice
+from feti_homog.mesh.tiles.tiles import TilePolicy
 
 pytestmark = pytest.mark.parallel
 

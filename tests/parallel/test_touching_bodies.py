@@ -15,18 +15,18 @@ from scipy.linalg import null_space
 from support import torn_cells
 from support.cases import FIBRE, MATRIX, make_case, monolithic_stiffness, relative_error, solve
 from support.pixel_images import SYMMETRIES, pixel_mesh, random_image, turned
-from unit.cell.faulty_meshes import MshFile
+from unit.mesh.faulty_meshes import MshFile
 
 from feti_homog import Case, run
-from feti_homog.cell.msh_reader import read
-from feti_homog.cell.periodic_topology import Torus
-from feti_homog.cell.refinement import ReferenceLattice
-from feti_homog.cell.submesh import SubdomainTable, cut_for_ranks, pinned_class
-from feti_homog.common.mpi_errors import on_root
-from feti_homog.config.materials import plane_stiffness
+from feti_homog.case.materials import plane_stiffness
 from feti_homog.errors import MeshError
 from feti_homog.feti.decomposition.shared_entities import share_entities
-from feti_homog.verification.certificate import verify
+from feti_homog.mesh.periodic_topology import Torus
+from feti_homog.mesh.readers.msh_reader import read
+from feti_homog.mesh.refinement import ReferenceLattice
+from feti_homog.mesh.submesh import SubdomainTable, cut_for_ranks, pinned_class
+from feti_homog.parallel.mpi_errors import on_root
+from feti_homog.verify.certificate import verify
 
 pytestmark = pytest.mark.parallel
 # Of random_image(8, seed): the nodes where three bodies meet, and where two touch.

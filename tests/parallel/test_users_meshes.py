@@ -11,11 +11,11 @@ from support.abaqus import write_inp
 from support.ranks import parallel_assert
 from support.users_meshes import polar_cell
 from support.verified_results import FIBRE, MATRIX
-from unit.cell.faulty_meshes import grid
+from unit.mesh.faulty_meshes import grid
 
 from feti_homog import Case, run
-from feti_homog.cell.msh_reader import read
-from feti_homog.verification.certificate import verify
+from feti_homog.mesh.readers.msh_reader import read
+from feti_homog.verify.certificate import verify
 
 pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 

@@ -10,7 +10,7 @@ from support.ranks import PIECES, parallel_assert
 from support.verified_results import LOADS, MIXED_PATHS, document
 
 from feti_homog import Case, run
-from feti_homog.verification.certificate import verify
+from feti_homog.verify.certificate import verify
 
 pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks, pytest.mark.usefixtures("shared_interfaces")]
 

@@ -17,8 +17,8 @@ from support.ranks import parallel_assert
 from support.sample_output import part_of, sample, without_interface
 
 from feti_homog import Case, run
-from feti_homog.output.files import xdmf
-from feti_homog.output.files.field_file import FieldFile
+from feti_homog.results import xdmf
+from feti_homog.results.field_file import FieldFile
 
 pytestmark = pytest.mark.parallel
 

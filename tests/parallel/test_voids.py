@@ -11,8 +11,8 @@ from support.cases import FIBRE, MATRIX, monolithic_stiffness, relative_error, s
 from support.void_cells import write_voids
 
 from feti_homog import run
-from feti_homog.config import case as cases
-from feti_homog.verification.certificate import verify
+from feti_homog.case import case as cases
+from feti_homog.verify.certificate import verify
 
 pytestmark = pytest.mark.parallel
 STRENGTHS = {"normal_strength": 5.0, "tangential_strength": 5.0}

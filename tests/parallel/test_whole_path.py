@@ -10,13 +10,13 @@ from support.cases import relative_error
 from support.loads import strains
 from support.ranks import PIECES
 
-from feti_homog.common.mpi_errors import on_root
-from feti_homog.interface.contact import BONDED
-from feti_homog.interface.energy_criterion import EnergyCriterion
-from feti_homog.interface.loaded_cell import LoadedCell
-from feti_homog.interface.path_following import events
-from feti_homog.interface.path_points import unloaded
-from feti_homog.interface.tip_criterion import TipCriterion
+from feti_homog.interface.contact.contact_problem import BONDED
+from feti_homog.interface.contact.loaded_cell import LoadedCell
+from feti_homog.interface.laws.energy_criterion import EnergyCriterion
+from feti_homog.interface.laws.tip_criterion import TipCriterion
+from feti_homog.interface.path.path_following import events
+from feti_homog.interface.path.path_points import unloaded
+from feti_homog.parallel.mpi_errors import on_root
 
 pytestmark = [pytest.mark.parallel, pytest.mark.usefixtures("shared_interfaces")]
 

@@ -10,13 +10,13 @@ from reference import monolithic
 
 from feti_homog.analysis import stiffness
 from feti_homog.analysis.context import AnalysisContext
-from feti_homog.common.petsc_options import case_options
-from feti_homog.common.progress import Progress
-from feti_homog.config import case as cases
+from feti_homog.case import case as cases
 from feti_homog.feti.thresholds import DEFAULTS
 from feti_homog.homogenization.averaging import Homogenization
 from feti_homog.homogenization.domain_partition import DEFAULT_POLICY
 from feti_homog.homogenization.unit_cell import tear
+from feti_homog.petsc.options import case_options
+from feti_homog.runtime.progress import Progress
 
 MATRIX, FIBRE = {"young": 88.0, "poisson": 0.299}, {"young": 200.0, "poisson": 0.222}
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from feti_homog.config.cell_section import Cell
+from feti_homog.case.cell_section import Cell
 
 
 def cell(geometry="random", fraction=0.4, size=0.05, fibres=16, gap=0.06, seed=0, spread=0.0, **lengths):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from feti_homog.verification.certificate import verify
+from feti_homog.verify.certificate import verify
 from support.base_case import BASE
 from support.jobs import mpirun
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.output.files import result_json
+from feti_homog.results import result_json
 from feti_homog.typing import Float
 
 PAIRS = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))

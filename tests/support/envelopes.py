@@ -12,13 +12,13 @@ from petsc4py import PETSc
 
 from feti_homog import Case, run
 from feti_homog.analysis.criteria import criterion_of
-from feti_homog.common.petsc_options import case_options
-from feti_homog.common.progress import Progress
 from feti_homog.homogenization import unit_cell
-from feti_homog.interface.contact import OPEN
-from feti_homog.interface.loaded_cell import LoadedCell
-from feti_homog.interface.path_following import events
-from feti_homog.interface.path_points import unloaded
+from feti_homog.interface.contact.contact_problem import OPEN
+from feti_homog.interface.contact.loaded_cell import LoadedCell
+from feti_homog.interface.path.path_following import events
+from feti_homog.interface.path.path_points import unloaded
+from feti_homog.petsc.options import case_options
+from feti_homog.runtime.progress import Progress
 from support import torn_cells
 from support.loads import strains
 from support.ranks import PIECES

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from feti_homog.verification.certificate import verify
+from feti_homog.verify.certificate import verify
 
 SMALL = 1e-6
 MATRIX = ("material", "matrix")

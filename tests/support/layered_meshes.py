@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from unit.cell.faulty_meshes import FIBRE, MATRIX, MshFile
+from unit.mesh.faulty_meshes import FIBRE, MATRIX, MshFile
 
 ALONG = 2
 

@@ -13,11 +13,11 @@ from reference.spatial_forms import law
 from reference.spatial_programme import Part, SpatialProgramme
 
 from feti_homog import Case, run
-from feti_homog.cell.arrangement import arrange
-from feti_homog.common.mpi_errors import on_root
-from feti_homog.common.petsc_options import case_options
-from feti_homog.common.progress import Progress
+from feti_homog.fibres.arrangement import arrange
 from feti_homog.homogenization import unit_cell
+from feti_homog.parallel.mpi_errors import on_root
+from feti_homog.petsc.options import case_options
+from feti_homog.runtime.progress import Progress
 from support.ranks import PIECES
 
 GENERALIZED = "generalized"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from unit.cell.faulty_meshes import Elements, MshFile
+from unit.mesh.faulty_meshes import Elements, MshFile
 
 # The symmetries of the square: their matrices.
 SYMMETRIES = [

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from functools import cache
 
-from feti_homog.cell.gmsh_mesher import draw
-from feti_homog.cell.tiles import TilePolicy
+from feti_homog.mesh.fill.gmsh_mesher import draw
+from feti_homog.mesh.tiles.tiles import TilePolicy
 from support.circular_cells import cell
 
 VOIDS = {"voids": 0.05, "void_radius": 0.7}

@@ -8,15 +8,15 @@ import numpy as np
 from petsc4py import PETSc
 from reference.quadratic_programme import QuadraticProgramme, torus_keys
 
-from feti_homog.cell.arrangement import arrange
-from feti_homog.common.petsc_options import case_options
-from feti_homog.common.progress import Progress
-from feti_homog.config import sections
+from feti_homog.case import sections
 from feti_homog.feti.thresholds import DEFAULTS
+from feti_homog.fibres.arrangement import arrange
 from feti_homog.homogenization import unit_cell
 from feti_homog.homogenization.domain_partition import DEFAULT_POLICY
 from feti_homog.homogenization.unit_cell import TornCell
-from feti_homog.interface.contact import BONDED, OPEN, Interface
+from feti_homog.interface.contact.contact_problem import BONDED, OPEN, Interface
+from feti_homog.petsc.options import case_options
+from feti_homog.runtime.progress import Progress
 from support.cases import make_case
 
 

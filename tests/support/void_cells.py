@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from feti_homog.cell.coarse_mesh import CoarseMesh
-from feti_homog.cell.gmsh_mesher import generate
-from feti_homog.config.cell_section import Cell
+from feti_homog.case.cell_section import Cell
+from feti_homog.mesh.coarse_mesh import CoarseMesh
+from feti_homog.mesh.fill.gmsh_mesher import generate
 from feti_homog.typing import Bool
 
 

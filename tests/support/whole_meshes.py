@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from feti_homog.cell.tiles import DEFAULT_TILES
 from feti_homog.homogenization.coarse_meshes import drawn, finished
+from feti_homog.mesh.tiles.tiles import DEFAULT_TILES
 
 
 def coarse_mesh(case, comm, policy=DEFAULT_TILES):

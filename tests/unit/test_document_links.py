@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 
 from feti_homog import cli
-from feti_homog.cell import msh_reader
-from feti_homog.cell.filling import gmsh_session
-from feti_homog.config.case import parse
-from feti_homog.config.sweep_section import SWEEP
+from feti_homog.case.case import parse
+from feti_homog.case.sweep_section import SWEEP
+from feti_homog.mesh.readers import msh_reader
+from feti_homog.mesh.tiles.filling import gmsh_session
 from feti_homog.sweep import plan
 
 ROOT = Path(__file__).parents[2]

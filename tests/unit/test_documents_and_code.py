@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from feti_homog.common.petsc_option_table import unknown_options
-from feti_homog.config import reference
+from feti_homog.case import reference
+from feti_homog.petsc.option_table import unknown_options
 
 ROOT = Path(__file__).parents[2]
 FOLDERS = ("drivers", "feti_homog", "meshes", "scripts", "tests")

@@ -17,10 +17,10 @@ from mpi4py import MPI
 from feti_homog.analysis.result import schema_keys
 from feti_homog.analysis.result_records import AnglePoint, EnvelopePoint, PathPoint
 from feti_homog.analysis.runner import run
-from feti_homog.config.case import Case
-from feti_homog.output.files.csv_tables import columns
-from feti_homog.output.files.field_layout import items
-from feti_homog.output.files.spatial_layout import spatial_items
+from feti_homog.case.case import Case
+from feti_homog.results.csv_tables import columns
+from feti_homog.results.field_layout import items
+from feti_homog.results.spatial_layout import spatial_items
 from feti_homog.sweep import collect, execute, plan
 from feti_homog.sweep.report.columns import COLUMNS, DATASETS, OUTPUT_COLUMNS
 from feti_homog.sweep.report.outputs import outputs

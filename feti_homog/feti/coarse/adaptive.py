@@ -19,8 +19,6 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix, diags
 
-from feti_homog.common import process_memory
-from feti_homog.common.distributed_arrays import allreduce_sum, scale_rows
 from feti_homog.feti.coarse.averaged_modes import AveragedModes
 from feti_homog.feti.coarse.geneo import kernels_and_soft_modes, local_columns, scaled_constraints, subdomain_blocks
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
@@ -37,6 +35,8 @@ from feti_homog.feti.thresholds import (
     ROUNDED_MODE_ENERGY,
     Thresholds,
 )
+from feti_homog.parallel.distributed_arrays import allreduce_sum, scale_rows
+from feti_homog.runtime import process_memory
 from feti_homog.typing import Float, Int
 
 

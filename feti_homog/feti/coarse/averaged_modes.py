@@ -13,9 +13,9 @@ import numpy as np
 from mpi4py import MPI
 from scipy.sparse import csr_matrix
 
-from feti_homog.common.distributed_arrays import allreduce_sum
 from feti_homog.feti.coarse.local_eigenproblems import SubdomainBlocks
 from feti_homog.feti.decomposition.neighbours import Neighbours
+from feti_homog.parallel.distributed_arrays import allreduce_sum
 from feti_homog.typing import Float, Int
 
 

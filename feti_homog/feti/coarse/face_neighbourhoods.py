@@ -16,13 +16,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from feti_homog.cell.periodic_topology import components, edge_pairs
-from feti_homog.cell.submesh import part
 from feti_homog.feti.coarse.trace_spaces import trace_space
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.linalg.schur_complement import schur_complement
 from feti_homog.feti.operators.explicit import ExplicitInterfaceOperator
 from feti_homog.feti.thresholds import DEFAULTS, MIN_FACE_NODES, Thresholds
+from feti_homog.mesh.periodic_topology import components, edge_pairs
+from feti_homog.mesh.submesh import part
 from feti_homog.typing import Bool, Float, Int
 
 

@@ -13,7 +13,6 @@ import numpy as np
 from mpi4py import MPI
 from scipy.sparse import csc_matrix, csr_matrix
 
-from feti_homog.common.mpi_errors import agree
 from feti_homog.feti.coarse.local_eigenproblems import (
     FaceEigenproblems,
     SubdomainBlocks,
@@ -26,6 +25,7 @@ from feti_homog.feti.linalg.distributed_matrix import add_shared_rows
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.preconditioners.scaled import StiffnessScaled
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
+from feti_homog.parallel.mpi_errors import agree
 from feti_homog.typing import Float, Float32, Int
 
 

@@ -6,8 +6,8 @@ import numpy as np
 from mpi4py import MPI
 from scipy.sparse import csr_matrix
 
-from feti_homog.cell.periodic_topology import components
-from feti_homog.common.distributed_arrays import allreduce_sum
+from feti_homog.mesh.periodic_topology import components
+from feti_homog.parallel.distributed_arrays import allreduce_sum
 from feti_homog.typing import Float, Int
 
 

@@ -8,13 +8,13 @@ import numpy as np
 from mpi4py import MPI
 from scipy.sparse import block_diag, csc_matrix, csr_matrix, diags
 
-from feti_homog.common.distributed_arrays import allreduce_sum
 from feti_homog.feti.coarse.gram_matrix import GramMatrix
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.linalg.distributed_matrix import assemble_owned_rows
 from feti_homog.feti.linalg.distributed_solver import RenewedSolver
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.thresholds import UNCONSTRAINED_EIGENVALUE
+from feti_homog.parallel.distributed_arrays import allreduce_sum
 from feti_homog.typing import Float, Int
 
 

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
-from feti_homog.cell.refinement import ReferenceLattice
-from feti_homog.cell.submesh import Submesh
 from feti_homog.fem.problem import Problem
 from feti_homog.feti.thresholds import DEFAULTS
+from feti_homog.mesh.refinement import ReferenceLattice
+from feti_homog.mesh.submesh import Submesh
 from feti_homog.typing import Int
 
 

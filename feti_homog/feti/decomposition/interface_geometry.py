@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 
-from feti_homog.cell.submesh import SubdomainTable, Submesh, SubmeshesOfRank
-from feti_homog.common.exchange import exchange
-from feti_homog.common.mpi_errors import agree
 from feti_homog.errors import MeshError
 from feti_homog.feti.decomposition.edge_arcs import mean_speed
 from feti_homog.feti.decomposition.sharers import Sharers, entity_code
+from feti_homog.mesh.submesh import SubdomainTable, Submesh, SubmeshesOfRank
+from feti_homog.parallel.exchange import exchange
+from feti_homog.parallel.mpi_errors import agree
 from feti_homog.typing import Bool, Float, Int
 
 # Two sides at a node are folded onto each other if their normals add up to no more than this share of their lengths.

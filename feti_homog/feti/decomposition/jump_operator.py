@@ -14,12 +14,12 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from feti_homog.cell.refinement import ReferenceLattice
 from feti_homog.fem.problem import PLANE, Problem
 from feti_homog.feti.decomposition.constraint_layout import ConstraintLayout, expand
 from feti_homog.feti.decomposition.shared_entities import SharedEntities
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.thresholds import KEPT_EXCHANGES
+from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.typing import Float, Int
 
 

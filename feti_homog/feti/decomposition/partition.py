@@ -9,9 +9,9 @@ import numpy as np
 import pymetis
 from scipy.sparse import coo_matrix, csr_matrix
 
-from feti_homog.cell.periodic_topology import Torus, components
-from feti_homog.common.dividing import balanced
 from feti_homog.feti.thresholds import LENGTH_CLASSES, MAX_IMBALANCE
+from feti_homog.mesh.periodic_topology import Torus, components
+from feti_homog.parallel.dividing import balanced
 from feti_homog.typing import Int
 
 

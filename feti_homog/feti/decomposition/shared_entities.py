@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 
-from feti_homog.cell.refinement import ReferenceLattice
-from feti_homog.cell.submesh import SubdomainTable, SubmeshesOfRank
-from feti_homog.common.exchange import exchange
 from feti_homog.feti.decomposition.interface_geometry import breakable_pairs, interface_geometry
 from feti_homog.feti.decomposition.sharers import Sharers, find_sharers
+from feti_homog.mesh.refinement import ReferenceLattice
+from feti_homog.mesh.submesh import SubdomainTable, SubmeshesOfRank
+from feti_homog.parallel.exchange import exchange
 from feti_homog.typing import Array, Bool, Float, Int
 
 

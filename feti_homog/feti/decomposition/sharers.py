@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 
-from feti_homog.cell.submesh import SubdomainTable, SubmeshesOfRank
-from feti_homog.common.dividing import ranges
-from feti_homog.common.exchange import exchange
+from feti_homog.mesh.submesh import SubdomainTable, SubmeshesOfRank
+from feti_homog.parallel.dividing import ranges
+from feti_homog.parallel.exchange import exchange
 from feti_homog.typing import Bool, Int
 
 

@@ -7,14 +7,14 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.sparse import csr_matrix, diags
 
-from feti_homog.cell.refinement import FineMesh, ReferenceLattice, refine
-from feti_homog.cell.submesh import Submesh
-from feti_homog.cell.unwrap import unwrap
 from feti_homog.errors import MeshError
 from feti_homog.fem.assembly import assemble
 from feti_homog.fem.problem import PLANE, Problem
 from feti_homog.fem.void_boundary import void_integrals
 from feti_homog.feti.thresholds import KERNEL_TOLERANCE
+from feti_homog.mesh.refinement import FineMesh, ReferenceLattice, refine
+from feti_homog.mesh.submesh import Submesh
+from feti_homog.mesh.unwrap import unwrap
 from feti_homog.typing import Float, Int
 
 

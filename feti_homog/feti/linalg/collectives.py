@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from mpi4py import MPI
 
-from feti_homog.common.dividing import even
+from feti_homog.parallel.dividing import even
 from feti_homog.typing import Array, Float, Int
 
 

@@ -10,7 +10,6 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix
 
-from feti_homog.common.distributed_arrays import allreduce_sum
 from feti_homog.feti.linalg.collectives import allgather_rows
 from feti_homog.feti.linalg.distributed_matrix import assemble_distributed
 from feti_homog.feti.linalg.factor_status import power_of_two
@@ -18,6 +17,7 @@ from feti_homog.feti.linalg.rank_tree import RankTree
 from feti_homog.feti.linalg.sparse_direct import factor_by_mumps, iterations
 from feti_homog.feti.linalg.tree_elimination import TreeElimination
 from feti_homog.feti.thresholds import MUMPS_COLUMNS_ONE_BY_ONE
+from feti_homog.parallel.distributed_arrays import allreduce_sum
 from feti_homog.typing import Float, Int
 
 # Options, after the prefix, that ask for a solver of PETSc's on all ranks.

@@ -10,7 +10,7 @@ import pymetis
 from mpi4py import MPI
 from scipy.sparse import csr_matrix
 
-from feti_homog.common.mpi_errors import on_root
+from feti_homog.parallel.mpi_errors import on_root
 from feti_homog.typing import Bool, Int
 
 

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from feti_homog.common.exchange import exchange
 from feti_homog.feti.linalg.rank_tree import Meeting
+from feti_homog.parallel.exchange import exchange
 from feti_homog.typing import Float, Int
 
 

@@ -6,8 +6,8 @@ import numpy as np
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix
 
-from feti_homog.common import petsc_ctypes
 from feti_homog.feti.linalg.factor_status import check_factor, mumps_error, power_of_two
+from feti_homog.petsc import c_functions
 from feti_homog.typing import Float, Int
 
 # What MUMPS says of a workspace that is smaller than it needs, and per cent more than its estimate that it then gets.
@@ -47,7 +47,7 @@ def _by_mumps(matrix: csr_matrix, rows: Int) -> Float:
         pc = _with_room(A, some)
         try:
             check_factor(pc)
-            return petsc_ctypes.schur_complement(pc.getFactorMatrix(), len(rows))
+            return c_functions.schur_complement(pc.getFactorMatrix(), len(rows))
         finally:
             pc.destroy()
     finally:
@@ -78,6 +78,6 @@ def _factored(A: PETSc.Mat, rows: PETSc.IS, workspace: int | None) -> PETSc.PC:
     pc.getFactorMatrix().setMumpsIcntl(8, 0)
     if workspace is not None:
         pc.getFactorMatrix().setMumpsIcntl(14, workspace)
-    petsc_ctypes.set_schur(pc.getFactorMatrix(), rows)
+    c_functions.set_schur(pc.getFactorMatrix(), rows)
     pc.setUp()
     return pc

@@ -12,12 +12,12 @@ import numpy as np
 from mpi4py import MPI
 from scipy.sparse import csr_matrix
 
-from feti_homog.common.mpi_errors import agree
 from feti_homog.feti.linalg.fronts import Front
 from feti_homog.feti.linalg.own_unknowns import eliminate_own
 from feti_homog.feti.linalg.rank_tree import RankTree, copies
 from feti_homog.feti.linalg.shared_fronts import meet
 from feti_homog.feti.thresholds import FRONT_BLOCK
+from feti_homog.parallel.mpi_errors import agree
 from feti_homog.typing import Float, Int
 
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from feti_homog.common.distributed_arrays import scale_rows
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
+from feti_homog.parallel.distributed_arrays import scale_rows
 from feti_homog.typing import Float
 
 

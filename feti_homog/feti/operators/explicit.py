@@ -11,7 +11,7 @@ import numpy as np
 from scipy.linalg.blas import dsymm, dsymv
 from scipy.sparse import csr_matrix
 
-from feti_homog.config.phase_names import COATING
+from feti_homog.case.phase_names import COATING
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.linalg.packed_symmetric import full_from_lower, invert_upper
 from feti_homog.feti.linalg.schur_complement import schur_complement

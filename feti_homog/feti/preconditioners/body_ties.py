@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 
-from feti_homog.common.distributed_arrays import allreduce_sum
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
+from feti_homog.parallel.distributed_arrays import allreduce_sum
 from feti_homog.typing import Float
 
 # Bonds, each in all directions, that let no rigid-body motion pass between two bodies.

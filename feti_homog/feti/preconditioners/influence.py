@@ -16,7 +16,6 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.sparse import identity
 
-from feti_homog.common.distributed_arrays import allreduce_sum, gather_rows, scale_rows
 from feti_homog.errors import CaseError
 from feti_homog.feti.decomposition.interface_neighbours import InterfaceNeighbours
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
@@ -26,6 +25,7 @@ from feti_homog.feti.preconditioners.bordered_inverse import BorderedInverse
 from feti_homog.feti.preconditioners.reference_cell import ReferenceCell, one_sided_jumps
 from feti_homog.feti.preconditioners.response_columns import ResponseColumns
 from feti_homog.feti.thresholds import INFLUENCE_BATCH, INFLUENCE_COLUMNS, NORM_ITERATIONS, NORM_MARGIN
+from feti_homog.parallel.distributed_arrays import allreduce_sum, gather_rows, scale_rows
 from feti_homog.typing import Float, Int
 
 

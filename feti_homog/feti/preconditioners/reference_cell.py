@@ -15,12 +15,12 @@ import numpy as np
 from mpi4py import MPI
 from scipy.sparse import csr_matrix
 
-from feti_homog.common.distributed_arrays import allreduce_sum, scale_rows
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.preconditioners.assembled_schur import AssembledSchur
 from feti_homog.feti.preconditioners.spring_update import SpringUpdate
 from feti_homog.feti.thresholds import STIFF_FIBRES
+from feti_homog.parallel.distributed_arrays import allreduce_sum, scale_rows
 from feti_homog.typing import Float
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 
-from feti_homog.common.distributed_arrays import gather_rows
 from feti_homog.feti.preconditioners.reference_cell import ReferenceCell
 from feti_homog.feti.thresholds import INFLUENCE_CHUNK
+from feti_homog.parallel.distributed_arrays import gather_rows
 from feti_homog.typing import Float, Int
 
 

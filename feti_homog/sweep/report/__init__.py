@@ -1,4 +1,4 @@
 """What the cases of a sweep come to: tables, statistics over realisations, pictures.
 
-May use `output` and the floors below it.  Main entries: `sweep_table.SweepTable`, `tables.write` and `figures.plot`.
+May use `report` and the floors below it.  Main entries: `sweep_table.SweepTable`, `tables.write` and `figures.plot`.
 """

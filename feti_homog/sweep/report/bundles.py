@@ -9,9 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from feti_homog.mechanics import response
-from feti_homog.mechanics.voigt import voigt_names
-from feti_homog.output.plots.plot_helpers import plain, strain_symbols
+from feti_homog.materials.voigt import voigt_names
+from feti_homog.report.plots.plot_helpers import plain, strain_symbols
+from feti_homog.results import path_curves
 from feti_homog.sweep.report.statistics import Statistics
 from feti_homog.sweep.report.style import COLOURS, label_axes, legend
 from feti_homog.sweep.report.sweep_table import SweepTable
@@ -25,7 +25,10 @@ def figure(table: SweepTable) -> Figure:
     there = [point for point in table.points if len(table.curves(point)[0])]
     points = [point for point in there if _leads(table, point) == _leads(table, there[0])][: len(COLOURS)]
     document = next(d for d in table.results_of(points[0]) if d.get("path"))
-    along, (strains, stresses) = response.leading_component(document), voigt_names(len(document["path"][0]["stress"]))
+    along, (strains, stresses) = (
+        path_curves.leading_component(document),
+        voigt_names(len(document["path"][0]["stress"])),
+    )
     components = [along, *_others(table, points, along)[:1]]
     picture = Figure(figsize=(0.4 + 4.6 * len(components), 4.6), layout="constrained")
     panels = picture.subplots(1, len(components), sharex=True, squeeze=False)[0]
@@ -44,13 +47,13 @@ def figure(table: SweepTable) -> Figure:
 def _leads(table: SweepTable, point: int) -> tuple[str, str]:
     """The plane state and the leading strain of the paths of a point."""
     document = next(d for d in table.results_of(point) if d.get("path"))
-    return document["case"]["analysis"]["plane"], str(response.leading_component(document))
+    return document["case"]["analysis"]["plane"], str(path_curves.leading_component(document))
 
 
 def _others(table: SweepTable, points: Sequence[int], along: int) -> list[int]:
     """The other stresses that are seen, the largest first."""
     largest = np.max([np.abs(table.curves(point)[1]).max(axis=(0, 1)) for point in points], axis=0)
-    seen = [k for k in response.components_above(response.FAINT, largest[None]) if k != along]
+    seen = [k for k in path_curves.components_above(path_curves.FAINT, largest[None]) if k != along]
     return sorted(seen, key=lambda k: -largest[k])
 
 

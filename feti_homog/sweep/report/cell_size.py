@@ -7,9 +7,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
-from feti_homog.mechanics import response
-from feti_homog.mechanics.voigt import voigt_names
-from feti_homog.output.plots.plot_helpers import plain
+from feti_homog.materials.voigt import voigt_names
+from feti_homog.report.plots.plot_helpers import plain
+from feti_homog.results import path_curves
 from feti_homog.sweep.report.series import Series, series_over
 from feti_homog.sweep.report.style import COLOURS, MARKERS, label_axes, legend, plot_series
 from feti_homog.sweep.report.sweep_table import SweepTable
@@ -30,8 +30,8 @@ def _along(table: SweepTable) -> tuple[str, ...]:
     if document is None:
         return ()
     strains, stresses = voigt_names(len(document["path"][0]["stress"]))
-    leading = response.leading_component(document)
-    is_given = any(target.get(stresses[leading]) for target in response.targets(document))
+    leading = path_curves.leading_component(document)
+    is_given = any(target.get(stresses[leading]) for target in path_curves.targets(document))
     return (f"onset_{stresses[leading]}", f"end_{strains[leading]}" if is_given else f"peak_{stresses[leading]}")
 
 

@@ -7,10 +7,10 @@ these are 1, 2 or 6, so that Cij is the same entry of all: the shear modulus in 
 
 from __future__ import annotations
 
-from feti_homog.common.records import STRESS
-from feti_homog.mechanics.bounds import Moduli
-from feti_homog.mechanics.spatial_constants import EngineeringConstants, TransverselyIsotropic
-from feti_homog.output.files.csv_tables import Column, columns
+from feti_homog.materials.bounds import Moduli
+from feti_homog.materials.spatial_constants import EngineeringConstants, TransverselyIsotropic
+from feti_homog.results.csv_tables import Column, columns
+from feti_homog.runtime.records import STRESS
 
 CASE_COLUMNS = (
     Column("row", "", "`case`, or of a point the `count`, `mean`, `std` and `ci95` of its realisations"),

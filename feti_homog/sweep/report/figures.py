@@ -6,7 +6,7 @@ from pathlib import Path
 
 import matplotlib as mpl
 
-from feti_homog.output.plots.plot_helpers import STYLE, save
+from feti_homog.report.plots.plot_helpers import STYLE, save
 from feti_homog.sweep.report import bundles, cell_size, match_comparison, moduli
 from feti_homog.sweep.report.series import varies
 from feti_homog.sweep.report.sweep_table import SweepTable

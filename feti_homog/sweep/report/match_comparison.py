@@ -10,12 +10,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from feti_homog.config.fibre_window import read_window
+from feti_homog.case.fibre_window import read_window
 from feti_homog.microstructure.fibre_pattern import FibrePattern
 from feti_homog.microstructure.nearest_neighbours import nearest_neighbours
 from feti_homog.microstructure.pair_functions import distances, pair_functions
 from feti_homog.microstructure.voronoi_cells import voronoi_cells
-from feti_homog.output.plots.plot_helpers import plain
+from feti_homog.report.plots.plot_helpers import plain
 from feti_homog.sweep.report.outputs import Document
 from feti_homog.sweep.report.style import COLOURS, legend
 from feti_homog.sweep.report.sweep_table import SweepTable

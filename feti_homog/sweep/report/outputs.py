@@ -7,13 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.mechanics.voigt import (
-    SPATIAL_STRAINS,
-    SPATIAL_STRESSES,
-    STRESSES,
-    voigt_names,
-)
-from feti_homog.output.text import point_tables
+from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES, STRESSES, voigt_names
+from feti_homog.report.text import point_tables
 
 Document = Mapping[str, Any]
 

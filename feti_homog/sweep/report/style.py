@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from feti_homog.mechanics.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES
-from feti_homog.output.plots.plot_helpers import strain_symbols, unit_label
+from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES
+from feti_homog.report.plots.plot_helpers import strain_symbols, unit_label
 from feti_homog.sweep.report.series import Series
 from feti_homog.sweep.report.sweep_table import SweepTable
 from feti_homog.typing import Float

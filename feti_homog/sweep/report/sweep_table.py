@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.mechanics import response
-from feti_homog.output.text.units import unit
+from feti_homog.report.text.units import unit
+from feti_homog.results import path_curves
 from feti_homog.sweep.report.outputs import Document
 from feti_homog.sweep.report.statistics import Statistics
 from feti_homog.typing import Float
@@ -86,7 +86,7 @@ class SweepTable:
 
         Both are empty if the cases are no straight paths, or none whose strain rises with the load.
         """
-        paths = [path for path in map(response.rising_strain, self.results_of(point)) if path is not None]
+        paths = [path for path in map(path_curves.rising_strain, self.results_of(point)) if path is not None]
         if not paths:
             return np.zeros(0), np.zeros((0, 0, 3))
         strain = np.linspace(0.0, min(path[-1, -1] for path in paths), CURVE_POINTS)

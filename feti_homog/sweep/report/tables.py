@@ -13,9 +13,9 @@ from typing import Any
 import h5py
 import numpy as np
 
-from feti_homog.mechanics.voigt import voigt_names
-from feti_homog.output.files import atomic
-from feti_homog.output.text.units import unit, with_unit
+from feti_homog.materials.voigt import voigt_names
+from feti_homog.report.text.units import unit, with_unit
+from feti_homog.results import atomic
 from feti_homog.sweep.report.statistics import Statistics
 from feti_homog.sweep.report.sweep_table import SweepTable
 

@@ -21,9 +21,9 @@ from feti_homog.analysis.result_records import (
     TipRates,
     Tips,
 )
-from feti_homog.mechanics.bounds import Bounds, engineering_moduli
-from feti_homog.mechanics.spatial_constants import engineering_constants, transversely_isotropic_part
-from feti_homog.output.files import csv_tables, result_json
+from feti_homog.materials.bounds import Bounds, engineering_moduli
+from feti_homog.materials.spatial_constants import engineering_constants, transversely_isotropic_part
+from feti_homog.results import csv_tables, result_json
 
 STIFFNESS = np.array([[9.0, 2.0, 0.0], [2.0, 8.0, 0.0], [0.0, 0.0, 3.0]])
 CELL = CellInfo(1.0, 2.0, 2.0, 0.4, {"matrix": 0.6, "fibre": 0.4}, 10, 20)

@@ -10,9 +10,9 @@ from mpi4py import MPI
 from support.cases import make_case
 
 from feti_homog.analysis import runner
-from feti_homog.common.progress import Progress
 from feti_homog.errors import CaseError
-from feti_homog.output.files import output_folder
+from feti_homog.results import output_folder
+from feti_homog.runtime.progress import Progress
 
 
 @pytest.mark.parametrize(("error", "destroyed"), [(None, 1), (CaseError("refused"), 1), (MemoryError("defect"), 0)])

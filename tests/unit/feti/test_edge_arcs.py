@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.special import ellipeinc
 
-from feti_homog.cell.ellipses import Ellipses
 from feti_homog.feti.decomposition.edge_arcs import along, mean_speed
+from feti_homog.fibres.ellipses import Ellipses
 
 A, B = 0.5, 0.2
 

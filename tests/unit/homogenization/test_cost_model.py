@@ -7,8 +7,8 @@ from dataclasses import replace
 import pytest
 from support.cases import FIBRE, MATRIX, make_case
 
-from feti_homog.config.interface_section import Arc, InterfaceSection
-from feti_homog.config.sections import Angle
+from feti_homog.case.interface_section import Arc, InterfaceSection
+from feti_homog.case.sections import Angle
 from feti_homog.homogenization import cost_model
 from feti_homog.homogenization.phase_laws import problems
 

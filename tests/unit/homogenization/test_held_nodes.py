@@ -11,13 +11,13 @@ from mpi4py import MPI
 from support.cases import FIBRE, MATRIX
 from support.layered_meshes import layers
 from support.pixel_images import pixel_mesh
-from unit.cell.test_touching import BRANCHES, TWO_FIBRES
+from unit.mesh.test_touching import BRANCHES, TWO_FIBRES
 
 from feti_homog import Case, run
-from feti_homog.common.progress import Progress
 from feti_homog.errors import CaseError
 from feti_homog.homogenization.cell_description import describe
 from feti_homog.homogenization.unit_cell import assemble_subdomains
+from feti_homog.runtime.progress import Progress
 
 TOUCHES = "[interface] nodes that never part: at 1 two bodies meet more than once"
 MEET = "[interface] nodes that never part: at 1 three bodies meet"

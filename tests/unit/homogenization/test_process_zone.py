@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 from support.whole_meshes import coarse_mesh
-from unit.cell.faulty_meshes import grid
+from unit.mesh.faulty_meshes import grid
 
-from feti_homog.config import case as cases
+from feti_homog.case import case as cases
 from feti_homog.homogenization import process_zone
 from feti_homog.homogenization.cell_description import describe
 

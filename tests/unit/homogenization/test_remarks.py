@@ -8,11 +8,11 @@ import tomllib
 import pytest
 from mpi4py import MPI
 from support.jobs import ROOT
-from unit.cell.faulty_meshes import RIGHT_SIDE, grid
-from unit.config.valid_cases import VALID_CASES
+from unit.case.valid_cases import VALID_CASES
+from unit.mesh.faulty_meshes import RIGHT_SIDE, grid
 
 from feti_homog import run
-from feti_homog.config.case import Case
+from feti_homog.case.case import Case
 from feti_homog.homogenization.cell_description import describe
 from feti_homog.homogenization.cell_remarks import table_remarks
 

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from feti_homog.cell import element_estimate
-from feti_homog.config import case as cases
+from feti_homog.case import case as cases
 from feti_homog.homogenization import tips
+from feti_homog.mesh.sizes import element_estimate
 
 CELL = {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.05}
 RADIUS = np.sqrt(0.4 / np.pi)

@@ -11,15 +11,15 @@ from pathlib import Path
 import pytest
 from support.sweep_files import sweep_file
 
-from feti_homog.common.file_locks import Lock, LockHeld, is_locked
 from feti_homog.errors import CaseError, FetiHomogError
-from feti_homog.output.files import atomic
+from feti_homog.results import atomic
+from feti_homog.runtime.file_locks import Lock, LockHeld, is_locked
 from feti_homog.sweep import plan, store
 
 HOLDER = """
 import sys
 from pathlib import Path
-from feti_homog.common.file_locks import Lock
+from feti_homog.runtime.file_locks import Lock
 Lock(Path(sys.argv[1]), shared={shared}).acquire()
 print("held", flush=True)
 sys.stdin.read()

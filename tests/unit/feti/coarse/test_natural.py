@@ -12,7 +12,7 @@ from mpi4py import MPI
 from scipy.sparse import diags, identity
 
 from feti_homog.feti.coarse.natural import NaturalCoarseSpace
-from feti_homog.interface.rigid_placement import place
+from feti_homog.interface.contact.floating_bodies import place
 
 FIBRES, NODES = 1000, 8
 ROWS = 2 * NODES * FIBRES

@@ -7,7 +7,6 @@ import pytest
 from mpi4py import MPI
 from scipy.sparse import csr_matrix, diags, kronsum
 
-from feti_homog.common.petsc_options import case_options
 from feti_homog.feti.linalg.dense_cholesky import check_lapack, cholesky
 from feti_homog.feti.linalg.distributed_solver import DistributedSolver
 from feti_homog.feti.linalg.factor_status import power_of_two
@@ -15,6 +14,7 @@ from feti_homog.feti.linalg.fronts import cholesky as front_cholesky
 from feti_homog.feti.linalg.packed_symmetric import invert_upper
 from feti_homog.feti.linalg.schur_complement import schur_complement
 from feti_homog.feti.linalg.sparse_direct import DirectSolver
+from feti_homog.petsc.options import case_options
 
 SMALL, LARGE = 3, 40  # rows of grids of which CHOLMOD makes simplicial and supernodal factors
 LIBRARIES = ["cholmod", "mumps", "petsc"]

@@ -9,11 +9,11 @@ import pytest
 from mpi4py import MPI
 from scipy.sparse import diags, kronsum
 
-from feti_homog.common import process_memory
 from feti_homog.feti.linalg.dense_block_sum import DenseBlockSum
 from feti_homog.feti.linalg.distributed_matrix import assemble_owned_rows
 from feti_homog.feti.linalg.distributed_solver import DistributedSolver
 from feti_homog.feti.linalg.sparse_direct import DirectSolver
+from feti_homog.runtime import process_memory
 
 PAGE, MEGABYTE = 4096, 2**20
 

@@ -1,0 +1,281 @@
+"""A case: the checked contents of its file as frozen dataclasses, with every fault reported at once."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from feti_homog.case import element_sizes
+from feti_homog.case.cell_files import with_files
+from feti_homog.case.cell_section import GEOMETRY, TOUCHING, Cell, size_faults
+from feti_homog.case.document import read_document, to_document
+from feti_homog.case.envelope_rules import envelope_faults, read_envelope
+from feti_homog.case.envelope_section import Envelope
+from feti_homog.case.generalized_plane import generalized_faults
+from feti_homog.case.interface_rules import interface_tables, misplaced_sections, read_angle, read_interfaces
+from feti_homog.case.interface_section import Arc, InterfaceSection
+from feti_homog.case.load_rules import expansion_faults, read_load, read_path, stress_free
+from feti_homog.case.load_section import LoadPath, SingleLoad
+from feti_homog.case.matched_cell import with_match
+from feti_homog.case.material_contrast import contrast_faults, contrast_warnings
+from feti_homog.case.material_forms import Isotropic, Material
+from feti_homog.case.material_sections import coating_faults, phase_faults, provider, read_materials
+from feti_homog.case.mixed_cell import mix_faults, void_faults
+from feti_homog.case.mixed_load import MixedLoad, Strain, completed
+from feti_homog.case.petsc_section import Scalar, read_petsc
+from feti_homog.case.schema import Selected, TableReader, selected_value, to_table
+from feti_homog.case.sections import SECTIONS, Analysis, Angle, Decomposition, Output
+from feti_homog.case.selectors import ANALYSIS_TYPE, CRITERION, DRAWN_STRESS, METHOD, PLANE
+from feti_homog.case.sweep_section import SWEEP
+from feti_homog.case.tables import KEY_OWNERS, REQUIRED, TOP_LEVEL
+from feti_homog.case.values import text
+from feti_homog.case.wording import limit_in_words, suggestion, toml_key, toml_value
+from feti_homog.errors import CaseError
+
+FIELDS = {"load": "single_load"}  # of a section whose name is that of a method
+LOCKING_POISSON, ROUNDING_POISSON = 0.49, 0.49999
+
+
+@dataclass(frozen=True, kw_only=True)
+class Case:
+    """A checked case.
+
+    Attributes:
+        materials: by phase, in the file's order.
+        interfaces: none if the bonding is perfect; of several each has its pair of phases.
+        angle, path, single_load, envelope: there if the analysis is of that type; single_load is the section [load].
+        petsc: options without dash.
+    """
+
+    name: str
+    cell: Cell
+    materials: dict[str, Material]
+    analysis: Analysis
+    interfaces: tuple[InterfaceSection, ...]
+    angle: Angle | None
+    path: LoadPath | None
+    single_load: SingleLoad | None
+    envelope: Envelope | None
+    decomposition: Decomposition
+    output: Output
+    petsc: dict[str, Scalar]
+
+    @classmethod
+    def load(cls, path: str | Path) -> Case:
+        """The case in a file; see `load`."""
+        return load(path)
+
+    @classmethod
+    def parse(cls, document: Mapping[str, Any], folder: str | Path = ".") -> Case:
+        """The case of nested dictionaries as in the file, with Python's or NumPy's values; see `parse`."""
+        return parse(document, Path(folder))
+
+    @property
+    def arcs(self) -> tuple[Arc, ...]:
+        """What is debonded from the start; none if the bonding is perfect."""
+        return tuple(arc for interface in self.interfaces for arc in interface.debonded)
+
+    @property
+    def interface(self) -> InterfaceSection | None:
+        """The first of the interfaces, None if the bonding is perfect: contact, criterion and growth are those of
+        all."""
+        return self.interfaces[0] if self.interfaces else None
+
+    @property
+    def targets(self) -> tuple[Mapping[str, float], ...]:
+        """The loads of a path after its unloaded start, or the one load of the case, in full.
+
+        By name: of each component, in the order of the plane state's strains, its strain or its stress; in generalized
+        plane strain then the temperature.
+        """
+        return completed(tuple(self._placed_loads.values()), self.analysis.plane)
+
+    @property
+    def _placed_loads(self) -> Mapping[str, Strain | MixedLoad]:
+        """The loads as they are given, by their places in their section."""
+        if self.single_load is not None:
+            return {"to": self.single_load.to}
+        return {} if self.path is None else self.path.placed
+
+    def material_of(self, phase: str) -> Material:
+        """The material of a phase; "fibre:2" without its own has that of "fibre". Raises KeyError."""
+        return self.materials[provider(phase, self.materials)]
+
+    def warnings(self) -> tuple[str, ...]:
+        """What is allowed but probably not wanted, one line each."""
+        contrast = contrast_warnings(self.materials, self.analysis.plane)
+        if self.analysis.plane == "stress":
+            return tuple(contrast)
+        solids = {phase: material for phase, material in self.materials.items() if isinstance(material, Isotropic)}
+        lines = {
+            f"[material.{toml_key(phase)}] poisson = {material.poisson}: ": material.poisson
+            for phase, material in solids.items()
+        }
+        locking = [
+            f"{line}linear triangles lock above {LOCKING_POISSON} in plane strain; use order = 2 in [cell]"
+            for line, poisson in lines.items()
+            if self.cell.order == 1 and poisson > LOCKING_POISSON
+        ]
+        rounding = [
+            f"{line}so near to 0.5 rounding may exceed what the checks allow; use at most {ROUNDING_POISSON}"
+            for line, poisson in lines.items()
+            if poisson > ROUNDING_POISSON
+        ]
+        return (*locking, *rounding, *contrast)
+
+    def remarks(self) -> tuple[str, ...]:
+        """What is not said but assumed, one line each."""
+        return stress_free(self.analysis.type, self._placed_loads, self.analysis.plane)
+
+    def resolved(self) -> dict[str, Any]:
+        """The case with its defaults as a plain document, of which `parse` makes an equal case."""
+        selected: Selected = {
+            GEOMETRY: self.cell.geometry,
+            ANALYSIS_TYPE: self.analysis.type,
+            PLANE: self.analysis.plane,
+            METHOD: None if self.path is None else self.path.method,
+            CRITERION: None if self.interface is None else self.interface.criterion,
+        }
+        cell = element_sizes.without_chosen(self.cell, to_table(self.cell, selected))
+        document: dict[str, Any] = {"name": self.name, "cell": cell}
+        document["material"] = {phase: to_table(material, selected) for phase, material in self.materials.items()}
+        sections = {section: getattr(self, FIELDS.get(section, section)) for section in SECTIONS if section != "cell"}
+        given = {section: contents for section, contents in sections.items() if contents is not None}
+        document |= {section: to_table(contents, selected) for section, contents in given.items()}
+        if len(self.interfaces) > 1:
+            document["interface"] = [to_table(interface, selected) for interface in self.interfaces]
+        return document | {"petsc": dict(self.petsc)}
+
+    def digest(self) -> str:
+        """Short name of what the case computes: the same whatever its name, output, PETSc options and max_events."""
+        document = {k: v for k, v in self.resolved().items() if k not in ("name", "output", "petsc")}
+        document.get("path", {}).pop("max_events", None)
+        for key in ("file", "match"):
+            document["cell"].pop(key, None)
+        content = b"".join(path.read_bytes() for path in (self.cell.file, self.cell.match) if path is not None)
+        return hashlib.sha256(json.dumps(document, sort_keys=True).encode() + content).hexdigest()[:16]
+
+
+def load(path: str | Path) -> Case:
+    """The case in a file, named after the file unless it says otherwise. Raises CaseError with all faults."""
+    return parse(read_document(path), Path(path).parent)
+
+
+def parse(values: Mapping[str, Any], folder: Path) -> Case:
+    """The case of nested dictionaries; its files are relative to `folder`.
+
+    NumPy's scalars and arrays, tuples and paths are as good as TOML's values.
+
+    Raises:
+        CaseError: with all faults.
+        TypeError: `values` is no mapping.
+    """
+    document = to_document(values)
+    reader = TableReader(_selected(document), KEY_OWNERS, _top_level_faults(document))
+    analysis, faults = reader.selected[ANALYSIS_TYPE], reader.faults
+    cell = _read_section(document, "cell", reader)
+    faults += element_sizes.exclusions(document.get("cell"))
+    decomposition = _read_section(document, "decomposition", reader)
+    if decomposition and decomposition.subdomains and decomposition.max_dofs:
+        faults.append("[decomposition] subdomains, max_dofs: exclude each other; give one")
+    sections = {
+        "cell": cell and _checked_cell(with_match(cell, folder, faults), folder, faults),
+        "materials": read_materials(document.get("material"), document.get("cell"), reader.selected[PLANE], reader),
+        "analysis": _read_section(document, "analysis", reader),
+        "decomposition": decomposition,
+    }
+    faults += misplaced_sections(document, analysis)
+    faults += generalized_faults(reader.selected)
+    sections |= {
+        "interfaces": read_interfaces(document, reader),
+        "angle": read_angle(document.get("angle"), reader),
+        "path": read_path(document.get("path"), reader),
+        "single_load": read_load(document.get("load"), reader),
+        "envelope": read_envelope(document.get("envelope"), reader),
+        "output": _read_section(document, "output", reader),
+        "petsc": read_petsc(document.get("petsc", {}), faults),
+    }
+    if isinstance(document.get("material"), dict) and sections["cell"]:
+        faults += coating_faults(sections["cell"], document["material"])
+    bonding = sections["envelope"], sections["interfaces"], sections["materials"]
+    faults += envelope_faults(*bonding, document, reader.selected)
+    faults += expansion_faults(sections["path"], sections["single_load"], sections["materials"])
+    if not faults:
+        faults += contrast_faults(sections["materials"], sections["analysis"].plane)
+    if not faults:
+        sections["cell"] = _sized_cell(document["cell"], sections, faults)
+    if faults:
+        raise CaseError(*faults)
+    return Case(name=document.get("name", "case"), **sections)
+
+
+def _selected(document: Mapping[str, Any]) -> Selected:
+    """The values that decide which keys belong to the case."""
+    selectors = (GEOMETRY, ANALYSIS_TYPE, PLANE, METHOD, CRITERION, DRAWN_STRESS)
+    tables = dict(document) | {"interface": next(iter(interface_tables(document)), None)}
+    return {s: selected_value(SECTIONS[s.section], tables.get(s.section), s.key) for s in selectors}
+
+
+def _top_level_faults(document: Mapping[str, Any]) -> list[str]:
+    """Faults of the names of sections and of the keys before the first section."""
+    faults = [f"[{section}]: missing section" for section in REQUIRED if section not in document]
+    for name, value in document.items():
+        hint = suggestion(name, TOP_LEVEL, KEY_OWNERS)
+        if name == SWEEP:
+            words = f"{SWEEP} = {toml_value(value)}: expected a section [{SWEEP}]"
+            many = "[sweep]: this file describes many cases; `feti-homog sweep` runs them"
+            faults.append(many if isinstance(value, dict) else words)
+        elif name not in TOP_LEVEL and isinstance(value, dict):
+            faults.append(f"[{toml_key(name)}]: unknown section; {hint}")
+        elif name not in TOP_LEVEL:
+            faults.append(f"{toml_key(name)}: unknown key; {hint}")
+    name = document.get("name", "case")
+    complaint = text.complaint(name)
+    if complaint:
+        faults.append(f"name = {toml_value(name)}: {complaint}")
+    return faults
+
+
+def _read_section(document: Mapping[str, Any], section: str, reader: TableReader) -> Any:
+    """The dataclass of a section, or None if that is faulty or was already found to be missing."""
+    if section in REQUIRED and section not in document:
+        return None
+    return reader.read(SECTIONS[section], document.get(section, {}), section)
+
+
+def _checked_cell(cell: Cell, folder: Path, faults: list[str]) -> Cell:
+    """The cell with its file's path completed; faults between its keys are added to `faults`."""
+    if cell.fibre_fraction is not None:
+        spacing = (cell.coating or 0.0) + (cell.min_gap if cell.geometry == "random" else 0.0)
+        limit = TOUCHING[cell.geometry] / (1.0 + spacing) ** 2
+        if cell.fibre_fraction >= limit:
+            reason = "there the coatings touch" if cell.coating else "there the fibres touch"
+            reason = "no circles min_gap apart are denser" if spacing > (cell.coating or 0.0) else reason
+            faults.append(
+                f"[cell] fibre_fraction = {cell.fibre_fraction}: expected less than "
+                f"{limit_in_words(limit, cell.fibre_fraction, 4)} for "
+                f"geometry = {toml_value(cell.geometry)}: {reason}"
+            )
+    faults += size_faults(cell) + mix_faults(cell) + void_faults(cell)
+    if cell.width is not None and cell.fibre_radius is not None:
+        faults.append("[cell] width, fibre_radius: exclude each other; give one")
+    return with_files(cell, folder, faults)
+
+
+def _sized_cell(table: Mapping[str, Any], sections: Mapping[str, Any], faults: list[str]) -> Cell:
+    """The cell with the sizes of elements, and unless its table says it the order, that it asks for."""
+    cell: Cell = sections["cell"]
+    plane, free_faces = sections["analysis"].plane, bool(sections["interfaces"]) or cell.has_voids
+    orders = (cell.order,) if "order" in table else (1, 2)
+    return element_sizes.with_sizes(cell, sections["materials"], plane, free_faces, orders, faults)
+
+
+def check_phases(case: Case, phases: Iterable[str]) -> None:
+    """Raises CaseError if a phase of the mesh has no material, or a material no phase."""
+    faults = phase_faults(case.materials, phases)
+    if faults:
+        raise CaseError(*faults)

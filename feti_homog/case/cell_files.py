@@ -1,0 +1,85 @@
+"""What a cell takes from files: the mesh of its user, or the table of its fibres with the size of the cell."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from feti_homog.case.cell_section import Cell
+from feti_homog.case.fibre_table import FibreTable, read_table, table_of
+from feti_homog.case.rounded_polygons import with_polygons
+from feti_homog.case.section_values import MESH_FILE, MESH_SUFFIXES
+from feti_homog.case.table_shapes import check_hollow, with_shapes
+from feti_homog.case.wording import toml_value
+from feti_homog.errors import CaseError
+
+SUFFIXES = {"mesh": MESH_SUFFIXES, "table": (".csv",)}
+FILES = {"mesh": MESH_FILE, "table": ".csv file"}
+
+
+def with_files(cell: Cell, folder: Path, faults: list[str]) -> Cell:
+    """The cell with its file's path completed and its table read; faults are added to `faults`."""
+    if cell.geometry not in SUFFIXES:
+        return cell
+    if cell.file is not None and cell.fibre_list is not None:
+        faults.append("[cell] file, fibre_list: exclude each other; give one")
+        return cell
+    if cell.file is None:
+        return _listed(cell, faults)
+    file = Path(os.path.realpath(folder / cell.file))  # unlike resolve, no error for links in a circle
+    given = toml_value(str(cell.file))
+    if file.suffix not in SUFFIXES[cell.geometry]:
+        expected = f"the name of a {FILES[cell.geometry]} for geometry = {toml_value(cell.geometry)}"
+        faults.append(f"[cell] file = {given}: expected {expected}")
+    elif words := missing(file):
+        faults.append(f"[cell] file = {given}: {words}")
+    elif cell.geometry == "table":
+        return _with_table(replace(cell, file=file), faults)
+    return replace(cell, file=file)
+
+
+def missing(file: Path) -> str:
+    """Why there is no such file, empty if there is."""
+    if os.path.isfile(file):  # false, not an error, for a name too long
+        return ""
+    return f"a folder; expected a file at {file}" if os.path.isdir(file) else f"no such file (expected at {file})"
+
+
+def _listed(cell: Cell, faults: list[str]) -> Cell:
+    if cell.fibre_list is not None:
+        return _with_table(cell, faults)
+    instead = ", or fibre_list" if cell.geometry == "table" else ""
+    faults.append(f"[cell] file: missing; expected the name of a {FILES[cell.geometry]}{instead}")
+    return cell
+
+
+def _with_table(cell: Cell, faults: list[str]) -> Cell:
+    """The cell with its table, which has the size of the cell."""
+    try:
+        table = read_table(cell.file) if cell.file is not None else table_of(cell.fibre_list or (), "fibre_list")
+    except CaseError as error:
+        faults += [f"[cell] {fault}" for fault in error.faults]
+        return cell
+    if cell.coating is not None and table.coating is not None:
+        faults.append(f"[cell] coating = {cell.coating:g}: {table.name} has a column of it; give one")
+    elif cell.coating is not None:
+        table = replace(table, coating=np.where(table.is_void, 0.0, cell.coating))
+    table = with_shapes(with_polygons(table, cell.window, faults), faults)
+    check_hollow(table, faults)
+    if table.polygons is not None and cell.tip_size is not None:
+        faults.append(f"[cell] tip_size = {cell.tip_size:g}: {table.name} has polygons, and with them no nodes at tips")
+    width, height = (_size(name, getattr(cell, name), table, faults) for name in ("width", "height"))
+    return replace(cell, table=replace(table, width=width, height=height))
+
+
+def _size(name: str, asked: float | None, table: FibreTable, faults: list[str]) -> float | None:
+    """Width or height of the cell: that of the case or that of the table, which must not differ."""
+    own: float | None = getattr(table, name)
+    if asked is None and own is None:
+        faults.append(f"[cell] {name}: missing; {table.name} has no line such as # width = 120, height = 80")
+    elif None not in (asked, own) and asked != own:
+        faults.append(f"[cell] {name} = {asked:g}: {table.name} says {own:g}; give one")
+    return own if asked is None else asked

@@ -1,0 +1,257 @@
+"""The section [cell] of a case file: the geometry of the periodic cell and its mesh."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from feti_homog.case.fibre_table import FibreTable
+from feti_homog.case.phase_names import FIBRE
+from feti_homog.case.schema import Selector, key
+from feti_homog.case.section_values import CELL_FILE, FIBRE_LIST, FRACTIONS, RADII, SEED, TABLE_FILE
+from feti_homog.case.values import choice, integer, real
+
+CIRCULAR = ("square", "hexagonal", "random")
+TOUCHING = {"square": math.pi / 4, "hexagonal": math.pi / math.sqrt(12), "random": math.pi / math.sqrt(12)}
+"""Fibre fraction at which the fibres touch; of a random cell, that of the densest packing of circles."""
+FIBRES_OF = {"square": 1, "hexagonal": 2}
+"""Fibres of the lattices."""
+
+GEOMETRY = Selector("cell", "geometry")
+ALL_CIRCULAR, RANDOM, TABLE = GEOMETRY.among(*CIRCULAR), GEOMETRY.among("random"), GEOMETRY.among("table")
+MESH = GEOMETRY.among("mesh")
+MESHED, FROM_A_FILE = GEOMETRY.among(*CIRCULAR, "table"), GEOMETRY.among("table", "mesh")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cell:
+    """Geometry of the periodic cell and its mesh. Keys of another geometry keep their defaults.
+
+    `table` is what `file` or `fibre_list` of geometry = "table" have, with the size of the cell; it is no key.
+    """
+
+    geometry: str = key(
+        choice(*CIRCULAR, "table", "mesh"),
+        '"square": a fibre in the middle of a square cell; "hexagonal": a cell sqrt(3) times as high as wide with '
+        'fibres in the middle and at the corners; "random": fibres in a square cell; "table": fibres of a table, as of '
+        'a micrograph; "mesh": a file of gmsh, Abaqus or VTK.',
+    )
+    fibre_fraction: float | None = key(
+        real(above=0.0, below=1.0),
+        "Area of the fibres / area of the cell, below that at which they touch: pi/4 (square), pi/sqrt(12) "
+        "(hexagonal; random, where min_gap lowers it).",
+        only=ALL_CIRCULAR,
+        unless=("match", "mix"),
+        default_words="required, or that of match or mix",
+    )
+    width: float | None = key(
+        real(least=1e-9, most=1e9), "Width of the cell.", unit="length", default=None, only=MESHED,
+        default_words="1, or what fibre_radius or the table make it",
+    )  # fmt: skip
+    height: float | None = key(
+        real(least=1e-9, most=1e9), "Height of the cell.", unit="length", default=None, only=TABLE,
+        default_words="what the table says",
+    )  # fmt: skip
+    fibre_radius: float | None = key(
+        real(least=1e-9, most=1e9), "Mean radius of the fibres, in place of width.", unit="length", default=None,
+        only=ALL_CIRCULAR, default_words="what width makes it",
+    )  # fmt: skip
+    coating: float | None = key(
+        real(least=0.01, most=1.0),
+        'Thickness of the coatings of all fibres / radius of the fibre, which is within; of the phase "coating". '
+        "fibre_fraction and fibre_radius are those without them, gaps those with them. Coatings of ellipses make both "
+        "semi-axes longer by coating sqrt(a b).",
+        default=None,
+        only=MESHED,
+        default_words="none, or the column coating of a table",
+    )
+    mesh_size: float = key(
+        real(least=1e-4, most=0.5),
+        "Size of the elements, before refine, / width of the cell.",
+        default=0.05,
+        only=MESHED,
+    )
+    interface_size: float | None = key(
+        real(least=1e-5, most=0.5),
+        "Size of the elements on interfaces, before refine, / width of the cell; from there they grow to mesh_size, by "
+        "0.4 of the distance. At most mesh_size.",
+        default=None,
+        default_words="mesh_size",
+        only=MESHED,
+    )
+    tip_size: float | None = key(
+        real(least=1e-6, most=0.5),
+        "Size of the elements at the tips of debonded arcs, before refine, / width of the cell; from there they grow "
+        "like those on interfaces. At most interface_size.",
+        default=None,
+        default_words="such that tips err no more than the rest; of paths and envelopes interface_size",
+        only=MESHED,
+    )
+    refine: int = key(
+        integer(least=0, most=8),
+        "How many times every element is split in four, on the ranks; new nodes follow round and elliptic interfaces.",
+        default=0,
+    )
+    accuracy: float | None = key(
+        real(least=1e-7, most=0.1),
+        "Largest relative error of the strain energy under any macroscopic strain, and so of the entries of the "
+        "effective stiffness: mesh_size and refine are chosen, which it excludes with interface_size and tip_size, and "
+        "order, unless it is given. It is not that of paths after bonds break, nor of polygons with sharp corners.",
+        default=None,
+        default_words="none",
+        only=MESHED,
+    )
+    element_size: float | None = key(
+        real(least=1e-6, most=0.5),
+        "Largest size of the elements, after refine, / width of the cell: mesh_size and refine are chosen, as with "
+        "accuracy.",
+        default=None,
+        default_words="none",
+        only=MESHED,
+    )
+    order: int = key(
+        integer(least=1, most=2),
+        "Order of the triangles. 1: linear; they lock in plane strain where poisson is above 0.49. 2: quadratic, "
+        "curved on round interfaces. With accuracy that of the two which takes fewer nodes, unless it is given.",
+        default=1,
+    )
+    bodies: str = key(
+        choice("torus", "plane"),
+        '"torus": a fibre that the boundary of the cell cuts is one body; "plane": its parts are bodies of their own. '
+        "The stiffness is the same.",
+        default="torus",
+    )
+    fibres: int | None = key(
+        integer(least=1, most=100_000), "Number of fibres.", only=RANDOM, unless=("match", "radii"),
+        default_words="required, or that of match, or what width and radii make it",
+    )  # fmt: skip
+    mix: Mapping[str, float] | None = key(
+        FRACTIONS,
+        "Fibres of several phases, in place of fibre_fraction: the area of those of each / area of the cell. Each "
+        "needs its [material.NAME].",
+        default=None,
+        only=RANDOM,
+        default_words="none",
+    )
+    radii: Mapping[str, float] | None = key(
+        RADII,
+        "Mean radius of the fibres of each phase of mix, in place of fibre_radius. Of fibres, or of as many as a cell "
+        "of this width takes, each phase gets the nearest whole number, at least one; its radii are then scaled such "
+        "that its fraction is exact.",
+        unit="length",
+        default=None,
+        only=RANDOM,
+        default_words="equal ones",
+    )
+    voids: float | None = key(
+        real(least=0.0, most=0.5),
+        "Voids at random among the fibres, min_gap from them and from each other: their area / area of the cell.",
+        default=None,
+        only=RANDOM,
+        default_words="none",
+    )
+    void_radius: float | None = key(
+        real(least=0.05, most=20.0),
+        "Radius of the voids / mean radius of the fibres. There is the nearest whole number of voids, at least one; "
+        "their radius is then scaled such that their fraction is exact.",
+        default=None,
+        only=RANDOM,
+        default_words="1",
+    )
+    match: Path | None = key(
+        TABLE_FILE,
+        "A table of the fibres in a window of a micrograph, relative to the case file: columns x, y, radius, and a "
+        'comment such as "# width = 120, height = 80". The cell gets its radii and, as near as can be, its '
+        "distributions of the distances of nearest and second neighbours, but none below min_gap. Ellipses count as "
+        "discs of the same area.",
+        default=None,
+        only=RANDOM,
+        default_words="none",
+    )
+    min_gap: float = key(
+        real(least=0.0, most=1.0), "Smallest gap between fibres / their mean diameter.", default=0.05, only=RANDOM
+    )
+    seed: int = key(
+        SEED,
+        "Seed of the random arrangement; the same seed gives the same cell on any machine and any number of ranks.",
+        default=0,
+        only=RANDOM,
+    )
+    radius_spread: float = key(
+        real(least=0.0, most=0.5),
+        "Largest difference of a radius from the mean / mean radius.",
+        default=0.0,
+        only=RANDOM,
+    )
+    file: Path | None = key(
+        CELL_FILE,
+        'Relative to the case file. Of geometry = "mesh" the mesh: triangles of three or six nodes that fill a '
+        'rectangle, in physical surfaces "matrix", "fibre", "glass", ...; the nodes on opposite sides match. Fibres '
+        "may have any shape. Of Abaqus' files (.inp) element sets have these names; of .vtu and .vtk files, which "
+        'meshio reads, cell data "phase" are 0 in the matrix, 1 in fibre, 2 in fibre:2, ... Of "table" the fibres, a '
+        "row for each: columns x, y, radius and, if there are any, phase and coating (thickness / radius); of ellipses "
+        "a and b, the semi-axes, in place of the radius, and angle from x to a in degrees; of "
+        "hollow fibres inner_radius; of rounded polygons sides and corner, with the angle of the first corner. Rows of "
+        "the phase void are voids. What "
+        'follows # is a comment, of which "# width = 120, height = 80" says the size of the cell.',
+        default=None,
+        only=FROM_A_FILE,
+        default_words="required, or fibre_list of a table",
+    )
+    repair: str = key(
+        choice("none", "snap"),
+        '"snap": nodes on sides that nearly match are moved to match; the result says how far.',
+        default="none",
+        only=MESH,
+    )
+    snap_tolerance: float = key(
+        real(least=0.0, most=0.1),
+        'How far nodes may be moved by repair = "snap" / width of the cell.',
+        default=1e-3,
+        only=MESH,
+    )
+    fibre_list: tuple[Mapping[str, Any], ...] | None = key(
+        FIBRE_LIST, "The fibres, in place of file.", default=None, only=TABLE, default_words="what file has"
+    )
+    window: str = key(
+        choice("periodic", "cut"),
+        'What a table is. "periodic": a cell, whose fibres return on the other side; they must not overlap. "cut": a '
+        "piece of something larger, whose fibres may overlap across the border: they are moved apart as little as can "
+        "be.",
+        default="periodic",
+        only=TABLE,
+    )
+    table: FibreTable | None = field(default=None, compare=False)
+
+    @property
+    def fractions(self) -> dict[str, float]:
+        """Fibre fraction of each phase of round fibres, in the order of the names; none where files say it."""
+        if self.mix is not None:
+            return dict(sorted(self.mix.items()))
+        return {} if self.fibre_fraction is None else {FIBRE: self.fibre_fraction}
+
+    @property
+    def has_voids(self) -> bool:
+        """Whether there are voids, as far as is known before a user's mesh is read."""
+        hollow = None if self.table is None else self.table.inner_radius
+        listed = self.table is not None and bool(self.table.is_void.any())
+        return bool(self.voids) or listed or (hollow is not None and bool(hollow.any()))
+
+    @property
+    def has_own_mesh(self) -> bool:
+        """Whether the user brings the mesh."""
+        return self.geometry == "mesh"
+
+
+def size_faults(cell: Cell) -> list[str]:
+    """Faults of sizes of elements that are larger than those around."""
+    faults, largest = [], ("mesh_size", cell.mesh_size)
+    for name, size in (("interface_size", cell.interface_size), ("tip_size", cell.tip_size)):
+        if size is not None and size > largest[1]:
+            faults.append(f"[cell] {name} = {size}: expected at most {largest[0]}, which is {largest[1]}")
+        elif size is not None:
+            largest = name, size
+    return faults

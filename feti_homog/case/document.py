@@ -1,0 +1,113 @@
+"""The document of a case: nested tables of TOML's types, from a file or of Python's and NumPy's values."""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path, PurePath
+from typing import Any
+
+import numpy as np
+
+from feti_homog.case.wording import dotted_key
+from feti_homog.errors import CaseError
+
+MAX_BYTES = 1 << 24
+MAX_DEPTH = 50
+
+TomlPath = tuple[str, ...]
+
+
+def read_document(path: str | Path) -> dict[str, Any]:
+    """The TOML document in a file, named after the file. Raises CaseError if it is none."""
+    path = Path(path)
+    if "\0" in str(path):
+        raise CaseError(f"{str(path)!r}: no file has a name with a null character")
+    try:
+        content = _bytes_of(path).decode("utf-8-sig")
+        document = tomllib.loads(content)
+    except UnicodeDecodeError as error:
+        line = error.object.count(b"\n", 0, error.start) + 1
+        raise CaseError(f"{path}: not UTF-8 text (line {line})") from None
+    except RecursionError:
+        raise _too_deep(path) from None
+    except ValueError as error:  # of too long a number too
+        place = f"line {content.count(chr(10)) + 1}, the end"
+        raise CaseError(f"{path}: not TOML: {str(error).replace('end of document', place)}") from None
+    except OSError as error:
+        raise CaseError(f"{path}: cannot be read: {error.strerror}") from None
+    if _is_deeper(document, MAX_DEPTH):
+        raise _too_deep(path)
+    # Where the locale knows no UTF-8, Python escapes the bytes of names of files.
+    return {"name": os.fsencode(path.stem).decode("utf-8", "replace")} | document
+
+
+def _too_deep(path: Path) -> CaseError:
+    return CaseError(f"{path}: tables and arrays are nested more than {MAX_DEPTH} deep")
+
+
+def _bytes_of(path: Path) -> bytes:
+    """The content of a file that may be a pipe; of one that does not end too much is refused."""
+    with path.open("rb") as stream:
+        content = stream.read(MAX_BYTES + 1)
+    if len(content) > MAX_BYTES:
+        raise CaseError(f"{path}: not a case file: it has more than {MAX_BYTES >> 20} MiB")
+    return content
+
+
+def _is_deeper(document: dict[str, Any], depth: int) -> bool:
+    """Whether tables and arrays stand in each other more than so deep."""
+    level: list[Any] = [document]
+    for _ in range(depth):
+        entries = (entry for each in level for entry in (each.values() if isinstance(each, dict) else each))
+        level = [entry for entry in entries if isinstance(entry, dict | list)]
+    return bool(level)
+
+
+def to_document(values: object) -> dict[str, Any]:
+    """The values with TOML's types: NumPy's scalars as numbers, arrays and tuples as lists, paths as texts.
+
+    Values of other types are left as they are: the keys refuse them.
+
+    Raises:
+        TypeError: the values are no mapping.
+        CaseError: a key is no text.
+    """
+    if not isinstance(values, Mapping):
+        raise TypeError(
+            f"expected the sections of a case as a dictionary, such as tomllib.load returns; got {_article(values)}"
+        )
+    faults: list[str] = []
+    document = {name: _to_toml(value, (str(name),), faults) for name, value in _named_items(values, (), faults)}
+    if faults:
+        raise CaseError(*faults)
+    return document
+
+
+def _to_toml(value: Any, path: TomlPath, faults: list[str]) -> Any:
+    if isinstance(value, Mapping):
+        return {name: _to_toml(entry, (*path, name), faults) for name, entry in _named_items(value, path, faults)}
+    if isinstance(value, np.ndarray):
+        return _to_toml(value.tolist(), path, faults)
+    if isinstance(value, list | tuple):
+        return [_to_toml(entry, path, faults) for entry in value]
+    if isinstance(value, np.floating):
+        return float(value)
+    if isinstance(value, np.generic):
+        return value.item()
+    return str(value) if isinstance(value, PurePath) else value
+
+
+def _named_items(table: Mapping[Any, Any], path: TomlPath, faults: list[str]) -> list[tuple[str, Any]]:
+    """The items of a table; a key that is no text is a fault."""
+    wrong = [name for name in table if not isinstance(name, str)]
+    place = f"[{dotted_key(path)}] " if path else ""
+    faults += [f"{place}{name!r}: expected a text as key, not {_article(name)}" for name in wrong]
+    return [(str(name), value) for name, value in table.items() if isinstance(name, str)]
+
+
+def _article(value: object) -> str:
+    """The type of a value in words: "an int", "a list"."""
+    name = type(value).__name__
+    return f"{'an' if name[0] in 'aeiou' else 'a'} {name}"

@@ -1,0 +1,146 @@
+"""The coarse mesh and its refinement for a cell that says how accurate it has to be, or how small its elements."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import replace
+from itertools import permutations
+from typing import Any
+
+import numpy as np
+
+from feti_homog.case.cell_section import FIBRES_OF, Cell
+from feti_homog.case.material_forms import Material
+from feti_homog.case.materials import plane_stiffness, spatial_stiffness
+from feti_homog.case.mixed_cell import fibre_counts
+from feti_homog.case.phase_names import COATING
+from feti_homog.typing import Float
+
+ASKED = ("accuracy", "element_size")
+CHOSEN = ("mesh_size", "interface_size", "tip_size", "refine")
+"""Keys that a cell has either of the one kind or of the other."""
+
+# Error of the coarsest mesh of elements of each order with stiff inclusions / (kappa beta^2), and how much larger it is
+# with soft ones: 1.5 times the largest that `scripts/measure_accuracy.py` finds.
+COARSE_ERROR = {1: 0.12, 2: 0.0075}
+SOFT_FACTOR = 6.0
+# Of the coarsest mesh: largest elements / distance of fibres on a square lattice, and / width of the cell. Circles and
+# gaps have smaller ones; still coarser meshes have hardly less elements.
+PITCH_SHARE, LARGEST = 0.5, 0.5
+MOST_REFINED = 8
+
+
+def exclusions(table: object) -> list[str]:
+    """Faults of the keys of [cell] that exclude each other, of the section as it is in the file."""
+    if not isinstance(table, Mapping):
+        return []
+    asked = [name for name in ASKED if name in table]
+    others = [name for name in CHOSEN if name in table]
+    if len(asked) > 1:
+        return [f"[cell] {', '.join(asked)}: exclude each other; give one"]
+    if asked and others:
+        return [f"[cell] {asked[0]}, {', '.join(others)}: exclude each other; {asked[0]} chooses the sizes"]
+    return []
+
+
+def with_sizes(
+    cell: Cell,
+    materials: Mapping[str, Material],
+    plane: str,
+    free_faces: bool,
+    orders: Collection[int],
+    faults: list[str],
+) -> Cell:
+    """The cell with the mesh_size, the refine and the order that its accuracy or its element_size asks for.
+
+    Of an accuracy eps, the coarsest mesh is refined r times, with r the least for which `coarse_error` / 4^(p r) <= eps
+    for elements of order p; of orders the one with the fewest nodes, about p^2 4^r. Of an element_size e, it is refined
+    r times with r the most for which e 2^r is at most its size, and the coarse elements have that size. It is a fault
+    if more than MOST_REFINED were needed.
+
+    Args:
+        free_faces: whether there are faces that no other phase holds firmly: of voids, of bonds that are soft or part.
+        orders: among which an accuracy chooses.
+    """
+    if cell.element_size is not None:
+        refine = min(MOST_REFINED, max(0, math.floor(math.log2(coarsest(cell) / cell.element_size))))
+        return replace(cell, mesh_size=min(coarsest(cell), cell.element_size * 2**refine), refine=refine)
+    if cell.accuracy is None:
+        return cell
+    refinements = {order: _refinements(cell.accuracy, materials, plane, order, free_faces) for order in orders}
+    order = min(refinements, key=lambda p: (p**2 * 4 ** refinements[p], p))
+    if refinements[order] > MOST_REFINED:
+        better = "a larger one, or order = 2" if order == 1 else "a larger one"
+        faults.append(
+            f"[cell] accuracy = {cell.accuracy:g}: would need elements split {refinements[order]} times, more than "
+            f"{MOST_REFINED}; expected {better}"
+        )
+    return replace(cell, mesh_size=coarsest(cell), refine=refinements[order], order=order)
+
+
+def _refinements(accuracy: float, materials: Mapping[str, Material], plane: str, order: int, free_faces: bool) -> int:
+    """The least r for which coarse_error / 4^(p r) is at most the accuracy."""
+    error = coarse_error(materials, plane, order, free_faces)
+    return max(0, math.ceil(math.log(error / accuracy, 4**order))) if error > 0 else 0
+
+
+def asked(cell: Cell) -> str:
+    """The key of which the sizes follow, with its value, as "accuracy = 0.001"; empty if the cell says them itself."""
+    values = {name: getattr(cell, name) for name in ASKED}
+    return next((f"{name} = {value:g}" for name, value in values.items() if value is not None), "")
+
+
+def without_chosen(cell: Cell, table: dict[str, Any]) -> dict[str, Any]:
+    """The table [cell] of a cell without the sizes that it does not say but chooses."""
+    return {name: value for name, value in table.items() if not (asked(cell) and name in CHOSEN)}
+
+
+def coarsest(cell: Cell) -> float:
+    """mesh_size of the coarsest mesh: half the distance of as many fibres on a square lattice / width of the
+    cell, in two digits."""
+    if cell.table is not None:
+        assert cell.table.width is not None and cell.table.height is not None
+        fibres, height = len(cell.table.radius), cell.table.height / cell.table.width
+    else:
+        fibres = FIBRES_OF.get(cell.geometry) or sum(fibre_counts(cell).values())
+        height = math.sqrt(3.0) if cell.geometry == "hexagonal" else 1.0
+    return min(LARGEST, float(f"{PITCH_SHARE * math.sqrt(height / fibres):.2g}"))
+
+
+def coarse_error(materials: Mapping[str, Material], plane: str, order: int, free_faces: bool) -> float:
+    """An upper estimate of the relative error of the strain energy on the coarsest mesh,
+
+        C_p kappa max s beta^2,  beta = |lambda - 1| / (lambda + 1),
+
+    lambda the eigenvalues of the stiffness of a phase relative to that around it, 0 of free faces, s SOFT_FACTOR where
+    lambda < 1 and else 1, and kappa the condition of the stiffness in the plane of the phase nearest to incompressible.
+    """
+    stiffness = {phase: _stiffness(material, plane) for phase, material in materials.items()}
+    ratios = [
+        np.linalg.eigvals(np.linalg.solve(stiffness[outer], stiffness[inner])).real
+        for inner, outer in permutations(stiffness, 2)
+        if inner != "matrix" and outer in ("matrix", COATING)
+    ]
+    if free_faces:
+        ratios.append(np.zeros(1))
+    kappa = max(np.linalg.cond(_orthonormal(plane_stiffness(material, plane))) for material in materials.values())
+    return float(COARSE_ERROR[order] * kappa * _contrast(ratios))
+
+
+def _contrast(ratios: Iterable[Float]) -> float:
+    """max s beta^2."""
+    of_all = np.concatenate([np.ones(1), *ratios])
+    beta = (of_all - 1) / (of_all + 1)
+    return float(np.max(np.where(beta < 0, SOFT_FACTOR, 1.0) * beta**2))
+
+
+def _stiffness(material: Material, plane: str) -> Float:
+    """(3, 3) in the plane, (6, 6) in generalized plane strain."""
+    return spatial_stiffness(material) if plane == "generalized" else plane_stiffness(material, plane)
+
+
+def _orthonormal(stiffness: Float) -> Float:
+    """A stiffness in the plane (3, 3) as one of orthonormal components, of [E11, E22, gamma12 / sqrt(2)]."""
+    scale = np.sqrt([1.0, 1.0, 2.0])
+    return np.asarray(stiffness * np.outer(scale, scale))

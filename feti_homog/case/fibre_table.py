@@ -1,0 +1,300 @@
+"""A table of fibres, as micrographs are measured: one row for each, with columns x, y, radius and others."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from feti_homog.case.phase_names import VOID
+from feti_homog.case.rounded_polygons import RoundedPolygons
+from feti_homog.case.values import is_number, real
+from feti_homog.case.wording import suggestion, toml_value
+from feti_homog.errors import CaseError
+from feti_homog.typing import Bool, Float, Int
+
+NUMBERS = ("x", "y", "radius", "coating", "a", "b", "angle", "inner_radius", "sides", "corner")
+COLUMNS = (*NUMBERS[:3], "phase", *NUMBERS[3:])
+SIZES = ("width", "height", "left", "bottom")
+"""What comment lines may say of the cell: its size, and the coordinates of its lower left corner."""
+OF_FIBRES = ("coating", "inner_radius")
+PHASE_NAME = re.compile(r"[A-Za-z0-9_:-]+")
+SIZE = re.compile(r"\b(width|height|left|bottom)\s*[=:]\s*([^\s;=]+?)(?=,?\s|,?$|;|,[a-z])")
+TYPES = (
+    dict.fromkeys(("x", "y", "angle"), real())
+    | dict.fromkeys(("radius", "a", "b"), real(above=0.0))
+    | dict.fromkeys(("coating", "inner_radius", "sides", "corner"), real(least=0.0))
+)
+# Faults that are told one by one.
+MAX_FAULTS = 30
+
+
+@dataclass(frozen=True)
+class FibreTable:
+    """N fibres in one unit of length, any of whose periodic images may stand for them.
+
+    Attributes:
+        name: of the file or list, for faults.
+        row: (N,) line of the file, counted from 1, or place in the list: what faults call the fibre.
+        x, y: (N,) centres.
+        radius: (N,); NaN where the table gives semi-axes instead.
+        phase: N names, "fibre" where the table gives none, "void" of voids.
+        coating: (N,) thickness / radius, 0 where a cell is empty; None without that column, like what follows.
+        sides, corner: (N,) of rounded polygons; NaN where a cell is empty.
+        inner_radius: (N,) of the void within hollow fibres, 0 of others.
+        a, b, angle: (N,) semi-axes, and the angle in degrees from x to a, of ellipses; NaN where a cell is empty.
+        width, height: of the cell; None if the table does not say.
+        left, bottom: coordinates of its lower left corner; None if the table does not say.
+    """
+
+    name: str
+    row: Int
+    x: Float
+    y: Float
+    radius: Float
+    phase: tuple[str, ...]
+    coating: Float | None
+    a: Float | None
+    b: Float | None
+    angle: Float | None
+    inner_radius: Float | None
+    sides: Float | None
+    corner: Float | None
+    width: float | None
+    height: float | None
+    left: float | None
+    bottom: float | None
+    polygons: RoundedPolygons | None = None
+
+    @property
+    def centres(self) -> Float:
+        """(N, 2)."""
+        return np.column_stack([self.x, self.y])
+
+    @property
+    def is_void(self) -> Bool:
+        """(N,) which rows are voids."""
+        return np.array([name == VOID for name in self.phase], bool)
+
+    @property
+    def solid(self) -> FibreTable:
+        """The table without its voids."""
+        kept = np.flatnonzero(~self.is_void)
+
+        def optional(values: Float | None) -> Float | None:
+            return None if values is None else values[kept]
+
+        return replace(
+            self,
+            row=self.row[kept],
+            x=self.x[kept],
+            y=self.y[kept],
+            radius=self.radius[kept],
+            phase=tuple(self.phase[k] for k in kept.tolist()),
+            coating=optional(self.coating),
+            a=optional(self.a),
+            b=optional(self.b),
+            angle=optional(self.angle),
+            inner_radius=optional(self.inner_radius),
+            sides=optional(self.sides),
+            corner=optional(self.corner),
+            polygons=None if self.polygons is None else self.polygons[kept],
+        )
+
+    @property
+    def outer_radius(self) -> Float:
+        """(N,) with the coating."""
+        return self.radius if self.coating is None else self.radius * (1 + self.coating)
+
+
+def read_table(path: Path) -> FibreTable:
+    """The table in a text file, which is not judged as a whole: fibres may overlap.
+
+    A line of names comes first: x, y, radius (or a, b), and phase, coating, angle if there are any, in any order
+    and case; then a line for each fibre. Columns are parted by commas, semicolons or tabs; without commas between
+    columns, decimals may have them. What follows "#" is a comment; one such as "# width = 120, height = 80" tells
+    the size of the cell, and with "left" and "bottom" where it begins.
+
+    Raises:
+        CaseError: the table is faulty; a line for each fault, with the line of the file.
+    """
+    name, faults = path.name, _Faults(path.name)
+    sizes: dict[str, float] = {}
+    lines = []
+    for number, line in enumerate(_text(path).splitlines(), 1):
+        contents, _, comment = line.partition("#")
+        _read_sizes(comment, number, sizes, faults)
+        if contents.strip():
+            lines.append((number, contents))
+    if not lines:
+        raise CaseError(*faults.lines, f"{name}: no rows; expected a line of names such as x, y, radius, then fibres")
+    delimiter = next((mark for mark in ";\t" if mark in lines[0][1]), ",")
+    names = [_bare(word).lower() for word in lines[0][1].split(delimiter)]
+    _check_names(names, lines[0][0], faults)
+    faults.throw()
+    rows = dict(_split(lines[1:], names, delimiter, faults))
+    return _table(name, rows, set(names), sizes, faults)
+
+
+def table_of(entries: Sequence[Mapping[str, Any]], name: str) -> FibreTable:
+    """The table of a list of fibres with the same keys as columns have; its faults count its rows from 1.
+
+    Raises:
+        CaseError: the list is faulty; a line for each fault.
+    """
+    faults = _Faults(name)
+    for number, entry in enumerate(entries, 1):
+        for key in entry.keys() - set(COLUMNS):
+            faults.add(number, f"{key} = {toml_value(entry[key])}: unknown key; {suggestion(key, COLUMNS, {})}")
+    return _table(name, dict(enumerate(entries, 1)), {key for entry in entries for key in entry}, {}, faults)
+
+
+class _Faults:
+    """Gathers the faults of a table, each with the row that has it."""
+
+    def __init__(self, name: str) -> None:
+        self.lines: list[str] = []
+        self._name = name
+
+    def add(self, row: int, words: str) -> None:
+        self.lines.append(f"{self._name}: row {row}: {words}")
+
+    def throw(self) -> None:
+        """Raise those that there are, the first ones in full."""
+        more = len(self.lines) - MAX_FAULTS
+        rest = [f"{self._name}: {more} more faults like these"] if more > 0 else []
+        if self.lines:
+            raise CaseError(*self.lines[:MAX_FAULTS], *rest)
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_bytes().decode("utf-8-sig")
+    except OSError as error:
+        raise CaseError(f"{path.name}: cannot be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise CaseError(f"{path.name}: expected text in UTF-8; it has other bytes at {error.start}") from error
+
+
+def _bare(word: str) -> str:
+    return word.strip().strip('"').strip()
+
+
+def _read_sizes(comment: str, row: int, sizes: dict[str, float], faults: _Faults) -> None:
+    """Add what a comment says of the cell to `sizes`."""
+    for key, word in SIZE.findall(comment):
+        value = _number(word, ";")
+        if value is None or not is_number(value) or (value <= 0 and key in SIZES[:2]):
+            expected = "a number above 0" if key in SIZES[:2] else "a number"
+            faults.add(row, f"{key} = {word}: expected {expected}")
+        elif sizes.setdefault(key, value) != value:
+            faults.add(row, f"{key} = {word}: an earlier line says {sizes[key]:g}")
+
+
+def _number(word: str, delimiter: str) -> float | None:
+    """The number that a word is; None if it is none."""
+    try:
+        value = float(word if delimiter == "," else word.replace(",", "."))
+    except ValueError:
+        return None
+    return value if math.isfinite(value) and "_" not in word else None
+
+
+def _check_names(names: list[str], row: int, faults: _Faults) -> None:
+    if not any(name in COLUMNS for name in names):
+        words = toml_value(", ".join(names))
+        faults.add(row, f"{words}: expected names of columns, as x, y, radius")
+        faults.throw()
+    for place, name in enumerate(names, 1):
+        if name in names[: place - 1]:
+            faults.add(row, f"column {name}: there are two of it")
+        elif name not in COLUMNS:
+            faults.add(row, f"column {toml_value(name)}: unknown; {suggestion(name, COLUMNS, {})}")
+    for name in _missing(set(names)):
+        faults.add(row, f"column {name}: missing")
+
+
+def _missing(names: set[str]) -> list[str]:
+    """Columns that a table with these lacks: x, y, and the radius or both semi-axes."""
+    size = [name for name in ("a", "b") if name not in names] if names & {"a", "b"} else ["radius"]
+    return [name for name in ("x", "y") if name not in names] + ([] if "radius" in names else size)
+
+
+def _split(
+    lines: list[tuple[int, str]], names: list[str], delimiter: str, faults: _Faults
+) -> Iterator[tuple[int, dict[str, Any]]]:
+    """Each row's number, and its cells by column: numbers, texts, and nothing for cells that are empty."""
+    for row, line in lines:
+        if line.count('"') % 2:
+            faults.add(row, "a quotation mark is not closed")
+            continue
+        words = [_bare(word) for word in line.split(delimiter)]
+        if len(words) != len(names):
+            faults.add(row, f"has {len(words)} columns; expected {len(names)}, as there are names")
+            continue
+        cells = dict(zip(names, words, strict=True))
+        read = {name: word if name == "phase" else _number(word, delimiter) for name, word in cells.items() if word}
+        yield row, {name: cells[name] if value is None else value for name, value in read.items()}
+
+
+def _table(
+    name: str, rows: Mapping[int, Mapping[str, Any]], names: set[str], sizes: Mapping[str, float], faults: _Faults
+) -> FibreTable:
+    """The table of rows whose cells are numbers, or texts where they are faulty."""
+    for row, cells in rows.items():
+        for words in _cell_faults(cells):
+            faults.add(row, words)
+    if not rows and not faults.lines:
+        faults.lines.append(f"{name}: no fibres; expected a row for each")
+    faults.throw()
+    nothing = {"coating": 0.0, "angle": 0.0, "inner_radius": 0.0, "sides": 0.0, "corner": 0.0}
+
+    def column(key: str) -> Float:
+        return np.array([cells.get(key, nothing.get(key, math.nan)) for cells in rows.values()], float)
+
+    def optional(key: str) -> Float | None:
+        return column(key) if key in names else None
+
+    return FibreTable(
+        name=name,
+        row=np.fromiter(rows, np.intp),
+        x=column("x"),
+        y=column("y"),
+        radius=column("radius"),
+        phase=tuple(cells.get("phase", "fibre") for cells in rows.values()),
+        coating=optional("coating"),
+        a=optional("a"),
+        b=optional("b"),
+        angle=optional("angle"),
+        inner_radius=optional("inner_radius"),
+        sides=optional("sides"),
+        corner=optional("corner"),
+        width=sizes.get("width"),
+        height=sizes.get("height"),
+        left=sizes.get("left"),
+        bottom=sizes.get("bottom"),
+    )
+
+
+def _cell_faults(cells: Mapping[str, Any]) -> Iterator[str]:
+    """What is wrong with the cells of one row."""
+    for key in ("x", "y", *([] if {"a", "b"} <= cells.keys() else ["radius"])):
+        if key not in cells:
+            yield f"{key}: no value; expected a number"
+    for key in NUMBERS:
+        complaint = TYPES[key].complaint(cells.get(key, 1.0))
+        if complaint:
+            yield f"{key} = {toml_value(cells[key])}: {complaint}"
+    phase = cells.get("phase", "fibre")
+    if phase == VOID:
+        yield from (f"{key} = {toml_value(cells[key])}: a void has none" for key in OF_FIBRES if cells.get(key))
+    if not isinstance(phase, str) or not PHASE_NAME.fullmatch(phase) or phase == "matrix":
+        yield (
+            f"phase = {toml_value(phase)}: expected a name of letters, digits, _, - and :, "
+            'but not "matrix", which is around the fibres'
+        )

@@ -1,0 +1,143 @@
+"""The section [interface]: what is debonded from the start, and the bonds that hold or break."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from feti_homog.case.schema import key
+from feti_homog.case.section_values import ARCS, FIBRES, PAIR, STIFFNESS, STRENGTH, TOUGHNESS
+from feti_homog.case.selectors import ANALYSIS_TYPE, BREAKING, BY_ENERGY, GENERALIZED
+from feti_homog.case.values import POSITIVE_OR_INF, boolean, choice, real
+
+STIFFNESSES = ("normal_stiffness", "tangential_stiffness")
+STRENGTHS = ("normal_strength", "tangential_strength", "axial_strength")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Arc:
+    """An arc of a fibre's interface that is debonded from the start, any number of them. Its tips stay bonded.
+
+    In type = "angle" the opening is None: [angle] values takes its place.
+    """
+
+    fibre: str | tuple[int, ...] = key(
+        FIBRES,
+        "Which fibres, in the order of the arrangement; of the hexagonal cell 1 is at the corners, 2 in the middle.",
+    )
+    centre: float = key(
+        real(least=-360.0, most=360.0),
+        "Direction of the middle of the arc, seen from the centre of the fibre, from x1 towards x2.",
+        unit="degrees",
+        default=0.0,
+    )
+    angle: float | None = key(
+        real(least=0.0, most=360.0),
+        "Whole opening of the arc, measured at the centre of the fibre. 0 is perfect bonding; at 360 nothing holds the "
+        "fibre, and its rigid motions are left out.",
+        unit="degrees",
+        only=ANALYSIS_TYPE.among("stiffness", "path", "load", "envelope"),
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class InterfaceSection:
+    """Bonding of fibres and matrix: what is debonded from the start, and the tractions that debond more. Without this
+    section bonding is perfect. Several sections [[interface]], each with its pair of phases, have the same contact,
+    criterion and growth.
+
+    A strength of None is unlimited.
+    """
+
+    contact: bool = key(
+        boolean,
+        "true: debonded faces do not overlap, they touch without friction. false: they overlap freely.",
+        default=True,
+    )
+    debonded: tuple[Arc, ...] = key(
+        ARCS,
+        'What is debonded from the start; needed in type = "angle", and in type = "stiffness" unless the cell is a '
+        'mesh (there lines in a physical curve "debonded" are debonded too).',
+        default=(),
+    )
+    normal_stiffness: float | None = key(
+        STIFFNESS,
+        "Normal traction / opening, k_n, of the bonds that hold, in tension and compression.",
+        unit="stress / length",
+        default=None,
+        default_words="inf",
+    )
+    tangential_stiffness: float | None = key(
+        STIFFNESS,
+        "Tangential traction / slip, k_t, of the bonds that hold.",
+        unit="stress / length",
+        default=None,
+        default_words="inf",
+    )
+    axial_stiffness: float | None = key(
+        POSITIVE_OR_INF,
+        "Traction along the fibre / slip along it, k_a, of the bonds that hold; inf: no slip along it.",
+        unit="stress / length",
+        default=None,
+        default_words="tangential_stiffness",
+        only=GENERALIZED,
+    )
+    normal_strength: float | None = key(
+        STRENGTH,
+        "R^n: the normal traction at which a bond breaks. A force per area: it does not depend on the mesh.",
+        unit="stress",
+        default=None,
+        default_words="inf",
+        only=BREAKING,
+    )
+    tangential_strength: float | None = key(
+        STRENGTH,
+        "R^t: the tangential traction at which a bond breaks.",
+        unit="stress",
+        default=None,
+        default_words="inf",
+        only=BREAKING,
+    )
+    axial_strength: float | None = key(
+        POSITIVE_OR_INF,
+        'R^a: the traction along the fibre at which a bond breaks; inf: it breaks none; in plane = "generalized".',
+        unit="stress",
+        default=None,
+        default_words="tangential_strength",
+        only=BREAKING,
+    )
+    criterion: str = key(
+        choice("max", "quadratic", "energy"),
+        'A bond breaks when this reaches 1: "max": the largest of t_n / R^n, |t_t| / R^t and along the fibre '
+        '|t_a| / R^a; "quadratic": the root of the sum of their squares; "energy": the energy of its spring / G_c, '
+        "see toughness. Compression never breaks a bond.",
+        default="max",
+        only=BREAKING,
+    )
+    toughness: float | None = key(
+        TOUGHNESS,
+        "G_Ic, energy per area. A bond breaks when G_I + G_II = <t_n>^2 / (2 k_n) + t_t^2 / (2 k_t) reaches "
+        "G_c = G_Ic (1 + tan^2((1 - mode_sensitivity) psi)), tan^2 psi = G_II / G_I; along the fibre "
+        "G_III = t_a^2 / (2 k_a) adds to G_II.",
+        unit="stress * length",
+        only=BY_ENERGY,
+    )
+    growth: str = key(
+        choice("released", "springs"),
+        'Where debonding has begun: "released": a bond beside a broken one breaks when that releases G_c times its '
+        'length, which hardly depends on the mesh; "springs": by the energy of its spring, as any other.',
+        default="released",
+        only=BY_ENERGY,
+    )
+    mode_sensitivity: float = key(
+        real(least=0.0, most=1.0),
+        "How much of the toughness in opening holds in shear: 1 all modes have the same, 0 shear alone breaks nothing.",
+        default=0.25,
+        only=BY_ENERGY,
+    )
+    between: tuple[str, str] | None = key(
+        PAIR,
+        "The two phases whose interfaces these are, in any order; pairs that no section names never part. Needed where "
+        "there are several sections [[interface]].",
+        default=None,
+        default_words="the matrix and all others",
+    )

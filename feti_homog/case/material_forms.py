@@ -1,0 +1,122 @@
+"""The forms in which a section [material.PHASE] gives the constants of a linear elastic phase."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from feti_homog.case.schema import key
+from feti_homog.case.section_values import EXPANSION, MATRIX, Matrix
+from feti_homog.case.values import real
+
+POSITIVE = real(above=0.0)
+PER_TEMPERATURE = "1 / temperature"
+EXPANSION_PAIR = ("expansion_axial", "expansion_transverse")
+"""Keys that are given together, in place of one expansion."""
+
+
+@dataclass(frozen=True)
+class Isotropic:
+    """Young's modulus and Poisson's ratio."""
+
+    young: float = key(POSITIVE, "Young's modulus.", unit="stress")
+    poisson: float = key(real(above=-1.0, most=0.5), "Poisson's ratio; 0.5 in plane stress alone.")
+    expansion: float | None = key(real(), "Thermal expansion.", unit=PER_TEMPERATURE, default=None)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Orthotropic:
+    """Engineering constants along the material axes, of which axis 3 is x3; nu_ij = -eps_j/eps_i under stress along i.
+
+    So nu_ij/E_i = nu_ji/E_j. Plane stress needs E1, E2, nu12 and G12, plane strain also E3, nu13 and nu23, generalized
+    plane strain all.
+    """
+
+    E1: float = key(POSITIVE, "Young's modulus along axis 1.", unit="stress")
+    E2: float = key(POSITIVE, "Young's modulus along axis 2.", unit="stress")
+    E3: float | None = key(
+        POSITIVE, "Young's modulus out of the plane; plane strain needs it.", unit="stress", default=None
+    )
+    nu12: float = key(real(), "Poisson's ratio in the plane; nu12^2 < E1/E2.")
+    nu13: float | None = key(real(), "Poisson's ratio out of the plane; plane strain needs it.", default=None)
+    nu23: float | None = key(real(), "Poisson's ratio out of the plane; plane strain needs it.", default=None)
+    G12: float = key(POSITIVE, "Shear modulus in the plane.", unit="stress")
+    G13: float | None = key(
+        POSITIVE,
+        "Shear modulus between axis 1 and x3; generalized plane strain needs it.",
+        unit="stress",
+        default=None,
+    )
+    G23: float | None = key(
+        POSITIVE,
+        "Shear modulus between axis 2 and x3; generalized plane strain needs it.",
+        unit="stress",
+        default=None,
+    )
+    angle: float = key(real(), "Direction of axis 1, from x1 towards x2.", unit="degrees", default=0.0)
+    expansion: float | tuple[float, ...] | None = key(
+        EXPANSION, "Thermal expansion, the same in all directions or along axes 1, 2, 3.", unit=PER_TEMPERATURE,
+        default=None,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class TransverselyIsotropic:
+    """Engineering constants of a phase that is isotropic in the plane, as most fibres along x3.
+
+    Plane stress needs E_transverse and nu_transverse, plane strain also E_axial and nu_axial, generalized plane strain
+    all.
+    """
+
+    E_axial: float | None = key(
+        POSITIVE, "Young's modulus along x3; plane strain needs it.", unit="stress", default=None
+    )
+    E_transverse: float = key(POSITIVE, "Young's modulus in the plane.", unit="stress")
+    nu_axial: float | None = key(
+        real(),
+        "Contraction in the plane per stretch under stress along x3, "
+        "2 nu_axial^2 < (1 - nu_transverse) E_axial/E_transverse; plane strain needs it.",
+        default=None,
+    )
+    nu_transverse: float = key(real(above=-1.0, below=1.0), "Poisson's ratio in the plane.")
+    G_axial: float | None = key(
+        POSITIVE,
+        "Shear modulus between x3 and the plane; generalized plane strain needs it.",
+        unit="stress",
+        default=None,
+    )
+    expansion: float | None = key(
+        real(), "Thermal expansion, the same in all directions.", unit=PER_TEMPERATURE, default=None
+    )
+    expansion_axial: float | None = key(
+        real(), "Thermal expansion along x3; with expansion_transverse.", unit=PER_TEMPERATURE, default=None
+    )
+    expansion_transverse: float | None = key(
+        real(), "Thermal expansion in the plane; with expansion_axial.", unit=PER_TEMPERATURE, default=None
+    )
+
+
+@dataclass(frozen=True)
+class General:
+    """The stiffness itself: 3x3, that of the plane state for which the case asks, or 6x6, which serves for all.
+
+    x3 is normal to a plane of symmetry: of a 6x6 stiffness, 23 and 13 are coupled to each other alone.
+    """
+
+    stiffness: Matrix = key(
+        MATRIX,
+        "The stiffness, symmetric and positive definite; of 6x6, 23 and 13 are coupled to each other alone.",
+        unit="stress",
+    )
+    expansion: float | tuple[float, ...] | None = key(
+        EXPANSION, "Thermal expansion, the same in all directions or along x1, x2, x3.", unit=PER_TEMPERATURE,
+        default=None,
+    )  # fmt: skip
+
+
+Material = Isotropic | Orthotropic | TransverselyIsotropic | General
+MATERIAL_FORMS: dict[str, type[Isotropic] | type[Orthotropic] | type[TransverselyIsotropic] | type[General]] = {
+    "isotropic": Isotropic,
+    "orthotropic": Orthotropic,
+    "transversely isotropic": TransverselyIsotropic,
+    "general": General,
+}

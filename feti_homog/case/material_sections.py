@@ -1,0 +1,153 @@
+"""Reading the sections [material.PHASE], and which material a phase of the mesh has."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping
+
+from feti_homog.case.cell_section import CIRCULAR, GEOMETRY, Cell
+from feti_homog.case.material_forms import MATERIAL_FORMS, Material
+from feti_homog.case.materials import expansion, plane_stiffness, spatial_stiffness
+from feti_homog.case.phase_names import COATING, FIBRE, MATRIX, PHASE
+from feti_homog.case.schema import TableReader, keys_of
+from feti_homog.case.section_values import FRACTIONS
+from feti_homog.case.wording import suggestion, toml_key, toml_value
+
+SUGGESTED = (MATRIX, FIBRE, COATING, "fibre:2")  # of phases that may have any name
+CONSTANTS = frozenset(name for form in MATERIAL_FORMS.values() for name in keys_of(form))
+
+
+def read_materials(table: object, cell: object, plane: str | None, reader: TableReader) -> dict[str, Material]:
+    """The materials by phase; what depends on a geometry, mix or plane state that is faulty is not checked.
+
+    `cell` is the section [cell] as it stands in the document.
+    """
+    if table is None:
+        return {}
+    if not isinstance(table, dict):
+        reader.faults.append(f"material = {toml_value(table)}: expected sections [material.matrix], [material.fibre]")
+        return {}
+    geometry = reader.selected[GEOMETRY]
+    fibres = fibre_phases(cell) if geometry in CIRCULAR else None
+    known = None if fibres is None else (MATRIX, *fibres, COATING)
+    materials = {}
+    for phase, constants in table.items():
+        fault = _phase_fault(phase, known, geometry, reader.owners)
+        material = None if fault else _read_material(constants, f"material.{toml_key(phase)}", plane, reader)
+        reader.faults += [fault] if fault else []
+        if material is not None:
+            materials[phase] = material
+    needed = (MATRIX, *(fibres or ()))
+    reader.faults += [f"[material.{phase}]: missing section" for phase in needed if phase not in table]
+    return materials
+
+
+def fibre_phases(cell: object) -> tuple[str, ...] | None:
+    """What the fibres of a section [cell] without a file are made of, None if its mix is faulty."""
+    mix = cell.get("mix") if isinstance(cell, dict) else None
+    if mix is None:
+        return (FIBRE,)
+    return tuple(mix) if FRACTIONS.accepts(mix) else None
+
+
+def coating_faults(cell: Cell, materials: Mapping[str, object]) -> list[str]:
+    """Faults of coatings without a material, and of a material of coatings where there are none."""
+    if cell.has_own_mesh:
+        return []
+    has_coatings = cell.coating is not None
+    if cell.table is not None:
+        has_coatings = cell.table.coating is not None and bool((cell.table.coating > 0).any())
+    if has_coatings and COATING not in materials:
+        return [f"[material.{COATING}]: missing section; [cell] has coatings"]
+    if not has_coatings and COATING in materials:
+        return [f"[material.{COATING}]: no fibre has a coating; expected [cell] coating, or a column of a table"]
+    return []
+
+
+def _phase_fault(phase: str, known: tuple[str, ...] | None, geometry: str | None, owners: Mapping[str, str]) -> str:
+    """What is wrong with the name of a phase, empty if nothing; `known` are all that a cell has, None if any may be."""
+    section = f"[material.{toml_key(phase)}]"
+    is_unknown = known is not None and ":" not in phase and phase not in known
+    if is_unknown or not PHASE.fullmatch(phase) or phase in CONSTANTS:
+        elsewhere = {} if phase == FIBRE else owners
+        return f"{section}: unknown phase; {suggestion(phase, known or SUGGESTED, elsewhere)}"
+    if ":" in phase and geometry in CIRCULAR:
+        return f'{section}: belongs to geometry = "mesh", not {toml_value(geometry)}'
+    return ""
+
+
+def _read_material(table: object, section: str, plane: str | None, reader: TableReader) -> Material | None:
+    """The material of a section, in the form that its keys tell; None if it is faulty."""
+    given = _keys_by_form(table)
+    forms = list(given) or ["isotropic"]
+    if len(forms) > 1:
+        groups = " and ".join(f"{', '.join(names)} ({form})" for form, names in given.items())
+        reader.faults.append(f"[{section}] {groups}: exclude each other; a material is of one kind")
+        return None
+    material: Material | None = reader.read(MATERIAL_FORMS[forms[0]], table, section)
+    if material is not None:
+        reader.faults += [f"[{section}] {fault}" for fault in _law_faults(material, plane)]
+    return material
+
+
+def _law_faults(material: Material, plane: str | None) -> list[str]:
+    """What is wrong with the constants of a material together; of the stiffness only if the plane state is known."""
+    faults = []
+    try:
+        if plane == "generalized":
+            spatial_stiffness(material)
+        elif plane is not None:
+            plane_stiffness(material, plane)
+    except ValueError as error:
+        faults.append(str(error))
+    try:
+        expansion(material)
+    except ValueError as error:
+        faults.append(str(error))
+    return faults
+
+
+def missing_expansions(materials: Mapping[str, Material], needed_by: str) -> list[str]:
+    """Faults of materials that do not say how they expand, which something needs; what they say wrongly is told
+    elsewhere.
+    """
+    return [
+        f"[material.{toml_key(phase)}] expansion: missing; {needed_by} needs it"
+        for phase, material in materials.items()
+        if _expands_unknown(material)
+    ]
+
+
+def _expands_unknown(material: Material) -> bool:
+    try:
+        return expansion(material) is None
+    except ValueError:
+        return False
+
+
+def _keys_by_form(table: object) -> dict[str, list[str]]:
+    """The keys of a table that belong to one form of a material alone, without the forms that have none."""
+    names = table if isinstance(table, dict) else {}
+    forms_of = Counter(name for cls in MATERIAL_FORMS.values() for name in keys_of(cls))
+    given = {
+        form: [name for name in keys_of(cls) if name in names and forms_of[name] == 1]
+        for form, cls in MATERIAL_FORMS.items()
+    }
+    return {form: names for form, names in given.items() if names}
+
+
+def provider(phase: str, materials: Mapping[str, Material]) -> str:
+    """The phase whose material a phase has: its own, or that of "fibre" for "fibre:2"."""
+    return phase if phase in materials else phase.partition(":")[0]
+
+
+def phase_faults(materials: Mapping[str, Material], phases: Iterable[str]) -> list[str]:
+    """Faults of phases of the mesh without a material, and of materials without a phase."""
+    phases = list(phases)
+    providers = [provider(phase, materials) for phase in phases]
+    without = [phase for phase, own in zip(phases, providers, strict=True) if own not in materials]
+    unused = [phase for phase in materials if phase not in providers]
+    has = ", ".join(map(toml_key, phases))
+    return [f"[material.{toml_key(phase)}]: missing section; the mesh has this phase" for phase in without] + [
+        f"[material.{toml_key(phase)}]: the mesh has no such phase; it has {has}" for phase in unused
+    ]

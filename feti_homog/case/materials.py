@@ -1,0 +1,168 @@
+"""The law of each phase: its stiffness in the plane and in space, and its thermal expansion.
+
+Voigt order [11, 22, 12] in the plane, [11, 22, 33, 23, 13, 12] in space, with engineering shears. x3 is normal to a
+plane of symmetry of every phase, so that [23, 13] are coupled to each other alone.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from feti_homog.case.engineering_constants import PLANE_IN_WORDS, known_compliance, stable_compliance
+from feti_homog.case.material_forms import (
+    EXPANSION_PAIR,
+    General,
+    Isotropic,
+    Material,
+    Orthotropic,
+    TransverselyIsotropic,
+)
+from feti_homog.case.voigt_matrices import IN_PLANE, IN_PLANE_BLOCK, is_positive_definite, rotated, strain_rotation
+from feti_homog.case.wording import toml_value
+from feti_homog.typing import Float
+
+COUPLINGS = ((0, 3), (0, 4), (1, 3), (1, 4), (2, 3), (2, 4), (3, 5), (4, 5))
+"""Entries of a spatial stiffness that vanish where x3 is normal to a plane of symmetry."""
+
+
+def plane_stiffness(material: Material, plane: str) -> Float:
+    """C with [S11, S22, S12] = C [E11, E22, gamma12], (3, 3), symmetric positive definite, unit of stress.
+
+    `plane` is "stress" (S33 = 0), "strain" (E33 = 0), or "generalized", where C is that at E33 = 0. Raises ValueError,
+    with the keys at fault, if the constants do not say C or are those of no stable material.
+    """
+    if isinstance(material, Isotropic):
+        lame, shear = _lame(material, plane)
+        return np.array([[lame + 2 * shear, lame, 0.0], [lame, lame + 2 * shear, 0.0], [0.0, 0.0, shear]])
+    if isinstance(material, General):
+        return _general_in_plane(_given_stiffness(material), plane)
+    compliance = stable_compliance(material, plane)
+    reduced = compliance[IN_PLANE_BLOCK]
+    if plane != "stress":
+        out = compliance[IN_PLANE, 2]
+        reduced = reduced - np.outer(out, out) / compliance[2, 2]
+    return rotated(np.asarray(np.linalg.inv(reduced), float), _angle(material))
+
+
+def spatial_stiffness(material: Material) -> Float:
+    """C with S = C E in the axes of the cell, (6, 6), symmetric positive definite, unit of stress.
+
+    Raises ValueError as `plane_stiffness` does.
+    """
+    if isinstance(material, Isotropic):
+        lame, shear = _lame(material, "generalized")
+        stiffness = np.diag([2 * shear] * 3 + [shear] * 3)
+        stiffness[:3, :3] += lame
+        return stiffness
+    if isinstance(material, General):
+        stiffness = _given_stiffness(material)
+        if len(stiffness) == 3:
+            raise ValueError("stiffness: expected 6x6 in generalized plane strain; 3x3 is that of one plane state")
+        return stiffness
+    return rotated(np.asarray(np.linalg.inv(stable_compliance(material, "generalized")), float), _angle(material))
+
+
+def expansion(material: Material) -> Float | None:
+    """Strains per unit of temperature of the free material, in the axes of the cell, (6,); None if not given.
+
+    Raises ValueError, with the keys at fault, if they are given twice or by half.
+    """
+    along_axes = _expansion_along_axes(material)
+    if along_axes is None:
+        return None
+    return np.asarray(strain_rotation(-_angle(material)) @ [*along_axes, 0.0, 0.0, 0.0])
+
+
+def out_of_plane(material: Material, plane: str) -> tuple[Float, Float]:
+    """s and e, (3,) each, with S33 = s . [S11, S22, S12] and E33 = e . [S11, S22, S12], in plane strain and stress.
+
+    S33 vanishes in plane stress, E33 in plane strain. NaN if the constants of the material do not say it.
+    """
+    row, young = _compliance_33(material)
+    return (np.zeros(3), row) if plane == "stress" else (-young * row, np.zeros(3))
+
+
+def _compliance_33(material: Material) -> tuple[Float, float]:
+    """c (3,) and E3 of E33 = c . [S11, S22, S12] + S33 / E3; NaN where the constants do not say it."""
+    if isinstance(material, Isotropic):
+        ratio = -material.poisson / material.young
+        return np.array([ratio, ratio, 0.0]), material.young
+    if isinstance(material, General):
+        stiffness = _given_stiffness(material)
+        compliance = np.full((6, 6), np.nan) if len(stiffness) == 3 else np.linalg.inv(stiffness)
+        return np.asarray(compliance[2, IN_PLANE]), 1.0 / compliance[2, 2]
+    compliance = known_compliance(material)
+    # Stresses turn as the transpose of strains that turn the other way.
+    to_axes = strain_rotation(-_angle(material)).T[IN_PLANE_BLOCK]
+    row = np.array([compliance[2, 0], compliance[2, 1], 0.0]) @ to_axes
+    return np.asarray(row), 1.0 / compliance[2, 2]
+
+
+def _lame(material: Isotropic, plane: str) -> tuple[float, float]:
+    """Lame's constant, in plane stress the reduced one, and the shear modulus."""
+    if plane != "stress" and material.poisson >= 0.5:
+        raise ValueError(f"poisson = {material.poisson}: expected less than 0.5 in {PLANE_IN_WORDS[plane]}")
+    shear = material.young / (2.0 * (1.0 + material.poisson))
+    thickness = 1.0 - material.poisson if plane == "stress" else 1.0 - 2.0 * material.poisson
+    return 2.0 * shear * material.poisson / thickness, shear
+
+
+def _angle(material: Material) -> float:
+    """Direction of the first material axis, degrees from x1 towards x2."""
+    return material.angle if isinstance(material, Orthotropic) else 0.0
+
+
+def _general_in_plane(stiffness: Float, plane: str) -> Float:
+    """Of a stiffness in space the block of plane strain, or what is left in plane stress."""
+    if len(stiffness) == 3:
+        return stiffness
+    block, out = stiffness[IN_PLANE_BLOCK], stiffness[IN_PLANE, 2]
+    return np.asarray(block - np.outer(out, out) / stiffness[2, 2]) if plane == "stress" else block
+
+
+def _given_stiffness(material: General) -> Float:
+    """The stiffness of a phase that gives it, (3, 3) or (6, 6), checked."""
+    given = np.array(material.stiffness)
+    noise = 1e-9 * np.abs(given).max()
+    if not np.allclose(given, given.T, rtol=0.0, atol=noise):
+        raise ValueError(f"stiffness = {toml_value(material.stiffness)}: expected a symmetric matrix")
+    stiffness = np.asarray((given + given.T) / 2.0)
+    if len(stiffness) == 6:
+        stiffness = _uncoupled(stiffness, noise)
+    if not is_positive_definite(stiffness):
+        raise ValueError(f"stiffness = {toml_value(material.stiffness)}: expected a positive definite matrix")
+    return stiffness
+
+
+def _uncoupled(stiffness: Float, noise: float) -> Float:
+    """The stiffness (6, 6) with zeros in place of couplings that are noise; ValueError if one is more."""
+    i, j = max(COUPLINGS, key=lambda entry: float(abs(stiffness[entry])))
+    if abs(stiffness[i, j]) > noise:
+        entry = f"C{i + 1}{j + 1} = {float(stiffness[i, j])}"
+        raise ValueError(f"stiffness: {entry}: expected 0; x3 must be normal to a plane of symmetry")
+    uncoupled = stiffness.copy()
+    rows, columns = np.transpose(COUPLINGS)
+    uncoupled[rows, columns] = uncoupled[columns, rows] = 0.0
+    return uncoupled
+
+
+def _expansion_along_axes(material: Material) -> tuple[float, ...] | None:
+    """Strains along the three material axes; None if they are not given."""
+    if isinstance(material, TransverselyIsotropic):
+        _check_expansions(material)
+        axial, transverse = material.expansion_axial, material.expansion_transverse
+        if axial is not None and transverse is not None:
+            return transverse, transverse, axial
+    if material.expansion is None or isinstance(material.expansion, tuple):
+        return material.expansion
+    return (material.expansion,) * 3
+
+
+def _check_expansions(material: TransverselyIsotropic) -> None:
+    """ValueError if the expansion is given twice or by half."""
+    given = [name for name in EXPANSION_PAIR if getattr(material, name) is not None]
+    if given and material.expansion is not None:
+        raise ValueError(f"expansion, {', '.join(given)}: exclude each other; give one or a pair")
+    if len(given) == 1:
+        (absent,) = set(EXPANSION_PAIR).difference(given)
+        raise ValueError(f"{absent}: missing; {given[0]} needs it")

@@ -1,0 +1,94 @@
+"""Loads by name: of each component its strain or its stress, and what they are in full along a path."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import accumulate
+from typing import Any
+
+from feti_homog.case.load_names import SPATIAL_STRAINS, SPATIAL_STRESSES, STRAINS, STRESSES, TEMPERATURE
+from feti_homog.case.schema import Condition, key
+from feti_homog.case.selectors import GENERALIZED
+from feti_homog.case.values import real
+
+Strain = tuple[float, ...]
+
+
+def _strain(name: str, only: Condition | None = None) -> Any:
+    return key(real(), f"Macroscopic strain {name}.", default=None, only=only)
+
+
+def _stress(name: str, only: Condition | None = None) -> Any:
+    return key(real(), f"Macroscopic stress {name}.", unit="stress", default=None, only=only)
+
+
+@dataclass(frozen=True, kw_only=True)
+class MixedLoad:
+    """What is prescribed of a macroscopic load: of a component its strain or its stress, never both. What a load of a
+    path does not name stays as it was prescribed last; what none has named so far is free of stress.
+    """
+
+    E11: float | None = _strain("E11")
+    E22: float | None = _strain("E22")
+    E33: float | None = _strain("E33", GENERALIZED)
+    gamma23: float | None = _strain("gamma23", GENERALIZED)
+    gamma13: float | None = _strain("gamma13", GENERALIZED)
+    gamma12: float | None = _strain("gamma12")
+    S11: float | None = _stress("S11")
+    S22: float | None = _stress("S22")
+    S33: float | None = _stress("S33", GENERALIZED)
+    S23: float | None = _stress("S23", GENERALIZED)
+    S13: float | None = _stress("S13", GENERALIZED)
+    S12: float | None = _stress("S12")
+    temperature: float | None = key(
+        real(),
+        "A change of temperature, 0 until it is named. Every phase must give its expansion.",
+        unit="temperature",
+        default=None,
+        only=GENERALIZED,
+    )
+
+    @property
+    def named(self) -> dict[str, float]:
+        """The values that are given, by name."""
+        values = ((each.name, getattr(self, each.name)) for each in dataclasses.fields(self))
+        return {name: value for name, value in values if value is not None}
+
+
+def components(plane: str) -> tuple[tuple[str, str], ...]:
+    """The names of strain and stress of each component of a plane state, in the order of its strains."""
+    spatial = plane in GENERALIZED.values
+    names = (SPATIAL_STRAINS, SPATIAL_STRESSES) if spatial else (STRAINS, STRESSES)
+    return tuple(zip(*names, strict=True))
+
+
+def completed(loads: Sequence[Strain | MixedLoad], plane: str) -> tuple[dict[str, float], ...]:
+    """The loads of a path in full: of each component one name and value, and the temperature in generalized plane
+    strain. What a load does not name is that of the load before, at first a stress of zero.
+    """
+    unloaded = {stress: 0.0 for _, stress in components(plane)}
+    unloaded |= {TEMPERATURE: 0.0} if plane in GENERALIZED.values else {}
+
+    def after(before: Mapping[str, float], load: Strain | MixedLoad) -> dict[str, float]:
+        given, full = named(load), dict[str, float]()
+        for names in components(plane):
+            source = given if not given.keys().isdisjoint(names) else before
+            full |= {name: source[name] for name in names if name in source}
+        return full | {name: given.get(name, value) for name, value in before.items() if name == TEMPERATURE}
+
+    return tuple(accumulate(loads, after, initial=unloaded))[1:]
+
+
+def first_named(loads: Sequence[Strain | MixedLoad], plane: str) -> dict[str, int]:
+    """By the name of its stress, which load is the first to name each component; len(loads) if none does."""
+    return {
+        names[1]: next((k for k, load in enumerate(loads) if not named(load).keys().isdisjoint(names)), len(loads))
+        for names in components(plane)
+    }
+
+
+def named(load: Strain | MixedLoad) -> dict[str, float]:
+    """What a load names, [E11, E22, gamma12] if it is a strain."""
+    return load.named if isinstance(load, MixedLoad) else dict(zip(STRAINS, load, strict=True))

@@ -1,0 +1,175 @@
+"""The reference of the case file, made of its keys alone: `feti-homog keys`."""
+
+from __future__ import annotations
+
+import inspect
+import textwrap
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from feti_homog.case.material_forms import Isotropic
+from feti_homog.case.petsc_section import OPTION_EXPECTED
+from feti_homog.case.schema import Key, keys_of
+from feti_homog.case.sections import SECTIONS_OF_AN_ANALYSIS
+from feti_homog.case.sweep_section import AXIS_EXPECTED, AXIS_MEANING, RANGE_KEYS, SWEEP, SweepSection
+from feti_homog.case.tables import TABLES, Table
+from feti_homog.case.values import text
+from feti_homog.errors import CaseError
+
+ORDER = (
+    "name",
+    "cell",
+    "material",
+    "analysis",
+    "interface",
+    "angle",
+    "path",
+    "load",
+    "envelope",
+    "decomposition",
+    "output",
+    "petsc",
+    SWEEP,
+)
+"""Sections in the order of the reference."""
+
+WIDTH = 100  # characters of a printed line
+INDENT: dict[str, Any] = {"initial_indent": "      ", "subsequent_indent": "      ", "break_on_hyphens": False}
+
+MATERIAL_MEANING = (
+    "One section for each phase: [material.matrix], [material.fibre] and, for phases of a mesh or a table, sections of "
+    "their names, [material.glass]; fibre:2 without its own has the constants of fibre. Each in one of four forms."
+)
+
+
+@dataclass(frozen=True)
+class KeyRow:
+    """One key of the case file, in words.
+
+    Attributes:
+        section: the section's name: "cell", "material", ...; "name" for the key before the first section.
+        table: its place in the file: "[cell]", "[material.PHASE], isotropic", ...
+        key: its name.
+        accepts: what its value must be.
+        unit: of the value, empty if it has none.
+        default: as TOML writes it or in a word; "required" if the key must be given where it applies; else empty.
+        applies: for which geometry, type of analysis or method it may be given; empty: for all.
+        meaning: a sentence or two.
+    """
+
+    section: str
+    table: str
+    key: str
+    accepts: str
+    unit: str
+    default: str
+    applies: str
+    meaning: str
+
+
+@dataclass(frozen=True)
+class TableReference:
+    """A table of the case file: its section, its place in the file, what it is for, and its keys."""
+
+    section: str
+    place: str
+    meaning: str
+    rows: tuple[KeyRow, ...]
+
+
+def tables() -> list[TableReference]:
+    """All tables of the case file, in the order of `ORDER`."""
+    found = [_name_table(), *map(_table, TABLES), _petsc_table(), _sweep_table(), _range_table()]
+    return sorted(found, key=lambda table: ORDER.index(table.section))
+
+
+def tables_of(section: str) -> list[TableReference]:
+    """The tables of a section. Raises CaseError if there is none of that name."""
+    found = [table for table in tables() if table.section == section]
+    if not found:
+        raise CaseError(f"{section}: unknown section; known are {', '.join(ORDER)}")
+    return found
+
+
+def rows() -> Iterator[KeyRow]:
+    """All keys of the case file."""
+    for table in tables():
+        yield from table.rows
+
+
+def _table(table: Table) -> TableReference:
+    place = f"{table.place}, {table.form}" if table.form else table.place
+    meaning = _first_paragraph(table.contents)
+    if table.contents is Isotropic:  # the first form
+        meaning = f"{MATERIAL_MEANING} {meaning}"
+    return TableReference(table.section, place, meaning, _rows(table.section, place, keys_of(table.contents)))
+
+
+def _rows(section: str, place: str, keys: Mapping[str, Key]) -> tuple[KeyRow, ...]:
+    return tuple(_row(section, place, name, entry) for name, entry in keys.items())
+
+
+def _row(section: str, place: str, name: str, entry: Key) -> KeyRow:
+    conditions = [SECTIONS_OF_AN_ANALYSIS.get(section), entry.only]
+    applies = ", ".join(condition.in_words(section) for condition in conditions if condition is not None)
+    default = "required" if entry.required and not entry.unless else entry.default
+    return KeyRow(section, place, name, entry.type.expected, entry.unit, default, applies, entry.meaning)
+
+
+def _first_paragraph(cls: type[Any]) -> str:
+    """The first paragraph of a docstring, in one line."""
+    return " ".join((inspect.getdoc(cls) or "").partition("\n\n")[0].split())
+
+
+def _name_table() -> TableReference:
+    place = "before the first section"
+    row = KeyRow("name", place, "name", text.expected, "", "the file's name", "", "Name of the case.")
+    return TableReference("name", place, "the case as a whole.", (row,))
+
+
+def _petsc_table() -> TableReference:
+    words = "An option of the solver, such as feti_ksp_rtol = 1e-10; `feti-homog options` lists them."
+    option = KeyRow("petsc", "[petsc]", "feti_OPTION", OPTION_EXPECTED, "", "", "", words)
+    meaning = (
+        "PETSc's options without their dash. Those of the command line come first; PETSc's own, as -log_view, "
+        "belong there alone."
+    )
+    return TableReference("petsc", "[petsc]", meaning, (option,))
+
+
+def _sweep_table() -> TableReference:
+    place = f"[{SWEEP}]"
+    axis = KeyRow(SWEEP, place, "SECTION.KEY", AXIS_EXPECTED, "", "", "", AXIS_MEANING)
+    settings = _rows(SWEEP, place, keys_of(SweepSection))
+    return TableReference(SWEEP, place, _first_paragraph(SweepSection), (axis, *settings))
+
+
+def _range_table() -> TableReference:
+    place = f"a range in [{SWEEP}]"
+    meaning = "Values of a key that lie between two ends."
+    return TableReference(SWEEP, place, meaning, _rows(SWEEP, place, RANGE_KEYS))
+
+
+def as_text(references: Sequence[TableReference]) -> str:
+    """The tables in plain text: each key, then what it accepts and when, and what it means."""
+    return "\n\n".join(map(_table_text, references))
+
+
+def _table_text(table: TableReference) -> str:
+    heading = textwrap.fill(f"{table.place}: {table.meaning}", WIDTH)
+    return "\n".join([heading, *map(_row_text, table.rows)])
+
+
+def _row_text(row: KeyRow) -> str:
+    unit = f" ({row.unit})" if row.unit else ""
+    lines = (f"{row.accepts}{unit}; {_presence(row)}", row.meaning)
+    return "\n".join([f"\n  {row.key}", *(textwrap.fill(line, WIDTH, **INDENT) for line in lines)])
+
+
+def _presence(row: KeyRow) -> str:
+    """Whether, and when, a key must or may be given."""
+    if row.default == "required":
+        return f"required if {row.applies}" if row.applies else "required"
+    default = f"default {row.default}" if row.default else "optional"
+    return f"{default}; only if {row.applies}" if row.applies else default

@@ -1,0 +1,192 @@
+"""Reading a table of a case file into a frozen dataclass whose fields say what they accept and what they mean."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TypeVar
+
+from feti_homog.case.values import INF, ValueType
+from feti_homog.case.wording import suggestion, toml_key, toml_value
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Selector:
+    """The key of a section whose value decides which other keys belong to the case."""
+
+    section: str
+    key: str
+
+    def among(self, *values: str) -> Condition:
+        """The condition that the key has one of these values."""
+        return Condition(self, values)
+
+    def in_words(self, section: str) -> str:
+        """The key as a fault in a section names it."""
+        return self.key if section == self.section else f"[{self.section}] {self.key}"
+
+
+@dataclass(frozen=True)
+class Condition:
+    """That a selector has one of some values."""
+
+    selector: Selector
+    values: tuple[str, ...]
+
+    def in_words(self, section: str) -> str:
+        """The condition as it is read in a section."""
+        return f"{self.selector.in_words(section)} = {' or '.join(map(toml_value, self.values))}"
+
+
+Selected = Mapping[Selector, str | None]
+"""The value of each selector, None if that is faulty: then what depends on it is not checked."""
+
+
+@dataclass(frozen=True)
+class Key:
+    """A key of a table.
+
+    Attributes:
+        type: what its value must be.
+        meaning: a sentence or two for the reference.
+        unit: of the value, empty if it has none.
+        default: in words; empty if there is none.
+        only: when it belongs to the table; always, if None.
+        required: whether it must be there where it belongs.
+        instead: what to write where it does not belong; empty if there is nothing like it.
+        unless: other keys of the table, beside any of which it is not required.
+    """
+
+    type: ValueType
+    meaning: str
+    unit: str
+    default: str
+    only: Condition | None
+    required: bool
+    instead: str = ""
+    unless: tuple[str, ...] = ()
+
+    def belongs(self, selected: Selected) -> bool:
+        """Whether the key belongs to the table; not, if that depends on a faulty selector."""
+        return self.only is None or selected.get(self.only.selector) in self.only.values
+
+
+def key(
+    type_: ValueType,
+    meaning: str,
+    *,
+    unit: str = "",
+    default: Any = dataclasses.MISSING,
+    default_words: str = "",
+    only: Condition | None = None,
+    instead: str = "",
+    unless: tuple[str, ...] = (),
+) -> Any:
+    """A dataclass field read from the key of its name; required where it belongs if it has no default.
+
+    `default_words` tells what a default of None stands for.
+    """
+    required = default is dataclasses.MISSING
+    words = default_words or ("" if required or default is None else _default_in_words(default))
+    metadata = {"key": Key(type_, meaning, unit, words, only, required, instead, unless)}
+    if required and only is None:
+        return dataclasses.field(metadata=metadata)
+    return dataclasses.field(default=None if required else default, metadata=metadata)
+
+
+def _default_in_words(default: Any) -> str:
+    return toml_value(list(default) if isinstance(default, tuple) else default)
+
+
+def keys_of(table_class: type[Any]) -> dict[str, Key]:
+    """The keys of a table by name; fields that are made of them are none."""
+    return {each.name: each.metadata["key"] for each in dataclasses.fields(table_class) if "key" in each.metadata}
+
+
+def defaults_of(table_class: type[Any]) -> dict[str, Any]:
+    """The defaults of a table, as TOML has them, of the keys that have one."""
+    found = {each.name: each.default for each in dataclasses.fields(table_class) if each.name in keys_of(table_class)}
+    return {name: _to_toml(value, {}) for name, value in found.items() if value not in (None, dataclasses.MISSING)}
+
+
+def selected_value(table_class: type[Any], table: object, name: str) -> Any:
+    """The value of a key if it is right, its default if it is not there, None if it is faulty."""
+    default = getattr(table_class, name, None)
+    value = table.get(name, default) if isinstance(table, Mapping) else default
+    return value if keys_of(table_class)[name].type.accepts(value) else None
+
+
+@dataclass
+class TableReader:
+    """Reads tables and gathers what is wrong with them.
+
+    Attributes:
+        selected: the values that decide which keys belong to the case.
+        owners: where keys belong that are unknown in a table.
+        faults: one line each.
+    """
+
+    selected: Selected = field(default_factory=dict)
+    owners: Mapping[str, str] = field(default_factory=dict)
+    faults: list[str] = field(default_factory=list)
+
+    def read(self, table_class: type[T], table: object, section: str, prefix: str = "") -> T | None:
+        """The table as an instance of `table_class`; None, and a line for each fault, if it is faulty.
+
+        `prefix` stands before the keys of a table within a section.
+        """
+        if not isinstance(table, dict):
+            self.faults.append(f"{section} = {toml_value(table)}: expected a section [{section}]")
+            return None
+        keys = keys_of(table_class)
+        unknown = {
+            name: f" = {toml_value(value)}: unknown key; {suggestion(name, keys, self.owners)}"
+            for name, value in table.items()
+            if name not in keys
+        }
+        known = {name: self._fault(name, entry, table, section) for name, entry in keys.items()}
+        lines = [f"[{section}] {prefix}{toml_key(name)}{words}" for name, words in (unknown | known).items() if words]
+        self.faults += lines
+        return None if lines else table_class(**{name: keys[name].type.store(value) for name, value in table.items()})
+
+    def _fault(self, name: str, entry: Key, table: Mapping[str, Any], section: str) -> str:
+        """What is wrong with one known key, empty if nothing."""
+        if name not in table:
+            missing = entry.required and not {*entry.unless} & {*table} and entry.belongs(self.selected)
+            return f": missing; expected {entry.type.expected}" if missing else ""
+        line = f" = {toml_value(table[name])}: "
+        if entry.only is not None and not entry.belongs(self.selected):
+            found = self.selected.get(entry.only.selector)
+            if found is not None:
+                instead = f"; use {entry.instead}" if entry.instead else ""
+                return f"{line}belongs to {entry.only.in_words(section)}, not {toml_value(found)}{instead}"
+        complaint = entry.type.complaint(table[name])
+        return f"{line}{complaint}" if complaint else ""
+
+
+def to_table(instance: Any, selected: Selected) -> dict[str, Any]:
+    """The table, of TOML's values, that `TableReader.read` makes the instance of.
+
+    It has neither the keys that do not belong to the case nor those without a value.
+    """
+    return {
+        name: _to_toml(getattr(instance, name), selected)
+        for name, entry in keys_of(type(instance)).items()
+        if getattr(instance, name) is not None and entry.belongs(selected)
+    }
+
+
+def _to_toml(value: Any, selected: Selected) -> Any:
+    """The value as TOML has it."""
+    if isinstance(value, tuple):
+        return [_to_toml(entry, selected) for entry in value]
+    if isinstance(value, Path):
+        return str(value)
+    if value == math.inf:
+        return INF
+    return to_table(value, selected) if dataclasses.is_dataclass(value) else value

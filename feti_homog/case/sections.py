@@ -1,0 +1,120 @@
+"""The sections of a case file: which keys they have, what each accepts, and what it means."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from feti_homog.case.cell_section import Cell
+from feti_homog.case.envelope_section import Envelope
+from feti_homog.case.interface_section import InterfaceSection
+from feti_homog.case.load_section import LoadPath, SingleLoad
+from feti_homog.case.mixed_load import Strain
+from feti_homog.case.schema import key
+from feti_homog.case.section_values import OPENINGS, STATES, STRAIN
+from feti_homog.case.selectors import ANGLE_ANALYSIS, ENVELOPE_ANALYSIS, IN_THE_PLANE, LOAD_ANALYSIS, PATH_ANALYSIS
+from feti_homog.case.values import boolean, choice, integer, real, text
+
+OUT_OF_PLANE_STRESSES = ("S33", "S23", "S13")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Analysis:
+    """What is computed, and in which plane state."""
+
+    type: str = key(
+        choice("stiffness", "angle", "path", "load", "envelope"),
+        '"stiffness": the effective stiffness; "angle": the response against the debonding angle, see [angle]; '
+        '"path": debonding by the load, see [path]; "load": the response to one load, under which nothing breaks, see '
+        '[load]; "envelope": the loads at which debonding begins, see [envelope].',
+    )
+    plane: str = key(
+        choice("strain", "stress", "generalized"),
+        'Plane state: "strain" is that of long fibres along x3, "stress" that of a thin sheet; "generalized" is '
+        "generalized plane strain: long fibres under all six strains, also along x3.",
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Angle:
+    """Openings of the arcs, one after the other."""
+
+    values: tuple[float, ...] = key(OPENINGS, "Openings of all arcs of [interface] debonded.", unit="degrees")
+    strain: Strain | None = key(
+        STRAIN,
+        "Macroscopic strain, other than zero; by default the three unit strains, which give the effective stiffness.",
+        default=None,
+        default_words="unit strains",
+        only=IN_THE_PLANE,
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Decomposition:
+    """Into how many subdomains the bodies are cut. Give one of the two keys, or neither."""
+
+    subdomains: int | None = key(
+        integer(least=1, most=1_000_000),
+        "Number of subdomains, at least that of the bodies; large bodies are cut to the fastest size.",
+        default=None,
+        default_words="automatic",
+    )
+    max_dofs: int | None = key(
+        integer(least=100, most=10**9),
+        "Bodies are cut such that no subdomain has many more unknowns than this.",
+        default=None,
+        default_words="automatic",
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Output:
+    """What is written and drawn."""
+
+    fields: bool = key(boolean, "Write result.h5 and result.xdmf.", default=True)
+    states: int | str = key(
+        STATES,
+        "The points of a path whose fields are written: at most so many, the first, the last, those around the deepest "
+        'drops of the stress, up to half, the others evenly between; "peaks": the ends and those around all drops of '
+        'more than 1 % of the largest stress; "all". The curve has every point.',
+        default=100,
+        only=PATH_ANALYSIS,
+    )
+    pictures: bool = key(boolean, "Draw the PNG files; without fields, the curves alone.", default=True)
+    report: bool = key(boolean, "Write report.html: numbers, pictures, curves and states on one page.", default=False)
+    stress: str = key(
+        choice("auto", "S11", "S22", "S12", *OUT_OF_PLANE_STRESSES),
+        'The component drawn; "auto": that of the unit strain. "S33", "S23" and "S13" are drawn in generalized plane '
+        "strain.",
+        default="auto",
+    )
+    deformation_scale: float | None = key(
+        real(least=0.0),
+        "Factor of the displacements drawn; by default such that displacements and openings are seen and no element "
+        "turns over, but at least 1 under a given strain.",
+        default=None,
+        default_words="automatic",
+    )
+    length_unit: str = key(text, "A label, such as mm; nothing is converted.", default="")
+    stress_unit: str = key(text, "A label, such as GPa; nothing is converted.", default="")
+
+
+SECTIONS: dict[str, type[Any]] = {
+    "cell": Cell,
+    "analysis": Analysis,
+    "interface": InterfaceSection,
+    "angle": Angle,
+    "path": LoadPath,
+    "load": SingleLoad,
+    "envelope": Envelope,
+    "decomposition": Decomposition,
+    "output": Output,
+}
+
+SECTIONS_OF_AN_ANALYSIS = {
+    "angle": ANGLE_ANALYSIS,
+    "path": PATH_ANALYSIS,
+    "load": LOAD_ANALYSIS,
+    "envelope": ENVELOPE_ANALYSIS,
+}
+"""Sections that must be given for one type of analysis, and belong to no other."""

@@ -1,0 +1,20 @@
+"""The keys whose values decide which other keys belong to a case."""
+
+from __future__ import annotations
+
+from feti_homog.case.schema import Selector
+
+ANALYSIS_TYPE = Selector("analysis", "type")
+PLANE = Selector("analysis", "plane")
+METHOD = Selector("path", "method")
+CRITERION = Selector("interface", "criterion")
+
+ANGLE_ANALYSIS, PATH_ANALYSIS = ANALYSIS_TYPE.among("angle"), ANALYSIS_TYPE.among("path")
+LOAD_ANALYSIS = ANALYSIS_TYPE.among("load")
+ENVELOPE_ANALYSIS, BREAKING = ANALYSIS_TYPE.among("envelope"), ANALYSIS_TYPE.among("path", "envelope")
+BY_ENERGY = CRITERION.among("energy")
+
+DRAWN_STRESS = Selector("output", "stress")
+
+IN_THE_PLANE, GENERALIZED = PLANE.among("strain", "stress"), PLANE.among("generalized")
+BY_EVENTS, BY_INCREMENTS = METHOD.among("events"), METHOD.among("increments")

@@ -1,0 +1,132 @@
+"""Types of values in a case file: each in words, as a test, as a JSON Schema, and as it is stored."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from feti_homog.case.wording import toml_value
+
+SMALLEST, LARGEST = 1e-100, 1e100
+"""Magnitudes of numbers other than 0: no product of a few over- or underflows."""
+INF = "inf"
+"""An infinite number in resolved cases, which are written as JSON."""
+MAGNITUDES = f"; numbers other than 0 have magnitudes from {SMALLEST:g} to {LARGEST:g}"
+
+
+@dataclass(frozen=True)
+class ValueType:
+    """What a value must be.
+
+    Attributes:
+        expected: in words, for faults and for the reference.
+        accepts: whether a value, of TOML's types, is right.
+        store: of a right value, what the dataclass of its table keeps.
+        json_schema: the same as JSON Schema, which knows no relations between numbers.
+    """
+
+    expected: str
+    accepts: Callable[[Any], bool]
+    store: Callable[[Any], Any]
+    json_schema: Mapping[str, Any]
+
+    def complaint(self, value: Any) -> str:
+        """What is expected of a wrong value, empty if it is right."""
+        return "" if self.accepts(value) else f"expected {self.expected}{magnitudes_in_words(value)}"
+
+
+def magnitudes_in_words(value: Any) -> str:
+    """The limits of magnitudes, where a number in a value is beyond them; else empty."""
+    if isinstance(value, list | tuple):
+        return next(filter(None, map(magnitudes_in_words, value)), "")
+    is_of_type = isinstance(value, int | float) and not isinstance(value, bool)
+    return MAGNITUDES if is_of_type and not is_number(value) and value == value else ""
+
+
+def is_number(value: object) -> bool:
+    """Whether the value is a finite number of sensible magnitude (true and false are none)."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    return value == 0 or SMALLEST <= abs(value) <= LARGEST
+
+
+def is_number_list(value: object, count: int | None = None) -> bool:
+    """Whether the value is a list of numbers, so many if a count is given."""
+    return isinstance(value, list) and count in (None, len(value)) and all(map(is_number, value))
+
+
+def to_floats(values: Iterable[Any]) -> tuple[float, ...]:
+    return tuple(map(float, values))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Limits:
+    """Limits of a number: `above` and `below` are outside, `least` and `most` inside."""
+
+    above: float = -math.inf
+    least: float = -math.inf
+    below: float = math.inf
+    most: float = math.inf
+
+    def hold(self, value: float) -> bool:
+        return self.above < value < self.below and self.least <= value <= self.most
+
+    def in_words(self) -> str:
+        limits = {"above": self.above, "at least": self.least, "below": self.below, "at most": self.most}
+        return " and ".join(f"{word} {_short(limit)}" for word, limit in limits.items() if math.isfinite(limit))
+
+    def json_schema(self) -> dict[str, float]:
+        limits = {
+            "exclusiveMinimum": self.above if self.above else -math.inf,
+            "minimum": max(self.least, -LARGEST if self.above else SMALLEST),
+            "exclusiveMaximum": self.below, "maximum": min(self.most, LARGEST),
+        }  # fmt: skip
+        return {word: limit for word, limit in limits.items() if math.isfinite(limit)}
+
+
+def _short(limit: float) -> str:
+    return str(limit) if isinstance(limit, int) else f"{limit:.6g}"
+
+
+def real(**limits: float) -> ValueType:
+    """A number within `Limits`."""
+    return _numeric("number", is_number, float, Limits(**limits))
+
+
+def integer(**limits: float) -> ValueType:
+    """An integer within `Limits`."""
+    return _numeric("integer", lambda value: is_number(value) and isinstance(value, int), int, Limits(**limits))
+
+
+def _numeric(name: str, is_of_type: Callable[[Any], bool], store: Callable[[Any], Any], limits: Limits) -> ValueType:
+    article = "an" if name == "integer" else "a"
+    return ValueType(
+        f"{article} {name} {limits.in_words()}".strip(),
+        lambda value: is_of_type(value) and limits.hold(value),
+        store,
+        {"type": name, **limits.json_schema()},
+    )
+
+
+def choice(*options: str) -> ValueType:
+    """One of some texts."""
+    words = "one of " + ", ".join(map(toml_value, options))
+    return ValueType(words, lambda value: value in options, str, {"enum": list(options)})
+
+
+POSITIVE_OR_INF = ValueType(
+    "a positive number, or inf",
+    lambda value: value in (math.inf, INF) or (is_number(value) and value > 0),
+    float,
+    {"anyOf": [{"type": "number", "minimum": SMALLEST}, {"const": INF}]},
+)
+"""Where inf is another thing than no value."""
+boolean = ValueType("true or false", lambda value: isinstance(value, bool), bool, {"type": "boolean"})
+text = ValueType(
+    "a text in one line",
+    lambda value: isinstance(value, str) and value.isprintable(),
+    str,
+    {"type": "string", "pattern": "^[^\\u0000-\\u001f\\u007f]*$"},
+)

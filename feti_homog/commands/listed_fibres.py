@@ -1,0 +1,135 @@
+"""The fibres of a case or of a result: where they are, how large, of which phases, and how thick their coatings are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from feti_homog.analysis import stored_result
+from feti_homog.case import case as cases
+from feti_homog.case.cell_section import Cell
+from feti_homog.case.rounded_polygons import RoundedPolygons
+from feti_homog.errors import CaseError
+from feti_homog.fibres import periodic_table
+from feti_homog.fibres.arrangement import arrange
+from feti_homog.fibres.ellipses import Ellipses
+from feti_homog.mesh.fibre_centres import fibre_circles
+from feti_homog.mesh.fibre_numbers import coating_thickness, fibre_numbers
+from feti_homog.mesh.fibre_shapes import fibre_frames
+from feti_homog.mesh.fill.gmsh_mesher import arrangement_scale
+from feti_homog.mesh.interface_edges import voids
+from feti_homog.mesh.periodic_topology import Torus
+from feti_homog.mesh.readers.msh_reader import read as read_mesh
+from feti_homog.typing import Float
+
+
+@dataclass(frozen=True)
+class ListedFibres:
+    """The N fibres of a periodic cell [0, width] x [0, height], in the order of their numbers.
+
+    Attributes:
+        size: (2,) width and height.
+        ellipses: N circles and ellipses about centres within the cell.
+        phases: their names; those of cells that the program meshes have the voids behind them.
+        coatings: (N,) thickness of the coatings, 0 without one.
+        cores: (N,) radii of the voids within hollow fibres, 0 of others.
+        polygons: those that some are, else None; they have discs of the same areas among the ellipses.
+        lacks_voids: whether there are voids that are not listed.
+    """
+
+    size: Float
+    ellipses: Ellipses
+    phases: tuple[str, ...]
+    coatings: Float
+    cores: Float
+    lacks_voids: bool
+    polygons: RoundedPolygons | None = None
+
+    @property
+    def radii(self) -> Float:
+        """(N,) of circles, and of discs of the same area as the ellipses."""
+        return np.asarray(np.sqrt(self.ellipses.semi_axes.prod(axis=1)))
+
+
+def read(source: Path) -> ListedFibres:
+    """Those of a case file or a folder of results.  On one rank.
+
+    Raises:
+        CaseError, MeshError: the source is faulty, or a fibre is neither round nor an ellipse.
+    """
+    found = _of_result(source) if source.is_dir() else _of_cell(cases.load(source).cell)
+    known = np.column_stack([found.ellipses.centres, found.radii, found.coatings])
+    lost = np.flatnonzero(~np.isfinite(known).all(axis=1)) + 1
+    if len(lost):
+        listed = ", ".join(map(str, lost[:10]))
+        raise CaseError(f"{source}: fibres that are neither round nor ellipses have no radius: {listed}")
+    return found
+
+
+def _of_result(directory: Path) -> ListedFibres:
+    document = stored_result.read(directory)
+    if document["case"]["cell"]["geometry"] != "mesh" and not _is_complete(document):
+        return _of_cell(cases.parse(document["case"], directory).cell)
+    return _of_records(document["fibres"], document["cell"])
+
+
+def _of_records(fibres: Sequence[Mapping[str, Any]], cell: Mapping[str, Any]) -> ListedFibres:
+    """Those of `fibres` and `cell` of a result."""
+    unknown = (np.nan, np.nan)
+    centres = np.array([fibre.get("centre") or unknown for fibre in fibres], float).reshape(-1, 2)
+    axes = [
+        (radius, radius) if (radius := fibre.get("radius")) else fibre.get("semi_axes") or unknown for fibre in fibres
+    ]
+    a, b = np.array(axes, float).reshape(-1, 2).T
+    return ListedFibres(
+        np.array([cell["width"], cell["height"]]),
+        Ellipses.of(centres, a, b, np.array([fibre.get("angle") or 0.0 for fibre in fibres])),
+        tuple(fibre["phase"] for fibre in fibres),
+        np.array([fibre.get("coating") or 0.0 for fibre in fibres]),
+        np.zeros(len(fibres)),
+        lacks_voids=bool(cell.get("porosity")),
+    )
+
+
+def _is_complete(document: Mapping[str, Any]) -> bool:
+    """Whether a result tells all outlines: it does not those of voids, nor of polygons."""
+    are_known = all("radius" in fibre or "semi_axes" in fibre for fibre in document["fibres"])
+    return are_known and not document["cell"].get("porosity")
+
+
+def _of_cell(cell: Cell) -> ListedFibres:
+    if cell.has_own_mesh:
+        return _of_mesh(cell)
+    arrangement = arrange(cell)
+    scale = arrangement_scale(cell, arrangement)
+    size = scale * np.array([arrangement.width, arrangement.height])
+    hollow = arrangement.is_hollow
+    discs = Ellipses.round(np.column_stack([arrangement.centres, arrangement.radii]))
+    inner = discs if arrangement.frames is None else arrangement.ellipses
+    own = inner.grown(np.where(hollow, arrangement.thickness, 0.0))
+    ellipses = Ellipses(scale * own.centres % size, scale * own.frames)
+    coatings = scale * np.where(hollow, 0.0, arrangement.thickness)
+    cores = scale * np.where(hollow, arrangement.radii, 0.0)
+    return ListedFibres(size, ellipses, arrangement.phase, coatings, cores, False, _polygons(cell))
+
+
+def _polygons(cell: Cell) -> RoundedPolygons | None:
+    """Those of a table, in the order of its fibres."""
+    if cell.table is None or cell.table.polygons is None:
+        return None
+    return cell.table.polygons[periodic_table.fibres(cell.table, cell.window)[0]]
+
+
+def _of_mesh(cell: Cell) -> ListedFibres:
+    assert cell.file is not None
+    mesh = read_mesh(cell.file)
+    torus = Torus.of(mesh)
+    numbers, is_fibre = fibre_numbers(torus)
+    ellipses = Ellipses(fibre_circles(torus)[:, :2] % mesh.period, fibre_frames(torus))
+    coatings = coating_thickness(numbers, is_fibre, ellipses.semi_axes)
+    phases = tuple(mesh.phases[phase] for phase in torus.constituent_phase[is_fibre])
+    return ListedFibres(mesh.period, ellipses[is_fibre], phases, coatings, np.zeros(len(phases)), voids(mesh) > 0)

@@ -1,0 +1,280 @@
+"""Unilateral, frictionless contact of debonded faces: the states that satisfy the KKT conditions.
+
+A debonded node is open (gap >= 0, no force) or closed (gap = 0, force <= 0, compression).  Which, is found by
+block principal pivoting on the dual problem, which is strictly convex.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from feti_homog.errors import NotCarriedError
+from feti_homog.feti.decomposition.constraint_layout import InterfaceNodes
+from feti_homog.feti.dual_solution import DualSolution
+from feti_homog.feti.solver import FetiSolver
+from feti_homog.interface.contact.block_pivoting import BlockPivoting
+from feti_homog.interface.contact.contact_certificate import kkt_errors
+from feti_homog.interface.contact.floating_bodies import place
+from feti_homog.interface.contact.load_scales import LoadScales
+from feti_homog.interface.loads import mixed_load
+from feti_homog.interface.loads.load import Load
+from feti_homog.interface.loads.solutions import Multipliers, Solutions
+from feti_homog.typing import Bool, Float, Int
+
+Status = NDArray[np.int8]
+
+BONDED, CLOSED, OPEN = 0, 1, 2
+
+# A force or a gap has a sign if it is larger than this many relative tolerances of the Krylov method, times the
+# largest force or imposed displacement; below, the solver's error may have made it.
+SIGN_NOISE_PER_RTOL = 10.0
+# An amplitude takes part in new motions if its square is larger than this, of motions of size one.
+LEAST_SHARE_OF_MOTION = 1e-6
+# Block pivots in a row, the last one with progress included: ten without progress are usual in the literature.
+BLOCK_PIVOTS = 11
+# Dual problems after which the search is given up; the certificate then tells how far off it is.
+MAX_CONTACT_SOLVES = 500
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """The cell under one load with the contact states that hold there.
+
+    Attributes:
+        load: what is prescribed.
+        status: (k,) BONDED, CLOSED or OPEN of the interface nodes that this rank owns.
+        solution: of the last dual problem; its multipliers and jumps are those of the state.
+        iterations, solves: Krylov iterations and dual problems that it took.
+        free_motions: number of rigid motions of bodies that no interface force resists; a face that touches without
+            a force resists none.
+        certificate: errors of the KKT conditions, `contact_certificate.kkt_errors`.
+        axial: the same of the displacement along the fibres with these bonds, where that is a problem.
+    """
+
+    load: Load
+    status: Status
+    solution: DualSolution
+    iterations: int
+    solves: int
+    free_motions: int
+    certificate: dict[str, float]
+    axial: Equilibrium | None = None
+
+    @property
+    def solutions(self) -> Solutions:
+        """Of all problems."""
+        return Solutions(self.solution, None if self.axial is None else self.axial.solution)
+
+    @property
+    def multipliers(self) -> Multipliers:
+        """Of all problems."""
+        return self.solutions.lam
+
+    @property
+    def converged(self) -> bool:
+        """Whether the Krylov method found all."""
+        return self.solutions.converged
+
+
+@dataclass(frozen=True)
+class Interface:
+    """All fibre-matrix interfaces of the torn cell.
+
+    Attributes:
+        solver: of the dual problem.
+        contact: false lets debonded faces overlap.
+        size: (2,) of the cell, for the scale of displacements.
+        block_pivots: see `BlockPivoting`.
+    """
+
+    solver: FetiSolver
+    contact: bool
+    size: Float
+    block_pivots: int = BLOCK_PIVOTS
+
+    @property
+    def nodes(self) -> InterfaceNodes:
+        """Interface nodes that this rank owns."""
+        return self.solver.jump_operator.nodes
+
+    @property
+    def sign_noise(self) -> float:
+        """Share of the largest force, or of the imposed displacement, below which a sign is the solver's error."""
+        return SIGN_NOISE_PER_RTOL * self.solver.rtol
+
+    def active(self, status: Status) -> Float:
+        """(owned rows,) 1 for the multipliers that act: all of a bonded node, the normal one of a closed node."""
+        mask = np.ones(self.solver.rows)
+        mask[self._pairs] = (status == BONDED)[:, None]
+        if self.contact:
+            mask[self.nodes.row] = status != OPEN
+        return mask
+
+    def debond(self, status: Status, which: Bool, lam: Float) -> Status:
+        """The status after the bonds of `which` have broken; under tension they start open."""
+        force = lam[self.nodes.row]
+        released = np.where((force < 0) & self.contact, CLOSED, OPEN).astype(np.int8)
+        return np.where(which & (status == BONDED), released, status)
+
+    def traction(self, solution: DualSolution) -> Float:
+        """(k, c) traction, in the plane normal and tangential, tension positive; or along the fibre."""
+        return np.asarray(solution.lam[self._pairs] / self.nodes.length[:, None])
+
+    def jump(self, solution: DualSolution) -> Float:
+        """(k, c) gap and slip, matrix minus fibre; or slip along the fibre."""
+        return np.asarray(self.solver.opening(solution)[self._pairs])
+
+    def stress(self, solution: DualSolution) -> Float:
+        """(v,) Sigma from the multipliers alone, and what works on the other loads; collective."""
+        return np.asarray(self.solver.stress_integral(solution) / self.size.prod())
+
+    @cached_property
+    def scales(self) -> LoadScales:
+        """Of what loads make.  Its properties are collective when first used, and so are its methods."""
+        return LoadScales(self.solver, self.size)
+
+    @property
+    def _pairs(self) -> Int:
+        """(k, c) rows of the bonds."""
+        return self.nodes.row[:, None] + np.arange(self.solver.jump_operator.components)
+
+    def linear(self, load: Load, status: Status, start: Float) -> DualSolution:
+        """The dual problem with the states as they are; `start` are first multipliers (owned rows,).  Collective.
+
+        Raises:
+            NotCarriedError: nothing carries the stresses of the load.
+        """
+        self.solver.activate(self.active(status))
+        given = self.scales.imposed_strain(np.where(load.by_stress, 0.0, load.values))
+        roots = self.scales.roots
+        noise = mixed_load.Noise(roots, self.sign_noise, float((roots[: len(given)] * given).max()))
+        return mixed_load.solve(self.solver, load, start, float(self.size.prod()), noise)
+
+    def is_linear(self, status: Status) -> bool:
+        """Whether no face can come to touch another; collective."""
+        return not (self.contact and self._any(status != BONDED))
+
+    def equilibria(self, strains: Float, status: Status, starts: Sequence[Float]) -> list[Equilibrium]:
+        """Solve a linear problem for every strain of (k, 3) together.  Collective."""
+        self.solver.activate(self.active(status))
+        solutions = self.solver.solve_many(strains, np.stack(starts, axis=1))
+        return [
+            self._equilibrium(Load.strain(strain), status, solution, solution.iterations, 1)
+            for strain, solution in zip(strains, solutions, strict=True)
+        ]
+
+    def equilibrium(self, load: Load, status: Status, start: Float) -> Equilibrium:
+        """Solve for the load, with `status` a first guess of who is in contact.  Collective; raises as `linear`."""
+        try:
+            return self._searched(load, status, start)
+        except NotCarriedError:
+            closed = np.where(status == OPEN, CLOSED, status).astype(np.int8)
+            if not self.contact or not self._any(closed != status):
+                raise
+        # Faces that come to touch may carry what open ones do not.
+        return self._searched(load, closed, start)
+
+    def _searched(self, load: Load, status: Status, start: Float) -> Equilibrium:
+        """The equilibrium, from these states on.  Collective; raises as `linear`."""
+        pivoting = BlockPivoting(self.solver.comm, self.block_pivots)
+        iterations = solves = 0
+        while True:
+            solution = self.linear(load, status, start)
+            iterations, solves = iterations + solution.iterations, solves + 1
+            solution, wrong = self._placed(status, solution)
+            count = self.solver.comm.allreduce(int(wrong.sum()))
+            if count == 0 or solves == MAX_CONTACT_SOLVES or solution.reason < 0:
+                return self._equilibrium(load, status, solution, iterations, solves)
+            flip = pivoting.choose(wrong, count)
+            status = np.where(flip, CLOSED + OPEN - status, status).astype(np.int8)
+            start = solution.lam
+
+    def undetermined(self, state: Equilibrium) -> Bool:
+        """(v,) strains that nothing determines: their stresses are given, and what is open lets them be any.
+        Collective."""
+        if not state.load.by_stress.any() or not self._any(state.status != BONDED):
+            return np.zeros(len(state.load.values), bool)
+        self.solver.activate(self.active(state.status))
+        held = self.scales.mean_stiffness * float(self.size.prod())
+        return mixed_load.unresisted(self.solver, state.load.by_stress, held)
+
+    def _any(self, which: Bool) -> bool:
+        """Return True if a node of any rank is one of `which`; collective."""
+        return bool(self.solver.comm.allreduce(bool(which.any()), MPI.LOR))
+
+    def gap_noise(self, strain: Float) -> float:
+        """Gaps smaller than this may be the solver's error."""
+        return self.sign_noise * self.scales.imposed(strain)
+
+    def stress_noise(self, strain: Float) -> float:
+        """Macroscopic stresses smaller than this may be the solver's error.  Collective."""
+        return self.sign_noise * self.scales.stress_scale(strain)
+
+    def force_noise(self, solution: DualSolution) -> Float:
+        """(k,) nodal forces at each node of this rank smaller than which may be the solver's error; collective.
+
+        It is a share of the largest of the same interface, or of what the imposed strain makes: an error of the jumps
+        moves forces by the stiffness of the softer side.  Forces between the pieces of a cut body say nothing here,
+        however large, nor do those of other interfaces."""
+        forces = np.abs(solution.lam[self._pairs]).max(axis=1, initial=0.0)
+        caused = self.scales.bond_stress(solution.strain) * self.scales.longest
+        return np.asarray(self.sign_noise * np.maximum(self.scales.over_interface(forces), caused))
+
+    def _placed(self, status: Status, solution: DualSolution) -> tuple[DualSolution, Bool]:
+        """The solution with free fibres where they have room, and which nodes (k,) break the KKT conditions."""
+        if not self.contact:
+            return solution, np.zeros(len(status), bool)
+        squeezed = np.zeros(len(status), bool)
+        coarse, noise = self.solver.natural, self.gap_noise(solution.strain)
+        if coarse.unconstrained_modes.shape[1]:
+            placement = place(self.solver.comm, coarse, self.nodes, status == OPEN, solution, noise)
+            alpha, jump = solution.alpha + placement.alpha, solution.jump + placement.jump(coarse)
+            solution, squeezed = replace(solution, alpha=alpha, jump=jump), placement.squeezed
+        force, gap = solution.lam[self.nodes.row], solution.jump[self.nodes.row]
+        pulled = (status == CLOSED) & (force > self.force_noise(solution))
+        overlaps = (status == OPEN) & (gap < -noise)
+        return solution, pulled | overlaps | squeezed
+
+    def _equilibrium(
+        self, load: Load, status: Status, solution: DualSolution, iterations: int, solves: int
+    ) -> Equilibrium:
+        """The state that a search ended with, its free motions and its certificate."""
+        certificate = kkt_errors(
+            self.solver.comm,
+            self.traction(solution),
+            self.nodes.length,
+            solution.jump[self.nodes.row],
+            (status != BONDED) & self.contact,
+            status == CLOSED,
+            self.scales.imposed(solution.strain),
+            self.scales.bond_stress(solution.strain),
+            self.scales.over_interface,
+        )
+        status, motions = self._without_idle(status, solution)
+        return Equilibrium(load, status, solution, iterations, solves, motions, certificate)
+
+    def _without_idle(self, status: Status, solution: DualSolution) -> tuple[Status, int]:
+        """The status and the number of rigid motions that neither a bond nor a face under compression resists.
+
+        A fibre may touch its hole without a force: such nodes count as open if it moves without them, lest they seem
+        to hold it; those of other fibres stay closed.  Collective.
+        """
+        coarse, idle = self.solver.natural, np.zeros(len(status), bool)
+        motions = coarse.unconstrained_modes
+        if self.contact:
+            idle = (status == CLOSED) & (solution.lam[self.nodes.row] >= -self.force_noise(solution))
+        if not self._any(idle):
+            return status, motions.shape[1]
+        more = coarse.free_motions(self.active(np.where(idle, OPEN, status).astype(np.int8)))
+        # The squares are the diagonal of the projector on the motions, which rises where a body comes free.
+        shares, before = (np.asarray(Z.power(2).sum(axis=1)).ravel() for Z in (more, motions))
+        risen = shares - before > LEAST_SHARE_OF_MOTION
+        freed = np.isin(coarse.body, coarse.body[risen])
+        idle &= (abs(coarse.G[self.nodes.row]) + abs(coarse.G[self.nodes.row + 1])) @ freed > 0
+        return np.where(idle, OPEN, status).astype(np.int8), more.shape[1]

@@ -1,0 +1,119 @@
+"""Sizes of what loads make in a cell, whatever is debonded: for tolerances, and for errors to be relative to."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from mpi4py import MPI
+
+from feti_homog.feti.solver import FetiSolver
+from feti_homog.materials.bounds import reuss, voigt
+from feti_homog.typing import Float
+
+
+class LoadScales:
+    """Of the loads (v,) of a problem: its m strains, and what else acts."""
+
+    def __init__(self, solver: FetiSolver, size: Float) -> None:
+        """`size` (2,) is that of the cell."""
+        self._solver, self._size = solver, size
+
+    @cached_property
+    def least_bonded_stiffness(self) -> Float:
+        """(v, v) Reuss' bound <L^-1>^-1 of the strains, and <L> of the other loads, collective: a scale of stress and
+        energy that debonding does not make zero."""
+        shares, stiffnesses = self._phases
+        m, least = self._solver.problem.strains, self.mean_stiffness.copy()
+        least[:m, m:] = least[m:, :m] = 0.0
+        least[:m, :m] = reuss(shares, stiffnesses[:, :m, :m])
+        return least
+
+    @cached_property
+    def mean_stiffness(self) -> Float:
+        """(v, v) <L>, Voigt's bound of the strains.  Collective."""
+        return voigt(*self._phases)
+
+    @cached_property
+    def _phases(self) -> tuple[Float, Float]:
+        """Shares (n,) and stiffnesses (n, v, v) of all subdomains.  Collective."""
+        parts = self._solver.comm.allgather([(s.area, s.L) for s in self._solver.subdomains])
+        areas, stiffnesses = zip(*(part for own in parts for part in own), strict=True)
+        return np.array(areas) / sum(areas), np.stack(stiffnesses)
+
+    @cached_property
+    def roots(self) -> Float:
+        """(v,) of the diagonal of `least_bonded_stiffness`: by these strains are multiplied and stresses divided that
+        are compared with each other; inf of what works on no stress.  Collective."""
+        diagonal = np.full(len(self.least_bonded_stiffness), np.inf)
+        stresses = slice(self._solver.problem.stresses)
+        diagonal[stresses] = self.least_bonded_stiffness.diagonal()[stresses]
+        return np.asarray(np.sqrt(diagonal))
+
+    @cached_property
+    def largest_stiffness(self) -> float:
+        """The largest entry of Reuss' bound.  Collective."""
+        m = self._solver.problem.strains
+        return float(np.abs(self.least_bonded_stiffness[:m, :m]).max())
+
+    @cached_property
+    def _bond_stiffness(self) -> Float:
+        """(k,) stress at each bond of this rank per strain of the cell: of the softer body, its springs in a row.
+        Collective."""
+        solver, nodes = self._solver, self._solver.jump_operator.nodes
+        m, own = solver.problem.strains, np.zeros(self._bodies)
+        for s in solver.subdomains:
+            own[s.submesh.body] = np.abs(s.L[:m, :m]).max()
+        solver.comm.Allreduce(MPI.IN_PLACE, own, MPI.MAX)
+        rows = nodes.row[:, None] + np.arange(solver.jump_operator.components)
+        give = solver.operator.compliance[rows].min(axis=1, initial=np.inf) * nodes.length / self._size.max()
+        return np.asarray(1.0 / (1.0 / own[nodes.bodies].min(axis=1, initial=np.inf) + give))
+
+    @cached_property
+    def _bodies(self) -> int:
+        """Number of bodies.  Collective."""
+        last = max((s.submesh.body for s in self._solver.subdomains), default=-1)
+        return int(self._solver.comm.allreduce(last, MPI.MAX)) + 1
+
+    def over_interface(self, values: Float) -> Float:
+        """(k,) of each bond of this rank the largest of values (k,), 0 at least, on all of its inner body.
+        Collective."""
+        inner, largest = self._solver.jump_operator.nodes.bodies[:, 1], np.zeros(self._bodies)
+        np.maximum.at(largest, inner, values)
+        self._solver.comm.Allreduce(MPI.IN_PLACE, largest, MPI.MAX)
+        return np.asarray(largest[inner])
+
+    @cached_property
+    def longest(self) -> Float:
+        """(k,) the largest tributary length on the interface of each bond of this rank.  Collective."""
+        return self.over_interface(self._solver.jump_operator.nodes.length)
+
+    def bond_stress(self, loads: Float) -> Float:
+        """(k,) or (k, n) stress that the loads (v,) or (v, n) make at each bond of this rank, or would if nothing else
+        bore them.  Collective."""
+        largest: Float = np.multiply.outer(self._bond_stiffness, self.imposed_strain(loads).max(axis=0))
+        return largest
+
+    @cached_property
+    def _free_strains(self) -> Float:
+        """(m, v) sizes of the strains that the loads make: their own, and of the others the largest of free bodies.
+
+        A soft body that expands hardly moves a stiff one, but its free motion is what the dual problem has to close.
+        Collective."""
+        m, stiffnesses = self._solver.problem.strains, self._phases[1]
+        free = np.linalg.solve(stiffnesses[:, :m, :m], stiffnesses[:, :m, m:])
+        return np.hstack([np.eye(m), np.abs(free).max(axis=0)])
+
+    def imposed(self, loads: Float) -> float:
+        """Largest displacement E y that the loads (v,) impose on the cell, or would on a free one.  Collective."""
+        corners = self._size * np.array([[1, 0], [0, 1], [1, 1]])
+        return float(np.abs(corners @ self._solver.problem.gradient(self.imposed_strain(loads)).T).max())
+
+    def stress_scale(self, loads: Float) -> float:
+        """A stress that the loads (v,) would make in the bonded cell at least, whatever their signs.  Collective."""
+        m = self._solver.problem.strains
+        return float(np.abs(self.least_bonded_stiffness[:m, :m] @ self.imposed_strain(loads)).max())
+
+    def imposed_strain(self, loads: Float) -> Float:
+        """(m,) or (m, n) sizes of the strains that the loads (v,) or (v, n) make.  Collective."""
+        return np.asarray(self._free_strains @ np.abs(loads))

@@ -1,0 +1,56 @@
+"""What comes next if the response stays as it is: the first bond that breaks, the first face that closes or opens."""
+
+from __future__ import annotations
+
+import numpy as np
+from mpi4py import MPI
+
+from feti_homog.feti.dual_solution import DualSolution
+from feti_homog.interface.contact.contact_problem import BONDED, CLOSED, OPEN, Equilibrium, Interface
+from feti_homog.interface.contact.floating_bodies import room_ahead, shares_to_zero
+from feti_homog.interface.contact.loaded_cell import LoadedCell
+from feti_homog.interface.laws.bond_criterion import BondCriterion
+from feti_homog.interface.loads.solutions import Solutions
+
+# Halvings of an interval of length one, after which double precision tells no more.
+BISECTIONS = 60
+
+
+def first_break(cell: LoadedCell, criterion: BondCriterion, state: Equilibrium, ahead: Solutions) -> float:
+    """Share of the way to `ahead` at which the first bond reaches its strength, or inf.  Collective.
+
+    Utilisation is convex along a straight way, so below 1 here and above 1 there it passes 1 once: bisection.
+    """
+    here, there = cell.traction(state.solutions), cell.traction(ahead)
+    utilisation = criterion.law(cell, state.status)
+    over = (state.status == BONDED) & (utilisation(there) > 1.0)
+    step, low, high = there - here, np.zeros(len(here)), np.ones(len(here))
+    for _ in range(BISECTIONS if over.any() else 0):
+        middle = (low + high) / 2
+        broken = utilisation(here + middle[:, None] * step) > 1.0
+        low, high = np.where(broken, low, middle), np.where(broken, middle, high)
+    return float(cell.comm.allreduce(high[over].min(initial=np.inf), MPI.MIN))
+
+
+def first_change(interface: Interface, state: Equilibrium, ahead: DualSolution) -> tuple[float, float]:
+    """Shares of the way to `ahead` at which the contact begins to change, and at which that is beyond doubt; or 1, 1.
+
+    Beyond doubt means that a tension or an overlap is twice what counts as the solver's error.  A closed node opens
+    when its force is none; open nodes of a fibre that is held close when their gap is none, those of a free
+    fibre when it has no more room (its gaps are not unique).  Collective.
+    """
+    if not interface.contact:
+        return 1.0, 1.0
+    solver, nodes = interface.solver, interface.nodes
+    tension = np.maximum(interface.force_noise(state.solution), interface.force_noise(ahead))
+    closed = state.status == CLOSED
+    shares = [shares_to_zero(-state.solution.lam[nodes.row][closed], -ahead.lam[nodes.row][closed], tension[closed])]
+    is_open, here, there = state.status == OPEN, state.solution.jump[nodes.row], ahead.jump[nodes.row]
+    noise = max(interface.gap_noise(state.solution.strain), interface.gap_noise(ahead.strain))
+    if solver.natural.unconstrained_modes.shape[1]:
+        shares.append(room_ahead(solver.comm, solver.natural, nodes, is_open, here, there, noise))
+    else:
+        shares.append(shares_to_zero(here[is_open], there[is_open], noise))
+    least = np.min(shares, axis=0)
+    solver.comm.Allreduce(MPI.IN_PLACE, least, MPI.MIN)
+    return float(least[0]), float(least[1])

@@ -1,0 +1,126 @@
+"""Load-induced debonding, Section III.F: the load follows a path, bonds over their strength break.
+
+`events` finds every break exactly.  The first leg of the path starts at zero, where for zero initial gaps the
+response is homogeneous of degree one: one solve gives the load at which the next bond breaks, be it lower than
+the last (snap-back).  On later legs it is the load that is controlled, see `later_leg`.  `increments` is the paper's
+loop.
+
+Energy.  A break happens at constant load, at which stresses or strains jump, and loses work less stored energy; between
+breaks nothing is lost.  A point's `energies` are those of the way from the last point's state to its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from feti_homog.interface.contact.loaded_cell import LoadedCell
+from feti_homog.interface.laws.bond_criterion import BondCriterion
+from feti_homog.interface.loads.load import Load
+from feti_homog.interface.path.later_leg import LaterLeg
+from feti_homog.interface.path.path_points import (
+    NO_ENERGIES,
+    UTILISATION_TIE,
+    Energies,
+    PathState,
+    Point,
+    count_on_all_ranks,
+    fracture_energy,
+    most_utilised,
+)
+
+
+def events(cell: LoadedCell, criterion: BondCriterion, waypoints: Sequence[Load], begin: PathState) -> Iterator[Point]:
+    """Every break along zero -> waypoints[0] -> ..., and the end of each leg.  Collective.
+
+    A leg begins with what the state has of the components that its waypoint gives, strain or stress.  A point's state
+    is the one before its bonds break.  On later legs the changes of contact are points too, with `broke` = 0: between
+    points the response is straight.  The last point is one that did not converge, if there is one.
+    """
+    for point in _legs(cell, criterion, waypoints, begin):
+        yield point
+        if not point.state.converged:
+            # What breaks next cannot be decided on a state that does not hold.
+            return
+
+
+def increments(
+    cell: LoadedCell,
+    criterion: BondCriterion,
+    waypoints: Sequence[Load],
+    steps: int,
+    worst_only: bool,
+    begin: PathState,
+) -> Iterator[Point]:
+    """The paper's loop: at each of `steps` equal load steps, release overloaded bonds until none is left.
+
+    A point's state is the one after its bonds broke.  `begin.leg` is the number of steps done.  With `worst_only`
+    just the most overloaded bonds are released at a time.  The last point is one that did not converge, if there is
+    one.
+    """
+    for step in range(begin.leg + 1, steps + 1):
+        leg = (step * len(waypoints) - 1) // steps
+        begins_here = ((step - 1) * len(waypoints) - 1) // steps < leg
+        origin, end = begin.last if begins_here else begin.origin, waypoints[leg]
+        start = cell.leg_start(origin, waypoints[leg - 1] if leg else None, end)
+        load = start.after(step * len(waypoints) / steps - leg, end)
+        point = _increment(cell, criterion, load, worst_only, begin)
+        after = PathState(step, 0.0, point.state.status, point.state.multipliers, origin, point.after.last)
+        begin = after
+        yield Point(step / steps, 1.0, point.state, point.broke, point.energies, point.used, after)
+        if not point.state.converged:
+            return
+
+
+def _increment(cell: LoadedCell, criterion: BondCriterion, load: Load, worst_only: bool, begin: PathState) -> Point:
+    """The state under a load after all overloaded bonds have broken."""
+    status, lam, here, broke = begin.status, begin.lam, begin, 0
+    energies = NO_ENERGIES
+    while True:
+        state = cell.equilibrium(load, status, lam)
+        status, lam, reached = state.status, state.multipliers, cell.macroscopic(state.solutions)
+        energies = energies.plus(here.energies_to(reached))
+        used, largest, which = most_utilised(cell, criterion, state)
+        here = PathState(begin.leg, 0.0, status, lam, begin.origin, reached)
+        if largest <= 1.0 + UTILISATION_TIE or not state.converged:
+            return Point(0.0, 1.0, state, broke, energies, used, here)
+        if not worst_only:
+            which = used > 1.0
+        fracture = fracture_energy(cell, criterion, which, cell.traction(state.solutions))
+        broke += count_on_all_ranks(cell, which)
+        status = cell.plane.debond(status, which, lam.plane)
+        here = PathState(begin.leg, 0.0, status, lam, begin.origin, reached, fracture)
+
+
+def _legs(cell: LoadedCell, criterion: BondCriterion, waypoints: Sequence[Load], begin: PathState) -> Iterator[Point]:
+    legs = len(waypoints)
+    if begin.leg == 0:
+        for point in _first_leg(cell, criterion, waypoints[0], legs, begin):
+            yield point
+            begin = point.after
+    for leg in range(max(begin.leg, 1), legs):
+        for point in LaterLeg(cell, criterion, waypoints, leg, begin).points():
+            yield point
+            begin = point.after
+
+
+def _first_leg(cell: LoadedCell, criterion: BondCriterion, load: Load, legs: int, begin: PathState) -> Iterator[Point]:
+    """From zero to the load through all equilibria; with the bonds of now, a state under t times the load is t times
+    the state, for t >= 0."""
+    factor = begin.position
+    while True:
+        state = cell.equilibrium(load, begin.status, begin.lam)
+        whole, lam = cell.macroscopic(state.solutions), state.multipliers
+        here = whole.scaled(factor)
+        energies = begin.energies_to(here)
+        used, largest, worst = most_utilised(cell, criterion, state)
+        factor = 1.0 / max(largest, 1.0)
+        reached = whole.scaled(factor)
+        energies = energies.plus(Energies(reached.stored - here.stored, 0.0, 0.0))
+        if largest <= 1.0:
+            after = PathState(1, 0.0, state.status, lam, reached, reached)
+            yield Point(1.0 / legs, 1.0, state, 0, energies, used, after)
+            return
+        fracture = fracture_energy(cell, criterion, worst, cell.traction(state.solutions))
+        broke, status = count_on_all_ranks(cell, worst), cell.plane.debond(state.status, worst, lam.plane)
+        begin = PathState(0, factor, status, lam, begin.origin, reached, fracture)
+        yield Point(factor / legs, factor, state, broke, energies, used / largest, begin)

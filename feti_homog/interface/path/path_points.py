@@ -1,0 +1,120 @@
+"""Points of a path of load, from where it goes on, and which bonds break under a state."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from mpi4py import MPI
+
+from feti_homog.interface.contact.contact_problem import BONDED, Equilibrium, Status
+from feti_homog.interface.contact.loaded_cell import LoadedCell
+from feti_homog.interface.laws.bond_criterion import BondCriterion, spring_criterion
+from feti_homog.interface.loads.macroscopic import Macroscopic
+from feti_homog.interface.loads.solutions import Multipliers
+from feti_homog.typing import Bool, Float
+
+# Bonds whose utilisation differs by no more than this, relatively, break together: those of a symmetric cell do, but
+# for the solver's error.
+UTILISATION_TIE = 1e-6
+
+
+@dataclass(frozen=True)
+class PathState:
+    """Where a path stands, enough to go on from.
+
+    Attributes:
+        leg, position: the load is the share `position`, 0..1, of the way to waypoint `leg`; of increments, `leg` is the
+            number of those done.
+        status, lam: contact states (k,) and multipliers to begin with.
+        origin: where the leg began.
+        last: the last point's state.
+        broken: toughness G_c of the bonds that broke there, in the mode in which each broke, times its length, per area
+            of the cell, 0 of bonds without toughness; None if none broke.
+    """
+
+    leg: int
+    position: float
+    status: Status
+    lam: Multipliers
+    origin: Macroscopic
+    last: Macroscopic
+    broken: float | None = None
+
+    def energies_to(self, here: Macroscopic) -> Energies:
+        """Those of the way from the last point's state to one under the load at which this stands.
+
+        The response between them may bend where contact changes, but that loses nothing: the work is what is stored or
+        lost."""
+        lost = 0.0 if self.broken is None else self.last.released_to(here)
+        return Energies(here.stored - self.last.stored + lost, lost, self.broken or 0.0)
+
+
+class Energies(NamedTuple):
+    """Energies per area of the cell of a part of a path: the work of the loads, what breaks lost of it, and the
+    fracture energy of these breaks."""
+
+    work: float
+    released: float
+    fracture: float
+
+    def plus(self, more: Energies) -> Energies:
+        """Those of two parts."""
+        return Energies(*(a + b for a, b in zip(self, more, strict=True)))
+
+
+NO_ENERGIES = Energies(0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Point:
+    """A point of the path.
+
+    Attributes:
+        load_factor: position on the whole path, 0 to 1, every leg taking the same share.
+        scale: the state is `scale` times the equilibrium `state`.
+        state: that equilibrium.
+        broke: number of bonds that break at this state, after it; of increments, that broke in the step, before it.
+        energies: between the last point's state and this one.
+        used: (k,) share of their strength that bonds use in the state, 0 where there are none.
+        after: from where the path goes on.
+    """
+
+    load_factor: float
+    scale: float
+    state: Equilibrium
+    broke: int
+    energies: Energies
+    used: Float
+    after: PathState
+
+
+def unloaded(cell: LoadedCell, status: Status) -> PathState:
+    """The beginning of a path with the debonded nodes of `status`."""
+    nothing = Macroscopic(np.zeros(len(cell.loads)), np.zeros(len(cell.loads)))
+    return PathState(0, 0.0, status, cell.no_multipliers(), nothing, nothing)
+
+
+def fracture_energy(cell: LoadedCell, criterion: BondCriterion, which: Bool, traction: Float) -> float:
+    """Toughness times length of the bonds of `which` (k,) under tractions (k, c) of any size, per area; collective."""
+    springs = spring_criterion(criterion)
+    if springs is None:
+        return 0.0
+    energy = float(springs.at(np.flatnonzero(which)).fracture_toughness(traction[which]) @ cell.nodes.length[which])
+    return float(cell.comm.allreduce(energy) / cell.area)
+
+
+def most_utilised(cell: LoadedCell, criterion: BondCriterion, state: Equilibrium) -> tuple[Float, float, Bool]:
+    """(k,) share of strength that the nodes of this rank use, 0 of debonded ones; the largest of all, and which (k,)
+    have it.  Collective, rank 0 decides."""
+    comm = cell.comm
+    used = criterion.law(cell, state.status)(cell.traction(state.solutions))
+    used = np.where(state.status == BONDED, used, 0.0)
+    largest = comm.bcast(comm.reduce(used.max(initial=0.0), MPI.MAX))
+    return used, float(largest), (used >= largest * (1.0 - UTILISATION_TIE)) & (used > 0.0)
+
+
+def count_on_all_ranks(cell: LoadedCell, which: Bool) -> int:
+    """Number of nodes of `which` (k,) on all ranks; collective."""
+    return int(cell.comm.allreduce(int(which.sum())))

@@ -1,0 +1,113 @@
+"""Debonded arcs: where their tips are, and which nodes of the interface are within them.
+
+Directions are degrees about the centre of a fibre, from x1 towards x2.  The tips of an arc stay bonded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+
+import numpy as np
+
+from feti_homog.case.interface_section import Arc
+from feti_homog.case.wording import toml_value
+from feti_homog.typing import Bool, Float, Int
+
+# A node this near to a tip, in degrees, is the tip: coordinates in files and of circles are rounded.
+TIP_TOLERANCE_DEGREES = 1e-6
+
+# Number of a fibre and direction of a tip, as `tips` has it -> where the mesh has it.
+MovedTips = Mapping[tuple[int, float], float]
+NOT_MOVED: MovedTips = MappingProxyType({})
+
+
+def tips(arcs: Sequence[Arc], values: Sequence[float], fibres: int) -> dict[int, list[float]]:
+    """Directions in [0, 360) of the tips of arcs on each of so many fibres, which are here numbered from 0.
+
+    An arc without an angle has every one of `values` in turn. Openings of 0 and 360 degrees have no tips.
+    """
+    marks: dict[int, set[float]] = {}
+    for arc in arcs:
+        halves = [opening / 2 for opening in (values if arc.angle is None else (arc.angle,)) if 0 < opening < 360]
+        ends = {_end(arc, side * half) for half in halves for side in (-1, 1)}
+        for fibre in range(1, fibres + 1) if isinstance(arc.fibre, str) else arc.fibre:
+            marks.setdefault(fibre - 1, set()).update(ends)
+    return {fibre: sorted(marks[fibre]) for fibre in sorted(marks) if marks[fibre]}
+
+
+def angles(points: Float, fibre: Int, centres: Float, period: Float) -> Float:
+    """Directions (k,) in (-180, 180] of points (k, 2) from the nearest image of centres[fibre], (c, 2).
+
+    NaN where the fibre has no centre.
+    """
+    offset = points - centres[fibre]
+    offset -= np.round(offset / period) * period
+    return np.asarray(np.degrees(np.arctan2(offset[:, 1], offset[:, 0])))
+
+
+def moved_tips(marks: Mapping[int, Sequence[float]], fibre: Int, direction: Float, most: float) -> MovedTips:
+    """Tips of `tips` that a mesh has elsewhere, by `most` degrees at most: at the nearest of its vertices, which lie on
+    the fibres `fibre` (k,), numbered from 1, in the directions (k,)."""
+    moved = {}
+    for number, ends in marks.items():
+        own = direction[fibre == number + 1]
+        for end in ends:
+            away = (own - end + 180.0) % 360.0 - 180.0
+            nearest = away[np.argmin(np.abs(away))] if len(away) else np.inf
+            if TIP_TOLERANCE_DEGREES < abs(nearest) <= most:
+                moved[number + 1, end] = end + float(nearest)
+    return moved
+
+
+def debonded(
+    arcs: Sequence[Arc], opening: float | None, fibre: Int, angle: Float, moved: MovedTips = NOT_MOVED
+) -> Bool:
+    """Whether nodes are within an arc of their fibre: (k,) for the fibres' numbers from 1 and directions (k,).
+
+    `opening` is that of arcs without an angle; `moved` says which tips the mesh has elsewhere.
+    """
+    inside = np.zeros(len(fibre), bool)
+    for arc in arcs:
+        whole = opening if arc.angle is None else arc.angle
+        if whole is None:
+            raise ValueError("an arc without an angle needs an opening")
+        start, stop = (_ends(arc, side * whole / 2, fibre, moved) for side in (-1, 1))
+        away = (angle - start) % 360.0
+        within = (away > TIP_TOLERANCE_DEGREES) & (away < stop - start - TIP_TOLERANCE_DEGREES)
+        within = (within & (0 < whole < 360)) | (whole >= 360.0)
+        inside |= within & (np.isin(fibre, arc.fibre) if isinstance(arc.fibre, tuple) else True)
+    return inside
+
+
+def _end(arc: Arc, half: float) -> float:
+    """Direction in [0, 360) of the tip of an arc that is `half` away from its centre."""
+    return round(arc.centre + half, 9) % 360.0
+
+
+def _ends(arc: Arc, half: float, fibre: Int, moved: MovedTips) -> Float:
+    """(k,) directions of that tip on the fibres (k,), without the turn that brings it to [0, 360)."""
+    ends, key = np.full(len(fibre), arc.centre + half), _end(arc, half)
+    for (number, end), actual in moved.items():
+        if end == key:
+            ends[fibre == number] += actual - end
+    return ends
+
+
+def faults(arcs: Sequence[Arc], centres: Float, label: str = "interface") -> list[str]:
+    """What is wrong with the arcs of the interface of this label on a cell whose fibres have these centres (fibres, 2),
+    NaN where there is none."""
+    found = []
+    for place, arc in enumerate(arcs):
+        chosen = range(1, len(centres) + 1) if isinstance(arc.fibre, str) else arc.fibre
+        written = arc.fibre if isinstance(arc.fibre, str) or len(arc.fibre) > 1 else arc.fibre[0]
+        line = f"[{label}] debonded[{place}].fibre = {toml_value(written)}: "
+        if max(chosen, default=0) > len(centres):
+            found.append(f"{line}expected at most {len(centres)}; the cell has {len(centres)} fibres, counted from 1")
+        winding = [number for number in chosen if number <= len(centres) and np.isnan(centres[number - 1, 0])]
+        if winding and arc.angle not in (0.0, 360.0):
+            found.append(
+                f"{line}fibre {winding[0]} has no centre, for it winds around the cell; expected angle = 360, or "
+                'a physical curve "debonded" in the mesh'
+            )
+    return found

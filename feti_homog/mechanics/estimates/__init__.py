@@ -1,4 +1,0 @@
-"""Closed estimates of the constants of a unidirectional composite, from its phases and their fractions alone.
-
-May use what `mechanics` may.  Main entries: `methods.estimates` and `fibre_bounds.fibre_bounds`.
-"""

@@ -1,0 +1,135 @@
+"""The coarse periodic mesh of a rectangular cell, as it is made on rank 0."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from feti_homog.fibres.ellipses import Ellipses
+from feti_homog.mesh.periodic_sides import paired_sides
+from feti_homog.typing import Float, Int, Int32
+
+
+@dataclass(frozen=True)
+class CoarseMesh:
+    """Conforming periodic mesh of straight triangles on the cell [0, width] x [0, height]; on rank 0 only.
+
+    Attributes:
+        width, height: periods of the cell.
+        points: (n, 2) nodes in the plane.
+        triangles: (m, 3) counter-clockwise; none has two edges on the same circle.
+        phase: (m,) index into `phases`, whose first name is "matrix".
+        precedence: (m,) in whose order the constituents of the triangles are numbered, 0 in the matrix: the fibre's
+            number, or the phase where fibres have none.
+        representative: (n,) node that stands for the class of a node on the torus: x = width -> x = 0,
+            y = height -> y = 0; idempotent.
+        ellipses: k circles and ellipses in the plane; periodic images are listed separately.
+        arc_edges: (a, 2) edges of the mesh whose ends lie on one of them, to rounding.
+        arc_circle: (a,) that one.
+        debonded_edges: (d, 2) edges between a fibre and the matrix that are debonded from the start.
+        snapped: how far a node of a user's mesh was moved to make sides match, at most.
+        unused_curves: the curves of a user's mesh that nothing uses, in a line.
+        centres: (fibres, 2) of fibres whose precedence is their number from 1, where they are known, else None; those
+            of their coatings are behind them in the same order.
+    """
+
+    width: float
+    height: float
+    points: Float
+    triangles: Int32
+    phase: Int32
+    phases: tuple[str, ...]
+    precedence: Int32
+    representative: Int32
+    ellipses: Ellipses
+    arc_edges: Int32
+    arc_circle: Int32
+    debonded_edges: Int32
+    snapped: float = 0.0
+    unused_curves: tuple[str, ...] = ()
+    centres: Float | None = None
+
+    @property
+    def period(self) -> Float:
+        """(2,) width and height."""
+        return np.array([self.width, self.height])
+
+    @property
+    def circles(self) -> Float:
+        """(k, 3) centre and radius of the ellipses, NaN where these are not round."""
+        return self.ellipses.circles
+
+
+def areas(points: Float, triangles: Int32) -> Float:
+    """Signed areas (m,) of triangles, positive counter-clockwise."""
+    a, b, c = (points[triangles[:, i]] for i in range(3))
+    u, v = b - a, c - a
+    return np.asarray(0.5 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]))
+
+
+def edges(triangles: Int32) -> Int32:
+    """Directed edges (3m, 2): edge i of triangle t, opposite to its corner i, is row 3 t + i."""
+    return triangles[:, [1, 2, 2, 0, 0, 1]].reshape(-1, 2)
+
+
+def edge_keys(pairs: Int32, nodes: int) -> Int:
+    """One integer for each undirected edge (k, 2) of a mesh with that many nodes."""
+    ordered = np.sort(pairs, axis=1).astype(np.int64)
+    return ordered[:, 0] * nodes + ordered[:, 1]
+
+
+def representatives(points: Float, width: float, height: float) -> Int32:
+    """Class representative (n,) of each node, for a mesh whose opposite sides match exactly.
+
+    A node at x = width has the class of its partner at x = 0, one at y = height that of its partner at y = 0,
+    and the four corners that of the origin.
+    """
+    result = np.arange(len(points), dtype=np.int32)
+    for _, low, high in paired_sides(points, np.array([width, height])):
+        result[high] = low
+    return result[result]
+
+
+def flip_double_arcs(triangles: Int32, phase: Int32, arc_edges: Int32, arc_circle: Int32, nodes: int) -> Int32:
+    """Triangles (m, 3) after edge flips, such that as few as possible have two edges on the same circle.
+
+    Such a triangle would have an angle of 180 degrees once its edges follow the circle. Its third edge, a
+    chord, is exchanged for the other diagonal of the two triangles beside the chord, in a few rounds.
+    """
+    triangles = triangles.copy()
+    for _ in range(8):
+        bad, corner = double_arcs(triangles, arc_edges, arc_circle, nodes)
+        keys = edge_keys(edges(triangles), nodes)
+        order = np.argsort(keys, kind="stable")
+        chord = 3 * bad + corner
+        first = np.searchsorted(keys[order], keys[chord])
+        pair = np.stack([order[first], order[np.minimum(first + 1, len(keys) - 1)]])
+        other = np.where(pair[0] == chord, pair[1], pair[0])
+        flippable = (keys[other] == keys[chord]) & (phase[other // 3] == phase[bad])
+        _, unique = np.unique(other // 3, return_index=True)
+        once = np.zeros(len(bad), dtype=bool)
+        once[unique] = True
+        chosen = flippable & once & ~np.isin(other // 3, bad)
+        if not chosen.any():
+            break
+        t, s, i, j = bad[chosen], other[chosen] // 3, corner[chosen], other[chosen] % 3
+        tip, a, b = (triangles[t, (i + step) % 3] for step in range(3))
+        far = triangles[s, j]
+        triangles[t] = np.stack([tip, a, far], axis=1)
+        triangles[s] = np.stack([tip, far, b], axis=1)
+    return triangles
+
+
+def double_arcs(triangles: Int32, arc_edges: Int32, arc_circle: Int32, nodes: int) -> tuple[Int32, Int32]:
+    """Triangles with two edges on the same circle, and the corner that these two edges share."""
+    if len(arc_edges) == 0:
+        return np.zeros(0, np.int32), np.zeros(0, np.int32)
+    keys = edge_keys(arc_edges, nodes)
+    order = np.argsort(keys)
+    mine = edge_keys(edges(triangles), nodes)
+    place = order[np.minimum(np.searchsorted(keys[order], mine), len(keys) - 1)]
+    circle = np.where(keys[place] == mine, arc_circle[place], -1).reshape(-1, 3)
+    shared = (np.roll(circle, -1, axis=1) == np.roll(circle, 1, axis=1)) & (np.roll(circle, 1, axis=1) >= 0)
+    bad = np.flatnonzero(shared.any(axis=1))
+    return bad.astype(np.int32), np.argmax(shared[bad], axis=1).astype(np.int32)

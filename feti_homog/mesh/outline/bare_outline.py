@@ -1,0 +1,210 @@
+"""The lines of a cell of round fibres, cut where they meet; their nodes are placed afterwards, by all ranks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from feti_homog.fibres.arrangement import Arrangement
+from feti_homog.fibres.ellipses import Ellipses
+from feti_homog.mesh.lines import Arcs, Segments, on_circle, on_circles
+from feti_homog.mesh.outline.bridges import Bridges, OnCircles
+from feti_homog.mesh.outline.circle_arcs import SAME_PLACE, arcs_within, vertex_angles
+from feti_homog.mesh.outline.curves import MATRIX, Curves, Numbering
+from feti_homog.mesh.outline.edge_samples import WHOLE, EdgeSamples, Sampling, Stations
+from feti_homog.mesh.outline.outline import Outline, crossings, disc_at, images, on_side, side_curves
+from feti_homog.mesh.outline.tip_marks import marked
+from feti_homog.mesh.sizes.graded_size import MeshSizes, SizeField, size_field
+from feti_homog.mesh.sizes.size_field import circle_size
+from feti_homog.parallel.dividing import even
+from feti_homog.typing import Bool, Float, Int
+
+NO_BRIDGES = Bridges(np.zeros((0, 2), np.int64), np.zeros(0))
+
+
+@dataclass(frozen=True)
+class SizedLines:
+    """Lines that get nodes one by one, so that ranks may share them."""
+
+    arcs: Arcs
+    bridges: Segments
+    sampling: Sampling
+
+    def parts(self, count: int) -> list[SizedLines]:
+        """So many parts, in order and of equal numbers of lines."""
+        arcs, bridges = (pairwise(even(len(lines), count)) for lines in (self.arcs, self.bridges))
+        return [
+            SizedLines(self.arcs.chosen(slice(*own)), self.bridges.chosen(slice(*other)), self.sampling)
+            for own, other in zip(arcs, bridges, strict=True)
+        ]
+
+    def stations(self, field: SizeField) -> LineStations:
+        """Where their nodes are.
+
+        Raises:
+            MeshError: there would be more than the sampling allows.
+        """
+        sampled = ((self.arcs, self.sampling.arc), (self.bridges, self.sampling.bridge))
+        found = [
+            EdgeSamples.of(field, lines, least).stations(np.ones(len(lines), np.int64), self.sampling.most_nodes)
+            for lines, least in sampled
+        ]
+        return LineStations(*found)
+
+
+@dataclass(frozen=True)
+class LineStations:
+    """Nodes of `SizedLines`."""
+
+    arcs: Stations
+    bridges: Stations
+
+    @classmethod
+    def joined(cls, parts: Sequence[LineStations], sampling: Sampling) -> LineStations:
+        """Of all parts.
+
+        Raises:
+            MeshError: they are more than the sampling allows.
+        """
+        return cls(
+            Stations.joined([part.arcs for part in parts], sampling.most_nodes),
+            Stations.joined([part.bridges for part in parts], sampling.most_nodes),
+        )
+
+
+@dataclass(frozen=True)
+class BareOutline:
+    """The lines of a cell without nodes but for their ends.
+
+    Attributes:
+        size: (2,) of the cell.
+        circles, disc, around: (k, 3), (k,), (k,) as `outline.images` finds them.
+        places: along each axis the vertices on the sides.
+        vertices: (v, 2) ends of lines.
+        circle: (a,) that each arc is on.
+        lines: arcs, then bridges.
+        field: the size of edges.
+    """
+
+    size: Float
+    circles: Float
+    disc: Int
+    around: Int
+    places: list[Float]
+    vertices: Float
+    circle: Int
+    lines: SizedLines
+    field: SizeField
+
+    @classmethod
+    def of(
+        cls,
+        arrangement: Arrangement,
+        sizes: MeshSizes,
+        marks: Mapping[int, Sequence[float]],
+        bridges: Bridges = NO_BRIDGES,
+        sampling: Sampling = WHOLE,
+    ) -> BareOutline:
+        """Lines whose nodes are to be at distances of at most `sizes`, closer in narrow passages.
+
+        `marks` maps a curve to angles in degrees, measured at its centre, that become nodes: curve k is the outer one
+        of fibre k, and ~k that within its coating. The bridges are the last curves.
+        """
+        size = np.array([arrangement.width, arrangement.height])
+        circles, disc, around = images(arrangement)
+        places = [crossings(circles, axis, size) for axis in (0, 1)]
+        sides = ((axis, level) for axis in (0, 1) for level in (0.0, size[1 - axis]))
+        border = np.concatenate([on_side(places[axis], axis, level) for axis, level in sides])
+        curve = np.where(around == MATRIX, disc, ~disc)
+        angles = vertex_angles(circles, curve, border, marks)
+        # Vertices within coatings are as far from each other as those on the circle around, which they face, unless
+        # marked.
+        sparse = (around != MATRIX) & ~np.isin(curve, list(marks))
+        border_once = np.unique(border, axis=0)
+        outer = np.concatenate([border_once, _arcs(circles, border, angles, size, ~sparse)[1]])
+        # Ends of bridges are where there is room for them, and make nothing finer.
+        angles = tuple(np.concatenate(parts) for parts in zip(angles, bridges.on_circles, strict=True))
+        (circle, start, stop), ends = _arcs(circles, border, angles, size, np.ones(len(circles), bool))
+        vertices = np.concatenate([border_once, ends])
+        field = size_field(arrangement, sizes, outer, _tips(arrangement, marks, vertices))
+        caps = _caps(arrangement, sizes.interface, disc, around)
+        arcs = Arcs(circles[circle], start, stop - start, caps[circle])
+        lines = SizedLines(arcs, _segments(circles, bridges, caps, field), sampling)
+        return cls(size, circles, disc, around, places, vertices, circle, lines, field)
+
+    def stations(self) -> LineStations:
+        """Where the nodes of its lines are, all found here.
+
+        Raises:
+            MeshError: there would be more than the sampling allows.
+        """
+        return self.lines.stations(self.field)
+
+    def outline(self, stations: LineStations) -> Outline:
+        """With these nodes; opposite sides have the same.
+
+        Raises:
+            MeshError: the sides would have more than the sampling allows.
+        """
+        find, numbering, sampling = partial(disc_at, self.circles), Numbering(self.vertices), self.lines.sampling
+        curves = [
+            side_curves(axis, self.places[axis], find, self.around, self.size, self.field, numbering, sampling)
+            for axis in (0, 1)
+        ]
+        arcs, bridges = stations.arcs, stations.bridges
+        node = numbering.along(self.lines.arcs.points(arcs.line, arcs.share), arcs.first)
+        curves.append(Curves(node, arcs.first, self.circle, self.circle, self.around[self.circle]))
+        if len(self.lines.bridges):
+            node = numbering.along(self.lines.bridges.points(bridges.line, bridges.share), bridges.first)
+            straight = np.full(len(self.lines.bridges), MATRIX)
+            curves.append(Curves(node, bridges.first, straight, straight, straight))
+        ellipses = Ellipses.round(self.circles)
+        return Outline(numbering.points(), Curves.joined(curves), ellipses, self.disc, self.around)
+
+
+def _arcs(
+    circles: Float, border: Float, vertices: OnCircles, size: Float, chosen: Bool
+) -> tuple[tuple[Int, Float, Float], Float]:
+    """The arcs of `arcs_within`, and the points (v, 2) at which those of the `chosen` (k,) circles begin, but for those
+    on the border, near its points (b, 2)."""
+    arcs = arcs_within(len(circles), *vertices, partial(on_circles, circles), size)
+    ends, same = on_circles(circles, *arcs[:2]), SAME_PLACE * size.max()
+    away = np.all((ends > same) & (ends < size - same), axis=1)
+    beside = np.flatnonzero(~away)
+    away[beside] = cKDTree(border).query(ends[beside])[0] > same
+    return arcs, ends[away & chosen[arcs[0]]]
+
+
+def _caps(arrangement: Arrangement, largest: float, disc: Int, around: Int) -> Float:
+    """Largest edge length (k,) on the circles of these discs (k,) with these circles around (k,)."""
+    first = np.unique(arrangement.circles[1], return_index=True)[1]
+    return np.asarray(circle_size(arrangement, largest)[first[disc] + (around != MATRIX)])
+
+
+def _segments(circles: Float, bridges: Bridges, caps: Float, field: SizeField) -> Segments:
+    """The bridges between circles, on which edges are at most `caps` (k,).
+
+    Where elements are not graded, edges are no longer than the sizes at both ends, interpolated: so gmsh does it across
+    the matrix.
+    """
+    begin, end = (on_circles(circles, bridges.ends[:, k], bridges.angle + k * np.pi) for k in (0, 1))
+    longest = np.full((len(begin), 2), field.base.largest)
+    if field.graded is None:
+        longest = np.stack(
+            [np.minimum(field.at(at), caps[bridges.ends[:, k]]) for k, at in enumerate((begin, end))], axis=1
+        )
+    return Segments(begin, end - begin, longest)
+
+
+def _tips(arrangement: Arrangement, marks: Mapping[int, Sequence[float]], vertices: Float) -> Float:
+    """The vertices (t, 2) that the marks have become; those of curves that are not there are none."""
+    curve, angle = marked(arrangement, marks)
+    size, fibre = np.array([arrangement.width, arrangement.height]), np.where(curve < 0, ~curve, curve)
+    radii = np.where(curve < 0, arrangement.radii[fibre], arrangement.outer_radii[fibre])
+    places = on_circle(np.column_stack([arrangement.centres[fibre], radii]), angle)
+    return np.asarray(vertices[cKDTree(vertices % size, boxsize=size).query(places % size)[1]])

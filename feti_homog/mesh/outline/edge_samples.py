@@ -1,0 +1,136 @@
+"""Where the nodes of a curve are: at distances that follow the size of edges along it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from feti_homog.errors import MeshError
+from feti_homog.mesh.lines import Lines
+from feti_homog.mesh.sizes.graded_size import SizeField
+from feti_homog.typing import Float, Int
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """How sizes are sampled: at so many positions along an arc, a piece of a side and a bridge, and for at most so many
+    nodes on all arcs, on the sides along one axis, and on all bridges."""
+
+    arc: int
+    side: int
+    bridge: int
+    most_nodes: int
+
+
+# Of a cell that one rank meshes in minutes, and of one that all ranks mesh: there an arc is a few edges long.
+WHOLE, IN_TILES = Sampling(65, 513, 17, 120_000), Sampling(17, 129, 17, 3_000_000)
+
+
+@dataclass(frozen=True)
+class Stations:
+    """Where the nodes of c lines are.
+
+    Attributes:
+        share: (n,) of the lengths of the lines, from 0 to 1.
+        first: (c + 1,) those of line k are from first[k] up to first[k + 1].
+        edges: int ds / h over all lines.
+    """
+
+    share: Float
+    first: Int
+    edges: float
+
+    @property
+    def line(self) -> Int:
+        """(n,) the line that each is on."""
+        return np.repeat(np.arange(len(self.first) - 1), np.diff(self.first))
+
+    @classmethod
+    def joined(cls, parts: Sequence[Stations], most: int) -> Stations:
+        """Of all these lines, one after the other.
+
+        Raises:
+            MeshError: they have more than `most` edges together.
+        """
+        edges = sum(part.edges for part in parts)
+        _refuse_many(edges, most)
+        counts = np.concatenate([np.diff(part.first) for part in parts])
+        return cls(np.concatenate([part.share for part in parts]), np.concatenate([[0], np.cumsum(counts)]), edges)
+
+
+def _refuse_many(edges: float, most: int) -> None:
+    if edges > most:
+        raise MeshError(
+            f"[cell] the lines of the cell need about {edges:.2g} nodes; expected at most "
+            f"{most}: make mesh_size and interface_size larger, or fibre_fraction or fibres smaller"
+        )
+
+
+@dataclass(frozen=True)
+class EdgeSamples:
+    """The size of edges h sampled along c lines: at the shares `share` (n,) of their lengths there is ds / h `density`
+    (n,); those of line k are from first[k] up to first[k + 1].  Those of a line depend on it and on the sizes alone."""
+
+    share: Float
+    density: Float
+    first: Int
+
+    @classmethod
+    def of(cls, field: SizeField, lines: Lines, least: int) -> EdgeSamples:
+        """Samples at `least` equidistant positions, and between them as far as the field asks for more."""
+        lengths = lines.lengths
+        count = len(lengths)
+        line, share = np.repeat(np.arange(count), least), np.tile(np.linspace(0, 1, least), count)
+        along = lines.points(line, share).reshape(count, least, 2)
+        sizes = np.minimum(field.on_lines(along).ravel(), lines.caps(line, share))
+        while True:
+            way = np.diff(share) * lengths[line[:-1]]
+            wide = (np.diff(line) == 0) & (way > field.step * np.minimum(sizes[:-1], sizes[1:]))
+            if not wide.any():
+                break
+            at = np.flatnonzero(wide) + 1
+            between, own = (share[at - 1] + share[at]) / 2, line[at]
+            more = np.minimum(field.at(lines.points(own, between)), lines.caps(own, between))
+            line, share, sizes = (np.insert(*x) for x in ((line, at, own), (share, at, between), (sizes, at, more)))
+        return cls(share, lengths[line] / sizes, np.searchsorted(line, np.arange(count + 1)))
+
+    def stations(self, least: Int, most: int) -> Stations:
+        """Nodes equidistant in ds / h, so that lines have `least` (c,) edges or more.
+
+        Raises:
+            MeshError: there would be more than `most`.
+        """
+        measure = self._measures()
+        whole = measure[self.first[1:] - 1]
+        _refuse_many(total := float(whole.sum()), most)
+        edges = np.maximum(np.ceil(whole - 1e-6).astype(int), least)
+        first = np.concatenate([[0], np.cumsum(edges + 1)])
+        line = np.repeat(np.arange(len(edges)), edges + 1)
+        target = (np.arange(first[-1]) - first[line]) * (whole / edges)[line]
+        target[first[1:] - 1] = whole
+        return Stations(self._at(measure, line, target), first, total)
+
+    def _measures(self) -> Float:
+        """(n,) int ds / h from the beginning of the line, by the trapezoidal rule."""
+        measure, counts = np.zeros(len(self.share)), np.diff(self.first)
+        for count in np.unique(counts):
+            rows = self.first[:-1][counts == count, None] + np.arange(count)
+            d, s = self.density[rows], self.share[rows]
+            measure[rows[:, 1:]] = np.cumsum((d[:, 1:] + d[:, :-1]) / 2 * np.diff(s, axis=1), axis=1)
+        return measure
+
+    def _at(self, measure: Float, line: Int, target: Float) -> Float:
+        """The positions (m,) where the measure of lines (m,) is `target` (m,), linear between samples."""
+        last = self.first[1:] - 1
+        # All in one ascending row, the lines 1 apart; the rounding of large sums may miss an interval by one.
+        shift = np.concatenate([[0.0], np.cumsum(measure[last] + 1)])[: len(last)]
+        row = measure + np.repeat(shift, np.diff(self.first))
+        j = np.searchsorted(row, target + shift[line], side="right") - 1
+        j = np.clip(j, self.first[line], last[line] - 1)
+        j = np.maximum(j - (measure[j] > target), self.first[line])
+        j = np.minimum(j + (measure[j + 1] <= target), last[line] - 1)
+        slope = (self.share[j + 1] - self.share[j]) / (measure[j + 1] - measure[j])
+        at = slope * (target - measure[j]) + self.share[j]
+        return np.where(target == measure[last[line]], 1.0, at)

@@ -1,0 +1,176 @@
+"""The lines of a cell with ellipses: its sides and the arcs in it, cut where they meet, with nodes on them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from itertools import product
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from feti_homog.fibres.arrangement import Arrangement
+from feti_homog.fibres.ellipses import Ellipses, directions
+from feti_homog.mesh.outline.bridges import TURN
+from feti_homog.mesh.outline.circle_arcs import MERGED, SAME_PLACE, arcs_within
+from feti_homog.mesh.outline.curves import MATRIX, Curves, Numbering
+from feti_homog.mesh.outline.edge_samples import WHOLE, EdgeSamples
+from feti_homog.mesh.outline.outline import Outline, on_side, side_curves
+from feti_homog.mesh.outline.tip_marks import marked
+from feti_homog.mesh.sizes.elliptic_size import size_field
+from feti_homog.mesh.sizes.graded_size import MeshSizes
+from feti_homog.typing import Float, Int
+
+# Steps of a quarter of an ellipse between which its length is taken to be linear.
+LENGTH_STEPS = 256
+
+
+def outline(arrangement: Arrangement, sizes: MeshSizes, marks: Mapping[int, Sequence[float]]) -> Outline:
+    """As `BareOutline.of`, with the nodes on its lines."""
+    size = np.array([arrangement.width, arrangement.height])
+    ellipses, fibre, around = _images(arrangement, size)
+    places = [_crossings(ellipses, axis, size) for axis in (0, 1)]
+    sides = ((axis, level) for axis in (0, 1) for level in (0.0, size[1 - axis]))
+    border = np.concatenate([on_side(places[axis], axis, level) for axis, level in sides])
+    curve = np.where(around == MATRIX, fibre, ~fibre)
+    angles, sharp = _vertex_angles(ellipses, curve, border, size, marks)
+    which, start, stop = arcs_within(len(fibre), *angles, lambda of, angle: ellipses[of].at(angle), size)
+    ends = ellipses[which].at(start)
+    away = cKDTree(border).query(ends)[0] > SAME_PLACE * size.max()
+    border = np.unique(border, axis=0)
+    numbering = Numbering(np.concatenate([border, ends[away]]))
+    # Vertices within coatings are as far from each other as those on the ellipse around, which they face, or marked.
+    sparse = (around != MATRIX) & ~np.isin(curve, list(marks))
+    outer = np.concatenate([border, ends[away & ~sparse[which]]])
+    tips = _tips(arrangement, marks, numbering.vertices, size)
+    field = size_field(arrangement, sizes, outer, sharp, tips)
+    find = partial(_ellipse_at, ellipses)
+    curves = [side_curves(axis, places[axis], find, around, size, field, numbering, WHOLE) for axis in (0, 1)]
+    arcs = _EllipticArcs.of(ellipses[which], start, stop, sizes.interface)
+    stations = EdgeSamples.of(field, arcs, WHOLE.arc).stations(np.ones(len(which), np.int64), WHOLE.most_nodes)
+    node = numbering.along(arcs.points(stations.line, stations.share), stations.first)
+    curves.append(Curves(node, stations.first, which, which, around[which]))
+    return Outline(numbering.points(), Curves.joined(curves), ellipses, fibre, around)
+
+
+def _images(arrangement: Arrangement, size: Float) -> tuple[Ellipses, Int, Int]:
+    """Periodic images that may reach into the cell, their fibres (k,), and the ellipses around them (k,).
+
+    Fibre by fibre, the ellipses of each image one after the other, from without.
+    """
+    steps = np.array(list(product((-1, 0, 1), repeat=2)))
+    order = arrangement.mesh_order
+    fibre = np.repeat(np.arange(len(arrangement.radii)) if order is None else order, len(steps))
+    shift = np.tile(steps, (len(arrangement.radii), 1)) * size
+    inner = Ellipses(arrangement.centres[fibre] + shift, arrangement.ellipses.frames[fibre])
+    outer = inner.grown(arrangement.thickness[fibre])
+    near = np.all((outer.centres + outer.reach > 0) & (outer.centres - outer.reach < size), axis=1)
+    coated = arrangement.coated[fibre[near]]
+    place = np.arange(len(coated)) + np.cumsum(coated) - coated
+    rank = np.argsort(np.concatenate([place, place[coated] + 1]))
+    around = np.concatenate([np.full(len(coated), MATRIX), place[coated]])
+    owner = np.concatenate([fibre[near], fibre[near][coated]])
+    return outer[near].joined(inner[near][coated])[rank], owner[rank], around[rank]
+
+
+def _crossings(ellipses: Ellipses, axis: int, size: Float) -> Float:
+    """Sorted coordinates along `axis` of the vertices on the side at 0: corners and crossings of ellipses.
+
+    d = x - c with the known component v obeys d . (F F^T)^-1 d = 1.
+    """
+    inverse, other = np.linalg.inv(ellipses.squares), 1 - axis
+    v, centre = -ellipses.centres[:, other], ellipses.centres[:, axis]
+    p, q = inverse[:, axis, axis], inverse[:, axis, other] * v
+    root = q**2 - p * (inverse[:, other, other] * v**2 - 1)
+    half = np.sqrt(np.maximum(root, 0.0)) / p
+    crossing = np.concatenate([centre - q / p - half, centre - q / p + half])[np.tile(half > 0, 2)]
+    return np.concatenate([[0.0], np.sort(crossing[(crossing > 0) & (crossing < size[axis])]), [size[axis]]])
+
+
+def _vertex_angles(
+    ellipses: Ellipses, curve: Int, border: Float, size: Float, marks: Mapping[int, Sequence[float]]
+) -> tuple[tuple[Int, Float], tuple[Float, Float]]:
+    """Ellipse (v,) and parameter (v,) in [0, 2 pi) of the vertices of ellipses: crossings of the sides, and the marks.
+
+    Also the crossings (c, 2), and R phi (c,) of the angle between side and ellipse there, whose radius is R.
+    """
+    angles, where, lengths = [np.zeros(0)], [np.zeros((0, 2))], [np.zeros(0)]
+    near = cKDTree(border).query_ball_point(ellipses.centres, ellipses.longest * (1 + SAME_PLACE))
+    for number, (owner, candidates) in enumerate(zip(curve.tolist(), near, strict=True)):
+        places = border[candidates]
+        one = ellipses[np.full(len(places), number)]
+        on_it = np.abs(np.linalg.norm(one.unit(places - one.centres), axis=1) - 1) < SAME_PLACE
+        places, one = places[on_it], one[on_it]
+        own = one.parameter(places - one.centres) % TURN
+        normal = one.normal(own)
+        along = np.where(_on_upright(places, size), normal[:, 0], normal[:, 1])
+        where.append(places)
+        lengths.append(one.bend(normal) * np.arccos(np.minimum(np.abs(along), 1.0)))
+        wanted, offsets = np.radians(marks.get(owner, ())), places - ellipses.centres[number]
+        away = np.abs((wanted[:, None] - np.arctan2(offsets[:, 1], offsets[:, 0]) + np.pi) % TURN - np.pi)
+        wanted = wanted[(away > MERGED).all(axis=1)]
+        mine = ellipses[np.full(len(wanted), number)]
+        angles.append(np.append(own, mine.parameter(directions(wanted)) % TURN))
+    whose = np.repeat(np.arange(len(curve)), [len(own) for own in angles[1:]])
+    return (whose, np.concatenate(angles)), (np.concatenate(where), np.concatenate(lengths))
+
+
+def _on_upright(places: Float, size: Float) -> Float:
+    """(n,) whether positions (n, 2) on the border are on the left or right side."""
+    return np.asarray(np.abs(places[:, 0] - np.clip(np.round(places[:, 0] / size[0]), 0, 1) * size[0]) == 0)
+
+
+def _tips(arrangement: Arrangement, marks: Mapping[int, Sequence[float]], vertices: Float, size: Float) -> Float:
+    """The vertices (t, 2) that the marks have become; those of curves that are not there are none."""
+    curve, angle = marked(arrangement, marks)
+    fibre = np.where(curve < 0, ~curve, curve)
+    own = arrangement.ellipses[fibre].grown(np.where(curve < 0, 0.0, arrangement.thickness[fibre]))
+    places = own.at(own.parameter(directions(angle)))
+    return np.asarray(vertices[cKDTree(vertices % size, boxsize=size).query(places % size)[1]])
+
+
+def _ellipse_at(ellipses: Ellipses, points: Float) -> Int:
+    """The smallest ellipse (k,) around each point, or MATRIX."""
+    holds, area = ellipses.level(points) < 1, np.abs(np.linalg.det(ellipses.frames))
+    return np.where(holds.any(axis=1), np.where(holds, area, np.inf).argmin(axis=1), MATRIX)
+
+
+@dataclass(frozen=True)
+class _EllipticArcs:
+    """As `Lines`.
+
+    Attributes:
+        ellipses: that of each of a arcs.
+        angle, way: (a, k) parameters of equidistant places on each, and the shares of the arc's length there.
+        lengths: (a,) of arcs.
+        cap: longest edge, unless the curvature asks for shorter ones.
+    """
+
+    ellipses: Ellipses
+    angle: Float
+    way: Float
+    lengths: Float
+    cap: float
+
+    @classmethod
+    def of(cls, ellipses: Ellipses, start: Float, stop: Float, cap: float) -> _EllipticArcs:
+        """Between parameters (a,) of ellipses (a,)."""
+        share = np.linspace(0, 1, LENGTH_STEPS + 1)
+        angle = start[:, None] + (stop - start)[:, None] * share
+        places = np.stack([ellipses.at(angle[:, k]) for k in range(len(share))], axis=1)
+        length = np.cumsum(np.linalg.norm(np.diff(places, axis=1), axis=2), axis=1)
+        way = np.column_stack([np.zeros(len(length)), length / length[:, -1:]])
+        return cls(ellipses, angle, way, length[:, -1], cap)
+
+    def points(self, line: Int, share: Float) -> Float:
+        """As in `Lines`."""
+        after = np.clip((self.way[line] <= share[:, None]).sum(axis=1), 1, LENGTH_STEPS)
+        low, high = self.way[line, after - 1], self.way[line, after]
+        part = (share - low) / (high - low)
+        parameter = self.angle[line, after - 1] * (1 - part) + self.angle[line, after] * part
+        return self.ellipses[line].at(parameter)
+
+    def caps(self, line: Int, share: Float) -> Float:
+        """As in `Lines`."""
+        return np.full(len(line), self.cap)

@@ -1,0 +1,140 @@
+"""The lines of a cell with nodes on them, and what of them is found before: images, crossings, pieces of sides."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from feti_homog.fibres.arrangement import Arrangement
+from feti_homog.fibres.ellipses import Ellipses
+from feti_homog.mesh.lines import Segments
+from feti_homog.mesh.outline.curves import MATRIX, OUTSIDE, Curves, Numbering, backwards
+from feti_homog.mesh.outline.edge_samples import EdgeSamples, Sampling
+from feti_homog.mesh.sizes.graded_size import SizeField
+from feti_homog.typing import Bool, Float, Int
+
+
+@dataclass(frozen=True)
+class Outline:
+    """The lines of a cell.
+
+    Attributes:
+        points: (n, 2) nodes on all lines, exactly in place.
+        curves: through the nodes.
+        ellipses: k circles and ellipses in the plane, the images of one disc after the other, that of a coating before
+            the one within.
+        disc: (k,) the disc of the arrangement that each circle is an image of.
+        around: (k,) the circle around each; MATRIX if there is none.
+    """
+
+    points: Float
+    curves: Curves
+    ellipses: Ellipses
+    disc: Int
+    around: Int
+
+    @property
+    def is_coating(self) -> Bool:
+        """(k,) which circles have a coating within."""
+        return np.isin(np.arange(len(self.around)), self.around)
+
+
+def images(arrangement: Arrangement) -> tuple[Float, Int, Int]:
+    """Circles (k, 3) of the periodic images that reach into the cell, their fibres (k,), the circles around them (k,).
+
+    Fibre by fibre, the circles of each image one after the other, from without.
+    """
+    size = np.array([arrangement.width, arrangement.height])
+    outer, fibre = _outer_images(arrangement, size)
+    coated = arrangement.coated[fibre]
+    inner = np.column_stack([outer[:, :2], arrangement.radii[fibre]])[coated]
+    place = np.arange(len(outer)) + np.cumsum(coated) - coated
+    rank = np.concatenate([place, place[coated] + 1])
+    order = np.argsort(rank)
+    around = np.concatenate([np.full(len(outer), MATRIX), place[coated]])
+    return np.concatenate([outer, inner])[order], np.concatenate([fibre, fibre[coated]])[order], around[order]
+
+
+def _outer_images(arrangement: Arrangement, size: Float) -> tuple[Float, Int]:
+    """Those of the discs with their coatings."""
+    radii = arrangement.outer_radii
+    circles, fibre = [], []
+    for step in product((-1, 0, 1), repeat=2):
+        centres = arrangement.centres + np.array(step) * size
+        outside = centres - np.clip(centres, 0, size)
+        near = np.flatnonzero((outside**2).sum(axis=1) < radii**2)
+        circles.append(np.column_stack([centres[near], radii[near]]))
+        fibre.append(near)
+    owner = np.concatenate(fibre)
+    rank = np.arange(len(radii))
+    if arrangement.mesh_order is not None:
+        rank[arrangement.mesh_order] = np.arange(len(rank))
+    order = np.argsort(rank[owner], kind="stable")
+    return np.concatenate(circles)[order], owner[order]
+
+
+def crossings(circles: Float, axis: int, size: Float) -> Float:
+    """Sorted coordinates along `axis` of the vertices on the side at 0: corners and crossings of circles."""
+    depth, centre, radius = circles[:, 1 - axis], circles[:, axis], circles[:, 2]
+    half = np.sqrt(np.maximum(radius**2 - depth**2, 0.0))
+    crossing = np.concatenate([centre - half, centre + half])[np.tile(half > 0, 2)]
+    return np.concatenate([[0.0], np.sort(crossing[(crossing > 0) & (crossing < size[axis])]), [size[axis]]])
+
+
+def on_side(places: Float, axis: int, level: float) -> Float:
+    """Points (k, 2) on the side along `axis` at the given level of the other coordinate."""
+    points = np.full((len(places), 2), level)
+    points[:, axis] = places
+    return points
+
+
+def side_curves(
+    axis: int,
+    places: Float,
+    disc_at: Callable[[Float], Int],
+    around: Int,
+    size: Float,
+    field: SizeField,
+    numbering: Numbering,
+    sampling: Sampling,
+) -> Curves:
+    """The pieces of the two sides along `axis`, with the same nodes on both; `disc_at` tells the smallest closed curve
+    around points, which is a number of `around` or MATRIX."""
+    begin, span = places[:-1], np.diff(places)
+    longest = np.full((len(span), 2), field.base.largest)
+    pieces = Segments(on_side(begin, axis, 0.0), on_side(span, axis, 0.0), longest)
+    samples = EdgeSamples.of(field, pieces, sampling.side)
+    parts = []
+    for level, low in ((0.0, True), (size[1 - axis], False)):
+        inside = disc_at(on_side(begin + span / 2, axis, level))
+        # A chord has two edges or more: a triangle with two arc edges beside it could not be flipped. From one circle
+        # of a coating to the other it is no chord.
+        into = around[inside] * (inside != MATRIX) + MATRIX * (inside == MATRIX)
+        crosses = np.zeros(len(inside), bool)
+        crosses[:-1] |= into[1:] == inside[:-1]
+        crosses[1:] |= into[:-1] == inside[1:]
+        least = np.where((inside == MATRIX) | crosses, 1, 2)
+        stations = samples.stations(least, sampling.most_nodes)
+        piece, first = stations.line, stations.first
+        along = begin[piece] + span[piece] * stations.share
+        along[first[:-1]], along[first[1:] - 1] = begin, places[1:]
+        node = numbering.along(on_side(along, axis, level), first)
+        # Counter-clockwise around the cell: along the coordinate at the bottom and at the right.
+        turned = np.full(len(span), low != (axis == 0))
+        straight, beyond = np.full(len(span), MATRIX), np.full(len(span), OUTSIDE)
+        parts.append(Curves(backwards(node, first, turned), first, straight, inside, beyond))
+    return Curves.joined(parts)
+
+
+def disc_at(circles: Float, points: Float) -> Int:
+    """The smallest circle (k,) around each point on a line, or MATRIX."""
+    beyond = circles[:, :2] - np.clip(circles[:, :2], points.min(axis=0), points.max(axis=0))
+    near = np.flatnonzero(np.linalg.norm(beyond, axis=1) < circles[:, 2])
+    if not len(near):
+        return np.full(len(points), MATRIX)
+    own = circles[near]
+    holds = np.linalg.norm(points[:, None] - own[:, :2], axis=2) < own[:, 2]
+    return np.where(holds.any(axis=1), near[np.where(holds, own[:, 2], np.inf).argmin(axis=1)], MATRIX)

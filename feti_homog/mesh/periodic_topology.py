@@ -1,0 +1,245 @@
+"""The coarse cell as a torus: node classes, torus edges and constituents.
+
+Two plane nodes that differ by a period are one class, two boundary edges that differ by a period one
+torus edge.  A constituent is a connected component of equal phase on the torus, so a fibre that the
+cell's boundary cuts is one constituent.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.sparse import coo_matrix, csr_matrix
+from scipy.sparse.csgraph import connected_components, dijkstra
+
+from feti_homog.case.phase_names import COATING
+from feti_homog.fibres.ellipses import Ellipses
+from feti_homog.mesh.coarse_mesh import CoarseMesh
+from feti_homog.mesh.periodic_sides import paired_sides
+from feti_homog.typing import Bool, Float, Int, Int32
+
+
+@dataclass(frozen=True)
+class Torus:
+    """Identities on the torus of a `CoarseMesh` with m triangles, or of some tiles of a larger one.
+
+    Attributes:
+        mesh: the plane mesh.
+        node_class: (n,) class of each plane node.
+        edges: (e, 2) plane edges, each from its lexicographically lower to its upper end.
+        triangle_edges: (m, 3) plane edge from vertex k to vertex k + 1 (mod 3).
+        torus_edge: (e,) torus edge of each plane edge.
+        constituent: (m,) constituent of each triangle; those of the matrix come first.
+        class_keys, edge_keys: ascending numbers in the whole cell of the classes and of the torus edges.
+        at_void: (torus edges,) whether one triangle of the whole cell has it, and a void is beside it.
+        is_whole: whether it has all triangles of the cell.
+    """
+
+    mesh: CoarseMesh
+    node_class: Int
+    edges: Int
+    triangle_edges: Int
+    torus_edge: Int
+    constituent: Int
+    class_keys: Int
+    edge_keys: Int
+    at_void: Bool
+    is_whole: bool = True
+
+    @classmethod
+    def of(cls, mesh: CoarseMesh) -> Torus:
+        """Identify the periodic images of `mesh` and find its constituents."""
+        node_class = np.unique(mesh.representative, return_inverse=True)[1]
+        edges, triangle_edges = plane_edges_of(mesh)
+        torus_edge = _identify_edges(mesh, edges)
+        left, right = edge_pairs(torus_edge[triangle_edges])
+        same = mesh.phase[left] == mesh.phase[right]
+        label = components(len(mesh.triangles), left[same], right[same])
+        keys = np.arange(node_class.max() + 1), np.arange(torus_edge.max() + 1)
+        at_void = np.bincount(torus_edge[triangle_edges].ravel()) == 1
+        torus = cls(mesh, node_class, edges, triangle_edges, torus_edge, label, *keys, at_void)
+        # Where the precedence leaves it open, fibres on circles are numbered in the order of the circles.
+        circle = np.full(len(edges), len(mesh.ellipses))
+        circle[torus.arcs] = mesh.arc_circle
+        first = np.full(label.max() + 1, len(mesh.ellipses))
+        np.minimum.at(first, np.repeat(label, 3), circle[triangle_edges].ravel())
+        order = np.lexsort((np.arange(len(label)), first[label], mesh.precedence))
+        return replace(torus, constituent=_renumber(label, order))
+
+    @cached_property
+    def triangle_torus_edges(self) -> Int:
+        """(m, 3) torus edge from vertex k to vertex k + 1 (mod 3)."""
+        return self.torus_edge[self.triangle_edges]
+
+    @cached_property
+    def sides(self) -> tuple[Int, Int, Int]:
+        """The triangles (e,) and (e,) on either side of each torus edge that two share, and that edge (e,)."""
+        flat = self.triangle_torus_edges.ravel()
+        order = np.argsort(flat, kind="stable")
+        twice = np.flatnonzero(flat[order][1:] == flat[order][:-1])
+        return order[twice] // 3, order[twice + 1] // 3, flat[order[twice]]
+
+    @cached_property
+    def debonded(self) -> Bool:
+        """(torus edges,) which are debonded from the start."""
+        debonded = np.zeros(len(self.edge_keys), bool)
+        debonded[self.torus_edge[self.plane_edges(self.mesh.debonded_edges)]] = True
+        return debonded
+
+    @cached_property
+    def edge_ellipses(self) -> Ellipses:
+        """The e ellipses that the plane edges lie on; those of straight edges are points."""
+        n = len(self.edges)
+        centres, frames = np.zeros((n, 2)), np.zeros((n, 2, 2))
+        own = self.mesh.ellipses[self.mesh.arc_circle]
+        centres[self.arcs], frames[self.arcs] = own.centres, own.frames
+        return Ellipses(centres, frames)
+
+    @cached_property
+    def edge_circles(self) -> Float:
+        """(e, 3) centre and radius of these ellipses: NaN where they are not round, 0 where the edge is straight."""
+        circles = np.zeros((len(self.edges), 3))
+        circles[self.arcs] = self.mesh.circles[self.mesh.arc_circle]
+        return circles
+
+    @cached_property
+    def edge_turns(self) -> Float:
+        """(e,) how far the parameter turns on its ellipse along each plane edge, at most pi; 0 where it is straight."""
+        turns, own = np.zeros(len(self.edges)), self.mesh.ellipses[self.mesh.arc_circle]
+        start, stop = (own.unit(self.mesh.points[self.edges[self.arcs, end]] - own.centres) for end in (0, 1))
+        sine = start[:, 0] * stop[:, 1] - start[:, 1] * stop[:, 0]
+        turns[self.arcs] = np.arctan2(np.abs(sine), (start * stop).sum(axis=1))
+        return turns
+
+    @cached_property
+    def edge_ends(self) -> Int:
+        """(torus edges, 2) classes of the ends of each."""
+        plane = np.unique(self.torus_edge, return_index=True)[1]
+        return np.asarray(self.node_class[self.edges[plane]])
+
+    @cached_property
+    def meeting(self) -> Int:
+        """(classes,) number of the constituents that meet in each."""
+        corner, n = self.node_class[self.mesh.triangles], int(self.constituent.max(initial=0)) + 1
+        pairs = np.unique(corner * n + self.constituent[:, None])
+        return np.bincount(pairs // n, minlength=len(self.class_keys))
+
+    @cached_property
+    def touching(self) -> Bool:
+        """(classes,) where two constituents meet, but not along one line: more than once, or without an edge.
+
+        On a line each has one sector of the triangles around.  Round fibres, all that is torn by tiles, touch nowhere.
+        """
+        if not self.is_whole:
+            return np.zeros(len(self.class_keys), bool)
+        left, right, edge = self.sides
+        between = edge[self.constituent[left] != self.constituent[right]]
+        shared, free = (
+            np.bincount(self.edge_ends[some].ravel(), minlength=len(self.class_keys))
+            for some in (between, np.flatnonzero(self.at_void))
+        )
+        # Each edge between constituents ends a sector, and so do both sides of a void together.
+        sectors = shared + free // 2
+        return np.asarray((self.meeting == 2) & ((sectors != 2) | (shared == 0)))
+
+    @cached_property
+    def never_part(self) -> Bool:
+        """(classes,) where constituents are held together whatever their interface: three meet, or two touch."""
+        return np.asarray((self.meeting > 2) | self.touching)
+
+    @cached_property
+    def edge_lengths(self) -> Float:
+        """Length of each torus edge, of its chord if it lies on a circle."""
+        ends = self.mesh.points[self.edges]
+        lengths = np.empty(len(self.edge_keys))
+        lengths[self.torus_edge] = np.hypot(*(ends[:, 1] - ends[:, 0]).T)
+        return lengths
+
+    @cached_property
+    def arcs(self) -> Int:
+        """(a,) plane edge of each of the mesh's `arc_edges`."""
+        return self.plane_edges(self.mesh.arc_edges)
+
+    def plane_edges(self, pairs: Int32) -> Int:
+        """(k,) plane edge between each pair (k, 2) of plane nodes."""
+        n = len(self.mesh.points)
+        key = np.sort(self.edges, axis=1) @ [n, 1]
+        order = np.argsort(key)
+        found = np.searchsorted(key[order], np.sort(pairs.astype(np.int64), axis=1) @ [n, 1])
+        return np.asarray(order[found])
+
+    @cached_property
+    def constituent_phase(self) -> Int:
+        """(constituents,) phase of each constituent."""
+        first = np.unique(self.constituent, return_index=True)[1]
+        return np.asarray(self.mesh.phase[first], np.int64)
+
+    @cached_property
+    def nesting(self) -> Int:
+        """(constituents,) places from the outermost to the innermost: by the number of others between a constituent and
+        the matrix, a coating before what it coats, and then by number."""
+        left, right, _ = self.sides
+        a, b = self.constituent[left], self.constituent[right]
+        phase, n = self.constituent_phase, len(self.constituent_phase)
+        touching = csr_matrix((np.ones(len(a)), (a, b)), shape=(n, n))
+        depth = dijkstra(touching, False, np.flatnonzero(phase == 0), unweighted=True, min_only=True)
+        return places_by_depth(depth, phase, self.mesh.phases)
+
+    def plane_parts(self) -> Int:
+        """(m,) constituents cut by the cell's boundary, as the paper's Fig. 2a does (`bodies = "plane"`)."""
+        left, right = edge_pairs(self.triangle_edges)
+        same = self.constituent[left] == self.constituent[right]
+        label = components(len(self.constituent), left[same], right[same])
+        return _renumber(label, np.argsort(self.constituent, kind="stable"))
+
+
+def places_by_depth(depth: Float | Int, phase: Int, phases: tuple[str, ...]) -> Int:
+    """(n,) places from the outermost to the innermost of constituents of these depths (n,) in the matrix, a coating
+    before what it coats, and then by number; `phase` (n,) is the number of the phase of each."""
+    coats = np.array([name == COATING for name in phases])[phase]
+    return np.argsort(np.lexsort((~coats, depth)))
+
+
+def edge_pairs(triangle_edges: Int) -> tuple[Int, Int]:
+    """The triangles on either side of each edge that two of them share: two arrays, in the edges' order."""
+    flat = triangle_edges.ravel()
+    order = np.argsort(flat, kind="stable")
+    twice = flat[order][1:] == flat[order][:-1]
+    return order[:-1][twice] // 3, order[1:][twice] // 3
+
+
+def components(n: int, left: Int, right: Int) -> Int:
+    """Connected components of the graph on n vertices with edges (left, right): (n,) labels."""
+    graph = coo_matrix((np.ones(len(left), np.int8), (left, right)), shape=(n, n))
+    return np.asarray(connected_components(graph, directed=False)[1], np.int64)
+
+
+def _renumber(label: Int, order: Int) -> Int:
+    """Number the labels by their first appearance in `order`."""
+    first = np.unique(label[order], return_index=True)[1]
+    rank = np.empty_like(first)
+    rank[np.argsort(first)] = np.arange(len(first))
+    return np.asarray(rank[label])
+
+
+def plane_edges_of(mesh: CoarseMesh) -> tuple[Int, Int]:
+    """Edges (e, 2) and those of each triangle (m, 3), as in `Torus`."""
+    triangles = mesh.triangles.astype(np.int64)
+    ends = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
+    n = len(mesh.points)
+    keys, which = np.unique(ends.min(axis=1) * n + ends.max(axis=1), return_inverse=True)
+    edges = np.stack([keys // n, keys % n], axis=1)
+    (xa, ya), (xb, yb) = mesh.points[edges[:, 0]].T, mesh.points[edges[:, 1]].T
+    backwards = (xa > xb) | ((xa == xb) & (ya > yb))
+    edges[backwards] = edges[backwards, ::-1]
+    return edges, which.reshape(-1, 3)
+
+
+def _identify_edges(mesh: CoarseMesh, edges: Int) -> Int:
+    """(e,) torus edge of each plane edge (e, 2)."""
+    same = np.arange(len(edges))
+    for _, low, high in paired_sides(mesh.points[edges].mean(axis=1), mesh.period):
+        same[high] = low
+    return np.asarray(np.unique(same, return_inverse=True)[1])

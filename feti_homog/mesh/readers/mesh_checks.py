@@ -1,0 +1,278 @@
+"""The checks of a user's mesh: each function finds one kind of fault and names the first offenders."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from feti_homog.case.phase_names import PHASE
+from feti_homog.mesh.coarse_mesh import areas, edge_keys, edges
+from feti_homog.mesh.middle_nodes import MiddleNodes
+from feti_homog.typing import Bool, Float, Int, Int32
+
+# Nodes nearer than this, relative to the cell, are at the same place: files may round coordinates.
+SAME_PLACE = 1e-7
+# A node nearer to an edge than this, relative to its length, hangs on it; an element that flat would be of no use.
+HANGING_DISTANCE = 1e-2
+# Area of a triangle, relative to its longest edge squared, up to which it is zero but for rounding of coordinates.
+FLAT_AREA = 1e-9
+# Lengths that can be computed with, as of the numbers in a case file.
+SMALLEST, LARGEST = 1e-100, 1e100
+# The physical curve of the edges that are debonded from the start.
+DEBONDED = "debonded"
+SIDES = {(0, 0): "left", (0, 1): "right", (1, 0): "lower", (1, 1): "upper"}
+
+
+@dataclass(frozen=True)
+class RawMesh:
+    """Triangles of a mesh file: nodes in use with their tags, elements with their tags and group.
+
+    Attributes:
+        node_tags: (n,) the file's numbers of the nodes.
+        points: (n, 3) their positions.
+        element_tags: (m,) the file's numbers of the elements.
+        triangles: (m, 3) nodes, numbered from 0.
+        group: (m,) index into `groups`, the names of the physical surfaces or sets that the elements belong to.
+        curves: (d, 2) node tags of the ends of the lines in each physical curve or set of lines, by its name.
+        middles: the middle nodes of second-order triangles.
+        container, curve_container: what the file calls a group, and an entry of `curves`.
+    """
+
+    node_tags: Int
+    points: Float
+    element_tags: Int
+    triangles: Int32
+    group: Int
+    groups: tuple[tuple[str, ...], ...]
+    curves: Mapping[str, Int]
+    middles: MiddleNodes
+    container: str
+    curve_container: str
+
+    @property
+    def debonded(self) -> Int:
+        """(d, 2) node tags of the ends of the lines in the curve DEBONDED."""
+        return self.curves.get(DEBONDED, np.zeros((0, 2), np.int64))
+
+    def node(self, number: int) -> str:
+        """A node in words."""
+        return f"node {self.node_tags[number]} {at(self.points[number])}"
+
+    def element(self, number: int) -> str:
+        """An element in words, with the position of its centre."""
+        centre = self.points[self.triangles[number]].mean(axis=0)
+        return f"element {self.element_tags[number]} at {at(centre)}"
+
+    def edge(self, pair: Iterable[int]) -> str:
+        """An edge in words."""
+        return "the edge between " + " and ".join(self.node(int(end)) for end in pair)
+
+
+def at(point: Float) -> str:
+    """A position in words, (x, y)."""
+    return f"({point[0]:.9g}, {point[1]:.9g})"
+
+
+def first_of(names: Iterable[str], total: int, shown: int = 3) -> str:
+    """The first few names and how many more there are."""
+    listed = ", ".join(name for name, _ in zip(names, range(shown), strict=False))
+    return listed if total <= shown else f"{listed} and {total - shown} more"
+
+
+def unlabelled(mesh: RawMesh) -> list[str]:
+    """Elements that are in no physical surface, or in several."""
+    faults = []
+    none = np.flatnonzero(np.isin(mesh.group, [k for k, names in enumerate(mesh.groups) if not names]))
+    if len(none):
+        faults.append(f"{first_of(map(mesh.element, none), len(none))}: not in any {mesh.container}")
+    for number, names in enumerate(mesh.groups):
+        if len(names) > 1:
+            element = mesh.element(int(np.argmax(mesh.group == number)))
+            faults.append(f"{element} is in {len(names)} {mesh.container}s: {', '.join(names)}")
+    return faults
+
+
+def unknown_phases(mesh: RawMesh) -> list[str]:
+    """Physical surfaces whose name is not a phase, and a missing matrix."""
+    names = [name for group in mesh.groups for name in group]
+    known = 'expected "matrix", "fibre", "glass", ... of letters, digits, _ and -, "fibre:2", not "void"'
+    strange = [name for name in names if not PHASE.fullmatch(name)]
+    faults = [f'{mesh.container} "{name}" is not a phase: {known}' for name in dict.fromkeys(strange)]
+    if "matrix" not in names:
+        faults.append(f'no {mesh.container} is named "matrix"')
+    return faults
+
+
+def not_finite(mesh: RawMesh) -> list[str]:
+    """Nodes whose coordinates are not numbers, or no lengths to compute with."""
+    bad = np.flatnonzero(~np.isfinite(mesh.points).all(axis=1))
+    if len(bad):
+        return [f"{first_of(map(mesh.node, bad), len(bad))}: coordinates are not finite"]
+    size = np.ptp(mesh.points[:, :2], axis=0)
+    if np.abs(mesh.points).max() > LARGEST or size.min() < SMALLEST:
+        return [
+            f"the cell is {size[0]:.3g} x {size[1]:.3g}: expected lengths and coordinates from {SMALLEST} to {LARGEST}"
+        ]
+    return []
+
+
+def not_planar(mesh: RawMesh) -> list[str]:
+    """Nodes off the plane of the first one."""
+    height = mesh.points[:, 2]
+    bad = np.flatnonzero(np.abs(height - height[0]) > SAME_PLACE * np.ptp(mesh.points[:, :2], axis=0).max())
+    if len(bad) == 0:
+        return []
+    where = f"{mesh.node(int(bad[0]))} has z = {height[bad[0]]:.9g}, {mesh.node(0)} has z = {height[0]:.9g}"
+    return [f"the mesh is not planar: {where}"]
+
+
+def flat(mesh: RawMesh) -> list[str]:
+    """Triangles of zero area."""
+    plane = mesh.points[:, :2]
+    ends = plane[edges(mesh.triangles)]
+    longest = ((ends[:, 1] - ends[:, 0]) ** 2).sum(axis=1).reshape(-1, 3).max(axis=1)
+    found = np.flatnonzero(np.abs(areas(plane, mesh.triangles)) <= FLAT_AREA * longest)
+    return [f"{first_of(map(mesh.element, found), len(found))}: zero area"] if len(found) else []
+
+
+def duplicate_nodes(mesh: RawMesh) -> list[str]:
+    """Different nodes at the same place."""
+    plane = mesh.points[:, :2]
+    pairs = cKDTree(plane).query_pairs(SAME_PLACE * np.ptp(plane, axis=0).max(), output_type="ndarray")
+    pairs = pairs[np.lexsort(pairs.T[::-1])]
+    names = (f"{mesh.node(a)} and {mesh.node(b)}" for a, b in pairs)
+    return [f"nodes at the same place: {first_of(names, len(pairs))}"] if len(pairs) else []
+
+
+def overlapping(mesh: RawMesh) -> list[str]:
+    """Edges of more than two triangles, or of two on the same side."""
+    pairs = edges(mesh.triangles)
+    _, first, where, number = np.unique(
+        edge_keys(pairs, len(mesh.points)), return_index=True, return_inverse=True, return_counts=True
+    )
+    forward = np.bincount(where, pairs[:, 0] < pairs[:, 1], len(first))
+    crowded = np.flatnonzero(number > 2)
+    folded = np.flatnonzero((number == 2) & (forward != 1))
+    faults = []
+    if len(crowded):
+        names = (f"{mesh.edge(pairs[first[k]])} ({number[k]})" for k in crowded)
+        faults.append(f"overlapping elements, more than two share an edge: {first_of(names, len(crowded))}")
+    if len(folded):
+        names = (mesh.edge(pairs[first[k]]) for k in folded)
+        faults.append(f"overlapping elements on the same side of an edge: {first_of(names, len(folded))}")
+    return faults
+
+
+def hanging_nodes(mesh: RawMesh, plane: Float, size: Float) -> list[str]:
+    """Nodes within edges of one triangle only that are not on the boundary of the cell.
+
+    `plane` (n, 2) are positions with the lower left corner at the origin, nodes on sides exactly there.
+    """
+    pairs = edges(mesh.triangles)
+    _, first, number = np.unique(edge_keys(pairs, len(plane)), return_index=True, return_counts=True)
+    single = pairs[first[number == 1]]
+    ends = plane[single]
+    on_side = np.any(np.all(ends == 0, axis=1) | np.all(ends == size, axis=1), axis=1)
+    inner = single[~on_side]
+    if len(inner) == 0:
+        return []
+    hanging = _hanging(plane, inner)
+    names = (f"{mesh.node(node)} on {mesh.edge(pair)}" for node, pair in hanging)
+    return [f"hanging nodes: {first_of(names, len(hanging))}"] if hanging else []
+
+
+def _hanging(plane: Float, pairs: Int32) -> list[tuple[int, tuple[int, int]]]:
+    """Nodes of the edges (k, 2) that lie within others, not at their ends, with these edges."""
+    found = []
+    nodes = np.unique(pairs)
+    tree = cKDTree(plane[nodes])
+    start, stop = plane[pairs[:, 0]], plane[pairs[:, 1]]
+    near = tree.query_ball_point((start + stop) / 2, np.linalg.norm(stop - start, axis=1) / 2)
+    for candidates, pair, a, b in zip(near, pairs, start, stop, strict=True):
+        others = np.setdiff1d(nodes[candidates], pair)
+        along, away = b - a, plane[others] - a
+        distance = np.abs(along[0] * away[:, 1] - along[1] * away[:, 0])
+        close = others[distance < HANGING_DISTANCE * (along @ along)]
+        found += [(int(node), (int(pair[0]), int(pair[1]))) for node in close]
+    return found
+
+
+def missing_corners(plane: Float, origin: Float, size: Float) -> list[str]:
+    """Corners of the bounding rectangle without a node."""
+    corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * size
+    missing = [corner for corner in corners if not np.all(plane == corner, axis=1).any()]
+    names = first_of((at(corner + origin) for corner in missing), len(missing), shown=4)
+    return [f"no node at the corner {names} of the cell"] if missing else []
+
+
+def too_large(plane: Float, triangles: Int32, size: Float) -> list[str]:
+    """Triangles that add up to more than the rectangle."""
+    total, whole = abs(areas(plane, triangles).sum()), size.prod()
+    if total <= (1 + 1e-6) * whole:
+        return []
+    return [f"the elements overlap: their area is {total:.9g}, that of the cell {whole:.9g}"]
+
+
+def unrefined_sides(plane: Float, size: Float) -> list[str]:
+    """Sides without a node between their corners: there an element would be its own neighbour."""
+    bare = [
+        SIDES[axis, side]
+        for axis in (0, 1)
+        for side, level in enumerate((0.0, size[axis]))
+        if np.count_nonzero(plane[:, axis] == level) < 3
+    ]
+    return (
+        [f"no node between the corners of the {first_of(bare, len(bare), 4)} side: expected one at least"]
+        if bare
+        else []
+    )
+
+
+def stray_lines(mesh: RawMesh) -> list[str]:
+    """Debonded lines whose ends are not nodes of triangles."""
+    bad = mesh.debonded[~np.isin(mesh.debonded, mesh.node_tags).all(axis=1)]
+    names = (f"that between nodes {start} and {stop}" for start, stop in bad)
+    what = f'lines in the {mesh.curve_container} "{DEBONDED}" that are no edges of triangles'
+    return [f"{what}: {first_of(names, len(bad))}"] if len(bad) else []
+
+
+def cannot_debond(mesh: RawMesh, pairs: Int32, fit: Bool) -> list[str]:
+    """Debonded lines (d, 2) that are not edges between a fibre and the matrix; `fit` (d,) says which are."""
+    bad = pairs[~fit]
+    what = f'lines in the {mesh.curve_container} "{DEBONDED}" that are not between a fibre and the matrix'
+    return [f"{what}: {first_of(map(mesh.edge, bad), len(bad))}"] if len(bad) else []
+
+
+def unused_curves(mesh: RawMesh) -> tuple[str, ...]:
+    """List the curves that are not DEBONDED, in one line."""
+    names = [f'"{name}"' for name in mesh.curves if name != DEBONDED]
+    if not names:
+        return ()
+    return (
+        f"{mesh.curve_container} {first_of(names, len(names))}: not used; lines that are debonded from the start "
+        f'belong in "{DEBONDED}"',
+    )
+
+
+def not_periodic(mesh: RawMesh, plane: Float, size: Float) -> list[str]:
+    """Nodes on a side without a partner at the same place of the opposite one."""
+    faults = []
+    for axis in (0, 1):
+        sides = [np.flatnonzero(plane[:, axis] == level) for level in (0.0, size[axis])]
+        for here in (0, 1):
+            other = np.sort(plane[sides[1 - here], 1 - axis])
+            own = plane[sides[here], 1 - axis]
+            after = np.clip(np.searchsorted(other, own), 1, len(other) - 1)
+            away = np.minimum(np.abs(other[after] - own), np.abs(other[after - 1] - own))
+            alone = sides[here][away > SAME_PLACE * size.max()]
+            if len(alone):
+                shift = np.where(np.arange(3) == axis, (1 - 2 * here) * size[axis], 0.0)
+                names = (f"{mesh.node(k)}, expected at {at(mesh.points[k] + shift)}" for k in alone)
+                faults.append(
+                    f"not periodic, nodes of the {SIDES[axis, here]} side have no partner on the "
+                    f"{SIDES[axis, 1 - here]} side: {first_of(names, len(alone))}"
+                )
+    return faults

@@ -1,0 +1,121 @@
+"""A user's mesh: read from a file, checked, and made into the coarse mesh of the cell."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from feti_homog.errors import MeshError
+from feti_homog.fibres.ellipses import Ellipses
+from feti_homog.mesh.coarse_mesh import CoarseMesh, areas, representatives
+from feti_homog.mesh.interface_edges import can_debond
+from feti_homog.mesh.periodic_sides import paired_sides
+from feti_homog.mesh.periodic_topology import Torus
+from feti_homog.mesh.readers import abaqus_file, bent_edges, gmsh_file, mesh_checks, void_checks, vtk_file
+from feti_homog.mesh.readers.bent_edges import with_bent_edges
+from feti_homog.mesh.readers.circle_detection import with_circles
+from feti_homog.mesh.readers.ellipse_detection import with_ellipses
+from feti_homog.mesh.readers.mesh_checks import RawMesh
+from feti_homog.mesh.readers.snapping import snapped
+from feti_homog.typing import Float
+
+LOADERS = {".msh": gmsh_file.load, ".inp": abaqus_file.load, ".vtu": vtk_file.load, ".vtk": vtk_file.load}
+
+
+def read(path: Path, snap: float | None = None) -> CoarseMesh:
+    """The coarse mesh in a file of one of the LOADERS, moved to [0, width] x [0, height].
+
+    It consists of triangles of three or six nodes, in either sense, in physical surfaces "matrix", "fibre", "glass",
+    ..., fills a rectangle but for voids, and has matching nodes on opposite sides. Lines in the curve
+    "debonded" are edges between a fibre and the matrix that are debonded. Round interfaces become circles
+    (`with_circles`), elliptic ones ellipses (`with_ellipses`); others follow their middle nodes (`with_bent_edges`).
+    With `snap`, nodes on sides are first moved by up to that / width to where they should be (`snapped`).
+
+    Raises:
+        MeshError: with all faults of the first stage that has any: file, labels, shapes, middle nodes, connections,
+            sides, debonded lines.
+    """
+    raw, moved = LOADERS[path.suffix](path), 0.0
+    _refuse(path.name, mesh_checks.unlabelled(raw), mesh_checks.unknown_phases(raw), mesh_checks.stray_lines(raw))
+    _refuse(path.name, mesh_checks.not_finite(raw))
+    if snap is not None:
+        raw, moved = snapped(raw, snap)
+    unused = tuple(f"{path.name}: {line}" for line in mesh_checks.unused_curves(raw))
+    return replace(made(raw, path.name), snapped=moved, unused_curves=unused)
+
+
+def made(raw: RawMesh, path: str) -> CoarseMesh:
+    """The coarse mesh of triangles in phases; `path` names them in faults. Raises as `read`."""
+    _refuse(path, mesh_checks.not_planar(raw), mesh_checks.flat(raw), mesh_checks.duplicate_nodes(raw))
+    raw = _turned(raw)
+    _refuse(path, bent_edges.faults(raw))
+    origin, size, plane = _on_rectangle(raw.points[:, :2])
+    corners = mesh_checks.missing_corners(plane, origin, size)
+    _refuse(path, mesh_checks.overlapping(raw), mesh_checks.hanging_nodes(raw, plane, size), corners)
+    _refuse(path, mesh_checks.too_large(plane, raw.triangles, size))
+    _refuse(path, mesh_checks.not_periodic(raw, plane, size), mesh_checks.unrefined_sides(plane, size))
+    mesh = _coarse_mesh(raw, _matched(plane, size), size)
+    _refuse(path, void_checks.unmatched_sides(raw, mesh))
+    _refuse(path, void_checks.islands(raw, mesh), void_checks.no_voids(raw, mesh))
+    _refuse(path, mesh_checks.cannot_debond(raw, mesh.debonded_edges, can_debond(mesh, mesh.debonded_edges)))
+    middles = replace(raw.middles, points=raw.middles.points - [*origin, 0.0])
+    mesh = with_circles(mesh, middles)
+    # Fibres keep the numbers that they have without bent edges: round ones first.
+    numbers = Torus.of(mesh).constituent.astype(np.int32)
+    mesh = with_bent_edges(with_ellipses(mesh, middles), middles)
+    return replace(mesh, precedence=numbers)
+
+
+def _refuse(path: str, *faults: list[str]) -> None:
+    """Raise MeshError if there are faults."""
+    found = [f"{path}: {fault}" for kind in faults for fault in kind]
+    if found:
+        raise MeshError(*found)
+
+
+def _turned(raw: RawMesh) -> RawMesh:
+    """The mesh with all triangles counter-clockwise; middle nodes are those of edges, whichever way these run."""
+    clockwise = areas(raw.points[:, :2], raw.triangles) < 0
+    return replace(raw, triangles=np.where(clockwise[:, None], raw.triangles[:, ::-1], raw.triangles))
+
+
+def _on_rectangle(plane: Float) -> tuple[Float, Float, Float]:
+    """Origin and size (2,) of the bounding rectangle, and positions (n, 2) in it, exactly on its sides."""
+    origin = plane.min(axis=0)
+    size = plane.max(axis=0) - origin
+    moved = plane - origin
+    near = mesh_checks.SAME_PLACE * size.max()
+    moved[np.abs(moved) < near] = 0.0
+    return origin, size, np.where(np.abs(moved - size) < near, size, moved)
+
+
+def _matched(plane: Float, size: Float) -> Float:
+    """Positions whose partners on opposite sides have the same coordinate along them."""
+    plane = plane.copy()
+    for axis, low, high in paired_sides(plane, size):
+        plane[high, 1 - axis] = plane[low, 1 - axis]
+    return plane
+
+
+def _coarse_mesh(raw: RawMesh, plane: Float, size: Float) -> CoarseMesh:
+    """A checked mesh without circles."""
+    names = [group[0] for group in raw.groups]
+    phases = ("matrix", *sorted(set(names) - {"matrix"}))
+    number = np.array([phases.index(name) for name in names], dtype=np.int32)
+    width, height = size.tolist()
+    return CoarseMesh(
+        width=width,
+        height=height,
+        points=plane,
+        triangles=raw.triangles,
+        phase=number[raw.group],
+        phases=phases,
+        precedence=number[raw.group],
+        representative=representatives(plane, width, height),
+        ellipses=Ellipses.round(np.zeros((0, 3))),
+        arc_edges=np.zeros((0, 2), np.int32),
+        arc_circle=np.zeros(0, np.int32),
+        debonded_edges=np.searchsorted(raw.node_tags, raw.debonded).astype(np.int32),
+    )

@@ -1,0 +1,100 @@
+"""Read the triangles and the lines of a file of VTK by meshio."""
+
+from __future__ import annotations
+
+import importlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from feti_homog.errors import MeshError
+from feti_homog.mesh.readers.element_blocks import Block, assembled
+from feti_homog.mesh.readers.mesh_checks import DEBONDED, RawMesh
+from feti_homog.typing import Int
+
+# Readers of meshio, and how many nodes its triangles have.
+READERS = {".vtu": "meshio.vtu", ".vtk": "meshio.vtk"}
+NODES = {"triangle": 3, "triangle6": 6}
+LINES = ("line", "line3")
+VERTEX = "vertex"
+PHASE = "phase"
+
+
+def load(path: Path) -> RawMesh:
+    """Read the triangles and the lines of a .vtu or .vtk file.
+
+    Its cell data `phase` are 0 in the matrix, 1 in phase fibre, k in fibre:k; its cell data `debonded`, if it has them,
+    are 1 on lines that are debonded from the start.  Nodes and elements have the numbers of the file, from 0.
+
+    Raises:
+        MeshError: meshio is not installed or cannot read the file, it has other elements, or no phases.
+    """
+    try:
+        reader = importlib.import_module(READERS[path.suffix])
+    except ImportError:
+        wanted = f"{path.suffix} files are read by meshio, which is not installed"
+        raise MeshError(f"{path.name}: {wanted}: pip install 'feti_homog[meshes]'") from None
+    try:
+        mesh = reader.read(str(path))
+    except OSError as error:
+        raise MeshError(f"{path}: cannot be read: {error.strerror}") from None
+    except Exception as error:  # meshio's readers raise whatever they meet
+        raise MeshError(f"{path.name}: meshio cannot read it: {str(error).strip() or type(error).__name__}") from None
+    faults = _faults(mesh)
+    if faults:
+        raise MeshError(*(f"{path.name}: {fault}" for fault in faults))
+    return _raw(mesh)
+
+
+def _faults(mesh: Any) -> list[str]:
+    """Elements that are not triangles, the lack of these, and of their phases."""
+    kinds = [block.type for block in mesh.cells]
+    others = [f"{len(block.data)} {block.type}" for block in mesh.cells if block.type not in (*NODES, *LINES, VERTEX)]
+    faults = [f"elements are {kind}: only triangles of three or six nodes can be used" for kind in others]
+    if not others and not set(kinds) & set(NODES):
+        faults.append("no triangles in it")
+    if PHASE not in mesh.cell_data:
+        expected = "expected 0 in the matrix, 1 in phase fibre, 2 in fibre:2, ..."
+        faults.append(f"no cell data named {PHASE}, but {', '.join(mesh.cell_data) or 'none'}: {expected}")
+    elif not faults:
+        values = np.concatenate([np.ravel(data) for data in mesh.cell_data[PHASE]])
+        bad = values[(values != np.round(values)) | (values < 0)]
+        if len(bad):
+            faults.append(f"cell data {PHASE} = {bad[0]:g}: expected 0, 1, 2, ...")
+    return faults
+
+
+def _raw(mesh: Any) -> RawMesh:
+    first, blocks = 0, []
+    for cells, data in zip(mesh.cells, mesh.cell_data[PHASE], strict=True):
+        tags = first + np.arange(len(cells.data))
+        first += len(tags)
+        if cells.type in NODES:
+            blocks.append(Block(tags, np.asarray(cells.data, np.int64), np.ravel(data).astype(np.int64)))
+    most = max(int(block.group.max(initial=0)) for block in blocks)
+    points = np.zeros((len(mesh.points), 3))
+    points[:, : mesh.points.shape[1]] = mesh.points
+    names = ["matrix", "fibre", *(f"fibre:{k}" for k in range(2, most + 1))]
+    containers = (f"value of {PHASE}", "cells")
+    return assembled(np.arange(len(points)), points, *_used(blocks, names), _curves(mesh), containers)
+
+
+def _curves(mesh: Any) -> dict[str, Int]:
+    """Nodes (d, 2) at the ends of the lines that cell data `debonded` mark, and of the others, by the cells' type."""
+    curves: dict[str, list[Int]] = {}
+    marks = mesh.cell_data.get(DEBONDED, [np.zeros(len(cells.data)) for cells in mesh.cells])
+    for cells, mark in zip(mesh.cells, marks, strict=True):
+        if cells.type in LINES:
+            ends, is_debonded = np.asarray(cells.data, np.int64)[:, :2], np.ravel(mark) != 0
+            for name, own in ((DEBONDED, ends[is_debonded]), (cells.type, ends[~is_debonded])):
+                if len(own):
+                    curves.setdefault(name, []).append(own)
+    return {name: np.concatenate(ends) for name, ends in curves.items()}
+
+
+def _used(blocks: list[Block], names: list[str]) -> tuple[list[Block], list[tuple[str, ...]]]:
+    """The blocks with groups numbered without gaps, and the names of these groups."""
+    used: Int = np.unique(np.concatenate([block.group for block in blocks]))
+    renumbered = [Block(block.tags, block.nodes, np.searchsorted(used, block.group)) for block in blocks]
+    return renumbered, [(names[k],) for k in used]

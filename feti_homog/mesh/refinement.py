@@ -1,0 +1,171 @@
+"""Uniform refinement of one subdomain, on its own rank and without communication.
+
+Each coarse triangle carries a lattice with M = order * 2**refine intervals a side.  A fine node is a coarse
+vertex, the p-th lattice node of a coarse edge, or interior to a coarse triangle; so its identity (on the
+torus and among subdomains) is arithmetic on coarse numbers.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from feti_homog.mesh.submesh import Submesh
+from feti_homog.typing import Bool, Float, Int, Int32
+
+
+@dataclass(frozen=True, eq=False)
+class ReferenceLattice:
+    """The reference triangle with corners (0,0), (M,0), (0,M), cut into 4**refine triangles.
+
+    Compared by identity, so that a cache may be keyed with it.
+
+    Attributes:
+        intervals: M.
+        nodes: (q, 3) integer barycentric coordinates, summing to M: corners, then edges, then interior.
+        triangles: (4**refine, 3 or 6) lattice nodes; members 4k..4k+3 make up one triangle a level coarser.
+    """
+
+    intervals: int
+    nodes: Int
+    triangles: Int
+
+    @classmethod
+    def of(cls, refine: int, order: int) -> ReferenceLattice:
+        """The lattice of `refine` halvings for elements of the given order (1 or 2)."""
+        m = order * 2**refine
+        corners = np.array([[[m, 0, 0], [0, m, 0], [0, 0, m]]])
+        for _ in range(refine):
+            corners = _split(corners)
+        if order == 2:
+            corners = np.concatenate([corners, (corners + np.roll(corners, -1, axis=1)) // 2], axis=1)
+        j, i = np.mgrid[0 : m + 1, 0 : m + 1]
+        inside = (i > 0) & (j > 0) & (i + j < m)
+        p = np.arange(1, m)
+        o = np.zeros_like(p)
+        edges = [np.stack(s, axis=1) for s in ((m - p, p, o), (o, m - p, p), (p, o, m - p))]
+        interior = np.stack([m - i - j, i, j], axis=2)[inside]
+        nodes = np.concatenate([m * np.eye(3, dtype=np.int64), *edges, interior])
+        number = np.zeros((m + 1, m + 1), np.int64)
+        number[nodes[:, 1], nodes[:, 2]] = np.arange(len(nodes))
+        return cls(m, nodes, number[corners[..., 1], corners[..., 2]])
+
+    @property
+    def order(self) -> int:
+        """Of the elements: 1 or 2."""
+        return 1 if self.triangles.shape[1] == 3 else 2
+
+    def number(self, vertices: Int, edges: Int, backwards: Bool, n_vertices: int, n_edges: int) -> Int:
+        """(t, q) node numbers: vertices first, then M - 1 nodes an edge along its direction, then interiors."""
+        inner = self.intervals - 1
+        p = np.arange(inner)
+        along = np.where(backwards[..., None], inner - 1 - p, p)
+        on_edges = (n_vertices + edges[..., None] * inner + along).reshape(len(edges), -1)
+        per_triangle = len(self.nodes) - 3 - 3 * inner
+        first = n_vertices + n_edges * inner + np.arange(len(vertices))[:, None] * per_triangle
+        return np.concatenate([vertices, on_edges, first + np.arange(per_triangle)], axis=1)
+
+
+@dataclass(frozen=True)
+class FineMesh:
+    """The refined subdomain: n plane nodes of c classes, t coarse triangles of m elements in all.
+
+    Attributes:
+        points: (n, 2) plane positions.
+        nodes: (t, q) plane node of each lattice node of each coarse triangle.
+        curved: (t,) whether an edge of the coarse triangle lies on an ellipse; the others are affine images of
+            the lattice.
+        node_class: (n,) class of each plane node; a class is what the degrees of freedom belong to.
+        n_classes: c.
+        lattice: of every coarse triangle.
+    """
+
+    points: Float
+    nodes: Int32
+    curved: Bool
+    node_class: Int32
+    n_classes: int
+    lattice: ReferenceLattice
+
+    @property
+    def triangles(self) -> Int32:
+        """(m, 3 or 6) plane nodes of the elements; vertices, then mid-edge nodes 01, 12, 20."""
+        elements = self.lattice.triangles
+        return self.nodes[:, elements].reshape(-1, elements.shape[1])
+
+
+def refine(submesh: Submesh, lattice: ReferenceLattice) -> FineMesh:
+    """Refine the subdomain; new nodes on circles and ellipses lie on them."""
+    edges, back, inner = submesh.triangle_edges, submesh.backwards, lattice.intervals - 1
+    plane = lattice.number(submesh.triangles, edges, back, len(submesh.points), len(submesh.edges)).astype(np.int32)
+    n_classes, n_edges = len(submesh.class_keys), len(submesh.edge_keys)
+    torus = lattice.number(submesh.vertex_class[submesh.triangles], submesh.edge_class[edges], back, n_classes, n_edges)
+    n = len(submesh.points) + len(submesh.edges) * inner + len(plane) * (len(lattice.nodes) - 3 - 3 * inner)
+    points, node_class = np.empty((n, 2)), np.empty(n, np.int32)
+    points[plane] = _positions(submesh, lattice)
+    node_class[plane] = torus
+    c = n_classes + n_edges * inner + n - len(submesh.points) - len(submesh.edges) * inner
+    curved = (submesh.turns[edges] > 0).any(axis=1)
+    return FineMesh(points, plane, curved, node_class, c, lattice)
+
+
+def edge_node(n_classes: int, edge: Int, position: Int, lattice: ReferenceLattice) -> Int:
+    """Class of the lattice node at `position` (1..M-1) of local torus edge `edge`."""
+    return n_classes + edge * (lattice.intervals - 1) + position - 1
+
+
+def _split(triangle: Int) -> Int:
+    """Four halved triangles for each (.., 3 corners, 3); child i keeps corner i, the last is in the middle."""
+    a, b, c = triangle[:, 0], triangle[:, 1], triangle[:, 2]
+    ab, bc, ca = (a + b) // 2, (b + c) // 2, (c + a) // 2
+    children = [[a, ab, ca], [ab, b, bc], [ca, bc, c], [bc, ca, ab]]
+    return np.asarray(np.stack([np.stack(child, axis=1) for child in children], axis=1).reshape(-1, 3, 3))
+
+
+def _positions(submesh: Submesh, lattice: ReferenceLattice) -> Float:
+    """(t, q, 2) lattice nodes of each coarse triangle, bent towards its curved edges.
+
+    x = sum_k b_k x_k + sum_edges (1 - b_o)^2 delta(s): delta is the arc's distance from its chord at
+    s = b_b / (b_a + b_b), b_o the coordinate of the vertex opposite.  Mid-edge nodes of quadratic
+    elements are midpoints except on the arcs, so only elements at an arc are curved.
+    """
+    b = lattice.nodes / lattice.intervals
+    x = b @ submesh.points[submesh.triangles]
+    for k in range(3):
+        edge = submesh.triangle_edges[:, k]
+        curved = np.flatnonzero(submesh.turns[edge] > 0)
+        a, c = submesh.points[submesh.triangles[curved, k]], submesh.points[submesh.triangles[curved, (k + 1) % 3]]
+        span = 1 - b[:, (k + 2) % 3]
+        s = np.divide(b[:, (k + 1) % 3], span, out=np.zeros_like(span), where=span > 0)
+        centre, turn = submesh.circles[edge[curved], :2], submesh.turns[edge[curved]]
+        x[curved] += span[:, None] ** 2 * (_arc(a, c, centre, turn, s) - _chord(a, c, s))
+    if lattice.order == 2:
+        _straighten(x, submesh, lattice)
+    return x
+
+
+def _straighten(x: Float, submesh: Submesh, lattice: ReferenceLattice) -> None:
+    """Put mid-edge nodes midway between their vertices, save those on arcs."""
+    corners = lattice.triangles[:, :3]
+    middle = (x[:, corners] + x[:, np.roll(corners, -1, axis=1)]) / 2
+    curved = submesh.turns[submesh.triangle_edges] > 0
+    on_edge = lattice.nodes[lattice.triangles[:, 3:]][..., [2, 0, 1]] == 0
+    on_arc = (curved[:, None, None, :] & on_edge).any(axis=3)
+    x[:, lattice.triangles[:, 3:]] = np.where(on_arc[..., None], x[:, lattice.triangles[:, 3:]], middle)
+
+
+def _chord(a: Float, b: Float, s: Float) -> Float:
+    """(t, q, 2) points that cut the chords from a to b (t, 2) in the ratio s (q,)."""
+    return a[:, None] + s[None, :, None] * (b - a)[:, None]
+
+
+def _arc(a: Float, b: Float, centre: Float, turn: Float, s: Float) -> Float:
+    """(t, q, 2) points that cut the arcs from a to b in the ratio s of their parameters, which turn by `turn` (t,).
+
+    An affine map takes the arc of a circle, where the weights of the spokes are these, to that of an ellipse.
+    """
+    from_a, from_b, angle = a[:, None] - centre[:, None], b[:, None] - centre[:, None], turn[:, None]
+    weight_a, weight_b = np.sin((1 - s) * angle), np.sin(s * angle)
+    spokes = (weight_a[..., None] * from_a + weight_b[..., None] * from_b) / np.sin(angle)[..., None]
+    return np.asarray(centre[:, None] + spokes)

@@ -1,0 +1,99 @@
+"""About how many triangles a mesh of round and elliptic fibres will have, before it is made."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from feti_homog.case.cell_section import FIBRES_OF
+from feti_homog.case.mixed_cell import fibre_counts
+from feti_homog.fibres.arrangement import arrange
+from feti_homog.fibres.ellipses import Ellipses
+from feti_homog.mesh.sizes.from_sources import MAX_GROWTH
+from feti_homog.mesh.sizes.size_field import MIN_EDGES_AROUND
+
+if TYPE_CHECKING:
+    from feti_homog.case.cell_section import Cell
+
+# Area of an equilateral triangle / its side squared.
+TRIANGLE_AREA = math.sqrt(3.0) / 4.0
+# Triangles about a fibre of a random cell, whose gaps are narrow.
+TRIANGLES_OF_A_FIBRE = 160
+# Ratios of sizes beyond those that a case can ask for.
+RATIOS = np.geomspace(1.0, 1e7, 400)
+
+
+def fibres_of(cell: Cell) -> int:
+    """Number of fibres."""
+    if cell.geometry == "table":
+        return arrange(cell).fibres
+    return FIBRES_OF.get(cell.geometry) or sum(fibre_counts(cell).values())
+
+
+def mean_radius(cell: Cell) -> float:
+    """Mean radius of the fibres, of a table of the voids too, / width of the cell."""
+    if cell.geometry == "table":
+        return float(arrange(cell).radii.mean())
+    return math.sqrt(math.fsum(cell.fractions.values()) * _height(cell) / (math.pi * fibres_of(cell)))
+
+
+def interface_size(cell: Cell) -> float:
+    """Size of elements on interfaces / width of the cell."""
+    return min(cell.interface_size or cell.mesh_size, 2 * math.pi * mean_radius(cell) / MIN_EDGES_AROUND)
+
+
+def triangles(cell: Cell) -> float:
+    """Those of a cell without debonded arcs: of one size, about fibres, at ends of ellipses, beside fine interfaces.
+
+    On both sides of interfaces of the length P there are 2 P int dx / (A (h + g x)^2) = 2 P / (A g h) triangles.
+    """
+    count = _height(cell) / (TRIANGLE_AREA * cell.mesh_size**2) + TRIANGLES_OF_A_FIBRE * _irregular_fibres(cell)
+    ellipses = _ellipses(cell)
+    if ellipses is not None:
+        count += _triangles_of_ends(ellipses, cell.interface_size or cell.mesh_size)
+    if cell.interface_size is None:
+        return count
+    length = 2 * math.pi * mean_radius(cell) * fibres_of(cell) if ellipses is None else math.fsum(ellipses.perimeters)
+    return count + 2 * length / (TRIANGLE_AREA * MAX_GROWTH * cell.interface_size)
+
+
+def triangles_of_a_tip(ratio: np.float64 | float) -> float:
+    """Those that a tip adds where elements are smaller by `ratio` than around.
+
+    int 2 pi r dr / (A (h + g r)^2) up to the radius at which h + g r is the size of the others, less those of this.
+    """
+    within = 2 * (np.log(ratio) + 1 / ratio - 1) - (1 - 1 / ratio) ** 2
+    return float(math.pi / (TRIANGLE_AREA * MAX_GROWTH**2) * within)
+
+
+def ratio_at_a_tip(count: float) -> float:
+    """How much smaller elements at a tip may be than around, if it is to add no more triangles than `count`."""
+    counts = [triangles_of_a_tip(ratio) for ratio in RATIOS]
+    return float(np.interp(count, counts, RATIOS))
+
+
+def _ellipses(cell: Cell) -> Ellipses | None:
+    """The fibres, if some are not round."""
+    arrangement = arrange(cell) if cell.geometry == "table" else None
+    return None if arrangement is None or arrangement.frames is None else arrangement.ellipses
+
+
+def _triangles_of_ends(ellipses: Ellipses, around: float) -> float:
+    """Those that the ends of long axes, where the radius of curvature is b^2 / a, add among elements of this size."""
+    short, long = np.sort(ellipses.semi_axes[~ellipses.are_round], axis=1).T
+    at_ends = 2 * np.pi * short**2 / long / MIN_EDGES_AROUND
+    return 2 * math.fsum(map(triangles_of_a_tip, np.maximum(1.0, around / at_ends).tolist()))
+
+
+def _irregular_fibres(cell: Cell) -> int:
+    """Number of fibres that are no lattice."""
+    return 0 if cell.geometry in FIBRES_OF else fibres_of(cell)
+
+
+def _height(cell: Cell) -> float:
+    """Height / width of the cell."""
+    if cell.geometry == "table":
+        return arrange(cell).height
+    return math.sqrt(3.0) if cell.geometry == "hexagonal" else 1.0

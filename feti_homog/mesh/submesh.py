@@ -1,0 +1,231 @@
+"""The coarse share of one subdomain: all that a rank needs to refine it by itself."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from feti_homog.mesh.periodic_topology import Torus
+from feti_homog.typing import Bool, Float, Int
+
+
+@dataclass(frozen=True)
+class Submesh:
+    """One subdomain of the coarse mesh: v plane vertices, e plane edges, t triangles.
+
+    A plane vertex belongs to a class, a plane edge to a torus edge; both are numbered locally, in
+    ascending order of their global numbers `class_keys` and `edge_keys`.
+
+    Attributes:
+        index: number of the subdomain.
+        body: constituent that it is a piece of.
+        phase: name of the material phase.
+        points: (v, 2) vertices, in plane position.
+        triangles: (t, 3) vertices, counter-clockwise.
+        triangle_edges: (t, 3) edge from vertex k to vertex k + 1 (mod 3).
+        backwards: (t, 3) true where the triangle runs along the edge against its direction.
+        edges: (e, 2) vertices from start to end.
+        circles: (e, 3) centre and radius of the circle that the edge lies on; the radius is NaN if that is an ellipse,
+            0 where the edge is straight.
+        turns: (e,) how far the parameter turns on it along the edge; 0 where the edge is straight.
+        vertex_class: (v,) class of each vertex.
+        edge_class: (e,) torus edge of each edge.
+        at_void: (torus edges,) whether one triangle of the whole cell has the torus edge, and a void is beside it.
+        debonded: (torus edges,) whether it is from the start.
+        touching: (classes,) as `Torus.touching`.
+        class_keys, edge_keys: global numbers of the classes and torus edges.
+        period: (2,) width and height of the cell.
+        pinned: local class that is pinned against translation of the whole cell, Eq. (15), or -1.
+    """
+
+    index: int
+    body: int
+    phase: str
+    points: Float
+    triangles: Int
+    triangle_edges: Int
+    backwards: Bool
+    edges: Int
+    circles: Float
+    turns: Float
+    vertex_class: Int
+    edge_class: Int
+    at_void: Bool
+    debonded: Bool
+    touching: Bool
+    class_keys: Int
+    edge_keys: Int
+    period: Float
+    pinned: int
+
+
+@dataclass(frozen=True)
+class SubdomainTable:
+    """What every rank knows of the s subdomains of all.
+
+    Attributes:
+        body: (s,) constituent that each is a piece of.
+        rank: (s,) that has it.
+        nesting: (constituents,) places from the outermost to the innermost, as `Torus.nesting`.
+        phase: (constituents,) number of the material phase of each.
+    """
+
+    body: Int
+    rank: Int
+    nesting: Int
+    phase: Int
+
+    @classmethod
+    def of(cls, torus: Torus, subdomain: Int, rank: Int) -> SubdomainTable:
+        """That of a whole cell whose triangles are in these subdomains (m,), numbered from 0 without gaps."""
+        first = np.unique(subdomain, return_index=True)[1]
+        return cls(torus.constituent[first], rank, torus.nesting, torus.constituent_phase)
+
+
+def cut(torus: Torus, subdomain: Int) -> Iterator[Submesh]:
+    """Cut the coarse cell into its subdomains; `subdomain` (m,) numbers each triangle's, from 0 without gaps."""
+    table = SubdomainTable.of(torus, subdomain, np.zeros(subdomain.max() + 1, np.int64))
+    for own in cut_for_ranks(torus, subdomain, table, 1, pinned_class(torus)):
+        yield from own.cut()
+
+
+@dataclass(frozen=True)
+class SubmeshesOfRank:
+    """The subdomains of one rank before it cuts them apart.
+
+    Attributes:
+        whole: all of their triangles as one submesh.
+        member: (t,) which of the subdomains each triangle is of.
+        index, body, phase: of each subdomain, as in `Submesh`.
+    """
+
+    whole: Submesh
+    member: Int
+    index: Int
+    body: Int
+    phase: tuple[str, ...]
+
+    @property
+    def loads(self) -> Int:
+        """Coarse triangles of each."""
+        return np.bincount(self.member, minlength=len(self.index))
+
+    def cut(self) -> list[Submesh]:
+        """The subdomains."""
+        order = np.argsort(self.member, kind="stable")
+        members = np.split(order, np.cumsum(self.loads))[:-1]
+        pieces = [part(self.whole, those) for those in members]
+        own = zip(pieces, self.index.tolist(), self.body.tolist(), self.phase, strict=True)
+        return [replace(piece, index=index, body=body, phase=phase) for piece, index, body, phase in own]
+
+
+def cut_for_ranks(
+    torus: Torus, subdomain: Int, table: SubdomainTable, n_ranks: int, pinned: int
+) -> Iterator[SubmeshesOfRank]:
+    """What each rank gets of these triangles, which are in the subdomains `subdomain` (m,); `pinned` is the key of the
+    pinned class."""
+    for r in range(n_ranks):
+        members = np.flatnonzero(table.rank[subdomain] == r)
+        index, member = np.unique(subdomain[members], return_inverse=True)
+        body = table.body[index]
+        yield SubmeshesOfRank(
+            whole=_submesh(torus, members, pinned),
+            member=member,
+            index=index,
+            body=body,
+            phase=tuple(torus.mesh.phases[k] for k in table.phase[body].tolist()),
+        )
+
+
+def cut_bodies(torus: Torus, members: Int) -> Iterator[Submesh]:
+    """The triangles `members` (m,) as a submesh for each constituent that has some; none is pinned."""
+    order = members[np.argsort(torus.constituent[members], kind="stable")]
+    ends = np.flatnonzero(np.diff(torus.constituent[order])) + 1
+    for own in np.split(order, ends) if len(order) else ():
+        yield replace(_submesh(torus, own, -1), body=int(torus.constituent[own[0]]))
+
+
+def part(submesh: Submesh, members: Int) -> Submesh:
+    """The coarse triangles `members` (m,) of a submesh, as a submesh of its own."""
+    vertices, triangles = np.unique(submesh.triangles[members], return_inverse=True)
+    edges, triangle_edges = np.unique(submesh.triangle_edges[members], return_inverse=True)
+    classes, vertex_class = np.unique(submesh.vertex_class[vertices], return_inverse=True)
+    torus_edges, edge_class = np.unique(submesh.edge_class[edges], return_inverse=True)
+    pinned_here = np.flatnonzero(classes == submesh.pinned)
+    return replace(
+        submesh,
+        points=submesh.points[vertices],
+        triangles=triangles.reshape(-1, 3),
+        triangle_edges=triangle_edges.reshape(-1, 3),
+        backwards=submesh.backwards[members],
+        edges=np.searchsorted(vertices, submesh.edges[edges]),
+        circles=submesh.circles[edges],
+        turns=submesh.turns[edges],
+        vertex_class=vertex_class,
+        edge_class=edge_class,
+        at_void=submesh.at_void[torus_edges],
+        debonded=submesh.debonded[torus_edges],
+        touching=submesh.touching[classes],
+        class_keys=submesh.class_keys[classes],
+        edge_keys=submesh.edge_keys[torus_edges],
+        pinned=int(pinned_here[0]) if len(pinned_here) else -1,
+    )
+
+
+def pinned_class(torus: Torus) -> int:
+    """The class of a whole cell that is pinned, Eq. (15): the one inside the matrix nearest to the cell's corner.
+
+    A pinned class on an interface would hold faces together that must be able to part, and one in a fibre would keep
+    that from moving when all of its bonds are broken.  u* is the same up to a constant.
+    """
+    outside = np.zeros(len(torus.class_keys), bool)
+    outside[torus.node_class[torus.mesh.triangles[torus.constituent_phase[torus.constituent] > 0]]] = True
+    # By preference inside the matrix, else where bodies never part, else inside any body.
+    ((*_, key),) = pinning(torus, np.select([torus.never_part, torus.meeting == 2, outside], [1, 3, 2], 0))
+    return key
+
+
+def pinning(torus: Torus, unfit: Int) -> list[tuple[int, float, int]]:
+    """Find the class that is best pinned, the least of several: how unfit it is, its distance from the cell's corner,
+    its key; `unfit` (classes,) is the larger, the less fit each is.  Nothing of no classes."""
+    mesh = torus.mesh
+    away = mesh.points - np.round(mesh.points / mesh.period) * mesh.period
+    distance = np.full(len(torus.class_keys), np.inf)
+    np.minimum.at(distance, torus.node_class, np.hypot(*away.T))
+    best = np.lexsort((distance, unfit))[:1].tolist()
+    return [(int(unfit[k]), float(distance[k]), int(torus.class_keys[k])) for k in best]
+
+
+def _submesh(torus: Torus, members: Int, pinned: int) -> Submesh:
+    """The triangles `members` (t,) as one submesh, of no body and phase; `pinned` is the key of the pinned class."""
+    mesh = torus.mesh
+    vertices, triangles = np.unique(mesh.triangles[members], return_inverse=True)
+    edges, triangle_edges = np.unique(torus.triangle_edges[members], return_inverse=True)
+    ends = np.searchsorted(vertices, torus.edges[edges])
+    triangles, triangle_edges = triangles.reshape(-1, 3), triangle_edges.reshape(-1, 3)
+    classes, vertex_class = np.unique(torus.node_class[vertices], return_inverse=True)
+    torus_edges, edge_class = np.unique(torus.torus_edge[edges], return_inverse=True)
+    pinned_here = np.flatnonzero(torus.class_keys[classes] == pinned)
+    return Submesh(
+        index=0,
+        body=0,
+        phase="",
+        points=mesh.points[vertices],
+        triangles=triangles,
+        triangle_edges=triangle_edges,
+        backwards=ends[triangle_edges, 0] != triangles,
+        edges=ends,
+        circles=torus.edge_circles[edges],
+        turns=torus.edge_turns[edges],
+        vertex_class=vertex_class,
+        edge_class=edge_class,
+        at_void=torus.at_void[torus_edges],
+        debonded=torus.debonded[torus_edges],
+        touching=torus.touching[classes],
+        class_keys=torus.class_keys[classes],
+        edge_keys=torus.edge_keys[torus_edges],
+        period=np.array([mesh.width, mesh.height]),
+        pinned=int(pinned_here[0]) if len(pinned_here) else -1,
+    )

@@ -1,0 +1,253 @@
+"""The regions of an outline filled with triangles by gmsh."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from itertools import chain, pairwise
+from types import ModuleType
+
+import numpy as np
+
+from feti_homog.errors import MeshError
+from feti_homog.mesh.coarse_mesh import areas, flip_double_arcs
+from feti_homog.mesh.outline.curves import MATRIX, OUTSIDE, Curve, Curves
+from feti_homog.mesh.sizes.from_sources import MAX_GROWTH
+from feti_homog.typing import Float, Int, Int32
+
+# gmsh's algorithms. The first makes the better triangles of one size, but leaves a disc with thousands of nodes on its
+# circle unfilled.
+FRONTAL_DELAUNAY, DELAUNAY = 6, 5
+# Decimals of the coordinates that gmsh is given. The last bits of the outline's differ from machine to machine, and
+# with them gmsh would make other triangles.
+DECIMALS = 12
+# Of the area of triangles against that of the part of the cell that they fill, relative.
+AREA_TOLERANCE = 1e-9
+# gmsh's element types.
+LINE, TRIANGLE = 1, 2
+
+# Curves are numbered from 1; a negative number is a curve run backwards.
+Signed = tuple[int, Curve]
+
+
+@dataclass(frozen=True)
+class Tile:
+    """Regions of an outline that are filled at once.
+
+    Attributes:
+        points: (n, 2) nodes on the lines.
+        curves: through the nodes; beyond one that bounds the tile it is OUTSIDE.
+        largest: size of elements.
+        is_graded: whether they grow from the sizes on the lines; else those are interpolated.
+    """
+
+    points: Float
+    curves: Curves
+    largest: float
+    is_graded: bool
+
+
+@dataclass(frozen=True)
+class Filling:
+    """The triangles of a tile.
+
+    Attributes:
+        inner: (k, 2) nodes that are not on lines, numbered after those that are.
+        triangles: (m, 3) counter-clockwise.
+        circle: (m,) the smallest circle around each, or MATRIX.
+    """
+
+    inner: Float
+    triangles: Int32
+    circle: Int
+
+
+@contextmanager
+def gmsh_session() -> Iterator[ModuleType]:
+    """gmsh, initialised, silent, with fixed options and an empty model; finalised at the end."""
+    import gmsh
+
+    gmsh.initialize(readConfigFiles=False, interruptible=False)
+    try:
+        for option, value in {
+            "General.Terminal": 0,
+            "General.NumThreads": 1,
+            "Mesh.Algorithm": FRONTAL_DELAUNAY,
+            "Mesh.RandomSeed": 1,
+            "Mesh.Renumber": 0,
+        }.items():
+            gmsh.option.setNumber(option, value)
+        gmsh.model.add("cell")
+        yield gmsh
+    finally:
+        gmsh.finalize()
+
+
+def fill(tile: Tile) -> Filling:
+    """The triangles of a tile; as few as possible have two edges on one circle.
+
+    Raises:
+        MeshError: gmsh cannot fill it.
+    """
+    with gmsh_session() as gmsh:
+        gmsh.option.setNumber("Mesh.MeshSizeMax", tile.largest)
+        surfaces, circle = _add_surfaces(gmsh, tile)
+        if tile.is_graded:
+            _grow_from_lines(gmsh, surfaces, tile.largest)
+        try:
+            gmsh.model.mesh.generate(2)
+        except Exception as error:  # gmsh has no other
+            raise _unfilled(tile, str(error)) from error
+        tags, coordinates, _ = gmsh.model.mesh.getNodes()
+        elements = [gmsh.model.mesh.getElementsByType(TRIANGLE, surface)[1] for surface in surfaces]
+    order = np.argsort(tags)
+    points = coordinates.reshape(-1, 3)[order, :2]
+    points[: len(tile.points)] = tile.points
+    triangles = np.searchsorted(tags[order], np.concatenate(elements)).astype(np.int32).reshape(-1, 3)
+    area = areas(points, triangles)
+    if abs(np.abs(area).sum() / _bounded_area(tile) - 1) > AREA_TOLERANCE:
+        raise _unfilled(tile, "triangles are missing")
+    triangles[area < 0] = triangles[area < 0][:, ::-1]
+    circle_of = np.repeat(circle, [len(nodes) // 3 for nodes in elements])
+    arcs, own = arc_edges(tile.curves)
+    triangles = flip_double_arcs(triangles, circle_of.astype(np.int32), arcs, own, len(points))
+    return Filling(points[len(tile.points) :], triangles, circle_of)
+
+
+def _unfilled(tile: Tile, why: str) -> MeshError:
+    curves = tile.curves
+    # A disc that a side cuts has pieces on the other side of the cell.
+    in_matrix = np.flatnonzero((curves.inside == MATRIX) | (curves.outside == MATRIX))
+    points = tile.points[curves.chosen(in_matrix).node] if len(in_matrix) else tile.points
+    (x, y), (right, top) = points.min(axis=0), points.max(axis=0)
+    return MeshError(
+        f"[cell] gmsh cannot fill the part from ({x:.4g}, {y:.4g}) to ({right:.4g}, {top:.4g}) of the cell of width 1: "
+        f"{why}; expected another seed, mesh_size or interface_size"
+    )
+
+
+def _bounded_area(tile: Tile) -> float:
+    """Area within the curves that bound a tile: 1/2 of the integral of x dy - y dx along those with the tile on their
+    left, less along those with it on their right."""
+    curves = tile.curves
+    sign = (curves.inside != OUTSIDE).astype(float) - (curves.outside != OUTSIDE)
+    within = np.ones(len(curves.node), bool)
+    within[curves.first[1:] - 1] = False
+    begin = np.flatnonzero(within)
+    a, b = tile.points[curves.node[begin]], tile.points[curves.node[begin + 1]]
+    weight = np.repeat(sign, np.diff(curves.first) - 1)
+    return float(weight @ (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / 2)
+
+
+def arc_edges(curves: Curves) -> tuple[Int32, Int32]:
+    """Edges (a, 2) on circles, and their circles (a,)."""
+    on_circle = np.repeat(curves.circle, np.diff(curves.first))
+    within = np.ones(len(curves.node), bool)
+    within[curves.first[1:] - 1] = False
+    begin = np.flatnonzero(within & (on_circle != MATRIX))
+    return curves.node[begin[:, None] + [0, 1]].astype(np.int32), on_circle[begin].astype(np.int32)
+
+
+def _grow_from_lines(gmsh: ModuleType, surfaces: list[int], largest: float) -> None:
+    """Let elements be as large as the nearest edge of the outline, h, h + g d at the distance d from it.
+
+    Without this, gmsh interpolates between the lines: a disc would be as fine within as on its circle.
+    """
+    field = gmsh.model.mesh.field
+    extended = field.add("Extend")
+    field.setNumbers(extended, "CurvesList", [tag for _, tag in gmsh.model.getEntities(1)])
+    field.setNumbers(extended, "SurfacesList", surfaces)
+    for option, value in {"SizeMax": largest, "DistMax": largest / MAX_GROWTH, "Power": 1}.items():
+        field.setNumber(extended, option, value)
+    field.setAsBackgroundMesh(extended)
+    gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
+    gmsh.option.setNumber("Mesh.Algorithm", DELAUNAY)
+
+
+def _add_lines(gmsh: ModuleType, points: Float, curves: list[Curve]) -> list[list[int]]:
+    """Make each edge of the outline a line of one element, node n a point n + 1; the lines of each curve."""
+    geo = gmsh.model.geo
+    for tag, (x, y) in enumerate(points.round(DECIMALS).tolist(), 1):
+        geo.addPoint(x, y, 0.0, tag=tag)
+    made = []
+    for curve in curves:
+        nodes = (curve.nodes + 1).tolist()
+        made.append([geo.addLine(start, stop) for start, stop in pairwise(nodes)])
+    for tag in chain.from_iterable(made):
+        geo.mesh.setTransfiniteCurve(tag, 2)
+    return made
+
+
+def _add_surfaces(gmsh: ModuleType, tile: Tile) -> tuple[list[int], list[int]]:
+    """Add the plane surfaces of fibres, coatings and matrix; their tags, and the circle next around each or MATRIX."""
+    curves = tile.curves.pieces()
+    geo, made = gmsh.model.geo, _add_lines(gmsh, tile.points, curves)
+
+    def add_loop(loop: list[Signed]) -> int:
+        tags = [made[tag - 1] if tag > 0 else [-line for line in reversed(made[-tag - 1])] for tag, _ in loop]
+        return int(geo.addCurveLoop(list(chain.from_iterable(tags))))
+
+    surfaces, circle = [], []
+    regions = defaultdict(list)
+    for loop in _loops(_bounding_lines(curves)):
+        regions[loop[0][1].inside].append(loop)
+    # The matrix is last.
+    for region in sorted(regions, key=lambda inside: inside == MATRIX):
+        for loops in _with_holes(regions[region], tile.points):
+            surfaces.append(geo.addPlaneSurface([add_loop(loop) for loop in loops]))
+            circle.append(region)
+    geo.synchronize()
+    return surfaces, circle
+
+
+def _bounding_lines(curves: list[Curve]) -> list[Signed]:
+    """All curves with what they bound on their left, forwards, then backwards with a negative tag."""
+    forwards = list(enumerate(curves, 1))
+    backwards = [(-tag, Curve(own.nodes[::-1], own.circle, own.outside, own.inside)) for tag, own in forwards]
+    return [(tag, curve) for tag, curve in forwards + backwards if curve.inside != OUTSIDE]
+
+
+def _loops(lines: list[Signed]) -> list[list[Signed]]:
+    """Closed chains of lines that have one region on their left; each vertex of a region starts one line."""
+    after = {(curve.inside, int(curve.nodes[0])): (tag, curve) for tag, curve in lines}
+    loops = []
+    while after:
+        loop = [after.pop(next(iter(after)))]
+        while (key := (loop[0][1].inside, int(loop[-1][1].nodes[-1]))) in after:
+            loop.append(after.pop(key))
+        loops.append(loop)
+    return loops
+
+
+def _with_holes(loops: list[list[Signed]], points: Float) -> list[list[list[Signed]]]:
+    """Groups of loops, each an outer one followed by the holes, which run clockwise, within it."""
+    polygons = [_polygon(loop, points) for loop in loops]
+    is_hole = [_area(polygon) < 0 for polygon in polygons]
+    groups = {k: [loop] for k, loop in enumerate(loops) if not is_hole[k]}
+    for loop in (loop for loop, hole in zip(loops, is_hole, strict=True) if hole):
+        place = points[loop[0][1].nodes[0]]
+        # Of one within the other the inner is meant, which is the smaller.
+        around = groups if len(groups) == 1 else (k for k in groups if _contains(polygons[k], place))
+        groups[min(around, key=lambda k: _area(polygons[k]))].append(loop)
+    return list(groups.values())
+
+
+def _polygon(loop: list[Signed], points: Float) -> Float:
+    """(k, 2) nodes of the loop in order."""
+    return np.asarray(points[np.concatenate([curve.nodes[:-1] for _, curve in loop])])
+
+
+def _area(polygon: Float) -> float:
+    """That of a polygon (k, 2), negative if it runs clockwise."""
+    a, b = polygon - polygon[0], np.roll(polygon, -1, axis=0) - polygon[0]
+    return float((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum() / 2)
+
+
+def _contains(polygon: Float, point: Float) -> bool:
+    """Whether a polygon (k, 2) contains a point, by counting the edges to its right."""
+    a, b = polygon - point, np.roll(polygon, -1, axis=0) - point
+    crossing = (a[:, 1] > 0) != (b[:, 1] > 0)
+    rise = np.where(crossing, b[:, 1] - a[:, 1], 1.0)
+    return bool(np.count_nonzero(crossing & (a[:, 0] - a[:, 1] * (b[:, 0] - a[:, 0]) / rise > 0)) % 2)

@@ -1,4 +1,0 @@
-"""Pictures, drawn from the files of a result folder; loads Matplotlib.
-
-May use `output.files` and `output.text`.  Main entry: `figures.plot`.
-"""

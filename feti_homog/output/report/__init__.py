@@ -1,4 +1,0 @@
-"""report.html: one page of a result with its numbers, pictures, curves and deformed states, readable without a network.
-
-May use `output.files`, `output.text` and `output.plots`; loads Bokeh.  Main entry: `page.write`.
-"""

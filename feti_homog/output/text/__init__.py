@@ -1,4 +1,0 @@
-"""Results in words: the printed summary and its tables.
-
-Uses `mechanics`.  Main entry: `summary.summary`.
-"""

@@ -1,0 +1,160 @@
+"""Values of PETSc's options that can be checked without PETSc, before any work."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from feti_homog.petsc.option_table import DIRECT_PREFIXES, OPTIONS
+from feti_homog.runtime.writable_files import can_be_read, can_be_written
+
+Value = str | int | float | bool
+
+TRUE, FALSE = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
+LARGEST_INTEGER = 2**31 - 1  # of a PETSc with 32-bit integers
+VIEWER = re.compile(r"(ascii)?(:(?P<file>[^:]*)(:(default|ascii_\w+)?(:(write|append))?)?)?")
+
+
+@dataclass(frozen=True)
+class Rule:
+    """What an option takes, in words, and whether a text is that; the text is empty if no value is given."""
+
+    expected: str
+    holds: Callable[[str], bool]
+
+
+def faulty_values(options: Mapping[str, Value]) -> list[str]:
+    """One fault for each option (name without dash) that cannot have its value."""
+    texts = {name: _text(value) for name, value in options.items()}
+    return sorted(
+        f"{in_words(name, texts[name])}: expected {rule.expected}"
+        for name, rule in RULES.items()
+        if name in texts and not rule.holds(texts[name])
+    )
+
+
+def in_words(name: str, value: str) -> str:
+    """An option (name without dash) as on the command line."""
+    return f"-{name} {value}".strip()
+
+
+def flag_value(value: Value) -> str | None:
+    """What PETSc takes for the value of a flag: empty if it is set, None if it is not; a viewer stays."""
+    text = _text(value)
+    return "" if text.lower() in TRUE else None if text.lower() in FALSE else text
+
+
+def is_flag(name: str) -> bool:
+    """Whether an option (name without dash) is a flag, which needs no value and may have that of a viewer."""
+    return name in FLAGS or name in VIEWERS
+
+
+def is_own_flag(name: str) -> bool:
+    """Whether an option (name without dash) is a flag of PETSc itself, which it reads when it starts or ends."""
+    return is_flag(name) and not name.startswith("feti_")
+
+
+def is_flag_value(text: str) -> bool:
+    """Whether a word after a flag is its value."""
+    return SWITCH.holds(text) or VIEWER.fullmatch(text) is not None
+
+
+def _text(value: Value) -> str:
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def _real(expected: str, holds: Callable[[float], bool]) -> Rule:
+    def rule(text: str) -> bool:
+        try:
+            return holds(float(text)) and "_" not in text
+        except ValueError:
+            return False
+
+    return Rule(expected, rule)
+
+
+def _integer(least: int, most: int = LARGEST_INTEGER) -> Rule:
+    def holds(text: str) -> bool:
+        return re.fullmatch(r"\+?[0-9]{1,10}", text) is not None and least <= int(text) <= most
+
+    return Rule(f"an integer of at least {least} and at most {most}", holds)
+
+
+def _names(known: list[str]) -> Rule:
+    return Rule(f"one of {', '.join(known)}", known.__contains__)
+
+
+def _is_viewer(text: str) -> bool:
+    """Whether the text says where to print, in a folder that exists."""
+    match = VIEWER.fullmatch(text)
+    return match is not None and (not match["file"] or can_be_written(match["file"]))
+
+
+def _is_new_file(text: str) -> bool:
+    """Whether the text is empty, or what may stand before its first colon is a file that can be written."""
+    file = text.partition(":")[0]
+    return not file or SWITCH.holds(file) or can_be_written(file)
+
+
+def _never(text: str) -> bool:
+    return text.lower() in FALSE
+
+
+def _has_options(file: str) -> bool:
+    """Whether a file can be read, and its lines are options, comments or aliases."""
+    if not can_be_read(file):
+        return False
+    with open(file, encoding="utf-8", errors="replace") as stream:
+        lines = [line.strip() for line in stream]
+    return all(not line or line.startswith(("-", "#", "!", "%", "alias ")) for line in lines)
+
+
+SWITCH = Rule("true or false, or no value", lambda text: text.lower() in ("", *TRUE, *FALSE))
+PRINTS = Rule(
+    "true or false, no value, or ascii:FILE of an existing folder",
+    lambda text: SWITCH.holds(text) or _is_viewer(text),
+)
+SHARE = _real("a number above 0 and below 1", lambda number: 0.0 < number < 1.0)
+NOT_NEGATIVE = _real("a number of at least 0", lambda number: 0.0 <= number < math.inf)
+
+FLAGS = (
+    *("feti_view", "malloc_debug", "malloc_test", "log_view_memory", "log_view_gpu_time"),
+    *("options_left", "skip_petscrc", "on_error_abort", "on_error_mpiabort", "no_signal_handler"),
+)
+VIEWERS = (
+    *(option.name for option in OPTIONS if not option.value and option.name != "feti_view"),
+    *(f"feti_ksp_{name}" for name in ("monitor_true_residual", "monitor_singular_value", "view_final_residual")),
+    *(f"feti_ksp_{name}" for name in ("converged_rate", "view_eigenvalues", "view_rhs", "view_solution")),
+    "log_view",
+    "options_view",
+)
+"""Flags that print, whose value may say where."""
+
+# With a relative tolerance of 1 or more nothing is solved.
+RULES: dict[str, Rule] = {
+    **{name: SWITCH for name in FLAGS},
+    **{name: PRINTS for name in VIEWERS},
+    **{
+        option.name: _names(option.value.split("|"))
+        for option in OPTIONS
+        if "|" in option.value and not option.value.endswith("...")
+    },
+    **{f"{prefix}ksp_rtol": SHARE for prefix in ("feti_", *DIRECT_PREFIXES)},
+    "feti_coarse_threshold": SHARE,
+    "feti_ksp_atol": NOT_NEGATIVE,
+    "feti_ksp_divtol": _real("a number above 1", lambda number: 1.0 < number < math.inf),
+    "feti_ksp_max_it": _integer(1),
+    "feti_schur_mat_mumps_icntl_14": _integer(0, 10_000),
+    "feti_schur_pc_type": Rule("cholesky, for what is condensed is symmetric", "cholesky".__eq__),
+    "feti_schur_pc_factor_mat_solver_type": Rule("mumps, which alone makes Schur complements", "mumps".__eq__),
+    "feti_ksp_error_if_not_converged": Rule("nothing: the run says it itself, and keeps what it computed", _never),
+    "fp_trap": Rule("nothing: numbers that are not finite are checked where they may occur", _never),
+    "info": Rule("a file of an existing folder, or no value", _is_new_file),
+    "malloc_dump": Rule("a file of an existing folder, or no value", _is_new_file),
+    "malloc_view": Rule("a file of an existing folder, or no value", _is_new_file),
+    "options_file": Rule("a file with an option of PETSc in each line", _has_options),
+    "log_trace": Rule("a file of an existing folder, or no value", lambda text: not text or can_be_written(text)),
+}
+"""For each of these options, what is expected in words, and whether a text is that."""

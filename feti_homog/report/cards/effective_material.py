@@ -1,0 +1,170 @@
+"""The effective material of a result in the axes of a card, of which axis 1 is the fibre."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from feti_homog.case.voigt_matrices import is_positive_definite
+from feti_homog.errors import CaseError
+from feti_homog.typing import Float
+
+FIBRE_FIRST = (2, 0, 1)
+"""The axes of the cell along which axes 1, 2, 3 of a card lie: x3, x1, x2, a right-handed turn."""
+PAIRS = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
+"""The pairs of axes of Voigt's order [11, 22, 33, 23, 13, 12]."""
+ORDER = [PAIRS.index(tuple(sorted((FIBRE_FIRST[i], FIBRE_FIRST[j])))) for i, j in PAIRS]
+"""Where in the order of the cell the components of a card stand: C_card = C_cell[ORDER][:, ORDER]."""
+COUPLINGS = ~np.eye(6, dtype=bool)
+"""(6, 6) where the stiffness of an orthotropic material is 0 in its axes."""
+COUPLINGS[:3, :3] = False
+TINY = float(np.finfo(float).tiny)
+NEGLIGIBLE = 1e-3
+"""Couplings up to this part of sqrt(C_ii C_jj), and shears up to this part of the largest expansion, are left out. It
+is far above what irregular meshes make of symmetric cells (1e-6), and below what is known of constants (1e-2)."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class EffectiveMaterial:
+    """A linear elastic material in axes of which 1 is the fibre, and 2 and 3 are x1 and x2 of the cell.
+
+    Attributes:
+        name: of the case.
+        version: of the program.
+        stress_unit: the case's label, empty if it has none.
+        symmetry: in words.
+        compliance: (6, 6) in Voigt's order [11, 22, 33, 23, 13, 12] with engineering shears, symmetric
+            positive definite.
+        expansion: (6,) strains per unit of temperature in the same order, or None.
+    """
+
+    name: str
+    version: str
+    stress_unit: str
+    symmetry: str
+    compliance: Float
+    expansion: Float | None
+
+    @property
+    def is_orthotropic(self) -> bool:
+        """Whether the compliance and the expansion have no coupling of shears."""
+        shears = np.zeros(3) if self.expansion is None else self.expansion[3:]
+        return not self.compliance[COUPLINGS].any() and not shears.any()
+
+    @property
+    def stiffness(self) -> Float:
+        """(6, 6) inverse of the compliance, symmetric."""
+        inverse = np.linalg.inv(self.compliance)
+        return np.asarray((inverse + inverse.T) / 2.0)
+
+    @property
+    def constants(self) -> dict[str, float]:
+        """E_i = 1/S_ii, nu_ij = -S_ij/S_ii (-eps_j/eps_i under stress along i) and G_ij, in the order in which Abaqus
+        takes them."""
+        S = self.compliance
+        return {
+            **{f"E{i + 1}": float(1.0 / S[i, i]) for i in range(3)},
+            **{f"nu{i + 1}{j + 1}": float(-S[i, j] / S[i, i]) for i, j in ((0, 1), (0, 2), (1, 2))},
+            **{f"G{i + 1}{j + 1}": float(1.0 / S[k, k]) for k in (5, 4, 3) for i, j in [PAIRS[k]]},
+        }
+
+
+def in_axes_of_the_cell(document: Mapping[str, Any]) -> EffectiveMaterial:
+    """The material of the stiffness and expansion of a result: orthotropic if its other entries are negligible.
+
+    Raises:
+        CaseError: the result has no linear spatial stiffness, or did not converge.
+        KeyError, TypeError, ValueError: it is damaged.
+    """
+    C = _stiffness(document)[np.ix_(ORDER, ORDER)]
+    given = document.get("thermal_expansion")
+    expansion = None if given is None else _numbers(given, (6,))[ORDER]
+    compliance = np.linalg.inv(C)
+    size = np.sqrt(np.diag(C))
+    sizes = [float(np.abs(C / np.outer(size, size))[COUPLINGS].max())]
+    words = f"couplings of shears of up to {sizes[0]:.2g} sqrt(Cii Cjj)"
+    if expansion is not None:
+        sizes.append(float(np.abs(expansion[3:]).max() / max(np.abs(expansion).max(), TINY)))
+        words += f" and shears of up to {sizes[1]:.2g} of the largest expansion"
+    if max(sizes) > NEGLIGIBLE:
+        symmetry = f"Not orthotropic in these axes, for there are {words}; {NEGLIGIBLE} would be left out."
+    else:
+        symmetry = f"Orthotropic; {words} are left out."
+        compliance = np.where(COUPLINGS, 0.0, compliance)
+        expansion = None if expansion is None else expansion * [1, 1, 1, 0, 0, 0]
+    return _material(document, symmetry, compliance, expansion)
+
+
+def nearest_transversely_isotropic(document: Mapping[str, Any]) -> EffectiveMaterial:
+    """The material of the transversely isotropic constants of a result.
+
+    Raises:
+        CaseError: the result has none, or did not converge.
+        KeyError, TypeError, ValueError: it is damaged.
+    """
+    _stiffness(document)
+    given = document["transversely_isotropic"]
+    names = ("E_axial", "E_transverse", "nu_axial", "nu_transverse", "G_axial")
+    E_a, E_t, nu_a, nu_t, G_a = _numbers([given[name] for name in names], (5,))
+    compliance = np.diag([1 / E_a, 1 / E_t, 1 / E_t, 2 * (1 + nu_t) / E_t, 1 / G_a, 1 / G_a])
+    compliance[0, 1:3] = compliance[1:3, 0] = -nu_a / E_a
+    compliance[1, 2] = compliance[2, 1] = -nu_t / E_t
+    if not is_positive_definite(compliance):
+        raise ValueError("transversely_isotropic: no stable material")
+    expansion = None
+    if given["expansion_axial"] is not None:
+        axial, transverse = _numbers([given["expansion_axial"], given["expansion_transverse"]], (2,))
+        expansion = np.array([axial, transverse, transverse, 0.0, 0.0, 0.0])
+    symmetry = f"The nearest transversely isotropic material, at a relative distance of {given['deviation']:.2g}."
+    return _material(document, symmetry, compliance, expansion)
+
+
+def _material(
+    document: Mapping[str, Any], symmetry: str, compliance: Float, expansion: Float | None
+) -> EffectiveMaterial:
+    return EffectiveMaterial(
+        name=document["case"]["name"],
+        version=document["version"],
+        stress_unit=document["case"]["output"]["stress_unit"],
+        symmetry=symmetry,
+        compliance=(compliance + compliance.T) / 2.0,
+        expansion=expansion,
+    )
+
+
+def _stiffness(document: Mapping[str, Any]) -> Float:
+    """(6, 6) in the axes of the cell, symmetric positive definite."""
+    analysis = document["case"]["analysis"]
+    if document["status"] != "done":
+        raise CaseError(f'its status is "{document["status"]}": {_first(document["faults"])}; run the case again')
+    if document.get("effective_stiffness") is None:
+        raise CaseError(
+            f'analysis.type = "{analysis["type"]}" has no effective stiffness; cards need "stiffness" or "envelope"'
+        )
+    if analysis["plane"] != "generalized":
+        words = f'plane = "{analysis["plane"]}" gives constants of the plane; cards need plane = "generalized"'
+        raise CaseError(words)
+    if document.get("effective_stiffness_compression") is not None:
+        raise CaseError("its debonded faces touch under some loads alone; cards are of linear materials")
+    C = _numbers(document["effective_stiffness"], (6, 6))
+    C = (C + C.T) / 2.0
+    if not is_positive_definite(C):
+        raise CaseError("its effective stiffness is not positive definite; cards are of stable materials")
+    return C
+
+
+def _numbers(value: Any, shape: tuple[int, ...]) -> Float:
+    """The array of this shape.  Raises TypeError or ValueError if it is none, or not finite."""
+    array = np.array(value, float)
+    if array.shape != shape or not np.isfinite(array).all():
+        raise ValueError(f"expected {' x '.join(map(str, shape))} finite numbers")
+    return array
+
+
+def _first(faults: Sequence[str]) -> str:
+    """The first of some faults, and how many more there are."""
+    more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
+    return f"{faults[0] if faults else 'it was not finished'}{more}"

@@ -1,0 +1,231 @@
+"""The deformed cell at several states of an angle or path, side by side and as an animation."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+from PIL import Image
+
+from feti_homog.errors import FetiHomogError
+from feti_homog.report.plots.decimation import DrawnMesh, drawn_mesh, outline_edges
+from feti_homog.report.plots.drawn_displacement import drawn_displacement, largest_scale
+from feti_homog.report.plots.interface_marks import STATE_NAMES, InterfaceEdges, state_legend
+from feti_homog.report.plots.load_labels import LoadLabels
+from feti_homog.report.plots.plot_helpers import (
+    STRESS_SYMBOLS,
+    draw_segments,
+    drawn_stress,
+    fill_triangles,
+    largest_length,
+    magnification,
+    pixels_of,
+    plain,
+    save,
+    stress_component,
+    unit_label,
+    value_range,
+)
+from feti_homog.report.text import point_tables
+from feti_homog.results import atomic, field_file
+from feti_homog.typing import Array
+
+Document = Mapping[str, Any]
+
+MAX_PANELS = 6
+MAX_FRAMES, FRAME_TIME = 24, 250  # of the animation; milliseconds
+FRAME_LIMIT, PANEL_LIMIT, STATE_LIMIT = 8000, 30_000, 60_000  # triangles in a frame, a panel, a picture of one state
+INCHES, BAR = 8.0, 0.55  # of all panels of a row, and of the colour bar in each
+LOADS_IN_PANEL, LINE = 2, 0.15  # in a line of its title; inches of a line
+
+
+@dataclass(frozen=True)
+class DeformedCell:
+    """What is the same in every panel."""
+
+    file: Any
+    drawn: DrawnMesh
+    borders: Array
+    interface_edges: InterfaceEdges
+    component: str
+    scale: float
+    labels: LoadLabels
+
+    @classmethod
+    def of(cls, file: Any, numbers: Sequence[int], document: Document, scale: float, limit: int) -> DeformedCell:
+        """The stress that the case chooses, or that suits all these states."""
+        drawn = drawn_mesh(file, limit)
+        borders = outline_edges(drawn, drawn.body)
+        chosen = document["case"]["output"].get("stress", "auto")
+        component = stress_component(chosen, [file[f"state/{n}"] for n in numbers])
+        edges = InterfaceEdges.of(file, drawn, borders)
+        return cls(file, drawn, borders, edges, component, scale, LoadLabels.of(document))
+
+    def moved(self, number: int) -> Array:
+        """(p, 2) places of the drawn nodes."""
+        places: Array = self.drawn.points + self.scale * drawn_displacement(self.file[f"state/{number}"], self.drawn)
+        return places
+
+    def draw(self, axes: Axes, number: int, moved: Array) -> None:
+        """The cell of a state, drawn nodes at `moved`, in its own range of colours: stresses grow along a path."""
+        state = self.file[f"state/{number}"]
+        stress = drawn_stress(state, self.component, self.drawn)
+        norm, extend = value_range(stress)
+        shapes = fill_triangles(axes, self.drawn, moved, stress, edges=False, norm=norm, cmap="viridis")
+        draw_segments(axes, moved[self.borders], "black", 0.5)
+        self.interface_edges.mark(axes, moved, state["status"][:], magnified=0.8)
+        axes.set_aspect("equal")
+        axes.set(xticks=(), yticks=())
+        axes.set_axis_off()
+        attributes = state.attrs
+        axes.set_title(f"{attributes['label']}\n{self.labels.label(attributes, LOADS_IN_PANEL)}", fontsize=9, y=1.0)
+        figure: Any = axes.figure
+        bar = figure.colorbar(shapes, cax=axes.inset_axes((1.02, 0.1, 0.035, 0.8)), extend=extend)
+        bar.ax.tick_params(labelsize=7, pad=1, length=2)
+        bar.locator = MaxNLocator(5)
+
+    def lines(self, number: int) -> int:
+        """Lines of the words for the load of a state."""
+        return 1 + self.labels.label(self.file[f"state/{number}"].attrs, LOADS_IN_PANEL).count("\n")
+
+    @property
+    def caption(self) -> str:
+        """What is drawn."""
+        unit = unit_label(self.file.attrs["stress_unit"]) or "(unit of the moduli)"
+        scale = "true scale" if self.scale == 1 else f"displacement × {self.scale:g}"
+        return f"${STRESS_SYMBOLS[self.component]}$ {unit}, {scale}"
+
+
+def draw_state(axes: Axes, directory: Path, number: int, stress: str = "auto", scale: float = 1.0) -> str:
+    """Draw a state of `directory`/result.h5 into axes; returns the caption.
+
+    `axes.get_legend_handles_labels()` has the marks of bonded, open and closed interfaces.
+
+    Raises:
+        FetiHomogError: result.h5 cannot be read, or has no such state.
+    """
+    path = directory / field_file.NAME
+    try:
+        with h5py.File(path, "r") as file:
+            cell = DeformedCell.of(file, [number], {"case": {"output": {"stress": stress}}}, scale, STATE_LIMIT)
+            cell.draw(axes, number, cell.moved(number))
+            caption = cell.caption
+    except (OSError, KeyError) as error:
+        raise FetiHomogError(f"cannot draw state {number} of {path}: {error}") from error
+    axes.autoscale_view()
+    for line in state_legend(list(STATE_NAMES)):
+        axes.add_line(line)
+    return caption
+
+
+def plot(directory: Path, file: Any, document: Document) -> list[Path]:
+    """`angle_states.png`, or `path_states.png` and `path.gif`."""
+    count = len(file.get("state", ()))
+    if not count:
+        return []
+    scale = shown_scale(file, document)
+    if "angle" in document:
+        # The first of the unit cases, if there are three an angle.
+        every = range(0, count, count // len(document["angle"]) or 1)
+        numbers = [every[round(k)] for k in np.linspace(0, len(every) - 1, min(MAX_PANELS, len(every)))]
+        return [save(_side_by_side(file, numbers, document, scale), directory / "angle_states.png")]
+    panels = _side_by_side(file, point_tables.chosen_states(document, MAX_PANELS, count), document, scale)
+    paths = [save(panels, directory / "path_states.png")]
+    frames = point_tables.chosen_states(document, MAX_FRAMES, count)
+    return [*paths, _animation(file, frames, document, scale, directory / "path.gif")]
+
+
+def shown_scale(file: Any, document: Mapping[str, Any]) -> float:
+    """The factor of displacements in all pictures of an angle or a path and in the report: that of the case or, by
+    default, one at which the largest displacement and opening are seen and no triangle turns over, but at least 1 under
+    a given load."""
+    chosen = document.get("case", {}).get("output", {}).get("deformation_scale")
+    if chosen is not None:
+        return float(chosen)
+    drawn = drawn_mesh(file, PANEL_LIMIT)
+    displacement = opening = 0.0
+    largest = math.inf
+    for number in _frames(document, len(file["state"])):
+        state = file[f"state/{number}"]
+        u = drawn_displacement(state, drawn)
+        displacement, largest = max(displacement, largest_length(u)), min(largest, largest_scale(u, drawn))
+        opening = max(opening, float(state["jump"][:, 0].max(initial=0.0)))
+    size = float(min(file.attrs["width"], file.attrs["height"]))
+    scale = magnification(displacement, size, opening, largest)
+    return max(scale, 1.0) if _is_load_given(document) else scale
+
+
+def _is_load_given(document: Mapping[str, Any]) -> bool:
+    """Whether states are under a load of the case, not under unit strains."""
+    angle = document.get("case", {}).get("angle", {})
+    return "path" in document or "load" in document or angle.get("strain") is not None
+
+
+def _frames(document: Mapping[str, Any], count: int) -> list[int]:
+    """Numbers of at most MAX_FRAMES of so many states."""
+    if "path" in document:
+        return point_tables.chosen_states(document, MAX_FRAMES, count)
+    return sorted({round(k) for k in np.linspace(0, count - 1, min(MAX_FRAMES, count))})
+
+
+def _side_by_side(file: Any, numbers: Sequence[int], document: Document, scale: float) -> Figure:
+    cell = DeformedCell.of(file, numbers, document, scale, PANEL_LIMIT)
+    places = [cell.moved(number) for number in numbers]
+    size = np.subtract(*_corners(places)[::-1])
+    rows = max(1, round(math.sqrt(0.7 * len(numbers) * size[0] / size[1])))
+    columns = -(-len(numbers) // rows)
+    panel = (INCHES - BAR * columns) / columns
+    title = 0.2 + LINE * (1 + max(cell.lines(number) for number in numbers))
+    figure = Figure(figsize=(INCHES, rows * (panel * size[1] / size[0] + title) + 0.7), layout="constrained")
+    grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
+    for axes, number, moved in zip(grid, numbers, places, strict=False):
+        cell.draw(axes, number, moved)
+    for axes in grid[len(numbers) :]:
+        axes.set_axis_off()
+    grid[0].autoscale_view()
+    figure.suptitle(f"{plain(file.attrs['title'])}: {cell.caption}".lstrip(": "), fontsize=11)
+    states = [cell.interface_edges.state(file[f"state/{n}/status"][:]) for n in numbers]
+    found = np.unique(np.concatenate(states))
+    handles = state_legend([kind for kind in STATE_NAMES if kind in found])
+    if handles:
+        figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False)
+    return figure
+
+
+def _animation(file: Any, numbers: Sequence[int], document: Document, scale: float, path: Path) -> Path:
+    """Frames of one layout, that of the last state."""
+    cell = DeformedCell.of(file, numbers, document, scale, FRAME_LIMIT)
+    places = [cell.moved(number) for number in numbers]
+    low, high = _corners(places)
+    size = high - low
+    title = 0.75 + LINE * max(cell.lines(number) for number in numbers)
+    figure = Figure(figsize=(3.6 + BAR, 3.6 * size[1] / size[0] + title), dpi=100, layout="constrained")
+    axes = figure.subplots()
+    figure.suptitle(cell.caption, fontsize=10)
+    frames: list[Image.Image] = []
+    for number, moved in zip(reversed(numbers), reversed(places), strict=True):
+        for artist in [*axes.collections, *axes.patches, *axes.child_axes]:
+            artist.remove()
+        cell.draw(axes, number, moved)
+        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+        picture = Image.fromarray(pixels_of(figure))
+        figure.set_layout_engine("none")
+        frames.insert(0, picture.quantize(256, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE))
+    times = [FRAME_TIME] * (len(frames) - 1) + [6 * FRAME_TIME]
+    film = {"save_all": True, "append_images": frames[1:], "duration": times, "loop": 0}
+    return atomic.replace(path, lambda part: frames[0].save(part, format="GIF", **film))
+
+
+def _corners(places: Sequence[Array]) -> tuple[Array, Array]:
+    """Lower left and upper right corner of all states, with a margin."""
+    low, high = np.min([p.min(axis=0) for p in places], axis=0), np.max([p.max(axis=0) for p in places], axis=0)
+    margin = 0.02 * (high - low)
+    return low - margin, high + margin

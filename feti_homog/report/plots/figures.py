@@ -1,0 +1,243 @@
+"""The pictures of a result: the cell, the deformed cell of each load case, and those of an angle or path."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import h5py
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from feti_homog.errors import FetiHomogError
+from feti_homog.materials.voigt import voigt_names
+from feti_homog.report.plots import axial_shear, deformed_panels, response_curves, traction_plots
+from feti_homog.report.plots.decimation import DrawnMesh, drawn_mesh, outline_edges
+from feti_homog.report.plots.drawn_displacement import drawn_displacement, largest_scale
+from feti_homog.report.plots.fibre_numbers import write_fibre_numbers
+from feti_homog.report.plots.interface_marks import InterfaceEdges
+from feti_homog.report.plots.load_labels import LoadLabels
+from feti_homog.report.plots.plot_helpers import (
+    STRESS_SYMBOLS,
+    STYLE,
+    cell_scale,
+    colour_range,
+    draw_segments,
+    drawn_stress,
+    figure_of,
+    fill_triangles,
+    label_cell_axes,
+    largest_length,
+    magnification,
+    plain,
+    save,
+    stress_component,
+    unit_label,
+)
+from feti_homog.results import field_file, result_json
+from feti_homog.typing import Array
+
+MESH_LINES = 6000  # triangles up to which their edges are drawn
+OUTLINED_BODIES = 8  # up to which the deformed cell is drawn over all that it has left
+UNDEFORMED, BAR_INCHES = "0.5", 1.1
+MATRIX = "#ece8df"
+FIBRES = ("Blues", "Oranges", "Greens", "Purples", "Reds", "Greys")  # one colour map for each phase
+
+
+def plot(directory: Path) -> list[Path]:
+    """Draws the pictures of `directory`/result.h5 and result.json beside them and returns their paths.
+
+    - cell.png: bodies and subdomains;
+    - of each load case case_E11.png, case_minus_E11.png, ... (unit strains), case_temperature.png or state_K.png;
+    - of `angle` angle.png and angle_states.png, of `path` path.png, path_states.png and path.gif;
+    - of `load` load.png, of `envelope` envelope.png;
+    - interface.png, if some interface is debonded.
+
+    If there is a result.json, its case.output chooses the stress component (else that of the unit strain) and the
+    deformation scale. A case without fields has the curves alone. Call on one rank.
+
+    Raises:
+        FetiHomogError: result.h5 cannot be read, or a picture cannot be written.
+    """
+    directory = Path(directory)
+    document = result_json.read(directory) if (directory / result_json.NAME).exists() else {}
+    with mpl.rc_context(STYLE):
+        try:
+            paths = _pictures(directory, document) if _output(document).get("fields", True) else []
+            return paths + response_curves.plot(directory, document)
+        except OSError as error:
+            raise FetiHomogError(f"cannot draw {directory / field_file.NAME}: {error.strerror or error}") from error
+
+
+def _output(document: Mapping[str, Any]) -> Mapping[str, Any]:
+    """The section [output] of the case, empty without a result.json."""
+    found: Mapping[str, Any] = document.get("case", {}).get("output", {})
+    return found
+
+
+def _pictures(directory: Path, document: Mapping[str, Any]) -> list[Path]:
+    """The pictures of result.h5."""
+    with h5py.File(directory / field_file.NAME, "r") as file:
+        drawn = drawn_mesh(file)
+        borders = outline_edges(drawn, drawn.body)
+        interface_edges = InterfaceEdges.of(file, drawn, borders)
+        paths = [save(_cell(file, drawn, borders), directory / "cell.png")]
+        if "angle" in document or "path" in document:
+            paths += deformed_panels.plot(directory, file, document)
+        else:
+            for number in sorted(file.get("state", ()), key=int):
+                state = file[f"state/{number}"]
+                draw = _sheared if axial_shear.is_axial(state) else _deformed
+                figure = draw(file, state, drawn, borders, interface_edges, document)
+                name = "load" if document.get("load") else _name(number, state.attrs)
+                paths.append(save(figure, directory / f"{name}.png"))
+        return paths + traction_plots.plot(directory, file, interface_edges, document)
+
+
+def _name(number: str, attributes: Any) -> str:
+    strain = attributes["strain"]
+    loads = dict(zip(voigt_names(len(strain))[0], strain, strict=True))
+    loads["temperature"] = attributes.get("temperature", 0.0)
+    name, value = max(loads.items(), key=lambda load: abs(load[1]))
+    if abs(value) != 1.0 or np.count_nonzero(list(loads.values())) != 1:
+        return f"state_{number}"
+    return f"case_{'minus_' if value < 0 else ''}{name}"
+
+
+def _cell(file: Any, drawn: DrawnMesh, borders: Array) -> Figure:
+    """The phases, each body in a shade of its own and with the fibre's number, beside the subdomains."""
+    attributes = file.attrs
+    figure, (left, right) = figure_of(attributes, panels=2)
+    edges = len(drawn.triangles) <= MESH_LINES
+    bodies, subdomains = drawn.body.max() + 1, drawn.subdomain.max() + 1
+    shades, legend = _shades(drawn, list(attributes["phases"]))
+    for axes, label, colours in ((left, drawn.body, shades), (right, drawn.subdomain, _distinct(subdomains))):
+        fill_triangles(axes, drawn, drawn.points, colours[label], edges)
+        draw_segments(axes, drawn.points[borders], "black", 0.9)
+        label_cell_axes(axes, attributes)
+    draw_segments(right, drawn.points[outline_edges(drawn, drawn.subdomain)], "black", 0.5)
+    write_fibre_numbers(left, file, drawn, borders, cell_scale(attributes))
+    left.set_title(_count(bodies, "body", "bodies"))
+    right.set_title(_count(subdomains, "subdomain", "subdomains"))
+    right.set_ylabel("")
+    figure.suptitle(plain(attributes["title"]), fontsize=12)
+    figure.legend(handles=legend, loc="outside lower center", ncols=4, frameon=False)
+    return figure
+
+
+def _deformed(
+    file: Any,
+    state: Any,
+    drawn: DrawnMesh,
+    borders: Array,
+    interface_edges: InterfaceEdges,
+    document: Mapping[str, Any],
+) -> Figure:
+    """The magnified deformed cell with a stress component in colour, and the outline it has left."""
+    displacement = drawn_displacement(state, drawn)
+    size = float(np.ptp(drawn.points, axis=0).min())
+    seen = magnification(largest_length(displacement), size, largest=largest_scale(displacement, drawn))
+    chosen = _output(document).get("deformation_scale")
+    scale = seen if chosen is None else chosen
+    moved = drawn.points + scale * displacement
+    figure, axes = _coloured(file, state, drawn, moved, _output(document))
+    draw_segments(axes, _left(file.attrs, drawn, borders), UNDEFORMED, 0.7)
+    undeformed = Line2D([], [], color=UNDEFORMED, linewidth=0.7, label="undeformed")
+    _outlined(figure, axes, state, moved, borders, interface_edges, [undeformed])
+    axes.set_title(
+        f"{plain(file.attrs['title'])}\n{LoadLabels.of(document).label(state.attrs)}, displacement × {scale:g}".lstrip()
+    )
+    return figure
+
+
+def _sheared(
+    file: Any,
+    state: Any,
+    drawn: DrawnMesh,
+    borders: Array,
+    interface_edges: InterfaceEdges,
+    document: Mapping[str, Any],
+) -> Figure:
+    """The cell with an axial stress in colour and lines of equal displacement along the fibres, which moves nothing in
+    the plane."""
+    figure, axes = _coloured(file, state, drawn, drawn.points, _output(document))
+    step = axial_shear.draw_levels(axes, state, drawn)
+    length = plain(file.attrs["length_unit"])
+    words = f"$u_3$ every {step:g} {length}".rstrip()
+    levels = Line2D([], [], color=axial_shear.INK, linewidth=axial_shear.WIDTH, label=words)
+    _outlined(figure, axes, state, drawn.points, borders, interface_edges, [levels])
+    axes.set_title(f"{plain(file.attrs['title'])}\n{LoadLabels.of(document).label(state.attrs)}".lstrip())
+    return figure
+
+
+def _coloured(file: Any, state: Any, drawn: DrawnMesh, moved: Array, output: Mapping[str, Any]) -> tuple[Figure, Axes]:
+    """The cell, its nodes at `moved`, in the colours of a stress."""
+    attributes = file.attrs
+    figure, (axes,) = figure_of(attributes, panels=1, beside=BAR_INCHES)
+    component = stress_component(output.get("stress", "auto"), [state])
+    stress = drawn_stress(state, component, drawn)
+    norm, colours, extend = colour_range(stress)
+    picture = fill_triangles(axes, drawn, moved, stress, edges=False, norm=norm, cmap=colours)
+    bar = figure.colorbar(picture, cax=axes.inset_axes((1.03, 0.0, 0.04, 1.0)), extend=extend)
+    bar.set_label(f"${STRESS_SYMBOLS[component]}$ " + (unit_label(attributes["stress_unit"]) or "(unit of the moduli)"))
+    return figure, axes
+
+
+def _outlined(
+    figure: Figure,
+    axes: Axes,
+    state: Any,
+    moved: Array,
+    borders: Array,
+    interface_edges: InterfaceEdges,
+    lines: list[Line2D],
+) -> None:
+    """Outlines of the bodies and the states of the interfaces, and a legend of them and of other lines."""
+    draw_segments(axes, moved[borders], "black", 0.8)
+    marks = interface_edges.mark(axes, moved, state["status"][:])
+    label_cell_axes(axes, state.file.attrs)
+    handles = [*(marks if len(marks) > 1 else ()), *lines]
+    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), frameon=False)
+
+
+def _left(attributes: Any, drawn: DrawnMesh, borders: Array) -> Array:
+    """The undeformed outlines (e, 2, 2): of the bodies if they are few, else of the cell alone."""
+    if drawn.body.max() < OUTLINED_BODIES:
+        outline: Array = drawn.points[borders]
+        return outline
+    corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * [attributes["width"], attributes["height"]]
+    return np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
+
+
+def _shades(drawn: DrawnMesh, phases: list[str]) -> tuple[Array, list[Patch]]:
+    """A colour (bodies, 4) for each body, a shade of its phase's; and the legend of the phases."""
+    colours = np.zeros((drawn.body.max() + 1, 4))
+    legend = []
+    for index, phase in enumerate(phases):
+        bodies = np.unique(drawn.body[drawn.phase == index])
+        if not len(bodies):
+            continue
+        if index == 0:
+            shades = np.tile(mpl.colors.to_rgba(MATRIX), (len(bodies), 1))
+        else:
+            tones = 0.65 - 0.35 * (np.arange(len(bodies)) * 0.618 % 1.0)
+            shades = mpl.colormaps[FIBRES[(index - 1) % len(FIBRES)]](tones)
+        colours[bodies] = shades
+        legend.append(Patch(facecolor=shades[0], edgecolor="black", linewidth=0.6, label=phase))
+    return colours, legend
+
+
+def _distinct(count: int) -> Array:
+    """Colours (count, 4), of which those with near numbers differ most."""
+    colours: Array = mpl.colormaps["tab20"](np.arange(count) * 7 % 20)
+    colours[:, :3] = 0.3 + 0.7 * colours[:, :3]
+    return colours
+
+
+def _count(number: int, one: str, many: str) -> str:
+    return f"{number} {one if number == 1 else many}"

@@ -1,0 +1,220 @@
+"""What the pictures have in common: their style, the frame of a cell, triangles and lines, colour ranges, labels."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from matplotlib.patches import PathPatch
+from matplotlib.path import Path as Path2D
+from PIL import Image
+
+from feti_homog.materials.voigt import AXIAL_STRESSES, SPATIAL_STRESSES, STRESSES, voigt_names
+from feti_homog.report.plots.decimation import DrawnMesh, triangle_means
+from feti_homog.results import atomic
+from feti_homog.results.path_curves import FAINT, components_above
+from feti_homog.typing import Array
+
+STRAIN_SYMBOLS = (r"E_{11}", r"E_{22}", r"\gamma_{12}")
+SPATIAL_STRAIN_SYMBOLS = (r"E_{11}", r"E_{22}", r"E_{33}", r"\gamma_{23}", r"\gamma_{13}", r"\gamma_{12}")
+STRESS_SYMBOLS = {name: rf"\sigma_{{{name[1:]}}}" for name in SPATIAL_STRESSES}
+# Where a state of result.h5 has the stresses: the table, and its column if it has more than one.
+STRESS_TABLES: dict[str, tuple[str, int | None]] = {
+    **{name: ("stress", column) for column, name in enumerate(STRESSES)},
+    "S33": ("stress_33", None),
+    **{name: ("axial_stress", column) for column, name in enumerate(AXIAL_STRESSES)},
+}
+SAME_VALUE = 1e-6  # values that differ by less, relatively, are one
+CELL_INCHES = 4.8  # inches, the longer side of a drawn cell
+STYLE = {"font.size": 10, "axes.titlesize": 11, "axes.linewidth": 0.8}
+DPI, PADDING = 200, 0.08  # dots per inch; inches
+# Shares of the cell that the largest displacement and opening are drawn as, and to which the former may be stretched.
+SEEN_DISPLACEMENT, SEEN_OPENING, MOST_DISPLACEMENT = 0.1, 0.04, 0.25
+
+
+def save(figure: Figure, path: Path) -> Path:
+    """Write the figure as PNG without the white around it; `bbox_inches="tight"` would draw it twice.
+
+    Raises FetiHomogError if it cannot be written.
+    """
+    figure.set_dpi(DPI)
+    picture = Image.fromarray(np.ascontiguousarray(_trimmed(pixels_of(figure), round(PADDING * DPI))))
+    return atomic.replace(path, lambda part: picture.save(part, format="PNG"))
+
+
+def pixels_of(figure: Figure) -> Array:
+    """The drawn figure (rows, columns, 3).  Letters that the font lacks are boxes, without a warning each."""
+    canvas: Any = FigureCanvasAgg(figure)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", r"Glyph \d+")
+        canvas.draw()
+    return np.ascontiguousarray(np.asarray(canvas.buffer_rgba())[..., :3])
+
+
+def _trimmed(pixels: Array, padding: int) -> Array:
+    """The part of an image (rows, columns, 3) that is not white, with some white around."""
+    drawn = (pixels != 255).any(axis=2)
+    places = []
+    for axis in (1, 0):
+        found = np.flatnonzero(drawn.any(axis=axis))
+        low, high = (found[0], found[-1] + 1) if len(found) else (0, drawn.shape[1 - axis])
+        places.append(slice(max(low - padding, 0), high + padding))
+    part: Array = pixels[tuple(places)]
+    return part
+
+
+def figure_of(attributes: Any, panels: int, beside: float = 0.0) -> tuple[Figure, Sequence[Axes]]:
+    """A figure with panels for pictures of the cell, and so many inches beside them."""
+    width, height = float(attributes["width"]), float(attributes["height"])
+    inches = cell_scale(attributes)
+    figure = Figure(
+        figsize=(panels * (width * inches + 0.7) + 0.1 + beside, height * inches + 1.2), layout="compressed"
+    )
+    return figure, figure.subplots(1, panels, squeeze=False)[0]
+
+
+def cell_scale(attributes: Any) -> float:
+    """Inches in the picture for a length unit of the cell."""
+    return CELL_INCHES / max(float(attributes["width"]), float(attributes["height"]))
+
+
+def label_cell_axes(axes: Axes, attributes: Any) -> None:
+    unit = unit_label(attributes["length_unit"]) or "(cell units)"
+    axes.set_aspect("equal")
+    axes.autoscale_view()
+    axes.margins(0.03)
+    axes.set_xlabel(f"$x_1$ {unit}")
+    axes.set_ylabel(f"$x_2$ {unit}")
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def fill_triangles(axes: Axes, drawn: DrawnMesh, points: Array, colours: Array, edges: bool, **mapping: Any) -> Any:
+    """Fills the triangles with values, or with colours (q, 4); antialiasing would leave seams."""
+    fill = {"array": colours} if colours.ndim == 1 else {"facecolors": colours}
+    border = {"edgecolors": "0.55", "linewidths": 0.15} if edges else {"edgecolors": "none", "antialiased": False}
+    style: dict[str, Any] = fill | border | mapping
+    corners: Any = points[drawn.triangles]
+    shapes = PolyCollection(corners, **style)
+    axes.add_collection(shapes)
+    return shapes
+
+
+def draw_segments(
+    axes: Axes, segments: Array, colour: str, width: float, cap: Literal["butt", "round"] = "butt"
+) -> None:
+    """Draws segments (e, 2, 2) as one path, in which they join without spots."""
+    path = Path2D(segments.reshape(-1, 2), [Path2D.MOVETO, Path2D.LINETO] * len(segments))
+    lines = PathPatch(path, fill=False, edgecolor=colour, linewidth=width, capstyle=cap, snap=False)
+    axes.add_artist(lines)
+    lines.set_clip_path(axes.patch)
+    axes.update_datalim(path.vertices)  # as `add_patch` does, one segment after the other
+
+
+def colour_range(values: Array) -> tuple[Normalize, str, str]:
+    """Colour range, map and the ends at which values lie outside; zero is white if both signs matter."""
+    norm, extend = value_range(values)
+    least, most = float(norm.vmin or 0.0), float(norm.vmax or 0.0)
+    if min(-least, most) <= 0.05 * max(-least, most) or np.ptp(values) <= SAME_VALUE * np.abs(values).max():
+        return norm, "viridis", extend
+    most = max(-least, most)
+    return Normalize(-most, most), "RdBu_r", _outside(values, -most, most)
+
+
+def value_range(values: Array) -> tuple[Normalize, str]:
+    """Colour range and the ends at which values lie outside; the extreme 0.5 % may, at either end."""
+    low, high = float(values.min()), float(values.max())
+    if high - low <= SAME_VALUE * max(abs(low), abs(high), 1e-300):
+        middle = 0.5 * (low + high)
+        half = 0.5 * (abs(middle) or 1.0)
+        return Normalize(middle - half, middle + half), "neither"
+    least, most = (float(value) for value in np.percentile(values, (0.5, 99.5)))
+    slack = 0.05 * (most - least)
+    least, most = (low if least - low < slack else least), (high if high - most < slack else most)
+    return Normalize(least, most), _outside(values, least, most)
+
+
+def _outside(values: Array, least: float, most: float) -> str:
+    ends = (bool(values.min() < least), bool(values.max() > most))
+    return {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}[ends]
+
+
+def magnification(displacement: float, size: float, opening: float = 0.0, largest: float = math.inf) -> float:
+    """1, 2 or 5 times a power of ten, at most `largest`, at which both are seen in a cell of this size.
+
+    The largest displacement is drawn as about a tenth of the cell; if there is a narrow opening, as more than that.
+    """
+    if displacement == 0.0:
+        return 1.0
+    wanted = SEEN_DISPLACEMENT * size / displacement
+    if opening > 0.0:
+        most = MOST_DISPLACEMENT * size / displacement
+        wanted = max(wanted, min(SEEN_OPENING * size / opening, most))
+    power = 10.0 ** math.floor(math.log10(min(wanted, largest)))
+    rounded = [factor * power for factor in (1, 2, 5, 10) if factor * power <= largest]
+    return min(rounded, key=lambda scale: abs(math.log(scale / wanted)))
+
+
+def largest_length(vectors: Array) -> float:
+    """The largest length of vectors (n, 2)."""
+    return float(np.linalg.norm(vectors, axis=1).max(initial=0.0))
+
+
+def strain_symbols(count: int) -> tuple[str, ...]:
+    """Those of the strains, 3 in the plane or 6 in space."""
+    return STRAIN_SYMBOLS if count == len(STRAIN_SYMBOLS) else SPATIAL_STRAIN_SYMBOLS
+
+
+def stress_component(chosen: str, states: Sequence[Any]) -> str:
+    """The stress that is chosen, else that of the largest strain of these states on which a macroscopic stress works;
+    of all strains if there is no stress."""
+    if chosen in STRESS_SYMBOLS:
+        return chosen
+    strains, stresses = (np.array([state.attrs[name] for state in states]) for name in ("strain", "stress"))
+    loaded = components_above(FAINT, stresses) or list(range(strains.shape[1]))
+    return voigt_names(strains.shape[1])[1][loaded[int(np.abs(strains[:, loaded]).max(axis=0).argmax())]]
+
+
+def drawn_stress(state: Any, component: str, drawn: DrawnMesh) -> Array:
+    """The stress (q,) of a state in each triangle drawn."""
+    table, column = STRESS_TABLES[component]
+    return triangle_means(state[table], column, drawn)
+
+
+def interfaces_of(case: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
+    """The section [interface] of a resolved case, or all sections [[interface]]; none of perfect bonding."""
+    sections = case.get("interface", [])
+    return sections if isinstance(sections, list) else [sections]
+
+
+def bond_limits(case: Mapping[str, Any]) -> list[str]:
+    """What breaks the bonds of each interface of a case, a line each; of several with the phases that it is between."""
+    bonds, unit = interfaces_of(case) or [{}], case.get("output", {}).get("stress_unit", "")
+    if len(bonds) == 1:
+        return [_limits(bonds[0], unit)]
+    return [f"{plain('-'.join(bond['between']))}: {_limits(bond, unit)}" for bond in bonds]
+
+
+def _limits(bond: Mapping[str, Any], unit: str) -> str:
+    if bond.get("criterion") == "energy":
+        return rf"criterion energy, $G_\mathrm{{Ic}} = {bond['toughness']:g}$"
+    limits = ((r"R^\mathrm{n}", "normal_strength"), (r"R^\mathrm{t}", "tangential_strength"))
+    words = [f"${name} = {bond[key]:g}$ {plain(unit)}".rstrip() for name, key in limits if bond.get(key)]
+    return ", ".join([f"criterion {bond['criterion']}", *words]) if words else "no debonding by load"
+
+
+def plain(text: str) -> str:
+    """A user's text for Matplotlib, which would read formulas between dollars."""
+    return text.replace("$", r"\$")
+
+
+def unit_label(label: str) -> str:
+    return f"({plain(label)})" if label else ""

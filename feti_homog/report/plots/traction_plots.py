@@ -1,0 +1,139 @@
+"""interface.png: tractions and jumps around the fibres."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from matplotlib.ticker import MultipleLocator
+
+from feti_homog.report.plots.interface_coordinate import DEGREES, Coordinate, coordinate
+from feti_homog.report.plots.interface_marks import BONDED, CLOSED, OPEN, STATE_COLOURS, STATE_NAMES, InterfaceEdges
+from feti_homog.report.plots.load_labels import LoadLabels
+from feti_homog.report.plots.plot_helpers import save, unit_label
+from feti_homog.typing import Array
+
+MAX_FIBRES = 4
+LOADS_IN_LINE = 7
+# Nodes are all around a fibre if the distance of the first and the last is not so many times that of others.
+MOST_UNEVEN = 2.0
+INK = ("#1f4e9c", "#2a7f3f", "#c44e00")
+NAMES = {"traction": (r"$t_\mathrm{n}$", r"$t_\mathrm{t}$", r"$t_\mathrm{a}$"), "jump": ("gap", "slip", "axial slip")}
+
+
+def plot(directory: Path, file: Any, edges: InterfaceEdges, document: Mapping[str, Any]) -> list[Path]:
+    """interface.png, if any state has debonded nodes: of a path's last state and first, else of one state."""
+    names = sorted(file.get("state", ()), key=int)
+    debonded = {name: int((file[f"state/{name}/status"][:] != BONDED).sum()) for name in names}
+    if not any(debonded.values()):
+        return []
+    total = len(file["interface/points"])
+    # After all bonds are gone there is not much left to see, unless the faces touch.
+    last = next((n for n in reversed(names) if 0 < debonded[n] < total or _touching(file, n)), names[-1])
+    partly = [name for name in names if 0 < debonded[name] < total]
+    shown = list(dict.fromkeys([names[0], last])) if "path" in document else [(partly or [last])[len(partly) // 2]]
+    return [save(_figure(file, edges, shown, LoadLabels.of(document)), directory / "interface.png")]
+
+
+def _touching(file: Any, name: str) -> bool:
+    return bool((file[f"state/{name}/status"][:] == CLOSED).any())
+
+
+def _figure(file: Any, edges: InterfaceEdges, names: list[str], labels: LoadLabels) -> Figure:
+    """A row for each of the fibres that are most debonded: tractions, and jumps."""
+    fibre, status = file["interface/fibre"][:], file[f"state/{names[-1]}/status"][:]
+    bodies, count = np.unique(fibre[status != BONDED], return_counts=True)
+    chosen = np.sort(bodies[np.argsort(-count, kind="stable")][:MAX_FIBRES])
+    figure = Figure(figsize=(9.0, 2.4 * len(chosen) + 1.5), layout="constrained")
+    grid = figure.subplots(len(chosen), 2, sharex="row", sharey="col", squeeze=False)
+    for row, body in zip(grid, chosen, strict=True):
+        place = coordinate(file, edges, body)
+        for axes, quantity in zip(row, NAMES, strict=True):
+            _shade(axes, place, status[place.nodes])
+            for name in names:
+                values = _values(file[f"state/{name}"], quantity)[place.nodes]
+                _curves(axes, quantity, place, values, name == names[-1])
+            _finish(axes, place)
+        row[0].set_title(_name(file, body, place), fontsize=10, loc="left")
+    _labels(file, figure, grid, status[np.isin(fibre, chosen)])
+    which = (
+        f"\nthe {len(chosen)} of {len(bodies)} debonded interfaces that are so most"
+        if len(bodies) > len(chosen)
+        else ""
+    )
+    figure.suptitle(_title(file, names, labels) + which, fontsize=10)
+    return figure
+
+
+def _name(file: Any, body: int, place: Coordinate) -> str:
+    number = file["interface/fibre_number"][place.nodes[0]]
+    return f"fibre {number}" if body in file["fibre/body"][:] else f"coating of fibre {number}"
+
+
+def _values(state: Any, quantity: str) -> Array:
+    """(k, 2) tractions or jumps, or (k, 3) if there are any along the fibres."""
+    values: Array = state[quantity][:]
+    if f"axial_{quantity}" not in state or not (axial := state[f"axial_{quantity}"][:]).any():
+        return values
+    return np.column_stack([values, axial])
+
+
+def _curves(axes: Axes, quantity: str, place: Coordinate, values: Array, last: bool) -> None:
+    """The values at the nodes of a fibre, around it if they are all around."""
+    at, turn = place.values, place.ends[1] - place.ends[0]
+    if place.ends == DEGREES and len(at) > 1 and at[0] + turn - at[-1] < MOST_UNEVEN * np.diff(at).max():
+        at, values = (
+            np.concatenate([at[-1:] - turn, at, at[:1] + turn]),
+            np.concatenate([values[-1:], values, values[:1]]),
+        )
+    for label, column, ink in zip(NAMES[quantity], values.T, INK, strict=False):
+        width, style = (1.5, "-") if last else (0.9, "--")
+        axes.plot(at, column, style, color=ink, linewidth=width, label=label if last else None)
+
+
+def _shade(axes: Axes, place: Coordinate, status: Array) -> None:
+    """The debonded parts of the last state; each node stands for half of the way to its neighbours."""
+    middle = (place.values[1:] + place.values[:-1]) / 2
+    edges = np.concatenate([[place.ends[0]], middle, [place.ends[1]]])
+    for kind in (OPEN, CLOSED):
+        for at in np.flatnonzero(status == kind):
+            axes.axvspan(edges[at], edges[at + 1], color=STATE_COLOURS[kind], alpha=0.18, linewidth=0)
+
+
+def _finish(axes: Axes, place: Coordinate) -> None:
+    axes.axhline(0.0, color="0.6", linewidth=0.6)
+    axes.set_xlim(*place.ends)
+    axes.set_xlabel(place.label)
+    if place.ends == DEGREES:
+        axes.xaxis.set_major_locator(MultipleLocator(60))
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def _labels(file: Any, figure: Figure, grid: Any, shaded: Array) -> None:
+    stress = unit_label(file.attrs["stress_unit"]) or "(unit of the moduli)"
+    length = unit_label(file.attrs["length_unit"]) or "(cell units)"
+    for row in grid:
+        row[0].set_ylabel(f"traction {stress}")
+        row[1].set_ylabel(f"jump {length}")
+    for axes in grid[0]:
+        axes.legend(frameon=False, fontsize=9, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.1, ncols=3)
+    patches = [
+        Patch(color=STATE_COLOURS[kind], alpha=0.18, linewidth=0, label=STATE_NAMES[kind])
+        for kind in (OPEN, CLOSED)
+        if kind in shaded
+    ]
+    figure.legend(handles=patches, loc="outside lower center", ncols=2, frameon=False)
+
+
+def _title(file: Any, names: list[str], labels: LoadLabels) -> str:
+    """The last state and, of more, the first."""
+    first, last = (file[f"state/{name}"].attrs for name in (names[0], names[-1]))
+    title = f"{last['label']}: {labels.label(last, LOADS_IN_LINE)}"
+    if len(names) > 1:
+        title += f"   (dashed: {first['label']}: {labels.label(first, LOADS_IN_LINE)})"
+    return title

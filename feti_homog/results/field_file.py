@@ -1,0 +1,258 @@
+"""result.h5: mesh, interface and states, written by all ranks together (parallel HDF5)."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from feti_homog.parallel.mpi_errors import agree, agree_after, all_raise, on_root, on_root_only
+from feti_homog.runtime.records import LENGTH, STRESS, Description
+from feti_homog.errors import FetiHomogError
+from feti_homog.results import atomic
+from feti_homog.results.field_layout import PROGRAM, FibrePart, Header, InterfacePart, MeshPart, StatePart, attributes, rows_of, tables
+from feti_homog.results.field_views import add_views, bytes_of_views
+
+if TYPE_CHECKING:
+    from mpi4py.MPI import Comm
+
+
+NAME = "result.h5"
+PURE_NUMBER = "1"  # the unit of what has none
+# Bytes for what HDF5 itself adds to the file and to each table (0.6 KB a table were measured).
+RESERVE, TABLE_RESERVE = 1 << 17, 1 << 12
+
+
+@dataclass(frozen=True)
+class _Rows:
+    """The place of this rank's rows in a table that all ranks share, in the order of the ranks."""
+
+    start: int
+    count: int
+    total: int
+
+    @classmethod
+    def of(cls, comm: Comm, count: int) -> _Rows:
+        counts = comm.allgather(count)
+        return cls(sum(counts[: comm.rank]), count, sum(counts))
+
+
+class FieldFile:
+    """The file `directory`/result.h5 while it is being written; every method is collective over `comm`.
+
+    `field_layout` says which tables and attributes it has, `field_views` which of them show others.
+
+    Until `close` the file is called `part`. As a context manager it closes when the block ends well; an error that
+    all ranks raise removes it, any other exception leaves the unfinished file. Empty parts still need their columns:
+    shape (0, 2).
+
+    Raises:
+        FetiHomogError: the file cannot be written; on every rank, and what there was of it is removed.
+    """
+
+    def __init__(
+        self,
+        directory: Path,
+        comm: Comm,
+        header: Header,
+        mesh: MeshPart,
+        fibres: FibrePart,
+        interface: InterfacePart,
+    ) -> None:
+        self._comm = comm
+        self.path = Path(directory) / NAME
+        self.part: Path = on_root(comm, atomic.part_of, self.path)
+        self._units = {LENGTH: header.length_unit, STRESS: header.stress_unit}
+        counts = {
+            "n": len(mesh.points),
+            "m": len(mesh.triangles),
+            "k": len(interface.points),
+            "f": len(fibres.number),
+        }
+        self._rows = {symbol: _Rows.of(comm, count) for symbol, count in counts.items()}
+        self._reserved = RESERVE
+        size = RESERVE + sum(map(self._bytes, (mesh, fibres, interface)))
+        on_root(comm, _with_write_errors, self.path, _create, self.part, size)
+        self._is_open = True
+        self._opened = contextlib.ExitStack()
+        path = self._agreed(agree, _path_for_mpi, self.part, self._opened)
+        self._file = self._agreed(agree_after, _open, path, comm, self._opened)
+        self._agreed(agree_after, _set_attributes, self._file, "/", attributes(header) | {"created_by": PROGRAM})
+        self._write_part("mesh", replace(mesh, triangles=mesh.triangles + np.int64(self._rows["n"].start)))
+        self._write_part("fibre", fibres)
+        self._write_part("interface", interface)
+
+    def write_state(self, number: int, state: StatePart) -> None:
+        """Adds state `number` (0, 1, ...) and flushes. The cell's own numbers are the same on all ranks."""
+        group = f"state/{number}"
+        self._write_part(group, state)
+        self._agreed(agree_after, _set_attributes, self._file, group, attributes(state))
+        self._agreed(agree_after, self._file.flush)
+
+    def close(self) -> Path:
+        """Completes the file, gives it its final name, and returns its path."""
+        self._agreed(agree_after, self._opened.close)
+        self._agreed(on_root_only, _complete, self.part, self.path)
+        self._is_open = False
+        return self.path
+
+    def __enter__(self) -> FieldFile:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if not self._is_open:
+            return
+        if error is None:
+            self.close()
+        elif all_raise(self._comm, error):
+            self._remove()
+
+    def _bytes(self, part: Any) -> int:
+        """Bytes that the tables of a part take, those of all ranks."""
+        return sum(
+            TABLE_RESERVE
+            + np.dtype(d.dtype).itemsize
+            * int(np.prod(np.shape(getattr(part, name))[1:]))
+            * self._rows[rows_of(d)].total
+            for name, d in tables(part).items()
+        )
+
+    def _write_part(self, group: str, part: Any) -> None:
+        """Makes the tables of a group, each rank giving its rows."""
+        size = self._bytes(part)
+        self._agreed(on_root_only, _reserve, self.part, self._reserved, size)
+        self._reserved += size
+        described = tables(part)
+        for symbol, rows in self._rows.items():
+            own = {name: d for name, d in described.items() if rows_of(d) == symbol}
+            if own:
+                self._write_tables(group, rows, part, own)
+
+    def _write_tables(self, group: str, rows: _Rows, part: Any, described: Mapping[str, Description]) -> None:
+        """Makes tables of the same rows of a part."""
+        arrays = agree(self._comm, _arrays, group, rows.count, part, described)
+        for name, array in arrays.items():
+            words = self._words(described[name])
+            self._agreed(agree_after, _write_rows, self._file, f"{group}/{name}", rows, array, words)
+
+    def _words(self, described: Description) -> dict[str, str]:
+        """The attributes of a dataset: what it holds, and in which unit, by its label if the case gives one."""
+        unit = self._units.get(described.unit) or described.unit or PURE_NUMBER
+        return {"meaning": described.meaning, "unit": unit}
+
+    def _agreed(self, agreed: Callable[..., Any], function: Callable[..., Any], *args: Any) -> Any:
+        """function(*args) by `agree_after` where HDF5 communicates; if it cannot write, the file is removed and all
+        raise."""
+        try:
+            return agreed(self._comm, _with_write_errors, self.path, function, *args)
+        except FetiHomogError:
+            self._remove()
+            raise
+
+    def _remove(self) -> None:
+        """Closes and removes the file, once. On a full disk HDF5 can close it only after it was cut to nothing."""
+        self._is_open = False
+        if self._comm.rank == 0:
+            with contextlib.suppress(OSError):
+                os.truncate(self.part, 0)
+        self._comm.barrier()
+        with contextlib.suppress(OSError, RuntimeError):
+            self._opened.close()
+        if self._comm.rank == 0:
+            with contextlib.suppress(OSError):
+                self.part.unlink()
+
+
+def _with_write_errors(path: Path, function: Callable[..., Any], *args: Any) -> Any:
+    """function(*args), its failures in words about `path`."""
+    with atomic.write_errors(path):
+        return function(*args)
+
+
+def _create(part: Path, size: int) -> None:
+    """Makes an empty HDF5 file with `size` bytes of space, by plain calls: HDF5 may crash or hang where they fail."""
+    part.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        with part.open("wb") as stream:
+            stream.write(_empty_file())
+            stream.flush()
+            os.posix_fallocate(stream.fileno(), 0, size)
+    except OSError:
+        part.unlink(missing_ok=True)
+        raise
+
+
+def _empty_file() -> bytes:
+    """An HDF5 file without content."""
+    with h5py.File("empty", "w", driver="core", backing_store=False) as file:
+        file.flush()
+        return bytes(file.id.get_file_image())
+
+
+def _path_for_mpi(part: Path, opened: contextlib.ExitStack) -> str:
+    """Names the file by a descriptor of its folder, until `opened` is closed: MPI-IO keeps names in short buffers."""
+    folder = os.open(part.parent, os.O_RDONLY)
+    opened.callback(os.close, folder)
+    return f"/proc/self/fd/{folder}/{part.name}"
+
+
+def _open(path: str, comm: Comm, opened: contextlib.ExitStack) -> Any:
+    """The file, opened by all ranks until `opened` is closed."""
+    return opened.enter_context(h5py.File(path, "r+", driver="mpio", comm=comm))
+
+
+def _complete(part: Path, path: Path) -> None:
+    """Adds the views and gives the file its name, on one rank: on all each view would cost as much as a table."""
+    # Nobody else has the file, and some file systems cannot lock.
+    with h5py.File(part, "r", locking=False) as file:
+        size = bytes_of_views(file)
+    _reserve(part, part.stat().st_size, size)
+    with h5py.File(part, "r+", locking=False) as file:
+        add_views(file)
+    atomic.commit(part, path)
+
+
+def _set_attributes(file: Any, name: str, attributes: Mapping[str, Any]) -> None:
+    target = file[name]
+    for key, value in attributes.items():
+        target.attrs[key] = value
+
+
+def _arrays(group: str, count: int, part: Any, described: Mapping[str, Description]) -> dict[str, NDArray[Any]]:
+    arrays = {name: np.ascontiguousarray(getattr(part, name), np.dtype(d.dtype)) for name, d in described.items()}
+    for name, array in arrays.items():
+        if len(array) != count:
+            raise ValueError(f"/{group}/{name} has {len(array)} rows, not {count}")
+    return arrays
+
+
+def _reserve(part: Path, start: int, size: int) -> None:
+    """Takes the space on the disk: were it to end while MPI-IO writes, some ranks might wait for ever."""
+    with part.open("r+b") as stream:
+        os.posix_fallocate(stream.fileno(), start, size)
+
+
+def _write_rows(file: Any, name: str, rows: _Rows, array: NDArray[Any], words: Mapping[str, str]) -> None:
+    """Makes a table and writes this rank's rows. An empty rank takes part with an empty selection."""
+    table = file.create_dataset(name, (rows.total, *array.shape[1:]), array.dtype)
+    _set_attributes(file, name, words)
+    memory, place = h5py.h5s.create_simple(array.shape), table.id.get_space()
+    if rows.count:
+        place.select_hyperslab((rows.start,) + (0,) * (array.ndim - 1), array.shape)
+    else:
+        memory.select_none()
+        place.select_none()
+    transfer = h5py.h5p.create(h5py.h5p.DATASET_XFER)
+    transfer.set_dxpl_mpio(h5py.h5fd.MPIO_COLLECTIVE)
+    if rows.total:
+        table.id.write(memory, place, array, dxpl=transfer)

@@ -1,0 +1,187 @@
+"""What result.h5 holds: the parts that each rank hands over, and where the file has them.
+
+Lengths are in the unit of the cell, stresses in that of the moduli.  n nodes, m elements, k interface nodes, f fibres
+are all of the file's, of which each rank has a part; nodes are torn, so that each subdomain has its own.
+"""
+
+from __future__ import annotations
+
+import typing
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from feti_homog.runtime.records import LENGTH, STRESS, Description, described, descriptions, type_words
+from feti_homog.materials.voigt import STRAINS, STRESSES
+from feti_homog.results.field_views import GROUP_OF_STATES, VIEWS, View
+from feti_homog.typing import AnyInt, Float, Float32
+
+PROGRAM = "feti_homog"
+
+
+@dataclass(frozen=True)
+class Header:
+    """The file's attributes."""
+
+    title: str = described("name of the case")
+    version: str = described("version of the program")
+    width: float = described("width of the cell", LENGTH)
+    height: float = described("height of the cell", LENGTH)
+    order: int = described("order of the elements: 1, or 2 with curved sides at interfaces")
+    refine: int = described("times that every triangle of the coarse mesh was cut in four")
+    phases: tuple[str, ...] = described("names of the phases")
+    length_unit: str = described("label of the unit of lengths, may be empty", default="")
+    stress_unit: str = described("label of the unit of stresses, may be empty", default="")
+    case: str = described("the case with its defaults as JSON, the same as `case` of result.json", default="{}")
+
+
+@dataclass(frozen=True)
+class MeshPart:
+    """This rank's n nodes and m triangles, one subdomain after the other; nodes are torn between subdomains.
+
+    Each group of 4**refine consecutive triangles fills one coarse triangle.
+    """
+
+    points: Float = described("positions of the nodes", LENGTH, "(n, 2)")
+    triangles: AnyInt = described(
+        "nodes of the elements, from 0: vertices, then of order 2 the mid-side nodes 01, 12, 20",
+        shape="(m, 3 or 6)", dtype="int64",
+    )  # fmt: skip
+    body: AnyInt = described("body of each element, from 0, the matrix", shape="(m,)", dtype="int32")
+    subdomain: AnyInt = described("subdomain of each element, from 0", shape="(m,)", dtype="int32")
+    phase: AnyInt = described("phase of each element, a place in `phases`", shape="(m,)", dtype="int32")
+    fibre_number: AnyInt = described(
+        "number of the fibre, also of its coating, from 1; 0 in the matrix", shape="(m,)", dtype="int32"
+    )
+
+
+@dataclass(frozen=True)
+class FibrePart:
+    """The f fibres, all of them on the first rank: numbered as in case files."""
+
+    number: AnyInt = described("number in `fibre = N` of case files, from 1", shape="(f,)", dtype="int32")
+    body: AnyInt = described("body in /mesh/body", shape="(f,)", dtype="int32")
+    phase: AnyInt = described("phase, a place in `phases`", shape="(f,)", dtype="int32")
+    centre: Float = described(
+        "centre of the circle, within the cell; of a fibre that is not round that of its area; NaN if it winds around",
+        LENGTH,
+        "(f, 2)",
+    )
+    radius: Float = described("radius; NaN of a fibre that is not round", LENGTH, "(f,)")
+
+
+@dataclass(frozen=True)
+class InterfacePart:
+    """The k fibre-matrix interface nodes whose multipliers this rank owns; k may be 0."""
+
+    points: Float = described("positions of the interface nodes", LENGTH, "(k, 2)")
+    normal: Float = described("unit normals (n1, n2), from fibre to matrix; tangents are (-n2, n1)", shape="(k, 2)")
+    length: Float = described("tributary length: that of the interface which a node stands for", LENGTH, "(k,)")
+    fibre: AnyInt = described("body of the fibre, or of its coating", shape="(k,)", dtype="int32")
+    fibre_number: AnyInt = described("number of the fibre, from 1", shape="(k,)", dtype="int32")
+    pair: AnyInt = described(
+        "place, from 0, of its section among the case's [[interface]]", shape="(k,)", dtype="int32"
+    )
+    fibre_node: AnyInt = described("a node of the mesh on the fibre's face, from 0", shape="(k,)", dtype="int64")
+    vertex: AnyInt = described("number of the interface node, from 0: viewers' elements", shape="(k, 1)", dtype="int64")
+    matrix_node: AnyInt = described(
+        "a node of the mesh on the matrix's face, from 0, where `fibre_node` is or an image of it by the periods",
+        shape="(k,)",
+        dtype="int64",
+    )
+
+
+@dataclass(frozen=True)
+class StatePart:
+    """One load case or state of the cell and this rank's part of its fields."""
+
+    strain: Float = described(f"macroscopic strain {', '.join(STRAINS)}", shape="(3,)")
+    stress_mean: Float = described(f"macroscopic stress {', '.join(STRESSES)}", STRESS, "(3,)", name="stress")
+    load_factor: float = described("position on the path, 0 to 1; 1 of other analyses")
+    point: int = described("number, from 0, of its point in `path` or `angle` of result.json; 0 of a stiffness")
+    label: str = described("the state in words, as `E11`, `60 deg E11`, `event 12`")
+    displacement: Float = described("displacement, that of the macroscopic strain included", LENGTH, "(n, 2)")
+    fluctuation: Float = described("displacement less that of the macroscopic strain, periodic", LENGTH, "(n, 2)")
+    stress: Float = described(f"means over the elements, {', '.join(STRESSES)}", STRESS, "(m, 3)")
+    stress_33: Float = described(
+        "stress 33, out of the plane: 0 of plane stress, NaN where the material's constants do not say it",
+        STRESS,
+        "(m,)",
+    )
+    element_strain: Float32 = described(
+        "strains of the means over the elements, components of the tensor 11, 22, 12 = gamma12 / 2, 33 (NaN as of "
+        "`stress_33`)",
+        shape="(m, 4)",
+        dtype="float32",
+    )
+    von_mises: Float32 = described("von Mises stress of `stress` and `stress_33`", STRESS, "(m,)", dtype="float32")
+    principal_1: Float32 = described("largest principal stress of the same", STRESS, "(m,)", dtype="float32")
+    principal_2: Float32 = described("middle principal stress", STRESS, "(m,)", dtype="float32")
+    principal_3: Float32 = described("smallest principal stress", STRESS, "(m,)", dtype="float32")
+    traction: Float = described("sigma n, normal (tension positive) and tangential", STRESS, "(k, 2)")
+    jump: Float = described(
+        "gap and slip: displacement of the matrix minus that of the fibre, normal and tangential", LENGTH, "(k, 2)"
+    )
+    traction_vector: Float = described("`traction` as (x, y, 0)", STRESS, "(k, 3)")
+    jump_vector: Float = described("`jump` as (x, y, 0)", LENGTH, "(k, 3)")
+    displacement_fibre: Float = described("displacement (x, y, 0) of the fibre's face", LENGTH, "(k, 3)")
+    displacement_matrix: Float = described(
+        "displacement (x, y, 0) of the matrix's face, at the same place: `displacement_fibre` plus `jump_vector`",
+        LENGTH,
+        "(k, 3)",
+    )
+    status: AnyInt = described("0 bonded, 1 closed (debonded, in contact), 2 open", shape="(k,)", dtype="int8")
+
+
+GROUPS = {"mesh": MeshPart, "fibre": FibrePart, "interface": InterfacePart, GROUP_OF_STATES: StatePart}
+
+
+@dataclass(frozen=True)
+class Item:
+    """A dataset or an attribute of result.h5; K in `path` is the number of a state, from 0."""
+
+    path: str
+    kind: str
+    shape: str
+    dtype: str
+    unit: str
+    meaning: str
+
+
+def items() -> Iterator[Item]:
+    """All that result.h5 holds in plane strain and stress, with unit and meaning: the reference table of the file."""
+    yield from items_of(Header, "", ())
+    yield Item("/", "attribute created_by", "", "text", "", f"`{PROGRAM}`")
+    for group, part in GROUPS.items():
+        yield from items_of(part, group, VIEWS.get(group, ()))
+
+
+def tables(part: Any) -> dict[str, Description]:
+    """The fields of a part that are datasets, those with a row for each node, element or interface node."""
+    return {name: d for name, d in descriptions(part).items() if rows_of(d)}
+
+
+def attributes(part: Any) -> dict[str, Any]:
+    """The other fields, by the names of the attributes, with their values."""
+    return {d.name or name: getattr(part, name) for name, d in descriptions(part).items() if not rows_of(d)}
+
+
+def rows_of(description: Description) -> str:
+    """What a dataset has rows of: `n` nodes, `m` elements, `k` interface nodes, `f` fibres; empty for attributes."""
+    first = description.shape[1:2]
+    return first if first in ("n", "m", "k", "f") else ""
+
+
+def items_of(part: type, group: str, views: Iterable[View]) -> Iterator[Item]:
+    """What a group holds, with these views of it."""
+    hints = typing.get_type_hints(part)
+    for name, d in descriptions(part).items():
+        if rows_of(d):
+            yield Item(f"/{group}/{name}", "dataset", d.shape, d.dtype, d.unit, d.meaning)
+        else:
+            words = type_words(hints[name], d)
+            yield Item(f"/{group}", f"attribute {d.name or name}", d.shape, words, d.unit, d.meaning)
+    for view in views:
+        d = descriptions(part)[view.source]
+        shape = f"({rows_of(d)}, {view.components})" if view.components else f"({rows_of(d)},)"
+        yield Item(f"/{view.path(group)}", "dataset", shape, d.dtype, d.unit, view.words)

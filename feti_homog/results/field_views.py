@@ -1,0 +1,142 @@
+"""Datasets of result.h5 that show others as viewers want them: vectors of three components, tensors, single columns.
+
+They are virtual: HDF5 fills them from the other datasets when they are read, so that they take next to no space.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import h5py
+import numpy as np
+
+from feti_homog.materials.voigt import AXIAL_STRESSES, STRESSES
+
+GROUP_OF_STATES = "state/K"
+WHOLE = -1  # instead of a column: all of a dataset that has none
+
+
+@dataclass(frozen=True)
+class View:
+    """A virtual dataset /`kind`/GROUP/`name` over datasets of /GROUP.
+
+    Attributes:
+        components: its columns; 0 if it has rows alone.
+        source: the dataset that its type and unit are from.
+        columns: its columns that are not 0: for each the dataset and the column there.
+        meaning: in words.
+    """
+
+    kind: str
+    name: str
+    components: int
+    source: str
+    columns: Mapping[int, tuple[str, int]]
+    meaning: str
+
+    @property
+    def words(self) -> str:
+        """Its meaning, and that it is virtual."""
+        return f"{self.meaning}; virtual"
+
+    def path(self, group: str) -> str:
+        """Its place in the file."""
+        return f"{self.kind}/{group}/{self.name}"
+
+
+def _vector(name: str, third: str = "") -> View:
+    columns = {0: (name, 0), 1: (name, 1)} | ({2: (third, WHOLE)} if third else {})
+    words = f"`{name}` with `{third}` as third component" if third else f"`{name}` with a third component 0"
+    return View("vector", name, 3, name, columns, words)
+
+
+def _tensor(name: str, source: str, entries: Mapping[tuple[int, int], tuple[str, int]]) -> View:
+    """The symmetric tensor [11, 12, 13, 21, 22, 23, 31, 32, 33] with these entries."""
+    places = [(3 * i + j, (min(i, j), max(i, j))) for i in range(3) for j in range(3)]
+    columns = {place: entries[pair] for place, pair in places if pair in entries}
+    words = f"tensor of `{source}`, rows of [[11, 12, 13], [12, 22, 23], [13, 23, 33]]"
+    return View("tensor", name, 9, source, columns, words)
+
+
+def _column(name: str, source: str, column: int) -> View:
+    return View("column", name, 0, source, {0: (source, column)}, f"column {column} of `{source}`")
+
+
+PLACES = ((0, 0), (1, 1), (0, 1), (2, 2))  # of 11, 22, 12, 33
+STRESS_TENSOR = dict(zip(PLACES, (("stress", 0), ("stress", 1), ("stress", 2), ("stress_33", WHOLE)), strict=True))
+STRAIN_TENSOR = {place: ("element_strain", column) for column, place in enumerate(PLACES)}
+PAIRS = [(f"{source}_{name}", source, column) for source in ("traction", "jump") for column, name in enumerate("nt")]
+
+COLUMNS = (
+    *(_column(name, "stress", column) for column, name in enumerate(STRESSES)),
+    *(_column(*pair) for pair in PAIRS),
+)
+AXIAL = "axial_displacement"  # that states of generalized plane strain have, and only they
+AXIAL_PLACES = ((1, 2), (0, 2))  # of 23, 13
+
+# The views of each group; those of /state/K are made for every state.
+VIEWS: dict[str, tuple[View, ...]] = {
+    "interface": (_vector("normal"),),
+    GROUP_OF_STATES: (
+        _vector("displacement"),
+        _vector("fluctuation"),
+        _tensor("stress", "stress", STRESS_TENSOR),
+        _tensor("strain", "element_strain", STRAIN_TENSOR),
+        *COLUMNS,
+    ),
+}
+
+# The same of a state of generalized plane strain.
+SPATIAL_VIEWS: tuple[View, ...] = (
+    _vector("displacement", AXIAL),
+    _vector("fluctuation", "axial_fluctuation"),
+    _tensor("stress", "stress", STRESS_TENSOR | {at: ("axial_stress", k) for k, at in enumerate(AXIAL_PLACES)}),
+    _tensor("strain", "element_strain", STRAIN_TENSOR | {at: ("axial_strain", k) for k, at in enumerate(AXIAL_PLACES)}),
+    *COLUMNS,
+    *(_column(name, "axial_stress", column) for column, name in enumerate(AXIAL_STRESSES)),
+)
+
+BYTES = 1 << 12  # that a view takes at most; 0.9 KB in the mean were measured
+
+
+def add_views(file: Any) -> None:
+    """Makes the views of all groups of an open file whose tables are complete; empty tables have none."""
+    for group, view in _views_of(file):
+        _add_view(file, view, group)
+
+
+def bytes_of_views(file: Any) -> int:
+    """Space that `add_views` takes at most."""
+    return BYTES * (1 + len(_views_of(file)))
+
+
+def _views_of(file: Any) -> list[tuple[str, View]]:
+    """Group and view of all that the tables of the file allow."""
+    groups = {"interface": VIEWS["interface"]}
+    for group in (f"state/{number}" for number in sorted(file.get("state", ()), key=int)):
+        groups[group] = SPATIAL_VIEWS if AXIAL in file[group] else VIEWS[GROUP_OF_STATES]
+    return [(group, view) for group, views in groups.items() for view in views if _has_rows(file[group], view)]
+
+
+def _has_rows(group: Any, view: View) -> bool:
+    """Whether the tables that a view shows are there, and not empty."""
+    names = {name for name, _ in view.columns.values()} | {view.source}
+    return names <= group.keys() and len(group[view.source]) > 0
+
+
+def _add_view(file: Any, view: View, group: str) -> None:
+    """Makes one virtual dataset over the tables of a group, with the unit of its source."""
+    original = file[f"{group}/{view.source}"]
+    rows = len(original)
+    shape = (rows, view.components) if view.components else (rows,)
+    layout = h5py.VirtualLayout(shape, original.dtype)
+    for place, (name, column) in view.columns.items():
+        table = file[f"{group}/{name}"]
+        source = h5py.VirtualSource(".", table.name, shape=table.shape, dtype=table.dtype)
+        own: Any = (slice(None), place) if view.components else slice(None)
+        layout[own] = source if column == WHOLE else source[:, column]
+    dataset = file.create_virtual_dataset(view.path(group), layout, np.zeros((), layout.dtype)[()])
+    dataset.attrs["meaning"] = view.words
+    dataset.attrs["unit"] = original.attrs["unit"]

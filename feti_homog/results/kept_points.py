@@ -1,0 +1,116 @@
+"""Which points of a path are kept with their fields: the ends, those around drops, the rest evenly.
+
+Points are those of `response`.  A path does not know its future, so the choice is made at its end.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from heapq import heapify, heapreplace
+from itertools import pairwise
+
+import numpy as np
+
+from feti_homog.results.path_curves import SAME_LOAD, Point
+from feti_homog.materials.voigt import STRAINS
+from feti_homog.typing import Float
+
+# A drop is a fall of the stress, or a jump of the strain, by more than this share of the largest: saw teeth of single
+# nodes are none.
+LEAST_DROP = 0.01
+
+Drop = tuple[float, int, int]
+"""How far the stress falls, of a jump of the strain as much of the largest, and the points before and after."""
+
+
+def kept(points: Sequence[Point], states: int | str, legs: int) -> list[int]:
+    """Numbers of the points to keep, rising.
+
+    `states` is "all", "peaks": the ends and the points around every drop, or how many at most: the ends, of the other
+    places half for the points around drops, the deepest first, and the rest as evenly between as they can be.
+    Of `legs` legs the first goes through all equilibria; 0 of increments.
+    """
+    if states == "all" or not points:
+        return list(range(len(points)))
+    ends, around = {0, len(points) - 1}, drops(points, legs)
+    if isinstance(states, str):
+        return sorted(ends.union(*(drop[1:] for drop in around)))
+    if len(points) <= states:
+        return list(range(len(points)))
+    chosen, room = ends, 2 + (states - 2) // 2
+    for _, *pair in sorted(around, key=lambda drop: -drop[0]):
+        if len(chosen.union(pair)) <= room:
+            chosen = chosen.union(pair)
+    return _filled(sorted(chosen), states)
+
+
+def drops(points: Sequence[Point], legs: int) -> list[Drop]:
+    """The drops of the stress: from each peak to the valley after it, and on a first leg of events also from each load
+    at which bonds break to the next point that a rising load comes to; and the jumps of the strain at a load that is
+    held, where a stress is given that cannot drop."""
+    stress, strain = (np.array([point[name] for point in points], float) for name in ("stress", "strain"))
+    size, length = _norm(stress, 2.0), _norm(strain, 0.5)
+    largest = float(size.max())
+    least = LEAST_DROP * largest
+    found = [(float(size[a] - size[b]), a, b) for a, b in pairwise(turning_points(size, least)) if size[a] > size[b]]
+    per_strain = largest / (float(length.max()) or 1.0)
+    load = np.array([point["load_factor"] for point in points])
+    of_first_leg = int((load * legs <= 1.0 + SAME_LOAD).sum()) if legs else 0
+    found += _of_rising_load(load[:of_first_leg], size, per_strain * strain, least)
+    return found + _jumps(load, of_first_leg, per_strain * strain, least)
+
+
+def _norm(values: Float, shear: float) -> Float:
+    """(n,) size of the tensors of (n, 3) or (n, 6), whose shears count as so much."""
+    tensions = 2 if values.shape[1] == len(STRAINS) else 3
+    square = np.square(values)
+    return np.asarray(np.sqrt(square[:, :tensions].sum(axis=1) + shear * square[:, tensions:].sum(axis=1)))
+
+
+def turning_points(values: Float, least: float) -> list[int]:
+    """Numbers of the peaks and valleys of a curve (n,), in turn, that are more than `least` apart.
+
+    The ends count if the curve falls or rises by so much from them, or to them.
+    """
+    found, low, high, rises, falls = list[int](), 0, 0, True, True
+    for number, value in enumerate(values):
+        low = number if value < values[low] else low
+        high = number if value > values[high] else high
+        if rises and value < values[high] - least:
+            found.append(high)
+            low, rises, falls = number, False, True
+        elif falls and value > values[low] + least:
+            found.append(low)
+            high, rises, falls = number, True, False
+    return [*found, high if rises else low] if found else []
+
+
+def _of_rising_load(load: Float, size: Float, strain: Float, least: float) -> list[Drop]:
+    """On rays through zero: the point after a drop is at another load, to which stress and strain are scaled."""
+    records = np.flatnonzero(load >= np.maximum.accumulate(load)).tolist() if len(load) else []
+    found = []
+    for a, b in pairwise(records):
+        scale = load[a] / load[b]
+        jump = _norm((strain[b] * scale - strain[a])[None], 0.5)[0]
+        found.append((max(float(size[a] - size[b] * scale), float(jump)), a, b))
+    return [drop for drop in found if drop[0] > least and drop[2] > drop[1] + 1]
+
+
+def _jumps(load: Float, first: int, strain: Float, least: float) -> list[Drop]:
+    """From point `first` on: to the point behind those at one load, between which bonds break at that load alone."""
+    starts = first + np.flatnonzero(np.abs(np.diff(load[first:], prepend=-1.0)) > SAME_LOAD)
+    found = []
+    for a, b in pairwise([*starts.tolist(), len(load)]):
+        jump = float(_norm((strain[b - 1] - strain[a])[None], 0.5)[0])
+        found.append((jump, a, min(b, len(load) - 1)))
+    return [drop for drop in found if drop[0] > least]
+
+
+def _filled(numbers: list[int], count: int) -> list[int]:
+    """`numbers` and others between them, `count` in all: the widest gap is always the next to be divided further."""
+    gaps: list[tuple[float, int, int, int]] = [(a - b, 1, a, b) for a, b in pairwise(numbers)]
+    heapify(gaps)
+    for _ in range(count - len(numbers)):
+        _, parts, a, b = gaps[0]
+        heapreplace(gaps, ((a - b) / (parts + 1), parts + 1, a, b))
+    return sorted({a + (b - a) * k // parts for _, parts, a, b in gaps for k in range(parts)} | {numbers[-1]})

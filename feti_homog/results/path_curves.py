@@ -1,0 +1,153 @@
+"""Numbers of stress-strain paths: what a rising load follows, the first leg, the components that are shown.
+
+Points are those of `path` in result.json: mappings with `load_factor`, `strain` and `stress`, of c components in Voigt
+order: [11, 22, 12], or [11, 22, 33, 23, 13, 12] of generalized plane strain; stresses in the unit of the moduli.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from feti_homog.case.load_names import TEMPERATURE
+from feti_homog.case.mixed_load import MixedLoad, Strain, completed, components, first_named
+from feti_homog.typing import Float
+
+SAME_LOAD = 1e-9  # load factors that differ by less, relatively, are one
+# Of the largest component: what the solver leaves of zero is less, and what would not be seen beside it.
+ZERO, FAINT = 1e-7, 1e-4
+
+Point = Mapping[str, Any]
+Document = Mapping[str, Any]
+
+
+def targets(document: Document) -> tuple[dict[str, float], ...]:
+    """The waypoints of a path, or the one load, in full: by name the strain or the stress of each component."""
+    return completed(_given(document), document["case"]["analysis"]["plane"])
+
+
+def named_components(document: Document) -> list[int]:
+    """The components that the waypoints name, in Voigt order."""
+    loads = _given(document)
+    first = first_named(loads, document["case"]["analysis"]["plane"])
+    return [component for component, number in enumerate(first.values()) if number < len(loads)]
+
+
+def _given(document: Document) -> list[Strain | MixedLoad]:
+    """The loads as the case gives them."""
+    section = document["case"].get("path") or document["case"]["load"]
+    given = section.get("waypoints") or [section[name] for name in ("strain", "to") if name in section]
+    return [MixedLoad(**load) if isinstance(load, Mapping) else tuple(load) for load in given]
+
+
+def changed_components(document: Document) -> list[int]:
+    """The components that the waypoints change, in Voigt order."""
+    pairs, found = components(document["case"]["analysis"]["plane"]), set[int]()
+    before: Mapping[str, float] = {stress: 0.0 for _, stress in pairs}
+    for target in targets(document):
+        for component, names in enumerate(pairs):
+            values = [{name: load[name] for name in names if load.get(name)} for load in (before, target)]
+            found |= {component} if values[0] != values[1] else set()
+        before = target
+    return sorted(found)
+
+
+def leading_component(document: Document) -> int:
+    """Of the components that the waypoints of a path change the one of the largest strain; of all if they change but
+    the temperature."""
+    largest = np.abs([point["strain"] for point in document["path"]]).max(axis=0)
+    changed = changed_components(document) or list(range(len(largest)))
+    return changed[int(largest[changed].argmax())]
+
+
+def components_above(share: float, values: Float) -> list[int]:
+    """Columns of (n, c) with entries above this share of the largest of all."""
+    largest = np.abs(values).max(axis=0, initial=0.0)
+    return [int(column) for column in np.flatnonzero(largest > share * largest.max(initial=0.0))]
+
+
+def shown_stresses(document: Document) -> list[int]:
+    """The components whose stress is seen on a path; the leading one if there is no stress."""
+    found = components_above(FAINT, np.array([point["stress"] for point in document["path"]], float))
+    return found or [leading_component(document)]
+
+
+def what_rises(document: Document) -> str:
+    """What rises on the first leg of a path, in words: "strain" if there is nothing else, or "load"."""
+    first = targets(document)[0]
+    others = {stress for _, stress in components(document["case"]["analysis"]["plane"])} | {TEMPERATURE}
+    return "load" if any(first[name] for name in others & first.keys()) else "strain"
+
+
+def legs(document: Document) -> int:
+    """How many straight legs the path of a case has."""
+    return len(document["case"]["path"].get("waypoints", [0]))
+
+
+def first_leg(document: Document) -> int:
+    """How many points of a path are on its first leg; of increments all, for they are drawn alike."""
+    points = document["path"]
+    if document["case"]["path"]["method"] == "increments":
+        return len(points)
+    end = (1.0 + SAME_LOAD) / legs(document)
+    return next((n for n, point in enumerate(points) if point["load_factor"] > end), len(points))
+
+
+def ends_of_legs(document: Document) -> list[int]:
+    """Numbers of the points at the waypoints of a path."""
+    position = np.array([point["load_factor"] for point in document["path"]]) * (count := legs(document))
+    found = (np.flatnonzero(np.abs(position - leg) <= SAME_LOAD * count) for leg in range(1, count + 1))
+    return [int(numbers[-1]) for numbers in found if len(numbers)]
+
+
+def is_proportional(document: Document) -> bool:
+    """Whether every point is on a ray of its own from zero: events along one leg, where the response is homogeneous."""
+    return document["case"]["path"]["method"] == "events" and legs(document) == 1
+
+
+def load_controlled(points: Sequence[Point]) -> Float:
+    """(v, 2 c) stresses and strains at the corners of a proportional path when the load only rises.
+
+    At a load t where bonds break, all break whose load is lower once the first are gone: at that load the cell comes to
+    the next branch that holds, each branch being a ray through zero: Sigma(t) = Sigma(t') t / t', and so the strains.
+    Where a strain is given its stress falls, where a stress is given its strain jumps.
+    """
+    load = np.array([point["load_factor"] for point in points])
+    values = np.array([[*point["stress"], *point["strain"]] for point in points])
+    records = np.flatnonzero(load >= np.maximum.accumulate(load))
+    corners = [np.zeros(values.shape[1]), values[records[0]]]
+    for before, after in pairwise(records):
+        corners += [values[after] * load[before] / load[after], values[after]]
+    return np.array(corners)
+
+
+def rising_strain(document: Document) -> Float | None:
+    """(v, c + 1) stresses and the size of the leading strain along a path of one leg, the load only rising.
+
+    None of any other result, and where that strain does not rise with the load.
+    """
+    points = document.get("path")
+    if not points or legs(document) != 1:
+        return None
+    if is_proportional(document):
+        curve = load_controlled(points)
+    else:
+        values = np.array([[*point["stress"], *point["strain"]] for point in points])
+        curve = np.vstack([np.zeros(values.shape[1]), values])
+    count = curve.shape[1] // 2
+    stress, strain = curve[:, :count], curve[:, count + leading_component(document)]
+    strain = strain * np.sign(strain[-1])
+    if np.any(np.diff(strain) < -ZERO * strain[-1]):
+        return None
+    return np.column_stack([stress, np.maximum.accumulate(strain)])
+
+
+def first_drop(points: Sequence[Point]) -> tuple[Float, int]:
+    """(c,) stress left when the bonds that break at the first point of a proportional path are gone, the load being
+    held there, and the number of the point whose branch it is on."""
+    load = points[0]["load_factor"]
+    number = next((n for n, point in enumerate(points) if n and point["load_factor"] >= load), len(points) - 1)
+    return np.asarray(points[number]["stress"]) * load / points[number]["load_factor"], number

@@ -1,0 +1,93 @@
+"""result.json: the document of a run, written whole or not at all."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from feti_homog.errors import CaseError, FetiHomogError
+from feti_homog.results import atomic, sealed_json
+
+NAME = "result.json"
+SCHEMA = 1  # version of the layout: to be raised when a key is renamed, removed or changes its meaning
+
+
+def write(directory: Path, document: Mapping[str, Any]) -> Path:
+    """Writes `directory`/result.json, whose folder is made if needed; returns its path.
+
+    NumPy arrays and scalars become lists and numbers, tuples lists, paths text. The file is replaced in one
+    step: a reader finds the old document or the new one. Call on one rank.
+
+    Raises:
+        FetiHomogError: a number is not finite (one line for each, with its place in the document), or the
+            file cannot be written.
+        TypeError: a value has no form in JSON.
+    """
+    content = _json_value(document, "")
+    faults = [f"{NAME}: {place} is {value}, not a finite number" for place, value in _not_finite(content, "")]
+    if faults:
+        raise FetiHomogError(*faults)
+
+    def write_text(part: Path) -> None:
+        part.parent.mkdir(parents=True, exist_ok=True)
+        part.write_text(sealed_json.dumps(content), encoding="utf-8")
+
+    return atomic.replace(Path(directory) / NAME, write_text)
+
+
+def read(directory: Path) -> dict[str, Any]:
+    """The document of `directory`/result.json.
+
+    Raises:
+        CaseError: it is missing, not JSON, no table or changed, or its layout is of another version than that
+            of this program.
+    """
+    path = Path(directory) / NAME
+    try:
+        if path.is_fifo():
+            raise CaseError(f"cannot read {path}: it is a pipe")
+        document = sealed_json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise CaseError(f"cannot read {path}: {error.strerror or error}") from error
+    except ValueError as error:
+        raise CaseError(f"cannot read {path}: {error}") from error
+    found = document.get("schema", "none")
+    if found != SCHEMA:
+        raise CaseError(f"{path}: its schema is {found}, this program reads schema {SCHEMA}; run the case again")
+    return document
+
+
+def _json_value(value: Any, place: str) -> Any:
+    """The value in JSON's own types.  Raises TypeError with the place of one that has none."""
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    if isinstance(value, Mapping):
+        return {key: _json_value(item, _inside(place, key)) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_json_value(item, f"{place}[{i}]") for i, item in enumerate(value)]
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    if value is None or isinstance(value, bool | int | float | str):
+        return value
+    raise TypeError(f"{NAME}: {place} is a {type(value).__name__}, which JSON cannot hold")
+
+
+def _not_finite(value: Any, place: str) -> Iterator[tuple[str, float]]:
+    """The numbers that are not finite, and their places."""
+    if isinstance(value, dict):
+        for key, item in value.items():
+            yield from _not_finite(item, _inside(place, key))
+    elif isinstance(value, list):
+        for i, item in enumerate(value):
+            yield from _not_finite(item, f"{place}[{i}]")
+    elif isinstance(value, float) and not math.isfinite(value):
+        yield place, value
+
+
+def _inside(place: str, key: str) -> str:
+    return f"{place}.{key}" if place else key

@@ -1,0 +1,155 @@
+"""result.xdmf and interface.xdmf: say where in result.h5 ParaView finds the cell, the interface and their states.
+
+All of ParaView's and VTK's readers understand them: whole datasets alone, points with a connectivity, tensors of nine
+components, one collection a file.  The readers take no texts: the label of a state is the name of its block, which two
+of them show, and an array of the bytes of its letters, as many in all states.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree as ET
+
+import h5py
+import numpy as np
+
+from feti_homog.materials.voigt import AXIAL_STRESSES, STRESSES
+from feti_homog.results import atomic, field_file
+from feti_homog.results.field_views import AXIAL
+
+CELL, INTERFACE = "result.xdmf", "interface.xdmf"
+TENSOR = np.array([0, 5, 4, 5, 1, 3, 4, 3, 2])  # places of the tensor's rows in [11, 22, 33, 23, 13, 12]
+NUMBERS = {"f": "Float", "i": "Int"}
+SHAPES = {1: "Scalar", 3: "Vector", 9: "Tensor"}  # by the number of components
+# The arrays of the cell and of the interface, and the datasets of result.h5, or of one of its states, that they are.
+CELL_NODES = {name: f"vector/state/K/{name}" for name in ("displacement", "fluctuation")}
+CELL_ELEMENTS = {
+    **{name: f"mesh/{name}" for name in ("body", "fibre_number", "phase", "subdomain")},
+    **{name: f"tensor/state/K/{name}" for name in ("stress", "strain")},
+    **{name: f"column/state/K/{name}" for name in STRESSES},
+    "S33": "state/K/stress_33",
+    **{name: f"state/K/{name}" for name in ("von_mises", "principal_1", "principal_2", "principal_3")},
+}
+INTERFACE_POINTS = {
+    "displacement": "state/K/displacement_fibre",
+    "displacement_matrix": "state/K/displacement_matrix",
+    "traction": "state/K/traction_vector",
+    "jump": "state/K/jump_vector",
+    **{name: f"column/state/K/{name}" for name in ("traction_n", "traction_t", "jump_n", "jump_t")},
+    "status": "state/K/status",
+    "normal": "vector/interface/normal",
+    **{name: f"interface/{name}" for name in ("length", "fibre", "fibre_number", "pair")},
+}
+# Of generalized plane strain there are these too.
+SPATIAL_ELEMENTS = {name: f"column/state/K/{name}" for name in AXIAL_STRESSES}
+SPATIAL_POINTS = {f"{name}_a": f"state/K/axial_{name}" for name in ("traction", "jump")}
+
+
+def write(directory: Path) -> list[Path]:
+    """Writes result.xdmf and, if there are interface nodes, interface.xdmf for the result.h5 of `directory`; returns
+    their paths.  Call on one rank.
+
+    Each has one temporal collection, the time being the number of the state: of fields on the nodes and elements of the
+    cell, or of those at the points of the interface.
+
+    Raises:
+        FetiHomogError: result.h5 cannot be read or a file cannot be written.
+    """
+    h5, paths = Path(directory) / field_file.NAME, []
+    with atomic.write_errors(Path(directory) / CELL), h5py.File(h5, "r", locking=False) as file:
+        paths.append(_write(h5.with_name(CELL), "cell", file, _cell))
+        if len(file["interface/points"]):
+            paths.append(_write(h5.with_name(INTERFACE), "interface", file, _interface))
+    return paths
+
+
+def _write(path: Path, name: str, file: h5py.File, fill: Callable[[ET.Element, h5py.File, str], None]) -> Path:
+    """One file; `fill` puts mesh and fields of a state into its grid."""
+    root = ET.Element("Xdmf", Version="3.0")
+    collection = ET.SubElement(
+        ET.SubElement(root, "Domain"), "Grid", Name=name, GridType="Collection", CollectionType="Temporal"
+    )
+    states = sorted(file.get("state", ()), key=int)
+    labels = [str(file[f"state/{state}"].attrs["label"]) for state in states]
+    longest = max((len(label.encode()) for label in labels), default=0)
+    for state, label in zip(states, labels, strict=True):
+        grid = _grid(collection, state, label)
+        _numbers(grid, "label", "Scalar", list(label.encode().ljust(longest)))
+        _means(grid, file[f"state/{state}"].attrs)
+        fill(grid, file, state)
+    ET.indent(root)
+    return atomic.replace(path, lambda part: ET.ElementTree(root).write(part, encoding="utf-8", xml_declaration=True))
+
+
+def _grid(collection: ET.Element, state: str, label: str) -> ET.Element:
+    """The grid of a state, in a collection of its own: readers pass on the name of a grid in such a one only."""
+    block = ET.SubElement(collection, "Grid", Name=f"state {state}", GridType="Collection", CollectionType="Spatial")
+    ET.SubElement(block, "Time", Value=state)
+    return ET.SubElement(block, "Grid", Name=label, GridType="Uniform")
+
+
+def _means(grid: ET.Element, attributes: Mapping[str, Any]) -> None:
+    """The cell's own numbers in a state."""
+    _numbers(grid, "load_factor", "Scalar", [float(attributes["load_factor"])])
+    strain, stress = attributes["strain"], attributes["stress"]
+    if "temperature" not in attributes:
+        _numbers(grid, "mean_strain", "Vector", strain.tolist())
+        _numbers(grid, "mean_stress", "Vector", stress.tolist())
+        return
+    _numbers(grid, "temperature", "Scalar", [float(attributes["temperature"])])
+    _numbers(grid, "mean_strain", "Tensor", (strain[TENSOR] * np.where(TENSOR < 3, 1.0, 0.5)).tolist())
+    _numbers(grid, "mean_stress", "Tensor", stress[TENSOR].tolist())
+
+
+def _numbers(grid: ET.Element, name: str, kind: str, values: Sequence[float]) -> None:
+    """Numbers of the state as a whole, written out."""
+    size = f"1 {len(values)}" if kind != "Scalar" else str(len(values))
+    number, precision = ("Float", "8") if isinstance(values[0], float) else ("Int", "4")
+    item = ET.Element("DataItem", Dimensions=size, Format="XML", NumberType=number, Precision=precision)
+    item.text = " ".join(map(repr, values))
+    attribute = ET.SubElement(grid, "Attribute", Name=name, AttributeType=kind, Center="Grid")
+    attribute.append(item)
+
+
+def _cell(grid: ET.Element, file: h5py.File, state: str) -> None:
+    triangles = file["mesh/triangles"]
+    kind = "Triangle_6" if triangles.shape[1] == 6 else "Triangle"
+    _mesh(grid, {"TopologyType": kind}, triangles, file["mesh/points"])
+    _attributes(grid, file, state, CELL_NODES.items(), "Node")
+    more = SPATIAL_ELEMENTS if AXIAL in file[f"state/{state}"] else {}
+    _attributes(grid, file, state, (CELL_ELEMENTS | more).items(), "Cell")
+
+
+def _interface(grid: ET.Element, file: h5py.File, state: str) -> None:
+    vertices = {"TopologyType": "Polyvertex", "NodesPerElement": "1"}
+    _mesh(grid, vertices, file["interface/vertex"], file["interface/points"])
+    more = SPATIAL_POINTS if AXIAL in file[f"state/{state}"] else {}
+    _attributes(grid, file, state, (INTERFACE_POINTS | more).items(), "Node")
+
+
+def _mesh(grid: ET.Element, kind: dict[str, str], connectivity: Any, points: Any) -> None:
+    topology = ET.SubElement(grid, "Topology", kind, NumberOfElements=str(len(connectivity)))
+    topology.append(_table(connectivity))
+    ET.SubElement(grid, "Geometry", GeometryType="XY").append(_table(points))
+
+
+def _attributes(grid: ET.Element, file: h5py.File, state: str, arrays: Iterable[tuple[str, str]], centre: str) -> None:
+    """The arrays of a state, each with its dataset."""
+    for name, place in arrays:
+        table = file[place.replace("/K/", f"/{state}/")]
+        _attribute(grid, name, 1 if table.ndim == 1 else table.shape[1], centre, _table(table))
+
+
+def _attribute(grid: ET.Element, name: str, components: int, centre: str, values: ET.Element) -> None:
+    ET.SubElement(grid, "Attribute", Name=name, AttributeType=SHAPES[components], Center=centre).append(values)
+
+
+def _table(table: Any) -> ET.Element:
+    """A whole dataset of result.h5."""
+    number = "Char" if table.dtype == np.int8 else NUMBERS[table.dtype.kind]
+    form = {"Format": "HDF", "NumberType": number, "Precision": str(table.dtype.itemsize)}
+    item = ET.Element("DataItem", form, Dimensions=" ".join(map(str, table.shape)))
+    item.text = f"{field_file.NAME}:{table.name}"
+    return item

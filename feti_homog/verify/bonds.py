@@ -1,0 +1,66 @@
+"""What the case says of the bonds of each interface node, and which of two bodies is the inner one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import dijkstra
+
+from feti_homog.typing import AnyInt, Bool, Int
+from feti_homog.verify.cell_tables import Mesh
+from feti_homog.verify.reading import ResultFiles
+from feti_homog.verify.torus import TornSides
+
+COATING = "coating"
+NUMBERS = ("normal_stiffness", "tangential_stiffness", "axial_stiffness", "normal_strength", "tangential_strength",
+           "axial_strength", "toughness", "mode_sensitivity")  # fmt: skip
+DEFAULTS = {"axial_stiffness": "tangential_stiffness", "axial_strength": "tangential_strength"}
+
+
+def bonds_of(files: ResultFiles, nodes: AnyInt | Bool | slice = slice(None)) -> Mapping[str, Any]:
+    """The section [interface]; of several, with the numbers (p,) of each of the `nodes` in place of one."""
+    sections = files.interfaces
+    if len(sections) < 2:
+        return sections[0] if sections else {}
+    pair = files.interface.pair[nodes]
+    numbers = {name: np.array([_number(section, name) for section in sections])[pair] for name in NUMBERS}
+    return {**sections[0], **numbers}
+
+
+def _number(section: Mapping[str, Any], name: str) -> float:
+    """That of a section, or of what it follows where it is not given; inf if there is none."""
+    value = section.get(name)
+    value = section.get(DEFAULTS.get(name, name)) if value is None else value
+    return np.inf if value is None else float(value)
+
+
+def pairs_of(files: ResultFiles) -> Int:
+    """(phases, phases) place of the section of the interfaces between two phases, -1 where they never part."""
+    pairs = np.full((len(files.phases),) * 2, -1)
+    for number, section in enumerate(files.interfaces or [{}]):
+        if "between" not in section:
+            pairs[0, 1:] = pairs[1:, 0] = number
+        else:
+            first, second = (files.phases.index(name) for name in section["between"])
+            pairs[first, second] = pairs[second, first] = number
+    return pairs
+
+
+def inwardness(mesh: Mesh, phases: tuple[str, ...], sides: TornSides, part: Int) -> Int:
+    """(parts,) the larger, the farther inwards: by bodies between one and the matrix, then coatings before others, then
+    by their labels; `part` (subdomains,) is that of each."""
+    paired = np.flatnonzero(sides.partner >= 0)
+    here, there = sides.element[paired], sides.element[sides.partner[paired]]
+    ends = part[mesh.subdomain[here]], part[mesh.subdomain[there]]
+    n = int(part.max()) + 1
+    phase, label = np.zeros(n, np.int64), np.zeros(n, np.int64)
+    phase[part[mesh.subdomain]], label[part[mesh.subdomain]] = mesh.phase, mesh.body
+    graph = csr_matrix((np.ones(len(paired)), ends), shape=(n, n))
+    steps = dijkstra(graph, directed=False, indices=np.flatnonzero(phase == 0), unweighted=True, min_only=True)
+    coats = np.array([name == COATING for name in phases])[phase]
+    place = np.empty(n, np.int64)
+    place[np.lexsort((label, ~coats, steps))] = np.arange(n)
+    return place

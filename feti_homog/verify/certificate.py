@@ -1,0 +1,126 @@
+"""All laws on all states of a folder of results, and how what was found is told."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from feti_homog.errors import CaseError
+from feti_homog.verify.arc_laws import check_arcs
+from feti_homog.verify.bonds import COATING
+from feti_homog.verify.derived_laws import check_derived
+from feti_homog.verify.discrete_cell import DiscreteCell
+from feti_homog.verify.envelope_laws import check_envelope
+from feti_homog.verify.field_laws import check_fields
+from feti_homog.verify.interface_laws import check_interface_state
+from feti_homog.verify.laws import laws
+from feti_homog.verify.ledger import Finding, Ledger
+from feti_homog.verify.load_laws import StateNumbers, check_load
+from feti_homog.verify.mesh_laws import check_interface, check_mesh
+from feti_homog.verify.own_process import in_own_process
+from feti_homog.verify.path_laws import check_path
+from feti_homog.verify.point_laws import check_points
+from feti_homog.verify.reading import ResultFiles, altered, opened
+from feti_homog.verify.spatial_laws import check_spatial
+from feti_homog.verify.summary_laws import check_summary
+from feti_homog.verify.table_laws import check_tables
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """What was found in a folder.
+
+    Attributes:
+        findings: of every law that applies.
+        title: case, mesh and states in words.
+        status: that of the run, with its faults if it has any.
+    """
+
+    findings: tuple[Finding, ...]
+    title: str
+    status: str
+
+    @property
+    def holds(self) -> bool:
+        """Whether every law does."""
+        return all(finding.holds for finding in self.findings)
+
+    @property
+    def text(self) -> str:
+        """A line for each law."""
+        broken = sum(not finding.holds for finding in self.findings)
+        verdict = f"{broken} of {len(self.findings)} laws are broken" if broken else "every law holds"
+        return "\n".join([self.title, self.status, *(finding.line() for finding in self.findings), verdict])
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """The same for programs."""
+        laws = [dict(finding.document) for finding in self.findings]
+        return {"title": self.title, "status": self.status, "holds": self.holds, "laws": laws}
+
+
+def verify(directory: Path) -> Certificate:
+    """Check the laws on all states of the result in a folder.
+
+    Raises:
+        CaseError: it has no result, or one whose files cannot be read; one line.
+    """
+    return in_own_process(directory, _of) if altered(directory) else _of(directory)
+
+
+def _of(directory: Path) -> Certificate:
+    with opened(directory) as files:
+        try:
+            with np.errstate(all="ignore"):  # numbers that are not finite break the laws that they are in
+                return _verified(files, directory)
+        except (KeyError, TypeError, IndexError, ValueError, AttributeError, MemoryError) as error:
+            words = f"{type(error).__name__} {error}"
+            raise CaseError(
+                f"{directory}: its files do not belong together or lack what they must have: {words}"
+            ) from error
+
+
+def _verified(files: ResultFiles, directory: Path) -> Certificate:
+    rtol, users_mesh = float(files.document["solver"]["rtol"]), files.case["cell"]["geometry"] == "mesh"
+    ledger = Ledger(laws(rtol, users_mesh, has_coatings=COATING in files.case["material"]))
+    ledger.record("files", len(files.altered), ", ".join(files.altered))
+    cell = DiscreteCell.of(files)
+    check_mesh(ledger, cell)
+    check_interface(ledger, cell)
+    states = []
+    for state in files.states():
+        arrays = (state.displacement, state.fluctuation, state.stress, state.traction, state.jump, state.strain)
+        ledger.record("numbers", [np.count_nonzero(~np.isfinite(array)) for array in arrays], state.name)
+        terms = np.abs(state.displacement) + np.abs(state.fluctuation)
+        fields = cell.elements.fields(state.displacement, terms, state.along, cell.free_strains(state))
+        check_fields(ledger, cell, state, fields)
+        check_derived(ledger, cell, state, fields)
+        check_interface_state(ledger, cell, state)
+        states.append(StateNumbers.of(cell, state, fields))
+    check_load(ledger, cell, states)
+    check_arcs(ledger, cell, states)
+    check_points(ledger, cell, states)
+    if "path" in files.document:
+        check_path(ledger, cell, states)
+    if "envelope" in files.document:
+        check_envelope(ledger, cell, states)
+    check_summary(ledger, cell)
+    check_tables(ledger, directory, files.document)
+    if files.is_spatial:
+        check_spatial(ledger, cell, states)
+    return Certificate(ledger.findings(), _title(files, states), _status(files))
+
+
+def _title(files: ResultFiles, states: Sequence[StateNumbers]) -> str:
+    kind, n, m = files.case["analysis"]["type"], len(files.mesh.points), len(files.mesh.triangles)
+    return f"{files.case['name']}: {kind}, {m} elements, {n} nodes, {len(states)} states"
+
+
+def _status(files: ResultFiles) -> str:
+    faults = files.document["faults"]
+    words = f"the run says: {files.document['status']}"
+    return f"{words}: {'; '.join(faults)}" if faults else words

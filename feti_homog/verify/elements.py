@@ -1,0 +1,177 @@
+"""Plane triangles of three and six nodes: strains, stresses, nodal forces and energies of given displacements.
+
+Displacements have two components, or in generalized plane strain three, c of them; strains and stresses have three or
+six, v, in the orders [11, 22, 12] and [11, 22, 33, 23, 13, 12].
+
+Written for the certificate alone, from barycentric coordinates r: N_a = r_a, or r_a (2 r_a - 1) and 4 r_a r_b on curved
+(isoparametric) sides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache, cached_property
+
+import numpy as np
+
+from feti_homog.typing import Float, Int
+from feti_homog.verify.cell_tables import Mesh
+
+ELEMENTS_AT_ONCE = 1 << 15
+# Gradients of so many numbers are kept from state to state: 400 MB.
+MOST_KEPT = 50_000_000
+SIDES = ((0, 1), (1, 2), (2, 0))
+# (c, 2) for each number of strains: du_i/dx_d is part of which.
+PLACES = {3: np.array([[0, 2], [2, 1]]), 6: np.array([[0, 5], [5, 1], [4, 3]])}
+
+
+@dataclass(frozen=True)
+class ElementFields:
+    """What displacements (n, c) make in the elements.
+
+    Attributes:
+        strain, stress: (m, v) means.
+        strain_size: (m,) sum t_a |dN_a/dx| with the terms t of u, du/dx times the same of places, and the other
+            strains, of whose rounding the strain has its share.
+        force: (n, c) int B^T sigma, what the elements of a node resist with.
+        force_size: the largest sum of |dN/dx| |L| strain_size over the elements of a node, of whose rounding the forces
+            have their share: large where a phase is far stiffer than it is strained.
+        largest_force: the largest that a single element exerts on a node.
+        energy: int sigma : eps.
+    """
+
+    strain: Float
+    stress: Float
+    strain_size: Float
+    force: Float
+    force_size: float
+    largest_force: float
+    energy: float
+
+
+class Elements:
+    """The elements of a mesh whose phases have the stiffnesses (phases, v, v)."""
+
+    def __init__(self, mesh: Mesh, stiffnesses: Float) -> None:
+        self._mesh, self._stiffnesses = mesh, stiffnesses
+
+    @cached_property
+    def area(self) -> Float:
+        """(m,) areas; negative where an element is inverted."""
+        return np.concatenate([weights.sum(axis=1) for _, _, weights in self._parts()])
+
+    @cached_property
+    def least_jacobian(self) -> Float:
+        """(m,) least determinant at the quadrature points, relative to the mean one of the element."""
+        parts = [weights / np.abs(weights.mean(axis=1))[:, None] for _, _, weights in self._parts()]
+        return np.concatenate([part.min(axis=1) for part in parts])
+
+    @cached_property
+    def node_integrals(self) -> Float:
+        """(n, 2) int dN/dx over all elements of each node."""
+        sums = np.zeros_like(self._mesh.points)
+        for part, gradients, weights in self._parts():
+            _add(sums, self._mesh.triangles[part], np.einsum("eqad,eq->ead", gradients, weights))
+        return sums
+
+    def fields(
+        self, displacement: Float, terms_of_u: Float, along: float = 0.0, free: Float | None = None
+    ) -> ElementFields:
+        """Strains, stresses, forces and energy of the displacements (n, c), sums of terms of these sizes (n, c).
+
+        `along` is E33, and `free` are the strains (phases, v) that the phases have without stress.
+        """
+        m, v = len(self._mesh.triangles), self._stiffnesses.shape[1]
+        strain, stress, size = np.empty((m, v)), np.empty((m, v)), np.empty(m)
+        force, terms, largest, energy = np.zeros_like(displacement), np.zeros_like(self._mesh.points), 0.0, 0.0
+        free = np.zeros((len(self._stiffnesses), v)) if free is None else free
+        for part, gradients, weights in self._parts():
+            nodes = self._mesh.triangles[part]
+            u, share = displacement[nodes], weights / weights.sum(axis=1)[:, None]
+            slope = np.einsum("eqad,eai->eqid", gradients, u)
+            local, own_free = _strains(slope, v, along), free[self._mesh.phase[part]]
+            answer = np.einsum("eij,eqj->eqi", self._stiffnesses[self._mesh.phase[part]], local - own_free[:, None])
+            strain[part], stress[part] = (np.einsum("eqi,eq->ei", field, share) for field in (local, answer))
+            size[part] = np.einsum("eqad,eai->eq", np.abs(gradients), terms_of_u[nodes]).max(axis=1)
+            size[part] += self._rounded_places(part, gradients, slope) + abs(along) + np.abs(own_free).max(axis=1)
+            tensor = answer[..., PLACES[v]]
+            own = np.einsum("eqad,eqid,eq->eai", gradients, tensor, weights, optimize=True)
+            _add(force, nodes, own)
+            rounded = np.abs(self._stiffnesses).max(axis=(1, 2))[self._mesh.phase[part]] * size[part]
+            _add(terms, nodes, np.einsum("eqad,eq,e->ead", np.abs(gradients), weights, rounded, optimize=True))
+            largest = max(largest, float(np.abs(own).max()))
+            energy += float(np.einsum("eqi,eqi,eq->", answer, local, weights, optimize=True))
+        return ElementFields(strain, stress, size, force, float(terms.max()), largest, energy)
+
+    def _rounded_places(self, part: slice, gradients: Float, slope: Float) -> Float:
+        """(e,) |du/dx| sum |x_a| |dN_a/dx|: gradients are off by the rounding of places, in small elements most."""
+        places = np.abs(self._mesh.points)[self._mesh.triangles[part]]
+        lengths = np.einsum("eqad,ead->eq", np.abs(gradients), places)
+        return np.asarray((np.abs(slope).max(axis=(2, 3)) * lengths).max(axis=1))
+
+    def _parts(self) -> Iterator[tuple[slice, Float, Float]]:
+        """Elements in portions, with gradients (e, q, a, 2) and weights (e, q) at their quadrature points."""
+        return iter(self._kept) if self._kept else self._computed()
+
+    @cached_property
+    def _kept(self) -> list[tuple[slice, Float, Float]]:
+        points, nodes = _rule(self._mesh.triangles.shape[1])[0].shape[:2]
+        return list(self._computed()) if len(self._mesh.triangles) * points * nodes * 2 <= MOST_KEPT else []
+
+    def _computed(self) -> Iterator[tuple[slice, Float, Float]]:
+        slopes, shares = _rule(self._mesh.triangles.shape[1])
+        for first in range(0, len(self._mesh.triangles), ELEMENTS_AT_ONCE):
+            part = slice(first, first + ELEMENTS_AT_ONCE)
+            corners = self._mesh.points[self._mesh.triangles[part]]
+            # r_0 = 1 - r_1 - r_2, so the columns of the Jacobian are dx/dr_1 - dx/dr_0 and dx/dr_2 - dx/dr_0.
+            free = slopes[:, :, 1:] - slopes[:, :, :1]
+            jacobian = np.einsum("qas,ead->eqds", free, corners)
+            (a, b), (c, d) = np.moveaxis(jacobian, (2, 3), (0, 1))
+            determinant = a * d - b * c
+            adjugate = np.moveaxis(np.array([[d, -b], [-c, a]]), (0, 1), (2, 3))
+            # Of an element without area nothing is finite, and every law says so.
+            inverse = adjugate / determinant[..., None, None]
+            gradients = np.einsum("qas,eqsd->eqad", free, inverse)
+            yield part, gradients, determinant * shares / 2
+
+
+@cache
+def _rule(nodes: int) -> tuple[Float, Float]:
+    """dN_a/dr_b (q, a, 3) and the weights (q,), their sum 1, of a rule exact for constants or for degree 4.
+
+    The six points are Dunavant's (1985) in closed form: (b, b, 1 - 2 b) with 18 b = 8 - sqrt(10) +- sqrt(38 - 44
+    sqrt(2/5)).
+    """
+    if nodes == 3:
+        return np.eye(3)[None], np.ones(1)
+    root, more = np.sqrt(10.0), np.sqrt(213125 - 53320 * np.sqrt(10.0))
+    spread = np.sqrt(38 - 44 * np.sqrt(0.4))
+    places, weights = [], []
+    for sign in (1.0, -1.0):
+        b = (8 - root + sign * spread) / 18
+        places += [np.roll([1 - 2 * b, b, b], turn) for turn in range(3)]
+        weights += [(620 + sign * more) / 3720] * 3
+    r = np.array(places)
+    slopes = np.zeros((6, 6, 3))
+    for a in range(3):
+        slopes[:, a, a] = 4 * r[:, a] - 1
+    for side, (a, b) in enumerate(SIDES):
+        slopes[:, 3 + side, a], slopes[:, 3 + side, b] = 4 * r[:, b], 4 * r[:, a]
+    return slopes, np.array(weights)
+
+
+def _strains(slope: Float, v: int, along: float) -> Float:
+    """(e, q, v) from du_i/dx_d (e, q, c, 2) and E33."""
+    local = np.zeros((*slope.shape[:2], v))
+    for (i, d), place in np.ndenumerate(PLACES[v]):
+        local[..., place] += slope[..., i, d]
+    if along:
+        local[..., 2] = along
+    return local
+
+
+def _add(sums: Float, nodes: Int, values: Float) -> None:
+    """Add values (e, a, c) to sums (n, c) at the nodes (e, a)."""
+    for direction in range(values.shape[2]):
+        sums[:, direction] += np.bincount(nodes.ravel(), values[..., direction].ravel(), len(sums))

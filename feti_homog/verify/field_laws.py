@@ -1,0 +1,123 @@
+"""Laws of the fields of one state: problem, stresses, equilibrium, averages."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from feti_homog.typing import Float, Int
+from feti_homog.verify.discrete_cell import ROUNDED_TERMS, DiscreteCell, gradient
+from feti_homog.verify.elements import PLACES, ElementFields
+from feti_homog.verify.ledger import Ledger, relative
+from feti_homog.verify.reading import State
+
+
+def check_fields(ledger: Ledger, cell: DiscreteCell, state: State, fields: ElementFields) -> None:
+    """Everything that the fields of a state obey by themselves; `fields` are what its displacements make."""
+    node, element = (f"{state.name}, {kind} {{}}".format for kind in ("mesh node", "element"))
+    imposed = cell.files.mesh.points @ gradient(state.strain).T
+    terms = np.abs(state.displacement) + np.abs(state.fluctuation) + np.abs(imposed)
+    off = np.abs(state.displacement - state.fluctuation - imposed).max(axis=1)
+    ledger.record("displacement", relative(off, terms.max(axis=1)), node)
+    stiffest = np.abs(cell.stiffnesses).max(axis=(1, 2))[cell.files.mesh.phase]
+    off = np.abs(state.stress - fields.stress).max(axis=1)
+    ledger.record("stress", relative(off, stiffest * fields.strain_size), element)
+    _check_copies(ledger, cell, state)
+    _check_equilibrium(ledger, cell, state, fields)
+    _check_averages(ledger, cell, state, fields)
+
+
+def interface_forces(cell: DiscreteCell, state: State) -> Float:
+    """(k, c) forces on the fibre at the interface nodes, in x1, x2 and x3: traction times tributary length."""
+    return in_axes(cell, state.traction * cell.files.interface.length[:, None])
+
+
+def in_axes(cell: DiscreteCell, vectors: Float) -> Float:
+    """(k, c) components in x1, x2 and x3 of normal, tangential and axial ones; the tangent is (-n2, n1)."""
+    n1, n2 = cell.files.interface.normal.T
+    normal, tangential, *axial = vectors.T
+    return np.stack([n1 * normal - n2 * tangential, n2 * normal + n1 * tangential, *axial], axis=1)
+
+
+def largest_displacement(cell: DiscreteCell, state: State) -> float:
+    """A scale of displacements that does not vanish where the fluctuation does."""
+    return float(np.abs(state.fluctuation).max()) + cell.imposed(state)
+
+
+def _check_copies(ledger: Ledger, cell: DiscreteCell, state: State) -> None:
+    """Copies of a node have one fluctuation: in a subdomain by periodicity, elsewhere but across a bond by gluing."""
+    nodes, scale = cell.nodes, largest_displacement(cell, state)
+    values = state.fluctuation[nodes.node]
+    sides = _sides(cell)
+    for law, group in (("periodicity", nodes.place * (int(nodes.subdomain.max()) + 1) + nodes.subdomain),
+                       ("continuity", sides)):  # fmt: skip
+        off = np.abs(values - _group_means(group, values)).max(axis=1)
+        ledger.record(law, relative(off, scale), lambda i: f"{state.name}, mesh node {nodes.node[i]}")
+
+
+def _sides(cell: DiscreteCell) -> Int:
+    """(b,) a number for each place and, at interface nodes, for each face: torn nodes of one number are glued."""
+    return np.asarray(2 * cell.nodes.place + ((cell.faces.row >= 0) & cell.faces.is_fibre))
+
+
+def _group_means(group: Int, values: Float) -> Float:
+    """(b, c) mean of each value's group."""
+    _, inverse, count = np.unique(group, return_inverse=True, return_counts=True)
+    inverse = inverse.ravel()
+    return np.stack([(np.bincount(inverse, column) / count)[inverse] for column in values.T], axis=1)
+
+
+def _check_equilibrium(ledger: Ledger, cell: DiscreteCell, state: State, fields: ElementFields) -> None:
+    """The forces of all copies of a node add up to zero; at an interface node those of each face to its traction."""
+    nodes, faces = cell.nodes, cell.faces
+    traction = interface_forces(cell, state)
+    scale = max(fields.largest_force, float(np.abs(traction).max(initial=0.0)))
+    scale = max(scale, cell.least_stress(state) * float(np.sqrt(cell.elements.area.min())) * 1e-3)
+    rest = fields.force.copy()
+    rest[nodes.node] = 0.0
+    scale += ROUNDED_TERMS * fields.force_size  # of all nodes: the one that is held collects what is left of the others
+    ledger.record("equilibrium", relative(np.abs(rest).max(axis=1), scale), f"{state.name}, mesh node {{}}".format)
+    side, inverse = np.unique(_sides(cell), return_inverse=True)
+    own = fields.force[nodes.node]
+    sums = np.stack([np.bincount(inverse.ravel(), column, len(side)) for column in own.T], axis=1)
+    row = np.full(nodes.places, -1)
+    row[nodes.place] = faces.row
+    at = row[side // 2]
+    # The fibre is pulled by the traction, the matrix by its reaction.
+    external = np.where(at < 0, 0.0, np.where(side % 2 == 1, 1.0, -1.0))
+    sums[at >= 0] -= external[at >= 0, None] * traction[at[at >= 0]]
+    first = np.unique(inverse.ravel(), return_index=True)[1]
+    where = f"{state.name}, mesh node {{}}{{}}"
+
+    def name(i: int) -> str:
+        return where.format(nodes.node[first[i]], f" (interface node {at[i]})" if at[i] >= 0 else "")
+
+    ledger.record("equilibrium", relative(np.abs(sums).max(axis=1), scale), name)
+
+
+def _check_averages(ledger: Ledger, cell: DiscreteCell, state: State, fields: ElementFields) -> None:
+    """<sigma> = Sigma, <eps> = E with the opening of the faces and the strain of voids, and Hill's condition."""
+    area, weights = cell.area, cell.elements.area[:, None]
+    mean = (weights * fields.stress).sum(axis=0) / area
+    size = float(((weights * np.abs(fields.stress)).sum(axis=0) / area).max())
+    stiffest = np.abs(cell.stiffnesses).max(axis=(1, 2))[cell.files.mesh.phase]
+    size += ROUNDED_TERMS * float((weights[:, 0] * stiffest * fields.strain_size).sum() / area)
+    ledger.record("mean stress", relative(mean - state.mean_stress, max(size, cell.least_stress(state))), state.name)
+    jump = in_axes(cell, state.jump)
+    integral = cell.faces.sums(cell.node_integrals[cell.nodes.node], of_fibre=False)
+    opening = np.einsum("ki,kj->ij", jump, integral)
+    opened = np.bincount(PLACES[len(mean)].ravel(), opening.ravel(), len(mean)) / area
+    off = (weights * fields.strain).sum(axis=0) / area + _void_strain(cell, state) - state.strain - opened
+    scale = cell.strain_size(state)
+    ledger.record("mean strain", relative(off, scale), state.name)
+    work = area * float(state.mean_stress @ state.strain) - float((interface_forces(cell, state) * jump).sum())
+    scale = max(abs(fields.energy), area * cell.least_stress(state) * scale)
+    ledger.record("Hill", relative(np.array(fields.energy - work), scale), state.name)
+
+
+def _void_strain(cell: DiscreteCell, state: State) -> Float:
+    """(v,) mean over the cell of the strain of voids: their share of E, and int sym(u* (x) n) ds along them, which is
+    periodic and so closes around voids that the cell's boundary cuts."""
+    v = len(state.strain)
+    slope = np.einsum("ni,nd->id", state.fluctuation, cell.void_integrals)
+    strain = np.bincount(PLACES[v].ravel(), slope.ravel(), v) / cell.area
+    return np.asarray(strain + cell.porosity * state.strain)

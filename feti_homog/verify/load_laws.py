@@ -1,0 +1,258 @@
+"""Laws of the states as a whole: their loads are those that the case asks for, their numbers those of result.json."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from feti_homog.typing import AnyInt, Bool, Float
+from feti_homog.verify.bonds import bonds_of
+from feti_homog.verify.discrete_cell import DiscreteCell
+from feti_homog.verify.elements import ElementFields
+from feti_homog.verify.interface_laws import BONDED, CLOSED, OPEN, spring_jumps, utilisation
+from feti_homog.verify.ledger import Ledger, relative
+from feti_homog.verify.prescribed import TEMPERATURE, Prescribed, at_points, targets
+from feti_homog.verify.reading import State
+
+COUNTS = {"bonded": BONDED, "closed": CLOSED, "open": OPEN}
+LAST_OF_PLANE = 2  # place of gamma12 among the unit loads: the state that the counts of an angle are of
+SPATIAL_ORDER = [0, 1, 5, 2, 4, 3]  # of the unit strains of generalized plane strain; the fifth load is a temperature
+
+
+@dataclass(frozen=True)
+class UnitLoad:
+    """A unit strain (v,), or a unit of temperature."""
+
+    strain: Float
+    temperature: float
+
+    def entries(self, told: Mapping[str, Any], stiffness: str, suffix: str, sign: float) -> dict[str, Float]:
+        """The stress under it, or under minus it, that is told in a column of a stiffness or in `thermal_stress`."""
+        if self.temperature:
+            return {"stress": sign * np.array(told[f"thermal_stress{suffix}"])}
+        return {"stress": sign * np.array(told[f"{stiffness}{suffix}"]) @ self.strain}
+
+
+@dataclass(frozen=True)
+class StateNumbers:
+    """What the laws of paths and tables need of a state.
+
+    Attributes:
+        strain, stress: (v,) macroscopic.
+        point: number of its point in `path` or `angle` of result.json.
+        stored: energy per area of the cell, <sigma : (eps - alpha T)> / 2 and that of the springs, from the fields.
+        in_springs: that of the springs in it.
+        traction: (k, c) normal, tangential and along the fibres.
+        used: (k,) share of the strength that the bonded nodes use, 0 elsewhere; NaN at tips of which the energy counts
+            that their break would release, for it is not in the files.
+        temperature: its change.
+        heat: what works on it, - <alpha : sigma>; 0 if the expansions alpha of the phases are not known.
+        expanding: mean of alpha : L : strain, likewise.
+    """
+
+    name: str
+    load_factor: float
+    point: int
+    strain: Float
+    stress: Float
+    stored: float
+    in_springs: float
+    traction: Float
+    status: AnyInt
+    used: Float
+    temperature: float
+    heat: float
+    expanding: float
+
+    @classmethod
+    def of(cls, cell: DiscreteCell, state: State, fields: ElementFields) -> StateNumbers:
+        """Those of a state of a cell."""
+        section = bonds_of(cell.files)
+        used = np.where(state.status == BONDED, utilisation(section, state.traction), 0.0)
+        if section.get("growth") == "released":
+            used[tips(cell, state.status)] = np.nan
+        stretched = state.traction * spring_jumps(cell, state) * cell.files.interface.length[:, None]
+        in_springs = float(stretched.sum()) / (2 * cell.area)
+        heat = _heat(cell, state)
+        energies = fields.energy / (2 * cell.area) + state.temperature * heat / 2 + in_springs, in_springs
+        means = state.strain, state.mean_stress
+        return cls(
+            state.name, state.load_factor, state.point, *means, *energies, state.traction, state.status, used,
+            state.temperature, heat, _expanding(cell, fields),
+        )  # fmt: skip
+
+
+def _heat(cell: DiscreteCell, state: State) -> float:
+    """- <alpha : sigma>, the derivative of the energy by the temperature."""
+    if cell.expansions is None:
+        return 0.0
+    own = (cell.expansions[cell.files.mesh.phase] * state.stress).sum(axis=1)
+    return -float(cell.elements.area @ own) / cell.area
+
+
+def _expanding(cell: DiscreteCell, fields: ElementFields) -> float:
+    """Mean of alpha : L : strain over the cell."""
+    if cell.expansions is None:
+        return 0.0
+    thermal = np.einsum("pij,pj->pi", cell.stiffnesses, cell.expansions)[cell.files.mesh.phase]
+    return float(cell.elements.area @ (thermal * fields.strain).sum(axis=1)) / cell.area
+
+
+def tips(cell: DiscreteCell, status: AnyInt) -> Bool:
+    """(k,) which bonds lie beside a broken one."""
+    broken, beside = status != BONDED, cell.beside
+    tips = np.zeros(len(broken), bool)
+    for here, there in (beside.T, beside.T[::-1]):
+        tips[here[broken[there]]] = True
+    return np.asarray(tips & ~broken)
+
+
+def check_load(ledger: Ledger, cell: DiscreteCell, states: Sequence[StateNumbers]) -> None:
+    """Loads against the case, and points or columns of result.json against the states."""
+    document, case = cell.files.document, cell.files.case
+    same = json.loads(str(cell.files.file.attrs["case"])) == case
+    ledger.record("tables", 0.0 if same else np.inf, "the case, which the two files tell otherwise")
+    unit = _unit_loads(cell)
+    rows = list(zip(_expected_loads(document, case, unit), _entries(document, unit), strict=False))
+    scales = _Scales.of(cell, states)
+    if "path" in document:
+        _check_kept(ledger, document, case, [state.point for state in states])
+        for number, (load, entries) in enumerate(rows):
+            strain, stress = np.array(entries["strain"]), np.array(entries["stress"])
+            warmer = float(entries.get(TEMPERATURE, 0.0))
+            _check_prescribed(ledger, load, strain, stress, warmer, scales, f"path[{number}]")
+        pairs = [(state, rows[state.point]) for state in states if 0 <= state.point < len(rows)]
+    else:
+        _check_all(ledger, document, states, len(rows))
+        pairs = list(zip(states, rows, strict=False))
+    for state, (load, entries) in pairs:
+        _check_prescribed(ledger, load, state.strain, state.stress, state.temperature, scales, state.name)
+        _check_entries(ledger, state, entries, scales)
+    for place, matrix in _linear_stiffnesses(document, cell.files.contact):
+        ledger.record("symmetry", relative(matrix - matrix.T, float(np.abs(matrix).max())), place)
+
+
+@dataclass(frozen=True)
+class _Scales:
+    """Sizes of the strains and stresses of all states, and of stresses that loads make where Sigma is none."""
+
+    strain: float
+    stress: float
+    imposed: float
+
+    @classmethod
+    def of(cls, cell: DiscreteCell, states: Sequence[StateNumbers]) -> _Scales:
+        largest = max((float(np.abs(state.stress).max()) for state in states), default=0.0)
+        imposed = max((cell.least_stress(state) for state in states), default=0.0)
+        return cls(cell.largest_strain or 1.0, largest or 1.0, max(largest, imposed) or 1.0)
+
+
+def _check_prescribed(
+    ledger: Ledger, load: Prescribed, strain: Float, stress: Float, temperature: float, scales: _Scales, place: str
+) -> None:
+    """Strains, stresses and the temperature that a load prescribes."""
+    given, by_stress = load.values[: len(strain)], load.by_stress[: len(strain)]
+    ledger.record("load", np.abs(strain - given)[~by_stress] / scales.strain, f"{place}, strain")
+    ledger.record("stress load", np.abs(stress - given)[by_stress] / scales.imposed, f"{place}, stress")
+    warmer = float(load.values[-1]) if len(load.values) > len(given) else 0.0
+    ledger.record("load", abs(temperature - warmer) / max(abs(warmer), 1.0), f"{place}, temperature")
+
+
+def _check_kept(ledger: Ledger, document: Mapping[str, Any], case: Mapping[str, Any], numbers: Sequence[int]) -> None:
+    """The states of a path are of the points that result.json says, in their order: the first, the last, and as many
+    as the case asks for."""
+    count, asked = len(document["path"]), case["output"]["states"]
+    told = list(document["states"]) == list(numbers)
+    ledger.record("tables", 0.0 if told else np.inf, "states, which the two files tell otherwise")
+    rising = all(a < b for a, b in pairwise(numbers))
+    ends = len(numbers) > 0 and numbers[0] == 0 and numbers[-1] == count - 1
+    ledger.record("load", 0.0 if rising and ends else np.inf, "states, which are not from the first point to the last")
+    wanted = count if asked == "all" else len(numbers) if asked == "peaks" else min(asked, count)
+    ledger.record("load", abs(wanted - len(numbers)), f"{len(numbers)} states, {wanted} asked for")
+
+
+def _check_all(ledger: Ledger, document: Mapping[str, Any], states: Sequence[StateNumbers], count: int) -> None:
+    """The states of other analyses are all that the case asks for, and know their points."""
+    ledger.record("load", abs(count - len(states)), f"{len(states)} states, {count} asked for")
+    each = count // len(document["angle"]) if "angle" in document else count
+    off = [abs(state.point - number // each) for number, state in enumerate(states)]
+    ledger.record("tables", off, lambda i: f"{states[i].name}, point")
+
+
+def _check_entries(ledger: Ledger, state: StateNumbers, entries: Mapping[str, Any], scales: _Scales) -> None:
+    """What result.json says of a state."""
+    told = {"strain": (state.strain, scales.strain), "stress": (state.stress, scales.stress)}
+    told |= {TEMPERATURE: (np.array(state.temperature), max(abs(state.temperature), 1.0))}
+    for name in told.keys() & entries.keys():
+        value, scale = told[name]
+        ledger.record("tables", relative(np.array(entries[name]) - value, scale), f"{state.name}, {name}")
+    if "load_factor" in entries:
+        ledger.record("tables", abs(entries["load_factor"] - state.load_factor), f"{state.name}, load_factor")
+    for name in COUNTS.keys() & entries.keys():
+        counted = np.count_nonzero(state.status == COUNTS[name])
+        ledger.record("tables", abs(entries[name] - counted), f"{state.name}, {name}")
+
+
+def _unit_loads(cell: DiscreteCell) -> list[UnitLoad]:
+    """The unit loads in the order of their states."""
+    if not cell.files.is_spatial:
+        return [UnitLoad(strain, 0.0) for strain in np.eye(3)]
+    unit = [UnitLoad(strain, 0.0) for strain in np.eye(6)[SPATIAL_ORDER]]
+    thermal = [] if cell.expansions is None else [UnitLoad(np.zeros(6), 1.0)]
+    return [*unit[:4], *thermal, *unit[4:]]
+
+
+def _expected_loads(
+    document: Mapping[str, Any], case: Mapping[str, Any], unit: Sequence[UnitLoad]
+) -> Iterator[Prescribed]:
+    """The loads of the points of a path, or of the states of another case, in their order."""
+    if "path" in document:
+        yield from at_points(case, document["path"])
+    elif "load" in document:
+        yield from targets(case)
+    elif "angle" in document:
+        given = case["angle"].get("strain")
+        own = [Prescribed.strain(np.array(given), 0.0)] if given is not None else _prescribed(unit, 1.0)
+        for _ in document["angle"]:
+            yield from own
+    else:
+        for sign in (1.0, -1.0) if "effective_stiffness_compression" in document else (1.0,):
+            yield from _prescribed(unit, sign)
+
+
+def _prescribed(unit: Sequence[UnitLoad], sign: float) -> list[Prescribed]:
+    return [Prescribed.strain(sign * load.strain, sign * load.temperature) for load in unit]
+
+
+def _entries(document: Mapping[str, Any], unit: Sequence[UnitLoad]) -> Iterator[Mapping[str, Any]]:
+    """What result.json says of each point of a path, or of each state of another case."""
+    if "path" in document:
+        yield from document["path"]
+    elif "load" in document:
+        yield document["load"]
+    elif "angle" in document:
+        for point in document["angle"]:
+            if "stiffness" in point:
+                for number, load in enumerate(unit):
+                    counts = {name: point[name] for name in COUNTS} if number == LAST_OF_PLANE else {}
+                    yield load.entries(point, "stiffness", "", 1.0) | counts
+            else:
+                yield point
+    else:
+        for suffix, sign in (("", 1.0), ("_compression", -1.0)):
+            if f"effective_stiffness{suffix}" in document:
+                yield from (load.entries(document, "effective_stiffness", suffix, sign) for load in unit)
+
+
+def _linear_stiffnesses(document: Mapping[str, Any], contact: bool) -> Iterator[tuple[str, Float]]:
+    """The stiffnesses in result.json of cells without one-sided contact, and what they are called."""
+    if "effective_stiffness" in document and "effective_stiffness_compression" not in document:
+        yield "effective_stiffness", np.array(document["effective_stiffness"])
+    for number, point in enumerate(document.get("angle", ())):
+        if "stiffness" in point and not (contact and point["open"] + point["closed"]):
+            yield f"angle[{number}].stiffness", np.array(point["stiffness"])

@@ -1,0 +1,105 @@
+"""Laws of the mesh, and of the interface nodes on it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from feti_homog.typing import AnyInt, Bool, Float, Int
+from feti_homog.verify.discrete_cell import DiscreteCell
+from feti_homog.verify.ledger import Ledger, relative
+
+
+def check_mesh(ledger: Ledger, cell: DiscreteCell) -> None:
+    """Elements have positive areas that fill the cell but for voids; a torn side has one partner or is at a void."""
+    elements, sides, told = cell.elements, cell.sides, cell.files.document["cell"].get("porosity", 0.0)
+    ledger.record("mesh", np.where(elements.least_jacobian > 0, 0.0, np.inf), "element {}".format)
+    ledger.record("mesh", relative(elements.area.sum() - (1 - told) * cell.area, cell.area), "the sum of all areas")
+    normals = sides.normal[sides.at_void]
+    ledger.record("mesh", relative(np.abs(normals.sum(axis=0)), cell.files.size.max()), "the sides at voids are closed")
+    is_told = bool(sides.at_void.any()) == (told > 0)
+    ledger.record("mesh", np.where(is_told, 0.0, np.inf), f"cell.porosity = {told:g}, {len(normals)} sides at voids")
+    ledger.record("mesh", sides.mismatch, lambda i: f"a side of element {sides.element[i]}")
+
+
+def check_interface(ledger: Ledger, cell: DiscreteCell) -> None:
+    """Each place where two bodies meet that may part has one interface node, of the inner one and of their section,
+    and there are no others."""
+    rows, faces = cell.files.interface, cell.faces
+    at = "interface node {}".format
+    ledger.record("interface", faces.distance / cell.files.size.max(), at)
+    count = np.bincount(faces.place[faces.place >= 0], minlength=cell.nodes.places)
+    wrong = np.flatnonzero(count != (faces.pair >= 0))
+    first = [int(cell.nodes.node[np.argmax(cell.nodes.place == place)]) for place in wrong[:1]]
+    words = f"{len(wrong)} places with another number of interface nodes than one, the first at mesh node {first}"
+    ledger.record("interface", np.where(len(wrong), np.inf, 0.0), words)
+    ledger.record("interface", _strangers(cell), at)
+    misplaced = (faces.place >= 0) & (rows.pair != faces.pair[faces.place])
+    ledger.record("interface", np.where(misplaced, np.inf, 0.0), at)
+    if (faces.place >= 0).all():
+        normal, length, is_round = _shape(cell)
+        turned, longer = np.hypot(*(rows.normal - normal).T), rows.length / length
+        # Of a fibre that is not round a side may be straight or an arc of half a turn at most.
+        rough = np.maximum(1.0 - longer, longer - np.pi / 2)
+        ledger.record("interface", np.where(is_round, np.abs(longer - 1.0), np.maximum(rough, 0.0)), at)
+        ledger.record("interface", np.where(is_round, turned, np.where(turned < np.sqrt(2.0), 0.0, turned)), at)
+        ledger.record("interface", np.abs(np.hypot(*rows.normal.T) - 1.0), at)
+
+
+def _shape(cell: DiscreteCell) -> tuple[Float, Float, Bool]:
+    """Normals (k, 2) and tributary lengths (k,) that follow from the mesh, and whether (k,) the fibre is round.
+
+    A round fibre has radial normals and sides that are arcs, 2 R arcsin(chord / 2 R); of others sides are taken as
+    straight, and a node has the mean normal of its sides.  Of its length a side gives each end one half or, of order 2,
+    one sixth, and its middle two thirds.
+    """
+    files, sides, rows = cell.files, cell.sides, cell.files.interface
+    inner = cell.inner
+    # A coating has the number of its fibre and another radius.
+    own_radius = np.where(_is_fibre(cell), files.fibres.radius[rows.fibre - 1], np.nan)
+    row_of = np.full(len(files.mesh.points), -1)
+    row_of[cell.nodes.node] = cell.faces.row
+    row = row_of[sides.nodes[inner]]
+    chord = np.hypot(*sides.normal[inner].T)
+    # A side whose nodes are no interface nodes belongs to none of them.
+    radius = own_radius[row.max(axis=1)]
+    arc = np.where(np.isnan(radius), chord, 2 * radius * np.arcsin(np.minimum(chord / (2 * radius), 1.0)))
+    shares = np.array([0.5, 0.5] if row.shape[1] == 2 else [1 / 6, 1 / 6, 2 / 3])
+    known = row >= 0
+    k = len(rows.length)
+    length = np.bincount(row[known], (arc[:, None] * shares)[known], k)
+    parts = sides.normal[inner][:, None] * shares[:, None]
+    normal = np.stack([np.bincount(row[known], part[known], k) for part in np.moveaxis(parts, 2, 0)], axis=1)
+    centre, is_round = files.fibres.centre[rows.fibre - 1], ~np.isnan(own_radius)
+    radial = from_centre(rows.points, centre, files.size) / own_radius[:, None]
+    flat = normal / np.hypot(*normal.T)[:, None]
+    return np.asarray(np.where(is_round[:, None], radial, flat)), np.asarray(length, float), np.asarray(is_round)
+
+
+def from_centre(points: Float, centres: Float, size: Float) -> Float:
+    """(k, 2) vectors to points from the nearest images of centres."""
+    away = points - centres
+    return np.asarray(away - np.round(away / size) * size)
+
+
+def _is_fibre(cell: DiscreteCell) -> Bool:
+    """(k,) whether the inner body is the fibre of the number itself, not a coating of it."""
+    rows, fibres = cell.files.interface, cell.files.fibres
+    return np.asarray(rows.body == fibres.body[rows.fibre - 1])
+
+
+def _strangers(cell: DiscreteCell) -> Float:
+    """(k,) with how many nodes each shares its body on the mesh, or its label of the body and number of the fibre, but
+    not the other."""
+    nodes, faces, rows = cell.nodes, cell.faces, cell.files.interface
+    fibre = rows.fibre + (int(rows.fibre.max(initial=0)) + 1) * rows.body.astype(np.int64)
+    own = (faces.row >= 0) & faces.is_fibre
+    part = np.full(len(fibre), -1)
+    part[faces.row[own]] = cell.constituent[nodes.subdomain[own]]
+    alike = _alike(part * (int(fibre.max(initial=0)) + 1) + fibre)
+    return np.asarray(np.maximum(_alike(part), _alike(fibre)) - alike, float)
+
+
+def _alike(labels: AnyInt) -> Int:
+    """(k,) how many have the same label as each."""
+    _, inverse, count = np.unique(labels, return_inverse=True, return_counts=True)
+    return np.asarray(count[inverse.ravel()])

@@ -1,0 +1,159 @@
+"""Laws of what points of an angle or a path say of energies, of what has debonded, and of the tips."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from feti_homog.typing import Float, Int
+from feti_homog.verify.arc_laws import directions
+from feti_homog.verify.bonds import bonds_of
+from feti_homog.verify.discrete_cell import DiscreteCell
+from feti_homog.verify.interface_laws import BONDED, mode, spring_energies, toughness
+from feti_homog.verify.ledger import Ledger, relative
+from feti_homog.verify.load_laws import StateNumbers, tips
+
+Point = Mapping[str, Any]
+# To so many digits directions of tips are told apart.
+DIRECTION_DIGITS = 9
+
+
+def check_points(ledger: Ledger, cell: DiscreteCell, states: Sequence[StateNumbers]) -> None:
+    """The numbers of points beside their strains, stresses and counts."""
+    document = cell.files.document
+    single = [document["load"]] if "load" in document else []
+    points: Sequence[Point] = document.get("path") or document.get("angle") or single
+    known = [state for state in states if 0 <= state.point < len(points)]
+    scale = max([state.stored for state in known], default=0.0) + cell.rounded_energy
+    for state in known:
+        point = points[state.point]
+        _check_debonding(ledger, cell, state, point)
+        for name in {"stored", "stored_in_springs"} & point.keys():
+            own = state.stored if name == "stored" else state.in_springs
+            ledger.record("energy", relative(np.array(point[name] - own), scale), f"{state.name}, {name}")
+    if "path" in document:
+        _check_path(ledger, cell, known, points, scale)
+
+
+def _check_path(
+    ledger: Ledger, cell: DiscreteCell, known: Sequence[StateNumbers], points: Sequence[Point], scale: float
+) -> None:
+    """The energies of all points of a path, and the tips of those whose fields are kept."""
+    for number, point in enumerate(points):
+        if not point.get("temperature"):
+            off = point["stored"] - float(np.dot(point["strain"], point["stress"])) / 2
+            ledger.record("energy", relative(np.array(off), scale), f"path[{number}].stored")
+    if cell.files.by_energy:
+        _check_ratios(ledger, points)
+        _check_toughness(ledger, cell, known, points, cell.files.case["path"]["method"] == "events")
+        for state in known:
+            _check_tips(ledger, cell, state, points[state.point]["tips"])
+
+
+def tip_shares(cell: DiscreteCell, state: StateNumbers, told: Mapping[str, Sequence[float]]) -> tuple[Int, Float]:
+    """(t,) the tips of a state, by fibre and direction, and sqrt(G / G_c) by what is told of them; none, if of other
+    tips."""
+    node = _tips_in_order(cell, state)
+    section = bonds_of(cell.files, node)
+    if len(told["G_I"]) != len(node) or len(told["G_II"]) != len(node):
+        return node[:0], np.zeros(0)
+    energy = np.array(told["G_I"]) + np.array(told["G_II"])
+    return node, np.sqrt(energy / toughness(section, mode(section, state.traction[node])))
+
+
+def _tips_in_order(cell: DiscreteCell, state: StateNumbers) -> Int:
+    node = np.flatnonzero(tips(cell, state.status))
+    turned = np.round(_directions(cell)[node], DIRECTION_DIGITS)
+    rows = cell.files.interface
+    return np.asarray(node[np.lexsort((turned, rows.pair[node], rows.fibre[node]))])
+
+
+def _directions(cell: DiscreteCell) -> Float:
+    """(k,) in degrees, in (-180, 180], about the centres of the fibres; of the normal where there is none."""
+    n1, n2 = cell.files.interface.normal.T
+    about = directions(cell)
+    found = np.where(np.isnan(about), np.degrees(np.arctan2(n2, n1)), about)
+    return np.asarray(found + 360.0 * (np.round(found, DIRECTION_DIGITS) <= -180.0))
+
+
+def _check_debonding(ledger: Ledger, cell: DiscreteCell, state: StateNumbers, point: Point) -> None:
+    """Lengths and angles of what has debonded."""
+    rows, fibres = cell.files.interface, cell.files.fibres
+    whole, debonded = (
+        np.bincount(rows.fibre - 1, weights, len(fibres.radius))
+        for weights in (rows.length, rows.length * (state.status != BONDED))
+    )
+    coated = np.bincount(rows.fibre - 1, rows.body != fibres.body[rows.fibre - 1], len(fibres.radius)) > 0
+    radius = np.where(coated, np.nan, fibres.radius)
+    angle = np.where(np.isnan(radius), 360.0 * debonded / np.where(whole > 0, whole, 1.0), 0.0)
+    angle += np.where(np.isnan(radius), 0.0, np.degrees(debonded / radius))
+    share = debonded.sum() / (whole.sum() or 1.0)
+    expected = {"debonded_length": debonded, "debonding_angle": np.nan_to_num(angle), "debonded_share": share}
+    scales = {"debonded_length": float(whole.max(initial=0.0)), "debonding_angle": 360.0}
+    if len(cell.files.interfaces) > 1:
+        expected["debonded_shares"] = _shares_of_pairs(cell, state)
+    for name, value in expected.items():
+        told = np.array(point.get(name, np.nan), float)
+        off = told - value if told.shape == np.shape(value) else np.array(np.inf)
+        ledger.record("tables", relative(off, scales.get(name, 1.0)), f"{state.name}, {name}")
+
+
+def _shares_of_pairs(cell: DiscreteCell, state: StateNumbers) -> Float:
+    """(sections,) debonded length / length of the interfaces of each section."""
+    rows, count = cell.files.interface, len(cell.files.interfaces)
+    own = rows.pair[:, None] == np.arange(count)
+    return np.asarray((rows.length * (state.status != BONDED)) @ own / (rows.length @ own))
+
+
+def _check_ratios(ledger: Ledger, points: Sequence[Point]) -> None:
+    for number, point in enumerate(points):
+        energy = point["fracture_energy"]
+        told, own = point.get("dissipation_ratio", 0.0), point["dissipated"] / energy if energy else 0.0
+        ledger.record("tables", abs(told - own) / max(abs(own), 1.0), f"path[{number}].dissipation_ratio")
+
+
+def _check_toughness(
+    ledger: Ledger, cell: DiscreteCell, states: Sequence[StateNumbers], points: Sequence[Point], by_events: bool
+) -> None:
+    """The fracture energy grows with the length that breaks: by G_c in the mode of the state before, if that is in the
+    files, else by between G_Ic and G_c in pure shear."""
+    length = cell.files.interface.length / cell.area
+    scale = max(points[-1]["fracture_energy"], 1e-300)
+    ledger.record("energy", points[0]["fracture_energy"] * by_events / scale, "path[0].fracture_energy")
+    for state, after in pairwise(states):
+        grown = points[after.point]["fracture_energy"] - points[state.point]["fracture_energy"]
+        broken = (state.status == BONDED) & (after.status != BONDED)
+        section = bonds_of(cell.files, broken)
+        if by_events and after.point == state.point + 1:
+            low = high = float(toughness(section, mode(section, state.traction[broken])) @ length[broken])
+        else:
+            modes = np.zeros(int(broken.sum())), np.full(int(broken.sum()), np.pi / 2)
+            low, high = (float(toughness(section, psi) @ length[broken]) for psi in modes)
+        off = max(low - grown, grown - high, 0.0)
+        ledger.record("energy", off / scale, f"{after.name}, fracture_energy")
+
+
+def _check_tips(ledger: Ledger, cell: DiscreteCell, state: StateNumbers, told: Mapping[str, Sequence[float]]) -> None:
+    """The tips are the bonds beside broken ones, in the mode of their tractions; by springs also with their energy."""
+    node = _tips_in_order(cell, state)
+    section = bonds_of(cell.files, node)
+    fibre, where = cell.files.interface.fibre[node], f"{state.name}, tip {{}}".format
+    pair = (cell.files.interface.pair[node] + 1).tolist() if len(cell.files.interfaces) > 1 else None
+    if (list(told["fibre"]), told.get("interface")) != (fibre.tolist(), pair) or any(
+        len(values) != len(node) for values in told.values()
+    ):
+        ledger.record("tables", np.inf, f"{state.name}, tips")
+        return
+    psi = mode(section, state.traction[node])
+    away = (np.array(told["angle"]) - _directions(cell)[node] + 180.0) % 360.0 - 180.0
+    ledger.record("tables", np.abs(away) / 360.0, where)
+    ledger.record("tables", np.abs(np.array(told["psi"]) - np.degrees(psi)) / 90.0, where)
+    first, second = np.array(told["G_I"]), np.array(told["G_II"])
+    ledger.record("tables", relative(first * np.sin(psi) ** 2 - second * np.cos(psi) ** 2, first + second), where)
+    if section["growth"] == "springs":
+        own = spring_energies(section, state.traction[node])
+        off = np.abs(np.stack([first, second], axis=1) - own).max(axis=1, initial=0.0)
+        ledger.record("tables", relative(off, own.sum(axis=1)), where)

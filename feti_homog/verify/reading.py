@@ -1,0 +1,279 @@
+"""The files of a result as arrays: result.json with the resolved case, result.h5 with mesh, interface and states."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from feti_homog.errors import CaseError
+from feti_homog.typing import AnyInt, Float, Int
+from feti_homog.verify.cell_tables import Fibres, InterfaceRows, Mesh
+from feti_homog.verify.checksums import is_as_written, seal_of
+
+JSON, FIELDS = "result.json", "result.h5"
+SCHEMA = 1
+# Tables of a state that are there to be looked at: rows of elements or of interface nodes, and columns.
+DERIVED: dict[str, tuple[Any, ...]] = {
+    "stress_33": ("m",), "element_strain": ("m", 4), "von_mises": ("m",),
+    "principal_1": ("m",), "principal_2": ("m",), "principal_3": ("m",),
+    "traction_vector": ("k", 3), "jump_vector": ("k", 3),
+    "displacement_fibre": ("k", 3), "displacement_matrix": ("k", 3),
+}  # fmt: skip
+# In generalized plane strain stresses 33 are among the stresses, and there are strains along the fibres.
+SPATIAL_DERIVED = {name: shape for name, shape in DERIVED.items() if name != "stress_33"} | {"axial_strain": ("m", 2)}
+ROWS = ("points", "normal", "length", "fibre_number", "fibre")
+MISSING_FIELDS = "only a run with `fields = true` in [output] leaves what there is to verify"
+
+
+@dataclass(frozen=True)
+class State:
+    """A state: what /state/K holds, and `name`, under which a violation is reported.
+
+    Strains and stresses have v = 3 components [11, 22, 12], displacements c = 2; of generalized plane strain 6, in the
+    order [11, 22, 33, 23, 13, 12], and 3.
+
+    Attributes:
+        strain, mean_stress: (v,) macroscopic.
+        point: number of its point in `path` or `angle` of result.json.
+        displacement, fluctuation: (n, c).
+        stress: (m, v) means over the elements.
+        traction, jump: (k, c) normal, tangential and along the fibres.
+        status: (k,) 0 bonded, 1 closed, 2 open.
+        derived: the tables of `DERIVED` or `SPATIAL_DERIVED`, which follow from those above.
+        temperature: its change.
+    """
+
+    name: str
+    strain: Float
+    mean_stress: Float
+    load_factor: float
+    point: int
+    displacement: Float
+    fluctuation: Float
+    stress: Float
+    traction: Float
+    jump: Float
+    status: AnyInt
+    derived: Mapping[str, Float]
+    temperature: float = 0.0
+
+    @property
+    def along(self) -> float:
+        """E33, of generalized plane strain."""
+        return float(self.strain[2]) if len(self.strain) > 3 else 0.0
+
+
+@dataclass(frozen=True)
+class ResultFiles:
+    """A folder of results, opened.
+
+    Attributes:
+        document: result.json.
+        size: (2,) width and height of the cell.
+        phases: names of the phases, the matrix first.
+        faces: (k, 2) a node of the mesh on each face of the interface nodes, fibre and matrix.
+        altered: names of the files that are not as the run wrote them.
+    """
+
+    document: Mapping[str, Any]
+    size: Float
+    phases: tuple[str, ...]
+    mesh: Mesh
+    interface: InterfaceRows
+    fibres: Fibres
+    faces: Int
+    file: h5py.File
+    altered: tuple[str, ...]
+
+    @property
+    def case(self) -> Mapping[str, Any]:
+        """The resolved case."""
+        case: Mapping[str, Any] = self.document["case"]
+        return case
+
+    @property
+    def is_spatial(self) -> bool:
+        """Whether it is one of generalized plane strain."""
+        return bool(self.case["analysis"]["plane"] == "generalized")
+
+    @property
+    def contact(self) -> bool:
+        """Whether debonded faces must not overlap."""
+        return any(section.get("contact", False) for section in self.interfaces)
+
+    @property
+    def interfaces(self) -> Sequence[Mapping[str, Any]]:
+        """The sections of interfaces; none of perfect bonding."""
+        return _interfaces(self.case)
+
+    @property
+    def by_energy(self) -> bool:
+        """Whether bonds break by energy."""
+        return any(section.get("criterion") == "energy" for section in self.interfaces)
+
+    def states(self) -> Iterator[State]:
+        """The states in their order, one in memory at a time."""
+        for number in sorted(map(int, self.file.get("state", ()))):
+            with _reading(Path(self.file.filename)):
+                yield self._state(number)
+
+    def _state(self, number: int) -> State:
+        group = self.file[f"state/{number}"]
+        n, m, k = len(self.mesh.points), len(self.mesh.triangles), len(self.interface.points)
+        basic = {
+            "displacement": (n, 2), "fluctuation": (n, 2), "stress": (m, 3),
+            "traction": (k, 2), "jump": (k, 2), "status": (k,),
+        }  # fmt: skip
+        shown = SPATIAL_DERIVED if self.is_spatial else DERIVED
+        derived = {name: (m if of == "m" else k, *columns) for name, (of, *columns) in shown.items()}
+        arrays, others = (
+            {name: self._table(number, name, shape) for name, shape in shapes.items()} for shapes in (basic, derived)
+        )
+        if self.is_spatial:
+            arrays |= self._spatial(number, arrays)
+        strain, mean = (np.array(group.attrs[name], float) for name in ("strain", "stress"))
+        v = 6 if self.is_spatial else 3
+        _expect(
+            strain.shape == mean.shape == (v,), f"/state/{number} has a strain or a stress of another size than {v}"
+        )
+        label, factor, point = str(group.attrs["label"]), float(group.attrs["load_factor"]), int(group.attrs["point"])
+        warmer = float(group.attrs["temperature"]) if self.is_spatial else 0.0
+        name = f"state {number} ({label})"
+        return State(name, strain, mean, factor, point, **arrays, derived=others, temperature=warmer)
+
+    def _spatial(self, number: int, plane: Mapping[str, Float]) -> dict[str, Float]:
+        """The tables of a state with what is along the fibres."""
+        rows = {"displacement": "n", "fluctuation": "n", "traction": "k", "jump": "k"}
+        count = {"n": len(self.mesh.points), "k": len(self.interface.points)}
+        whole = {
+            name: np.column_stack([plane[name], self._table(number, f"axial_{name}", (count[of],))])
+            for name, of in rows.items()
+        }
+        m = len(self.mesh.triangles)
+        S33, (S23, S13) = self._table(number, "stress_33", (m,)), self._table(number, "axial_stress", (m, 2)).T
+        S11, S22, S12 = plane["stress"].T
+        return whole | {"stress": np.column_stack([S11, S22, S33, S23, S13, S12])}
+
+    def _table(self, number: int, name: str, shape: tuple[int, ...]) -> Any:
+        """A table of a state, of the shape that it must have."""
+        array = _rows(self.file[f"state/{number}/{name}"])
+        _expect(array.shape == shape, f"/state/{number}/{name} has shape {array.shape}, expected {shape}")
+        return array
+
+
+def altered(directory: Path) -> tuple[str, ...]:
+    """Names of the files of a result that are not as the run wrote them, by their checksums.
+
+    Raises:
+        CaseError: one is missing or cannot be read; one line.
+    """
+    document, path = _document(directory / JSON), directory / FIELDS
+    if not path.is_file():
+        asked = document["case"].get("output", {}).get("fields", False)
+        reason = "it is missing; run the case again" if asked else MISSING_FIELDS
+        raise CaseError(f"{path}: {reason}")
+    with _reading(path):
+        holds = {JSON: is_as_written(document), FIELDS: seal_of(path) == document.get("result_h5")}
+    return tuple(name for name, as_written in holds.items() if not as_written)
+
+
+@contextmanager
+def opened(directory: Path) -> Iterator[ResultFiles]:
+    """The results in a folder, while the block lasts.
+
+    Raises:
+        CaseError: there are none that can be read; one line.
+    """
+    changed, path = altered(directory), directory / FIELDS
+    with _reading(path):
+        file = h5py.File(path, "r")
+    with file:
+        with _reading(path):
+            files = _contents(_document(directory / JSON), file, changed)
+        yield files
+
+
+def _document(path: Path) -> Mapping[str, Any]:
+    try:
+        if path.is_fifo():
+            raise CaseError(f"cannot read {path}: it is a pipe")
+        document = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise CaseError(f"cannot read {path}: {error.strerror or error}") from error
+    except ValueError as error:
+        raise CaseError(f"cannot read {path}: it is damaged: {error}") from error
+    if not isinstance(document, dict) or document.get("schema") != SCHEMA or not isinstance(document.get("case"), dict):
+        raise CaseError(f"{path}: is no result of this version: expected schema {SCHEMA} and a case")
+    return document
+
+
+def _contents(document: Mapping[str, Any], file: h5py.File, altered: tuple[str, ...]) -> ResultFiles:
+    """The whole of both files but the states."""
+    mesh = Mesh(*(_rows(file[f"mesh/{name}"]) for name in ("points", "triangles", "subdomain", "phase", "body")))
+    own = file["interface"]
+    # Results of before there were several sections have no pairs.
+    pair = _rows(own["pair"]) if "pair" in own else np.zeros(len(own["points"]), np.int32)
+    points, normal, length, number, body = (_rows(own[name]) for name in ROWS)
+    rows = InterfaceRows(points, normal, length, number, body, pair)
+    fibres = Fibres(*(_rows(file[f"fibre/{name}"]) for name in ("number", "body", "phase", "centre", "radius")))
+    faces = np.stack([_rows(file[f"interface/{name}"]) for name in ("fibre_node", "matrix_node")], axis=1)
+    size = np.array([file.attrs["width"], file.attrs["height"]], float)
+    phases = tuple(map(str, file.attrs["phases"]))
+    n, m, k = len(mesh.points), len(mesh.triangles), len(rows.points)
+    _expect(mesh.points.shape == (n, 2) and n > 0, "/mesh/points is no table of positions")
+    _expect(mesh.triangles.shape in ((m, 3), (m, 6)) and m > 0, "/mesh/triangles is no table of triangles")
+    _expect(bool((mesh.triangles >= 0).all() and (mesh.triangles < n).all()), "/mesh/triangles names unknown nodes")
+    _expect(
+        mesh.subdomain.shape == mesh.phase.shape == mesh.body.shape == (m,),
+        "/mesh has labels of another number of elements",
+    )
+    _expect(bool((mesh.phase >= 0).all() and (mesh.phase < len(phases)).all()), "/mesh/phase names unknown phases")
+    _expect(rows.points.shape == rows.normal.shape == (k, 2), "/interface has tables of different lengths")
+    lengths = {table.shape for table in (rows.length, rows.fibre, rows.body, rows.pair)}
+    _expect(lengths == {(k,)}, "/interface has tables of different lengths")
+    _expect_known_pairs(_interfaces(document["case"]), rows, phases)
+    _expect(len(fibres.body) == len(fibres.radius), "/fibre has tables of different lengths")
+    _expect(fibres.centre.shape == (len(fibres.radius), 2), "/fibre has tables of different lengths")
+    _expect(faces.shape == (k, 2), "/interface has tables of different lengths")
+    _expect(bool((faces >= 0).all() and (faces < n).all()), "/interface names unknown nodes")
+    within = (rows.fibre >= 1) & (rows.fibre <= len(fibres.radius))
+    _expect(bool(within.all()), "/interface/fibre_number names unknown fibres")
+    return ResultFiles(document, size, phases, mesh, rows, fibres, faces, file, altered)
+
+
+def _expect_known_pairs(sections: Sequence[Mapping[str, Any]], rows: InterfaceRows, phases: tuple[str, ...]) -> None:
+    known = (rows.pair >= 0) & (rows.pair < max(len(sections), 1))
+    _expect(bool(known.all()), "/interface/pair names unknown interfaces")
+    named = {name for section in sections for name in section.get("between", ())}
+    _expect(named <= set(phases), "the case has interfaces between unknown phases")
+
+
+def _interfaces(case: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
+    sections = case.get("interface", [])
+    return sections if isinstance(sections, list) else [sections]
+
+
+def _rows(table: h5py.Dataset) -> Any:
+    return np.asarray(table[()])
+
+
+def _expect(holds: bool, fault: str) -> None:
+    if not holds:
+        raise ValueError(fault)
+
+
+@contextmanager
+def _reading(path: Path) -> Iterator[None]:
+    """What goes wrong in reading a damaged or foreign file, as one line about it."""
+    try:
+        yield
+    except (OSError, RuntimeError, KeyError, ValueError, TypeError) as error:
+        words = error.args[0] if error.args else error
+        raise CaseError(f"cannot read {path}: {' '.join(str(words).split())}") from error

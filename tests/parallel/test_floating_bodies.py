@@ -1,0 +1,31 @@
+"""Linear programmes that place free fibres: when one is not solved, every rank hears of it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import OptimizeResult
+from support import torn_cells
+
+from feti_homog.errors import ConvergenceError
+from feti_homog.interface.contact import floating_bodies
+from feti_homog.interface.contact.contact_problem import OPEN
+from feti_homog.interface.loads.load import Load
+
+pytestmark = pytest.mark.parallel
+
+
+def unsolved(*_, **__):
+    return OptimizeResult(x=None, success=False, status=4, message="Numerical difficulties were encountered.")
+
+
+def test_an_unsolved_programme_is_raised_on_every_rank(comm, monkeypatch):
+    cell = torn_cells.tear(comm, geometry="square", mesh_size=0.3)
+    status = np.full(len(cell.solver.jump_operator.nodes.row), OPEN, np.int8)
+    interface, start = torn_cells.interface(cell, True), np.zeros(cell.solver.rows)
+    monkeypatch.setattr("scipy.optimize.linprog", unsolved)
+    with pytest.raises(ConvergenceError, match="not solved: Numerical difficulties"):
+        interface.equilibrium(Load.strain(np.array([-1.0, -1.0, 0.0])), status, start)
+    nodes, gap = interface.nodes, np.ones(len(status))
+    with pytest.raises(ConvergenceError, match="not solved: Numerical difficulties"):
+        floating_bodies.room_ahead(comm, cell.solver.natural, nodes, status == OPEN, gap, -gap, 1e-9)

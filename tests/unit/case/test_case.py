@@ -1,0 +1,209 @@
+"""Case files, right and faulty."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import pickle
+from pathlib import Path
+
+import pytest
+from support.base_case import BASE, FIBRE, changed, fibre
+from unit.case.faulty_bonding import BARE_ARC, FAULTY_BONDINGS, PATH, debonded, of_type
+from unit.case.faulty_cases import FAULTY_CASES
+from unit.case.faulty_envelopes import FAULTY_ENVELOPES
+from unit.case.faulty_loads import FAULTY_LOADS
+from unit.case.faulty_sizes import FAULTY_SIZES
+from unit.case.faulty_table_cells import FAULTY_TABLE_CELLS
+from unit.case.valid_cases import MESH, VALID_CASES
+
+from feti_homog.case.case import check_phases, load, parse
+from feti_homog.case.interface_section import Arc, InterfaceSection
+from feti_homog.case.load_section import LoadPath
+from feti_homog.case.material_forms import General, Isotropic, Orthotropic
+from feti_homog.case.sections import Angle
+from feti_homog.errors import CaseError
+
+FAULTY = FAULTY_CASES | FAULTY_BONDINGS | FAULTY_ENVELOPES | FAULTY_LOADS | FAULTY_SIZES | FAULTY_TABLE_CELLS
+
+
+def case_of(tmp_path: Path, content: str, name: str = "cell.toml"):
+    (tmp_path / "cell.msh").touch()
+    path = tmp_path / name
+    path.write_text(content, encoding="utf-8")
+    return load(path)
+
+
+def test_keys_that_are_left_out_have_their_defaults(tmp_path):
+    case = case_of(tmp_path, BASE.replace("mesh_size = 0.05\n", ""))
+    assert case.name == "cell"
+    assert dataclasses.asdict(case.cell) == {
+        "geometry": "hexagonal", "fibre_fraction": 0.4, "mesh_size": 0.05, "interface_size": None, "tip_size": None,
+        "accuracy": None, "element_size": None,
+        "refine": 0, "order": 1, "bodies": "torus", "fibres": None, "width": None, "fibre_radius": None,
+        "coating": None, "min_gap": 0.05, "seed": 0, "radius_spread": 0.0, "file": None,
+        "repair": "none", "snap_tolerance": 1e-3,
+        "height": None, "fibre_list": None, "window": "periodic", "table": None, "match": None,
+        "voids": None, "void_radius": None,
+        "mix": None, "radii": None,
+    }  # fmt: skip
+    assert list(case.materials.items()) == [
+        ("matrix", Isotropic(88.0, 0.299)),
+        ("fibre", Isotropic(200.0, 0.222)),
+    ]
+    assert (case.analysis.type, case.analysis.plane) == ("stiffness", "strain")
+    assert (case.decomposition.subdomains, case.decomposition.max_dofs) == (None, None)
+    assert (case.output.fields, case.output.pictures, case.output.stress) == (True, True, "auto")
+    assert (case.interface, case.angle, case.path) == (None, None, None)
+    assert case.petsc == {}
+    assert case.warnings() == ()
+
+
+@pytest.mark.parametrize("name", FAULTY)
+def test_faults_are_told_by_section_and_key(tmp_path, name):
+    content, expected = FAULTY[name]
+    with pytest.raises(CaseError) as caught:
+        case_of(tmp_path, content)
+    faults = caught.value.faults
+    for words in expected:
+        assert any(words in fault for fault in faults), faults
+    assert all(len(fault.splitlines()) == 1 for fault in faults)
+    assert caught.value.exit_code == 2
+
+
+@pytest.mark.parametrize("name", [name for name, (_, expected) in FAULTY.items() if len(expected) == 1])
+def test_one_fault_is_one_line(tmp_path, name):
+    with pytest.raises(CaseError) as caught:
+        case_of(tmp_path, FAULTY[name][0])
+    # a mistyped key that is required is also missing; a mesh has neither fraction nor size of elements
+    related = {"young_mistyped": 2, "mesh_with_fraction": 2}
+    assert len(caught.value.faults) == related.get(name, 1), caught.value.faults
+
+
+def test_there_are_enough_faulty_cases():
+    parts = (FAULTY_CASES, FAULTY_BONDINGS, FAULTY_ENVELOPES, FAULTY_LOADS, FAULTY_SIZES, FAULTY_TABLE_CELLS)
+    assert len(FAULTY) == sum(map(len, parts)) >= 100
+
+
+def test_a_missing_file_is_told(tmp_path):
+    with pytest.raises(CaseError, match=r"none\.toml: cannot be read: No such file"):
+        load(tmp_path / "none.toml")
+
+
+def test_a_folder_in_the_place_of_a_file_is_told(tmp_path):
+    with pytest.raises(CaseError, match="cannot be read: Is a directory"):
+        load(tmp_path)
+
+
+def test_a_file_that_is_not_utf8_is_told(tmp_path):
+    path = tmp_path / "cell.toml"
+    path.write_bytes(BASE.encode() + "# Zelle für Stoß\n".encode("latin-1"))
+    with pytest.raises(CaseError, match=r"not UTF-8 text \(line 17\)"):
+        load(path)
+
+
+def test_byte_order_mark_is_allowed(tmp_path):
+    assert case_of(tmp_path, "\ufeff" + BASE) == case_of(tmp_path, BASE)
+
+
+def test_integers_are_numbers(tmp_path):
+    material = case_of(tmp_path, BASE.replace("88.0", "88")).materials["matrix"]
+    assert isinstance(material, Isotropic)
+    assert isinstance(material.young, float)
+
+
+@pytest.mark.parametrize("name", VALID_CASES)
+def test_resolved_makes_the_same_case_again(tmp_path, name):
+    case = case_of(tmp_path, VALID_CASES[name])
+    written = json.loads(json.dumps(case.resolved(), allow_nan=False))
+    assert written == case.resolved()
+    assert parse(written, Path("/nowhere")) == case
+    assert pickle.loads(pickle.dumps(case)) == case
+
+
+def test_arcs_and_strengths_are_read(tmp_path):
+    case = case_of(tmp_path, debonded('{fibre = "all", centre = -30, angle = 60}, {fibre = 2, angle = 10.5}'))
+    arcs = (Arc(fibre="all", centre=-30.0, angle=60.0), Arc(fibre=(2,), centre=0.0, angle=10.5))
+    assert case.interface == InterfaceSection(debonded=arcs)
+    assert (case.interface.contact, case.interface.criterion) == (True, "max")
+    assert (case.interface.normal_strength, case.interface.tangential_strength) == (None, None)
+    strong = case_of(tmp_path, of_type("path", PATH, "[interface]", "normal_strength = inf", "tangential_strength = 2"))
+    assert (strong.interface.normal_strength, strong.interface.tangential_strength) == (None, 2.0)
+
+
+def test_openings_are_read(tmp_path):
+    case = case_of(tmp_path, of_type("angle", "[angle]", "values = [0, 30, 360.0]", BARE_ARC))
+    assert case.angle == Angle(values=(0.0, 30.0, 360.0), strain=None)
+    assert case.interface == InterfaceSection(debonded=(Arc(fibre=(1,), angle=None),))
+
+
+def test_targets_of_a_path_are_read(tmp_path):
+    case = case_of(tmp_path, of_type("path", PATH))
+    assert case.path == LoadPath(strain=(0.2, 0.0, 0.0))
+    assert case.path.targets == ((0.2, 0.0, 0.0),)
+    assert (case.path.method, case.path.increments, case.path.max_events) == ("events", None, 100_000)
+    there_and_back = case_of(tmp_path, of_type("path", "[path]\nwaypoints = [[1, 0, 0], [0, 0, 0]]"))
+    assert there_and_back.path.targets == ((1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+
+def test_the_keys_of_a_material_choose_its_kind(tmp_path):
+    assert case_of(tmp_path, fibre("stiffness = [[3, 1, 0], [1, 3, 0], [0, 0, 1]]\n")).materials["fibre"] == General(
+        ((3.0, 1.0, 0.0), (1.0, 3.0, 0.0), (0.0, 0.0, 1.0))
+    )
+    constants = "E1 = 10.0\nE2 = 5.0\nnu12 = 0.3\nG12 = 2.0\n"
+    assert case_of(tmp_path, fibre(constants, "stress")).materials["fibre"] == Orthotropic(
+        E1=10.0, E2=5.0, nu12=0.3, G12=2.0
+    )
+
+
+def test_mesh_file_is_beside_the_case(tmp_path):
+    (tmp_path / "cases").mkdir()
+    content = MESH.replace("cell.msh", "../cell.msh")
+    assert case_of(tmp_path, content, "cases/one.toml").cell.file == (tmp_path / "cell.msh").resolve()
+
+
+def test_phases_of_mesh_and_case_must_match(tmp_path):
+    case = case_of(tmp_path, MESH)
+    check_phases(case, ["matrix", "fibre"])
+    check_phases(case, ["matrix", "fibre:1", "fibre:2"])
+    assert case.material_of("fibre:2") == Isotropic(200.0, 0.222)
+    with pytest.raises(CaseError, match=r"^\[material.fibre\]: the mesh has no such phase; it has matrix$"):
+        check_phases(case, ["matrix"])
+    with pytest.raises(CaseError, match=r'^\[material."fibre:2"\]: missing section; the mesh has this phase$'):
+        check_phases(case_of(tmp_path, MESH.replace(FIBRE, "")), ["matrix", "fibre:2"])
+    own = case_of(tmp_path, MESH + '[material."fibre:2"]\nyoung = 1\npoisson = 0\n')
+    assert own.material_of("fibre:2") == Isotropic(1.0, 0.0)
+    with pytest.raises(CaseError, match="fibre:2"):
+        check_phases(own, ["matrix", "fibre"])
+
+
+@pytest.mark.parametrize("plane", ["strain", "stress", "generalized"])
+def test_high_contrast_is_warned_of(tmp_path, plane):
+    case = BASE.replace('"strain"', f'"{plane}"').replace("young = 200.0", "young = 1e13")
+    (warning,) = case_of(tmp_path, case).warnings()
+    assert warning.startswith("[material.fibre], [material.matrix]: stiffnesses differ by a factor of ")
+    assert case_of(tmp_path, case.replace("1e13", "1e11")).warnings() == ()
+
+
+def test_locking_is_warned_of(tmp_path):
+    locking = BASE.replace("0.299", "0.4999")
+    (warning,) = case_of(tmp_path, locking).warnings()
+    assert warning.startswith("[material.matrix] poisson = 0.4999") and "order = 2" in warning
+    assert case_of(tmp_path, locking.replace('"strain"', '"stress"')).warnings() == ()
+    assert case_of(tmp_path, locking.replace("mesh_size", "order = 2\nmesh_size")).warnings() == ()
+
+
+def test_incompressible_is_allowed_in_plane_stress(tmp_path):
+    case_of(tmp_path, changed(("0.299", "0.5"), ('"strain"', '"stress"')))
+
+
+def test_phases_of_any_name(tmp_path):
+    named = MESH.replace("material.fibre", "material.E-glass_1") + '[material."carbon:2"]\nyoung = 5\npoisson = 0\n'
+    case = case_of(tmp_path, named)
+    check_phases(case, ["matrix", "E-glass_1", "carbon:2"])
+    assert case.material_of("E-glass_1") == Isotropic(200.0, 0.222)
+    with pytest.raises(CaseError, match=r"^\[material.boron\]: missing section; the mesh has this phase$"):
+        check_phases(case, ["matrix", "E-glass_1", "carbon:2", "boron"])
+    for name in ("void", '"my glass"', '"glass:"'):
+        with pytest.raises(CaseError, match="unknown phase"):
+            case_of(tmp_path, MESH + f"[material.{name}]\nyoung = 5\npoisson = 0\n")

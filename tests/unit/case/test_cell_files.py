@@ -1,0 +1,51 @@
+"""Sizes that the case and its table give."""
+
+from __future__ import annotations
+
+import pytest
+from support.base_case import BASE, MESH_CELL
+
+from feti_homog.case.case import load
+from feti_homog.errors import CaseError
+
+TABLE = "x,y,radius\n1,1,0.5\n"
+
+
+def case_of(tmp_path, keys, table=TABLE):
+    (tmp_path / "t.csv").write_text(table)
+    path = tmp_path / "case.toml"
+    path.write_text(BASE.replace(MESH_CELL[0], f'geometry = "table"\nfile = "t.csv"\n{keys}'))
+    return load(path)
+
+
+def test_the_case_or_the_table_gives_the_size(tmp_path):
+    size = "# width = 4, height = 3\n"
+    cells = [
+        case_of(tmp_path, "width = 4\nheight = 3").cell,
+        case_of(tmp_path, "", size + TABLE).cell,
+        case_of(tmp_path, "height = 3", "# width = 4\n" + TABLE).cell,
+        case_of(tmp_path, "width = 4", size + TABLE).cell,
+    ]
+    assert [(cell.table.width, cell.table.height) for cell in cells] == [(4.0, 3.0)] * 4
+    assert cells[0].file == tmp_path / "t.csv"
+
+
+@pytest.mark.parametrize(
+    ("keys", "table", "line"),
+    [
+        ("width = 4", TABLE, r"\[cell\] height: missing; t.csv has no line such as # width = 120, height = 80"),
+        ("width = 5\nheight = 3", "# width = 4\n" + TABLE, r"\[cell\] width = 5: t.csv says 4; give one"),
+        ("width = 4\nheight = 3", TABLE + "1,2\n", r"\[cell\] t.csv: row 3: has 2 columns"),
+    ],
+)
+def test_faults_of_sizes_and_rows(keys, table, line, tmp_path):
+    with pytest.raises(CaseError, match=line) as error:
+        case_of(tmp_path, keys, table)
+    assert len(error.value.faults) == 1
+
+
+def test_the_digest_is_that_of_the_table(tmp_path):
+    keys = "width = 4\nheight = 3"
+    digests = [case_of(tmp_path, keys, table).digest() for table in (TABLE, TABLE, TABLE.replace("0.5", "0.6"))]
+    assert digests[0] == digests[1] != digests[2]
+    assert case_of(tmp_path, keys + '\nwindow = "cut"').digest() != digests[0]

@@ -1,0 +1,104 @@
+"""The JSON Schema of a case file against the reader: what the one takes, the other takes."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+
+import pytest
+from hypothesis import given, settings
+from jsonschema import Draft202012Validator
+from support.base_case import BASE
+from support.jobs import ROOT
+from unit.case.documents import documents
+from unit.case.faulty_bonding import FAULTY_BONDINGS
+from unit.case.faulty_cases import FAULTY_CASES
+from unit.case.faulty_envelopes import FAULTY_ENVELOPES
+from unit.case.faulty_loads import FAULTY_LOADS
+from unit.case.faulty_sizes import FAULTY_SIZES
+from unit.case.faulty_table_cells import FAULTY_TABLE_CELLS
+from unit.case.valid_cases import VALID_CASES, VALID_SWEEPS
+
+from feti_homog.case.json_schema import json_schema
+
+VALIDATOR = Draft202012Validator(json_schema())
+FILES = [path for folder in ("drivers", "scripts/cases") for path in sorted((ROOT / folder).glob("*.toml"))]
+FAULTY = FAULTY_CASES | FAULTY_BONDINGS | FAULTY_ENVELOPES | FAULTY_LOADS | FAULTY_SIZES | FAULTY_TABLE_CELLS
+
+NO_TOML = {"syntax", "syntax_unclosed", "key_twice", "section_twice", "number_too_long"}
+BETWEEN_NUMBERS = {
+    "fibres_touch", "fibres_touch_in_square", "random_too_dense", "poisson_half", "orthotropic_no_third",
+    "orthotropic_unstable", "orthotropic_unstable_third", "stiffness_not_symmetric", "stiffness_indefinite",
+    "angle_strain_zero", "path_to_zero", "waypoints_begin_at_zero", "waypoints_repeated", "increments_too_few",
+    "poisson_half_in_space", "orthotropic_no_axial_shear", "orthotropic_unstable_in_space", "transverse_no_axial",
+    "transverse_no_shear", "transverse_ratio_nearly_one", "transverse_unstable", "stiffness_of_the_plane_in_space",
+    "stiffness_not_symmetric_in_space", "stiffness_indefinite_in_space", "stiffness_couples_shears",
+    "interface_size_above_mesh_size", "interface_size_above_the_default_mesh_size",
+    "tip_size_above_mesh_size", "tip_size_above_interface_size", "envelope_temperature_without_expansion",
+    "temperature_without_expansion", "temperature_of_a_load_without_one_expansion", "load_of_zero",
+    "path_to_a_load_of_zero", "waypoint_of_a_load_of_zero", "waypoint_that_names_what_it_is",
+    "waypoint_of_the_strain_that_a_load_is", "increments_too_few_for_loads",
+    "accuracy_of_linear_elements_that_nearly_lock", "fibre_with_a_coating",
+    "nearly_rigid_fibres", "nearly_void_matrix",
+}  # fmt: skip
+NOT_IN_JSON = {"fraction_is_nan", "strength_is_nan", "path_strain_nan", "load_nan"}
+INTEGER_TO_JSON = {"refine_is_real"}
+OUTSIDE_THE_FILE = {"no_table", "mesh_not_there"}
+BEYOND_A_SCHEMA = NO_TOML | BETWEEN_NUMBERS | NOT_IN_JSON | INTEGER_TO_JSON | OUTSIDE_THE_FILE
+
+
+def faults(content: str) -> list[str]:
+    return [error.message for error in VALIDATOR.iter_errors(tomllib.loads(content))]
+
+
+def test_it_is_a_schema():
+    Draft202012Validator.check_schema(json_schema())
+    assert json.loads(json.dumps(json_schema(), allow_nan=False)) == json_schema()
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)
+def test_files_of_the_repository_are_valid(path):
+    assert not faults(path.read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("name", VALID_CASES)
+def test_what_the_reader_takes_is_valid(name):
+    assert not faults(VALID_CASES[name])
+
+
+@settings(deadline=None, derandomize=True, max_examples=50)
+@given(documents())
+def test_generated_cases_are_valid(document):
+    assert not list(VALIDATOR.iter_errors(document))
+
+
+@pytest.mark.parametrize("name", [name for name in FAULTY if name not in BEYOND_A_SCHEMA])
+def test_what_the_reader_refuses_is_not_valid(name):
+    assert faults(FAULTY[name][0])
+
+
+@pytest.mark.parametrize("name", sorted(BEYOND_A_SCHEMA - NO_TOML))
+def test_what_is_beyond_a_schema_is_known(name):
+    assert not faults(FAULTY[name][0])
+
+
+@pytest.mark.parametrize("name", VALID_SWEEPS)
+def test_sweeps_are_valid(name):
+    assert not faults(VALID_SWEEPS[name])
+
+
+@pytest.mark.parametrize(
+    "table",
+    [
+        "realisation = 3", "cel.order = [1]", "name = ['a']", "cell.order = 2", "cell.order = []", "mode = 'rows'",
+        "cell.fibre_fraction = {from = 0.1, to = 0.3, by = 0.1}", "cell.fibre_fraction = {from = 0.1}",
+        "cell.fibre_fraction = {from = 0.1, to = 0.3, count = 1}",
+        "cell.fibre_fraction = {from = 0.1, to = 0.3, step = 0.0}", "samples = 0", "'cel.order' = [1]",
+    ],
+)  # fmt: skip
+def test_faulty_sweeps_are_not_valid(table):
+    assert faults(f"{BASE}[sweep]\n{table}\n")
+
+
+def test_what_a_sweep_leaves_out_may_still_be_faulty():
+    assert faults(VALID_SWEEPS["tables"].replace("mesh_size = 0.05", "mesh_size = 5"))

@@ -1,0 +1,14 @@
+"""The names of strains in case files and results against those of the problems that are solved."""
+
+from __future__ import annotations
+
+from feti_homog.case.load_names import SPATIAL_STRAINS, STRAINS
+from feti_homog.fem.problem import AXIAL, GENERALIZED, PLANE
+from feti_homog.homogenization.phase_laws import AXIAL_SHEAR, IN_PLANE
+
+
+def test_names_are_those_of_the_unit_loads():
+    assert PLANE.loads == STRAINS
+    assert GENERALIZED.loads[: GENERALIZED.stresses] == tuple(SPATIAL_STRAINS[place] for place in IN_PLANE)
+    assert AXIAL.loads == tuple(SPATIAL_STRAINS[place] for place in AXIAL_SHEAR)
+    assert sorted(IN_PLANE + AXIAL_SHEAR) == list(range(6))

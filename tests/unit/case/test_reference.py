@@ -1,0 +1,71 @@
+"""The reference of the case file: nothing is left out, and every key says what it means."""
+
+from __future__ import annotations
+
+import pytest
+
+from feti_homog.case import reference
+from feti_homog.case.schema import keys_of
+from feti_homog.case.sweep_section import RANGE_KEYS, SweepSection
+from feti_homog.case.tables import TABLES, TOP_LEVEL
+from feti_homog.errors import CaseError
+
+
+def rows(section: str) -> dict[str, reference.KeyRow]:
+    return {row.key: row for table in reference.tables_of(section) for row in table.rows}
+
+
+def test_all_keys_of_all_tables_are_there():
+    found = [(row.section, row.key) for row in reference.rows()]
+    assert {section for section, _ in found} == {*TOP_LEVEL, "sweep"}
+    for table in TABLES:
+        assert {(table.section, name) for name in keys_of(table.contents)} <= set(found)
+    assert {("sweep", name) for name in (*keys_of(SweepSection), *RANGE_KEYS)} <= set(found)
+    assert len({(row.table, row.key) for row in reference.rows()}) == len(found)
+
+
+@pytest.mark.parametrize("row", list(reference.rows()), ids=lambda row: f"{row.table} {row.key}")
+def test_every_key_says_in_a_sentence_what_it_means(row):
+    assert row.meaning.endswith(".") and row.accepts
+    assert row.meaning[0].isupper() or row.meaning[0] in '"t' or row.meaning.startswith("R^")
+
+
+@pytest.mark.parametrize(
+    ("section", "key", "expected"),
+    [
+        ("cell", "mesh_size", ("a number at least 0.0001 and at most 0.5", "", "0.05")),
+        ("cell", "geometry", ('one of "square", "hexagonal", "random", "table", "mesh"', "", "required")),
+        ("material", "young", ("a number above 0", "stress", "required")),
+        ("material", "E_transverse", ("a number above 0", "stress", "required")),
+        ("material", "expansion_axial", ("a number", "1 / temperature", "")),
+        ("interface", "normal_strength", ("a traction above 0, or inf", "stress", "inf")),
+        ("interface", "debonded", ("a list of arcs {fibre, centre, angle}", "", "[]")),
+        ("angle", "values", ("a rising list of numbers from 0 to 360", "degrees", "required")),
+        ("output", "stress_unit", ("a text in one line", "", '""')),
+        ("path", "increments", ("an integer at least 1 and at most 1000000", "", "required")),
+        ("name", "name", ("a text in one line", "", "the file's name")),
+    ],
+)
+def test_rows_are_those_of_the_keys(section, key, expected):
+    row = rows(section)[key]
+    assert (row.accepts, row.unit, row.default) == expected
+
+
+def test_where_keys_apply():
+    assert rows("cell")["fibres"].applies == 'geometry = "random"'
+    assert rows("interface")["criterion"].applies == '[analysis] type = "path" or "envelope"'
+    assert rows("path")["release"].applies == '[analysis] type = "path", method = "increments"'
+    assert rows("cell")["refine"].applies == ""
+    assert rows("angle")["strain"].applies == '[analysis] type = "angle", [analysis] plane = "strain" or "stress"'
+
+
+def test_the_text_has_every_key_and_no_long_line():
+    text = reference.as_text(reference.tables())
+    assert max(map(len, text.splitlines())) <= reference.WIDTH
+    assert all(f"\n  {row.key}\n" in text for row in reference.rows())
+    assert all(table.place in text for table in reference.tables())
+
+
+def test_an_unknown_section():
+    with pytest.raises(CaseError, match=r"^cells: unknown section; known are name, cell, material, "):
+        reference.tables_of("cells")

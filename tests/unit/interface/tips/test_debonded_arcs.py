@@ -1,0 +1,108 @@
+"""Arcs on the interface: their tips and the nodes within them, counted by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from feti_homog.case.interface_section import Arc
+from feti_homog.interface.tips.debonded_arcs import angles, debonded, moved_tips, tips
+
+ROUND = np.arange(0.0, 360.0, 10.0)
+
+
+def open_at(*arcs, opening=None, fibre=1):
+    """The directions, of 36 around a fibre, that are within the arcs."""
+    return ROUND[debonded(arcs, opening, np.full(36, fibre), ROUND)].tolist()
+
+
+def test_tips_are_half_an_opening_off_the_centre():
+    arcs = [Arc(fibre="all", centre=0.0, angle=60.0), Arc(fibre=(2,), centre=180.0, angle=90.0)]
+    assert tips(arcs, (), 3) == {0: [30.0, 330.0], 1: [30.0, 135.0, 225.0, 330.0], 2: [30.0, 330.0]}
+
+
+def test_every_value_of_the_opening_has_its_tips():
+    arcs = [Arc(fibre=(1, 3), centre=-90.0)]
+    marks = [180.0, 225.0, 315.0, 0.0]
+    assert tips(arcs, (0.0, 90.0, 180.0, 360.0), 3) == {0: sorted(marks), 2: sorted(marks)}
+
+
+def test_coinciding_tips_are_one():
+    arcs = [Arc(fibre="all", centre=10.0, angle=20.0), Arc(fibre="all", centre=-350.0 + 20.0, angle=20.0)]
+    assert tips(arcs, (), 1) == {0: [0.0, 20.0, 40.0]}
+    assert tips([Arc(fibre="all", centre=0.1 + 0.2, angle=0.2)], (), 1) == {0: [0.2, 0.4]}
+
+
+@pytest.mark.parametrize("angle", [0.0, 360.0])
+def test_nothing_and_everything_have_no_tips(angle):
+    assert tips([Arc(fibre="all", angle=angle)], (), 4) == {}
+
+
+def test_tips_stay_bonded():
+    assert open_at(Arc(fibre="all", angle=60.0)) == [0, 10, 20, 340, 350]
+    assert open_at(Arc(fibre="all", angle=60.1)) == [0, 10, 20, 30, 330, 340, 350]
+
+
+@pytest.mark.parametrize("turns", [-360.0, 0.0, 360.0])
+def test_centre_and_directions_wrap_around(turns):
+    arcs = [Arc(fibre="all", centre=170.0, angle=60.0)]
+    found = debonded(arcs, None, np.ones(36, int), ROUND + turns)
+    assert ROUND[found].tolist() == [150, 160, 170, 180, 190]
+
+
+def test_opening_takes_the_place_of_the_angle():
+    arc = Arc(fibre=(1,), centre=90.0)
+    assert open_at(arc, opening=40.0) == [80, 90, 100]
+    assert open_at(arc, opening=0.0) == []
+    assert open_at(arc, opening=360.0) == ROUND.tolist()
+    assert open_at(arc, Arc(fibre=(1,), angle=20.0), opening=40.0) == [0, 80, 90, 100]
+    with pytest.raises(ValueError, match="opening"):
+        open_at(arc)
+
+
+def test_nearly_everything_leaves_one_node():
+    assert open_at(Arc(fibre="all", centre=0.0, angle=359.0)) == [a for a in ROUND if a != 180]
+
+
+def test_arcs_belong_to_their_fibres():
+    arc = Arc(fibre=(2, 4), angle=30.0)
+    assert [open_at(arc, fibre=f) for f in (1, 2, 3, 4)] == [[], [0, 10, 350], [], [0, 10, 350]]
+
+
+def test_a_node_near_a_tip_is_the_tip():
+    near = 30.0 + np.array([-1e-3, -1e-7, 0.0, 1e-7])
+    arcs, fibre = [Arc(fibre="all", angle=60.0)], np.ones(4, int)
+    assert debonded(arcs, None, fibre, near).tolist() == [True, False, False, False]
+
+
+def test_an_arc_ends_where_the_mesh_has_its_tips():
+    """Vertices at 29.99 and -30.02 in place of 30 and -30 of fibre 1; those of fibre 2 are where they should be."""
+    fibre = np.array([1, 1, 1, 1, 2, 2])
+    direction = np.array([29.99, -30.02, 29.98, -30.01, 30.0, 330.0])
+    marks = tips([Arc(fibre="all", angle=60.0)], (), 2)
+    moved = moved_tips(marks, fibre, direction, 0.05)
+    assert moved == {(1, 30.0): pytest.approx(29.99), (1, 330.0): pytest.approx(329.99)}
+    inside = debonded([Arc(fibre="all", angle=60.0)], None, fibre, direction, moved)
+    assert inside.tolist() == [False, False, True, False, False, False]
+    assert moved_tips(marks, fibre, direction, 0.005) == {}
+
+
+def test_no_arcs_no_debonding():
+    assert open_at() == []
+
+
+def test_adjacent_arcs_leave_the_common_tip():
+    assert open_at(Arc(fibre="all", centre=10.0, angle=20.0), Arc(fibre="all", centre=30.0, angle=20.0)) == [10, 30]
+
+
+def test_a_fibre_without_a_centre_opens_as_a_whole_only():
+    nowhere = np.full(36, np.nan)
+    assert not debonded([Arc(fibre="all", angle=359.0)], None, np.ones(36, int), nowhere).any()
+    assert debonded([Arc(fibre="all", angle=360.0)], None, np.ones(36, int), nowhere).all()
+
+
+def test_directions_are_about_the_nearest_image():
+    centres, period = np.array([[0.0, 0.0], [0.9, 0.5]]), np.array([1.0, 2.0])
+    points = np.array([[0.1, 0.0], [0.0, 1.9], [0.9, 2.1], [0.1, 0.5], [0.9, 0.3], [0.7, 0.5]])
+    fibre = np.array([0, 0, 0, 1, 1, 1])
+    assert angles(points, fibre, centres, period) == pytest.approx([0.0, -90.0, 135.0, 0.0, -90.0, 180.0])

@@ -1,0 +1,161 @@
+"""Constants of spatial stiffnesses against compliances, turned tensors and random tests."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from reference.fibre_composites import CARBON, compliance
+
+from feti_homog.materials.spatial_constants import (
+    EngineeringConstants,
+    engineering_constants,
+    is_transversely_isotropic,
+    transverse_moduli,
+    transversely_isotropic_part,
+    transversely_isotropic_stiffness,
+)
+
+PAIRS = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
+CONSTANTS = {"E1": 11.0, "E2": 14.0, "E3": 140.0, "nu12": 0.35, "nu13": 0.02, "nu23": 0.03, "G12": 4.0, "G13": 5.0}
+CONSTANTS["G23"] = 6.0
+
+
+def orthotropic(c):
+    """Stiffness from the compliance that the definitions of the constants give."""
+    S = np.diag([1 / c["E1"], 1 / c["E2"], 1 / c["E3"], 1 / c["G23"], 1 / c["G13"], 1 / c["G12"]])
+    for (i, j), nu, E in (((0, 1), "nu12", "E1"), ((0, 2), "nu13", "E1"), ((1, 2), "nu23", "E2")):
+        S[i, j] = S[j, i] = -c[nu] / c[E]
+    return np.linalg.inv(S)
+
+
+def random_stiffness(seed):
+    factor = np.random.default_rng(seed).standard_normal((6, 6))
+    return factor @ factor.T + 0.1 * np.eye(6)
+
+
+def tensor(stiffness):
+    """Fourth-order tensor of a (6, 6) stiffness."""
+    C = np.zeros((3, 3, 3, 3))
+    for row, (i, j) in enumerate(PAIRS):
+        for column, (k, m) in enumerate(PAIRS):
+            C[i, j, k, m] = C[j, i, k, m] = C[i, j, m, k] = C[j, i, m, k] = stiffness[row, column]
+    return C
+
+
+def turned(stiffness, degrees):
+    """The same material turned about x3."""
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    Q = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+    C = np.einsum("ai,bj,ck,dl,ijkl->abcd", Q, Q, Q, Q, tensor(stiffness))
+    return np.array([[C[a][b] for b in PAIRS] for a in PAIRS])
+
+
+def test_constants_of_an_orthotropic_stiffness_are_those_it_is_made_of():
+    found = dataclasses.asdict(engineering_constants(orthotropic(CONSTANTS)))
+    assert found == pytest.approx(CONSTANTS, rel=1e-12)
+    assert isinstance(engineering_constants(orthotropic(CONSTANTS)), EngineeringConstants)
+
+
+def test_contractions_are_those_of_a_state_of_uniaxial_stress():
+    stiffness = random_stiffness(1)
+    found = engineering_constants(stiffness)
+    for i, E in enumerate((found.E1, found.E2, found.E3)):
+        strain = np.linalg.solve(stiffness, np.eye(6)[i])
+        assert 1 / strain[i] == pytest.approx(E, rel=1e-12)
+        for j, nu in {0: ((1, found.nu12), (2, found.nu13)), 1: ((2, found.nu23),), 2: ()}[i]:
+            assert -strain[j] / strain[i] == pytest.approx(nu, rel=1e-9)
+
+
+def test_constants_of_a_transversely_isotropic_stiffness_are_those_it_is_made_of():
+    found = transversely_isotropic_part(np.linalg.inv(compliance(235.0, 14.0, 0.2, 0.25, 28.0)), [9, 9, -0.9, 0, 0, 0])
+    given = {
+        "E_axial": 235.0, "E_transverse": 14.0, "nu_axial": 0.2, "nu_transverse": 0.25, "G_axial": 28.0,
+        "G_transverse": 5.6, "expansion_axial": -0.9, "expansion_transverse": 9.0,
+    }  # fmt: skip
+    assert {name: getattr(found, name) for name in given} == pytest.approx(given, rel=1e-12)
+    assert is_transversely_isotropic(found)
+    # Stress that holds the axis and makes a unit change of area.
+    assert found.K_transverse == pytest.approx(235 / (2 * (0.75 * 235 / 14 - 2 * 0.04)), rel=1e-12)
+
+
+def test_stiffness_of_the_constants_is_the_one_they_came_from():
+    stiffness = np.linalg.inv(compliance(235.0, 14.0, 0.2, 0.25, 28.0))
+    np.testing.assert_allclose(transversely_isotropic_stiffness(CARBON), stiffness, rtol=1e-13, atol=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_nearest_transversely_isotropic_stiffness_is_the_mean_over_all_turns(seed):
+    stiffness = random_stiffness(seed)
+    mean = np.mean([turned(stiffness, degrees) for degrees in np.arange(0.0, 360.0, 30.0)], axis=0)
+    nearest = transversely_isotropic_stiffness(transversely_isotropic_part(stiffness))
+    np.testing.assert_allclose(nearest, mean, atol=1e-13 * np.linalg.norm(stiffness))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_deviation_is_the_distance_of_the_tensors(seed):
+    stiffness = random_stiffness(seed)
+    found = transversely_isotropic_part(stiffness)
+    rest = tensor(stiffness) - tensor(transversely_isotropic_stiffness(found))
+    assert found.deviation == pytest.approx(np.linalg.norm(rest) / np.linalg.norm(tensor(stiffness)), rel=1e-12)
+    assert not is_transversely_isotropic(found)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_no_other_transversely_isotropic_stiffness_is_nearer(seed):
+    """The rest is orthogonal to every change of the five moduli, as tensors."""
+    stiffness, rng = random_stiffness(seed), np.random.default_rng(seed)
+    found = transversely_isotropic_part(stiffness)
+    nearest = transversely_isotropic_stiffness(found)
+    changes = {name: getattr(found, name) * (1 + rng.uniform(-0.1, 0.1)) for name in ("E_axial", "nu_axial", "G_axial")}
+    changes |= {name: getattr(found, name) * 1.1 for name in ("G_transverse", "K_transverse")}
+    other = transversely_isotropic_stiffness(dataclasses.replace(found, **changes))
+    inner = np.sum((tensor(stiffness) - tensor(nearest)) * (tensor(other) - tensor(nearest)))
+    assert abs(inner) < 1e-12 * np.linalg.norm(stiffness) ** 2
+
+
+def test_constants_are_the_same_in_all_turned_axes():
+    stiffness = random_stiffness(4)
+    one, other = (dataclasses.astuple(transversely_isotropic_part(c)) for c in (stiffness, turned(stiffness, 25.0)))
+    assert [x for x in one if x is not None] == pytest.approx([x for x in other if x is not None], rel=1e-10)
+
+
+def test_expansion_is_the_mean_over_all_turns():
+    found = transversely_isotropic_part(np.eye(6), [3.0, 5.0, 7.0, 0.0, 0.0, 2.0])
+    assert (found.expansion_axial, found.expansion_transverse) == (7.0, 4.0)
+    without = transversely_isotropic_part(np.eye(6))
+    assert (without.expansion_axial, without.expansion_transverse) == (None, None)
+
+
+def test_singular_stiffness_has_no_constants():
+    with pytest.raises(np.linalg.LinAlgError):
+        engineering_constants(np.zeros((6, 6)))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_transverse_moduli_are_those_in_turned_axes(seed):
+    stiffness = random_stiffness(seed)
+    constants = [engineering_constants(turned(stiffness, degrees)) for degrees in np.arange(0.0, 180.0, 0.25)]
+    expected = {
+        f"{name[0]}_{end}": choose([getattr(own, name) for own in constants])
+        for name in ("E1", "G12") for end, choose in (("least", min), ("largest", max))
+    }  # fmt: skip
+    assert dataclasses.asdict(transverse_moduli(stiffness)) == pytest.approx(expected, rel=1e-10)
+
+
+def test_transverse_moduli_of_a_transversely_isotropic_stiffness_do_not_depend_on_the_direction():
+    constants = transversely_isotropic_part(random_stiffness(7))
+    across = transverse_moduli(transversely_isotropic_stiffness(constants))
+    assert (across.E_least, across.E_largest) == pytest.approx((constants.E_transverse,) * 2, rel=1e-12)
+    assert (across.G_least, across.G_largest) == pytest.approx((constants.G_transverse,) * 2, rel=1e-12)
+
+
+def test_crossed_fibres_are_softest_between_them():
+    """1/E at 45 degrees is (2 S11 + 2 S12 + S66)/4, 1/G there 2 (S11 - S12) where S11 = S22."""
+    square = orthotropic(CONSTANTS | {"E2": CONSTANTS["E1"], "nu23": CONSTANTS["nu13"], "G23": CONSTANTS["G13"]})
+    E, nu, G = CONSTANTS["E1"], CONSTANTS["nu12"], CONSTANTS["G12"]
+    across = transverse_moduli(square)
+    ends = sorted([E, 4 / (2 / E - 2 * nu / E + 1 / G)])
+    assert (across.E_least, across.E_largest) == pytest.approx(ends)
+    assert sorted([G, E / (2 * (1 + nu))]) == pytest.approx([across.G_least, across.G_largest])

@@ -1,0 +1,81 @@
+"""Elliptic fibres in meshes of straight edges: found wherever they lie, and followed by refinement."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from support.users_meshes import fibre_area, polar_cell
+
+from feti_homog.mesh.fibre_centres import fibre_circles
+from feti_homog.mesh.periodic_topology import Torus
+from feti_homog.mesh.readers.ellipse_detection import fit
+from feti_homog.mesh.readers.msh_reader import read
+from feti_homog.mesh.refinement import ReferenceLattice, refine
+from feti_homog.mesh.submesh import cut
+
+A, B, TURN = 0.3, 0.2, 0.4
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.4, np.pi / 2, 2.5])
+@pytest.mark.parametrize(("a", "b"), [(0.3, 0.2), (0.2, 0.2), (1e-3, 4e-3), (30.0, 1.0)])
+def test_fit_gives_back_the_ellipse(a, b, turn):
+    t = np.sort(np.random.default_rng(1).uniform(0, 2 * np.pi, 40))
+    turned = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    centre = np.array([0.7, -0.2])
+    ellipse = fit(centre + (turned @ np.diag([a, b]) @ [np.cos(t), np.sin(t)]).T)
+    assert ellipse is not None and ellipse.centre == pytest.approx(centre, abs=1e-10)
+    square = turned @ np.diag([a**2, b**2]) @ turned.T
+    assert ellipse.frame @ ellipse.frame.T == pytest.approx(square, rel=1e-8, abs=1e-8 * a * b)
+
+
+@pytest.mark.parametrize(
+    "places",
+    [
+        np.stack([np.cos(np.arange(20) * np.pi / 10), np.sin(np.arange(20) * np.pi / 10) ** 3], axis=1),
+        np.stack([np.arange(20.0), np.arange(20.0) ** 2], axis=1),
+        np.stack([np.arange(20.0), np.ones(20)], axis=1),
+        np.stack([np.cos(np.linspace(0, 3, 20)), np.sin(np.linspace(0, 3, 20))], axis=1),
+    ],
+    ids=["astroid", "parabola", "line", "half a circle"],
+)
+def test_other_chains_are_no_ellipses(places):
+    assert fit(places) is None
+
+
+@pytest.mark.parametrize("centre", [(0.5, 0.5), (0.0, 0.0), (0.93, 0.08)])
+def test_fine_nodes_lie_on_the_ellipse_wherever_the_cell_cuts_it(centre, tmp_path):
+    """Of which the coarse edges miss it by h^2."""
+    polar_cell(centre, B, tmp_path / "ellipse.msh", stretch=A / B, turn=TURN, size=0.06)
+    mesh = read(tmp_path / "ellipse.msh")
+    torus = Torus.of(mesh)
+    assert len(mesh.arc_edges) > 20 and np.isnan(fibre_circles(torus)[1, 2])
+    off = []
+    for piece in cut(torus, torus.constituent):
+        ends = piece.edges[piece.turns > 0]
+        middle = piece.points[ends].mean(axis=1)
+        fine = refine(piece, ReferenceLattice.of(1, 1))
+        nodes = fine.points[len(piece.points) : len(piece.points) + len(piece.edges)][piece.turns > 0]
+        off.append([np.abs(_level(points, centre) - 1).max() for points in (middle, nodes)])
+    assert np.max(off, axis=0)[0] > 5e-3 and np.max(off, axis=0)[1] < 1e-9
+
+
+@pytest.mark.parametrize("stretch", [1.5, 3.0])
+def test_areas_approach_that_of_the_ellipse_by_h2(stretch, tmp_path):
+    """Of the polygons of nodes in the middle of the parameter: each halving quarters what is missing."""
+    polar_cell((0.5, 0.5), 0.15, tmp_path / "ellipse.msh", stretch=stretch, size=0.06, turn=TURN)
+    mesh, exact = read(tmp_path / "ellipse.msh"), np.pi * 0.15**2 * stretch
+    missing = [1 - fibre_area(mesh, refinements=refinements, order=2) / exact for refinements in range(5)]
+    assert np.array(missing[:-1]) / missing[1:] == pytest.approx(4.0, rel=2e-2) and 0 < missing[-1] < 1e-4
+
+
+def test_thin_ellipse_with_few_edges_stays_a_polygon(tmp_path):
+    polar_cell((0.5, 0.5), 0.02, tmp_path / "thin.msh", stretch=20.0, size=0.2)
+    assert len(read(tmp_path / "thin.msh").arc_edges) == 0
+
+
+def _level(points, centre):
+    """(k,) 1 on the ellipse of semi-axes A and B about the nearest image of the centre."""
+    away = points - centre
+    away -= np.round(away)
+    along = away @ [np.cos(TURN), np.sin(TURN)], away @ [-np.sin(TURN), np.cos(TURN)]
+    return np.hypot(along[0] / A, along[1] / B)

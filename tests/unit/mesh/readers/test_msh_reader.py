@@ -1,0 +1,189 @@
+"""A user's mesh: every fault is named, and good meshes come back as they are."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import gmsh
+import numpy as np
+import pytest
+from support.users_meshes import polar_cell
+from unit.mesh.faulty_meshes import FAULTY_MESHES, MshFile, grid
+
+from feti_homog.errors import MeshError
+from feti_homog.mesh.coarse_mesh import CoarseMesh, areas
+from feti_homog.mesh.readers import gmsh_file
+from feti_homog.mesh.readers.msh_reader import read
+from feti_homog.mesh.tiles.filling import gmsh_session
+
+MESHES = Path(__file__).parents[4] / "meshes"
+
+
+@pytest.mark.parametrize("name", FAULTY_MESHES)
+def test_faulty_mesh_is_refused(name, tmp_path):
+    write, message = FAULTY_MESHES[name]
+    write(tmp_path / "faulty.msh")
+    with pytest.raises(MeshError) as caught:
+        read(tmp_path / "faulty.msh")
+    assert any(message in fault for fault in caught.value.faults), caught.value
+    assert all("faulty.msh" in fault and "\n" not in fault for fault in caught.value.faults)
+
+
+def test_there_are_enough_faulty_meshes():
+    assert len(FAULTY_MESHES) >= 35
+
+
+def test_several_faults_are_told_at_once(tmp_path):
+    mesh = replace(grid(), names={1: "my resin", 2: "my fibre"}).with_element(5, 2, 0, (3, 4, 9))
+    assert len(_faults(mesh, tmp_path)) == 4
+
+
+def test_faults_after_the_first_few_are_counted(tmp_path):
+    mesh = grid()
+    for tag in (1, 3, 5, 7, 9):
+        mesh = mesh.with_element(tag, 2, 0, mesh.elements[tag][3])
+    (fault,) = _faults(mesh, tmp_path)
+    assert fault.endswith("element 5 at (0.666666667, 0.0833333333) and 2 more: not in any physical surface")
+
+
+@pytest.mark.parametrize(("version", "binary"), [(2.2, 0), (2.2, 1), (4.0, 0), (4.1, 0), (4.1, 1)])
+def test_every_format_gives_the_same_mesh(version, binary, tmp_path):
+    grid().write(tmp_path / "good.msh")
+    reference = read(tmp_path / "good.msh")
+    _rewritten(tmp_path / "good.msh", tmp_path / "other.msh", version, binary)
+    mesh = read(tmp_path / "other.msh")
+    assert np.array_equal(_content(mesh), _content(reference)) and mesh.phases == reference.phases
+
+
+def test_grid_comes_back(tmp_path):
+    grid().write(tmp_path / "good.msh")
+    mesh = read(tmp_path / "good.msh")
+    assert (mesh.width, mesh.height, mesh.phases) == (1.0, 1.0, ("matrix", "fibre"))
+    assert len(mesh.points) == 25 and len(mesh.triangles) == 32 and len(mesh.circles) == 0
+    assert areas(mesh.points, mesh.triangles) == pytest.approx(np.full(32, 1 / 32))
+    assert np.bincount(mesh.phase).tolist() == [24, 8]
+    assert len(np.unique(mesh.representative)) == 16
+
+
+def test_clockwise_and_shifted_mesh_is_turned_and_moved(tmp_path):
+    mesh = grid()
+    nodes = {tag: (3 * x - 5, 2 * y + 7, 4.0) for tag, (x, y, _) in mesh.nodes.items()}
+    elements = {tag: (*e[:3], e[3][::-1]) for tag, e in mesh.elements.items()}
+    replace(mesh, nodes=nodes, elements=elements).write(tmp_path / "good.msh")
+    result = read(tmp_path / "good.msh")
+    assert (result.width, result.height) == (3.0, 2.0)
+    assert np.all(result.points.min(axis=0) == 0) and areas(result.points, result.triangles).min() > 0
+
+
+def test_unused_nodes_are_ignored(tmp_path):
+    mesh = grid()
+    replace(mesh, nodes={**mesh.nodes, 500: (9.0, 9.0, 9.0)}).write(tmp_path / "good.msh")
+    assert len(read(tmp_path / "good.msh").points) == 25
+
+
+def test_rounded_coordinates_are_matched_exactly(tmp_path):
+    noise = np.random.default_rng(1).uniform(-2e-8, 2e-8, (26, 2))
+    nodes = {tag: (x + noise[tag, 0], y + noise[tag, 1], z) for tag, (x, y, z) in grid().nodes.items()}
+    replace(grid(), nodes=nodes).write(tmp_path / "good.msh")
+    _assert_periodic(read(tmp_path / "good.msh"))
+
+
+def test_phases_beyond_two_and_matrix_first(tmp_path):
+    mesh = grid(lambda x, y: y > 0.5)
+    mesh = replace(mesh, names={1: "fibre:glass", 2: "matrix"})
+    mesh.write(tmp_path / "good.msh")
+    result = read(tmp_path / "good.msh")
+    assert result.phases == ("matrix", "fibre:glass") and len(result.circles) == 0
+    upper = result.points[result.triangles].mean(axis=1)[:, 1] > 0.5
+    assert np.array_equal(result.phase, np.where(upper, 0, 1))
+
+
+@pytest.mark.parametrize("corner", [False, True])
+def test_polygons_stay_polygons(corner, tmp_path):
+    """A square fibre, in the middle or around the corner: its corners are on a circle, its sides are not."""
+    inside = (lambda x, y: abs(x - 0.5) > 0.25 and abs(y - 0.5) > 0.25) if corner else None
+    (grid(inside) if inside else grid()).write(tmp_path / "good.msh")
+    mesh = read(tmp_path / "good.msh")
+    assert len(mesh.circles) == 0 and len(mesh.arc_edges) == 0 and np.bincount(mesh.phase)[1] == 8
+
+
+@pytest.mark.parametrize("centre", [(0.5, 0.5), (0.0, 0.0), (0.1, 0.45), (0.93, 0.08)])
+def test_round_fibre_is_found_wherever_the_cell_cuts_it(centre, tmp_path):
+    polar_cell(centre, 0.35, tmp_path / "round.msh")
+    mesh = read(tmp_path / "round.msh")
+    _assert_periodic(mesh)
+    size = np.array([mesh.width, mesh.height])
+    offset = (mesh.circles[:, :2] - centre + size / 2) % size - size / 2
+    assert np.abs(offset).max() < 1e-8 and mesh.circles[:, 2] == pytest.approx(0.35, abs=1e-8)
+    spokes = mesh.points[mesh.arc_edges] - mesh.circles[mesh.arc_circle][:, None, :2]
+    radius = mesh.circles[mesh.arc_circle][:, None, 2]
+    assert np.abs(np.linalg.norm(spokes, axis=2) / radius - 1).max() < 1e-12
+    turned = np.arctan2(*np.moveaxis(spokes, 2, 0)[::-1])
+    spans = np.abs((turned[:, 1] - turned[:, 0] + np.pi) % (2 * np.pi) - np.pi)
+    assert spans.sum() == pytest.approx(2 * np.pi)
+
+
+def test_an_ellipse_is_no_circle(tmp_path):
+    polar_cell((0.5, 0.5), 0.35, tmp_path / "round.msh", stretch=1 + 1e-5)
+    mesh = read(tmp_path / "round.msh")
+    assert len(mesh.ellipses) == 1 and np.isnan(mesh.circles[0, 2])
+    semi_axes = np.linalg.svd(mesh.ellipses.frames[0], compute_uv=False)
+    assert semi_axes == pytest.approx([0.35 * (1 + 1e-5), 0.35], rel=1e-9)
+
+
+@pytest.mark.parametrize(("name", "height", "circles"), [("square", 1.0, 1), ("hexagonal", np.sqrt(3), 5)])
+def test_meshes_of_the_repository_have_their_circles_and_fraction(name, height, circles):
+    mesh = read(MESHES / f"{name}.msh")
+    assert (mesh.width, mesh.height) == pytest.approx((1.0, height)) and len(mesh.circles) == circles
+    _assert_periodic(mesh)
+    fibres = 1 if name == "square" else 2
+    assert fibres * np.pi * mesh.circles[0, 2] ** 2 / height == pytest.approx(0.4, abs=1e-6)
+
+
+def _faults(mesh: MshFile, folder: Path) -> tuple[str, ...]:
+    mesh.write(folder / "faulty.msh")
+    with pytest.raises(MeshError) as caught:
+        read(folder / "faulty.msh")
+    return caught.value.faults
+
+
+def _rewritten(source: Path, target: Path, version: float, binary: int) -> None:
+    gmsh.initialize(interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.open(str(source))
+        gmsh.option.setNumber("Mesh.MshFileVersion", version)
+        gmsh.option.setNumber("Mesh.Binary", binary)
+        gmsh.write(str(target))
+    finally:
+        gmsh.finalize()
+
+
+def _content(mesh: CoarseMesh) -> np.ndarray:
+    """The triangles (m, 7) by their corners' coordinates and phase, sorted, whatever the numbering."""
+    corners = np.sort(mesh.points[mesh.triangles].view(complex)[..., 0], axis=1)
+    rows = np.column_stack([corners.real, corners.imag, mesh.phase])
+    return rows[np.lexsort(rows.T)]
+
+
+def _assert_periodic(mesh: CoarseMesh) -> None:
+    size = np.array([mesh.width, mesh.height])
+    shift = mesh.points - mesh.points[mesh.representative]
+    assert np.all((shift == 0) | (shift == size))
+    assert np.all(mesh.points[mesh.representative] < size)
+    assert np.array_equal(mesh.representative[mesh.representative], mesh.representative)
+    assert areas(mesh.points, mesh.triangles).min() > 0
+
+
+@pytest.mark.parametrize(("version", "binary"), [(2.2, 0), (2.2, 1), (4.0, 0), (4.1, 0), (4.1, 1)])
+def test_the_number_of_elements_is_read_from_every_format(tmp_path, version, binary):
+    with gmsh_session() as gmsh:
+        gmsh.open(str(MESHES / "two_fibres.msh"))
+        gmsh.option.setNumber("Mesh.MshFileVersion", version)
+        gmsh.option.setNumber("Mesh.Binary", binary)
+        gmsh.write(str(tmp_path / "same.msh"))
+        count = sum(map(len, gmsh.model.mesh.getElements()[1]))
+    assert gmsh_file._listed_elements(tmp_path / "same.msh") == count
+    same, first = (gmsh_file.load(path) for path in (tmp_path / "same.msh", MESHES / "two_fibres.msh"))
+    assert len(same.triangles) == len(first.triangles)

@@ -1,0 +1,171 @@
+"""Cells cut into tiles: meshes that join up, by the laws of the torus; where their borders run; faults."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import gmsh
+import numpy as np
+import pytest
+from support.tiled_cells import CELLS, SMALL, drawn, mesh_of
+from unit.mesh.fill.test_gmsh_mesher import least_angle
+
+from feti_homog.errors import MeshError
+from feti_homog.fibres.arrangement import Arrangement, arrange
+from feti_homog.mesh.coarse_mesh import areas
+from feti_homog.mesh.fill.gmsh_mesher import draw, generate
+from feti_homog.mesh.outline.bridges import CLEAR, LEAST_ANGLE
+from feti_homog.mesh.outline.curves import MATRIX, OUTSIDE
+from feti_homog.mesh.outline.outline import images
+from feti_homog.mesh.periodic_topology import Torus
+from feti_homog.mesh.tiles import filling
+from feti_homog.mesh.tiles.tiles import TilePolicy, is_tiled, tiling
+
+NONE = TilePolicy(least_discs=10**6)
+MARKS = {0: (20.0, 100.0), 7: (0.0, 180.0)}
+named = pytest.mark.parametrize("name", CELLS)
+
+
+@named
+def test_tiles_make_one_mesh_of_the_torus(name):
+    mesh = mesh_of(name)
+    torus = Torus.of(mesh)
+    beside = np.bincount(torus.triangle_torus_edges.ravel())
+    voids = len(arrange(CELLS[name]).radii) - arrange(CELLS[name]).fibres
+    assert beside.max() == 2 and torus.at_void.any() == (voids > 0)
+    # Each void takes a disc out of a surface whose characteristic is that of the torus, 0.
+    assert torus.node_class.max() + 1 - len(beside) + len(mesh.triangles) == -voids
+    fibres = arrange(CELLS[name]).fibres
+    assert torus.constituent.max() == fibres * (2 if "coated" in name else 1)
+    assert set(mesh.triangles.ravel()) == set(range(len(mesh.points)))
+
+
+@named
+def test_tiles_have_the_areas_and_circles_of_the_cell_at_once(name):
+    mesh = mesh_of(name)
+    assert areas(mesh.points, mesh.triangles).min() > 0
+    whole = generate(CELLS[name], policy=NONE)
+    for of_phase in range(len(mesh.phases)):
+        own, other = (areas(m.points, m.triangles)[m.phase == of_phase].sum() for m in (mesh, whole))
+        # Arcs have other edges where bridges end.
+        assert own == pytest.approx(other, rel=1e-2)
+    assert np.array_equal(mesh.circles, whole.circles)
+    assert 0.9 < len(mesh.triangles) / len(whole.triangles) < 1.6
+    angles = [np.quantile(least_angle(m.points, m.triangles), [0.0, 0.01]) for m in (mesh, whole)]
+    assert np.all(angles[0] > angles[1] - 4)
+
+
+@named
+def test_opposite_sides_have_the_same_nodes(name):
+    mesh = mesh_of(name)
+    for axis, period in ((0, mesh.width), (1, mesh.height)):
+        low, high = (np.sort(mesh.points[mesh.points[:, axis] == level, 1 - axis]) for level in (0.0, period))
+        assert np.array_equal(low, high)
+
+
+@named
+def test_bridges_cross_the_matrix_and_nothing_else(name):
+    lines = drawn(name).lines
+    curves, circles = lines.curves, lines.ellipses.circles
+    bridge = np.flatnonzero((curves.circle == MATRIX) & (curves.inside == MATRIX) & (curves.outside == MATRIX))
+    ends = lines.points[curves.ends[bridge]]
+    share = np.linspace(0.0, 1.0, 51)[1:-1, None, None]
+    inside = ends[:, 0] * (1 - share) + ends[:, 1] * share
+    distance = np.linalg.norm(inside[:, :, None] - circles[:, :2], axis=3) - circles[:, 2]
+    assert len(bridge) > 4 and distance.min() > 0 and inside.min() > 0 and inside.max() < 1
+    # From circle to circle at right angles, away from all others.
+    distance = np.linalg.norm(ends[:, :, None] - circles[:, :2], axis=3) - circles[:, 2]
+    own = np.abs(distance).argmin(axis=2)
+    assert np.abs(np.take_along_axis(distance, own[:, :, None], axis=2)).max() < 1e-12
+    spokes = ends - circles[own, :2]
+    way = ends[:, 1] - ends[:, 0]
+    turn = spokes[..., 0] * way[:, None, 1] - spokes[..., 1] * way[:, None, 0]
+    assert np.abs(turn / np.linalg.norm(spokes, axis=2) / np.linalg.norm(way, axis=1)[:, None]).max() < 1e-9
+    outer = np.flatnonzero(lines.around == MATRIX)
+    away = np.linalg.norm(inside[:, :, None] - circles[outer, :2], axis=3) / circles[outer, 2]
+    third = (outer != own[:, :1]) & (outer != own[:, 1:])
+    assert np.where(third[None], away, np.inf).min() > 1 + CLEAR - 1e-9
+    for circle in np.unique(own):
+        angle = np.sort(np.arctan2(*spokes[own == circle][:, ::-1].T))
+        assert np.all(np.diff(angle, append=angle[0] + 2 * np.pi) > LEAST_ANGLE - 1e-9)
+
+
+def test_marks_become_nodes_and_bridges_keep_away():
+    case = CELLS["dense"]
+    arrangement, mesh = arrange(case), generate(case, MARKS, SMALL)
+    for fibre, angles in MARKS.items():
+        for angle in np.radians(angles):
+            place = arrangement.centres[fibre] + arrangement.radii[fibre] * np.array([np.cos(angle), np.sin(angle)])
+            assert np.linalg.norm((mesh.points - place + 0.5) % 1.0 - 0.5, axis=1).min() < 1e-12
+    torus = Torus.of(mesh)
+    assert np.all(np.bincount(torus.triangle_torus_edges.ravel()) == 2)
+    assert least_angle(mesh.points, mesh.triangles).min() > 15
+
+
+def test_bridges_keep_away_from_all_of_some_near_marks():
+    """The second in the direction of a bridge that is there without them."""
+    case = CELLS["dense"]
+    arrangement = arrange(case)
+    disc = images(arrangement)[1]
+    found = tiling(arrangement, case.mesh_size, {}, SMALL).bridges
+    ends, angles = found.on_circles
+    fibre, angle = int(disc[ends[0]]), float(np.degrees(angles[0]))
+    marked = tiling(arrangement, case.mesh_size, {fibre: (angle - 10, angle, angle + 10)}, SMALL).bridges
+    ends, angles = marked.on_circles
+    away = np.degrees(angles[disc[ends] == fibre]) - angle
+    assert np.all(np.abs((away + 180) % 360 - 180) > np.degrees(LEAST_ANGLE) - 1e-9)
+
+
+def test_fibres_in_a_row_are_one_tile():
+    """No three of their centres make a triangle."""
+    row = Arrangement(1.0, 0.2, np.array([[(k + 0.5) / 8, 0.1] for k in range(8)]), np.full(8, 0.04), ("fibre",) * 8)
+    assert is_tiled(row, SMALL) and tiling(row, 0.05, {}, SMALL) is None
+
+
+def test_what_is_in_a_tile_is_of_it_alone():
+    found = drawn("dense")
+    edges = np.zeros(len(found.lines.points), int)
+    for nodes, tile in found.parts:
+        assert np.array_equal(tile.points, found.lines.points[nodes])
+        bounds = (tile.curves.inside != OUTSIDE).astype(int) + (tile.curves.outside != OUTSIDE)
+        assert bounds.min() == 1
+        edges[nodes] += 1
+    # Within a tile, on a border of two, and where a bridge begins on a fibre that is in a third.
+    assert edges.min() == 1 and edges.max() in (2, 3)
+
+
+def test_order_of_filling_does_not_matter():
+    found = drawn("dense")
+    backwards = [filling.fill(tile) for _, tile in reversed(found.parts)][::-1]
+    mesh = found.mesh(backwards)
+    assert np.array_equal(mesh.points, mesh_of("dense").points)
+    assert np.array_equal(mesh.triangles, mesh_of("dense").triangles)
+
+
+def test_small_cells_and_other_shapes_are_not_tiled():
+    arrangement = arrange(CELLS["dense"])
+    assert is_tiled(arrangement, TilePolicy(least_discs=36)) and not is_tiled(arrangement, TilePolicy(least_discs=37))
+    assert not is_tiled(replace(arrangement, frames=np.zeros((36, 2, 2))), SMALL)
+    assert len(draw(CELLS["dense"], policy=TilePolicy(least_discs=37)).parts) == 1
+
+
+def test_a_tile_that_gmsh_leaves_unfilled_is_told(monkeypatch):
+    _, tile = drawn("dense").parts[0]
+    add = filling._add_surfaces
+
+    def without_last(gmsh, own):
+        surfaces, circle = add(gmsh, own)
+        return surfaces[:-1], circle[:-1]
+
+    monkeypatch.setattr(filling, "_add_surfaces", without_last)
+    with pytest.raises(MeshError, match=r"gmsh cannot fill the part from \(0, 0\) to .*: triangles are missing"):
+        filling.fill(tile)
+
+
+def test_a_tile_that_gmsh_fails_on_is_told(monkeypatch):
+    def broken(dimension):
+        raise RuntimeError(f"no mesh of dimension {dimension}")
+
+    monkeypatch.setattr(gmsh.model.mesh, "generate", broken)
+    with pytest.raises(MeshError, match=r"gmsh cannot fill the part .*: no mesh of dimension 2; expected another"):
+        filling.fill(drawn("dense").parts[0][1])

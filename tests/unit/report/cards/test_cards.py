@@ -1,0 +1,138 @@
+"""Cards read back by readers of their own: the material of the result, turned to the axes of a card."""
+
+from __future__ import annotations
+
+import csv
+import io
+
+import numpy as np
+import pytest
+from support.card_readers import CONSTANTS, READERS, stiffness_of_constants
+from support.effective_results import (
+    BORON_ALUMINIUM,
+    COSINES,
+    DISTINCT,
+    GLASS_EPOXY,
+    PAIRS,
+    TURNED,
+    TURNED_WITHOUT_EXPANSION,
+    document,
+    turned_stiffness,
+)
+
+from feti_homog import cli
+from feti_homog.errors import CaseError
+from feti_homog.report.cards import wording
+from feti_homog.report.cards.effective_material import in_axes_of_the_cell, nearest_transversely_isotropic
+from feti_homog.report.cards.export import FORMATS
+
+every_format = pytest.mark.parametrize("form", FORMATS)
+
+
+def compliance(C):
+    """(6, 6) of a tensor."""
+    return np.linalg.inv(np.array([[C[*row, *column] for column in PAIRS] for row in PAIRS]))
+
+
+def assert_same(found, expected):
+    size = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
+    assert np.abs((found - expected) / size).max() < 1e-12
+
+
+def assert_is_the_material(text, form, sample):
+    C, alpha = READERS[form](text)
+    assert_same(compliance(C), np.linalg.inv(turned_stiffness(sample.stiffness_in_the_cell, COSINES.T)))
+    if sample.expansion is None:
+        assert alpha is None
+    else:
+        to_card = COSINES.T @ sample.cosines
+        expected = to_card @ np.diag(sample.expansion) @ to_card.T
+        assert np.abs(alpha - expected).max() < 1e-12 * np.abs(expected).max()
+
+
+@every_format
+@pytest.mark.parametrize("sample", [BORON_ALUMINIUM, GLASS_EPOXY, DISTINCT], ids=["boron", "glass", "distinct"])
+def test_orthotropic_material_is_read_back(form, sample):
+    assert_is_the_material(FORMATS[form](in_axes_of_the_cell(document(sample))), form, sample)
+
+
+@every_format
+def test_material_that_is_not_orthotropic_is_read_back(form):
+    text = FORMATS[form](in_axes_of_the_cell(document(TURNED_WITHOUT_EXPANSION)))
+    assert_is_the_material(text, form, TURNED_WITHOUT_EXPANSION)
+
+
+@pytest.mark.parametrize("form", ["calculix", "moose", "csv"])
+def test_shears_of_the_expansion_are_read_back(form):
+    assert_is_the_material(FORMATS[form](in_axes_of_the_cell(document(TURNED))), form, TURNED)
+
+
+@pytest.mark.parametrize("form", ["abaqus", "ansys"])
+def test_shears_of_the_expansion_are_refused_by_formats_without_them(form):
+    with pytest.raises(CaseError, match=r"expansion has shears in its axes, .* use --transversely-isotropic"):
+        FORMATS[form](in_axes_of_the_cell(document(TURNED)))
+
+
+@every_format
+def test_transversely_isotropic_material_is_that_of_its_constants(form):
+    assert_is_the_material(FORMATS[form](nearest_transversely_isotropic(document(TURNED))), form, GLASS_EPOXY)
+
+
+def test_constants_stand_where_the_fibre_is_axis_1():
+    """E1 and nu12 of the literature, not E3 and nu31 of the cell."""
+    constants = in_axes_of_the_cell(document(DISTINCT)).constants
+    assert list(constants) == CONSTANTS.split()
+    assert list(constants.values()) == pytest.approx(DISTINCT.constants, rel=1e-13)
+
+
+def test_table_has_the_constants_of_its_stiffness():
+    rows = list(csv.DictReader(io.StringIO(FORMATS["csv"](in_axes_of_the_cell(document(DISTINCT))))))
+    values = {row["name"]: float(row["value"]) for row in rows}
+    C, _ = READERS["csv"](FORMATS["csv"](in_axes_of_the_cell(document(DISTINCT))))
+    assert_same(compliance(C), compliance(stiffness_of_constants(values)))
+    units = {row["name"]: row["unit"] for row in rows}
+    assert (units["E1"], units["nu12"], units["C44"], units["expansion_11"]) == ("GPa", "", "GPa", "1 / temperature")
+    assert all(row["meaning"] for row in rows)
+
+
+@pytest.mark.parametrize(("form", "mark"), [("abaqus", "**"), ("calculix", "**"), ("ansys", "!"), ("moose", "#")])
+def test_comments_say_what_the_axes_and_units_are(form, mark):
+    name = "fibres in \u00e9poxy, 55 %, " + "very " * 60
+    text = FORMATS[form](
+        in_axes_of_the_cell(document(DISTINCT) | {"case": document(DISTINCT)["case"] | {"name": name}})
+    )
+    said = " ".join(line.removeprefix(mark).strip() for line in text.splitlines() if line.startswith(mark))
+    assert text.isascii() and max(map(len, text.splitlines())) < 256 and "\\xe9poxy" in said
+    for words in ("Axis 1 is the fibre, x3 of the cell", "axes 2 and 3 are x1 and x2", "Stresses in GPa", "per unit of",
+                  "nu_ij = -eps_j/eps_i", "Orthotropic; "):  # fmt: skip
+        assert words in said
+
+
+@pytest.mark.parametrize(
+    "value", [215.33468712345678, -1.0993681512345678e-05, 1e-300, 123456789012345678.0, 0.1, -0.0]
+)
+def test_numbers_keep_what_their_field_holds(value):
+    assert float(wording.number(value)) == value
+    short = wording.number(value, 20)
+    assert len(short) <= 20 and float(short) == pytest.approx(value, rel=1e-13, abs=0.0)
+    assert not wording.number(-0.0).startswith("-")
+
+
+@pytest.mark.parametrize(
+    ("name", "identifier"),
+    [("E-glass/epoxy 55 %", "E_glass_epoxy_55"), ("55 %", "material_55"), ("\u2126", "material"), ("a" * 99, "a" * 60)],
+)
+def test_names_are_those_that_programs_accept(name, identifier):
+    assert wording.identifier(name) == identifier
+
+
+def test_the_command_line_offers_every_format():
+    arguments = cli.command_parser().parse_args(["export", "DIR", "--format", "csv"])
+    assert arguments.symmetry == "orthotropic" and arguments.out is None
+    (words,) = [a.help for a in _export_actions() if a.dest == "format"]
+    assert words.endswith(f": {', '.join(FORMATS)}")
+
+
+def _export_actions():
+    commands = next(a.choices for a in cli.command_parser()._actions if isinstance(a.choices, dict))
+    return commands["export"]._actions

@@ -1,0 +1,79 @@
+"""`feti-homog export`: from a folder to a card, and what goes wrong."""
+
+from __future__ import annotations
+
+import pytest
+from support.effective_results import DISTINCT, document
+
+from feti_homog.errors import CaseError
+from feti_homog.report.cards import abaqus, export
+from feti_homog.report.cards.effective_material import in_axes_of_the_cell
+from feti_homog.results import product_file, result_json
+
+
+@pytest.fixture
+def folder(tmp_path):
+    result_json.write(tmp_path / "results", document(DISTINCT))
+    return tmp_path / "results"
+
+
+def test_the_card_is_that_of_result_json(folder):
+    expected = abaqus.text(in_axes_of_the_cell(document(DISTINCT)))
+    assert export.card(folder, "abaqus", "orthotropic") == expected
+    assert "The nearest transversely isotropic" in export.card(folder, "abaqus", "transversely isotropic")
+
+
+def test_a_card_replaces_what_was_there(tmp_path):
+    path = tmp_path / "card.inp"
+    path.write_text("before")
+    assert product_file.write(path, "a\nb") == path
+    assert path.read_text() == "a\nb\n" and list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("", "expected a file, but it is a folder"),
+        ("nowhere/card.inp", "expected a file in a folder that there is"),
+        ("result.json", "expected another name; results have files of that name"),
+    ],
+)
+def test_cards_are_written_to_files_of_their_own(folder, name, words):
+    before = (folder / "result.json").read_text()
+    with pytest.raises(CaseError, match=words):
+        product_file.write(folder / name, "card")
+    assert (folder / "result.json").read_text() == before
+
+
+def test_faults_name_the_file(folder):
+    result_json.write(folder, document(DISTINCT, status="not converged"))
+    with pytest.raises(CaseError, match=r"^cannot export .*result\.json: its status is \"not converged\""):
+        export.card(folder, "abaqus", "orthotropic")
+
+
+def test_folders_without_a_result_are_told(tmp_path):
+    with pytest.raises(CaseError, match=r"cannot read .*result\.json: No such file"):
+        export.card(tmp_path, "csv", "orthotropic")
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        {"effective_stiffness": [[1.0, 2.0], [3.0]]},
+        {"effective_stiffness": "C"},
+        {"thermal_expansion": [1e-5, 1e-5]},
+        {"case": {}},
+        {"case": []},
+        {"transversely_isotropic": {"E_axial": 1.0}},
+        {"transversely_isotropic": None},
+    ],
+)
+def test_damaged_results_are_told(folder, more):
+    result_json.write(folder, document(DISTINCT, **more))
+    faults = []
+    for symmetry in export.SYMMETRIES:
+        try:
+            export.card(folder, "csv", symmetry)
+        except CaseError as error:
+            faults += error.faults
+    assert faults and all("it is damaged, or no result of this program" in fault for fault in faults)

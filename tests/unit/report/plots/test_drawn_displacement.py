@@ -1,0 +1,92 @@
+"""Displacements in pictures: the translation that is drawn, and the scale at which no triangle turns over."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+from support.sample_output import Sample, in_space, sample
+
+from feti_homog.report.plots import deformed_panels, plot_helpers
+from feti_homog.report.plots.decimation import DrawnMesh, drawn_mesh
+from feti_homog.report.plots.drawn_displacement import LEAST_AREA, drawn_displacement, largest_scale
+from feti_homog.results.field_file import FieldFile
+
+
+def write(directory: Path, whole: Sample) -> Path:
+    from mpi4py import MPI
+
+    with FieldFile(directory, MPI.COMM_SELF, whole.header, whole.mesh, whole.fibres, whole.interface) as file:
+        for k, state in enumerate(whole.states):
+            file.write_state(k, state)
+    return directory / "result.h5"
+
+
+def square() -> DrawnMesh:
+    points = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]])
+    label = np.zeros(2, int)
+    return DrawnMesh(8, 1, 1, np.arange(4), points, np.array([[0, 1, 2], [2, 0, 3]]), label, label, label)
+
+
+def area_ratio(displacement: Any, drawn: DrawnMesh, scale: float) -> float:
+    """The least of all triangles, by their corners."""
+    before, after = (places[drawn.triangles] for places in (drawn.points, drawn.points + scale * displacement))
+    areas = [np.linalg.det(corners[:, 1:] - corners[:, :1]) for corners in (before, after)]
+    return float((areas[1] / areas[0]).min())
+
+
+@pytest.mark.parametrize(
+    ("gradient", "expected"),
+    [
+        ([[1.0, 0.0], [0.0, 0.3]], np.inf),
+        ([[-1.0, 0.0], [0.0, 0.0]], 0.5),
+        ([[-0.1, 0.0], [0.0, -0.1]], 10 * (1 - np.sqrt(0.5))),
+        ([[0.0, 1.0], [1.0, 0.0]], np.sqrt(0.5)),
+        ([[0.0, -1.0], [1.0, 0.0]], np.inf),
+        ([[1.0, 0.0], [0.0, -0.5]], (0.5 + np.sqrt(0.25 + 1.0)) / 1.0),
+    ],
+    ids=["stretched", "pressed", "shrunk", "sheared", "turned", "longer and thinner"],
+)
+def test_the_largest_scale_of_a_uniform_gradient(gradient: Any, expected: float) -> None:
+    drawn = square()
+    displacement = drawn.points @ np.array(gradient).T + [7.0, -3.0]
+    assert largest_scale(displacement, drawn) == pytest.approx(expected)
+    if np.isfinite(expected):
+        assert area_ratio(displacement, drawn, expected) == pytest.approx(LEAST_AREA)
+
+
+@pytest.mark.parametrize("spatial", [False, True], ids=["plane", "space"])
+def test_a_translation_is_not_drawn(tmp_path: Path, spatial: bool) -> None:
+    whole = sample(8, refine=1)
+    states = tuple(replace(state, displacement=state.displacement + np.array([0.3, -0.2])) for state in whole.states)
+    moved = replace(whole, states=states)
+    with h5py.File(write(tmp_path, in_space(moved) if spatial else moved), "r") as file:
+        drawn = drawn_mesh(file)
+        shown = [drawn_displacement(file[f"state/{k}"], drawn) for k in range(2)]
+    for u, state in zip(shown, whole.states, strict=False):
+        gradient = np.zeros((2, 2)) if spatial else np.diag(state.strain[:2])
+        mean = (u - drawn.points @ gradient)[drawn.triangles].mean(axis=(0, 1))
+        np.testing.assert_allclose(mean, 0.0, atol=1e-14)
+
+
+@pytest.mark.parametrize(("largest", "scale"), [(np.inf, 0.1), (0.1, 0.1), (0.099, 0.05), (0.0035, 0.002), (7.0, 0.1)])
+def test_the_scale_is_round_and_within_its_limit(largest: float, scale: float) -> None:
+    assert plot_helpers.magnification(1.0, 1.0, largest=largest) == pytest.approx(scale)
+
+
+def test_no_triangle_of_a_magnified_state_turns_over(tmp_path: Path) -> None:
+    """Where a small displacement varies fast, as under a temperature in narrow gaps."""
+    whole = sample(8, refine=1)
+    points = whole.mesh.points
+    waves = 1e-5 * np.sin(2 * np.pi * 4 * points)
+    states = tuple(replace(state, strain=0 * state.strain, displacement=waves) for state in whole.states)
+    document = {"case": {"output": {}, "angle": {}}, "angle": []}
+    with h5py.File(write(tmp_path, replace(whole, states=states)), "r") as file:
+        drawn, scale = drawn_mesh(file), deformed_panels.shown_scale(file, document)
+        displacement = drawn_displacement(file["state/0"], drawn)
+    assert LEAST_AREA <= area_ratio(displacement, drawn, scale) < 0.9
+    assert area_ratio(displacement, drawn, plot_helpers.magnification(np.abs(waves).max(), 1.0)) < 0

@@ -1,0 +1,228 @@
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+from matplotlib.image import imread
+from PIL import Image
+from support.sample_output import Sample, in_space, sample
+
+from feti_homog.errors import CaseError, FetiHomogError
+from feti_homog.report.plots import axial_shear, decimation, figures, plot_helpers
+from feti_homog.report.plots.interface_marks import InterfaceEdges
+from feti_homog.results.field_file import FieldFile
+from feti_homog.results.result_json import SCHEMA
+
+
+def write(directory: Path, whole: Sample) -> Path:
+    from mpi4py import MPI
+
+    with FieldFile(directory, MPI.COMM_SELF, whole.header, whole.mesh, whole.fibres, whole.interface) as file:
+        for k, state in enumerate(whole.states):
+            file.write_state(k, state)
+    return directory / "result.h5"
+
+
+def areas(points: Any, triangles: Any) -> Any:
+    a, b, c = (points[triangles[:, i]] for i in range(3))
+    return 0.5 * ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
+
+
+@pytest.mark.parametrize(("limit", "group"), [(10_000, 1), (3000, 4), (600, 16), (10, 64)])
+def test_coarser_triangles_have_the_means_of_theirs(tmp_path: Path, limit: int, group: int) -> None:
+    whole = sample(8, refine=3)
+    with h5py.File(write(tmp_path, whole), "r") as file:
+        drawn = decimation.drawn_mesh(file, limit)
+        stress = decimation.triangle_means(file["state/0/stress"], 1, drawn)
+        displacement = decimation.nodal_values(file["state/2/displacement"], drawn)
+    assert drawn.group == group and len(drawn.triangles) == 128 * 64 // group
+    np.testing.assert_allclose(areas(drawn.points, drawn.triangles), group / 64 / 128, rtol=1e-12)
+    # The stress is linear, so its mean is its value at the middle of the coarser triangle.
+    middle = drawn.points[drawn.triangles].mean(axis=1)
+    np.testing.assert_allclose(stress, 2.0 + middle[:, 1], rtol=1e-12)
+    inside = (np.abs(middle - 0.5) < 0.25).all(axis=1)
+    np.testing.assert_array_equal(drawn.body, inside)
+    expected = 0.5 * drawn.points[:, ::-1] + 0.05 * np.sin(2 * np.pi * drawn.points[:, ::-1])
+    np.testing.assert_allclose(displacement, expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("block", [1, 7, 64, 1 << 18])
+def test_decimation_does_not_depend_on_its_blocks(tmp_path: Path, block: int) -> None:
+    with h5py.File(write(tmp_path, sample(4, refine=2)), "r") as file:
+        whole = decimation.drawn_mesh(file, 200)
+        means = decimation.triangle_means(file["state/1/stress"], 0, whole)
+        drawn = decimation.drawn_mesh(file, 200, block)
+        np.testing.assert_array_equal(drawn.triangles, whole.triangles)
+        np.testing.assert_array_equal(drawn.points, whole.points)
+        np.testing.assert_array_equal(decimation.triangle_means(file["state/1/stress"], 0, drawn), means)
+
+
+def test_six_node_triangles_are_drawn_in_four(tmp_path: Path) -> None:
+    whole = sample(4, order=2)
+    with h5py.File(write(tmp_path, whole), "r") as file:
+        fine, coarse = decimation.drawn_mesh(file), decimation.drawn_mesh(file, 100)
+        stress = decimation.triangle_means(file["state/0/stress"], 0, fine)
+    assert (len(fine.triangles), len(coarse.triangles)) == (128, 32)
+    np.testing.assert_allclose(areas(fine.points, fine.triangles), 1 / 128, rtol=1e-12)
+    np.testing.assert_allclose(areas(coarse.points, coarse.triangles), 1 / 32, rtol=1e-12)
+    np.testing.assert_array_equal(stress[::4], whole.states[0].stress[:, 0])
+
+
+def test_outlines_leave_out_the_cuts_within_a_body(tmp_path: Path) -> None:
+    with h5py.File(write(tmp_path, sample(8)), "r") as file:
+        drawn = decimation.drawn_mesh(file)
+    ends = drawn.points[decimation.outline_edges(drawn, drawn.body)]
+    length = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).sum()
+    assert length == pytest.approx(4 + 2 * 4 * 0.5)  # the cell, and both sides of the fibre
+    ends = drawn.points[decimation.outline_edges(drawn, drawn.subdomain)]
+    length = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).sum()
+    assert length == pytest.approx(4 + 2 * 4 * 0.5 + 2 * 0.5)  # and both sides of the cut
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("order", "refine"), [(1, 1), (2, 0)])
+def test_all_pictures_are_made(tmp_path: Path, order: int, refine: int) -> None:
+    write(tmp_path, sample(4, refine, order))
+    paths = figures.plot(tmp_path)
+    cases = ["case_E11.png", "case_E22.png", "case_gamma12.png"]
+    assert [path.name for path in paths] == ["cell.png", *cases, "interface.png"]
+    for path in paths:
+        picture = imread(path)
+        assert min(picture.shape[:2]) > 500 and picture[..., :3].std() > 0.1
+
+
+def test_texts_of_the_user_are_no_formulas(tmp_path: Path, recwarn: pytest.WarningsRecorder) -> None:
+    example = sample(4)
+    header = replace(example.header, title="costs $\\frac{1$ or 纤维", stress_unit="$$GPa$$", length_unit="$")
+    write(tmp_path, replace(example, header=header))
+    figures.plot(tmp_path)
+    assert not [warning for warning in recwarn if "Glyph" in str(warning.message)]
+
+
+def listed(kind: str, **points: Any) -> dict[str, Any]:
+    """A document with a list of three points, as many as the sample has states."""
+    counts = {"bonded": 5, "open": 3, "closed": 2, "broke": 1}
+    section = {"strain": [0.0, 0.0, 1.0]} | ({"method": "events"} if kind == "path" else {"values": [0, 90, 180]})
+    case = {"name": "a", "analysis": {"type": kind, "plane": "strain"}, "interface": {"contact": True}, kind: section}
+    rows = [counts | {key: values[k] for key, values in points.items()} for k in range(3)]
+    return {"schema": SCHEMA, "case": case | {"output": {"stress_unit": "GPa"}}, kind: rows}
+
+
+LISTS = [
+    (listed("path", load_factor=[0.5, 0.2, 1], strain=[[0.5, 0, 0], [0.2, 0, 0], [1, 0, 0]], stress=[[3, 1, 0]] * 3),
+     ["path_states.png", "path.gif", "interface.png", "path.png"]),
+    (listed("angle", angle=[0, 90, 180], strain=[[0, 0, 1]] * 3, stress=[[1, 2, 3]] * 3),
+     ["angle_states.png", "interface.png", "angle.png"]),
+    (listed("angle", angle=[0, 90, 180], stiffness=[[[9, 2, 0], [2, 8, 0], [0, 0, 3]]] * 3),
+     ["angle_states.png", "interface.png", "angle.png"]),
+]  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("document", "names"), LISTS, ids=["path", "angle, strain", "angle, stiffness"])
+def test_pictures_of_paths_and_angles_are_made(tmp_path: Path, document: dict[str, Any], names: list[str]) -> None:
+    write(tmp_path, sample(4, refine=1))
+    (tmp_path / "result.json").write_text(json.dumps(document))
+    paths = figures.plot(tmp_path)
+    assert [path.name for path in paths] == ["cell.png", *names]
+    for path in paths:
+        with Image.open(path) as picture:
+            assert getattr(picture, "n_frames", 1) == (3 if path.suffix == ".gif" else 1)
+            assert np.asarray(picture.convert("RGB")).std() > 20 and min(picture.size) > 300
+
+
+def test_without_fields_only_curves_are_drawn(tmp_path: Path) -> None:
+    document = LISTS[0][0] | {"case": LISTS[0][0]["case"] | {"output": {"fields": False}}}
+    (tmp_path / "result.json").write_text(json.dumps(document))
+    assert [path.name for path in figures.plot(tmp_path)] == ["path.png"]
+
+
+def test_faces_are_as_their_worst_node(tmp_path: Path) -> None:
+    with h5py.File(write(tmp_path, sample(8)), "r") as file:
+        drawn = decimation.drawn_mesh(file)
+        interface_edges = InterfaceEdges.of(file, drawn, decimation.outline_edges(drawn, drawn.body))
+        ends = file["interface/points"][:][interface_edges.nodes]
+        states = interface_edges.state(file["state/0/status"][:])
+    np.testing.assert_allclose(ends, drawn.points[interface_edges.edges], atol=1e-12)
+    # Two sides of five nodes: bonded, closed, open, bonded, closed and open, bonded, closed, open, bonded.
+    expected = {(0.25, x): state for x, state in zip((5, 7, 9, 11), (1, 2, 2, 1), strict=True)}
+    expected |= {(0.75, x): state for x, state in zip((5, 7, 9, 11), (2, 1, 2, 2), strict=True)}
+    middle = ends.mean(axis=1)
+    assert len(states) == 2 * len(expected)
+    assert [expected[y, round(16 * x)] for x, y in middle] == states.tolist()
+
+
+@pytest.mark.slow
+def test_loads_in_space_have_their_pictures(tmp_path: Path) -> None:
+    """Strain along the fibres and a temperature deform the cell; axial shear has lines of its displacement."""
+    write(tmp_path, in_space(sample(4)))
+    paths = figures.plot(tmp_path)
+    names = ["case_E33.png", "case_temperature.png", "case_minus_gamma13.png"]
+    assert [path.name for path in paths] == ["cell.png", *names, "interface.png"]
+    for path in paths:
+        picture = imread(path)
+        assert min(picture.shape[:2]) > 500 and picture[..., :3].std() > 0.1
+    before = [path.read_bytes() for path in paths]
+    output = {"stress": "S23"}
+    (tmp_path / "result.json").write_text(json.dumps({"schema": SCHEMA, "case": {"output": output}}))
+    after = [path.read_bytes() for path in figures.plot(tmp_path)]
+    assert before[0] == after[0] and all(a != b for a, b in zip(before[1:4], after[1:4], strict=True))
+
+
+@pytest.mark.parametrize(("wanted", "step"), [(0.083, 0.1), (0.1, 0.1), (0.11, 0.2), (3.0, 5.0), (6e4, 1e5), (0, 1)])
+def test_lines_of_displacement_are_at_round_steps(wanted: float, step: float) -> None:
+    assert axial_shear.round_step(wanted) == pytest.approx(step)
+
+
+@pytest.mark.slow
+def test_the_case_chooses_component_and_scale(tmp_path: Path) -> None:
+    write(tmp_path, sample(4))
+    before = [path.read_bytes() for path in figures.plot(tmp_path)]
+    output = {"stress": "S22", "deformation_scale": 0.3}
+    (tmp_path / "result.json").write_text(json.dumps({"schema": SCHEMA, "case": {"output": output}}))
+    after = [path.read_bytes() for path in figures.plot(tmp_path)]
+    assert before[0] == after[0] and all(a != b for a, b in zip(before[1:4], after[1:4], strict=True))
+
+
+@pytest.mark.parametrize(
+    ("values", "expected"),
+    [
+        (np.linspace(1, 2, 1001), (1, 2, "viridis", "neither")),
+        (np.linspace(-1, 2, 1001), (-2, 2, "RdBu_r", "neither")),
+        (np.append(np.linspace(1, 2, 1001), 50), (1, 2, "viridis", "max")),
+        (np.append(np.linspace(1, 2, 1001), -50), (1, 2, "viridis", "min")),
+        (np.full(9, 4.0) + 1e-9 * np.arange(9), (2, 6, "viridis", "neither")),
+        (np.zeros(9), (-0.5, 0.5, "viridis", "neither")),
+    ],
+)
+def test_the_colour_range_leaves_out_outliers(values: Any, expected: tuple[float, float, str, str]) -> None:
+    norm, colours, extend = plot_helpers.colour_range(values)
+    assert (norm.vmin, norm.vmax) == pytest.approx(expected[:2], abs=0.02)
+    assert (colours, extend) == expected[2:]
+
+
+@pytest.mark.parametrize(("largest", "scale"), [(1.0, 0.1), (1.2, 0.1), (0.01, 10.0), (0.3e-4, 5e3), (0.0, 1.0)])
+def test_the_deformation_scale_shows_a_tenth_of_the_cell(largest: float, scale: float) -> None:
+    assert plot_helpers.magnification(largest, 1.0) == pytest.approx(scale)
+
+
+def test_a_missing_or_broken_result_is_told(tmp_path: Path) -> None:
+    with pytest.raises(FetiHomogError, match=r"^cannot draw .*result\.h5: "):
+        figures.plot(tmp_path)
+    (tmp_path / "result.h5").write_text("nothing")
+    with pytest.raises(FetiHomogError, match=r"^cannot draw .*result\.h5: "):
+        figures.plot(tmp_path)
+
+
+@pytest.mark.parametrize("schema", [{}, {"schema": SCHEMA + 1}])
+def test_a_result_of_another_schema(tmp_path: Path, schema: dict[str, int]) -> None:
+    write(tmp_path, sample(4))
+    (tmp_path / "result.json").write_text(json.dumps({"case": {}} | schema))
+    found = rf"result\.json: its schema is {schema.get('schema', 'none')}, this program reads schema {SCHEMA}"
+    with pytest.raises(CaseError, match=found):
+        figures.plot(tmp_path)

@@ -1,0 +1,294 @@
+"""What the pictures say beside what they draw: legends, scales, numbers of points."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.legend import Legend
+from matplotlib.lines import Line2D
+from matplotlib.text import Annotation
+from PIL import Image
+from support.figure_words import curves, panels
+from support.sample_output import Sample, in_space, sample
+
+from feti_homog.report.html import curves as interactive
+from feti_homog.report.plots import deformed_panels, figures, plot_helpers, response_curves, traction_plots
+from feti_homog.report.plots.interface_marks import BONDED, CLOSED
+from feti_homog.report.plots.load_labels import LoadLabels
+from feti_homog.results.field_file import FieldFile
+from feti_homog.results.result_json import SCHEMA
+
+DRAWING = (figures, deformed_panels, response_curves, traction_plots)
+
+
+def path_of(strains: list[float]) -> dict[str, Any]:
+    """The document of a path whose points have these strains E11."""
+    counts = {"bonded": 5, "open": 3, "closed": 2, "broke": 1}
+    points = [counts | {"load_factor": e, "strain": [e, 0, 0], "stress": [3 * e, e, 0.5 * e]} for e in strains]
+    section = {"strain": [1.0, 0.0, 0.0], "method": "events"}
+    case = {"analysis": {"type": "path", "plane": "strain"}, "interface": {"contact": True}, "path": section}
+    return {"schema": SCHEMA, "case": case | {"output": {"stress_unit": "GPa"}}, "path": points}
+
+
+def write(directory: Path, whole: Sample, document: dict[str, Any] | None) -> None:
+    from mpi4py import MPI
+
+    *parts, states = vars(whole).values()
+    with FieldFile(directory, MPI.COMM_SELF, *parts) as file:
+        for k, state in enumerate(states):
+            file.write_state(k, state)
+    if document is not None:
+        (directory / "result.json").write_text(json.dumps(document))
+
+
+def drawn(directory: Path, monkeypatch: Any) -> dict[str, Figure]:
+    """The figures of a result by the names of their files."""
+    found: dict[str, Figure] = {}
+
+    def keep(figure: Figure, path: Path) -> Path:
+        FigureCanvasAgg(figure).draw()
+        found[path.name] = figure
+        return path
+
+    for module in DRAWING:
+        monkeypatch.setattr(module, "save", keep)
+    figures.plot(directory)
+    return found
+
+
+def legends(figure: Figure) -> list[Legend]:
+    found = [*figure.legends, *(axes.get_legend() for axes in figure.axes)]
+    return [legend for legend in found if legend is not None]
+
+
+def entries(figure: Figure) -> list[str]:
+    return [text.get_text() for legend in legends(figure) for text in legend.get_texts()]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("document", [None, path_of([0.5, 0.2, 1.0])], ids=["load cases", "path"])
+def test_legends_cover_nothing(tmp_path: Path, monkeypatch: Any, document: dict[str, Any] | None) -> None:
+    write(tmp_path, sample(4), document)
+    for name, figure in drawn(tmp_path, monkeypatch).items():
+        renderer: Any = FigureCanvasAgg(figure).get_renderer()
+        boxes = [axes.get_window_extent(renderer) for axes in figure.axes if axes.axison]
+        boxes += [axes.xaxis.label.get_window_extent(renderer) for axes in figure.axes if axes.axison]
+        for legend in legends(figure):
+            box = legend.get_window_extent(renderer)
+            assert not [other for other in boxes if other.width and box.shrunk(0.99, 0.95).overlaps(other)], name
+
+
+def test_a_picture_is_drawn_once(tmp_path: Path) -> None:
+    """Without white around it, which needs no second drawing."""
+    times: list[str] = []
+
+    class Counted(Line2D):
+        def draw(self, renderer: Any) -> None:
+            times.append(str(renderer))
+            super().draw(renderer)
+
+    figure = Figure(figsize=(4, 3), layout="constrained")
+    figure.add_artist(Counted([0.4, 0.6], [0.5, 0.5], color="black", linewidth=4))
+    plot_helpers.save(figure, tmp_path / "picture.png")
+    with Image.open(tmp_path / "picture.png") as picture:
+        assert picture.size == pytest.approx((0.2 * 800 + 11 + 32, 11 + 32), abs=8)
+    assert len(times) == 1
+
+
+def test_the_grey_outline_has_its_name(tmp_path: Path, monkeypatch: Any) -> None:
+    write(tmp_path, sample(4), None)
+    assert entries(drawn(tmp_path, monkeypatch)["case_E11.png"]) == ["in contact", "open", "undeformed"]
+
+
+@pytest.mark.parametrize(("status", "names"), [(CLOSED, ["in contact"]), (2, ["open"])])
+def test_the_legend_of_tractions_has_only_what_is_there(
+    tmp_path: Path, monkeypatch: Any, status: int, names: list[str]
+) -> None:
+    whole = sample(4)
+    states = tuple(replace(state, status=np.where(state.status == BONDED, BONDED, status)) for state in whole.states)
+    write(tmp_path, replace(whole, states=states), None)
+    assert [text.get_text() for text in drawn(tmp_path, monkeypatch)["interface.png"].legends[0].texts] == names
+
+
+@pytest.mark.parametrize(
+    ("displacement", "opening", "scale"),
+    [(2e-3, 0.0, 50.0), (2e-3, 1e-3, 50.0), (2e-2, 2e-3, 10.0), (0.5, 1e-3, 0.5), (0.1, 0.1, 1.0)],
+)
+def test_narrow_openings_are_seen(displacement: float, opening: float, scale: float) -> None:
+    """Of 0.2 % of the cell too; displacements stay below a quarter of it, or about."""
+    found = plot_helpers.magnification(displacement, 1.0, opening)
+    assert found == pytest.approx(scale)
+
+
+def test_a_path_of_small_strains_is_magnified_and_says_so(tmp_path: Path, monkeypatch: Any) -> None:
+    whole, small = sample(4), 0.002
+    states = tuple(
+        replace(s, strain=small * s.strain, displacement=small * s.displacement, jump=0.2 * small * s.jump)
+        for s in whole.states
+    )
+    write(tmp_path, replace(whole, states=states), path_of([0.001, 0.0015, 0.002]))
+    with h5py.File(tmp_path / "result.h5") as file:
+        scale = deformed_panels.shown_scale(file, path_of([0.001, 0.0015, 0.002]))
+        opening = max(file[f"state/{k}/jump"][:, 0].max() for k in range(3))
+    assert scale * opening > 0.02
+    title: Any = drawn(tmp_path, monkeypatch)["path_states.png"].get_suptitle()
+    assert title.endswith(f"displacement × {scale:g}")
+
+
+def in_six(points: list[tuple[float, float, float]], path: dict[str, Any], **more: Any) -> dict[str, Any]:
+    """The document of a path in generalized plane strain of load factors with gamma13 and S13."""
+    counts = {"bonded": 4, "open": 3, "closed": 3, "broke": 1}
+    rows = [
+        counts | {"load_factor": t, "strain": [0, 0, 0, 0, e, 0], "stress": [1e-9, 0, 0, 0, s, 0]} | more
+        for t, e, s in points
+    ]
+    document = path_of([])
+    document["case"] |= {"analysis": {"type": "path", "plane": "generalized"}, "path": {"method": "events"} | path}
+    return document | {"path": rows}
+
+
+def test_under_a_given_shear_its_stress_alone_is_drawn_over_its_strain_at_a_rising_load() -> None:
+    document = in_six([(0.5, 1.0, 2.0), (0.4, 1.5, 1.6), (1.0, 4.0, 4.0)], {"to": {"S13": 4.0}})
+    figure = response_curves._path(document)
+    upper = figure.axes[0]
+    assert upper.get_xlabel() == r"macroscopic strain $\gamma_{13}$"
+    assert entries(figure)[:3] == [r"$\Sigma_{13}$", "all equilibria", "rising load"]
+    thick = max(upper.lines, key=lambda line: line.get_linewidth())
+    np.testing.assert_allclose(thick.get_xydata(), [[0, 0], [1, 2], [2, 2], [4, 4]])
+
+
+def test_a_change_of_temperature_has_an_axis_of_its_own() -> None:
+    points = [(0.5, 0.0, 0.0), (0.8, 1.0, 2.0), (1.0, 2.0, 3.0)]
+    figure = response_curves._path(
+        in_six(points, {"waypoints": [{"temperature": -9.0}, {"S13": 3.0}]}, temperature=-9.0)
+    )
+    labels = [axes.get_ylabel() for axes in figure.axes]
+    assert any("temperature" in label for label in labels) and "later legs" in entries(figure)
+    low, high = figure.axes[next(k for k, label in enumerate(labels) if "temperature" in label)].get_ylim()
+    assert low < -9.0 < 0.0 < high
+
+
+def test_words_of_a_load_leave_out_what_is_not_seen() -> None:
+    strain = np.array([0.02, -0.007, 3e-8, 0.0, 0.01, 6e-5])
+    lines = LoadLabels().label({"strain": strain, "temperature": -100.0}, 2).splitlines()
+    assert len(lines) == 3 and "33" not in "".join(lines) and r"{6} \cdot 10^{-5}" in lines[1] and "-100" in lines[2]
+
+
+@pytest.mark.parametrize(("stress", "told"), [(7.0, "{7}"), (1e-13, "{0}")])
+def test_words_of_a_path_with_many_strains_are_the_leading_one_and_its_stress(stress: float, told: str) -> None:
+    state = {"strain": np.array([-0.01, 0.05, -0.01, 0.0, 0.001, 0.0]), "stress": np.array([0, stress, 0, 0, 1, 0])}
+    document = in_six([(0.5, 0.0, 0.0), (1.0, 2.0, 3.0)], {"to": {"S13": 3.0, "S22": 7.0}})
+    for point in document["path"]:
+        point["strain"], point["stress"] = state["strain"].tolist(), [0.0, 7.0, 0.0, 0.0, 1.0, 0.0]
+    words = LoadLabels.of(document).words(state | {"temperature": -100.0})
+    assert words == ["$E_{22} = {0.05}$", rf"$\Sigma_{{22}} = {told}$", r"$\Delta T = {-100}$"]
+    few = {"strain": np.array([0.0, 0.05, 0.0, 0.0, 0.001, 0.0]), "stress": state["stress"]}
+    assert LoadLabels.of(document).words(few) == ["$E_{22} = {0.05}$", r"$\gamma_{13} = {0.001}$"]
+
+
+def test_a_single_load_has_a_picture_that_says_what_it_gives(tmp_path: Path, monkeypatch: Any) -> None:
+    whole = sample(4)
+    point = {"strain": [0.02, -0.01, 0.003], "stress": [6.0, 0.0, 0.0]}
+    case = {"analysis": {"type": "load", "plane": "strain"}, "load": {"to": {"S11": 6.0}}, "output": {}}
+    write(tmp_path, replace(whole, states=whole.states[:1]), {"schema": SCHEMA, "case": case, "load": point})
+    title = drawn(tmp_path, monkeypatch)["load.png"].axes[0].get_title()
+    assert r"$\Sigma_{11} = {6}$" in title and "E_" not in title
+
+
+def test_points_of_a_path_are_numbered_where_its_curve_folds_back(tmp_path: Path, monkeypatch: Any) -> None:
+    write(tmp_path, sample(4), path_of([0.5, 0.2, 1.0]))
+    figure = drawn(tmp_path, monkeypatch)["path.png"]
+    upper, middle, lower = figure.axes
+    for axes in (upper, middle):
+        assert {"0", "1", "2"} <= {text.get_text() for text in axes.texts if isinstance(text, Annotation)}
+    np.testing.assert_allclose(lower.lines[0].get_xdata(), [0, 1, 2])
+    stresses = {r"$\Sigma_{11}$": 3.0, r"$\Sigma_{22}$": 1.0, r"$\Sigma_{12}$": 0.5}
+    for line, factor in zip(middle.lines, stresses.values(), strict=False):
+        np.testing.assert_allclose(line.get_ydata(), factor * np.array([0.5, 0.2, 1.0]))
+    (strain, stress, named), (_, beside, _), (number, nodes, counted) = panels(figure)
+    assert (strain, stress, beside) == ("macroscopic strain $E_{11}$", "macroscopic stress (GPa)", "stress (GPa)")
+    for name, factor in stresses.items():
+        np.testing.assert_allclose(named[name][-1], factor)
+    assert (number, nodes) == ("number of the point, in the order of the path", "interface nodes")
+    assert [counted[name].tolist() for name in ("bonded", "in contact", "open")] == [[5] * 3, [2] * 3, [3] * 3]
+
+
+def test_curves_of_the_page_have_their_names_and_units() -> None:
+    found = {name: curves(figure) for name, figure in interactive.figures(path_of([0.5, 0.2, 1.0])).items()}
+    assert found["curve"][:2] == ("macroscopic strain E11", "macroscopic stress (GPa)")
+    for name, factor in (("S11", 3.0), ("S22", 1.0), ("S12", 0.5)):
+        assert found["along"][2][name] == pytest.approx([factor * t for t in (0.5, 0.2, 1.0)])
+    names = ("bonded", "in contact", "open")
+    assert [found["counts"][2][name].tolist() for name in names] == [[5] * 3, [2] * 3, [3] * 3]
+
+
+@pytest.mark.parametrize("kind", ["stiffness", "stress"])
+def test_curves_against_the_angle_have_their_names_and_units(kind: str) -> None:
+    """C11 and so on are the entries of that place, in the picture and on the page."""
+    numbers = 10.0 * np.arange(1.0, 4.0)[:, None] + np.arange(1.0, 4.0) if kind == "stiffness" else [11.0, 22.0, 12.0]
+    document = path_of([])
+    points = [{"angle": a, kind: ((1 + a) * np.array(numbers)).tolist(), "strain": [0.1, 0, 0]} for a in (0, 1)]
+    counts = {"bonded": 5, "open": 3, "closed": 2}
+    document |= {"angle": [counts | point for point in points], "path": None}
+    document["case"] |= {"angle": {}, "analysis": {"type": "angle", "plane": "strain"}}
+    what = {"stiffness": "effective stiffness", "stress": "macroscopic stress"}[kind]
+    ((_, label, found),) = panels(response_curves._angle(document))
+    _, beside, interactive_ones = curves(interactive.figures(document)["curve"])
+    assert (label, beside) == (f"{what} (GPa)",) * 2
+    named = {name: values for name, values in found.items() if name.startswith("$")}
+    assert len(named) == len(interactive_ones) >= 3
+    for name, values in (named | interactive_ones).items():
+        place = float("".join(letter for letter in name if letter.isdigit()))
+        assert list(values) == [place, 2 * place], name
+
+
+def test_youngs_modulus_of_an_isotropic_material_is_the_same_in_all_directions() -> None:
+    bulk, shear = 5.0, 2.0
+    C = [[bulk + shear, bulk - shear, 0.0], [bulk - shear, bulk + shear, 0.0], [0.0, 0.0, shear]]
+    case = {"case": {"output": {"stress_unit": "GPa"}}, "moduli": {}, "effective_stiffness": C}
+    _, label, found = curves(interactive.figures(case)["young"])
+    assert label == "E (GPa)" and found["E"] == pytest.approx(4 * bulk * shear / (bulk + shear))
+
+
+def test_tractions_and_jumps_have_their_names_and_units(tmp_path: Path, monkeypatch: Any) -> None:
+    """Beside half of the fibre, from its lower left corner: where each of the sample's ten nodes is."""
+    whole = sample(4)
+    write(tmp_path, in_space(whole), None)
+    traction, jump = panels(drawn(tmp_path, monkeypatch)["interface.png"])
+    assert (traction[1], jump[1]) == ("traction (GPa)", "jump (mm)")
+    k = np.arange(10.0)
+    values = {r"$t_\mathrm{n}$": k, r"$t_\mathrm{t}$": -k, r"$t_\mathrm{a}$": k}
+    for (_, _, found), expected in ((traction, values), (jump, {"gap": 0.1 * k, "slip": 0.2 * k, "axial slip": -k})):
+        for name, numbers in expected.items():
+            assert sorted(set(found[name].tolist())) == pytest.approx(sorted(numbers)), name
+
+
+def test_several_interfaces_have_lines_of_the_title_that_are_within_the_picture():
+    document = path_of([0.0, 0.1])
+    bond = {"contact": True, "criterion": "max", "normal_strength": 0.03125, "tangential_strength": 0.05125}
+    document["case"] |= {
+        "name": "a_case_of_several_interfaces",
+        "interface": [bond | {"between": pair} for pair in (["coating", "matrix"], ["glass", "coating"])],
+    }
+    figure = response_curves._path(document)
+    FigureCanvasAgg(figure).draw()
+    title = figure.axes[0].title
+    assert title.get_text().count("\n") == 2
+    assert figure.bbox.x0 <= title.get_window_extent().x0 and title.get_window_extent().x1 <= figure.bbox.x1
+
+
+def test_what_breaks_the_bonds_is_in_the_title():
+    case = {"interface": {"criterion": "quadratic", "normal_strength": 0.06}, "output": {"stress_unit": "GPa"}}
+    assert plot_helpers.bond_limits(case) == ["criterion quadratic, $R^\\mathrm{n} = 0.06$ GPa"]
+    assert plot_helpers.bond_limits({"interface": {"criterion": "energy", "toughness": 3e-5}}) == [
+        "criterion energy, $G_\\mathrm{Ic} = 3e-05$"
+    ]
+    assert plot_helpers.bond_limits({}) == ["no debonding by load"]

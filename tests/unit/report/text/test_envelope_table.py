@@ -1,0 +1,55 @@
+"""The printed table of an envelope."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from feti_homog.report.text.envelope_table import components, envelope_table
+
+
+def document(count: int, names: tuple[str, ...], without: tuple[int, ...] = (), **section: Any) -> dict[str, Any]:
+    """An envelope of so many directions, some of them without an onset."""
+    points: list[dict[str, Any]] = []
+    for number in range(count):
+        point: dict[str, Any] = {"angle": 360.0 * number / count}
+        if number not in without:
+            point |= {"factor": 10.0 + number, "fibre": 2, "bond_angle": -12.5} | dict.fromkeys(names, 0.25)
+        points.append(point)
+    return {"case": {"envelope": {"plane": ["S22", "S12"]} | section}, "envelope": points}
+
+
+def test_the_least_and_the_largest_load_and_some_directions():
+    lines = envelope_table(document(72, ("normal", "tangential", "axial")), " (MPa)")
+    assert lines[0] == "Onset of debonding in the plane S22, S12 (MPa): 72 directions"
+    assert lines[1].split() == ["least", "10", "at", "0", "degrees"]
+    assert lines[2].split() == ["largest", "81", "at", "355", "degrees"]
+    assert len(lines) == 5 + 12 and max(map(len, lines)) < 80
+    assert lines[3].endswith(" (degrees), traction / strength")
+    assert lines[4].split() == ["angle", "S22", "S12", "fibre", "at", "normal", "tangent", "axial"]
+    assert lines[5].split() == ["0", "10", "0", "2", "-12.50", "0.25", "0.25", "0.25"]
+
+
+def test_directions_without_an_onset_are_counted():
+    lines = envelope_table(document(8, ("psi",), without=(0, 3), temperature=-50.0), "")
+    assert lines[0].endswith("8 directions, after a temperature of -50")
+    assert lines[1].strip() == "no load breaks a bond in 2 of them"
+    assert lines[6].split() == ["0", "none", "none"] and lines[5].split()[-1] == "psi"
+    assert lines[4].endswith(" (degrees), psi of its traction")
+
+
+def test_nothing_may_break():
+    lines = envelope_table(document(4, (), without=(0, 1, 2, 3)), "")
+    assert len(lines) == 2
+
+
+def test_strains_have_no_unit():
+    whole = document(4, ("psi",))
+    whole["case"]["envelope"]["plane"] = ["E11", "gamma12"]
+    assert envelope_table(whole, " (MPa)")[0] == "Onset of debonding in the plane E11, gamma12: 4 directions"
+
+
+@pytest.mark.parametrize(("angle", "expected"), [(0.0, (3.0, 0.0)), (90.0, (0.0, 3.0)), (180.0, (-3.0, 0.0))])
+def test_what_rounding_leaves_of_zero_is_zero(angle, expected):
+    assert components({"angle": angle, "factor": 3.0}) == pytest.approx(expected, abs=1e-300)

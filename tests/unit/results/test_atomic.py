@@ -1,0 +1,24 @@
+"""What writers that were killed leave behind is removed; nothing else is."""
+
+from __future__ import annotations
+
+from mpi4py import MPI
+
+from feti_homog.results import atomic, output_folder
+
+
+def test_unfinished_files_are_removed(tmp_path):
+    kept = [tmp_path / name for name in ("result.json", "my.part", "cases.csv", "notes.host.12.part")]
+    unfinished = ("result.h5", "case_minus_temperature.png", "load.csv")
+    for path in [*kept, *(atomic.part_of(tmp_path / name) for name in unfinished)]:
+        path.write_text("")
+    with output_folder.held(tmp_path, MPI.COMM_SELF, print):
+        assert {path.name for path in tmp_path.iterdir()} == {path.name for path in kept} | {output_folder.LOCK}
+    assert sorted(tmp_path.iterdir()) == sorted(kept)
+
+
+def test_a_committed_file_has_its_name_only(tmp_path):
+    part = atomic.part_of(tmp_path / "table.csv")
+    part.write_text("a,b\n")
+    atomic.commit(part, tmp_path / "table.csv")
+    assert [path.read_text() for path in tmp_path.iterdir()] == ["a,b\n"]

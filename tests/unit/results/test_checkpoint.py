@@ -1,0 +1,140 @@
+"""Checkpoints: what is read is what was written, or is refused."""
+
+from __future__ import annotations
+
+import random
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from feti_homog.errors import CaseError
+from feti_homog.results import atomic
+from feti_homog.results.checkpoint import FORMAT, USER_BLOCK, Checkpoint, refuse_others
+
+EVENTS = 4
+
+
+def written(folder: Path, signature: str = "this run") -> Checkpoint:
+    checkpoint = Checkpoint(folder, MPI.COMM_SELF, signature)
+    for number in range(EVENTS):
+        checkpoint.write(number, {"path": [0.1 * number, 1.0]}, {"lam": np.arange(5.0) * number, "jump": np.zeros(0)})
+    return checkpoint
+
+
+def same(events) -> bool:
+    return all(
+        event["path"].tolist() == [0.1 * number, 1.0]
+        and event["lam"].tolist() == (np.arange(5.0) * number).tolist()
+        and event["jump"].shape == (0,)
+        for number, event in enumerate(events)
+    )
+
+
+def test_what_was_written_is_read(tmp_path):
+    checkpoint = written(tmp_path)
+    assert checkpoint.count() == EVENTS and same(map(checkpoint.read, range(EVENTS)))
+    assert checkpoint.clear() == EVENTS and checkpoint.count() == 0 and checkpoint.clear() == 0
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_checkpoint_of_another_run_is_refused(tmp_path):
+    written(tmp_path)
+    with pytest.raises(CaseError, match=r"--resume: .*000000\.h5 is of another run: expected that; found this run"):
+        Checkpoint(tmp_path, MPI.COMM_SELF, "that").count()
+
+
+def test_a_checkpoint_without_one_of_its_events_is_refused(tmp_path):
+    checkpoint = written(tmp_path)
+    (tmp_path / "checkpoint" / "000001.h5").unlink()
+    with pytest.raises(CaseError, match="--resume: event 000001 is missing"):
+        checkpoint.count()
+
+
+def test_an_unfinished_event_does_not_count(tmp_path):
+    checkpoint = written(tmp_path)
+    atomic.part_of(tmp_path / "checkpoint" / "000004.h5").write_bytes(b"half")
+    assert checkpoint.count() == EVENTS
+
+
+@pytest.mark.parametrize("version", [1, FORMAT + 1])
+def test_an_event_of_another_format(tmp_path, version):
+    checkpoint = written(tmp_path)
+    path = tmp_path / "checkpoint" / "000001.h5"
+    if version == 1:  # which had no header
+        with h5py.File(path, "w") as file:
+            file.attrs["format"] = version
+    else:
+        path.write_bytes(path.read_bytes().replace(b"format %d" % FORMAT, b"format %d" % version, 1))
+    found = rf"000001\.h5 has the checkpoints' format {version}, this program reads format {FORMAT};"
+    with pytest.raises(CaseError, match=found):
+        checkpoint.count()
+
+
+@pytest.mark.parametrize("content", [b"", b"nothing", None])
+def test_an_unreadable_event_is_refused(tmp_path, content):
+    checkpoint = written(tmp_path)
+    path = tmp_path / "checkpoint" / "000002.h5"
+    path.write_bytes(path.read_bytes()[:-200] if content is None else content)
+    with pytest.raises(CaseError, match=r"--resume: .*000002\.h5"):
+        checkpoint.count()
+
+
+@pytest.mark.parametrize("bit", range(8))
+def test_any_flipped_bit_is_refused_before_hdf5_sees_it(tmp_path, bit):
+    """Where a bit is wrong some releases of HDF5 end the process; its own words would be "no readable event"."""
+    checkpoint, chance = written(tmp_path), random.Random(bit)
+    path = tmp_path / "checkpoint" / "000003.h5"
+    content = path.read_bytes()
+    for place in [*chance.sample(range(USER_BLOCK, len(content)), 12), content.index(b"sha256") + 10]:
+        damaged = bytearray(content)
+        damaged[place] ^= 1 << bit
+        path.write_bytes(damaged)
+        with pytest.raises(CaseError, match=r"--resume: .*000003\.h5 is damaged: its checksum is wrong"):
+            checkpoint.count()
+
+
+def test_bits_that_nobody_reads_are_harmless(tmp_path):
+    checkpoint = written(tmp_path)
+    path = tmp_path / "checkpoint" / "000003.h5"
+    damaged = bytearray(path.read_bytes())
+    damaged[USER_BLOCK - 1] ^= 1
+    path.write_bytes(damaged)
+    assert checkpoint.count() == EVENTS and same(map(checkpoint.read, range(EVENTS)))
+
+
+@pytest.mark.parametrize(("old", "new"), [(1, 2), (3, 0), (0, EVENTS)])
+def test_a_copy_of_another_event_is_refused(tmp_path, old, new):
+    checkpoint = written(tmp_path)
+    path = tmp_path / "checkpoint" / f"{new:06d}.h5"
+    path.write_bytes((tmp_path / "checkpoint" / f"{old:06d}.h5").read_bytes())
+    with pytest.raises(CaseError, match=rf"{new:06d}\.h5 is a copy of event {old:06d}: expected event {new:06d}"):
+        checkpoint.count()
+
+
+def test_nothing_but_events_is_removed(tmp_path):
+    checkpoint = written(tmp_path)
+    (tmp_path / "checkpoint" / "weights.pt").write_text("mine")
+    assert checkpoint.clear() == EVENTS
+    assert [path.name for path in tmp_path.rglob("*") if path.is_file()] == ["weights.pt"]
+
+
+@pytest.mark.parametrize("name", ["checkpoint", "checkpoint.dropped"])
+@pytest.mark.parametrize("content", ["weights.pt", "000000.h5.old", "000009.h5/mine"])
+def test_a_folder_of_others_is_refused(tmp_path, name, content):
+    written(tmp_path)
+    refuse_others(tmp_path)
+    path = tmp_path / name / content
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text("mine")
+    with pytest.raises(CaseError, match=f"no run of this program wrote {name}/"):
+        refuse_others(tmp_path)
+
+
+@pytest.mark.parametrize(("make", "kind"), [(Path.touch, "file"), (lambda path: path.symlink_to("."), "link")])
+def test_a_checkpoint_that_is_no_folder_is_refused(tmp_path, make, kind):
+    make(tmp_path / "checkpoint")
+    with pytest.raises(CaseError, match=f"checkpoint is a {kind} there, and a run makes a folder of that name"):
+        refuse_others(tmp_path)

@@ -1,0 +1,81 @@
+"""The folder of the results: held by one run, and gone again if nothing was written."""
+
+from __future__ import annotations
+
+import errno
+import fcntl
+import os
+from pathlib import Path
+
+import pytest
+from mpi4py import MPI
+
+from feti_homog.errors import CaseError, FetiHomogError
+from feti_homog.results import output_folder
+
+
+def test_folders_that_stay_empty_are_removed(tmp_path):
+    with (
+        pytest.raises(CaseError, match="bad input"),
+        output_folder.held(tmp_path / "new" / "out", MPI.COMM_SELF, print),
+    ):
+        raise CaseError("bad input")
+    assert not list(tmp_path.iterdir())
+
+
+def test_folders_with_results_or_of_others_stay(tmp_path):
+    (tmp_path / "there").mkdir()
+    with output_folder.held(tmp_path / "there", MPI.COMM_SELF, print):
+        pass
+    with output_folder.held(tmp_path / "new" / "out", MPI.COMM_SELF, print):
+        (tmp_path / "new" / "out" / "result.json").touch()
+    assert [path.name for path in (tmp_path / "new" / "out").iterdir()] == ["result.json"]
+    assert not list((tmp_path / "there").iterdir())
+
+
+def test_a_folder_that_cannot_be_made_is_refused():
+    refusal = pytest.raises(CaseError, match="--out /proc/results: cannot be made: ")
+    with refusal, output_folder.held(Path("/proc/results"), MPI.COMM_SELF, print):
+        pass
+
+
+def test_files_of_an_earlier_result_are_removed_and_nothing_else(tmp_path):
+    earlier = ["result.h5", "result.xdmf", "path.csv", "angle.csv", "path.gif", "path.png", "angle_states.png"]
+    earlier += ["envelope.csv", "envelope.png", "load.csv", "load.png", "case_E33.png", "case_minus_temperature.png"]
+    earlier += [
+        "interface.xdmf",
+        "cell.png",
+        "state_3.png",
+        "interface.png",
+        "case_minus_gamma12.png",
+        "case_E11.png",
+        "angle_states.png",
+    ]
+    others = ["case.toml", "my.png", "case_mine.png", "cell.svg", "checkpoint", "result.h5.old", "sweep.csv"]
+    for name in [*earlier, *others, "result.json"]:
+        (tmp_path / name).touch()
+    output_folder.remove_other_results(tmp_path, {"result.json", "path.csv"})
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted([*others, "result.json", "path.csv"])
+
+
+@pytest.mark.parametrize("code", [errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP])
+def test_a_file_system_without_locks_is_told_of(tmp_path, monkeypatch, capsys, code):
+    def flock(file, kind):
+        raise OSError(code, os.strerror(code))
+
+    monkeypatch.setattr(fcntl, "flock", flock)
+    with output_folder.held(tmp_path / "out", MPI.COMM_SELF, print):
+        (tmp_path / "out" / "result.json").touch()
+        output_folder.usable(tmp_path / "out")
+    said = capsys.readouterr().out
+    assert said.startswith("warning: cannot lock ") and said.count("\n") == 1 and os.strerror(code) in said
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["result.json"]
+
+
+def test_other_failures_of_the_lock_are_errors(tmp_path, monkeypatch):
+    def flock(file, kind):
+        raise OSError(errno.EIO, "Input/output error")
+
+    monkeypatch.setattr(fcntl, "flock", flock)
+    with pytest.raises(FetiHomogError, match="cannot lock"), output_folder.held(tmp_path, MPI.COMM_SELF, print):
+        pass

@@ -1,0 +1,155 @@
+"""The branch of a path that a rising load follows, its components, and which of its points are chosen."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from feti_homog.results.path_curves import changed_components, ends_of_legs, first_drop, first_leg, leading_component, load_controlled, named_components, rising_strain, shown_stresses, targets, what_rises
+from feti_homog.report.text.point_tables import chosen, chosen_states
+
+
+def point(load: float, stiffness: float, broke: int = 1) -> dict[str, Any]:
+    strain = 0.1 * load
+    stress = [stiffness * strain, 0.0, 0.0]
+    return {"load_factor": load, "strain": [strain, 0.0, 0.0], "stress": stress, "broke": broke}
+
+
+def test_snap_back_becomes_a_drop() -> None:
+    # Rays of falling stiffness; the second and third break below the load of the first.
+    points = [point(0.5, 10.0), point(0.3, 8.0), point(0.4, 6.0), point(0.8, 4.0), point(1.0, 2.0, 0)]
+    found = load_controlled(points)[:, [3, 0]]
+    expected = [[0, 0], [0.05, 0.5], [0.05, 0.2], [0.08, 0.32], [0.08, 0.16], [0.1, 0.2]]
+    np.testing.assert_allclose(found, expected, atol=1e-15)
+
+
+def document(method: str, waypoints: int, points: list[dict[str, Any]]) -> dict[str, Any]:
+    given = {"waypoints": [[1.0, 0, 0]] * waypoints} if waypoints > 1 else {"strain": [1.0, 0, 0]}
+    case = {"analysis": {"plane": "strain"}, "path": {"method": method} | given}
+    return {"case": case, "path": points}
+
+
+def test_the_first_drop_ends_on_the_next_branch_that_holds() -> None:
+    points = [point(0.5, 10.0), point(0.3, 8.0), point(0.4, 6.0), point(0.8, 4.0), point(1.0, 2.0, 0)]
+    stress, number = first_drop(points)
+    assert number == 3 and stress.tolist() == pytest.approx([0.05 * 4.0, 0.0, 0.0])
+
+
+def test_first_legs() -> None:
+    points = [point(load, 1.0) for load in (0.2, 0.5, 0.6, 1.0)]
+    assert [first_leg(document("events", n, points)) for n in (1, 2, 3)] == [4, 2, 1]
+    assert first_leg(document("increments", 2, points)) == 4
+
+
+def test_rising_strain_of_increments_is_the_points_from_zero() -> None:
+    found = rising_strain(document("increments", 1, [point(0.5, 4.0), point(1.0, 2.0)]))
+    np.testing.assert_allclose(found[:, [3, 0]], [[0, 0], [0.05, 0.2], [0.1, 0.2]])
+    assert rising_strain(document("events", 2, [point(1.0, 2.0)])) is None
+
+
+def test_no_break_is_a_straight_line() -> None:
+    np.testing.assert_allclose(load_controlled([point(1.0, 3.0, 0)])[:, [3, 0]], [[0, 0], [0.1, 0.3]])
+
+
+@pytest.mark.parametrize(("count", "rows"), [(1, 6), (6, 6), (7, 6), (500, 15), (3, 2)])
+def test_the_first_and_the_last_state_are_drawn(count: int, rows: int) -> None:
+    numbers = chosen(document("events", 1, [point(0.5, 1.0) for _ in range(count)]), rows)
+    assert numbers[0] == 0 and numbers[-1] == count - 1 and numbers == sorted(set(numbers))
+    assert len(numbers) == min(count, rows)
+
+
+def test_drawn_states_are_where_bonds_break() -> None:
+    points = [point(0.01 * n, 1.0, broke=5 if n in (40, 60, 80) else 0) for n in range(101)]
+    assert chosen(document("events", 1, points), 5) == [0, 40, 60, 100]
+
+
+def test_the_ends_of_legs_are_drawn() -> None:
+    """Bonds break on the first leg alone; the second goes back."""
+    points = [point(0.01 * n, 1.0, broke=int(n < 50)) for n in range(1, 101)]
+    numbers = chosen(document("events", 2, points), 5)
+    assert {0, 49, 99} <= set(numbers) and ends_of_legs(document("events", 2, points)) == [49, 99]
+    # If there are too many, bonds alone decide.
+    assert chosen(document("events", 50, points), 5)[-1] == 99 and len(chosen(document("events", 50, points), 5)) <= 5
+
+
+def test_of_points_with_fields_those_are_drawn_that_share_the_broken_bonds_evenly() -> None:
+    points = [point(0.5, 1.0) for _ in range(101)]
+    kept = [0, 1, 2, 48, 75, 99, 100]
+    result = document("events", 1, points)
+    assert chosen(result, 5, kept) == [0, 2, 48, 75, 100]
+    assert chosen(result, 10, kept) == kept
+    result["states"] = kept
+    assert chosen_states(result, 5, 7) == [0, 2, 3, 4, 6]
+    # Of a file that ends early there is what there is.
+    assert chosen_states(result, 5, 3) == [0, 1, 2]
+    assert chosen_states(document("events", 1, points[:3]), 5, 3) == [0, 1, 2]
+
+
+COMPLIANCE = np.diag([2.0, 3.0, 1.0, 6.0, 7.0, 5.0]) - 0.5 * (np.ones((6, 6)) - np.eye(6)) * (np.arange(6) < 3)
+
+
+def mixed(waypoints: Any, stresses: Any, plane: str = "generalized", **more: Any) -> dict[str, Any]:
+    """A path through stresses (n, 6) or (n, 3) of one elastic law; components in the plane are the first, second and
+    last."""
+    stresses = np.array(stresses, float)
+    places = list(range(6)) if plane == "generalized" else [0, 1, 5]
+    law = COMPLIANCE[np.ix_(places, places)]
+    points = [
+        {"load_factor": t, "strain": (law @ s).tolist(), "stress": s.tolist(), "broke": 0} | more
+        for t, s in zip(np.linspace(0.0, 1.0, len(stresses) + 1)[1:], stresses, strict=True)
+    ]
+    given = {"to": waypoints} if isinstance(waypoints, dict) else {"waypoints": waypoints}
+    return {"case": {"analysis": {"plane": plane}, "path": {"method": "events"} | given}, "path": points}
+
+
+def test_what_a_waypoint_does_not_name_stays_and_the_components_that_change_are_named() -> None:
+    path = mixed([{"temperature": -100.0}, {"S22": 60.0}, {"E22": 0.01}], [[0] * 6, [0, 60, 0, 0, 0, 0]])
+    assert targets(path)[1]["temperature"] == -100.0 and targets(path)[1]["S13"] == 0.0
+    assert changed_components(path) == [1] and leading_component(path) == 1
+    path = mixed({"S11": 0.0, "gamma12": 0.1}, [[0, 0, 1.0]], "strain")
+    assert changed_components(path) == [2] and named_components(path) == [0, 2]
+    assert changed_components(mixed([[0.1, 0, 0], {"S11": 5.0}, {"S11": 5.0, "E22": 0.1}], [[1, 0, 0]], "stress")) == [
+        0,
+        1,
+    ]
+
+
+def test_the_strain_that_leads_is_among_those_that_are_named() -> None:
+    """Poisson's strain and thermal ones may be larger."""
+    path = mixed([{"temperature": -100.0}, {"S13": 1.0}], [[0] * 6, [0, 0, 0, 0, 1.0, 0]])
+    path["path"][0]["strain"] = path["path"][1]["strain"] = [-20.0, -20.0, -3.0, 0.0, 7.0, 0.0]
+    assert leading_component(path) == 4 and shown_stresses(path) == [4]
+    cooled = mixed({"temperature": -100.0}, [[0] * 6])
+    cooled["path"][0]["strain"] = [-1.0, -2.0, -0.5, 0.0, 0.0, 0.0]
+    assert leading_component(cooled) == 1 and shown_stresses(cooled) == [1]
+
+
+@pytest.mark.parametrize(
+    ("load", "word"),
+    [({"E11": 0.1, "S22": 0.0}, "strain"), ({"S11": 5.0}, "load"), ({"E11": 0.1, "S22": 5.0}, "load")],
+)
+def test_what_rises_is_the_strain_if_no_stress_is_given(load: dict[str, float], word: str) -> None:
+    assert what_rises(mixed(load, [[1.0, 0, 0]], "strain")) == word
+    assert what_rises(mixed({"E22": 0.1, "temperature": 5.0}, [[1.0] * 6])) == "load"
+
+
+def test_under_a_given_stress_the_strain_jumps_at_a_rising_load() -> None:
+    """Rays of rising compliance: at load 0.5 from 1 to 4 times the first, past the one that breaks below it."""
+    path = mixed({"S13": 2.0}, [[0, 0, 0, 0, 2 * t, 0] for t in (0.5, 0.4, 0.8, 1.0)])
+    for point, load, factor in zip(path["path"], (0.5, 0.4, 0.8, 1.0), (1, 2, 4, 5), strict=True):
+        stress = np.array([0, 0, 0, 0, 2 * load, 0])
+        point |= {"load_factor": load, "stress": stress.tolist(), "strain": (factor * COMPLIANCE @ stress).tolist()}
+    found = rising_strain(path)
+    assert found is not None and found.shape == (6, 7)
+    expected = [[0, 0], [7, 1], [28, 1], [44.8, 1.6], [56, 1.6], [70, 2]]
+    np.testing.assert_allclose(found[:, [6, 4]], expected, atol=1e-12)
+    stress, number = first_drop(path["path"])
+    assert number == 2 and stress.tolist() == pytest.approx([0, 0, 0, 0, 1.0, 0])
+
+
+def test_a_strain_that_goes_back_has_no_rising_curve() -> None:
+    path = mixed({"S11": 1.0}, [[t, 0, 0] for t in (0.5, 1.0)], "strain")
+    path["path"][0]["strain"][0] = 5.0
+    assert rising_strain(path) is None

@@ -1,0 +1,58 @@
+"""What the XDMF files say is there is there, in forms that every reader knows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import h5py
+import pytest
+from mpi4py import MPI
+from support.sample_output import Sample, sample, without_interface
+
+from feti_homog.results import xdmf
+from feti_homog.results.field_file import FieldFile
+
+
+def write(directory: Path, whole: Sample) -> None:
+    with FieldFile(directory, MPI.COMM_SELF, whole.header, whole.mesh, whole.fibres, whole.interface) as file:
+        for k, state in enumerate(whole.states):
+            file.write_state(k, state)
+
+
+@pytest.mark.parametrize(("name", "tables"), [("cell", 2 + 2 + 14), ("interface", 2 + 14)])
+def test_xdmf_points_at_tables_of_the_right_shape(tmp_path: Path, name: str, tables: int) -> None:
+    write(tmp_path, sample(4, order=2))
+    paths = dict(zip(("cell", "interface"), xdmf.write(tmp_path), strict=True))
+    root = ET.parse(paths[name]).getroot()
+    found = [item for item in root.iter("DataItem") if item.get("Format") == "HDF"]
+    assert len(found) == 3 * tables
+    with h5py.File(tmp_path / "result.h5", "r") as file:
+        for item in found:
+            place, _, path = str(item.text).partition(":")
+            assert place == "result.h5"
+            assert " ".join(map(str, file[path].shape)) == item.get("Dimensions")
+    (collection,) = root.findall("./Domain/Grid")
+    assert (collection.get("Name"), collection.get("CollectionType")) == (name, "Temporal")
+    assert [time.get("Value") for time in root.iter("Time")] == ["0", "1", "2"]
+    labels = [grid.get("Name") for grid in root.iter("Grid") if grid.get("GridType") == "Uniform"]
+    assert labels == ["state 0", "state 1", "state 2"]
+    kind = {"cell": "Triangle_6", "interface": "Polyvertex"}[name]
+    assert {topology.get("TopologyType") for topology in root.iter("Topology")} == {kind}
+
+
+def test_all_readers_know_the_forms(tmp_path: Path) -> None:
+    """ParaView's default one knows no hyperslabs and no topology without connectivity, and turns tensors of six."""
+    write(tmp_path, sample(4))
+    for path in xdmf.write(tmp_path):
+        root = ET.parse(path).getroot()
+        assert not [item for item in root.iter("DataItem") if item.get("ItemType")]
+        assert all(len(topology) == 1 for topology in root.iter("Topology"))
+        kinds = {attribute.get("AttributeType") for attribute in root.iter("Attribute")}
+        assert kinds <= {"Scalar", "Vector", "Tensor"}
+
+
+def test_xdmf_without_interface_nodes_is_one_file(tmp_path: Path) -> None:
+    write(tmp_path, without_interface(sample(4)))
+    assert xdmf.write(tmp_path) == [tmp_path / "result.xdmf"]
+    assert [path.name for path in tmp_path.glob("*.xdmf")] == ["result.xdmf"]

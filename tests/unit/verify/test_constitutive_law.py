@@ -1,0 +1,73 @@
+"""The certificate's own plane stiffnesses, by way of three dimensions, are those of the solver's elements."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from support.verified_results import CARBON as WARM_CARBON
+from support.verified_results import FIBRE, MATRIX, TURNED, TURNED_IN_SPACE, WARM
+
+from feti_homog.case.case import parse
+from feti_homog.case.material_forms import Orthotropic
+from feti_homog.case.materials import expansion, out_of_plane, plane_stiffness, spatial_stiffness
+from feti_homog.errors import CaseError
+from feti_homog.verify import constitutive_law
+from feti_homog.verify.constitutive_law import expansions, plane_stiffnesses, spatial_stiffnesses
+
+GENERAL = {"stiffness": [[10.0, 2.0, 0.5], [2.0, 8.0, 0.1], [0.5, 0.1, 3.0]]}
+IN_PLANE = {"E1": 15.0, "E2": 230.0, "nu12": 0.013, "G12": 25.0, "angle": 30.0}
+CARBON = {"E_axial": 235.0, "E_transverse": 14.0, "nu_axial": 0.2, "nu_transverse": 0.25}
+SHEET = {"E_transverse": 14.0, "nu_transverse": -0.25}
+STIFF = {"E1": 2.0, "E2": 9.0, "E3": 4.0, "nu12": -0.2, "nu13": 0.4, "nu23": 0.3, "G12": 1.0, "angle": -73.0}
+
+
+IN_SPACE = {
+    "stiffness": spatial_stiffness(Orthotropic(**STIFF, G13=2.0, G23=1.5)).tolist()  # turned: 12 is coupled to all
+}
+
+
+@pytest.mark.parametrize("plane", ["strain", "stress"])
+@pytest.mark.parametrize("fibre", [FIBRE, TURNED, STIFF, GENERAL, IN_SPACE, CARBON, IN_PLANE, SHEET], ids=str)
+def test_both_ways_to_the_law_of_a_plane_state_agree(tmp_path, fibre, plane):
+    if plane == "strain" and fibre in (IN_PLANE, SHEET):
+        pytest.skip("plane strain needs constants out of the plane")
+    document = {
+        "cell": {"geometry": "square", "fibre_fraction": 0.3},
+        "material": {"matrix": MATRIX, "fibre": fibre},
+        "analysis": {"type": "stiffness", "plane": plane},
+    }
+    case = parse(document, tmp_path)
+    phases = ["matrix", "fibre", "fibre:2"]
+    own = plane_stiffnesses(case.resolved(), phases)
+    rules = constitutive_law.out_of_plane(case.resolved(), phases)
+    for stiffness, rule, phase in zip(own, rules, ("matrix", "fibre", "fibre"), strict=True):
+        expected = plane_stiffness(case.material_of(phase), plane)
+        assert np.abs(stiffness - expected).max() < 1e-13 * np.abs(expected).max()
+        np.testing.assert_allclose(rule, out_of_plane(case.material_of(phase), plane), rtol=1e-12, atol=1e-14)
+
+
+@pytest.mark.parametrize("fibre", [WARM, TURNED_IN_SPACE, WARM_CARBON, IN_SPACE | {"expansion": [1e-6, 2e-6, 3e-6]}])
+def test_both_ways_to_the_law_in_space_agree(tmp_path, fibre):
+    document = {
+        "cell": {"geometry": "square", "fibre_fraction": 0.3},
+        "material": {"matrix": WARM, "fibre": fibre},
+        "analysis": {"type": "stiffness", "plane": "generalized"},
+    }
+    case = parse(document, tmp_path)
+    own = spatial_stiffnesses(case.resolved(), ["matrix", "fibre"])
+    free = expansions(case.resolved(), ["matrix", "fibre"])
+    for stiffness, strain, phase in zip(own, free, ("matrix", "fibre"), strict=True):
+        expected = spatial_stiffness(case.material_of(phase))
+        assert np.abs(stiffness - expected).max() < 1e-13 * np.abs(expected).max()
+        np.testing.assert_allclose(strain, expansion(case.material_of(phase)), rtol=1e-12, atol=1e-20)
+
+
+def test_a_phase_that_does_not_say_how_it_expands_leaves_all_unknown():
+    case = {"material": {"matrix": MATRIX, "fibre": WARM_CARBON}}
+    assert expansions(case, ["matrix", "fibre"]) is None
+
+
+def test_a_phase_without_material_is_told():
+    case = {"material": {"matrix": MATRIX}, "analysis": {"plane": "strain"}}
+    with pytest.raises(CaseError, match="no material for the phase fibre"):
+        plane_stiffnesses(case, ["matrix", "fibre"])

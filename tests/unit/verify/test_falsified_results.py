@@ -1,0 +1,239 @@
+"""What the program computes is verified; a copy in which one thing is false breaks the laws that it must break."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from support.falsifications import (
+    MATRIX,
+    SMALL,
+    attribute,
+    both,
+    broken,
+    document,
+    scale,
+    shift,
+    swap_rows,
+)
+from support.verified_results import CASES, LOADS, MIXED_PATHS, falsified
+
+from feti_homog.verify.certificate import verify
+from feti_homog.verify.discrete_cell import DiscreteCell, gradient
+from feti_homog.verify.reading import opened
+
+pytestmark = pytest.mark.slow
+
+MATERIAL = {"stress", "stress 33", "equilibrium", "mean stress", "Hill"}
+SPRINGS = {"bond", "penetration", "complementarity"}
+PATHS = ("path", "thinned", "peaks", "energy", "pairs", "springs' energy", "increments", *MIXED_PATHS)
+SPATIAL = ("spatial", "spatial contact", "spatial springs")
+ENVELOPES = ("envelope", "envelope by energy", "envelope in space")
+MATERIAL_33 = MATERIAL | {"bounds", "shown"}
+
+
+@pytest.mark.parametrize("kind", CASES)
+def test_results_obey_every_law(results, kind):
+    certificate = verify(results(kind))
+    assert certificate.holds, certificate.text
+    told = {finding.law.name for finding in certificate.findings}
+    assert told >= {"stress", "equilibrium", "periodicity", "jump", "mean stress", "Hill", "load", "tables", "cell"}
+    assert ("penetration" in told) == (kind not in ("bonded", "plane", "overlap", "load", SPATIAL[0], *ENVELOPES))
+    assert ("energy" in told) == (kind in (*PATHS, *LOADS, "loaded angle"))
+    assert ("stress load" in told) == (kind in (*MIXED_PATHS, *LOADS))
+    assert ("strength" in told) == (kind in (*PATHS, *ENVELOPES[::2])) and ("onset" in told) == (kind in ENVELOPES)
+    assert ("moduli" in told) == (kind in ("bonded", "plane", "spatial", ENVELOPES[2]))
+    assert ("compliance" in told) == (kind in (*SPATIAL[:2], ENVELOPES[2]))
+    assert ("Levin" in told) == (kind in (*SPATIAL[::2], ENVELOPES[2]))
+
+
+def other_fibre(_, file):
+    number = file["interface/fibre_number"]
+    number[0] = 1 if number[0] > 1 else 2
+
+
+def other_pair(_, file):
+    pair = file["interface/pair"]
+    pair[0] = 1 - pair[0]
+
+
+def length_and_traction(_, file):
+    """With the same forces: what a node stands for is longer, and pulled less."""
+    file["interface/length"][0] *= 1 + SMALL
+    for state in file["state"].values():
+        state["traction"][0] = state["traction"][0] / (1 + SMALL)
+
+
+def case_of_fields(_, file):
+    file.attrs["case"] = str(file.attrs["case"]).replace("0.299", "0.2991")
+
+
+def delete_state(_, file):
+    del file[f"state/{len(file['state']) - 1}"]
+
+
+FALSE = {
+    "one stress": ("bonded", scale("stress"), {"stress", "stress 33", "shown"}),
+    "one stress of a path": ("path", scale("stress", state=7), {"stress", "stress 33", "shown"}),
+    "a stress out of the plane": ("bonded", scale("stress_33"), {"stress 33"}),
+    "a strain out of the plane": ("plane", scale("element_strain"), {"shown"}),
+    "a von Mises stress": ("angle", scale("von_mises"), {"shown"}),
+    "a principal stress": ("path", scale("principal_1", state=7), {"shown"}),
+    "a vector of traction": ("bonded", scale("traction_vector"), {"vectors"}),
+    "a vector of jump": ("contact", scale("jump_vector"), {"vectors"}),
+    "a face": ("contact", scale("displacement_matrix"), {"vectors"}),
+    "a node of a face": ("contact", shift("fibre_node", 1, group="interface"), {"vectors"}),
+    "one displacement": (
+        "bonded", shift("displacement"), {"displacement", "stress", "shown", "equilibrium", "mean stress"},
+    ),
+    "one fluctuation": ("contact", shift("fluctuation"), {"displacement", "periodicity"}),
+    "one traction": ("bonded", scale("traction"), {"equilibrium", "vectors"}),
+    "one traction of a path": ("path", scale("traction", state=7), {"equilibrium", "vectors"}),
+    "one jump": ("angle", scale("jump", state=3), {"jump", "vectors"}),
+    "tractions of two nodes": ("bonded", swap_rows("state/0/traction"), {"equilibrium", "vectors"}),
+    "an interface node moved": ("bonded", shift("points", 1e-3, group="interface"), {"interface", "jump"}),
+    "a length": ("bonded", shift("length", group="interface"), {"interface", "equilibrium"}),
+    "a normal": ("bonded", shift("normal", group="interface"), {"interface", "equilibrium", "vectors"}),
+    "fibres of two nodes": ("angle", other_fibre, {"interface", "tables"}),
+    "a radius": ("bonded", shift("radius", group="fibre"), {"interface", "tables"}),
+    "a centre": ("bonded", shift("centre", group="fibre"), {"interface", "tables"}),
+    "a fibre's number": ("angle", document("fibres", 2, "number", to=7), {"tables"}),
+    "a fibre's phase": ("bonded", document("fibres", 0, "phase", to="matrix"), {"tables"}),
+    "a fibre's centre": ("angle", document("fibres", 1, "centre", 0), {"tables"}),
+    "numbers of fibres": ("angle", swap_rows("fibre/number"), {"tables"}),
+    "a length with its traction": ("bonded", length_and_traction, {"interface", "vectors"}),
+    "the case in one file": ("bonded", case_of_fields, {"tables"}),
+    "an arc": ("contact", document("case", "interface", "debonded", 0, "angle", factor=1.5), {"arcs"}),
+    "where an arc is": ("angle", document("case", "interface", "debonded", 0, "centre", factor=5), {"arcs"}),
+    "an angle": ("angle", document("angle", 1, "angle", to=170.0), {"arcs"}),
+    "a mean stress": ("bonded", attribute("stress"), {"mean stress", "tables"}),
+    "a strain": ("bonded", attribute("strain"), {"displacement", "load"}),
+    "a missing state": ("path", delete_state, {"load", "tables"}),
+    "not a number": ("bonded", shift("stress", np.nan), {"numbers", "stress", "stress 33", "shown"}),
+    "Poisson's ratio": ("bonded", document("case", *MATRIX, "poisson", factor=1 + 1e-4), MATERIAL_33),
+    "the plane state": ("plane", document("case", "analysis", "plane", to="strain"), MATERIAL_33),
+    "an angle of axes": ("angle", document("case", "material", "fibre", "angle"), MATERIAL - {"Hill"}),
+    "contact that was not asked for": ("overlap", document("case", "interface", "contact", to=True), {"penetration"}),
+    "an entry of the stiffness": ("bonded", document("effective_stiffness", 0, 1), {"tables", "moduli"}),
+    "an entry under pressure": ("contact", document("effective_stiffness_compression", 1, 1), {"tables"}),
+    "a stiffness of an angle": ("angle", document("angle", 1, "stiffness", 2, 2), {"tables"}),
+    "a load factor in one file": ("path", attribute("load_factor", state=3), {"tables"}),
+    "a load factor": (
+        "path",
+        both(attribute("load_factor", state=3), document("path", 3, "load_factor")),
+        {"load"},
+    ),
+    "a stress of a point": ("path", document("path", 4, "stress", 0), {"tables"}),
+    "bonds that broke": ("path", document("path", 4, "broke", factor=2), {"breaks", "strength"}),
+    "a count of bonds": ("path", document("path", 4, "bonded", factor=2), {"tables", "breaks"}),
+    "a stress of a point without fields": ("thinned", document("path", 1, "stress", 0, factor=1.01), {"energy"}),
+    "a strain of a point without fields": ("thinned", document("path", 1, "strain", 0), {"load"}),
+    "a count of a point without fields": ("thinned", document("path", 1, "bonded", factor=2), {"breaks"}),
+    "the point of a state": ("thinned", attribute("point", factor=2, state=1), {"load", "tables", "breaks", "energy"}),
+    "the points of states": ("thinned", document("states", 1, factor=2), {"tables"}),
+    "more states than were asked for": ("thinned", document("case", "output", "states", to=6), {"load"}),
+    "a strength too low": ("path", document("case", "interface", "normal_strength", factor=0.99), {"strength"}),
+    "a strength too high": ("path", document("case", "interface", "normal_strength", factor=1.01), {"strength"}),
+    "a strength of steps": ("increments", document("case", "interface", "normal_strength", factor=0.5), {"strength"}),
+    "a stiffness of springs": ("springs", document("case", "interface", "normal_stiffness", factor=1.01), SPRINGS),
+    "a toughness too low": ("energy", document("case", "interface", "toughness", factor=0.98), {"strength", "energy"}),
+    "a dissipated energy": ("path", document("path", 5, "dissipated", factor=1.01), {"energy"}),
+    "a rising dissipation": ("path", document("path", 5, "dissipated_strain_controlled", factor=1.01), {"energy"}),
+    "a dissipation of increments": ("increments", document("path", 11, "dissipated", factor=-1.0), {"energy"}),
+    "an energy stored": ("path", document("path", 5, "stored", factor=1.01), {"energy"}),
+    "an energy stored at a point without fields": ("thinned", document("path", 1, "stored", factor=1.01), {"energy"}),
+    "an energy stored at an angle": ("loaded angle", document("angle", 1, "stored", factor=1.01), {"energy"}),
+    "an energy of springs": ("energy", document("path", 5, "stored_in_springs", factor=1.01), {"energy"}),
+    "energy of springs that there are none of": ("path", document("path", 5, "stored_in_springs", to=0.01), {"energy"}),
+    "an energy of fracture": ("energy", document("path", 5, "fracture_energy", factor=1.01), {"energy", "tables"}),
+    "an energy of fracture of increments": (
+        "springs' energy", document("path", -1, "fracture_energy", factor=1e3), {"energy", "tables"},
+    ),
+    "a ratio of energies": ("energy", document("path", 5, "dissipation_ratio"), {"tables"}),
+    "a debonded length": ("path", document("path", 5, "debonded_length", 0), {"tables"}),
+    "a debonding angle": ("loaded angle", document("angle", 1, "debonding_angle", 0), {"tables"}),
+    "a debonded share": ("angle", document("angle", 1, "debonded_share"), {"tables"}),
+    "the place of a tip": ("energy", document("path", 5, "tips", "angle", 0), {"tables"}),
+    "the fibre of a tip": ("springs' energy", document("path", -1, "tips", "fibre", 0, to=7), {"tables"}),
+    "the mode of a tip": ("energy", document("path", 5, "tips", "psi", 0), {"tables"}),
+    "an energy of a tip": ("springs' energy", document("path", -1, "tips", "G_I", 0), {"tables"}),
+    "what drives a tip": (
+        "energy", both(*(document("path", 5, "tips", name, 0, factor=9.0) for name in ("G_I", "G_II"))), {"strength"},
+    ),
+    "a missing tip": ("energy", lambda content, _: content["path"][5]["tips"]["psi"].pop(), {"tables"}),
+    "a debonded share of a pair": ("pairs", document("path", -1, "debonded_shares", 1), {"tables"}),
+    "the interface of a tip": ("pairs", document("path", -1, "tips", "interface", 0, to=7), {"tables"}),
+    "no interfaces of tips": ("pairs", lambda content, _: content["path"][-1]["tips"].pop("interface"), {"tables"}),
+    "pairs of two nodes": ("pairs", other_pair, {"interface", "tables"}),
+    "a waypoint": ("increments", document("case", "path", "waypoints", 1, 0), {"load"}),
+    "a modulus": ("bonded", document("moduli", "E1"), {"moduli"}),
+    "a bound": ("bonded", document("bounds", "hashin_shtrikman", "shear", 1), {"bounds"}),
+    "a fraction": ("bonded", document("cell", "fractions", "fibre"), {"cell"}),
+    "an area": ("bonded", document("cell", "area"), {"cell"}),
+    "a number of elements": ("bonded", document("cell", "elements", to=1), {"cell"}),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", FALSE)
+def test_a_falsified_copy_breaks_its_laws(results, tmp_path, name):
+    kind, edit, laws = FALSE[name]
+    assert broken(falsified(results(kind), tmp_path / "copy", edit)) == laws | {"files"}
+
+
+def test_a_file_from_before_there_were_pairs_is_verified(results, tmp_path):
+    """There was one section [[interface]] then."""
+
+    def edit(_, file):
+        del file["interface/pair"]
+
+    assert broken(falsified(results("path"), tmp_path / "copy", edit)) == {"files"}
+
+
+def test_a_file_with_another_byte_is_noticed(results, tmp_path):
+    copy = falsified(results("bonded"), tmp_path / "copy", lambda content, _: content.update(created="2001-01-01"))
+    assert broken(copy) == {"files"}
+
+
+def test_an_element_turned_over_is_noticed(results, tmp_path):
+    def edit(_, file):
+        file["mesh/triangles"][5] = file["mesh/triangles"][5][[0, 2, 1, 5, 4, 3]]
+
+    assert "mesh" in broken(falsified(results("bonded"), tmp_path / "copy", edit))
+
+
+def test_an_element_without_area_is_noticed(results, tmp_path):
+    def edit(_, file):
+        file["mesh/triangles"][5] = file["mesh/triangles"][5][[0, 0, 0, 0, 0, 0]]
+
+    assert "mesh" in broken(falsified(results("bonded"), tmp_path / "copy", edit))
+
+
+def test_a_missing_state_of_an_angle_is_noticed(results, tmp_path):
+    def edit(_, file):
+        for number in list(file["state"])[1:]:
+            del file[f"state/{number}"]
+
+    assert "load" in broken(falsified(results("angle"), tmp_path / "copy", edit))
+
+
+def test_a_mesh_node_that_was_moved_is_noticed(results, tmp_path):
+    found = broken(falsified(results("bonded"), tmp_path / "copy", shift("points", group="mesh")))
+    assert found >= {"displacement", "stress", "equilibrium"}
+
+
+def test_displacements_that_fit_their_stresses_break_equilibrium_alone(results, tmp_path):
+    """A node is moved with its fluctuation, and the stresses of its elements after it."""
+
+    def edit(_, file):
+        with opened(results("bonded")) as files:
+            cell, state = DiscreteCell.of(files), next(files.states())
+        inner = np.setdiff1d(np.arange(len(state.fluctuation)), cell.nodes.node)[3]
+        state.fluctuation[inner] += SMALL
+        displacement = state.fluctuation + cell.files.mesh.points @ gradient(state.strain).T
+        for name in ("fluctuation", "displacement", "stress"):
+            fields = {"fluctuation": state.fluctuation, "displacement": displacement}
+            file[f"state/0/{name}"][()] = fields.get(name, cell.elements.fields(displacement, displacement).stress)
+
+    assert broken(falsified(results("bonded"), tmp_path / "copy", edit)) - {"stress 33", "shown"} == {
+        "equilibrium",
+        "files",
+    }

@@ -1,0 +1,45 @@
+"""Files on which HDF5 crashes, or does not come to an end, are told of in one line."""
+
+from __future__ import annotations
+
+import os
+import signal
+
+import pytest
+
+from feti_homog.errors import CaseError
+from feti_homog.verify.own_process import in_own_process
+
+
+def crash(_):
+    os.kill(os.getpid(), signal.SIGSEGV)
+
+
+def refuse(directory):
+    raise CaseError(f"{directory}: no")
+
+
+def ask_for_too_much(_):
+    raise MemoryError("256 TiB")
+
+
+def test_an_answer_comes_back(tmp_path):
+    assert in_own_process(tmp_path, os.listdir) == []
+
+
+@pytest.mark.parametrize(
+    ("function", "words"), [(crash, "HDF5 crashes on them"), (refuse, "no"), (ask_for_too_much, "256 TiB")]
+)
+def test_what_goes_wrong_is_told(tmp_path, function, words):
+    with pytest.raises(CaseError, match=f"^{tmp_path}: .*{words}$"):
+        in_own_process(tmp_path, function)
+
+
+def test_what_does_not_end_is_ended(tmp_path):
+    """A pipe ends when no process can write to it any more."""
+    ours, theirs = os.pipe()
+    with pytest.raises(CaseError, match="does not come to an end"):
+        in_own_process(tmp_path, lambda _: signal.pause(), patience=0.0)
+    os.close(theirs)
+    assert os.read(ours, 1) == b""
+    os.close(ours)

@@ -1,0 +1,52 @@
+"""What verification reads of the loads of a case is what the program goes through."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from support.verified_results import LOADS, MIXED_PATHS, document
+
+from feti_homog import Case
+from feti_homog.verify.prescribed import NAMES, at_points, targets
+
+TWO_LEGS = {"path": {"waypoints": [{"E11": 0.4, "S22": 2.0}, {"S11": 3.0, "S22": 6.0}]}}
+
+
+@pytest.mark.parametrize("kind", [*MIXED_PATHS, *LOADS, "path", "peaks"])
+def test_loads_in_full_are_those_of_the_case(kind):
+    case = Case.parse(document(kind))
+    for load, expected in zip(targets(case.resolved()), case.targets, strict=True):
+        v = 6 if len(load.values) > 3 else 3
+        names = np.where(load.by_stress[:v], NAMES[v][1], NAMES[v][0]).tolist()
+        assert dict(zip([*names, "temperature"], load.values.tolist(), strict=False)) == expected
+
+
+def along(load_factor, broke=0, **means):
+    point = {"load_factor": load_factor, "broke": broke, "strain": [0.0] * 3, "stress": [0.0] * 3}
+    return point | means
+
+
+@pytest.mark.parametrize("method", ["events", "increments"])
+def test_a_leg_begins_with_what_the_state_has_of_components_whose_kind_changes(method):
+    case = {"analysis": {"plane": "strain"}, "path": TWO_LEGS["path"] | {"method": method}}
+    end_of_leg = along(0.5, strain=[0.4, 9.0, 9.0], stress=[1.0, 2.0, 0.0])
+    loads = list(at_points(case, [along(0.25), end_of_leg, along(0.75), along(1.0)]))
+    expected = [[0.2, 1.0, 0.0], [0.4, 2.0, 0.0], [2.0, 4.0, 0.0], [3.0, 6.0, 0.0]]
+    np.testing.assert_allclose([load.values for load in loads], expected, rtol=1e-15)
+    assert [load.by_stress.tolist() for load in loads] == 2 * [[False, True, True]] + 2 * [[True, True, True]]
+
+
+def test_breaks_at_a_waypoint_belong_to_the_leg_that_ends_there():
+    case = {"analysis": {"plane": "strain"}, "path": TWO_LEGS["path"] | {"method": "events"}}
+    after = along(0.5, strain=[0.4, 0.0, 0.0], stress=[0.5, 2.0, 0.0])
+    _, at_break, at_end, beyond = at_points(case, [along(0.25), along(0.5, broke=1), after, along(0.75)])
+    assert at_break.values.tolist() == at_end.values.tolist() == [0.4, 2.0, 0.0]
+    np.testing.assert_allclose(beyond.values, [1.75, 4.0, 0.0], rtol=1e-15)
+
+
+def test_steps_that_pass_a_waypoint_go_round_its_corner():
+    path = {"waypoints": [[0.3, 0.0, 0.0], [0.3, 0.3, 0.0]], "method": "increments"}
+    points = [along(step / 3) for step in (1, 2, 3)]
+    loads = at_points({"analysis": {"plane": "strain"}, "path": path}, points)
+    expected = [[0.2, 0.0, 0.0], [0.3, 0.1, 0.0], [0.3, 0.3, 0.0]]
+    np.testing.assert_allclose([load.values for load in loads], expected, rtol=1e-14, atol=1e-16)

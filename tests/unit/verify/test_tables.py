@@ -1,0 +1,44 @@
+"""Tables of points that are not those of result.json break their law, and no other; those that are missing do not."""
+
+from __future__ import annotations
+
+import shutil
+
+import pytest
+from support.falsifications import broken
+
+from feti_homog.verify.certificate import verify
+
+KINDS = {"path": "cooled", "angle": "angle", "load": "load"}
+
+
+def junk(lines):
+    return ["junk"]
+
+
+def number(lines):
+    return [*lines[:-1], lines[-1].replace("1", "2").replace("0", "1")]
+
+
+def row(lines):
+    return lines[:-1]
+
+
+def column(lines):
+    return [line.partition(",")[2] for line in lines]
+
+
+def nothing(lines):
+    return []
+
+
+@pytest.mark.parametrize("edit", [junk, number, row, column, nothing])
+@pytest.mark.parametrize("name", ["path", "angle", "load"])
+def test_a_false_table_is_told(results, tmp_path, name, edit):
+    copy = shutil.copytree(results(KINDS[name]), tmp_path / "copy")
+    table = copy / f"{name}.csv"
+    assert not broken(copy)
+    table.write_text("\n".join(edit(table.read_text().splitlines())))
+    assert broken(copy) == {"CSV"}
+    table.unlink()
+    assert verify(copy).holds
