@@ -23,12 +23,12 @@ from feti_homog.analysis.result_records import (
     StiffnessBounds,
 )
 from feti_homog.case.case import Case
-from feti_homog.case.materials import plane_stiffness
 from feti_homog.fibres.ellipses import Ellipses
 from feti_homog.homogenization.domain_partition import CellSummary
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.materials import bounds
 from feti_homog.materials.bounds import Moduli
+from feti_homog.materials.laws import plane_stiffness
 from feti_homog.parallel.mpi_errors import on_root
 from feti_homog.typing import Float
 from feti_homog.version import __version__

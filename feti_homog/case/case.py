@@ -21,20 +21,20 @@ from feti_homog.case.interface_section import Arc, InterfaceSection
 from feti_homog.case.load_rules import expansion_faults, read_load, read_path, stress_free
 from feti_homog.case.load_section import LoadPath, SingleLoad
 from feti_homog.case.matched_cell import with_match
-from feti_homog.case.material_contrast import contrast_faults, contrast_warnings
-from feti_homog.case.material_forms import Isotropic, Material
 from feti_homog.case.material_sections import coating_faults, phase_faults, provider, read_materials
 from feti_homog.case.mixed_cell import mix_faults, void_faults
 from feti_homog.case.mixed_load import MixedLoad, Strain, completed
 from feti_homog.case.petsc_section import Scalar, read_petsc
-from feti_homog.case.schema import Selected, TableReader, selected_value, to_table
 from feti_homog.case.sections import SECTIONS, Analysis, Angle, Decomposition, Output
 from feti_homog.case.selectors import ANALYSIS_TYPE, CRITERION, DRAWN_STRESS, METHOD, PLANE
 from feti_homog.case.sweep_section import SWEEP
 from feti_homog.case.tables import KEY_OWNERS, REQUIRED, TOP_LEVEL
-from feti_homog.case.values import text
-from feti_homog.case.wording import limit_in_words, suggestion, toml_key, toml_value
 from feti_homog.errors import CaseError
+from feti_homog.materials.forms import Isotropic, Material
+from feti_homog.materials.laws import contrast_faults, contrast_warnings
+from feti_homog.schema.keys import Selected, TableReader, selected_value, to_table
+from feti_homog.schema.values import text
+from feti_homog.schema.wording import limit_in_words, suggestion, toml_key, toml_value
 
 FIELDS = {"load": "single_load"}  # of a section whose name is that of a method
 LOCKING_POISSON, ROUNDING_POISSON = 0.49, 0.49999

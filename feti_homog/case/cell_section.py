@@ -10,9 +10,9 @@ from typing import Any
 
 from feti_homog.case.fibre_table import FibreTable
 from feti_homog.case.phase_names import FIBRE
-from feti_homog.case.schema import Selector, key
 from feti_homog.case.section_values import CELL_FILE, FIBRE_LIST, FRACTIONS, RADII, SEED, TABLE_FILE
-from feti_homog.case.values import choice, integer, real
+from feti_homog.schema.keys import Selector, key
+from feti_homog.schema.values import choice, integer, real
 
 CIRCULAR = ("square", "hexagonal", "random")
 TOUCHING = {"square": math.pi / 4, "hexagonal": math.pi / math.sqrt(12), "random": math.pi / math.sqrt(12)}

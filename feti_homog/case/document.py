@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.case.wording import dotted_key
 from feti_homog.errors import CaseError
+from feti_homog.schema.wording import dotted_key
 
 MAX_BYTES = 1 << 24
 MAX_DEPTH = 50

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from feti_homog.case.cell_section import FIBRES_OF, Cell
-from feti_homog.case.material_forms import Material
-from feti_homog.case.materials import plane_stiffness, spatial_stiffness
 from feti_homog.case.mixed_cell import fibre_counts
 from feti_homog.case.phase_names import COATING
+from feti_homog.materials.forms import Material
+from feti_homog.materials.laws import plane_stiffness, spatial_stiffness
 from feti_homog.typing import Float
 
 ASKED = ("accuracy", "element_size")

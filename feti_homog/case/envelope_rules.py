@@ -8,12 +8,12 @@ from typing import Any
 
 from feti_homog.case.envelope_section import Envelope
 from feti_homog.case.interface_section import STRENGTHS, InterfaceSection
-from feti_homog.case.load_names import STRAINS, STRESSES
-from feti_homog.case.material_forms import Material
 from feti_homog.case.material_sections import missing_expansions
-from feti_homog.case.schema import Selected, TableReader
 from feti_homog.case.selectors import ENVELOPE_ANALYSIS, GENERALIZED, PLANE
-from feti_homog.case.wording import toml_value
+from feti_homog.materials.forms import Material
+from feti_homog.materials.voigt import STRAINS, STRESSES
+from feti_homog.schema.keys import Selected, TableReader
+from feti_homog.schema.wording import toml_value
 
 TYPE = ENVELOPE_ANALYSIS.in_words("")
 

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from feti_homog.case.load_names import SPATIAL_STRAINS, SPATIAL_STRESSES
-from feti_homog.case.schema import key
 from feti_homog.case.selectors import GENERALIZED
-from feti_homog.case.values import ValueType, integer, real
+from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES
+from feti_homog.schema.keys import key
+from feti_homog.schema.values import ValueType, integer, real
 
 FAMILIES = (SPATIAL_STRESSES, SPATIAL_STRAINS)
 

@@ -13,9 +13,9 @@ import numpy as np
 
 from feti_homog.case.phase_names import VOID
 from feti_homog.case.rounded_polygons import RoundedPolygons
-from feti_homog.case.values import is_number, real
-from feti_homog.case.wording import suggestion, toml_value
 from feti_homog.errors import CaseError
+from feti_homog.schema.values import is_number, real
+from feti_homog.schema.wording import suggestion, toml_value
 from feti_homog.typing import Bool, Float, Int
 
 NUMBERS = ("x", "y", "radius", "coating", "a", "b", "angle", "inner_radius", "sides", "corner")

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from feti_homog.case.schema import Selected
 from feti_homog.case.sections import OUT_OF_PLANE_STRESSES
 from feti_homog.case.selectors import DRAWN_STRESS, GENERALIZED, IN_THE_PLANE, PLANE
-from feti_homog.case.wording import toml_value
+from feti_homog.schema.keys import Selected
+from feti_homog.schema.wording import toml_value
 
 
 def generalized_faults(selected: Selected) -> list[str]:

@@ -8,11 +8,11 @@ from typing import Any
 
 from feti_homog.case.cell_section import GEOMETRY, MESHED
 from feti_homog.case.interface_section import STIFFNESSES, STRENGTHS, Arc, InterfaceSection
-from feti_homog.case.schema import Selected, TableReader
 from feti_homog.case.section_values import ARCS, PAIR
 from feti_homog.case.sections import SECTIONS_OF_AN_ANALYSIS, Angle
 from feti_homog.case.selectors import ANALYSIS_TYPE, GENERALIZED, PLANE
-from feti_homog.case.wording import toml_value
+from feti_homog.schema.keys import Selected, TableReader
+from feti_homog.schema.wording import toml_value
 
 COMMON = ("contact", "criterion", "growth")
 """The keys in which all sections [[interface]] agree."""

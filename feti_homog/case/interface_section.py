@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from feti_homog.case.schema import key
 from feti_homog.case.section_values import ARCS, FIBRES, PAIR, STIFFNESS, STRENGTH, TOUGHNESS
 from feti_homog.case.selectors import ANALYSIS_TYPE, BREAKING, BY_ENERGY, GENERALIZED
-from feti_homog.case.values import POSITIVE_OR_INF, boolean, choice, real
+from feti_homog.schema.keys import key
+from feti_homog.schema.values import POSITIVE_OR_INF, boolean, choice, real
 
 STIFFNESSES = ("normal_stiffness", "tangential_stiffness")
 STRENGTHS = ("normal_strength", "tangential_strength", "axial_strength")

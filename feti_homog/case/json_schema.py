@@ -12,15 +12,15 @@ from typing import Any
 
 from feti_homog.case.interface_section import Arc
 from feti_homog.case.json_schema_rules import Schema, rules_of_one_case
-from feti_homog.case.material_forms import MATERIAL_FORMS
 from feti_homog.case.mixed_load import MixedLoad
 from feti_homog.case.petsc_section import PREFIXED
 from feti_homog.case.phase_names import PHASE
-from feti_homog.case.schema import Key, defaults_of, keys_of
 from feti_homog.case.sections import SECTIONS
 from feti_homog.case.sweep_section import AXIS_MEANING, RANGE_KEYS, SWEEP, SweepSection
 from feti_homog.case.tables import TOP_LEVEL
-from feti_homog.case.values import text
+from feti_homog.materials.forms import MATERIAL_FORMS
+from feti_homog.schema.keys import Key, defaults_of, keys_of
+from feti_homog.schema.values import text
 
 AXIS_VALUES = {"type": "array", "minItems": 1}
 AXIS_TABLE = {"type": "object", "minProperties": 1, "additionalProperties": {"$ref": "#/$defs/axis"}}

@@ -10,10 +10,7 @@ from feti_homog.case.cell_section import ALL_CIRCULAR, GEOMETRY, MESH, MESHED, T
 from feti_homog.case.element_sizes import ASKED, CHOSEN
 from feti_homog.case.envelope_section import pairs_of
 from feti_homog.case.interface_section import STIFFNESSES, STRENGTHS, Arc
-from feti_homog.case.load_names import STRAINS, STRESSES
-from feti_homog.case.material_forms import EXPANSION_PAIR, MATERIAL_FORMS
 from feti_homog.case.mixed_load import MixedLoad, components
-from feti_homog.case.schema import Condition, Key, Selector, defaults_of, keys_of
 from feti_homog.case.sections import OUT_OF_PLANE_STRESSES, SECTIONS, SECTIONS_OF_AN_ANALYSIS
 from feti_homog.case.selectors import (
     ANALYSIS_TYPE,
@@ -27,7 +24,10 @@ from feti_homog.case.selectors import (
     PLANE,
 )
 from feti_homog.case.tables import REQUIRED
-from feti_homog.case.values import LARGEST
+from feti_homog.materials.forms import EXPANSION_PAIR, MATERIAL_FORMS
+from feti_homog.materials.voigt import STRAINS, STRESSES
+from feti_homog.schema.keys import Condition, Key, Selector, defaults_of, keys_of
+from feti_homog.schema.values import LARGEST
 
 Schema = dict[str, Any]
 

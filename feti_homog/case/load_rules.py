@@ -7,15 +7,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
-from feti_homog.case.load_names import TEMPERATURE
 from feti_homog.case.load_section import LoadPath, SingleLoad
-from feti_homog.case.material_forms import Material
 from feti_homog.case.material_sections import missing_expansions
-from feti_homog.case.mixed_load import MixedLoad, Strain, completed, components, first_named, named
-from feti_homog.case.schema import TableReader
+from feti_homog.case.mixed_load import TEMPERATURE, MixedLoad, Strain, completed, components, first_named, named
 from feti_homog.case.section_values import LOAD, WAYPOINTS
 from feti_homog.case.selectors import GENERALIZED, PLANE
-from feti_homog.case.wording import toml_value
+from feti_homog.materials.forms import Material
+from feti_homog.schema.keys import TableReader
+from feti_homog.schema.wording import toml_value
 
 
 def read_path(table: Any, reader: TableReader) -> LoadPath | None:

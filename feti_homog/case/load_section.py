@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from feti_homog.case.mixed_load import MixedLoad, Strain
-from feti_homog.case.schema import key
 from feti_homog.case.section_values import LOAD, STRAIN, WAYPOINTS
 from feti_homog.case.selectors import BY_EVENTS, BY_INCREMENTS, IN_THE_PLANE
-from feti_homog.case.values import choice, integer
+from feti_homog.schema.keys import key
+from feti_homog.schema.values import choice, integer
 
 
 @dataclass(frozen=True, kw_only=True)

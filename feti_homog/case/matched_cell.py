@@ -8,8 +8,8 @@ from pathlib import Path
 
 from feti_homog.case.cell_files import missing
 from feti_homog.case.cell_section import Cell
-from feti_homog.case.wording import toml_value
 from feti_homog.errors import CaseError
+from feti_homog.schema.wording import toml_value
 
 FEWEST_FIBRES = 10  # of fewer, distances have no distribution
 

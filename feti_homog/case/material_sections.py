@@ -6,12 +6,12 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 
 from feti_homog.case.cell_section import CIRCULAR, GEOMETRY, Cell
-from feti_homog.case.material_forms import MATERIAL_FORMS, Material
-from feti_homog.case.materials import expansion, plane_stiffness, spatial_stiffness
 from feti_homog.case.phase_names import COATING, FIBRE, MATRIX, PHASE
-from feti_homog.case.schema import TableReader, keys_of
 from feti_homog.case.section_values import FRACTIONS
-from feti_homog.case.wording import suggestion, toml_key, toml_value
+from feti_homog.materials.forms import MATERIAL_FORMS, Material
+from feti_homog.materials.laws import expansion, plane_stiffness, spatial_stiffness
+from feti_homog.schema.keys import TableReader, keys_of
+from feti_homog.schema.wording import suggestion, toml_key, toml_value
 
 SUGGESTED = (MATRIX, FIBRE, COATING, "fibre:2")  # of phases that may have any name
 CONSTANTS = frozenset(name for form in MATERIAL_FORMS.values() for name in keys_of(form))

@@ -7,8 +7,8 @@ from math import fsum, pi, sqrt
 import numpy as np
 
 from feti_homog.case.cell_section import Cell
-from feti_homog.case.schema import keys_of
-from feti_homog.case.wording import toml_value
+from feti_homog.schema.keys import keys_of
+from feti_homog.schema.wording import toml_value
 
 FEWEST = 0.5  # fibres of a phase, below which one would be another phase's worth
 

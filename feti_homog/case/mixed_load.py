@@ -8,11 +8,12 @@ from dataclasses import dataclass
 from itertools import accumulate
 from typing import Any
 
-from feti_homog.case.load_names import SPATIAL_STRAINS, SPATIAL_STRESSES, STRAINS, STRESSES, TEMPERATURE
-from feti_homog.case.schema import Condition, key
 from feti_homog.case.selectors import GENERALIZED
-from feti_homog.case.values import real
+from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES, STRAINS, STRESSES
+from feti_homog.schema.keys import Condition, key
+from feti_homog.schema.values import real
 
+TEMPERATURE = "temperature"
 Strain = tuple[float, ...]
 
 

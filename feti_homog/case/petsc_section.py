@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import re
 
-from feti_homog.case.values import is_number, text
-from feti_homog.case.wording import toml_key, toml_value
+from feti_homog.schema.values import is_number, text
+from feti_homog.schema.wording import toml_key, toml_value
 
 Scalar = str | int | float | bool
 

@@ -8,14 +8,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from feti_homog.case.material_forms import Isotropic
 from feti_homog.case.petsc_section import OPTION_EXPECTED
-from feti_homog.case.schema import Key, keys_of
 from feti_homog.case.sections import SECTIONS_OF_AN_ANALYSIS
 from feti_homog.case.sweep_section import AXIS_EXPECTED, AXIS_MEANING, RANGE_KEYS, SWEEP, SweepSection
 from feti_homog.case.tables import TABLES, Table
-from feti_homog.case.values import text
 from feti_homog.errors import CaseError
+from feti_homog.materials.forms import Isotropic
+from feti_homog.schema.keys import Key, keys_of
+from feti_homog.schema.values import text
 
 ORDER = (
     "name",

@@ -3,13 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 from feti_homog.case.phase_names import FIBRE_PHASE
-from feti_homog.case.values import SMALLEST, ValueType, integer, is_number, is_number_list, real, text, to_floats
+from feti_homog.schema.values import (
+    SMALLEST,
+    ValueType,
+    integer,
+    is_number,
+    is_number_list,
+    list_of,
+    numbers,
+    real,
+    text,
+    to_floats,
+)
 
 STRAIN_COMPONENTS = "[E11, E22, gamma12]"
 PAIR_EXAMPLE = '["coating", "matrix"]'
@@ -18,8 +28,6 @@ SEED = integer(least=0, most=10**15)
 
 MESH_SUFFIXES = (".msh", ".inp", ".vtu", ".vtk")
 MESH_FILE = ".msh, .inp, .vtu or .vtk file"
-
-Matrix = tuple[tuple[float, ...], ...]
 
 
 def _is_cell_file(value: Any) -> bool:
@@ -70,18 +78,6 @@ def _are_openings(value: Any) -> bool:
 
 def _is_strength(value: Any) -> bool:
     return (is_number(value) and value > 0) or (isinstance(value, float) and value == math.inf)
-
-
-def _is_stiffness(value: Any) -> bool:
-    return isinstance(value, list) and len(value) in (3, 6) and all(is_number_list(row, len(value)) for row in value)
-
-
-def _list_of(count: int, items: Mapping[str, Any]) -> dict[str, Any]:
-    return {"type": "array", "items": items, "minItems": count, "maxItems": count}
-
-
-def _numbers(count: int) -> dict[str, Any]:
-    return _list_of(count, real().json_schema)
 
 
 def _positive_or_inf(what: str) -> ValueType:
@@ -146,7 +142,7 @@ PAIR = ValueType(
     f"the names of two phases, such as {PAIR_EXAMPLE}",
     _are_two_phases,
     tuple,
-    {**_list_of(2, text.json_schema), "uniqueItems": True},
+    {**list_of(2, text.json_schema), "uniqueItems": True},
 )
 STRENGTH = _positive_or_inf("a traction")
 STIFFNESS = _positive_or_inf("a stiffness")
@@ -168,7 +164,7 @@ OPENINGS = ValueType(
     },
 )
 STRAIN = ValueType(
-    f"a list of three numbers {STRAIN_COMPONENTS}", lambda v: is_number_list(v, 3), to_floats, _numbers(3)
+    f"a list of three numbers {STRAIN_COMPONENTS}", lambda v: is_number_list(v, 3), to_floats, numbers(3)
 )
 LOAD = ValueType(
     "a table of strains and stresses such as {S11 = 60.0, S22 = 0.0}",
@@ -180,17 +176,5 @@ WAYPOINTS = ValueType(
     f"a list of strains {STRAIN_COMPONENTS} or of tables such as {{S11 = 60.0}}",
     lambda v: isinstance(v, list) and v != [] and all(is_number_list(load, 3) or LOAD.accepts(load) for load in v),
     tuple,
-    {"type": "array", "items": {"anyOf": [_numbers(3), LOAD.json_schema]}, "minItems": 1},
-)
-MATRIX = ValueType(
-    "a symmetric 3x3 array of numbers in the order 11, 22, 12, or 6x6 in the order 11, 22, 33, 23, 13, 12",
-    _is_stiffness,
-    lambda v: tuple(map(to_floats, v)),
-    {"anyOf": [_list_of(3, _numbers(3)), _list_of(6, _numbers(6))]},
-)
-EXPANSION = ValueType(
-    "a number or a list of three numbers",
-    lambda v: is_number(v) or is_number_list(v, 3),
-    lambda v: to_floats(v) if isinstance(v, list) else float(v),
-    {"anyOf": [real().json_schema, _numbers(3)]},
+    {"type": "array", "items": {"anyOf": [numbers(3), LOAD.json_schema]}, "minItems": 1},
 )

@@ -10,10 +10,10 @@ from feti_homog.case.envelope_section import Envelope
 from feti_homog.case.interface_section import InterfaceSection
 from feti_homog.case.load_section import LoadPath, SingleLoad
 from feti_homog.case.mixed_load import Strain
-from feti_homog.case.schema import key
 from feti_homog.case.section_values import OPENINGS, STATES, STRAIN
 from feti_homog.case.selectors import ANGLE_ANALYSIS, ENVELOPE_ANALYSIS, IN_THE_PLANE, LOAD_ANALYSIS, PATH_ANALYSIS
-from feti_homog.case.values import boolean, choice, integer, real, text
+from feti_homog.schema.keys import key
+from feti_homog.schema.values import boolean, choice, integer, real, text
 
 OUT_OF_PLANE_STRESSES = ("S33", "S23", "S13")
 

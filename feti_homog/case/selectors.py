@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from feti_homog.case.schema import Selector
+from feti_homog.schema.keys import Selector
 
 ANALYSIS_TYPE = Selector("analysis", "type")
 PLANE = Selector("analysis", "plane")

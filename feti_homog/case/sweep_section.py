@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from feti_homog.case.schema import Key, key
 from feti_homog.case.section_values import SEED
-from feti_homog.case.values import ValueType, choice, integer, real
+from feti_homog.schema.keys import Key, key
+from feti_homog.schema.values import ValueType, choice, integer, real
 
 SWEEP = "sweep"
 MAX_CASES = 20_000

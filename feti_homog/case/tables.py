@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from feti_homog.case.interface_section import Arc
-from feti_homog.case.material_forms import MATERIAL_FORMS
 from feti_homog.case.mixed_load import MixedLoad
-from feti_homog.case.schema import keys_of
 from feti_homog.case.sections import SECTIONS
+from feti_homog.materials.forms import MATERIAL_FORMS
+from feti_homog.schema.keys import keys_of
 
 REQUIRED = ("cell", "material", "analysis")
 TOP_LEVEL = (*SECTIONS, "material", "petsc", "name")

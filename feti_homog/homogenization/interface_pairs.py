@@ -6,7 +6,7 @@ import numpy as np
 
 from feti_homog.case.case import Case
 from feti_homog.case.interface_rules import interface_label
-from feti_homog.case.wording import toml_value
+from feti_homog.schema.wording import toml_value
 from feti_homog.typing import AnyInt, Int
 
 

@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from feti_homog.case.case import Case
-from feti_homog.case.materials import plane_stiffness
 from feti_homog.materials.bounds import engineering_moduli
+from feti_homog.materials.laws import plane_stiffness
 from feti_homog.mesh.coarse_mesh import CoarseMesh
 from feti_homog.mesh.interface_edges import interface_edges
 

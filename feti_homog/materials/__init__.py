@@ -1,4 +1,5 @@
-"""Closed formulas of the mechanics of composites: moduli, bounds, Voigt's notation.
+"""Materials: their constants, laws and bounds, Voigt's notation, closed formulas of the mechanics of composites.
 
-May use `case`, `runtime` and `errors`.  Main entries: `bounds`, `spatial_constants`, `estimates.methods`.
+May use `schema`, `runtime` and `errors`.  Main entries: `forms`, `laws`, `bounds`, `spatial_constants`,
+`estimates.methods`.
 """

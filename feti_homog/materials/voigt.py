@@ -1,4 +1,4 @@
-"""Voigt orders with engineering shear strains: names of the components, and the tensor of a strain.
+"""Voigt orders with engineering shear strains: names of the components, the tensor of a strain, rotated matrices.
 
 [11, 22, 12] in the plane, [11, 22, 33, 23, 13, 12] in space.
 """
@@ -7,24 +7,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from feti_homog.case.load_names import SPATIAL_STRAINS, SPATIAL_STRESSES, STRAINS, STRESSES
 from feti_homog.typing import Float
 
-__all__ = [
-    "AXIAL_STRESSES",
-    "SPATIAL_STIFFNESSES",
-    "SPATIAL_STRAINS",
-    "SPATIAL_STRESSES",
-    "STIFFNESSES",
-    "STRAINS",
-    "STRESSES",
-    "strain_tensor",
-    "voigt_names",
-]
-
+STRESSES, STRAINS = ("S11", "S22", "S12"), ("E11", "E22", "gamma12")
+SPATIAL_STRESSES = ("S11", "S22", "S33", "S23", "S13", "S12")
+SPATIAL_STRAINS = ("E11", "E22", "E33", "gamma23", "gamma13", "gamma12")
 AXIAL_STRESSES = ("S23", "S13")
 STIFFNESSES = tuple(f"C{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3))
 SPATIAL_STIFFNESSES = tuple(f"C{i}{j}" for i in range(1, 7) for j in range(1, 7))
+IN_PLANE = [0, 1, 5]
+"""Where [11, 22, 12] stand in the order of space."""
+IN_PLANE_BLOCK = np.ix_(IN_PLANE, IN_PLANE)
 
 
 def voigt_names(count: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -35,3 +28,31 @@ def voigt_names(count: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
 def strain_tensor(strain: Float) -> Float:
     """(2, 2) tensor of a strain (3,): E12 = gamma12 / 2."""
     return np.array([[strain[0], strain[2] / 2], [strain[2] / 2, strain[1]]])
+
+
+def rotated(stiffness: Float, angle: float) -> Float:
+    """Stiffness, (3, 3) or (6, 6), in the axes of the cell of a material whose axis 1 is turned by `angle` degrees.
+
+    C = T^T C' T, where T takes strains to the material axes.
+    """
+    rotation = strain_rotation(angle)
+    to_axes = rotation if len(stiffness) == 6 else rotation[IN_PLANE_BLOCK]
+    return np.asarray(to_axes.T @ stiffness @ to_axes)
+
+
+def strain_rotation(angle: float) -> Float:
+    """T (6, 6) that takes strains to axes turned about x3 by `angle` degrees, from x1 towards x2."""
+    c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+    rotation = np.eye(6)
+    rotation[IN_PLANE_BLOCK] = [[c * c, s * s, c * s], [s * s, c * c, -c * s], [-2 * c * s, 2 * c * s, c * c - s * s]]
+    rotation[3:5, 3:5] = [[c, -s], [s, c]]  # of [gamma23, gamma13]
+    return rotation
+
+
+def is_positive_definite(matrix: Float) -> bool:
+    """Whether a symmetric matrix, scaled to a unit diagonal, has no eigenvalue below 1e-12."""
+    diagonal = np.diag(matrix)
+    if diagonal.min() <= 0.0:
+        return False
+    scaled = matrix / np.sqrt(np.outer(diagonal, diagonal))
+    return bool(np.linalg.eigvalsh(scaled).min() > 1e-12)

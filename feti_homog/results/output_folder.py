@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from feti_homog.runtime.file_locks import LockHeld, LocksUnsupported, TemporaryLock, holder
 from feti_homog.parallel.mpi_errors import on_root
-from feti_homog.case.load_names import SPATIAL_STRAINS
+from feti_homog.materials.voigt import SPATIAL_STRAINS
 from feti_homog.errors import CaseError, FetiHomogError
 from feti_homog.results import atomic
 

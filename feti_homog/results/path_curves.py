@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.case.load_names import TEMPERATURE
+from feti_homog.case.mixed_load import TEMPERATURE
 from feti_homog.case.mixed_load import MixedLoad, Strain, completed, components, first_named
 from feti_homog.typing import Float
 

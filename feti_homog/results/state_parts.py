@@ -6,12 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from feti_homog.case import materials
 from feti_homog.fem.assembly import element_strain
 from feti_homog.homogenization import phase_laws
 from feti_homog.homogenization.averaging import Response, displacement, fluctuation
 from feti_homog.homogenization.unit_cell import TornCell
-from feti_homog.materials import stress_measures
+from feti_homog.materials import laws, stress_measures
 from feti_homog.results.field_layout import StatePart
 from feti_homog.results.spatial_layout import SpatialStatePart
 from feti_homog.typing import Float, Float32
@@ -164,7 +163,7 @@ def _out_of_plane(cell: TornCell, stress: Float) -> tuple[Float, Float]:
     """Stresses 33 and strains 33 (m,) of the stresses (m, 3) in plane strain or stress."""
     sizes = [elements for _, elements in _sizes(cell)]
     rules = [
-        materials.out_of_plane(cell.case.material_of(s.submesh.phase), cell.case.analysis.plane)
+        laws.out_of_plane(cell.case.material_of(s.submesh.phase), cell.case.analysis.plane)
         for s in cell.subdomains
     ]
     parts = zip(np.split(stress, np.cumsum(sizes)), rules, strict=False)

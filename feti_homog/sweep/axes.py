@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from feti_homog.case.document import TomlPath
-from feti_homog.case.schema import keys_of
 from feti_homog.case.sections import SECTIONS
 from feti_homog.case.sweep_section import AXIS_EXPECTED, MAX_CASES, RANGE_KEYS, SWEEP, SweepSection
 from feti_homog.case.tables import TOP_LEVEL
-from feti_homog.case.values import is_number, magnitudes_in_words
-from feti_homog.case.wording import dotted_key, suggestion, toml_value
+from feti_homog.schema.keys import keys_of
+from feti_homog.schema.values import is_number, magnitudes_in_words
+from feti_homog.schema.wording import dotted_key, suggestion, toml_value
 
 STEP_TOLERANCE = 1e-9  # of a step: what rounding may take from the last one
 

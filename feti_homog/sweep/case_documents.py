@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from feti_homog.case.sweep_section import SWEEP
-from feti_homog.case.wording import dotted_key, toml_value
+from feti_homog.schema.wording import dotted_key, toml_value
 from feti_homog.sweep.points import Assignment
 
 

@@ -13,9 +13,9 @@ from feti_homog.case import case as cases
 from feti_homog.case.case import Case
 from feti_homog.case.document import read_document, to_document
 from feti_homog.case.sweep_section import SWEEP
-from feti_homog.case.wording import toml_value
 from feti_homog.errors import CaseError
 from feti_homog.report.text.units import unit
+from feti_homog.schema.wording import toml_value
 from feti_homog.sweep.case_documents import CaseDocument, case_documents
 from feti_homog.sweep.points import read_points
 

@@ -11,9 +11,9 @@ import numpy as np
 from scipy.stats import qmc
 
 from feti_homog.case.document import TomlPath
-from feti_homog.case.schema import TableReader, keys_of
 from feti_homog.case.sweep_section import AXIS_EXPECTED, MAX_CASES, SWEEP, SweepSection
-from feti_homog.case.wording import dotted_key
+from feti_homog.schema.keys import TableReader, keys_of
+from feti_homog.schema.wording import dotted_key
 from feti_homog.sweep.axes import Axis, AxisReader
 
 Assignment = dict[TomlPath, Any]

@@ -18,9 +18,9 @@ from support.pixel_images import SYMMETRIES, pixel_mesh, random_image, turned
 from unit.mesh.faulty_meshes import MshFile
 
 from feti_homog import Case, run
-from feti_homog.case.materials import plane_stiffness
 from feti_homog.errors import MeshError
 from feti_homog.feti.decomposition.shared_entities import share_entities
+from feti_homog.materials.laws import plane_stiffness
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.readers.msh_reader import read
 from feti_homog.mesh.refinement import ReferenceLattice

@@ -11,7 +11,7 @@ from types import MappingProxyType
 import numpy as np
 
 from feti_homog.case.interface_section import Arc
-from feti_homog.case.wording import toml_value
+from feti_homog.schema.wording import toml_value
 from feti_homog.typing import Bool, Float, Int
 
 # A node this near to a tip, in degrees, is the tip: coordinates in files and of circles are rounded.

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from feti_homog.case.wording import toml_value
 from feti_homog.errors import MeshError
 from feti_homog.mesh.readers.element_blocks import Block, assembled
 from feti_homog.mesh.readers.mesh_checks import RawMesh
+from feti_homog.schema.wording import toml_value
 from feti_homog.typing import Int
 
 TRIANGLE = re.compile(r"(CPE|CPS|CPEG|DC2D|M3D|S|STRI)(3|6|65)[A-Z]*")

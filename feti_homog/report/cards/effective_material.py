@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.case.voigt_matrices import is_positive_definite
 from feti_homog.errors import CaseError
+from feti_homog.materials.voigt import is_positive_definite
 from feti_homog.typing import Float
 
 FIBRE_FIRST = (2, 0, 1)

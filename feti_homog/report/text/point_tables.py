@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.case.load_names import TEMPERATURE
+from feti_homog.case.mixed_load import TEMPERATURE
 from feti_homog.materials.voigt import STRAINS, STRESSES, voigt_names
 from feti_homog.results import path_curves
 

@@ -9,14 +9,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from feti_homog.case.cell_section import GEOMETRY
-from feti_homog.case.material_forms import Material
 from feti_homog.case.material_sections import read_materials
-from feti_homog.case.materials import plane_stiffness, spatial_stiffness
-from feti_homog.case.schema import TableReader
 from feti_homog.materials import bounds as mechanics
 from feti_homog.materials.estimates.fibre_bounds import fibre_bounds
+from feti_homog.materials.forms import Material
+from feti_homog.materials.laws import plane_stiffness, spatial_stiffness
 from feti_homog.materials.spatial_constants import is_transversely_isotropic, transversely_isotropic_part
 from feti_homog.report.plots.plot_helpers import plain
+from feti_homog.schema.keys import TableReader
 from feti_homog.sweep.report.series import Series, series_over
 from feti_homog.sweep.report.style import COLOURS, label_axes, legend, plot_series
 from feti_homog.sweep.report.sweep_table import SweepTable

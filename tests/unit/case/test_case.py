@@ -20,9 +20,9 @@ from unit.case.valid_cases import MESH, VALID_CASES
 from feti_homog.case.case import check_phases, load, parse
 from feti_homog.case.interface_section import Arc, InterfaceSection
 from feti_homog.case.load_section import LoadPath
-from feti_homog.case.material_forms import General, Isotropic, Orthotropic
 from feti_homog.case.sections import Angle
 from feti_homog.errors import CaseError
+from feti_homog.materials.forms import General, Isotropic, Orthotropic
 
 FAULTY = FAULTY_CASES | FAULTY_BONDINGS | FAULTY_ENVELOPES | FAULTY_LOADS | FAULTY_SIZES | FAULTY_TABLE_CELLS
 

@@ -7,12 +7,12 @@ import re
 
 import pytest
 
-from feti_homog.case.schema import keys_of
 from feti_homog.case.section_values import OPENINGS, STRAIN, STRENGTH, WAYPOINTS
 from feti_homog.case.sweep_section import RANGE_KEYS, SweepSection
 from feti_homog.case.tables import TABLES
-from feti_homog.case.values import LARGEST, MAGNITUDES, SMALLEST, real
-from feti_homog.case.wording import limit_in_words
+from feti_homog.schema.keys import keys_of
+from feti_homog.schema.values import LARGEST, MAGNITUDES, SMALLEST, real
+from feti_homog.schema.wording import limit_in_words
 
 WORDS = re.compile(r"(above|at least|below|at most) (\S+)")
 TYPES = {

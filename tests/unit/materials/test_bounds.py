@@ -8,9 +8,6 @@ import numpy as np
 import pytest
 from reference.references import HASHIN_SHTRIKMAN_BULK, HASHIN_SHTRIKMAN_SHEAR, REUSS_MODULI, VOIGT_MODULI
 
-from feti_homog.case.material_forms import Isotropic, Orthotropic
-from feti_homog.case.materials import plane_stiffness
-from feti_homog.case.voigt_matrices import rotated
 from feti_homog.materials.bounds import (
     anisotropy,
     engineering_moduli,
@@ -20,6 +17,9 @@ from feti_homog.materials.bounds import (
     reuss,
     voigt,
 )
+from feti_homog.materials.forms import Isotropic, Orthotropic
+from feti_homog.materials.laws import plane_stiffness
+from feti_homog.materials.voigt import rotated
 
 MATRIX = plane_stiffness(Isotropic(88.0, 0.299), "strain")
 FIBRE = plane_stiffness(Isotropic(200.0, 0.222), "strain")

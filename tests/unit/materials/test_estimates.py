@@ -21,11 +21,11 @@ from reference.fibre_composites import (
     isotropic,
 )
 
-from feti_homog.case.materials import Isotropic, plane_stiffness
 from feti_homog.materials.bounds import hashin_shtrikman
 from feti_homog.materials.estimates.constituents import CONSTANTS, NOTHING, Fibres, Springs
 from feti_homog.materials.estimates.fibre_bounds import fibre_bounds
 from feti_homog.materials.estimates.methods import METHODS, estimates
+from feti_homog.materials.laws import Isotropic, plane_stiffness
 from feti_homog.materials.spatial_constants import transversely_isotropic_part
 
 ANISOTROPIC_MATRIX = fibre_like(5.0, 3.0, 0.3, 0.4, 1.7, 40.0, 60.0)

@@ -8,9 +8,9 @@ from support.verified_results import CARBON as WARM_CARBON
 from support.verified_results import FIBRE, MATRIX, TURNED, TURNED_IN_SPACE, WARM
 
 from feti_homog.case.case import parse
-from feti_homog.case.material_forms import Orthotropic
-from feti_homog.case.materials import expansion, out_of_plane, plane_stiffness, spatial_stiffness
 from feti_homog.errors import CaseError
+from feti_homog.materials.forms import Orthotropic
+from feti_homog.materials.laws import expansion, out_of_plane, plane_stiffness, spatial_stiffness
 from feti_homog.verify import constitutive_law
 from feti_homog.verify.constitutive_law import expansions, plane_stiffnesses, spatial_stiffnesses
 

@@ -1,4 +1,4 @@
-"""The law of each phase: its stiffness in the plane and in space, and its thermal expansion.
+"""The law of each phase: its stiffness in the plane and in space, its thermal expansion, and how far phases are apart.
 
 Voigt order [11, 22, 12] in the plane, [11, 22, 33, 23, 13, 12] in space, with engineering shears. x3 is normal to a
 plane of symmetry of every phase, so that [23, 13] are coupled to each other alone.
@@ -6,10 +6,12 @@ plane of symmetry of every phase, so that [23, 13] are coupled to each other alo
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from functools import partial
+
 import numpy as np
 
-from feti_homog.case.engineering_constants import PLANE_IN_WORDS, known_compliance, stable_compliance
-from feti_homog.case.material_forms import (
+from feti_homog.materials.forms import (
     EXPANSION_PAIR,
     General,
     Isotropic,
@@ -17,12 +19,21 @@ from feti_homog.case.material_forms import (
     Orthotropic,
     TransverselyIsotropic,
 )
-from feti_homog.case.voigt_matrices import IN_PLANE, IN_PLANE_BLOCK, is_positive_definite, rotated, strain_rotation
-from feti_homog.case.wording import toml_value
+from feti_homog.materials.voigt import IN_PLANE, IN_PLANE_BLOCK, is_positive_definite, rotated, strain_rotation
+from feti_homog.schema.wording import limit_in_words, toml_key, toml_value
 from feti_homog.typing import Float
 
 COUPLINGS = ((0, 3), (0, 4), (1, 3), (1, 4), (2, 3), (2, 4), (3, 5), (4, 5))
 """Entries of a spatial stiffness that vanish where x3 is normal to a plane of symmetry."""
+PLANE_IN_WORDS = {"strain": "plane strain", "generalized": "generalized plane strain"}
+NEEDED: dict[type[Orthotropic] | type[TransverselyIsotropic], dict[str, tuple[str, ...]]] = {
+    Orthotropic: {"strain": ("E3", "nu13", "nu23"), "generalized": ("E3", "nu13", "nu23", "G13", "G23")},
+    TransverselyIsotropic: {"strain": ("E_axial", "nu_axial"), "generalized": ("E_axial", "nu_axial", "G_axial")},
+}
+"""The optional constants that a plane state needs."""
+# Beyond the first, rounding of displacements makes stresses as large as those of the soft phase are allowed to be off;
+# beyond the second, it leaves nothing of them.
+WORRYING_CONTRAST, LARGEST_CONTRAST = 1e10, 1e14
 
 
 def plane_stiffness(material: Material, plane: str) -> Float:
@@ -166,3 +177,83 @@ def _check_expansions(material: TransverselyIsotropic) -> None:
     if len(given) == 1:
         (absent,) = set(EXPANSION_PAIR).difference(given)
         raise ValueError(f"{absent}: missing; {given[0]} needs it")
+
+
+def stable_compliance(material: Orthotropic | TransverselyIsotropic, plane: str) -> Float:
+    """Compliance (6, 6) in the material axes, checked as far as the plane state needs it."""
+    compliance = known_compliance(material)
+    if not is_positive_definite(compliance[:2, :2]):
+        raise ValueError(f"{_limit_in_plane(material)}; no material is stable otherwise")
+    absent = [name for name in NEEDED[type(material)].get(plane, ()) if getattr(material, name) is None]
+    if absent:
+        needs = "needs it" if len(absent) == 1 else "needs them"
+        raise ValueError(f"{', '.join(absent)}: missing; {PLANE_IN_WORDS[plane]} {needs}")
+    if plane != "stress" and not is_positive_definite(compliance[:3, :3]):
+        raise ValueError(_limit_in_space(material))
+    return compliance
+
+
+def known_compliance(material: Orthotropic | TransverselyIsotropic) -> Float:
+    """Compliance (6, 6) in the material axes; NaN where the constants do not say it."""
+    if isinstance(material, TransverselyIsotropic):
+        E1, E3, G13, nu31 = _numbers(material.E_transverse, material.E_axial, material.G_axial, material.nu_axial)
+        nu12, nu13 = material.nu_transverse, nu31 * E1 / E3
+        G12 = E1 / (2.0 * (1.0 + nu12))
+        moduli, ratios, shears = [E1, E1, E3], [nu12, nu13, nu13], [G13, G13, G12]
+    else:
+        moduli = _numbers(material.E1, material.E2, material.E3)
+        ratios = _numbers(material.nu12, material.nu13, material.nu23)
+        shears = _numbers(material.G23, material.G13, material.G12)
+    compliance = np.diag(1.0 / np.array([*moduli, *shears]))
+    for (i, j), ratio in zip(((0, 1), (0, 2), (1, 2)), ratios, strict=True):
+        compliance[i, j] = compliance[j, i] = -ratio / moduli[i]
+    return compliance
+
+
+def _numbers(*constants: float | None) -> list[float]:
+    """The constants, NaN for those that are not given."""
+    return [np.nan if constant is None else constant for constant in constants]
+
+
+def _limit_in_plane(material: Orthotropic | TransverselyIsotropic) -> str:
+    """What is wrong with the constants of the plane."""
+    if isinstance(material, TransverselyIsotropic):
+        return f"nu_transverse = {material.nu_transverse}: expected a number above -1 and below 1"
+    limit = limit_in_words(material.E1 / material.E2, material.nu12**2, 6)
+    return f"nu12 = {material.nu12}: expected nu12^2 < E1/E2 = {limit}"
+
+
+def _limit_in_space(material: Orthotropic | TransverselyIsotropic) -> str:
+    """What is wrong with constants of which those of the plane are right."""
+    if isinstance(material, Orthotropic):
+        return "E1, E2, E3, nu12, nu13, nu23: expected a positive definite compliance"
+    E_transverse, E_axial, nu_axial = _numbers(material.E_transverse, material.E_axial, material.nu_axial)
+    limit = limit_in_words((1.0 - material.nu_transverse) * E_axial / (2.0 * E_transverse), nu_axial**2, 6)
+    words = "nu_axial^2 < (1 - nu_transverse) E_axial/(2 E_transverse)"
+    return f"nu_axial = {nu_axial}: expected {words} = {limit}; no material is stable otherwise"
+
+
+def contrast_faults(materials: Mapping[str, Material], plane: str) -> list[str]:
+    """A fault if the phases are too far apart; their constants are those of stable materials."""
+    contrast, phases = _contrast(materials, plane)
+    if contrast <= LARGEST_CONTRAST:
+        return []
+    return [f"{phases}: stiffnesses that differ by a factor of {contrast:.1e}: expected at most {LARGEST_CONTRAST:g}"]
+
+
+def contrast_warnings(materials: Mapping[str, Material], plane: str) -> list[str]:
+    """A warning if rounding may matter."""
+    contrast, phases = _contrast(materials, plane)
+    if contrast <= WORRYING_CONTRAST:
+        return []
+    return [f"{phases}: stiffnesses differ by a factor of {contrast:.1e}: rounding may exceed what the checks allow"]
+
+
+def _contrast(materials: Mapping[str, Material], plane: str) -> tuple[float, str]:
+    """The largest ratio of the largest entries of two phases' stiffnesses, and the sections of these phases."""
+    law = spatial_stiffness if plane == "generalized" else partial(plane_stiffness, plane=plane)
+    with np.errstate(over="ignore"):
+        sizes = {phase: float(np.abs(law(material)).max()) for phase, material in materials.items()}
+    stiffest, softest = max(sizes, key=sizes.__getitem__), min(sizes, key=sizes.__getitem__)
+    names = ", ".join(f"[material.{toml_key(phase)}]" for phase in (stiffest, softest))
+    return sizes[stiffest] / sizes[softest], names

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from feti_homog.case.load_names import SPATIAL_STRAINS, STRAINS
 from feti_homog.fem.problem import AXIAL, GENERALIZED, PLANE
 from feti_homog.homogenization.phase_laws import AXIAL_SHEAR, IN_PLANE
+from feti_homog.materials.voigt import SPATIAL_STRAINS, STRAINS
 
 
 def test_names_are_those_of_the_unit_loads():

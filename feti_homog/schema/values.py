@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from feti_homog.case.wording import toml_value
+from feti_homog.schema.wording import toml_value
 
 SMALLEST, LARGEST = 1e-100, 1e100
 """Magnitudes of numbers other than 0: no product of a few over- or underflows."""
@@ -108,6 +108,16 @@ def _numeric(name: str, is_of_type: Callable[[Any], bool], store: Callable[[Any]
         store,
         {"type": name, **limits.json_schema()},
     )
+
+
+def list_of(count: int, items: Mapping[str, Any]) -> dict[str, Any]:
+    """The JSON Schema of a list of so many items."""
+    return {"type": "array", "items": items, "minItems": count, "maxItems": count}
+
+
+def numbers(count: int) -> dict[str, Any]:
+    """The JSON Schema of a list of so many numbers."""
+    return list_of(count, real().json_schema)
 
 
 def choice(*options: str) -> ValueType:
