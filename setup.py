@@ -23,19 +23,20 @@ setup(
         "numpy>=1.23",  # of the major version that petsc4py was built for: scripts/bootstrap takes that one
         "scipy>=1.10",
         "matplotlib>=3.6",
-        "bokeh>=3.4",
-        "jinja2>=3.1",
         "gmsh>=4.11",
         "pymetis>=2023.1",
-        "tqdm>=4.64",
         "tomli-w>=1.0",
     ],
     extras_require={
         # These must be built on one MPI: from the distribution or the cluster's modules, never by default
         # from wheels (the h5py wheel has no MPI).
         "mpi": ["petsc4py>=3.18", "mpi4py>=3.1", "h5py>=3.7"],
+        "report": ["bokeh>=3.4", "jinja2>=3.1", "tqdm>=4.64"],  # report.html, and a progress bar on terminals
         "meshes": ["meshio>=5.3"],  # cells in .vtu and .vtk files
         "dev": [
+            "bokeh>=3.4",
+            "jinja2>=3.1",
+            "tqdm>=4.64",
             "meshio>=5.3",
             "pytest>=7.4",
             "selenium>=4.20",
@@ -50,5 +51,5 @@ setup(
             "vtk>=9.3",
         ],
     },
-    entry_points={"console_scripts": ["feti-homog = feti_homog.cli:main"]},
+    entry_points={"console_scripts": ["feti-homog = feti_homog.__main__:main"]},
 )

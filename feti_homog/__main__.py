@@ -1,11 +1,21 @@
-"""`python -m feti_homog`."""
+"""Start the command line: `python -m feti_homog`, and the console script `feti-homog`."""
 
+import os
 import signal
 import sys
 
-if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-    signal.signal(signal.SIGINT, signal.SIG_DFL)  # until the program listens, Ctrl-C ends it without a traceback
+from feti_homog.runtime.environment import prepare
 
-from feti_homog.cli import main
 
-sys.exit(main())
+def main() -> int:
+    """Run the command line in a prepared environment; returns the exit code."""
+    prepare(os.environ)
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)  # until the program listens, Ctrl-C ends it without a traceback
+    from feti_homog.cli import main as command  # NumPy reads the environment when it is imported
+
+    return command()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

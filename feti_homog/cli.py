@@ -20,6 +20,7 @@ from feti_homog.commands import fibres, statistics
 from feti_homog.errors import EXIT_DONE, EXIT_UNCONVERGED, CaseError, FetiHomogError
 from feti_homog.petsc.command_words import split_argv
 from feti_homog.petsc.option_table import help_text
+from feti_homog.runtime.environment import require_report
 from feti_homog.runtime.interrupts import end_on_signals, launched_rank
 from feti_homog.runtime.standard_streams import complain, prepare, print_product, say
 from feti_homog.version import __version__
@@ -32,6 +33,9 @@ SWEEP_HELP = (
     "Expand the file into numbered cases, check all of them, and run them one after the other. Finished cases are "
     "skipped, so after an interruption the same command goes on. Cases that fail are kept with their error and "
     "reported at the end, with exit code 3."
+)
+LAUNCHER_HELP = (
+    "Open MPI's own switches belong to mpirun: --allow-run-as-root, --oversubscribe (more ranks than cores)."
 )
 VERIFY_HELP = (
     "Recompute stresses, equilibrium, periodicity, averages, contact, strengths and energies from result.json and "
@@ -81,7 +85,7 @@ def command_parser() -> Parser:
     parser = Parser(
         prog="feti-homog",
         description="Effective stiffness of fibre composites by FETI, on any number of MPI ranks.",
-        epilog=help_text(),
+        epilog=f"{help_text()}\n\n{LAUNCHER_HELP}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"feti-homog {__version__}")
@@ -202,6 +206,7 @@ def _report(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.analysis import stored_result
     from feti_homog.parallel.mpi_errors import on_root_only
 
+    require_report()
     on_root_only(comm, stored_result.read, arguments.directory)
     path = on_root_only(comm, _written_report, arguments.directory)
     if path is not None:

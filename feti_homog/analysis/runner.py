@@ -38,6 +38,7 @@ from feti_homog.results.checkpoint import Checkpoint, EventsInMemory, NoCheckpoi
 from feti_homog.results.event_log import EventLog
 from feti_homog.results.field_file import FieldFile
 from feti_homog.runtime import process_memory
+from feti_homog.runtime.environment import require_report
 from feti_homog.runtime.progress import Progress
 
 
@@ -61,6 +62,8 @@ def run(
     if resume and on_root(comm, stored_result.finished, directory, case):
         progress.say(f"{directory} holds the finished result of this case: nothing to do")
         return Result.of(on_root(comm, result_json.read, directory))
+    if case.output.report:
+        require_report()
     on_root(comm, output_folder.usable, directory)
     on_root(comm, folder_contents.refuse_files_of_others, directory)
     with output_folder.held(directory, comm, progress.say), _torn(case, comm, progress) as cell:

@@ -6,6 +6,7 @@ import sys
 import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
 from typing import TypeVar
 
 from mpi4py import MPI
@@ -24,7 +25,7 @@ class Progress:
         self.comm = comm
         self.prints = comm.rank == 0 and not quiet
         # mpirun gives rank 0 a terminal for its output even if mpirun has none itself, but none for its errors.
-        self.on_terminal = self.prints and sys.stdout.isatty() and sys.stderr.isatty()
+        self.on_terminal = self.prints and sys.stdout.isatty() and sys.stderr.isatty() and find_spec("tqdm") is not None
         self.seconds: dict[str, float] = {}
         self._within = [0.0]  # seconds that stages within those now open took, the innermost last
 

@@ -1,0 +1,32 @@
+"""Settings that a process needs before it imports NumPy, h5py and MPI, and libraries that are optional."""
+
+from __future__ import annotations
+
+from collections.abc import MutableMapping
+from importlib.util import find_spec
+
+from feti_homog.errors import LibraryError
+
+SETTINGS = {
+    "OMP_NUM_THREADS": "1",  # one core per rank: threads of BLAS would compete with the ranks
+    "H5PY_ALWAYS_USE_MPI": "1",  # Debian has a serial h5py beside the parallel one
+    "OMPI_MCA_btl_vader_single_copy_mechanism": "none",  # containers forbid the default of Open MPI 4
+    "OMPI_MCA_smsc": "^cma",  # and of Open MPI 5
+}
+
+
+def prepare(environment: MutableMapping[str, str]) -> None:
+    """Set what is not yet set."""
+    for name, value in SETTINGS.items():
+        environment.setdefault(name, value)
+
+
+def require_report() -> None:
+    """Check the libraries of report.html.
+
+    Raises:
+        LibraryError: one is not installed.
+    """
+    missing = [name for name in ("bokeh", "jinja2") if find_spec(name) is None]
+    if missing:
+        raise LibraryError(f"report.html needs {' and '.join(missing)}: pip install 'feti_homog[report]'")
