@@ -1,5 +1,4 @@
-"""The command line: `feti-homog run CASE.toml --out DIR`, `check CASE.toml`, `plot DIR`, `report DIR`, `export DIR`,
-`verify DIR`, `statistics`, `fibres`, `sweep`, `collect`, `keys`, `schema`, `options`.
+"""The command line, `feti-homog COMMAND ...`.
 
 Options with a double dash are ours, with a single dash PETSc's.
 """
@@ -31,16 +30,13 @@ if TYPE_CHECKING:
 
 SWEEP_HELP = (
     "Expand the file into numbered cases, check all of them, and run them one after the other. Finished cases are "
-    "skipped, so after an interruption the same command goes on. Cases that fail are kept with their error and "
-    "reported at the end, with exit code 3."
+    "skipped: the same command resumes. Failed cases are kept and reported at the end, with exit code 3."
 )
-LAUNCHER_HELP = (
-    "Open MPI's own switches belong to mpirun: --allow-run-as-root, --oversubscribe (more ranks than cores)."
-)
+LAUNCHER_HELP = "Switches of Open MPI go to mpirun: --allow-run-as-root, --oversubscribe (more ranks than cores)."
 VERIFY_HELP = (
     "Recompute stresses, equilibrium, periodicity, averages, contact, strengths and energies from result.json and "
-    "result.h5, with elements of its own: one line a law, with its largest violation and the limit. Exit code 3 if a "
-    "law is broken. Needs neither MPI nor PETSc; of several ranks each does all of it, and the first one prints."
+    "result.h5, with elements of its own: a line per law, with its largest violation and limit. Exit code 3 if a law "
+    "is broken. Needs neither MPI nor PETSc; on several ranks each does all of it, and the first one prints."
 )
 EXPORT_HELP = (
     'Print the effective constants of a stiffness or an envelope in plane = "generalized" as a card of a material. Its '

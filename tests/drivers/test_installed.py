@@ -67,6 +67,6 @@ def test_the_wheel_runs_the_demo_case(installed, tmp_path, start):
 
 
 def test_the_wheel_is_what_runs(installed):
-    program = "import feti_homog; print(feti_homog.__file__)"
+    program = "import feti_homog as package; print(package.__file__)"
     where = done(installed / "venv/bin/python", "-c", program, cwd=installed, env=variables())
     assert Path(where.strip()).is_relative_to(installed / "venv")
