@@ -44,6 +44,7 @@ setup(
             "coverage>=7.10",
             "radon>=6",
             "ruff>=0.4",
+            "codespell>=2.4",
             "mypy>=1.8",
             "clarabel>=0.6",
             "jsonschema>=4.20",

@@ -39,6 +39,7 @@ PROVIDERS = {
             "coverage",
             "radon",
             "ruff",
+            "codespell_lib",
             "mypy",
             "clarabel",
             "feti_homog",
