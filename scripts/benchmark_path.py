@@ -27,7 +27,7 @@ from feti_homog.feti.preconditioners.influence import Influence  # noqa: E402
 from feti_homog.homogenization.averaging import Homogenization  # noqa: E402
 from feti_homog.homogenization.unit_cell import tear  # noqa: E402
 from feti_homog.interface.contact.contact_problem import BONDED  # noqa: E402
-from feti_homog.interface.contact.loaded_cell import LoadedCell  # noqa: E402
+from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces  # noqa: E402
 from feti_homog.interface.laws.strength_criterion import StrengthCriterion  # noqa: E402
 from feti_homog.interface.loads.load import Load  # noqa: E402
 from feti_homog.interface.path.path_following import events  # noqa: E402
@@ -102,10 +102,10 @@ def run_events(homogenization: Homogenization, count: int | None) -> tuple[list[
     interface = homogenization.interface
     bonded = np.full(len(interface.nodes.row), BONDED, np.int8)
     found = events(
-        LoadedCell(interface),
+        CoupledInterfaces(interface),
         StrengthCriterion(STRENGTH, STRENGTH, "max"),
         [Load.strain(np.array(STRAIN))],
-        unloaded(LoadedCell(interface), bonded),
+        unloaded(CoupledInterfaces(interface), bonded),
     )
     seconds, iterations, solves = [], [], []
     start = time.perf_counter()

@@ -17,7 +17,7 @@ from feti_homog.homogenization.averaging import Homogenization, Response
 from feti_homog.homogenization.energy_release import EnergyReleaseRates
 from feti_homog.homogenization.fibre_debonding import FibreInterfaces
 from feti_homog.interface.contact.contact_problem import OPEN, Equilibrium, Status
-from feti_homog.interface.contact.loaded_cell import LoadedCell
+from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.loads.load import Load
 from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES, STRAINS
 from feti_homog.runtime.progress import Progress
@@ -78,9 +78,9 @@ class AnalysisContext:
         return (self.homogenization,) if self.axial is None else (self.homogenization, self.axial)
 
     @property
-    def loaded_cell(self) -> LoadedCell:
+    def loaded_cell(self) -> CoupledInterfaces:
         """The interfaces of all problems."""
-        return LoadedCell(*(problem.interface for problem in self._problems))
+        return CoupledInterfaces(*(problem.interface for problem in self._problems))
 
     @property
     def case(self) -> Case:

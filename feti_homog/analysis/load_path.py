@@ -36,7 +36,7 @@ def run(
             responses = context.responses(point.state, point.scale)
             source = "" if energies is None else ", from the checkpoint"
             if energies is not None:
-                work.recall(*energies, point)
+                work.resume_from(*energies, point)
             else:
                 work.arrive(point)
                 if point.state.converged:
@@ -120,17 +120,17 @@ def _entry(
         "load_factor": point.load_factor,
         "broke": point.broke,
         "free_motions": point.state.free_motions,
-        "work": work.followed.work,
-        "dissipated": work.followed.released,
+        "work": work.all_equilibria.work,
+        "dissipated": work.all_equilibria.released,
         "dissipated_strain_controlled": work.load_controlled,
-        **({} if spring_criterion(criterion) is None else _fracture(work.followed)),
+        **({} if spring_criterion(criterion) is None else _fracture(work.all_equilibria)),
     } | context.loaded_point(responses)
 
 
-def _fracture(followed: Energies) -> dict[str, float]:
+def _fracture(all_equilibria: Energies) -> dict[str, float]:
     """What bonds that break by energy have lost beside their toughness."""
-    energy = followed.fracture
-    return {"fracture_energy": energy} | ({"dissipation_ratio": followed.released / energy} if energy else {})
+    energy = all_equilibria.fracture
+    return {"fracture_energy": energy} | ({"dissipation_ratio": all_equilibria.released / energy} if energy else {})
 
 
 def _counts(entry: Mapping[str, Any]) -> str:

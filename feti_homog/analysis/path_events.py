@@ -26,13 +26,13 @@ class Work:
     What is lost to breaks is the work of the loads less what is stored.
 
     Attributes:
-        followed: where every bond broke at its own load, the first leg with its snap-back.
+        all_equilibria: where every bond broke at its own load, the first leg with its snap-back.
         load_controlled: what is lost where the load only rose on the first leg, as in a test: a bond of a snap-back
             breaks at the largest load t so far, and loses (t / own load)^2 times as much, for all is of degree one in
             the load.
     """
 
-    followed: Energies = NO_ENERGIES
+    all_equilibria: Energies = NO_ENERGIES
     load_controlled: float = 0.0
     _load: float = 0.0
     _largest_load: float = 0.0
@@ -42,11 +42,11 @@ class Work:
         # Beyond the first leg loads do not fall.
         rise = self._largest_load / self._load if self._load else 1.0
         controlled = self.load_controlled + rise**2 * point.energies.released
-        self.recall(self.followed.plus(point.energies), controlled, point)
+        self.resume_from(self.all_equilibria.plus(point.energies), controlled, point)
 
-    def recall(self, followed: Energies, load_controlled: float, point: Point) -> None:
+    def resume_from(self, all_equilibria: Energies, load_controlled: float, point: Point) -> None:
         """Go on from a point up to which there were these."""
-        self.followed, self.load_controlled = followed, load_controlled
+        self.all_equilibria, self.load_controlled = all_equilibria, load_controlled
         self._load, self._largest_load = point.load_factor, max(point.load_factor, self._largest_load)
 
 
@@ -58,7 +58,7 @@ def stored(point: Point, work: Work) -> tuple[dict[str, Any], Arrays]:
     after = point.after
     whole: dict[str, Any] = {
         "path": [point.load_factor, point.scale, float(after.leg), after.position, float(point.broke)],
-        "energies": [*point.energies, *work.followed, work.load_controlled],
+        "energies": [*point.energies, *work.all_equilibria, work.load_controlled],
         "macroscopic": np.stack([after.origin.strain, after.origin.stress, after.last.strain, after.last.stress]),
         "broken": np.nan if after.broken is None else after.broken,
     }
@@ -72,7 +72,7 @@ def stored(point: Point, work: Work) -> tuple[dict[str, Any], Arrays]:
 
 
 def restored(event: Arrays) -> tuple[Point, tuple[Energies, float]]:
-    """What `stored` took apart: the point, and `followed` and `load_controlled` of the energies up to it."""
+    """What `stored` took apart: the point, and `all_equilibria` and `load_controlled` of the energies up to it."""
     load_factor, scale, leg, position, broke = event["path"].tolist()
     energies = event["energies"].tolist()
     state = _put_together(event, "")

@@ -7,7 +7,7 @@ import numpy as np
 from feti_homog.analysis.result_records import Tips
 from feti_homog.feti.decomposition.interface_neighbours import InterfaceNeighbours
 from feti_homog.homogenization.unit_cell import TornCell
-from feti_homog.interface.contact.loaded_cell import LoadedCell
+from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.laws.energy_criterion import EnergyCriterion
 from feti_homog.interface.laws.tip_energies import tip_energies
 from feti_homog.interface.path.path_points import Point
@@ -29,7 +29,7 @@ def bond_directions(cell: TornCell) -> Float:
 class TipRecorder:
     """Makes the records of points whose bonds break by energy."""
 
-    def __init__(self, cell: TornCell, loaded: LoadedCell, springs: EnergyCriterion) -> None:
+    def __init__(self, cell: TornCell, loaded: CoupledInterfaces, springs: EnergyCriterion) -> None:
         """`loaded` are the interfaces of the cell.  Collective."""
         self._cell, self._loaded, self._springs = cell, loaded, springs
         self._neighbours = InterfaceNeighbours(cell.comm, cell.solver.jump_operator, cell.subdomains)

@@ -19,8 +19,8 @@ from feti_homog.interface.contact.contact_problem import (
     BONDED,
     CLOSED,
     OPEN,
+    ContactProblem,
     Equilibrium,
-    Interface,
     Status,
 )
 from feti_homog.interface.loads.load import Load
@@ -67,7 +67,7 @@ class Homogenization:
 
     def __init__(self, cell: TornCell, contact: bool) -> None:
         self.cell = cell
-        self.interface = Interface(cell.solver, contact, np.array([cell.summary.width, cell.summary.height]))
+        self.interface = ContactProblem(cell.solver, contact, np.array([cell.summary.width, cell.summary.height]))
 
     @property
     def loads(self) -> tuple[str, ...]:

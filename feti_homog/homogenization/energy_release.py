@@ -25,7 +25,7 @@ from feti_homog.homogenization.crack_extension import (
     wrapped,
 )
 from feti_homog.homogenization.unit_cell import TornCell
-from feti_homog.interface.contact.contact_problem import BONDED, Interface, Status
+from feti_homog.interface.contact.contact_problem import BONDED, ContactProblem, Status
 from feti_homog.interface.tips.crack_tips import CrackTips, InterfaceChains, closing_work
 from feti_homog.materials.voigt import strain_tensor
 from feti_homog.parallel.distributed_arrays import allreduce_sum
@@ -78,7 +78,7 @@ class EnergyReleaseRates:
             tributary lengths.
     """
 
-    def __init__(self, cell: TornCell, interface: Interface) -> None:
+    def __init__(self, cell: TornCell, interface: ContactProblem) -> None:
         """Collective."""
         nodes = interface.nodes
         self.cell, self.interface, self._period = cell, interface, cell.summary.period

@@ -10,24 +10,21 @@ from typing import Any
 import numpy as np
 
 from feti_homog.errors import CaseError
-from feti_homog.verify.arc_laws import check_arcs
 from feti_homog.verify.bonds import COATING
-from feti_homog.verify.derived_laws import check_derived
+from feti_homog.verify.check_arcs import check_arcs
+from feti_homog.verify.check_envelope import check_envelope
+from feti_homog.verify.check_fields import check_derived, check_fields
+from feti_homog.verify.check_interfaces import check_interface_state
+from feti_homog.verify.check_loads import StateNumbers, check_load
+from feti_homog.verify.check_mesh import check_interface, check_mesh
+from feti_homog.verify.check_path import check_path
+from feti_homog.verify.check_points import check_points
+from feti_homog.verify.check_spatial import check_spatial
+from feti_homog.verify.check_summary import check_summary, check_tables
 from feti_homog.verify.discrete_cell import DiscreteCell
-from feti_homog.verify.envelope_laws import check_envelope
-from feti_homog.verify.field_laws import check_fields
-from feti_homog.verify.interface_laws import check_interface_state
-from feti_homog.verify.laws import laws
-from feti_homog.verify.ledger import Finding, Ledger
-from feti_homog.verify.load_laws import StateNumbers, check_load
-from feti_homog.verify.mesh_laws import check_interface, check_mesh
+from feti_homog.verify.findings import Finding, Findings, checks
 from feti_homog.verify.own_process import in_own_process
-from feti_homog.verify.path_laws import check_path
-from feti_homog.verify.point_laws import check_points
 from feti_homog.verify.reading import ResultFiles, altered, opened
-from feti_homog.verify.spatial_laws import check_spatial
-from feti_homog.verify.summary_laws import check_summary
-from feti_homog.verify.table_laws import check_tables
 
 
 @dataclass(frozen=True)
@@ -86,33 +83,33 @@ def _of(directory: Path) -> Certificate:
 
 def _verified(files: ResultFiles, directory: Path) -> Certificate:
     rtol, users_mesh = float(files.document["solver"]["rtol"]), files.case["cell"]["geometry"] == "mesh"
-    ledger = Ledger(laws(rtol, users_mesh, has_coatings=COATING in files.case["material"]))
-    ledger.record("files", len(files.altered), ", ".join(files.altered))
+    findings = Findings(checks(rtol, users_mesh, has_coatings=COATING in files.case["material"]))
+    findings.record("files", len(files.altered), ", ".join(files.altered))
     cell = DiscreteCell.of(files)
-    check_mesh(ledger, cell)
-    check_interface(ledger, cell)
+    check_mesh(findings, cell)
+    check_interface(findings, cell)
     states = []
     for state in files.states():
         arrays = (state.displacement, state.fluctuation, state.stress, state.traction, state.jump, state.strain)
-        ledger.record("numbers", [np.count_nonzero(~np.isfinite(array)) for array in arrays], state.name)
+        findings.record("numbers", [np.count_nonzero(~np.isfinite(array)) for array in arrays], state.name)
         terms = np.abs(state.displacement) + np.abs(state.fluctuation)
         fields = cell.elements.fields(state.displacement, terms, state.along, cell.free_strains(state))
-        check_fields(ledger, cell, state, fields)
-        check_derived(ledger, cell, state, fields)
-        check_interface_state(ledger, cell, state)
+        check_fields(findings, cell, state, fields)
+        check_derived(findings, cell, state, fields)
+        check_interface_state(findings, cell, state)
         states.append(StateNumbers.of(cell, state, fields))
-    check_load(ledger, cell, states)
-    check_arcs(ledger, cell, states)
-    check_points(ledger, cell, states)
+    check_load(findings, cell, states)
+    check_arcs(findings, cell, states)
+    check_points(findings, cell, states)
     if "path" in files.document:
-        check_path(ledger, cell, states)
+        check_path(findings, cell, states)
     if "envelope" in files.document:
-        check_envelope(ledger, cell, states)
-    check_summary(ledger, cell)
-    check_tables(ledger, directory, files.document)
+        check_envelope(findings, cell, states)
+    check_summary(findings, cell)
+    check_tables(findings, directory, files.document)
     if files.is_spatial:
-        check_spatial(ledger, cell, states)
-    return Certificate(ledger.findings(), _title(files, states), _status(files))
+        check_spatial(findings, cell, states)
+    return Certificate(findings.worst(), _title(files, states), _status(files))
 
 
 def _title(files: ResultFiles, states: Sequence[StateNumbers]) -> str:

@@ -27,9 +27,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from feti_homog.typing import Float
+from feti_homog.verify.check_loads import StateNumbers
 from feti_homog.verify.discrete_cell import DiscreteCell
-from feti_homog.verify.ledger import Ledger
-from feti_homog.verify.load_laws import StateNumbers
+from feti_homog.verify.findings import Findings
 from feti_homog.verify.prescribed import SAME_SHARE, TEMPERATURE, Prescribed, at_points, targets
 
 # Loads whose components differ by so much, relatively, are in proportion.
@@ -83,18 +83,18 @@ class PointNumbers:
 
 
 def check_path_energies(
-    ledger: Ledger, cell: DiscreteCell, states: Sequence[StateNumbers], points: Sequence[Point]
+    findings: Findings, cell: DiscreteCell, states: Sequence[StateNumbers], points: Sequence[Point]
 ) -> None:
     """`work`, `stored` and what was dissipated at all points; fields are kept of those of `states`."""
     numbers = _numbers(cell, states, points)
     scale = max(each.stored for each in numbers) + cell.rounded_energy or 1e-300
     for each, point in zip(numbers, points, strict=True):
         off = point["work"] - each.stored - point["dissipated"]
-        ledger.record("energy", abs(off) / scale, f"{each.name}, work less stored and dissipated")
+        findings.record("energy", abs(off) / scale, f"{each.name}, work less stored and dissipated")
     if cell.files.case["path"]["method"] == "events":
-        _check_events(ledger, numbers, points, 1.0 / len(targets(cell.files.case)), scale)
+        _check_events(findings, numbers, points, 1.0 / len(targets(cell.files.case)), scale)
     else:
-        _check_increments(ledger, _stiffest(cell), numbers, points, scale)
+        _check_increments(findings, _stiffest(cell), numbers, points, scale)
 
 
 def _numbers(cell: DiscreteCell, states: Sequence[StateNumbers], points: Sequence[Point]) -> list[PointNumbers]:
@@ -119,25 +119,25 @@ def _numbers(cell: DiscreteCell, states: Sequence[StateNumbers], points: Sequenc
 
 
 def _check_events(
-    ledger: Ledger, numbers: Sequence[PointNumbers], points: Sequence[Point], first_leg: float, scale: float
+    findings: Findings, numbers: Sequence[PointNumbers], points: Sequence[Point], first_leg: float, scale: float
 ) -> None:
     """What is lost between two points is lost by the bonds that break at the first of them; the first leg ends at the
     load factor `first_leg`."""
-    ledger.record("energy", abs(points[0]["dissipated"]) / scale, f"{numbers[0].name}, dissipated")
-    ledger.record("energy", abs(points[0]["dissipated_strain_controlled"]) / scale, f"{numbers[0].name}, dissipated")
+    findings.record("energy", abs(points[0]["dissipated"]) / scale, f"{numbers[0].name}, dissipated")
+    findings.record("energy", abs(points[0]["dissipated_strain_controlled"]) / scale, f"{numbers[0].name}, dissipated")
     largest = 0.0
     for (state, before), (after, now) in pairwise(zip(numbers, points, strict=True)):
         largest = max(largest, before["load_factor"])
         low, high = (0.0, 0.0) if before["broke"] == 0 else _losses(state, after)
         lost = now["dissipated"] - before["dissipated"]
-        ledger.record("energy", max(low - lost, lost - high, 0.0) / scale, f"{after.name}, dissipated")
+        findings.record("energy", max(low - lost, lost - high, 0.0) / scale, f"{after.name}, dissipated")
         if before["broke"] == 0:
             straight = _work(after.strain - state.strain, state.stress + after.stress) / 2
             off = np.nan_to_num(now["work"] - before["work"] - straight)
-            ledger.record("energy", abs(off) / scale, f"{after.name}, work")
+            findings.record("energy", abs(off) / scale, f"{after.name}, work")
         rise = largest / before["load_factor"] if 0.0 < before["load_factor"] < first_leg - SAME_SHARE else 1.0
         off = now["dissipated_strain_controlled"] - before["dissipated_strain_controlled"] - rise**2 * lost
-        ledger.record("energy", abs(off) / scale, f"{after.name}, dissipated_strain_controlled")
+        findings.record("energy", abs(off) / scale, f"{after.name}, dissipated_strain_controlled")
 
 
 def _losses(state: PointNumbers, after: PointNumbers) -> tuple[float, float]:
@@ -176,7 +176,7 @@ def _work(one: Float, other: Float) -> float:
 
 
 def _check_increments(
-    ledger: Ledger, stiffest: Float, numbers: Sequence[PointNumbers], points: Sequence[Point], scale: float
+    findings: Findings, stiffest: Float, numbers: Sequence[PointNumbers], points: Sequence[Point], scale: float
 ) -> None:
     """At the load of a step: what was lost is the potential of the old bonds, which (P) bounds by the step before, less
     that of the new; the strain of the new ones in bonded phases stores no less than the old bonds would have."""
@@ -188,9 +188,9 @@ def _check_increments(
             high = float(now.strain @ stiffest[:n, :n] @ now.strain) / 2 - now.stored
             least, most = potentials(now.load, numbers[number - 1]) if number else (-np.inf, np.inf)
             low, high = max(least - now.potential, 0.0), min(high, most - now.potential)
-        ledger.record("energy", max(low - lost, lost - high, 0.0) / scale, f"{now.name}, dissipated")
+        findings.record("energy", max(low - lost, lost - high, 0.0) / scale, f"{now.name}, dissipated")
         off = point["dissipated_strain_controlled"] - point["dissipated"]
-        ledger.record("energy", abs(off) / scale, f"{now.name}, dissipated_strain_controlled")
+        findings.record("energy", abs(off) / scale, f"{now.name}, dissipated_strain_controlled")
         total = point["dissipated"]
 
 

@@ -15,7 +15,7 @@ from feti_homog import Case
 from feti_homog.analysis.criteria import criterion_of
 from feti_homog.homogenization import unit_cell
 from feti_homog.interface.contact.contact_problem import BONDED, CLOSED, OPEN
-from feti_homog.interface.contact.loaded_cell import LoadedCell
+from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.loads.load import Load
 from feti_homog.interface.path.path_following import events
 from feti_homog.interface.path.path_points import unloaded
@@ -82,8 +82,8 @@ def compare(case, expected, strain):
     """The points of the path have the broken bonds, loads and stresses of the events; bonds of both pairs break."""
     interface = torn_cells.interface(case.cell, True)
     bonded = np.full(case.here, BONDED, np.int8)
-    begin = unloaded(LoadedCell(interface), bonded)
-    points = list(events(LoadedCell(interface), criterion_of(case.cell), strains(np.array([strain])), begin))
+    begin = unloaded(CoupledInterfaces(interface), bonded)
+    points = list(events(CoupledInterfaces(interface), criterion_of(case.cell), strains(np.array([strain])), begin))
     found = np.array([case.in_reference_order(p.after.status) != BONDED for p in points])
     np.testing.assert_array_equal(found, np.cumsum([e.broke for e in expected], axis=0) > 0)
     assert relative_error(np.array([p.load_factor for p in points]), [e.load_factor for e in expected]) < 1e-8

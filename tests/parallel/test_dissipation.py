@@ -13,7 +13,7 @@ from support.ranks import PIECES
 
 from feti_homog.analysis.path_events import Work
 from feti_homog.interface.contact.contact_problem import BONDED
-from feti_homog.interface.contact.loaded_cell import LoadedCell
+from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.laws.strength_criterion import StrengthCriterion
 from feti_homog.interface.loads.load import Load
 from feti_homog.interface.path.path_following import events, increments
@@ -32,12 +32,12 @@ CRITERION = StrengthCriterion(20.0, 30.0, "max")
 
 def start(cell, contact):
     interface = torn_cells.interface(cell, contact)
-    return interface, unloaded(LoadedCell(interface), np.full(len(interface.nodes.row), BONDED, np.int8))
+    return interface, unloaded(CoupledInterfaces(interface), np.full(len(interface.nodes.row), BONDED, np.int8))
 
 
 def follow(cell, waypoints, contact=True):
     interface, begin = start(cell, contact)
-    return list(events(LoadedCell(interface), CRITERION, strains(np.array(waypoints)), begin))
+    return list(events(CoupledInterfaces(interface), CRITERION, strains(np.array(waypoints)), begin))
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +57,7 @@ def dissipated(points):
     energies, rows = Work(), []
     for point in points:
         energies.arrive(point)
-        rows.append((energies.followed.released, energies.load_controlled))
+        rows.append((energies.all_equilibria.released, energies.load_controlled))
     return np.array(rows)
 
 
@@ -123,7 +123,7 @@ def test_rising_strain_dissipates_the_area_under_its_curve(straight, case, conta
 def test_increments_dissipate_the_work_that_is_not_stored(torn, worst_only):
     cell = torn(**THREE)
     interface, begin = start(cell, True)
-    points = list(increments(LoadedCell(interface), CRITERION, strains(STRAIGHT[None]), 12, worst_only, begin))
+    points = list(increments(CoupledInterfaces(interface), CRITERION, strains(STRAIGHT[None]), 12, worst_only, begin))
     found = dissipated(points)
     work = 0.5 * strain(points[0]) @ stress(cell, points[0])
     for before, now, lost in zip(points, points[1:], found[1:, 0], strict=False):

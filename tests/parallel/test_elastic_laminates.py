@@ -16,7 +16,7 @@ from unit.mesh.faulty_meshes import grid
 
 from feti_homog.homogenization.averaging import Homogenization
 from feti_homog.interface.contact.contact_problem import BONDED
-from feti_homog.interface.contact.loaded_cell import LoadedCell
+from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.laws.energy_criterion import EnergyCriterion
 from feti_homog.interface.laws.tip_criterion import TipCriterion
 from feti_homog.interface.path.path_following import events
@@ -83,7 +83,9 @@ def test_all_bonds_break_at_once_and_nothing_is_left(comm, strip, growth):
         springs = EnergyCriterion(NORMAL, TANGENTIAL, TOUGHNESS, 0.25)
         law = springs if growth == "springs" else TipCriterion(springs, cell.solver.preconditioner)
         strain = np.array([[2 * peak / C11, 0.0, 0.0]])
-        first, last = events(LoadedCell(interface), law, strains(strain), unloaded(LoadedCell(interface), bonded(cell)))
+        first, last = events(
+            CoupledInterfaces(interface), law, strains(strain), unloaded(CoupledInterfaces(interface), bonded(cell))
+        )
         assert first.load_factor == pytest.approx(0.5, rel=1e-8)
         assert first.scale * interface.stress(first.state.solution)[0] == pytest.approx(peak, rel=1e-8)
         assert first.broke == comm.allreduce(len(interface.nodes.row))

@@ -23,7 +23,7 @@ from support.ranks import PIECES, parallel_assert
 from feti_homog import Case, run
 from feti_homog.feti.decomposition.interface_neighbours import InterfaceNeighbours
 from feti_homog.interface.contact.contact_problem import BONDED
-from feti_homog.interface.contact.loaded_cell import LoadedCell
+from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.laws.energy_criterion import EnergyCriterion
 from feti_homog.interface.laws.tip_criterion import TipCriterion
 from feti_homog.interface.loads.load import Load
@@ -52,11 +52,11 @@ def path(comm, growth, strain, **case):
     """The interface and the points of a path straight to a strain."""
     cell = torn_cells.tear(comm, **case)
     interface = torn_cells.interface(cell, True)
-    begin = unloaded(LoadedCell(interface), np.full(len(interface.nodes.row), BONDED, np.int8))
+    begin = unloaded(CoupledInterfaces(interface), np.full(len(interface.nodes.row), BONDED, np.int8))
     return (
         cell,
         interface,
-        list(events(LoadedCell(interface), criterion(cell, growth), strains(np.array([strain])), begin)),
+        list(events(CoupledInterfaces(interface), criterion(cell, growth), strains(np.array([strain])), begin)),
     )
 
 
@@ -152,7 +152,7 @@ def test_onset_of_one_fibre_in_much_matrix(comm, strength, radius):
         **GLASS_EPOXY,
     )
     interface = torn_cells.interface(cell, True)
-    begin = unloaded(LoadedCell(interface), np.full(len(interface.nodes.row), BONDED, np.int8))
+    begin = unloaded(CoupledInterfaces(interface), np.full(len(interface.nodes.row), BONDED, np.int8))
     responses = interface.equilibria(np.eye(3), begin.status, [begin.lam.plane] * 3)
     L = np.array([interface.stress(response.solution) for response in responses]).T
     matrix, fibre = (
@@ -162,7 +162,7 @@ def test_onset_of_one_fibre_in_much_matrix(comm, strength, radius):
     for load in ([1.0, 0.0, 0.0], [1.0, -1.0, 0.0]):
         expected = onset_of_fibre(matrix, fibre, radius, (stiffness, stiffness / 4), TOUGHNESS, SENSITIVITY, load[:2])
         strain = np.linalg.solve(L, 1.2 * expected * np.array(load))
-        first = next(events(LoadedCell(interface), bonds, strains(strain[None]), begin))
+        first = next(events(CoupledInterfaces(interface), bonds, strains(strain[None]), begin))
         stress = first.scale * interface.stress(first.state.solution)
         np.testing.assert_allclose(stress, expected * np.array(load), atol=0.005 * expected)
 

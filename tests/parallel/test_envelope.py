@@ -15,7 +15,7 @@ from feti_homog.analysis.criteria import criterion_of
 from feti_homog.errors import CaseError
 from feti_homog.homogenization.averaging import Homogenization
 from feti_homog.interface.contact.contact_problem import OPEN
-from feti_homog.interface.contact.loaded_cell import LoadedCell
+from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.path.onset import OnsetCriterion
 from feti_homog.report.plots import response_curves
 from feti_homog.results import result_json
@@ -209,7 +209,7 @@ def test_a_tip_in_space_releases_what_its_break_does(comm):
         plane, axial = Homogenization(cell, False), Homogenization(cell.axial, False)
         status = np.where(cell.debonded(None), OPEN, 0).astype(np.int8)
         criterion = criterion_of(cell)
-        onset = OnsetCriterion.of(criterion, LoadedCell(plane.interface, axial.interface), status)
+        onset = OnsetCriterion.of(criterion, CoupledInterfaces(plane.interface, axial.interface), status)
         energy, traction = cell_energy(plane, axial, strain, status)
         tips = onset.tips.tips
         foretold = (
@@ -245,7 +245,7 @@ def direct_utilisation(cell, strain, temperature):
         )
         for each, loads in pairs
     ]
-    onset = OnsetCriterion.of(criterion_of(cell), LoadedCell(plane.interface, axial.interface), status)
+    onset = OnsetCriterion.of(criterion_of(cell), CoupledInterfaces(plane.interface, axial.interface), status)
     used = onset.utilisation(np.hstack(found), np.arange(len(status)))
     return max(cell.comm.allgather(float(used.max(initial=0.0))))
 

@@ -28,4 +28,4 @@ def test_an_unsolved_programme_is_raised_on_every_rank(comm, monkeypatch):
         interface.equilibrium(Load.strain(np.array([-1.0, -1.0, 0.0])), status, start)
     nodes, gap = interface.nodes, np.ones(len(status))
     with pytest.raises(ConvergenceError, match="not solved: Numerical difficulties"):
-        floating_bodies.room_ahead(comm, cell.solver.natural, nodes, status == OPEN, gap, -gap, 1e-9)
+        floating_bodies.admissible_share(comm, cell.solver.natural, nodes, status == OPEN, gap, -gap, 1e-9)

@@ -11,7 +11,7 @@ from support.loads import strains
 from support.ranks import PIECES
 
 from feti_homog.interface.contact.contact_problem import BONDED, OPEN
-from feti_homog.interface.contact.loaded_cell import LoadedCell
+from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.laws.strength_criterion import StrengthCriterion
 from feti_homog.interface.loads.load import Load
 from feti_homog.interface.path.path_following import events
@@ -41,7 +41,7 @@ def interface_with(cell, is_debonded):
     """The interface with contact and the beginning of a path with some nodes debonded, or all (True)."""
     interface = torn_cells.interface(cell, True)
     debonded = np.broadcast_to(is_debonded, len(interface.nodes.row))
-    return interface, unloaded(LoadedCell(interface), np.where(debonded, OPEN, BONDED).astype(np.int8))
+    return interface, unloaded(CoupledInterfaces(interface), np.where(debonded, OPEN, BONDED).astype(np.int8))
 
 
 def largest_bend(interface, points, legs):
@@ -70,7 +70,7 @@ def test_free_fibres_are_straight_between_points(torn, case, waypoints):
     cell = torn(**FREE[case])
     interface, begin = interface_with(cell, True)
     solves = cell.solver.solves
-    points = list(events(LoadedCell(interface), NEVER, strains(np.array(waypoints)), begin))
+    points = list(events(CoupledInterfaces(interface), NEVER, strains(np.array(waypoints)), begin))
     solves = cell.solver.solves - solves
     assert all(p.state.solution.reason > 0 and max(p.state.certificate.values()) < 1e-8 for p in points)
     assert largest_bend(interface, points, len(waypoints)) < STRAIGHT
@@ -83,7 +83,7 @@ def test_partly_free_and_breaking_fibres_are_straight_between_points(comm):
     fibre = cell.solver.jump_operator.nodes.fibre
     interface, begin = interface_with(cell, fibre != comm.allreduce(fibre.min(initial=1000), min))
     waypoints = np.array([[0.05, 0.05, 0.0], [-0.05, -0.02, 0.03], [0.6, -0.3, 0.1], [-0.8, -0.2, 0.0]])
-    points = list(events(LoadedCell(interface), StrengthCriterion(20.0, 30.0, "max"), strains(waypoints), begin))
+    points = list(events(CoupledInterfaces(interface), StrengthCriterion(20.0, 30.0, "max"), strains(waypoints), begin))
     assert sum(p.broke for p in points[1:]) > 3
     assert largest_bend(interface, points, len(waypoints)) < STRAIGHT
 
@@ -94,7 +94,7 @@ def test_a_fibre_that_breaks_bond_by_bond_takes_few_solves(comm):
     interface, begin = interface_with(cell, False)
     waypoints = np.array([[0.02, 0.0, 0.0], [-0.05, 0.02, 0.0], [0.1, 0.0, 0.0]])
     solves = cell.solver.solves
-    points = list(events(LoadedCell(interface), StrengthCriterion(4.0, 3.0, "max"), strains(waypoints), begin))
+    points = list(events(CoupledInterfaces(interface), StrengthCriterion(4.0, 3.0, "max"), strains(waypoints), begin))
     assert len(points) > 30 and points[-1].load_factor == 1.0
     # A state at each change or break, one past it, and one ahead, with a pivot now and then: no halvings.
     assert cell.solver.solves - solves < 3.5 * len(points)
@@ -103,7 +103,7 @@ def test_a_fibre_that_breaks_bond_by_bond_takes_few_solves(comm):
 def test_a_free_fibre_is_squeezed_where_the_strain_is_zero(torn):
     cell = torn(**FREE["square"])
     interface, begin = interface_with(cell, True)
-    tension, turn, pressed = events(LoadedCell(interface), NEVER, strains(np.array(WAYPOINTS[0])), begin)
+    tension, turn, pressed = events(CoupledInterfaces(interface), NEVER, strains(np.array(WAYPOINTS[0])), begin)
     assert [tension.load_factor, pressed.load_factor] == [0.5, 1.0]
     assert abs(turn.load_factor - 0.75) < 1e-9 and np.abs(turn.state.solution.strain).max() < 1e-9
     # On both sides the response is proportional to the strain, with the stiffnesses of a void and of a contact.
@@ -116,6 +116,6 @@ def test_faces_that_touch_without_force_hold_nothing(torn):
     interface, begin = interface_with(cell, True)
     waypoints = np.array([[-0.05, -0.05, 0.0], [0.0, 0.0, 0.0]])
     pressed, unloaded_again = (
-        p for p in events(LoadedCell(interface), NEVER, strains(waypoints), begin) if p.after.position == 0
+        p for p in events(CoupledInterfaces(interface), NEVER, strains(waypoints), begin) if p.after.position == 0
     )
     assert [pressed.state.free_motions, unloaded_again.state.free_motions] == [1, 3]

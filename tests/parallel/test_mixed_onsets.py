@@ -13,8 +13,8 @@ from support.ranks import PIECES, parallel_assert
 from feti_homog import Case, run
 from feti_homog.analysis.criteria import criterion_of
 from feti_homog.homogenization import unit_cell
-from feti_homog.interface.contact.contact_problem import BONDED, OPEN, Interface
-from feti_homog.interface.contact.loaded_cell import LoadedCell
+from feti_homog.interface.contact.contact_problem import BONDED, OPEN, ContactProblem
+from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.loads.load import Load
 from feti_homog.interface.path.path_following import events
 from feti_homog.interface.path.path_points import unloaded
@@ -78,7 +78,9 @@ def first_break(cell, axes, values, temperature):
     temperature if there is one, and the share of its leg.  Collective."""
     size = np.array([cell.summary.width, cell.summary.height])
     contact = cell.case.interface.contact
-    loaded = LoadedCell(Interface(cell.solver, contact, size), Interface(cell.axial.solver, False, size))
+    loaded = CoupledInterfaces(
+        ContactProblem(cell.solver, contact, size), ContactProblem(cell.axial.solver, False, size)
+    )
     of_stresses, whole = axes[0] in STRESSES, np.zeros(6)
     whole[[(STRESSES if of_stresses else STRAINS).index(name) for name in axes]] = values
     legs = [load(loaded.loads, of_stresses, np.zeros(6), temperature)] if temperature else []

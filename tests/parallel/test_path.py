@@ -14,7 +14,7 @@ from support.loads import strains
 from support.ranks import PIECES, parallel_assert
 
 from feti_homog.interface.contact.contact_problem import BONDED, OPEN
-from feti_homog.interface.contact.loaded_cell import LoadedCell
+from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.laws.strength_criterion import StrengthCriterion
 from feti_homog.interface.path.path_following import events, increments
 from feti_homog.interface.path.path_points import unloaded
@@ -48,10 +48,10 @@ def follow(cell, contact, law, waypoints, begin=None):
     interface = torn_cells.interface(cell, contact)
     return list(
         events(
-            LoadedCell(interface),
+            CoupledInterfaces(interface),
             law,
             strains(np.array(waypoints)),
-            begin or unloaded(LoadedCell(interface), bonded_status(cell)),
+            begin or unloaded(CoupledInterfaces(interface), bonded_status(cell)),
         )
     )
 
@@ -118,10 +118,10 @@ def test_debonding_begins_at_the_load_of_the_series_solution(comm):
     interface = torn_cells.interface(cell, True)
     first = next(
         events(
-            LoadedCell(interface),
+            CoupledInterfaces(interface),
             StrengthCriterion(0.1, 0.1, "max"),
             strains(np.eye(3)[:1]),
-            unloaded(LoadedCell(interface), bonded_status(cell)),
+            unloaded(CoupledInterfaces(interface), bonded_status(cell)),
         )
     )
     stress = first.scale * torn_cells.stress(cell, first.state.solution)
@@ -152,9 +152,11 @@ def test_increments_meet_events_and_the_curve_between_them_converges_with_first_
     law, strain = StrengthCriterion(0.05, 0.05, "max"), np.array([[1e-3, 0.0, 0.0]])
     exact = curve(cell, follow(cell, True, law, strain))[:, :2]
     interface, loads, errors = torn_cells.interface(cell, True), np.linspace(0, 1, 20001), []
-    begin = unloaded(LoadedCell(interface), bonded_status(cell))
+    begin = unloaded(CoupledInterfaces(interface), bonded_status(cell))
     for steps in (10, 40, 160):
-        found = curve(cell, list(increments(LoadedCell(interface), law, strains(strain), steps, True, begin)))[:, :2]
+        found = curve(cell, list(increments(CoupledInterfaces(interface), law, strains(strain), steps, True, begin)))[
+            :, :2
+        ]
         assert relative_error(found[:, 1], rising(exact, found[:, 0])) < 1e-7
         errors.append(np.abs(np.interp(loads, *np.vstack([[0, 0], found]).T) - rising(exact, loads)).mean())
     # A drop within a step h is smeared over it: an error of between a quarter and a half of the drop times h.
@@ -169,12 +171,12 @@ def test_onset_by_increments_is_late_by_less_than_one_increment(torn):
     for steps in (10, 40):
         points = list(
             increments(
-                LoadedCell(interface),
+                CoupledInterfaces(interface),
                 law,
                 strains(strain),
                 steps,
                 False,
-                unloaded(LoadedCell(interface), bonded_status(cell)),
+                unloaded(CoupledInterfaces(interface), bonded_status(cell)),
             )
         )
         onset = next(p.load_factor for p in points if p.broke)
@@ -206,8 +208,8 @@ def test_increments_stop_at_a_solve_that_does_not_converge(comm, worst_only):
     loose = {"petsc": {"feti_ksp_max_it": 1, "feti_pc_type": "none"}}
     cell = torn_cells.tear(comm, **SQUARE, **loose)
     interface, law = torn_cells.interface(cell, True), StrengthCriterion(1e-3, 1e-3, "max")
-    begin = unloaded(LoadedCell(interface), bonded_status(cell))
-    (point,) = increments(LoadedCell(interface), law, strains(np.array([MIXED])), 4, worst_only, begin)
+    begin = unloaded(CoupledInterfaces(interface), bonded_status(cell))
+    (point,) = increments(CoupledInterfaces(interface), law, strains(np.array([MIXED])), 4, worst_only, begin)
     assert point.state.solution.reason < 0 and point.broke == 0
 
 
@@ -219,10 +221,10 @@ def test_infinite_strengths_never_break(torn):
     interface = torn_cells.interface(cell, True)
     points = list(
         events(
-            LoadedCell(interface),
+            CoupledInterfaces(interface),
             StrengthCriterion(1.0, 1.0, "max"),
             strains(np.array([SHEAR, MIXED])),
-            unloaded(LoadedCell(interface), status),
+            unloaded(CoupledInterfaces(interface), status),
         )
     )
     points = [p for p in points if p.after.position == 0]

@@ -17,7 +17,7 @@ from feti_homog import Case, run
 from feti_homog.analysis.path_events import Work
 from feti_homog.homogenization.averaging import Homogenization
 from feti_homog.interface.contact.contact_problem import BONDED
-from feti_homog.interface.contact.loaded_cell import LoadedCell
+from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.laws.energy_criterion import EnergyCriterion
 from feti_homog.interface.laws.strength_criterion import StrengthCriterion
 from feti_homog.interface.laws.tip_criterion import TipCriterion
@@ -69,23 +69,23 @@ def test_work_is_stored_or_dissipated_at_every_point(torn, stiffnesses, name, wa
     cell = torn(**THREE, **PHASES, **TIGHT, mesh_size=0.15, radius_spread=0.2, springs=stiffnesses)
     homogenization, law = Homogenization(cell, True), criterion(cell, name)
     interface = homogenization.interface
-    begin = unloaded(LoadedCell(interface), np.full(len(interface.nodes.row), BONDED, np.int8))
+    begin = unloaded(CoupledInterfaces(interface), np.full(len(interface.nodes.row), BONDED, np.int8))
     energies, work, before, worst, scale, broke = Work(), 0.0, None, 0.0, 0.0, 0
-    for point in events(LoadedCell(interface), law, strains(np.array(waypoints)), begin):
+    for point in events(CoupledInterfaces(interface), law, strains(np.array(waypoints)), begin):
         response = homogenization.response(point.state, point.scale)
         energies.arrive(point)
         if before is None:
             work = 0.5 * response.strain @ response.stress
         else:
             work += 0.5 * (before[1] + response.stress) @ (response.strain - before[0])
-        worst = max(worst, abs(work - response.stored - energies.followed.released))
+        worst = max(worst, abs(work - response.stored - energies.all_equilibria.released))
         scale, broke = max(scale, response.stored), broke + point.broke
         assert response.stored == pytest.approx(0.5 * response.strain @ response.stress, rel=1e-8, abs=1e-9 * scale)
         assert 0.0 <= response.in_springs <= response.stored * (1 + 1e-12)
         assert (response.in_springs == 0.0) == (stiffnesses[0] is None or response.stored == 0.0)
         after = interface.equilibrium(Load.strain(response.strain), point.after.status, point.after.lam.plane)
         before = response.strain, interface.stress(after.solution)
-    assert broke > 8 and worst < EXACT * scale and energies.followed.released > 0.01 * scale
+    assert broke > 8 and worst < EXACT * scale and energies.all_equilibria.released > 0.01 * scale
 
 
 def test_what_is_stored_is_that_of_quadratic_programming(built):
@@ -95,9 +95,9 @@ def test_what_is_stored_is_that_of_quadratic_programming(built):
     case = built(geometry="square", mesh_size=0.2, **PHASES, **TIGHT, springs=springs)
     homogenization = Homogenization(case.cell, True)
     interface, comm = homogenization.interface, case.cell.comm
-    begin = unloaded(LoadedCell(interface), np.full(case.here, BONDED, np.int8))
+    begin = unloaded(CoupledInterfaces(interface), np.full(case.here, BONDED, np.int8))
     points = list(
-        events(LoadedCell(interface), criterion(case.cell, "released", width), strains(np.array(LEGS)), begin)
+        events(CoupledInterfaces(interface), criterion(case.cell, "released", width), strains(np.array(LEGS)), begin)
     )
     assert len(points) > 12
     for point in points[::3]:

@@ -17,7 +17,7 @@ from feti_homog import Case, run
 from feti_homog.errors import ConvergenceError
 from feti_homog.feti.preconditioners.bordered_inverse import BorderedInverse
 from feti_homog.interface.contact.contact_problem import BONDED, OPEN
-from feti_homog.interface.contact.loaded_cell import LoadedCell
+from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.laws.energy_criterion import EnergyCriterion
 from feti_homog.interface.laws.tip_criterion import TipCriterion
 from feti_homog.interface.loads import mixed_load
@@ -196,7 +196,7 @@ def softly_held(comm, stiffness, young, count, **cell):
     case = base | {"fibre": {"young": young, "poisson": 0.2}, "decomposition": {"subdomains": 2}} | cell
     petsc = {"feti_pc_type": "influence", "feti_dual_operator": "explicit"}
     cell = torn_cells.tear(comm, springs=(stiffness, RATIO * stiffness), petsc=petsc, **case)
-    loaded = LoadedCell(torn_cells.interface(cell, False))
+    loaded = CoupledInterfaces(torn_cells.interface(cell, False))
     springs = EnergyCriterion(stiffness, RATIO * stiffness, TOUGHNESS * stiffness, SENSITIVITY)
     begin = unloaded(loaded, np.full(len(loaded.nodes.row), BONDED, np.int8))
     points = events(loaded, TipCriterion(springs, cell.solver.preconditioner), strains(STRAIN[None]), begin)

@@ -20,7 +20,7 @@ from feti_homog.homogenization import coarse_meshes
 from feti_homog.homogenization.domain_partition import PartitionPolicy, distribute
 from feti_homog.homogenization.tile_tearing import can_be_torn_by_tiles, tear_by_tiles
 from feti_homog.interface.contact.contact_problem import BONDED
-from feti_homog.interface.contact.loaded_cell import LoadedCell
+from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.laws.strength_criterion import StrengthCriterion
 from feti_homog.interface.path.path_following import events
 from feti_homog.interface.path.path_points import unloaded
@@ -117,7 +117,7 @@ def test_a_path_is_that_of_the_cell_torn_on_rank_0(comm):
         cell = {"geometry": "random", "fibres": 16, "fibre_fraction": 0.5, "mesh_size": 0.1, "decomposition": pieces}
         torn = torn_cells.tear(comm, springs=(500.0, 300.0), policy=TILED, **cell)
         assert (torn.summary.subdomains > 17) == (not pieces)
-        loaded = LoadedCell(torn_cells.interface(torn, contact=True))
+        loaded = CoupledInterfaces(torn_cells.interface(torn, contact=True))
         bonded = np.full(len(torn.solver.jump_operator.nodes.row), BONDED, np.int8)
         law = StrengthCriterion(20.0, 30.0, "quadratic")
         path = events(loaded, law, strains(np.array([[1.0, -0.2, 0.4]])), unloaded(loaded, bonded))

@@ -11,7 +11,7 @@ from support.loads import strains
 from support.ranks import PIECES
 
 from feti_homog.interface.contact.contact_problem import BONDED
-from feti_homog.interface.contact.loaded_cell import LoadedCell
+from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.laws.energy_criterion import EnergyCriterion
 from feti_homog.interface.laws.tip_criterion import TipCriterion
 from feti_homog.interface.path.path_following import events
@@ -78,5 +78,10 @@ def follow(cell, growth, begin=None):
     law = TipCriterion(springs, cell.solver.preconditioner) if growth == "released" else springs
     bonded = np.full(len(interface.nodes.row), BONDED, np.int8)
     return list(
-        events(LoadedCell(interface), law, strains(STRAIN[None]), begin or unloaded(LoadedCell(interface), bonded))
+        events(
+            CoupledInterfaces(interface),
+            law,
+            strains(STRAIN[None]),
+            begin or unloaded(CoupledInterfaces(interface), bonded),
+        )
     )

@@ -14,7 +14,7 @@ from feti_homog import Case, run
 from feti_homog.analysis.criteria import criterion_of
 from feti_homog.homogenization import unit_cell
 from feti_homog.interface.contact.contact_problem import OPEN
-from feti_homog.interface.contact.loaded_cell import LoadedCell
+from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.path.path_following import events
 from feti_homog.interface.path.path_points import unloaded
 from feti_homog.petsc.options import case_options
@@ -81,7 +81,12 @@ def path_onset(cell: Any, strain: np.ndarray) -> tuple[float, np.ndarray]:
     status = np.where(cell.debonded(None), OPEN, 0).astype(np.int8)
     far = 1e6 * strain
     point = next(
-        events(LoadedCell(interface), criterion_of(cell), strains(far[None]), unloaded(LoadedCell(interface), status))
+        events(
+            CoupledInterfaces(interface),
+            criterion_of(cell),
+            strains(far[None]),
+            unloaded(CoupledInterfaces(interface), status),
+        )
     )
     assert point.broke or cell.comm.allreduce(point.broke)
     return 1e6 * point.load_factor, point.scale * interface.stress(point.state.solution)

@@ -12,7 +12,7 @@ MATRIX = ("material", "matrix")
 
 def broken(folder):
     """The laws that a result breaks."""
-    return {finding.law.name for finding in verify(folder).findings if not finding.holds}
+    return {finding.check.name for finding in verify(folder).findings if not finding.holds}
 
 
 def scale(name, factor=1 + SMALL, state=0):

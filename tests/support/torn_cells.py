@@ -14,7 +14,7 @@ from feti_homog.fibres.arrangement import arrange
 from feti_homog.homogenization import unit_cell
 from feti_homog.homogenization.domain_partition import DEFAULT_POLICY
 from feti_homog.homogenization.unit_cell import TornCell
-from feti_homog.interface.contact.contact_problem import BONDED, OPEN, Interface
+from feti_homog.interface.contact.contact_problem import BONDED, OPEN, ContactProblem
 from feti_homog.petsc.options import case_options
 from feti_homog.runtime.progress import Progress
 from support.cases import make_case
@@ -77,7 +77,7 @@ def printed(comm, capfd, **case):
 
 def interface(cell, contact):
     """Its interfaces."""
-    return Interface(cell.solver, contact, np.array([cell.summary.width, cell.summary.height]))
+    return ContactProblem(cell.solver, contact, np.array([cell.summary.width, cell.summary.height]))
 
 
 def build(comm, **case):

@@ -23,8 +23,8 @@ from feti_homog.interface.contact.contact_certificate import kkt_errors
 from feti_homog.interface.contact.floating_bodies import place
 from feti_homog.interface.contact.load_scales import LoadScales
 from feti_homog.interface.loads import mixed_load
+from feti_homog.interface.loads.coupled_solution import CoupledSolution, Multipliers
 from feti_homog.interface.loads.load import Load
-from feti_homog.interface.loads.solutions import Multipliers, Solutions
 from feti_homog.typing import Bool, Float, Int
 
 Status = NDArray[np.int8]
@@ -67,9 +67,9 @@ class Equilibrium:
     axial: Equilibrium | None = None
 
     @property
-    def solutions(self) -> Solutions:
+    def solutions(self) -> CoupledSolution:
         """Of all problems."""
-        return Solutions(self.solution, None if self.axial is None else self.axial.solution)
+        return CoupledSolution(self.solution, None if self.axial is None else self.axial.solution)
 
     @property
     def multipliers(self) -> Multipliers:
@@ -83,7 +83,7 @@ class Equilibrium:
 
 
 @dataclass(frozen=True)
-class Interface:
+class ContactProblem:
     """All fibre-matrix interfaces of the torn cell.
 
     Attributes:
@@ -230,16 +230,16 @@ class Interface:
         """The solution with free fibres where they have room, and which nodes (k,) break the KKT conditions."""
         if not self.contact:
             return solution, np.zeros(len(status), bool)
-        squeezed = np.zeros(len(status), bool)
+        pressed = np.zeros(len(status), bool)
         coarse, noise = self.solver.natural, self.gap_noise(solution.strain)
         if coarse.unconstrained_modes.shape[1]:
             placement = place(self.solver.comm, coarse, self.nodes, status == OPEN, solution, noise)
             alpha, jump = solution.alpha + placement.alpha, solution.jump + placement.jump(coarse)
-            solution, squeezed = replace(solution, alpha=alpha, jump=jump), placement.squeezed
+            solution, pressed = replace(solution, alpha=alpha, jump=jump), placement.pressed
         force, gap = solution.lam[self.nodes.row], solution.jump[self.nodes.row]
         pulled = (status == CLOSED) & (force > self.force_noise(solution))
         overlaps = (status == OPEN) & (gap < -noise)
-        return solution, pulled | overlaps | squeezed
+        return solution, pulled | overlaps | pressed
 
     def _equilibrium(
         self, load: Load, status: Status, solution: DualSolution, iterations: int, solves: int

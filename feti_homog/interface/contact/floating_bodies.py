@@ -43,7 +43,7 @@ class Placement:
     """Amplitudes (dimension,) to add to alpha, and the open nodes (k,) that must close for lack of room."""
 
     alpha: Float
-    squeezed: Bool
+    pressed: Bool
 
     def jump(self, coarse: NaturalCoarseSpace) -> Float:
         """(owned rows,) G alpha."""
@@ -91,12 +91,12 @@ def place(
         ConvergenceError: on every rank; a linear programme was not solved.
     """
     gaps = [solution.jump[nodes.row]]
-    amplitudes, squeezed = _decided_on_root(comm, coarse, nodes, is_open, _place_all, gaps, noise)
+    amplitudes, pressed = _decided_on_root(comm, coarse, nodes, is_open, _place_all, gaps, noise)
     first = comm.exscan(len(nodes.row)) or 0
-    return Placement(coarse.unconstrained_modes @ amplitudes, squeezed[first : first + len(nodes.row)])
+    return Placement(coarse.unconstrained_modes @ amplitudes, pressed[first : first + len(nodes.row)])
 
 
-def room_ahead(
+def admissible_share(
     comm: MPI.Intracomm,
     coarse: NaturalCoarseSpace,
     nodes: InterfaceNodes,
@@ -111,7 +111,7 @@ def room_ahead(
 
         (1 - w) here + w ahead + M a >= 0,   and   >= -2 noise,
 
-    where the first fibre begins to be squeezed, and where it is beyond doubt.
+    where the first fibre begins to be pressed, and where it is beyond doubt.
     Collective, decided on rank 0; raises as `place`.
     """
     return _decided_on_root(comm, coarse, nodes, is_open, _shares_of_all, [here, ahead], noise)
@@ -162,14 +162,14 @@ def _moving_together(bodies: Array, fixed: int) -> Array:
 
 
 def _place_all(fibres: _Fibres, gap: Float, noise: float) -> tuple[Float, Bool]:
-    squeezed, amplitudes = np.zeros(len(gap), bool), np.zeros(fibres.opening.shape[1])
+    pressed, amplitudes = np.zeros(len(gap), bool), np.zeros(fibres.opening.shape[1])
     for own, motion, columns, modes in fibres.nodes_and_motions(gap < -noise):
         if modes.shape[1]:
             a, room, forces = _largest_gap(gap[own], motion)
             amplitudes[columns] += modes @ a
             if room < -noise:
-                squeezed[own[forces > LEAST_FORCE_SHARE * forces.max()]] = True
-    return amplitudes, squeezed
+                pressed[own[forces > LEAST_FORCE_SHARE * forces.max()]] = True
+    return amplitudes, pressed
 
 
 def _shares_of_all(fibres: _Fibres, here: Float, ahead: Float, noise: float) -> tuple[float, float]:

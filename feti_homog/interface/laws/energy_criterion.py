@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from feti_homog.interface.contact.contact_problem import Status
-from feti_homog.interface.contact.loaded_cell import LoadedCell
+from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.laws.strength_criterion import at_nodes
 from feti_homog.typing import Float, Int
 
@@ -46,7 +46,7 @@ class EnergyCriterion:
         """That of the nodes (p,), one after the other."""
         return EnergyCriterion(*(at_nodes(getattr(self, each.name), node) for each in dataclasses.fields(self)))
 
-    def law(self, cell: LoadedCell, status: Status) -> Callable[[Float], Float]:
+    def law(self, cell: CoupledInterfaces, status: Status) -> Callable[[Float], Float]:
         """`utilisation`, whatever is debonded."""
         return self.utilisation
 

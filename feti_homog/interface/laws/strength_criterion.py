@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from feti_homog.interface.contact.contact_problem import Status
-from feti_homog.interface.contact.loaded_cell import LoadedCell
+from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.typing import Float, Int
 
 
@@ -36,7 +36,7 @@ class StrengthCriterion:
         normal, tangential, axial = (at_nodes(value, node) for value in (self.normal, self.tangential, self.axial))
         return StrengthCriterion(normal, tangential, self.criterion, axial)
 
-    def law(self, cell: LoadedCell, status: Status) -> Callable[[Float], Float]:
+    def law(self, cell: CoupledInterfaces, status: Status) -> Callable[[Float], Float]:
         """`utilisation`, whatever is debonded."""
         return self.utilisation
 

@@ -16,8 +16,8 @@ import numpy as np
 
 from feti_homog.errors import ConvergenceError
 from feti_homog.feti.preconditioners.influence import Influence
-from feti_homog.interface.contact.contact_problem import BONDED, Interface, Status
-from feti_homog.interface.contact.loaded_cell import LoadedCell
+from feti_homog.interface.contact.contact_problem import BONDED, ContactProblem, Status
+from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.laws.energy_criterion import EnergyCriterion
 from feti_homog.typing import Bool, Float, Int
 
@@ -77,7 +77,7 @@ class TipCriterion:
     influence: Influence
     axial: Influence | None = None
 
-    def law(self, cell: LoadedCell, status: Status) -> Callable[[Float], Float]:
+    def law(self, cell: CoupledInterfaces, status: Status) -> Callable[[Float], Float]:
         """The utilisation (k,) of tractions (k, c) on the interface nodes of this rank, with these bonds.  Collective;
         what it returns is not."""
         tips = self.tips(cell, status)
@@ -93,7 +93,7 @@ class TipCriterion:
 
         return utilisation
 
-    def tips(self, cell: LoadedCell, status: Status) -> Tips:
+    def tips(self, cell: CoupledInterfaces, status: Status) -> Tips:
         """The tips that this rank owns.  Collective.
 
         Raises:
@@ -113,7 +113,7 @@ class TipCriterion:
         return Tips(own, H, cell.nodes.length[own], stiffness, axial)
 
     @staticmethod
-    def _activate(influence: Influence, interface: Interface, status: Status) -> None:
+    def _activate(influence: Influence, interface: ContactProblem, status: Status) -> None:
         """Let the inverse be that with these bonds.  Collective; raises as `tips`."""
         interface.solver.activate(interface.active(status))
         if not influence.rounding <= MOST_ROUNDING:

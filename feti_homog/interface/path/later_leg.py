@@ -10,11 +10,11 @@ from mpi4py import MPI
 
 from feti_homog.errors import NotCarriedError
 from feti_homog.interface.contact.contact_problem import Equilibrium
-from feti_homog.interface.contact.loaded_cell import LoadedCell
+from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.laws.bond_criterion import BondCriterion
+from feti_homog.interface.loads.coupled_solution import CoupledSolution
 from feti_homog.interface.loads.load import Load
 from feti_homog.interface.loads.macroscopic import Macroscopic
-from feti_homog.interface.loads.solutions import Solutions
 from feti_homog.interface.path.leg_prediction import first_break, first_change
 from feti_homog.interface.path.path_points import (
     NO_ENERGIES,
@@ -56,7 +56,7 @@ class LaterLeg:
     """
 
     def __init__(
-        self, cell: LoadedCell, criterion: BondCriterion, waypoints: Sequence[Load], leg: int, begin: PathState
+        self, cell: CoupledInterfaces, criterion: BondCriterion, waypoints: Sequence[Load], leg: int, begin: PathState
     ) -> None:
         """Stand where `begin` says on the way from its origin to waypoint `leg`.  Collective."""
         self.cell, self.criterion, self.end = cell, criterion, waypoints[leg]
@@ -79,14 +79,14 @@ class LaterLeg:
             yield from self._touch() if ahead is None else self._advance(ahead)
         yield self._point(0, self._path_state(self.leg + 1, 0.0))
 
-    def _ahead(self) -> Solutions | None:
+    def _ahead(self) -> CoupledSolution | None:
         """The end of the leg with the contact states as they are; None if they do not carry its stresses."""
         try:
             return self.cell.linear(self.end, self._state.status, self._state.multipliers)
         except NotCarriedError:
             return None
 
-    def _advance(self, ahead: Solutions) -> Iterator[Point]:
+    def _advance(self, ahead: CoupledSolution) -> Iterator[Point]:
         """Go to the next event, or as far towards it as the response is straight, and past it."""
         before, share = self._state, self._share
         breaks, begins, certain = self._predict(ahead)
@@ -107,7 +107,7 @@ class LaterLeg:
         """Whether the worst bonds are at their strength."""
         return self._used_at_worst > 1.0 - UTILISATION_TIE
 
-    def _predict(self, ahead: Solutions) -> tuple[float, float, float]:
+    def _predict(self, ahead: CoupledSolution) -> tuple[float, float, float]:
         """Shares of the leg where a bond breaks, where the contact begins to change, and where that is beyond doubt.
 
         What does not happen on the leg is at infinity.
@@ -119,7 +119,7 @@ class LaterLeg:
             begins = certain = np.inf
         return self._share + rest * breaks, self._share + rest * begins, self._share + rest * certain
 
-    def _approach(self, target: float, ahead: Solutions) -> bool:
+    def _approach(self, target: float, ahead: CoupledSolution) -> bool:
         """Stand at the target, or at the first half, quarter, ... of the way up to which the response is straight.
 
         Whether it is the target.
@@ -139,7 +139,7 @@ class LaterLeg:
         self._stand(target, state)
         return reached
 
-    def _continues(self, ahead: Solutions, way: float, state: Equilibrium) -> bool:
+    def _continues(self, ahead: CoupledSolution, way: float, state: Equilibrium) -> bool:
         """Whether no bond is overloaded in a state, and its response on the line from here to `ahead`; collective."""
         cell = self.cell
         _, used, _ = most_utilised(cell, self.criterion, state)

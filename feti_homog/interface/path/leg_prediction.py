@@ -6,17 +6,17 @@ import numpy as np
 from mpi4py import MPI
 
 from feti_homog.feti.dual_solution import DualSolution
-from feti_homog.interface.contact.contact_problem import BONDED, CLOSED, OPEN, Equilibrium, Interface
-from feti_homog.interface.contact.floating_bodies import room_ahead, shares_to_zero
-from feti_homog.interface.contact.loaded_cell import LoadedCell
+from feti_homog.interface.contact.contact_problem import BONDED, CLOSED, OPEN, ContactProblem, Equilibrium
+from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
+from feti_homog.interface.contact.floating_bodies import admissible_share, shares_to_zero
 from feti_homog.interface.laws.bond_criterion import BondCriterion
-from feti_homog.interface.loads.solutions import Solutions
+from feti_homog.interface.loads.coupled_solution import CoupledSolution
 
 # Halvings of an interval of length one, after which double precision tells no more.
 BISECTIONS = 60
 
 
-def first_break(cell: LoadedCell, criterion: BondCriterion, state: Equilibrium, ahead: Solutions) -> float:
+def first_break(cell: CoupledInterfaces, criterion: BondCriterion, state: Equilibrium, ahead: CoupledSolution) -> float:
     """Share of the way to `ahead` at which the first bond reaches its strength, or inf.  Collective.
 
     Utilisation is convex along a straight way, so below 1 here and above 1 there it passes 1 once: bisection.
@@ -32,7 +32,7 @@ def first_break(cell: LoadedCell, criterion: BondCriterion, state: Equilibrium, 
     return float(cell.comm.allreduce(high[over].min(initial=np.inf), MPI.MIN))
 
 
-def first_change(interface: Interface, state: Equilibrium, ahead: DualSolution) -> tuple[float, float]:
+def first_change(interface: ContactProblem, state: Equilibrium, ahead: DualSolution) -> tuple[float, float]:
     """Shares of the way to `ahead` at which the contact begins to change, and at which that is beyond doubt; or 1, 1.
 
     Beyond doubt means that a tension or an overlap is twice what counts as the solver's error.  A closed node opens
@@ -48,7 +48,7 @@ def first_change(interface: Interface, state: Equilibrium, ahead: DualSolution) 
     is_open, here, there = state.status == OPEN, state.solution.jump[nodes.row], ahead.jump[nodes.row]
     noise = max(interface.gap_noise(state.solution.strain), interface.gap_noise(ahead.strain))
     if solver.natural.unconstrained_modes.shape[1]:
-        shares.append(room_ahead(solver.comm, solver.natural, nodes, is_open, here, there, noise))
+        shares.append(admissible_share(solver.comm, solver.natural, nodes, is_open, here, there, noise))
     else:
         shares.append(shares_to_zero(here[is_open], there[is_open], noise))
     least = np.min(shares, axis=0)

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from feti_homog.interface.contact.contact_problem import BONDED, Status
-from feti_homog.interface.contact.loaded_cell import LoadedCell
+from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.laws.bond_criterion import BondCriterion
 from feti_homog.interface.laws.energy_criterion import EnergyCriterion
 from feti_homog.interface.laws.strength_criterion import StrengthCriterion
@@ -60,7 +60,7 @@ class OnsetCriterion:
     tips: TipEnergies | None
 
     @classmethod
-    def of(cls, criterion: BondCriterion, cell: LoadedCell, status: Status) -> OnsetCriterion:
+    def of(cls, criterion: BondCriterion, cell: CoupledInterfaces, status: Status) -> OnsetCriterion:
         """That of a criterion with these bonds.  Collective."""
         bonded = np.asarray(status == BONDED)
         if not isinstance(criterion, TipCriterion):

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from feti_homog.interface.contact.loaded_cell import LoadedCell
+from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.laws.bond_criterion import BondCriterion
 from feti_homog.interface.loads.load import Load
 from feti_homog.interface.path.later_leg import LaterLeg
@@ -29,7 +29,9 @@ from feti_homog.interface.path.path_points import (
 )
 
 
-def events(cell: LoadedCell, criterion: BondCriterion, waypoints: Sequence[Load], begin: PathState) -> Iterator[Point]:
+def events(
+    cell: CoupledInterfaces, criterion: BondCriterion, waypoints: Sequence[Load], begin: PathState
+) -> Iterator[Point]:
     """Every break along zero -> waypoints[0] -> ..., and the end of each leg.  Collective.
 
     A leg begins with what the state has of the components that its waypoint gives, strain or stress.  A point's state
@@ -44,7 +46,7 @@ def events(cell: LoadedCell, criterion: BondCriterion, waypoints: Sequence[Load]
 
 
 def increments(
-    cell: LoadedCell,
+    cell: CoupledInterfaces,
     criterion: BondCriterion,
     waypoints: Sequence[Load],
     steps: int,
@@ -71,7 +73,9 @@ def increments(
             return
 
 
-def _increment(cell: LoadedCell, criterion: BondCriterion, load: Load, worst_only: bool, begin: PathState) -> Point:
+def _increment(
+    cell: CoupledInterfaces, criterion: BondCriterion, load: Load, worst_only: bool, begin: PathState
+) -> Point:
     """The state under a load after all overloaded bonds have broken."""
     status, lam, here, broke = begin.status, begin.lam, begin, 0
     energies = NO_ENERGIES
@@ -91,7 +95,9 @@ def _increment(cell: LoadedCell, criterion: BondCriterion, load: Load, worst_onl
         here = PathState(begin.leg, 0.0, status, lam, begin.origin, reached, fracture)
 
 
-def _legs(cell: LoadedCell, criterion: BondCriterion, waypoints: Sequence[Load], begin: PathState) -> Iterator[Point]:
+def _legs(
+    cell: CoupledInterfaces, criterion: BondCriterion, waypoints: Sequence[Load], begin: PathState
+) -> Iterator[Point]:
     legs = len(waypoints)
     if begin.leg == 0:
         for point in _first_leg(cell, criterion, waypoints[0], legs, begin):
@@ -103,7 +109,9 @@ def _legs(cell: LoadedCell, criterion: BondCriterion, waypoints: Sequence[Load],
             begin = point.after
 
 
-def _first_leg(cell: LoadedCell, criterion: BondCriterion, load: Load, legs: int, begin: PathState) -> Iterator[Point]:
+def _first_leg(
+    cell: CoupledInterfaces, criterion: BondCriterion, load: Load, legs: int, begin: PathState
+) -> Iterator[Point]:
     """From zero to the load through all equilibria; with the bonds of now, a state under t times the load is t times
     the state, for t >= 0."""
     factor = begin.position

@@ -9,10 +9,10 @@ import numpy as np
 from mpi4py import MPI
 
 from feti_homog.interface.contact.contact_problem import BONDED, Equilibrium, Status
-from feti_homog.interface.contact.loaded_cell import LoadedCell
+from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.laws.bond_criterion import BondCriterion, spring_criterion
+from feti_homog.interface.loads.coupled_solution import Multipliers
 from feti_homog.interface.loads.macroscopic import Macroscopic
-from feti_homog.interface.loads.solutions import Multipliers
 from feti_homog.typing import Bool, Float
 
 # Bonds whose utilisation differs by no more than this, relatively, break together: those of a symmetric cell do, but
@@ -90,13 +90,13 @@ class Point:
     after: PathState
 
 
-def unloaded(cell: LoadedCell, status: Status) -> PathState:
+def unloaded(cell: CoupledInterfaces, status: Status) -> PathState:
     """The beginning of a path with the debonded nodes of `status`."""
     nothing = Macroscopic(np.zeros(len(cell.loads)), np.zeros(len(cell.loads)))
     return PathState(0, 0.0, status, cell.no_multipliers(), nothing, nothing)
 
 
-def fracture_energy(cell: LoadedCell, criterion: BondCriterion, which: Bool, traction: Float) -> float:
+def fracture_energy(cell: CoupledInterfaces, criterion: BondCriterion, which: Bool, traction: Float) -> float:
     """Toughness times length of the bonds of `which` (k,) under tractions (k, c) of any size, per area; collective."""
     springs = spring_criterion(criterion)
     if springs is None:
@@ -105,7 +105,7 @@ def fracture_energy(cell: LoadedCell, criterion: BondCriterion, which: Bool, tra
     return float(cell.comm.allreduce(energy) / cell.area)
 
 
-def most_utilised(cell: LoadedCell, criterion: BondCriterion, state: Equilibrium) -> tuple[Float, float, Bool]:
+def most_utilised(cell: CoupledInterfaces, criterion: BondCriterion, state: Equilibrium) -> tuple[Float, float, Bool]:
     """(k,) share of strength that the nodes of this rank use, 0 of debonded ones; the largest of all, and which (k,)
     have it.  Collective, rank 0 decides."""
     comm = cell.comm
@@ -115,6 +115,6 @@ def most_utilised(cell: LoadedCell, criterion: BondCriterion, state: Equilibrium
     return used, float(largest), (used >= largest * (1.0 - UTILISATION_TIE)) & (used > 0.0)
 
 
-def count_on_all_ranks(cell: LoadedCell, which: Bool) -> int:
+def count_on_all_ranks(cell: CoupledInterfaces, which: Bool) -> int:
     """Number of nodes of `which` (k,) on all ranks; collective."""
     return int(cell.comm.allreduce(int(which.sum())))

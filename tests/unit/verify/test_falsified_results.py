@@ -35,7 +35,7 @@ MATERIAL_33 = MATERIAL | {"bounds", "shown"}
 def test_results_obey_every_law(results, kind):
     certificate = verify(results(kind))
     assert certificate.holds, certificate.text
-    told = {finding.law.name for finding in certificate.findings}
+    told = {finding.check.name for finding in certificate.findings}
     assert told >= {"stress", "equilibrium", "periodicity", "jump", "mean stress", "Hill", "load", "tables", "cell"}
     assert ("penetration" in told) == (kind not in ("bonded", "plane", "overlap", "load", SPATIAL[0], *ENVELOPES))
     assert ("energy" in told) == (kind in (*PATHS, *LOADS, "loaded angle"))

@@ -105,6 +105,6 @@ def test_one_of_many_loose_fibres_that_overlaps_is_moved(coarse):
     nodes, solution = SimpleNamespace(row=row, bodies=bodies), SimpleNamespace(jump=jump)
     with at_most(MOST):
         found = place(MPI.COMM_SELF, coarse, nodes, np.ones(len(row), bool), solution, 1e-9)
-    assert jump[row].min() < 0.0 and not found.squeezed.any()
+    assert jump[row].min() < 0.0 and not found.pressed.any()
     placed = (jump + found.jump(coarse))[row].reshape(FIBRES, NODES)
     assert placed.min() > 0.01 - 1e-9 and np.abs(np.delete(placed, moved, axis=0) - 0.01).max() < 1e-12

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from feti_homog.typing import Float
-from feti_homog.verify.arc_laws import directions
 from feti_homog.verify.bonds import bonds_of
+from feti_homog.verify.check_arcs import directions
+from feti_homog.verify.check_interfaces import BONDED, mode, shares, utilisation
+from feti_homog.verify.check_loads import StateNumbers, tips
 from feti_homog.verify.discrete_cell import DiscreteCell
-from feti_homog.verify.interface_laws import BONDED, mode, shares, utilisation
-from feti_homog.verify.ledger import Ledger, relative
-from feti_homog.verify.load_laws import StateNumbers, tips
+from feti_homog.verify.findings import Findings, relative
 from feti_homog.verify.prescribed import NAMES
 
 # Utilisations by tractions below 10 rtol of the stress are none to the program; twice as many are here.
@@ -47,27 +47,27 @@ class _Bonds:
         return np.where(self._bonded & ~self.released, utilisation(self.section, traction), 0.0)
 
 
-def check_envelope(ledger: Ledger, cell: DiscreteCell, states: Sequence[StateNumbers]) -> None:
+def check_envelope(findings: Findings, cell: DiscreteCell, states: Sequence[StateNumbers]) -> None:
     """The points of `envelope` in result.json."""
     document, asked = cell.files.document, cell.files.case["envelope"]
     points, bonds = document["envelope"], _Bonds(cell, states)
-    ledger.record("load", abs(len(points) - asked["directions"]), "envelope, which lacks directions or has too many")
+    findings.record("load", abs(len(points) - asked["directions"]), "envelope, which lacks directions or has too many")
     stiffness, temperature = np.array(document["effective_stiffness"]), float(asked.get("temperature", 0.0))
     thermal = temperature * np.array(document.get("thermal_stress", np.zeros(len(stiffness))))
     for number, point in enumerate(points):
         at = f"envelope[{number}]"
-        ledger.record("load", abs(point["angle"] - 360.0 * number / len(points)) / 360.0, f"{at}.angle")
+        findings.record("load", abs(point["angle"] - 360.0 * number / len(points)) / 360.0, f"{at}.angle")
         unit = _unit(asked["plane"], np.radians(360.0 * number / len(points)), len(stiffness))
         if "factor" in point:
-            _check_load(ledger, point, asked["plane"], unit, (stiffness, thermal), at)
-            _check_bonds(ledger, cell, bonds, point, temperature, at)
+            _check_load(findings, point, asked["plane"], unit, (stiffness, thermal), at)
+            _check_bonds(findings, cell, bonds, point, temperature, at)
         else:
             of_strains = asked["plane"][0] in NAMES[len(stiffness)][0]
             strain = unit if of_strains else np.linalg.solve(stiffness, unit)
             least = NOISE_PER_RTOL * float(document["solver"]["rtol"]) * np.abs(stiffness @ strain).max()
             traction = bonds.traction(strain, 0.0)
             over = bonds.used(traction) > utilisation(bonds.section, np.full_like(traction, least))
-            ledger.record("onset", np.inf if over.any() else 0.0, f"{at}, where some load breaks a bond")
+            findings.record("onset", np.inf if over.any() else 0.0, f"{at}, where some load breaks a bond")
 
 
 def _unit(plane: Sequence[str], angle: float, count: int) -> Float:
@@ -79,18 +79,20 @@ def _unit(plane: Sequence[str], angle: float, count: int) -> Float:
 
 
 def _check_load(
-    ledger: Ledger, point: Point, plane: Sequence[str], unit: Float, law: tuple[Float, Float], at: str
+    findings: Findings, point: Point, plane: Sequence[str], unit: Float, law: tuple[Float, Float], at: str
 ) -> None:
     """What the case names is factor times cosine and sine, what it does not name none; stress follows from strain."""
     (stiffness, thermal), strain, stress = law, np.array(point["strain"]), np.array(point["stress"])
     told = strain if plane[0] in NAMES[len(strain)][0] else stress
     scale = max(float(point["factor"]), float(np.abs(told).max()))
-    ledger.record("load", relative(told - point["factor"] * unit, scale), f"{at}, {' and '.join(plane)}")
+    findings.record("load", relative(told - point["factor"] * unit, scale), f"{at}, {' and '.join(plane)}")
     terms = np.abs(stiffness) @ np.abs(strain) + np.abs(thermal)
-    ledger.record("load", relative(stress - stiffness @ strain - thermal, terms.max()), f"{at}.stress")
+    findings.record("load", relative(stress - stiffness @ strain - thermal, terms.max()), f"{at}.stress")
 
 
-def _check_bonds(ledger: Ledger, cell: DiscreteCell, bonds: _Bonds, point: Point, temperature: float, at: str) -> None:
+def _check_bonds(
+    findings: Findings, cell: DiscreteCell, bonds: _Bonds, point: Point, temperature: float, at: str
+) -> None:
     """No bond is over its strength, the one that is told is at it, and breaks as told."""
     traction = bonds.traction(np.array(point["strain"]), temperature)
     used = bonds.used(traction)
@@ -100,19 +102,19 @@ def _check_bonds(ledger: Ledger, cell: DiscreteCell, bonds: _Bonds, point: Point
     away = np.where(np.isnan(about_centre), by_normal, about_centre) - point["bond_angle"]
     here = (rows.fibre == point["fibre"]) & (rows.pair == point.get("interface", 1) - 1)
     here &= np.abs((away + 180.0) % 360.0 - 180.0) < SAME_DIRECTION
-    ledger.record("tables", 0.0 if here.any() else np.inf, f"{at}, where no bond is")
+    findings.record("tables", 0.0 if here.any() else np.inf, f"{at}, where no bond is")
     if not here.any():
         return
     is_tip = bool((here & bonds.released).any())
     if point["factor"] == 0.0:
-        ledger.record("onset", max(1.0 - largest, 0.0) if not is_tip else 0.0, f"{at}, of the temperature alone")
+        findings.record("onset", max(1.0 - largest, 0.0) if not is_tip else 0.0, f"{at}, of the temperature alone")
     else:
-        ledger.record("onset", max(largest - 1.0, 0.0) if is_tip else abs(largest - 1.0), at)
+        findings.record("onset", max(largest - 1.0, 0.0) if is_tip else abs(largest - 1.0), at)
     node = int(np.flatnonzero(here)[np.argmax(used[here])])
     if not is_tip:
-        ledger.record("strength", (largest - used[node]) / largest, f"{at}, fibre and bond_angle")
+        findings.record("strength", (largest - used[node]) / largest, f"{at}, fibre and bond_angle")
     for name, value in _mode(bonds_of(cell.files, np.array([node])), traction[node : node + 1]).items():
-        ledger.record("onset", abs(point[name] - value) / (90.0 if name == "psi" else 1.0), f"{at}.{name}")
+        findings.record("onset", abs(point[name] - value) / (90.0 if name == "psi" else 1.0), f"{at}.{name}")
 
 
 def _mode(section: Mapping[str, Any], traction: Float) -> dict[str, float]:

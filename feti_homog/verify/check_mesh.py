@@ -6,43 +6,45 @@ import numpy as np
 
 from feti_homog.typing import AnyInt, Bool, Float, Int
 from feti_homog.verify.discrete_cell import DiscreteCell
-from feti_homog.verify.ledger import Ledger, relative
+from feti_homog.verify.findings import Findings, relative
 
 
-def check_mesh(ledger: Ledger, cell: DiscreteCell) -> None:
+def check_mesh(findings: Findings, cell: DiscreteCell) -> None:
     """Elements have positive areas that fill the cell but for voids; a torn side has one partner or is at a void."""
     elements, sides, told = cell.elements, cell.sides, cell.files.document["cell"].get("porosity", 0.0)
-    ledger.record("mesh", np.where(elements.least_jacobian > 0, 0.0, np.inf), "element {}".format)
-    ledger.record("mesh", relative(elements.area.sum() - (1 - told) * cell.area, cell.area), "the sum of all areas")
+    findings.record("mesh", np.where(elements.least_jacobian > 0, 0.0, np.inf), "element {}".format)
+    findings.record("mesh", relative(elements.area.sum() - (1 - told) * cell.area, cell.area), "the sum of all areas")
     normals = sides.normal[sides.at_void]
-    ledger.record("mesh", relative(np.abs(normals.sum(axis=0)), cell.files.size.max()), "the sides at voids are closed")
+    findings.record(
+        "mesh", relative(np.abs(normals.sum(axis=0)), cell.files.size.max()), "the sides at voids are closed"
+    )
     is_told = bool(sides.at_void.any()) == (told > 0)
-    ledger.record("mesh", np.where(is_told, 0.0, np.inf), f"cell.porosity = {told:g}, {len(normals)} sides at voids")
-    ledger.record("mesh", sides.mismatch, lambda i: f"a side of element {sides.element[i]}")
+    findings.record("mesh", np.where(is_told, 0.0, np.inf), f"cell.porosity = {told:g}, {len(normals)} sides at voids")
+    findings.record("mesh", sides.mismatch, lambda i: f"a side of element {sides.element[i]}")
 
 
-def check_interface(ledger: Ledger, cell: DiscreteCell) -> None:
+def check_interface(findings: Findings, cell: DiscreteCell) -> None:
     """Each place where two bodies meet that may part has one interface node, of the inner one and of their section,
     and there are no others."""
     rows, faces = cell.files.interface, cell.faces
     at = "interface node {}".format
-    ledger.record("interface", faces.distance / cell.files.size.max(), at)
+    findings.record("interface", faces.distance / cell.files.size.max(), at)
     count = np.bincount(faces.place[faces.place >= 0], minlength=cell.nodes.places)
     wrong = np.flatnonzero(count != (faces.pair >= 0))
     first = [int(cell.nodes.node[np.argmax(cell.nodes.place == place)]) for place in wrong[:1]]
     words = f"{len(wrong)} places with another number of interface nodes than one, the first at mesh node {first}"
-    ledger.record("interface", np.where(len(wrong), np.inf, 0.0), words)
-    ledger.record("interface", _strangers(cell), at)
+    findings.record("interface", np.where(len(wrong), np.inf, 0.0), words)
+    findings.record("interface", _strangers(cell), at)
     misplaced = (faces.place >= 0) & (rows.pair != faces.pair[faces.place])
-    ledger.record("interface", np.where(misplaced, np.inf, 0.0), at)
+    findings.record("interface", np.where(misplaced, np.inf, 0.0), at)
     if (faces.place >= 0).all():
         normal, length, is_round = _shape(cell)
         turned, longer = np.hypot(*(rows.normal - normal).T), rows.length / length
         # Of a fibre that is not round a side may be straight or an arc of half a turn at most.
         rough = np.maximum(1.0 - longer, longer - np.pi / 2)
-        ledger.record("interface", np.where(is_round, np.abs(longer - 1.0), np.maximum(rough, 0.0)), at)
-        ledger.record("interface", np.where(is_round, turned, np.where(turned < np.sqrt(2.0), 0.0, turned)), at)
-        ledger.record("interface", np.abs(np.hypot(*rows.normal.T) - 1.0), at)
+        findings.record("interface", np.where(is_round, np.abs(longer - 1.0), np.maximum(rough, 0.0)), at)
+        findings.record("interface", np.where(is_round, turned, np.where(turned < np.sqrt(2.0), 0.0, turned)), at)
+        findings.record("interface", np.abs(np.hypot(*rows.normal.T) - 1.0), at)
 
 
 def _shape(cell: DiscreteCell) -> tuple[Float, Float, Bool]:

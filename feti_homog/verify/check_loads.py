@@ -12,10 +12,10 @@ import numpy as np
 
 from feti_homog.typing import AnyInt, Bool, Float
 from feti_homog.verify.bonds import bonds_of
+from feti_homog.verify.check_interfaces import BONDED, CLOSED, OPEN, spring_jumps, utilisation
 from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.elements import ElementFields
-from feti_homog.verify.interface_laws import BONDED, CLOSED, OPEN, spring_jumps, utilisation
-from feti_homog.verify.ledger import Ledger, relative
+from feti_homog.verify.findings import Findings, relative
 from feti_homog.verify.prescribed import TEMPERATURE, Prescribed, at_points, targets
 from feti_homog.verify.reading import State
 
@@ -112,29 +112,29 @@ def tips(cell: DiscreteCell, status: AnyInt) -> Bool:
     return np.asarray(tips & ~broken)
 
 
-def check_load(ledger: Ledger, cell: DiscreteCell, states: Sequence[StateNumbers]) -> None:
+def check_load(findings: Findings, cell: DiscreteCell, states: Sequence[StateNumbers]) -> None:
     """Loads against the case, and points or columns of result.json against the states."""
     document, case = cell.files.document, cell.files.case
     same = json.loads(str(cell.files.file.attrs["case"])) == case
-    ledger.record("tables", 0.0 if same else np.inf, "the case, which the two files tell otherwise")
+    findings.record("tables", 0.0 if same else np.inf, "the case, which the two files tell otherwise")
     unit = _unit_loads(cell)
     rows = list(zip(_expected_loads(document, case, unit), _entries(document, unit), strict=False))
     scales = _Scales.of(cell, states)
     if "path" in document:
-        _check_kept(ledger, document, case, [state.point for state in states])
+        _check_kept(findings, document, case, [state.point for state in states])
         for number, (load, entries) in enumerate(rows):
             strain, stress = np.array(entries["strain"]), np.array(entries["stress"])
             warmer = float(entries.get(TEMPERATURE, 0.0))
-            _check_prescribed(ledger, load, strain, stress, warmer, scales, f"path[{number}]")
+            _check_prescribed(findings, load, strain, stress, warmer, scales, f"path[{number}]")
         pairs = [(state, rows[state.point]) for state in states if 0 <= state.point < len(rows)]
     else:
-        _check_all(ledger, document, states, len(rows))
+        _check_all(findings, document, states, len(rows))
         pairs = list(zip(states, rows, strict=False))
     for state, (load, entries) in pairs:
-        _check_prescribed(ledger, load, state.strain, state.stress, state.temperature, scales, state.name)
-        _check_entries(ledger, state, entries, scales)
+        _check_prescribed(findings, load, state.strain, state.stress, state.temperature, scales, state.name)
+        _check_entries(findings, state, entries, scales)
     for place, matrix in _linear_stiffnesses(document, cell.files.contact):
-        ledger.record("symmetry", relative(matrix - matrix.T, float(np.abs(matrix).max())), place)
+        findings.record("symmetry", relative(matrix - matrix.T, float(np.abs(matrix).max())), place)
 
 
 @dataclass(frozen=True)
@@ -153,49 +153,53 @@ class _Scales:
 
 
 def _check_prescribed(
-    ledger: Ledger, load: Prescribed, strain: Float, stress: Float, temperature: float, scales: _Scales, place: str
+    findings: Findings, load: Prescribed, strain: Float, stress: Float, temperature: float, scales: _Scales, place: str
 ) -> None:
     """Strains, stresses and the temperature that a load prescribes."""
     given, by_stress = load.values[: len(strain)], load.by_stress[: len(strain)]
-    ledger.record("load", np.abs(strain - given)[~by_stress] / scales.strain, f"{place}, strain")
-    ledger.record("stress load", np.abs(stress - given)[by_stress] / scales.imposed, f"{place}, stress")
+    findings.record("load", np.abs(strain - given)[~by_stress] / scales.strain, f"{place}, strain")
+    findings.record("stress load", np.abs(stress - given)[by_stress] / scales.imposed, f"{place}, stress")
     warmer = float(load.values[-1]) if len(load.values) > len(given) else 0.0
-    ledger.record("load", abs(temperature - warmer) / max(abs(warmer), 1.0), f"{place}, temperature")
+    findings.record("load", abs(temperature - warmer) / max(abs(warmer), 1.0), f"{place}, temperature")
 
 
-def _check_kept(ledger: Ledger, document: Mapping[str, Any], case: Mapping[str, Any], numbers: Sequence[int]) -> None:
+def _check_kept(
+    findings: Findings, document: Mapping[str, Any], case: Mapping[str, Any], numbers: Sequence[int]
+) -> None:
     """The states of a path are of the points that result.json says, in their order: the first, the last, and as many
     as the case asks for."""
     count, asked = len(document["path"]), case["output"]["states"]
     told = list(document["states"]) == list(numbers)
-    ledger.record("tables", 0.0 if told else np.inf, "states, which the two files tell otherwise")
+    findings.record("tables", 0.0 if told else np.inf, "states, which the two files tell otherwise")
     rising = all(a < b for a, b in pairwise(numbers))
     ends = len(numbers) > 0 and numbers[0] == 0 and numbers[-1] == count - 1
-    ledger.record("load", 0.0 if rising and ends else np.inf, "states, which are not from the first point to the last")
+    findings.record(
+        "load", 0.0 if rising and ends else np.inf, "states, which are not from the first point to the last"
+    )
     wanted = count if asked == "all" else len(numbers) if asked == "peaks" else min(asked, count)
-    ledger.record("load", abs(wanted - len(numbers)), f"{len(numbers)} states, {wanted} asked for")
+    findings.record("load", abs(wanted - len(numbers)), f"{len(numbers)} states, {wanted} asked for")
 
 
-def _check_all(ledger: Ledger, document: Mapping[str, Any], states: Sequence[StateNumbers], count: int) -> None:
+def _check_all(findings: Findings, document: Mapping[str, Any], states: Sequence[StateNumbers], count: int) -> None:
     """The states of other analyses are all that the case asks for, and know their points."""
-    ledger.record("load", abs(count - len(states)), f"{len(states)} states, {count} asked for")
+    findings.record("load", abs(count - len(states)), f"{len(states)} states, {count} asked for")
     each = count // len(document["angle"]) if "angle" in document else count
     off = [abs(state.point - number // each) for number, state in enumerate(states)]
-    ledger.record("tables", off, lambda i: f"{states[i].name}, point")
+    findings.record("tables", off, lambda i: f"{states[i].name}, point")
 
 
-def _check_entries(ledger: Ledger, state: StateNumbers, entries: Mapping[str, Any], scales: _Scales) -> None:
+def _check_entries(findings: Findings, state: StateNumbers, entries: Mapping[str, Any], scales: _Scales) -> None:
     """What result.json says of a state."""
     told = {"strain": (state.strain, scales.strain), "stress": (state.stress, scales.stress)}
     told |= {TEMPERATURE: (np.array(state.temperature), max(abs(state.temperature), 1.0))}
     for name in told.keys() & entries.keys():
         value, scale = told[name]
-        ledger.record("tables", relative(np.array(entries[name]) - value, scale), f"{state.name}, {name}")
+        findings.record("tables", relative(np.array(entries[name]) - value, scale), f"{state.name}, {name}")
     if "load_factor" in entries:
-        ledger.record("tables", abs(entries["load_factor"] - state.load_factor), f"{state.name}, load_factor")
+        findings.record("tables", abs(entries["load_factor"] - state.load_factor), f"{state.name}, load_factor")
     for name in COUNTS.keys() & entries.keys():
         counted = np.count_nonzero(state.status == COUNTS[name])
-        ledger.record("tables", abs(entries[name] - counted), f"{state.name}, {name}")
+        findings.record("tables", abs(entries[name] - counted), f"{state.name}, {name}")
 
 
 def _unit_loads(cell: DiscreteCell) -> list[UnitLoad]:

@@ -12,15 +12,15 @@ import numpy as np
 from mpi4py import MPI
 
 from feti_homog.feti.decomposition.constraint_layout import InterfaceNodes
-from feti_homog.interface.contact.contact_problem import Equilibrium, Interface, Status
+from feti_homog.interface.contact.contact_problem import ContactProblem, Equilibrium, Status
+from feti_homog.interface.loads.coupled_solution import CoupledSolution, Multipliers
 from feti_homog.interface.loads.load import Load
 from feti_homog.interface.loads.macroscopic import Macroscopic
-from feti_homog.interface.loads.solutions import Multipliers, Solutions
 from feti_homog.typing import Float
 
 
 @dataclass(frozen=True)
-class LoadedCell:
+class CoupledInterfaces:
     """The interfaces of a cell in its problems; strains and stresses (n,) are those of the plane problem, then those
     of the axial one.
 
@@ -29,8 +29,8 @@ class LoadedCell:
         axial: those of the displacement along the fibres, without; None if there is none.
     """
 
-    plane: Interface
-    axial: Interface | None = None
+    plane: ContactProblem
+    axial: ContactProblem | None = None
 
     @property
     def comm(self) -> MPI.Intracomm:
@@ -53,7 +53,7 @@ class LoadedCell:
         return tuple(name for each in self.problems for name in each.solver.problem.loads)
 
     @property
-    def problems(self) -> tuple[Interface, ...]:
+    def problems(self) -> tuple[ContactProblem, ...]:
         """The interfaces of each problem."""
         return (self.plane,) if self.axial is None else (self.plane, self.axial)
 
@@ -62,11 +62,11 @@ class LoadedCell:
         along = 0 if self.axial is None else self.axial.solver.rows
         return Multipliers(np.zeros(self.plane.solver.rows), np.zeros(along))
 
-    def linear(self, load: Load, status: Status, start: Multipliers) -> Solutions:
+    def linear(self, load: Load, status: Status, start: Multipliers) -> CoupledSolution:
         """The dual problems with the states as they are.  Collective."""
         in_plane, along = load.parts(len(self.plane.solver.problem.loads))
         plane = self.plane.linear(in_plane, status, start.plane)
-        return Solutions(plane, None if self.axial is None else self.axial.linear(along, status, start.axial))
+        return CoupledSolution(plane, None if self.axial is None else self.axial.linear(along, status, start.axial))
 
     def equilibrium(self, load: Load, status: Status, start: Multipliers) -> Equilibrium:
         """The state under a load, with `status` a first guess of who is in contact.  Collective."""
@@ -87,14 +87,14 @@ class LoadedCell:
             values = np.where(before.by_stress == end.by_stress, before.values, values)
         return Load(values, end.by_stress)
 
-    def traction(self, found: Solutions) -> Float:
+    def traction(self, found: CoupledSolution) -> Float:
         """(k, 2) normal and tangential traction, tension positive, or (k, 3) with that along the fibre."""
         in_plane = self.plane.traction(found.plane)
         if self.axial is None or found.axial is None:
             return in_plane
         return np.hstack([in_plane, self.axial.traction(found.axial)])
 
-    def macroscopic(self, found: Solutions) -> Macroscopic:
+    def macroscopic(self, found: CoupledSolution) -> Macroscopic:
         """Strains and stresses.  Collective."""
         pairs = [(found.plane.strain, self.plane.stress(found.plane))]
         if self.axial is not None and found.axial is not None:

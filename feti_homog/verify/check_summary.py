@@ -1,34 +1,37 @@
-"""Laws of the numbers that result.json sums up: of the mesh, the moduli and the bounds."""
+"""Laws of the numbers that result.json sums up: of the mesh, the moduli and the bounds; and of the tables beside it."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import csv
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from feti_homog.typing import Float
 from feti_homog.verify.discrete_cell import DiscreteCell
-from feti_homog.verify.ledger import Ledger, relative
+from feti_homog.verify.findings import Findings, relative
+from feti_homog.verify.prescribed import NAMES
 
 Section = Mapping[str, Any]
 
 
-def check_summary(ledger: Ledger, cell: DiscreteCell) -> None:
+def check_summary(findings: Findings, cell: DiscreteCell) -> None:
     """The sections `cell`, `moduli` and `bounds` of result.json, where they are."""
     document = cell.files.document
-    _check_cell(ledger, cell, document["cell"])
-    _check_fibres(ledger, cell, document["fibres"])
+    _check_cell(findings, cell, document["cell"])
+    _check_fibres(findings, cell, document["fibres"])
     if document.get("moduli") is not None:
         stiffness = np.array(document["effective_stiffness"])
         for name, value in _moduli(stiffness).items():
             scale = max(abs(value), 1.0) if name in ("eta1", "eta2", "anisotropy") else abs(value)
-            ledger.record("moduli", relative(np.array(document["moduli"][name] - value), scale), f"moduli.{name}")
+            findings.record("moduli", relative(np.array(document["moduli"][name] - value), scale), f"moduli.{name}")
     if document.get("bounds") is not None:
-        _check_bounds(ledger, cell, document["bounds"], np.array(document["effective_stiffness"]))
+        _check_bounds(findings, cell, document["bounds"], np.array(document["effective_stiffness"]))
 
 
-def _check_cell(ledger: Ledger, cell: DiscreteCell, told: Section) -> None:
+def _check_cell(findings: Findings, cell: DiscreteCell, told: Section) -> None:
     width, height = cell.files.size
     names, mesh = cell.files.phases, cell.files.mesh
     fibres = [number for number, name in enumerate(names) if name not in ("matrix", "coating")]
@@ -37,25 +40,25 @@ def _check_cell(ledger: Ledger, cell: DiscreteCell, told: Section) -> None:
     expected |= {"nodes": len(mesh.points), "fibre_fraction": float(cell.fractions[fibres].sum())}
     for name, value in expected.items():
         scale = 1.0 if name in ("fibre_fraction", "porosity") else abs(value) or 1.0
-        ledger.record("cell", abs(told.get(name, 0.0) - value) / scale, f"cell.{name}")
+        findings.record("cell", abs(told.get(name, 0.0) - value) / scale, f"cell.{name}")
     for name, value in zip(names, cell.fractions, strict=True):
-        ledger.record("cell", abs(told["fractions"][name] - value), f"cell.fractions.{name}")
+        findings.record("cell", abs(told["fractions"][name] - value), f"cell.fractions.{name}")
 
 
-def _check_fibres(ledger: Ledger, cell: DiscreteCell, told: Sequence[Section]) -> None:
+def _check_fibres(findings: Findings, cell: DiscreteCell, told: Sequence[Section]) -> None:
     """The list of fibres is that of result.h5, in the order of their numbers."""
     fibres, phases = cell.files.fibres, cell.files.phases
     numbers = np.arange(1, len(fibres.number) + 1)
-    ledger.record("tables", np.where(np.array_equal(fibres.number, numbers), 0.0, np.inf), "/fibre/number")
+    findings.record("tables", np.where(np.array_equal(fibres.number, numbers), 0.0, np.inf), "/fibre/number")
     listed = [(fibre["number"], fibre["phase"]) for fibre in told]
     expected = [(number, phases[phase]) for number, phase in zip(numbers, fibres.phase, strict=True)]
-    ledger.record("tables", np.where(listed == expected, 0.0, np.inf), "fibres")
+    findings.record("tables", np.where(listed == expected, 0.0, np.inf), "fibres")
     if listed == expected:
         circles = np.array([[*fibre.get("centre", (None, None)), fibre.get("radius")] for fibre in told], float)
         circles = circles.reshape(-1, 3)  # of a cell without fibres too
         stored = np.column_stack([fibres.centre, fibres.radius])
         off = np.where(np.isnan(circles) & np.isnan(stored), 0.0, circles - stored)
-        ledger.record("tables", relative(off, cell.files.size.max()).max(axis=1), lambda i: f"fibres[{i}]")
+        findings.record("tables", relative(off, cell.files.size.max()).max(axis=1), lambda i: f"fibres[{i}]")
 
 
 def _moduli(stiffness: Float) -> dict[str, float]:
@@ -88,20 +91,20 @@ def _square(c: Float) -> float:
     return float(np.square(c[index[:, None], index[None]]).sum())
 
 
-def _check_bounds(ledger: Ledger, cell: DiscreteCell, told: Section, stiffness: Float) -> None:
+def _check_bounds(findings: Findings, cell: DiscreteCell, told: Section, stiffness: Float) -> None:
     """Voigt's and Reuss' bounds, those of Hashin and Shtrikman, and the order of all."""
     upper, lower = np.einsum("p,pij->ij", cell.fractions, cell.stiffnesses), cell.reuss
     size = float(np.abs(upper).max())
     for name, bound in (("voigt", upper), ("reuss", lower)):
-        ledger.record("bounds", relative(np.array(told[name]) - bound, size), f"bounds.{name}")
+        findings.record("bounds", relative(np.array(told[name]) - bound, size), f"bounds.{name}")
     for place, gap in (("Voigt - L", upper - stiffness), ("L - Reuss", stiffness - lower)):
         least = float(np.linalg.eigvalsh((gap + gap.T) / 2).min())
-        ledger.record("bounds", max(-least, 0.0) / size, f"the least eigenvalue of {place}")
+        findings.record("bounds", max(-least, 0.0) / size, f"the least eigenvalue of {place}")
     if told["hashin_shtrikman"] is not None:
         expected = _hashin_shtrikman(cell)
         for name, pair in expected.items():
             off = np.array(told["hashin_shtrikman"][name]) - pair
-            ledger.record("bounds", relative(off, pair[1]), f"bounds.hashin_shtrikman.{name}")
+            findings.record("bounds", relative(off, pair[1]), f"bounds.hashin_shtrikman.{name}")
 
 
 def _hashin_shtrikman(cell: DiscreteCell) -> dict[str, tuple[float, float]]:
@@ -113,3 +116,40 @@ def _hashin_shtrikman(cell: DiscreteCell) -> dict[str, tuple[float, float]]:
         for name, moduli, added in (("bulk", bulk, mu0), ("shear", shear, k0 * mu0 / (k0 + 2 * mu0))):
             found[name].append(float(1 / (cell.fractions @ (1 / (moduli + added))) - added))
     return {name: (pair[0], pair[1]) for name, pair in found.items()}
+
+
+LISTS = ("angle", "path", "load", "envelope")
+
+
+def check_tables(findings: Findings, directory: Path, document: Mapping[str, Any]) -> None:
+    """angle.csv, path.csv, load.csv and envelope.csv, each with a row a point."""
+    for name in LISTS:
+        path = directory / f"{name}.csv"
+        if name in document and path.is_file():
+            points = document[name] if isinstance(document[name], list) else [document[name]]
+            _check_table(findings, path, [dict(_columns(point)) for point in points])
+
+
+def _check_table(findings: Findings, path: Path, points: Sequence[Mapping[str, str]]) -> None:
+    with path.open(encoding="utf-8", errors="replace", newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    columns = list(dict.fromkeys(name for point in points for name in point))
+    told = [*rows[0]] if rows else columns
+    findings.record("CSV", 0.0 if len(rows) == len(points) else np.inf, f"{path.name}, the number of its rows")
+    findings.record("CSV", 0.0 if sorted(told) == sorted(columns) else np.inf, f"{path.name}, its columns")
+    for number, (row, point) in enumerate(zip(rows, points, strict=False)):
+        wrong = next((name for name in columns if row.get(name) != point.get(name, "")), None)
+        findings.record("CSV", 0.0 if wrong is None else np.inf, f"{path.name}, row {number}, {wrong}")
+
+
+def _columns(point: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """The names of the numbers of a point, and how a table writes them."""
+    for name, value in point.items():
+        if name in ("strain", "stress", "thermal_stress"):
+            components = NAMES[len(value)][name != "strain"]
+            prefix = "thermal_" if name == "thermal_stress" else ""
+            yield from zip([f"{prefix}{component}" for component in components], map(str, value), strict=True)
+        elif name == "stiffness":
+            yield from ((f"C{i}{j}", str(C)) for i, row in enumerate(value, 1) for j, C in enumerate(row, 1))
+        elif value is None or isinstance(value, int | float | str):
+            yield name, "" if value is None else str(value)

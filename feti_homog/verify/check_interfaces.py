@@ -9,28 +9,28 @@ import numpy as np
 
 from feti_homog.typing import Float
 from feti_homog.verify.bonds import bonds_of
+from feti_homog.verify.check_fields import in_axes, largest_displacement
 from feti_homog.verify.discrete_cell import DiscreteCell
-from feti_homog.verify.field_laws import in_axes, largest_displacement
-from feti_homog.verify.ledger import Ledger, relative
+from feti_homog.verify.findings import Findings, relative
 from feti_homog.verify.reading import State
 
 BONDED, CLOSED, OPEN = 0, 1, 2
 
 
-def check_interface_state(ledger: Ledger, cell: DiscreteCell, state: State) -> None:
+def check_interface_state(findings: Findings, cell: DiscreteCell, state: State) -> None:
     """The jumps are those of the displacements; bonds hold; debonded faces obey the conditions of contact."""
     at = f"{state.name}, interface node {{}}".format
     values = state.fluctuation[cell.nodes.node]
     parted = cell.faces.means(values, of_fibre=False) - cell.faces.means(values, of_fibre=True)
     largest = largest_displacement(cell, state)
-    ledger.record("jump", relative(np.abs(in_axes(cell, state.jump) - parted).max(axis=1, initial=0.0), largest), at)
+    findings.record("jump", relative(np.abs(in_axes(cell, state.jump) - parted).max(axis=1, initial=0.0), largest), at)
     slack = state.jump - spring_jumps(cell, state)
-    ledger.record("bond", relative(np.where(state.status != OPEN, np.abs(slack[:, 0]), 0.0), largest), at)
-    ledger.record(
+    findings.record("bond", relative(np.where(state.status != OPEN, np.abs(slack[:, 0]), 0.0), largest), at)
+    findings.record(
         "bond", relative(np.where(state.status == BONDED, np.abs(slack[:, 1:]).max(axis=1), 0.0), largest), at
     )
     if (state.status != BONDED).any():
-        _check_contact(ledger, cell, state)
+        _check_contact(findings, cell, state)
 
 
 def spring_jumps(cell: DiscreteCell, state: State) -> Float:
@@ -93,7 +93,7 @@ def _energy_share(section: Mapping[str, Any], traction: Float) -> Float:
     )
 
 
-def _check_contact(ledger: Ledger, cell: DiscreteCell, state: State) -> None:
+def _check_contact(findings: Findings, cell: DiscreteCell, state: State) -> None:
     """gap >= 0, traction <= 0, gap traction = 0, and no other force on debonded faces."""
     at = f"{state.name}, interface node {{}}".format
     debonded, closed = state.status != BONDED, state.status == CLOSED
@@ -103,8 +103,8 @@ def _check_contact(ledger: Ledger, cell: DiscreteCell, state: State) -> None:
     pull, force = max(float(np.abs(state.traction).max()), least), np.abs(normal) * length
     push = max(float(force.max()), least * float(length.max()))
     free = np.where(debonded, shear, 0.0) + np.where(state.status == OPEN, np.abs(normal), 0.0)
-    ledger.record("free faces", relative(free, pull), at)
+    findings.record("free faces", relative(free, pull), at)
     if cell.files.contact:
-        ledger.record("penetration", relative(np.where(debonded, np.maximum(-gap, 0.0), 0.0), imposed), at)
-        ledger.record("tension", relative(np.where(closed, np.maximum(normal, 0.0), 0.0), pull), at)
-        ledger.record("complementarity", relative(np.where(debonded, force * gap, 0.0), push * imposed), at)
+        findings.record("penetration", relative(np.where(debonded, np.maximum(-gap, 0.0), 0.0), imposed), at)
+        findings.record("tension", relative(np.where(closed, np.maximum(normal, 0.0), 0.0), pull), at)
+        findings.record("complementarity", relative(np.where(debonded, force * gap, 0.0), push * imposed), at)

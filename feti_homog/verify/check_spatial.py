@@ -8,59 +8,59 @@ from typing import Any
 import numpy as np
 
 from feti_homog.typing import Float
+from feti_homog.verify.check_interfaces import BONDED
+from feti_homog.verify.check_loads import StateNumbers
 from feti_homog.verify.constitutive_law import VOIGT
 from feti_homog.verify.discrete_cell import DiscreteCell
-from feti_homog.verify.interface_laws import BONDED
-from feti_homog.verify.ledger import Ledger, relative
-from feti_homog.verify.load_laws import StateNumbers
+from feti_homog.verify.findings import Findings, relative
 
 DIRECTIONS = 720  # across the fibres, in half a turn
 RATIOS = ("nu", "deviation")  # beginnings of the names of numbers whose scale is 1
 Section = Mapping[str, Any]
 
 
-def check_spatial(ledger: Ledger, cell: DiscreteCell, states: Sequence[StateNumbers]) -> None:
+def check_spatial(findings: Findings, cell: DiscreteCell, states: Sequence[StateNumbers]) -> None:
     """What follows from the stiffness, and the thermal stress from the states under unit strains."""
     document = cell.files.document
     if "effective_stiffness" in document:
-        _check_stiffness(ledger, document)
+        _check_stiffness(findings, document)
     for place, thermal, own in _thermal_stresses(cell, states):
-        _check_levin(ledger, cell, place, thermal, own)
+        _check_levin(findings, cell, place, thermal, own)
 
 
-def _check_stiffness(ledger: Ledger, document: Section) -> None:
+def _check_stiffness(findings: Findings, document: Section) -> None:
     stiffness = np.array(document["effective_stiffness"])
     thermal = document.get("thermal_stress")
     # Columns that are secants of one load each have no inverse that means anything.
     is_linear = "effective_stiffness_compression" not in document
-    ledger.record("compliance", 0.0 if is_linear is ("compliance" in document) else np.inf, "compliance")
+    findings.record("compliance", 0.0 if is_linear is ("compliance" in document) else np.inf, "compliance")
     if "compliance" in document:
         compliance = np.array(document["compliance"])
         off = np.abs(compliance @ stiffness - np.eye(6)).max(axis=1)
         # Rows of the product are summed of terms that cancel.
-        ledger.record("compliance", relative(off, (np.abs(compliance) @ np.abs(stiffness)).max(axis=1)), "compliance")
+        findings.record("compliance", relative(off, (np.abs(compliance) @ np.abs(stiffness)).max(axis=1)), "compliance")
     strains = None
     if "thermal_expansion" in document:
         strains = np.linalg.solve(stiffness, -np.array(thermal, float))
         off = np.array(document["thermal_expansion"]) - strains
-        ledger.record("compliance", relative(off, float(np.abs(strains).max())), "thermal_expansion")
+        findings.record("compliance", relative(off, float(np.abs(strains).max())), "thermal_expansion")
     for section, values in (
         ("constants", _constants(stiffness)),
         ("transversely_isotropic", _about_fibres(stiffness, strains)),
         ("transverse_moduli", _across_fibres(stiffness)),
     ):
         if document.get(section) is not None:
-            _check_numbers(ledger, section, document[section], values)
+            _check_numbers(findings, section, document[section], values)
 
 
-def _check_numbers(ledger: Ledger, section: str, told: Section, values: Mapping[str, float | None]) -> None:
+def _check_numbers(findings: Findings, section: str, told: Section, values: Mapping[str, float | None]) -> None:
     for name, value in values.items():
         place = f"{section}.{name}"
         if value is None or told[name] is None:
-            ledger.record("moduli", 0.0 if value is told[name] else np.inf, place)
+            findings.record("moduli", 0.0 if value is told[name] else np.inf, place)
         else:
             scale = max(abs(value), 1.0) if name.startswith(RATIOS) else abs(value)
-            ledger.record("moduli", relative(np.array(told[name] - value), scale), place)
+            findings.record("moduli", relative(np.array(told[name] - value), scale), place)
 
 
 def _constants(stiffness: Float) -> dict[str, float]:
@@ -124,7 +124,7 @@ def _thermal_stresses(
 
 
 def _check_levin(
-    ledger: Ledger, cell: DiscreteCell, place: str, thermal: Float, states: Sequence[StateNumbers]
+    findings: Findings, cell: DiscreteCell, place: str, thermal: Float, states: Sequence[StateNumbers]
 ) -> None:
     """By reciprocity, which contact without tension has not."""
     if cell.files.contact and any((state.status != BONDED).any() for state in states):
@@ -133,4 +133,4 @@ def _check_levin(
     for state in states:
         if not state.temperature:
             off = float(thermal @ state.strain) + state.expanding
-            ledger.record("Levin", relative(np.array(off), scale), f"{place}, {state.name}")
+            findings.record("Levin", relative(np.array(off), scale), f"{place}, {state.name}")

@@ -9,19 +9,19 @@ from typing import Any
 import numpy as np
 
 from feti_homog.typing import Float, Int
-from feti_homog.verify.arc_laws import directions
 from feti_homog.verify.bonds import bonds_of
+from feti_homog.verify.check_arcs import directions
+from feti_homog.verify.check_interfaces import BONDED, mode, spring_energies, toughness
+from feti_homog.verify.check_loads import StateNumbers, tips
 from feti_homog.verify.discrete_cell import DiscreteCell
-from feti_homog.verify.interface_laws import BONDED, mode, spring_energies, toughness
-from feti_homog.verify.ledger import Ledger, relative
-from feti_homog.verify.load_laws import StateNumbers, tips
+from feti_homog.verify.findings import Findings, relative
 
 Point = Mapping[str, Any]
 # To so many digits directions of tips are told apart.
 DIRECTION_DIGITS = 9
 
 
-def check_points(ledger: Ledger, cell: DiscreteCell, states: Sequence[StateNumbers]) -> None:
+def check_points(findings: Findings, cell: DiscreteCell, states: Sequence[StateNumbers]) -> None:
     """The numbers of points beside their strains, stresses and counts."""
     document = cell.files.document
     single = [document["load"]] if "load" in document else []
@@ -30,27 +30,27 @@ def check_points(ledger: Ledger, cell: DiscreteCell, states: Sequence[StateNumbe
     scale = max([state.stored for state in known], default=0.0) + cell.rounded_energy
     for state in known:
         point = points[state.point]
-        _check_debonding(ledger, cell, state, point)
+        _check_debonding(findings, cell, state, point)
         for name in {"stored", "stored_in_springs"} & point.keys():
             own = state.stored if name == "stored" else state.in_springs
-            ledger.record("energy", relative(np.array(point[name] - own), scale), f"{state.name}, {name}")
+            findings.record("energy", relative(np.array(point[name] - own), scale), f"{state.name}, {name}")
     if "path" in document:
-        _check_path(ledger, cell, known, points, scale)
+        _check_path(findings, cell, known, points, scale)
 
 
 def _check_path(
-    ledger: Ledger, cell: DiscreteCell, known: Sequence[StateNumbers], points: Sequence[Point], scale: float
+    findings: Findings, cell: DiscreteCell, known: Sequence[StateNumbers], points: Sequence[Point], scale: float
 ) -> None:
     """The energies of all points of a path, and the tips of those whose fields are kept."""
     for number, point in enumerate(points):
         if not point.get("temperature"):
             off = point["stored"] - float(np.dot(point["strain"], point["stress"])) / 2
-            ledger.record("energy", relative(np.array(off), scale), f"path[{number}].stored")
+            findings.record("energy", relative(np.array(off), scale), f"path[{number}].stored")
     if cell.files.by_energy:
-        _check_ratios(ledger, points)
-        _check_toughness(ledger, cell, known, points, cell.files.case["path"]["method"] == "events")
+        _check_ratios(findings, points)
+        _check_toughness(findings, cell, known, points, cell.files.case["path"]["method"] == "events")
         for state in known:
-            _check_tips(ledger, cell, state, points[state.point]["tips"])
+            _check_tips(findings, cell, state, points[state.point]["tips"])
 
 
 def tip_shares(cell: DiscreteCell, state: StateNumbers, told: Mapping[str, Sequence[float]]) -> tuple[Int, Float]:
@@ -79,7 +79,7 @@ def _directions(cell: DiscreteCell) -> Float:
     return np.asarray(found + 360.0 * (np.round(found, DIRECTION_DIGITS) <= -180.0))
 
 
-def _check_debonding(ledger: Ledger, cell: DiscreteCell, state: StateNumbers, point: Point) -> None:
+def _check_debonding(findings: Findings, cell: DiscreteCell, state: StateNumbers, point: Point) -> None:
     """Lengths and angles of what has debonded."""
     rows, fibres = cell.files.interface, cell.files.fibres
     whole, debonded = (
@@ -98,7 +98,7 @@ def _check_debonding(ledger: Ledger, cell: DiscreteCell, state: StateNumbers, po
     for name, value in expected.items():
         told = np.array(point.get(name, np.nan), float)
         off = told - value if told.shape == np.shape(value) else np.array(np.inf)
-        ledger.record("tables", relative(off, scales.get(name, 1.0)), f"{state.name}, {name}")
+        findings.record("tables", relative(off, scales.get(name, 1.0)), f"{state.name}, {name}")
 
 
 def _shares_of_pairs(cell: DiscreteCell, state: StateNumbers) -> Float:
@@ -108,21 +108,21 @@ def _shares_of_pairs(cell: DiscreteCell, state: StateNumbers) -> Float:
     return np.asarray((rows.length * (state.status != BONDED)) @ own / (rows.length @ own))
 
 
-def _check_ratios(ledger: Ledger, points: Sequence[Point]) -> None:
+def _check_ratios(findings: Findings, points: Sequence[Point]) -> None:
     for number, point in enumerate(points):
         energy = point["fracture_energy"]
         told, own = point.get("dissipation_ratio", 0.0), point["dissipated"] / energy if energy else 0.0
-        ledger.record("tables", abs(told - own) / max(abs(own), 1.0), f"path[{number}].dissipation_ratio")
+        findings.record("tables", abs(told - own) / max(abs(own), 1.0), f"path[{number}].dissipation_ratio")
 
 
 def _check_toughness(
-    ledger: Ledger, cell: DiscreteCell, states: Sequence[StateNumbers], points: Sequence[Point], by_events: bool
+    findings: Findings, cell: DiscreteCell, states: Sequence[StateNumbers], points: Sequence[Point], by_events: bool
 ) -> None:
     """The fracture energy grows with the length that breaks: by G_c in the mode of the state before, if that is in the
     files, else by between G_Ic and G_c in pure shear."""
     length = cell.files.interface.length / cell.area
     scale = max(points[-1]["fracture_energy"], 1e-300)
-    ledger.record("energy", points[0]["fracture_energy"] * by_events / scale, "path[0].fracture_energy")
+    findings.record("energy", points[0]["fracture_energy"] * by_events / scale, "path[0].fracture_energy")
     for state, after in pairwise(states):
         grown = points[after.point]["fracture_energy"] - points[state.point]["fracture_energy"]
         broken = (state.status == BONDED) & (after.status != BONDED)
@@ -133,10 +133,12 @@ def _check_toughness(
             modes = np.zeros(int(broken.sum())), np.full(int(broken.sum()), np.pi / 2)
             low, high = (float(toughness(section, psi) @ length[broken]) for psi in modes)
         off = max(low - grown, grown - high, 0.0)
-        ledger.record("energy", off / scale, f"{after.name}, fracture_energy")
+        findings.record("energy", off / scale, f"{after.name}, fracture_energy")
 
 
-def _check_tips(ledger: Ledger, cell: DiscreteCell, state: StateNumbers, told: Mapping[str, Sequence[float]]) -> None:
+def _check_tips(
+    findings: Findings, cell: DiscreteCell, state: StateNumbers, told: Mapping[str, Sequence[float]]
+) -> None:
     """The tips are the bonds beside broken ones, in the mode of their tractions; by springs also with their energy."""
     node = _tips_in_order(cell, state)
     section = bonds_of(cell.files, node)
@@ -145,15 +147,15 @@ def _check_tips(ledger: Ledger, cell: DiscreteCell, state: StateNumbers, told: M
     if (list(told["fibre"]), told.get("interface")) != (fibre.tolist(), pair) or any(
         len(values) != len(node) for values in told.values()
     ):
-        ledger.record("tables", np.inf, f"{state.name}, tips")
+        findings.record("tables", np.inf, f"{state.name}, tips")
         return
     psi = mode(section, state.traction[node])
     away = (np.array(told["angle"]) - _directions(cell)[node] + 180.0) % 360.0 - 180.0
-    ledger.record("tables", np.abs(away) / 360.0, where)
-    ledger.record("tables", np.abs(np.array(told["psi"]) - np.degrees(psi)) / 90.0, where)
+    findings.record("tables", np.abs(away) / 360.0, where)
+    findings.record("tables", np.abs(np.array(told["psi"]) - np.degrees(psi)) / 90.0, where)
     first, second = np.array(told["G_I"]), np.array(told["G_II"])
-    ledger.record("tables", relative(first * np.sin(psi) ** 2 - second * np.cos(psi) ** 2, first + second), where)
+    findings.record("tables", relative(first * np.sin(psi) ** 2 - second * np.cos(psi) ** 2, first + second), where)
     if section["growth"] == "springs":
         own = spring_energies(section, state.traction[node])
         off = np.abs(np.stack([first, second], axis=1) - own).max(axis=1, initial=0.0)
-        ledger.record("tables", relative(off, own.sum(axis=1)), where)
+        findings.record("tables", relative(off, own.sum(axis=1)), where)

@@ -1,29 +1,30 @@
-"""Laws of the fields of one state: problem, stresses, equilibrium, averages."""
+"""Laws of the fields of one state: problem, stresses, equilibrium, averages, and what they show to viewers."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from feti_homog.typing import Float, Int
+from feti_homog.verify.constitutive_law import VOIGT, out_of_plane
 from feti_homog.verify.discrete_cell import ROUNDED_TERMS, DiscreteCell, gradient
 from feti_homog.verify.elements import PLACES, ElementFields
-from feti_homog.verify.ledger import Ledger, relative
+from feti_homog.verify.findings import Findings, relative
 from feti_homog.verify.reading import State
 
 
-def check_fields(ledger: Ledger, cell: DiscreteCell, state: State, fields: ElementFields) -> None:
+def check_fields(findings: Findings, cell: DiscreteCell, state: State, fields: ElementFields) -> None:
     """Everything that the fields of a state obey by themselves; `fields` are what its displacements make."""
     node, element = (f"{state.name}, {kind} {{}}".format for kind in ("mesh node", "element"))
     imposed = cell.files.mesh.points @ gradient(state.strain).T
     terms = np.abs(state.displacement) + np.abs(state.fluctuation) + np.abs(imposed)
     off = np.abs(state.displacement - state.fluctuation - imposed).max(axis=1)
-    ledger.record("displacement", relative(off, terms.max(axis=1)), node)
+    findings.record("displacement", relative(off, terms.max(axis=1)), node)
     stiffest = np.abs(cell.stiffnesses).max(axis=(1, 2))[cell.files.mesh.phase]
     off = np.abs(state.stress - fields.stress).max(axis=1)
-    ledger.record("stress", relative(off, stiffest * fields.strain_size), element)
-    _check_copies(ledger, cell, state)
-    _check_equilibrium(ledger, cell, state, fields)
-    _check_averages(ledger, cell, state, fields)
+    findings.record("stress", relative(off, stiffest * fields.strain_size), element)
+    _check_copies(findings, cell, state)
+    _check_equilibrium(findings, cell, state, fields)
+    _check_averages(findings, cell, state, fields)
 
 
 def interface_forces(cell: DiscreteCell, state: State) -> Float:
@@ -43,7 +44,7 @@ def largest_displacement(cell: DiscreteCell, state: State) -> float:
     return float(np.abs(state.fluctuation).max()) + cell.imposed(state)
 
 
-def _check_copies(ledger: Ledger, cell: DiscreteCell, state: State) -> None:
+def _check_copies(findings: Findings, cell: DiscreteCell, state: State) -> None:
     """Copies of a node have one fluctuation: in a subdomain by periodicity, elsewhere but across a bond by gluing."""
     nodes, scale = cell.nodes, largest_displacement(cell, state)
     values = state.fluctuation[nodes.node]
@@ -51,7 +52,7 @@ def _check_copies(ledger: Ledger, cell: DiscreteCell, state: State) -> None:
     for law, group in (("periodicity", nodes.place * (int(nodes.subdomain.max()) + 1) + nodes.subdomain),
                        ("continuity", sides)):  # fmt: skip
         off = np.abs(values - _group_means(group, values)).max(axis=1)
-        ledger.record(law, relative(off, scale), lambda i: f"{state.name}, mesh node {nodes.node[i]}")
+        findings.record(law, relative(off, scale), lambda i: f"{state.name}, mesh node {nodes.node[i]}")
 
 
 def _sides(cell: DiscreteCell) -> Int:
@@ -66,7 +67,7 @@ def _group_means(group: Int, values: Float) -> Float:
     return np.stack([(np.bincount(inverse, column) / count)[inverse] for column in values.T], axis=1)
 
 
-def _check_equilibrium(ledger: Ledger, cell: DiscreteCell, state: State, fields: ElementFields) -> None:
+def _check_equilibrium(findings: Findings, cell: DiscreteCell, state: State, fields: ElementFields) -> None:
     """The forces of all copies of a node add up to zero; at an interface node those of each face to its traction."""
     nodes, faces = cell.nodes, cell.faces
     traction = interface_forces(cell, state)
@@ -75,7 +76,7 @@ def _check_equilibrium(ledger: Ledger, cell: DiscreteCell, state: State, fields:
     rest = fields.force.copy()
     rest[nodes.node] = 0.0
     scale += ROUNDED_TERMS * fields.force_size  # of all nodes: the one that is held collects what is left of the others
-    ledger.record("equilibrium", relative(np.abs(rest).max(axis=1), scale), f"{state.name}, mesh node {{}}".format)
+    findings.record("equilibrium", relative(np.abs(rest).max(axis=1), scale), f"{state.name}, mesh node {{}}".format)
     side, inverse = np.unique(_sides(cell), return_inverse=True)
     own = fields.force[nodes.node]
     sums = np.stack([np.bincount(inverse.ravel(), column, len(side)) for column in own.T], axis=1)
@@ -91,27 +92,27 @@ def _check_equilibrium(ledger: Ledger, cell: DiscreteCell, state: State, fields:
     def name(i: int) -> str:
         return where.format(nodes.node[first[i]], f" (interface node {at[i]})" if at[i] >= 0 else "")
 
-    ledger.record("equilibrium", relative(np.abs(sums).max(axis=1), scale), name)
+    findings.record("equilibrium", relative(np.abs(sums).max(axis=1), scale), name)
 
 
-def _check_averages(ledger: Ledger, cell: DiscreteCell, state: State, fields: ElementFields) -> None:
+def _check_averages(findings: Findings, cell: DiscreteCell, state: State, fields: ElementFields) -> None:
     """<sigma> = Sigma, <eps> = E with the opening of the faces and the strain of voids, and Hill's condition."""
     area, weights = cell.area, cell.elements.area[:, None]
     mean = (weights * fields.stress).sum(axis=0) / area
     size = float(((weights * np.abs(fields.stress)).sum(axis=0) / area).max())
     stiffest = np.abs(cell.stiffnesses).max(axis=(1, 2))[cell.files.mesh.phase]
     size += ROUNDED_TERMS * float((weights[:, 0] * stiffest * fields.strain_size).sum() / area)
-    ledger.record("mean stress", relative(mean - state.mean_stress, max(size, cell.least_stress(state))), state.name)
+    findings.record("mean stress", relative(mean - state.mean_stress, max(size, cell.least_stress(state))), state.name)
     jump = in_axes(cell, state.jump)
     integral = cell.faces.sums(cell.node_integrals[cell.nodes.node], of_fibre=False)
     opening = np.einsum("ki,kj->ij", jump, integral)
     opened = np.bincount(PLACES[len(mean)].ravel(), opening.ravel(), len(mean)) / area
     off = (weights * fields.strain).sum(axis=0) / area + _void_strain(cell, state) - state.strain - opened
     scale = cell.strain_size(state)
-    ledger.record("mean strain", relative(off, scale), state.name)
+    findings.record("mean strain", relative(off, scale), state.name)
     work = area * float(state.mean_stress @ state.strain) - float((interface_forces(cell, state) * jump).sum())
     scale = max(abs(fields.energy), area * cell.least_stress(state) * scale)
-    ledger.record("Hill", relative(np.array(fields.energy - work), scale), state.name)
+    findings.record("Hill", relative(np.array(fields.energy - work), scale), state.name)
 
 
 def _void_strain(cell: DiscreteCell, state: State) -> Float:
@@ -121,3 +122,71 @@ def _void_strain(cell: DiscreteCell, state: State) -> Float:
     slope = np.einsum("ni,nd->id", state.fluctuation, cell.void_integrals)
     strain = np.bincount(PLACES[v].ravel(), slope.ravel(), v) / cell.area
     return np.asarray(strain + cell.porosity * state.strain)
+
+
+def check_derived(findings: Findings, cell: DiscreteCell, state: State, fields: ElementFields) -> None:
+    """What is out of the plane, von Mises and principal stresses, vectors, and the faces' displacements."""
+    _check_elements(findings, cell, state, fields)
+    _check_interface(findings, cell, state)
+
+
+def _check_elements(findings: Findings, cell: DiscreteCell, state: State, fields: ElementFields) -> None:
+    element = f"{state.name}, element {{}}".format
+    scale = np.abs(fields.strain).max(axis=1) + ROUNDED_TERMS * fields.strain_size
+    shown = {"element_strain": fields.strain[:, [0, 1, -1]] * [1.0, 1.0, 0.5]}
+    terms = {"element_strain": np.column_stack([scale] * 3)}
+    if cell.files.is_spatial:
+        tensors = state.stress[:, VOIGT[6]]
+        shown["axial_strain"], terms["axial_strain"] = fields.strain[:, [3, 4]] / 2, np.column_stack([scale] * 2)
+        E33, E33_terms = fields.strain[:, 2], scale
+    else:
+        tensors, E33, E33_terms = _out_of_plane(findings, cell, state)
+    shown["element_strain"] = np.column_stack([shown["element_strain"], E33])
+    terms["element_strain"] = np.column_stack([terms["element_strain"], E33_terms])
+    for name, strains in shown.items():
+        for column, (strain, own) in enumerate(zip(strains.T, terms[name].T, strict=True)):
+            findings.record("shown", _off(state.derived[name][:, column], strain, own), element)
+    unknown = np.where(np.isnan(tensors[:, 2, 2]), np.nan, 0.0)
+    tensors[:, 2, 2] = np.nan_to_num(tensors[:, 2, 2])
+    principal = np.linalg.eigvalsh(tensors)
+    deviator = tensors - np.trace(tensors, axis1=1, axis2=2)[:, None, None] / 3 * np.eye(3)
+    mises = np.sqrt(1.5 * (deviator**2).sum(axis=(1, 2)))
+    size = np.abs(tensors).max(axis=(1, 2))
+    for name, values in (("von_mises", mises), *((f"principal_{3 - i}", principal[:, i]) for i in range(3))):
+        findings.record("shown", _off(state.derived[name], values + unknown, size), element)
+
+
+def _out_of_plane(findings: Findings, cell: DiscreteCell, state: State) -> tuple[Float, Float, Float]:
+    """Stresses (m, 3, 3), strains 33 (m,) and the sizes of their terms (m,), in plane strain and stress."""
+    rules = out_of_plane(cell.files.case, cell.files.phases)[cell.files.mesh.phase]
+    (S33, E33), (S33_terms, E33_terms) = (
+        np.einsum("eci,ei->ce", rule, stress)
+        for rule, stress in ((rules, state.stress), (np.abs(rules), np.abs(state.stress)))
+    )
+    off = _off(state.derived["stress_33"], S33, S33_terms)
+    findings.record("stress 33", off, f"{state.name}, element {{}}".format)
+    tensors = np.zeros((len(S33), 3, 3))
+    tensors[:, :2, :2], tensors[:, 2, 2] = state.stress[:, VOIGT[3]], S33
+    return tensors, E33, E33_terms
+
+
+def _check_interface(findings: Findings, cell: DiscreteCell, state: State) -> None:
+    node = f"{state.name}, interface node {{}}".format
+    shown, opening = state.derived, in_axes(cell, state.jump)
+    fibre = state.displacement[cell.files.faces[:, 0]]
+    moved = largest_displacement(cell, state) + float(np.abs(fibre).max(initial=0.0))
+    pulled = float(np.abs(state.traction).max(initial=0.0))
+    for name, vectors, scale in (
+        ("traction_vector", in_axes(cell, state.traction), pulled),
+        ("jump_vector", opening, moved),
+        ("displacement_fibre", fibre, moved),
+        ("displacement_matrix", fibre + opening, moved),
+    ):
+        off = shown[name] - np.pad(vectors, [(0, 0), (0, 3 - vectors.shape[1])])
+        findings.record("vectors", relative(np.abs(off).max(axis=1), scale), node)
+
+
+def _off(shown: Float, true: Float, terms: Float) -> Float:
+    """(m,) relative errors of what is shown; none where both are unknown, or too large for single precision."""
+    same = (np.isnan(true) & np.isnan(shown)) | (np.isinf(shown) & (true.astype(shown.dtype) == shown))
+    return np.where(same, 0.0, relative(np.where(same, 0.0, shown - true), np.where(same, 1.0, terms)))

@@ -23,7 +23,7 @@ class Multipliers(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Solutions:
+class CoupledSolution:
     """Solutions with the same bonds; `axial` is None without such a problem."""
 
     plane: DualSolution

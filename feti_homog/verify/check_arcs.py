@@ -7,17 +7,17 @@ from collections.abc import Sequence
 import numpy as np
 
 from feti_homog.typing import Bool, Float
+from feti_homog.verify.check_interfaces import BONDED
+from feti_homog.verify.check_loads import StateNumbers
+from feti_homog.verify.check_mesh import from_centre
 from feti_homog.verify.discrete_cell import DiscreteCell
-from feti_homog.verify.interface_laws import BONDED
-from feti_homog.verify.ledger import Ledger
-from feti_homog.verify.load_laws import StateNumbers
-from feti_homog.verify.mesh_laws import from_centre
+from feti_homog.verify.findings import Findings
 
 # The mesher moves the tips of arcs by so many degrees at most; what is nearer to a tip is on neither side of it.
 AT_TIP = 0.06
 
 
-def check_arcs(ledger: Ledger, cell: DiscreteCell, states: Sequence[StateNumbers]) -> None:
+def check_arcs(findings: Findings, cell: DiscreteCell, states: Sequence[StateNumbers]) -> None:
     """Nodes inside the arcs are debonded in all states; those outside are bonded, before the load breaks them.
 
     In a user's mesh a curve may be debonded that is not in the files, so that only the first is known.
@@ -30,11 +30,11 @@ def check_arcs(ledger: Ledger, cell: DiscreteCell, states: Sequence[StateNumbers
         opening = points[min(max(state.point, 0), len(points) - 1)]["angle"] if points else None
         inside, outside = _sides(cell, opening)
         bonded = state.status == BONDED
-        ledger.record("arcs", np.count_nonzero(inside & bonded), f"{state.name}, bonded within arcs")
+        findings.record("arcs", np.count_nonzero(inside & bonded), f"{state.name}, bonded within arcs")
         # The first state of a path by events is the one at which the first bonds break.
         intact = "path" not in document or (state.point == 0 and case["path"]["method"] == "events")
         if intact and not (from_mesh and "interface" in case):
-            ledger.record("arcs", np.count_nonzero(outside & ~bonded), f"{state.name}, debonded outside of arcs")
+            findings.record("arcs", np.count_nonzero(outside & ~bonded), f"{state.name}, debonded outside of arcs")
 
 
 def _sides(cell: DiscreteCell, opening: float | None) -> tuple[Bool, Bool]:

@@ -13,27 +13,27 @@ from typing import Any
 import numpy as np
 
 from feti_homog.typing import Bool
+from feti_homog.verify.check_interfaces import BONDED
+from feti_homog.verify.check_loads import StateNumbers
+from feti_homog.verify.check_points import tip_shares
 from feti_homog.verify.discrete_cell import DiscreteCell
-from feti_homog.verify.interface_laws import BONDED
-from feti_homog.verify.ledger import Ledger
-from feti_homog.verify.load_laws import StateNumbers
+from feti_homog.verify.findings import Findings
 from feti_homog.verify.path_energies import check_path_energies
-from feti_homog.verify.point_laws import tip_shares
 from feti_homog.verify.prescribed import SAME_SHARE
 
 Point = Mapping[str, Any]
 
 
-def check_path(ledger: Ledger, cell: DiscreteCell, states: Sequence[StateNumbers]) -> None:
+def check_path(findings: Findings, cell: DiscreteCell, states: Sequence[StateNumbers]) -> None:
     """All laws of a path on its points in result.json, and on the states of those whose fields are kept."""
     points = cell.files.document["path"]
     if any(not 0 <= state.point < len(points) for state in states):  # which breaks the law of the load
         return
     by_events = cell.files.case["path"]["method"] == "events"
-    _check_counts(ledger, points, by_events)
-    _check_breaks(ledger, states, points, by_events)
-    _check_strength(ledger, [_with_tips(cell, state, points[state.point]) for state in states], points, by_events)
-    check_path_energies(ledger, cell, states, points)
+    _check_counts(findings, points, by_events)
+    _check_breaks(findings, states, points, by_events)
+    _check_strength(findings, [_with_tips(cell, state, points[state.point]) for state in states], points, by_events)
+    check_path_energies(findings, cell, states, points)
 
 
 def _with_tips(cell: DiscreteCell, state: StateNumbers, point: Point) -> StateNumbers:
@@ -46,42 +46,44 @@ def _with_tips(cell: DiscreteCell, state: StateNumbers, point: Point) -> StateNu
     return replace(state, used=used)
 
 
-def _check_counts(ledger: Ledger, points: Sequence[Point], by_events: bool) -> None:
+def _check_counts(findings: Findings, points: Sequence[Point], by_events: bool) -> None:
     """The number of bonds falls by those that break."""
     for number, (point, after) in enumerate(pairwise(points)):
         broke = (point if by_events else after)["broke"]
-        ledger.record("breaks", abs(point["bonded"] - after["bonded"] - broke), f"path[{number + 1}].bonded")
+        findings.record("breaks", abs(point["bonded"] - after["bonded"] - broke), f"path[{number + 1}].bonded")
     if by_events and points[-1]["load_factor"] == 1.0:
-        ledger.record("breaks", points[-1]["broke"], f"path[{len(points) - 1}], bonds that broke at the end")
+        findings.record("breaks", points[-1]["broke"], f"path[{len(points) - 1}], bonds that broke at the end")
 
 
-def _check_breaks(ledger: Ledger, states: Sequence[StateNumbers], points: Sequence[Point], by_events: bool) -> None:
+def _check_breaks(findings: Findings, states: Sequence[StateNumbers], points: Sequence[Point], by_events: bool) -> None:
     """The bonds of two states that follow each other differ by those that the points say broke between them."""
     shift = 0 if by_events else 1
     for state, after in pairwise(states):
         bonded, still = state.status == BONDED, after.status == BONDED
         broke = sum(point["broke"] for point in points[state.point + shift : after.point + shift])
-        ledger.record("breaks", np.count_nonzero(still & ~bonded), f"{after.name}, bonds that healed")
-        ledger.record("breaks", abs(np.count_nonzero(bonded & ~still) - broke), f"{state.name}, bonds that broke")
+        findings.record("breaks", np.count_nonzero(still & ~bonded), f"{after.name}, bonds that healed")
+        findings.record("breaks", abs(np.count_nonzero(bonded & ~still) - broke), f"{state.name}, bonds that broke")
 
 
-def _check_strength(ledger: Ledger, states: Sequence[StateNumbers], points: Sequence[Point], by_events: bool) -> None:
+def _check_strength(
+    findings: Findings, states: Sequence[StateNumbers], points: Sequence[Point], by_events: bool
+) -> None:
     """No bond is over its strength but in a cascade, where one break overloads others; events break the worst bonds."""
     for state in states:
         where = f"{state.name}, interface node {{}}".format
         used = np.nan_to_num(state.used)
         if not (by_events and _in_cascade(points, state.point)):
-            ledger.record("strength", np.maximum(used - 1.0, 0.0), where)
+            findings.record("strength", np.maximum(used - 1.0, 0.0), where)
         if by_events and (broke := points[state.point]["broke"]):
             # Which break, the next point tells; that so many are as near to their strength as the worst, this one does.
             due = max(float(used.max(initial=0.0)), 1.0)
             worst = np.sort(np.where(np.isnan(state.used), np.inf, state.used))[-broke:]
-            ledger.record("strength", np.maximum(1.0 - worst / due, 0.0), f"{state.name}, bonds that break")
+            findings.record("strength", np.maximum(1.0 - worst / due, 0.0), f"{state.name}, bonds that break")
     for state, after in pairwise(states):
         if by_events and after.point == state.point + 1:
             due = max(float(np.nan_to_num(state.used).max(initial=0.0)), 1.0)
             off = np.where(_broken(state, after) & ~np.isnan(state.used), 1.0 - state.used / due, 0.0)
-            ledger.record("strength", off, f"{state.name}, interface node {{}}".format)
+            findings.record("strength", off, f"{state.name}, interface node {{}}".format)
 
 
 def _in_cascade(points: Sequence[Point], number: int) -> bool:
