@@ -33,9 +33,9 @@ from feti_homog.feti.coarse.natural import NaturalCoarseSpace  # noqa: E402
 from feti_homog.feti.decomposition.jump_operator import JumpOperator  # noqa: E402
 from feti_homog.homogenization import coarse_meshes  # noqa: E402
 from feti_homog.homogenization.domain_partition import DEFAULT_POLICY  # noqa: E402
-from feti_homog.homogenization.drawn_cell import drawn_cell, summary_of, tiles_to_fill  # noqa: E402
+from feti_homog.homogenization.tile_tearing import summary_of, tiled_cell, tiles_to_fill  # noqa: E402
 from feti_homog.homogenization.unit_cell import TornCell, tear  # noqa: E402
-from feti_homog.mesh.fill.drawing import Sketch  # noqa: E402
+from feti_homog.mesh.fill.unmeshed_cell import UnmeshedCell  # noqa: E402
 from feti_homog.mesh.tiles.tiles import TilePolicy  # noqa: E402
 from feti_homog.parallel.mpi_errors import on_root, run_main  # noqa: E402
 from feti_homog.petsc.options import case_options  # noqa: E402
@@ -157,19 +157,19 @@ def measure(case: Case, progress: StagePeaks, way: str | None) -> dict[str, Any]
 
 
 def seconds_alone(case: Case, policy: TilePolicy) -> float:
-    """In which rank 0 draws a cell, but for the nodes that all place, and fills one that is not cut into tiles."""
+    """In which rank 0 meshes a cell, but for the nodes that all place, and fills one that is not cut into tiles."""
     start = time.perf_counter()
-    sketch = coarse_meshes.begun(case, policy)
-    assert isinstance(sketch, Sketch)
+    unmeshed = coarse_meshes.begin_mesh(case, policy)
+    assert isinstance(unmeshed, UnmeshedCell)
     begun = time.perf_counter()
-    stations = sketch.bare.stations()
+    stations = unmeshed.bare.stations()
     placed = time.perf_counter()
-    drawing = sketch.drawn(stations)
-    if len(drawing.parts) == 1:
-        drawing.filled()
-    drawn_cell(case, drawing)
-    tiles_to_fill(drawing)
-    summary_of(case, drawing, 0, 0)
+    noded = unmeshed.with_nodes(stations)
+    if len(noded.parts) == 1:
+        noded.filled()
+    tiled_cell(case, noded)
+    tiles_to_fill(noded)
+    summary_of(case, noded, 0, 0)
     return begun - start + time.perf_counter() - placed
 
 

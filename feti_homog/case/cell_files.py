@@ -10,9 +10,8 @@ import numpy as np
 
 from feti_homog.case.cell_section import Cell
 from feti_homog.case.fibre_table import FibreTable, read_table, table_of
-from feti_homog.case.rounded_polygons import with_polygons
 from feti_homog.case.section_values import MESH_FILE, MESH_SUFFIXES
-from feti_homog.case.table_shapes import check_hollow, with_shapes
+from feti_homog.case.table_shapes import check_hollow, with_polygons, with_shapes
 from feti_homog.errors import CaseError
 from feti_homog.schema.wording import toml_value
 

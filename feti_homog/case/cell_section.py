@@ -6,13 +6,16 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from feti_homog.case.fibre_table import FibreTable
 from feti_homog.case.phase_names import FIBRE
 from feti_homog.case.section_values import CELL_FILE, FIBRE_LIST, FRACTIONS, RADII, SEED, TABLE_FILE
 from feti_homog.schema.keys import Selector, key
 from feti_homog.schema.values import choice, integer, real
+
+if TYPE_CHECKING:
+    from feti_homog.microstructure.fibre_pattern import FibrePattern
 
 CIRCULAR = ("square", "hexagonal", "random")
 TOUCHING = {"square": math.pi / 4, "hexagonal": math.pi / math.sqrt(12), "random": math.pi / math.sqrt(12)}
@@ -30,7 +33,8 @@ MESHED, FROM_A_FILE = GEOMETRY.among(*CIRCULAR, "table"), GEOMETRY.among("table"
 class Cell:
     """Geometry of the periodic cell and its mesh. Keys of another geometry keep their defaults.
 
-    `table` is what `file` or `fibre_list` of geometry = "table" have, with the size of the cell; it is no key.
+    `table` is what `file` or `fibre_list` of geometry = "table" have, with the size of the cell, and `matched` the
+    fibres of `match`; they are no keys.
     """
 
     geometry: str = key(
@@ -225,6 +229,7 @@ class Cell:
         only=TABLE,
     )
     table: FibreTable | None = field(default=None, compare=False)
+    matched: FibrePattern | None = field(default=None, compare=False)
 
     @property
     def fractions(self) -> dict[str, float]:

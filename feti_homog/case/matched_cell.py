@@ -15,8 +15,8 @@ FEWEST_FIBRES = 10  # of fewer, distances have no distribution
 
 
 def with_match(cell: Cell, folder: Path, faults: list[str]) -> Cell:
-    """The cell with the path of its table completed, and the number and the fraction of the table's fibres where it has
-    none of its own; faults are added to `faults`."""
+    """The cell with its table read, the path of that completed, and the number and the fraction of the table's fibres
+    where it has none of its own; faults are added to `faults`."""
     if cell.match is None:
         return cell
     file, given = Path(os.path.realpath(folder / cell.match)), f"[cell] match = {toml_value(str(cell.match))}"
@@ -39,4 +39,4 @@ def with_match(cell: Cell, folder: Path, faults: list[str]) -> Cell:
     if count < FEWEST_FIBRES:
         faults.append(f"[cell] fibres = {count}: expected at least {FEWEST_FIBRES} with match")
     fraction = window.fibre_fraction if cell.fibre_fraction is None else cell.fibre_fraction
-    return replace(cell, match=file, fibres=count, fibre_fraction=fraction)
+    return replace(cell, match=file, matched=window, fibres=count, fibre_fraction=fraction)

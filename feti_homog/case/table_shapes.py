@@ -1,4 +1,4 @@
-"""Round and elliptic fibres of a table: every fibre gets a radius and semi-axes."""
+"""Shapes of the fibres of a table: every fibre gets a radius, and semi-axes or a polygon if some are not round."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from feti_homog.case.fibre_table import FibreTable
+from feti_homog.case.rounded_polygons import SIDES, RoundedPolygons
 from feti_homog.typing import Bool, Float
 
 BOTH_SIZES = "has a radius and semi-axes; give one"
@@ -46,6 +47,34 @@ def equal_area_radii(table: FibreTable) -> Float:
     if table.a is None or table.b is None:
         return table.radius
     return np.where(np.isnan(table.a), table.radius, np.where(table.a == table.b, table.a, np.sqrt(table.a * table.b)))
+
+
+def with_polygons(table: FibreTable, window: str, faults: list[str]) -> FibreTable:
+    """The table with its polygons, whose radii become those of discs of the same area; faults are added to `faults`."""
+    if table.sides is None:
+        if table.corner is not None:
+            faults.append(f"[cell] {table.name}: corner: belongs to sides, which no fibre has")
+        return table
+    sides = np.nan_to_num(table.sides)
+    given, corner = sides != 0, np.zeros(len(sides)) if table.corner is None else table.corner
+    least, most = SIDES
+    _tell(table, given & ((sides != np.round(sides)) | (sides < least) | (sides > most)),
+          f"expected sides from {least} to {most}, a whole number, or 0", faults)  # fmt: skip
+    _tell(table, given & (corner > 1), "expected corner at most 1, which makes a circle", faults)
+    _tell(table, ~given & (corner > 0), "has a corner, but no sides", faults)
+    for name in ("a", "coating", "inner_radius"):
+        column = getattr(table, name)
+        if column is not None:
+            _tell(table, given & (np.nan_to_num(column) > 0), f"has sides and {name}; give one", faults)
+    if given.any() and window == "cut":
+        faults.append(f'[cell] window = "cut": {table.name} has polygons, which it does not move')
+    if faults or not given.any():
+        return replace(table, sides=None, corner=None)
+    number = sides.astype(np.intp)
+    inner = table.radius * np.cos(np.pi / np.maximum(number, least))
+    angle = np.zeros(len(sides)) if table.angle is None else table.angle
+    polygons = RoundedPolygons(number, table.radius, np.where(given, corner * inner, 0.0), angle)
+    return replace(table, radius=np.where(given, np.sqrt(polygons.areas / np.pi), table.radius), polygons=polygons)
 
 
 def check_hollow(table: FibreTable, faults: list[str]) -> None:

@@ -15,7 +15,7 @@ from feti_homog.case.cell_section import Cell
 from feti_homog.case.rounded_polygons import RoundedPolygons
 from feti_homog.errors import CaseError
 from feti_homog.fibres import periodic_table
-from feti_homog.fibres.arrangement import arrange
+from feti_homog.fibres.arrange import arrange
 from feti_homog.fibres.ellipses import Ellipses
 from feti_homog.mesh.fibre_centres import fibre_circles
 from feti_homog.mesh.fibre_numbers import coating_thickness, fibre_numbers
@@ -23,7 +23,7 @@ from feti_homog.mesh.fibre_shapes import fibre_frames
 from feti_homog.mesh.fill.gmsh_mesher import arrangement_scale
 from feti_homog.mesh.interface_edges import voids
 from feti_homog.mesh.periodic_topology import Torus
-from feti_homog.mesh.readers.msh_reader import read as read_mesh
+from feti_homog.mesh.readers.msh_reader import read_cell
 from feti_homog.typing import Float
 
 
@@ -125,8 +125,7 @@ def _polygons(cell: Cell) -> RoundedPolygons | None:
 
 
 def _of_mesh(cell: Cell) -> ListedFibres:
-    assert cell.file is not None
-    mesh = read_mesh(cell.file)
+    mesh = read_cell(cell)
     torus = Torus.of(mesh)
     numbers, is_fibre = fibre_numbers(torus)
     ellipses = Ellipses(fibre_circles(torus)[:, :2] % mesh.period, fibre_frames(torus))

@@ -1,31 +1,16 @@
-"""Where the fibres are: square, hexagonal and random arrangements of discs on the torus."""
+"""Fibres on the torus: which outlines they have, of what they are made, and where the sides of the cell pass."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import product
-from math import fsum, pi, sqrt
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from feti_homog.case.mixed_cell import fibre_counts, fractions_in_words, void_count
-from feti_homog.case.phase_names import COATING, FIBRE, MATRIX, VOID
-from feti_homog.errors import MeshError
+from feti_homog.case.phase_names import COATING, MATRIX, VOID
 from feti_homog.fibres.convex_shapes import ConvexShapes
 from feti_homog.fibres.ellipses import Ellipses
-from feti_homog.fibres.relaxation import relax
 from feti_homog.typing import Bool, Float, Int
-
-if TYPE_CHECKING:
-    from feti_homog.case.cell_section import Cell
-
-
-# Quenched random packings jam near this area fraction.
-JAMMED = 0.84
-# Steps of the descent after which an arrangement counts as jammed; found ones take less than 200.
-MAX_STEPS = 2000
 
 
 @dataclass(frozen=True)
@@ -112,109 +97,6 @@ class Arrangement:
         return Ellipses(self.centres, self.frames)
 
 
-def arrange(cell: Cell) -> Arrangement:
-    """The arrangement that a case asks for in a cell of width 1, its fractions `cell.fractions` to rounding.
-
-    square: one disc in the middle of a 1 x 1 cell. hexagonal: 1 x sqrt(3), a disc in the middle and one at
-    the corner. random: discs in a 1 x 1 cell, see `random_arrangement`, with
-    `cell.match` see `matched_arrangement`. table: see `table_arrangement.table_arrangement`.
-
-    Raises:
-        MeshError: discs of that fraction touch, no arrangement is found, or the table is faulty.
-    """
-    if cell.match is not None:
-        from feti_homog.fibres.matched_arrangement import matched_arrangement
-
-        return matched_arrangement(cell)
-    if cell.geometry == "table":
-        from feti_homog.fibres.table_arrangement import table_arrangement
-
-        return table_arrangement(cell)
-    return ARRANGEMENTS[cell.geometry](cell)
-
-
-def square_arrangement(cell: Cell) -> Arrangement:
-    """One disc in the middle of the unit square."""
-    return _lattice(cell, 1.0, np.array([[0.5, 0.5]]), pi / 4)
-
-
-def hexagonal_arrangement(cell: Cell) -> Arrangement:
-    """Discs at the corner and in the middle of a 1 x sqrt(3) cell: the hexagonal lattice of distance 1."""
-    return _lattice(cell, sqrt(3), np.array([[0.0, 0.0], [0.5, sqrt(3) / 2]]), pi / (2 * sqrt(3)))
-
-
-def _lattice(cell: Cell, height: float, centres: Float, limit: float) -> Arrangement:
-    """Equal discs at the centres (N, 2) of a 1 x height cell, which touch at the fraction `limit` if they are bare."""
-    fraction = cell.fibre_fraction
-    limit /= (1 + (cell.coating or 0.0)) ** 2
-    assert fraction is not None
-    if fraction >= limit:
-        raise MeshError(
-            f"[cell] fibre_fraction = {fraction:g}: the fibres of the {cell.geometry} cell touch at "
-            f"{limit:.4f}; it must be smaller"
-        )
-    radius = sqrt(fraction * height / (pi * len(centres)))
-    radii = np.full(len(centres), radius)
-    return Arrangement(1.0, height, centres, radii, (FIBRE,) * len(centres), coating=_coating(cell, radii))
-
-
-def _coating(cell: Cell, radii: Float) -> Float | None:
-    """Thickness (N,) of the coatings that a case gives all its fibres, of these radii."""
-    return None if cell.coating is None else cell.coating * radii
-
-
-def random_arrangement(cell: Cell, max_steps: int = MAX_STEPS, max_attempts: int | None = None) -> Arrangement:
-    """Discs at random in the unit square, periodic, the same for the same case on every machine.
-
-    Radii are uniform in mean * (1 - s, 1 + s), s = `radius_spread`, and scaled to the fraction of each phase; those of
-    voids are all alike. Any two discs, coatings and images included, are at least `min_gap` mean diameters of fibres
-    apart. Random centres are moved down the gradient of the overlap energy 1/2 sum max(0, R_i + R_j - |x_i - x_j|)^2 of
-    the discs grown by half the gap until it is zero; when that has not come after `max_steps`, it starts again from
-    other centres, up to `max_attempts` times (default: 10 for few fibres, 3 for many). Last, all is shifted
-    (`clear_shift`).
-
-    Raises:
-        MeshError: no arrangement is found.
-    """
-    phase = tuple(name for name, own in fibre_counts(cell).items() for _ in range(own))
-    fibres, gap, fraction = len(phase), cell.min_gap, fsum(cell.fractions.values())
-    generator = np.random.default_rng(cell.seed)
-    radii = 1 + cell.radius_spread * generator.uniform(-1, 1, fibres)
-    for name, share in cell.fractions.items():
-        own = np.array(phase) == name
-        radii[own] *= sqrt(share / (pi * fsum(radii[own] ** 2)))
-    coating, clear = _coating(cell, radii), gap * fsum(radii) / fibres
-    radii, coating = _with_voids(cell, radii, coating)
-    count, phase = len(radii), phase + (VOID,) * (len(radii) - fibres)
-    grown = (radii if coating is None else radii + coating) + clear
-    ask = f"[cell] {fractions_in_words(cell)} with min_gap = {gap:g} and fibres = {fibres}"
-    of_all = "fraction of fibres and voids" if cell.voids else "fibre fraction"
-    if pi * np.sum(grown**2) > 0.9:
-        raise MeshError(
-            f"{ask}: random arrangements with this gap exist up to a {of_all} of at most about "
-            f"{JAMMED / (1 + (cell.coating or 0.0) + gap) ** 2:.2f}; lower one of them"
-        )
-    attempts, best = max_attempts or max(3, min(10, 100 // count)), 0.0
-    for _ in range(attempts):
-        centres, reached = relax(generator.random((count, 2)), grown, max_steps)
-        if reached >= 1:
-            return clear_shift(Arrangement(1.0, 1.0, centres, radii, phase, coating=coating))
-        best = max(best, reached)
-    raise MeshError(
-        f"{ask}: no arrangement found in {attempts} attempts; they reached a fibre fraction of at most about "
-        f"{fraction * best**2:.2f} with this gap; lower one of them, or change seed"
-    )
-
-
-def _with_voids(cell: Cell, radii: Float, coating: Float | None) -> tuple[Float, Float | None]:
-    """Radii and coatings of the fibres, and after them those of the voids."""
-    count = void_count(cell, float(radii.mean()))
-    if not count:
-        return radii, coating
-    own = np.full(count, sqrt((cell.voids or 0.0) / (pi * count)))
-    return np.append(radii, own), None if coating is None else np.append(coating, np.zeros(count))
-
-
 def clearance(arrangement: Arrangement) -> float:
     """Distance of the sides of the cell from the nearest position at which they would touch a disc."""
     size = np.array([arrangement.width, arrangement.height])
@@ -244,10 +126,3 @@ def clear_shift(arrangement: Arrangement) -> Arrangement:
     offset = (centres - corners[:, None] + half) % size - half
     distance = np.abs(np.linalg.norm(offset, axis=2) - radii).min(axis=1)
     return replace(arrangement, centres=(arrangement.centres - corners[np.argmax(distance)]) % size)
-
-
-ARRANGEMENTS: dict[str, Callable[[Cell], Arrangement]] = {
-    "square": square_arrangement,
-    "hexagonal": hexagonal_arrangement,
-    "random": random_arrangement,
-}

@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from feti_homog.errors import MeshError
-from feti_homog.fibres.arrangement import MAX_STEPS
-from feti_homog.fibres.relaxation import relax
+from feti_homog.fibres.relaxation import MAX_STEPS, relax
 from feti_homog.microstructure.fibre_pattern import FibrePattern
 
 ATTEMPTS = 3

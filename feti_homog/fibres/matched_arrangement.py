@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from feti_homog.case.fibre_window import read_window
 from feti_homog.case.phase_names import FIBRE
 from feti_homog.errors import MeshError
 from feti_homog.fibres.arrangement import Arrangement, clear_shift
@@ -17,26 +16,23 @@ from feti_homog.microstructure.neighbour_match import match_distance, matched, w
 from feti_homog.typing import Float
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from feti_homog.case.cell_section import Cell
 
 
 def matched_arrangement(cell: Cell) -> Arrangement:
     """Discs at random in the unit square, periodic, the same for the same case on every machine.
 
-    The radii are quantiles of those of the table `cell.match`, dealt at random and scaled to the fraction. The centres
+    The radii are quantiles of the window `cell.matched`, dealt at random and scaled to the fraction. The centres
     are placed as those of other random cells, `min_gap` mean diameters apart, and then moved one by one until the
     distances of the nearest and the second neighbours are distributed as in the table (`neighbour_match.matched`). Of
     coated fibres the gap is that of the coatings.
 
     Raises:
-        CaseError: the table is faulty.
         MeshError: no arrangement is found.
     """
     count, fraction = cell.fibres, cell.fibre_fraction
-    assert cell.match is not None and count is not None and fraction is not None
-    window = read_window(cell.match)
+    window = cell.matched
+    assert window is not None and count is not None and fraction is not None
     generator = np.random.default_rng(cell.seed)
     levels = (np.arange(count) + 0.5) / count
     radii = generator.permutation(np.quantile(window.radii, levels))
@@ -52,7 +48,7 @@ def matched_arrangement(cell: Cell) -> Arrangement:
     return clear_shift(Arrangement(1.0, 1.0, centres, radii, (FIBRE,) * count, coating=coating))
 
 
-def distance_of(table: Path, width: float, height: float, centres: Float, radii: Float) -> float:
-    """How far a periodic cell with these fibres is from its table, in mean diameters: `match_distance`."""
+def distance_of(window: FibrePattern, width: float, height: float, centres: Float, radii: Float) -> float:
+    """How far a periodic cell with these fibres is from the window that it matches, in mean diameters."""
     pattern = FibrePattern(width, height, centres, radii, periodic=True)
-    return match_distance(pattern, wanted_distances(read_window(table), pattern.count))
+    return match_distance(pattern, wanted_distances(window, pattern.count))

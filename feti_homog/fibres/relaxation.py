@@ -9,6 +9,8 @@ from feti_homog.typing import Float, Int
 
 # Relative excess of the radii that push over those that must not overlap: the descent ends in finite time.
 RADIUS_EXCESS = 1e-3
+# Steps of the descent after which an arrangement counts as jammed; found ones take less than 200.
+MAX_STEPS = 2000
 
 
 def relax(centres: Float, radii: Float, max_steps: int, size: tuple[float, float] = (1.0, 1.0)) -> tuple[Float, float]:

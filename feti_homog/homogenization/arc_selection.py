@@ -54,15 +54,15 @@ class InterfaceNodes:
             (step == 0) | (step == lattice.intervals),
         )
 
-    def moved_tips(self, case: Case) -> tuple[MovedTips, ...]:
-        """Of each interface the tips that the mesher has put into a vertex near them; a user's mesh has its vertices
-        where they are."""
+    def moved_tips(self, case: Case, fibres: int) -> tuple[MovedTips, ...]:
+        """Find the tips of each interface, on so many fibres, that the mesher has put into a vertex near them; a user's
+        mesh has its vertices where they are."""
         if case.cell.has_own_mesh:
             return (debonded_arcs.NOT_MOVED,) * len(case.interfaces)
         most, moved = float(np.degrees(MERGED)), []
         for pair, interface in enumerate(case.interfaces):
             own = self.is_vertex & (self.pair == pair)
-            wanted = tips.on_interface(case, interface)
+            wanted = tips.on_interface(case, interface, fibres)
             moved.append(debonded_arcs.moved_tips(wanted, self.fibre[own], self.direction[own], most))
         return tuple(moved)
 

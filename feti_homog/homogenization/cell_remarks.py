@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from feti_homog.case.case import Case
-from feti_homog.case.fibre_window import read_window
 from feti_homog.case.selectors import BREAKING
 from feti_homog.fibres import periodic_table
 from feti_homog.homogenization import bonds
@@ -86,9 +85,9 @@ def table_remarks(case: Case) -> tuple[str, ...]:
 def _other_fraction(case: Case) -> tuple[str, ...]:
     """Mention a fibre fraction other than that of the table that the cell matches."""
     cell = case.cell
-    if cell.match is None or cell.fibre_fraction is None:
+    if cell.match is None or cell.matched is None or cell.fibre_fraction is None:
         return ()
-    fraction = read_window(cell.match).fibre_fraction
+    fraction = cell.matched.fibre_fraction
     if abs(cell.fibre_fraction / fraction - 1.0) <= SAME_FRACTION:
         return ()
     return (

@@ -12,10 +12,14 @@ from mpi4py import MPI
 
 from feti_homog.case import case as cases
 from feti_homog.case.case import Case
+from feti_homog.fibres.arrange import listed_arrangement
 from feti_homog.homogenization import tips
 from feti_homog.mesh.coarse_mesh import CoarseMesh
-from feti_homog.mesh.fill.drawing import Drawing, Sketch
+from feti_homog.mesh.fill.gmsh_mesher import begin
+from feti_homog.mesh.fill.unmeshed_cell import NodedCell, UnmeshedCell
 from feti_homog.mesh.outline.bare_outline import LineStations
+from feti_homog.mesh.readers.msh_reader import read_cell
+from feti_homog.mesh.sizes.element_estimate import ElementEstimate
 from feti_homog.mesh.sizes.graded_size import SizeField
 from feti_homog.mesh.tiles.filling import Filling, Tile, fill
 from feti_homog.mesh.tiles.tiles import TilePolicy
@@ -26,53 +30,50 @@ from feti_homog.parallel.mpi_errors import agree, on_root_only
 T = TypeVar("T")
 
 
-def drawn(case: Case, comm: MPI.Intracomm, policy: TilePolicy) -> Drawing | CoarseMesh | None:
+def place_nodes(case: Case, comm: MPI.Intracomm, policy: TilePolicy) -> NodedCell | CoarseMesh | None:
     """On rank 0 a user's mesh, or the cell with its tiles still to be filled; the nodes on its lines are placed by all
     ranks.  Collective.
 
     Raises:
-        CaseError, MeshError: on every rank, as `begun`.
+        CaseError, MeshError: on every rank, as `begin_mesh`.
     """
-    found = on_root_only(comm, begun, case, policy)
-    sketch = found if isinstance(found, Sketch) else None
-    if not comm.bcast(sketch is not None):
-        assert not isinstance(found, Sketch)
+    found = on_root_only(comm, begin_mesh, case, policy)
+    unmeshed = found if isinstance(found, UnmeshedCell) else None
+    if not comm.bcast(unmeshed is not None):
+        assert not isinstance(found, UnmeshedCell)
         return found
-    field: SizeField = comm.bcast(None if sketch is None else sketch.bare.field)
-    own = deal(comm, [] if sketch is None else sketch.bare.lines.parts(comm.size))
+    field: SizeField = comm.bcast(None if unmeshed is None else unmeshed.bare.field)
+    own = deal(comm, [] if unmeshed is None else unmeshed.bare.lines.parts(comm.size))
     stations = collect(comm, agree(comm, own.stations, field))
-    return on_root_only(comm, _with_nodes, sketch, stations)
+    return on_root_only(comm, _with_nodes, unmeshed, stations)
 
 
-def _with_nodes(sketch: Sketch, stations: list[LineStations]) -> Drawing:
-    """With the nodes that ranks have placed."""
-    return sketch.drawn(LineStations.joined(stations, sketch.bare.lines.sampling))
+def _with_nodes(unmeshed: UnmeshedCell, stations: list[LineStations]) -> NodedCell:
+    """The cell with the nodes that ranks have placed."""
+    return unmeshed.with_nodes(LineStations.joined(stations, unmeshed.bare.lines.sampling))
 
 
-def begun(case: Case, policy: TilePolicy) -> Sketch | Drawing | CoarseMesh:
-    """A user's mesh, or the cell as far as rank 0 draws it alone.
+def begin_mesh(case: Case, policy: TilePolicy) -> UnmeshedCell | NodedCell | CoarseMesh:
+    """A user's mesh, or the cell as far as rank 0 makes it alone.
 
     Raises:
         CaseError: a phase has no material, or a material no phase.
-        MeshError: the cell cannot be drawn, or its mesh file is faulty.
+        MeshError: the cell cannot be meshed, or its mesh file is faulty.
     """
-    # gmsh is imported where it is needed.
-    found: Sketch | Drawing | CoarseMesh
+    found: UnmeshedCell | NodedCell | CoarseMesh
     if case.cell.has_own_mesh:
-        from feti_homog.mesh.readers.msh_reader import read
-
-        assert case.cell.file is not None
-        found = read(case.cell.file, case.cell.snap_tolerance if case.cell.repair == "snap" else None)
+        found = read_cell(case.cell)
     else:
-        from feti_homog.mesh.fill.gmsh_mesher import begin
-
-        found = begin(replace(case.cell, tip_size=tips.size(case)), tips.marks(case), policy)
+        listed = listed_arrangement(case.cell)
+        estimate = ElementEstimate.of(case.cell, listed)
+        cell = replace(case.cell, tip_size=tips.size(case, estimate))
+        found = begin(cell, listed, tips.marks(case, estimate.fibres), policy)
     cases.check_phases(case, found.phases)
     return found
 
 
-def finished(found: Drawing | CoarseMesh | None, comm: MPI.Intracomm) -> CoarseMesh | None:
-    """The mesh that rank 0 has `drawn`, there; its tiles are filled by all ranks.  Collective.
+def fill_tiles(found: NodedCell | CoarseMesh | None, comm: MPI.Intracomm) -> CoarseMesh | None:
+    """The mesh on rank 0, the tiles that it has from `place_nodes` filled by all ranks.  Collective.
 
     Raises:
         MeshError: on every rank, if one cannot fill a tile of its.
@@ -101,6 +102,6 @@ def fill_own(tiles: list[tuple[int, Tile]]) -> list[tuple[int, Filling]]:
     return [(k, fill(tile)) for k, tile in tiles]
 
 
-def _joined(found: Drawing | CoarseMesh, fillings: list[Filling]) -> CoarseMesh:
+def _joined(found: NodedCell | CoarseMesh, fillings: list[Filling]) -> CoarseMesh:
     """The mesh of these filled tiles, if it is not there already."""
     return found if isinstance(found, CoarseMesh) else found.mesh(fillings)

@@ -172,7 +172,7 @@ def distribute(
     moved = (debonded_arcs.NOT_MOVED,) * len(case.interfaces)
     if case.arcs and not faults:
         nodes = InterfaceNodes.of(torus, lattice, pairs, numbers, centres)
-        moved = nodes.moved_tips(case)
+        moved = nodes.moved_tips(case, int(is_fibre.sum()))
         faults = arc_selection.faults(case, nodes, moved)
     if faults:
         raise CaseError(*faults)
@@ -212,7 +212,8 @@ def distribute(
 
 def match_distance(case: Case, width: float, height: float, centres: Float, radii: Float) -> float | None:
     """That of `CellSummary`, for fibres of these centres (n, 2) and radii (n,)."""
-    return None if case.cell.match is None else distance_of(case.cell.match, width, height, centres, radii)
+    window = case.cell.matched
+    return None if window is None else distance_of(window, width, height, centres, radii)
 
 
 def wanted_pieces(

@@ -6,45 +6,58 @@ of so many ranks, not on who filled which tile.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import chain
 
 import numpy as np
 from mpi4py import MPI
 
 from feti_homog.case.case import Case
+from feti_homog.errors import CaseError
 from feti_homog.feti.decomposition.partition import assign_ranks, cut_into_pieces
+from feti_homog.homogenization import interface_pairs
+from feti_homog.homogenization.cell_remarks import subdomain_remarks, table_remarks
 from feti_homog.homogenization.coarse_meshes import deal_tiles, fill_own
-from feti_homog.homogenization.domain_partition import PartitionPolicy, RankShare, wanted_pieces
-from feti_homog.homogenization.drawn_cell import drawn_cell, summary_of, tiles_to_fill
-from feti_homog.mesh.fill.drawing import Drawing
+from feti_homog.homogenization.domain_partition import (
+    CellSummary,
+    PartitionPolicy,
+    RankShare,
+    in_cell,
+    match_distance,
+    wanted_pieces,
+)
+from feti_homog.mesh.coarse_mesh import representatives
+from feti_homog.mesh.fill.unmeshed_cell import NodedCell
 from feti_homog.mesh.joined_submeshes import joined
-from feti_homog.mesh.periodic_topology import Torus, components
+from feti_homog.mesh.outline.curves import MATRIX
+from feti_homog.mesh.periodic_topology import Torus, components, places_by_depth
 from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.mesh.submesh import SubdomainTable, SubmeshesOfRank, cut_for_ranks, pinning
-from feti_homog.mesh.tiles.tile_torus import FilledTile, Regions, tile_torus
+from feti_homog.mesh.tiles.filling import arc_edges
+from feti_homog.mesh.tiles.tile_torus import FilledTile, NumberedTile, Regions, tile_torus
 from feti_homog.parallel.dealing import swap
 from feti_homog.parallel.mpi_errors import agree, on_root, on_root_only
 from feti_homog.typing import Float, Int
 
 
-def can_be_torn_by_tiles(case: Case, drawing: Drawing) -> bool:
+def can_be_torn_by_tiles(case: Case, noded: NodedCell) -> bool:
     """Whether no choice of the case needs the whole mesh: tips of arcs, bodies cut by the sides, the matrix in fewer
     pieces than there are tiles."""
     whole = case.arcs or case.cell.bodies == "plane" or case.decomposition.subdomains is not None
-    return len(drawing.parts) > 1 and not whole
+    return len(noded.parts) > 1 and not whole
 
 
 def tear_by_tiles(
-    case: Case, drawing: Drawing | None, lattice: ReferenceLattice, comm: MPI.Intracomm, policy: PartitionPolicy
+    case: Case, noded: NodedCell | None, lattice: ReferenceLattice, comm: MPI.Intracomm, policy: PartitionPolicy
 ) -> RankShare:
-    """This rank's share of the cell that is drawn on rank 0.  Collective.
+    """This rank's share of the cell whose lines rank 0 has with nodes.  Collective.
 
     Raises:
-        CaseError, MeshError: on every rank, as `drawn_cell` and `filling.fill`.
+        CaseError, MeshError: on every rank, as `tiled_cell` and `filling.fill`.
     """
-    facts = on_root(comm, drawn_cell, case, drawing)
-    regions: Regions = comm.bcast(None if drawing is None else drawing.regions)
-    torus, tile = _filled(drawing, regions, comm)
+    facts = on_root(comm, tiled_cell, case, noded)
+    regions: Regions = comm.bcast(None if noded is None else noded.regions)
+    torus, tile = _filled(noded, regions, comm)
     load = np.bincount(torus.constituent, minlength=len(regions.phase))
     comm.Allreduce(MPI.IN_PLACE, load)
     wanted = wanted_pieces(case, load, facts.edges, lattice, comm.size, policy)
@@ -55,13 +68,13 @@ def tear_by_tiles(
     rank = on_root(comm, _assigned, loads, neighbours or [], comm.size)
     table = SubdomainTable(body, rank, facts.nesting, regions.phase)
     shares = agree(comm, _shares, torus, subdomain, table, comm.size, _pinned(torus, comm))
-    summary = on_root(comm, summary_of, case, drawing, len(body), int(load.sum()))
+    summary = on_root(comm, summary_of, case, noded, len(body), int(load.sum()))
     return RankShare(summary, table, facts.pairs, joined(swap(comm, shares)))
 
 
-def _filled(drawing: Drawing | None, regions: Regions, comm: MPI.Intracomm) -> tuple[Torus, Int]:
+def _filled(noded: NodedCell | None, regions: Regions, comm: MPI.Intracomm) -> tuple[Torus, Int]:
     """The torus of the tiles that this rank fills, and the tile (m,) of each triangle.  Collective."""
-    tiles = on_root_only(comm, tiles_to_fill, drawing) or []
+    tiles = on_root_only(comm, tiles_to_fill, noded) or []
     own = deal_tiles(tiles, [len(tile.nodes) for tile in tiles], comm)
     fillings = agree(comm, fill_own, [(k, tile.tile) for k, tile in own])
     inner = dict(chain.from_iterable(comm.allgather([(k, len(filling.inner)) for k, filling in fillings])))
@@ -125,3 +138,84 @@ def _pinned(torus: Torus, comm: MPI.Intracomm) -> int:
     found = comm.allgather(pinning(torus, np.select([at_interface, in_matrix], [2, 0], 1)))
     best: tuple[int, float, int] = min(chain.from_iterable(found))
     return best[-1]
+
+
+@dataclass(frozen=True)
+class TiledCell:
+    """Facts for all ranks.
+
+    Attributes:
+        pairs: (phases, phases) as in `interface_pairs.pairs_of`.
+        nesting: (constituents,) as in `Torus.nesting`.
+        edges: (constituents,) coarse edges that each shares with others.
+    """
+
+    pairs: Int
+    nesting: Int
+    edges: Int
+
+
+def tiled_cell(case: Case, noded: NodedCell) -> TiledCell:
+    """That of a cell without debonded arcs.
+
+    Raises:
+        CaseError: an interface of the case is between phases that do not touch.
+    """
+    regions, around, curves = noded.regions, noded.lines.around, noded.lines.curves
+    # The last of `constituent` is the matrix, which is around where `around` is MATRIX, -1.
+    inside, outside = regions.constituent[:-1], regions.constituent[around]
+    solid = (inside >= 0) & (outside >= 0)
+    faults = interface_pairs.faults(case, regions.phases, regions.phase[inside[solid]], regions.phase[outside[solid]])
+    if faults:
+        raise CaseError(*faults)
+    n = len(regions.phase)
+    depth = np.zeros(n, np.int64)
+    depth[inside[inside >= 0]] = np.where(around == MATRIX, 1, 2)[inside >= 0]
+    nesting = places_by_depth(depth, regions.phase, regions.phases)
+    arcs = np.flatnonzero(curves.circle != MATRIX)
+    beside = np.stack([regions.constituent[side[arcs]] for side in (curves.inside, curves.outside)])
+    shared = (beside >= 0).all(axis=0)
+    count = np.diff(curves.first)[arcs] - 1
+    edges = np.bincount(beside[:, shared].ravel(), np.tile(count[shared], 2), n).astype(np.int64)
+    return TiledCell(interface_pairs.pairs_of(case, regions.phases), nesting, edges)
+
+
+def tiles_to_fill(noded: NodedCell) -> list[NumberedTile]:
+    """The tiles of a noded."""
+    lines, arrangement = noded.lines, noded.arrangement
+    stands_for = representatives(lines.points, arrangement.width, arrangement.height).astype(np.int64)
+    return [NumberedTile(nodes, stands_for[nodes], tile) for nodes, tile in noded.parts]
+
+
+def summary_of(case: Case, noded: NodedCell, subdomains: int, triangles: int) -> CellSummary:
+    """That of the cell, cut into so many subdomains of so many coarse triangles."""
+    regions, lines, arrangement = noded.regions, noded.lines, noded.arrangement
+    own = regions.constituent[:-1]
+    solid = np.flatnonzero(own >= 0)
+    circle = solid[np.unique(own[solid], return_index=True)[1]]
+    disc, hollow = lines.disc[circle], arrangement.is_hollow
+    is_fibre = ~lines.is_coating[circle] | hollow[disc]
+    centres = in_cell(noded.scale * arrangement.centres[disc], np.array([regions.width, regions.height]))
+    radii = regions.ellipses.circles[circle, 2]
+    ends = noded.scale * lines.points[arc_edges(lines.curves)[0]]
+    nothing = np.full((1, 2), np.nan)
+    return CellSummary(
+        width=regions.width,
+        height=regions.height,
+        phases=regions.phases,
+        bodies=len(regions.phase),
+        subdomains=subdomains,
+        coarse_triangles=triangles,
+        interface_edge=float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max(initial=0.0)),
+        numbers=np.append(0, disc + 1),
+        is_fibre=np.append(False, is_fibre),
+        constituent_phase=regions.phase,
+        centres=np.concatenate([nothing, centres]),
+        radii=np.append(np.nan, radii),
+        frames=np.concatenate([np.full((1, 2, 2), np.nan), regions.ellipses.frames[circle]]),
+        moved_tips=({},) * len(case.interfaces),
+        snapped=0.0,
+        voids=int(arrangement.is_void.sum() + hollow.sum()),
+        match_distance=match_distance(case, regions.width, regions.height, centres[is_fibre], radii[is_fibre]),
+        remarks=(*table_remarks(case), *subdomain_remarks(case, len(regions.phase), subdomains, triangles)),
+    )

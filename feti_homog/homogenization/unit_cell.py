@@ -16,7 +16,7 @@ from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.solver import FetiSolver
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 from feti_homog.homogenization import bonds, cost_model, phase_laws
-from feti_homog.homogenization.coarse_meshes import drawn, finished
+from feti_homog.homogenization.coarse_meshes import fill_tiles, place_nodes
 from feti_homog.homogenization.domain_partition import (
     DEFAULT_POLICY,
     CellSummary,
@@ -27,7 +27,7 @@ from feti_homog.homogenization.domain_partition import (
 from feti_homog.homogenization.tile_tearing import can_be_torn_by_tiles, tear_by_tiles
 from feti_homog.interface.tips import debonded_arcs
 from feti_homog.mesh.coarse_mesh import CoarseMesh
-from feti_homog.mesh.fill.drawing import Drawing
+from feti_homog.mesh.fill.unmeshed_cell import NodedCell
 from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.mesh.submesh import SubmeshesOfRank
 from feti_homog.parallel.dealing import deal
@@ -170,11 +170,11 @@ def assemble_subdomains(
 
 def cut(case: Case, lattice: ReferenceLattice, comm: MPI.Intracomm, policy: PartitionPolicy) -> RankShare:
     """This rank's share of the cell, meshed and cut.  Collective."""
-    found = drawn(case, comm, policy.tiles)
-    if comm.bcast(isinstance(found, Drawing) and can_be_torn_by_tiles(case, found)):
+    found = place_nodes(case, comm, policy.tiles)
+    if comm.bcast(isinstance(found, NodedCell) and can_be_torn_by_tiles(case, found)):
         assert not isinstance(found, CoarseMesh)
         return tear_by_tiles(case, found, lattice, comm, policy)
-    mesh = finished(found, comm)
+    mesh = fill_tiles(found, comm)
     return deal(comm, on_root_only(comm, distribute, case, mesh, lattice, comm.size, policy) or [])
 
 

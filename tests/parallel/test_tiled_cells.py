@@ -65,9 +65,9 @@ def test_the_mesh_is_that_of_one_rank(comm, keys):
 
 def share_of(case, comm):
     """This rank's share of the cell, torn by tiles."""
-    drawing = coarse_meshes.drawn(case, comm, SMALL)
-    assert drawing is None or can_be_torn_by_tiles(case, drawing)
-    return tear_by_tiles(case, drawing, LATTICE, comm, TILED)
+    noded = coarse_meshes.place_nodes(case, comm, SMALL)
+    assert noded is None or can_be_torn_by_tiles(case, noded)
+    return tear_by_tiles(case, noded, LATTICE, comm, TILED)
 
 
 @pytest.mark.few_ranks
@@ -131,8 +131,8 @@ def test_what_needs_the_whole_mesh_is_torn_on_rank_0(comm):
     contact = {"debonded": [{"fibre": 1, "centre": 0.0, "angle": 90.0}], "contact": True}
     for more in ({"interface": contact}, {"decomposition": {"subdomains": 17}}, {"bodies": "plane"}):
         case = case_of(**more)
-        drawing = coarse_meshes.drawn(case, comm, SMALL)
-        assert drawing is None or not can_be_torn_by_tiles(case, drawing)
+        noded = coarse_meshes.place_nodes(case, comm, SMALL)
+        assert noded is None or not can_be_torn_by_tiles(case, noded)
     cell, *_ = solve(case_of(decomposition={"subdomains": 17}), comm, policy=TILED)
     assert cell.summary.subdomains == 17
 

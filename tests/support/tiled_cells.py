@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 
-from feti_homog.mesh.fill.gmsh_mesher import draw
+from feti_homog.mesh.fill.gmsh_mesher import begin
 from feti_homog.mesh.tiles.tiles import TilePolicy
 from support.circular_cells import cell
 
@@ -24,12 +24,12 @@ SMALL = TilePolicy(least_discs=4, discs=4)
 
 
 @cache
-def drawn(name):
-    found = draw(CELLS[name], policy=SMALL)
+def noded(name):
+    found = begin(CELLS[name], None, policy=SMALL).with_nodes()
     assert len(found.parts) >= 4
     return found
 
 
 @cache
 def mesh_of(name):
-    return drawn(name).filled()
+    return noded(name).filled()

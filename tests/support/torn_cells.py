@@ -10,7 +10,7 @@ from reference.quadratic_programme import QuadraticProgramme, torus_keys
 
 from feti_homog.case import sections
 from feti_homog.feti.thresholds import DEFAULTS
-from feti_homog.fibres.arrangement import arrange
+from feti_homog.fibres.arrange import arrange
 from feti_homog.homogenization import unit_cell
 from feti_homog.homogenization.domain_partition import DEFAULT_POLICY
 from feti_homog.homogenization.unit_cell import TornCell

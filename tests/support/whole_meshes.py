@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from feti_homog.homogenization.coarse_meshes import drawn, finished
+from feti_homog.homogenization.coarse_meshes import fill_tiles, place_nodes
 from feti_homog.mesh.tiles.tiles import DEFAULT_TILES
 
 
 def coarse_mesh(case, comm, policy=DEFAULT_TILES):
     """That of rank 0, filled by all; None on others.  Collective."""
-    return finished(drawn(case, comm, policy), comm)
+    return fill_tiles(place_nodes(case, comm, policy), comm)

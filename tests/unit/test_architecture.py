@@ -9,8 +9,11 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from radon.complexity import cc_visit
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "feti_homog"
@@ -105,6 +108,20 @@ def test_imports_point_to_floors_below(path):
     floors = {floor_of(name) for name in imported_names(path)} - {None}
     above = {floor for floor in floors if own is not None and LEVEL[floor] > LEVEL[own]}
     assert not above, f"{path.name} imports {', '.join(sorted(above))}"
+
+
+def test_modules_do_not_import_each_other_in_circles():
+    """Imports inside functions and for type checking included."""
+    names = [name_of(path).removesuffix(".__init__") for path in MODULES]
+    used = {name: modules_of(imported_names(path), names) for name, path in zip(names, MODULES, strict=True)}
+    graph = csr_array([[other in used[name] - {name} for other in names] for name in names], dtype=bool)
+    circle = connected_components(graph, connection="strong")[1]
+    assert not [name for name, own in zip(names, circle, strict=True) if np.count_nonzero(circle == own) > 1]
+
+
+def modules_of(imported: set[str], names: list[str]) -> set[str]:
+    """The modules that these are, or whose words these are."""
+    return {name if name in names else name.rpartition(".")[0] for name in imported}
 
 
 @pytest.mark.parametrize("path", sorted(PACKAGE.rglob("__init__.py")), ids=lambda path: str(path.parent.name))

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from feti_homog.case.cell_section import Cell
 from feti_homog.errors import MeshError
 from feti_homog.fibres.ellipses import Ellipses
 from feti_homog.mesh.coarse_mesh import CoarseMesh, areas, representatives
@@ -22,6 +23,12 @@ from feti_homog.mesh.readers.snapping import snapped
 from feti_homog.typing import Float
 
 LOADERS = {".msh": gmsh_file.load, ".inp": abaqus_file.load, ".vtu": vtk_file.load, ".vtk": vtk_file.load}
+
+
+def read_cell(cell: Cell) -> CoarseMesh:
+    """The user's mesh of a cell, repaired as the case asks for.  Raises as `read`."""
+    assert cell.file is not None
+    return read(cell.file, cell.snap_tolerance if cell.repair == "snap" else None)
 
 
 def read(path: Path, snap: float | None = None) -> CoarseMesh:

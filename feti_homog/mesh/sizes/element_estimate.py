@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
 
 import numpy as np
 
-from feti_homog.case.cell_section import FIBRES_OF
+from feti_homog.case.cell_section import FIBRES_OF, Cell
 from feti_homog.case.mixed_cell import fibre_counts
-from feti_homog.fibres.arrangement import arrange
+from feti_homog.fibres.arrangement import Arrangement
 from feti_homog.fibres.ellipses import Ellipses
 from feti_homog.mesh.sizes.from_sources import MAX_GROWTH
 from feti_homog.mesh.sizes.size_field import MIN_EDGES_AROUND
-
-if TYPE_CHECKING:
-    from feti_homog.case.cell_section import Cell
 
 # Area of an equilateral triangle / its side squared.
 TRIANGLE_AREA = math.sqrt(3.0) / 4.0
@@ -25,38 +22,56 @@ TRIANGLES_OF_A_FIBRE = 160
 RATIOS = np.geomspace(1.0, 1e7, 400)
 
 
-def fibres_of(cell: Cell) -> int:
-    """Number of fibres."""
-    if cell.geometry == "table":
-        return arrange(cell).fibres
-    return FIBRES_OF.get(cell.geometry) or sum(fibre_counts(cell).values())
+@dataclass(frozen=True)
+class ElementEstimate:
+    """A cell of width 1 before it is meshed, and but for tables before its fibres are arranged.
 
-
-def mean_radius(cell: Cell) -> float:
-    """Mean radius of the fibres, of a table of the voids too, / width of the cell."""
-    if cell.geometry == "table":
-        return float(arrange(cell).radii.mean())
-    return math.sqrt(math.fsum(cell.fractions.values()) * _height(cell) / (math.pi * fibres_of(cell)))
-
-
-def interface_size(cell: Cell) -> float:
-    """Size of elements on interfaces / width of the cell."""
-    return min(cell.interface_size or cell.mesh_size, 2 * math.pi * mean_radius(cell) / MIN_EDGES_AROUND)
-
-
-def triangles(cell: Cell) -> float:
-    """Those of a cell without debonded arcs: of one size, about fibres, at ends of ellipses, beside fine interfaces.
-
-    On both sides of interfaces of the length P there are 2 P int dx / (A (h + g x)^2) = 2 P / (A g h) triangles.
+    Attributes:
+        cell: with the sizes of its elements.
+        fibres: number of fibres.
+        mean_radius: of the fibres, of a table of the voids too.
+        height: of the cell.
+        ellipses: the fibres, if some are not round.
     """
-    count = _height(cell) / (TRIANGLE_AREA * cell.mesh_size**2) + TRIANGLES_OF_A_FIBRE * _irregular_fibres(cell)
-    ellipses = _ellipses(cell)
-    if ellipses is not None:
-        count += _triangles_of_ends(ellipses, cell.interface_size or cell.mesh_size)
-    if cell.interface_size is None:
-        return count
-    length = 2 * math.pi * mean_radius(cell) * fibres_of(cell) if ellipses is None else math.fsum(ellipses.perimeters)
-    return count + 2 * length / (TRIANGLE_AREA * MAX_GROWTH * cell.interface_size)
+
+    cell: Cell
+    fibres: int
+    mean_radius: float
+    height: float
+    ellipses: Ellipses | None = None
+
+    @classmethod
+    def of(cls, cell: Cell, listed: Arrangement | None) -> ElementEstimate:
+        """That of a cell, with the arrangement of its table if it has one."""
+        if listed is not None:
+            ellipses = None if listed.frames is None else listed.ellipses
+            return cls(cell, listed.fibres, float(listed.radii.mean()), listed.height, ellipses)
+        fibres = FIBRES_OF.get(cell.geometry) or sum(fibre_counts(cell).values())
+        height = math.sqrt(3.0) if cell.geometry == "hexagonal" else 1.0
+        radius = math.sqrt(math.fsum(cell.fractions.values()) * height / (math.pi * fibres))
+        return cls(cell, fibres, radius, height)
+
+    @property
+    def interface_size(self) -> float:
+        """Size of elements on interfaces."""
+        asked = self.cell.interface_size or self.cell.mesh_size
+        return min(asked, 2 * math.pi * self.mean_radius / MIN_EDGES_AROUND)
+
+    @property
+    def triangles(self) -> float:
+        """Number of them without debonded arcs: of one size, about fibres, at ends of ellipses, beside fine interfaces.
+
+        On both sides of interfaces of the length P there are 2 P int dx / (A (h + g x)^2) = 2 P / (A g h) triangles.
+        """
+        cell, ellipses = self.cell, self.ellipses
+        irregular = 0 if cell.geometry in FIBRES_OF else self.fibres
+        count = self.height / (TRIANGLE_AREA * cell.mesh_size**2) + TRIANGLES_OF_A_FIBRE * irregular
+        if ellipses is not None:
+            count += _triangles_of_ends(ellipses, cell.interface_size or cell.mesh_size)
+        if cell.interface_size is None:
+            return count
+        length = 2 * math.pi * self.mean_radius * self.fibres if ellipses is None else math.fsum(ellipses.perimeters)
+        return count + 2 * length / (TRIANGLE_AREA * MAX_GROWTH * cell.interface_size)
 
 
 def triangles_of_a_tip(ratio: np.float64 | float) -> float:
@@ -74,26 +89,8 @@ def ratio_at_a_tip(count: float) -> float:
     return float(np.interp(count, counts, RATIOS))
 
 
-def _ellipses(cell: Cell) -> Ellipses | None:
-    """The fibres, if some are not round."""
-    arrangement = arrange(cell) if cell.geometry == "table" else None
-    return None if arrangement is None or arrangement.frames is None else arrangement.ellipses
-
-
 def _triangles_of_ends(ellipses: Ellipses, around: float) -> float:
     """Those that the ends of long axes, where the radius of curvature is b^2 / a, add among elements of this size."""
     short, long = np.sort(ellipses.semi_axes[~ellipses.are_round], axis=1).T
     at_ends = 2 * np.pi * short**2 / long / MIN_EDGES_AROUND
     return 2 * math.fsum(map(triangles_of_a_tip, np.maximum(1.0, around / at_ends).tolist()))
-
-
-def _irregular_fibres(cell: Cell) -> int:
-    """Number of fibres that are no lattice."""
-    return 0 if cell.geometry in FIBRES_OF else fibres_of(cell)
-
-
-def _height(cell: Cell) -> float:
-    """Height / width of the cell."""
-    if cell.geometry == "table":
-        return arrange(cell).height
-    return math.sqrt(3.0) if cell.geometry == "hexagonal" else 1.0

@@ -9,7 +9,8 @@ import pytest
 from support.circular_cells import cell
 
 from feti_homog.errors import MeshError
-from feti_homog.fibres.arrangement import Arrangement, arrange, clear_shift, random_arrangement
+from feti_homog.fibres.arrange import arrange, random_arrangement
+from feti_homog.fibres.arrangement import Arrangement, clear_shift
 from feti_homog.fibres.torus_pairs import neighbours
 
 

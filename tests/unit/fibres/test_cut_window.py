@@ -9,7 +9,7 @@ from unit.fibres.test_periodic_table import cell_of, table
 
 from feti_homog.case.cell_section import Cell
 from feti_homog.errors import MeshError
-from feti_homog.fibres.arrangement import arrange
+from feti_homog.fibres.arrange import arrange
 from feti_homog.fibres.cut_window import LEAST_GAP, MOST_GAP, moves
 from feti_homog.fibres.periodic_table import moved_rows
 

@@ -18,7 +18,7 @@ from feti_homog.case.cell_section import Cell
 from feti_homog.case.fibre_window import read_window
 from feti_homog.case.json_schema import json_schema
 from feti_homog.errors import CaseError
-from feti_homog.fibres.arrangement import arrange
+from feti_homog.fibres.arrange import arrange
 from feti_homog.fibres.matched_arrangement import distance_of
 from feti_homog.microstructure.fibre_pattern import FibrePattern
 from feti_homog.microstructure.nearest_neighbours import nearest_neighbours
@@ -31,7 +31,9 @@ def table(tmp_path_factory):
 
 
 def cell(table=None, **keys):
-    return Cell(geometry="random", match=table, **{"fibres": 40, "fibre_fraction": 0.2, "min_gap": 0.01} | keys)
+    window = None if table is None else read_window(table)
+    given = {"match": table, "matched": window, "fibres": 40, "fibre_fraction": 0.2, "min_gap": 0.01}
+    return Cell(geometry="random", **given | keys)
 
 
 def pattern_of(arrangement):
@@ -39,7 +41,7 @@ def pattern_of(arrangement):
 
 
 def distance(table, arrangement):
-    return distance_of(table, 1.0, 1.0, arrangement.centres, arrangement.radii)
+    return distance_of(read_window(table), 1.0, 1.0, arrangement.centres, arrangement.radii)
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -10,7 +10,7 @@ import pytest
 from feti_homog.case.cell_section import Cell
 from feti_homog.case.fibre_table import table_of
 from feti_homog.errors import MeshError
-from feti_homog.fibres.arrangement import arrange
+from feti_homog.fibres.arrange import arrange
 from feti_homog.fibres.periodic_table import MAX_FAULTS
 from feti_homog.mesh.fibre_centres import fibre_circles
 from feti_homog.mesh.fill.gmsh_mesher import generate

@@ -7,7 +7,7 @@ import pytest
 from unit.mesh.test_table_ellipses import cell_of, table
 
 from feti_homog.errors import MeshError
-from feti_homog.fibres.arrangement import arrange
+from feti_homog.fibres.arrange import arrange
 from feti_homog.fibres.cut_window import LEAST_GAP, MOST_GAP, moves
 from feti_homog.fibres.ellipses import Ellipses, gaps
 from feti_homog.fibres.periodic_table import moved_rows

@@ -13,7 +13,7 @@ from feti_homog import run
 from feti_homog.case import case as cases
 from feti_homog.commands import fibre_rows, fibre_sources
 from feti_homog.errors import CaseError, MeshError
-from feti_homog.fibres.arrangement import arrange
+from feti_homog.fibres.arrange import arrange
 from feti_homog.mesh.coarse_mesh import areas
 from feti_homog.mesh.fill.gmsh_mesher import generate
 from feti_homog.mesh.interface_edges import void_edges, voids

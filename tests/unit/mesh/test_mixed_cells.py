@@ -10,9 +10,9 @@ from feti_homog.case.cell_section import Cell
 from feti_homog.case.mixed_cell import fibre_counts
 from feti_homog.commands.fibre_rows import table
 from feti_homog.errors import MeshError
-from feti_homog.fibres.arrangement import arrange
+from feti_homog.fibres.arrange import arrange
 from feti_homog.mesh.fill.gmsh_mesher import arrangement_scale, generate
-from feti_homog.mesh.sizes import element_estimate
+from feti_homog.mesh.sizes.element_estimate import ElementEstimate
 
 MIX = {"glass": 0.3, "carbon": 0.25}
 RADII = {"glass": 6.0, "carbon": 3.5}
@@ -42,8 +42,8 @@ def test_each_phase_has_its_fraction_and_gaps_are_kept(keys):
     assert shares(found) == pytest.approx(MIX, abs=1e-14)
     assert {name: found.phase.count(name) for name in MIX} == fibre_counts(cell)
     assert smallest_gap(found) >= cell.min_gap * 2 * found.radii.mean() * (1 - 1e-12)
-    assert element_estimate.fibres_of(cell) == len(found.radii)
-    assert element_estimate.mean_radius(cell) == pytest.approx(np.sqrt((found.radii**2).mean()), rel=1e-12)
+    assert ElementEstimate.of(cell, None).fibres == len(found.radii)
+    assert ElementEstimate.of(cell, None).mean_radius == pytest.approx(np.sqrt((found.radii**2).mean()), rel=1e-12)
 
 
 @pytest.mark.parametrize("size", [{"fibres": 60}, {"width": 100.0}])

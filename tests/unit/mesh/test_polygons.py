@@ -14,7 +14,7 @@ from feti_homog import run
 from feti_homog.case import case as cases
 from feti_homog.commands import fibre_rows
 from feti_homog.errors import CaseError, MeshError
-from feti_homog.fibres.arrangement import arrange
+from feti_homog.fibres.arrange import arrange
 from feti_homog.fibres.convex_shapes import ConvexShapes, shape_gaps
 from feti_homog.fibres.ellipses import Ellipses
 from feti_homog.mesh.coarse_mesh import areas

@@ -11,7 +11,7 @@ from feti_homog.case.cell_section import Cell
 from feti_homog.case.fibre_table import table_of
 from feti_homog.case.table_shapes import with_shapes
 from feti_homog.errors import MeshError
-from feti_homog.fibres.arrangement import arrange
+from feti_homog.fibres.arrange import arrange
 from feti_homog.fibres.ellipses import Ellipses, gaps
 from feti_homog.mesh.coarse_mesh import areas
 from feti_homog.mesh.fibre_centres import fibre_circles

@@ -16,7 +16,7 @@ from feti_homog.mesh.outline.edge_samples import Stations
 
 
 def bare_of(name):
-    return begin(CELLS[name], policy=SMALL).bare
+    return begin(CELLS[name], None, policy=SMALL).bare
 
 
 @pytest.mark.parametrize("count", [3, 400])

@@ -7,9 +7,10 @@ import pytest
 from scipy.special import ellipe
 from unit.mesh.test_table_ellipses import cell_of, table
 
+from feti_homog.fibres.arrange import arrange
 from feti_homog.fibres.ellipses import Ellipses
 from feti_homog.mesh.fill.gmsh_mesher import generate
-from feti_homog.mesh.sizes import element_estimate
+from feti_homog.mesh.sizes.element_estimate import ElementEstimate
 
 
 @pytest.mark.parametrize("ratio", [1.5, 4.0, 16.0])
@@ -17,7 +18,7 @@ from feti_homog.mesh.sizes import element_estimate
 def test_estimates_are_near_the_numbers_of_meshes(ratio, interface_size, within):
     row = {"x": 0.5, "y": 0.5, "a": 0.45, "b": 0.45 / ratio, "angle": 20.0}
     cell = cell_of(table([row]), interface_size=interface_size)
-    assert element_estimate.triangles(cell) == pytest.approx(len(generate(cell).triangles), rel=within)
+    assert ElementEstimate.of(cell, arrange(cell)).triangles == pytest.approx(len(generate(cell).triangles), rel=within)
 
 
 def test_perimeters_are_elliptic_integrals():

@@ -6,9 +6,9 @@ from functools import cache
 
 import numpy as np
 import pytest
-from support.tiled_cells import drawn, mesh_of
+from support.tiled_cells import mesh_of, noded
 
-from feti_homog.homogenization.drawn_cell import tiles_to_fill
+from feti_homog.homogenization.tile_tearing import tiles_to_fill
 from feti_homog.mesh.joined_submeshes import joined
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.submesh import SubdomainTable, cut_for_ranks
@@ -21,7 +21,7 @@ named = pytest.mark.parametrize("name", ["dense", "dilute", "coated, voids", "wi
 @cache
 def filled(name):
     """The filled tiles, and how many nodes they have."""
-    lines, first, tiles = tiles_to_fill(drawn(name)), drawn(name).regions.nodes, []
+    lines, first, tiles = tiles_to_fill(noded(name)), noded(name).regions.nodes, []
     for number, own in enumerate(lines):
         tiles.append(FilledTile(number, own, fill(own.tile), first))
         first += len(tiles[-1].filling.inner)
@@ -30,7 +30,7 @@ def filled(name):
 
 def torus_of(name, those=slice(None)):
     tiles, nodes = filled(name)
-    return tile_torus(drawn(name).regions, tiles[those], nodes)
+    return tile_torus(noded(name).regions, tiles[those], nodes)
 
 
 def are_one_to_one(a, b):
@@ -70,7 +70,7 @@ def test_shares_of_two_ranks_are_those_of_one(name):
     keys, subdomain = np.unique(key, return_inverse=True)
     body = keys // (tile.max() + 1)
     rank = np.arange(len(keys)) % 2
-    table = SubdomainTable(body, rank, np.arange(body.max() + 1), drawn(name).regions.phase)
+    table = SubdomainTable(body, rank, np.arange(body.max() + 1), noded(name).regions.phase)
     pinned = int(whole.class_keys[-1])
     expected = list(cut_for_ranks(whole, subdomain, table, 2, pinned))
     half = len(filled(name)[0]) // 2

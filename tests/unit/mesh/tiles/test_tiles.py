@@ -7,13 +7,14 @@ from dataclasses import replace
 import gmsh
 import numpy as np
 import pytest
-from support.tiled_cells import CELLS, SMALL, drawn, mesh_of
+from support.tiled_cells import CELLS, SMALL, mesh_of, noded
 from unit.mesh.fill.test_gmsh_mesher import least_angle
 
 from feti_homog.errors import MeshError
-from feti_homog.fibres.arrangement import Arrangement, arrange
+from feti_homog.fibres.arrange import arrange
+from feti_homog.fibres.arrangement import Arrangement
 from feti_homog.mesh.coarse_mesh import areas
-from feti_homog.mesh.fill.gmsh_mesher import draw, generate
+from feti_homog.mesh.fill.gmsh_mesher import begin, generate
 from feti_homog.mesh.outline.bridges import CLEAR, LEAST_ANGLE
 from feti_homog.mesh.outline.curves import MATRIX, OUTSIDE
 from feti_homog.mesh.outline.outline import images
@@ -65,7 +66,7 @@ def test_opposite_sides_have_the_same_nodes(name):
 
 @named
 def test_bridges_cross_the_matrix_and_nothing_else(name):
-    lines = drawn(name).lines
+    lines = noded(name).lines
     curves, circles = lines.curves, lines.ellipses.circles
     bridge = np.flatnonzero((curves.circle == MATRIX) & (curves.inside == MATRIX) & (curves.outside == MATRIX))
     ends = lines.points[curves.ends[bridge]]
@@ -123,7 +124,7 @@ def test_fibres_in_a_row_are_one_tile():
 
 
 def test_what_is_in_a_tile_is_of_it_alone():
-    found = drawn("dense")
+    found = noded("dense")
     edges = np.zeros(len(found.lines.points), int)
     for nodes, tile in found.parts:
         assert np.array_equal(tile.points, found.lines.points[nodes])
@@ -135,7 +136,7 @@ def test_what_is_in_a_tile_is_of_it_alone():
 
 
 def test_order_of_filling_does_not_matter():
-    found = drawn("dense")
+    found = noded("dense")
     backwards = [filling.fill(tile) for _, tile in reversed(found.parts)][::-1]
     mesh = found.mesh(backwards)
     assert np.array_equal(mesh.points, mesh_of("dense").points)
@@ -146,11 +147,11 @@ def test_small_cells_and_other_shapes_are_not_tiled():
     arrangement = arrange(CELLS["dense"])
     assert is_tiled(arrangement, TilePolicy(least_discs=36)) and not is_tiled(arrangement, TilePolicy(least_discs=37))
     assert not is_tiled(replace(arrangement, frames=np.zeros((36, 2, 2))), SMALL)
-    assert len(draw(CELLS["dense"], policy=TilePolicy(least_discs=37)).parts) == 1
+    assert len(begin(CELLS["dense"], None, policy=TilePolicy(least_discs=37)).with_nodes().parts) == 1
 
 
 def test_a_tile_that_gmsh_leaves_unfilled_is_told(monkeypatch):
-    _, tile = drawn("dense").parts[0]
+    _, tile = noded("dense").parts[0]
     add = filling._add_surfaces
 
     def without_last(gmsh, own):
@@ -168,4 +169,4 @@ def test_a_tile_that_gmsh_fails_on_is_told(monkeypatch):
 
     monkeypatch.setattr(gmsh.model.mesh, "generate", broken)
     with pytest.raises(MeshError, match=r"gmsh cannot fill the part .*: no mesh of dimension 2; expected another"):
-        filling.fill(drawn("dense").parts[0][1])
+        filling.fill(noded("dense").parts[0][1])

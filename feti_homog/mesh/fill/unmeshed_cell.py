@@ -1,36 +1,39 @@
-"""A cell on its way to a mesh: sketched, with bare lines; drawn, with nodes on them and cut into tiles; filled."""
+"""A cell on its way to a mesh: with bare lines; with nodes on them, cut into tiles; filled."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
+from types import MappingProxyType
 
 import numpy as np
 
 from feti_homog.case.phase_names import VOID
 from feti_homog.fibres.arrangement import Arrangement
 from feti_homog.mesh.coarse_mesh import CoarseMesh, representatives
-from feti_homog.mesh.fill.void_holes import without_voids
 from feti_homog.mesh.outline.bare_outline import BareOutline, LineStations
+from feti_homog.mesh.outline.edge_samples import IN_TILES
 from feti_homog.mesh.outline.outline import Outline
 from feti_homog.mesh.sizes.graded_size import MeshSizes
 from feti_homog.mesh.tiles.filling import Filling, Tile, arc_edges, fill
 from feti_homog.mesh.tiles.tile_torus import Regions
-from feti_homog.mesh.tiles.tiles import Tiling, cut
+from feti_homog.mesh.tiles.tiles import DEFAULT_TILES, TilePolicy, Tiling, cut, tiling
 from feti_homog.typing import Float, Int, Int32
+
+NO_MARKS: Mapping[int, Sequence[float]] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
-class Sketch:
-    """What is known of a mesh before its lines have nodes.
+class UnmeshedCell:
+    """A cell of round fibres before its lines have nodes.
 
     Attributes:
         arrangement: of the discs.
         bare: its lines.
         sizes: of elements.
         tiles: those that it will be cut into; None if it is filled at once.
-        scale: as in `Drawing`.
+        scale: as in `NodedCell`.
     """
 
     arrangement: Arrangement
@@ -39,23 +42,41 @@ class Sketch:
     tiles: Tiling | None
     scale: float
 
+    @classmethod
+    def of(
+        cls,
+        arrangement: Arrangement,
+        sizes: MeshSizes,
+        marks: Mapping[int, Sequence[float]] = NO_MARKS,
+        scale: float = 1.0,
+        policy: TilePolicy = DEFAULT_TILES,
+    ) -> UnmeshedCell:
+        """The bare lines of round discs, and their tiles; see `gmsh_mesher.begin`."""
+        tiles = tiling(arrangement, sizes.largest, marks, policy)
+        if tiles is None:
+            bare = BareOutline.of(arrangement, sizes, marks)
+        else:
+            bare = BareOutline.of(arrangement, sizes, marks, tiles.bridges, IN_TILES)
+        return cls(arrangement, bare, sizes, tiles, scale)
+
     @property
     def phases(self) -> tuple[str, ...]:
         """Those of the mesh."""
         return self.arrangement.phases
 
-    def drawn(self, stations: LineStations) -> Drawing:
-        """With these nodes.
+    def with_nodes(self, stations: LineStations | None = None) -> NodedCell:
+        """The cell with these nodes on its lines, by default all placed here.
 
         Raises:
-            MeshError: the sides would have too many.
+            MeshError: the lines would have too many.
         """
-        return drawing(self.arrangement, self.bare.outline(stations), self.sizes, self.tiles, self.scale)
+        lines = self.bare.outline(self.bare.stations() if stations is None else stations)
+        return NodedCell.of(self.arrangement, lines, self.sizes, self.tiles, self.scale)
 
 
 @dataclass(frozen=True)
-class Drawing:
-    """What is known of a mesh before triangles are made.
+class NodedCell:
+    """A cell with nodes on its lines, before triangles are made.
 
     Attributes:
         arrangement: of the discs.
@@ -68,6 +89,14 @@ class Drawing:
     lines: Outline
     parts: tuple[tuple[Int, Tile], ...]
     scale: float
+
+    @classmethod
+    def of(
+        cls, arrangement: Arrangement, lines: Outline, sizes: MeshSizes, tiles: Tiling | None, scale: float
+    ) -> NodedCell:
+        """The cell of an arrangement with this outline, cut into tiles."""
+        whole = Tile(lines.points, lines.curves, sizes.largest, sizes.are_graded(arrangement))
+        return cls(arrangement, lines, tuple(cut(lines, whole, tiles)), scale)
 
     @property
     def phases(self) -> tuple[str, ...]:
@@ -101,7 +130,7 @@ class Drawing:
             debonded_edges=np.zeros((0, 2), np.int32),
             centres=scale * arrangement.centres[: arrangement.fibres] if known else None,
         )
-        return without_voids(filled, void) if np.any(phase == void) else filled
+        return _without_voids(filled, void) if np.any(phase == void) else filled
 
     @cached_property
     def _within(self) -> tuple[Int32, Int32]:
@@ -146,7 +175,20 @@ class Drawing:
         return points, np.concatenate(triangles), np.concatenate([filling.circle for filling in fillings])
 
 
-def drawing(arrangement: Arrangement, lines: Outline, sizes: MeshSizes, tiles: Tiling | None, scale: float) -> Drawing:
-    """That of an arrangement with this outline, cut into tiles."""
-    whole = Tile(lines.points, lines.curves, sizes.largest, sizes.are_graded(arrangement))
-    return Drawing(arrangement, lines, tuple(cut(lines, whole, tiles)), scale)
+def _without_voids(mesh: CoarseMesh, void: int) -> CoarseMesh:
+    """The mesh without the triangles of the phase number `void`, which has no name in it, and without nodes that no
+    other triangle has."""
+    kept = mesh.phase != void
+    used = np.zeros(len(mesh.points), bool)
+    used[mesh.triangles[kept]] = True
+    number = (np.cumsum(used) - 1).astype(np.int32)
+    points = mesh.points[used]
+    return replace(
+        mesh,
+        points=points,
+        triangles=number[mesh.triangles[kept]],
+        phase=mesh.phase[kept],
+        precedence=mesh.precedence[kept],
+        representative=representatives(points, mesh.width, mesh.height),
+        arc_edges=number[mesh.arc_edges],
+    )
