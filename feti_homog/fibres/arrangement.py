@@ -8,6 +8,7 @@ from itertools import product
 import numpy as np
 
 from feti_homog.case.phase_names import COATING, MATRIX, VOID
+from feti_homog.fibres.clear_sides import farthest, widest_gaps
 from feti_homog.fibres.convex_shapes import ConvexShapes
 from feti_homog.fibres.ellipses import Ellipses
 from feti_homog.typing import Bool, Float, Int
@@ -117,12 +118,9 @@ def clear_shift(arrangement: Arrangement) -> Arrangement:
     centres = arrangement.centres[disc]
     lines = []
     for axis in (0, 1):
-        touching = np.sort(np.concatenate([centres[:, axis] - radii, centres[:, axis] + radii]) % size[axis])
-        gaps = np.diff(touching, append=touching[0] + size[axis])
-        wide = np.argsort(-gaps, kind="stable")[:4]
-        wide = wide[gaps[wide] > 0.7 * gaps[wide[0]]]
-        lines.append(touching[wide] + gaps[wide] / 2)
+        touching = np.concatenate([centres[:, axis] - radii, centres[:, axis] + radii])
+        lines.append(widest_gaps(touching, size[axis]))
     corners, half = np.array(list(product(*lines))), np.array(size) / 2
     offset = (centres - corners[:, None] + half) % size - half
     distance = np.abs(np.linalg.norm(offset, axis=2) - radii).min(axis=1)
-    return replace(arrangement, centres=(arrangement.centres - corners[np.argmax(distance)]) % size)
+    return replace(arrangement, centres=(arrangement.centres - farthest(corners, distance)) % size)

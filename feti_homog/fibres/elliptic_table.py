@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from feti_homog.fibres.clear_sides import farthest, widest_gaps
 from feti_homog.fibres.ellipses import Ellipses
 from feti_homog.typing import Float, Int
 
@@ -54,14 +55,10 @@ def clear_shift(arrangement: Arrangement) -> Arrangement:
     reach, lines = ellipses.reach, []
     for axis in (0, 1):
         centre = ellipses.centres[:, axis]
-        touching = np.sort(np.concatenate([centre - reach[:, axis], centre + reach[:, axis]]) % size[axis])
-        widths = np.diff(touching, append=touching[0] + size[axis])
-        wide = np.argsort(-widths, kind="stable")[:4]
-        wide = wide[widths[wide] > 0.7 * widths[wide[0]]]
-        lines.append(touching[wide] + widths[wide] / 2)
+        touching = np.concatenate([centre - reach[:, axis], centre + reach[:, axis]])
+        lines.append(widest_gaps(touching, size[axis]))
     corners = np.array(list(product(*lines)))
     offset = (corners[:, None] - ellipses.centres + size / 2) % size - size / 2
     unit = np.einsum("kij,nkj->nki", np.linalg.inv(ellipses.frames), offset)
     away = np.abs(np.linalg.norm(unit, axis=2) - 1) * arrangement.radii[disc]
-    corner = corners[np.argmax(away.min(axis=1))]
-    return replace(arrangement, centres=(arrangement.centres - corner) % size)
+    return replace(arrangement, centres=(arrangement.centres - farthest(corners, away.min(axis=1))) % size)

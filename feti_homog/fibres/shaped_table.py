@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from feti_homog.fibres.clear_sides import farthest, widest_gaps
 from feti_homog.fibres.convex_shapes import ConvexShapes
 from feti_homog.fibres.ellipses import Ellipses
 from feti_homog.typing import Float
@@ -48,18 +49,13 @@ def clear_shift(arrangement: Arrangement) -> Arrangement:
 
     As of discs: the sides are in the middles of the widest gaps between tangents, the corner far from outlines.
     """
-    size, lines = np.array([arrangement.width, arrangement.height]), []
+    size = np.array([arrangement.width, arrangement.height])
     touching = arrangement.centres[:, :, None] + _reach(arrangement)
-    for axis in (0, 1):
-        places = np.sort(touching[:, axis].ravel() % size[axis])
-        widths = np.diff(places, append=places[0] + size[axis])
-        wide = np.argsort(-widths, kind="stable")[:4]
-        wide = wide[widths[wide] > 0.7 * widths[wide[0]]]
-        lines.append(places[wide] + widths[wide] / 2)
+    lines = [widest_gaps(touching[:, axis].ravel(), size[axis]) for axis in (0, 1)]
     corners = np.array(list(product(*lines)))
     points = outer_shapes(arrangement).boundary(POINTS)[0]
     away = [np.linalg.norm((corner - points + size / 2) % size - size / 2, axis=1).min() for corner in corners]
-    return replace(arrangement, centres=(arrangement.centres - corners[int(np.argmax(away))]) % size)
+    return replace(arrangement, centres=(arrangement.centres - farthest(corners, np.array(away))) % size)
 
 
 def _reach(arrangement: Arrangement) -> Float:

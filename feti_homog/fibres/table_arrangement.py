@@ -18,8 +18,9 @@ if TYPE_CHECKING:
 
 # Distance of the sides of a cell from tangency with a circle / mean radius, below which elements there are needles.
 LEAST_CLEARANCE = 1e-3
-# Decimals of coordinates / width of the cell of tables that may have any origin and unit.
-TABLE_DECIMALS = 10
+# Decimals of coordinates / width of the cell of tables that may have any origin and unit, and of height / width: gmsh
+# may put other elements beside ellipses and polygons where the last digit of a length is another.
+TABLE_DECIMALS, HEIGHT_DECIMALS = 10, 12
 
 
 def table_arrangement(cell: Cell) -> Arrangement:
@@ -27,7 +28,8 @@ def table_arrangement(cell: Cell) -> Arrangement:
 
     A table that says where its cell begins keeps that place, if the sides are clear of tangency with its discs; the
     table of a cell gives the mesh of that cell. Else all is shifted (`clear_shift`), rounded and meshed in the order of
-    the coordinates, so that tables that differ by a shift, by the order of rows or by units have one mesh.
+    the coordinates, so that tables that differ by a shift, by the order of rows or by units have one mesh. Ellipses and
+    polygons are rounded wherever they are.
 
     Raises:
         MeshError: rows lie outside, come twice, overlap or touch.
@@ -43,7 +45,9 @@ def table_arrangement(cell: Cell) -> Arrangement:
     shifted = shift(discs)
     is_placed = table.left is not None and table.bottom is not None
     clear = min(LEAST_CLEARANCE * float(discs.radii.mean()), clear_of(shifted))
-    return discs if is_placed and clear_of(discs) >= clear else _rounded(shifted)
+    if not is_placed or clear_of(discs) < clear:
+        return _in_mesh_order(_rounded(shifted))
+    return discs if discs.frames is None and discs.shapes is None else _rounded(discs)
 
 
 def _discs(table: FibreTable, rows: Int, centres: Float, radii: Float, height: float) -> Arrangement:
@@ -69,14 +73,22 @@ def _discs(table: FibreTable, rows: Int, centres: Float, radii: Float, height: f
 
 
 def _rounded(arrangement: Arrangement) -> Arrangement:
-    """The arrangement with coordinates of TABLE_DECIMALS, meshed in their order."""
-    centres, coating, frames = arrangement.centres.round(TABLE_DECIMALS), arrangement.coating, arrangement.frames
+    """The arrangement with coordinates of TABLE_DECIMALS, 0 on either side, in a cell of HEIGHT_DECIMALS."""
+    size = np.array([arrangement.width, arrangement.height])
+    centres = arrangement.centres.round(TABLE_DECIMALS)
+    coating, frames, shapes = arrangement.coating, arrangement.frames, arrangement.shapes
     return replace(
         arrangement,
-        centres=centres,
+        height=round(arrangement.height, HEIGHT_DECIMALS),
+        centres=np.where(centres >= size - 10.0**-TABLE_DECIMALS, 0.0, centres),
         radii=arrangement.radii.round(TABLE_DECIMALS),
-        mesh_order=np.lexsort((centres[:, 1], centres[:, 0])),
         coating=None if coating is None else coating.round(TABLE_DECIMALS),
         frames=None if frames is None else frames.round(TABLE_DECIMALS),
-        shapes=None if arrangement.shapes is None else arrangement.shapes.rounded(TABLE_DECIMALS),
+        shapes=None if shapes is None else shapes.rounded(TABLE_DECIMALS),
     )
+
+
+def _in_mesh_order(arrangement: Arrangement) -> Arrangement:
+    """The arrangement meshed in the order of its coordinates."""
+    x, y = arrangement.centres.T
+    return replace(arrangement, mesh_order=np.lexsort((y, x)))
