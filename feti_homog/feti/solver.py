@@ -20,6 +20,7 @@ from petsc4py import PETSc
 
 from feti_homog.fem.problem import PLANE, Problem
 from feti_homog.feti import factory, view
+from feti_homog.feti.active_jumps import ActiveJumps
 from feti_homog.feti.decomposition.interface_springs import GLUE, InterfaceSprings
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.shared_entities import SharedEntities
@@ -28,9 +29,8 @@ from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.feti.krylov import ActiveRows, Krylov
 from feti_homog.feti.operators.dual_operator import DualOperator
 from feti_homog.feti.operators.inner_loads import CondensedLoads
-from feti_homog.feti.thresholds import DEFAULTS, MAX_RESTARTS, ZERO_JUMP, Thresholds
+from feti_homog.feti.thresholds import DEFAULTS, MAX_RESTARTS, Thresholds
 from feti_homog.mesh.refinement import ReferenceLattice
-from feti_homog.parallel.distributed_arrays import allreduce_sum
 from feti_homog.runtime import process_memory
 from feti_homog.typing import Float
 
@@ -93,6 +93,7 @@ class FetiSolver:
         self.operator = DualOperator(self.jump_operator, self.interface_operators, compliance)
         process_memory.trim()
         self.active = ActiveRows(self.rows)
+        self._jumps = ActiveJumps(comm, self.operator, self.natural, self.active)
         self._view = PETSc.Options("feti_").getBool("view", False)
         self._krylov: dict[int, Krylov] = {}
         # The shells call Python, so they are destroyed with the solver: PETSc's own finalization comes when the
@@ -177,16 +178,18 @@ class FetiSolver:
         k = len(strains)
         krylov = self._krylov_for(k)
         torn_jump = self.d @ strains.T
-        right = self.natural.project(self.active.restrict(torn_jump))
-        jump, rounding = self._norms(right), ZERO_JUMP * self._norms(torn_jump)
+        torn = self._jumps.norms(torn_jump)
+        right = self._jumps.projected(torn_jump, torn)
+        jump = self._jumps.norms(right)
         # A load that the active rows do not see has no multipliers.
+        rounding = self._jumps.rounding(self._torn_displacement, strains.T, jump, torn)
         is_seen = jump > rounding
         scale = np.where(is_seen, jump, 1.0)
         right = np.where(is_seen, right, 0.0) / scale
         self.solves += k
         E = np.where(is_seen, strains.T, 0.0) / scale
         closing = self.natural.project(self.preconditioner.close(right, self.d, E))
-        krylov.test.set_scales(float(np.sqrt(is_seen.sum())), float(np.linalg.norm(self._norms(closing))))
+        krylov.test.set_scales(float(np.sqrt(is_seen.sum())), float(np.linalg.norm(self._jumps.norms(closing))))
         starts = np.where(is_seen, self.natural.project(self.active.restrict(starts)), 0.0) / scale
         lam = self.preconditioner.initial_multipliers(starts, closing)
         found = Iterate(lam, np.zeros_like(lam), right)
@@ -236,7 +239,7 @@ class FetiSolver:
         for restart in range(MAX_RESTARTS + 2):
             krylov.test.ends_on_stall = self.adaptive is not None and restart <= MAX_RESTARTS
             first = self._first_iterate(lam, right)
-            left = float(np.linalg.norm(self._norms(first.residual)))
+            left = float(np.linalg.norm(self._jumps.norms(first.residual)))
             if krylov.test.is_met(self.rtol, left, self.preconditioner.norm * left):
                 return first, iterations, int(PETSc.KSP.ConvergedReason.CONVERGED_RTOL)
             lam = first.lam + krylov.solve(first.residual)
@@ -249,10 +252,10 @@ class FetiSolver:
     def _first_iterate(self, lam: Float, right: Float) -> Iterate:
         """Multipliers to begin with, 0 where `lam` leave more than was there."""
         applied, residual = np.zeros_like(lam), right
-        if self._norms(lam).any():
+        if self._jumps.norms(lam).any():
             applied = self.operator.apply(lam)
-            residual = self.natural.project(right - self.active.restrict(applied))
-        is_better = self._norms(residual) <= self._norms(right)
+            residual = self._jumps.projected(right - applied, self._jumps.norms(right))
+        is_better = self._jumps.norms(residual) <= self._jumps.norms(right)
         lam, applied = np.where(is_better, lam, 0.0), np.where(is_better, applied, 0.0)
         return Iterate(lam, applied, np.where(is_better, residual, right))
 
@@ -265,18 +268,13 @@ class FetiSolver:
         if self.natural.kernel_dimension:
             alpha -= self.natural.amplitudes(self.active.restrict(jump))
             jump = jump + self.natural.G @ alpha
-        residual = self._norms(self.active.restrict(jump)) / np.where(scale > 0, scale, 1.0)
+        residual = self._jumps.norms(self.active.restrict(jump)) / np.where(scale > 0, scale, 1.0)
         return [
             DualSolution(
                 strain, lam[:, k].copy(), jump[:, k].copy(), alpha[:, k].copy(), iterations, reason, float(residual[k])
             )
             for k, strain in enumerate(strains)
         ]
-
-    def _norms(self, x: Float) -> Float:
-        """Norms over all ranks of the columns of x (owned rows, k)."""
-        norms: Float = np.sqrt(allreduce_sum(self.comm, np.einsum("ik,ik->k", x, x)))
-        return norms
 
     def _krylov_for(self, columns: int) -> Krylov:
         """The Krylov method for so many load cases, set up when first asked for."""

@@ -122,8 +122,13 @@ STALL_ITERATIONS = 4
 FORCE_STALL_ITERATIONS = 50
 # Such new beginnings, before the iteration is left to go on.
 MAX_RESTARTS = 2
-# A jump that the active rows see, relative to that of the torn cell, is rounding if it is as small as this.
-ZERO_JUMP = 1e-13
+# A projected vector, relative to the one before, below which it is projected again: what rounding leaves of rigid-body
+# motions is then that of a vector of its own size.
+CANCELLED = 1e-2
+# A jump that the active rows see, relative to that of the torn cell, is rounding if it is as small as the first of
+# these; below the second, what is rounding is measured (`active_jumps.jump_rounding`) and multiplied by a margin, for
+# it was up to 20 times as large with phases 1000 times apart.
+ZERO_JUMP, SMALL_JUMP, ROUNDING_MARGIN = 1e-13, 1e-8, 100.0
 
 # preconditioners
 

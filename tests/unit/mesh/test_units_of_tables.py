@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from feti_homog.mesh.fill.gmsh_mesher import generate
 from feti_homog.case import case as cases
+from feti_homog.mesh.fill.gmsh_mesher import generate
 
 LENGTHS = ("x", "y", "radius", "a", "b")
 COLUMNS = (*LENGTHS, "angle", "sides", "corner")
