@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feti_homog.analysis.result_fields import Fields
-from feti_homog.analysis.result_html import tables
 from feti_homog.analysis.result_records import (
     EITHER_STIFFNESS,
     AnglePoint,
@@ -28,6 +27,7 @@ from feti_homog.materials.bounds import Moduli
 from feti_homog.materials.estimates.fibre_bounds import FibreBounds
 from feti_homog.materials.estimates.methods import Estimates
 from feti_homog.materials.spatial_constants import EngineeringConstants, TransverselyIsotropic, TransverseModuli
+from feti_homog.report.html.tables import notebook
 from feti_homog.report.text.summary import short_summary
 from feti_homog.results import path_curves
 from feti_homog.results.file_seal import FileSeal
@@ -175,7 +175,7 @@ class Result:
         return short_summary(self.document)
 
     def _repr_html_(self) -> str:
-        return tables(self.document)
+        return notebook(self.document)
 
 
 def schema_keys() -> Iterator[Key]:

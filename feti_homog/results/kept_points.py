@@ -1,6 +1,7 @@
-"""Which points of a path are kept with their fields: the ends, those around drops, the rest evenly.
+"""The points of a path that are kept with their fields, and those of them that tables and pictures show.
 
-Points are those of `response`.  A path does not know its future, so the choice is made at its end.
+Kept are the ends, the points around drops, and the rest evenly.  A path does not know its future, so the choice is made
+at its end.
 """
 
 from __future__ import annotations
@@ -11,8 +12,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from feti_homog.results.path_curves import SAME_LOAD, Point
 from feti_homog.materials.voigt import STRAINS
+from feti_homog.results import path_curves
+from feti_homog.results.path_curves import SAME_LOAD, Document, Point
 from feti_homog.typing import Float
 
 # A drop is a fall of the stress, or a jump of the strain, by more than this share of the largest: saw teeth of single
@@ -114,3 +116,31 @@ def _filled(numbers: list[int], count: int) -> list[int]:
         _, parts, a, b = gaps[0]
         heapreplace(gaps, ((a - b) / (parts + 1), parts + 1, a, b))
     return sorted({a + (b - a) * k // parts for _, parts, a, b in gaps for k in range(parts)} | {numbers[-1]})
+
+
+def chosen(document: Document, rows: int, among: Sequence[int] | None = None) -> list[int]:
+    """Numbers of at most `rows` points of a path: the first, the last, the ends of its legs if they are not too many,
+    and between them as evenly as bonds broke; with `among`, rising, of these points."""
+    points = document["path"]
+    numbers = np.arange(len(points)) if among is None else np.asarray(among, int)
+    if len(numbers) <= rows:
+        return [int(number) for number in numbers]
+    fixed = {0, len(numbers) - 1}
+    ends = np.flatnonzero(np.isin(numbers, path_curves.ends_of_legs(document))).tolist()
+    if len(fixed.union(ends)) <= rows:
+        fixed = fixed.union(ends)
+    broken = np.cumsum([point["broke"] for point in points])[numbers]
+    wanted = np.linspace(broken[0], broken[-1], rows - len(fixed) + 2)[1:-1]
+    places = {int(np.abs(broken - w).argmin()) for w in wanted} | fixed
+    return [int(numbers[place]) for place in sorted(places)]
+
+
+def kept_points(document: Document) -> list[int]:
+    """Numbers of the points of a path whose fields are kept, in the order of the states; of all if none are."""
+    return list(document.get("states") or range(len(document["path"])))
+
+
+def chosen_states(document: Document, rows: int, count: int) -> list[int]:
+    """Numbers of at most `rows` of the first `count` states of a path, chosen as `chosen` chooses points."""
+    among = kept_points(document)[:count]
+    return [among.index(number) for number in chosen(document, rows, among)]

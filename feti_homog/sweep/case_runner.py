@@ -54,7 +54,7 @@ class CaseRunner:
             start = time.perf_counter()
             status = self._compute(entry, case)
             seconds = time.perf_counter() - start
-            inputs = entry.in_words(case.output.stress_unit)
+            inputs = entry.describe(case.output.stress_unit)
             self._print(f"{entry.folder} of {total}: {status}, {seconds:.2f} s; {inputs}")
             return Outcome.COMPUTED, ""
         finally:

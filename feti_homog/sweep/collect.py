@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.report.text.point_tables import sweep_failures
 from feti_homog.sweep import store
 from feti_homog.sweep.plan import SweepCase
 from feti_homog.sweep.report import figures, tables
@@ -41,13 +40,13 @@ def collect(directory: Path, pictures: bool) -> list[str]:
     if pictures:
         paths += figures.plot(directory, table)
     counts = ", ".join(f"{count} {status}" for status, count in Counter(table.status).items())
-    failures = [
-        (entry.folder, entry.in_words(index.stress_unit), state.reason)
+    failed = [
+        (entry, state)
         for entry, state in zip(index.entries, states, strict=True)
         if state.status.is_failure or state.status is Status.DAMAGED
     ]
-    failure_lines = sweep_failures(failures) if failures else []
-    return [f"{len(table.status)} cases: {counts}", *failure_lines, *map(str, paths)]
+    failures = store.failure_lines(failed, index.stress_unit)
+    return [f"{len(table.status)} cases: {counts}", *failures, *map(str, paths)]
 
 
 def _index_and_states(directory: Path) -> tuple[SweepIndex, list[CaseState]]:

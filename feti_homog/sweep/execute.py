@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from feti_homog.errors import CaseError, ConvergenceError, FetiHomogError
 from feti_homog.parallel.mpi_errors import ARRIVAL_TIMEOUT_S, on_root, on_root_only, others_come
-from feti_homog.report.text.point_tables import sweep_failures, sweep_table
 from feti_homog.runtime.file_locks import LockHeld, TemporaryLock
 from feti_homog.runtime.standard_streams import complain, say
 from feti_homog.sweep import store
 from feti_homog.sweep.case_runner import CaseRunner, Outcome
 from feti_homog.sweep.option_checks import check_options
 from feti_homog.sweep.plan import Sweep
-from feti_homog.sweep.store import LOCK_FILE, CaseState, Status
+from feti_homog.sweep.store import LOCK_FILE, Status
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
@@ -25,8 +24,11 @@ if TYPE_CHECKING:
 def list_cases(sweep: Sweep, directory: Path | None) -> list[str]:
     """The cases in a table, with their status if a folder is given.  On one rank."""
     statuses = ["" if directory is None else store.case_state(directory, entry).status for entry in sweep.entries]
-    inputs = [entry.in_words(sweep.stress_unit) for entry in sweep.entries]
-    return sweep_table(list(zip([entry.folder for entry in sweep.entries], statuses, inputs, strict=True)))
+    width = max(map(len, statuses))
+    return [
+        f"{entry.folder}  {status:<{width}}  {entry.describe(sweep.stress_unit)}".replace("    ", "  ").rstrip()
+        for entry, status in zip(sweep.entries, statuses, strict=True)
+    ]
 
 
 def run_all(sweep: Sweep, directory: Path, comm: Intracomm, ranks_per_case: int, retry: bool, quiet: bool) -> None:
@@ -47,15 +49,20 @@ def run_all(sweep: Sweep, directory: Path, comm: Intracomm, ranks_per_case: int,
             on_root_only(comm, _reset_failures, directory, sweep)
         fault = _run_free_cases(CaseRunner(group, directory, False, quiet), sweep)
         _raise_together(comm, fault)
+    _report(sweep, directory, comm, quiet)
+
+
+def _report(sweep: Sweep, directory: Path, comm: Intracomm, quiet: bool) -> None:
+    """Print how many cases are done; raises ConvergenceError if some failed.  Collective."""
     states = on_root(comm, lambda: [store.case_state(directory, entry) for entry in sweep.entries])
     if comm.rank == 0 and not quiet:
         done = sum(state.status is Status.DONE for state in states)
         say(f"{done} of {len(states)} cases done in {directory}")
-    failures = _failures(sweep, states)
-    if failures:
+    failed = [(entry, state) for entry, state in zip(sweep.entries, states, strict=True) if state.status.is_failure]
+    if failed:
         if comm.rank == 0:
-            say("\n".join(sweep_failures(failures)))
-        raise ConvergenceError(f"{len(failures)} of {len(states)} cases failed; --retry computes them again")
+            say("\n".join(store.failure_lines(failed, sweep.stress_unit)))
+        raise ConvergenceError(f"{len(failed)} of {len(states)} cases failed; --retry computes them again")
 
 
 def run_one(sweep: Sweep, number: int, directory: Path, comm: Intracomm, retry: bool, quiet: bool) -> None:
@@ -79,7 +86,7 @@ def run_one(sweep: Sweep, number: int, directory: Path, comm: Intracomm, retry: 
     state = on_root(comm, store.case_state, directory, entry)
     if state.status.is_failure:
         hint = "; it failed before, --retry computes it again" if outcome is Outcome.FAILED_BEFORE else ""
-        raise ConvergenceError(f"{entry.folder} ({entry.in_words(sweep.stress_unit)}): {state.reason}{hint}")
+        raise ConvergenceError(f"{entry.folder} ({entry.describe(sweep.stress_unit)}): {state.reason}{hint}")
 
 
 def _group(comm: Intracomm, ranks: int) -> Any:
@@ -111,15 +118,6 @@ def _raise_together(comm: Intracomm, fault: FetiHomogError | None) -> None:
     if faults:
         kept = "finished cases are kept; the same command goes on with the others"
         raise FetiHomogError(*dict.fromkeys(line for fault in faults for line in fault.faults), kept)
-
-
-def _failures(sweep: Sweep, states: Sequence[CaseState]) -> list[tuple[str, str, str]]:
-    """Folder, inputs and reason of each case that failed."""
-    return [
-        (entry.folder, entry.in_words(sweep.stress_unit), state.reason)
-        for entry, state in zip(sweep.entries, states, strict=True)
-        if state.status.is_failure
-    ]
 
 
 def _reset_failures(directory: Path, sweep: Sweep) -> None:

@@ -44,7 +44,7 @@ class SweepCase:
     def folder(self) -> str:
         return f"case-{self.number:04d}"
 
-    def in_words(self, stress_unit: str) -> str:
+    def describe(self, stress_unit: str) -> str:
         """The inputs in one line, with their units."""
         values = [(f"{name} = {toml_value(value)}", unit(name, stress_unit)) for name, value in self.inputs.items()]
         return ", ".join(f"{text} {own}".rstrip() for text, own in values)

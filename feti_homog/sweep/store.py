@@ -199,11 +199,19 @@ def write_error(directory: Path, entry: SweepCase, error: FetiHomogError) -> Non
     atomic.replace_text(directory / entry.folder / ERROR_FILE, "\n".join(lines) + "\n")
 
 
+def failure_lines(cases: Sequence[tuple[SweepCase, CaseState]], stress_unit: str) -> list[str]:
+    """Folder, inputs and reason of cases that failed, after an empty line and their number; nothing without any."""
+    lines = ["", f"{len(cases)} failed:"] if cases else []
+    for entry, state in cases:
+        lines += [f"  {entry.folder}  {entry.describe(stress_unit)}", f"    {state.reason}"]
+    return lines
+
+
 def _refuse_another(directory: Path, known: Sequence[SweepCase], wanted: Sequence[SweepCase]) -> None:
     """Raises CaseError unless the known cases are the first of those wanted."""
     for old, new in zip(known, wanted, strict=False):
         if old != new:
-            words = f"its {old.folder} ({old.in_words('')}) differs from that of this file ({new.in_words('')})"
+            words = f"its {old.folder} ({old.describe('')}) differs from that of this file ({new.describe('')})"
             raise CaseError(f"--out {directory} holds another sweep: {words}; choose another folder")
     if len(known) > len(wanted):
         raise CaseError(

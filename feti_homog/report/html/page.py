@@ -17,7 +17,7 @@ from markupsafe import Markup
 from feti_homog.errors import CaseError
 from feti_homog.materials.voigt import SPATIAL_STRAINS, STRAINS
 from feti_homog.report.html import curves, states, tables
-from feti_homog.report.text.summary import title_of
+from feti_homog.report.text.summary import checks, title_of
 from feti_homog.results import atomic, field_file, result_json
 from feti_homog.version import __version__
 
@@ -70,8 +70,8 @@ def page(document: Document, directory: Path) -> str:
         document=document,
         version=__version__,
         facts=tables.facts(document),
-        answers=tables.answers(document),
-        checks=tables.checks(document),
+        answers=[Markup(table.html) for table in tables.answers(document)],
+        checks=checks(document),
         pictures=_pictures(directory),
         library=Markup(library),
         curves=[(figures[key].name, Markup(boxes[key])) for key in figures],

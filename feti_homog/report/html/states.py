@@ -16,7 +16,7 @@ from feti_homog.report.plots.deformed_panels import shown_scale
 from feti_homog.report.plots.drawn_displacement import drawn_displacement
 from feti_homog.report.plots.interface_marks import STATE_COLOURS, STATE_NAMES, STATE_WIDTHS, InterfaceEdges
 from feti_homog.report.plots.plot_helpers import drawn_stress, stress_component, value_range
-from feti_homog.report.text import point_tables
+from feti_homog.results import kept_points
 from feti_homog.results.path_curves import FAINT, components_above
 
 MOST_STATES, TRIANGLES = 48, 8000  # of the viewer, which keep a page below some megabytes
@@ -57,7 +57,7 @@ def _numbers(file: Any, document: Document) -> list[int]:
     """The states that are shown: all, or of many some."""
     count = len(file["state"])
     if document.get("path"):
-        return point_tables.chosen_states(document, MOST_STATES, count)
+        return kept_points.chosen_states(document, MOST_STATES, count)
     return sorted({round(k) for k in np.linspace(0, count - 1, min(MOST_STATES, count))})
 
 

@@ -1,46 +1,19 @@
-"""The numbers of a result as rows of tables."""
+"""The numbers of a result for report.html and for notebooks."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
+from html import escape
 from typing import Any
 
-from feti_homog.materials.voigt import SPATIAL_STRESSES, voigt_names
-from feti_homog.report.text.constants_tables import SHORT, comparison
-from feti_homog.report.text.envelope_table import components
-from feti_homog.report.text.point_tables import chosen, shown_entries
-from feti_homog.report.text.spatial_tables import THERMAL
-from feti_homog.report.text.summary import check_applies
-from feti_homog.report.text.units import with_unit
+from feti_homog.report.text import point_tables, stiffness_tables
+from feti_homog.report.text.summary import checks, title_of
+from feti_homog.report.text.table import Column, Table
+from feti_homog.report.text.units import in_brackets
 
-ENVELOPE_NUMBERS = ("fibre", "interface", "bond_angle", "normal", "tangential", "axial", "psi")
-MOST_ROWS = 60  # of a table of points
-NOISE = 1e-12  # what the solver leaves of a zero
+MOST_ROWS, NOTEBOOK_ROWS = 60, 20  # of a table of points
 
 Document = Mapping[str, Any]
-
-
-@dataclass(frozen=True)
-class Table:
-    """Rows of words; the first column has their names."""
-
-    caption: str
-    head: Sequence[str]
-    rows: Sequence[Sequence[str]]
-
-
-@dataclass(frozen=True)
-class Check:
-    """A law with its largest relative error and the limit of it."""
-
-    law: str
-    error: float
-    limit: float
-
-    @property
-    def holds(self) -> bool:
-        return self.error <= self.limit
 
 
 def facts(document: Document) -> list[tuple[str, str]]:
@@ -63,133 +36,29 @@ def facts(document: Document) -> list[tuple[str, str]]:
     ]  # fmt: skip
 
 
-def answers(document: Document) -> list[Table]:
-    """What was asked for: stiffness with moduli and bounds, or points of an angle or path, or onsets."""
-    unit = document["case"]["output"].get("stress_unit", "")
-    label = f" ({unit})" if unit else ""
-    found = [_envelope(document, label)] if document.get("envelope") else []
-    found += _stiffnesses(document, label)
-    if document.get("thermal_stress") is not None:
-        found.append(_thermal(document, label))
-    found += _constants(document, label)
-    if document.get("moduli") is not None:
-        rows = [[with_unit(name, unit), _number(value)] for name, value in document["moduli"].items()]
-        found.append(Table("Engineering moduli", ["", "computed"], rows))
-    if document.get("bounds") is not None:
-        found.append(Table(f"Bounds{label}", ["", "lower", "computed", "upper"], list(_bounds(document))))
-    found += [_points(key, document, label) for key in ("angle", "path") if document.get(key)]
-    return found + ([_load(document["load"], label)] if document.get("load") else [])
-
-
-def _stiffnesses(document: Document, label: str) -> list[Table]:
-    """The effective stiffness, also under minus the unit strains."""
-    found = []
-    for key, words in (
-        ("effective_stiffness", "Effective stiffness"),
-        ("effective_stiffness_compression", "Effective stiffness under minus the unit strains"),
-    ):
-        if document.get(key) is not None:
-            strains, stresses = voigt_names(len(document[key]))
-            rows = [[name, *map(_number, row)] for name, row in zip(stresses, document[key], strict=True)]
-            found.append(Table(f"{words}{label}", ["", *strains], rows))
-    return found
-
-
-def _envelope(document: Document, label: str) -> Table:
-    """The two components at onset, where the bond is, and how it breaks; of many directions some."""
-    axes, points = document["case"]["envelope"]["plane"], document["envelope"]
-    step = -(-len(points) // MOST_ROWS)
-    names = [name for name in ENVELOPE_NUMBERS if any(name in point for point in points)]
-    rows = [
-        [f"{point['angle']:g}", *map(_number, components(point)), *(_number(point[name]) for name in names)]
-        if "factor" in point
-        else [f"{point['angle']:g}", *["none"] * 2, *[""] * len(names)]
-        for point in points[::step]
-    ]
-    some = "" if step == 1 else f", {len(rows)} of {len(points)} directions"
-    unit = label if axes[0].startswith("S") else ""
-    return Table(f"Onset of debonding{some}; load{unit}", ["angle", *axes, *names], rows)
-
-
-def _load(point: Document, label: str) -> Table:
-    """The equilibrium under one load: strains, stresses and its numbers."""
-    names = zip(*voigt_names(len(point["strain"])), strict=True)
-    values = zip(point["strain"], point["stress"], strict=True)
-    rows = [
-        [name, _number(value)]
-        for pair, found in zip(names, values, strict=True)
-        for name, value in zip(pair, found, strict=True)
-    ]
-    numbers = [[name, _number(value)] for name, value in point.items() if isinstance(value, int | float)]
-    return Table(f"Equilibrium under the load; stress{label}", ["", "computed"], rows + numbers)
-
-
-def checks(document: Document) -> list[Check]:
-    """Every law that was checked."""
-    tolerance, contact = document["check_tolerance"], document["kkt_tolerance"]
+def answers(document: Document, most: int = MOST_ROWS) -> list[Table]:
+    """What was asked for: stiffness with moduli, constants and bounds, or points of an angle or path, or onsets, tables
+    of points with at most so many rows."""
+    unit = document["case"].get("output", {}).get("stress_unit", "")
+    label = in_brackets(unit)
     return [
-        Check(law, error, contact if law.startswith("kkt_") else tolerance)
-        for law, error in document["checks"].items()
-        if check_applies(law, document)
+        *([point_tables.envelope_table(document, label, most)] if document.get("envelope") else []),
+        *stiffness_tables.stiffnesses(document, label, "Effective stiffness under minus the unit strains"),
+        *stiffness_tables.thermal(document, label),
+        *stiffness_tables.constants(document, label),
+        *stiffness_tables.moduli(document, unit),
+        *stiffness_tables.bounds(document, label),
+        *(point_tables.all_numbers(key, document, label, most) for key in ("angle", "path") if document.get(key)),
+        *([point_tables.load_table(document, label)] if document.get("load") else []),
     ]
 
 
-def _bounds(document: Document) -> Iterator[list[str]]:
-    bounds, here = document["bounds"], document["effective_stiffness"]
-    for i, name in enumerate(("C11", "C22", "C33")):
-        values = (bounds["reuss"][i][i], here[i][i], bounds["voigt"][i][i])
-        yield [f"{name} (Reuss, Voigt)", *map(_number, values)]
-    for name, (lower, upper) in (bounds["hashin_shtrikman"] or {}).items():
-        yield [f"{name} (Hashin-Shtrikman)", *map(_number, (lower, document["moduli"][name], upper))]
-
-
-def _constants(document: Document, label: str) -> list[Table]:
-    """Engineering constants in space, and what closed estimates and bounds say of them."""
-    found = []
-    if (constants := document.get("constants")) is not None:
-        rows = [[name, _number(value)] for name, value in constants.items()]
-        found.append(Table(f"Engineering constants in the axes of the cell{label}", ["", "computed"], rows))
-    if (across := document.get("transverse_moduli")) is not None:
-        rows = [[name, *(_number(across[f"{name}_{end}"]) for end in ("least", "largest"))] for name in ("E", "G")]
-        found.append(Table(f"Over all directions across the fibres{label}", ["", "least", "largest"], rows))
-    if document.get("transversely_isotropic") is not None:
-        names, sources = comparison(document)
-        compared = [[title, *numbers] for title, numbers in sources]
-        found.append(
-            Table(f"Along the fibres and across them{label}", ["", *(SHORT[name] for name in names)], compared)
-        )
-    return found
-
-
-def _thermal(document: Document, label: str) -> Table:
-    """What a unit of temperature does, a row for each component."""
-    known = {words: document[key] for key, words in THERMAL.items() if document.get(key) is not None}
-    rows = [
-        [stress[1:], *map("{:.7g}".format, numbers)]
-        for stress, *numbers in zip(SPATIAL_STRESSES, *known.values(), strict=True)
-    ]
-    return Table(f"Per unit of temperature{label}", ["", *known], rows)
-
-
-def _points(key: str, document: Document, label: str) -> Table:
-    """The points of an angle or path, of many some."""
-    points = document[key]
-    numbers = chosen(document, MOST_ROWS) if key == "path" else range(min(len(points), MOST_ROWS))
-    some = "" if len(numbers) == len(points) else f", {len(numbers)} of {len(points)}"
-    names = [name for name, value in points[0].items() if isinstance(value, int | float)]
-    entries = shown_entries(points) if points[0].get("stiffness") is not None else {}
-    head = ["point", *names, *(entries or voigt_names(len(points[0]["stress"]))[1])]
-    rows = []
-    for number in numbers:
-        point = points[number]
-        stiff = point.get("stiffness")
-        values = point["stress"] if stiff is None else [stiff[i][j] for i, j in entries.values()]
-        rows.append([str(number), *(_number(point[name]) for name in names), *map(_number, values)])
-    return Table(f"Points of the {key}{some}; stress{label}", head, rows)
-
-
-def _number(value: float) -> str:
-    return f"{value:.7g}" if isinstance(value, int) or abs(value) > NOISE else "0"
+def notebook(document: Document) -> str:
+    """Title, tables, checks and status as HTML."""
+    rows = [[check.law, f"{check.error:.1e}"] for check in checks(document)]
+    errors = Table("Largest relative errors", [Column("law"), Column("error")], rows)
+    tables = [table.html for table in (*answers(document, NOTEBOOK_ROWS), errors)]
+    return "\n".join([f"<h4>{escape(title_of(document))}</h4>", *tables, f"<p>{escape(document['status'])}</p>"])
 
 
 def _count(number: int) -> str:

@@ -34,8 +34,7 @@ from feti_homog.report.plots.plot_helpers import (
     unit_label,
     value_range,
 )
-from feti_homog.report.text import point_tables
-from feti_homog.results import atomic, field_file
+from feti_homog.results import atomic, field_file, kept_points
 from feti_homog.typing import Array
 
 Document = Mapping[str, Any]
@@ -137,9 +136,9 @@ def plot(directory: Path, file: Any, document: Document) -> list[Path]:
         every = range(0, count, count // len(document["angle"]) or 1)
         numbers = [every[round(k)] for k in np.linspace(0, len(every) - 1, min(MAX_PANELS, len(every)))]
         return [save(_side_by_side(file, numbers, document, scale), directory / "angle_states.png")]
-    panels = _side_by_side(file, point_tables.chosen_states(document, MAX_PANELS, count), document, scale)
+    panels = _side_by_side(file, kept_points.chosen_states(document, MAX_PANELS, count), document, scale)
     paths = [save(panels, directory / "path_states.png")]
-    frames = point_tables.chosen_states(document, MAX_FRAMES, count)
+    frames = kept_points.chosen_states(document, MAX_FRAMES, count)
     return [*paths, _animation(file, frames, document, scale, directory / "path.gif")]
 
 
@@ -172,7 +171,7 @@ def _is_load_given(document: Mapping[str, Any]) -> bool:
 def _frames(document: Mapping[str, Any], count: int) -> list[int]:
     """Numbers of at most MAX_FRAMES of so many states."""
     if "path" in document:
-        return point_tables.chosen_states(document, MAX_FRAMES, count)
+        return kept_points.chosen_states(document, MAX_FRAMES, count)
     return sorted({round(k) for k in np.linspace(0, count - 1, min(MAX_FRAMES, count))})
 
 

@@ -15,8 +15,8 @@ from feti_homog.materials.voigt import STRESSES, voigt_names
 from feti_homog.report.plots import envelope_plot
 from feti_homog.report.plots.interface_marks import BONDED, CLOSED, OPEN, STATE_COLOURS, STATE_NAMES
 from feti_homog.report.plots.plot_helpers import bond_limits, interfaces_of, plain, save, strain_symbols, unit_label
-from feti_homog.report.text import point_tables
-from feti_homog.results import path_curves
+from feti_homog.report.text.point_tables import shown_entries
+from feti_homog.results import kept_points, path_curves
 from feti_homog.typing import Array
 
 Document = Mapping[str, Any]
@@ -67,7 +67,7 @@ def _angle_columns(points: Sequence[Mapping[str, Any]], stiff: bool) -> list[tup
         stress = np.array([point["stress"] for point in points])
         return list(zip(map(_symbol, STRESSES), stress.T, strict=True))
     stiffness = np.array([point["stiffness"] for point in points])
-    return [(f"C_{{{i + 1}{j + 1}}}", stiffness[:, i, j]) for i, j in point_tables.shown_entries(points).values()]
+    return [(f"C_{{{i + 1}{j + 1}}}", stiffness[:, i, j]) for i, j in shown_entries(points).values()]
 
 
 def _symbol(stress: str) -> str:
@@ -100,7 +100,7 @@ def _path(document: Document) -> Figure:
     for axes in (upper, middle, lower):
         _finish(axes)
     # The panels of path_states.png show the same points.
-    numbers = point_tables.chosen(document, NUMBERED_POINTS, point_tables.kept_points(document))
+    numbers = kept_points.chosen(document, NUMBERED_POINTS, kept_points.kept_points(document))
     curve = np.stack([strain, stress[:, component]], axis=1)
     _number_points(upper, (middle, lower), curve, numbers, INK[component])
     return figure

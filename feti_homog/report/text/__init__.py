@@ -1,4 +1,4 @@
-"""Results in words: the printed summary and its tables.
+"""Results as text: the printed summary, and the tables that it shares with report.html and notebooks.
 
-May use `results`.  Main entry: `summary.summary`.
+May use `results`.  Main entries: `summary.summary`, `table.Table`.
 """

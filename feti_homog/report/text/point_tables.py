@@ -1,8 +1,10 @@
-"""The points of result.json, `angle`, `path` and `load`, as short tables for the printed summary."""
+"""The points of an angle, a path, a load or an envelope, and the energy release rates at their tips, as tables."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from math import cos, radians, sin
 from textwrap import wrap
 from typing import Any
 
@@ -10,44 +12,26 @@ import numpy as np
 
 from feti_homog.case.mixed_load import TEMPERATURE
 from feti_homog.materials.voigt import STRAINS, STRESSES, voigt_names
+from feti_homog.report.text.table import Column, Table, without_noise
 from feti_homog.results import path_curves
+from feti_homog.results.kept_points import chosen
 
 WIDTH = 79
-ROWS = 15  # of a path's table
-COLUMNS = 5  # of its strains, stresses and the temperature
+PATH_ROWS, ENVELOPE_ROWS = 15, 12  # of their tables
+PATH_COLUMNS = 5  # of its strains, stresses and the temperature
 ENTRIES = {"C11": (0, 0), "C22": (1, 1), "C12": (0, 1), "C33": (2, 2)}
 SPATIAL_ENTRIES = {f"C{i}{i}": (i - 1, i - 1) for i in range(1, 7)} | {"C12": (0, 1)}
 STATES = ("bonded", "open", "closed")
+COUNTS = [Column(state, 7, "d") for state in STATES]
+ENVELOPE_NUMBERS = ("fibre", "interface", "bond_angle", "normal", "tangential", "axial", "psi")
+SHARES = {"normal": "normal", "tangential": "tangent", "axial": "axial", "psi": "psi"}
+RATES = (*(Column(name) for name in ("G", "G_I", "G_II")), Column("psi", 8, ".1f"), Column("fibre", 8, "d"),
+         Column("angle", 9))  # fmt: skip
+SECTION = Column("interface", 11, "d")  # of cases that have several
+TIP_TITLE = "Largest energy release rate"
 
 Point = Mapping[str, Any]
-
-
-def chosen(document: Mapping[str, Any], rows: int, among: Sequence[int] | None = None) -> list[int]:
-    """Numbers of at most `rows` points of a path: the first, the last, the ends of its legs if they are not too many,
-    and between them as evenly as bonds broke; with `among`, rising, of these points."""
-    points = document["path"]
-    numbers = np.arange(len(points)) if among is None else np.asarray(among, int)
-    if len(numbers) <= rows:
-        return [int(number) for number in numbers]
-    fixed = {0, len(numbers) - 1}
-    ends = np.flatnonzero(np.isin(numbers, path_curves.ends_of_legs(document))).tolist()
-    if len(fixed.union(ends)) <= rows:
-        fixed = fixed.union(ends)
-    broken = np.cumsum([point["broke"] for point in points])[numbers]
-    wanted = np.linspace(broken[0], broken[-1], rows - len(fixed) + 2)[1:-1]
-    places = {int(np.abs(broken - w).argmin()) for w in wanted} | fixed
-    return [int(numbers[place]) for place in sorted(places)]
-
-
-def kept_points(document: Mapping[str, Any]) -> list[int]:
-    """Numbers of the points of a path whose fields are kept, in the order of the states; of all if none are."""
-    return list(document.get("states") or range(len(document["path"])))
-
-
-def chosen_states(document: Mapping[str, Any], rows: int, count: int) -> list[int]:
-    """Numbers of at most `rows` of the first `count` states of a path, chosen as `chosen` chooses points."""
-    among = kept_points(document)[:count]
-    return [among.index(number) for number in chosen(document, rows, among)]
+Document = Mapping[str, Any]
 
 
 def shown_entries(points: Sequence[Point]) -> dict[str, tuple[int, int]]:
@@ -55,45 +39,57 @@ def shown_entries(points: Sequence[Point]) -> dict[str, tuple[int, int]]:
     return ENTRIES if len(points[0]["stiffness"]) == len(STRAINS) else SPATIAL_ENTRIES
 
 
-def angle_table(points: Sequence[Point], stress: str) -> list[str]:
-    """A row for each angle: stiffnesses or stresses, and the states of the interface nodes."""
+def all_numbers(key: str, document: Document, label: str, most: int) -> Table:
+    """The numbers and stresses, or entries of the stiffness, of an angle's or a path's points, of many some."""
+    points = document[key]
+    numbers = chosen(document, most) if key == "path" else range(min(len(points), most))
+    some = "" if len(numbers) == len(points) else f", {len(numbers)} of {len(points)}"
+    names = [name for name, value in points[0].items() if isinstance(value, int | float)]
+    stiff = points[0].get("stiffness") is not None
+    entries = shown_entries(points) if stiff else {}
+    rows = []
+    for number in numbers:
+        point = points[number]
+        values = [point["stiffness"][i][j] for i, j in entries.values()] if stiff else point["stress"]
+        rows.append([number, *(point[name] for name in names), *values])
+    head = ["point", *names, *(entries or voigt_names(len(points[0]["stress"]))[1])]
+    return Table(f"Points of the {key}{some}; stress{label}", [*map(Column, head)], rows)
+
+
+def angle_table(points: Sequence[Point], label: str) -> Table:
+    """A row for each angle: stiffnesses or stresses, and the states of the interface nodes; `label` is the unit of
+    stresses in brackets, or empty."""
     stiff = "stiffness" in points[0]
     entries = shown_entries(points) if stiff else {}
-    names, counted = tuple(entries) or STRESSES, len(entries) <= len(ENTRIES)
-    width = 12 if counted else 10
-    lines = [
-        f"{'Stiffness' if stiff else 'Stress'}{stress} against the debonding angle (degrees)",
-        f"{'angle':>9}" + "".join(f"{name:>{width}}" for name in names) + _heads() * counted,
-    ]
+    counts = COUNTS if len(entries) <= len(ENTRIES) else []
+    rows = []
     for point in points:
         values = [point["stiffness"][i][j] for i, j in entries.values()] if stiff else point["stress"]
-        numbers = "".join(_number(value, width) for value in values)
-        lines.append(f"{point['angle']:>9.5g}{numbers}" + _counts(point) * counted)
-    return lines
+        states = (point[column.name] for column in counts)
+        rows.append([point["angle"], *map(without_noise, values), *states])
+    width = 12 if counts else 10
+    columns = [Column("angle", 9), *(Column(name, width) for name in tuple(entries) or STRESSES), *counts]
+    return Table(f"{'Stiffness' if stiff else 'Stress'}{label} against the debonding angle (degrees)", columns, rows)
 
 
-def path_table(document: Mapping[str, Any], stress: str) -> list[str]:
+def path_table(document: Document, label: str) -> Table:
     """Totals of the path, and rows of some of its points."""
-    points = document["path"]
-    numbers = chosen(document, ROWS)
-    columns = _path_columns(document)
-    shown = dict(list(columns.items())[:COLUMNS])
+    points, numbers, found = document["path"], chosen(document, PATH_ROWS), _path_columns(document)
+    shown = dict(list(found.items())[:PATH_COLUMNS])
+    rest = [name for name in found if name not in shown]
     broke = sum(point["broke"] for point in points)
     some = "" if len(numbers) == len(points) else f", {len(numbers)} shown"
-    rest = [name for name in columns if name not in shown]
-    lines = [
-        f"Path{stress}: {len(points)} points{some}; {broke} bonds broke",
-        *_path_energies(document, stress),
-        *([f"Also in path.csv: {', '.join(rest)}"] if rest else []),
-        f"{'point':>5}{'load':>9}" + "".join(f"{name:>{_width(name)}}" for name in shown) + _heads(),
+    rows = [
+        [k, points[k]["load_factor"], *(without_noise(column[k]) for column in shown.values()), *_counts(points[k])]
+        for k in numbers
     ]
-    for number in numbers:
-        values = "".join(_number(column[number], _width(name)) for name, column in shown.items())
-        lines.append(f"{number:>5}{points[number]['load_factor']:>9.6f}{values}{_counts(points[number])}")
-    return lines
+    columns = [Column("point", 5, "d"), Column("load", 9, ".6f")]
+    columns += [*(Column(name, max(11, len(name) + 1)) for name in shown), *COUNTS]
+    totals = [*_path_energies(document, label), *([f"Also in path.csv: {', '.join(rest)}"] if rest else [])]
+    return Table(f"Path{label}: {len(points)} points{some}; {broke} bonds broke", columns, rows, totals)
 
 
-def _path_columns(document: Mapping[str, Any]) -> dict[str, Any]:
+def _path_columns(document: Document) -> dict[str, Any]:
     """What varies along a path: the leading strain, stresses that are named or there, the temperature, other strains
     under given stresses."""
     points = document["path"]
@@ -109,11 +105,6 @@ def _path_columns(document: Mapping[str, Any]) -> dict[str, Any]:
     return found | {strains[k]: strain[:, k] for k in others if stresses[k] in given}
 
 
-def _width(name: str) -> int:
-    """Columns of the text of a number of this name."""
-    return max(11, len(name) + 1)
-
-
 def _without_noise(values: Sequence[Sequence[float]]) -> Any:
     """(n, c) with zeros in the columns that have no more than the solver leaves of zero."""
     columns = np.array(values, float)
@@ -121,80 +112,181 @@ def _without_noise(values: Sequence[Sequence[float]]) -> Any:
     return np.where(is_there, columns, 0.0)
 
 
-def load_table(document: Mapping[str, Any], stress: str) -> list[str]:
+def load_lines(document: Document, label: str) -> list[str]:
     """The equilibrium under one load: strains, stresses, energies, and the states of the interface nodes."""
     point = document["load"]
-    strain, sigma = (_without_noise([point[name]])[0] for name in ("strain", "stress"))
-    strains, stresses = voigt_names(len(strain))
+    strain, sigma = (map(without_noise, _without_noise([point[name]])[0]) for name in ("strain", "stress"))
+    strains, stresses = voigt_names(len(point["strain"]))
     target = path_curves.targets(document)[0]
     given = ", ".join(f"{name} = {value:g}" for name, value in target.items() if value or name in strains)
-    rows = [("strain", strain), (f"stress{stress}", sigma)]
+    columns = [Column("", -14, indent=0), *(Column(name[1:]) for name in stresses)]
     motions = point["free_motions"]
     return [
         *wrap(f"Equilibrium under {given}", WIDTH),
-        f"{'':<14}" + "".join(f"{name[1:]:>12}" for name in stresses),
-        *(f"{label:<14}" + "".join(_number(value) for value in values) for label, values in rows),
-        *_energies(point, stress),
+        *Table("", columns, [["strain", *strain], [f"stress{label}", *sigma]]).lines[1:],
+        *_energies(point, label),
         *_debonded(document, point),
         ", ".join(f"{point[state]} {state}" for state in STATES) + " interface nodes",
         *([f"Free motions of fibres: {motions}"] if motions else []),
     ]
 
 
-def _path_energies(document: Mapping[str, Any], stress: str) -> list[str]:
+def load_table(document: Document, label: str) -> Table:
+    """Strains, stresses and numbers of the equilibrium under one load."""
+    point = document["load"]
+    names = zip(*voigt_names(len(point["strain"])), strict=True)
+    values = zip(point["strain"], point["stress"], strict=True)
+    rows = [
+        [name, value]
+        for pair, found in zip(names, values, strict=True)
+        for name, value in zip(pair, found, strict=True)
+    ]
+    numbers = [[name, value] for name, value in point.items() if isinstance(value, int | float)]
+    title = f"Equilibrium under the load; stress{label}"
+    return Table(title, [Column(""), Column("computed")], [*rows, *numbers])
+
+
+def _path_energies(document: Document, label: str) -> list[str]:
     """What the loads have done along a path, what is stored at its end, what breaks have lost, also if the load only
     rose, and what debonded."""
     last = document["path"][-1]
     where = " on the first leg" if path_curves.legs(document) > 1 else ""
     rising = f"{last['dissipated_strain_controlled']:.6g} if the {path_curves.what_rises(document)} only rises{where}"
     lines = [
-        f"Work per area{stress}: {last['work']:.6g}",
-        *_energies(last, stress),
-        f"Dissipated per area{stress}: {last['dissipated']:.6g} along all equilibria, {rising}",
+        f"Work per area{label}: {last['work']:.6g}",
+        *_energies(last, label),
+        f"Dissipated per area{label}: {last['dissipated']:.6g} along all equilibria, {rising}",
     ]
     if "dissipation_ratio" in last:
         ratio = f"{last['dissipation_ratio']:.4f} times it was dissipated"
-        lines.append(f"Toughness of what broke per area{stress}: {last['fracture_energy']:.6g}; {ratio}")
+        lines.append(f"Toughness of what broke per area{label}: {last['fracture_energy']:.6g}; {ratio}")
     return [*lines, *_debonded(document, last)]
 
 
-def _energies(point: Point, stress: str) -> list[str]:
-    """What is stored."""
+def _energies(point: Point, label: str) -> list[str]:
     springs = f", {point['stored_in_springs']:.6g} of it in springs" if point["stored_in_springs"] else ""
-    return [f"Stored per area{stress}: {point['stored']:.6g}{springs}"]
+    return [f"Stored per area{label}: {point['stored']:.6g}{springs}"]
 
 
-def _debonded(document: Mapping[str, Any], point: Point) -> list[str]:
+def _debonded(document: Document, point: Point) -> list[str]:
     """The share of the interfaces that has debonded, and those of the pairs of phases if there are several."""
-    words = f"Debonded: {100 * point['debonded_share']:.1f} % of the interfaces"
+    text = f"Debonded: {100 * point['debonded_share']:.1f} % of the interfaces"
     if "debonded_shares" in point:
         shares = zip(document["case"]["interface"], point["debonded_shares"], strict=True)
         pairs = [f"{100 * share:.1f} % of {' and '.join(section['between'])}" for section, share in shares]
-        words += f"; {', '.join(pairs)}"
-    return wrap(words, WIDTH)
+        text += f"; {', '.join(pairs)}"
+    return wrap(text, WIDTH)
 
 
-def sweep_table(rows: Sequence[tuple[str, str, str]]) -> list[str]:
-    """A line for each case of a sweep: folder, status (if any is known) and inputs."""
-    width = max(len(status) for _, status, _ in rows)
-    return [f"{folder}  {status:<{width}}  {inputs}".replace("    ", "  ").rstrip() for folder, status, inputs in rows]
+def _counts(point: Point) -> list[int]:
+    return [point[state] for state in STATES]
 
 
-def sweep_failures(rows: Sequence[tuple[str, str, str]]) -> list[str]:
-    """Folder, inputs and reason of each case that failed."""
-    return ["", f"{len(rows)} failed:"] + [
-        line for folder, inputs, reason in rows for line in (f"  {folder}  {inputs}", f"    {reason}")
+def envelope_lines(document: Document, label: str) -> list[str]:
+    """The least and the largest load, and the first bond that breaks in some directions."""
+    section, points = document["case"]["envelope"], document["envelope"]
+    axes, known = section["plane"], [point for point in points if "factor" in point]
+    unit = label if axes[0].startswith("S") else ""
+    warmer = section.get("temperature")
+    after = "" if warmer is None else f", after a temperature of {warmer:g}"
+    lines = [f"Onset of debonding in the plane {axes[0]}, {axes[1]}{unit}: {len(points)} directions{after}"]
+    if len(known) < len(points):
+        lines.append(f"  no load breaks a bond in {len(points) - len(known)} of them")
+    if not known:
+        return lines
+    for title, point in (("least", min(known, key=_load)), ("largest", max(known, key=_load))):
+        lines.append(f"  {title:<9}{_load(point):.7g} at {point['angle']:g} degrees")
+    return lines + _onset_lines(points, axes, known[0])
+
+
+def _onset_lines(points: Sequence[Point], axes: Sequence[str], first: Point) -> list[str]:
+    """Some directions, with the numbers that `first`, one with an onset, has."""
+    several, names = "interface" in first, [name for name in SHARES if name in first]
+    used = "psi of its traction" if names == ["psi"] else "traction / strength"
+    columns = [
+        Column("angle", 8),
+        *(Column(axis, 12, ".6g") for axis in axes),
+        Column("fibre", 6, "d"),
+        Column("at", 9, ".2f"),
+        *([Column("interface", 10, "d")] * several),
+        *(Column(SHARES[name], 10, ".4g") for name in names),
     ]
+    shown = ["fibre", "bond_angle", *(["interface"] * several), *names]
+    rows = [_onset(point, shown) for point in _evenly(points)]
+    return Table(f"  first bond: its fibre, its direction there (degrees), {used}", columns, rows).lines
 
 
-def _heads() -> str:
-    return "".join(f"{state:>7}" for state in STATES)
+def envelope_table(document: Document, label: str, most: int) -> Table:
+    """The two components at onset, where the bond is, and how it breaks; of many directions some."""
+    axes, points = document["case"]["envelope"]["plane"], document["envelope"]
+    step = -(-len(points) // most)
+    names = [name for name in ENVELOPE_NUMBERS if any(name in point for point in points)]
+    rows = [_onset(point, names) for point in points[::step]]
+    some = "" if step == 1 else f", {len(rows)} of {len(points)} directions"
+    unit = label if axes[0].startswith("S") else ""
+    return Table(f"Onset of debonding{some}; load{unit}", [*map(Column, ("angle", *axes, *names))], rows)
 
 
-def _counts(point: Point) -> str:
-    return "".join(f"{point[state]:>7}" for state in STATES)
+def components(point: Point) -> tuple[float, float]:
+    """The two components of the load at onset."""
+    angle, load = radians(point["angle"]), _load(point)
+    return without_noise(load * cos(angle), load), without_noise(load * sin(angle), load)
 
 
-def _number(value: float, width: int = 12) -> str:
-    """The number; what the solver leaves of a zero is one."""
-    return f" {value:>{width - 1}.5g}" if abs(value) > 1e-12 else f"{0:>{width}}"
+def _onset(point: Point, names: Sequence[str]) -> list[Any]:
+    """Direction, load and these numbers of a direction."""
+    if "factor" not in point:
+        return [point["angle"], "none", "none", *[""] * len(names)]
+    return [point["angle"], *components(point), *(without_noise(point[name]) for name in names)]
+
+
+def _load(point: Point) -> float:
+    return float(point["factor"])
+
+
+def _evenly(points: Sequence[Point]) -> list[Point]:
+    """Evenly spaced directions, the first among them."""
+    step = max(1, -(-len(points) // ENVELOPE_ROWS))
+    while len(points) % step:
+        step += 1
+    return list(points[::step])
+
+
+def tip_table(tips: Document | None, label: str) -> list[Table]:
+    """For each load the tip of the largest G; none without tips."""
+    largest = _largest(tips)
+    rows = [[load, *_rates(tip)] for load, tip in largest.items()]
+    return [Table(f"{TIP_TITLE}{label}", [Column("load", 9), *_rate_columns(largest)], rows)] if rows else []
+
+
+def angle_tip_table(points: Sequence[Document], label: str) -> list[Table]:
+    """For each angle the largest G of each load, or of a single load all about the tip; none without tips."""
+    found = [(point["angle"], tips) for point in points if (tips := _largest(point.get("tips")))]
+    loads = dict.fromkeys(load for _, tips in found for load in tips)
+    if len(loads) == 1:
+        rows = [[angle, *_rates(tip)] for angle, tips in found for tip in tips.values()]
+        return [Table(f"{TIP_TITLE}{label}", [Column("angle", 9), *_rate_columns(found[0][1])], rows)]
+    rows = [[angle, *(tip["G"] for tip in tips.values())] for angle, tips in found]
+    columns = [Column("angle", 9), *map(Column, loads)]
+    return [Table(f"{TIP_TITLE}{label} under each load", columns, rows)] if rows else []
+
+
+def _largest(tips: Document | None) -> dict[str, Document]:
+    """The tip of the largest G of each load, in the order of the loads."""
+    best: dict[str, Document] = {}
+    names = ["load", *(column.name for column in RATES), *([SECTION.name] if tips and SECTION.name in tips else [])]
+    for values in zip(*(tips[name] for name in names), strict=True) if tips else ():
+        tip = dict(zip(names, values, strict=True))
+        # Of tips that are alike but for rounding, the first.
+        if tip["load"] not in best or tip["G"] > best[tip["load"]]["G"] * (1 + 1e-6):
+            best[tip["load"]] = tip
+    return best
+
+
+def _rate_columns(tips: Mapping[str, Document]) -> list[Column]:
+    shown = [replace(column, name="at") if column.name == "angle" else column for column in RATES]
+    return [*shown, *([SECTION] if any(SECTION.name in tip for tip in tips.values()) else [])]
+
+
+def _rates(tip: Document) -> list[Any]:
+    return [value for name, value in tip.items() if name != "load"]

@@ -3,24 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from math import floor, log10
+from dataclasses import dataclass
 from pathlib import Path
 from textwrap import wrap
 from typing import Any
 
 from feti_homog.case.element_sizes import ASKED
-from feti_homog.materials.voigt import SPATIAL_STRESSES, STRAINS, STRESSES
-from feti_homog.report.text.constants_tables import constants_blocks
-from feti_homog.report.text.envelope_table import envelope_table
-from feti_homog.report.text.point_tables import angle_table, load_table, path_table
-from feti_homog.report.text.spatial_tables import spatial_blocks
-from feti_homog.report.text.tip_tables import angle_tip_table, tip_table
+from feti_homog.materials.voigt import SPATIAL_STRESSES
+from feti_homog.report.text import point_tables, stiffness_tables
+from feti_homog.report.text.point_tables import WIDTH
+from feti_homog.report.text.units import in_brackets
 
-WIDTH = 79
 LABEL = 12  # columns of the labels at the left
-NAME = 28  # columns of the names of table rows
+NAME = 28  # columns of the names of checks
 GLUE = "\N{NO-BREAK SPACE}"  # at which no line is broken
-STIFF = ("C11", "C22", "C33")
 LISTED = 12  # numbers of iterations that are reported one by one
 TITLES = {
     "stiffness": "effective stiffness",
@@ -29,7 +25,6 @@ TITLES = {
     "load": "equilibrium under a load",
     "envelope": "onset of debonding",
 }
-MODULI = ("E1", "E2", "G12", "bulk", "shear")  # in the unit of the stresses; the others are ratios
 
 Document = Mapping[str, Any]
 
@@ -86,35 +81,34 @@ def _joined(blocks: Iterable[Sequence[str]]) -> str:
 
 def _answer(document: Document) -> list[list[str]]:
     """The blocks of what was asked for."""
-    unit = document["case"].get("output", {}).get("stress_unit", "")
-    stress = f" ({unit})" if unit else ""
-    length = document["case"].get("output", {}).get("length_unit", "")
-    toughness = f" ({unit} {length})" if unit and length else ""
+    output = document["case"].get("output", {})
+    unit, length = output.get("stress_unit", ""), output.get("length_unit", "")
+    label, toughness = in_brackets(unit), in_brackets(f"{unit} {length}") if unit and length else ""
     if "angle" in document:
-        return [angle_table(document["angle"], stress), angle_tip_table(document["angle"], toughness)]
+        points = document["angle"]
+        tables = [point_tables.angle_table(points, label), *point_tables.angle_tip_table(points, toughness)]
+        return [table.lines for table in tables]
     if "path" in document:
-        return [path_table(document, stress)]
+        return [point_tables.path_table(document, label).lines]
     if "load" in document:
-        return [load_table(document, stress), tip_table(document["load"].get("tips"), toughness)]
-    onsets = [envelope_table(document, stress)] if "envelope" in document else []
-    return onsets + _stiffness_blocks(document, stress, toughness)
+        tips = point_tables.tip_table(document["load"].get("tips"), toughness)
+        return [point_tables.load_lines(document, label), *(table.lines for table in tips)]
+    onsets = [point_tables.envelope_lines(document, label)] if "envelope" in document else []
+    return onsets + _stiffness_blocks(document, label, toughness)
 
 
-def _stiffness_blocks(document: Document, stress: str, toughness: str) -> list[list[str]]:
+def _stiffness_blocks(document: Document, label: str, toughness: str) -> list[list[str]]:
     """The effective stiffness with what follows from it; units in brackets."""
+    blocks = [table.lines for table in stiffness_tables.stiffnesses(document, label)]
+    tips = [table.lines for table in point_tables.tip_table(document.get("tips"), toughness)]
     if len(document["effective_stiffness"]) == len(SPATIAL_STRESSES):
-        tables = [*spatial_blocks(document, stress), *constants_blocks(document, stress)]
-        return [*tables, tip_table(document.get("tips"), toughness)]
-    blocks = [_matrix(f"Effective stiffness{stress}", document["effective_stiffness"])]
-    if "effective_stiffness_compression" in document:
-        blocks.append(_matrix(f"Under minus E{stress}", document["effective_stiffness_compression"]))
+        thermal = [table.lines for table in stiffness_tables.thermal(document, label)]
+        return [*blocks, *thermal, *stiffness_tables.constants_lines(document, label), *tips]
     if document["case"].get("interface"):  # moduli and bounds are of bonded, linear composites
-        return [*blocks, tip_table(document.get("tips"), toughness)]
-    return [
-        *blocks,
-        _moduli(f"Engineering moduli{stress}", document["moduli"]),
-        _bounds(f"Bounds{stress}", document) if document.get("bounds") else ["Bounds: none of cells with voids"],
-    ]
+        return [*blocks, *tips]
+    bounds = [table.lines for table in stiffness_tables.bounds(document, label)]
+    moduli = stiffness_tables.moduli_lines(document, label)
+    return [*blocks, moduli, *(bounds or [["Bounds: none of cells with voids"]])]
 
 
 def _cell(document: Document) -> list[str]:
@@ -175,61 +169,39 @@ def _iterations(counts: Sequence[int]) -> list[str]:
     return [f"{min(counts)} to {max(counts)} a state", f"{sum(counts)} for {len(counts)} states"]
 
 
-def _matrix(title: str, rows: Sequence[Sequence[float]]) -> list[str]:
-    # All entries to the digit that is the eighth of the largest.
-    largest = max(abs(entry) for row in rows for entry in row)
-    form = f".{7 - floor(log10(largest))}f" if 1e-4 < largest < 1e8 else ".7e"
-    lines = [f"{title:<{NAME}}" + "".join(f"{name:>16}" for name in STRAINS)]
-    for name, row in zip(STRESSES, rows, strict=True):
-        lines.append(f"  {name:<{NAME - 2}}" + "".join(f"{_signless(entry, form):>16}" for entry in row))
-    return lines
+@dataclass(frozen=True)
+class Check:
+    """A law with its largest relative error and the limit of it, if there is one."""
+
+    law: str
+    error: float
+    limit: float | None
+
+    @property
+    def holds(self) -> bool:
+        return self.limit is None or self.error <= self.limit
 
 
-def _moduli(title: str, moduli: Document) -> list[str]:
-    stiff = [f"{name:<6}{moduli[name]:>13.7g}" for name in MODULI if name in moduli]
-    ratios = [f"{name:<11}{_signless(value, '.6f'):>13}" for name, value in moduli.items() if name not in MODULI]
-    count = max(len(stiff), len(ratios))
-    pairs = zip(stiff + [""] * (count - len(stiff)), ratios + [""] * (count - len(ratios)), strict=True)
-    return [title, *(f"  {left:<30}{right}".rstrip() for left, right in pairs)]
-
-
-def _bounds(title: str, document: Document) -> list[str]:
-    moduli, bounds, here = document["moduli"], document["bounds"], document["effective_stiffness"]
-    lines = [f"{title:<{NAME}}{'lower':>14}{'computed':>14}{'upper':>14}"]
-    for i, name in enumerate(STIFF):
-        lower, upper = bounds["reuss"][i][i], bounds["voigt"][i][i]
-        inside = lower - 1e-9 * abs(lower) <= here[i][i] <= upper + 1e-9 * abs(upper)
-        note = "" if inside else "  outside"
-        lines.append(_between(f"{name} Reuss, Voigt", lower, here[i][i], upper) + note)
-    # These hold for isotropic cells only, so a value outside is no fault.
-    for name, (lower, upper) in (bounds["hashin_shtrikman"] or {}).items():
-        lines.append(_between(f"{name} Hashin-Shtr.", lower, moduli[name], upper))
-    return lines
-
-
-def _between(label: str, lower: float, value: float, upper: float) -> str:
-    return f"  {label:<{NAME - 2}}{lower:>14.7g}{value:>14.7g}{upper:>14.7g}"
+def checks(document: Document) -> list[Check]:
+    """The laws that were checked; those of contact do not apply where all is bonded."""
+    limit, has_interface = document.get("check_tolerance"), bool(document["case"].get("interface"))
+    contact = document.get("kkt_tolerance", limit)
+    return [
+        Check(law, error, contact if law.startswith("kkt_") else limit)
+        for law, error in document["checks"].items()
+        if has_interface or not law.startswith("kkt_")
+    ]
 
 
 def _checks(document: Document) -> list[str]:
-    """The checks that say anything."""
-    shown = {name: error for name, error in document["checks"].items() if check_applies(name, document)}
-    tolerance = document.get("check_tolerance")
-    limit = "" if tolerance is None else f" (relative, at most {tolerance:.1e})"
-    lines = [f"Checks{limit}"]
-    contact = document.get("kkt_tolerance", tolerance)
-    if any(name.startswith("kkt_") for name in shown) and contact != tolerance:
-        lines[0] = lines[0].replace(")", f"; of contact {contact:.1e})")
-    for name, error in shown.items():
-        tolerance = contact if name.startswith("kkt_") else document.get("check_tolerance")
-        verdict = "" if tolerance is None else "pass" if error <= tolerance else "FAIL"
-        lines.append(f"  {name:<{NAME - 2}}{error:>14.1e}    {verdict}".rstrip())
-    return lines
-
-
-def check_applies(check: str, document: Document) -> bool:
-    """Whether a check says anything: those of contact do not where all is bonded."""
-    return not check.startswith("kkt_") or bool(document["case"].get("interface"))
+    found, limit = checks(document), document.get("check_tolerance")
+    of_contact = {f"; of contact {check.limit:.1e}" for check in found if check.limit != limit}
+    title = "Checks" if limit is None else f"Checks (relative, at most {limit:.1e}{''.join(of_contact)})"
+    verdicts = {True: "pass", False: "FAIL"}
+    return [title] + [
+        f"  {c.law:<{NAME - 2}}{c.error:>14.1e}    {'' if c.limit is None else verdicts[c.holds]}".rstrip()
+        for c in found
+    ]
 
 
 def _timings(timings: Document) -> list[str]:
@@ -249,12 +221,6 @@ def _field(label: str, words: Sequence[str]) -> list[str]:
 
 def _listed(value: Any) -> list[Any]:
     return list(value) if isinstance(value, list | tuple) else [value]
-
-
-def _signless(value: float, form: str) -> str:
-    """The number, without the sign of a zero that it is rounded to."""
-    text = f"{value:{form}}"
-    return text.removeprefix("-") if float(text) == 0.0 else text
 
 
 def _number(count: int, name: str) -> str:

@@ -23,5 +23,9 @@ def unit(name: str, stress_unit: str) -> str:
 
 def with_unit(name: str, stress_unit: str) -> str:
     """The name and, in brackets, the unit that it has."""
-    own = unit(name, stress_unit)
-    return f"{name} ({own})" if own else name
+    return name + in_brackets(unit(name, stress_unit))
+
+
+def in_brackets(unit: str) -> str:
+    """The unit for a title: in brackets after a space; empty if there is none."""
+    return f" ({unit})" if unit else ""

@@ -217,8 +217,9 @@ def test_what_is_printed_is_short(name):
 
 def test_tables_for_notebooks():
     html = RESULTS["stiffness"]._repr_html_()
-    assert html.count("<table>") == html.count("</table>") == 3
+    assert html.count("<table>") == html.count("</table>") == 4
     assert all(
-        words in html for words in ("L<sup>ef</sup> (GPa)", "<th>gamma12</th>", "<td>E1 (GPa)</td>", "<p>done</p>")
+        words in html
+        for words in ("Effective stiffness (GPa)", ">gamma12</th>", ">E1 (GPa)</th>", "Bounds (GPa)", "<p>done</p>")
     )
-    assert "<th>load_factor</th>" in RESULTS["path"]._repr_html_()
+    assert ">load_factor</th>" in RESULTS["path"]._repr_html_()

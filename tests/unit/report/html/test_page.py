@@ -18,6 +18,7 @@ from support.sample_output import in_space, sample
 from feti_homog.errors import CaseError
 from feti_homog.report.html import page, states, tables
 from feti_homog.report.plots.decimation import drawn_mesh, nodal_values, triangle_means
+from feti_homog.report.text.summary import checks
 from feti_homog.results import result_json
 from feti_homog.results.field_file import FieldFile
 
@@ -65,9 +66,18 @@ def envelope() -> dict[str, Any]:
 
 def test_the_table_of_an_envelope() -> None:
     (table,) = tables.answers(envelope())
-    assert table.caption == "Onset of debonding; load (GPa)"
-    assert table.head == ["angle", "S22", "S12", "fibre", "bond_angle", "normal", "tangential"]
-    assert table.rows[1] == ["90", "0", "4", "1", "30", "1", "0"] and table.rows[2][:3] == ["180", "none", "none"]
+    assert table.title == "Onset of debonding; load (GPa)"
+    assert [column.name for column in table.columns] == [
+        "angle",
+        "S22",
+        "S12",
+        "fibre",
+        "bond_angle",
+        "normal",
+        "tangential",
+    ]
+    assert table.cells[1] == ["90", "0", "4", "1", "30", "1", "0"]
+    assert table.cells[2] == ["180", "none", "none", "", "", "", ""]
 
 
 def bonded() -> dict[str, Any]:
@@ -187,22 +197,41 @@ def test_the_table_of_a_load() -> None:
     point = COUNTS | {"strain": [0.1, 0.2, 0.3], "stress": [4.0, 5.0, 6.0], "stored": 7.0}
     (table,) = tables.answers(document("load", load=point))
     expected = {"E11": "0.1", "E22": "0.2", "gamma12": "0.3", "S11": "4", "S22": "5", "S12": "6", "stored": "7"}
-    found = dict(table.rows)
+    found = dict(table.cells)
     assert {name: found[name] for name in expected} == expected and (found["open"], found["closed"]) == ("3", "2")
 
 
 def test_many_points_are_some_rows(tmp_path: Path) -> None:
     (table,) = tables.answers(path(500))
-    last = dict(zip(table.head, table.rows[-1], strict=True))
+    last = dict(zip((column.name for column in table.columns), table.cells[-1], strict=True))
     expected = {"bonded": "5", "open": "3", "closed": "2", "load_factor": "1", "S11": "3", "S22": "1", "S12": "0"}
-    assert {name: last[name] for name in expected} == expected and table.caption.endswith("stress (GPa)")
-    assert len(table.rows) == tables.MOST_ROWS and "60 of 500" in table.caption
-    assert (table.rows[0][0], table.rows[-1][0]) == ("0", "499")
+    assert {name: last[name] for name in expected} == expected and table.title.endswith("stress (GPa)")
+    assert len(table.rows) == tables.MOST_ROWS and "60 of 500" in table.title
+    assert (table.cells[0][0], table.cells[-1][0]) == ("0", "499")
 
 
 def test_bounds_stand_on_both_sides_of_what_was_computed() -> None:
-    *_, table = tables.answers(bonded())
-    assert table.rows[-1] == ["bulk (Hashin-Shtrikman)", "1", "1.5", "2"]
+    result = bonded()
+    result["bounds"]["voigt"] = [[10.0, 2.0, 0.0], [2.0, 8.5, 0.0], [0.0, 0.0, 3.5]]
+    result["bounds"]["reuss"] = [[7.0, 2.0, 0.0], [2.0, 6.5, 0.0], [0.0, 0.0, 2.5]]
+    *_, table = tables.answers(result)
+    assert [column.name for column in table.columns] == ["", "lower", "computed", "upper"]
+    assert table.cells == [
+        ["C11 Reuss, Voigt", "7", "9", "10"],
+        ["C22 Reuss, Voigt", "6.5", "8", "8.5"],
+        ["C33 Reuss, Voigt", "2.5", "3", "3.5"],
+        ["bulk Hashin-Shtr.", "1", "1.5", "2"],
+    ]
+    result["bounds"]["reuss"][0][0] = 9.5
+    *_, table = tables.answers(result)
+    assert table.cells[0] == ["C11 Reuss, Voigt", "9.5", "9", "10", "outside"] and len(table.cells[1]) == 4
+
+
+def test_checks_of_contact_have_a_limit_of_their_own() -> None:
+    result = document("load", checks={"hill": 2e-6, "kkt_tension": 2e-6})
+    assert [(check.law, check.limit, check.holds) for check in checks(result)] == [
+        ("hill", 1e-5, True), ("kkt_tension", 1e-6, False),
+    ]  # fmt: skip
 
 
 def no_folder(directory: Path) -> Path:

@@ -1,4 +1,4 @@
-"""The printed table of an envelope."""
+"""The printed tables of points: that of an envelope."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from feti_homog.report.text.envelope_table import components, envelope_table
+from feti_homog.report.text.point_tables import components, envelope_lines
 
 
 def document(count: int, names: tuple[str, ...], without: tuple[int, ...] = (), **section: Any) -> dict[str, Any]:
@@ -21,7 +21,7 @@ def document(count: int, names: tuple[str, ...], without: tuple[int, ...] = (), 
 
 
 def test_the_least_and_the_largest_load_and_some_directions():
-    lines = envelope_table(document(72, ("normal", "tangential", "axial")), " (MPa)")
+    lines = envelope_lines(document(72, ("normal", "tangential", "axial")), " (MPa)")
     assert lines[0] == "Onset of debonding in the plane S22, S12 (MPa): 72 directions"
     assert lines[1].split() == ["least", "10", "at", "0", "degrees"]
     assert lines[2].split() == ["largest", "81", "at", "355", "degrees"]
@@ -32,7 +32,7 @@ def test_the_least_and_the_largest_load_and_some_directions():
 
 
 def test_directions_without_an_onset_are_counted():
-    lines = envelope_table(document(8, ("psi",), without=(0, 3), temperature=-50.0), "")
+    lines = envelope_lines(document(8, ("psi",), without=(0, 3), temperature=-50.0), "")
     assert lines[0].endswith("8 directions, after a temperature of -50")
     assert lines[1].strip() == "no load breaks a bond in 2 of them"
     assert lines[6].split() == ["0", "none", "none"] and lines[5].split()[-1] == "psi"
@@ -40,14 +40,14 @@ def test_directions_without_an_onset_are_counted():
 
 
 def test_nothing_may_break():
-    lines = envelope_table(document(4, (), without=(0, 1, 2, 3)), "")
+    lines = envelope_lines(document(4, (), without=(0, 1, 2, 3)), "")
     assert len(lines) == 2
 
 
 def test_strains_have_no_unit():
     whole = document(4, ("psi",))
     whole["case"]["envelope"]["plane"] = ["E11", "gamma12"]
-    assert envelope_table(whole, " (MPa)")[0] == "Onset of debonding in the plane E11, gamma12: 4 directions"
+    assert envelope_lines(whole, " (MPa)")[0] == "Onset of debonding in the plane E11, gamma12: 4 directions"
 
 
 @pytest.mark.parametrize(("angle", "expected"), [(0.0, (3.0, 0.0)), (90.0, (0.0, 3.0)), (180.0, (-3.0, 0.0))])

@@ -4,28 +4,28 @@ from __future__ import annotations
 
 import pytest
 
-from feti_homog.report.text.constants_tables import constants_blocks
+from feti_homog.report.text.stiffness_tables import constants_lines
 
 CELL = {"E_axial": 41.7, "G_transverse": 3.7, "expansion_axial": None, "deviation": 0.002}
 AXES = dict.fromkeys(("E1", "E2", "E3", "nu12", "nu13", "nu23", "G12", "G13", "G23"), 1.5)
 
 
 def test_without_constants_there_is_nothing():
-    assert constants_blocks({}, "") == [[], []]
+    assert constants_lines({}, "") == [[]]
 
 
 def test_a_row_for_each_source_and_a_column_for_each_constant_that_one_knows():
     estimates = {"halpin_tsai": {"E_axial": 41.6, "G_transverse": None}, "chamis": {"E_axial": None}}
     document = {"constants": AXES, "transversely_isotropic": CELL, "estimates": estimates}
     document["fibre_bounds"] = {"E_axial": [40.0, 43.0], "nu_axial": None}
-    axes, table = constants_blocks(document, " (GPa)")
+    axes, table = constants_lines(document, " (GPa)")
     assert len(axes) == 4 and axes[0].endswith("(GPa)")
     assert "0.2 %" in table[0] and table[1].split() == ["E", "axial", "G", "transv."]
     assert [line.split()[-2:] for line in table[2:-1]] == [
         ["41.7", "3.7"], ["41.6", "-"], ["40", "-"], ["43", "-"],
     ]  # fmt: skip
     assert len({len(line) for line in table[1:-1]}) == 1
-    assert table[-1].strip().startswith("-: the method, or bounds of fibres of any section, say nothing of it")
+    assert table[-1].strip().startswith("-: not available from this method")
 
 
 @pytest.mark.parametrize(
@@ -39,11 +39,11 @@ def test_a_row_for_each_source_and_a_column_for_each_constant_that_one_knows():
     ],
 )
 def test_a_cell_without_estimates_is_told_of_what_they_are(more, words):
-    _, table = constants_blocks({"transversely_isotropic": CELL, **more}, "")
+    _, table = constants_lines({"transversely_isotropic": CELL, **more}, "")
     assert table[-1] == f"  no closed estimates, which are of {words}"
 
 
 def test_the_range_over_directions_stands_above_the_table():
     across = {"E_least": 9.81, "E_largest": 10.93, "G_least": 3.3, "G_largest": 3.82}
-    _, table = constants_blocks({"transversely_isotropic": CELL, "transverse_moduli": across}, "")
+    _, table = constants_lines({"transversely_isotropic": CELL, "transverse_moduli": across}, "")
     assert table[1] == "  over all directions across: E from 9.81 to 10.93, G from 3.3 to 3.82"

@@ -1,0 +1,185 @@
+"""Stiffness, what a unit of temperature does, moduli and constants beside their bounds and estimates, as tables."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from math import floor, log10
+from typing import Any
+
+from feti_homog.case.phase_names import COATING
+from feti_homog.materials.voigt import SPATIAL_STRESSES, STRAINS, voigt_names
+from feti_homog.report.text.table import Column, Table, number
+from feti_homog.report.text.units import with_unit
+
+NAMES = Column("", -28)
+STIFF = ("C11", "C22", "C33")
+STRESS_MODULI = ("E1", "E2", "G12", "bulk", "shear")  # in the unit of the stresses; the others are ratios
+ENGINEERING = (("E1", "E2", "E3"), ("G12", "G13", "G23"), ("nu12", "nu13", "nu23"))
+THERMAL = {
+    "thermal_stress": "stress at no strain",
+    "thermal_stress_compression": "under minus one",
+    "thermal_expansion": "strain at no stress",
+}
+THERMAL_DIGITS = 7  # below the last of the largest there is zero
+THIS_CELL, LOWER, UPPER, UNKNOWN = "this cell", "lower bound", "upper bound", "-"
+ABREAST = 5  # constants beside each other in text
+SHORT = {
+    "E_axial": "E axial",
+    "E_transverse": "E transv.",
+    "nu_axial": "nu axial",
+    "nu_transverse": "nu transv.",
+    "G_axial": "G axial",
+    "G_transverse": "G transv.",
+    "K_transverse": "K transv.",
+    "expansion_axial": "exp. axial",
+    "expansion_transverse": "exp. transv.",
+}
+Document = Mapping[str, Any]
+
+
+def stiffnesses(document: Document, label: str, under_minus: str = "Under minus E") -> list[Table]:
+    """L^ef, also under minus the unit strains, to the digit that is the last of its largest entry; `label` is the unit
+    of stresses in brackets, or empty."""
+    titles = {"effective_stiffness": "Effective stiffness", "effective_stiffness_compression": under_minus}
+    return [_matrix(f"{title}{label}", document[key]) for key, title in titles.items() if document.get(key) is not None]
+
+
+def _matrix(title: str, rows: Sequence[Sequence[float]]) -> Table:
+    strains, stresses = voigt_names(len(rows))
+    in_plane = len(rows) == len(STRAINS)
+    names, width, digits, most, short = (NAMES, 16, 8, 1e8, ".7e") if in_plane else (Column("", -6), 12, 7, 1e6, ".4e")
+    largest = max(abs(entry) for row in rows for entry in row)
+    form = f".{digits - 1 - floor(log10(largest))}f" if 10.0 ** (4 - digits) < largest < most else short
+    named = [[name, *row] for name, row in zip(stresses, rows, strict=True)]
+    return Table(title, [names, *(Column(name, width, form) for name in strains)], named, title_in_head=in_plane)
+
+
+def thermal(document: Document, label: str) -> list[Table]:
+    """What a unit of temperature does: a row for each component, a column for each of what is known."""
+    known = {key: title for key, title in THERMAL.items() if document.get(key) is not None}
+    names = [stress[1:] for stress in SPATIAL_STRESSES]
+    rows = list(zip(names, *(_rounded(document[key]) for key in known), strict=True))
+    columns = [Column("", -6), *(Column(title, 22, ".7g") for title in known.values())]
+    return [Table(f"Per unit of temperature{label}", columns, rows)] if known else []
+
+
+def _rounded(numbers: Sequence[float]) -> list[float]:
+    least = 10.0**-THERMAL_DIGITS * max(map(abs, numbers))
+    return [0.0 if abs(entry) <= least else entry for entry in numbers]
+
+
+def moduli(document: Document, unit: str) -> list[Table]:
+    """Engineering moduli of the plane state, each with its unit."""
+    rows = [[with_unit(name, unit), value] for name, value in (document.get("moduli") or {}).items()]
+    return [Table("Engineering moduli", [NAMES, Column("computed")], rows)] if rows else []
+
+
+def moduli_lines(document: Document, label: str) -> list[str]:
+    """The same as text: moduli on the left, ratios on the right."""
+    values = document["moduli"]
+    left = [f"{name:<6}{values[name]:>13.7g}" for name in STRESS_MODULI if name in values]
+    right = [f"{name:<11}{number(v, '.6f'):>13}" for name, v in values.items() if name not in STRESS_MODULI]
+    count = max(len(left), len(right))
+    pairs = zip(left + [""] * (count - len(left)), right + [""] * (count - len(right)), strict=True)
+    return [f"Engineering moduli{label}", *(f"  {modulus:<30}{ratio}".rstrip() for modulus, ratio in pairs)]
+
+
+def bounds(document: Document, label: str) -> list[Table]:
+    """Lower bound, computed value and upper bound; those outside are marked."""
+    if not document.get("bounds"):
+        return []
+    found, here, rows = document["bounds"], document["effective_stiffness"], []
+    for i, name in enumerate(STIFF):
+        lower, value, upper = found["reuss"][i][i], here[i][i], found["voigt"][i][i]
+        inside = lower - 1e-9 * abs(lower) <= value <= upper + 1e-9 * abs(upper)
+        rows.append([f"{name} Reuss, Voigt", lower, value, upper, *([] if inside else ["outside"])])
+    # These hold for isotropic cells only, so a value outside is no fault.
+    for name, (lower, upper) in (found["hashin_shtrikman"] or {}).items():
+        rows.append([f"{name} Hashin-Shtr.", lower, document["moduli"][name], upper])
+    columns = [NAMES, *(Column(name, 14, ".7g") for name in ("lower", "computed", "upper"))]
+    columns += [Column("", 9)] if any(len(row) > len(columns) for row in rows) else []
+    return [Table(f"Bounds{label}", columns, rows, title_in_head=True)]
+
+
+def constants(document: Document, label: str) -> list[Table]:
+    """Engineering constants in space, their range over all directions across the fibres, and what closed estimates and
+    bounds are beside them."""
+    found, computed = [], [NAMES, Column("computed")]
+    if (values := document.get("constants")) is not None:
+        found.append(Table(f"Engineering constants in the axes of the cell{label}", computed, list(values.items())))
+    if (across := document.get("transverse_moduli")) is not None:
+        ends = ("least", "largest")
+        rows = [[name, *(across[f"{name}_{end}"] for end in ends)] for name in ("E", "G")]
+        title = f"Over all directions across the fibres{label}"
+        found.append(Table(title, [NAMES, *map(Column, ends)], rows))
+    return [*found, *estimates(document, label)]
+
+
+def constants_lines(document: Document, label: str) -> list[list[str]]:
+    """The same as blocks of text; empty blocks where nothing is known."""
+    values, block = document.get("constants"), list[str]()
+    if values is not None:
+        rows = ("    ".join(f"{name:<5}{values[name]:>13.7g}" for name in names) for names in ENGINEERING)
+        block = [f"Engineering constants in the axes of the cell{label}", *(f"  {row}" for row in rows)]
+    return [block, *(_estimates_lines(document, table) for table in estimates(document, label))]
+
+
+def estimates(document: Document, label: str) -> list[Table]:
+    """Constants along the fibres and across them: a row for each source that knows one, a column for each constant that
+    some source knows."""
+    if document.get("transversely_isotropic") is None:
+        return []
+    rows = {title: _known(row) for title, row in _sources(document).items()}
+    names = [name for name in SHORT if any(name in row for row in rows.values())]
+    cells = [[title, *(_five(row.get(name)) for name in names)] for title, row in rows.items() if row]
+    columns = [Column("", -22), *(Column(SHORT[name], 13) for name in names)]
+    return [Table(f"Along the fibres and across them{label}", columns, cells)]
+
+
+def _sources(document: Document) -> dict[str, Document]:
+    """The constants of this cell, by each method, and the bounds."""
+    limits = _known(document.get("fibre_bounds") or {})
+    sources = {THIS_CELL: document["transversely_isotropic"]}
+    sources |= {name.replace("_", " "): row for name, row in (document.get("estimates") or {}).items()}
+    return sources | {name: {key: limits[key][k] for key in limits} for k, name in enumerate((LOWER, UPPER))}
+
+
+def _estimates_lines(document: Document, table: Table) -> list[str]:
+    """A few constants beside each other, the others below them."""
+    cell, across = document["transversely_isotropic"], document.get("transverse_moduli")
+    lines = [f"{table.title}; {100 * cell['deviation']:.2g} % from transversely isotropic"]
+    if across is not None:
+        ranges = (f"{n} from {_five(across[f'{n}_least'])} to {_five(across[f'{n}_largest'])}" for n in ("E", "G"))
+        lines.append(f"  over all directions across: {', '.join(ranges)}")
+    for first in range(1, len(table.columns), ABREAST):
+        part = [0, *range(first, min(first + ABREAST, len(table.columns)))]
+        rows = [[row[k] for k in part] for row in table.rows]
+        known = [row for row in rows if set(row[1:]) != {UNKNOWN}]
+        lines += replace(table, columns=[table.columns[k] for k in part], rows=known).lines[1:]
+    if any(UNKNOWN in row for row in table.rows):
+        lines.append(f"  {UNKNOWN}: not available from this method")
+    why = _why_no_estimates(document)
+    return [*lines, *([f"  no closed estimates, which are of {why}"] if why else [])]
+
+
+def _why_no_estimates(document: Document) -> str:
+    """The cells of which there are estimates, where there are none of this one; empty if there are."""
+    case, cell = document.get("case", {}), document.get("cell", {})
+    if document.get("estimates") is not None:
+        return ""
+    if len(cell.get("fractions", ())) == 1:
+        return "composites"
+    if cell.get("porosity"):
+        return "cells without voids"
+    if COATING in case.get("material", {}):
+        return "fibres without coatings"
+    return "round fibres that are bonded, all alike" if case.get("interface") else "round fibres"
+
+
+def _known(row: Document) -> dict[str, Any]:
+    return {name: value for name, value in row.items() if value is not None}
+
+
+def _five(value: float | None) -> str:
+    return UNKNOWN if value is None else f"{value:.5g}"

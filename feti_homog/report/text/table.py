@@ -1,0 +1,97 @@
+"""Tables of a result: rows made once, written as text for a terminal and as HTML."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from html import escape
+from typing import Any
+
+NOISE = 1e-12  # what the solver leaves of a zero
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a table.
+
+    Attributes:
+        name: its head.
+        width: characters in text; negative for texts, which stand on the left.
+        form: format of its numbers in text.
+        indent: spaces before texts on the left.
+    """
+
+    name: str
+    width: int = 12
+    form: str = ".5g"
+    indent: int = 2
+
+    @property
+    def head(self) -> str:
+        """The head in text."""
+        return f"{self.name:<{-self.width}}" if self.width < 0 else f"{self.name:>{self.width}}"
+
+    def cell(self, value: Any) -> str:
+        """An entry in text: texts as they are, numbers in the format of the column."""
+        if self.width < 0:
+            return f"{' ' * self.indent + value:<{-self.width}}"
+        return f" {number(value, self.form):>{self.width - 1}}"
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows of texts and numbers, each as long as `columns` or shorter.
+
+    Attributes:
+        above: lines of the text between title and heads.
+        title_in_head: in text the title stands where the first column has its head.
+    """
+
+    title: str
+    columns: Sequence[Column]
+    rows: Sequence[Sequence[Any]]
+    above: Sequence[str] = ()
+    title_in_head: bool = False
+
+    @property
+    def lines(self) -> list[str]:
+        """The table as text."""
+        head = "".join(column.head for column in self.columns)
+        rows = ("".join(column.cell(value) for column, value in zip(self.columns, row)) for row in self.rows)  # noqa: B905
+        if self.title_in_head:
+            first = -self.columns[0].width
+            return [line.rstrip() for line in (f"{self.title:<{first}}{head[first:]}", *rows)]
+        return [line.rstrip() for line in (self.title, *self.above, head, *rows)]
+
+    @property
+    def cells(self) -> list[list[str]]:
+        """The rows as texts, numbers with seven digits."""
+        return [[number(v, "d" if isinstance(v, int) else ".7g") for v in map(without_noise, row)] for row in self.rows]
+
+    @property
+    def html(self) -> str:
+        """The table as HTML."""
+        head = _row((column.name for column in self.columns), "col", 'th scope="col"')
+        rows = "\n".join(_row(row, "row", "td") for row in self.cells)
+        return (
+            f"<table><caption>{escape(self.title)}</caption>\n<thead>{head}</thead>\n<tbody>\n{rows}\n</tbody></table>"
+        )
+
+
+def number(value: Any, form: str) -> str:
+    """A number in a format, without the sign of a zero that it is rounded to; texts as they are."""
+    if isinstance(value, str):
+        return value
+    text = format(value, form)
+    return text.removeprefix("-") if float(text) == 0.0 else text
+
+
+def without_noise(value: Any, size: float = 1.0) -> Any:
+    """The value; zero in place of a number that is what the solver leaves of zero beside `size`."""
+    return 0.0 if isinstance(value, float) and abs(value) <= NOISE * size else value
+
+
+def _row(cells: Iterable[str], scope: str, tag: str) -> str:
+    first, *others = cells
+    rest = "".join(f"<{tag}>{escape(cell)}</{tag.partition(' ')[0]}>" for cell in others)
+    return f'<tr><th scope="{scope}">{escape(first)}</th>{rest}</tr>'
