@@ -48,8 +48,9 @@ class StateNumbers:
         stored: energy per area of the cell, <sigma : (eps - alpha T)> / 2 and that of the springs, from the fields.
         in_springs: that of the springs in it.
         traction: (k, c) normal, tangential and along the fibres.
-        used: (k,) share of the strength that the bonded nodes use, 0 elsewhere; NaN at tips of which the energy counts
-            that their break would release, for it is not in the files.
+        released: (k,) which bonds are tips of which the energy counts that their break would release.
+        used: (k,) share of the strength that the bonded nodes use, 0 elsewhere; NaN at these tips, for that energy is
+            not in the files.
         temperature: its change.
         heat: what works on it, - <alpha : sigma>; 0 if the expansions alpha of the phases are not known.
         expanding: mean of alpha : L : strain, likewise.
@@ -64,6 +65,7 @@ class StateNumbers:
     in_springs: float
     traction: Float
     status: AnyInt
+    released: Bool
     used: Float
     temperature: float
     heat: float
@@ -73,17 +75,17 @@ class StateNumbers:
     def of(cls, cell: DiscreteCell, state: State, fields: ElementFields) -> StateNumbers:
         """Those of a state of a cell."""
         section = bonds_of(cell.files)
+        released = tips(cell, state.status) & (section.get("growth") == "released")
         used = np.where(state.status == BONDED, utilisation(section, state.traction), 0.0)
-        if section.get("growth") == "released":
-            used[tips(cell, state.status)] = np.nan
+        used[released] = np.nan
         stretched = state.traction * spring_jumps(cell, state) * cell.files.interface.length[:, None]
         in_springs = float(stretched.sum()) / (2 * cell.area)
         heat = _heat(cell, state)
         energies = fields.energy / (2 * cell.area) + state.temperature * heat / 2 + in_springs, in_springs
         means = state.strain, state.mean_stress
         return cls(
-            state.name, state.load_factor, state.point, *means, *energies, state.traction, state.status, used,
-            state.temperature, heat, _expanding(cell, fields),
+            state.name, state.load_factor, state.point, *means, *energies, state.traction, state.status, released,
+            used, state.temperature, heat, _expanding(cell, fields),
         )  # fmt: skip
 
 

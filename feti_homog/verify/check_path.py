@@ -17,9 +17,9 @@ from feti_homog.verify.check_interfaces import BONDED
 from feti_homog.verify.check_loads import StateNumbers
 from feti_homog.verify.check_points import tip_shares
 from feti_homog.verify.discrete_cell import DiscreteCell
-from feti_homog.verify.findings import Findings
+from feti_homog.verify.findings import Findings, same_state_limit
 from feti_homog.verify.path_energies import check_path_energies
-from feti_homog.verify.prescribed import SAME_SHARE
+from feti_homog.verify.prescribed import SAME_SHARE, TEMPERATURE
 
 Point = Mapping[str, Any]
 
@@ -32,7 +32,9 @@ def check_path(findings: Findings, cell: DiscreteCell, states: Sequence[StateNum
     by_events = cell.files.case["path"]["method"] == "events"
     _check_counts(findings, points, by_events)
     _check_breaks(findings, states, points, by_events)
-    _check_strength(findings, [_with_tips(cell, state, points[state.point]) for state in states], points, by_events)
+    near = same_state_limit(float(cell.files.document["solver"]["rtol"]))
+    in_full = [_with_tips(cell, state, points[state.point]) for state in states]
+    _check_strength(findings, in_full, points, by_events, near)
     check_path_energies(findings, cell, states, points)
 
 
@@ -66,14 +68,15 @@ def _check_breaks(findings: Findings, states: Sequence[StateNumbers], points: Se
 
 
 def _check_strength(
-    findings: Findings, states: Sequence[StateNumbers], points: Sequence[Point], by_events: bool
+    findings: Findings, states: Sequence[StateNumbers], points: Sequence[Point], by_events: bool, near: float
 ) -> None:
-    """No bond is over its strength but in a cascade, where one break overloads others; events break the worst bonds."""
+    """No bond is over its strength but where a jump at this load overloads it and it breaks at once; events break the
+    worst bonds."""
     for state in states:
         where = f"{state.name}, interface node {{}}".format
         used = np.nan_to_num(state.used)
-        if not (by_events and _in_cascade(points, state.point)):
-            findings.record("strength", np.maximum(used - 1.0, 0.0), where)
+        held = ~_overloaded_by_jump(state, points, near) if by_events else np.ones(len(used), bool)
+        findings.record("strength", np.where(held, np.maximum(used - 1.0, 0.0), 0.0), where)
         if by_events and (broke := points[state.point]["broke"]):
             # Which break, the next point tells; that so many are as near to their strength as the worst, this one does.
             due = max(float(used.max(initial=0.0)), 1.0)
@@ -86,6 +89,16 @@ def _check_strength(
             findings.record("strength", off, f"{state.name}, interface node {{}}".format)
 
 
+def _overloaded_by_jump(state: StateNumbers, points: Sequence[Point], near: float) -> Bool:
+    """(k,) which bonds may be over their strength where some break: all in a cascade, where one break overloads
+    others; tips where only the contact changed, with which the energy jumps that their break releases."""
+    if points[state.point]["broke"] == 0:
+        return np.zeros(len(state.used), bool)
+    if _in_cascade(points, state.point):
+        return np.ones(len(state.used), bool)
+    return state.released & _only_contact_changed(points, state.point, near)
+
+
 def _in_cascade(points: Sequence[Point], number: int) -> bool:
     """Whether bonds broke at the same load just before."""
     before = points[number - 1] if number else None
@@ -94,6 +107,20 @@ def _in_cascade(points: Sequence[Point], number: int) -> bool:
 
 def _same_load(one: Point, other: Point) -> bool:
     return bool(abs(one["load_factor"] - other["load_factor"]) <= SAME_SHARE)
+
+
+def _only_contact_changed(points: Sequence[Point], number: int, near: float) -> bool:
+    """Return True if a point has bonds, strains and stresses (up to `near`) of the one before, but other contact."""
+    if number == 0:
+        return False
+    before, now = points[number - 1], points[number]
+    turned = before["broke"] == 0 and before["closed"] != now["closed"]
+    return turned and all(_is_near(before.get(name), now.get(name), near) for name in ("strain", "stress", TEMPERATURE))
+
+
+def _is_near(one: Any, other: Any, near: float) -> bool:
+    here, there = (np.atleast_1d(np.asarray(value or 0.0, float)) for value in (one, other))
+    return float(np.abs(here - there).max()) <= near * float(np.abs(there).max())
 
 
 def _broken(state: StateNumbers, after: StateNumbers) -> Bool:

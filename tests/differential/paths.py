@@ -15,7 +15,8 @@ from differential.transforms import sections, waypoints
 
 # Bonds break together up to UTILISATION_TIE; between these shares of it the solver's error decides.
 TIE = 1e-5
-LEG_END = 1e-9
+# A leg begins with steps of 1e-9 of it where contact changes at once; rounding of its end is less than this.
+LEG_END = 1e-12
 Point = Mapping[str, Any]
 
 

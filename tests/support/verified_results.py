@@ -126,6 +126,17 @@ MIXED_PATHS: dict[str, dict[str, Any]] = {
         "interface": STRENGTHS,
         "path": {"waypoints": [{"S11": 6.0}, {"S11": -3.0}, {"S11": 7.5, "E22": 0.02}]},
     },
+    "jump": {  # a face opens at point 8 and overloads the last bond, a tip
+        "cell": {"geometry": "square", "fibre_fraction": 0.37, "mesh_size": 0.4},
+        "interface": SPRINGS
+        | {"criterion": "energy", "toughness": 0.001, "debonded": [{"fibre": "all", "centre": 140.0, "angle": 277.0}]},
+        "path": {
+            "waypoints": [
+                {"S11": -1.22, "S22": 0.57, "S12": 0.84},
+                {"E11": -0.01, "E22": 0.035, "gamma12": 0.004},
+            ]
+        },
+    },
     "uneven steps": {  # no step meets the first waypoint, and contact changes within steps
         "cell": SQUARE,
         "interface": STRENGTHS,

@@ -12,7 +12,7 @@ import pytest
 from differential import transforms
 from differential.__main__ import CASES, SEED
 from differential.comparison import DIFFERENT, apart, envelopes_apart, leaves
-from differential.paths import document_of, paths_apart
+from differential.paths import document_of, keyed, paths_apart
 from differential.random_cases import draw, stream
 from differential.twin import SolvedAnew
 from mpi4py import MPI
@@ -123,6 +123,13 @@ def test_every_number_that_is_wrong_is_noticed(solved, wanted):
         less = document | {"path": [p | {"broke": p["broke"] + 1} for p in document["path"]]}
         assert max(paths_apart(document, less, folder)[0])[0] == DIFFERENT
     assert noticed > 5
+
+
+def test_contact_that_changes_as_a_leg_begins_is_not_the_end_of_the_leg_before():
+    """The step from there is 1e-9 of a leg, also of one that is cut in two."""
+    steps = 0.0, 1e-10, 1e-9, 1.0
+    ends = keyed([{"load_factor": (1.0 + step) / 2, "broke": 0, "open": k} for k, step in enumerate(steps)], 2, False)
+    assert {key: point["open"] for key, point in ends.items()} == {("end", 1): 0, ("end", 2): 3}
 
 
 def test_envelopes_that_differ_are_noticed():

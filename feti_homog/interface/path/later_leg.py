@@ -40,7 +40,8 @@ class LaterLeg:
 
     From the equilibrium at s the transitions are
 
-        overloaded   The worst bonds break: a point; equilibrium at the same s without them.
+        overloaded   By a break, or at tips by a change of contact, with which the energy jumps that they release.  The
+                     worst bonds break: a point; equilibrium at the same s without them.
         advance      With the response linear from here on, predict where the first bond breaks, where the contact
                      begins to change, and where the leg ends.  Equilibrium at the first of these; if the stress is
                      not on the line, or a bond is overloaded, something comes before: halve the way until that is
@@ -100,7 +101,7 @@ class LaterLeg:
         elif self._differs(before):
             self._false_alarm = False
             if self._share > self._reported + LEAST_SHARE:
-                yield self._turn(self._share)
+                yield from self._turned()
         yield from self._break_overloaded()
 
     def _is_due(self) -> bool:
@@ -167,7 +168,7 @@ class LaterLeg:
         self._stand(beyond, self.cell.equilibrium(self._load_at(beyond), before.status, before.multipliers))
         self._false_alarm = not self._differs(before)
         if there_is_one and not self._false_alarm:
-            yield self._turn(self._share)
+            yield from self._turned()
 
     def _touch(self) -> Iterator[Point]:
         """Report the state in which open faces touch, which carry no more than there is here, and go on from there.
@@ -183,13 +184,22 @@ class LaterLeg:
         self._stand(beyond, there)
         self._false_alarm = False
 
+    def _turned(self) -> Iterator[Point]:
+        """Report the state after a change of contact; a break here is the point otherwise."""
+        if not self._is_overloaded():
+            yield self._turn(self._share)
+
     def _turn(self, position: float) -> Point:
         """The state here as a point at which nothing breaks and from which the path goes on at `position`."""
         return self._point(0, self._path_state(self.leg, position))
 
     def _break_overloaded(self) -> Iterator[Point]:
-        while self._used_at_worst > 1.0 + UTILISATION_TIE and self._state.converged:
+        while self._is_overloaded():
             yield from self._break()
+
+    def _is_overloaded(self) -> bool:
+        """Return True if bonds break here at once: a break or a change of contact has overloaded them."""
+        return self._used_at_worst > 1.0 + UTILISATION_TIE and self._state.converged
 
     def _break(self) -> Iterator[Point]:
         """Break the worst bonds here, and find the state after it."""

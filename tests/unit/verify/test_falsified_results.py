@@ -159,6 +159,16 @@ FALSE = {
     "what drives a tip": (
         "energy", both(*(document("path", 5, "tips", name, 0, factor=9.0) for name in ("G_I", "G_II"))), {"strength"},
     ),
+    "a jump without a change of contact": (
+        "jump", both(document("path", 7, "closed", to=4), document("path", 7, "open", to=15)), {"strength", "tables"},
+    ),
+    "a jump away from the point before": (
+        "jump", document("path", 7, "stress", 0, factor=1.01), {"strength", "tables", "energy"},
+    ),
+    "a jump that breaks nothing": ("jump", document("path", 8, "broke", to=0), {"strength", "breaks", "energy"}),
+    "a jump before contact changes": (
+        "jump", both(*(document("path", 7, "tips", name, 0, factor=1.4) for name in ("G_I", "G_II"))), {"strength"},
+    ),
     "a missing tip": ("energy", lambda content, _: content["path"][5]["tips"]["psi"].pop(), {"tables"}),
     "a debonded share of a pair": ("pairs", document("path", -1, "debonded_shares", 1), {"tables"}),
     "the interface of a tip": ("pairs", document("path", -1, "tips", "interface", 0, to=7), {"tables"}),
