@@ -173,7 +173,7 @@ def _run(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.results import output_folder
 
     case = on_root(comm, cases.load, arguments.case)
-    if arguments.resume and case.path is None:
+    if arguments.resume and not case.section.is_followed:
         raise CaseError(f'--resume: only for [analysis] type = "path"; this case has "{case.analysis.type}"')
     on_root(comm, output_folder.usable, arguments.out)
     run(case, arguments.out, comm, arguments.quiet, arguments.resume)

@@ -31,7 +31,6 @@ from feti_homog.analysis import stiffness  # noqa: E402
 from feti_homog.analysis.context import AnalysisContext  # noqa: E402
 from feti_homog.case import case as cases  # noqa: E402
 from feti_homog.feti.linalg.sparse_direct import DirectSolver  # noqa: E402
-from feti_homog.homogenization.averaging import Homogenization  # noqa: E402
 from feti_homog.homogenization.unit_cell import TornCell, tear  # noqa: E402
 from feti_homog.petsc.options import case_options  # noqa: E402
 from feti_homog.runtime.progress import Progress  # noqa: E402
@@ -116,7 +115,7 @@ def measure(geometry: str, order: int, mesh_size: float, refine: int) -> tuple[i
     with case_options(case.petsc):
         start = time.perf_counter()
         cell = tear(case, comm, progress)
-        context = AnalysisContext(Homogenization(cell, contact=False), cell.debonded, progress, lambda *_: None)
+        context = AnalysisContext.of(cell, progress)
         L = np.asarray(stiffness.run(context)["effective_stiffness"])
         feti = time.perf_counter() - start
     mesh = progress.seconds["mesh"] + progress.seconds["assemble"]

@@ -29,7 +29,6 @@ from feti_homog.analysis.context import AnalysisContext  # noqa: E402
 from feti_homog.case import case as cases  # noqa: E402
 from feti_homog.case.case import Case  # noqa: E402
 from feti_homog.homogenization import phase_laws, unit_cell  # noqa: E402
-from feti_homog.homogenization.averaging import Homogenization  # noqa: E402
 from feti_homog.parallel.mpi_errors import agree, run_main  # noqa: E402
 from feti_homog.petsc.options import case_options  # noqa: E402
 from feti_homog.runtime import process_memory  # noqa: E402
@@ -70,9 +69,8 @@ def feti(case: Case, progress: Progress, loads: int | None, rtol: float) -> dict
         cell = unit_cell.tear(case, comm, progress)
         progress.seconds["set-up"] = progress.seconds.pop("factor") + progress.seconds.pop("axial", 0.0)
         with progress.stage("set-up"):
-            problems = [Homogenization(own, contact=False) for own in (cell, cell.axial) if own is not None]
-            context = AnalysisContext(problems[0], cell.debonded, progress, lambda *_: None)
-            status = context.status(None)
+            context = AnalysisContext.of(cell, progress)
+            problems, status = context.loads.problems, context.status(None)
         columns = []
         with progress.stage("solve"):
             for problem in problems:
@@ -80,10 +78,10 @@ def feti(case: Case, progress: Progress, loads: int | None, rtol: float) -> dict
                 responses = problem.respond(E, status, [np.zeros(problem.cell.solver.rows)] * len(E))
                 columns.append(np.stack([response.stress for response in responses], axis=1))
                 for response in responses:
-                    context.record_checks("", response)
+                    context.checks.record("", response)
     dofs = cell.sum_over_ranks(sum(s.n_dofs for problem in problems for s in problem.cell.subdomains))
     cell.destroy()
-    return _report(dofs, cell.summary.subdomains, columns, context.iterations, context.reasons)
+    return _report(dofs, cell.summary.subdomains, columns, context.checks.iterations, context.checks.reasons)
 
 
 def peer(tool: Peer, case: Case, progress: Progress, loads: int | None, rtol: float) -> dict[str, Any]:
@@ -183,11 +181,7 @@ def _report(
     dofs: int, subdomains: int, problems: Sequence[Float], iterations: list[int], reasons: list[int]
 ) -> dict[str, Any]:
     """What is compared; `problems` are the stresses (v, k) under the loads of each problem."""
-    if len(problems) == 1:
-        stresses = problems[0]
-    else:
-        stiffness, thermal = phase_laws.spatial(*problems)
-        stresses = stiffness if thermal is None else np.column_stack([stiffness, thermal])
+    stresses = np.column_stack(list(phase_laws.secants(*problems).values()))
     return {
         "dofs": dofs,
         "subdomains": subdomains,

@@ -19,8 +19,8 @@ from feti_homog.interface.laws.tip_criterion import TipCriterion
 from feti_homog.typing import Float, Int
 
 
-def criterion_of(cell: TornCell) -> BondCriterion:
-    """What breaks the bonds of a cell.  Collective.
+def criterion_of(cell: TornCell, grows: bool = False) -> BondCriterion:
+    """What breaks the bonds of a cell, in which debonding that `grows` makes tips of its own.  Collective.
 
     Raises:
         CaseError: tips of debonding ask for what the solver does not have.
@@ -31,7 +31,7 @@ def criterion_of(cell: TornCell) -> BondCriterion:
     pair = cell.solver.jump_operator.nodes.pair
     if bonds[0].criterion != "energy":
         return _strengths(bonds, pair)
-    has_tips = cell.case.path is not None or cell.sum_over_ranks(int(cell.debonded(None).sum())) > 0
+    has_tips = grows or cell.sum_over_ranks(int(cell.debonded(None).sum())) > 0
     has_tips &= cell.solver.jump_operator.global_rows > 0
     springs = _springs(bonds, pair)
     return _at_tips(cell, springs) if bonds[0].growth == "released" and has_tips else springs
@@ -65,7 +65,7 @@ def _of_nodes(values: Sequence[float | None], pair: Int) -> float | Float:
 
 def _at_tips(cell: TornCell, springs: EnergyCriterion) -> TipCriterion:
     """Raises CaseError if the solver has no inverse of the dual operator."""
-    inverses = [each.solver.preconditioner for each in (cell, cell.axial) if each is not None]
+    inverses = [each.solver.preconditioner for each in cell.problems]
     known = [inverse for inverse in inverses if isinstance(inverse, Influence)]
     if len(known) < len(inverses):
         raise CaseError('[interface] growth = "released": needs -feti_pc_type influence; or growth = "springs"')

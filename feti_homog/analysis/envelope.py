@@ -12,16 +12,19 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
+from feti_homog.analysis.constants import constants
 from feti_homog.analysis.context import AnalysisContext
+from feti_homog.analysis.criteria import criterion_of
+from feti_homog.analysis.registry import Analysis
+from feti_homog.analysis.result_records import EnvelopePoint
 from feti_homog.analysis.tip_records import DIRECTION_DIGITS, bond_directions
 from feti_homog.case.envelope_section import Envelope
 from feti_homog.errors import CaseError
 from feti_homog.homogenization.averaging import Response, asymmetry
-from feti_homog.interface.laws.bond_criterion import BondCriterion
 from feti_homog.interface.laws.energy_criterion import EnergyCriterion
 from feti_homog.interface.path.onset import OnsetCriterion
 from feti_homog.interface.path.path_points import UTILISATION_TIE
-from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES, STRAINS, STRESSES
+from feti_homog.materials.voigt import voigt_names
 from feti_homog.typing import Float, Int
 
 # Bonds times directions that are looked at together.
@@ -52,29 +55,32 @@ class Rays:
         return {"factor": factor, "strain": strain, "stress": self.stress_before + factor * self.stress[number]}
 
 
-def run(context: AnalysisContext, section: Envelope, criterion: BondCriterion) -> dict[str, Any]:
+def run(context: AnalysisContext) -> dict[str, Any]:
     """`envelope`, a list of directions with the load at which the first bond breaks, and `effective_stiffness` from
     the unit loads; if a temperature is a load, `thermal_stress`.
 
     Raises:
         CaseError: faces of the mesh are debonded and may touch.
     """
-    status, interface = context.status(None), context.homogenization.interface
-    if not interface.is_linear(status):
+    section, status = context.case.section, context.status(None)
+    assert isinstance(section, Envelope)
+    if not context.plane.interface.is_linear(status):
         raise CaseError(
             '[interface] contact: expected false with a debonded curve of the mesh; [analysis] type = "envelope" '
             "superposes loads, which contact forbids"
         )
-    columns, responses = context.unit_responses("", status, context.zero_multipliers(), 1.0)
+    columns, responses = context.unit_responses("", status, context.loads.zero_multipliers(), 1.0)
     context.record_unit_states(responses, 1.0, "", 0)
     stiffness = columns.pop("stiffness")
-    context.check("L^ef", {"symmetry": asymmetry(stiffness)})
+    context.checks.require("L^ef", {"symmetry": asymmetry(stiffness)})
     angles = 360.0 * np.arange(section.directions) / section.directions
     rays = rays_of(section.plane, angles, stiffness, columns.get("thermal_stress"), section.temperature or 0.0)
-    onset = OnsetCriterion.of(criterion, context.loaded_cell, status)
+    onset = OnsetCriterion.of(criterion_of(context.cell), context.loads.interfaces, status)
     finder = _Finder(context, responses, onset)
-    points = [{"angle": float(angle)} | point for angle, point in zip(angles, finder.points(rays), strict=True)]
-    return {"effective_stiffness": stiffness, "envelope": points} | columns
+    pairs = zip(angles, finder.points(rays), strict=True)
+    points = tuple(EnvelopePoint(angle=float(angle), **point) for angle, point in pairs)
+    secants = {"effective_stiffness": stiffness} | columns
+    return {"envelope": points} | secants | constants(context.cell, secants)
 
 
 def rays_of(
@@ -82,8 +88,7 @@ def rays_of(
 ) -> Rays:
     """The rays in directions (n,), degrees, of a plane whose axes have these names: of stresses at E = C^-1 S, with no
     other stresses, or of strains; after a change of temperature at zero stress, or strain."""
-    spatial = len(stiffness) == len(SPATIAL_STRAINS)
-    strains, stresses = (SPATIAL_STRAINS, SPATIAL_STRESSES) if spatial else (STRAINS, STRESSES)
+    strains, stresses = voigt_names(len(stiffness))
     of_stresses = plane[0] in stresses
     names = stresses if of_stresses else strains
     unit = np.stack([np.cos(np.radians(angles)), np.sin(np.radians(angles))], axis=1)
@@ -102,9 +107,9 @@ class _Finder:
 
     def __init__(self, context: AnalysisContext, responses: Sequence[Response], onset: OnsetCriterion) -> None:
         """`responses` are those to the unit loads.  Collective."""
-        cell = context.homogenization.cell
-        self._comm, self._onset, self._loads = cell.comm, onset, context.unit_loads
-        self._problems, self._noise = context.loaded_cell.problems, context.homogenization.interface.sign_noise
+        cell = context.cell
+        self._comm, self._onset, self._loads = cell.comm, onset, context.loads.names
+        self._problems, self._noise = context.loads.interfaces.problems, context.plane.interface.sign_noise
         self._unit = _tractions(context, responses)
         self._most = max(1, self._comm.allreduce(self._unit.shape[1], MPI.MAX))
         nodes = cell.solver.jump_operator.nodes
@@ -114,7 +119,7 @@ class _Finder:
 
     def points(self, rays: Rays) -> Iterator[dict[str, Any]]:
         """What result.json says of each ray, but its direction.  Collective."""
-        names = STRAINS if rays.strain.shape[1] == len(STRAINS) else SPATIAL_STRAINS
+        names = voigt_names(rays.strain.shape[1])[0]
         at_start = self._tractions(rays.strain_before[None], rays.temperature, names)[0]
         before = at_start if rays.temperature else None
         node = np.arange(len(at_start))
@@ -194,10 +199,14 @@ class _Finder:
 def _tractions(context: AnalysisContext, responses: Sequence[Response]) -> Float:
     """(l, k, c) tractions of this rank's nodes under each unit load: normal and tangential, and along the fibres if
     there is such a problem."""
-    plane = len(context.homogenization.loads)
-    pairs = [context.homogenization.interface.traction(r.state.solution) for r in responses[:plane]]
-    if context.axial is None:
-        return np.stack(pairs)
-    along = [context.axial.interface.traction(r.state.solution) for r in responses[plane:]]
-    of_plane = [np.pad(pair, [(0, 0), (0, 1)]) for pair in pairs]
-    return np.stack([*of_plane, *(np.pad(one, [(0, 0), (2, 0)]) for one in along)])
+    components = [problem.cell.solver.problem.components for problem in context.loads.problems]
+    found, first, column = list[Float](), 0, 0
+    for problem, own in zip(context.loads.problems, components, strict=True):
+        beside = [(0, 0), (column, sum(components) - column - own)]
+        for response in responses[first : first + len(problem.loads)]:
+            found.append(np.pad(problem.interface.traction(response.state.solution), beside))
+        first, column = first + len(problem.loads), column + own
+    return np.stack(found)
+
+
+ANALYSIS = Analysis(run, table=True)

@@ -7,30 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.analysis import spatial_constants
-from feti_homog.analysis.context import CONTACT_TOLERANCE, AnalysisContext
+from feti_homog.analysis.checks import CONTACT_TOLERANCE
+from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.result import Result
 from feti_homog.analysis.result_fields import Fields
-from feti_homog.analysis.result_records import (
-    AnglePoint,
-    CellInfo,
-    Checks,
-    EnvelopePoint,
-    FibreInfo,
-    LoadPoint,
-    PathPoint,
-    SolverInfo,
-    StiffnessBounds,
-)
+from feti_homog.analysis.result_records import CellInfo, Checks, FibreInfo, SolverInfo
 from feti_homog.case.case import Case
 from feti_homog.fibres.ellipses import Ellipses
 from feti_homog.homogenization.domain_partition import CellSummary
 from feti_homog.homogenization.unit_cell import TornCell
-from feti_homog.materials import bounds
-from feti_homog.materials.bounds import Moduli
-from feti_homog.materials.laws import plane_stiffness
 from feti_homog.parallel.mpi_errors import on_root
-from feti_homog.typing import Float
 from feti_homog.version import __version__
 
 # Phases that are no fibres.
@@ -40,22 +26,9 @@ REMARKABLE_LOSS = 0.005
 
 
 def result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Fields | None) -> Result:
-    """The numbers of an analysis with all that belongs to them; collective."""
-    cell, progress = context.homogenization.cell, context.progress
-    areas = cell.areas()
-    whole = cell.summary.area if cell.summary.voids else sum(areas.values())
-    fractions = {phase: area / whole for phase, area in areas.items()}
-    points: dict[str, Any] = {
-        name: tuple(kind(**point) for point in analysis[name])
-        for name, kind in (("angle", AnglePoint), ("path", PathPoint), ("envelope", EnvelopePoint))
-        if name in analysis
-    }
-    if "load" in analysis:
-        points["load"] = LoadPoint(**analysis["load"])
-    if "effective_stiffness" in analysis and cell.axial is not None:
-        points |= spatial_constants.constants(cell, analysis, fractions)
-    elif "effective_stiffness" in analysis and cell.case.interface is None:
-        points |= _moduli_and_bounds(cell, analysis["effective_stiffness"], fractions)
+    """The entries of an analysis with all that belongs to them; collective."""
+    cell, progress, checks = context.cell, context.progress, context.checks
+    fractions = cell.fractions()
     return Result(
         version=__version__,
         case=cell.case.resolved(),
@@ -63,8 +36,8 @@ def result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Fields
         cell=_cell_info(cell, fractions),
         fibres=_fibres(cell.summary),
         solver=_solver_info(context),
-        checks=Checks(**context.checks),
-        check_tolerance=context.tolerance("jump"),
+        checks=Checks(**checks.errors),
+        check_tolerance=checks.tolerance("jump"),
         kkt_tolerance=CONTACT_TOLERANCE,
         warnings=(*cell.case.warnings(), *cell.summary.warnings(), *context.warnings()),
         remarks=(
@@ -73,12 +46,12 @@ def result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Fields
             *_lost_area(cell.case, fractions),
             *context.remarks(),
         ),
-        faults=tuple(context.faults),
-        status="not converged" if context.faults else "done",
+        faults=tuple(checks.faults),
+        status="not converged" if checks.faults else "done",
         timings=progress.timings(),
         memory=progress.memory(),
         fields=fields,
-        **{**analysis, **points},
+        **analysis,
     )
 
 
@@ -130,9 +103,9 @@ def _fibres(summary: CellSummary) -> tuple[FibreInfo, ...]:
 
 def _solver_info(context: AnalysisContext) -> SolverInfo:
     """Of all problems together.  Collective."""
-    cell = context.homogenization.cell
+    cell = context.cell
     plan, solver = cell.summary, cell.solver
-    solvers = [solver] if cell.axial is None else [solver, cell.axial.solver]
+    solvers = [problem.solver for problem in cell.problems]
     return SolverInfo(
         ranks=cell.comm.size,
         bodies=plan.bodies,
@@ -146,22 +119,6 @@ def _solver_info(context: AnalysisContext) -> SolverInfo:
         coarse_factorizations=sum(s.natural.factorizations for s in solvers),
         rtol=solver.rtol,
         solves=sum(s.solves for s in solvers),
-        iterations=tuple(context.iterations),
-        converged_reason=tuple(context.reasons),
+        iterations=tuple(context.checks.iterations),
+        converged_reason=tuple(context.checks.reasons),
     )
-
-
-def _moduli_and_bounds(cell: TornCell, L: Float, fractions: dict[str, float]) -> dict[str, Moduli | StiffnessBounds]:
-    """The moduli of L^ef and the bounds of the phases."""
-    case, shares = cell.case, list(fractions.values())
-    phases = [plane_stiffness(case.material_of(phase), case.analysis.plane) for phase in fractions]
-    isotropic = all(bounds.is_isotropic(stiffness) for stiffness in phases)
-    found: dict[str, Moduli | StiffnessBounds] = {"moduli": bounds.engineering_moduli(L)}
-    # With voids the lower bounds are zero.
-    if not cell.summary.voids:
-        found["bounds"] = StiffnessBounds(
-            voigt=bounds.voigt(shares, phases),
-            reuss=bounds.reuss(shares, phases),
-            hashin_shtrikman=bounds.hashin_shtrikman(shares, phases) if isotropic else None,
-        )
-    return found

@@ -8,18 +8,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from feti_homog.analysis import debonding_angle, envelope, load, load_path, result_builder, stiffness, stored_result
+from feti_homog.analysis import result_builder, stored_result
 from feti_homog.analysis.context import AnalysisContext
-from feti_homog.analysis.criteria import criterion_of
+from feti_homog.analysis.registry import analysis_of
 from feti_homog.analysis.result import Result
 from feti_homog.analysis.state_recorder import StateRecorder
 from feti_homog.case.case import Case
 from feti_homog.errors import ConvergenceError
-from feti_homog.homogenization.averaging import Homogenization
 from feti_homog.homogenization.unit_cell import TornCell, tear
 from feti_homog.parallel.mpi_errors import all_raise, on_root, on_root_only
 from feti_homog.petsc.options import case_options, refuse_unused
@@ -34,7 +32,7 @@ from feti_homog.results import (
     result_json,
     xdmf,
 )
-from feti_homog.results.checkpoint import Checkpoint, EventsInMemory, NoCheckpoint
+from feti_homog.results.checkpoint import Checkpoint, EventsInMemory
 from feti_homog.results.event_log import EventLog
 from feti_homog.results.field_file import FieldFile
 from feti_homog.runtime import process_memory
@@ -83,11 +81,11 @@ def compute(case: Case, comm: MPI.Intracomm, keep_fields: bool = False) -> Resul
     progress = Progress(comm, quiet=True)
     with _torn(case, comm, progress) as cell:
         states = StateRecorder(cell, None, keep_fields, progress.say)
-        context = _context(cell, progress, states)
+        context = AnalysisContext.of(cell, progress, states)
         by_energy = case.interface is not None and case.interface.criterion == "energy"
-        checkpoint = EventsInMemory(comm) if keep_fields or by_energy else NoCheckpoint(comm)
-        analysis = _analyse(context, checkpoint, resume=False)
-        result = result_builder.result(context, analysis, states.kept())
+        if keep_fields or by_energy:
+            context = replace(context, checkpoint=EventsInMemory(comm))
+        result = result_builder.result(context, _analyse(context), states.kept())
     if result.faults:
         raise ConvergenceError(*result.faults)
     return result
@@ -116,11 +114,11 @@ def _run_and_write(cell: TornCell, directory: Path, progress: Progress, resume: 
     file = _field_file(cell, directory, progress) if output.fields else None
     with file or nullcontext(), closing(EventLog(directory, cell.comm, cell.case.name, progress.say)) as log:
         states = StateRecorder(cell, file, keep_fields, progress.say)
-        context = replace(_context(cell, progress, states), log=log.write)
+        context = AnalysisContext.of(cell, progress, states)
+        context = replace(context, checkpoint=_checkpoint(cell, directory), resume=resume, log=log.write)
         for warning in context.warnings():
             progress.say(f"warning: {warning}")
-        checkpoint = _checkpoint(cell, directory)
-        analysis = _analyse(context, checkpoint, resume)
+        analysis = _analyse(context)
         seal = states.seal()
         if states.error is not None and not keep_fields:
             analysis.pop("states", None)
@@ -128,8 +126,8 @@ def _run_and_write(cell: TornCell, directory: Path, progress: Progress, resume: 
     _write(result, directory, cell)
     if states.error is not None:
         raise states.error
-    if cell.case.path is not None and not result.faults:
-        checkpoint.clear()
+    if analysis_of(cell.case).events and not result.faults:
+        context.checkpoint.clear()
     for name, wanted, make in (("pictures", output.pictures, _draw), ("report", output.report, _report)):
         if wanted:
             with progress.stage(name) as words:
@@ -151,41 +149,13 @@ def _field_file(cell: TornCell, directory: Path, progress: Progress) -> FieldFil
         )
 
 
-def _context(cell: TornCell, progress: Progress, states: StateRecorder) -> AnalysisContext:
-    """The analysis of a cell."""
-    contact = cell.case.interface is not None and cell.case.interface.contact
-    return AnalysisContext(
-        Homogenization(cell, contact),
-        cell.debonded,
-        progress,
-        states.record,
-        states=cell.case.output.states,
-        axial=None if cell.axial is None else Homogenization(cell.axial, contact=False),
-        keeps_fields=states.has_place,
-    )
-
-
-def _analyse(context: AnalysisContext, checkpoint: Checkpoint, resume: bool) -> dict[str, Any]:
-    """The numbers of the analysis asked for, as they stand in result.json."""
+def _analyse(context: AnalysisContext) -> dict[str, Any]:
+    """The entries of `Result` that the analysis asked for makes."""
     with context.progress.stage("solve") as words:
-        analysis = _analysis(context, checkpoint, resume)
-        words.append(f"{len(context.iterations)} states, {sum(context.iterations)} iterations")
+        analysis = analysis_of(context.case).run(context)
+        iterations = context.checks.iterations
+        words.append(f"{len(iterations)} states, {sum(iterations)} iterations")
     return analysis
-
-
-def _analysis(context: AnalysisContext, checkpoint: Checkpoint, resume: bool) -> dict[str, Any]:
-    cell = context.homogenization.cell
-    case = cell.case
-    if case.single_load is not None:
-        return load.run(context)
-    if case.path is not None:
-        return load_path.run(context, case.path, criterion_of(cell), checkpoint, resume)
-    if case.envelope is not None:
-        return envelope.run(context, case.envelope, criterion_of(cell))
-    if case.angle is not None:
-        strain = None if case.angle.strain is None else np.array(case.angle.strain)
-        return debonding_angle.run(context, case.angle.values, strain)
-    return stiffness.run(context)
 
 
 def _checkpoint(cell: TornCell, directory: Path) -> Checkpoint:
@@ -200,13 +170,12 @@ def _write(result: Result, directory: Path, cell: TornCell) -> None:
     written = {result_json.NAME}
     if result.result_h5 is not None:
         written |= {field_file.NAME, *(path.name for path in on_root(cell.comm, xdmf.write, directory))}
-    lists = {name: getattr(result, name) for name in ("angle", "path", "envelope")}
-    lists["load"] = None if result.load is None else (result.load,)
-    for name, points in lists.items():
-        if points is not None:
-            on_root_only(cell.comm, csv_tables.write, directory / f"{name}.csv", points)
-            written.add(f"{name}.csv")
-    written |= {event_log.NAME} if result.path is not None else set()
+    analysis, name = analysis_of(cell.case), cell.case.analysis.type
+    if analysis.table:
+        points = getattr(result, name)
+        rows = points if isinstance(points, tuple) else (points,)
+        written.add(on_root(cell.comm, csv_tables.write, directory / f"{name}.csv", rows).name)
+    written |= {event_log.NAME} if analysis.events else set()
     on_root_only(cell.comm, output_folder.remove_other_results, directory, written)
 
 

@@ -44,7 +44,7 @@ class StateRecorder:
     def _state(
         self, plane: Response | None, axial: Response | None, load_factor: float, label: str, point: int
     ) -> StatePart:
-        if self._cell.axial is not None or plane is None:
+        if plane is None or len(self._cell.problems) > 1:
             return state_parts.spatial_state_part(self._cell, plane, axial, load_factor, label, point)
         return state_parts.state_part(self._cell, plane, load_factor, label, point)
 

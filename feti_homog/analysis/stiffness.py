@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from feti_homog.analysis.constants import constants
 from feti_homog.analysis.context import AnalysisContext
+from feti_homog.analysis.registry import Analysis
 from feti_homog.homogenization.averaging import asymmetry
 
 
@@ -14,12 +16,12 @@ def run(context: AnalysisContext) -> dict[str, Any]:
 
     If a temperature is a load, `thermal_stress` under a unit of it, and `thermal_stress_compression`."""
     status = context.status(None)
-    starts = context.zero_multipliers()
-    one_sided = context.homogenization.interface.contact and context.homogenization.counts(status)["open"] > 0
+    starts = context.loads.zero_multipliers()
+    one_sided = context.plane.interface.contact and context.plane.counts(status)["open"] > 0
     columns, responses = context.unit_responses("", status, starts, 1.0)
     context.record_unit_states(responses, 1.0, "", 0)
     document: dict[str, Any] = {"effective_stiffness": columns.pop("stiffness")} | columns
-    under, loads = list(responses), context.unit_loads
+    under, loads = list(responses), list(context.loads.names)
     if one_sided:
         minus, responses = context.unit_responses("", status, starts, -1.0)
         context.record_unit_states(responses, -1.0, "-", 0)
@@ -27,7 +29,10 @@ def run(context: AnalysisContext) -> dict[str, Any]:
         document |= {f"{name}_compression": column for name, column in minus.items()}
         under, loads = [*under, *responses], [*loads, *(f"-{name}" for name in loads)]
     else:
-        context.check("L^ef", {"symmetry": asymmetry(document["effective_stiffness"])})
-    if context.homogenization.cell.case.interface is not None:
-        document["tips"] = context.tips(under, loads)
-    return document
+        context.checks.require("L^ef", {"symmetry": asymmetry(document["effective_stiffness"])})
+    if context.case.interface is not None:
+        document["tips"] = context.tips.of(under, loads)
+    return document | constants(context.cell, document)
+
+
+ANALYSIS = Analysis(run)

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from feti_homog.case import element_sizes
+from feti_homog.case.asked import AnalysisSection, Stiffness
 from feti_homog.case.cell_files import with_files
 from feti_homog.case.cell_section import GEOMETRY, TOUCHING, Cell, size_faults
 from feti_homog.case.document import read_document, to_document
@@ -23,7 +24,7 @@ from feti_homog.case.load_section import LoadPath, SingleLoad
 from feti_homog.case.matched_cell import with_match
 from feti_homog.case.material_sections import coating_faults, phase_faults, provider, read_materials
 from feti_homog.case.mixed_cell import mix_faults, void_faults
-from feti_homog.case.mixed_load import MixedLoad, Strain, completed
+from feti_homog.case.mixed_load import completed
 from feti_homog.case.petsc_section import Scalar, read_petsc
 from feti_homog.case.sections import SECTIONS, Analysis, Angle, Decomposition, Output
 from feti_homog.case.selectors import ANALYSIS_TYPE, CRITERION, DRAWN_STRESS, METHOD, PLANE
@@ -92,14 +93,12 @@ class Case:
         By name: of each component, in the order of the plane state's strains, its strain or its stress; in generalized
         plane strain then the temperature.
         """
-        return completed(tuple(self._placed_loads.values()), self.analysis.plane)
+        return completed(tuple(self.section.placed.values()), self.analysis.plane)
 
     @property
-    def _placed_loads(self) -> Mapping[str, Strain | MixedLoad]:
-        """The loads as they are given, by their places in their section."""
-        if self.single_load is not None:
-            return {"to": self.single_load.to}
-        return {} if self.path is None else self.path.placed
+    def section(self) -> AnalysisSection:
+        """The section of the analysis."""
+        return self.angle or self.path or self.single_load or self.envelope or Stiffness()
 
     def material_of(self, phase: str) -> Material:
         """The material of a phase; "fibre:2" without its own has that of "fibre". Raises KeyError."""
@@ -129,7 +128,7 @@ class Case:
 
     def remarks(self) -> tuple[str, ...]:
         """What is not said but assumed, one line each."""
-        return stress_free(self.analysis.type, self._placed_loads, self.analysis.plane)
+        return stress_free(self.analysis.type, self.section.placed, self.analysis.plane)
 
     def resolved(self) -> dict[str, Any]:
         """The case with its defaults as a plain document, of which `parse` makes an equal case."""

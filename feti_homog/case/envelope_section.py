@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
+from feti_homog.case.asked import AnalysisSection
 from feti_homog.case.selectors import GENERALIZED
 from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES
 from feti_homog.schema.keys import key
@@ -36,8 +37,10 @@ PLANE_OF_LOADS = ValueType(
 
 
 @dataclass(frozen=True, kw_only=True)
-class Envelope:
+class Envelope(AnalysisSection):
     """The plane of macroscopic stresses or strains in which the onset of debonding is sought, along rays from zero."""
+
+    breaks: ClassVar[bool] = True
 
     plane: tuple[str, str] = key(
         PLANE_OF_LOADS,

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
+from feti_homog.case.asked import AnalysisSection
 from feti_homog.case.mixed_load import MixedLoad, Strain
 from feti_homog.case.section_values import LOAD, STRAIN, WAYPOINTS
 from feti_homog.case.selectors import BY_EVENTS, BY_INCREMENTS, IN_THE_PLANE
@@ -12,8 +15,11 @@ from feti_homog.schema.values import choice, integer
 
 
 @dataclass(frozen=True, kw_only=True)
-class LoadPath:
+class LoadPath(AnalysisSection):
     """Macroscopic loads that are gone through, straight from zero to each waypoint. Give strain, to or waypoints."""
+
+    breaks: ClassVar[bool] = True
+    is_followed: ClassVar[bool] = True
 
     strain: Strain | None = key(
         STRAIN,
@@ -63,7 +69,7 @@ class LoadPath:
         return tuple(self.placed.values())
 
     @property
-    def placed(self) -> dict[str, Strain | MixedLoad]:
+    def placed(self) -> Mapping[str, Strain | MixedLoad]:
         """The waypoints by their places in the section."""
         if self.waypoints is not None:
             return {f"waypoints[{k}]": load for k, load in enumerate(self.waypoints)}
@@ -71,10 +77,15 @@ class LoadPath:
 
 
 @dataclass(frozen=True, kw_only=True)
-class SingleLoad:
+class SingleLoad(AnalysisSection):
     """The one macroscopic load under which the cell is in equilibrium; nothing breaks."""
 
     to: MixedLoad = key(
         LOAD,
         "The load, strains and stresses by name, other than zero. Components that it does not name are free of stress.",
     )
+
+    @property
+    def placed(self) -> Mapping[str, Strain | MixedLoad]:
+        """The load."""
+        return {"to": self.to}

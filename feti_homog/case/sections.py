@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from feti_homog.case.asked import AnalysisSection
 from feti_homog.case.cell_section import Cell
 from feti_homog.case.envelope_section import Envelope
 from feti_homog.case.interface_section import InterfaceSection
@@ -36,7 +37,7 @@ class Analysis:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Angle:
+class Angle(AnalysisSection):
     """Openings of the arcs, one after the other."""
 
     values: tuple[float, ...] = key(OPENINGS, "Openings of all arcs of [interface] debonded.", unit="degrees")
@@ -47,6 +48,15 @@ class Angle:
         default_words="unit strains",
         only=IN_THE_PLANE,
     )
+
+    @property
+    def openings(self) -> tuple[float, ...]:
+        """All of them."""
+        return self.values
+
+    def solves(self, loads: int, one_sided: bool) -> int:
+        """Those of each opening."""
+        return len(self.values) * (loads if self.strain is None else 1)
 
 
 @dataclass(frozen=True, kw_only=True)

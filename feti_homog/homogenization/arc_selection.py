@@ -89,7 +89,7 @@ def fibre_faults(case: Case, centres: Float) -> list[str]:
 
 def faults(case: Case, nodes: InterfaceNodes, moved: Sequence[MovedTips]) -> list[str]:
     """Faults of arcs, and of openings of [angle], other than 0 that select no node of a fibre."""
-    openings: Sequence[float | None] = [None] if case.angle is None else case.angle.values
+    openings: Sequence[float | None] = case.section.openings or [None]
     found = []
     for pair, interface in enumerate(case.interfaces):
         own, label = nodes.within(pair), interface_label(pair, len(case.interfaces))

@@ -61,6 +61,11 @@ class Response:
     checks: dict[str, float]
     counts: dict[str, int]
 
+    @property
+    def debonded(self) -> int:
+        """Number of debonded interface nodes."""
+        return self.counts["open"] + self.counts["closed"]
+
 
 class Homogenization:
     """Averages over a torn cell with its interfaces."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from feti_homog.case.case import Case
-from feti_homog.case.selectors import BREAKING
 from feti_homog.fibres import periodic_table
 from feti_homog.homogenization import bonds
 from feti_homog.mesh.periodic_topology import Torus
@@ -54,7 +53,7 @@ def _bonding(case: Case, has_debonded_curve: bool) -> tuple[str, ...]:
     """Mention a debonded curve without an [interface], and an [interface] under which every bond is perfect."""
     if case.interface is None:
         return ('the curve "debonded" of the mesh is bonded: there is no [interface]',) if has_debonded_curve else ()
-    can_open = case.arcs or has_debonded_curve or bonds.has_springs(case) or case.analysis.type in BREAKING.values
+    can_open = case.arcs or has_debonded_curve or bonds.has_springs(case) or case.section.breaks
     if can_open or not case.cell.has_own_mesh:
         return ()
     return ("[interface]: nothing is debonded, and no bond is elastic: the bonding is perfect",)

@@ -46,15 +46,10 @@ class Estimate:
 def applications(case: Case, problem: Problem) -> int:
     """About how many times the analysis applies the dual operator of a problem."""
     # A mesh may have a curve "debonded"; along the fibres nothing touches.
-    may_open = bool(case.arcs) or case.cell.has_own_mesh or case.path is not None
+    may_open = bool(case.arcs) or case.cell.has_own_mesh or case.section.is_followed
     contact = case.interface is not None and case.interface.contact and may_open and problem != AXIAL
-    solves = len(problem.loads)
-    if case.angle is not None:
-        solves = len(case.angle.values) * (solves if case.angle.strain is None else 1)
-    elif contact:
-        solves *= 2  # under plus and minus each unit load
-    if case.path is not None or _asks_for_tips(case):
-        solves = SOLVES_OF_A_PATH
+    many = case.section.is_followed or _asks_for_tips(case)
+    solves = SOLVES_OF_A_PATH if many else case.section.solves(len(problem.loads), contact)
     return _iterations(case) * solves * (SOLVES_OF_A_CONTACT if contact else 1)
 
 
@@ -67,7 +62,7 @@ def _asks_for_tips(case: Case) -> bool:
     """Whether an envelope needs the inverse of the dual operator, which many solves call for."""
     bond = case.interface
     by_energy = bond is not None and bond.criterion == "energy" and bond.growth == "released"
-    return case.envelope is not None and by_energy and (bool(case.arcs) or case.cell.has_own_mesh)
+    return case.section.breaks and by_energy and (bool(case.arcs) or case.cell.has_own_mesh)
 
 
 def estimate(

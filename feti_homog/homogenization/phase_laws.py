@@ -57,16 +57,19 @@ def axial_law(case: Case, phase: str) -> Float:
     return spatial_stiffness(case.material_of(phase))[np.ix_(AXIAL_SHEAR, AXIAL_SHEAR)]
 
 
-def spatial(plane: Float, axial: Float) -> tuple[Float, Float | None]:
-    """The stiffness (6, 6), and the stress under a unit of temperature (6,), or None if that is no load; from stresses
-    under unit loads, (v, v) of the plane problem and (2, 2) of the axial one."""
+def secants(plane: Float, *axial: Float) -> dict[str, Float]:
+    """`stiffness` (3, 3) or, with an axial problem, (6, 6), and if a temperature is a load the `thermal_stress` (6,)
+    under a unit of it; from stresses under unit loads, (v, v) of the plane problem and (2, 2) of the axial one."""
+    if not axial:
+        return {"stiffness": plane}
     C, place = np.zeros((6, 6)), np.ix_(IN_PLANE, IN_PLANE)
-    C[place], C[np.ix_(AXIAL_SHEAR, AXIAL_SHEAR)] = plane[:4, :4], axial
-    if len(plane) == 4:
-        return C, None
-    thermal = np.zeros(6)
-    thermal[IN_PLANE] = plane[:4, 4]
-    return C, thermal
+    C[place], C[np.ix_(AXIAL_SHEAR, AXIAL_SHEAR)] = plane[:4, :4], axial[0]
+    return {"stiffness": C} | ({"thermal_stress": spatial_vector(plane[:, 4], None)} if len(plane) > 4 else {})
+
+
+def components(plane: Float, *axial: Float) -> Float:
+    """(3,) or, with an axial problem, (6,) components of a strain or stress from those of each problem."""
+    return spatial_vector(plane, *axial) if axial else plane
 
 
 def spatial_vector(plane: Float | None, axial: Float | None) -> Float:

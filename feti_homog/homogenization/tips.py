@@ -5,7 +5,6 @@ from __future__ import annotations
 from feti_homog.case.case import Case
 from feti_homog.case.interface_section import InterfaceSection
 from feti_homog.case.phase_names import COATING, MATRIX
-from feti_homog.case.selectors import BREAKING
 from feti_homog.interface.tips import debonded_arcs
 from feti_homog.mesh.sizes.element_estimate import ElementEstimate, ratio_at_a_tip
 
@@ -22,8 +21,7 @@ LEAST_SIZE = 1e-5
 def on_interface(case: Case, interface: InterfaceSection, fibres: int) -> dict[int, list[float]]:
     """Directions in [0, 360) of the tips of its arcs on so many fibres, at all their openings, by the fibre's number
     from 0."""
-    openings = case.angle.values if case.angle else ()
-    return debonded_arcs.tips(interface.debonded, openings, fibres)
+    return debonded_arcs.tips(interface.debonded, case.section.openings, fibres)
 
 
 def marks(case: Case, fibres: int) -> dict[int, list[float]]:
@@ -45,13 +43,13 @@ def size(case: Case, estimate: ElementEstimate) -> float | None:
     Along paths tips move, and only what the case says counts; so it is with envelopes, for they begin paths.
     """
     cell, tips = case.cell, sum(len(own) for own in marks(case, estimate.fibres).values())
-    if cell.tip_size is not None or case.analysis.type in BREAKING.values or not tips:
+    if cell.tip_size is not None or case.section.breaks or not tips:
         return cell.tip_size
     radius, around = estimate.mean_radius, estimate.interface_size
     fine = around / 2**cell.refine
     balanced: float = TIP_SHARE * 2**cell.refine * radius * (fine / radius) ** (2 * cell.order)
     wanted = max(balanced, LEAST_SIZE)
-    if case.angle is not None and len(case.angle.values) > 1:
+    if len(case.section.openings) > 1:
         share = TIP_TRIANGLES * estimate.triangles / tips
         wanted = max(wanted, around / ratio_at_a_tip(share))
     return min(around, wanted)

@@ -52,6 +52,11 @@ class TornCell:
     solver: FetiSolver
     axial: TornCell | None = None
 
+    @property
+    def problems(self) -> tuple[TornCell, ...]:
+        """The cell in each of its problems: that of the plane first."""
+        return (self,) if self.axial is None else (self, self.axial)
+
     @cached_property
     def offsets(self) -> Int:
         """Where each subdomain begins in this rank's vectors of degrees of freedom."""
@@ -95,15 +100,20 @@ class TornCell:
             local[s.submesh.phase] += s.area
         return {phase: self.comm.allreduce(area) for phase, area in local.items()}
 
+    def fractions(self) -> dict[str, float]:
+        """Share of each phase in the area of the cell, in that of the mesh where there are no voids; collective."""
+        areas = self.areas()
+        whole = self.summary.area if self.summary.voids else sum(areas.values())
+        return {phase: area / whole for phase, area in areas.items()}
+
     def sum_over_ranks(self, number: int) -> int:
         """Sum of a number over ranks; collective."""
         return int(self.comm.allreduce(number))
 
     def destroy(self) -> None:
         """Free the solvers; collective."""
-        self.solver.destroy()
-        if self.axial is not None:
-            self.axial.destroy()
+        for each in self.problems:
+            each.solver.destroy()
 
 
 def tear(

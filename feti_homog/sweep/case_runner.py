@@ -84,7 +84,7 @@ class CaseRunner:
     def _compute(self, entry: SweepCase, case: Case) -> str:
         """Run a case and keep its error if it is the case's own.  Collective; returns its status in words."""
         try:
-            run(case, self.directory / entry.folder, self.comm, quiet=True, resume=case.path is not None)
+            run(case, self.directory / entry.folder, self.comm, quiet=True, resume=case.section.is_followed)
             return Status.DONE
         except (CaseError, MeshError, ConvergenceError) as error:
             if not others_come(self.comm, ARRIVAL_TIMEOUT_S):

@@ -11,15 +11,14 @@ from support.cases import make_case
 from support.ranks import parallel_assert
 from unit.mesh.faulty_meshes import grid
 
-from feti_homog.analysis import load_path
+from feti_homog.analysis import path as load_path
 from feti_homog.analysis.context import AnalysisContext
+from feti_homog.analysis.loads import CellLoads
 from feti_homog.case.load_section import LoadPath
 from feti_homog.errors import CaseError, ConvergenceError
-from feti_homog.homogenization.averaging import Homogenization
 from feti_homog.interface.contact.contact_problem import OPEN
 from feti_homog.interface.laws.strength_criterion import StrengthCriterion
 from feti_homog.petsc.options import case_options
-from feti_homog.results.checkpoint import NoCheckpoint
 from feti_homog.runtime.progress import Progress
 
 pytestmark = pytest.mark.parallel
@@ -37,7 +36,7 @@ class Words(Progress):
 
 
 def context_of(comm, cell, contact=True):
-    return AnalysisContext(Homogenization(cell, contact), cell.debonded, Words(comm), lambda *_: None)
+    return replace(AnalysisContext.of(cell, Words(comm)), loads=CellLoads(cell, contact))
 
 
 @pytest.mark.parametrize("contact", [True, False])
@@ -49,25 +48,25 @@ def test_hill_holds_where_a_debonded_cell_stores_nothing(comm, shared_path, cont
     cell = torn_cells.tear(comm, geometry="mesh", file="strip.msh", folder=shared_path)
     context = context_of(comm, cell, contact)
     status = np.full(len(cell.solver.jump_operator.nodes.row), OPEN, np.int8)
-    responses = context.homogenization.respond(np.eye(3), status, context.zero_multipliers())
+    responses = context.plane.respond(np.eye(3), status, context.loads.zero_multipliers())
     for response in responses:
-        context.record_checks("strip", response)
+        context.checks.record("strip", response)
     for k in (0, 2):
         assert np.abs(responses[k].stress).max() < 1e-12 * responses[1].stress[1]
-    assert not context.faults
+    assert not context.checks.faults
     comm.barrier()
 
 
 def test_jumps_are_told_on_the_scale_on_which_they_are_checked(comm):
     cell = torn_cells.tear(comm, geometry="square", mesh_size=0.3)
     context = context_of(comm, cell)
-    (response,) = context.homogenization.respond(np.eye(3)[:1], context.status(None), context.zero_multipliers()[:1])
+    (response,) = context.plane.respond(np.eye(3)[:1], context.status(None), context.loads.zero_multipliers()[:1])
     # Where the forces vanish the torn cell's jump does, too, and relative to it any jump is large.
     solution = replace(response.state.solution, residual=2.7e-5, reason=-3)
     loose = replace(response, state=replace(response.state, solution=solution))
-    line, words = context.record_checks("E11", loose), f"relative jump {response.checks['jump']:.1e}"
+    line, words = context.checks.record("E11", loose), f"relative jump {response.checks['jump']:.1e}"
     parallel_assert(comm, words in line and "2.7e-05" not in line)
-    parallel_assert(comm, len(context.faults) == 1 and words in context.faults[0])
+    parallel_assert(comm, len(context.checks.faults) == 1 and words in context.checks.faults[0])
 
 
 @pytest.mark.parametrize(("rtol", "limit"), [(1e-10, 1e-7), (1e-7, 1e-4), (1e-3, 1e-4), (0.5, 1e-4)])
@@ -75,17 +74,17 @@ def test_no_tolerance_lifts_the_limit_of_the_checks(comm, rtol, limit):
     cell = torn_cells.tear(comm, geometry="square", mesh_size=0.3, petsc={"feti_ksp_rtol": rtol})
     context = context_of(comm, cell)
     for law in ("hill", "jump", "strain", "symmetry"):
-        assert context.tolerance(law) == pytest.approx(limit)
-    assert context.tolerance("kkt_tension") == 1e-6
+        assert context.checks.tolerance(law) == pytest.approx(limit)
+    assert context.checks.tolerance("kkt_tension") == 1e-6
     assert bool(context.warnings()) == (rtol > 1e-7)
-    context.check("E11", {"hill": 1.1 * limit})
-    assert len(context.faults) == 1
+    context.checks.require("E11", {"hill": 1.1 * limit})
+    assert len(context.checks.faults) == 1
 
 
 def test_what_is_no_number_is_within_no_tolerance(comm):
     context = context_of(comm, torn_cells.tear(comm, geometry="square", mesh_size=0.3))
-    context.check("E11", {"hill": np.nan})
-    assert len(context.faults) == 1 and "check hill: nan" in context.faults[0]
+    context.checks.require("E11", {"hill": np.nan})
+    assert len(context.checks.faults) == 1 and "check hill: nan" in context.checks.faults[0]
 
 
 @pytest.mark.parametrize("method", ["events", "increments"])
@@ -99,9 +98,8 @@ def test_a_path_whose_solve_breaks_down_is_no_result(comm, monkeypatch, method):
         return replace(solve(strain, start), residual=np.nan, reason=-9)
 
     monkeypatch.setattr(cell.solver, "solve", broken_down)
-    law, checkpoint = StrengthCriterion(10.0, 10.0, "max"), NoCheckpoint(comm)
     with pytest.raises(ConvergenceError, match="broke down after"):
-        load_path.run(context, path, law, checkpoint, False)
+        load_path.follow(context, path, StrengthCriterion(10.0, 10.0, "max"))
 
 
 @pytest.mark.parametrize("rtol", [2.0, 1, 0, -1e-8, "small", "nan"])

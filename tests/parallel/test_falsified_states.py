@@ -11,6 +11,7 @@ from support.ranks import PIECES, parallel_assert
 
 from feti_homog.analysis import stiffness
 from feti_homog.analysis.context import AnalysisContext
+from feti_homog.analysis.loads import CellLoads
 from feti_homog.case.interface_section import Arc
 from feti_homog.homogenization.averaging import Homogenization
 from feti_homog.interface.contact.contact_problem import BONDED, CLOSED, OPEN
@@ -221,20 +222,18 @@ def test_a_stress_that_is_not_the_prescribed_one(falsified):
 
 
 def test_a_stiffness_that_is_not_symmetric(falsified, monkeypatch):
-    homogenization = Homogenization(falsified.cell, contact=False)
-    respond = homogenization.respond
+    context = AnalysisContext.of(falsified.cell, Progress(falsified.comm, quiet=True))
+    context = replace(context, loads=CellLoads(falsified.cell, contact=False))
+    respond = context.plane.respond
 
     def skewed(*arguments):
         first, *others = respond(*arguments)
         return [replace(first, stress=first.stress + np.array([0.0, 1.0, 0.0])), *others]
 
-    monkeypatch.setattr(homogenization, "respond", skewed)
-    context = AnalysisContext(
-        homogenization, falsified.cell.debonded, Progress(falsified.comm, quiet=True), lambda *_: None
-    )
+    monkeypatch.setattr(context.plane, "respond", skewed)
     L = stiffness.run(context)["effective_stiffness"]
-    assert context.checks["symmetry"] == pytest.approx(1.0 / np.abs(L).max(), rel=1e-6)
-    assert len(context.faults) == 1 and "check symmetry" in context.faults[0]
+    assert context.checks.errors["symmetry"] == pytest.approx(1.0 / np.abs(L).max(), rel=1e-6)
+    assert len(context.checks.faults) == 1 and "check symmetry" in context.checks.faults[0]
 
 
 def test_noise_is_a_share_of_the_largest_force_of_all_ranks(falsified):

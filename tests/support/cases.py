@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,9 +11,9 @@ from reference import monolithic
 
 from feti_homog.analysis import stiffness
 from feti_homog.analysis.context import AnalysisContext
+from feti_homog.analysis.loads import CellLoads
 from feti_homog.case import case as cases
 from feti_homog.feti.thresholds import DEFAULTS
-from feti_homog.homogenization.averaging import Homogenization
 from feti_homog.homogenization.domain_partition import DEFAULT_POLICY
 from feti_homog.homogenization.unit_cell import tear
 from feti_homog.petsc.options import case_options
@@ -34,20 +35,25 @@ def make_case(*, matrix=MATRIX, fibre=FIBRE, plane="strain", petsc=None, decompo
     return cases.parse(document, Path(folder))
 
 
+class Responses:
+    """Takes the responses that are to be kept as states, in place of `StateRecorder`."""
+
+    def __init__(self):
+        self.taken = []
+
+    def record(self, plane, axial, *_):
+        self.taken.append(plane)
+
+
 def solve(case, comm, thresholds=DEFAULTS, policy=DEFAULT_POLICY):
     """The torn cell, L^ef and the responses."""
     PETSc.garbage_cleanup(comm)
     progress = Progress(comm, quiet=True)
     with case_options(case.petsc):
         cell = tear(case, comm, progress, thresholds, policy)
-        responses = []
-        context = AnalysisContext(
-            Homogenization(cell, contact=False),
-            lambda opening: np.zeros(len(cell.solver.jump_operator.nodes.row), bool),
-            progress,
-            lambda response, *_: responses.append(response),
-        )
-        return cell, stiffness.run(context)["effective_stiffness"], responses
+        context, states = AnalysisContext.of(cell, progress), Responses()
+        context = replace(context, loads=CellLoads(cell, contact=False), states=states)
+        return cell, stiffness.run(context)["effective_stiffness"], states.taken
 
 
 def monolithic_stiffness(cell):

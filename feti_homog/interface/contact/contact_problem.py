@@ -67,6 +67,11 @@ class Equilibrium:
     axial: Equilibrium | None = None
 
     @property
+    def problems(self) -> tuple[Equilibrium, ...]:
+        """Those of all problems, the one in the plane first."""
+        return (self,) if self.axial is None else (self, self.axial)
+
+    @property
     def solutions(self) -> CoupledSolution:
         """Of all problems."""
         return CoupledSolution(self.solution, None if self.axial is None else self.axial.solution)

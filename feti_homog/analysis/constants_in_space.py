@@ -27,15 +27,15 @@ from feti_homog.typing import Bool, Float
 SAME_RADIUS = 1e-6
 
 
-def constants(cell: TornCell, analysis: Mapping[str, Any], fractions: Mapping[str, float]) -> dict[str, Any]:
-    """The keys of result.json that follow from `effective_stiffness` and `thermal_stress`.  Collective.
+def constants(cell: TornCell, secants: Mapping[str, Any]) -> dict[str, Any]:
+    """The entries of `Result` that follow from `effective_stiffness` and `thermal_stress`.  Collective.
 
     Nothing follows where faces touch without tension: each column is a secant of its own load.  Estimates and bounds
     are of cells with fibres and without voids and debonding, estimates of round fibres.
     """
-    if "effective_stiffness_compression" in analysis:
+    if "effective_stiffness_compression" in secants:
         return {}
-    stiffness, thermal = analysis["effective_stiffness"], analysis.get("thermal_stress")
+    stiffness, thermal = secants["effective_stiffness"], secants.get("thermal_stress")
     compliance = np.linalg.inv(stiffness)
     strains = None if thermal is None else -compliance @ thermal
     found: dict[str, Any] = {
@@ -46,7 +46,7 @@ def constants(cell: TornCell, analysis: Mapping[str, Any], fractions: Mapping[st
     }
     if strains is not None:
         found["thermal_expansion"] = strains
-    is_debonded = cell.sum_over_ranks(int(cell.debonded(None).sum())) > 0
+    is_debonded, fractions = cell.sum_over_ranks(int(cell.debonded(None).sum())) > 0, cell.fractions()
     has_bounds = not is_debonded and not cell.summary.voids and len(fractions) > 1
     return found if not has_bounds else found | _comparisons(cell, fractions)
 

@@ -6,8 +6,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from feti_homog.analysis.context import AnalysisContext
+from feti_homog.analysis.criteria import criterion_of
 from feti_homog.analysis.event_progress import EVENTS_BAR, STEPS_BAR, EventProgress
 from feti_homog.analysis.path_events import Work, restored, stored
+from feti_homog.analysis.registry import Analysis
+from feti_homog.analysis.result_records import PathPoint
 from feti_homog.analysis.tip_records import TipRecorder
 from feti_homog.case.load_section import LoadPath
 from feti_homog.errors import NotCarriedError
@@ -16,61 +19,66 @@ from feti_homog.interface.laws.bond_criterion import BondCriterion, spring_crite
 from feti_homog.interface.path.path_following import events, increments
 from feti_homog.interface.path.path_points import Energies, Point, unloaded
 from feti_homog.results import event_log
-from feti_homog.results.checkpoint import Checkpoint
 from feti_homog.results.kept_points import kept
 
 BARS = {"events": EVENTS_BAR, "increments": STEPS_BAR}
 
 
-def run(
-    context: AnalysisContext, path: LoadPath, criterion: BondCriterion, checkpoint: Checkpoint, resume: bool
-) -> dict[str, Any]:
+def run(context: AnalysisContext) -> dict[str, Any]:
+    """The path of the case, until its bonds break; see `follow`."""
+    section = context.case.section
+    assert isinstance(section, LoadPath)
+    return follow(context, section, criterion_of(context.cell, grows=True))
+
+
+def follow(context: AnalysisContext, path: LoadPath, criterion: BondCriterion) -> dict[str, Any]:
     """`path`, a list of points, one an event (or increment); each is checkpointed before the next is sought.
 
     `states` has the numbers of the points whose fields are recorded; which, is chosen when all are known.
     """
-    known = _known(context, checkpoint, resume)
+    known = _known(context)
     work, entries, last = Work(), list[dict[str, Any]](), None
     with EventProgress(context.progress, BARS[path.method], event_log.NAME) as shown:
-        for number, (point, energies) in enumerate(_points(context, path, criterion, checkpoint, known)):
-            responses = context.responses(point.state, point.scale)
+        for number, (point, energies) in enumerate(_points(context, path, criterion, known)):
+            responses = context.loads.responses(point.state, point.scale)
             source = "" if energies is None else ", from the checkpoint"
             if energies is not None:
                 work.resume_from(*energies, point)
             else:
                 work.arrive(point)
                 if point.state.converged:
-                    checkpoint.write(number, *stored(point, work))
+                    context.checkpoint.write(number, *stored(point, work))
             _tell(context, shown, f"{_label(path, number)} at {point.load_factor:.6f}{source}", responses)
             entries.append(_entry(context, criterion, point, responses, work))
             shown.advance(point.load_factor, f"{len(entries)} {path.method}, {_counts(entries[-1])}")
             last = point
             if not _goes_on(context, path, point, number + 1):
                 break
-    return {"path": entries, "resumed": known} | _kept(context, path, criterion, checkpoint, entries, last)
+    states = _kept(context, path, criterion, entries, last)
+    return {"path": tuple(PathPoint(**entry) for entry in entries), "resumed": known} | states
 
 
-def _known(context: AnalysisContext, checkpoint: Checkpoint, resume: bool) -> int:
+def _known(context: AnalysisContext) -> int:
     """How many events of the checkpoint are used; if none are wanted it is cleared.
 
     Raises:
         CaseError: the checkpoint cannot be used.
     """
-    if resume:
-        known = checkpoint.count()
+    if context.resume:
+        known = context.checkpoint.count()
         context.progress.say(
             f"  {known} events are taken from the checkpoint"
             if known
             else "  there is no checkpoint: the path begins at its beginning"
         )
         return known
-    if dropped := checkpoint.clear():
+    if dropped := context.checkpoint.clear():
         context.progress.say(f"  {dropped} events of an earlier run are dropped; --resume would have gone on from them")
     return 0
 
 
 def _points(
-    context: AnalysisContext, path: LoadPath, criterion: BondCriterion, checkpoint: Checkpoint, known: int
+    context: AnalysisContext, path: LoadPath, criterion: BondCriterion, known: int
 ) -> Iterator[tuple[Point, tuple[Energies, float] | None]]:
     """The points of the checkpoint with the energies up to each, then those still to be found.
 
@@ -79,10 +87,10 @@ def _points(
     Raises:
         NotCarriedError: nothing carries them from the beginning.
     """
-    cell, waypoints = context.loaded_cell, [context.load(target) for target in context.case.targets]
+    cell, waypoints = context.loads.interfaces, [context.loads.load(target) for target in context.case.targets]
     begin = unloaded(cell, context.status(None))
     for number in range(known):
-        point, energies = restored(checkpoint.read(number))
+        point, energies = restored(context.checkpoint.read(number))
         begin = point.after
         yield point, energies
     if path.method == "events":
@@ -96,16 +104,16 @@ def _points(
     except NotCarriedError as error:
         if count == 0:
             raise
-        context.faults.append(f"[path]: {error} beyond the last point; prescribe strains there")
+        context.checks.faults.append(f"[path]: {error} beyond the last point; prescribe strains there")
 
 
 def _tell(context: AnalysisContext, shown: EventProgress, name: str, responses: Sequence[Response]) -> None:
     """Check the responses of a point; their lines go to the log and, if due or telling of a fault, to the terminal."""
     for response, problem in zip(responses, ("", ", along the fibres"), strict=False):
-        faults = len(context.faults)
-        line = context.record_checks(f"{name}{problem}", response)
+        faults = len(context.checks.faults)
+        line = context.checks.record(f"{name}{problem}", response)
         context.log(line)
-        shown.tell(line, urgent=len(context.faults) > faults)
+        shown.tell(line, urgent=len(context.checks.faults) > faults)
 
 
 def _label(path: LoadPath, number: int) -> str:
@@ -143,7 +151,7 @@ def _goes_on(context: AnalysisContext, path: LoadPath, point: Point, count: int)
         # What broke next was decided on a state that does not hold.
         return False
     if count == path.max_events and point.load_factor < 1.0:
-        context.faults.append(
+        context.checks.faults.append(
             f"[path] max_events = {count}: the path was not finished: "
             'result.json has status "not converged"; --resume with a higher max_events goes on'
         )
@@ -155,24 +163,26 @@ def _kept(
     context: AnalysisContext,
     path: LoadPath,
     criterion: BondCriterion,
-    checkpoint: Checkpoint,
     entries: Sequence[dict[str, Any]],
     last: Point | None,
 ) -> dict[str, Any]:
     """Tips and fields of the points that are kept, from the checkpoint, in which the last one may not be; `states`, the
     numbers of those whose fields are recorded."""
     springs = spring_criterion(criterion)
-    if last is None or (springs is None and not context.keeps_fields):
+    if last is None or (springs is None and not context.states.has_place):
         return {}
-    numbers = kept(entries, context.states, len(context.case.targets) if path.method == "events" else 0)
-    tips = None if springs is None else TipRecorder(context.homogenization.cell, context.loaded_cell, springs)
+    numbers = kept(entries, context.case.output.states, len(context.case.targets) if path.method == "events" else 0)
+    tips = None if springs is None else TipRecorder(context.cell, context.loads.interfaces, springs)
     with context.progress.stage("states") as words:
         for number in context.progress.bar(numbers, "states"):
-            point = last if number == len(entries) - 1 else restored(checkpoint.read(number))[0]
+            point = last if number == len(entries) - 1 else restored(context.checkpoint.read(number))[0]
             if tips is not None:
                 entries[number]["tips"] = tips.of(point)
-            if context.keeps_fields:
-                responses = context.responses(point.state, point.scale)
+            if context.states.has_place:
+                responses = context.loads.responses(point.state, point.scale)
                 context.record_state(responses, point.load_factor, _label(path, number), number)
         words.append(f"{len(numbers)} of {len(entries)} points")
-    return {"states": numbers} if context.keeps_fields else {}
+    return {"states": numbers} if context.states.has_place else {}
+
+
+ANALYSIS = Analysis(run, table=True, events=True)

@@ -1,0 +1,48 @@
+"""`analysis.type = "angle"`: the response against the debonding angle, Fig. 3."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from feti_homog.analysis.context import AnalysisContext
+from feti_homog.analysis.registry import Analysis
+from feti_homog.analysis.result_records import AnglePoint
+from feti_homog.case.sections import Angle
+from feti_homog.homogenization.averaging import Response, asymmetry
+
+
+def run(context: AnalysisContext) -> dict[str, Any]:
+    """`angle`, a list of points: under a given strain the stress, else the stiffness from the three unit cases.
+
+    Each angle begins with the multipliers of the one before it.
+    """
+    section = context.case.section
+    assert isinstance(section, Angle)
+    unit = section.strain is None
+    starts = context.loads.zero_multipliers()[: None if unit else 1]
+    points = []
+    for number, value in enumerate(context.progress.bar(section.values, "angles")):
+        status, label = context.status(value), f"{value:g} deg"
+        point: dict[str, Any] = {"angle": value}
+        responses: list[Response]
+        if unit:
+            columns, responses = context.unit_responses(f"{label} ", status, starts, 1.0)
+            point |= columns
+            if not (context.plane.interface.contact and responses[0].debonded):
+                context.checks.require(label, {"symmetry": asymmetry(columns["stiffness"])})
+            context.record_unit_states(responses, 1.0, f"{label} ", number)
+        else:
+            responses = context.plane.respond(np.array([section.strain]), status, starts)
+            context.progress.say(context.checks.record(label, responses[0]))
+            point |= {"strain": responses[0].strain, "stress": responses[0].stress}
+            point |= {"stored": responses[0].stored, "stored_in_springs": responses[0].in_springs}
+            context.record_state(responses, 1.0, label, number)
+        starts = [r.state.solution.lam for r in responses]
+        tips = context.tips.of(responses, context.loads.names if unit else ("strain",))
+        points.append(AnglePoint(**point | context.point(responses), tips=tips))
+    return {"angle": tuple(points)}
+
+
+ANALYSIS = Analysis(run, table=True)
