@@ -9,7 +9,7 @@ from feti_homog.fibres.hard_core import hard_core
 from feti_homog.microstructure.randomness import poisson
 from feti_homog.microstructure.statistics import measure
 from feti_homog.report.text import statistics_text
-from feti_homog.results import output_folder, statistics_tables
+from feti_homog.results import output_folder
 
 MODELS = {"hard-core": hard_core, "poisson": poisson}
 
@@ -34,7 +34,7 @@ def run(
         from feti_homog.report.plots import statistics_picture
 
         out.mkdir(parents=True, exist_ok=True)
-        paths = statistics_tables.write(out, found)
+        paths = statistics_text.write(out, found)
         paths.append(statistics_picture.write(out, found, source.stem, model))
         lines += map(str, paths)
     return lines

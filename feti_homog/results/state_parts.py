@@ -12,7 +12,7 @@ from feti_homog.homogenization.averaging import Response, displacement, fluctuat
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.materials import laws, stress_measures
 from feti_homog.results.field_layout import StatePart
-from feti_homog.results.spatial_layout import SpatialStatePart
+from feti_homog.results.field_layout import SpatialStatePart
 from feti_homog.typing import Float, Float32
 
 

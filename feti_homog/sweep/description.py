@@ -12,10 +12,15 @@ from feti_homog.homogenization.cell_description import describe
 from feti_homog.parallel.mpi_errors import on_root
 from feti_homog.petsc.options import case_options
 from feti_homog.sweep import plan
-from feti_homog.sweep.option_checks import check_options
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
+
+
+import json
+
+from feti_homog.errors import CaseError
+from feti_homog.sweep.plan import Sweep, case_names
 
 
 def of_file(path: Path, comm: Intracomm) -> str:
@@ -35,3 +40,19 @@ def of_file(path: Path, comm: Intracomm) -> str:
     with case_options(case.petsc):
         text = describe(case, comm)
     return f"{words}{text}" if comm.rank == 0 else ""
+
+
+def check_options(sweep: Sweep) -> None:
+    """Raises CaseError with the faults of the options of all cases, each with the cases that have it."""
+    numbers_by_options = dict[str, list[int]]()
+    for entry, case in zip(sweep.entries, sweep.cases, strict=True):
+        numbers_by_options.setdefault(json.dumps(case.petsc, sort_keys=True), []).append(entry.number)
+    faults = []
+    for options, numbers in numbers_by_options.items():
+        try:
+            with case_options(json.loads(options)):
+                pass
+        except CaseError as error:
+            faults += [f"{case_names(numbers)}: {fault}" for fault in error.faults]
+    if faults:
+        raise CaseError(*faults)

@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from itertools import product
 from math import prod
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.stats import qmc
 
 from feti_homog.case.document import TomlPath
-from feti_homog.case.sweep_section import AXIS_EXPECTED, MAX_CASES, SWEEP, SweepSection
+from feti_homog.case.sections import SECTIONS
+from feti_homog.case.sweep_section import AXIS_EXPECTED, MAX_CASES, RANGE_KEYS, SWEEP, SweepSection
+from feti_homog.case.tables import TOP_LEVEL
 from feti_homog.schema.keys import TableReader, keys_of
-from feti_homog.schema.wording import dotted_key
-from feti_homog.sweep.axes import Axis, AxisReader
+from feti_homog.schema.values import is_number, magnitudes_in_words
+from feti_homog.schema.wording import dotted_key, suggestion, toml_value
 
+STEP_TOLERANCE = 1e-9  # of a step: what rounding may take from the last one
 Assignment = dict[TomlPath, Any]
 
 
@@ -93,3 +98,157 @@ def _samples(axes: Sequence[Axis], settings: SweepSection) -> list[list[Assignme
     paths = [axis.path for axis in axes]
     columns = [axis.at(column) for axis, column in zip(axes, shares.T, strict=True)]
     return [[dict(zip(paths, row, strict=True)) for row in zip(*columns, strict=True)]]
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A key that varies: its values or, if it is sampled, the ends that they lie between."""
+
+    path: TomlPath
+    values: tuple[Any, ...] = ()
+    ends: tuple[float, float] = (0.0, 0.0)
+    log: bool = False
+
+    def at(self, shares: ArrayLike) -> list[Any]:
+        """The values at shares in [0, 1] of the way from the first to the second end."""
+        low, high = np.log(self.ends) if self.log else self.ends
+        found = low + (high - low) * np.asarray(shares)
+        return [_rounded(value, self.path) for value in (np.exp(found) if self.log else found).tolist()]
+
+
+@dataclass(frozen=True)
+class Range:
+    """A checked range: its ends, and a step, a number of values, or neither if it is sampled."""
+
+    low: float
+    high: float
+    log: bool
+    step: float | None
+    count: int | None
+
+    def axis(self, path: TomlPath) -> Axis:
+        """The axis of the key that has this range."""
+        axis = Axis(path, ends=(self.low, self.high), log=self.log)
+        if self.step is not None:
+            return Axis(path, tuple(_rounded(value, path) for value in _steps(self.low, self.high, self.step)))
+        if self.count is not None:
+            return Axis(path, tuple(axis.at(np.linspace(0, 1, self.count))))
+        return axis
+
+
+@dataclass
+class AxisReader:
+    """Reads the axes of a table, nested by section, and gathers what is wrong with them.
+
+    Attributes:
+        is_sampled: whether ranges without step and count are allowed.
+        faults: one line each.
+    """
+
+    is_sampled: bool
+    faults: list[str] = field(default_factory=list)
+
+    def read(self, table: Mapping[str, Any]) -> list[Axis]:
+        """The axes in the order of the file, but for the faulty ones."""
+        axes = []
+        for path, value in _leaves(table):
+            fault = self._fault(path, value)
+            if fault:
+                self.faults.append(f"[{SWEEP}] {dotted_key(path)} = {toml_value(value)}: {fault}")
+            else:
+                axes.append(_axis(path, value))
+        return axes
+
+    def _fault(self, path: TomlPath, value: Any) -> str:
+        """What is wrong with an axis, empty if nothing."""
+        if path[0] not in TOP_LEVEL or path[0] in ("name", SWEEP):
+            known = [*keys_of(SweepSection), *SECTIONS, "material", "petsc"]
+            return f"unknown key; {suggestion(path[0], known, {})}"
+        if isinstance(value, list):
+            return "" if value else "expected at least one value"
+        return range_fault(value, self.is_sampled) if _is_range(path, value) else f"expected {AXIS_EXPECTED}"
+
+
+def _leaves(table: Mapping[str, Any], above: TomlPath = ()) -> Iterator[tuple[TomlPath, Any]]:
+    """The paths and values of a nested table; a range is a value, and so is what stands in an unknown section."""
+    for name, value in table.items():
+        path = (*above, *name.split("."))
+        is_known = path[0] in TOP_LEVEL and path[0] not in ("name", SWEEP)
+        if is_known and isinstance(value, dict) and value and not _is_range(path, value):
+            yield from _leaves(value, path)
+        else:
+            yield path, value
+
+
+def _is_range(path: TomlPath, value: Any) -> bool:
+    """Whether the value of a key is meant as a range; a section, which may have a key "to", is none."""
+    return len(path) > 1 and isinstance(value, dict) and bool(value.keys() & {"from", "to"})
+
+
+def _axis(path: TomlPath, value: Any) -> Axis:
+    """The axis of a value without fault."""
+    return Axis(path, tuple(value)) if isinstance(value, list) else _range(value).axis(path)
+
+
+def _range(table: Mapping[str, Any]) -> Range:
+    """The range of a table without fault."""
+    is_log = table.get("scale") == "log"
+    return Range(float(table["from"]), float(table["to"]), is_log, table.get("step"), table.get("count"))
+
+
+def range_fault(table: Mapping[str, Any], is_sampled: bool) -> str:
+    """What is wrong with a range, empty if nothing."""
+    unknown = [name for name in table if name not in RANGE_KEYS]
+    if unknown:
+        return f"{unknown[0]}: unknown key; known here: {', '.join(RANGE_KEYS)}"
+    return _ends_fault(table) or _spacing_fault(table, is_sampled)
+
+
+def _ends_fault(table: Mapping[str, Any]) -> str:
+    low, high, scale = table.get("from"), table.get("to"), table.get("scale", "linear")
+    if not (is_number(low) and is_number(high) and low < high):  # type: ignore[operator]
+        return f"expected numbers from < to{magnitudes_in_words([low, high])}"
+    if scale not in ("linear", "log") or (scale == "log" and low <= 0):  # type: ignore[operator]
+        return 'expected scale = "linear" or "log", this from a number above 0'
+    return ""
+
+
+def _spacing_fault(table: Mapping[str, Any], is_sampled: bool) -> str:
+    """What is wrong with the step or count of a range whose ends are right."""
+    step, count = table.get("step"), table.get("count")
+    if step is not None and count is not None:
+        return "step, count: exclude each other; give one"
+    if step is not None:
+        return _step_fault(step, table)
+    if count is not None:
+        return "" if _is_count(count) else f"expected a count from 2 to {MAX_CASES}"
+    return "" if is_sampled else f"expected {AXIS_EXPECTED}"
+
+
+def _step_fault(step: Any, table: Mapping[str, Any]) -> str:
+    width = table["to"] - table["from"]
+    if not is_number(step) or not 0 < step <= width or table.get("scale") == "log":
+        return f"expected a step above 0 and at most to - from, linear{magnitudes_in_words(step)}"
+    if width / step >= MAX_CASES:
+        return f"about {width / step:.6g} values; expected a step that makes at most {MAX_CASES}"
+    return ""
+
+
+def _is_count(count: Any) -> bool:
+    return isinstance(count, int) and 2 <= count <= MAX_CASES
+
+
+def _steps(low: float, high: float, step: float) -> list[float]:
+    """low, low + step, ... up to high, which a rounding error does not leave out."""
+    return [low + k * step for k in range(int((high - low) / step + STEP_TOLERANCE) + 1)]
+
+
+def _rounded(value: float, path: TomlPath) -> Any:
+    """The number without the noise of its last digits; an integer where the key takes nothing else."""
+    value = float(f"{value:.12g}")
+    section = SECTIONS.get(path[0])
+    entry = keys_of(section).get(path[1]) if section is not None and len(path) == 2 else None
+    takes_integers_only = (
+        entry is not None and entry.type.accepts(round(value)) and not entry.type.accepts(round(value) + 0.5)
+    )
+    return round(value) if takes_integers_only else value

@@ -9,9 +9,8 @@ from markdown_text import code, page, table
 from feti_homog.analysis.result import schema_keys
 from feti_homog.analysis.result_records import AnglePoint, EnvelopePoint, LoadPoint, PathPoint
 from feti_homog.results.csv_tables import Column, columns
-from feti_homog.results.field_layout import Item, items
-from feti_homog.results.spatial_layout import spatial_items
-from feti_homog.sweep.report.columns import COLUMNS, DATASETS
+from feti_homog.results.field_layout import Item, items, spatial_items
+from feti_homog.sweep.report.tables import COLUMNS, DATASETS
 
 INTRODUCTION = """\
 Any consistent units: the unit of stresses is that of the moduli in the case file, that of lengths the unit of the cell.

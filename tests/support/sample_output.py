@@ -7,8 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.results.field_layout import FibrePart, Header, InterfacePart, MeshPart, StatePart, rows_of, tables
-from feti_homog.results.spatial_layout import SpatialStatePart
+from feti_homog.results.field_layout import (
+    FibrePart,
+    Header,
+    InterfacePart,
+    MeshPart,
+    SpatialStatePart,
+    StatePart,
+    rows_of,
+    tables,
+)
 
 GRADIENTS = tuple(np.array([[a, b], [b, c]]) for a, b, c in ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.5, 0.0)))
 

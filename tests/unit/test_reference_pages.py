@@ -19,11 +19,10 @@ from feti_homog.analysis.result_records import AnglePoint, EnvelopePoint, PathPo
 from feti_homog.analysis.runner import run
 from feti_homog.case.case import Case
 from feti_homog.results.csv_tables import columns
-from feti_homog.results.field_layout import items
-from feti_homog.results.spatial_layout import spatial_items
+from feti_homog.results.field_layout import items, spatial_items
 from feti_homog.sweep import collect, execute, plan
-from feti_homog.sweep.report.columns import COLUMNS, DATASETS, OUTPUT_COLUMNS
 from feti_homog.sweep.report.outputs import outputs
+from feti_homog.sweep.report.tables import COLUMNS, DATASETS, OUTPUT_COLUMNS
 
 pytestmark = pytest.mark.slow
 

@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from feti_homog.errors import CaseError
+from feti_homog.report.cards.card_text import comments, identifier, number
 from feti_homog.report.cards.effective_material import PAIRS, EffectiveMaterial
-from feti_homog.report.cards.wording import comments, identifier, number
 from feti_homog.typing import Float
 
 WIDTH, PER_LINE = 20, 8

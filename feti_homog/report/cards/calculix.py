@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from feti_homog.report.cards import abaqus
+from feti_homog.report.cards.card_text import comments
 from feti_homog.report.cards.effective_material import EffectiveMaterial
-from feti_homog.report.cards.wording import comments
 
 TENSOR_SHEARS = np.array([1.0, 1.0, 1.0, 0.5, 0.5, 0.5])
 

@@ -16,8 +16,7 @@ from matplotlib.ticker import MaxNLocator
 from PIL import Image
 
 from feti_homog.errors import FetiHomogError
-from feti_homog.report.plots.decimation import DrawnMesh, drawn_mesh, outline_edges
-from feti_homog.report.plots.drawn_displacement import drawn_displacement, largest_scale
+from feti_homog.report.plots.decimation import DrawnMesh, drawn_displacement, drawn_mesh, largest_scale, outline_edges
 from feti_homog.report.plots.interface_marks import STATE_NAMES, InterfaceEdges, state_legend
 from feti_homog.report.plots.load_labels import LoadLabels
 from feti_homog.report.plots.plot_helpers import (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -12,20 +13,24 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
+from matplotlib.tri import Triangulation
 
 from feti_homog.errors import FetiHomogError
 from feti_homog.materials.voigt import voigt_names
-from feti_homog.report.plots import axial_shear, deformed_panels, response_curves, traction_plots
-from feti_homog.report.plots.decimation import DrawnMesh, drawn_mesh, outline_edges
-from feti_homog.report.plots.drawn_displacement import drawn_displacement, largest_scale
-from feti_homog.report.plots.fibre_numbers import write_fibre_numbers
+from feti_homog.report.plots import cell_picture, deformed_panels, response_curves, traction_plots
+from feti_homog.report.plots.decimation import (
+    DrawnMesh,
+    drawn_displacement,
+    drawn_mesh,
+    largest_scale,
+    nodal_values,
+    outline_edges,
+)
 from feti_homog.report.plots.interface_marks import InterfaceEdges
 from feti_homog.report.plots.load_labels import LoadLabels
 from feti_homog.report.plots.plot_helpers import (
     STRESS_SYMBOLS,
     STYLE,
-    cell_scale,
     colour_range,
     draw_segments,
     drawn_stress,
@@ -42,11 +47,10 @@ from feti_homog.report.plots.plot_helpers import (
 from feti_homog.results import field_file, result_json
 from feti_homog.typing import Array
 
-MESH_LINES = 6000  # triangles up to which their edges are drawn
+LEVEL_INK, LEVEL_WIDTH = "0.15", 0.6  # of lines of equal displacement along the fibres
+LEVELS = 12  # about so many lines
 OUTLINED_BODIES = 8  # up to which the deformed cell is drawn over all that it has left
 UNDEFORMED, BAR_INCHES = "0.5", 1.1
-MATRIX = "#ece8df"
-FIBRES = ("Blues", "Oranges", "Greens", "Purples", "Reds", "Greys")  # one colour map for each phase
 
 
 def plot(directory: Path) -> list[Path]:
@@ -86,13 +90,13 @@ def _pictures(directory: Path, document: Mapping[str, Any]) -> list[Path]:
         drawn = drawn_mesh(file)
         borders = outline_edges(drawn, drawn.body)
         interface_edges = InterfaceEdges.of(file, drawn, borders)
-        paths = [save(_cell(file, drawn, borders), directory / "cell.png")]
+        paths = [save(cell_picture.figure(file, drawn, borders), directory / "cell.png")]
         if "angle" in document or "path" in document:
             paths += deformed_panels.plot(directory, file, document)
         else:
             for number in sorted(file.get("state", ()), key=int):
                 state = file[f"state/{number}"]
-                draw = _sheared if axial_shear.is_axial(state) else _deformed
+                draw = _sheared if is_axial(state) else _deformed
                 figure = draw(file, state, drawn, borders, interface_edges, document)
                 name = "load" if document.get("load") else _name(number, state.attrs)
                 paths.append(save(figure, directory / f"{name}.png"))
@@ -107,27 +111,6 @@ def _name(number: str, attributes: Any) -> str:
     if abs(value) != 1.0 or np.count_nonzero(list(loads.values())) != 1:
         return f"state_{number}"
     return f"case_{'minus_' if value < 0 else ''}{name}"
-
-
-def _cell(file: Any, drawn: DrawnMesh, borders: Array) -> Figure:
-    """The phases, each body in a shade of its own and with the fibre's number, beside the subdomains."""
-    attributes = file.attrs
-    figure, (left, right) = figure_of(attributes, panels=2)
-    edges = len(drawn.triangles) <= MESH_LINES
-    bodies, subdomains = drawn.body.max() + 1, drawn.subdomain.max() + 1
-    shades, legend = _shades(drawn, list(attributes["phases"]))
-    for axes, label, colours in ((left, drawn.body, shades), (right, drawn.subdomain, _distinct(subdomains))):
-        fill_triangles(axes, drawn, drawn.points, colours[label], edges)
-        draw_segments(axes, drawn.points[borders], "black", 0.9)
-        label_cell_axes(axes, attributes)
-    draw_segments(right, drawn.points[outline_edges(drawn, drawn.subdomain)], "black", 0.5)
-    write_fibre_numbers(left, file, drawn, borders, cell_scale(attributes))
-    left.set_title(_count(bodies, "body", "bodies"))
-    right.set_title(_count(subdomains, "subdomain", "subdomains"))
-    right.set_ylabel("")
-    figure.suptitle(plain(attributes["title"]), fontsize=12)
-    figure.legend(handles=legend, loc="outside lower center", ncols=4, frameon=False)
-    return figure
 
 
 def _deformed(
@@ -166,10 +149,10 @@ def _sheared(
     """The cell with an axial stress in colour and lines of equal displacement along the fibres, which moves nothing in
     the plane."""
     figure, axes = _coloured(file, state, drawn, drawn.points, _output(document))
-    step = axial_shear.draw_levels(axes, state, drawn)
+    step = draw_levels(axes, state, drawn)
     length = plain(file.attrs["length_unit"])
     words = f"$u_3$ every {step:g} {length}".rstrip()
-    levels = Line2D([], [], color=axial_shear.INK, linewidth=axial_shear.WIDTH, label=words)
+    levels = Line2D([], [], color=LEVEL_INK, linewidth=LEVEL_WIDTH, label=words)
     _outlined(figure, axes, state, drawn.points, borders, interface_edges, [levels])
     axes.set_title(f"{plain(file.attrs['title'])}\n{LoadLabels.of(document).label(state.attrs)}".lstrip())
     return figure
@@ -214,30 +197,28 @@ def _left(attributes: Any, drawn: DrawnMesh, borders: Array) -> Array:
     return np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
 
 
-def _shades(drawn: DrawnMesh, phases: list[str]) -> tuple[Array, list[Patch]]:
-    """A colour (bodies, 4) for each body, a shade of its phase's; and the legend of the phases."""
-    colours = np.zeros((drawn.body.max() + 1, 4))
-    legend = []
-    for index, phase in enumerate(phases):
-        bodies = np.unique(drawn.body[drawn.phase == index])
-        if not len(bodies):
-            continue
-        if index == 0:
-            shades = np.tile(mpl.colors.to_rgba(MATRIX), (len(bodies), 1))
-        else:
-            tones = 0.65 - 0.35 * (np.arange(len(bodies)) * 0.618 % 1.0)
-            shades = mpl.colormaps[FIBRES[(index - 1) % len(FIBRES)]](tones)
-        colours[bodies] = shades
-        legend.append(Patch(facecolor=shades[0], edgecolor="black", linewidth=0.6, label=phase))
-    return colours, legend
+def is_axial(state: Any) -> bool:
+    """Whether a state shears the cell along the fibres alone."""
+    strain = state.attrs["strain"]
+    others = [*strain[[0, 1, -1]], strain[2], state.attrs["temperature"]] if len(strain) > 3 else strain
+    return not np.any(others) and bool(np.any(strain))
 
 
-def _distinct(count: int) -> Array:
-    """Colours (count, 4), of which those with near numbers differ most."""
-    colours: Array = mpl.colormaps["tab20"](np.arange(count) * 7 % 20)
-    colours[:, :3] = 0.3 + 0.7 * colours[:, :3]
-    return colours
+def draw_levels(axes: Axes, state: Any, drawn: DrawnMesh) -> float:
+    """Draw lines of equal displacement along the fibres; returns the step between them."""
+    displacement: Array = nodal_values(state["axial_displacement"], drawn)
+    least, most = float(displacement.min()), float(displacement.max())
+    step = round_step((most - least) / LEVELS)
+    levels = step * np.arange(math.ceil(least / step), math.floor(most / step) + 1)
+    x, y = drawn.points.T
+    mesh = Triangulation(x, y, drawn.triangles)
+    axes.tricontour(mesh, displacement, levels=levels, colors=LEVEL_INK, linewidths=LEVEL_WIDTH, linestyles="solid")
+    return step
 
 
-def _count(number: int, one: str, many: str) -> str:
-    return f"{number} {one if number == 1 else many}"
+def round_step(wanted: float) -> float:
+    """1, 2 or 5 times a power of ten, not less than wanted."""
+    if wanted <= 0.0:
+        return 1.0
+    power = 10.0 ** math.floor(math.log10(wanted))
+    return power * next(factor for factor in (1.0, 2.0, 5.0, 10.0) if factor * power >= wanted * (1 - 1e-9))

@@ -17,9 +17,8 @@ from feti_homog.materials.laws import plane_stiffness, spatial_stiffness
 from feti_homog.materials.spatial_constants import is_transversely_isotropic, transversely_isotropic_part
 from feti_homog.report.plots.plot_helpers import plain
 from feti_homog.schema.keys import TableReader
-from feti_homog.sweep.report.series import Series, series_over
 from feti_homog.sweep.report.style import COLOURS, label_axes, legend, plot_series
-from feti_homog.sweep.report.sweep_table import SweepTable
+from feti_homog.sweep.report.sweep_table import Series, SweepTable, series_over
 from feti_homog.typing import Float
 
 FRACTION = "cell.fibre_fraction"

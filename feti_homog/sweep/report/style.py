@@ -10,8 +10,7 @@ from matplotlib.axes import Axes
 
 from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES
 from feti_homog.report.plots.plot_helpers import strain_symbols, unit_label
-from feti_homog.sweep.report.series import Series
-from feti_homog.sweep.report.sweep_table import SweepTable
+from feti_homog.sweep.report.sweep_table import Series, SweepTable
 from feti_homog.typing import Float
 
 COLOURS = ("#1f4e9c", "#c44e00", "#2a7f3f", "#7a3e9d", "#8c6d1f", "#c2185b")

@@ -8,13 +8,14 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from scipy.stats import t as student
 
 from feti_homog.report.text.units import unit
 from feti_homog.results import path_curves
 from feti_homog.sweep.report.outputs import Document
-from feti_homog.sweep.report.statistics import Statistics
 from feti_homog.typing import Float
 
+CONFIDENCE = 0.95
 CURVE_POINTS = 401  # strains at which curves are averaged
 
 
@@ -108,3 +109,64 @@ def _in_words(name: str, value: Any) -> str:
     if isinstance(value, float | int) and not isinstance(value, bool):
         return f"{name} {value:g}"
     return value if isinstance(value, str) else f"{name} {value}"
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """Over the realisations that are done, (points, ...): `ci95` is half the width of the 95 % confidence interval of
+    the mean by Student's t; it and `std` are NaN of fewer than two."""
+
+    count: Float
+    mean: Float
+    std: Float
+    ci95: Float
+
+    @classmethod
+    def of(cls, samples: Float) -> Statistics:
+        """Over the first axis of samples (n, ...), without those that are NaN."""
+        known = np.isfinite(samples)
+        count = known.sum(axis=0)
+        several = np.where(count > 1, count, np.nan)
+        mean = np.where(known, samples, 0.0).sum(axis=0) / np.where(count > 0, count, np.nan)
+        std = np.sqrt(np.where(known, (samples - mean) ** 2, 0.0).sum(axis=0) / (several - 1))
+        return cls(count.astype(float), mean, std, student.ppf(0.5 + CONFIDENCE / 2, several - 1) * std / several**0.5)
+
+
+@dataclass(frozen=True)
+class Series:
+    """Points that differ by one key only: their numbers, and that key's values `x`, rising."""
+
+    label: str
+    points: list[int]
+    x: Float
+
+
+def series_over(table: SweepTable, key: str) -> list[Series]:
+    """The series over a key, of the points with finished cases.
+
+    What varies along with the key, one value to one, makes no other series.
+    """
+    points = [p for p in table.points if table.results_of(p) and table.input_of(p, key) is not None]
+    along = [name for name in table.inputs if _follows(table, points, name, key)]
+    labels = {point: table.label(point, along) for point in points}
+    return [
+        _series(table, key, label, [point for point in points if labels[point] == label])
+        for label in dict.fromkeys(labels.values())
+    ]
+
+
+def _series(table: SweepTable, key: str, label: str, points: Sequence[int]) -> Series:
+    pairs = sorted((float(table.input_of(point, key)), point) for point in points)
+    return Series(label, [point for _, point in pairs], np.array([x for x, _ in pairs]))
+
+
+def _follows(table: SweepTable, points: Sequence[int], name: str, key: str) -> bool:
+    """Whether an input has one value for each value of the key."""
+    pairs = {(repr(table.input_of(point, key)), repr(table.input_of(point, name))) for point in points}
+    return len(pairs) == len({value for value, _ in pairs})
+
+
+def varies(table: SweepTable, key: str) -> bool:
+    """Whether a key has more than one value among finished cases."""
+    values = table.inputs.get(key, ())
+    return len({v for v, d in zip(values, table.documents, strict=False) if v is not None and d is not None}) > 1

@@ -6,7 +6,7 @@ import pytest
 
 from feti_homog import Case
 from feti_homog.errors import CaseError
-from feti_homog.sweep.case_documents import case_documents
+from feti_homog.sweep.plan import case_documents
 
 OUTER, INNER = ["coating", "matrix"], ["fibre", "coating"]
 STRONG = {"normal_strength": 1.0}

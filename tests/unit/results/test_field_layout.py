@@ -10,7 +10,7 @@ from support.sample_output import in_space, sample
 from feti_homog.runtime.records import LENGTH, STRESS
 from feti_homog.results.field_file import FieldFile
 from feti_homog.results.field_layout import items
-from feti_homog.results.spatial_layout import spatial_items
+from feti_homog.results.field_layout import spatial_items
 
 UNITS = {LENGTH: "mm", STRESS: "GPa", "": "1", "temperature": "temperature"}  # of the sample
 

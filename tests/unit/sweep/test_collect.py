@@ -14,9 +14,7 @@ from scipy import stats
 from feti_homog.report.text.units import unit, with_unit
 from feti_homog.sweep.report import figures, moduli, tables
 from feti_homog.sweep.report.outputs import numbers, outputs
-from feti_homog.sweep.report.series import series_over
-from feti_homog.sweep.report.statistics import Statistics
-from feti_homog.sweep.report.sweep_table import SweepTable
+from feti_homog.sweep.report.sweep_table import Statistics, SweepTable, series_over
 
 MATERIAL = {"matrix": {"young": 88.0, "poisson": 0.299}, "fibre": {"young": 200.0, "poisson": 0.222}}
 

@@ -22,7 +22,7 @@ from support.effective_results import (
 
 from feti_homog import cli
 from feti_homog.errors import CaseError
-from feti_homog.report.cards import wording
+from feti_homog.report.cards import card_text
 from feti_homog.report.cards.effective_material import in_axes_of_the_cell, nearest_transversely_isotropic
 from feti_homog.report.cards.export import FORMATS
 
@@ -112,10 +112,10 @@ def test_comments_say_what_the_axes_and_units_are(form, mark):
     "value", [215.33468712345678, -1.0993681512345678e-05, 1e-300, 123456789012345678.0, 0.1, -0.0]
 )
 def test_numbers_keep_what_their_field_holds(value):
-    assert float(wording.number(value)) == value
-    short = wording.number(value, 20)
+    assert float(card_text.number(value)) == value
+    short = card_text.number(value, 20)
     assert len(short) <= 20 and float(short) == pytest.approx(value, rel=1e-13, abs=0.0)
-    assert not wording.number(-0.0).startswith("-")
+    assert not card_text.number(-0.0).startswith("-")
 
 
 @pytest.mark.parametrize(
@@ -123,7 +123,7 @@ def test_numbers_keep_what_their_field_holds(value):
     [("E-glass/epoxy 55 %", "E_glass_epoxy_55"), ("55 %", "material_55"), ("\u2126", "material"), ("a" * 99, "a" * 60)],
 )
 def test_names_are_those_that_programs_accept(name, identifier):
-    assert wording.identifier(name) == identifier
+    assert card_text.identifier(name) == identifier
 
 
 def test_the_command_line_offers_every_format():

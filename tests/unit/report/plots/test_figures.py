@@ -13,7 +13,7 @@ from PIL import Image
 from support.sample_output import Sample, in_space, sample
 
 from feti_homog.errors import CaseError, FetiHomogError
-from feti_homog.report.plots import axial_shear, decimation, figures, plot_helpers
+from feti_homog.report.plots import decimation, figures, plot_helpers
 from feti_homog.report.plots.interface_marks import InterfaceEdges
 from feti_homog.results.field_file import FieldFile
 from feti_homog.results.result_json import SCHEMA
@@ -176,7 +176,7 @@ def test_loads_in_space_have_their_pictures(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("wanted", "step"), [(0.083, 0.1), (0.1, 0.1), (0.11, 0.2), (3.0, 5.0), (6e4, 1e5), (0, 1)])
 def test_lines_of_displacement_are_at_round_steps(wanted: float, step: float) -> None:
-    assert axial_shear.round_step(wanted) == pytest.approx(step)
+    assert figures.round_step(wanted) == pytest.approx(step)
 
 
 @pytest.mark.slow

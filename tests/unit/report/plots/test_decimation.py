@@ -12,8 +12,7 @@ import pytest
 from support.sample_output import Sample, in_space, sample
 
 from feti_homog.report.plots import deformed_panels, plot_helpers
-from feti_homog.report.plots.decimation import DrawnMesh, drawn_mesh
-from feti_homog.report.plots.drawn_displacement import LEAST_AREA, drawn_displacement, largest_scale
+from feti_homog.report.plots.decimation import LEAST_AREA, DrawnMesh, drawn_displacement, drawn_mesh, largest_scale
 from feti_homog.results.field_file import FieldFile
 
 

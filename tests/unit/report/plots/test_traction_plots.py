@@ -12,10 +12,10 @@ import pytest
 from matplotlib.figure import Figure
 from support.sample_output import Sample, sample
 
+from feti_homog.report.plots.cell_picture import write_fibre_numbers
 from feti_homog.report.plots.decimation import drawn_mesh, outline_edges
-from feti_homog.report.plots.fibre_numbers import write_fibre_numbers
-from feti_homog.report.plots.interface_coordinate import Coordinate, coordinate
 from feti_homog.report.plots.interface_marks import InterfaceEdges
+from feti_homog.report.plots.traction_plots import Coordinate, coordinate
 from feti_homog.results.field_file import FieldFile
 
 CORNERS = np.array([[0.75, 0.25], [0.75, 0.75], [0.25, 0.75], [0.25, 0.25]])
