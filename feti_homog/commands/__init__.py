@@ -1,4 +1,5 @@
-"""Commands of the command line that bring their own options, a module each.
+"""Commands of `feti-homog`, one module each: `add(actions)` gives the parser its options and its action.
 
-May use `api` and all floors below it.  Main entry: `add` of each module, which `cli` calls.
+May use every floor but `cli`.  The modules import what a command computes with in its action: `--help` and `--version`
+start without NumPy and MPI.  Main entry: `cli.main`.
 """

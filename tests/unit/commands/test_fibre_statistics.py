@@ -13,7 +13,7 @@ from support.fibre_patterns import hexagonal_lattice, poisson_points, square_lat
 
 from feti_homog.analysis.runner import run
 from feti_homog.case import case as cases
-from feti_homog.commands import fibre_sources, fibre_statistics
+from feti_homog.commands import fibre_statistics
 from feti_homog.errors import CaseError, MeshError
 from feti_homog.fibres.hard_core import hard_core
 from feti_homog.microstructure.nearest_neighbours import nearest_neighbours
@@ -39,7 +39,7 @@ def columns(path):
 def test_a_case_and_its_result_have_the_same_fibres(tmp_path):
     path = write(tmp_path / "case.toml", SMALL + "[output]\npictures = false\nfields = false\n")
     run(cases.load(path), tmp_path / "result", MPI.COMM_SELF, quiet=True)
-    of_case, of_result = fibre_sources.read(path, None), fibre_sources.read(tmp_path / "result", None)
+    of_case, of_result = fibre_statistics.pattern(path, None), fibre_statistics.pattern(tmp_path / "result", None)
     assert (of_case.width, of_result.width, of_case.periodic, of_result.periodic) == (40.0, 40.0, True, True)
     away = (of_result.centres - of_case.centres + 20) % 40 - 20
     assert of_result.radii == pytest.approx(of_case.radii) and away == pytest.approx(0, abs=1e-9)
@@ -49,7 +49,7 @@ def test_a_case_and_its_result_have_the_same_fibres(tmp_path):
 def test_fibres_of_a_mesh_are_found(tmp_path):
     cell = f'geometry = "mesh"\nfile = "{MESHES / "hexagonal.msh"}"\n'
     text = BASE.replace('geometry = "hexagonal"\nfibre_fraction = 0.4\nmesh_size = 0.05\n', cell)
-    found = fibre_sources.read(write(tmp_path / "case.toml", text), None)
+    found = fibre_statistics.pattern(write(tmp_path / "case.toml", text), None)
     assert found.count == 2 and found.fibre_fraction == pytest.approx(0.4, abs=1e-6)
     assert nearest_neighbours(found).means == pytest.approx(found.width * np.ones(3))
 
@@ -59,7 +59,7 @@ def test_tables_are_windows(tmp_path, size):
     comment = "" if size else "# width = 12, height = 8, left = 100, bottom = -4\n"
     corner = (0.0, 0.0) if size else (100.0, -4.0)
     rows = [f"{x + corner[0]},{y + corner[1]},{r}" for x, y, r in [(1, 2, 1), (5.5, 7.75, 0.5), (12, 0, 0.25)]]
-    found = fibre_sources.read(write(tmp_path / "f.csv", "\n".join([f"{comment}x,y,radius", *rows])), size)
+    found = fibre_statistics.pattern(write(tmp_path / "f.csv", "\n".join([f"{comment}x,y,radius", *rows])), size)
     assert (found.width, found.height, found.periodic) == (12.0, 8.0, False)
     assert found.centres == pytest.approx(np.array([[1, 2], [5.5, 7.75], [12, 0]]))
     assert found.fibre_fraction == pytest.approx(np.pi * (1 + 0.25 + 0.0625) / 96)
@@ -71,7 +71,7 @@ SIZE = "# width = 12, height = 8\n"
 def test_ellipses_count_as_discs_of_the_same_area(tmp_path):
     ellipses = f"{SIZE}x,y,radius,a,b,angle\n1,2,,1,4,30\n5,6,0.5,,,\n"
     discs = f"{SIZE}x,y,radius\n1,2,2\n5,6,0.5\n"
-    found, expected = (fibre_sources.read(write(tmp_path / "f.csv", text), None) for text in (ellipses, discs))
+    found, expected = (fibre_statistics.pattern(write(tmp_path / "f.csv", text), None) for text in (ellipses, discs))
     assert np.array_equal(found.radii, expected.radii) and np.array_equal(found.centres, expected.centres)
 
 
@@ -88,7 +88,7 @@ FAULTY = {
 @pytest.mark.parametrize("text", FAULTY)
 def test_faults_of_tables(tmp_path, text):
     with pytest.raises(CaseError) as error:
-        fibre_sources.read(write(tmp_path / "f.csv", text), None)
+        fibre_statistics.pattern(write(tmp_path / "f.csv", text), None)
     assert len(error.value.faults) == len(FAULTY[text])
     assert all(words in fault for words, fault in zip(FAULTY[text], error.value.faults, strict=True))
 
@@ -102,7 +102,7 @@ def test_other_faults(tmp_path):
         (tmp_path / "nowhere.csv", None, "nowhere.csv: cannot be read"),
     ]:
         with pytest.raises(CaseError, match=words):
-            fibre_sources.read(path, size)
+            fibre_statistics.pattern(path, size)
 
 
 def test_tables_and_picture_hold_what_was_measured(tmp_path):
@@ -114,7 +114,7 @@ def test_tables_and_picture_hold_what_was_measured(tmp_path):
     fibres, pairs, directions = (columns(tmp_path / "out" / name) for name in names[:3])
     assert fibres["voronoi_area"].sum() == pytest.approx(1600.0)
     assert fibres["voronoi_area"] @ fibres["local_fraction"] / 1600 == pytest.approx(0.4)
-    distances = nearest_neighbours(fibre_sources.read(path, None)).distances
+    distances = nearest_neighbours(fibre_statistics.pattern(path, None)).distances
     assert fibres["distance_2"] == pytest.approx(distances[:, 1])
     assert pairs["L"] == pytest.approx(np.sqrt(pairs["K"] / np.pi))
     rings = np.pi * np.diff(pairs["r"] ** 2, prepend=0)

@@ -11,7 +11,7 @@ from support.void_cells import write_voids
 
 from feti_homog import run
 from feti_homog.case import case as cases
-from feti_homog.commands import fibre_rows, fibre_sources
+from feti_homog.commands import fibre_rows, fibre_statistics
 from feti_homog.errors import CaseError, MeshError
 from feti_homog.fibres.arrange import arrange
 from feti_homog.mesh.coarse_mesh import areas
@@ -90,9 +90,9 @@ def test_the_table_of_a_cell_with_voids_gives_it_again(tmp_path, cell):
     assert voids(one) == voids(other) > 0
     if cell["geometry"] == "random":
         assert np.abs(one.points - other.points).max() < 1e-12 and np.array_equal(one.triangles, other.triangles)
-    pattern = fibre_sources.read(tmp_path / "case.toml", None) if cell["geometry"] == "random" else None
+    pattern = fibre_statistics.pattern(tmp_path / "case.toml", None) if cell["geometry"] == "random" else None
     assert pattern is None or pattern.count == 12
-    window = fibre_sources.read(tmp_path / "again.csv", None) if cell["geometry"] == "random" else None
+    window = fibre_statistics.pattern(tmp_path / "again.csv", None) if cell["geometry"] == "random" else None
     assert window is None or (window.count, window.fibre_fraction) == (12, pytest.approx(0.4))
 
 
@@ -147,7 +147,7 @@ def test_the_folder_of_a_result_has_the_table_of_its_case(tmp_path):
     (tmp_path / "case.toml").write_text(_toml(case))
     run(case, MPI.COMM_SELF, out=tmp_path / "run")
     assert fibre_rows.table(tmp_path / "run") == fibre_rows.table(tmp_path / "case.toml")
-    assert fibre_sources.read(tmp_path / "run", None).count == 3
+    assert fibre_statistics.pattern(tmp_path / "run", None).count == 3
 
 
 def test_voids_of_a_users_mesh_are_not_listed(tmp_path):
@@ -156,7 +156,7 @@ def test_voids_of_a_users_mesh_are_not_listed(tmp_path):
     (tmp_path / "case.toml").write_text(_toml(case_of(tmp_path, {"geometry": "mesh", "file": "cell.msh"})))
     with pytest.raises(CaseError, match="has voids, which only a case of a table or of a random cell lists"):
         fibre_rows.table(tmp_path / "case.toml")
-    assert fibre_sources.read(tmp_path / "case.toml", None).count == 2
+    assert fibre_statistics.pattern(tmp_path / "case.toml", None).count == 2
 
 
 def test_a_void_is_no_fibre_that_can_debond(tmp_path):

@@ -1,0 +1,36 @@
+"""`feti-homog run CASE.toml --out DIR`: run a case and write its results."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from feti_homog.api import folder
+from feti_homog.errors import CaseError
+
+if TYPE_CHECKING:
+    from mpi4py.MPI import Intracomm
+
+
+def add(actions: argparse._SubParsersAction[Any]) -> None:
+    """Add the command to those of a parser."""
+    parser = actions.add_parser("run", help="run a case file and write its results to a folder")
+    parser.add_argument("case", type=Path, metavar="CASE.toml")
+    parser.add_argument("--out", type=folder, required=True, metavar="DIR", help="folder of the results")
+    parser.add_argument("--quiet", action="store_true", help="print nothing but errors")
+    parser.add_argument("--resume", action="store_true", help="go on from where a path to the same folder was ended")
+    parser.set_defaults(action=_run)
+
+
+def _run(arguments: argparse.Namespace, comm: Intracomm) -> None:
+    from feti_homog.analysis.runner import run
+    from feti_homog.case import case as cases
+    from feti_homog.parallel.mpi_errors import on_root
+    from feti_homog.results import output_folder
+
+    case = on_root(comm, cases.load, arguments.case)
+    if arguments.resume and not case.section.is_followed:
+        raise CaseError(f'--resume: only for [analysis] type = "path"; this case has "{case.analysis.type}"')
+    on_root(comm, output_folder.usable, arguments.out)
+    run(case, arguments.out, comm, arguments.quiet, arguments.resume)

@@ -1,0 +1,57 @@
+"""`feti-homog sweep CASE.toml --out DIR`: run the cases of a file with [sweep]."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from feti_homog.api import folder
+from feti_homog.commands.output import print_product
+from feti_homog.errors import CaseError
+
+if TYPE_CHECKING:
+    from mpi4py.MPI import Intracomm
+
+HELP = (
+    "Expand the file into numbered cases, check all of them, and run them one after the other. Finished cases are "
+    "skipped: the same command resumes. Failed cases are kept and reported at the end, with exit code 3."
+)
+
+
+def add(actions: argparse._SubParsersAction[Any]) -> None:
+    """Add the command to those of a parser."""
+    parser = actions.add_parser("sweep", help="run the cases of a file with [sweep]", description=HELP)
+    parser.add_argument("case", type=Path, metavar="CASE.toml", help="a case file with a section [sweep]")
+    parser.add_argument("--out", type=folder, metavar="DIR", help="folder of the sweep, in which each case has its own")
+    one = parser.add_mutually_exclusive_group()
+    one.add_argument("--list", action="store_true", help="print the cases, with --out also their status; run none")
+    one.add_argument("--index", type=int, metavar="K", help="run case K alone, counted from 1, as a job array does")
+    parser.add_argument("--retry", action="store_true", help="compute again what failed before")
+    parser.add_argument(
+        "--ranks-per-case",
+        type=int,
+        metavar="R",
+        help="run as many cases at once as there are groups of R ranks (by default one, on all ranks)",
+    )
+    parser.add_argument("--quiet", action="store_true", help="print nothing but errors and what failed")
+    parser.set_defaults(action=_sweep)
+
+
+def _sweep(arguments: argparse.Namespace, comm: Intracomm) -> None:
+    from feti_homog.parallel.mpi_errors import on_root, on_root_only
+    from feti_homog.results import output_folder
+    from feti_homog.sweep import execute, plan
+
+    if arguments.out is None and not arguments.list:
+        raise CaseError("command line: the following arguments are required: --out (see --help)")
+    sweep = on_root(comm, plan.load, arguments.case)
+    if arguments.list:
+        lines = on_root_only(comm, execute.list_cases, sweep, arguments.out) or []
+        return print_product(comm, "\n".join(lines))
+    on_root(comm, output_folder.usable, arguments.out)
+    if arguments.index is None:
+        group = comm.size if arguments.ranks_per_case is None else arguments.ranks_per_case
+        execute.run_all(sweep, arguments.out, comm, group, arguments.retry, arguments.quiet)
+    else:
+        execute.run_one(sweep, arguments.index, arguments.out, comm, arguments.retry, arguments.quiet)
