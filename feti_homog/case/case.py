@@ -11,25 +11,36 @@ from typing import Any
 
 from feti_homog.case import element_sizes
 from feti_homog.case.asked import AnalysisSection, Stiffness
-from feti_homog.case.cell_files import with_files
+from feti_homog.case.cell_files import with_files, with_match
 from feti_homog.case.cell_section import GEOMETRY, TOUCHING, Cell, size_faults
 from feti_homog.case.document import read_document, to_document
-from feti_homog.case.envelope_rules import envelope_faults, read_envelope
 from feti_homog.case.envelope_section import Envelope
-from feti_homog.case.generalized_plane import generalized_faults
-from feti_homog.case.interface_rules import interface_tables, misplaced_sections, read_angle, read_interfaces
-from feti_homog.case.interface_section import Arc, InterfaceSection
-from feti_homog.case.load_rules import expansion_faults, read_load, read_path, stress_free
-from feti_homog.case.load_section import LoadPath, SingleLoad
-from feti_homog.case.matched_cell import with_match
-from feti_homog.case.material_sections import coating_faults, phase_faults, provider, read_materials
-from feti_homog.case.mixed_cell import mix_faults, void_faults
+from feti_homog.case.interface_section import Arc, InterfaceSection, interface_tables, read_interfaces
+from feti_homog.case.load_section import LoadPath, SingleLoad, expansion_faults, load_faults, stress_free
+from feti_homog.case.material_sections import (
+    coating_faults,
+    missing_expansions,
+    phase_faults,
+    provider,
+    read_materials,
+)
+from feti_homog.case.mixed_cell import mix_faults
 from feti_homog.case.mixed_load import completed
 from feti_homog.case.petsc_section import Scalar, read_petsc
-from feti_homog.case.sections import SECTIONS, Analysis, Angle, Decomposition, Output
-from feti_homog.case.selectors import ANALYSIS_TYPE, CRITERION, DRAWN_STRESS, METHOD, PLANE
+from feti_homog.case.rules import RULES
+from feti_homog.case.sections import (
+    KEY_OWNERS,
+    REQUIRED,
+    SECTIONS,
+    SECTIONS_OF_AN_ANALYSIS,
+    TOP_LEVEL,
+    Analysis,
+    Angle,
+    Decomposition,
+    Output,
+)
+from feti_homog.case.selectors import ANALYSIS_TYPE, CRITERION, METHOD, PLANE
 from feti_homog.case.sweep_section import SWEEP
-from feti_homog.case.tables import KEY_OWNERS, REQUIRED, TOP_LEVEL
 from feti_homog.errors import CaseError
 from feti_homog.materials.forms import Isotropic, Material
 from feti_homog.materials.laws import contrast_faults, contrast_warnings
@@ -175,34 +186,21 @@ def parse(values: Mapping[str, Any], folder: Path) -> Case:
     """
     document = to_document(values)
     reader = TableReader(_selected(document), KEY_OWNERS, _top_level_faults(document))
-    analysis, faults = reader.selected[ANALYSIS_TYPE], reader.faults
+    selected, faults = reader.selected, reader.faults
     cell = _read_section(document, "cell", reader)
-    faults += element_sizes.exclusions(document.get("cell"))
-    decomposition = _read_section(document, "decomposition", reader)
-    if decomposition and decomposition.subdomains and decomposition.max_dofs:
-        faults.append("[decomposition] subdomains, max_dofs: exclude each other; give one")
     sections = {
         "cell": cell and _checked_cell(with_match(cell, folder, faults), folder, faults),
-        "materials": read_materials(document.get("material"), document.get("cell"), reader.selected[PLANE], reader),
+        "materials": read_materials(document.get("material"), document.get("cell"), selected[PLANE], reader),
         "analysis": _read_section(document, "analysis", reader),
-        "decomposition": decomposition,
-    }
-    faults += misplaced_sections(document, analysis)
-    faults += generalized_faults(reader.selected)
-    sections |= {
+        "decomposition": _read_section(document, "decomposition", reader),
         "interfaces": read_interfaces(document, reader),
-        "angle": read_angle(document.get("angle"), reader),
-        "path": read_path(document.get("path"), reader),
-        "single_load": read_load(document.get("load"), reader),
-        "envelope": read_envelope(document.get("envelope"), reader),
+        **{FIELDS.get(name, name): _read_section(document, name, reader) for name in SECTIONS_OF_AN_ANALYSIS},
         "output": _read_section(document, "output", reader),
         "petsc": read_petsc(document.get("petsc", {}), faults),
     }
-    if isinstance(document.get("material"), dict) and sections["cell"]:
-        faults += coating_faults(sections["cell"], document["material"])
-    bonding = sections["envelope"], sections["interfaces"], sections["materials"]
-    faults += envelope_faults(*bonding, document, reader.selected)
-    faults += expansion_faults(sections["path"], sections["single_load"], sections["materials"])
+    for rule in RULES:
+        faults += rule.faults(document, selected)
+    faults += _relations(sections, document, selected)
     if not faults:
         faults += contrast_faults(sections["materials"], sections["analysis"].plane)
     if not faults:
@@ -212,9 +210,22 @@ def parse(values: Mapping[str, Any], folder: Path) -> Case:
     return Case(name=document.get("name", "case"), **sections)
 
 
+def _relations(sections: Mapping[str, Any], document: Mapping[str, Any], selected: Selected) -> list[str]:
+    """Faults between the values of sections, of those that are not faulty themselves."""
+    path, load, angle, envelope = (sections[name] for name in ("path", "single_load", "angle", "envelope"))
+    faults = load_faults(path, load, selected[PLANE]) + expansion_faults(path, load, sections["materials"])
+    if isinstance(document.get("material"), dict) and sections["cell"]:
+        faults += coating_faults(sections["cell"], document["material"])
+    if angle is not None and angle.strain is not None and not any(angle.strain):
+        faults.append("[angle] strain: expected a strain other than zero")
+    if envelope is not None and envelope.temperature is not None:
+        faults += missing_expansions(sections["materials"], "[envelope] temperature")
+    return faults
+
+
 def _selected(document: Mapping[str, Any]) -> Selected:
     """The values that decide which keys belong to the case."""
-    selectors = (GEOMETRY, ANALYSIS_TYPE, PLANE, METHOD, CRITERION, DRAWN_STRESS)
+    selectors = (GEOMETRY, ANALYSIS_TYPE, PLANE, METHOD, CRITERION)
     tables = dict(document) | {"interface": next(iter(interface_tables(document)), None)}
     return {s: selected_value(SECTIONS[s.section], tables.get(s.section), s.key) for s in selectors}
 
@@ -240,8 +251,8 @@ def _top_level_faults(document: Mapping[str, Any]) -> list[str]:
 
 
 def _read_section(document: Mapping[str, Any], section: str, reader: TableReader) -> Any:
-    """The dataclass of a section, or None if that is faulty or was already found to be missing."""
-    if section in REQUIRED and section not in document:
+    """The dataclass of a section, or None if it is faulty or absent."""
+    if section not in document and section in (*REQUIRED, *SECTIONS_OF_AN_ANALYSIS):
         return None
     return reader.read(SECTIONS[section], document.get(section, {}), section)
 
@@ -259,9 +270,7 @@ def _checked_cell(cell: Cell, folder: Path, faults: list[str]) -> Cell:
                 f"{limit_in_words(limit, cell.fibre_fraction, 4)} for "
                 f"geometry = {toml_value(cell.geometry)}: {reason}"
             )
-    faults += size_faults(cell) + mix_faults(cell) + void_faults(cell)
-    if cell.width is not None and cell.fibre_radius is not None:
-        faults.append("[cell] width, fibre_radius: exclude each other; give one")
+    faults += size_faults(cell) + mix_faults(cell)
     return with_files(cell, folder, faults)
 
 

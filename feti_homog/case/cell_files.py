@@ -1,4 +1,4 @@
-"""What a cell takes from files: the mesh of its user, or the table of its fibres with the size of the cell."""
+"""What a cell takes from files: a mesh, a table of its fibres with the size of the cell, or one that it matches."""
 
 from __future__ import annotations
 
@@ -10,31 +10,27 @@ import numpy as np
 
 from feti_homog.case.cell_section import Cell
 from feti_homog.case.fibre_table import FibreTable, read_table, table_of
-from feti_homog.case.section_values import MESH_FILE, MESH_SUFFIXES
+from feti_homog.case.section_values import MESH_SUFFIXES
 from feti_homog.case.table_shapes import check_hollow, with_polygons, with_shapes
 from feti_homog.errors import CaseError
 from feti_homog.schema.wording import toml_value
 
 SUFFIXES = {"mesh": MESH_SUFFIXES, "table": (".csv",)}
-FILES = {"mesh": MESH_FILE, "table": ".csv file"}
+LIST = "fibre_list"
+FEWEST_MATCHED = 10  # fibres: of fewer, distances have no distribution
 
 
 def with_files(cell: Cell, folder: Path, faults: list[str]) -> Cell:
     """The cell with its file's path completed and its table read; faults are added to `faults`."""
-    if cell.geometry not in SUFFIXES:
-        return cell
-    if cell.file is not None and cell.fibre_list is not None:
-        faults.append("[cell] file, fibre_list: exclude each other; give one")
+    if cell.geometry not in SUFFIXES or (cell.file is not None and cell.fibre_list is not None):
         return cell
     if cell.file is None:
-        return _listed(cell, faults)
+        return cell if cell.fibre_list is None else _with_table(cell, faults)
     file = Path(os.path.realpath(folder / cell.file))  # unlike resolve, no error for links in a circle
-    given = toml_value(str(cell.file))
     if file.suffix not in SUFFIXES[cell.geometry]:
-        expected = f"the name of a {FILES[cell.geometry]} for geometry = {toml_value(cell.geometry)}"
-        faults.append(f"[cell] file = {given}: expected {expected}")
-    elif words := missing(file):
-        faults.append(f"[cell] file = {given}: {words}")
+        return cell
+    if words := missing(file):
+        faults.append(f"[cell] file = {toml_value(str(cell.file))}: {words}")
     elif cell.geometry == "table":
         return _with_table(replace(cell, file=file), faults)
     return replace(cell, file=file)
@@ -47,18 +43,36 @@ def missing(file: Path) -> str:
     return f"a folder; expected a file at {file}" if os.path.isdir(file) else f"no such file (expected at {file})"
 
 
-def _listed(cell: Cell, faults: list[str]) -> Cell:
-    if cell.fibre_list is not None:
-        return _with_table(cell, faults)
-    instead = ", or fibre_list" if cell.geometry == "table" else ""
-    faults.append(f"[cell] file: missing; expected the name of a {FILES[cell.geometry]}{instead}")
-    return cell
+def with_match(cell: Cell, folder: Path, faults: list[str]) -> Cell:
+    """The cell with its table read, the path of that completed, and the number and the fraction of the table's fibres
+    where it has none of its own; faults are added to `faults`."""
+    if cell.match is None:
+        return cell
+    file, given = Path(os.path.realpath(folder / cell.match)), f"[cell] match = {toml_value(str(cell.match))}"
+    if words := missing(file):
+        faults.append(f"{given}: {words}")
+        return cell
+    from feti_homog.case.fibre_window import read_window  # loads SciPy's trees, which few cases need
+    from feti_homog.microstructure.neighbour_match import knows_neighbours
+
+    try:
+        window = read_window(file)
+    except CaseError as error:
+        faults += [f"[cell] match: {fault}" for fault in error.faults]
+        return cell
+    if not knows_neighbours(window):
+        faults.append(f"{given}: the window is too small to know the nearest and the second neighbour of any fibre")
+    if cell.fibres is None and window.count < FEWEST_MATCHED:
+        faults.append(f"[cell] fibres = {window.count}: expected at least {FEWEST_MATCHED} with match")
+    count = window.count if cell.fibres is None else cell.fibres
+    fraction = window.fibre_fraction if cell.fibre_fraction is None else cell.fibre_fraction
+    return replace(cell, match=file, matched=window, fibres=count, fibre_fraction=fraction)
 
 
 def _with_table(cell: Cell, faults: list[str]) -> Cell:
     """The cell with its table, which has the size of the cell."""
     try:
-        table = read_table(cell.file) if cell.file is not None else table_of(cell.fibre_list or (), "fibre_list")
+        table = read_table(cell.file) if cell.file is not None else table_of(cell.fibre_list or (), LIST)
     except CaseError as error:
         faults += [f"[cell] {fault}" for fault in error.faults]
         return cell
@@ -77,7 +91,7 @@ def _with_table(cell: Cell, faults: list[str]) -> Cell:
 def _size(name: str, asked: float | None, table: FibreTable, faults: list[str]) -> float | None:
     """Width or height of the cell: that of the case or that of the table, which must not differ."""
     own: float | None = getattr(table, name)
-    if asked is None and own is None:
+    if asked is None and own is None and table.name != LIST:
         faults.append(f"[cell] {name}: missing; {table.name} has no line such as # width = 120, height = 80")
     elif None not in (asked, own) and asked != own:
         faults.append(f"[cell] {name} = {asked:g}: {table.name} says {own:g}; give one")

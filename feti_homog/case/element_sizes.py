@@ -31,19 +31,6 @@ PITCH_SHARE, LARGEST = 0.5, 0.5
 MOST_REFINED = 8
 
 
-def exclusions(table: object) -> list[str]:
-    """Faults of the keys of [cell] that exclude each other, of the section as it is in the file."""
-    if not isinstance(table, Mapping):
-        return []
-    asked = [name for name in ASKED if name in table]
-    others = [name for name in CHOSEN if name in table]
-    if len(asked) > 1:
-        return [f"[cell] {', '.join(asked)}: exclude each other; give one"]
-    if asked and others:
-        return [f"[cell] {asked[0]}, {', '.join(others)}: exclude each other; {asked[0]} chooses the sizes"]
-    return []
-
-
 def with_sizes(
     cell: Cell,
     materials: Mapping[str, Material],

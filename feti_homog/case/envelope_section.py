@@ -2,37 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from feti_homog.case.asked import AnalysisSection
 from feti_homog.case.selectors import GENERALIZED
 from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES
 from feti_homog.schema.keys import key
-from feti_homog.schema.values import ValueType, integer, real
+from feti_homog.schema.values import choice, either, integer, list_of, real
 
 FAMILIES = (SPATIAL_STRESSES, SPATIAL_STRAINS)
 
 
-def _is_plane(value: Any) -> bool:
-    if not isinstance(value, list) or len(value) != 2 or not all(isinstance(name, str) for name in value):
-        return False
-    return value[0] != value[1] and any(set(value) <= set(family) for family in FAMILIES)
-
-
-def pairs_of(*families: Sequence[str]) -> dict[str, Any]:
-    """The JSON Schema of two different names of one family."""
-    of_one = [{"items": {"enum": list(family)}} for family in families]
-    return {"type": "array", "minItems": 2, "maxItems": 2, "uniqueItems": True, "anyOf": of_one}
-
-
-PLANE_OF_LOADS = ValueType(
+PLANE_OF_LOADS = either(
     f"two different names, both of stresses ({', '.join(SPATIAL_STRESSES)}) or both of strains "
     f"({', '.join(SPATIAL_STRAINS)})",
-    _is_plane,
-    tuple,
-    pairs_of(*FAMILIES),
+    *(list_of(choice(*family), "", count=2, unique=True) for family in FAMILIES),
 )
 
 

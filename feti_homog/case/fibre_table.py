@@ -13,8 +13,9 @@ import numpy as np
 
 from feti_homog.case.phase_names import VOID
 from feti_homog.case.rounded_polygons import RoundedPolygons
+from feti_homog.case.section_values import FIBRE_CELLS
 from feti_homog.errors import CaseError
-from feti_homog.schema.values import is_number, real
+from feti_homog.schema.values import is_number
 from feti_homog.schema.wording import suggestion, toml_value
 from feti_homog.typing import Bool, Float, Int
 
@@ -25,11 +26,6 @@ SIZES = ("width", "height", "left", "bottom")
 OF_FIBRES = ("coating", "inner_radius")
 PHASE_NAME = re.compile(r"[A-Za-z0-9_:-]+")
 SIZE = re.compile(r"\b(width|height|left|bottom)\s*[=:]\s*([^\s;=]+?)(?=,?\s|,?$|;|,[a-z])")
-TYPES = (
-    dict.fromkeys(("x", "y", "angle"), real())
-    | dict.fromkeys(("radius", "a", "b"), real(above=0.0))
-    | dict.fromkeys(("coating", "inner_radius", "sides", "corner"), real(least=0.0))
-)
 # Faults that are told one by one.
 MAX_FAULTS = 30
 
@@ -287,7 +283,7 @@ def _cell_faults(cells: Mapping[str, Any]) -> Iterator[str]:
         if key not in cells:
             yield f"{key}: no value; expected a number"
     for key in NUMBERS:
-        complaint = TYPES[key].complaint(cells.get(key, 1.0))
+        complaint = FIBRE_CELLS[key].complaint(cells.get(key, 1.0))
         if complaint:
             yield f"{key} = {toml_value(cells[key])}: {complaint}"
     phase = cells.get("phase", "fibre")

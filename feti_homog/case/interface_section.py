@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
-from feti_homog.case.section_values import ARCS, FIBRES, PAIR, STIFFNESS, STRENGTH, TOUGHNESS
-from feti_homog.case.selectors import ANALYSIS_TYPE, BREAKING, BY_ENERGY, GENERALIZED
-from feti_homog.schema.keys import key
-from feti_homog.schema.values import POSITIVE_OR_INF, boolean, choice, real
+from feti_homog.case.section_values import FIBRES, PAIR, STIFFNESS, STRENGTH, TOUGHNESS
+from feti_homog.case.selectors import ANALYSIS_TYPE, BREAKING, BY_ENERGY, BY_STRENGTH, GENERALIZED
+from feti_homog.schema.keys import TableReader, key
+from feti_homog.schema.values import POSITIVE_OR_INF, boolean, choice, list_of, real, table_of
+from feti_homog.schema.wording import toml_value
 
 STIFFNESSES = ("normal_stiffness", "tangential_stiffness")
 STRENGTHS = ("normal_strength", "tangential_strength", "axial_strength")
+COMMON = ("contact", "criterion", "growth")
+"""The keys in which all sections [[interface]] agree."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,6 +42,9 @@ class Arc:
         unit="degrees",
         only=ANALYSIS_TYPE.among("stiffness", "path", "load", "envelope"),
     )
+
+
+ARCS = list_of(table_of(Arc, "arc", ""), "a list of arcs {fibre, centre, angle}")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,7 +95,7 @@ class InterfaceSection:
         unit="stress",
         default=None,
         default_words="inf",
-        only=BREAKING,
+        only=(BREAKING, BY_STRENGTH),
     )
     tangential_strength: float | None = key(
         STRENGTH,
@@ -95,15 +103,15 @@ class InterfaceSection:
         unit="stress",
         default=None,
         default_words="inf",
-        only=BREAKING,
+        only=(BREAKING, BY_STRENGTH),
     )
     axial_strength: float | None = key(
         POSITIVE_OR_INF,
-        'R^a: the traction along the fibre at which a bond breaks; inf: it breaks none; in plane = "generalized".',
+        "R^a: the traction along the fibre at which a bond breaks; inf: it breaks none.",
         unit="stress",
         default=None,
         default_words="tangential_strength",
-        only=BREAKING,
+        only=(BREAKING, GENERALIZED, BY_STRENGTH),
     )
     criterion: str = key(
         choice("max", "quadratic", "energy"),
@@ -141,3 +149,48 @@ class InterfaceSection:
         default=None,
         default_words="the matrix and all others",
     )
+
+
+def interface_tables(document: Mapping[str, Any]) -> list[Any]:
+    """The section [interface], or all of several sections [[interface]]; none if there is none."""
+    given = document.get("interface", [])
+    return given if isinstance(given, list) else [given]
+
+
+def interface_label(number: int, count: int) -> str:
+    """What faults call an interface of so many; the numbers are from 0, the labels from 1."""
+    return "interface" if count == 1 else f"interface {number + 1}"
+
+
+def read_interfaces(document: Mapping[str, Any], reader: TableReader) -> tuple[InterfaceSection, ...] | None:
+    """The sections of interfaces with their arcs, in the order of the file; None if one is faulty."""
+    tables = interface_tables(document)
+    if document.get("interface") == []:
+        reader.faults.append("interface = []: expected a section [interface]")
+    read = [reader.read(InterfaceSection, table, interface_label(n, len(tables))) for n, table in enumerate(tables)]
+    interfaces = tuple(interface for interface in read if interface is not None)
+    if len(interfaces) < len(tables):
+        return None
+    reader.faults += _faults_between(interfaces)
+    return interfaces
+
+
+def _faults_between(interfaces: tuple[InterfaceSection, ...]) -> list[str]:
+    """Faults of several sections: pairs that are missing or named twice, and keys that must agree."""
+    faults: list[str] = []
+    first: dict[frozenset[str], int] = {}
+    for number, interface in enumerate(interfaces[: None if len(interfaces) > 1 else 0]):
+        label = interface_label(number, len(interfaces))
+        if interface.between is None:
+            faults.append(f"[{label}] between: missing; of several [[interface]] each needs {PAIR.expected}")
+            continue
+        other = first.setdefault(frozenset(interface.between), number)
+        if other != number:
+            pair = toml_value(list(interface.between))
+            faults.append(f"[{label}] between = {pair}: expected another pair than [interface {other + 1}] has")
+        for name in COMMON:
+            value, common = getattr(interface, name), getattr(interfaces[0], name)
+            if value != common:
+                expected = f"expected {toml_value(common)}, as of [interface 1]"
+                faults.append(f"[{label}] {name} = {toml_value(value)}: {expected}: all interfaces agree in it")
+    return faults

@@ -7,19 +7,23 @@ fraction at which fibres touch, are beyond a schema: `feti-homog check` knows th
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from feti_homog.case.cell_section import ALL_CIRCULAR, GEOMETRY
 from feti_homog.case.interface_section import Arc
-from feti_homog.case.json_schema_rules import Schema, rules_of_one_case
-from feti_homog.case.mixed_load import MixedLoad
+from feti_homog.case.material_sections import CONSTANTS
+from feti_homog.case.mixed_load import TEMPERATURE, MixedLoad
 from feti_homog.case.petsc_section import PREFIXED
-from feti_homog.case.phase_names import PHASE
-from feti_homog.case.sections import SECTIONS
+from feti_homog.case.phase_names import COATING, FIBRE, MATRIX, PHASE
+from feti_homog.case.rules import PLACES_OF_LOADS, RULES
+from feti_homog.case.sections import REQUIRED, SECTIONS, TOP_LEVEL
+from feti_homog.case.selectors import ANALYSIS_TYPE, CRITERION, GENERALIZED, METHOD, PLANE
 from feti_homog.case.sweep_section import AXIS_MEANING, RANGE_KEYS, SWEEP, SweepSection
-from feti_homog.case.tables import TOP_LEVEL
-from feti_homog.materials.forms import MATERIAL_FORMS
-from feti_homog.schema.keys import Key, defaults_of, keys_of
+from feti_homog.materials.forms import EXPANSION_PAIR, MATERIAL_FORMS
+from feti_homog.materials.laws import NEEDED
+from feti_homog.schema.keys import Condition, Key, Selector, defaults_of, keys_of
+from feti_homog.schema.rules import ITEMS, Rule, Schema
 from feti_homog.schema.values import text
 
 AXIS_VALUES = {"type": "array", "minItems": 1}
@@ -52,7 +56,7 @@ def json_schema() -> Schema:
             "range": _object({name: _key(entry) for name, entry in RANGE_KEYS.items()}) | {"required": ["from", "to"]},
         },
         "if": {"not": {"required": [SWEEP]}},
-        "then": rules_of_one_case(),
+        "then": _rules_of_one_case(),
     }
 
 
@@ -112,3 +116,143 @@ def _axis() -> Schema:
     """A list of values, a range, or a table of axes."""
     no_range = {"not": {"anyOf": [{"required": ["from"]}, {"required": ["to"]}]}}
     return {"description": AXIS_MEANING, "anyOf": [AXIS_VALUES, _reference("range"), AXIS_TABLE | no_range]}
+
+
+def _rules_of_one_case() -> Schema:
+    """What must be given, by conditions that are independent of each other."""
+    required = [_required(path, contents) for path, contents in _tables()]
+    selectors = (GEOMETRY, ANALYSIS_TYPE, PLANE, METHOD, CRITERION)
+    conditional = [_keys_of_a_value(selector, value) for selector in selectors for value in _values(selector)]
+    shared = [_rule(rule) for rule in RULES]
+    return {"required": list(REQUIRED), "allOf": [*filter(None, required), *conditional, *shared, *_material_rules()]}
+
+
+def _tables() -> Iterator[tuple[tuple[str, ...], type[Any]]]:
+    """The way to each table with keys that may be conditional, and the table."""
+    for section, contents in SECTIONS.items():
+        yield (section,), contents
+    yield ("interface", "debonded", ITEMS), Arc
+    for place in PLACES_OF_LOADS:
+        yield place, MixedLoad
+
+
+def _rule(rule: Rule) -> Schema:
+    """A rule that the reader has too."""
+    schema = _at(rule.path, rule.schema)
+    return {"if": {"allOf": [_if(condition) for condition in rule.when]}, "then": schema} if rule.when else schema
+
+
+def _at(path: Sequence[str], schema: Schema) -> Schema:
+    """The schema for what stands at a path, if it is there."""
+    for name in reversed(path):
+        if name == ITEMS:
+            schema = {"items": schema}
+        else:
+            schema = {"properties": {name: _each_or_one(schema) if name == "interface" else schema}}
+    return schema
+
+
+def _each_or_one(schema: Schema) -> Schema:
+    """The schema of a section, or of each of several."""
+    return {"if": {"type": "array"}, "then": {"items": schema}, "else": schema}
+
+
+def _required(path: Sequence[str], contents: type[Any]) -> Schema:
+    """The keys that a table always has; empty if there are none."""
+    names = [name for name, entry in keys_of(contents).items() if entry.required and not entry.only]
+    return _at(path, {"required": names}) if names else {}
+
+
+def _values(selector: Selector) -> Sequence[str]:
+    values: Sequence[str] = keys_of(SECTIONS[selector.section])[selector.key].type.json_schema["enum"]
+    return values
+
+
+def _if(condition: Condition) -> Schema:
+    """That a selector has one of some values; its default if it is not given."""
+    selector = condition.selector
+    default = defaults_of(SECTIONS[selector.section]).get(selector.key)
+    has_value: Schema = {"properties": {selector.key: {"enum": list(condition.values)}}}
+    if default not in condition.values:
+        has_value["required"] = [selector.key]
+    if selector.section == "interface":  # the first of several, for all agree
+        has_value = {"if": {"type": "array"}, "then": {"prefixItems": [has_value]}, "else": has_value}
+    return {"properties": {selector.section: has_value}, "required": [selector.section]}
+
+
+def _keys_of_a_value(selector: Selector, value: str) -> Schema:
+    """What follows from a selector's value: required keys, and those that belong to other values."""
+    consequences = [_consequence(path, keys_of(contents), selector, value) for path, contents in _tables()]
+    return {"if": _if(selector.among(value)), "then": {"allOf": [*filter(None, consequences)]}}
+
+
+def _consequence(path: Sequence[str], keys: Mapping[str, Key], selector: Selector, value: str) -> Schema:
+    own = {name: entry for name, entry in keys.items() if selector in [each.selector for each in entry.only]}
+    required = [
+        _presence(name, entry) for name, entry in own.items() if entry.required and _fits(entry, selector, value)
+    ]
+    excluded = {name: False for name, entry in own.items() if not _fits(entry, selector, value)}
+    return _at(path, {"properties": excluded} | ({"allOf": required} if required else {})) if own else {}
+
+
+def _fits(entry: Key, selector: Selector, value: str) -> bool:
+    return all(value in condition.values for condition in entry.only if condition.selector == selector)
+
+
+def _presence(name: str, entry: Key) -> Schema:
+    """That a key is there, or one that it is not required beside."""
+    there: list[Schema] = [{"required": [each]} for each in (name, *entry.unless)]
+    return {"anyOf": there} if entry.unless else there[0]
+
+
+def _material_rules() -> list[Schema]:
+    """Which constants and phases belong together."""
+    complete = [
+        {"required": [name for name, entry in keys_of(contents).items() if entry.required]}
+        for contents in MATERIAL_FORMS.values()
+    ]
+    axial, transverse = EXPANSION_PAIR
+    expansions = {
+        "dependentRequired": {axial: [transverse], transverse: [axial]},
+        "not": {"required": ["expansion", axial]},
+    }
+    phases = {"required": [MATRIX], "additionalProperties": {"anyOf": complete} | expansions}
+    temperatures = (("envelope", TEMPERATURE), *((*place, TEMPERATURE) for place in PLACES_OF_LOADS))
+    warm = {"anyOf": [_there(path) for path in temperatures]}
+    expand = {"anyOf": [{"required": [name]} for name in ("expansion", axial)]}
+    of_circles = {"propertyNames": {"not": {"pattern": ":"}}}
+    of_one_phase = {"required": [FIBRE], "propertyNames": {"enum": [MATRIX, FIBRE, COATING]}}
+    unmixed = {"allOf": [_if(ALL_CIRCULAR), {"not": _at(("cell",), {"required": ["mix"]})}]}
+    coated = _at(("cell",), {"required": ["coating"]})
+    uncoated = {"allOf": [_if(ALL_CIRCULAR), {"not": coated}]}
+    return [
+        _at(("material",), phases | {"propertyNames": {"not": {"enum": sorted(CONSTANTS)}}}),
+        {"if": _if(ALL_CIRCULAR), "then": _at(("material",), of_circles)},
+        {"if": unmixed, "then": _at(("material",), of_one_phase)},
+        {"if": warm, "then": _each_material(expand)},
+        *(_needs(form, plane, names) for form, planes in NEEDED.items() for plane, names in planes.items()),
+        {"if": _if(GENERALIZED), "then": _each_material({"properties": {"stiffness": {"minItems": 6}}})},
+        {"if": coated, "then": _at(("material",), {"required": [COATING]})},
+        {"if": uncoated, "then": _at(("material",), {"properties": {COATING: False}})},
+        _at(("interface",), {"if": {"minItems": 2}, "then": {"items": {"required": ["between"]}}}),
+    ]
+
+
+def _each_material(schema: Schema) -> Schema:
+    return _at(("material",), {"additionalProperties": schema})
+
+
+def _needs(form: type[Any], plane: str, names: Sequence[str]) -> Schema:
+    """What a plane state needs of a form of material, which is told by a key that it always has."""
+    own = next(name for name, entry in keys_of(form).items() if entry.required)
+    of_form = {"if": {"required": [own]}, "then": {"required": [*names]}}
+    return {"if": _if(PLANE.among(plane)), "then": _each_material(of_form)}
+
+
+def _there(path: Sequence[str]) -> Schema:
+    """That there is something at a path, of a list in any of its items."""
+    schema: Schema = {}
+    for name in reversed(path):
+        schema = {"contains": schema} if name == ITEMS else {"required": [name], "properties": {name: schema}}
+        schema |= {"type": "array" if name == ITEMS else "object"}
+    return schema

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import ClassVar
 
 from feti_homog.case.asked import AnalysisSection
-from feti_homog.case.mixed_load import MixedLoad, Strain
-from feti_homog.case.section_values import LOAD, STRAIN, WAYPOINTS
+from feti_homog.case.material_sections import missing_expansions
+from feti_homog.case.mixed_load import LOAD, TEMPERATURE, WAYPOINTS, MixedLoad, Strain, completed, first_named, named
+from feti_homog.case.section_values import STRAIN
 from feti_homog.case.selectors import BY_EVENTS, BY_INCREMENTS, IN_THE_PLANE
+from feti_homog.materials.forms import Material
 from feti_homog.schema.keys import key
 from feti_homog.schema.values import choice, integer
+from feti_homog.schema.wording import toml_value
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,3 +93,54 @@ class SingleLoad(AnalysisSection):
     def placed(self) -> Mapping[str, Strain | MixedLoad]:
         """The load."""
         return {"to": self.to}
+
+
+def load_faults(path: LoadPath | None, load: SingleLoad | None, plane: str | None) -> list[str]:
+    """Faults of loads that are zero or repeat the last one, and of too few increments; None is a faulty plane state."""
+    if load is not None and not any(load.to.named.values()):
+        return [f"[load] to = {_in_words(load.to)}: expected a load other than zero"]
+    if path is None:
+        return []
+    faults = []
+    if plane is not None and [path.strain, path.to, path.waypoints].count(None) == 2:
+        faults = _repeated_loads(path, plane)
+    if path.increments is not None and path.increments < len(path.targets):
+        faults.append(f"[path] increments = {path.increments}: expected at least one for each waypoint")
+    return faults
+
+
+def _repeated_loads(path: LoadPath, plane: str) -> list[str]:
+    """Faults of waypoints at which the path already is."""
+    placed = path.placed
+    loads = completed(path.targets, plane)
+    is_last = [not any(loads[0].values()), *(before == after for before, after in pairwise(loads))]
+    last = ["zero, where the path begins", *placed]
+    return [
+        f"[path] {place} = {_in_words(load)}: expected a {_noun(load)} other than {last[k]}"
+        for k, (place, load) in enumerate(placed.items())
+        if is_last[k]
+    ]
+
+
+def _in_words(load: Strain | MixedLoad) -> str:
+    return toml_value(load.named if isinstance(load, MixedLoad) else list(load))
+
+
+def _noun(load: Strain | MixedLoad) -> str:
+    return "load" if isinstance(load, MixedLoad) else "strain"
+
+
+def expansion_faults(path: LoadPath | None, load: SingleLoad | None, materials: Mapping[str, Material]) -> list[str]:
+    """Faults of phases that do not say how they expand, where a load names a temperature."""
+    placed: dict[str, Strain | MixedLoad] = {} if load is None else {"[load] to": load.to}
+    placed |= {} if path is None else {f"[path] {place}": each for place, each in path.placed.items()}
+    place = next((place for place, load in placed.items() if TEMPERATURE in named(load)), None)
+    return [] if place is None else missing_expansions(materials, f"{place}.{TEMPERATURE}")
+
+
+def stress_free(section: str, placed: Mapping[str, Strain | MixedLoad], plane: str) -> tuple[str, ...]:
+    """Which components are free of stress because no load of a section names them, or none so far; a line each."""
+    first = first_named(tuple(placed.values()), plane)
+    words = ["", *(f"stress-free until {place}" for place in [*placed][1:]), "never named: stress-free"]
+    unnamed = {k: [name for name, number in first.items() if number == k] for k in range(1, len(words))}
+    return tuple(f"[{section}] {', '.join(names)}: {words[k]}" for k, names in unnamed.items() if names)

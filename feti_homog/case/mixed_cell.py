@@ -7,7 +7,6 @@ from math import fsum, pi, sqrt
 import numpy as np
 
 from feti_homog.case.cell_section import Cell
-from feti_homog.schema.keys import keys_of
 from feti_homog.schema.wording import toml_value
 
 FEWEST = 0.5  # fibres of a phase, below which one would be another phase's worth
@@ -53,13 +52,6 @@ def fractions_in_words(cell: Cell) -> str:
     return f"{fibres}, voids = {cell.voids:g}" if cell.voids else fibres
 
 
-def void_faults(cell: Cell) -> list[str]:
-    """What is wrong with the keys of voids together."""
-    if cell.voids is None:
-        return [] if cell.void_radius is None else ["[cell] void_radius: belongs to voids, which is missing"]
-    return ["[cell] match, voids: exclude each other; cells that match a table have no voids"] if cell.match else []
-
-
 def mixed_width(cell: Cell) -> float | None:
     """Width of the cell, or None where `fibre_radius` or the default make it: the one in which `fibres` fibres have
     these radii and fractions, W^2 = sum n_p pi r_p^2 / sum c_p."""
@@ -70,15 +62,15 @@ def mixed_width(cell: Cell) -> float | None:
 
 
 def mix_faults(cell: Cell) -> list[str]:
-    """What is wrong with the keys of a mix together."""
+    """What is wrong with the numbers of a mix together."""
     if cell.mix is None:
-        return [] if cell.radii is None else ["[cell] radii: belongs to mix, which is missing; use fibre_radius"]
-    own = "match" if cell.match is not None else "fibre_fraction"  # match brings a fraction along
-    faults = [] if getattr(cell, own) is None else [f"[cell] {own}, mix: exclude each other; give one"]
-    given = f"[cell] mix = {toml_value(dict(cell.mix))}"
+        return []
+    faults, given = [], f"[cell] mix = {toml_value(dict(cell.mix))}"
     if fsum(cell.mix.values()) >= 1:
         faults.append(f"{given}: expected a sum below 1")
-    faults += [] if cell.radii is None else _radii_faults(cell)
+    if cell.radii is not None and set(cell.radii) != set(cell.mix):
+        expected = ", ".join(cell.mix)
+        faults.append(f"[cell] radii = {toml_value(dict(cell.radii))}: expected a radius of each of mix: {expected}")
     if faults:
         return faults
     return [
@@ -86,20 +78,3 @@ def mix_faults(cell: Cell) -> list[str]:
         for phase, expected in _expected_counts(cell).items()
         if expected < FEWEST
     ]
-
-
-def _radii_faults(cell: Cell) -> list[str]:
-    """Faults of radii, which are those of the mix and say, with the number of fibres, how wide the cell is."""
-    assert cell.mix is not None and cell.radii is not None
-    faults = []
-    if set(cell.radii) != set(cell.mix):
-        expected = ", ".join(cell.mix)
-        faults.append(f"[cell] radii = {toml_value(dict(cell.radii))}: expected a radius of each of mix: {expected}")
-    if cell.fibre_radius is not None:
-        faults.append("[cell] fibre_radius, radii: exclude each other; give one")
-    if cell.fibres is not None and cell.width is not None:
-        faults.append("[cell] fibres, width: exclude each other beside radii; one follows from the other")
-    if cell.fibres is None and cell.width is None:
-        words = keys_of(Cell)["fibres"].type.expected
-        faults.append(f"[cell] fibres: missing; expected {words}, or the width of the cell")
-    return faults

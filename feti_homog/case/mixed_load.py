@@ -8,20 +8,21 @@ from dataclasses import dataclass
 from itertools import accumulate
 from typing import Any
 
+from feti_homog.case.section_values import STRAIN, STRAIN_COMPONENTS
 from feti_homog.case.selectors import GENERALIZED
 from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES, STRAINS, STRESSES
 from feti_homog.schema.keys import Condition, key
-from feti_homog.schema.values import real
+from feti_homog.schema.values import either, list_of, real, table_of
 
 TEMPERATURE = "temperature"
 Strain = tuple[float, ...]
 
 
-def _strain(name: str, only: Condition | None = None) -> Any:
+def _strain(name: str, *only: Condition) -> Any:
     return key(real(), f"Macroscopic strain {name}.", default=None, only=only)
 
 
-def _stress(name: str, only: Condition | None = None) -> Any:
+def _stress(name: str, *only: Condition) -> Any:
     return key(real(), f"Macroscopic stress {name}.", unit="stress", default=None, only=only)
 
 
@@ -56,6 +57,12 @@ class MixedLoad:
         """The values that are given, by name."""
         values = ((each.name, getattr(self, each.name)) for each in dataclasses.fields(self))
         return {name: value for name, value in values if value is not None}
+
+
+LOAD = table_of(MixedLoad, "mixed_load", "a table of strains and stresses such as {S11 = 60.0, S22 = 0.0}", least=1)
+WAYPOINTS = list_of(
+    either("", STRAIN, LOAD), f"a list of strains {STRAIN_COMPONENTS} or of tables such as {{S11 = 60.0}}", least=1
+)
 
 
 def components(plane: str) -> tuple[tuple[str, str], ...]:

@@ -9,9 +9,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from feti_homog.case.petsc_section import OPTION_EXPECTED
-from feti_homog.case.sections import SECTIONS_OF_AN_ANALYSIS
+from feti_homog.case.sections import SECTIONS_OF_AN_ANALYSIS, TABLES, Table
 from feti_homog.case.sweep_section import AXIS_EXPECTED, AXIS_MEANING, RANGE_KEYS, SWEEP, SweepSection
-from feti_homog.case.tables import TABLES, Table
 from feti_homog.errors import CaseError
 from feti_homog.materials.forms import Isotropic
 from feti_homog.schema.keys import Key, keys_of
@@ -111,8 +110,8 @@ def _rows(section: str, place: str, keys: Mapping[str, Key]) -> tuple[KeyRow, ..
 
 
 def _row(section: str, place: str, name: str, entry: Key) -> KeyRow:
-    conditions = [SECTIONS_OF_AN_ANALYSIS.get(section), entry.only]
-    applies = ", ".join(condition.in_words(section) for condition in conditions if condition is not None)
+    of_section = [SECTIONS_OF_AN_ANALYSIS[section]] if section in SECTIONS_OF_AN_ANALYSIS else []
+    applies = ", ".join(condition.in_words(section) for condition in (*of_section, *entry.only))
     default = "required" if entry.required and not entry.unless else entry.default
     return KeyRow(section, place, name, entry.type.expected, entry.unit, default, applies, entry.meaning)
 

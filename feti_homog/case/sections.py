@@ -8,12 +8,13 @@ from typing import Any
 from feti_homog.case.asked import AnalysisSection
 from feti_homog.case.cell_section import Cell
 from feti_homog.case.envelope_section import Envelope
-from feti_homog.case.interface_section import InterfaceSection
+from feti_homog.case.interface_section import Arc, InterfaceSection
 from feti_homog.case.load_section import LoadPath, SingleLoad
-from feti_homog.case.mixed_load import Strain
+from feti_homog.case.mixed_load import MixedLoad, Strain
 from feti_homog.case.section_values import OPENINGS, STATES, STRAIN
 from feti_homog.case.selectors import ANGLE_ANALYSIS, ENVELOPE_ANALYSIS, IN_THE_PLANE, LOAD_ANALYSIS, PATH_ANALYSIS
-from feti_homog.schema.keys import key
+from feti_homog.materials.forms import MATERIAL_FORMS
+from feti_homog.schema.keys import key, keys_of
 from feti_homog.schema.values import boolean, choice, integer, real, text
 
 OUT_OF_PLANE_STRESSES = ("S33", "S23", "S13")
@@ -128,3 +129,40 @@ SECTIONS_OF_AN_ANALYSIS = {
     "envelope": ENVELOPE_ANALYSIS,
 }
 """Sections that must be given for one type of analysis, and belong to no other."""
+
+REQUIRED = ("cell", "material", "analysis")
+TOP_LEVEL = (*SECTIONS, "material", "petsc", "name")
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table.
+
+    Attributes:
+        section: the section in which it stands.
+        place: its place in the file, in words.
+        contents: the dataclass that lists its keys.
+        form: which of several forms of the table this is, empty if there is one.
+    """
+
+    section: str
+    place: str
+    contents: type[Any]
+    form: str = ""
+
+
+TABLES = (
+    *(Table(section, f"[{section}]", contents) for section, contents in SECTIONS.items()),
+    *(Table("material", "[material.PHASE]", contents, form) for form, contents in MATERIAL_FORMS.items()),
+    Table("interface", "an arc of [interface] debonded", Arc),
+    Table("path", "a load of [path] to or waypoints", MixedLoad),
+    Table("load", "[load] to", MixedLoad),
+)
+
+
+def _places(name: str) -> str:
+    return " or ".join(table.place for table in TABLES if name in keys_of(table.contents))
+
+
+KEY_OWNERS = {name: _places(name) for table in TABLES for name in keys_of(table.contents)}
+"""By key, the tables to which it belongs, in words."""

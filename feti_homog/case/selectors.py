@@ -12,7 +12,7 @@ CRITERION = Selector("interface", "criterion")
 ANGLE_ANALYSIS, PATH_ANALYSIS = ANALYSIS_TYPE.among("angle"), ANALYSIS_TYPE.among("path")
 LOAD_ANALYSIS = ANALYSIS_TYPE.among("load")
 ENVELOPE_ANALYSIS, BREAKING = ANALYSIS_TYPE.among("envelope"), ANALYSIS_TYPE.among("path", "envelope")
-BY_ENERGY = CRITERION.among("energy")
+BY_ENERGY, BY_STRENGTH = CRITERION.among("energy"), CRITERION.among("max", "quadratic")
 
 DRAWN_STRESS = Selector("output", "stress")
 

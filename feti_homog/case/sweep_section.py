@@ -20,7 +20,7 @@ AXIS_MEANING = (
 
 
 def _range_key(type_: ValueType, meaning: str, *, default: str = "", required: bool = False) -> Key:
-    return Key(type_, meaning, unit="", default=default, only=None, required=required)
+    return Key(type_, meaning, unit="", default=default, only=(), required=required)
 
 
 RANGE_KEYS = {

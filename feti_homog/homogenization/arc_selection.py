@@ -9,8 +9,7 @@ from itertools import product
 import numpy as np
 
 from feti_homog.case.case import Case
-from feti_homog.case.interface_rules import interface_label
-from feti_homog.case.interface_section import Arc
+from feti_homog.case.interface_section import Arc, interface_label
 from feti_homog.homogenization import tips
 from feti_homog.interface.tips import debonded_arcs
 from feti_homog.interface.tips.debonded_arcs import MovedTips

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from feti_homog.case.case import Case
-from feti_homog.case.interface_rules import interface_label
+from feti_homog.case.interface_section import interface_label
 from feti_homog.schema.wording import toml_value
 from feti_homog.typing import AnyInt, Int
 

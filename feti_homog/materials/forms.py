@@ -3,31 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from feti_homog.schema.keys import key
-from feti_homog.schema.values import ValueType, is_number, is_number_list, list_of, numbers, real, to_floats
+from feti_homog.schema.values import either, list_of, real
 
 Matrix = tuple[tuple[float, ...], ...]
 
 
-def _is_stiffness(value: Any) -> bool:
-    return isinstance(value, list) and len(value) in (3, 6) and all(is_number_list(row, len(value)) for row in value)
-
-
 POSITIVE = real(above=0.0)
-MATRIX = ValueType(
+MATRIX = either(
     "a symmetric 3x3 array of numbers in the order 11, 22, 12, or 6x6 in the order 11, 22, 33, 23, 13, 12",
-    _is_stiffness,
-    lambda v: tuple(map(to_floats, v)),
-    {"anyOf": [list_of(3, numbers(3)), list_of(6, numbers(6))]},
+    *(list_of(list_of(real(), "", count=size), "", count=size) for size in (3, 6)),
 )
-EXPANSION = ValueType(
-    "a number or a list of three numbers",
-    lambda v: is_number(v) or is_number_list(v, 3),
-    lambda v: to_floats(v) if isinstance(v, list) else float(v),
-    {"anyOf": [real().json_schema, numbers(3)]},
-)
+EXPANSION = either("a number or a list of three numbers", real(), list_of(real(), "", count=3))
 PER_TEMPERATURE = "1 / temperature"
 EXPANSION_PAIR = ("expansion_axial", "expansion_transverse")
 """Keys that are given together, in place of one expansion."""

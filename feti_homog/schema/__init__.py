@@ -1,4 +1,5 @@
-"""Tables of keys: what each key accepts and means, tables read with all of their faults, and the words of faults.
+"""Tables of keys: types of values, tables read with all of their faults, relations between keys, words of faults.
 
-May use `errors` and `typing`.  Main entries: `keys.key`, `keys.TableReader`; `values` has the types of values.
+May use `errors` and `typing`.  Main entries: `values`, types each with words, test and JSON Schema; `keys.key`,
+`keys.TableReader`; `rules.Rule`.
 """

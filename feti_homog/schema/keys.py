@@ -56,7 +56,7 @@ class Key:
         meaning: a sentence or two for the reference.
         unit: of the value, empty if it has none.
         default: in words; empty if there is none.
-        only: when it belongs to the table; always, if None.
+        only: when it belongs to the table: all of these conditions hold.
         required: whether it must be there where it belongs.
         instead: what to write where it does not belong; empty if there is nothing like it.
         unless: other keys of the table, beside any of which it is not required.
@@ -66,14 +66,22 @@ class Key:
     meaning: str
     unit: str
     default: str
-    only: Condition | None
+    only: tuple[Condition, ...]
     required: bool
     instead: str = ""
     unless: tuple[str, ...] = ()
 
     def belongs(self, selected: Selected) -> bool:
         """Whether the key belongs to the table; not, if that depends on a faulty selector."""
-        return self.only is None or selected.get(self.only.selector) in self.only.values
+        return all(selected.get(condition.selector) in condition.values for condition in self.only)
+
+    def owner(self, selected: Selected, section: str) -> str:
+        """To what the key belongs, if that is another case than the one selected; else empty."""
+        for condition in self.only:
+            found = selected.get(condition.selector)
+            if found is not None and found not in condition.values:
+                return f"{condition.in_words(section)}, not {toml_value(found)}"
+        return ""
 
 
 def key(
@@ -83,18 +91,19 @@ def key(
     unit: str = "",
     default: Any = dataclasses.MISSING,
     default_words: str = "",
-    only: Condition | None = None,
+    only: Condition | tuple[Condition, ...] = (),
     instead: str = "",
     unless: tuple[str, ...] = (),
 ) -> Any:
     """A dataclass field read from the key of its name; required where it belongs if it has no default.
 
-    `default_words` tells what a default of None stands for.
+    `default_words` stand for a default of None.
     """
+    conditions = only if isinstance(only, tuple) else (only,)
     required = default is dataclasses.MISSING
     words = default_words or ("" if required or default is None else _default_in_words(default))
-    metadata = {"key": Key(type_, meaning, unit, words, only, required, instead, unless)}
-    if required and only is None:
+    metadata = {"key": Key(type_, meaning, unit, words, conditions, required, instead, unless)}
+    if required and not conditions:
         return dataclasses.field(metadata=metadata)
     return dataclasses.field(default=None if required else default, metadata=metadata)
 
@@ -143,16 +152,29 @@ class TableReader:
         if not isinstance(table, dict):
             self.faults.append(f"{section} = {toml_value(table)}: expected a section [{section}]")
             return None
-        keys = keys_of(table_class)
+        keys, before = keys_of(table_class), len(self.faults)
         unknown = {
             name: f" = {toml_value(value)}: unknown key; {suggestion(name, keys, self.owners)}"
             for name, value in table.items()
             if name not in keys
         }
         known = {name: self._fault(name, entry, table, section) for name, entry in keys.items()}
-        lines = [f"[{section}] {prefix}{toml_key(name)}{words}" for name, words in (unknown | known).items() if words]
-        self.faults += lines
-        return None if lines else table_class(**{name: keys[name].type.store(value) for name, value in table.items()})
+        faulty = {name: words for name, words in (unknown | known).items() if words}
+        self.faults += [f"[{section}] {prefix}{toml_key(name)}{words}" for name, words in faulty.items()]
+        values = {
+            name: self._stored(keys[name].type, value, section, f"{prefix}{name}")
+            for name, value in table.items()
+            if name in keys and keys[name].type.accepts(value)
+        }
+        return table_class(**values) if len(self.faults) == before else None
+
+    def _stored(self, type_: ValueType, value: Any, section: str, place: str) -> Any:
+        """A right value as its dataclass keeps it, with the tables in it read."""
+        if type_.item is not None:
+            return tuple(self._stored(type_.item, item, section, f"{place}[{k}]") for k, item in enumerate(value))
+        if type_.table is not None and isinstance(value, dict):
+            return self.read(type_.table, value, section, f"{place}.")
+        return type_.store(value)
 
     def _fault(self, name: str, entry: Key, table: Mapping[str, Any], section: str) -> str:
         """What is wrong with one known key, empty if nothing."""
@@ -160,11 +182,9 @@ class TableReader:
             missing = entry.required and not {*entry.unless} & {*table} and entry.belongs(self.selected)
             return f": missing; expected {entry.type.expected}" if missing else ""
         line = f" = {toml_value(table[name])}: "
-        if entry.only is not None and not entry.belongs(self.selected):
-            found = self.selected.get(entry.only.selector)
-            if found is not None:
-                instead = f"; use {entry.instead}" if entry.instead else ""
-                return f"{line}belongs to {entry.only.in_words(section)}, not {toml_value(found)}{instead}"
+        owner = entry.owner(self.selected, section)
+        if owner:
+            return f"{line}belongs to {owner}{f'; use {entry.instead}' if entry.instead else ''}"
         complaint = entry.type.complaint(table[name])
         return f"{line}{complaint}" if complaint else ""
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 from feti_homog.schema.wording import toml_value
@@ -25,12 +26,20 @@ class ValueType:
         accepts: whether a value, of TOML's types, is right.
         store: of a right value, what the dataclass of its table keeps.
         json_schema: the same as JSON Schema, which knows no relations between numbers.
+        table: the dataclass of the value if it is a table; `TableReader` reads it.
+        item: of a list with tables in it, the type of its entries.
     """
 
     expected: str
     accepts: Callable[[Any], bool]
     store: Callable[[Any], Any]
     json_schema: Mapping[str, Any]
+    table: type[Any] | None = None
+    item: ValueType | None = None
+
+    def named(self, expected: str, store: Callable[[Any], Any] | None = None) -> ValueType:
+        """The same values in other words, stored in another way if one is given."""
+        return replace(self, expected=expected, store=store or self.store)
 
     def complaint(self, value: Any) -> str:
         """What is expected of a wrong value, empty if it is right."""
@@ -50,15 +59,6 @@ def is_number(value: object) -> bool:
     if isinstance(value, bool) or not isinstance(value, int | float):
         return False
     return value == 0 or SMALLEST <= abs(value) <= LARGEST
-
-
-def is_number_list(value: object, count: int | None = None) -> bool:
-    """Whether the value is a list of numbers, so many if a count is given."""
-    return isinstance(value, list) and count in (None, len(value)) and all(map(is_number, value))
-
-
-def to_floats(values: Iterable[Any]) -> tuple[float, ...]:
-    return tuple(map(float, values))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,14 +110,47 @@ def _numeric(name: str, is_of_type: Callable[[Any], bool], store: Callable[[Any]
     )
 
 
-def list_of(count: int, items: Mapping[str, Any]) -> dict[str, Any]:
-    """The JSON Schema of a list of so many items."""
-    return {"type": "array", "items": items, "minItems": count, "maxItems": count}
+def list_of(
+    item: ValueType, expected: str, *, least: int = 0, count: int | None = None, unique: bool = False
+) -> ValueType:
+    """A list of values of one type: at least so many or just so many, none twice if they are unique."""
+    fewest = least if count is None else count
+
+    def accepts(value: Any) -> bool:
+        if not isinstance(value, list) or len(value) < fewest or (count is not None and len(value) > count):
+            return False
+        return all(map(item.accepts, value)) and not (unique and len({*value}) < len(value))
+
+    limits = {"minItems": fewest, "maxItems": count, "uniqueItems": unique}
+    schema = {"type": "array", "items": item.json_schema} | {word: limit for word, limit in limits.items() if limit}
+    return ValueType(
+        expected, accepts, lambda value: tuple(map(item.store, value)), schema, item=item if item.table else None
+    )
 
 
-def numbers(count: int) -> dict[str, Any]:
-    """The JSON Schema of a list of so many numbers."""
-    return list_of(count, real().json_schema)
+def either(expected: str, *types: ValueType) -> ValueType:
+    """A value of any of some types."""
+    table = next((each.table for each in types if each.table is not None), None)
+    return ValueType(
+        expected,
+        lambda value: any(each.accepts(value) for each in types),
+        lambda value: next(each.store(value) for each in types if each.accepts(value)),
+        {"anyOf": [each.json_schema for each in types]},
+        table,
+    )
+
+
+def table_of(table: type[Any], name: str, expected: str, *, least: int = 0) -> ValueType:
+    """A table of at least so many keys, which `TableReader` reads; `name` is that of its JSON Schema."""
+    reference = {"$ref": f"#/$defs/{name}"} | ({"minProperties": least} if least else {})
+    return ValueType(expected, lambda v: isinstance(v, dict) and len(v) >= least, lambda v: v, reference, table)
+
+
+def file_name(expected: str, *suffixes: str) -> ValueType:
+    """The name of a file with one of some suffixes."""
+    pattern = rf"^{PRINTABLE}*\.({'|'.join(suffix[1:] for suffix in suffixes)})$"
+    accepts = lambda value: text.accepts(value) and value.endswith(suffixes)  # noqa: E731
+    return ValueType(expected, accepts, Path, {"type": "string", "pattern": pattern})
 
 
 def choice(*options: str) -> ValueType:
@@ -134,9 +167,10 @@ POSITIVE_OR_INF = ValueType(
 )
 """Where inf is another thing than no value."""
 boolean = ValueType("true or false", lambda value: isinstance(value, bool), bool, {"type": "boolean"})
+PRINTABLE = "[^\\u0000-\\u001f\\u007f]"
 text = ValueType(
     "a text in one line",
     lambda value: isinstance(value, str) and value.isprintable(),
     str,
-    {"type": "string", "pattern": "^[^\\u0000-\\u001f\\u007f]*$"},
+    {"type": "string", "pattern": f"^{PRINTABLE}*$"},
 )

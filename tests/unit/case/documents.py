@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -196,6 +197,39 @@ def documents(draw: st.DrawFn) -> dict[str, Any]:
     document |= draw(st.fixed_dictionaries({}, optional=rest))
     if analysis == "path" and draw(st.booleans()):
         document["output"] = document.get("output", {}) | {"states": draw(st.sampled_from(["all", "peaks", 2, 12345]))}
+    return document
+
+
+JUNK = (-1, 0, 1, 0.5, 1e200, True, "x", "all", "inf", math.inf, [], {}, [1, 2], [{}], 3)
+
+
+@st.composite
+def changed_documents(draw: st.DrawFn, sources: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """One of some documents, in a few places changed: keys and sections removed, faulty, or those of another one."""
+    document = copy.deepcopy(draw(st.sampled_from(sources)))
+    for _ in range(draw(st.integers(1, 3))):
+        other = draw(st.sampled_from(sources))
+        section = draw(st.sampled_from(sorted({*document, *other, "interface"})))
+        table = document.get(section)
+        if isinstance(table, list) and table and isinstance(table[0], dict):
+            table = draw(st.sampled_from(table))
+        change = draw(st.sampled_from(["remove", "spoil", "take", "exchange", "exclude", "repeat"]))
+        if change == "exclude" or (change == "exchange" and section not in other):
+            document.pop(section, None)
+        elif change == "exchange":
+            document[section] = copy.deepcopy(other[section])
+        elif change == "repeat" and section == "interface" and isinstance(document.get(section), dict):
+            pairs = draw(st.sampled_from([[{}], [{}, {}], [{"between": ["a", "b"]}, {"between": ["b", "c"]}]]))
+            document[section] = [table | pair for pair in pairs]
+        elif change == "take" and isinstance(table, dict) and isinstance(other.get(section), dict) and other[section]:
+            name = draw(st.sampled_from(sorted(other[section])))
+            table[name] = copy.deepcopy(other[section][name])
+        elif isinstance(table, dict) and table:
+            name = draw(st.sampled_from(sorted(table)))
+            if change == "remove":
+                del table[name]
+            else:
+                table[name] = copy.deepcopy(draw(st.sampled_from(JUNK)))
     return document
 
 

@@ -39,11 +39,11 @@ FAULTY_ENVELOPES: dict[str, tuple[str, tuple[str, ...]]] = {
     ),
     "envelope_along_the_fibres": (
         envelope('["S22", "S33"]'),
-        ('[envelope] plane = ["S22", "S33"]: S33 belongs to [analysis] plane = "generalized", not "strain"',),
+        ('[envelope] plane[1] = "S33": belongs to [analysis] plane = "generalized", not "strain"',),
     ),
     "envelope_along_the_fibres_of_a_sheet": (
         envelope('["gamma13", "E11"]', state="stress"),
-        ('gamma13 belongs to [analysis] plane = "generalized", not "stress"',),
+        ('[envelope] plane[0] = "gamma13": belongs to [analysis] plane = "generalized", not "stress"',),
     ),
     "envelope_of_few_directions": (
         envelope('["S11", "S22"]', "directions = 3"),

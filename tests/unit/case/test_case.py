@@ -75,8 +75,8 @@ def test_faults_are_told_by_section_and_key(tmp_path, name):
 def test_one_fault_is_one_line(tmp_path, name):
     with pytest.raises(CaseError) as caught:
         case_of(tmp_path, FAULTY[name][0])
-    # a mistyped key that is required is also missing; a mesh has neither fraction nor size of elements
-    related = {"young_mistyped": 2, "mesh_with_fraction": 2}
+    # a mistyped key that is required is also missing; a mesh has neither fraction nor size of elements, but a file
+    related = {"young_mistyped": 2, "mesh_with_fraction": 3}
     assert len(caught.value.faults) == related.get(name, 1), caught.value.faults
 
 
