@@ -93,7 +93,7 @@ def _curves(
     axes: Any, angles: list[float], values: dict[str, Any], styles: dict[str, str], letter: str,
     entries: Sequence[str],
 ) -> None:  # fmt: skip
-    """A colour an entry, a line style a case."""
+    """Draw a colour per entry and a line style per case."""
     for entry, ink in zip(entries, INK, strict=False):
         axes.plot([], [], color=ink, label=f"${letter}_{{{entry}}}$")
     for name, style in styles.items():

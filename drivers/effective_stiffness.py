@@ -63,7 +63,7 @@ def stiffness(arguments: argparse.Namespace, comm: Intracomm, geometry: str, pla
 
 
 def draw(fractions: Sequence[float], sweep: Sequence[Any], path: Path) -> Path:
-    """The entries over the fibre fraction."""
+    """Return the entries over the fibre fraction."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

@@ -48,7 +48,7 @@ def main(given: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def onset(given: argparse.Namespace, comm: Intracomm, radius: float) -> Onset:
-    """The first break of one fibre and what follows it at once."""
+    """Return the first break of one fibre and what follows it at once."""
     exact = exact_onset(radius)
     stiffness = solved(given, comm, radius, analysis={"type": "stiffness", "plane": "strain"}).effective_stiffness
     strain = np.linalg.solve(np.array(stiffness), [1.5 * exact, 0.0, 0.0])
@@ -70,7 +70,7 @@ def onset(given: argparse.Namespace, comm: Intracomm, radius: float) -> Onset:
 
 
 def solved(given: argparse.Namespace, comm: Intracomm, radius: float, **sections: dict[str, Any]) -> Result:
-    """The result of a cell with this fibre and sections, plane strain."""
+    """Return the result of a cell with this fibre and sections, plane strain."""
     width = CELL_PER_RADIUS * radius
     node_distance = min(LENGTH / 2, 2 * np.pi * radius / 96) * (4 if given.quick else 1)
     springs = {"normal_stiffness": NORMAL, "tangential_stiffness": TANGENTIAL}
@@ -94,7 +94,7 @@ def solved(given: argparse.Namespace, comm: Intracomm, radius: float, **sections
 
 
 def exact_onset(radius: float) -> float:
-    """The remote uniaxial stress (MPa) at which the first bond of a fibre in an infinite matrix breaks.
+    """Return the remote uniaxial stress (MPa) at which the first bond of a fibre in an infinite matrix breaks.
 
     Tractions t_n = p0 + N cos 2t, t_t = T sin 2t from the plane problem of a circular inclusion on springs, per unit
     remote stress; the bond with the largest sqrt(G / G_c) breaks first.

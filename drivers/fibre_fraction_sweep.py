@@ -28,7 +28,7 @@ def main(given: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def document(given: argparse.Namespace) -> dict[str, Any]:
-    """The sweep as a TOML file would have it."""
+    """Return the sweep as a TOML file would have it."""
     cell = {"refine": given.refine, "order": given.order, "mesh_size": given.mesh_size}
     random = {"geometry": "random", "fibres": given.fibres}
     return {
@@ -44,7 +44,8 @@ def document(given: argparse.Namespace) -> dict[str, Any]:
 
 
 def report(table: Any) -> list[str]:
-    """A line for each point; isotropy is |C33 - (C11 - C12)/2| / C33, +- the 95 % confidence interval of a mean."""
+    """Return a line for each point; isotropy is |C33 - (C11 - C12)/2| / C33, +- the 95 % confidence interval of a
+    mean."""
     lines = [f"stiffness in {table.stress_unit}", HEADS]
     for number, point in enumerate(table.points):
         row = table.rows(point)[0]

@@ -19,7 +19,7 @@ INK = ("#1f4e9c", "#c44e00", "#2a7f3f", "#7a3e9d")
 
 
 def parser(description: str, name: str, mesh_size: float, refine: int, order: int) -> argparse.ArgumentParser:
-    """The options that they all have; results go to results/`name` by default."""
+    """Return the options that they all have; results go to results/`name` by default."""
     options = quick_parser(description, name, "a coarse mesh and few points")
     options.add_argument("--mesh-size", type=float, default=mesh_size, help="coarse element size / cell width")
     options.add_argument("--refine", type=int, default=refine, help="times that every element is cut in four")
@@ -38,13 +38,13 @@ def quick_parser(description: str, name: str, quick: str) -> argparse.ArgumentPa
 
 
 def add_output_options(options: argparse.ArgumentParser) -> None:
-    """What is written of every case besides its numbers."""
+    """Write the header of a case: everything but its numbers."""
     options.add_argument("--fields", action="store_true", help="write the fields of every case")
     options.add_argument("--pictures", action="store_true", help="draw every case, and write its fields")
 
 
 def written(options: argparse.Namespace) -> dict[str, Any]:
-    """The section [output] that these options ask for."""
+    """Return the section [output] that these options ask for."""
     return {"stress_unit": "GPa", "fields": options.fields or options.pictures, "pictures": options.pictures}
 
 
@@ -57,7 +57,7 @@ def solved(
     keep_fields: bool = False,
     **rest: Any,
 ) -> Result:
-    """The result, on every rank, of the case `name`, in a folder of its own; `rest` are its other sections."""
+    """Return the result, on every rank, of the case `name`, in a folder of its own; `rest` are its other sections."""
     cell = {
         "geometry": geometry,
         "fibre_fraction": options.fibre_fraction,

@@ -53,7 +53,7 @@ def main(given: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def solved(given: argparse.Namespace, comm: Intracomm, bonds: str, refine: int) -> Result:
-    """The path of one law on one mesh."""
+    """Return the path of one law on one mesh."""
     document = {
         "name": f"{bonds}, refine = {refine}",
         "cell": {

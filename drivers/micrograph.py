@@ -115,7 +115,7 @@ def write(folder: Path, stiffness: Result, onset: Result, fields: Any) -> list[P
 
 
 def draw_fibres(axes: Any, result: Result, tractions: np.ndarray, first: list[int]) -> None:
-    """The cell with its fibres by their largest tractions, those that come first in the colour of their points."""
+    """Draw the cell with its fibres by their largest tractions, the first to break in the colour of their points."""
     from matplotlib.collections import EllipseCollection
 
     cell = result.cell

@@ -57,7 +57,7 @@ def main(given: argparse.Namespace, comm: Intracomm) -> None:
 def solved(
     given: argparse.Namespace, comm: Intracomm, geometry: str, contrast: float, fraction: float, seed: int
 ) -> Result:
-    """The stiffness of one cell."""
+    """Return the stiffness of one cell."""
     cell: dict[str, Any] = {"geometry": geometry, "fibre_fraction": fraction, "order": 2}
     cell |= {"mesh_size": 0.25 if given.quick else given.mesh_size, "refine": 0 if given.quick else given.refine}
     if geometry == "random":
@@ -75,7 +75,7 @@ def solved(
 
 
 def row(constants: Any) -> NDArray[np.float64]:
-    """The values of NAMES, NaN where a method says nothing."""
+    """Return the values of NAMES, NaN where a method says nothing."""
     return np.array([getattr(constants, name) for name in NAMES], float)
 
 
@@ -115,7 +115,7 @@ def _draw(
     cells: Table,
     estimates: dict[str, dict[tuple[float, float], NDArray[np.float64]]],
 ) -> None:
-    """A panel a constant: points are cells, lines estimates."""
+    """Draw a panel per constant: points are cells, lines estimates."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(12.0, 6.0), layout="constrained")

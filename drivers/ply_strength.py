@@ -48,7 +48,7 @@ def main(given: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def solved(given: argparse.Namespace, comm: Intracomm, test: str, temperature: float) -> Result:
-    """The path of one test."""
+    """Return the path of one test."""
     strain, end, _, _ = TESTS[test]
     cooling = [{"temperature": temperature}] if temperature else []
     document = {
@@ -117,7 +117,7 @@ def write(folder: Path, found: dict[tuple[str, float], Result]) -> list[Path]:
 
 
 def symbol(component: str) -> str:
-    """A component as LaTeX."""
+    """Return a component as LaTeX."""
     letter = {"E": "E", "S": "\\Sigma", "g": "\\gamma"}[component[0]]
     return f"{letter}_{{{component[-2:]}}}"
 

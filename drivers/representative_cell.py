@@ -29,7 +29,7 @@ def main(given: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def document(given: argparse.Namespace) -> dict[str, Any]:
-    """The sweep as a TOML file would have it.  The mesh is as fine beside each fibre, whatever their number."""
+    """Return the sweep as a TOML file would have it. The mesh is as fine beside each fibre, whatever their number."""
     cell = {
         "geometry": "random", "fibre_fraction": given.fibre_fraction, "min_gap": given.min_gap,
         "refine": given.refine, "order": given.order, "seed": given.seed,
@@ -48,7 +48,7 @@ def document(given: argparse.Namespace) -> dict[str, Any]:
 
 
 def report(table: Any, tolerance: float) -> list[str]:
-    """A line for each number of fibres: mean, half of its 95 % interval, and standard deviation of one cell."""
+    """Return a line for each number of fibres: mean, half of its 95 % interval, and standard deviation of one cell."""
     heads = "".join(f"{name + ' (GPa)':>12}{'+-':>9}{'std %':>8}" for name in NAMES)
     lines, more = [f"{'fibres':>6}{heads}"], []
     enough = None

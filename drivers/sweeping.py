@@ -16,7 +16,7 @@ STIFFNESS = {"material": EQUATION_38, "analysis": {"type": "stiffness", "plane":
 
 
 def parser(description: str, name: str) -> argparse.ArgumentParser:
-    """The options that they all have; results go to results/`name` by default."""
+    """Return the options that they all have; results go to results/`name` by default."""
     options = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--out", type=Path, default=Path("results") / name, metavar="DIR")
     options.add_argument("--refine", type=int, default=0, help="times that every element is cut in four")

@@ -40,7 +40,7 @@ def main(given: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def solved(given: argparse.Namespace, comm: Intracomm, seed: int) -> Result:
-    """The path of one arrangement."""
+    """Return the path of one arrangement."""
     document = {
         "name": f"seed {seed}",
         "cell": {

@@ -34,7 +34,7 @@ def main(given: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def row(given: argparse.Namespace, comm: Intracomm, share: float) -> list[float]:
-    """The columns of one porosity: means over the cells, and their standard deviations."""
+    """Return the columns of one porosity: means over the cells, and their standard deviations."""
     found = []
     for seed in range(2 if given.quick else given.cells):
         bonded = solved(given, comm, share, seed, "stiffness")

@@ -94,7 +94,7 @@ def ladder() -> Iterator[tuple[float, int]]:
 
 
 def row(geometry: str, order: int, target: float, repeat: int) -> Row:
-    """The coarsest mesh whose error is at most `target`, timed."""
+    """Return the coarsest mesh whose error is at most `target`, timed."""
     for mesh_size, refine in ladder():
         error = measure(geometry, order, mesh_size, refine)[1]
         if error <= target:

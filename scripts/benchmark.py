@@ -73,7 +73,8 @@ def _tools(text: str) -> str:
 
 
 def best(arguments: argparse.Namespace, planes: Sequence[str]) -> dict[tuple[str, str], Row]:
-    """The fastest run of each tool in each plane state, or one that did not end well, after which it gets no other.
+    """Return the fastest run of each tool in each plane state, or one that did not end well, after which it gets no
+    other.
 
     The tools take turns, so that none has the quiet minutes of a machine to itself.
     """
@@ -120,7 +121,7 @@ def job(ranks: int, words: Sequence[object], timeout: float) -> str:
 
 
 def _reason(words: str) -> str:
-    """The last line that tells of an error, empty if there is none."""
+    """Return the last line that tells of an error, empty if there is none."""
     lines = [line.strip() for line in words.splitlines() if "rror" in line and "mpirun" not in line]
     return lines[-1] if lines else ""
 

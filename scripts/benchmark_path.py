@@ -83,7 +83,7 @@ def main() -> None:
 
 
 def document(arguments: argparse.Namespace) -> dict[str, Any]:
-    """The case: bonded at first, strengths low enough that many nodes break."""
+    """Return the case: bonded at first, strengths low enough that many nodes break."""
     geometry = {"geometry": "hexagonal", "fibre_fraction": 0.4}
     if arguments.fibres:
         geometry = {"geometry": "random", "fibre_fraction": 0.5, "min_gap": 0.06, "fibres": arguments.fibres}

@@ -102,12 +102,12 @@ def table(rows: Sequence[Row]) -> list[str]:
 
 
 def _ours(rows: Sequence[Row], row: Row) -> Row | None:
-    """This program's first row that is done of the plane state of `row`."""
+    """Return this program's first finished row of the plane state of `row`."""
     return next((r for r in rows if r.tool == "feti" and r.plane == row.plane and r.status == "done"), None)
 
 
 def notes(rows: Sequence[Row]) -> list[str]:
-    """What must be known to read the table."""
+    """Return the notes below the table."""
     largest = max((row.difference for row in rows if row.status == "done"), default=0.0)
     peers = dict.fromkeys(row.tool for row in rows if row.tool in PEERS and PEERS[row.tool].note)
     return [
@@ -133,7 +133,7 @@ def pairs(rows: Sequence[Row]) -> list[str]:
 
 
 def write(path: Path, rows: Sequence[Row]) -> None:
-    """The rows as CSV, a column for each stage."""
+    """Write the rows as CSV, a column per stage."""
     names = [f.name for f in fields(Row) if f.name not in ("seconds", "stresses")]
     with path.open("w", newline="") as stream:
         writer = csv.DictWriter(stream, [*names, *STAGES, "solver", "total"], extrasaction="ignore")

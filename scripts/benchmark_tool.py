@@ -63,7 +63,7 @@ def main() -> int:
 
 
 def feti(case: Case, progress: Progress, loads: int | None, rtol: float) -> dict[str, Any]:
-    """This program."""
+    """Time this program."""
     comm = progress.comm
     with case_options(case.petsc | {"feti_ksp_rtol": rtol}):
         cell = unit_cell.tear(case, comm, progress)
@@ -114,7 +114,7 @@ def peer(tool: Peer, case: Case, progress: Progress, loads: int | None, rtol: fl
 
 
 def _operator(tool: Peer, cell: Glued) -> PETSc.Mat:
-    """The matrix in the peer's type, with the rigid-body modes if it wants them; that of `cell` may be freed."""
+    """Return the matrix in the peer's type, with the rigid-body modes if it wants them; that of `cell` may be freed."""
     A, modes = cell.A, cell.rigid() if tool.rigid else None
     if tool.matrix != "is":
         A = cell.A.convert(tool.matrix, PETSc.Mat())
@@ -126,7 +126,7 @@ def _operator(tool: Peer, cell: Glued) -> PETSc.Mat:
 
 
 def _solver(tool: Peer, A: PETSc.Mat, rtol: float) -> PETSc.KSP:
-    """The KSP of a matrix, set up."""
+    """Return the KSP of a matrix, set up."""
     database = PETSc.Options(PREFIX)
     for name, value in tool.options.items():
         if not database.hasName(name):
@@ -180,7 +180,7 @@ def _solved_together(ksp: PETSc.KSP, loads: Sequence[PETSc.Vec]) -> _Solved:
 def _report(
     dofs: int, subdomains: int, problems: Sequence[Float], iterations: list[int], reasons: list[int]
 ) -> dict[str, Any]:
-    """What is compared; `problems` are the stresses (v, k) under the loads of each problem."""
+    """Return the numbers to compare; `problems` are the stresses (v, k) under the loads of each problem."""
     stresses = np.column_stack(list(phase_laws.secants(*problems).values()))
     return {
         "dofs": dofs,

@@ -71,7 +71,7 @@ def fault_imported(module: str) -> str:
 
 
 def versions() -> str:
-    """What results may depend on, in one line."""
+    """Return in one line the versions that results may depend on."""
     import h5py
     import numpy
     import scipy

@@ -30,7 +30,7 @@ class CommunicationError(AssertionError):
 
 @contextmanager
 def collective_calls() -> Iterator[Counter[str]]:
-    """Calls of this rank in the block, by name, without those that PETSc and MUMPS make themselves.
+    """Provide calls of this rank in the block, by name, without those that PETSc and MUMPS make themselves.
 
     The block gets slower: no time of it is worth anything.
     """
@@ -46,8 +46,8 @@ def collective_calls() -> Iterator[Counter[str]]:
 
 @contextmanager
 def no_communication() -> Iterator[None]:
-    """A block in which mpi4py, PETSc's objects and HDF5's files of several ranks raise CommunicationError before they
-    communicate, or after PETSc has made such an object."""
+    """Provide a block in which mpi4py, PETSc's objects and HDF5's files of several ranks raise CommunicationError
+    before they communicate, or after PETSc has made such an object."""
 
     def refuse(frame: FrameType, event: str, function: Any) -> None:
         if event == "call":

@@ -37,7 +37,7 @@ class Nodes:
 
     @classmethod
     def of(cls, comm: MPI.Intracomm, subdomains: list[Subdomain], lattice: ReferenceLattice) -> Nodes:
-        """Number the nodes; one that several ranks hold is owned by the lowest of them.  Collective."""
+        """Assign numbers to the nodes; one that several ranks hold is owned by the lowest of them.  Collective."""
         keys, several = _keys(comm, subdomains, lattice)
         sizes = np.cumsum([len(k) for k in keys])[:-1]
         unique, first, which = np.unique(np.concatenate(keys), return_index=True, return_inverse=True)
@@ -62,7 +62,8 @@ class Nodes:
 
 
 def _keys(comm: MPI.Intracomm, subdomains: list[Subdomain], lattice: ReferenceLattice) -> tuple[list[Int], int]:
-    """A key for each class of each subdomain, the same wherever the node is, and from which on keys are not shared."""
+    """Return a key for each class of each subdomain, the same wherever the node is, and from which on keys are not
+    shared."""
     inner = lattice.intervals - 1
     inside = [s.mesh.n_classes - len(s.submesh.class_keys) - len(s.submesh.edge_keys) * inner for s in subdomains]
     classes, edges = (
@@ -105,7 +106,8 @@ class Glued:
     problem: Problem
 
     def rigid(self) -> PETSc.NullSpace:
-        """The translations, and in the plane a rotation, which leaps where the cell's sides meet; orthonormal."""
+        """Return the translations, and in the plane a rotation, which leaps where the cell's sides meet;
+        orthonormal."""
         values = [np.tile(translation, (len(self.points), 1)) for translation in np.eye(self.problem.components)]
         if self.problem.turns:
             values.append((self.points - 0.5) @ np.array([[0.0, 1.0], [-1.0, 0.0]]))

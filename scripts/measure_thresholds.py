@@ -44,7 +44,7 @@ def main() -> None:
 
 
 def with_value(name: str, value: float) -> Thresholds:
-    """The defaults but for one."""
+    """Return the defaults but for one."""
     return replace(DEFAULTS, **{name: type(getattr(DEFAULTS, name))(value)})
 
 

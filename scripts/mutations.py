@@ -34,7 +34,7 @@ def copied(folder: Path) -> Path:
 
 
 def run_tests(folder: Path, tests: str, ranks: int) -> int:
-    """The exit status of tests in a folder at this number of ranks."""
+    """Return the exit status of tests in a folder at this number of ranks."""
     words = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *shlex.split(tests)]
     command = words if ranks == 1 else ["mpirun", "--oversubscribe", "-n", str(ranks), *words, "-m", "parallel"]
     environment = os.environ | {"PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1"}

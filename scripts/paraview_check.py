@@ -40,7 +40,7 @@ def main():
 
 
 def seen_in(path, faults, pictures):
-    """The states of a file by reader; what is wrong is added to `faults`; drawn if there is a folder for it."""
+    """Return the states of a file by reader; what is wrong is added to `faults`; drawn if there is a folder for it."""
     seen = {}
     for kind in READERS:
         reader = opened(kind, path)
@@ -56,12 +56,12 @@ def seen_in(path, faults, pictures):
 
 
 def opened(kind, path):
-    """A reader of the file."""
+    """Return a reader of the file."""
     return getattr(simple, kind)(**{READERS[kind]: str(path)})
 
 
 def state_of(reader, time):
-    """The label, number of elements and arrays of a state; of arrays the ranges of their components."""
+    """Return the label, number of elements and arrays of a state; of arrays the ranges of their components."""
     simple.UpdatePipeline(time=time, proxy=reader)
     data = leaf_of(servermanager.Fetch(reader))
     arrays = {}
@@ -78,21 +78,21 @@ def state_of(reader, time):
 
 
 def leaf_of(data):
-    """The mesh in a data set of one block, or of one piece of one block."""
+    """Return the mesh in a data set of one block, or of one piece of one block."""
     while data.IsA("vtkCompositeDataSet"):
         data = data.GetPiece(0) if data.IsA("vtkMultiPieceDataSet") else data.GetBlock(0)
     return data
 
 
 def label_of(data):
-    """The text whose bytes are the array `label`; empty if there is none."""
+    """Return the text whose bytes are the array `label`; empty if there is none."""
     array = data.GetFieldData().GetArray("label")
     count = array.GetNumberOfValues() if array else 0
     return bytes(int(array.GetVariantValue(place).ToInt()) for place in range(count)).decode().rstrip()
 
 
 def faults_of(states, path):
-    """What a reader does not show of what the file names."""
+    """List the arrays of the file that a reader does not show."""
     grids = [grid for grid in ElementTree.parse(path).iter("Grid") if grid.get("GridType") == "Uniform"]
     places = {"Node": "node", "Cell": "element", "Grid": "state"}
     if len(states) != len(grids):
@@ -108,7 +108,7 @@ def faults_of(states, path):
 
 
 def draw(reader, folder):
-    """A picture of the last state for each array, on the mesh that is warped so that it is seen."""
+    """Draw a picture of the last state for each array, on the warped mesh."""
     folder.mkdir(parents=True, exist_ok=True)
     view = simple.CreateView("RenderView")
     view.ViewSize, view.InteractionMode = SIZE, "2D"

@@ -79,7 +79,8 @@ class Cell:
         return not (self.fraction >= 0.65 and self.gap > 0.1)
 
     def case(self, space: str) -> Case:
-        """The case, with that kind of coarse space; where there are coatings it and the cut are the program's own."""
+        """Return the case, with that kind of coarse space; where there are coatings it and the cut are the program's
+        own."""
         coating = {"coating": {"young": 3.0 * self.coating_contrast, "poisson": 0.3}} if self.coating else {}
         other = {"other": {"young": 3.0 * self.mix_contrast, "poisson": 0.3}} if self.mix else {}
         return cases.parse(
@@ -104,7 +105,7 @@ class Cell:
         )  # fmt: skip
 
     def _fractions(self) -> dict[str, Any]:
-        """The keys of the fibres' fractions and radii."""
+        """Return the keys of the fibres' fractions and radii."""
         if not self.mix:
             return {"fibre_fraction": self.fraction}
         half = self.fraction / 2
@@ -157,7 +158,7 @@ def main() -> None:
 
 
 def _silent(*_: object, **__: object) -> None:
-    """Prints nothing."""
+    """Print nothing."""
 
 
 def combinations(arguments: argparse.Namespace) -> list[Cell]:
@@ -171,7 +172,7 @@ def combinations(arguments: argparse.Namespace) -> list[Cell]:
 
 
 def summary(rows: list[Row]) -> str:
-    """The range of iterations and of coarse vectors."""
+    """Return the range of iterations and of coarse vectors."""
     iterations, vectors = (np.array([getattr(row, name) for row in rows]) for name in ("iterations", "vectors"))
     return (
         f"{len(rows)} cells: {iterations.min()} to {iterations.max()} iterations, {np.mean(iterations <= 25):.1%} "

@@ -83,7 +83,7 @@ def main() -> int:
 
 
 def planned(arguments: argparse.Namespace) -> dict[str, list[Run]]:
-    """The runs of each study; the cell of strong scaling is that of weak scaling on most ranks."""
+    """Return the runs of each study; the cell of strong scaling is that of weak scaling on most ranks."""
     fibres, dofs, refine, most = arguments.fibres, arguments.dofs, arguments.refine, max(arguments.ranks)
     ladder = [(max(1, round(fibres * size / dofs)), size) for size in arguments.sizes]
     return {
@@ -134,7 +134,7 @@ def work_off(run: Run, arguments: argparse.Namespace) -> bool:
 
 
 def read(path: Path) -> list[Row]:
-    """The run of a report; none if there is no report."""
+    """Return the run of a report; none if there is no report."""
     if not path.exists():
         return []
     fields = json.loads(path.read_text())
@@ -147,7 +147,7 @@ def read(path: Path) -> list[Row]:
 
 
 def rows_of(study: str, runs: Sequence[Run], arguments: argparse.Namespace) -> list[Row]:
-    """The runs of a study that are there.
+    """Return the runs of a study that are there.
 
     The largest run of weak scaling is one of strong scaling too; by itself it tells nothing.
     """
@@ -182,13 +182,13 @@ def report(found: dict[str, list[Row]], arguments: argparse.Namespace) -> list[s
 
 
 def forecast_lines(futures: dict[str, list[Prediction]]) -> list[str]:
-    """A table of each series of predictions, then what stops the scaling."""
+    """Return a table of each series of predictions, then what stops the scaling."""
     tables = [line for title, series in futures.items() for line in ("", *table(title, series))]
     return [*tables, "", *(line for title, series in futures.items() for line in verdict(title, series))]
 
 
 def study_tables(study: str, rows: Sequence[Row], cores: int) -> list[str]:
-    """The tables of one study."""
+    """Return the tables of one study."""
     tables = by_size(rows) if study == "sizes" else [*by_ranks(rows, cores), *speedups(rows, cores), "", *memory(rows)]
     return ["", STUDIES[study], *tables]
 

@@ -108,7 +108,7 @@ class Borders:
 
     @classmethod
     def of(cls, counted: Sequence[tuple[int, int, FrontSize]]) -> Borders:
-        """The largest of what was counted: n, all ranks, and a front."""
+        """Return the largest of what was counted: n, all ranks, and a front."""
         front, left, last = 0.0, 0.0, 0.0
         for n, ranks, size in counted:
             root = sqrt(n * size.ranks / ranks)
@@ -191,7 +191,7 @@ def elimination_of(rows: Sequence[Row], cores: int, of: Attributes) -> Eliminati
 
 
 def _values(rows: Sequence[Row], name: str) -> list[float]:
-    """An attribute of all rows."""
+    """Return an attribute of all rows."""
     return [getattr(row, name) for row in rows]
 
 

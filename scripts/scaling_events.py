@@ -69,7 +69,7 @@ class EventModel:
 
 
 def fitted(rows: Sequence[EventRow], cores: int) -> EventModel:
-    """The model of least squares of logarithms.
+    """Return the model of least squares of logarithms.
 
     Raises:
         ValueError: the timed runs are of one size, or on one number of ranks.
@@ -98,7 +98,7 @@ def study(arguments: argparse.Namespace) -> tuple[bool, list[str]]:
 
 
 def work_off(fibres: int, ranks: int, arguments: argparse.Namespace) -> EventRow | None:
-    """The run in its report, which is made if it is not there; None if that fails."""
+    """Return the run in its report, which is made if it is not there; None if that fails."""
     name = f"events_{arguments.events}_of_{fibres}_fibres_ranks_{ranks}.json"
     path = arguments.out / "scaling" / name
     if not path.exists():

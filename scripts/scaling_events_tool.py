@@ -52,7 +52,7 @@ def main() -> int:
 
 
 def measure(case: Case, arguments: argparse.Namespace, comm: MPI.Intracomm) -> EventRow:
-    """The row of a path, which is followed once for its times and once for its collective calls.  Collective."""
+    """Return the row of a path, which is followed once for its times and once for its collective calls. Collective."""
     progress = Progress(comm, quiet=True)
     cell = tear(case, comm, progress)
     solver = cell.solver

@@ -36,7 +36,7 @@ class Power:
 
 
 def fit_shares(work: Sequence[float], ranks: Sequence[float], seconds: Sequence[float]) -> Shares:
-    """The shares of `nonnegative` least squares.
+    """Return the shares of `nonnegative` least squares.
 
     Raises:
         ValueError: all runs are on equally many ranks, so that nothing tells the shares apart.
@@ -64,7 +64,7 @@ def nonnegative(columns: Float, seconds: Float, known: Float) -> Float:
 
 
 def fit_power(work: Sequence[float], seconds: Sequence[float]) -> Power:
-    """The power of the work with the least sum of squares of logarithms, each times the seconds.
+    """Return the power of the work with the least sum of squares of logarithms, each times the seconds.
 
     Raises:
         ValueError: all runs have equal work.

@@ -29,7 +29,7 @@ def forecast(rates: Rates, machine: Machine, way: str | None = None) -> dict[str
 
 
 def assumptions(rates: Rates, machine: Machine) -> list[str]:
-    """The model in words, with its constants."""
+    """Return the model in words, with its constants."""
     r, (coarse, natural) = rates, (rates.coarse, rates.natural)
     factor, solve = coarse.rates.factor, coarse.rates.solve
     others = []
@@ -88,7 +88,7 @@ def _shares(s: Shares) -> str:
 
 
 def checks(rates: Rates, machine: Machine, rows: Sequence[Row], cores: int) -> list[str]:
-    """The model beside every run that was timed: seconds of both, and its relative error."""
+    """Return the model beside every run that was timed: seconds of both, and its relative error."""
     names = ("mesh", "assemble", "set-up", "solve", "total")
     lines = [
         "model, measured seconds, and the model's error",
@@ -133,7 +133,7 @@ def table(title: str, found: Sequence[Prediction]) -> list[str]:
 
 
 def verdict(title: str, found: Sequence[Prediction]) -> list[str]:
-    """What the time goes to on many ranks, and what of it no further rank takes off."""
+    """Return the shares of time on many ranks, and those that further ranks do not reduce."""
     lines = []
     for p in found:
         if p.ranks in FAR:

@@ -174,7 +174,7 @@ def _per_dof(rows: Sequence[Row]) -> dict[str, Any]:
 
 
 def _counts(rows: Sequence[Row], cores: int) -> dict[str, Any]:
-    """The largest counts of all rows."""
+    """Return the largest counts of all rows."""
     most = max(rows, key=lambda row: (row.ranks, row.dofs))
     return dict(
         loads=rows[0].loads,
@@ -228,7 +228,7 @@ class Prediction:
 
 
 def predict(rates: Rates, machine: Machine, dofs: float, ranks: int, way: str | None = None) -> Prediction:
-    """What a cell of `dofs` takes on `ranks`, with that way to solve the coarse problem, by default the program's."""
+    """Predict the time of a cell of `dofs` on `ranks`, by default with the coarse solver of the program."""
     subdomains = max(rates.subdomains * dofs, 1.0)
     # A rank has whole subdomains, and none is cut for its sake.
     whole = ceil(subdomains / ranks) * ranks / subdomains

@@ -21,7 +21,7 @@ STUDY_INK = {"weak": "#1f4e9c", "strong": "#c44e00"}
 
 
 def plot(path: Path, studies: dict[str, list[Row]], futures: dict[str, list[Prediction]]) -> None:
-    """Iterations and messages by ranks, seconds by size, and the shares of the predicted times."""
+    """Draw iterations and messages by ranks, seconds by size, and the shares of the predicted times."""
     figure, ((iterations, messages), (sizes, shares)) = plt.subplots(2, 2, figsize=(11, 7.5))
     by_ranks = {study: studies[study] for study in STUDY_INK if studies[study]}
     _iterations(iterations, by_ranks)
@@ -41,7 +41,7 @@ def plot(path: Path, studies: dict[str, list[Row]], futures: dict[str, list[Pred
 
 
 def _iterations(axes: Axes, studies: dict[str, list[Row]]) -> None:
-    """Iterations of weak and strong scaling by ranks."""
+    """Draw the iterations of weak and strong scaling by ranks."""
     for study, rows in studies.items():
         ranks, iterations = [row.ranks for row in rows], [row.iterations for row in rows]
         axes.plot(ranks, iterations, "o-", color=STUDY_INK[study], label=study)

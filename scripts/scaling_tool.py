@@ -106,7 +106,7 @@ class StagePeaks(Progress):
 
 
 def random_cell(fibres: int, dofs: int, refine: int, options: dict[str, str | float]) -> Case:
-    """A case with about so many degrees of freedom, and PETSc's options of its coarse space."""
+    """Return a case with about so many degrees of freedom, and PETSc's options of its coarse space."""
     each = dofs / fibres / 4**refine
     regular = (np.sqrt(each + (IN_GAPS / 2) ** 2) - IN_GAPS / 2) ** 2
     document = {
@@ -174,7 +174,7 @@ def seconds_alone(case: Case, policy: TilePolicy) -> float:
 
 
 def _messages(cell: TornCell) -> dict[str, Any]:
-    """What a rank sends and receives in one exchange of multipliers, and how many exchanges the solves made.
+    """Count the messages of a rank in one exchange of multipliers, and the exchanges of the solves.
 
     `told` and `heard` count the values, for all loads, and `neighbours` the ranks that a rank tells or hears of in a
     gather; in a sum they change places.  `logged` are the bytes, both ways, that PETSc counted in the solves.

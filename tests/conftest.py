@@ -27,7 +27,7 @@ PATIENCE = 60.0  # seconds that a failing rank waits for the others to end the s
 
 @cache
 def report_comm() -> Any:
-    """A communicator of its own: reports never meet what a test left unfinished on the world's."""
+    """Return a communicator of its own: reports never meet what a test left unfinished on the world's."""
     from mpi4py import MPI
 
     return MPI.COMM_WORLD.Dup()

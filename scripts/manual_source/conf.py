@@ -67,8 +67,7 @@ def setup(app):
 
 
 def _with_short_tree(app, page, template, context, doctree):
-    """The tree of all pages, beside each page, would be most of the time of the build: only the way to the page is
-    unfolded, and the code's source files have none."""
+    """Unfold the tree of pages only towards the page: whole trees would dominate the build."""
     tree = context["toctree"]
     if page.startswith("_modules/"):
         context["toctree"] = lambda **_: ""

@@ -22,7 +22,7 @@ def setup(app: Sphinx) -> dict[str, Any]:
 
 
 def add_filters(environment: Environment) -> None:
-    """Gives the templates what they ask of a class."""
+    """Give the templates what they ask of a class."""
     environment.filters |= {"described": described, "names_described": names_described}
 
 
@@ -31,7 +31,7 @@ def _to_markup(app: Sphinx, what: str, name: str, obj: Any, options: Any, lines:
 
 
 def markup(docstring: str) -> str:
-    """The docstring in reStructuredText; indented blocks, as of formulas, stay as they are."""
+    """Return the docstring in reStructuredText; indented blocks, as of formulas, stay as they are."""
     blocks, in_section = [], False
     for block in re.split(r"\n[ ]*\n", docstring):
         if block.startswith(" ") and not in_section:
@@ -54,13 +54,13 @@ def _plain(text: str) -> str:
 
 
 def names_described(cls: Any) -> list[str]:
-    """The attributes that the docstring of a class, as napoleon leaves it, describes."""
+    """Return the attributes that the docstring of a class, as napoleon leaves it, describes."""
     described = re.findall(r"^:ivar ([\w, ]+):", cls.docstring, flags=re.MULTILINE)
     return [name for names in described for name in names.split(", ")]
 
 
 def described(cls: Any) -> str:
-    """The docstring of a class with the types of the attributes that it describes."""
+    """Return the docstring of a class with the types of the attributes that it describes."""
     types = {child.name: child.annotation for child in cls.children if child.type == "attribute" and child.annotation}
     lines = [f":vartype {name}: {_plain(types[name])}" for name in names_described(cls) if name in types]
     return "\n".join([cls.docstring.rstrip(), *lines, ""])

@@ -26,7 +26,7 @@ def _warn_of_faults(app: Sphinx, doctree: nodes.document) -> None:
 
 
 def fault(formula: str) -> str:
-    """What docutils does not understand of a formula in TeX; empty if nothing."""
+    """Return the part of a formula in TeX that docutils does not understand; empty if there is none."""
     formula = re.sub(r"\\tag\{[^{}]*\}", "", formula).strip()  # known to MathJax only
     if r"\\" in formula and not formula.startswith(r"\begin"):
         environment = pick_math_environment(formula)

@@ -7,12 +7,12 @@ from collections.abc import Iterable, Sequence
 
 
 def page(*parts: str) -> str:
-    """The parts with empty lines between them."""
+    """Return the parts with empty lines between them."""
     return "\n\n".join(parts)
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """A table in Markdown; columns that are empty in all rows are left out."""
+    """Return a table in Markdown; columns that are empty in all rows are left out."""
     rows = list(rows)
     used = [i for i in range(len(head)) if any(row[i] for row in rows)]
     lines = [[head[i] for i in used], ["---"] * len(used), *([plain(row[i]) for i in used] for row in rows)]
@@ -20,7 +20,7 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 
 def plain(text: str) -> str:
-    """The text with what Markdown would take for markup escaped, but for `code`."""
+    """Return the text with what Markdown would take for markup escaped, but for `code`."""
     pieces = text.split("`")
     pieces[::2] = [re.sub(r"[\\*_\[\]<>$#~|]", r"\\\g<0>", piece) for piece in pieces[::2]]
     pieces[1::2] = [piece.replace("|", r"\|") for piece in pieces[1::2]]
@@ -28,10 +28,10 @@ def plain(text: str) -> str:
 
 
 def code(word: str) -> str:
-    """The word as code, if it is not empty."""
+    """Return the word as code, if it is not empty."""
     return word and f"`{word}`"
 
 
 def capitalised(words: str) -> str:
-    """The words with a capital at their beginning; the others stay."""
+    """Return the words with a capital at their beginning; the others stay."""
     return words[:1].upper() + words[1:]

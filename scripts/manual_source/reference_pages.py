@@ -21,7 +21,7 @@ ERRORS = (errors.FetiHomogError, errors.CaseError, errors.MeshError, errors.Conv
 
 
 def write(folder: Path) -> None:
-    """Writes every page to the folder, under its name, and the JSON Schema of case files."""
+    """Write every page to the folder, under its name, and the JSON Schema of case files."""
     folder.mkdir()
     for name, text in PAGES.items():
         (folder / f"{name}.md").write_text(text(), encoding="utf-8")
@@ -39,7 +39,7 @@ def command_line() -> str:
 
 
 def case_file() -> str:
-    """The keys of every table of a case file."""
+    """Return the keys of every table of a case file."""
     words = (
         f"A case file is TOML. `feti-homog keys` prints these tables; [{SCHEMA}]({SCHEMA}), which `feti-homog schema` "
         "prints, lets editors complete and check the keys."

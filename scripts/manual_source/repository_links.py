@@ -36,7 +36,7 @@ def _lead_to_pages(app: Sphinx, doctree: nodes.document) -> None:
 
 
 def page_of(place: str, pages: set[str]) -> str | None:
-    """The page of a folder or module, given relative to the repository; None if it has none."""
+    """Return the page of a folder or module, given relative to the repository; None if it has none."""
     path = PurePosixPath(place)
     module = f"api/{path.with_suffix('')}/index" if path.suffix in ("", ".py") else ""
     if path.name == "__init__.py":

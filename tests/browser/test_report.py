@@ -42,7 +42,7 @@ return Bokeh.documents.flatMap((page) => [...page.all_models]).filter((model) =>
 
 
 def opened(chromium: Any, report: Path, width: int = 1200) -> None:
-    """The page, with its curves drawn; logs of earlier pages are dropped."""
+    """Open the page and wait for its curves; drop the logs of earlier pages."""
     for log in ("browser", "performance"):
         chromium.get_log(log)
     chromium.set_window_size(width, 900)
@@ -56,7 +56,7 @@ def opened(chromium: Any, report: Path, width: int = 1200) -> None:
 
 
 def view(chromium: Any) -> str:
-    """The picture of the state that is shown."""
+    """Return the picture of the state that is shown."""
     return str(chromium.execute_script("return document.getElementById('view').toDataURL()"))
 
 

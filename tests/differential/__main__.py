@@ -25,7 +25,7 @@ MOST_REFUSED = 0.1  # share of cases that may be refused
 
 
 def parser() -> argparse.ArgumentParser:
-    """The words of the command."""
+    """Return the words of the command."""
     words = argparse.ArgumentParser(prog="python -m differential", description=__doc__)
     words.add_argument("--cases", type=int, default=CASES, help="how many cases, from --first")
     words.add_argument("--first", type=int, default=0, help="number of the first case")
@@ -67,7 +67,7 @@ def too_little(rows: Sequence[Row], cases: int, ranks: int) -> list[str]:
 
 
 def read(folder: Path) -> list[Row]:
-    """The rows of the cases that a run in this folder finished."""
+    """Return the rows of the cases that a run in this folder finished."""
     return [Row(**row) for path in sorted(folder.glob(f"case-*/{ROWS}")) for row in json.loads(path.read_text())]
 
 

@@ -33,7 +33,7 @@ Kinds = Mapping[str, Sequence[Any]]
 
 
 def apart(base: Any, other: Any) -> list[tuple[float, str]]:
-    """The deviation of each kind of number, and its path; inf where counts, words or shapes differ."""
+    """Return the deviation of each kind of number, and its path; inf where counts, words or shapes differ."""
     ours, theirs = ({p: v for p, v in _kinds(document).items()} for document in (base, other))
     found = [(DIFFERENT, f"{path} in one of them") for path in ours.keys() ^ theirs.keys()]
     sizes = _sizes(ours)
@@ -48,7 +48,7 @@ def _kinds(document: Any) -> dict[str, list[Any]]:
 
 
 def leaves(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:
-    """The numbers, arrays and texts of a document with their paths, in order."""
+    """Yield the numbers, arrays and texts of a document with their paths, in order."""
     if isinstance(value, Mapping):
         for name, item in value.items():
             if name not in LEFT_OUT_WITHIN:
@@ -111,7 +111,7 @@ def _certainty(record: str, name: str, base: Kinds, sizes: Mapping[str, float]) 
 
 
 def _largest(off: np.ndarray, size: float) -> float:
-    """The largest of the differences `off` / size, where 0 / 0 = 0."""
+    """Return the largest of the differences `off` / size, where 0 / 0 = 0."""
     largest = float(off.max(initial=0.0))
     if not np.isfinite(off).all() or (largest > 0.0 and size == 0.0):
         return DIFFERENT

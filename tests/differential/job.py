@@ -47,7 +47,7 @@ class Row:
 
 
 def examine(comm: Any, seed: int, numbers: Sequence[int], folder: Path, of_each: int = DRAWN_PER_CASE) -> list[Row]:
-    """The rows of all cases, on every rank.  Collective; `folder` is one that all ranks see."""
+    """Return the rows of all cases, on every rank. Collective; `folder` is one that all ranks see."""
     from mpi4py import MPI
 
     own: list[Row] = []
@@ -80,7 +80,7 @@ def _claimed(folder: Path, number: int) -> bool:
 
 
 def _alone(comm: Any, seed: int, number: int, folder: Path, of_each: int) -> list[Row]:
-    """The rows of a case on one rank."""
+    """Return the rows of a case on one rank."""
     folder.mkdir()
     try:
         drawn = draw(seed, number, folder)
@@ -94,7 +94,7 @@ def _alone(comm: Any, seed: int, number: int, folder: Path, of_each: int) -> lis
 
 
 def chosen(rng: np.random.Generator, drawn: Drawn, base: Any, count: int) -> list[Relation]:
-    """The relations that a case draws of those that it has, by their weights."""
+    """Return the relations that a case draws of those that it has, by their weights."""
     having = [relation for relation in DRAWN if relation.applies(drawn, base)]
     weights = np.array([relation.weight for relation in having], float)
     count = min(count, len(having))
@@ -102,7 +102,7 @@ def chosen(rng: np.random.Generator, drawn: Drawn, base: Any, count: int) -> lis
 
 
 def _together(comm: Any, seed: int, number: int, folder: Path) -> list[Row]:
-    """The rows of a case on all ranks.  Collective."""
+    """Return the rows of a case on all ranks. Collective."""
     drawn, base = Drawn(seed, number, on_root(comm, lambda: draw(seed, number, folder).document), folder), None
     base = on_root(comm, document_of, folder / "out")
     rows = [_checked(comm, RANKS, drawn, base, folder)]
@@ -113,7 +113,7 @@ def _together(comm: Any, seed: int, number: int, folder: Path) -> list[Row]:
 
 
 def _checked(comm: Any, relation: Relation, drawn: Drawn, base: Any, folder: Path) -> Row:
-    """The row of a relation; random numbers are those of its name.  Collective over `comm`."""
+    """Return the row of a relation; random numbers are those of its name. Collective over `comm`."""
     name = f"{relation.name}, {comm.size} ranks" if comm.size > 1 and relation is not RANKS else relation.name
     work = folder / name.replace(" ", "-")
     on_root(comm, lambda: work.mkdir())
@@ -132,7 +132,7 @@ def _checked(comm: Any, relation: Relation, drawn: Drawn, base: Any, folder: Pat
 
 
 def _of_error(number: int, relation: str, error: Exception, refusals: tuple[type[Exception], ...]) -> Row:
-    """The row of a relation, or a case, whose run raised."""
+    """Return the row of a relation, or a case, whose run raised."""
     refused = isinstance(error, refusals) or (isinstance(error, FetiHomogError) and NOT_CARRIED in str(error))
     words = f"{type(error).__name__}: {error}"
     if not isinstance(error, FetiHomogError):
@@ -153,7 +153,7 @@ def tell(seed: int, rows: Sequence[Row], folder: Path) -> None:
 
 
 def case_text(seed: int, number: int, folder: Path) -> str:
-    """The case file of a case, as TOML."""
+    """Return the case file of a case, as TOML."""
     return tomli_w.dumps(_plain(draw(seed, number, folder).document))
 
 
@@ -166,7 +166,7 @@ def _plain(value: Any) -> Any:
 
 
 def table(rows: Sequence[Row]) -> str:
-    """The worst deviation of each relation, and how many cases were compared, in part, or not at all."""
+    """Return the worst deviation of each relation, and how many cases were compared, in part, or not at all."""
     head = ("relation", "compared", "in part", "refused", "failed", "worst deviation", "/ tolerance", "case", "of")
     known = [RUNS, *(relation.name for relation in (*ALWAYS, RANKS, *DRAWN))]
     names = dict.fromkeys([*known, *sorted({row.relation for row in rows})])
@@ -175,7 +175,7 @@ def table(rows: Sequence[Row]) -> str:
 
 
 def _line(name: str, rows: Sequence[Row]) -> tuple[Any, ...]:
-    """The line of a relation."""
+    """Return the line of a relation."""
     compared = [row for row in rows if row.verdict != REFUSED]
     in_part, failed = (sum(map(bool, of)) for of in ([r.note for r in compared], [r.verdict == FAILED for r in rows]))
     counts = (name, len(compared), in_part, len(rows) - len(compared), failed)

@@ -40,7 +40,7 @@ def split_way(setting: Setting) -> Compared:
 
 
 def _expandable(load: Mapping[str, float], drawn: Drawn) -> dict[str, float]:
-    """A load without a temperature if that is never other than zero, for then phases need not expand."""
+    """Return a load without a temperature if that is never other than zero, for then phases need not expand."""
     warm = any("temperature" in load for load in transforms.waypoints(drawn.document["path"]) if isinstance(load, dict))
     return {name: value for name, value in load.items() if warm or name != "temperature"}
 
@@ -53,7 +53,7 @@ def _state(point: Any, plane: str) -> dict[str, float]:
 
 
 def _joined(path: list[Any], legs: int, leg: int, share: float) -> list[Any]:
-    """The points of a path one of whose legs is cut, without the end of its first part, as on the whole one."""
+    """Return the points of a path one of whose legs is cut, without the end of its first part, as on the whole one."""
     points, cut = [], (leg + 1) / (legs + 1)
     for point in path:
         place = point["load_factor"] * (legs + 1)
@@ -78,7 +78,7 @@ def _ends_compared(setting: Setting, other: Any, legs: int) -> Compared:
 
 
 def stress_back(setting: Setting) -> Compared:
-    """The strain under the stress that a strain gave.  Collective."""
+    """Return the strain under the stress that a strain gave. Collective."""
     drawn, document = setting.drawn, dict(setting.drawn.document)
     strains, stresses = NAMES[components(drawn.plane)]
     strain, stress, angle = _response(setting, len(strains))
@@ -93,7 +93,7 @@ def stress_back(setting: Setting) -> Compared:
 
 
 def _response(setting: Setting, v: int) -> tuple[np.ndarray, np.ndarray, float | None]:
-    """A strain, the stress under it, and of an analysis of angles the last of these."""
+    """Return a strain, the stress under it, and of an analysis of angles the last of these."""
     base, column = setting.base, int(setting.rng.integers(v))
     if "load" in base:
         return np.array(base["load"]["strain"]), np.array(base["load"]["stress"]), None
@@ -111,14 +111,14 @@ def _temperature(setting: Setting) -> dict[str, float]:
 
 
 def _with_angles(interface: Any, angle: float) -> Any:
-    """The interfaces whose arcs have this opening."""
+    """Return the interfaces whose arcs have this opening."""
     if isinstance(interface, list):
         return [_with_angles(section, angle) for section in interface]
     return interface | {"debonded": [arc | {"angle": angle} for arc in interface["debonded"]]}
 
 
 def onset(setting: Setting) -> Compared:
-    """The first break of a path along a direction of an envelope.  Collective."""
+    """Return the first break of a path along a direction of an envelope. Collective."""
     points = [point for point in setting.base["envelope"] if point.get("factor")]
     if not points:
         return Compared(0.0, "nothing breaks", "nothing to compare")
@@ -147,6 +147,6 @@ def onset(setting: Setting) -> Compared:
 
 
 def _first_break(setting: Setting, document: Document) -> Any:
-    """The point of a path at which the first bond breaks."""
+    """Return the point of a path at which the first bond breaks."""
     other = setting.solved(document)
     return next((point for point in other["path"] if point["broke"]), None)

@@ -21,7 +21,7 @@ Point = Mapping[str, Any]
 
 
 def keyed(path: Sequence[Point], legs: int, by_steps: bool) -> dict[tuple[Any, ...], Point]:
-    """The points that are determined: breaks by the bonds broken before, ends of legs, or all steps."""
+    """Return the points that are determined: breaks by the bonds broken before, ends of legs, or all steps."""
     found: dict[tuple[Any, ...], Point] = {}
     broken = 0
     for number, point in enumerate(path):
@@ -36,7 +36,7 @@ def keyed(path: Sequence[Point], legs: int, by_steps: bool) -> dict[tuple[Any, .
 
 
 def paths_apart(base: Any, other: Any, folder: Path) -> tuple[list[tuple[float, str]], str]:
-    """The deviations of the points that both have, and in words where they part because loads tie.
+    """Return the deviations of the points that both have, and in words where they part because loads tie.
 
     `folder` has the files of the base."""
     section, note = base["case"]["path"], ""

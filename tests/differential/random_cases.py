@@ -66,7 +66,7 @@ class Drawn:
 
 
 def stream(seed: int, number: int, which: int) -> np.random.Generator:
-    """The random numbers of a case for one of the uses above."""
+    """Return the random numbers of a case for one of the uses above."""
     return np.random.default_rng([seed, number, which])
 
 

@@ -30,7 +30,8 @@ class DrawnCell:
 
 
 def random_cell(rng: np.random.Generator, folder: Path, small: bool) -> DrawnCell:
-    """A cell of some hundred nodes, fewer if it is to be `small`; the file of a user's mesh is written to `folder`."""
+    """Return a cell of some hundred nodes, fewer if it is to be `small`; the file of a user's mesh is written to
+    `folder`."""
     names, shares = zip(*GEOMETRIES.items(), strict=True)
     geometry = str(rng.choice(names, p=shares))
     order = int(rng.choice([1, 2], p=[0.7, 0.3]))
@@ -122,7 +123,8 @@ def _distance(dx: float, dy: float, width: float, height: float) -> float:
 
 
 def _shape(rng: np.random.Generator, radius: float, coated: bool) -> Document:
-    """A shape within a circle: round, elliptic, a polygon, or hollow; round or elliptic ones with their coating."""
+    """Return a shape within a circle: round, elliptic, a polygon, or hollow; round or elliptic ones with their
+    coating."""
     if coated and rng.random() < 0.7:
         thickness = rng.uniform(0.15, 0.3)
         return {"radius": radius / (1 + thickness), "coating": thickness}
@@ -136,7 +138,7 @@ def _shape(rng: np.random.Generator, radius: float, coated: bool) -> Document:
 
 
 def _mesh(rng: np.random.Generator, most: int, folder: Path) -> DrawnCell:
-    """A cell of the program as a user's mesh, sometimes without its last fibre."""
+    """Return a cell of the program as a user's mesh, sometimes without its last fibre."""
     count = int(rng.integers(1, most + 1))
     cell = {"geometry": "random", "fibres": count, "fibre_fraction": rng.uniform(0.15, 0.35), "min_gap": 0.15,
             "seed": int(rng.integers(1000)), "mesh_size": rng.uniform(0.2, 0.28)}  # fmt: skip

@@ -21,7 +21,7 @@ STEPS = 6  # of a path by increments
 
 
 def components(plane: str) -> int:
-    """Number of strains of a plane state."""
+    """Count the strains of a plane state."""
     return 6 if plane == "generalized" else 3
 
 
@@ -71,7 +71,7 @@ def _arcs(rng: np.random.Generator, analysis: str, fibres: int) -> list[Document
 
 
 def random_loads(rng: np.random.Generator, analysis: str, plane: str, expands: bool) -> Document:
-    """The section of the analysis."""
+    """Return the section of the analysis."""
     if analysis == "angle":
         values = sorted(rng.uniform(20, 200, 2).tolist())
         by_strain = plane != "generalized" and rng.random() < 0.5

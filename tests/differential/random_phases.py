@@ -15,7 +15,7 @@ FORMS = ("isotropic", "orthotropic", "transversely isotropic", "general")
 
 
 def random_material(rng: np.random.Generator, plane: str, expands: bool, size: float = 1.0) -> Document:
-    """The table of a material whose moduli are about `size`."""
+    """Return the table of a material whose moduli are about `size`."""
     form = str(rng.choice(FORMS, p=[0.55, 0.15, 0.15, 0.15]))
     E, nu = size * rng.uniform(0.5, 2.0), rng.uniform(0.0, 0.4)
     if form == "isotropic":
@@ -37,7 +37,7 @@ def random_material(rng: np.random.Generator, plane: str, expands: bool, size: f
 
 
 def _stiffness(rng: np.random.Generator, E: float, plane: str) -> list[list[float]]:
-    """A random stiffness: 3x3, or 6x6 in which 23 and 13 are coupled to each other alone."""
+    """Return a random stiffness: 3x3, or 6x6 in which 23 and 13 are coupled to each other alone."""
     spatial = plane == "generalized" or rng.random() < 0.5
     blocks = [[0, 1, 2, 5], [3, 4]] if spatial else [[0, 1, 2]]
     C = np.zeros((6, 6) if spatial else (3, 3))

@@ -83,7 +83,7 @@ class Relation:
     refusals: tuple[type[Exception], ...] = ()
 
     def tolerance(self, rtol: float) -> float:
-        """The largest deviation that holds."""
+        """Return the largest deviation that holds."""
         return 0.0 if self.exact else max(SHARE * rtol, LEAST)
 
 

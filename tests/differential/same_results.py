@@ -76,7 +76,7 @@ def influence_columns(setting: Setting) -> Compared:
 
 
 def resume(setting: Setting) -> Compared:
-    """A path that ends at a random event and goes on from there.  Collective."""
+    """Return a path that ends at a random event and goes on from there. Collective."""
     events = len(setting.base["path"])
     last = int(setting.rng.integers(events))
     write = Checkpoint.write

@@ -49,7 +49,7 @@ class Setting:
         return json.loads(json.dumps(result.document, default=lambda array: array.tolist()))
 
     def compared(self, other: Any) -> Compared:
-        """The result of the same case, found otherwise, against the base."""
+        """Return the result of the same case, found otherwise, against the base."""
         found, note = apart(self.base, other), ""
         if self.drawn.analysis == "path":
             points, note = paths_apart(self.base, other, self.files)

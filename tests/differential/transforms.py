@@ -16,7 +16,7 @@ from differential.random_phases import Document
 
 
 def in_units(document: Document, units: Units) -> Document:
-    """A case in other units."""
+    """Return a case in other units."""
     scaled = units.case(document)
     if not document["cell"].keys() & {"width", "fibre_radius", "file"}:
         scaled["cell"]["width"] = units.length  # of 1, the default
@@ -34,14 +34,14 @@ def scale_mesh(source: Path, target: Path, length: float) -> None:
 
 
 def sections(document: Mapping[str, Any]) -> list[Document]:
-    """The sections of interfaces."""
+    """Return the sections of interfaces."""
     given = document.get("interface", [])
     return given if isinstance(given, list) else [given]
 
 
 def reordered(rng: np.random.Generator, document: Document) -> tuple[Document, list[int], list[int]]:
-    """The case with keys, fibres, arcs and sections of interfaces in another order; of each fibre, and of each section,
-    the place that it had."""
+    """Return the case with keys, fibres, arcs and sections of interfaces in another order; of each fibre, and of each
+    section, the place that it had."""
     case = copy.deepcopy(document)
     fibres, places = _shuffled_rows(rng, case["cell"])
     for section in sections(case):
@@ -77,7 +77,7 @@ def _reversed_keys(value: Any) -> Any:
 
 
 def relabelled(result: Any, fibres: Sequence[int], order: Sequence[int]) -> Any:
-    """A result of `reordered` whose fibres and sections have the numbers that they had."""
+    """Return a result of `reordered` whose fibres and sections have the numbers that they had."""
     if isinstance(result, list):
         return [relabelled(item, fibres, order) for item in result]
     if not isinstance(result, Mapping):
@@ -97,7 +97,7 @@ def _renumbered(fibres: Sequence[Document], places: Sequence[int]) -> list[Docum
 
 
 def _relabelled_tips(tips: Document, fibres: Sequence[int], order: Sequence[int]) -> Document:
-    """The tips in the order of load, fibre, section, and within these as they are."""
+    """Return the tips in the order of load, fibre, section, and within these as they are."""
     own = {"fibre": [fibres[f - 1] + 1 if fibres else f for f in tips["fibre"]]}
     if "interface" in tips:
         own["interface"] = [order[i - 1] + 1 for i in tips["interface"]]
@@ -109,7 +109,7 @@ def _relabelled_tips(tips: Document, fibres: Sequence[int], order: Sequence[int]
 
 
 def full(load: Any, before: Mapping[str, float], plane: str, expands: bool) -> dict[str, float]:
-    """A load of a path with a value of every component, given strain or stress; `before` is the one before."""
+    """Return a load of a path with a value of every component, given strain or stress; `before` is the one before."""
     strains, stresses = NAMES[components(plane)]
     named = dict(zip(strains, load, strict=True)) if isinstance(load, list) else dict(load)
     result = dict(before) or dict.fromkeys(stresses, 0.0)
@@ -124,10 +124,10 @@ def full(load: Any, before: Mapping[str, float], plane: str, expands: bool) -> d
 
 
 def waypoints(path: Mapping[str, Any]) -> list[Any]:
-    """The loads of a section [path]."""
+    """Return the loads of a section [path]."""
     return list(path["waypoints"]) if "waypoints" in path else [path["strain"] if "strain" in path else path["to"]]
 
 
 def between(begin: Mapping[str, float], end: Mapping[str, float], share: float) -> dict[str, float]:
-    """The load after a share of the way to `end`; `begin` has strains and stresses of all components."""
+    """Return the load after a share of the way to `end`; `begin` has strains and stresses of all components."""
     return {name: (1 - share) * begin.get(name, 0.0) + share * value for name, value in end.items()}

@@ -69,7 +69,7 @@ class SolvedAnew:
         self._join_faces()
 
     def _number_nodes(self) -> None:
-        """Number the nodes: one for each phase at each place of the torus."""
+        """Assign numbers to the nodes: one for each phase at each place of the torus."""
         mesh = {name: self.file[f"mesh/{name}"][()] for name in ("points", "triangles", "phase")}
         self.points, self.triangles, self.phase = mesh["points"], mesh["triangles"], mesh["phase"]
         n = len(self.points)
@@ -105,7 +105,7 @@ class SolvedAnew:
         self.Q = Q
 
     def _join_faces(self) -> None:
-        """The faces of the interface nodes, and which other nodes at one place are one."""
+        """Find the faces of the interface nodes, and the other nodes that share one place."""
         own = self.file["interface"]
         self.fibre, self.matrix = (self.node[own[f"{side}_node"][()]] for side in ("fibre", "matrix"))
         normal, self.length = own["normal"][()], own["length"][()]
@@ -131,7 +131,7 @@ class SolvedAnew:
         return np.array([[float(x) for x in row] for row in found])
 
     def compare(self, number: int) -> Twin:
-        """The deviations of state `number`."""
+        """Return the deviations of state `number`."""
         state = self.file[f"state/{number}"]
         status = state["status"][()]
         load, stress = self._loads(state)
@@ -169,11 +169,11 @@ class SolvedAnew:
         return load, stress
 
     def _least(self, load: np.ndarray) -> float:
-        """A stress by which small ones are measured, which are what is left of larger ones."""
+        """Return a stress by which small ones are measured, which are what is left of larger ones."""
         return LEAST * float(np.abs(self.mean[:6] @ load).max() / self.size.prod()) or 1.0
 
     def _entry(self, state: Any) -> Any:
-        """The entry of result.json for a state of a path or a load."""
+        """Return the entry of result.json for a state of a path or a load."""
         if "path" in self.document:
             return self.document["path"][int(state.attrs["point"])]
         return self.document.get("load")

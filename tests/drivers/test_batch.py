@@ -93,7 +93,7 @@ fi
 
 @pytest.fixture
 def scheduler(tmp_path):
-    """The environment with the stand-ins; what they noted is in its NOTES."""
+    """Provide the environment with the stand-ins; what they noted is in its NOTES."""
     folder = tmp_path / "bin"
     folder.mkdir()
     for name, text in {"srun": LAUNCH, "mpirun": LAUNCH, "sbatch": SBATCH, "qsub": QSUB}.items():
@@ -104,7 +104,7 @@ def scheduler(tmp_path):
 
 
 def submitted(scheduler, script, *words, code=0, cwd=ROOT):
-    """What the script says, and what the stand-ins noted."""
+    """Return the output of the script and the notes of the stand-ins."""
     job = subprocess.run(
         [str(script), *map(str, words)], cwd=cwd, env=scheduler, capture_output=True, text=True, timeout=PATIENCE
     )
@@ -115,7 +115,7 @@ def submitted(scheduler, script, *words, code=0, cwd=ROOT):
 
 @pytest.fixture
 def elsewhere(tmp_path):
-    """A folder far from the repository, with a name that shells and schedulers could misread."""
+    """Provide a folder far from the repository, with a name that shells and schedulers could misread."""
     folder = tmp_path / "a place, 100%j"
     folder.mkdir()
     return folder

@@ -47,7 +47,7 @@ def test_contact_prevents_overlap_and_stiffens(tmp_path):
 
 @pytest.fixture(scope="module")
 def stress_strain(tmp_path_factory):
-    """The folder and the table of the driver of Figure 5, with the pictures of its cases."""
+    """Provide the folder and the table of the driver of Figure 5, with the pictures of its cases."""
     folder = tmp_path_factory.mktemp("stress_strain")
     return folder, driven("stress_strain", folder, "--pictures")
 

@@ -29,7 +29,7 @@ for name, words in json.loads(Path(sys.argv[1]).read_text()).items():
 
 @pytest.fixture(scope="module", params=[1, 2])
 def answers(request, tmp_path_factory):
-    """What each command said on standard error, its exit code in the last line, and what was expected."""
+    """Return standard error of each command, its exit code in the last line, and the expected text."""
     folder = tmp_path_factory.mktemp(f"{request.param} ranks")
     commands = write_inputs(folder)
     (folder / "commands.json").write_text(json.dumps({name: words for name, (words, _) in commands.items()}))

@@ -26,7 +26,8 @@ def done(*words: str | Path, **options) -> str:
 
 @pytest.fixture(scope="module")
 def installed(tmp_path_factory) -> Path:
-    """The folder of an environment with the wheel, which finds its requirements where those of the tests are."""
+    """Provide the folder of an environment with the wheel, which finds its requirements where those of the tests
+    are."""
     folder = tmp_path_factory.mktemp("installed")
     source = folder / "source"
     for name in SOURCES:
@@ -47,7 +48,7 @@ def installed(tmp_path_factory) -> Path:
 
 
 def variables() -> dict[str, str]:
-    """The environment of a user who has set what the launcher needs, and nothing else."""
+    """Return the environment of a user who has set what the launcher needs, and nothing else."""
     own = {
         k: v for k, v in os.environ.items() if not k.startswith((*LAUNCHER_VARIABLES, "PYTHON")) and k not in SETTINGS
     }

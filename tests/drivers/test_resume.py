@@ -139,7 +139,7 @@ def assert_same_curve(found, expected):
 
 @pytest.fixture(scope="module")
 def reference(tmp_path_factory):
-    """The uninterrupted run."""
+    """Provide the uninterrupted run."""
     folder = tmp_path_factory.mktemp("reference")
     job = command_line(2, "run", case_file(folder), "--out", folder / "out")
     assert job.returncode == 0, job.stderr
@@ -148,7 +148,7 @@ def reference(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def interrupted(tmp_path_factory):
-    """A folder with some events of an ended run."""
+    """Provide a folder with some events of an ended run."""
     folder = tmp_path_factory.mktemp("interrupted")
     assert killed(2, case_file(folder), folder / "out", 5) == 5
     return folder / "out"

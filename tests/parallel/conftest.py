@@ -30,7 +30,7 @@ def agreement_is_silent():
 
 @pytest.fixture(scope="module")
 def narrow():
-    """The narrow cell at the default threshold."""
+    """Provide the narrow cell at the default threshold."""
     from support.coarse_space_cells import Narrow
 
     from feti_homog.feti.thresholds import DEFAULTS

@@ -39,7 +39,7 @@ def case_of(cell, debonded, folder=".", subdomains=None, **sections):
 
 
 def torn(case, comm):
-    """The torn cell; number, direction and state of all interface nodes by the opening, on every rank."""
+    """Return the torn cell; number, direction and state of all interface nodes by the opening, on every rank."""
     PETSc.garbage_cleanup(comm)
     cell = tear(case, comm, Progress(comm, quiet=True))
     number = cell.summary.fibre_number(cell.solver.jump_operator.nodes.fibre)

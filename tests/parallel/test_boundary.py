@@ -183,7 +183,7 @@ def test_every_rank_has_a_piece(interface):
 
 
 def torn_by_default(comm, interface, policy=SMALL_PIECES):
-    """A cell of two fibres and a matrix; the bodies of its pieces and the triangles of the largest piece."""
+    """Return a cell of two fibres and a matrix; the bodies of its pieces and the triangles of the largest piece."""
     case = replace(make_case(geometry="hexagonal", mesh_size=0.1), interfaces=() if interface is None else (interface,))
     cell = unit_cell.tear(case, comm, Progress(comm, quiet=True), policy=policy)
     own = comm.allgather([s.submesh.body for s in cell.subdomains])

@@ -79,7 +79,7 @@ def of_nodes(programme, name, tables):
 
 
 def compare(case, expected, strain):
-    """The points of the path have the broken bonds, loads and stresses of the events; bonds of both pairs break."""
+    """Compare broken bonds, loads and stresses of the path with the events; bonds of both pairs break."""
     interface = torn_cells.interface(case.cell, True)
     bonded = np.full(case.here, BONDED, np.int8)
     begin = unloaded(CoupledInterfaces(interface), bonded)

@@ -41,7 +41,7 @@ def response(cell, contact, strain, status):
 
 
 def stiffness(cell, status):
-    """The stiffness without contact."""
+    """Return the stiffness without contact."""
     return np.array([response(cell, False, strain, status)[0] for strain in STRAINS]).T
 
 

@@ -19,7 +19,7 @@ pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 
 
 def path_run(comm, folder, text, *words):
-    """The exit code of `run` of a path on all ranks; its results are in folder/out."""
+    """Return the exit code of `run` of a path on all ranks; its results are in folder/out."""
     if comm.rank == 0:
         (folder / "path.toml").write_text(text)
     comm.barrier()
@@ -30,7 +30,7 @@ def path_run(comm, folder, text, *words):
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory):
-    """The folder of two finished runs, `one` and `other`, on every rank."""
+    """Provide the folder of two finished runs, `one` and `other`, on every rank."""
     from mpi4py import MPI
 
     comm = MPI.COMM_WORLD
@@ -114,7 +114,7 @@ OF_RESUME = {"result of another case": (lambda out: other(out, "result.json"), "
 
 
 def damaged(comm, finished, damage):
-    """A copy of the finished run, damaged."""
+    """Return a copy of the finished run, damaged."""
     out = finished / "out"
     if comm.rank == 0:
         shutil.rmtree(out, ignore_errors=True)
@@ -125,7 +125,7 @@ def damaged(comm, finished, damage):
 
 
 def times(folder):
-    """What is there and since when."""
+    """Return the files of a folder and their times."""
     return {path.name: path.stat().st_mtime_ns for path in folder.iterdir()} if folder.exists() else {}
 
 
@@ -183,7 +183,7 @@ SWEEP = BASE.replace("mesh_size = 0.05", "mesh_size = 0.4") + (
 
 @pytest.fixture(scope="module")
 def swept(tmp_path_factory):
-    """The folder of a finished sweep, on every rank."""
+    """Provide the folder of a finished sweep, on every rank."""
     from mpi4py import MPI
 
     comm = MPI.COMM_WORLD

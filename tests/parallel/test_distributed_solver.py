@@ -42,7 +42,7 @@ def share(comm, matrix, holder):
 
 
 def made(comm, total, unknowns, part):
-    """The solver that the options ask for."""
+    """Return the solver that the options ask for."""
     solver = RenewedSolver(comm, total, unknowns, "test_")
     solver.factor(unknowns, part)
     return solver

@@ -30,7 +30,7 @@ FRACTION = 0.25
 
 @pytest.fixture
 def strip(comm, shared_path):
-    """A cell with a strip of fibre normal to x1, a quarter of it, at either order."""
+    """Provide a cell with a strip of fibre normal to x1, a quarter of it, at either order."""
     if comm.rank == 0:
         grid(lambda x, y: 0.25 < x < 0.5).write(shared_path / "strip.msh")
     comm.barrier()
@@ -53,7 +53,7 @@ def strip(comm, shared_path):
 
 
 def series(matrix, fibre, stiffness):
-    """The modulus of matrix, fibre and two interfaces of a cell of width 1 in a row."""
+    """Return the modulus of matrix, fibre and two interfaces of a cell of width 1 in a row."""
     return 1.0 / ((1 - FRACTION) / matrix + FRACTION / fibre + 2.0 / stiffness)
 
 

@@ -49,7 +49,7 @@ def criterion(cell, growth):
 
 
 def path(comm, growth, strain, **case):
-    """The interface and the points of a path straight to a strain."""
+    """Return the interface and the points of a path straight to a strain."""
     cell = torn_cells.tear(comm, **case)
     interface = torn_cells.interface(cell, True)
     begin = unloaded(CoupledInterfaces(interface), np.full(len(interface.nodes.row), BONDED, np.int8))

@@ -30,7 +30,7 @@ STEP = 0.5
 
 
 def solved(comm, strain, openings, bond, arc=(), materials=(), pieces=None, folder=".", **cell):
-    """The points of an angle under a strain, and the area of the cell."""
+    """Return the points of an angle under a strain, and the area of the cell."""
     document = {
         "cell": SQUARE | cell,
         "material": {"matrix": MATRIX, "fibre": FIBRE} | dict(materials),
@@ -198,7 +198,7 @@ def test_one_fibre_in_a_large_matrix_has_the_published_rates(comm):
 
 
 def loaded(comm, cell, arcs, materials=(), folder="."):
-    """The point of a load on the cell, whose arcs are 100 degrees long where they do not say."""
+    """Return the point of a load on the cell, whose arcs are 100 degrees long where they do not say."""
     document = {
         "cell": cell,
         "material": {"matrix": MATRIX, "fibre": FIBRE} | dict(materials),

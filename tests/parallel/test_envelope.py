@@ -36,7 +36,7 @@ def factors(result):
 
 
 def unit(point, axes, names):
-    """The load of a direction, with zeros for what is not named."""
+    """Return the load of a direction, with zeros for what is not named."""
     angle, load = np.radians(point.angle), np.zeros(len(names))
     load[[names.index(name) for name in axes]] = np.cos(angle), np.sin(angle)
     return load
@@ -109,7 +109,7 @@ def test_compression_breaks_no_bond_that_only_tension_breaks(comm):
 
 @pytest.fixture
 def strip(comm, shared_path):
-    """A folder with the mesh of a strip of fibre normal to x1."""
+    """Provide a folder with the mesh of a strip of fibre normal to x1."""
     if comm.rank == 0:
         grid(lambda x, y: 0.25 < x < 0.5).write(shared_path / "strip.msh")
     comm.barrier()
@@ -227,7 +227,7 @@ def test_a_tip_in_space_releases_what_its_break_does(comm):
 
 
 def cell_energy(plane, axial, strain, status):
-    """The energy of the cell under a strain (6,), and the tractions (k, 3)."""
+    """Return the energy of the cell under a strain (6,), and the tractions (k, 3)."""
     pairs = ((plane, strain[[0, 1, 5, 2]]), (axial, strain[[4, 3]]))
     found = [each.respond(loads[None], status, [np.zeros(each.cell.solver.rows)])[0] for each, loads in pairs]
     traction = np.hstack([each.interface.traction(r.state.solution) for (each, _), r in zip(pairs, found, strict=True)])
@@ -235,7 +235,7 @@ def cell_energy(plane, axial, strain, status):
 
 
 def direct_utilisation(cell, strain, temperature):
-    """The largest utilisation of all bonds, from solves under a strain and a change of temperature."""
+    """Return the largest utilisation of all bonds, from solves under a strain and a change of temperature."""
     plane, axial = Homogenization(cell, False), Homogenization(cell.axial, False)
     status = np.where(cell.debonded(None), OPEN, 0).astype(np.int8)
     pairs = ((plane, [*strain[[0, 1, 5, 2]], temperature]), (axial, strain[[4, 3]]))

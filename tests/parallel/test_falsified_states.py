@@ -42,7 +42,7 @@ class Falsified:
         return self.interface.linear(Load.strain(strain), status, np.zeros(self.cell.solver.rows))
 
     def checks(self, solution, status, load=None):
-        """The checks of a state that is taken as found."""
+        """Return the checks of a state that is taken as found."""
         found = self.interface._equilibrium(load or Load.strain(solution.strain), status, solution, 1, 1)
         response = self.homogenization.response(replace(found, status=status), 1.0)
         alike = self.comm.allgather(response.checks)
@@ -50,7 +50,7 @@ class Falsified:
         return response.checks
 
     def assert_only(self, checks, **expected):
-        """The checks are these, and the others noise."""
+        """Check that these checks rise and the others stay noise."""
         for law, error in checks.items():
             if law in expected:
                 assert error == pytest.approx(expected[law], rel=1e-6), law
@@ -66,11 +66,11 @@ class Falsified:
         return max(a, b) + c / 2
 
     def least_stress(self, strain):
-        """A stress that strains of this size cause at least, by Reuss' bound."""
+        """Return a stress that strains of this size cause at least, by Reuss' bound."""
         return np.abs(self.reuss() @ np.abs(strain)).max()
 
     def bond_stress(self, strain):
-        """A stress that strains of this size cause in the matrix, the softer body of a bond."""
+        """Return a stress that strains of this size cause in the matrix, the softer body of a bond."""
         return sum(bulk_and_shear(MATRIX)) * np.abs(strain).max()
 
     def reuss(self):
@@ -99,13 +99,13 @@ class Falsified:
 
 
 def bulk_and_shear(phase):
-    """The moduli of a phase in plane strain."""
+    """Return the moduli of a phase in plane strain."""
     E, nu = phase["young"], phase["poisson"]
     return E / (2 * (1 + nu) * (1 - 2 * nu)), E / (2 * (1 + nu))
 
 
 def mixed(pairs):
-    """The sum of shares of solutions under one strain."""
+    """Return the sum of shares of solutions under one strain."""
     sums = {name: sum(share * getattr(one, name) for share, one in pairs) for name in ("lam", "jump", "alpha")}
     return replace(pairs[0][1], **sums)
 

@@ -102,7 +102,7 @@ def test_faulty_commands_are_refused_on_every_rank_and_told_once(comm, capsys, w
 
 
 def refused(comm, folder, capsys, command, expected):
-    """The command ends with exit code 2 on every rank; rank 0 tells the faults, a line each."""
+    """Check that the command ends with exit code 2 on every rank, and that rank 0 prints a line per fault."""
     comm.barrier()
     out = ["--out", str(folder / "results")] if command == "run" else []
     before = sorted(folder.iterdir())

@@ -28,7 +28,7 @@ CELLS = {
 
 @pytest.fixture(scope="module", params=CELLS)
 def computed(request: Any) -> Result:
-    """A cell in 7 pieces, half of each fibre debonded and in contact."""
+    """Provide a cell in 7 pieces, half of each fibre debonded and in contact."""
     document = {
         "cell": CELLS[request.param],
         "material": {"matrix": MATRIX, "fibre": FIBRE},

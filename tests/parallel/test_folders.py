@@ -21,7 +21,7 @@ LONG = "a" * 300
 
 
 def make(folder, name, content):
-    """A folder with a file, or with a folder if there is no content, of that name."""
+    """Make a folder with a file of that name, or with a folder if there is no content."""
     folder.mkdir()
     if content is None:
         (folder / name).mkdir()
@@ -69,7 +69,7 @@ def tree(folder):
 
 
 def run(comm, folder, out):
-    """The exit code of the tiny case, the same on all ranks."""
+    """Return the exit code of the tiny case, the same on all ranks."""
     if comm.rank == 0:
         (folder / "cell.toml").write_text(CASE)
     comm.barrier()

@@ -21,12 +21,12 @@ ARC = {"interface": {"debonded": [{"fibre": 1, "centre": 20.0, "angle": 80.0}]}}
 
 
 def hook(x, y):
-    """A fibre without any symmetry, in a 4 x 4 grid."""
+    """Return a fibre without any symmetry, in a 4 x 4 grid."""
     return (int(4 * x), int(4 * y)) in {(1, 1), (2, 1), (2, 2)}
 
 
 def moved(mesh: MshFile, place) -> MshFile:
-    """The mesh with its nodes at place(x, y), its triangles counterclockwise."""
+    """Return the mesh with its nodes at place(x, y), its triangles counterclockwise."""
     nodes = {tag: (*place(x, y), 0.0) for tag, (x, y, _) in mesh.nodes.items()}
     a, b, c = (np.array(nodes[tag][:2]) for tag in next(iter(mesh.elements.values()))[3])
     way = 1 if np.linalg.det([b - a, c - a]) > 0 else -1
@@ -56,7 +56,7 @@ def same(found, expected, tolerance=EXACT):
 
 
 def swapped(phase):
-    """An orthotropic phase with x1 and x2 exchanged."""
+    """Return an orthotropic phase with x1 and x2 exchanged."""
     names = {"E1": "E2", "E2": "E1", "nu13": "nu23", "nu23": "nu13", "G13": "G23", "G23": "G13"}
     a, b, c = phase["expansion"]
     nu21 = phase["nu12"] * phase["E2"] / phase["E1"]

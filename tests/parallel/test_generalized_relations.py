@@ -101,7 +101,7 @@ def test_homogeneous_cell_without_a_plane_of_symmetry_across(comm):
 
 
 def strips(where):
-    """A mesh of a 4 x 4 grid with a quarter of fibre: straight strips, or strips along the diagonal."""
+    """Return a mesh of a 4 x 4 grid with a quarter of fibre: straight strips, or strips along the diagonal."""
     if where == "diagonal":
         mesh = grid(lambda x, y: int(N * x) == int(N * y))
         # The upper halves beside the strip take the place of those in it.
@@ -113,7 +113,7 @@ def strips(where):
 
 
 def written(comm, folder, where):
-    """The mesh file of `strips`, as keys of a cell.  Collective."""
+    """Return the mesh file of `strips`, as keys of a cell. Collective."""
     if comm.rank == 0:
         strips(where).write(folder / "strips.msh")
     comm.barrier()

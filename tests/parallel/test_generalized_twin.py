@@ -25,19 +25,19 @@ CUT = {"decomposition": {"subdomains": 7}}
 
 
 def arcs(*given, **keys):
-    """A section [interface] with arcs (fibre, centre, angle)."""
+    """Return a section [interface] with arcs (fibre, centre, angle)."""
     debonded = [dict(zip(("fibre", "centre", "angle"), arc, strict=False)) for arc in given]
     return {"interface": {"debonded": debonded} | keys}
 
 
 def springs_of(section):
-    """(normal, tangential) of a section [interface], or None."""
+    """Return (normal, tangential) of a section [interface], or None."""
     stiffnesses = section.get("normal_stiffness"), section.get("tangential_stiffness")
     return None if None in stiffnesses else stiffnesses
 
 
 def compare(comm, tolerance=TIGHT, **case):
-    """The result of a case, whose secants are those of the twin.  Collective."""
+    """Return the result of a case, whose secants are those of the twin. Collective."""
     result, twin = solved(comm, **case), Twin(comm, **case)
     section = case.get("sections", {}).get("interface", {})
     how = {"contact": bool(section) and section.get("contact", True), "springs": springs_of(section)}
@@ -185,7 +185,7 @@ def test_random_cells(comm, number):
 
 
 def random_phase(rng):
-    """A stiffness (6, 6) with x3 normal to a plane of symmetry and nothing more, and an expansion."""
+    """Return a stiffness (6, 6) with x3 normal to a plane of symmetry and nothing more, and an expansion."""
     C, scale = np.zeros((6, 6)), 10.0 ** rng.uniform(-1, 1)
     for block in ([0, 1, 2, 5], [3, 4]):
         A = rng.normal(size=(len(block), len(block)))

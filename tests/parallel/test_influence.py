@@ -44,7 +44,7 @@ def inverse(dense, active):
 
 
 def activate(cell, status):
-    """The active rows, on all ranks, of a status; the solver is set to them."""
+    """Return the active rows, on all ranks, of a status; the solver is set to them."""
     active = torn_cells.interface(cell, True).active(status)
     cell.solver.activate(active)
     return gathered(cell, active) > 0

@@ -45,7 +45,7 @@ def case_of(folder, name, materials, interface, fields=False, **analysis):
 
 @pytest.fixture
 def meshes(comm, shared_path):
-    """A fibre in two rings: of one phase, of two, and with a ring of the matrix."""
+    """Provide a fibre in two rings: of one phase, of two, and with a ring of the matrix."""
 
     def write():
         for name, core, ring in (("plain", "fibre", "fibre"), ("coated", *INNER), ("core", "fibre", "matrix")):

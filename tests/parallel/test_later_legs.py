@@ -38,7 +38,7 @@ NEVER = StrengthCriterion(np.inf, np.inf, "max")
 
 
 def interface_with(cell, is_debonded):
-    """The interface with contact and the beginning of a path with some nodes debonded, or all (True)."""
+    """Return the interface with contact and the beginning of a path with some nodes debonded, or all (True)."""
     interface = torn_cells.interface(cell, True)
     debonded = np.broadcast_to(is_debonded, len(interface.nodes.row))
     return interface, unloaded(CoupledInterfaces(interface), np.where(debonded, OPEN, BONDED).astype(np.int8))

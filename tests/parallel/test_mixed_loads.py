@@ -73,7 +73,7 @@ def test_stresses_that_rounding_misses_are_no_result(comm, bonding):
 
 
 def compare(comm, loads, **case):
-    """The results are the oracle's, which has the stress of the other oracles under the strain that it finds last."""
+    """Compare the results with the oracle, whose stress is that of the other oracles under its last strain."""
     twin, closed, state = LoadedTwin(comm, **case, load={"to": next(iter(loads.values()))}), 0, None
     for to in loads.values():
         written = case | {"load": {"to": to}}
@@ -96,7 +96,7 @@ def compare(comm, loads, **case):
 
 
 def stress_under(twin, strain):
-    """That of the programmes in all displacements."""
+    """Solve the programme in all displacements."""
     programme, springs, contact = twin.cell.programme, twin.springs, twin.cell.contact
     if twin.cell.d == 3:
         return programme.stress(strain, twin.bonded, contact, springs)
@@ -151,7 +151,7 @@ def test_a_strain_of_an_arc_releases_what_its_column_of_the_stiffness_does(comm)
 
 @pytest.fixture
 def cut(comm, shared_path):
-    """A folder with a laminate normal to x1 whose layers are debonded on one side."""
+    """Provide a folder with a laminate normal to x1 whose layers are debonded on one side."""
     if comm.rank == 0:
         side = [(node(2, j), node(2, j + 1)) for j in range(4)]
         grid(lambda x, y: 0.25 < x < 0.5).with_curve(side).write(shared_path / "cut.msh")

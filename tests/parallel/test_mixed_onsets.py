@@ -36,7 +36,7 @@ STRESSES = ("S11", "S22", "S33", "S23", "S13", "S12")
 
 
 def case_of(bonds, axes, temperature):
-    """An envelope in eight directions of two axes."""
+    """Return an envelope in eight directions of two axes."""
     cooling = {"temperature": temperature} if temperature else {}
     return Case.parse(
         {
@@ -57,7 +57,7 @@ def case_of(bonds, axes, temperature):
 
 @contextmanager
 def torn(comm, case):
-    """The torn cell of a case.  Collective."""
+    """Provide the torn cell of a case. Collective."""
     PETSc.garbage_cleanup(comm)
     with case_options(case.petsc):
         cell = unit_cell.tear(case, comm, Progress(comm, quiet=True))
@@ -66,7 +66,7 @@ def torn(comm, case):
 
 
 def load(names, of_stresses, values, temperature):
-    """The load with these values of the strains, or stresses, and no other of its kind."""
+    """Return the load with these values of the strains, or stresses, and no other of its kind."""
     given = dict(zip(STRESSES if of_stresses else STRAINS, values, strict=True)) | {"temperature": temperature}
     pairs = dict(zip(STRAINS, STRESSES, strict=True))
     by_stress = np.array([of_stresses and name != "temperature" for name in names])

@@ -105,7 +105,7 @@ def test_a_longer_way_in_the_same_direction_has_the_same_events(comm, to):
 
 @pytest.fixture
 def strip(comm, shared_path):
-    """A folder with a laminate normal to x1."""
+    """Provide a folder with a laminate normal to x1."""
     if comm.rank == 0:
         grid(lambda x, y: 0.25 < x < 0.5).write(shared_path / "strip.msh")
     comm.barrier()

@@ -21,7 +21,7 @@ def stiffness(tmp_path, cell):
 
 
 def lattice(w, s, h, q, radius):
-    """The cell of q fibres that `Lattices that are no rectangle` of meshes/README.md describes."""
+    """Return the cell of q fibres that `Lattices that are no rectangle` of meshes/README.md describes."""
     centres = [(k * s % w, k * h) for k in range(q)]
     fibres = ", ".join(f"{{x = {x}, y = {y}, radius = {radius}}}" for x, y in centres)
     return f'geometry = "table"\nwidth = {w}\nheight = {q * h}\nfibre_list = [{fibres}]\n'

@@ -51,7 +51,7 @@ PATHS = {
 
 
 def solved(comm, folder, phases, across, plane, interface, petsc, materials=EPOXY_GLASS, pieces=None, **analysis):
-    """The result of a case of layers, with its files in the folder.  Collective."""
+    """Return the result of a case of layers, with its files in the folder. Collective."""
     if comm.rank == 0:
         layers(phases, across).write(folder / "layers.msh")
     comm.barrier()

@@ -39,7 +39,7 @@ def random_cell(rng):
 
 
 def random_bonds(rng, in_space):
-    """A section [interface]: strengths or toughness, glue or springs, with an arc or without."""
+    """Return a section [interface]: strengths or toughness, glue or springs, with an arc or without."""
     keys = ["normal", "tangential", *(["axial"] if in_space else [])]
     springs = {f"{key}_stiffness": float(10 ** rng.uniform(0.5, 2.5)) for key in keys}
     if rng.random() < 0.4:

@@ -36,7 +36,7 @@ SPRINGS = {"criterion": "energy", "normal_stiffness": 20.0, "tangential_stiffnes
 
 
 def two_inclusions(softness, stiff, soft, unit=1.0, young=10.0, **analysis):
-    """A stiff and a soft fibre, with the interfaces `stiff` and `soft`; `unit` is that of their moduli."""
+    """Return a stiff and a soft fibre, with the interfaces `stiff` and `soft`; `unit` is that of their moduli."""
     (kind,) = analysis
     return Case.parse(
         {
@@ -119,7 +119,7 @@ def test_a_component_far_softer_than_another_carries_its_stress(comm, bonded):
 
 
 def loaded_along(bonded):
-    """A uniform cell, with its fibre glued or bonded, under stresses that are far apart."""
+    """Return a uniform cell, with its fibre glued or bonded, under stresses that are far apart."""
     document = {
         "cell": {"geometry": "square", "fibre_fraction": 0.3, "mesh_size": 0.3},
         "material": {"matrix": STIFF_ALONG, "fibre": STIFF_ALONG},
@@ -189,7 +189,7 @@ class RigidFibre:
 
 
 def softly_held(comm, stiffness, young, count, **cell):
-    """The first load factors of a path of one fibre on springs of this stiffness, and its cell."""
+    """Return the first load factors of a path of one fibre on springs of this stiffness, and its cell."""
     base = {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.2, "matrix": {"young": 1.0, "poisson": 0.3}}
     # One subdomain of each body on any number of ranks: beside forces between pieces of the matrix, those of the
     # springs would be rounding.

@@ -24,7 +24,7 @@ def torus():
 
 
 def shared_by_ranks(torus, comm, intervals=2):
-    """The decomposition into pieces of about 20 triangles, and what this rank's share."""
+    """Return the decomposition into pieces of about 20 triangles, and what this rank's share."""
     pieces = pieces_for_size(np.bincount(torus.constituent), 1, 20)
     cut = decompose(torus, torus.constituent, pieces, comm.size)
     table = SubdomainTable.of(torus, cut.subdomain, cut.rank)

@@ -90,18 +90,18 @@ def slips_freely(states, path):
 
 
 def hook(x, y):
-    """A fibre without any symmetry, in a 4 x 4 grid."""
+    """Return a fibre without any symmetry, in a 4 x 4 grid."""
     return (int(4 * x), int(4 * y)) in {(1, 1), (2, 1), (2, 2)}
 
 
 def quarter_turned(mesh):
-    """The mesh turned by 90 degrees."""
+    """Return the mesh turned by 90 degrees."""
     return MshFile({tag: (1.0 - y, x, 0.0) for tag, (x, y, _) in mesh.nodes.items()}, mesh.elements)
 
 
 @pytest.fixture
 def hooks(comm, shared_path):
-    """A folder with a cell and the same turned by 90 degrees."""
+    """Provide a folder with a cell and the same turned by 90 degrees."""
     if comm.rank == 0:
         grid(hook).write(shared_path / "cell.msh")
         quarter_turned(grid(hook)).write(shared_path / "turned.msh")

@@ -23,7 +23,7 @@ UNIT = np.eye(3)
 
 
 def bonded_responses(cell):
-    """The responses to the unit strains with all bonds intact."""
+    """Return the responses to the unit strains with all bonds intact."""
     status = np.full(len(cell.solver.jump_operator.nodes.row), BONDED, np.int8)
     return Homogenization(cell, True).respond(UNIT, status, [np.zeros(cell.solver.rows)] * 3)
 

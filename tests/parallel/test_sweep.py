@@ -23,7 +23,7 @@ FRACTIONS = "'cell.fibre_fraction' = {from = 0.1, to = 0.6, step = 0.1}\n"
 
 
 def swept(comm, folder, table, case=CASE, ranks_per_case=None):
-    """The collected table of a sweep, on every rank."""
+    """Return the collected table of a sweep, on every rank."""
     sweep = plan.expand({"name": "sweep"} | tomllib.loads(f"{case}[sweep]\n{table}"), Path())
     execute.run_all(sweep, folder / "out", comm, ranks_per_case or comm.size, retry=False, quiet=True)
     return on_root(comm, collect.read, folder / "out")

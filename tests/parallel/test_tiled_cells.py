@@ -64,7 +64,7 @@ def test_the_mesh_is_that_of_one_rank(comm, keys):
 
 
 def share_of(case, comm):
-    """This rank's share of the cell, torn by tiles."""
+    """Tear this rank's share of the cell by tiles."""
     noded = coarse_meshes.place_nodes(case, comm, SMALL)
     assert noded is None or can_be_torn_by_tiles(case, noded)
     return tear_by_tiles(case, noded, LATTICE, comm, TILED)

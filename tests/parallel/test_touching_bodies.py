@@ -53,7 +53,7 @@ KINDS: dict[str, dict[str, Any]] = {
 
 
 def cell_of(comm: Any, path: Any, mesh: MshFile, **cell: Any) -> dict[str, Any]:
-    """The section of a cell with that mesh in a file.  Collective."""
+    """Return the section of a cell with that mesh in a file. Collective."""
     on_root(comm, mesh.write, path / "pixels.msh")
     return {"geometry": "mesh", "file": str(path / "pixels.msh")} | cell
 
@@ -88,7 +88,7 @@ def test_symmetries_of_the_square_turn_the_response(comm: Any, shared_path: Any,
 
 
 def debonded_lines(mesh: MshFile, share: float = 0.6) -> list[tuple[int, int]]:
-    """A random share of the edges between fibre and matrix within the cell."""
+    """Return a random share of the edges between fibre and matrix within the cell."""
     sides: dict[tuple[int, int], list[int]] = {}
     for _, phase, _, (a, b, c) in mesh.elements.values():
         for p, q in ((a, b), (b, c), (c, a)):

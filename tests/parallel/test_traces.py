@@ -19,7 +19,7 @@ ALL = 10**9
 
 
 def traced(enough, **cell):
-    """The refined cell with trace spaces of at least so many dofs."""
+    """Return the refined cell with trace spaces of at least so many dofs."""
     return {"thresholds": Thresholds(min_trace_dofs=enough)} | REFINED | cell
 
 

@@ -46,7 +46,7 @@ CASES = {
 
 
 def document(analysis, plane="strain", cell=None, petsc=None, fibre=GLASS, **sections):
-    """A case; phases expand where that is solved for."""
+    """Return a case; phases expand where that is solved for."""
     phases = {"matrix": EPOXY, "fibre": fibre}
     if plane != "generalized":
         phases = {

@@ -47,7 +47,7 @@ CASES: dict[str, dict[str, Any]] = {
 
 
 def written(comm: Any, directory: Path, order: int) -> Path:
-    """The sample, written by all ranks."""
+    """Return the sample, written by all ranks."""
     part = part_of(sample(4, 0, order), comm.rank, comm.size)
     with FieldFile(directory, comm, part.header, part.mesh, part.fibres, part.interface) as file:
         for k, state in enumerate(part.states):
@@ -59,7 +59,7 @@ def written(comm: Any, directory: Path, order: int) -> Path:
 
 
 def computed(comm: Any, directory: Path, name: str) -> Path:
-    """A tiny cell."""
+    """Return a tiny cell."""
     document = {
         "cell": {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.25, "order": 2 if name == "angle" else 1},
         "material": {"matrix": MATRIX, "fibre": FIBRE},
@@ -83,7 +83,7 @@ def test_a_viewer_has_all_of_a_result(comm: Any, shared_path: Path, name: str) -
 
 
 def _is_all_seen(folder: Path) -> int:
-    """The number of states, after all arrays of both files were compared."""
+    """Return the number of states, after all arrays of both files were compared."""
     from support.vtk_states import viewed_states
 
     with h5py.File(folder / "result.h5", "r") as file:
@@ -129,7 +129,7 @@ def _is_cell(file: Any, number: int, seen: Any) -> None:
 
 
 def _is_interface(file: Any, number: int, seen: Any) -> None:
-    """A vertex at every interface node, with all arrays; warped it stays on the cell."""
+    """Check a vertex at every interface node, with all arrays; warped, it stays on the cell."""
     group, state = file["interface"], file[f"state/{number}"]
     np.testing.assert_array_equal(seen.points[:, :2], group["points"][:])
     np.testing.assert_array_equal(seen.cells[:, 0], np.arange(len(seen.points)))
@@ -141,7 +141,7 @@ def _is_interface(file: Any, number: int, seen: Any) -> None:
 
 
 def _are_equal(file: Any, number: int, seen: dict[str, np.ndarray], expected: dict[str, str]) -> None:
-    """The arrays seen are those expected, each with the values and the type of its dataset."""
+    """Check that the arrays read are those expected, each with the values and the type of its dataset."""
     assert set(seen) == set(expected)
     for name, place in expected.items():
         table = file[place.replace("/K/", f"/{number}/")]

@@ -73,7 +73,7 @@ def test_a_path_goes_on_from_its_middle_as_if_it_had_not_stopped(comm):
 
 
 def follow(cell, growth, begin=None):
-    """The points of the path, or of what is left of it."""
+    """Return the points of the path, or of what is left of it."""
     interface, springs = torn_cells.interface(cell, True), EnergyCriterion(*SPRINGS, TOUGHNESS, SENSITIVITY)
     law = TipCriterion(springs, cell.solver.preconditioner) if growth == "released" else springs
     bonded = np.full(len(interface.nodes.row), BONDED, np.int8)

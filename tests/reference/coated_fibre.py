@@ -41,7 +41,7 @@ def excess_energy(matrix, fibre, c, medium, springs=BONDED):
 
 
 def self_consistent_shear(matrix, fibre, c, medium_of, springs=BONDED):
-    """The root m* of `excess_energy` of the medium `medium_of(m*)`."""
+    """Return the root m* of `excess_energy` of the medium `medium_of(m*)`."""
     scale = matrix.G_transverse
     return scale * brentq(
         lambda x: excess_energy(matrix, fibre, c, medium_of(scale * x), springs), 1e-3, 1e3, xtol=1e-15, rtol=1e-14

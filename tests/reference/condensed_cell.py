@@ -27,15 +27,15 @@ class MixedLoad:
 
     @classmethod
     def named(cls, target):
-        """That of a table with one name for each component and, if it is a load, the temperature last."""
+        """Return the load of a table with one name for each component; the temperature of a load comes last."""
         return cls(np.array([*target.values()], float), np.array([name[0] == "S" for name in target]))
 
     def scaled(self, factor):
-        """That of `factor` times all values."""
+        """Return the load of `factor` times all values."""
         return MixedLoad(factor * self.values, self.by_stress)
 
     def towards(self, end, share):
-        """That after a share of the way to another one of the same kinds."""
+        """Return the load after a share of the way to another one of the same kinds."""
         return MixedLoad((1 - share) * self.values + share * end.values, self.by_stress)
 
 
@@ -53,7 +53,7 @@ class State:
     closed: np.ndarray
 
     def scaled(self, t):
-        """The state under t >= 0 times the load."""
+        """Return the state under t >= 0 times the load."""
         linear = (t * x for x in (self.strain, self.stress))
         return State(*linear, t**2 * self.stored, t**2 * self.in_springs, t * self.jump, t * self.force, self.closed)
 
@@ -96,7 +96,7 @@ class CondensedCell:
         return (A + A.T) / 2
 
     def equilibrium(self, load, bonded):
-        """The state under a load with the `bonded` (k,) nodes holding."""
+        """Return the state under a load with the `bonded` (k,) nodes holding."""
         d, n = self.d, self.n
         free_jumps = np.ones((self.k, d), bool)
         if self.glued:
@@ -152,7 +152,7 @@ class CondensedCell:
 
     @staticmethod
     def _near(K, f, C, active, reach, motions):
-        """The same by exchanging who touches, free motions left out; None if that does not end soon."""
+        """Return the same by exchanging who touches, free motions left out; None if that does not end soon."""
         for _ in range(12):
             border = np.hstack([-C[active].T, motions(active)])
             m, n = border.shape[1], len(f)

@@ -31,7 +31,7 @@ def kernel(S):
 
 
 def gathered(cell, own):
-    """The rows that the ranks own, one rank after the other, on every rank.  Collective."""
+    """Return the rows that the ranks own, one rank after the other, on every rank. Collective."""
     return np.concatenate(cell.comm.allgather(own))
 
 
@@ -51,7 +51,7 @@ class DenseDual:
     """
 
     def __init__(self, cell):
-        """Collective."""
+        """Gather the dense problem of a cell.  Collective."""
         jump_operator = cell.solver.jump_operator
         own = []
         for s, first in zip(cell.subdomains, cell.offsets, strict=False):

@@ -30,7 +30,7 @@ class SlowEnergyPath:
     proportional = SlowLoadPath.proportional
 
     def state(self, strain, bonded):
-        """The state, and the square root of the share of the toughness that the break of each node releases."""
+        """Return the state, and the square root of the share of the toughness that the break of each node releases."""
         state = self.programme.solve_elastic(strain, bonded, True, self.springs)
         tn, tt = (state.force / self.programme.lengths()[:, None]).T
         GI, GII = np.maximum(tn, 0.0) ** 2 / (2 * self.springs[0]), tt**2 / (2 * self.springs[1])

@@ -33,7 +33,7 @@ def excess_energy(layers, medium):
 
 
 def self_consistent_shear(layers, medium_of):
-    """The shear modulus m* of the medium `medium_of(m*)` whose energy the layers, matrix outside, do not change
+    """Return the shear modulus m* of the medium `medium_of(m*)` whose energy the layers, matrix outside, do not change
     (Christensen and Lo 1979 of two layers; Herve and Zaoui 1995 of more)."""
     scale = layers[-1][0].G_transverse
     return scale * brentq(lambda x: excess_energy(layers, medium_of(scale * x)), 1e-3, 1e3, xtol=1e-15, rtol=1e-14)

@@ -37,7 +37,7 @@ class SlowLoadPath:
     criterion: str
 
     def state(self, strain, bonded):
-        """The state, and the share of strength that each node uses."""
+        """Return the state, and the share of strength that each node uses."""
         state = self.programme.solve(strain, bonded, self.contact)
         tn, tt = (state.force / self.programme.lengths()[:, None]).T
         shares = np.array([np.maximum(tn, 0.0) / self.normal, np.abs(tt) / self.tangential])

@@ -132,7 +132,7 @@ class MixedPath:
         return found
 
     def at(self, load):
-        """The state, and the shares of what breaks the bonds."""
+        """Return the state, and the shares of what breaks the bonds."""
         state = self.cell.equilibrium(load, self.bonded)
         return state, self.law.used(self.cell, state, self.bonded)
 

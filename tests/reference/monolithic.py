@@ -31,7 +31,8 @@ def effective_stiffness(points, triangles, stiffness, width, height):
 
 
 def periodic_numbers(points, width, height):
-    """Number of the class of each node, by rounded position modulo the periods; and how many there are."""
+    """Assign a number to the class of each node, by rounded position modulo the periods; returns the number of
+    classes too."""
     period = np.array([width, height])
     reduced = np.round(points / period * 1e8).astype(np.int64) % 10**8
     # Torn copies have the same position, so they become one node here.

@@ -113,7 +113,7 @@ class QuadraticProgramme:
         return result
 
     def solve(self, strain, bonded, contact):
-        """The state under a strain (3,) with the `bonded` (k,) nodes held together."""
+        """Return the state under a strain (3,) with the `bonded` (k,) nodes held together."""
         T, reach = self._together(bonded), self.size.max() * np.abs(strain).max()
         free = np.flatnonzero(~bonded) if contact else np.zeros(0, int)
         K, f = (T.T @ self.K @ T).tocsc() / self.scale, -T.T @ (self.Q @ strain) / self.scale
@@ -134,8 +134,8 @@ class QuadraticProgramme:
         return State(float(energy), stress, u, *turned, closed)
 
     def solve_elastic(self, strain, bonded, contact, springs):
-        """The same with springs of stiffnesses `springs` (normal, tangential), numbers or (k,), at bonded nodes, and
-        normal ones in compression between debonded faces.  The energy is that of the bodies and of the springs."""
+        """Return the same with springs of stiffnesses `springs` (normal, tangential), numbers or (k,), at bonded nodes,
+        and normal ones in compression between debonded faces. The energy is that of the bodies and of the springs."""
         k, lengths = len(bonded), self.lengths()
         stiffness = [s * lengths for s in springs]
         free = np.flatnonzero(~bonded) if contact else np.zeros(0, int)
@@ -196,7 +196,7 @@ class QuadraticProgramme:
 
 
 def nearest(points, centres, radii, size):
-    """The circle to which each point is nearest, and the arm from its centre."""
+    """Return the circle to which each point is nearest, and the arm from its centre."""
     arm = points[:, None] - centres
     arm -= np.round(arm / size) * size
     fibre = np.argmin(np.hypot(*np.moveaxis(arm, 2, 0)) - radii, axis=1)

@@ -53,7 +53,7 @@ def about_x3(angle):
 
 
 def rotated(C, angle):
-    """The stiffness of a body that is turned about x3: C_abcd = Q_ai Q_bj Q_ck Q_dl C_ijkl."""
+    """Return the stiffness of a body that is turned about x3: C_abcd = Q_ai Q_bj Q_ck Q_dl C_ijkl."""
     tensor = np.zeros((3, 3, 3, 3))
     for a, (i, j) in enumerate(PAIRS):
         for b, (k, m) in enumerate(PAIRS):
@@ -149,8 +149,8 @@ def stiffness_of_constants(E1, E2, G12, G23, nu12, nu23):
 
 
 def layered_contrast(fibre, coating, share):
-    """The contrast of a homogeneous fibre that answers cos(n t) as one in a coating does, over the matrix: function of
-    n; `share` is the area of the fibre within that of both."""
+    """Return the contrast of a homogeneous fibre that answers cos(n t) as one in a coating does, over the matrix:
+    function of n; `share` is the area of the fibre within that of both."""
 
     def contrast(n):
         reflected = (coating - fibre) / (coating + fibre) * share**n

@@ -86,7 +86,7 @@ class SpatialProgramme:
             self._place(np.asarray(centres), np.asarray(radii), np.flatnonzero(~matrix))
 
     def _place(self, centres, radii, inside):
-        """Normals and angles of the interface nodes, and the rigid motions (n, 3, fibres, 4) of the nodes `inside`."""
+        """Find normals and angles of the interface nodes, and rigid motions (n, 3, fibres, 4) of the nodes `inside`."""
         fibre, arm = nearest(self.points, centres, radii, self.size)
         on = self.fibre_node
         self.fibre, self.radius = fibre[on], radii[fibre[on]]

@@ -42,7 +42,7 @@ class TouchingBodies(QuadraticProgramme):
         super().__init__(parts, np.zeros((0, 2)), np.zeros((0, 0)), size)
 
     def _sides(self):
-        """{the sides' ends, keys in order: [(triangle, k), ...]}."""
+        """Return {the sides' ends, keys in order: [(triangle, k), ...]}."""
         sides = defaultdict(list)
         for t, keys in enumerate(self._keys.tolist()):
             for k in range(3):
@@ -74,7 +74,7 @@ class TouchingBodies(QuadraticProgramme):
         return len(bodies) == 2 and set(bodies.values()) == {1} and edges
 
     def _place(self, depth, centres, radii):
-        """Normals and lengths of the interface nodes, and their edges."""
+        """Find normals and lengths of the interface nodes, and their edges."""
         place = {key: number for number, key in enumerate(self.key.tolist())}
         self.normal, self.lengths = np.zeros((len(place), 2)), np.zeros(len(place))
         self.edges = defaultdict(set)

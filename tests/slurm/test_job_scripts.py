@@ -46,14 +46,14 @@ pictures = false
 
 @pytest.fixture
 def elsewhere(tmp_path):
-    """A folder far from the repository, with a name that shells and SLURM could misread."""
+    """Provide a folder far from the repository, with a name that shells and SLURM could misread."""
     folder = tmp_path / "a place, 100%j"
     folder.mkdir()
     return folder
 
 
 def submitted(slurm, folder: Path, script: str, *words: str, **variables: str) -> list[str]:
-    """The numbers of the jobs that a script of submission names."""
+    """Return the numbers of the jobs that a script of submission names."""
     output = slurm.run(SCRIPTS / script, *words, cwd=folder, **variables)
     return re.findall(r"job (?:array )?(\d+)", output)
 

@@ -30,6 +30,6 @@ def write_inp(path: Path, mesh: Any, sets: bool = True, elements: Mapping[int, s
 
 
 def _nodes(element: Any) -> tuple[int, ...]:
-    """The nodes in Abaqus's order, which has the middle of a line between its ends."""
+    """Return the nodes in Abaqus's order, which has the middle of a line between its ends."""
     kind, *_, nodes = element
     return (nodes[0], nodes[2], nodes[1]) if kind == 8 else nodes

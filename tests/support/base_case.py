@@ -44,7 +44,7 @@ TABLE_CELL = (
 
 
 def changed(*edits: tuple[str, str], end: str = "") -> str:
-    """The right case with its words exchanged and lines added at its end."""
+    """Return the right case with its words exchanged and lines added at its end."""
     document = BASE
     for old, new in edits:
         assert document.count(old) >= 1, old

@@ -109,7 +109,7 @@ READERS: dict[str, Callable[[str], Card]] = {
 
 
 def filled(entries: str, values: Sequence[float]) -> Float:
-    """The tensor of C_ijkl, "1123" and the like, and of those that are the same by symmetry."""
+    """Return the tensor of C_ijkl, "1123" and the like, and of those that are the same by symmetry."""
     C = np.zeros((3, 3, 3, 3))
     for word, value in zip(entries.split(), values, strict=True):
         i, j, k, m = (int(digit) - 1 for digit in word)

@@ -23,7 +23,7 @@ MATRIX, FIBRE = {"young": 88.0, "poisson": 0.299}, {"young": 200.0, "poisson": 0
 
 
 def make_case(*, matrix=MATRIX, fibre=FIBRE, plane="strain", petsc=None, decomposition=None, folder=".", **cell):
-    """A case of the given cell, tight enough (1e-10) for comparisons."""
+    """Return a case of the given cell, tight enough (1e-10) for comparisons."""
     circular = {} if cell.get("geometry") == "mesh" else {"fibre_fraction": 0.4, "mesh_size": 0.15}
     document = {
         "cell": {"geometry": "hexagonal"} | circular | cell,
@@ -46,7 +46,7 @@ class Responses:
 
 
 def solve(case, comm, thresholds=DEFAULTS, policy=DEFAULT_POLICY):
-    """The torn cell, L^ef and the responses."""
+    """Return the torn cell, L^ef and the responses."""
     PETSc.garbage_cleanup(comm)
     progress = Progress(comm, quiet=True)
     with case_options(case.petsc):

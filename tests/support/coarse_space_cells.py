@@ -31,7 +31,7 @@ class Narrow:
     space, M, that of dense modes, and what the program applies, H."""
 
     def __init__(self, threshold, dense=None):
-        """The dense dual problem does not depend on the threshold.  Collective."""
+        """Solve the dense dual problem, which does not depend on the threshold.  Collective."""
         self.cell = torn_cells.tear(MPI.COMM_WORLD, **NARROW, petsc={"feti_coarse_threshold": threshold})
         self.solver = self.cell.solver
         self.coarse = self.solver.adaptive
@@ -46,17 +46,17 @@ class Narrow:
             yield eigh(S, B.T @ self.M @ B)
 
     def own(self, whole):
-        """This rank's rows."""
+        """Return this rank's rows."""
         first, last = self.solver.jump_operator.owned
         return whole[first:last]
 
     def random(self, seed, columns=()):
-        """A vector on all rows."""
+        """Return a vector on all rows."""
         return np.random.default_rng(seed).standard_normal((self.dense.total, *columns))
 
 
 def solve_many(cell, strains=STRAINS, starts=None):
-    """The dual solutions under some strains, with the options of the case."""
+    """Return the dual solutions under some strains, with the options of the case."""
     with case_options(cell.case.petsc):
         zero = np.zeros((cell.solver.rows, len(strains)))
         return cell.solver.solve_many(strains, zero if starts is None else starts)
@@ -82,13 +82,13 @@ def statuses(cell, seed):
 
 
 def masks(cell, seeds):
-    """This rank's active rows for statuses drawn at random.  Collective."""
+    """Draw statuses at random; returns this rank's active rows.  Collective."""
     interface = torn_cells.interface(cell, True)
     return [interface.active(statuses(cell, seed)) for seed in seeds]
 
 
 def agree(cell, found, expected):
-    """That solutions are the same.  Collective."""
+    """Check that solutions agree.  Collective."""
     for a, b in zip(found, expected, strict=True):
         assert a.reason > 0 and b.reason > 0
         assert relative_error(torn_cells.stress(cell, a), torn_cells.stress(cell, b)) < 1e-8

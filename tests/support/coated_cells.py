@@ -8,7 +8,7 @@ RADIUS, INNER = 0.35, 0.25
 
 
 def write(path, core, ring, size=0.09):
-    """The cell of width 1 whose fibre has the phase `core` up to the radius INNER and `ring` from there to RADIUS."""
+    """Mesh the cell of width 1 whose fibre has the phase `core` up to the radius INNER, and `ring` up to RADIUS."""
     gmsh.initialize(interruptible=False)
     gmsh.option.setNumber("General.Verbosity", 0)
     try:

@@ -12,7 +12,7 @@ CASE = BASE.replace("mesh_size = 0.05", "mesh_size = 0.15")
 
 
 def case_file(folder: Path, end: str = "[output]\npictures = false\n") -> Path:
-    """A small case that ends with these lines; by default it draws nothing, which takes longest."""
+    """Return a small case that ends with these lines; by default it draws nothing, which takes longest."""
     path = folder / "small.toml"
     path.write_text(CASE + end)
     return path
@@ -24,7 +24,7 @@ def command_line(ranks: int, *words: str | Path):
 
 
 def assert_verified(*folders: Path) -> None:
-    """The results in these folders obey every law of `feti-homog verify`."""
+    """Check that the results in these folders obey every law of `feti-homog verify`."""
     assert folders
     for folder in folders:
         certificate = verify(folder)

@@ -50,11 +50,11 @@ class Units:
     temperature: float = 1.0
 
     def of(self, powers: tuple[int, int, int]) -> float:
-        """The factor of numbers with these powers of stress, length and temperature."""
+        """Return the factor of numbers with these powers of stress, length and temperature."""
         return self.stress ** powers[0] * self.length ** powers[1] * self.temperature ** powers[2]
 
     def case(self, document: Mapping[str, Any]) -> dict[str, Any]:
-        """A case in these units."""
+        """Return a case in these units."""
         return {name: value if name == "petsc" else self._entry(name, value) for name, value in document.items()}
 
     def _entry(self, name: str, value: Any) -> Any:
@@ -89,7 +89,7 @@ def powers_of_keys(document: Mapping[str, Any]) -> dict[str, tuple[int, int, int
 
 
 def in_units(document: Mapping[str, Any], units: Units) -> dict[str, Any]:
-    """A result.json in other units; its case stays as it is."""
+    """Return a result.json in other units; its case stays as it is."""
     powers = powers_of_keys(document)
     return {name: v if name == "case" else _scaled(v, name, powers, units) for name, v in document.items()}
 
@@ -104,7 +104,7 @@ def _scaled(value: Any, path: str, powers: Mapping[str, tuple[int, int, int]], u
 
 
 def _leaves(value: Any, path: str) -> Iterator[tuple[str, np.ndarray]]:
-    """The numbers of a document by their places; texts and what is absent are none."""
+    """Yield the numbers of a document by their places; texts and what is absent are none."""
     if isinstance(value, Mapping):
         for name, item in value.items():
             yield from _leaves(item, f"{path}.{name}" if path else name)
@@ -135,5 +135,5 @@ def differences(one: Result, other: Result, units: Units) -> dict[str, float]:
 
 
 def _kind(path: str) -> str:
-    """A place without the numbers in lists."""
+    """Return a place without the numbers in lists."""
     return re.sub(r"\[\d+\]", "[]", path)

@@ -91,7 +91,7 @@ def turned_stiffness(C: Float, cosines: Float) -> Float:
 
 
 def document(sample: Sample, **more: Any) -> dict[str, Any]:
-    """What result.json holds of these constants, as far as cards are concerned."""
+    """Return the part of result.json that cards read, for these constants."""
     E1, E2, _, nu12, _, nu23, G12, _, G23 = GLASS_EPOXY.constants
     alpha = sample.expansion_in_the_cell
     C = sample.stiffness_in_the_cell
@@ -119,6 +119,6 @@ def document(sample: Sample, **more: Any) -> dict[str, Any]:
 
 
 def changed(document: Mapping[str, Any], section: str, **entries: Any) -> dict[str, Any]:
-    """The document with other entries in a section of its case."""
+    """Return the document with other entries in a section of its case."""
     case = document["case"] | {section: document["case"].get(section, {}) | entries}
     return dict(document) | {"case": case}

@@ -31,7 +31,7 @@ ISOTROPIC = {"matrix": {"young": 88.0, "poisson": 0.299}, "fibre": {"young": 200
 
 
 def document(plane: str, interface: dict[str, Any], **sections: dict[str, Any]) -> dict[str, Any]:
-    """A small cell with these bonds; what `sections` say replaces what is here."""
+    """Return a small cell with these bonds; what `sections` say replaces what is here."""
     base = {
         "cell": {"geometry": "hexagonal", "fibre_fraction": 0.4, "mesh_size": 0.2},
         "material": ISOTROPIC,
@@ -54,14 +54,15 @@ def envelope(
     folder: Path = Path(),
     **own: Any,
 ) -> Any:
-    """The result of an envelope.  Collective."""
+    """Return the result of an envelope. Collective."""
     both = (sections or {}) | {"analysis": {"type": "envelope"}, "envelope": {"plane": list(axes)} | own}
     return run(Case.parse(document(plane, interface, **both), folder), comm)
 
 
 @contextmanager
 def torn(comm: Any, plane: str, interface: dict[str, Any], **sections: Any) -> Iterator[Any]:
-    """The torn cell of a path, in generalized plane strain of an envelope, in the cell of `envelope`.  Collective."""
+    """Provide the torn cell of a path, in generalized plane strain of an envelope, in the cell of `envelope`.
+    Collective."""
     PETSc.garbage_cleanup(comm)
     if plane == "generalized":
         more = {"analysis": {"type": "envelope"}, "envelope": {"plane": ["E11", "E22"]}}

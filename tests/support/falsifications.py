@@ -11,7 +11,7 @@ MATRIX = ("material", "matrix")
 
 
 def broken(folder):
-    """The laws that a result breaks."""
+    """Return the laws that a result breaks."""
     return {finding.check.name for finding in verify(folder).findings if not finding.holds}
 
 
@@ -104,7 +104,7 @@ def raised(point, by, *names):
 
 
 def free_axial_traction(state):
-    """An open face of a state is pulled along the fibre."""
+    """Return an open face of a state is pulled along the fibre."""
 
     def edit(_, file):
         group = file[f"state/{state}"]

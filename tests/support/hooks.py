@@ -70,7 +70,7 @@ class HookedJob:
         os.close(own)
 
     def told(self) -> str:
-        """The next that a rank tells: its number and the text, "here" of one that waits."""
+        """Return the next that a rank tells: its number and the text, "here" of one that waits."""
         while b"\n" not in self._said:
             if not self._read():
                 raise AssertionError(f"the job has ended before: {self.process.communicate()}")
@@ -82,7 +82,7 @@ class HookedJob:
         os.close(os.open(self._folder / "release", os.O_WRONLY))
 
     def ended(self) -> subprocess.CompletedProcess[str]:
-        """The job when it has ended by itself, with all its processes."""
+        """Return the job when it has ended by itself, with all its processes."""
         from support.jobs import PATIENCE
 
         output, errors = self.process.communicate(timeout=PATIENCE)
@@ -131,7 +131,7 @@ def hooked(ranks: int, hooks: Sequence[Hook], *words: str | Path) -> subprocess.
 
 
 def descendants(pid: int) -> list[int]:
-    """The processes that a process has started, and theirs."""
+    """Return the processes that a process has started, and theirs."""
     children = []
     for stat in Path("/proc").glob("[0-9]*/stat"):
         try:
@@ -171,7 +171,7 @@ def _install(hook: Hook, comm: Any, names: dict[str, Any]) -> None:
 
 
 def main(folder: str, hooks: str, *words: str) -> int:
-    """The exit code of the command line with these words."""
+    """Return the exit code of the command line with these words."""
     from feti_homog import api, cli
 
     def command(words: Sequence[str], comm: Any) -> int:

@@ -150,7 +150,7 @@ def write_inputs(folder: Path) -> dict[str, tuple[list[str], str]]:
 
 
 def write_grid(path: Path, count: int, size: float) -> None:
-    """A square of count x count squares of two triangles, the first of which are fibre."""
+    """Write a square of count x count squares of two triangles, the first of which are fibre."""
     n = count + 1
     nodes = [f"{j * n + i + 1} {size * i / count!r} {size * j / count!r} 0" for j in range(n) for i in range(n)]
     corners = [j * n + i + 1 for j in range(count) for i in range(count)]

@@ -8,7 +8,7 @@ ALONG = 2
 
 
 def layers(phases: str, across: int) -> MshFile:
-    """A unit cell of equal columns, or rows, of squares cut in two: one for each letter of `phases`, M or F."""
+    """Return a unit cell of equal columns, or rows, of squares cut in two: one for each letter of `phases`, M or F."""
     n = len(phases)
 
     def node(i: int, j: int) -> int:

@@ -29,7 +29,8 @@ EPOXY_GLASS = (
 
 
 def document(cell, phases, plane, interface=None, petsc=None, **analysis):
-    """A case as a document: `phases` are tables of materials, `analysis` is one type and its section, or None."""
+    """Return a case as a document: `phases` are tables of materials, `analysis` is one type and its section, or
+    None."""
     (name,) = analysis
     circular = {} if cell.get("geometry") == "mesh" else {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.3}
     sections = {key: value for key, value in (analysis | {"interface": interface}).items() if value is not None}
@@ -44,12 +45,12 @@ def document(cell, phases, plane, interface=None, petsc=None, **analysis):
 
 
 def solved(comm, folder=".", **case):
-    """The result of a case.  Collective."""
+    """Return the result of a case. Collective."""
     return run(Case.parse(document(**case), folder), comm)
 
 
 def loads_of(written):
-    """The loads of a case, in full."""
+    """Return the loads of a case, in full."""
     return [MixedLoad.named(target) for target in Case.parse(document(**written)).targets]
 
 
@@ -62,7 +63,7 @@ class LoadedTwin:
     """
 
     def __init__(self, comm, **written):
-        """Collective."""
+        """Tear the case of these sections and assemble its twin.  Collective."""
         parsed = Case.parse(document(**written))
         self.comm, self.case, self.interface = comm, parsed, written.get("interface") or {}
         PETSc.garbage_cleanup(comm)
@@ -106,11 +107,11 @@ class LoadedTwin:
         return Strengths((n, t, given.get("axial_strength", t)), given.get("criterion", "max"))
 
     def equilibrium(self, load):
-        """The state under a load, on every rank.  Collective."""
+        """Return the state under a load, on every rank. Collective."""
         return on_root(self.comm, lambda: self.cell.equilibrium(load, self.bonded))
 
     def path(self, steps=12):
-        """The events of the case's path, on every rank.  Collective."""
+        """Return the events of the case's path, on every rank. Collective."""
         return on_root(self.comm, lambda: MixedPath(self.cell, self._law, self.bonded).follow(self.loads, steps))
 
     def increments(self, steps, worst_only):
@@ -156,8 +157,8 @@ def is_end(point, legs):
 
 
 def compare_paths(comm, tolerance=1e-8, steps=12, **case):
-    """The result of a path whose points are those of the oracle: events with their energies, and changes of contact
-    between them; and the events.  Collective."""
+    """Return the result of a path whose points are those of the oracle: events with their energies, and changes of
+    contact between them; and the events. Collective."""
     twin, result = LoadedTwin(comm, **case), solved(comm, **case)
     events, legs = twin.path(steps), len(twin.loads)
     points = [p for p in result.path if p.broke or is_end(p, legs)]

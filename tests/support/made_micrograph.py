@@ -20,7 +20,7 @@ HEAD = "# Not measured: a window of a random cell, by tests/support/made_microgr
 
 
 def text() -> str:
-    """The table."""
+    """Return the table."""
     whole = arrange(CELL)
     scale = RADIUS / whole.radii.mean()
     width, height = np.floor(scale * SHARE)

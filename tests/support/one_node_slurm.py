@@ -83,7 +83,7 @@ class OneNodeSlurm:
         self.environment = environment() | {"SLURM_CONF": str(folder / "slurm.conf"), "PATH": PATH}
 
     def run(self, *words: str | Path, cwd: Path | None = None, code: int = 0, **variables: str) -> str:
-        """What a command prints, which must have this exit code; both streams together."""
+        """Run a command with this exit code; returns both streams together."""
         job = subprocess.run(
             list(map(str, words)),
             cwd=cwd,
@@ -97,7 +97,7 @@ class OneNodeSlurm:
         return job.stdout
 
     def jobs(self, number: str) -> list[Job]:
-        """The job of that number, or the tasks of that array in their order."""
+        """Return the job of that number, or the tasks of that array in their order."""
         lines = self.run("scontrol", "show", "job", "--oneliner", number).splitlines()
         found = [dict(re.findall(r"(\w+)=(\S*)", line)) for line in lines if line.strip()]
         found.sort(key=lambda job: [int(index) for index in re.findall(r"\d+", job.get("ArrayTaskId", ""))])
@@ -122,7 +122,7 @@ class OneNodeSlurm:
 
 
 def wait(reached: Callable[[], bool], seconds: float, complaint: str) -> None:
-    """Raises TimeoutError with the complaint if it takes longer."""
+    """Raise TimeoutError with the complaint if it takes longer."""
     deadline = time.monotonic() + seconds
     while not reached():
         if time.monotonic() > deadline:

@@ -34,8 +34,8 @@ def random_image(size: int, seed: int, share: float = 0.4, phases: int = 1, void
 
 
 def pixel_mesh(image: np.ndarray, jitter: float = 0.0, symmetry: np.ndarray = SYMMETRIES[0], seed: int = 0) -> MshFile:
-    """The unit square of these pixels, negative ones voids, its nodes moved by up to `jitter` pixels, periodically, and
-    then turned or mirrored about its centre."""
+    """Return the unit square of these pixels, negative ones voids, its nodes moved by up to `jitter` pixels,
+    periodically, and then turned or mirrored about its centre."""
     n = len(image)
     i, j = np.meshgrid(np.arange(n + 1), np.arange(n + 1))
     moved = jitter * np.random.default_rng(seed).uniform(-1, 1, (2, n, n))

@@ -6,7 +6,7 @@ import numpy as np
 
 
 def random_cell(rng):
-    """A case of 1 to 6 fibres, of about a hundred to three hundred nodes, for `make_case`."""
+    """Return a case of 1 to 6 fibres, of about a hundred to three hundred nodes, for `make_case`."""
     fibres = int(rng.integers(1, 7))
     geometry = "random" if fibres > 2 else ("square", "hexagonal")[fibres - 1]
     order = int(rng.integers(1, 3))

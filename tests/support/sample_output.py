@@ -34,7 +34,7 @@ class Sample:
 
 
 def sample(cells: int = 8, refine: int = 0, order: int = 1) -> Sample:
-    """The unit square on `cells` x `cells` coarse squares of two triangles; the fibre is the middle quarter.
+    """Return the unit square on `cells` x `cells` coarse squares of two triangles; the fibre is the middle quarter.
 
     Body 0, the matrix, is torn in two (left, right of x = 1/2); body 1 is the fibre. 4 divides `cells`.
     """
@@ -62,7 +62,7 @@ def sample(cells: int = 8, refine: int = 0, order: int = 1) -> Sample:
 
 
 def part_of(whole: Sample, rank: int, size: int) -> Sample:
-    """The share of a rank: subdomains are dealt out in order; ranks past the third have nothing."""
+    """Return the share of a rank: subdomains are dealt out in order; ranks past the third have nothing."""
     mesh, last = whole.mesh, 2
     mine = [submesh for submesh in range(last + 1) if min(submesh, size - 1) == rank]
     rows = np.isin(mesh.subdomain, mine)
@@ -77,14 +77,14 @@ def part_of(whole: Sample, rank: int, size: int) -> Sample:
 
 
 def without_interface(whole: Sample) -> Sample:
-    """The same with no interface nodes."""
+    """Return the same with no interface nodes."""
     none = InterfacePart(**{name: table[:0] for name, table in vars(whole.interface).items()})
     states = (_cut(state, slice(None), slice(None), slice(0)) for state in whole.states)
     return replace(whole, interface=none, states=tuple(states))
 
 
 def in_space(whole: Sample) -> Sample:
-    """The same as states of generalized plane strain under E33 = 1, a temperature, and gamma13 = -1."""
+    """Return the same as states of generalized plane strain under E33 = 1, a temperature, and gamma13 = -1."""
     return replace(whole, states=tuple(_in_space(whole.mesh, state) for state in whole.states))
 
 
@@ -145,7 +145,7 @@ def _interface(mesh: MeshPart) -> InterfacePart:
 
 
 def _nodes_at(mesh: MeshPart, points: np.ndarray, body: int) -> np.ndarray:
-    """The nodes of a body at the points."""
+    """Return the nodes of a body at the points."""
     nodes = np.unique(mesh.triangles[mesh.body == body])
     away = np.abs(mesh.points[nodes][:, None] - points).max(axis=2)
     return nodes[away.argmin(axis=0)]

@@ -20,7 +20,7 @@ GLASS = {"young": 73.0, "poisson": 0.22, "expansion": 5.0}
 
 
 def document(matrix=EPOXY, fibre=GLASS, petsc=None, analysis="stiffness", sections=None, **cell):
-    """A case as a document; `cell` are keys of its cell, `sections` more of its sections."""
+    """Return a case as a document; `cell` are keys of its cell, `sections` more of its sections."""
     circular = {} if cell.get("geometry") == "mesh" else {"fibre_fraction": 0.4, "mesh_size": 0.2}
     return {
         "cell": {"geometry": "square"} | circular | cell,
@@ -31,7 +31,7 @@ def document(matrix=EPOXY, fibre=GLASS, petsc=None, analysis="stiffness", sectio
 
 
 def solved(comm, folder=".", **case):
-    """The result of a case.  Collective."""
+    """Return the result of a case. Collective."""
     return compute(Case.parse(document(**case), folder), comm)
 
 
@@ -43,7 +43,7 @@ class Twin:
     """
 
     def __init__(self, comm, folder=".", **case):
-        """Collective."""
+        """Tear the case and assemble its twin.  Collective."""
         written = document(**case)
         parsed = Case.parse(written, folder)
         self.comm = comm
@@ -77,7 +77,7 @@ class Twin:
         return S[:6, :6], S[:6, 6]
 
     def destroy(self):
-        """Collective."""
+        """Free the cell.  Collective."""
         self.cell.destroy()
         PETSc.garbage_cleanup(self.comm)
 

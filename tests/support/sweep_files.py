@@ -18,7 +18,7 @@ FAILING_POINTS = "cell.fibre_fraction = [0.2, 0.745, 0.25]\n"
 
 
 def sweep_file(folder: Path, table: str, case: str = CASE, name: str = "sweep") -> Path:
-    """A case file with these lines under [sweep]."""
+    """Return a case file with these lines under [sweep]."""
     path = folder / f"{name}.toml"
     path.write_text(f"{case}[sweep]\n{table}" if table else case)
     return path

@@ -32,7 +32,8 @@ class ReferencedCell:
         return interface(self.cell, contact)
 
     def status(self, bonded):
-        """The status on this rank, debonded nodes open, of the reference's `bonded` (k,) on rank 0.  Collective."""
+        """Return the status on this rank, debonded nodes open, of the reference's `bonded` (k,) on rank 0.
+        Collective."""
         comm = self.cell.comm
         bonded = comm.bcast(bonded[self.order] if comm.rank == 0 else None)
         first = comm.exscan(self.here) or 0
@@ -57,8 +58,8 @@ class ReferencedCell:
 
 
 def tear(comm, arcs=(), thresholds=DEFAULTS, springs=(None, None), policy=DEFAULT_POLICY, **case):
-    """The torn cell of the case that `make_case` makes, the tips of arcs at its nodes, with elastic interfaces of the
-    stiffnesses `springs`.  Collective."""
+    """Return the torn cell of the case that `make_case` makes, the tips of arcs at its nodes, with elastic interfaces
+    of the stiffnesses `springs`. Collective."""
     PETSc.garbage_cleanup(comm)
     normal, tangential = springs
     bonding = sections.InterfaceSection(debonded=tuple(arcs), normal_stiffness=normal, tangential_stiffness=tangential)
@@ -68,7 +69,7 @@ def tear(comm, arcs=(), thresholds=DEFAULTS, springs=(None, None), policy=DEFAUL
 
 
 def printed(comm, capfd, **case):
-    """What a torn cell and one solve print on rank 0, on every rank."""
+    """Return on every rank the lines that a torn cell and one solve print on rank 0."""
     capfd.readouterr()
     cell = tear(comm, **case)
     cell.solver.solve(np.array([1.0, -0.5, 0.3]), np.zeros(cell.solver.rows))
@@ -81,12 +82,12 @@ def interface(cell, contact):
 
 
 def build(comm, **case):
-    """The cell of `tear` and its quadratic programme.  Collective."""
+    """Return the cell of `tear` and its quadratic programme. Collective."""
     return referenced(tear(comm, **case))
 
 
 def referenced(cell):
-    """A cell of round fibres, all of them coated or none, and its quadratic programme.  Collective."""
+    """Return a cell of round fibres, all of them coated or none, and its quadratic programme. Collective."""
     comm, fibres = cell.comm, arrange(cell.case.cell)
     size = np.array([cell.summary.width, cell.summary.height])
     inwards = ["matrix", *(["coating"] if fibres.coated.all() else []), "fibre"]

@@ -22,8 +22,9 @@ def polar_cell(
     size: float = 0.1,
     turn: float = 0.0,
 ) -> None:
-    """A periodic mesh of the unit cell by gmsh's OpenCASCADE kernel, with one fibre about `centre`: an
-    ellipse of semi-axes radius * stretch and radius, the first at `turn` radians from the horizontal."""
+    """Write a periodic mesh of the unit cell by gmsh's OpenCASCADE kernel, with one elliptic fibre about `centre`.
+
+    Its semi-axes are radius * stretch and radius, the first at `turn` radians from the horizontal."""
     gmsh.initialize(interruptible=False)
     try:
         gmsh.option.setNumber("General.Terminal", 0)

@@ -175,7 +175,7 @@ CASES |= MIXED_PATHS | LOADS
 
 
 def document(kind: str) -> dict[str, Any]:
-    """The case of a kind of result."""
+    """Return the case of a kind of result."""
     parts = dict(CASES[kind])
     analysis = next((name for name in ("angle", "path", "envelope", "load") if name in parts), "stiffness")
     material = {"matrix": parts.pop("matrix", MATRIX), "fibre": parts.pop("fibre", FIBRE)}
@@ -195,7 +195,7 @@ def write(kind: str, folder: Path) -> Path:
 
 
 def falsified(folder: Path, copy: Path, edit: Callable[[dict[str, Any], Any], object]) -> Path:
-    """A copy of a result after edit(document of result.json, open result.h5); returns its folder.
+    """Return a copy of a result after edit(document of result.json, open result.h5); returns its folder.
 
     Both files have the case: an edit of that in the document is one of both.
     """

@@ -14,7 +14,7 @@ from feti_homog.typing import Bool
 
 
 def write_voids(path: Path, voids: Sequence[int] | None = None, **cell) -> None:
-    """The mesh of a cell whose circles number `voids`, or all of them, are not meshed, and periodic images of these."""
+    """Write the mesh of a cell without the circles numbered `voids`, or any of them, and periodic images of these."""
     mesh = generate(Cell(**({"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.15} | cell)), {})
     centres = mesh.points[mesh.triangles].mean(axis=1)
     kept = mesh.phase == 0
@@ -26,7 +26,7 @@ def write_voids(path: Path, voids: Sequence[int] | None = None, **cell) -> None:
 
 
 def write_part(path: Path, mesh: CoarseMesh, kept: Bool) -> None:
-    """The file of those triangles of a mesh that are `kept` (m,)."""
+    """Write the file of the triangles of a mesh that are `kept` (m,)."""
     triangles, phase = mesh.triangles[kept], mesh.phase[kept]
     names = [f'2 {number + 1} "{name}"' for number, name in enumerate(mesh.phases) if (phase == number).any()]
     used = np.unique(triangles)

@@ -28,7 +28,7 @@ class ViewedState:
 
 
 def viewed_states(path: Path) -> Iterator[ViewedState]:
-    """The states of a file, one after the other."""
+    """Yield the states of a file, one after the other."""
     reader = vtkXdmfReader()
     reader.SetFileName(str(path))
     reader.UpdateInformation()

@@ -7,5 +7,5 @@ from feti_homog.mesh.tiles.tiles import DEFAULT_TILES
 
 
 def coarse_mesh(case, comm, policy=DEFAULT_TILES):
-    """That of rank 0, filled by all; None on others.  Collective."""
+    """Gather the mesh on rank 0, filled by all; None on other ranks.  Collective."""
     return fill_tiles(place_nodes(case, comm, policy), comm)

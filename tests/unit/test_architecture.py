@@ -74,7 +74,8 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 
 
 def floor_of(name: str) -> str | None:
-    """The floor of a module or of a name in one, both without the package's name; None for the package itself."""
+    """Return the floor of a module or of a name in one, both without the package's name; None for the package
+    itself."""
     words = name.split(".")
     return next((floor for n in (2, 1) if (floor := ".".join(words[:n])) in LEVEL), None)
 
@@ -84,7 +85,7 @@ def name_of(path: Path) -> str:
 
 
 def imported_names(path: Path) -> set[str]:
-    """What a module imports from the package, wherever in it, without the package's name."""
+    """Return the imports of a module from the package, inside functions too, without the package's name."""
     found = set()
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
@@ -120,7 +121,7 @@ def test_modules_do_not_import_each_other_in_circles():
 
 
 def modules_of(imported: set[str], names: list[str]) -> set[str]:
-    """The modules that these are, or whose words these are."""
+    """Return the modules that these are, or whose words these are."""
     return {name if name in names else name.rpartition(".")[0] for name in imported}
 
 

@@ -66,11 +66,11 @@ def test_the_cases_of_ci_cover_the_language(tmp_path):
 
 @pytest.fixture(scope="module")
 def solved(tmp_path_factory):
-    """number -> case and folder of its result."""
+    """Provide number -> case and folder of its result."""
     made = {}
 
     def of(wanted):
-        """The first case that `wanted` takes."""
+        """Return the first case that `wanted` takes."""
         for number in range(500):
             folder = tmp_path_factory.mktemp("case")
             drawn = draw(SEED, number, folder)
@@ -93,7 +93,7 @@ def is_load(drawn):
 
 
 def put(document, path, place=0):
-    """A copy of a document in which the largest number of a kind is wrong."""
+    """Return a copy of a document in which the largest number of a kind is wrong."""
     wrong = copy.deepcopy(document)
     value, names = wrong, path.split(".")
     for name in names[:-1]:

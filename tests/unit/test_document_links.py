@@ -31,19 +31,19 @@ documents = pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: str(path
 
 
 def prose(path):
-    """The text without its fenced blocks."""
+    """Return the text without its fenced blocks."""
     return re.sub(r"^```.*?^```$", "", path.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
 
 
 def blocks(path, language):
-    """The fenced blocks of a language."""
+    """Return the fenced blocks of a language."""
     text = path.read_text(encoding="utf-8")
     return re.findall(rf"^```{language}\n(.*?)^```$", text, flags=re.MULTILINE | re.DOTALL)
 
 
 @cache
 def anchors(path):
-    """The anchors of a document's headings, as GitHub makes them."""
+    """Return the anchors of a document's headings, as GitHub makes them."""
     headings = re.findall(r"^#+ (.+)$", prose(path), flags=re.MULTILINE)
     return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
@@ -57,7 +57,8 @@ def names_in(module):
 
 
 def module_of(dotted):
-    """The file of a dotted name below the package, and the names after it: a package, a module, or names in one."""
+    """Return the file of a dotted name below the package, and the names after it: a package, a module, or names in
+    one."""
     words = dotted.removeprefix("feti_homog.").split(".")
     place = ROOT / "feti_homog"
     while words and (place / words[0]).is_dir():

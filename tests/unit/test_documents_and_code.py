@@ -23,7 +23,7 @@ every_document = pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path:
 
 
 def code_words(document: Path) -> set[str]:
-    """What stands in backticks outside of blocks."""
+    """Return the text in backticks outside of code blocks."""
     return set(re.findall(r"`([^`\n]+)`", FENCE.sub("", document.read_text(encoding="utf-8"))))
 
 
@@ -40,7 +40,7 @@ def words_of_the_code() -> frozenset[str]:
 
 @cache
 def keys() -> dict[str, set[str]]:
-    """The keys of each section of a case file."""
+    """Return the keys of each section of a case file."""
     found: dict[str, set[str]] = {}
     for row in reference.rows():
         found.setdefault(row.section, set()).add(row.key)
@@ -48,7 +48,7 @@ def keys() -> dict[str, set[str]]:
 
 
 def unknown_keys(table: dict[str, object]) -> Iterator[str]:
-    """The keys of a case file, as it was read, that the reference does not have."""
+    """Yield the keys of a case file, as it was read, that the reference does not have."""
     for section, content in table.items():
         if section not in keys():
             yield section

@@ -161,7 +161,7 @@ SWEEP = {"sweep": {"cell.mesh_size": [0.25, 0.3]}}
 
 @pytest.fixture(scope="module")
 def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """A folder of results of each case."""
+    """Provide a folder of results of each case."""
     root = tmp_path_factory.mktemp("results")
     for name, sections in CASES.items():
         run(Case.parse(BASE | sections), root / name, MPI.COMM_SELF, quiet=True)
@@ -183,7 +183,7 @@ def sweep_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def paths_of(value: Any, above: str = "") -> Iterator[str]:
-    """The places of a document as the reference writes them; a case is not gone into."""
+    """Yield the places of a document as the reference writes them; a case is not gone into."""
     entries = value.items() if isinstance(value, dict) else ()
     for name, item in entries:
         yield f"{above}{name}"
@@ -194,7 +194,8 @@ def paths_of(value: Any, above: str = "") -> Iterator[str]:
 
 
 def unmatched(names: Iterable[str], patterns: Iterable[str]) -> tuple[set[str], set[str]]:
-    """The names that are of no pattern and the patterns that are of no name; capitals, i and j stand for anything."""
+    """Return the names that are of no pattern and the patterns that are of no name; capitals, i and j stand for
+    anything."""
     expressions = {pattern: expression(pattern) for pattern in patterns}
     names = set(names)
     unknown = {name for name in names if not any(e.fullmatch(name) for e in expressions.values())}

@@ -29,7 +29,7 @@ class Clock:
 
 
 def told(steps, urgent=(), count=10):
-    """What is said of events of so many seconds each."""
+    """Return the printed lines of events of so many seconds each."""
     progress, clock = Words(), Clock()
     with EventProgress(progress, EVENTS_BAR, "the log", clock) as shown:
         for number in range(count):

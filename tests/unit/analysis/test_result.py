@@ -118,7 +118,7 @@ RESULTS = {
 
 
 def leaves(value: Any, place: str = "") -> list[str]:
-    """The places of all values of a document as `schema_keys` writes them."""
+    """Return the places of all values of a document as `schema_keys` writes them."""
     if isinstance(value, dict):
         return [leaf for key, item in value.items() for leaf in leaves(item, f"{place}.{key}".lstrip("."))]
     if isinstance(value, list) and value and isinstance(value[0], dict):

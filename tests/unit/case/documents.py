@@ -31,7 +31,7 @@ NONZERO_STRAINS = STRAINS.filter(any)
 
 
 def optional(**strategies: st.SearchStrategy[Any]) -> st.SearchStrategy[dict[str, Any]]:
-    """A table of which any keys may be absent."""
+    """Return a table of which any keys may be absent."""
     return st.fixed_dictionaries({}, optional=strategies)
 
 
@@ -63,7 +63,7 @@ EXPANSIONS_BY_AXES = st.one_of(EXPANSIONS, st.lists(EXPANSIONS, min_size=3, max_
 
 @st.composite
 def materials(draw: st.DrawFn) -> dict[str, Any]:
-    """A material that serves in all plane states, or a 3x3 stiffness."""
+    """Return a material that serves in all plane states, or a 3x3 stiffness."""
     form = draw(st.sampled_from(["isotropic", "orthotropic", "transversely isotropic", "general"]))
     if form == "isotropic":
         constants = {"young": draw(POSITIVE), "poisson": draw(numbers(-0.9, 0.49))}
@@ -105,7 +105,7 @@ def arcs(draw: st.DrawFn, with_angle: bool) -> dict[str, Any]:
 
 @st.composite
 def loads(draw: st.DrawFn, plane: str, expand: bool) -> dict[str, float]:
-    """A load by name: of some components, in any order, the strain or the stress, and perhaps a temperature."""
+    """Return a load by name: of some components, in any order, the strain or the stress, and perhaps a temperature."""
     names = (SPATIAL_STRAINS, SPATIAL_STRESSES) if plane == "generalized" else (STRAIN_NAMES, STRESS_NAMES)
     pairs = draw(st.lists(st.sampled_from(list(zip(*names, strict=True))), min_size=1, unique=True))
     load = {draw(st.sampled_from(pair)): draw(numbers(-1.0, 1.0)) for pair in pairs}
@@ -137,14 +137,14 @@ def is_new(load: Any, before: Sequence[Any]) -> bool:
 
 
 def planes_of(phases: Iterable[dict[str, Any]]) -> list[str]:
-    """The plane states in which phases can be."""
+    """Return the plane states in which phases can be."""
     in_space = all(len(constants.get("stiffness", ())) != 3 for constants in phases)
     return ["strain", "stress", "generalized"] if in_space else ["strain", "stress"]
 
 
 @st.composite
 def envelopes(draw: st.DrawFn, plane: str, expand: bool) -> dict[str, Any]:
-    """A plane of stresses or of strains, in the plane or in space."""
+    """Return a plane of stresses or of strains, in the plane or in space."""
     families = FAMILIES if plane == "generalized" else (STRESS_NAMES, STRAIN_NAMES)
     names = draw(st.lists(st.sampled_from(draw(st.sampled_from(families))), min_size=2, max_size=2, unique=True))
     own = {"temperature": numbers(-1e3, 1e3)} if plane == "generalized" and expand else {}
@@ -153,7 +153,7 @@ def envelopes(draw: st.DrawFn, plane: str, expand: bool) -> dict[str, Any]:
 
 @st.composite
 def documents(draw: st.DrawFn) -> dict[str, Any]:
-    """The document of a valid case, with round fibres."""
+    """Return the document of a valid case, with round fibres."""
     analysis = draw(st.sampled_from(["stiffness", "angle", "path", "load", "envelope"]))
     own_arcs = draw(st.lists(arcs(with_angle=analysis != "angle"), min_size=analysis == "angle", max_size=3))
     interface: dict[str, Any] = {"debonded": own_arcs} | draw(optional(contact=st.booleans()))
@@ -234,7 +234,7 @@ def changed_documents(draw: st.DrawFn, sources: Sequence[dict[str, Any]]) -> dic
 
 
 def with_numpy_values(value: Any) -> Any:
-    """The same document with NumPy's scalars and arrays, and tuples instead of lists."""
+    """Return the same document with NumPy's scalars and arrays, and tuples instead of lists."""
     if isinstance(value, dict):
         return {name: with_numpy_values(entry) for name, entry in value.items()}
     if isinstance(value, list):

@@ -10,7 +10,7 @@ def of_type(name: str, *sections: str) -> str:
 
 
 def debonded(arc: str, *lines: str) -> str:
-    """A load path with one arc."""
+    """Return a load path with one arc."""
     return of_type("path", PATH, "[interface]", f"debonded = [{arc}]", *lines)
 
 

@@ -9,7 +9,7 @@ BONDS = "[interface]\nnormal_strength = 10.0"
 
 
 def envelope(plane: str, *lines: str, state: str = "strain", bonds: str = BONDS) -> str:
-    """An envelope in a plane of loads."""
+    """Return an envelope in a plane of loads."""
     text = of_type("envelope", bonds, f"[envelope]\nplane = {plane}", *lines)
     return text.replace('"strain"', f'"{state}"')
 

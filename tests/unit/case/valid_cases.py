@@ -22,7 +22,7 @@ MESH = changed(MESH_CELL)
 
 
 def in_space(case: str, bonds: str = "") -> str:
-    """A case in generalized plane strain, whose phases expand."""
+    """Return a case in generalized plane strain, whose phases expand."""
     expands = case.replace("poisson = 0.299", "poisson = 0.299\nexpansion = 1e-5").replace(
         "poisson = 0.222", "poisson = 0.222\nexpansion = 2e-5"
     )

@@ -24,7 +24,7 @@ INFLUENCE, ADAPTIVE, NATURAL = (
 
 
 def read(**given):
-    """The options of a database with these values."""
+    """Return the options of a database with these values."""
     return SolverOptions.read(given.get, given.get)
 
 

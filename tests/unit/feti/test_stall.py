@@ -8,7 +8,7 @@ from feti_homog.feti.krylov import Stall
 
 
 def stalls_at(norms) -> int | None:
-    """The first iteration for four iterations before which no norm has halved."""
+    """Return the first iteration for four iterations before which no norm has halved."""
     stall = Stall(4)
     return next((iteration for iteration, norm in enumerate(norms) if stall.is_reached(iteration, norm)), None)
 

@@ -16,13 +16,13 @@ SEEDS = st.integers(0, 2**32 - 1)
 
 
 def stiffness(rng):
-    """A symmetric positive definite matrix."""
+    """Return a symmetric positive definite matrix."""
     root = rng.normal(size=(COMPONENTS, COMPONENTS))
     return root @ root.T + np.eye(COMPONENTS)
 
 
 def state(L, load):
-    """What a material of this stiffness does under a load."""
+    """Return the response of a material of this stiffness to a load."""
     f, strain = load.by_stress, np.where(load.by_stress, 0.0, load.values)
     strain[f] = np.linalg.solve(L[np.ix_(f, f)], load.values[f] - (L @ strain)[f])
     return Macroscopic(strain, L @ strain)

@@ -36,7 +36,7 @@ every_composite = pytest.mark.parametrize("composite", HEXAGONAL.values(), ids=H
 
 
 def said(estimate):
-    """What an estimate says, by name."""
+    """Return the values of an estimate by name."""
     return {name: value for name, value in dataclasses.asdict(estimate).items() if value is not None}
 
 

@@ -49,7 +49,7 @@ def compliances(springs, radius):
 
 
 def said(estimate):
-    """What an estimate says, by name."""
+    """Return the values of an estimate by name."""
     return {name: value for name, value in dataclasses.asdict(estimate).items() if value is not None}
 
 

@@ -22,7 +22,7 @@ def three_dimensional_stiffness(E1, E2, E3, nu12, nu13, nu23, G12):
 
 
 def tensor(stiffness):
-    """The (2, 2, 2, 2) tensor of a (3, 3) stiffness."""
+    """Return the (2, 2, 2, 2) tensor of a (3, 3) stiffness."""
     place = {(0, 0): 0, (1, 1): 1, (0, 1): 2, (1, 0): 2}
     return np.array(
         [[[[stiffness[place[i, j], place[k, m]] for m in (0, 1)] for k in (0, 1)] for j in (0, 1)] for i in (0, 1)]
@@ -110,7 +110,8 @@ def test_near_incompressible_is_stable():
 
 
 def in_space(material, plane, strain):
-    """The stress (3, 3) and strain (3, 3) of the plane state with these strains [11, 22, 12] in space, turned back."""
+    """Return the stress (3, 3) and strain (3, 3) of the plane state with these strains [11, 22, 12] in space, turned
+    back."""
     whole = three_dimensional_stiffness(**CONSTANTS)
     c, s = np.cos(np.radians(material.angle)), np.sin(np.radians(material.angle))
     turn = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])  # to the axes of the material

@@ -45,7 +45,7 @@ def tensor(stiffness):
 
 
 def turned(stiffness, degrees):
-    """The same material turned about x3."""
+    """Return the same material turned about x3."""
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     Q = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
     C = np.einsum("ai,bj,ck,dl,ijkl->abcd", Q, Q, Q, Q, tensor(stiffness))

@@ -29,7 +29,7 @@ def turn(angle: float) -> np.ndarray:
 
 
 def tensor(stiffness: np.ndarray) -> np.ndarray:
-    """The (3, 3, 3, 3) tensor of a (6, 6) stiffness."""
+    """Return the (3, 3, 3, 3) tensor of a (6, 6) stiffness."""
     found = np.zeros((3, 3, 3, 3))
     for row, (i, j) in enumerate(AXES):
         for column, (k, m) in enumerate(AXES):
@@ -56,7 +56,7 @@ def rows(stiffness: np.ndarray) -> tuple[tuple[float, ...], ...]:
 
 
 def same_material(young: float, poisson: float) -> list[Material]:
-    """An isotropic material in all forms, with an expansion of 3."""
+    """Return an isotropic material in all forms, with an expansion of 3."""
     shear, lame = young / (2 * (1 + poisson)), young * poisson / ((1 + poisson) * (1 - 2 * poisson))
     whole = np.diag([2 * shear] * 3 + [shear] * 3)
     whole[:3, :3] += lame

@@ -66,7 +66,7 @@ def _middle(x: float, y: float) -> bool:
 
 
 def grid(fibre: Callable[[float, float], bool] = _middle) -> MshFile:
-    """A good mesh of 4 x 4 squares, elements 2 k + 1 and 2 k + 2 the lower and the upper half of square k."""
+    """Return a good mesh of 4 x 4 squares, elements 2 k + 1 and 2 k + 2 the lower and the upper half of square k."""
     nodes = {node(i, j): (i / N, j / N, 0.0) for j in range(N + 1) for i in range(N + 1)}
     elements = {}
     for j in range(N):
@@ -89,7 +89,7 @@ ALL_SIDES = (
 
 
 def turned(mesh: MshFile, *tags: int) -> MshFile:
-    """The mesh with these elements, of three or six nodes, in the other sense."""
+    """Return the mesh with these elements, of three or six nodes, in the other sense."""
     for tag in tags:
         kind, physical, _, nodes = mesh.elements[tag]
         mesh = mesh.with_element(tag, kind, physical, [nodes[k] for k in (0, 2, 1, 5, 4, 3)[: len(nodes)]])
@@ -97,7 +97,7 @@ def turned(mesh: MshFile, *tags: int) -> MshFile:
 
 
 def _split_node(at: int, elements: Sequence[int]) -> MshFile:
-    """A second node 99 in the place of one, used by these elements."""
+    """Return a second node 99 in the place of one, used by these elements."""
     mesh = grid()
     mesh = replace(mesh, nodes={**mesh.nodes, 99: mesh.nodes[at]})
     for tag in elements:
@@ -121,7 +121,7 @@ def _quadrilaterals() -> MshFile:
 
 
 def _third_order() -> MshFile:
-    """A 10-node triangle."""
+    """Return a 10-node triangle."""
     places = [(0, 0), (3, 0), (0, 3), (1, 0), (2, 0), (2, 1), (1, 2), (0, 2), (0, 1), (1, 1)]
     nodes = {k: (float(x), float(y), 0.0) for k, (x, y) in enumerate(places, 1)}
     return MshFile(nodes, {1: (21, 1, 1, tuple(range(1, 11)))})
@@ -154,12 +154,12 @@ def _two_islands() -> MshFile:
 
 
 def _cut_corner() -> MshFile:
-    """The last corner node moved inwards along the upper side: the corner is cut off."""
+    """Return the last corner node moved inwards along the upper side: the corner is cut off."""
     return grid().moved(n25=(0.875, 1.0))
 
 
 def _unbalanced() -> MshFile:
-    """The lowest left square in three triangles, with a node on the lower side that the upper one lacks."""
+    """Return the lowest left square in three triangles, with a node on the lower side that the upper one lacks."""
     mesh = replace(grid(), nodes={**grid().nodes, 99: (0.125, 0.0, 0.0)})
     return mesh.without(1).with_element(51, 2, 1, (1, 99, 7)).with_element(52, 2, 1, (99, 2, 7))
 
@@ -173,7 +173,7 @@ def _mesh(build: Callable[[], MshFile]) -> Callable[[Path], None]:
 
 
 def _broken(path: Path) -> None:
-    """A good file that ends in the middle of its nodes."""
+    """Write a good file that ends in the middle of its nodes."""
     grid().write(path)
     text = path.read_text()
     path.write_text(text[: text.index("$EndNodes") - 40])
@@ -184,7 +184,7 @@ def _unknown_node(path: Path) -> None:
 
 
 def _line_twice(path: Path) -> None:
-    """The line of element 12 in place of that of 13, which gmsh takes for one element and says nothing of."""
+    """Write the line of element 12 in place of that of 13; gmsh reads one element without an error."""
     grid().write(path)
     lines = path.read_text().splitlines()
     own = {line.split()[0]: number for number, line in enumerate(lines) if len(line.split()) == 8}

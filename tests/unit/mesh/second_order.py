@@ -10,7 +10,7 @@ from unit.mesh.faulty_meshes import FIBRE, MshFile, grid
 
 
 def second_order(mesh: MshFile, bent: Callable[[float, float], Sequence[float]] | None = None) -> MshFile:
-    """The mesh with triangles of six nodes and lines of three; `bent` moves the middles (x, y) of edges."""
+    """Return the mesh with triangles of six nodes and lines of three; `bent` moves the middles (x, y) of edges."""
     nodes, elements = dict(mesh.nodes), {}
     middle: dict[frozenset[int], int] = {}
     for tag, (kind, physical, entity, corners) in mesh.elements.items():
@@ -28,7 +28,7 @@ def second_order(mesh: MshFile, bent: Callable[[float, float], Sequence[float]] 
 
 
 def _middle_moved(x: float, y: float, *place: float) -> MshFile:
-    """The grid in second order, with the middle node at (x, y) elsewhere."""
+    """Return the grid in second order, with the middle node at (x, y) elsewhere."""
     return second_order(grid(), lambda u, v: place if (u, v) == (x, y) else (u, v))
 
 

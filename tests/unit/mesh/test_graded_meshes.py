@@ -27,7 +27,7 @@ CROWDED = cell(fibres=20, fraction=0.6, gap=0.02)
 
 
 def edge_lengths(mesh):
-    """(a,) edges on the circles."""
+    """Return (a,) edges on the circles."""
     return np.linalg.norm(np.diff(mesh.points[mesh.arc_edges], axis=1)[:, 0], axis=1)
 
 

@@ -27,7 +27,7 @@ def torus_of(folder: Path, image: np.ndarray, jitter: float = 0.0, symmetry: np.
 
 
 def places(torus: Torus, classes: np.ndarray, size: int) -> set[tuple[float, float]]:
-    """The plane nodes of some classes, in pixels."""
+    """Return the plane nodes of some classes, in pixels."""
     found = torus.mesh.points[classes[torus.node_class]] * size
     return {tuple(place) for place in np.round(found, 1).tolist()}
 

@@ -46,13 +46,13 @@ def mesh(cell, folder):
 
 
 def listed(width, height, size, rows, unit, folder):
-    """The mesh of a table in the case file."""
+    """Return the mesh of a table in the case file."""
     cell = {"width": unit * width, "height": unit * height, "fibre_list": of_unit(rows, unit), "mesh_size": size}
     return mesh(cell, folder)
 
 
 def placed(width, height, size, rows, unit, folder):
-    """The mesh of a table in a file that has the place of the cell."""
+    """Return the mesh of a table in a file that has the place of the cell."""
     lines = [f"# width = {unit * width!r}, height = {unit * height!r}, left = 0, bottom = 0", ",".join(COLUMNS)]
     lines += [",".join(str(row.get(name, "")) for name in COLUMNS) for row in of_unit(rows, unit)]
     (folder / "table.csv").write_text("\n".join(lines))

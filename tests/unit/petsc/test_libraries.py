@@ -20,7 +20,7 @@ SERIAL = "class Configuration: mpi = False\nget_config = Configuration"
 
 
 def faults(folder, **modules: str) -> list[str]:
-    """What the program prints where these modules stand before the installed ones."""
+    """Return the output of the program where these modules precede the installed ones."""
     for name, text in modules.items():
         (folder / f"{name}.py").write_text(text)
     environment = {name: value for name, value in os.environ.items() if not name.startswith(("OMPI_", "PMIX_"))}

@@ -11,7 +11,7 @@ from feti_homog.petsc.options import case_options
 
 @pytest.fixture
 def given():
-    """Sets an option (name without dash) of the command line, until the test ends."""
+    """Set an option (name without dash) of the command line, until the test ends."""
     database, names = PETSc.Options(), []
 
     def give(name, value):

@@ -16,7 +16,7 @@ UNITS = {LENGTH: "mm", STRESS: "GPa", "": "1", "temperature": "temperature"}  # 
 
 
 def words_of(described):
-    """The attributes by which a dataset describes itself."""
+    """Return the attributes by which a dataset describes itself."""
     return {"meaning": described.meaning, "unit": UNITS[described.unit]}
 
 

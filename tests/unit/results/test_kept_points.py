@@ -106,7 +106,7 @@ def test_the_size_of_a_stress_is_that_of_the_tensor(shear: float) -> None:
 
 
 def in_space(strain: float, stress: float, load: float) -> dict[str, Any]:
-    """Pulled along x2: [11, 22, 33, 23, 13, 12]."""
+    """Return pulled along x2: [11, 22, 33, 23, 13, 12]."""
     return {
         "load_factor": load,
         "strain": [-0.3 * strain, strain, -0.2 * strain, 0.0, 0.0, 0.0],

@@ -24,7 +24,7 @@ print('3d' in projections.get_projection_names())
 
 
 def words_of(tmp_path: Path, program: str) -> tuple[str, str]:
-    """What a program prints and warns of where the bound toolkits are those of an old Matplotlib."""
+    """Return output and warnings of a program where the bound toolkits are those of an old Matplotlib."""
     old = tmp_path / "mpl_toolkits" / "mplot3d"
     old.mkdir(parents=True, exist_ok=True)
     (old / "__init__.py").write_text("from matplotlib import something_that_is_gone")

@@ -46,7 +46,7 @@ def eliminated(unknowns: int, ranks: int, factor: float, solve: float, solves: i
 
 
 def made_up(dofs: int, ranks: int, way: str = ELIMINATION) -> Row:
-    """A run whose seconds follow constants that the tests know; its messages take no time."""
+    """Return a run whose seconds follow constants that the tests know; its messages take no time."""
     triangles, coarse, kernel = dofs // 50, dofs // 500, dofs // 1000
     factor, solve = 1e-6 * coarse**1.5, 1e-7 * coarse**1.2
     natural_factor, natural_solve, natural_fronts = eliminated(kernel, ranks, 2e-5 * kernel, 3e-6 * kernel, 2)

@@ -37,7 +37,7 @@ def test_statistics_of_too_few_values_are_nan():
 
 
 def document(fraction, fibres, shift):
-    """What a run leaves, with a stiffness a little above that of Reuss."""
+    """Write the files of a run with a stiffness slightly above that of Reuss."""
     C = np.array([[120.0 + 80 * fraction, 50.0, 0.0], [50.0, 120.0 + 80 * fraction, 0.0], [0.0, 0.0, 35.0]]) + shift
     cell = {"geometry": "random", "fibre_fraction": fraction, "fibres": fibres}
     return {
@@ -219,7 +219,7 @@ def assert_drawn(folder, table, names):
 
 
 def spatial_document(fraction, shift):
-    """What a run of generalized plane strain leaves."""
+    """Write the files of a run in generalized plane strain."""
     found = document(fraction, 1, 0.0)
     C = np.diag([150.0 + shift, 150.0, 210.0, 50.0, 50.0, 45.0]) + 1e-3 * np.arange(36).reshape(6, 6)
     thermal = {"thermal_stress": [-1.0] * 6, "thermal_expansion": [1e-5] * 6}

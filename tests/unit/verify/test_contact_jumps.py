@@ -24,7 +24,7 @@ def path_of(folder):
 
 
 def cut(path):
-    """The case whose second leg is cut in two where contact begins to change."""
+    """Return the case whose second leg is cut in two where contact begins to change."""
     case = document("jump")
     begin, end = case["path"]["waypoints"]
     start = next(point["strain"] for point in path if point["load_factor"] == 1 / LEG)

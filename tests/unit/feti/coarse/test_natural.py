@@ -59,7 +59,7 @@ def coarse():
 
 @contextmanager
 def at_most(limit):
-    """A block that allocates no more at a time than so many bytes."""
+    """Provide a block that allocates no more at a time than so many bytes."""
     tracemalloc.start()
     yield
     peak = tracemalloc.get_traced_memory()[1]

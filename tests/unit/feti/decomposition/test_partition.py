@@ -13,7 +13,7 @@ from feti_homog.mesh.submesh import SubdomainTable, cut_for_ranks, pinned_class
 
 
 def torus_of(fibres, seed, mesh_size):
-    """A random cell of 60 %."""
+    """Return a random cell of 60 %."""
     cell = Cell(
         geometry="random",
         fibres=fibres,
@@ -32,7 +32,7 @@ def torus():
 
 
 def fine(torus, n_ranks, size=20, **options):
-    """The decomposition into pieces of about `size` triangles."""
+    """Return the decomposition into pieces of about `size` triangles."""
     load = np.bincount(torus.constituent)
     return decompose(torus, torus.constituent, pieces_for_size(load, 1, size), n_ranks, **options)
 

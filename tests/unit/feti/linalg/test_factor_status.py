@@ -29,14 +29,14 @@ def grid(n):
 
 
 def spoilt(n, value):
-    """A matrix with another diagonal entry in the middle."""
+    """Return a matrix with another diagonal entry in the middle."""
     A = grid(n).tolil()
     A[n * n // 2, n * n // 2] = value
     return csr_matrix(A)
 
 
 def with_zero_row(value):
-    """A grid with an entry of its own."""
+    """Return a grid with an entry of its own."""
     A = grid(SMALL).tolil()
     A[4], A[:, 4] = 0.0, 0.0
     A[4, 4] = value

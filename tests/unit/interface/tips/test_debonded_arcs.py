@@ -12,7 +12,7 @@ ROUND = np.arange(0.0, 360.0, 10.0)
 
 
 def open_at(*arcs, opening=None, fibre=1):
-    """The directions, of 36 around a fibre, that are within the arcs."""
+    """Return the directions, of 36 around a fibre, that are within the arcs."""
     return ROUND[debonded(arcs, opening, np.full(36, fibre), ROUND)].tolist()
 
 

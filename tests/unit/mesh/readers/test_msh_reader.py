@@ -161,7 +161,7 @@ def _rewritten(source: Path, target: Path, version: float, binary: int) -> None:
 
 
 def _content(mesh: CoarseMesh) -> np.ndarray:
-    """The triangles (m, 7) by their corners' coordinates and phase, sorted, whatever the numbering."""
+    """Return the triangles (m, 7) by their corners' coordinates and phase, sorted, whatever the numbering."""
     corners = np.sort(mesh.points[mesh.triangles].view(complex)[..., 0], axis=1)
     rows = np.column_stack([corners.real, corners.imag, mesh.phase])
     return rows[np.lexsort(rows.T)]

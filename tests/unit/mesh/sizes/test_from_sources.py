@@ -12,13 +12,13 @@ LARGEST = 0.04
 
 
 def sources(count, seed=1):
-    """Some of any length and growth, near enough to each other that several matter everywhere."""
+    """Return some of any length and growth, near enough to each other that several matter everywhere."""
     rng = np.random.default_rng(seed)
     return rng.random((count, 2)) * SIZE, 0.05 * rng.random(count), MAX_GROWTH * rng.random(count)
 
 
 def brute_force(some, points):
-    """The formula, with every source within its reach."""
+    """Return the formula, with every source within its reach."""
     places, lengths, growths = some
     way = points[:, None] - places
     away = np.sqrt(((way - SIZE * np.round(way / SIZE)) ** 2).sum(axis=2))

@@ -20,7 +20,7 @@ named = pytest.mark.parametrize("name", ["dense", "dilute", "coated, voids", "wi
 
 @cache
 def filled(name):
-    """The filled tiles, and how many nodes they have."""
+    """Return the filled tiles, and how many nodes they have."""
     lines, first, tiles = tiles_to_fill(noded(name)), noded(name).regions.nodes, []
     for number, own in enumerate(lines):
         tiles.append(FilledTile(number, own, fill(own.tile), first))

@@ -19,7 +19,7 @@ SHEAR_23_AND_13, SHEAR_12 = np.eye(6)[[3, 4]], np.eye(6)[5]
 
 
 def coupled(size):
-    """The entries 16 and 45 of a stiffness are this part of sqrt(C_ii C_jj)."""
+    """Return the entries 16 and 45 of a stiffness are this part of sqrt(C_ii C_jj)."""
     C = DISTINCT.stiffness_in_the_cell
     C[0, 5] = C[5, 0] = size * np.sqrt(C[0, 0] * C[5, 5])
     C[3, 4] = C[4, 3] = -size * np.sqrt(C[3, 3] * C[4, 4])

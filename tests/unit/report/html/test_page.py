@@ -32,7 +32,7 @@ NAME = "a <b> & 'c'"
 
 
 def document(kind: str, **more: Any) -> dict[str, Any]:
-    """A result with three states, as many as the sample."""
+    """Return a result with three states, as many as the sample."""
     case = {
         "name": NAME, "cell": {"geometry": "square"}, "analysis": {"type": kind, "plane": "strain"},
         "output": {"stress_unit": "GPa"}, "path": {"strain": [1, 0, 0], "method": "events"}, "angle": {"strain": None},

@@ -32,7 +32,7 @@ def square() -> DrawnMesh:
 
 
 def area_ratio(displacement: Any, drawn: DrawnMesh, scale: float) -> float:
-    """The least of all triangles, by their corners."""
+    """Return the least of all triangles, by their corners."""
     before, after = (places[drawn.triangles] for places in (drawn.points, drawn.points + scale * displacement))
     areas = [np.linalg.det(corners[:, 1:] - corners[:, :1]) for corners in (before, after)]
     return float((areas[1] / areas[0]).min())

@@ -105,7 +105,7 @@ def test_texts_of_the_user_are_no_formulas(tmp_path: Path, recwarn: pytest.Warni
 
 
 def listed(kind: str, **points: Any) -> dict[str, Any]:
-    """A document with a list of three points, as many as the sample has states."""
+    """Return a document with a list of three points, as many as the sample has states."""
     counts = {"bonded": 5, "open": 3, "closed": 2, "broke": 1}
     section = {"strain": [0.0, 0.0, 1.0]} | ({"method": "events"} if kind == "path" else {"values": [0, 90, 180]})
     case = {"name": "a", "analysis": {"type": kind, "plane": "strain"}, "interface": {"contact": True}, kind: section}

@@ -30,7 +30,7 @@ DRAWING = (figures, deformed_panels, response_curves, traction_plots)
 
 
 def path_of(strains: list[float]) -> dict[str, Any]:
-    """The document of a path whose points have these strains E11."""
+    """Return the document of a path whose points have these strains E11."""
     counts = {"bonded": 5, "open": 3, "closed": 2, "broke": 1}
     points = [counts | {"load_factor": e, "strain": [e, 0, 0], "stress": [3 * e, e, 0.5 * e]} for e in strains]
     section = {"strain": [1.0, 0.0, 0.0], "method": "events"}
@@ -50,7 +50,7 @@ def write(directory: Path, whole: Sample, document: dict[str, Any] | None) -> No
 
 
 def drawn(directory: Path, monkeypatch: Any) -> dict[str, Figure]:
-    """The figures of a result by the names of their files."""
+    """Return the figures of a result by the names of their files."""
     found: dict[str, Figure] = {}
 
     def keep(figure: Figure, path: Path) -> Path:
@@ -144,7 +144,7 @@ def test_a_path_of_small_strains_is_magnified_and_says_so(tmp_path: Path, monkey
 
 
 def in_six(points: list[tuple[float, float, float]], path: dict[str, Any], **more: Any) -> dict[str, Any]:
-    """The document of a path in generalized plane strain of load factors with gamma13 and S13."""
+    """Return the document of a path in generalized plane strain of load factors with gamma13 and S13."""
     counts = {"bonded": 4, "open": 3, "closed": 3, "broke": 1}
     rows = [
         counts | {"load_factor": t, "strain": [0, 0, 0, 0, e, 0], "stress": [1e-9, 0, 0, 0, s, 0]} | more

@@ -32,8 +32,8 @@ def write(directory: Path, whole: Sample) -> Path:
 
 
 def around(whole: Sample, count: int, number: int) -> Sample:
-    """The sample with `count` interface nodes on each side of the square fibre, which has this number, in any order;
-    the fibre is moved by half a cell, so that the sides of the cell cut it in four."""
+    """Return the sample with `count` interface nodes on each side of the square fibre, which has this number, in any
+    order; the fibre is moved by half a cell, so that the sides of the cell cut it in four."""
     steps = np.arange(count)[:, None] / count
     sides = np.concatenate([a + steps * (b - a) for a, b in zip(CORNERS, np.roll(CORNERS, -1, axis=0), strict=True)])
     normals = np.repeat([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]], count, axis=0)
@@ -49,7 +49,7 @@ def around(whole: Sample, count: int, number: int) -> Sample:
 
 
 def _resized(state: Any, old: int, new: int) -> dict[str, Any]:
-    """The tables of a state on `old` interface nodes, for `new` ones."""
+    """Return the tables of a state on `old` interface nodes, for `new` ones."""
     tables = {name: value for name, value in vars(state).items() if isinstance(value, np.ndarray) and len(value) == old}
     return {name: np.resize(table, (new, *table.shape[1:])) for name, table in tables.items()}
 

@@ -10,7 +10,7 @@ from feti_homog.report.text.point_tables import components, envelope_lines
 
 
 def document(count: int, names: tuple[str, ...], without: tuple[int, ...] = (), **section: Any) -> dict[str, Any]:
-    """An envelope of so many directions, some of them without an onset."""
+    """Return an envelope of so many directions, some of them without an onset."""
     points: list[dict[str, Any]] = []
     for number in range(count):
         point: dict[str, Any] = {"angle": 360.0 * number / count}
