@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -81,26 +81,9 @@ class FibreTable:
     def solid(self) -> FibreTable:
         """The table without its voids."""
         kept = np.flatnonzero(~self.is_void)
-
-        def optional(values: Float | None) -> Float | None:
-            return None if values is None else values[kept]
-
-        return replace(
-            self,
-            row=self.row[kept],
-            x=self.x[kept],
-            y=self.y[kept],
-            radius=self.radius[kept],
-            phase=tuple(self.phase[k] for k in kept.tolist()),
-            coating=optional(self.coating),
-            a=optional(self.a),
-            b=optional(self.b),
-            angle=optional(self.angle),
-            inner_radius=optional(self.inner_radius),
-            sides=optional(self.sides),
-            corner=optional(self.corner),
-            polygons=None if self.polygons is None else self.polygons[kept],
-        )
+        columns = {each.name: getattr(self, each.name) for each in fields(self)}
+        arrays = {name: c[kept] for name, c in columns.items() if isinstance(c, np.ndarray | RoundedPolygons)}
+        return replace(self, phase=tuple(self.phase[k] for k in kept.tolist()), **arrays)
 
     @property
     def outer_radius(self) -> Float:
@@ -248,33 +231,16 @@ def _table(
     if not rows and not faults.lines:
         faults.lines.append(f"{name}: no fibres; expected a row for each")
     faults.throw()
-    nothing = {"coating": 0.0, "angle": 0.0, "inner_radius": 0.0, "sides": 0.0, "corner": 0.0}
+    nothing = dict.fromkeys(("coating", "angle", "inner_radius", "sides", "corner"), 0.0)
 
     def column(key: str) -> Float:
         return np.array([cells.get(key, nothing.get(key, math.nan)) for cells in rows.values()], float)
 
-    def optional(key: str) -> Float | None:
-        return column(key) if key in names else None
-
-    return FibreTable(
-        name=name,
-        row=np.fromiter(rows, np.intp),
-        x=column("x"),
-        y=column("y"),
-        radius=column("radius"),
-        phase=tuple(cells.get("phase", "fibre") for cells in rows.values()),
-        coating=optional("coating"),
-        a=optional("a"),
-        b=optional("b"),
-        angle=optional("angle"),
-        inner_radius=optional("inner_radius"),
-        sides=optional("sides"),
-        corner=optional("corner"),
-        width=sizes.get("width"),
-        height=sizes.get("height"),
-        left=sizes.get("left"),
-        bottom=sizes.get("bottom"),
-    )
+    columns: dict[str, Any] = {key: column(key) if key in names else None for key in NUMBERS[3:]}
+    columns |= {size: sizes.get(size) for size in SIZES}
+    phase = tuple(cells.get("phase", "fibre") for cells in rows.values())
+    row, (x, y, radius) = np.fromiter(rows, np.intp), map(column, NUMBERS[:3])
+    return FibreTable(name=name, row=row, x=x, y=y, radius=radius, phase=phase, **columns)
 
 
 def _cell_faults(cells: Mapping[str, Any]) -> Iterator[str]:

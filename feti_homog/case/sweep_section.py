@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from feti_homog.case.section_values import SEED
 from feti_homog.schema.keys import Key, key
-from feti_homog.schema.values import ValueType, choice, integer, real
+from feti_homog.schema.values import choice, integer, real
 
 SWEEP = "sweep"
 MAX_CASES = 20_000
@@ -19,21 +19,15 @@ AXIS_MEANING = (
 )
 
 
-def _range_key(type_: ValueType, meaning: str, *, default: str = "", required: bool = False) -> Key:
-    return Key(type_, meaning, unit="", default=default, only=(), required=required)
-
-
 RANGE_KEYS = {
-    "from": _range_key(real(), "First value, below the last.", required=True),
-    "to": _range_key(real(), "Last value.", required=True),
-    "step": _range_key(real(above=0.0), "Distance of the values, at most to - from; of linear ranges."),
-    "count": _range_key(
+    "from": Key(real(), "First value, below the last.", required=True),
+    "to": Key(real(), "Last value.", required=True),
+    "step": Key(real(above=0.0), "Distance of the values, at most to - from; of linear ranges."),
+    "count": Key(
         integer(least=2, most=MAX_CASES),
         "Number of values, both ends included. Without step and count, samples in [sweep] tells how many.",
     ),
-    "scale": _range_key(
-        choice("linear", "log"), '"log": values of even ratios, from a number above 0.', default='"linear"'
-    ),
+    "scale": Key(choice("linear", "log"), '"log": values of even ratios, from a number above 0.', default='"linear"'),
 }
 """A range is no dataclass: `from` is a word of Python's."""
 

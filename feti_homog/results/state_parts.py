@@ -10,7 +10,7 @@ from feti_homog.fem.assembly import element_strain
 from feti_homog.homogenization import phase_laws
 from feti_homog.homogenization.averaging import Response, displacement, fluctuation
 from feti_homog.homogenization.unit_cell import TornCell
-from feti_homog.materials import laws, stress_measures
+from feti_homog.materials import laws, voigt
 from feti_homog.results.field_layout import StatePart
 from feti_homog.results.field_layout import SpatialStatePart
 from feti_homog.typing import Float, Float32
@@ -20,7 +20,7 @@ def state_part(cell: TornCell, response: Response, load_factor: float, label: st
     """The fields of a response in plane strain or stress.  Collective when first called."""
     fields, nodes = _fields_of(cell, response), cell.solver.jump_operator.nodes
     stress, (S33, E33) = fields.stress, _out_of_plane(cell, fields.stress)
-    first, second, third = stress_measures.principal(stress, S33).T
+    first, second, third = voigt.principal(stress, S33).T
     opening = _in_axes(nodes.normal, fields.jump)
     fibre = fields.displacement[cell.class_nodes[nodes.fibre_node]]
     return StatePart(
@@ -34,7 +34,7 @@ def state_part(cell: TornCell, response: Response, load_factor: float, label: st
         stress=stress,
         stress_33=S33,
         element_strain=_single(np.column_stack([fields.strain * [1.0, 1.0, 0.5], E33])),
-        von_mises=_single(stress_measures.von_mises(stress, S33)),
+        von_mises=_single(voigt.von_mises(stress, S33)),
         principal_1=_single(first),
         principal_2=_single(second),
         principal_3=_single(third),
@@ -64,7 +64,7 @@ def spatial_state_part(
     stress, S33 = in_plane.stress[:, :3], in_plane.stress[:, 3]
     # The axial problem has [13, 23], the file [23, 13].
     shears = np.ascontiguousarray(along.stress[:, ::-1])
-    first, second, third = stress_measures.spatial_principal(stress, S33, shears).T
+    first, second, third = voigt.spatial_principal(stress, S33, shears).T
     nodes = cell.solver.jump_operator.nodes
     opening = _vectors(_in_axes(nodes.normal, in_plane.jump), along.jump)
     fibre = _vectors(in_plane.displacement, along.displacement)[cell.class_nodes[nodes.fibre_node]]
@@ -80,7 +80,7 @@ def spatial_state_part(
         stress=stress,
         stress_33=S33,
         element_strain=_single(in_plane.strain[:, :4] * [1.0, 1.0, 0.5, 1.0]),
-        von_mises=_single(stress_measures.spatial_von_mises(stress, S33, shears)),
+        von_mises=_single(voigt.spatial_von_mises(stress, S33, shears)),
         principal_1=_single(first),
         principal_2=_single(second),
         principal_3=_single(third),

@@ -64,10 +64,10 @@ class Key:
 
     type: ValueType
     meaning: str
-    unit: str
-    default: str
-    only: tuple[Condition, ...]
-    required: bool
+    unit: str = ""
+    default: str = ""
+    only: tuple[Condition, ...] = ()
+    required: bool = False
     instead: str = ""
     unless: tuple[str, ...] = ()
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from feti_homog.materials import stress_measures
+from feti_homog.materials import voigt
 
 
 def tensors(stress, out_of_plane):
@@ -22,7 +22,7 @@ def random(seed):
 def test_principal_stresses_are_the_eigenvalues_largest_first():
     stress, out_of_plane = random(1)
     expected = np.linalg.eigvalsh(tensors(stress, out_of_plane))[:, ::-1]
-    np.testing.assert_allclose(stress_measures.principal(stress, out_of_plane), expected, atol=1e-14)
+    np.testing.assert_allclose(voigt.principal(stress, out_of_plane), expected, atol=1e-14)
 
 
 def test_von_mises_is_the_norm_of_the_deviator():
@@ -30,7 +30,7 @@ def test_von_mises_is_the_norm_of_the_deviator():
     whole = tensors(stress, out_of_plane)
     deviator = whole - np.trace(whole, axis1=1, axis2=2)[:, None, None] / 3 * np.eye(3)
     expected = np.sqrt(1.5 * (deviator**2).sum(axis=(1, 2)))
-    np.testing.assert_allclose(stress_measures.von_mises(stress, out_of_plane), expected, rtol=1e-14)
+    np.testing.assert_allclose(voigt.von_mises(stress, out_of_plane), expected, rtol=1e-14)
 
 
 def test_all_six_components_are_taken():
@@ -40,18 +40,18 @@ def test_all_six_components_are_taken():
     whole[:, 1, 2] = whole[:, 2, 1] = axial[:, 0]
     whole[:, 0, 2] = whole[:, 2, 0] = axial[:, 1]
     principal = np.linalg.eigvalsh(whole)[:, ::-1]
-    np.testing.assert_allclose(stress_measures.spatial_principal(stress, out_of_plane, axial), principal, atol=1e-14)
+    np.testing.assert_allclose(voigt.spatial_principal(stress, out_of_plane, axial), principal, atol=1e-14)
     shears = ((principal - np.roll(principal, 1, axis=1)) ** 2).sum(axis=1)
-    mises = stress_measures.spatial_von_mises(stress, out_of_plane, axial)
+    mises = voigt.spatial_von_mises(stress, out_of_plane, axial)
     np.testing.assert_allclose(mises, np.sqrt(shears / 2), rtol=1e-13)
 
 
 def test_of_tension_it_is_the_tension_however_large():
     stress = np.array([[1e300, 0.0, 0.0], [0.0, 1e-300, 0.0]])
-    np.testing.assert_allclose(stress_measures.von_mises(stress, np.zeros(2)), [1e300, 1e-300], rtol=1e-14)
+    np.testing.assert_allclose(voigt.von_mises(stress, np.zeros(2)), [1e300, 1e-300], rtol=1e-14)
 
 
 def test_what_is_not_known_out_of_the_plane_is_not_a_number():
     stress = np.array([[1.0, 2.0, 3.0]])
-    assert np.isnan(stress_measures.von_mises(stress, np.array([np.nan]))).all()
-    assert np.isnan(stress_measures.principal(stress, np.array([np.nan]))).all()
+    assert np.isnan(voigt.von_mises(stress, np.array([np.nan]))).all()
+    assert np.isnan(voigt.principal(stress, np.array([np.nan]))).all()
