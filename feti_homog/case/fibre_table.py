@@ -82,7 +82,9 @@ class FibreTable:
         """The table without its voids."""
         kept = np.flatnonzero(~self.is_void)
         columns = {each.name: getattr(self, each.name) for each in fields(self)}
-        arrays = {name: c[kept] for name, c in columns.items() if isinstance(c, np.ndarray | RoundedPolygons)}
+        arrays: dict[str, Any] = {
+            name: c[kept] for name, c in columns.items() if isinstance(c, np.ndarray | RoundedPolygons)
+        }
         return replace(self, phase=tuple(self.phase[k] for k in kept.tolist()), **arrays)
 
     @property
@@ -239,8 +241,8 @@ def _table(
     columns: dict[str, Any] = {key: column(key) if key in names else None for key in NUMBERS[3:]}
     columns |= {size: sizes.get(size) for size in SIZES}
     phase = tuple(cells.get("phase", "fibre") for cells in rows.values())
-    row, (x, y, radius) = np.fromiter(rows, np.intp), map(column, NUMBERS[:3])
-    return FibreTable(name=name, row=row, x=x, y=y, radius=radius, phase=phase, **columns)
+    columns |= dict(zip(NUMBERS[:3], map(column, NUMBERS[:3]), strict=True))
+    return FibreTable(name=name, row=np.fromiter(rows, np.intp), phase=phase, **columns)
 
 
 def _cell_faults(cells: Mapping[str, Any]) -> Iterator[str]:
