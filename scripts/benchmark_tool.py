@@ -92,7 +92,7 @@ def peer(tool: Peer, case: Case, progress: Progress, loads: int | None, rtol: fl
         nodes = Nodes.of(comm, subdomains, lattice)
     meshed, dofs = list(subdomains), 0
     columns, iterations, reasons = list[Float](), list[int](), list[int]()
-    for problem in ("plane", "axial") if phase_laws.is_generalized(case) else ("plane",):
+    for problem in ("plane", "axial")[: len(phase_laws.problems(case))]:
         if problem == "axial":
             with progress.stage("assemble"):
                 subdomains = agree(comm, unit_cell.assemble_axial, case, meshed)

@@ -14,7 +14,7 @@ from feti_homog.case.cell_section import FIBRES_OF, Cell
 from feti_homog.case.mixed_cell import fibre_counts
 from feti_homog.case.phase_names import COATING
 from feti_homog.materials.forms import Material
-from feti_homog.materials.laws import plane_stiffness, spatial_stiffness
+from feti_homog.materials.laws import plane_stiffness, stiffness_of
 from feti_homog.typing import Float
 
 ASKED = ("accuracy", "element_size")
@@ -103,7 +103,7 @@ def coarse_error(materials: Mapping[str, Material], plane: str, order: int, free
     lambda the eigenvalues of the stiffness of a phase relative to that around it, 0 of free faces, s SOFT_FACTOR where
     lambda < 1 and else 1, and kappa the condition of the stiffness in the plane of the phase nearest to incompressible.
     """
-    stiffness = {phase: _stiffness(material, plane) for phase, material in materials.items()}
+    stiffness = {phase: stiffness_of(material, plane) for phase, material in materials.items()}
     ratios = [
         np.linalg.eigvals(np.linalg.solve(stiffness[outer], stiffness[inner])).real
         for inner, outer in permutations(stiffness, 2)
@@ -120,11 +120,6 @@ def _contrast(ratios: Iterable[Float]) -> float:
     of_all = np.concatenate([np.ones(1), *ratios])
     beta = (of_all - 1) / (of_all + 1)
     return float(np.max(np.where(beta < 0, SOFT_FACTOR, 1.0) * beta**2))
-
-
-def _stiffness(material: Material, plane: str) -> Float:
-    """(3, 3) in the plane, (6, 6) in generalized plane strain."""
-    return spatial_stiffness(material) if plane == "generalized" else plane_stiffness(material, plane)
 
 
 def _orthonormal(stiffness: Float) -> Float:

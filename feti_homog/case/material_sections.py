@@ -9,7 +9,7 @@ from feti_homog.case.cell_section import CIRCULAR, GEOMETRY, Cell
 from feti_homog.case.phase_names import COATING, FIBRE, MATRIX, PHASE
 from feti_homog.case.section_values import FRACTIONS
 from feti_homog.materials.forms import MATERIAL_FORMS, Material
-from feti_homog.materials.laws import expansion, plane_stiffness, spatial_stiffness
+from feti_homog.materials.laws import expansion, stiffness_of
 from feti_homog.schema.keys import TableReader, keys_of
 from feti_homog.schema.wording import suggestion, toml_key, toml_value
 
@@ -94,10 +94,8 @@ def _law_faults(material: Material, plane: str | None) -> list[str]:
     """What is wrong with the constants of a material together; of the stiffness only if the plane state is known."""
     faults = []
     try:
-        if plane == "generalized":
-            spatial_stiffness(material)
-        elif plane is not None:
-            plane_stiffness(material, plane)
+        if plane is not None:
+            stiffness_of(material, plane)
     except ValueError as error:
         faults.append(str(error))
     try:

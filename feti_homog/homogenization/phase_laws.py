@@ -14,29 +14,26 @@ import numpy as np
 from feti_homog.case.case import Case
 from feti_homog.fem.problem import AXIAL, GENERALIZED, PLANE, Problem
 from feti_homog.materials.laws import expansion, plane_stiffness, spatial_stiffness
+from feti_homog.materials.plane_state import PLANE_STATES
 from feti_homog.typing import Float
 
 IN_PLANE, AXIAL_SHEAR = [0, 1, 5, 2], [4, 3]
 """Where the strains of the plane problem, E33 among them, and of the axial one stand in the order of space."""
 
 
-def is_generalized(case: Case) -> bool:
-    """Whether strains along the fibres are loads too."""
-    return case.analysis.plane == "generalized"
+def problems(case: Case) -> tuple[Problem, ...]:
+    """The problem of the plane and, if strains along the fibres are loads, the axial one; a temperature is a load if
+    the phases say how they expand."""
+    if not PLANE_STATES[case.analysis.plane].is_spatial:
+        return (PLANE,)
+    if any(expansion(material) is None for material in case.materials.values()):
+        return replace(GENERALIZED, loads=GENERALIZED.loads[:4]), AXIAL
+    return GENERALIZED, AXIAL
 
 
 def plane_problem(case: Case) -> Problem:
-    """That of the displacements in the plane; a temperature is a load if the phases say how they expand."""
-    if not is_generalized(case):
-        return PLANE
-    if any(expansion(material) is None for material in case.materials.values()):
-        return replace(GENERALIZED, loads=GENERALIZED.loads[:4])
-    return GENERALIZED
-
-
-def problems(case: Case) -> tuple[Problem, ...]:
-    """Those that are solved: that of the plane, and if strains along the fibres are loads the axial one."""
-    return (plane_problem(case), AXIAL) if is_generalized(case) else (plane_problem(case),)
+    """The problem of the displacements in the plane."""
+    return problems(case)[0]
 
 
 def plane_law(case: Case, phase: str) -> Float:

@@ -136,7 +136,7 @@ def tear(
         multipliers, dimension = solver.jump_operator.global_rows, solver.coarse_dimension
         words.append(f"{multipliers} multipliers, coarse dimension {dimension}")
     cell = TornCell(comm, case, summary, lattice, subdomains, solver)
-    if not phase_laws.is_generalized(case):
+    if len(phase_laws.problems(case)) == 1:
         return cell
     with progress.stage("assemble") as words:
         own = agree(comm, assemble_axial, case, subdomains)

@@ -7,7 +7,6 @@ plane of symmetry of every phase, so that [23, 13] are coupled to each other alo
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import partial
 
 import numpy as np
 
@@ -19,21 +18,32 @@ from feti_homog.materials.forms import (
     Orthotropic,
     TransverselyIsotropic,
 )
+from feti_homog.materials.plane_state import GENERALIZED, PLANE_STATES, PLANE_STRAIN
 from feti_homog.materials.voigt import IN_PLANE, IN_PLANE_BLOCK, is_positive_definite, rotated, strain_rotation
 from feti_homog.schema.wording import limit_in_words, toml_key, toml_value
 from feti_homog.typing import Float
 
 COUPLINGS = ((0, 3), (0, 4), (1, 3), (1, 4), (2, 3), (2, 4), (3, 5), (4, 5))
 """Entries of a spatial stiffness that vanish where x3 is normal to a plane of symmetry."""
-PLANE_IN_WORDS = {"strain": "plane strain", "generalized": "generalized plane strain"}
 NEEDED: dict[type[Orthotropic] | type[TransverselyIsotropic], dict[str, tuple[str, ...]]] = {
-    Orthotropic: {"strain": ("E3", "nu13", "nu23"), "generalized": ("E3", "nu13", "nu23", "G13", "G23")},
-    TransverselyIsotropic: {"strain": ("E_axial", "nu_axial"), "generalized": ("E_axial", "nu_axial", "G_axial")},
+    Orthotropic: {
+        PLANE_STRAIN.name: ("E3", "nu13", "nu23"),
+        GENERALIZED.name: ("E3", "nu13", "nu23", "G13", "G23"),
+    },
+    TransverselyIsotropic: {
+        PLANE_STRAIN.name: ("E_axial", "nu_axial"),
+        GENERALIZED.name: ("E_axial", "nu_axial", "G_axial"),
+    },
 }
 """The optional constants that a plane state needs."""
 # Beyond the first, rounding of displacements makes stresses as large as those of the soft phase are allowed to be off;
 # beyond the second, it leaves nothing of them.
 WORRYING_CONTRAST, LARGEST_CONTRAST = 1e10, 1e14
+
+
+def stiffness_of(material: Material, plane: str) -> Float:
+    """The stiffness (3, 3) in the plane, or (6, 6) if the plane state is one of space.  Raises as `plane_stiffness`."""
+    return spatial_stiffness(material) if PLANE_STATES[plane].is_spatial else plane_stiffness(material, plane)
 
 
 def plane_stiffness(material: Material, plane: str) -> Float:
@@ -49,7 +59,7 @@ def plane_stiffness(material: Material, plane: str) -> Float:
         return _general_in_plane(_given_stiffness(material), plane)
     compliance = stable_compliance(material, plane)
     reduced = compliance[IN_PLANE_BLOCK]
-    if plane != "stress":
+    if not PLANE_STATES[plane].is_sheet:
         out = compliance[IN_PLANE, 2]
         reduced = reduced - np.outer(out, out) / compliance[2, 2]
     return rotated(np.asarray(np.linalg.inv(reduced), float), _angle(material))
@@ -61,7 +71,7 @@ def spatial_stiffness(material: Material) -> Float:
     Raises ValueError as `plane_stiffness` does.
     """
     if isinstance(material, Isotropic):
-        lame, shear = _lame(material, "generalized")
+        lame, shear = _lame(material, GENERALIZED.name)
         stiffness = np.diag([2 * shear] * 3 + [shear] * 3)
         stiffness[:3, :3] += lame
         return stiffness
@@ -70,7 +80,7 @@ def spatial_stiffness(material: Material) -> Float:
         if len(stiffness) == 3:
             raise ValueError("stiffness: expected 6x6 in generalized plane strain; 3x3 is that of one plane state")
         return stiffness
-    return rotated(np.asarray(np.linalg.inv(stable_compliance(material, "generalized")), float), _angle(material))
+    return rotated(np.asarray(np.linalg.inv(stable_compliance(material, GENERALIZED.name)), float), _angle(material))
 
 
 def expansion(material: Material) -> Float | None:
@@ -90,7 +100,7 @@ def out_of_plane(material: Material, plane: str) -> tuple[Float, Float]:
     S33 vanishes in plane stress, E33 in plane strain. NaN if the constants of the material do not say it.
     """
     row, young = _compliance_33(material)
-    return (np.zeros(3), row) if plane == "stress" else (-young * row, np.zeros(3))
+    return (np.zeros(3), row) if PLANE_STATES[plane].is_sheet else (-young * row, np.zeros(3))
 
 
 def _compliance_33(material: Material) -> tuple[Float, float]:
@@ -111,10 +121,11 @@ def _compliance_33(material: Material) -> tuple[Float, float]:
 
 def _lame(material: Isotropic, plane: str) -> tuple[float, float]:
     """Lame's constant, in plane stress the reduced one, and the shear modulus."""
-    if plane != "stress" and material.poisson >= 0.5:
-        raise ValueError(f"poisson = {material.poisson}: expected less than 0.5 in {PLANE_IN_WORDS[plane]}")
+    state = PLANE_STATES[plane]
+    if not state.is_sheet and material.poisson >= 0.5:
+        raise ValueError(f"poisson = {material.poisson}: expected less than 0.5 in {state.title}")
     shear = material.young / (2.0 * (1.0 + material.poisson))
-    thickness = 1.0 - material.poisson if plane == "stress" else 1.0 - 2.0 * material.poisson
+    thickness = 1.0 - material.poisson if state.is_sheet else 1.0 - 2.0 * material.poisson
     return 2.0 * shear * material.poisson / thickness, shear
 
 
@@ -128,7 +139,7 @@ def _general_in_plane(stiffness: Float, plane: str) -> Float:
     if len(stiffness) == 3:
         return stiffness
     block, out = stiffness[IN_PLANE_BLOCK], stiffness[IN_PLANE, 2]
-    return np.asarray(block - np.outer(out, out) / stiffness[2, 2]) if plane == "stress" else block
+    return np.asarray(block - np.outer(out, out) / stiffness[2, 2]) if PLANE_STATES[plane].is_sheet else block
 
 
 def _given_stiffness(material: General) -> Float:
@@ -181,14 +192,14 @@ def _check_expansions(material: TransverselyIsotropic) -> None:
 
 def stable_compliance(material: Orthotropic | TransverselyIsotropic, plane: str) -> Float:
     """Compliance (6, 6) in the material axes, checked as far as the plane state needs it."""
-    compliance = known_compliance(material)
+    compliance, state = known_compliance(material), PLANE_STATES[plane]
     if not is_positive_definite(compliance[:2, :2]):
         raise ValueError(f"{_limit_in_plane(material)}; no material is stable otherwise")
     absent = [name for name in NEEDED[type(material)].get(plane, ()) if getattr(material, name) is None]
     if absent:
         needs = "needs it" if len(absent) == 1 else "needs them"
-        raise ValueError(f"{', '.join(absent)}: missing; {PLANE_IN_WORDS[plane]} {needs}")
-    if plane != "stress" and not is_positive_definite(compliance[:3, :3]):
+        raise ValueError(f"{', '.join(absent)}: missing; {state.title} {needs}")
+    if not state.is_sheet and not is_positive_definite(compliance[:3, :3]):
         raise ValueError(_limit_in_space(material))
     return compliance
 
@@ -251,9 +262,8 @@ def contrast_warnings(materials: Mapping[str, Material], plane: str) -> list[str
 
 def _contrast(materials: Mapping[str, Material], plane: str) -> tuple[float, str]:
     """The largest ratio of the largest entries of two phases' stiffnesses, and the sections of these phases."""
-    law = spatial_stiffness if plane == "generalized" else partial(plane_stiffness, plane=plane)
     with np.errstate(over="ignore"):
-        sizes = {phase: float(np.abs(law(material)).max()) for phase, material in materials.items()}
+        sizes = {phase: float(np.abs(stiffness_of(material, plane)).max()) for phase, material in materials.items()}
     stiffest, softest = max(sizes, key=sizes.__getitem__), min(sizes, key=sizes.__getitem__)
     names = ", ".join(f"[material.{toml_key(phase)}]" for phase in (stiffest, softest))
     return sizes[stiffest] / sizes[softest], names

@@ -9,7 +9,7 @@ from textwrap import wrap
 from typing import Any
 
 from feti_homog.case.element_sizes import ASKED
-from feti_homog.materials.voigt import SPATIAL_STRESSES
+from feti_homog.materials.plane_state import plane_state_of
 from feti_homog.report.text import point_tables, stiffness_tables
 from feti_homog.report.text.point_tables import WIDTH
 from feti_homog.report.text.units import in_brackets
@@ -101,7 +101,7 @@ def _stiffness_blocks(document: Document, label: str, toughness: str) -> list[li
     """The effective stiffness with what follows from it; units in brackets."""
     blocks = [table.lines for table in stiffness_tables.stiffnesses(document, label)]
     tips = [table.lines for table in point_tables.tip_table(document.get("tips"), toughness)]
-    if len(document["effective_stiffness"]) == len(SPATIAL_STRESSES):
+    if plane_state_of(document).is_spatial:
         thermal = [table.lines for table in stiffness_tables.thermal(document, label)]
         return [*blocks, *thermal, *stiffness_tables.constants_lines(document, label), *tips]
     if document["case"].get("interface"):  # moduli and bounds are of bonded, linear composites

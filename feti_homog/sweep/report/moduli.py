@@ -12,8 +12,8 @@ from feti_homog.case.cell_section import GEOMETRY
 from feti_homog.case.material_sections import read_materials
 from feti_homog.materials import bounds as mechanics
 from feti_homog.materials.estimates.fibre_bounds import fibre_bounds
-from feti_homog.materials.forms import Material
-from feti_homog.materials.laws import plane_stiffness, spatial_stiffness
+from feti_homog.materials.laws import stiffness_of
+from feti_homog.materials.plane_state import PLANE_STATES, plane_state_of
 from feti_homog.materials.spatial_constants import is_transversely_isotropic, transversely_isotropic_part
 from feti_homog.report.plots.plot_helpers import plain
 from feti_homog.schema.keys import TableReader
@@ -44,9 +44,9 @@ class PanelBounds:
 
 def panels_of(table: SweepTable) -> tuple[str, ...]:
     """The outputs that are drawn; none if the cases have no moduli."""
-    planes = {document["case"]["analysis"]["plane"] for document in table.finished}
-    in_space = (SPATIAL_PANELS, SECANTS) if planes == {"generalized"} else (COMMON_PANELS,)
-    choices = in_space if "generalized" in planes else (PANELS,)
+    spatial = {plane_state_of(document).is_spatial for document in table.finished}
+    in_space = (COMMON_PANELS,) if False in spatial else (SPATIAL_PANELS, SECANTS)
+    choices = in_space if True in spatial else (PANELS,)
     return next((names for names in choices if all(name in table.outputs for name in names)), ())
 
 
@@ -102,11 +102,10 @@ def _bounds(table: SweepTable) -> PanelBounds | None:
     plane = case["analysis"]["plane"]
     reader = TableReader({GEOMETRY: case["cell"]["geometry"]})
     materials = read_materials(case["material"], case["cell"], plane, reader)
-    phases = [_stiffness(materials[phase], plane) for phase in ("matrix", "fibre")]
+    phases = [stiffness_of(materials[phase], plane) for phase in ("matrix", "fibre")]
     c = _fractions([float(document["cell"]["fibre_fraction"]) for document in table.finished])
-    bounds_at, tight = (
-        (_spatial_bounds_at, "Hill, Hashin") if plane == "generalized" else (_bounds_at, HASHIN_SHTRIKMAN)
-    )
+    spatial = PLANE_STATES[plane].is_spatial
+    bounds_at, tight = (_spatial_bounds_at, "Hill, Hashin") if spatial else (_bounds_at, HASHIN_SHTRIKMAN)
     columns = [bounds_at([1 - share, share], phases) for share in c]
     return PanelBounds(c, {name: np.array([column[name] for column in columns]).T for name in columns[0]}, tight)
 
@@ -116,11 +115,6 @@ def _fractions(meshed: list[float]) -> Float:
     least, largest = min(meshed), max(meshed)
     first = 0.0 if least <= largest / 2 else least - BEFORE * (largest - least or least)
     return np.linspace(first, min(1.0, MARGIN * largest), FRACTIONS)
-
-
-def _stiffness(material: Material, plane: str) -> Float:
-    """Of a phase, (6, 6) in generalized plane strain."""
-    return spatial_stiffness(material) if plane == "generalized" else plane_stiffness(material, plane)
 
 
 def _has_voids(table: SweepTable) -> bool:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from feti_homog.materials.plane_state import GENERALIZED, PLANE_STRAIN
 from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES, STRESSES, voigt_names
 from feti_homog.report.text import point_tables
 
@@ -14,16 +15,15 @@ Document = Mapping[str, Any]
 
 
 PHASES_OF_ONE_FIBRE = 2
-IN_THE_PLANE, IN_SPACE = (1, 2, 3), (1, 2, 6)
-"""The numbers i and j in the names Cij of a plane state: its own, and those of the same strains in space."""
 
 
 def numbers(planes: Iterable[str | None]) -> tuple[int, ...]:
-    """Those of a sweep over these plane states: where some cases are in space, Cij is the same entry of all."""
-    return IN_SPACE if "generalized" in planes else IN_THE_PLANE
+    """Numbers i and j in the names Cij of a sweep over these plane states: where some cases are in space, Cij is the
+    same entry of all."""
+    return (GENERALIZED if GENERALIZED.name in planes else PLANE_STRAIN).numbers
 
 
-def outputs(document: Document, numbers: Sequence[int] = IN_THE_PLANE) -> dict[str, float]:
+def outputs(document: Document, numbers: Sequence[int] = PLANE_STRAIN.numbers) -> dict[str, float]:
     """The numbers of a result.json by the names of the table's columns; `numbers` of strains in the plane, in names."""
     solver = document["solver"]
     found = _cell(document["cell"])
