@@ -26,9 +26,9 @@ from feti_homog.case import case as cases  # noqa: E402
 from feti_homog.feti.preconditioners.influence import Influence  # noqa: E402
 from feti_homog.homogenization.averaging import Homogenization  # noqa: E402
 from feti_homog.homogenization.unit_cell import tear  # noqa: E402
-from feti_homog.interface.contact.contact_problem import BONDED  # noqa: E402
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces  # noqa: E402
-from feti_homog.interface.laws.strength_criterion import StrengthCriterion  # noqa: E402
+from feti_homog.interface.contact.states import BONDED, BondState  # noqa: E402
+from feti_homog.interface.laws.strength import MaxStrength  # noqa: E402
 from feti_homog.interface.loads.load import Load  # noqa: E402
 from feti_homog.interface.path.path_following import events  # noqa: E402
 from feti_homog.interface.path.path_points import unloaded  # noqa: E402
@@ -103,9 +103,9 @@ def run_events(homogenization: Homogenization, count: int | None) -> tuple[list[
     bonded = np.full(len(interface.nodes.row), BONDED, np.int8)
     found = events(
         CoupledInterfaces(interface),
-        StrengthCriterion(STRENGTH, STRENGTH, "max"),
+        MaxStrength(STRENGTH, STRENGTH),
         [Load.strain(np.array(STRAIN))],
-        unloaded(CoupledInterfaces(interface), bonded),
+        unloaded(CoupledInterfaces(interface), BondState.without_memory(bonded)),
     )
     seconds, iterations, solves = [], [], []
     start = time.perf_counter()

@@ -70,12 +70,12 @@ def feti(case: Case, progress: Progress, loads: int | None, rtol: float) -> dict
         progress.seconds["set-up"] = progress.seconds.pop("factor") + progress.seconds.pop("axial", 0.0)
         with progress.stage("set-up"):
             context = AnalysisContext.of(cell, progress)
-            problems, status = context.loads.problems, context.status(None)
+            problems, bonds = context.loads.problems, context.bonds(None)
         columns = []
         with progress.stage("solve"):
             for problem in problems:
                 E = np.eye(len(problem.loads))[:loads]
-                responses = problem.respond(E, status, [np.zeros(problem.cell.solver.rows)] * len(E))
+                responses = problem.respond(E, bonds, [np.zeros(problem.cell.solver.rows)] * len(E))
                 columns.append(np.stack([response.stress for response in responses], axis=1))
                 for response in responses:
                     context.checks.record("", response)

@@ -24,17 +24,17 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     starts = context.loads.zero_multipliers()[: None if unit else 1]
     points = []
     for number, value in enumerate(context.progress.bar(section.values, "angles")):
-        status, label = context.status(value), f"{value:g} deg"
+        bonds, label = context.bonds(value), f"{value:g} deg"
         point: dict[str, Any] = {"angle": value}
         responses: list[Response]
         if unit:
-            columns, responses = context.unit_responses(f"{label} ", status, starts, 1.0)
+            columns, responses = context.unit_responses(f"{label} ", bonds, starts, 1.0)
             point |= columns
             if not (context.plane.interface.contact and responses[0].debonded):
                 context.checks.require(label, {"symmetry": asymmetry(columns["stiffness"])})
             context.record_unit_states(responses, 1.0, f"{label} ", number)
         else:
-            responses = context.plane.respond(np.array([section.strain]), status, starts)
+            responses = context.plane.respond(np.array([section.strain]), bonds, starts)
             context.progress.say(context.checks.record(label, responses[0]))
             point |= {"strain": responses[0].strain, "stress": responses[0].stress}
             point |= {"stored": responses[0].stored, "stored_in_springs": responses[0].in_springs}

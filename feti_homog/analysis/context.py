@@ -17,7 +17,7 @@ from feti_homog.homogenization import process_zone
 from feti_homog.homogenization.averaging import Homogenization, Response
 from feti_homog.homogenization.fibre_debonding import FibreInterfaces
 from feti_homog.homogenization.unit_cell import TornCell
-from feti_homog.interface.contact.contact_problem import OPEN, Status
+from feti_homog.interface.contact.states import OPEN, BondState
 from feti_homog.materials.voigt import SPATIAL_STRAINS, STRAINS
 from feti_homog.results.checkpoint import Checkpoint, NoCheckpoint
 from feti_homog.runtime.progress import Progress
@@ -72,18 +72,18 @@ class AnalysisContext:
         """The case that is analysed."""
         return self.cell.case
 
-    def status(self, opening: float | None) -> Status:
-        """Interface states before any load: prescribed debonded nodes are open."""
-        return np.where(self.cell.debonded(opening), OPEN, 0).astype(np.int8)
+    def bonds(self, opening: float | None) -> BondState:
+        """State of the interfaces before any load: prescribed debonded nodes are open."""
+        return self.plane.intact.with_status(np.where(self.cell.debonded(opening), OPEN, 0).astype(np.int8))
 
     def unit_responses(
-        self, label: str, status: Status, starts: Sequence[Float], sign: float
+        self, label: str, bonds: BondState, starts: Sequence[Float], sign: float
     ) -> tuple[dict[str, Float], list[Response]]:
         """The secants, see `CellLoads.secants`, and the responses to plus or minus each unit load.  Collective."""
         responses = list[Response]()
         for problem in self.loads.problems:
             own = starts[len(responses) : len(responses) + len(problem.loads)]
-            found = problem.respond(sign * np.eye(len(problem.loads)), status, own)
+            found = problem.respond(sign * np.eye(len(problem.loads)), bonds, own)
             for name, response in zip(problem.loads, found, strict=True):
                 self.progress.say(self.checks.record(f"{label}{'-' if sign < 0 else ''}{name}", response))
             responses += found

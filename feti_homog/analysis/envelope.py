@@ -21,8 +21,7 @@ from feti_homog.analysis.tip_records import DIRECTION_DIGITS, bond_directions
 from feti_homog.case.envelope_section import Envelope
 from feti_homog.errors import CaseError
 from feti_homog.homogenization.averaging import Response, asymmetry
-from feti_homog.interface.laws.energy_criterion import EnergyCriterion
-from feti_homog.interface.path.onset import OnsetCriterion
+from feti_homog.interface.path.onset import Onset
 from feti_homog.interface.path.path_points import UTILISATION_TIE
 from feti_homog.materials.voigt import voigt_names
 from feti_homog.typing import Float, Int
@@ -62,20 +61,20 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     Raises:
         CaseError: faces of the mesh are debonded and may touch.
     """
-    section, status = context.case.section, context.status(None)
+    section, bonds = context.case.section, context.bonds(None)
     assert isinstance(section, Envelope)
-    if not context.plane.interface.is_linear(status):
+    if not context.plane.interface.is_linear(bonds.status):
         raise CaseError(
             '[interface] contact: expected false with a debonded curve of the mesh; [analysis] type = "envelope" '
             "superposes loads, which contact forbids"
         )
-    columns, responses = context.unit_responses("", status, context.loads.zero_multipliers(), 1.0)
+    columns, responses = context.unit_responses("", bonds, context.loads.zero_multipliers(), 1.0)
     context.record_unit_states(responses, 1.0, "", 0)
     stiffness = columns.pop("stiffness")
     context.checks.require("L^ef", {"symmetry": asymmetry(stiffness)})
     angles = 360.0 * np.arange(section.directions) / section.directions
     rays = rays_of(section.plane, angles, stiffness, columns.get("thermal_stress"), section.temperature or 0.0)
-    onset = OnsetCriterion.of(criterion_of(context.cell), context.loads.interfaces, status)
+    onset = Onset.of(criterion_of(context.cell), context.loads.interfaces, bonds)
     finder = _Finder(context, responses, onset)
     pairs = zip(angles, finder.points(rays), strict=True)
     points = tuple(EnvelopePoint(angle=float(angle), **point) for angle, point in pairs)
@@ -105,11 +104,11 @@ def rays_of(
 class _Finder:
     """Finds the first bond that breaks on each ray."""
 
-    def __init__(self, context: AnalysisContext, responses: Sequence[Response], onset: OnsetCriterion) -> None:
+    def __init__(self, context: AnalysisContext, responses: Sequence[Response], onset: Onset) -> None:
         """`responses` are those to the unit loads.  Collective."""
         cell = context.cell
         self._comm, self._onset, self._loads = cell.comm, onset, context.loads.names
-        self._problems, self._noise = context.loads.interfaces.problems, context.plane.interface.sign_noise
+        self._problems, self._noise = context.loads.interfaces.problems, context.plane.interface.scales.sign_noise
         self._unit = _tractions(context, responses)
         self._most = max(1, self._comm.allreduce(self._unit.shape[1], MPI.MAX))
         nodes = cell.solver.jump_operator.nodes
@@ -155,7 +154,7 @@ class _Finder:
             end = first + len(problem.solver.problem.loads)
             of_one = np.zeros((len(self._fibre), components))
             of_one[:, part] = 1.0
-            total += problem.scales.bond_stress(loads[:, first:end].T).T * self._onset.bonds.utilisation(of_one)
+            total += problem.scales.bond_stress(loads[:, first:end].T).T * self._onset.bonds.law.share(of_one)
             first = end
         return self._noise * total
 
@@ -185,15 +184,11 @@ class _Finder:
 
     def _break_names(self, components: int) -> tuple[str, ...]:
         """What is told of the break of a bond under a traction of so many components."""
-        by_energy = isinstance(self._onset.bonds, EnergyCriterion)
-        return ("psi",) if by_energy else ("normal", "tangential", "axial")[:components]
+        return tuple(self._onset.bonds.law.break_names)[:components]
 
     def _breaks(self, node: Int, traction: Float) -> Float:
         """(p, d) the same for tractions (p, c) at the nodes (p,)."""
-        law = self._onset.bonds.at(node)
-        return (
-            np.degrees(law.mode_angle(traction))[:, None] if isinstance(law, EnergyCriterion) else law.shares(traction)
-        )
+        return self._onset.bonds.law.at(node).breaks(traction)
 
 
 def _tractions(context: AnalysisContext, responses: Sequence[Response]) -> Float:

@@ -14,8 +14,8 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     """`load`: the state under the load, with what is debonded from the start, open or in contact; `tips` of its arcs
     if only strains of the plane are there."""
     cell, (target,) = context.loads.interfaces, context.case.targets
-    status = context.status(None)
-    state = cell.equilibrium(context.loads.load(target), status, cell.no_multipliers())
+    bonds = context.bonds(None)
+    state = cell.equilibrium(context.loads.load(target), bonds, cell.no_multipliers())
     responses = context.loads.responses(state, 1.0)
     for response, problem in zip(responses, ("load", "load, along the fibres"), strict=False):
         context.progress.say(context.checks.record(problem, response))

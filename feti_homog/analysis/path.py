@@ -15,7 +15,7 @@ from feti_homog.analysis.tip_records import TipRecorder
 from feti_homog.case.load_section import LoadPath
 from feti_homog.errors import NotCarriedError
 from feti_homog.homogenization.averaging import Response
-from feti_homog.interface.laws.bond_criterion import BondCriterion, spring_criterion
+from feti_homog.interface.laws.bond_law import BondLaw
 from feti_homog.interface.path.path_following import events, increments
 from feti_homog.interface.path.path_points import Energies, Point, unloaded
 from feti_homog.results import event_log
@@ -31,7 +31,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     return follow(context, section, criterion_of(context.cell, grows=True))
 
 
-def follow(context: AnalysisContext, path: LoadPath, criterion: BondCriterion) -> dict[str, Any]:
+def follow(context: AnalysisContext, path: LoadPath, law: BondLaw) -> dict[str, Any]:
     """`path`, a list of points, one an event (or increment); each is checkpointed before the next is sought.
 
     `states` has the numbers of the points whose fields are recorded; which, is chosen when all are known.
@@ -39,7 +39,7 @@ def follow(context: AnalysisContext, path: LoadPath, criterion: BondCriterion) -
     known = _known(context)
     work, entries, last = Work(), list[dict[str, Any]](), None
     with EventProgress(context.progress, BARS[path.method], event_log.NAME) as shown:
-        for number, (point, energies) in enumerate(_points(context, path, criterion, known)):
+        for number, (point, energies) in enumerate(_points(context, path, law, known)):
             responses = context.loads.responses(point.state, point.scale)
             source = "" if energies is None else ", from the checkpoint"
             if energies is not None:
@@ -49,12 +49,12 @@ def follow(context: AnalysisContext, path: LoadPath, criterion: BondCriterion) -
                 if point.state.converged:
                     context.checkpoint.write(number, *stored(point, work))
             _tell(context, shown, f"{_label(path, number)} at {point.load_factor:.6f}{source}", responses)
-            entries.append(_entry(context, criterion, point, responses, work))
+            entries.append(_entry(context, law, point, responses, work))
             shown.advance(point.load_factor, f"{len(entries)} {path.method}, {_counts(entries[-1])}")
             last = point
             if not _goes_on(context, path, point, number + 1):
                 break
-    states = _kept(context, path, criterion, entries, last)
+    states = _kept(context, path, law, entries, last)
     return {"path": tuple(PathPoint(**entry) for entry in entries), "resumed": known} | states
 
 
@@ -78,7 +78,7 @@ def _known(context: AnalysisContext) -> int:
 
 
 def _points(
-    context: AnalysisContext, path: LoadPath, criterion: BondCriterion, known: int
+    context: AnalysisContext, path: LoadPath, law: BondLaw, known: int
 ) -> Iterator[tuple[Point, tuple[Energies, float] | None]]:
     """The points of the checkpoint with the energies up to each, then those still to be found.
 
@@ -88,15 +88,15 @@ def _points(
         NotCarriedError: nothing carries them from the beginning.
     """
     cell, waypoints = context.loads.interfaces, [context.loads.load(target) for target in context.case.targets]
-    begin = unloaded(cell, context.status(None))
+    begin = unloaded(cell, context.bonds(None))
     for number in range(known):
         point, energies = restored(context.checkpoint.read(number))
         begin = point.after
         yield point, energies
     if path.method == "events":
-        found = events(cell, criterion, waypoints, begin)
+        found = events(cell, law, waypoints, begin)
     else:
-        found = increments(cell, criterion, waypoints, path.increments or 1, path.release == "worst", begin)
+        found = increments(cell, law, waypoints, path.increments or 1, path.release == "worst", begin)
     count = known
     try:
         for count, point in enumerate(found, known + 1):  # noqa: B007
@@ -121,7 +121,7 @@ def _label(path: LoadPath, number: int) -> str:
 
 
 def _entry(
-    context: AnalysisContext, criterion: BondCriterion, point: Point, responses: Sequence[Response], work: Work
+    context: AnalysisContext, law: BondLaw, point: Point, responses: Sequence[Response], work: Work
 ) -> dict[str, Any]:
     """What result.json says of a point."""
     return {
@@ -131,7 +131,7 @@ def _entry(
         "work": work.all_equilibria.work,
         "dissipated": work.all_equilibria.released,
         "dissipated_strain_controlled": work.load_controlled,
-        **({} if spring_criterion(criterion) is None else _fracture(work.all_equilibria)),
+        **(_fracture(work.all_equilibria) if law.has_toughness else {}),
     } | context.loaded_point(responses)
 
 
@@ -162,17 +162,16 @@ def _goes_on(context: AnalysisContext, path: LoadPath, point: Point, count: int)
 def _kept(
     context: AnalysisContext,
     path: LoadPath,
-    criterion: BondCriterion,
+    law: BondLaw,
     entries: Sequence[dict[str, Any]],
     last: Point | None,
 ) -> dict[str, Any]:
     """Tips and fields of the points that are kept, from the checkpoint, in which the last one may not be; `states`, the
     numbers of those whose fields are recorded."""
-    springs = spring_criterion(criterion)
-    if last is None or (springs is None and not context.states.has_place):
+    if last is None or not (law.has_toughness or context.states.has_place):
         return {}
     numbers = kept(entries, context.case.output.states, len(context.case.targets) if path.method == "events" else 0)
-    tips = None if springs is None else TipRecorder(context.cell, context.loads.interfaces, springs)
+    tips = TipRecorder(context.cell, context.loads.interfaces, law) if law.has_toughness else None
     with context.progress.stage("states") as words:
         for number in context.progress.bar(numbers, "states"):
             point = last if number == len(entries) - 1 else restored(context.checkpoint.read(number))[0]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.feti.dual_solution import DualSolution
-from feti_homog.interface.contact.contact_problem import Equilibrium
+from feti_homog.interface.contact.states import BondState, Equilibrium
 from feti_homog.interface.loads.load import Load
 from feti_homog.interface.loads.macroscopic import Macroscopic
 from feti_homog.interface.path.path_points import NO_ENERGIES, Energies, PathState, Point
@@ -62,7 +62,7 @@ def stored(point: Point, work: Work) -> tuple[dict[str, Any], Arrays]:
         "macroscopic": np.stack([after.origin.strain, after.origin.stress, after.last.strain, after.last.stress]),
         "broken": np.nan if after.broken is None else after.broken,
     }
-    distributed: Arrays = {"used": point.used, "status_after": after.status}
+    distributed: Arrays = {"used": point.used, "status_after": after.bonds.status, "history_after": after.bonds.history}
     for suffix, state in (("", point.state), (AXIAL, point.state.axial)):
         if state is not None:
             numbers, arrays = _taken_apart(state)
@@ -83,7 +83,7 @@ def restored(event: Arrays) -> tuple[Point, tuple[Energies, float]]:
     after = PathState(
         int(leg),
         position,
-        event["status_after"],
+        BondState(event["status_after"], event["history_after"]),
         state.multipliers,
         Macroscopic(origin_strain, origin_stress),
         Macroscopic(strain, stress),
@@ -104,7 +104,7 @@ def _taken_apart(state: Equilibrium) -> tuple[dict[str, Any], Arrays]:
         "residual": solution.residual,
         "certificate": [state.certificate[law] for law in KKT_LAWS],
     }
-    return whole, {"status": state.status, "lam": solution.lam, "jump": solution.jump}
+    return whole, {"status": state.status, "history": state.bonds.history, "lam": solution.lam, "jump": solution.jump}
 
 
 def _put_together(event: Arrays, suffix: str) -> Equilibrium:
@@ -115,4 +115,5 @@ def _put_together(event: Arrays, suffix: str) -> Equilibrium:
     certificate = dict(zip(KKT_LAWS, event[f"certificate{suffix}"].tolist(), strict=True))
     values, by_stress = event[f"load{suffix}"]
     load = Load(values, by_stress.astype(bool))
-    return Equilibrium(load, event[f"status{suffix}"], solution, iterations, solves, free_motions, certificate)
+    bonds = BondState(event[f"status{suffix}"], event[f"history{suffix}"])
+    return Equilibrium(load, bonds, solution, iterations, solves, free_motions, certificate)

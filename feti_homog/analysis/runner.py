@@ -82,8 +82,7 @@ def compute(case: Case, comm: MPI.Intracomm, keep_fields: bool = False) -> Resul
     with _torn(case, comm, progress) as cell:
         states = StateRecorder(cell, None, keep_fields, progress.say)
         context = AnalysisContext.of(cell, progress, states)
-        by_energy = case.interface is not None and case.interface.criterion == "energy"
-        if keep_fields or by_energy:
+        if keep_fields or context.plane.law.has_toughness:
             context = replace(context, checkpoint=EventsInMemory(comm))
         result = result_builder.result(context, _analyse(context), states.kept())
     if result.faults:

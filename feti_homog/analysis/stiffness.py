@@ -15,15 +15,15 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     faces also `effective_stiffness_compression`, its columns -Sigma(-E); `tips` of debonded arcs under each of them.
 
     If a temperature is a load, `thermal_stress` under a unit of it, and `thermal_stress_compression`."""
-    status = context.status(None)
+    bonds = context.bonds(None)
     starts = context.loads.zero_multipliers()
-    one_sided = context.plane.interface.contact and context.plane.counts(status)["open"] > 0
-    columns, responses = context.unit_responses("", status, starts, 1.0)
+    one_sided = context.plane.interface.contact and context.plane.counts(bonds.status)["open"] > 0
+    columns, responses = context.unit_responses("", bonds, starts, 1.0)
     context.record_unit_states(responses, 1.0, "", 0)
     document: dict[str, Any] = {"effective_stiffness": columns.pop("stiffness")} | columns
     under, loads = list(responses), list(context.loads.names)
     if one_sided:
-        minus, responses = context.unit_responses("", status, starts, -1.0)
+        minus, responses = context.unit_responses("", bonds, starts, -1.0)
         context.record_unit_states(responses, -1.0, "-", 0)
         document["effective_stiffness_compression"] = minus.pop("stiffness")
         document |= {f"{name}_compression": column for name, column in minus.items()}

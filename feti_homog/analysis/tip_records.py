@@ -1,6 +1,8 @@
-"""What result.json says of the tips of debonding."""
+"""Tips of debonding in result.json: the energies that drive them on, and in which mode."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -8,10 +10,10 @@ from feti_homog.analysis.result_records import Tips
 from feti_homog.feti.decomposition.interface_neighbours import InterfaceNeighbours
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
-from feti_homog.interface.laws.energy_criterion import EnergyCriterion
-from feti_homog.interface.laws.tip_energies import tip_energies
+from feti_homog.interface.contact.states import BONDED, BondState
+from feti_homog.interface.laws.bond_law import BondLaw
 from feti_homog.interface.path.path_points import Point
-from feti_homog.typing import Float
+from feti_homog.typing import Float, Int
 
 # Directions of nodes differ by rounding from rank to rank, and so would their order.
 DIRECTION_DIGITS = 9
@@ -26,19 +28,52 @@ def bond_directions(cell: TornCell) -> Float:
     return np.asarray(direction + 360.0 * (np.round(direction, DIRECTION_DIGITS) <= -180.0))
 
 
-class TipRecorder:
-    """Makes the records of points whose bonds break by energy."""
+@dataclass(frozen=True)
+class TipEnergies:
+    """The tips on this rank: bonds that hold beside broken ones.
 
-    def __init__(self, cell: TornCell, loaded: CoupledInterfaces, springs: EnergyCriterion) -> None:
+    Attributes:
+        node: (t,) numbers of their interface nodes on this rank.
+        opening, shear: (t,) G_I and G_II, energies per area whose sum is compared with G_c(psi): of the bond's spring,
+            or what its break would release; parted by tan^2 psi = G_II / G_I.
+        mode: (t,) psi in degrees, of the traction.
+    """
+
+    node: Int
+    opening: Float
+    shear: Float
+    mode: Float
+
+
+def tip_energies(
+    law: BondLaw, neighbours: InterfaceNeighbours, bonds: BondState, traction: Float, used: Float
+) -> TipEnergies:
+    """Energies of a state with tractions (k, c), of which bonds use the shares `used` (k,) of their strength.
+
+    Such a share is sqrt(G / G_c(psi)).  Collective.
+    """
+    everywhere = np.concatenate(neighbours.comm.allgather(bonds.status))
+    beside = (neighbours.adjacency @ (everywhere != BONDED) > 0)[neighbours.first :][: len(bonds.status)]
+    is_tip = (bonds.status == BONDED) & beside
+    node = np.flatnonzero(is_tip)
+    energy = used[node] ** 2 * law.fracture(bonds, is_tip, traction)
+    mode = law.at(node).mode_angle(traction[node])
+    return TipEnergies(node, energy * np.cos(mode) ** 2, energy * np.sin(mode) ** 2, np.degrees(mode))
+
+
+class TipRecorder:
+    """Makes the records of points whose bonds have a toughness."""
+
+    def __init__(self, cell: TornCell, loaded: CoupledInterfaces, law: BondLaw) -> None:
         """`loaded` are the interfaces of the cell.  Collective."""
-        self._cell, self._loaded, self._springs = cell, loaded, springs
+        self._cell, self._loaded, self._law = cell, loaded, law
         self._neighbours = InterfaceNeighbours(cell.comm, cell.solver.jump_operator, cell.subdomains)
 
     def of(self, point: Point) -> Tips:
         """The tips of a point on every rank, by fibre, interface and direction.  Collective."""
         cell, nodes = self._cell, self._loaded.nodes
         traction = point.scale * self._loaded.traction(point.state.solutions)
-        own = tip_energies(self._springs, self._neighbours, point.state.status, traction, point.used)
+        own = tip_energies(self._law, self._neighbours, point.state.bonds, traction, point.used)
         direction = bond_directions(cell)[own.node]
         fibre = cell.summary.fibre_number(nodes.fibre[own.node])
         table = np.column_stack([fibre, direction, own.opening, own.shear, own.mode, nodes.pair[own.node]])

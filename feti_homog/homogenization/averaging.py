@@ -14,15 +14,10 @@ from mpi4py import MPI
 
 from feti_homog.errors import ConvergenceError
 from feti_homog.feti.operators.node_blocks import NodeBlocks
+from feti_homog.homogenization.bonds import bond_law
 from feti_homog.homogenization.unit_cell import TornCell
-from feti_homog.interface.contact.contact_problem import (
-    BONDED,
-    CLOSED,
-    OPEN,
-    ContactProblem,
-    Equilibrium,
-    Status,
-)
+from feti_homog.interface.contact.contact_problem import ContactProblem
+from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, BondState, Equilibrium, Status
 from feti_homog.interface.loads.load import Load
 from feti_homog.parallel.distributed_arrays import allreduce_sum
 from feti_homog.typing import Float
@@ -68,29 +63,41 @@ class Response:
 
 
 class Homogenization:
-    """Averages over a torn cell with its interfaces."""
+    """Averages over a torn cell with its interfaces.
+
+    Attributes:
+        law: of the bonds, by the sections of interfaces alone.
+        interface: the contact problem.
+    """
 
     def __init__(self, cell: TornCell, contact: bool) -> None:
-        self.cell = cell
-        self.interface = ContactProblem(cell.solver, contact, np.array([cell.summary.width, cell.summary.height]))
+        self.cell, size = cell, np.array([cell.summary.width, cell.summary.height])
+        self.law = bond_law(cell.case.interfaces, cell.solver.jump_operator.nodes.pair)
+        self.interface = ContactProblem(cell.solver, contact, size, self.law.softening)
+
+    @property
+    def intact(self) -> BondState:
+        """State of the interfaces with all bonds."""
+        nodes = len(self.interface.nodes.row)
+        return BondState(np.zeros(nodes, np.int8), self.law.begin(nodes))
 
     @property
     def loads(self) -> tuple[str, ...]:
         """Names of the unit loads."""
         return self.cell.solver.problem.loads
 
-    def respond(self, strains: Float, status: Status, starts: Sequence[Float]) -> list[Response]:
+    def respond(self, strains: Float, bonds: BondState, starts: Sequence[Float]) -> list[Response]:
         """Solve the unit-cell problem under every strain of (k, v) and average.  Collective.
 
-        `status` says which nodes are debonded and guesses who is in contact; `starts` are first multipliers.
+        `bonds` have the debonded nodes and a guess of who is in contact; `starts` are first multipliers.
 
         Raises:
             ConvergenceError: a solve broke down and left no numbers.
         """
-        if self.interface.is_linear(status):
-            return [self.response(state, 1.0) for state in self.interface.equilibria(strains, status, starts)]
+        if self.interface.is_linear(bonds.status):
+            return [self.response(state, 1.0) for state in self.interface.equilibria(strains, bonds, starts)]
         pairs = zip(strains, starts, strict=True)
-        return [self.response(self.interface.equilibrium(Load.strain(E), status, start), 1.0) for E, start in pairs]
+        return [self.response(self.interface.equilibrium(Load.strain(E), bonds, start), 1.0) for E, start in pairs]
 
     def response(self, state: Equilibrium, scale: float) -> Response:
         """The averages of `scale` times an equilibrium.  Collective.

@@ -1,12 +1,19 @@
-"""The springs of the bonds of a case, in the plane and along the fibres; without a stiffness bonds are rigid."""
+"""Bonds of a case: springs in the plane and along the fibres, rigid without a stiffness, and the law that breaks."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
+import numpy as np
+
+from feti_homog.case import bond_laws
 from feti_homog.case.case import Case
 from feti_homog.case.interface_section import InterfaceSection
 from feti_homog.feti.decomposition.interface_springs import InterfaceSprings
+from feti_homog.interface.laws.bond_law import BondLaw
+from feti_homog.interface.laws.registry import law_class
+from feti_homog.typing import Float, Int
 
 
 def springs(case: Case) -> InterfaceSprings:
@@ -33,3 +40,19 @@ def has_springs(case: Case) -> bool:
     """Whether any bond gives way."""
     stiffnesses = (*springs(case).stiffness, *axial_springs(case).stiffness)
     return any(math.isfinite(stiffness) for own in stiffnesses for stiffness in own)
+
+
+def bond_law(bonds: Sequence[InterfaceSection], pair: Int) -> BondLaw:
+    """Law of the bonds at the nodes (k,) of the interfaces `pair` (k,); without sections of interfaces none breaks."""
+
+    def value(key: str, *others: str) -> float | Float:
+        given = [next((v for name in (key, *others) if (v := getattr(bond, name)) is not None), None) for bond in bonds]
+        finite = [math.inf if own is None else own for own in given] or [math.inf]
+        return finite[0] if len(finite) == 1 else np.array(finite)[pair]
+
+    return law_class(bonds[0].criterion if bonds else bond_laws.DEFAULT).of_keys(value)
+
+
+def has_process_zone(case: Case) -> bool:
+    """Return True if elements must resolve the length along which the bonds of a case break."""
+    return case.interface is not None and bond_laws.LAWS[case.interface.criterion].has_process_zone

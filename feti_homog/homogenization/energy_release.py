@@ -25,7 +25,8 @@ from feti_homog.homogenization.crack_extension import (
     wrapped,
 )
 from feti_homog.homogenization.unit_cell import TornCell
-from feti_homog.interface.contact.contact_problem import BONDED, ContactProblem, Status
+from feti_homog.interface.contact.contact_problem import ContactProblem
+from feti_homog.interface.contact.states import BONDED, Status
 from feti_homog.interface.tips.crack_tips import CrackTips, InterfaceChains, closing_work
 from feti_homog.materials.voigt import strain_tensor
 from feti_homog.parallel.distributed_arrays import allreduce_sum
@@ -99,8 +100,8 @@ class EnergyReleaseRates:
         tips = self._tips(status)
         jump = self._gathered(self.interface.jump(solution))
         force = self._gathered(self.interface.traction(solution)) * self.length[:, None]
-        jump[np.abs(jump) < self.interface.gap_noise(solution.strain)] = 0.0
-        force[np.abs(force) < self._gathered(self.interface.force_noise(solution))[:, None]] = 0.0
+        jump[np.abs(jump) < self.interface.scales.gap_noise(solution.strain)] = 0.0
+        force[np.abs(force) < self._gathered(self.interface.scales.force_noise(solution))[:, None]] = 0.0
         closing, length = self._closing(tips, status, force, jump)
         modes = self._modes(tips, response, force, closing)
         return EnergyRelease(

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from feti_homog.case.case import Case
+from feti_homog.homogenization.bonds import has_process_zone
 from feti_homog.materials.bounds import engineering_moduli
 from feti_homog.materials.laws import plane_stiffness
 from feti_homog.mesh.coarse_mesh import CoarseMesh
@@ -32,7 +33,7 @@ def process_zone(case: Case) -> float | None:
     matrix is in general, and of its most compliant axis.
     """
     lengths = [1 / (2 * bond.normal_stiffness) for bond in case.interfaces if bond.toughness and bond.normal_stiffness]
-    if case.interface is None or case.interface.criterion != "energy" or not lengths:
+    if not has_process_zone(case) or not lengths:
         return None
     moduli = [engineering_moduli(plane_stiffness(m, case.analysis.plane)) for m in case.materials.values()]
     return min(min(m.E1, m.E2) for m in moduli) * min(lengths)
@@ -52,7 +53,8 @@ def warnings(case: Case, width: float, edge: float) -> list[str]:
     if case.cell.refine:
         found += f" after refine = {case.cell.refine}"
     wanted = f"their break takes E' G_Ic / sigma_c^2 = {length:.3g}, of which they should be half at most"
-    return [f'[interface] criterion = "energy": {found}; {wanted}: set {_remedies(case, width, edge, length)}']
+    law = f'[interface] criterion = "{case.interfaces[0].criterion}"'
+    return [f"{law}: {found}; {wanted}: set {_remedies(case, width, edge, length)}"]
 
 
 def _remedies(case: Case, width: float, edge: float, length: float) -> str:

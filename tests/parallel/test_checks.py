@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from feti_homog.interface.laws.strength_criterion import StrengthCriterion
 from support import torn_cells
 from support.cases import make_case
 from support.ranks import parallel_assert
@@ -16,8 +17,7 @@ from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.loads import CellLoads
 from feti_homog.case.load_section import LoadPath
 from feti_homog.errors import CaseError, ConvergenceError
-from feti_homog.interface.contact.contact_problem import OPEN
-from feti_homog.interface.laws.strength_criterion import StrengthCriterion
+from feti_homog.interface.contact.states import OPEN
 from feti_homog.petsc.options import case_options
 from feti_homog.runtime.progress import Progress
 
@@ -48,7 +48,7 @@ def test_hill_holds_where_a_debonded_cell_stores_nothing(comm, shared_path, cont
     cell = torn_cells.tear(comm, geometry="mesh", file="strip.msh", folder=shared_path)
     context = context_of(comm, cell, contact)
     status = np.full(len(cell.solver.jump_operator.nodes.row), OPEN, np.int8)
-    responses = context.plane.respond(np.eye(3), status, context.loads.zero_multipliers())
+    responses = context.plane.respond(np.eye(3), torn_cells.bonds(status), context.loads.zero_multipliers())
     for response in responses:
         context.checks.record("strip", response)
     for k in (0, 2):
@@ -60,7 +60,7 @@ def test_hill_holds_where_a_debonded_cell_stores_nothing(comm, shared_path, cont
 def test_jumps_are_told_on_the_scale_on_which_they_are_checked(comm):
     cell = torn_cells.tear(comm, geometry="square", mesh_size=0.3)
     context = context_of(comm, cell)
-    (response,) = context.plane.respond(np.eye(3)[:1], context.status(None), context.loads.zero_multipliers()[:1])
+    (response,) = context.plane.respond(np.eye(3)[:1], context.bonds(None), context.loads.zero_multipliers()[:1])
     # Where the forces vanish the torn cell's jump does, too, and relative to it any jump is large.
     solution = replace(response.state.solution, residual=2.7e-5, reason=-3)
     loose = replace(response, state=replace(response.state, solution=solution))

@@ -19,7 +19,7 @@ from feti_homog.feti.decomposition.neighbours import Neighbours
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.preconditioners.scaled import Dirichlet
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
-from feti_homog.interface.contact.contact_problem import BONDED, OPEN
+from feti_homog.interface.contact.states import BONDED, OPEN
 
 pytestmark = pytest.mark.parallel
 

@@ -14,8 +14,8 @@ from support.loads import strains
 from feti_homog import Case
 from feti_homog.analysis.criteria import criterion_of
 from feti_homog.homogenization import unit_cell
-from feti_homog.interface.contact.contact_problem import BONDED, CLOSED, OPEN
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
+from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN
 from feti_homog.interface.loads.load import Load
 from feti_homog.interface.path.path_following import events
 from feti_homog.interface.path.path_points import unloaded
@@ -82,9 +82,9 @@ def compare(case, expected, strain):
     """Compare broken bonds, loads and stresses of the path with the events; bonds of both pairs break."""
     interface = torn_cells.interface(case.cell, True)
     bonded = np.full(case.here, BONDED, np.int8)
-    begin = unloaded(CoupledInterfaces(interface), bonded)
+    begin = unloaded(CoupledInterfaces(interface), torn_cells.bonds(bonded))
     points = list(events(CoupledInterfaces(interface), criterion_of(case.cell), strains(np.array([strain])), begin))
-    found = np.array([case.in_reference_order(p.after.status) != BONDED for p in points])
+    found = np.array([case.in_reference_order(p.after.bonds.status) != BONDED for p in points])
     np.testing.assert_array_equal(found, np.cumsum([e.broke for e in expected], axis=0) > 0)
     assert relative_error(np.array([p.load_factor for p in points]), [e.load_factor for e in expected]) < 1e-8
     stress = np.array([p.scale * torn_cells.stress(case.cell, p.state.solution) for p in points])
@@ -140,7 +140,7 @@ def test_random_debonding_of_two_pairs_in_contact_is_that_of_the_quadratic_progr
             return case.reference.solve_elastic(strain, bonded, True, own)
 
         expected = on_root(comm, brute_force)
-        state = interface.equilibrium(Load.strain(strain), case.status(bonded), case.start())
+        state = interface.equilibrium(Load.strain(strain), torn_cells.bonds(case.status(bonded)), case.start())
         assert state.solution.reason > 0 and max(state.certificate.values()) < 1e-8
         assert relative_error(torn_cells.stress(case.cell, state.solution), expected.stress) < 1e-7
         status = case.in_reference_order(state.status)

@@ -14,7 +14,7 @@ from support.random_cells import random_bonded, random_cell, random_strain
 from support.ranks import parallel_assert
 
 from feti_homog.case.interface_section import Arc
-from feti_homog.interface.contact.contact_problem import BONDED, CLOSED, OPEN
+from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN
 from feti_homog.interface.loads.load import Load
 
 pytestmark = pytest.mark.parallel
@@ -35,7 +35,7 @@ def directions(cell):
 def response(cell, contact, strain, status):
     """Sigma and the equilibrium from the multipliers zero."""
     state = torn_cells.interface(cell, contact).equilibrium(
-        Load.strain(np.array(strain, float)), status, np.zeros(cell.solver.rows)
+        Load.strain(np.array(strain, float)), torn_cells.bonds(status), np.zeros(cell.solver.rows)
     )
     return torn_cells.stress(cell, state.solution), state
 
@@ -220,7 +220,7 @@ def test_a_fibre_that_comes_free_opens_no_other_fibres_faces(comm):
     bonded = ~free & (np.abs(directions(cell)) < 90)
     status, start = np.where(bonded, BONDED, CLOSED).astype(np.int8), np.zeros(cell.solver.rows)
     # Without a strain no face carries a force.
-    (state,) = torn_cells.interface(cell, True).equilibria(np.zeros((1, 3)), status, [start])
+    (state,) = torn_cells.interface(cell, True).equilibria(np.zeros((1, 3)), torn_cells.bonds(status), [start])
     assert state.free_motions == 3
     parallel_assert(comm, bool((state.status == np.where(free, OPEN, status)).all()))
 
@@ -240,7 +240,7 @@ def test_single_pivots_find_the_same_state(comm, half):
     strain = [0.3, -0.6, 0.5]
     expected, block = response(cell, True, strain, status)
     interface = replace(torn_cells.interface(cell, True), block_pivots=0)
-    single = interface.equilibrium(Load.strain(np.array(strain)), status, np.zeros(cell.solver.rows))
+    single = interface.equilibrium(Load.strain(np.array(strain)), torn_cells.bonds(status), np.zeros(cell.solver.rows))
     stress = torn_cells.stress(cell, single.solution)
     assert 1 < single.solves < 10 * MOST_SOLVES
     assert comm.allreduce(int((single.status != block.status).sum())) == 0

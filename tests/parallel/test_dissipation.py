@@ -12,9 +12,9 @@ from support.loads import strains
 from support.ranks import PIECES
 
 from feti_homog.analysis.path_events import Work
-from feti_homog.interface.contact.contact_problem import BONDED
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
-from feti_homog.interface.laws.strength_criterion import StrengthCriterion
+from feti_homog.interface.contact.states import BONDED
+from feti_homog.interface.laws.strength import MaxStrength
 from feti_homog.interface.loads.load import Load
 from feti_homog.interface.path.path_following import events, increments
 from feti_homog.interface.path.path_points import unloaded
@@ -27,12 +27,14 @@ SQUARE = {"geometry": "square", "mesh_size": 0.2} | TIGHT
 THREE = {"geometry": "random", "fibres": 3, "min_gap": 0.1, "seed": 4, "mesh_size": 0.25, "radius_spread": 0.3} | TIGHT
 CASES = {"square": SQUARE, "three": THREE}
 STRAIGHT = np.array([1.0, 0.1, 0.2])
-CRITERION = StrengthCriterion(20.0, 30.0, "max")
+CRITERION = MaxStrength(20.0, 30.0)
 
 
 def start(cell, contact):
     interface = torn_cells.interface(cell, contact)
-    return interface, unloaded(CoupledInterfaces(interface), np.full(len(interface.nodes.row), BONDED, np.int8))
+    return interface, unloaded(
+        CoupledInterfaces(interface), torn_cells.bonds(np.full(len(interface.nodes.row), BONDED, np.int8))
+    )
 
 
 def follow(cell, waypoints, contact=True):
@@ -77,7 +79,7 @@ def stored(cell, point):
 def stress_under(interface, cell, strain, point):
     """Sigma under a strain with the bonds that a point leaves."""
     return torn_cells.stress(
-        cell, interface.equilibrium(Load.strain(strain), point.after.status, point.after.lam.plane).solution
+        cell, interface.equilibrium(Load.strain(strain), point.after.bonds, point.after.lam.plane).solution
     )
 
 

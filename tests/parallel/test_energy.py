@@ -22,10 +22,10 @@ from support.ranks import PIECES, parallel_assert
 
 from feti_homog import Case, run
 from feti_homog.feti.decomposition.interface_neighbours import InterfaceNeighbours
-from feti_homog.interface.contact.contact_problem import BONDED
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
-from feti_homog.interface.laws.energy_criterion import EnergyCriterion
-from feti_homog.interface.laws.tip_criterion import TipCriterion
+from feti_homog.interface.contact.states import BONDED
+from feti_homog.interface.laws.energy import SpringEnergy
+from feti_homog.interface.laws.released import ReleasedEnergy
 from feti_homog.interface.loads.load import Load
 from feti_homog.interface.path.path_following import events
 from feti_homog.interface.path.path_points import unloaded
@@ -35,7 +35,7 @@ pytestmark = [pytest.mark.parallel, pytest.mark.usefixtures("shared_interfaces")
 # Glass and epoxy, MPa and micrometres; sigma_c = 90 MPa, G_Ic = 2 J/m2, fibres of 7.5 micrometres, 40 %.
 GLASS_EPOXY = {"matrix": {"young": 2790.0, "poisson": 0.33}, "fibre": {"young": 70800.0, "poisson": 0.22}}
 NORMAL, TANGENTIAL, TOUGHNESS, SENSITIVITY = 2025.0, 506.25, 2.0, 0.25
-SPRINGS = EnergyCriterion(NORMAL, TANGENTIAL, TOUGHNESS, SENSITIVITY)
+SPRINGS = SpringEnergy(NORMAL, TANGENTIAL, TOUGHNESS, SENSITIVITY)
 INFLUENCE = {"feti_pc_type": "influence", "feti_dual_operator": "explicit"}
 CELL = {"springs": (NORMAL, TANGENTIAL), "petsc": INFLUENCE, "decomposition": PIECES} | GLASS_EPOXY
 SQUARE = {"geometry": "square", "fibre_fraction": 0.4, "fibre_radius": 7.5, "order": 2, "mesh_size": 0.1} | CELL
@@ -45,14 +45,14 @@ ONSET_STRAIN, ONSET_STRESS = GLASS_EPOXY_ONSET.value
 def criterion(cell, growth):
     if growth == "springs":
         return SPRINGS
-    return TipCriterion(SPRINGS, cell.solver.preconditioner)
+    return ReleasedEnergy(SPRINGS, cell.solver.preconditioner)
 
 
 def path(comm, growth, strain, **case):
     """Return the interface and the points of a path straight to a strain."""
     cell = torn_cells.tear(comm, **case)
     interface = torn_cells.interface(cell, True)
-    begin = unloaded(CoupledInterfaces(interface), np.full(len(interface.nodes.row), BONDED, np.int8))
+    begin = unloaded(CoupledInterfaces(interface), torn_cells.bonds(np.full(len(interface.nodes.row), BONDED, np.int8)))
     return (
         cell,
         interface,
@@ -138,7 +138,7 @@ CELL_PER_RADIUS = 60.0
 def test_onset_of_one_fibre_in_much_matrix(comm, strength, radius):
     """By the energy of springs of this strength in pure opening: that of a fibre alone, by Michell's functions."""
     stiffness = strength**2 / (2 * TOUGHNESS)
-    bonds = EnergyCriterion(stiffness, stiffness / 4, TOUGHNESS, SENSITIVITY)
+    bonds = SpringEnergy(stiffness, stiffness / 4, TOUGHNESS, SENSITIVITY)
     cell = torn_cells.tear(
         comm,
         geometry="square",
@@ -152,8 +152,8 @@ def test_onset_of_one_fibre_in_much_matrix(comm, strength, radius):
         **GLASS_EPOXY,
     )
     interface = torn_cells.interface(cell, True)
-    begin = unloaded(CoupledInterfaces(interface), np.full(len(interface.nodes.row), BONDED, np.int8))
-    responses = interface.equilibria(np.eye(3), begin.status, [begin.lam.plane] * 3)
+    begin = unloaded(CoupledInterfaces(interface), torn_cells.bonds(np.full(len(interface.nodes.row), BONDED, np.int8)))
+    responses = interface.equilibria(np.eye(3), begin.bonds, [begin.lam.plane] * 3)
     L = np.array([interface.stress(response.solution) for response in responses]).T
     matrix, fibre = (
         SimpleNamespace(K_transverse=K, G_transverse=G)
@@ -230,7 +230,7 @@ def test_the_inverse_blocks_are_those_of_the_solver(comm):
     status = np.full(len(interface.nodes.row), BONDED, np.int8)
     strain, start = np.array([0.02, 0.005, 0.01]), np.zeros(cell.solver.rows)
     for released in (3, 7):
-        before = interface.linear(Load.strain(strain), status, start)
+        before = interface.linear(Load.strain(strain), torn_cells.bonds(status), start)
         pairs = neighbours.rows[[released]][:, None] + np.arange(2)
         H = cell.solver.preconditioner.inverse_blocks(pairs)[0]
         at = released - neighbours.first
@@ -238,7 +238,7 @@ def test_the_inverse_blocks_are_those_of_the_solver(comm):
         lam = before.lam[interface.nodes.row[at] + np.arange(2)] if here else np.zeros(2)
         if here:
             status[at] = 2
-        after = interface.linear(Load.strain(strain), status, start)
+        after = interface.linear(Load.strain(strain), torn_cells.bonds(status), start)
         jump = after.jump[interface.nodes.row[at] + np.arange(2)] if here else np.zeros(2)
         lam, jump = comm.allreduce(lam), comm.allreduce(jump)
         assert np.linalg.solve(H, lam) == pytest.approx(jump, rel=1e-6, abs=1e-9 * math.hypot(*jump))

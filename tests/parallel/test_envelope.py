@@ -14,9 +14,9 @@ from feti_homog import Case, run
 from feti_homog.analysis.criteria import criterion_of
 from feti_homog.errors import CaseError
 from feti_homog.homogenization.averaging import Homogenization
-from feti_homog.interface.contact.contact_problem import OPEN
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
-from feti_homog.interface.path.onset import OnsetCriterion
+from feti_homog.interface.contact.states import OPEN, BondState
+from feti_homog.interface.path.onset import Onset
 from feti_homog.report.plots import response_curves
 from feti_homog.results import result_json
 from feti_homog.verify.certificate import verify
@@ -208,13 +208,13 @@ def test_a_tip_in_space_releases_what_its_break_does(comm):
     with torn(comm, "generalized", bonds, **RANDOM) as cell:
         plane, axial = Homogenization(cell, False), Homogenization(cell.axial, False)
         status = np.where(cell.debonded(None), OPEN, 0).astype(np.int8)
-        criterion = criterion_of(cell)
-        onset = OnsetCriterion.of(criterion, CoupledInterfaces(plane.interface, axial.interface), status)
+        bonds, loaded = BondState.without_memory(status), CoupledInterfaces(plane.interface, axial.interface)
+        law = criterion_of(cell)
+        onset, tips = Onset.of(law, loaded, bonds), law.tips(loaded, bonds)
         energy, traction = cell_energy(plane, axial, strain, status)
-        tips = onset.tips.tips
         foretold = (
             onset.utilisation(traction[tips.node], tips.node) ** 2
-            * criterion.springs.fracture_toughness(traction[tips.node])
+            * law.springs.fracture_toughness(traction[tips.node])
             * tips.length
         )
         owned = [(rank, k) for rank, count in enumerate(comm.allgather(len(tips.node))) for k in range(count)]
@@ -229,7 +229,10 @@ def test_a_tip_in_space_releases_what_its_break_does(comm):
 def cell_energy(plane, axial, strain, status):
     """Return the energy of the cell under a strain (6,), and the tractions (k, 3)."""
     pairs = ((plane, strain[[0, 1, 5, 2]]), (axial, strain[[4, 3]]))
-    found = [each.respond(loads[None], status, [np.zeros(each.cell.solver.rows)])[0] for each, loads in pairs]
+    found = [
+        each.respond(loads[None], BondState.without_memory(status), [np.zeros(each.cell.solver.rows)])[0]
+        for each, loads in pairs
+    ]
     traction = np.hstack([each.interface.traction(r.state.solution) for (each, _), r in zip(pairs, found, strict=True)])
     return sum(r.stored for r in found) * plane.cell.summary.area, traction
 
@@ -237,16 +240,16 @@ def cell_energy(plane, axial, strain, status):
 def direct_utilisation(cell, strain, temperature):
     """Return the largest utilisation of all bonds, from solves under a strain and a change of temperature."""
     plane, axial = Homogenization(cell, False), Homogenization(cell.axial, False)
-    status = np.where(cell.debonded(None), OPEN, 0).astype(np.int8)
+    bonds = BondState.without_memory(np.where(cell.debonded(None), OPEN, 0).astype(np.int8))
     pairs = ((plane, [*strain[[0, 1, 5, 2]], temperature]), (axial, strain[[4, 3]]))
     found = [
         each.interface.traction(
-            each.respond(np.array([loads]), status, [np.zeros(each.cell.solver.rows)])[0].state.solution
+            each.respond(np.array([loads]), bonds, [np.zeros(each.cell.solver.rows)])[0].state.solution
         )
         for each, loads in pairs
     ]
-    onset = OnsetCriterion.of(criterion_of(cell), CoupledInterfaces(plane.interface, axial.interface), status)
-    used = onset.utilisation(np.hstack(found), np.arange(len(status)))
+    onset = Onset.of(criterion_of(cell), CoupledInterfaces(plane.interface, axial.interface), bonds)
+    used = onset.utilisation(np.hstack(found), np.arange(len(bonds.status)))
     return max(cell.comm.allgather(float(used.max(initial=0.0))))
 
 

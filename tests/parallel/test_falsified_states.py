@@ -14,7 +14,7 @@ from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.loads import CellLoads
 from feti_homog.case.interface_section import Arc
 from feti_homog.homogenization.averaging import Homogenization
-from feti_homog.interface.contact.contact_problem import BONDED, CLOSED, OPEN
+from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN
 from feti_homog.interface.loads.load import Load
 from feti_homog.runtime.progress import Progress
 
@@ -39,12 +39,14 @@ class Falsified:
         return np.select([self.arc if where is None else where, self.arc], [kind, OPEN], BONDED).astype(np.int8)
 
     def solution(self, strain, status):
-        return self.interface.linear(Load.strain(strain), status, np.zeros(self.cell.solver.rows))
+        return self.interface.linear(Load.strain(strain), torn_cells.bonds(status), np.zeros(self.cell.solver.rows))
 
     def checks(self, solution, status, load=None):
         """Return the checks of a state that is taken as found."""
-        found = self.interface._equilibrium(load or Load.strain(solution.strain), status, solution, 1, 1)
-        response = self.homogenization.response(replace(found, status=status), 1.0)
+        found = self.interface._equilibrium(
+            load or Load.strain(solution.strain), torn_cells.bonds(status), solution, 1, 1
+        )
+        response = self.homogenization.response(replace(found, bonds=torn_cells.bonds(status)), 1.0)
         alike = self.comm.allgather(response.checks)
         assert all(checks == alike[0] for checks in alike)
         return response.checks
@@ -211,7 +213,7 @@ def test_open_faces_that_bear_a_force(falsified):
 def test_a_stress_that_is_not_the_prescribed_one(falsified):
     status, extra = falsified.status(BONDED), 0.01
     load = Load(np.array([4.0, -0.01, 1.0]), np.array([True, False, True]))
-    solution = falsified.interface.linear(load, status, np.zeros(falsified.cell.solver.rows))
+    solution = falsified.interface.linear(load, torn_cells.bonds(status), np.zeros(falsified.cell.solver.rows))
     other = replace(load, values=load.values + np.array([0.0, 0.0, extra]))
     stress = falsified.interface.stress(solution)
     roots = np.sqrt(np.diag(falsified.reuss()))
@@ -244,9 +246,9 @@ def test_noise_is_a_share_of_the_largest_force_of_all_ranks(falsified):
     caused = falsified.bond_stress(PULLED) * lengths.max()
     parallel_assert(
         falsified.comm,
-        interface.force_noise(solution) == pytest.approx(share * max(np.abs(forces).max(), caused), rel=1e-9),
+        interface.scales.force_noise(solution) == pytest.approx(share * max(np.abs(forces).max(), caused), rel=1e-9),
     )
-    assert interface.gap_noise(PULLED) == pytest.approx(share * falsified.imposed(PULLED), rel=1e-9)
+    assert interface.scales.gap_noise(PULLED) == pytest.approx(share * falsified.imposed(PULLED), rel=1e-9)
 
 
 def test_a_node_that_one_rank_has_debonded_may_touch_on_all(falsified):

@@ -9,7 +9,7 @@ from support import torn_cells
 
 from feti_homog.errors import ConvergenceError
 from feti_homog.interface.contact import floating_bodies
-from feti_homog.interface.contact.contact_problem import OPEN
+from feti_homog.interface.contact.states import OPEN
 from feti_homog.interface.loads.load import Load
 
 pytestmark = pytest.mark.parallel
@@ -25,7 +25,7 @@ def test_an_unsolved_programme_is_raised_on_every_rank(comm, monkeypatch):
     interface, start = torn_cells.interface(cell, True), np.zeros(cell.solver.rows)
     monkeypatch.setattr("scipy.optimize.linprog", unsolved)
     with pytest.raises(ConvergenceError, match="not solved: Numerical difficulties"):
-        interface.equilibrium(Load.strain(np.array([-1.0, -1.0, 0.0])), status, start)
+        interface.equilibrium(Load.strain(np.array([-1.0, -1.0, 0.0])), torn_cells.bonds(status), start)
     nodes, gap = interface.nodes, np.ones(len(status))
     with pytest.raises(ConvergenceError, match="not solved: Numerical difficulties"):
         floating_bodies.admissible_share(comm, cell.solver.natural, nodes, status == OPEN, gap, -gap, 1e-9)

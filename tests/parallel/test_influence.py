@@ -17,7 +17,7 @@ from feti_homog.errors import CaseError
 from feti_homog.feti.operators.explicit import ExplicitInterfaceOperator
 from feti_homog.feti.preconditioners.influence import Influence
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
-from feti_homog.interface.contact.contact_problem import BONDED, CLOSED, OPEN
+from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN
 
 pytestmark = pytest.mark.parallel
 

@@ -10,9 +10,9 @@ from support import torn_cells
 from support.loads import strains
 from support.ranks import PIECES
 
-from feti_homog.interface.contact.contact_problem import BONDED, OPEN
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
-from feti_homog.interface.laws.strength_criterion import StrengthCriterion
+from feti_homog.interface.contact.states import BONDED, OPEN
+from feti_homog.interface.laws.strength import MaxStrength
 from feti_homog.interface.loads.load import Load
 from feti_homog.interface.path.path_following import events
 from feti_homog.interface.path.path_points import unloaded
@@ -34,14 +34,16 @@ WAYPOINTS = [
     [[0.05, 0.05, 0.0], [-0.05, 0.02, 0.03], [0.02, -0.06, 0.01], [0.05, 0.05, -0.1]],
     [[-0.05, -0.04, 0.0], [0.05, 0.05, 1e-4], [-0.05, -0.04, 0.0]],
 ]
-NEVER = StrengthCriterion(np.inf, np.inf, "max")
+NEVER = MaxStrength(np.inf, np.inf)
 
 
 def interface_with(cell, is_debonded):
     """Return the interface with contact and the beginning of a path with some nodes debonded, or all (True)."""
     interface = torn_cells.interface(cell, True)
     debonded = np.broadcast_to(is_debonded, len(interface.nodes.row))
-    return interface, unloaded(CoupledInterfaces(interface), np.where(debonded, OPEN, BONDED).astype(np.int8))
+    return interface, unloaded(
+        CoupledInterfaces(interface), torn_cells.bonds(np.where(debonded, OPEN, BONDED).astype(np.int8))
+    )
 
 
 def largest_bend(interface, points, legs):
@@ -51,14 +53,12 @@ def largest_bend(interface, points, legs):
     for before, now in pairwise(points):
         if before.load_factor * legs < 1 - 1e-12 or before.scale != 1.0:
             continue
-        status, last = now.state.status, now.state.solution
-        first = interface.equilibrium(
-            Load.strain(before.state.solution.strain), status, before.after.lam.plane
-        ).solution
+        bonds, last = now.state.bonds, now.state.solution
+        first = interface.equilibrium(Load.strain(before.state.solution.strain), bonds, before.after.lam.plane).solution
         for share in (0.1, 0.5, 0.8):
             strain, lam = ((1 - share) * a + share * b for a, b in ((first.strain, last.strain), (first.lam, last.lam)))
             # Where the path is straight the guess is the solution: only to confirm it costs little.
-            between = stress(interface.equilibrium(Load.strain(strain), status, lam).solution)
+            between = stress(interface.equilibrium(Load.strain(strain), bonds, lam).solution)
             line = (1 - share) * stress(first) + share * stress(last)
             bend = max(bend, np.abs(between - line).max() / scale)
     return bend
@@ -83,7 +83,7 @@ def test_partly_free_and_breaking_fibres_are_straight_between_points(comm):
     fibre = cell.solver.jump_operator.nodes.fibre
     interface, begin = interface_with(cell, fibre != comm.allreduce(fibre.min(initial=1000), min))
     waypoints = np.array([[0.05, 0.05, 0.0], [-0.05, -0.02, 0.03], [0.6, -0.3, 0.1], [-0.8, -0.2, 0.0]])
-    points = list(events(CoupledInterfaces(interface), StrengthCriterion(20.0, 30.0, "max"), strains(waypoints), begin))
+    points = list(events(CoupledInterfaces(interface), MaxStrength(20.0, 30.0), strains(waypoints), begin))
     assert sum(p.broke for p in points[1:]) > 3
     assert largest_bend(interface, points, len(waypoints)) < STRAIGHT
 
@@ -94,7 +94,7 @@ def test_a_fibre_that_breaks_bond_by_bond_takes_few_solves(comm):
     interface, begin = interface_with(cell, False)
     waypoints = np.array([[0.02, 0.0, 0.0], [-0.05, 0.02, 0.0], [0.1, 0.0, 0.0]])
     solves = cell.solver.solves
-    points = list(events(CoupledInterfaces(interface), StrengthCriterion(4.0, 3.0, "max"), strains(waypoints), begin))
+    points = list(events(CoupledInterfaces(interface), MaxStrength(4.0, 3.0), strains(waypoints), begin))
     assert len(points) > 30 and points[-1].load_factor == 1.0
     # A state at each change or break, one past it, and one ahead, with a pivot now and then: no halvings.
     assert cell.solver.solves - solves < 3.5 * len(points)

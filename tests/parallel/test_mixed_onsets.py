@@ -13,8 +13,9 @@ from support.ranks import PIECES, parallel_assert
 from feti_homog import Case, run
 from feti_homog.analysis.criteria import criterion_of
 from feti_homog.homogenization import unit_cell
-from feti_homog.interface.contact.contact_problem import BONDED, OPEN, ContactProblem
+from feti_homog.interface.contact.contact_problem import ContactProblem
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
+from feti_homog.interface.contact.states import BONDED, OPEN, BondState
 from feti_homog.interface.loads.load import Load
 from feti_homog.interface.path.path_following import events
 from feti_homog.interface.path.path_points import unloaded
@@ -86,7 +87,7 @@ def first_break(cell, axes, values, temperature):
     legs = [load(loaded.loads, of_stresses, np.zeros(6), temperature)] if temperature else []
     legs.append(load(loaded.loads, of_stresses, whole, temperature))
     status = np.where(cell.debonded(None), OPEN, BONDED).astype(np.int8)
-    points = events(loaded, criterion_of(cell), legs, unloaded(loaded, status))
+    points = events(loaded, criterion_of(cell), legs, unloaded(loaded, BondState.without_memory(status)))
     point = next(point for point in points if point.broke)
     state = loaded.macroscopic(point.state.solutions).scaled(point.scale)
     order = [loaded.loads.index(name) for name in STRAINS]

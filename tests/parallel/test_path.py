@@ -13,9 +13,9 @@ from support.cases import relative_error
 from support.loads import strains
 from support.ranks import PIECES, parallel_assert
 
-from feti_homog.interface.contact.contact_problem import BONDED, OPEN
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
-from feti_homog.interface.laws.strength_criterion import StrengthCriterion
+from feti_homog.interface.contact.states import BONDED, OPEN
+from feti_homog.interface.laws.strength import MaxStrength, QuadraticStrength
 from feti_homog.interface.path.path_following import events, increments
 from feti_homog.interface.path.path_points import unloaded
 from feti_homog.parallel.mpi_errors import on_root
@@ -39,8 +39,8 @@ CELLS = [
 TENSION, MIXED, SHEAR = [1.0, 0.1, 0.2], [0.6, -0.8, 0.3], [0.2, -0.1, 1.0]
 
 
-def bonded_status(cell):
-    return np.full(len(cell.solver.jump_operator.nodes.row), BONDED, np.int8)
+def intact(cell):
+    return torn_cells.bonds(np.full(len(cell.solver.jump_operator.nodes.row), BONDED, np.int8))
 
 
 def follow(cell, contact, law, waypoints, begin=None):
@@ -51,7 +51,7 @@ def follow(cell, contact, law, waypoints, begin=None):
             CoupledInterfaces(interface),
             law,
             strains(np.array(waypoints)),
-            begin or unloaded(CoupledInterfaces(interface), bonded_status(cell)),
+            begin or unloaded(CoupledInterfaces(interface), intact(cell)),
         )
     )
 
@@ -63,7 +63,7 @@ def curve(cell, points):
 
 def broken(case, points):
     """For each point, which of the reference's nodes are broken after it."""
-    return np.array([case.in_reference_order(p.after.status) != BONDED for p in points])
+    return np.array([case.in_reference_order(p.after.bonds.status) != BONDED for p in points])
 
 
 def is_certified(points):
@@ -81,7 +81,9 @@ def test_events_are_those_of_the_quadratic_programme(comm, built, cell, criterio
     expected = on_root(
         comm, lambda: SlowLoadPath(case.reference, contact, *strengths, criterion).proportional(np.array(strain))
     )
-    points = follow(case.cell, contact, StrengthCriterion(*strengths, criterion), [strain])
+    points = follow(
+        case.cell, contact, (MaxStrength if criterion == "max" else QuadraticStrength)(*strengths), [strain]
+    )
     assert len(points) == len(expected) > 3
     assert is_certified(points)
     np.testing.assert_array_equal(broken(case, points), np.cumsum([e.broke for e in expected], axis=0) > 0)
@@ -97,7 +99,7 @@ def test_events_of_later_legs_are_those_of_small_steps_and_bisection(comm, built
     case = built(**PHASES, **SQUARE)
     legs = np.array([[0.3, -0.4, 0.15], back, [0.9, -0.9, 0.7]])
     expected = on_root(comm, lambda: SlowLoadPath(case.reference, True, 0.15, 0.3, "max").legs(legs, 12))
-    points = follow(case.cell, True, StrengthCriterion(0.15, 0.3, "max"), legs)
+    points = follow(case.cell, True, MaxStrength(0.15, 0.3), legs)
     assert is_certified(points)
     turns = [p for p in points if not p.broke and p.after.position > 0]
     assert turns
@@ -119,9 +121,9 @@ def test_debonding_begins_at_the_load_of_the_series_solution(comm):
     first = next(
         events(
             CoupledInterfaces(interface),
-            StrengthCriterion(0.1, 0.1, "max"),
+            MaxStrength(0.1, 0.1),
             strains(np.eye(3)[:1]),
-            unloaded(CoupledInterfaces(interface), bonded_status(cell)),
+            unloaded(CoupledInterfaces(interface), intact(cell)),
         )
     )
     stress = first.scale * torn_cells.stress(cell, first.state.solution)
@@ -138,7 +140,7 @@ def test_debonding_begins_at_the_load_of_the_series_solution(comm):
 @pytest.mark.parametrize("contact", [True, False])
 def test_bonds_never_heal_and_every_break_dissipates(built, contact):
     case = built(**THREE)
-    points = follow(case.cell, contact, StrengthCriterion(20.0, 30.0, "quadratic"), [SHEAR])
+    points = follow(case.cell, contact, QuadraticStrength(20.0, 30.0), [SHEAR])
     after = broken(case, points)
     assert (after[1:] >= after[:-1]).all()
     for before, now in pairwise(points):
@@ -149,10 +151,10 @@ def test_bonds_never_heal_and_every_break_dissipates(built, contact):
 def test_increments_meet_events_and_the_curve_between_them_converges_with_first_order(torn):
     """Releasing the worst bonds one after the other, an increment ends where events end that break no later."""
     cell = torn(**SQUARE)
-    law, strain = StrengthCriterion(0.05, 0.05, "max"), np.array([[1e-3, 0.0, 0.0]])
+    law, strain = MaxStrength(0.05, 0.05), np.array([[1e-3, 0.0, 0.0]])
     exact = curve(cell, follow(cell, True, law, strain))[:, :2]
     interface, loads, errors = torn_cells.interface(cell, True), np.linspace(0, 1, 20001), []
-    begin = unloaded(CoupledInterfaces(interface), bonded_status(cell))
+    begin = unloaded(CoupledInterfaces(interface), intact(cell))
     for steps in (10, 40, 160):
         found = curve(cell, list(increments(CoupledInterfaces(interface), law, strains(strain), steps, True, begin)))[
             :, :2
@@ -166,7 +168,7 @@ def test_increments_meet_events_and_the_curve_between_them_converges_with_first_
 
 def test_onset_by_increments_is_late_by_less_than_one_increment(torn):
     cell = torn(**SQUARE)
-    law, strain = StrengthCriterion(0.05, 0.05, "max"), np.array([[1e-3, 0.0, 0.0]])
+    law, strain = MaxStrength(0.05, 0.05), np.array([[1e-3, 0.0, 0.0]])
     interface, exact = torn_cells.interface(cell, True), follow(cell, True, law, strain)[0].load_factor
     for steps in (10, 40):
         points = list(
@@ -176,7 +178,7 @@ def test_onset_by_increments_is_late_by_less_than_one_increment(torn):
                 strains(strain),
                 steps,
                 False,
-                unloaded(CoupledInterfaces(interface), bonded_status(cell)),
+                unloaded(CoupledInterfaces(interface), intact(cell)),
             )
         )
         onset = next(p.load_factor for p in points if p.broke)
@@ -193,7 +195,7 @@ def rising(exact, loads):
 @pytest.mark.quick
 def test_a_path_goes_on_from_any_of_its_points_with_the_same_events(comm):
     case = torn_cells.build(comm, **SQUARE)
-    law, waypoints = StrengthCriterion(20.0, 30.0, "max"), [[0.7, -0.8, 0.5], [0.0, 0.0, 0.0], [-1.0, 1.0, 1.5]]
+    law, waypoints = MaxStrength(20.0, 30.0), [[0.7, -0.8, 0.5], [0.0, 0.0, 0.0], [-1.0, 1.0, 1.5]]
     points = follow(case.cell, True, law, waypoints)
     whole, sets = curve(case.cell, points), broken(case, points)
     for k in range(0, len(points) - 1, max(1, len(points) // 6)):
@@ -207,24 +209,24 @@ def test_a_path_goes_on_from_any_of_its_points_with_the_same_events(comm):
 def test_increments_stop_at_a_solve_that_does_not_converge(comm, worst_only):
     loose = {"petsc": {"feti_ksp_max_it": 1, "feti_pc_type": "none"}}
     cell = torn_cells.tear(comm, **SQUARE, **loose)
-    interface, law = torn_cells.interface(cell, True), StrengthCriterion(1e-3, 1e-3, "max")
-    begin = unloaded(CoupledInterfaces(interface), bonded_status(cell))
+    interface, law = torn_cells.interface(cell, True), MaxStrength(1e-3, 1e-3)
+    begin = unloaded(CoupledInterfaces(interface), intact(cell))
     (point,) = increments(CoupledInterfaces(interface), law, strains(np.array([MIXED])), 4, worst_only, begin)
     assert point.state.solution.reason < 0 and point.broke == 0
 
 
 def test_infinite_strengths_never_break(torn):
     cell = torn(**SQUARE)
-    points = follow(cell, True, StrengthCriterion(np.inf, np.inf, "quadratic"), [TENSION, SHEAR])
+    points = follow(cell, True, QuadraticStrength(np.inf, np.inf), [TENSION, SHEAR])
     assert [(p.load_factor, p.broke) for p in points] == [(0.5, 0), (1.0, 0)]
-    status = np.full(len(bonded_status(cell)), OPEN, np.int8)
+    status = np.full(len(intact(cell)), OPEN, np.int8)
     interface = torn_cells.interface(cell, True)
     points = list(
         events(
             CoupledInterfaces(interface),
-            StrengthCriterion(1.0, 1.0, "max"),
+            MaxStrength(1.0, 1.0),
             strains(np.array([SHEAR, MIXED])),
-            unloaded(CoupledInterfaces(interface), status),
+            unloaded(CoupledInterfaces(interface), torn_cells.bonds(status)),
         )
     )
     points = [p for p in points if p.after.position == 0]
@@ -237,12 +239,12 @@ def test_twenty_fibres_debond_to_the_end_certified_and_dissipating(comm):
     many = {"geometry": "random", "fibres": 20, "fibre_fraction": 0.4, "min_gap": 0.1, "seed": 2, "mesh_size": 0.08}
     many |= {"decomposition": {"subdomains": 22}}
     cell = torn_cells.tear(comm, **many, **INFLUENCE)
-    points = follow(cell, True, StrengthCriterion(30.0, 15.0, "max"), [[1.0, -0.3, 0.4]])
+    points = follow(cell, True, MaxStrength(30.0, 15.0), [[1.0, -0.3, 0.4]])
     assert is_certified(points)
     assert points[-1].load_factor == 1.0
     left = comm.allreduce(int((points[-1].state.status == BONDED).sum()))
-    assert left < comm.allreduce(len(bonded_status(cell)))
+    assert left < comm.allreduce(len(intact(cell)))
     for before, now in pairwise(points):
-        parallel_assert(comm, bool(((before.after.status != BONDED) <= (now.after.status != BONDED)).all()))
+        parallel_assert(comm, bool(((before.after.bonds.status != BONDED) <= (now.after.bonds.status != BONDED)).all()))
         drop = torn_cells.stress(cell, before.state.solution) - torn_cells.stress(cell, now.state.solution)
         assert drop @ [1.0, -0.3, 0.4] > -1e-9 * np.abs(drop).max()

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from reference.closed_forms import bulk_and_shear
 from reference.references import GLASS_EPOXY_DISSIPATED, GLASS_EPOXY_ONSET
+from support import torn_cells
 from support.loads import strains
 from support.ranks import PIECES
 from unit.mesh.faulty_meshes import grid
@@ -16,11 +17,11 @@ from unit.mesh.faulty_meshes import grid
 from feti_homog import Case, run
 from feti_homog.analysis.path_events import Work
 from feti_homog.homogenization.averaging import Homogenization
-from feti_homog.interface.contact.contact_problem import BONDED
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
-from feti_homog.interface.laws.energy_criterion import EnergyCriterion
-from feti_homog.interface.laws.strength_criterion import StrengthCriterion
-from feti_homog.interface.laws.tip_criterion import TipCriterion
+from feti_homog.interface.contact.states import BONDED
+from feti_homog.interface.laws.energy import SpringEnergy
+from feti_homog.interface.laws.released import ReleasedEnergy
+from feti_homog.interface.laws.strength import MaxStrength
 from feti_homog.interface.loads.load import Load
 from feti_homog.interface.path.path_following import events
 from feti_homog.interface.path.path_points import unloaded
@@ -46,11 +47,11 @@ LEGS = [[0.03, 0.002, 0.01], [0.0, 0.0, 0.0], [-0.01, 0.02, 0.03]]
 def criterion(cell, name, unit=1.0):
     """Of lengths in micrometres, or in so many of them."""
     if name == "strength":
-        return StrengthCriterion(50.0, 60.0, "max")
-    springs = EnergyCriterion(NORMAL * unit, TANGENTIAL * unit, TOUGHNESS / unit, 0.25)
+        return MaxStrength(50.0, 60.0)
+    springs = SpringEnergy(NORMAL * unit, TANGENTIAL * unit, TOUGHNESS / unit, 0.25)
     if name == "springs":
         return springs
-    return TipCriterion(springs, cell.solver.preconditioner)
+    return ReleasedEnergy(springs, cell.solver.preconditioner)
 
 
 @pytest.mark.parametrize("waypoints", [[STRAIGHT], LEGS], ids=["straight", "legs"])
@@ -69,7 +70,7 @@ def test_work_is_stored_or_dissipated_at_every_point(torn, stiffnesses, name, wa
     cell = torn(**THREE, **PHASES, **TIGHT, mesh_size=0.15, radius_spread=0.2, springs=stiffnesses)
     homogenization, law = Homogenization(cell, True), criterion(cell, name)
     interface = homogenization.interface
-    begin = unloaded(CoupledInterfaces(interface), np.full(len(interface.nodes.row), BONDED, np.int8))
+    begin = unloaded(CoupledInterfaces(interface), torn_cells.bonds(np.full(len(interface.nodes.row), BONDED, np.int8)))
     energies, work, before, worst, scale, broke = Work(), 0.0, None, 0.0, 0.0, 0
     for point in events(CoupledInterfaces(interface), law, strains(np.array(waypoints)), begin):
         response = homogenization.response(point.state, point.scale)
@@ -83,7 +84,7 @@ def test_work_is_stored_or_dissipated_at_every_point(torn, stiffnesses, name, wa
         assert response.stored == pytest.approx(0.5 * response.strain @ response.stress, rel=1e-8, abs=1e-9 * scale)
         assert 0.0 <= response.in_springs <= response.stored * (1 + 1e-12)
         assert (response.in_springs == 0.0) == (stiffnesses[0] is None or response.stored == 0.0)
-        after = interface.equilibrium(Load.strain(response.strain), point.after.status, point.after.lam.plane)
+        after = interface.equilibrium(Load.strain(response.strain), point.after.bonds, point.after.lam.plane)
         before = response.strain, interface.stress(after.solution)
     assert broke > 8 and worst < EXACT * scale and energies.all_equilibria.released > 0.01 * scale
 
@@ -95,7 +96,7 @@ def test_what_is_stored_is_that_of_quadratic_programming(built):
     case = built(geometry="square", mesh_size=0.2, **PHASES, **TIGHT, springs=springs)
     homogenization = Homogenization(case.cell, True)
     interface, comm = homogenization.interface, case.cell.comm
-    begin = unloaded(CoupledInterfaces(interface), np.full(case.here, BONDED, np.int8))
+    begin = unloaded(CoupledInterfaces(interface), torn_cells.bonds(np.full(case.here, BONDED, np.int8)))
     points = list(
         events(CoupledInterfaces(interface), criterion(case.cell, "released", width), strains(np.array(LEGS)), begin)
     )

@@ -16,10 +16,10 @@ from support.loads import strains
 from feti_homog import Case, run
 from feti_homog.errors import ConvergenceError
 from feti_homog.feti.preconditioners.bordered_inverse import BorderedInverse
-from feti_homog.interface.contact.contact_problem import BONDED, OPEN
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
-from feti_homog.interface.laws.energy_criterion import EnergyCriterion
-from feti_homog.interface.laws.tip_criterion import TipCriterion
+from feti_homog.interface.contact.states import BONDED, OPEN
+from feti_homog.interface.laws.energy import SpringEnergy
+from feti_homog.interface.laws.released import ReleasedEnergy
 from feti_homog.interface.loads import mixed_load
 from feti_homog.interface.loads.load import Load
 from feti_homog.interface.path.path_following import events
@@ -197,9 +197,9 @@ def softly_held(comm, stiffness, young, count, **cell):
     petsc = {"feti_pc_type": "influence", "feti_dual_operator": "explicit"}
     cell = torn_cells.tear(comm, springs=(stiffness, RATIO * stiffness), petsc=petsc, **case)
     loaded = CoupledInterfaces(torn_cells.interface(cell, False))
-    springs = EnergyCriterion(stiffness, RATIO * stiffness, TOUGHNESS * stiffness, SENSITIVITY)
-    begin = unloaded(loaded, np.full(len(loaded.nodes.row), BONDED, np.int8))
-    points = events(loaded, TipCriterion(springs, cell.solver.preconditioner), strains(STRAIN[None]), begin)
+    springs = SpringEnergy(stiffness, RATIO * stiffness, TOUGHNESS * stiffness, SENSITIVITY)
+    begin = unloaded(loaded, torn_cells.bonds(np.full(len(loaded.nodes.row), BONDED, np.int8)))
+    points = events(loaded, ReleasedEnergy(springs, cell.solver.preconditioner), strains(STRAIN[None]), begin)
     return np.array([point.load_factor for point, _ in zip(points, range(count), strict=False)]), cell
 
 
@@ -208,7 +208,7 @@ def test_soft_springs_break_as_between_rigid_bodies(comm, stiffness, young):
     found, cell = softly_held(comm, stiffness, young, 6)
     interface = torn_cells.interface(cell, False)
     nodes, parted = interface.nodes, np.full(len(interface.nodes.row), OPEN, np.int8)
-    jump = interface.jump(interface.linear(Load.strain(STRAIN), parted, np.zeros(cell.solver.rows)))
+    jump = interface.jump(interface.linear(Load.strain(STRAIN), torn_cells.bonds(parted), np.zeros(cell.solver.rows)))
     each = (jump, nodes.points, nodes.normal, nodes.length)
     jump, points, normal, length = (np.concatenate(comm.allgather(x)) for x in each)
     expected = RigidFibre(jump, points - points.mean(axis=0), normal, length).load_factors(6)

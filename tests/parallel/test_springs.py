@@ -14,7 +14,7 @@ from support.cases import FIBRE, MATRIX, relative_error
 from support.random_cells import random_bonded, random_cell, random_strain
 
 from feti_homog.homogenization.averaging import Homogenization
-from feti_homog.interface.contact.contact_problem import BONDED, CLOSED, OPEN
+from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN
 from feti_homog.interface.loads.load import Load
 
 pytestmark = pytest.mark.parallel
@@ -25,7 +25,7 @@ UNIT = np.eye(3)
 def bonded_responses(cell):
     """Return the responses to the unit strains with all bonds intact."""
     status = np.full(len(cell.solver.jump_operator.nodes.row), BONDED, np.int8)
-    return Homogenization(cell, True).respond(UNIT, status, [np.zeros(cell.solver.rows)] * 3)
+    return Homogenization(cell, True).respond(UNIT, torn_cells.bonds(status), [np.zeros(cell.solver.rows)] * 3)
 
 
 def stiffness(comm, **case):
@@ -100,7 +100,7 @@ def test_random_cells_equal_the_quadratic_programme(comm, number):
         bonded, strain = comm.bcast((bonded, random_strain(rng)))
         contact = bool(comm.bcast(rng.random() < 0.85))
         interface = case.interface(contact)
-        state = interface.equilibrium(Load.strain(strain), case.status(bonded), case.start())
+        state = interface.equilibrium(Load.strain(strain), torn_cells.bonds(case.status(bonded)), case.start())
         assert state.solution.reason > 0 and max(state.certificate.values()) < 1e-9
         expected = comm.bcast(case.reference and case.reference.solve_elastic(strain, bonded, contact, springs))
         assert relative_error(torn_cells.stress(case.cell, state.solution), expected.stress) < 1e-7

@@ -19,9 +19,9 @@ from feti_homog.errors import MeshError
 from feti_homog.homogenization import coarse_meshes
 from feti_homog.homogenization.domain_partition import PartitionPolicy, distribute
 from feti_homog.homogenization.tile_tearing import can_be_torn_by_tiles, tear_by_tiles
-from feti_homog.interface.contact.contact_problem import BONDED
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
-from feti_homog.interface.laws.strength_criterion import StrengthCriterion
+from feti_homog.interface.contact.states import BONDED
+from feti_homog.interface.laws.strength import QuadraticStrength
 from feti_homog.interface.path.path_following import events
 from feti_homog.interface.path.path_points import unloaded
 from feti_homog.mesh.refinement import ReferenceLattice
@@ -119,8 +119,8 @@ def test_a_path_is_that_of_the_cell_torn_on_rank_0(comm):
         assert (torn.summary.subdomains > 17) == (not pieces)
         loaded = CoupledInterfaces(torn_cells.interface(torn, contact=True))
         bonded = np.full(len(torn.solver.jump_operator.nodes.row), BONDED, np.int8)
-        law = StrengthCriterion(20.0, 30.0, "quadratic")
-        path = events(loaded, law, strains(np.array([[1.0, -0.2, 0.4]])), unloaded(loaded, bonded))
+        law = QuadraticStrength(20.0, 30.0)
+        path = events(loaded, law, strains(np.array([[1.0, -0.2, 0.4]])), unloaded(loaded, torn_cells.bonds(bonded)))
         points = list(islice(path, 8))
         found.append([[p.load_factor, *(p.scale * torn_cells.stress(torn, p.state.solution))] for p in points])
     assert len(found[0]) == 8 and np.ptp([load for load, *_ in found[0]]) > 0

@@ -10,10 +10,10 @@ from support.cases import relative_error
 from support.loads import strains
 from support.ranks import PIECES
 
-from feti_homog.interface.contact.contact_problem import BONDED
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
-from feti_homog.interface.laws.energy_criterion import EnergyCriterion
-from feti_homog.interface.laws.tip_criterion import TipCriterion
+from feti_homog.interface.contact.states import BONDED
+from feti_homog.interface.laws.energy import SpringEnergy
+from feti_homog.interface.laws.released import ReleasedEnergy
 from feti_homog.interface.path.path_following import events
 from feti_homog.interface.path.path_points import unloaded
 from feti_homog.parallel.mpi_errors import on_root
@@ -46,7 +46,7 @@ def test_whole_paths_are_those_of_brute_force(comm, built, growth):
             slow = SlowEnergyPath(case.reference, SPRINGS, TOUGHNESS, SENSITIVITY, growth)
             expected = on_root(comm, slow.proportional, STRAIN)
         points = follow(case.cell, growth)
-        found = np.array([case.in_reference_order(p.after.status) != BONDED for p in points])
+        found = np.array([case.in_reference_order(p.after.bonds.status) != BONDED for p in points])
         np.testing.assert_array_equal(found, np.cumsum([e.broke for e in expected], axis=0) > 0)
         assert len(points) > 30 and found[-1].mean() > 0.5
         assert relative_error(np.array([p.load_factor for p in points]), [e.load_factor for e in expected]) < 1e-8
@@ -67,21 +67,21 @@ def test_a_path_goes_on_from_its_middle_as_if_it_had_not_stopped(comm):
     assert [p.broke for p in rest] == [p.broke for p in expected]
     assert relative_error(np.array([p.load_factor for p in rest]), [p.load_factor for p in expected]) < 1e-9
     for found, point in zip(rest, expected, strict=True):
-        np.testing.assert_array_equal(found.after.status, point.after.status)
+        np.testing.assert_array_equal(found.after.bonds.status, point.after.bonds.status)
     for cell in cells:
         cell.solver.destroy()
 
 
 def follow(cell, growth, begin=None):
     """Return the points of the path, or of what is left of it."""
-    interface, springs = torn_cells.interface(cell, True), EnergyCriterion(*SPRINGS, TOUGHNESS, SENSITIVITY)
-    law = TipCriterion(springs, cell.solver.preconditioner) if growth == "released" else springs
+    interface, springs = torn_cells.interface(cell, True), SpringEnergy(*SPRINGS, TOUGHNESS, SENSITIVITY)
+    law = ReleasedEnergy(springs, cell.solver.preconditioner) if growth == "released" else springs
     bonded = np.full(len(interface.nodes.row), BONDED, np.int8)
     return list(
         events(
             CoupledInterfaces(interface),
             law,
             strains(STRAIN[None]),
-            begin or unloaded(CoupledInterfaces(interface), bonded),
+            begin or unloaded(CoupledInterfaces(interface), torn_cells.bonds(bonded)),
         )
     )

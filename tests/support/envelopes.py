@@ -13,8 +13,8 @@ from petsc4py import PETSc
 from feti_homog import Case, run
 from feti_homog.analysis.criteria import criterion_of
 from feti_homog.homogenization import unit_cell
-from feti_homog.interface.contact.contact_problem import OPEN
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
+from feti_homog.interface.contact.states import OPEN
 from feti_homog.interface.path.path_following import events
 from feti_homog.interface.path.path_points import unloaded
 from feti_homog.petsc.options import case_options
@@ -86,7 +86,7 @@ def path_onset(cell: Any, strain: np.ndarray) -> tuple[float, np.ndarray]:
             CoupledInterfaces(interface),
             criterion_of(cell),
             strains(far[None]),
-            unloaded(CoupledInterfaces(interface), status),
+            unloaded(CoupledInterfaces(interface), torn_cells.bonds(status)),
         )
     )
     assert point.broke or cell.comm.allreduce(point.broke)

@@ -14,7 +14,8 @@ from feti_homog.fibres.arrange import arrange
 from feti_homog.homogenization import unit_cell
 from feti_homog.homogenization.domain_partition import DEFAULT_POLICY
 from feti_homog.homogenization.unit_cell import TornCell
-from feti_homog.interface.contact.contact_problem import BONDED, OPEN, ContactProblem
+from feti_homog.interface.contact.contact_problem import ContactProblem
+from feti_homog.interface.contact.states import BONDED, OPEN, BondState
 from feti_homog.petsc.options import case_options
 from feti_homog.runtime.progress import Progress
 from support.cases import make_case
@@ -74,6 +75,11 @@ def printed(comm, capfd, **case):
     cell = tear(comm, **case)
     cell.solver.solve(np.array([1.0, -0.5, 0.3]), np.zeros(cell.solver.rows))
     return cell, comm.bcast(capfd.readouterr().out)
+
+
+def bonds(status):
+    """State of bonds without memory."""
+    return BondState.without_memory(status)
 
 
 def interface(cell, contact):

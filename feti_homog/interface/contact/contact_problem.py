@@ -12,7 +12,6 @@ from functools import cached_property
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
 from feti_homog.errors import NotCarriedError
 from feti_homog.feti.decomposition.constraint_layout import InterfaceNodes
@@ -22,69 +21,26 @@ from feti_homog.interface.contact.block_pivoting import BlockPivoting
 from feti_homog.interface.contact.contact_certificate import kkt_errors
 from feti_homog.interface.contact.floating_bodies import place
 from feti_homog.interface.contact.load_scales import LoadScales
+from feti_homog.interface.contact.states import (
+    BONDED,
+    CLOSED,
+    OPEN,
+    BondState,
+    Equilibrium,
+    Softening,
+    Status,
+    never_softens,
+)
 from feti_homog.interface.loads import mixed_load
-from feti_homog.interface.loads.coupled_solution import CoupledSolution, Multipliers
 from feti_homog.interface.loads.load import Load
 from feti_homog.typing import Bool, Float, Int
 
-Status = NDArray[np.int8]
-
-BONDED, CLOSED, OPEN = 0, 1, 2
-
-# A force or a gap has a sign if it is larger than this many relative tolerances of the Krylov method, times the
-# largest force or imposed displacement; below, the solver's error may have made it.
-SIGN_NOISE_PER_RTOL = 10.0
 # An amplitude takes part in new motions if its square is larger than this, of motions of size one.
 LEAST_SHARE_OF_MOTION = 1e-6
 # Block pivots in a row, the last one with progress included: ten without progress are usual in the literature.
 BLOCK_PIVOTS = 11
 # Dual problems after which the search is given up; the certificate then tells how far off it is.
 MAX_CONTACT_SOLVES = 500
-
-
-@dataclass(frozen=True)
-class Equilibrium:
-    """The cell under one load with the contact states that hold there.
-
-    Attributes:
-        load: what is prescribed.
-        status: (k,) BONDED, CLOSED or OPEN of the interface nodes that this rank owns.
-        solution: of the last dual problem; its multipliers and jumps are those of the state.
-        iterations, solves: Krylov iterations and dual problems that it took.
-        free_motions: number of rigid motions of bodies that no interface force resists; a face that touches without
-            a force resists none.
-        certificate: errors of the KKT conditions, `contact_certificate.kkt_errors`.
-        axial: the same of the displacement along the fibres with these bonds, where that is a problem.
-    """
-
-    load: Load
-    status: Status
-    solution: DualSolution
-    iterations: int
-    solves: int
-    free_motions: int
-    certificate: dict[str, float]
-    axial: Equilibrium | None = None
-
-    @property
-    def problems(self) -> tuple[Equilibrium, ...]:
-        """Those of all problems, the one in the plane first."""
-        return (self,) if self.axial is None else (self, self.axial)
-
-    @property
-    def solutions(self) -> CoupledSolution:
-        """Of all problems."""
-        return CoupledSolution(self.solution, None if self.axial is None else self.axial.solution)
-
-    @property
-    def multipliers(self) -> Multipliers:
-        """Of all problems."""
-        return self.solutions.lam
-
-    @property
-    def converged(self) -> bool:
-        """Whether the Krylov method found all."""
-        return self.solutions.converged
 
 
 @dataclass(frozen=True)
@@ -95,23 +51,20 @@ class ContactProblem:
         solver: of the dual problem.
         contact: false lets debonded faces overlap.
         size: (2,) of the cell, for the scale of displacements.
+        softening: of the law of the bonds.
         block_pivots: see `BlockPivoting`.
     """
 
     solver: FetiSolver
     contact: bool
     size: Float
+    softening: Softening = never_softens
     block_pivots: int = BLOCK_PIVOTS
 
     @property
     def nodes(self) -> InterfaceNodes:
         """Interface nodes that this rank owns."""
         return self.solver.jump_operator.nodes
-
-    @property
-    def sign_noise(self) -> float:
-        """Share of the largest force, or of the imposed displacement, below which a sign is the solver's error."""
-        return SIGN_NOISE_PER_RTOL * self.solver.rtol
 
     def active(self, status: Status) -> Float:
         """(owned rows,) 1 for the multipliers that act: all of a bonded node, the normal one of a closed node."""
@@ -120,6 +73,14 @@ class ContactProblem:
         if self.contact:
             mask[self.nodes.row] = status != OPEN
         return mask
+
+    def prepare(self, bonds: BondState) -> None:
+        """Make the dual problem that of a state of the bonds.  Collective.
+
+        Raises:
+            CaseError: the compliance of springs changed and the preconditioner cannot follow.
+        """
+        self.solver.activate(self.active(bonds.status))
 
     def debond(self, status: Status, which: Bool, lam: Float) -> Status:
         """The status after the bonds of `which` have broken; under tension they start open."""
@@ -149,55 +110,55 @@ class ContactProblem:
         """(k, c) rows of the bonds."""
         return self.nodes.row[:, None] + np.arange(self.solver.jump_operator.components)
 
-    def linear(self, load: Load, status: Status, start: Float) -> DualSolution:
-        """The dual problem with the states as they are; `start` are first multipliers (owned rows,).  Collective.
+    def linear(self, load: Load, bonds: BondState, start: Float) -> DualSolution:
+        """Solve the dual problem with the states as they are; `start` are first multipliers (owned rows,).  Collective.
 
         Raises:
             NotCarriedError: nothing carries the stresses of the load.
         """
-        self.solver.activate(self.active(status))
+        self.prepare(bonds)
         given = self.scales.imposed_strain(np.where(load.by_stress, 0.0, load.values))
         roots = self.scales.roots
-        noise = mixed_load.Noise(roots, self.sign_noise, float((roots[: len(given)] * given).max()))
+        noise = mixed_load.Noise(roots, self.scales.sign_noise, float((roots[: len(given)] * given).max()))
         return mixed_load.solve(self.solver, load, start, float(self.size.prod()), noise)
 
     def is_linear(self, status: Status) -> bool:
         """Whether no face can come to touch another; collective."""
         return not (self.contact and self._any(status != BONDED))
 
-    def equilibria(self, strains: Float, status: Status, starts: Sequence[Float]) -> list[Equilibrium]:
+    def equilibria(self, strains: Float, bonds: BondState, starts: Sequence[Float]) -> list[Equilibrium]:
         """Solve a linear problem for every strain of (k, 3) together.  Collective."""
-        self.solver.activate(self.active(status))
+        self.prepare(bonds)
         solutions = self.solver.solve_many(strains, np.stack(starts, axis=1))
         return [
-            self._equilibrium(Load.strain(strain), status, solution, solution.iterations, 1)
+            self._equilibrium(Load.strain(strain), bonds, solution, solution.iterations, 1)
             for strain, solution in zip(strains, solutions, strict=True)
         ]
 
-    def equilibrium(self, load: Load, status: Status, start: Float) -> Equilibrium:
-        """Solve for the load, with `status` a first guess of who is in contact.  Collective; raises as `linear`."""
+    def equilibrium(self, load: Load, bonds: BondState, start: Float) -> Equilibrium:
+        """Solve for the load, with `bonds` a first guess of who is in contact.  Collective; raises as `linear`."""
         try:
-            return self._searched(load, status, start)
+            return self._searched(load, bonds, start)
         except NotCarriedError:
-            closed = np.where(status == OPEN, CLOSED, status).astype(np.int8)
-            if not self.contact or not self._any(closed != status):
+            closed = np.where(bonds.status == OPEN, CLOSED, bonds.status).astype(np.int8)
+            if not self.contact or not self._any(closed != bonds.status):
                 raise
         # Faces that come to touch may carry what open ones do not.
-        return self._searched(load, closed, start)
+        return self._searched(load, bonds.with_status(closed), start)
 
-    def _searched(self, load: Load, status: Status, start: Float) -> Equilibrium:
+    def _searched(self, load: Load, bonds: BondState, start: Float) -> Equilibrium:
         """The equilibrium, from these states on.  Collective; raises as `linear`."""
         pivoting = BlockPivoting(self.solver.comm, self.block_pivots)
         iterations = solves = 0
         while True:
-            solution = self.linear(load, status, start)
+            solution = self.linear(load, bonds, start)
             iterations, solves = iterations + solution.iterations, solves + 1
-            solution, wrong = self._placed(status, solution)
+            solution, wrong = self._placed(bonds.status, solution)
             count = self.solver.comm.allreduce(int(wrong.sum()))
             if count == 0 or solves == MAX_CONTACT_SOLVES or solution.reason < 0:
-                return self._equilibrium(load, status, solution, iterations, solves)
+                return self._equilibrium(load, bonds, solution, iterations, solves)
             flip = pivoting.choose(wrong, count)
-            status = np.where(flip, CLOSED + OPEN - status, status).astype(np.int8)
+            bonds = bonds.with_status(np.where(flip, CLOSED + OPEN - bonds.status, bonds.status).astype(np.int8))
             start = solution.lam
 
     def undetermined(self, state: Equilibrium) -> Bool:
@@ -205,7 +166,7 @@ class ContactProblem:
         Collective."""
         if not state.load.by_stress.any() or not self._any(state.status != BONDED):
             return np.zeros(len(state.load.values), bool)
-        self.solver.activate(self.active(state.status))
+        self.prepare(state.bonds)
         held = self.scales.mean_stiffness * float(self.size.prod())
         return mixed_load.unresisted(self.solver, state.load.by_stress, held)
 
@@ -213,43 +174,26 @@ class ContactProblem:
         """Return True if a node of any rank is one of `which`; collective."""
         return bool(self.solver.comm.allreduce(bool(which.any()), MPI.LOR))
 
-    def gap_noise(self, strain: Float) -> float:
-        """Gaps smaller than this may be the solver's error."""
-        return self.sign_noise * self.scales.imposed(strain)
-
-    def stress_noise(self, strain: Float) -> float:
-        """Macroscopic stresses smaller than this may be the solver's error.  Collective."""
-        return self.sign_noise * self.scales.stress_scale(strain)
-
-    def force_noise(self, solution: DualSolution) -> Float:
-        """(k,) nodal forces at each node of this rank smaller than which may be the solver's error; collective.
-
-        It is a share of the largest of the same interface, or of what the imposed strain makes: an error of the jumps
-        moves forces by the stiffness of the softer side.  Forces between the pieces of a cut body say nothing here,
-        however large, nor do those of other interfaces."""
-        forces = np.abs(solution.lam[self._pairs]).max(axis=1, initial=0.0)
-        caused = self.scales.bond_stress(solution.strain) * self.scales.longest
-        return np.asarray(self.sign_noise * np.maximum(self.scales.over_interface(forces), caused))
-
     def _placed(self, status: Status, solution: DualSolution) -> tuple[DualSolution, Bool]:
         """The solution with free fibres where they have room, and which nodes (k,) break the KKT conditions."""
         if not self.contact:
             return solution, np.zeros(len(status), bool)
         pressed = np.zeros(len(status), bool)
-        coarse, noise = self.solver.natural, self.gap_noise(solution.strain)
+        coarse, noise = self.solver.natural, self.scales.gap_noise(solution.strain)
         if coarse.unconstrained_modes.shape[1]:
             placement = place(self.solver.comm, coarse, self.nodes, status == OPEN, solution, noise)
             alpha, jump = solution.alpha + placement.alpha, solution.jump + placement.jump(coarse)
             solution, pressed = replace(solution, alpha=alpha, jump=jump), placement.pressed
         force, gap = solution.lam[self.nodes.row], solution.jump[self.nodes.row]
-        pulled = (status == CLOSED) & (force > self.force_noise(solution))
+        pulled = (status == CLOSED) & (force > self.scales.force_noise(solution))
         overlaps = (status == OPEN) & (gap < -noise)
         return solution, pulled | overlaps | pressed
 
     def _equilibrium(
-        self, load: Load, status: Status, solution: DualSolution, iterations: int, solves: int
+        self, load: Load, bonds: BondState, solution: DualSolution, iterations: int, solves: int
     ) -> Equilibrium:
         """The state that a search ended with, its free motions and its certificate."""
+        status = bonds.status
         certificate = kkt_errors(
             self.solver.comm,
             self.traction(solution),
@@ -262,7 +206,7 @@ class ContactProblem:
             self.scales.over_interface,
         )
         status, motions = self._without_idle(status, solution)
-        return Equilibrium(load, status, solution, iterations, solves, motions, certificate)
+        return Equilibrium(load, bonds.with_status(status), solution, iterations, solves, motions, certificate)
 
     def _without_idle(self, status: Status, solution: DualSolution) -> tuple[Status, int]:
         """The status and the number of rigid motions that neither a bond nor a face under compression resists.
@@ -273,7 +217,7 @@ class ContactProblem:
         coarse, idle = self.solver.natural, np.zeros(len(status), bool)
         motions = coarse.unconstrained_modes
         if self.contact:
-            idle = (status == CLOSED) & (solution.lam[self.nodes.row] >= -self.force_noise(solution))
+            idle = (status == CLOSED) & (solution.lam[self.nodes.row] >= -self.scales.force_noise(solution))
         if not self._any(idle):
             return status, motions.shape[1]
         more = coarse.free_motions(self.active(np.where(idle, OPEN, status).astype(np.int8)))

@@ -12,7 +12,8 @@ import numpy as np
 from mpi4py import MPI
 
 from feti_homog.feti.decomposition.constraint_layout import InterfaceNodes
-from feti_homog.interface.contact.contact_problem import ContactProblem, Equilibrium, Status
+from feti_homog.interface.contact.contact_problem import ContactProblem
+from feti_homog.interface.contact.states import BondState, Equilibrium
 from feti_homog.interface.loads.coupled_solution import CoupledSolution, Multipliers
 from feti_homog.interface.loads.load import Load
 from feti_homog.interface.loads.macroscopic import Macroscopic
@@ -62,25 +63,26 @@ class CoupledInterfaces:
         along = 0 if self.axial is None else self.axial.solver.rows
         return Multipliers(np.zeros(self.plane.solver.rows), np.zeros(along))
 
-    def linear(self, load: Load, status: Status, start: Multipliers) -> CoupledSolution:
+    def linear(self, load: Load, bonds: BondState, start: Multipliers) -> CoupledSolution:
         """The dual problems with the states as they are.  Collective."""
         in_plane, along = load.parts(len(self.plane.solver.problem.loads))
-        plane = self.plane.linear(in_plane, status, start.plane)
-        return CoupledSolution(plane, None if self.axial is None else self.axial.linear(along, status, start.axial))
+        plane = self.plane.linear(in_plane, bonds, start.plane)
+        return CoupledSolution(plane, None if self.axial is None else self.axial.linear(along, bonds, start.axial))
 
-    def equilibrium(self, load: Load, status: Status, start: Multipliers) -> Equilibrium:
-        """The state under a load, with `status` a first guess of who is in contact.  Collective."""
+    def equilibrium(self, load: Load, bonds: BondState, start: Multipliers) -> Equilibrium:
+        """The state under a load, with `bonds` a first guess of who is in contact.  Collective."""
         in_plane, along = load.parts(len(self.plane.solver.problem.loads))
-        state = self.plane.equilibrium(in_plane, status, start.plane)
+        state = self.plane.equilibrium(in_plane, bonds, start.plane)
         if self.axial is None:
             return state
-        return replace(state, axial=self.axial.equilibrium(along, state.status, start.axial))
+        return replace(state, axial=self.axial.equilibrium(along, state.bonds, start.axial))
 
     def leg_start(self, origin: Macroscopic, before: Load | None, end: Load) -> Load:
         """Where a leg begins: at the waypoint before, which the last point, `origin`, need not meet; components that
         are given in another way now are as that has them, stresses without the solver's error.  Collective."""
         parts = np.split(origin.strain, [len(self.plane.solver.problem.loads)])
-        noise = [np.full(len(own), each.stress_noise(own)) for own, each in zip(parts, self.problems, strict=False)]
+        scales = [each.scales for each in self.problems]
+        noise = [np.full(len(own), each.stress_noise(own)) for own, each in zip(parts, scales, strict=False)]
         stress = np.where(np.abs(origin.stress) > np.concatenate(noise), origin.stress, 0.0)
         values = np.where(end.by_stress, stress, origin.strain)
         if before is not None:

@@ -7,9 +7,14 @@ from functools import cached_property
 import numpy as np
 from mpi4py import MPI
 
+from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.feti.solver import FetiSolver
 from feti_homog.materials.bounds import reuss, voigt
 from feti_homog.typing import Float
+
+# A force or a gap has a sign if it is larger than this many relative tolerances of the Krylov method, times the
+# largest force or imposed displacement; below, the solver's error may have made it.
+SIGN_NOISE_PER_RTOL = 10.0
 
 
 class LoadScales:
@@ -113,6 +118,31 @@ class LoadScales:
         """A stress that the loads (v,) would make in the bonded cell at least, whatever their signs.  Collective."""
         m = self._solver.problem.strains
         return float(np.abs(self.least_bonded_stiffness[:m, :m] @ self.imposed_strain(loads)).max())
+
+    @property
+    def sign_noise(self) -> float:
+        """Share of the largest force, or of the imposed displacement, below which a sign is the solver's error."""
+        return SIGN_NOISE_PER_RTOL * self._solver.rtol
+
+    def gap_noise(self, strain: Float) -> float:
+        """Gaps smaller than this may be the solver's error.  Collective."""
+        return self.sign_noise * self.imposed(strain)
+
+    def stress_noise(self, strain: Float) -> float:
+        """Macroscopic stresses smaller than this may be the solver's error.  Collective."""
+        return self.sign_noise * self.stress_scale(strain)
+
+    def force_noise(self, solution: DualSolution) -> Float:
+        """(k,) nodal forces at each node of this rank smaller than which may be the solver's error; collective.
+
+        It is a share of the largest of the same interface, or of what the imposed strain makes: an error of the jumps
+        moves forces by the stiffness of the softer side.  Forces between the pieces of a cut body say nothing here,
+        however large, nor do those of other interfaces."""
+        B = self._solver.jump_operator
+        pairs = B.nodes.row[:, None] + np.arange(B.components)
+        forces = np.abs(solution.lam[pairs]).max(axis=1, initial=0.0)
+        caused = self.bond_stress(solution.strain) * self.longest
+        return np.asarray(self.sign_noise * np.maximum(self.over_interface(forces), caused))
 
     def imposed_strain(self, loads: Float) -> Float:
         """(m,) or (m, n) sizes of the strains that the loads (v,) or (v, n) make.  Collective."""

@@ -1,4 +1,4 @@
-"""Laws of the interface: which bond breaks at which traction or energy.
+"""Laws of bonds: which bond breaks at which traction or energy, and what follows.
 
-May use `interface.tips`.  Main entry: `bond_criterion.BondCriterion`.
+May use `interface.tips`.  Main entries: `bond_law.BondLaw`, `registry.law_class`.
 """

@@ -9,9 +9,9 @@ import numpy as np
 from mpi4py import MPI
 
 from feti_homog.errors import NotCarriedError
-from feti_homog.interface.contact.contact_problem import Equilibrium
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
-from feti_homog.interface.laws.bond_criterion import BondCriterion
+from feti_homog.interface.contact.states import Equilibrium
+from feti_homog.interface.laws.bond_law import BondLaw
 from feti_homog.interface.loads.coupled_solution import CoupledSolution
 from feti_homog.interface.loads.load import Load
 from feti_homog.interface.loads.macroscopic import Macroscopic
@@ -21,8 +21,7 @@ from feti_homog.interface.path.path_points import (
     UTILISATION_TIE,
     PathState,
     Point,
-    count_on_all_ranks,
-    fracture_energy,
+    break_bonds,
     most_utilised,
 )
 from feti_homog.typing import Float
@@ -57,17 +56,17 @@ class LaterLeg:
     """
 
     def __init__(
-        self, cell: CoupledInterfaces, criterion: BondCriterion, waypoints: Sequence[Load], leg: int, begin: PathState
+        self, cell: CoupledInterfaces, law: BondLaw, waypoints: Sequence[Load], leg: int, begin: PathState
     ) -> None:
         """Stand where `begin` says on the way from its origin to waypoint `leg`.  Collective."""
-        self.cell, self.criterion, self.end = cell, criterion, waypoints[leg]
+        self.cell, self.law, self.end = cell, law, waypoints[leg]
         self.leg, self.legs = leg, len(waypoints)
         self.origin = begin.last if begin.position == 0.0 else begin.origin
         self.start = cell.leg_start(self.origin, waypoints[leg - 1], self.end)
         # Where the last point is, up to where the line is known to bend, and whether a predicted change did not come.
         self._reported, self._bends_before, self._false_alarm = begin.position, np.inf, False
         self._from, self._energies = begin, NO_ENERGIES
-        self._stand(begin.position, cell.equilibrium(self._load_at(begin.position), begin.status, begin.lam))
+        self._stand(begin.position, cell.equilibrium(self._load_at(begin.position), begin.bonds, begin.lam))
 
     def _load_at(self, share: float) -> Load:
         return self.start.after(share, self.end)
@@ -83,7 +82,7 @@ class LaterLeg:
     def _ahead(self) -> CoupledSolution | None:
         """The end of the leg with the contact states as they are; None if they do not carry its stresses."""
         try:
-            return self.cell.linear(self.end, self._state.status, self._state.multipliers)
+            return self.cell.linear(self.end, self._state.bonds, self._state.multipliers)
         except NotCarriedError:
             return None
 
@@ -114,7 +113,7 @@ class LaterLeg:
         What does not happen on the leg is at infinity.
         """
         rest = 1.0 - self._share
-        breaks = first_break(self.cell, self.criterion, self._state, ahead)
+        breaks = first_break(self.cell, self.law, self._state, ahead)
         begins, certain = (1.0, 1.0) if self._false_alarm else first_change(self.cell.plane, self._state, ahead.plane)
         if begins == 1.0:
             begins = certain = np.inf
@@ -132,7 +131,7 @@ class LaterLeg:
             target, reached = max((start + self._bends_before) / 2, nearest), False
         while True:
             way = (target - start) / (1.0 - start)
-            state = self.cell.equilibrium(self._load_at(target), here.status, here.multipliers.towards(ahead.lam, way))
+            state = self.cell.equilibrium(self._load_at(target), here.bonds, here.multipliers.towards(ahead.lam, way))
             if target <= nearest or not state.converged or self._continues(ahead, way, state):
                 break
             self._bends_before, reached = target, False
@@ -143,7 +142,7 @@ class LaterLeg:
     def _continues(self, ahead: CoupledSolution, way: float, state: Equilibrium) -> bool:
         """Whether no bond is overloaded in a state, and its response on the line from here to `ahead`; collective."""
         cell = self.cell
-        _, used, _ = most_utilised(cell, self.criterion, state)
+        _, used, _ = most_utilised(cell, self.law, state)
         here, there = self._from.last, cell.macroscopic(ahead)
         ends = np.stack([self._response(here), self._response(there)])
         off = np.abs((1.0 - way) * ends[0] + way * ends[1] - self._response(cell.macroscopic(state.solutions))).max()
@@ -165,7 +164,7 @@ class LaterLeg:
         there_is_one = self._share <= self._reported + LEAST_SHARE
         if not there_is_one:
             yield self._turn(beyond)
-        self._stand(beyond, self.cell.equilibrium(self._load_at(beyond), before.status, before.multipliers))
+        self._stand(beyond, self.cell.equilibrium(self._load_at(beyond), before.bonds, before.multipliers))
         self._false_alarm = not self._differs(before)
         if there_is_one and not self._false_alarm:
             yield from self._turned()
@@ -177,8 +176,8 @@ class LaterLeg:
             NotCarriedError: touching faces do not carry it either.
         """
         state, beyond = self._state, min(self._share + LEAST_SHARE, 1.0)
-        there = self.cell.equilibrium(self._load_at(beyond), state.status, state.multipliers)
-        here = self.cell.equilibrium(self._load_at(self._share), there.status, there.multipliers)
+        there = self.cell.equilibrium(self._load_at(beyond), state.bonds, state.multipliers)
+        here = self.cell.equilibrium(self._load_at(self._share), there.bonds, there.multipliers)
         self._stand(self._share, here)
         yield self._turn(beyond)
         self._stand(beyond, there)
@@ -204,12 +203,11 @@ class LaterLeg:
     def _break(self) -> Iterator[Point]:
         """Break the worst bonds here, and find the state after it."""
         cell, state, worst = self.cell, self._state, self._worst
-        fracture = fracture_energy(cell, self.criterion, worst, cell.traction(state.solutions))
-        status = cell.plane.debond(state.status, worst, state.multipliers.plane)
-        broken = replace(self._path_state(self.leg, self._share), status=status, broken=fracture)
-        yield self._point(count_on_all_ranks(cell, worst), broken)
+        bonds, count, fracture = break_bonds(cell, self.law, worst, state)
+        broken = replace(self._path_state(self.leg, self._share), bonds=bonds, broken=fracture)
+        yield self._point(count, broken)
         self._bends_before, self._false_alarm, self._from = np.inf, False, broken
-        self._stand(self._share, cell.equilibrium(self._load_at(self._share), status, state.multipliers))
+        self._stand(self._share, cell.equilibrium(self._load_at(self._share), bonds, state.multipliers))
 
     def _point(self, broke: int, after: PathState) -> Point:
         energies, self._energies, self._reported = self._energies, NO_ENERGIES, self._share
@@ -224,10 +222,10 @@ class LaterLeg:
         self._share, self._state = share, state
         if share >= self._bends_before:
             self._bends_before = np.inf
-        self._used, self._used_at_worst, self._worst = most_utilised(self.cell, self.criterion, state)
+        self._used, self._used_at_worst, self._worst = most_utilised(self.cell, self.law, state)
         here = self.cell.macroscopic(state.solutions)
         self._energies = self._energies.plus(self._from.energies_to(here))
-        self._from = PathState(self.leg, share, state.status, state.multipliers, self.origin, here)
+        self._from = PathState(self.leg, share, state.bonds, state.multipliers, self.origin, here)
 
     def _differs(self, before: Equilibrium) -> bool:
         """Whether contact states are other than before; collective."""

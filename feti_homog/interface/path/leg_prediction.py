@@ -6,23 +6,21 @@ import numpy as np
 from mpi4py import MPI
 
 from feti_homog.feti.dual_solution import DualSolution
-from feti_homog.interface.contact.contact_problem import BONDED, CLOSED, OPEN, ContactProblem, Equilibrium
+from feti_homog.interface.contact.contact_problem import ContactProblem
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.floating_bodies import admissible_share, shares_to_zero
-from feti_homog.interface.laws.bond_criterion import BondCriterion
+from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, Equilibrium
+from feti_homog.interface.laws.bond_law import BISECTIONS, BondLaw
 from feti_homog.interface.loads.coupled_solution import CoupledSolution
 
-# Halvings of an interval of length one, after which double precision tells no more.
-BISECTIONS = 60
 
-
-def first_break(cell: CoupledInterfaces, criterion: BondCriterion, state: Equilibrium, ahead: CoupledSolution) -> float:
+def first_break(cell: CoupledInterfaces, law: BondLaw, state: Equilibrium, ahead: CoupledSolution) -> float:
     """Share of the way to `ahead` at which the first bond reaches its strength, or inf.  Collective.
 
     Utilisation is convex along a straight way, so below 1 here and above 1 there it passes 1 once: bisection.
     """
     here, there = cell.traction(state.solutions), cell.traction(ahead)
-    utilisation = criterion.law(cell, state.status)
+    utilisation = law.utilisation(cell, state.bonds)
     over = (state.status == BONDED) & (utilisation(there) > 1.0)
     step, low, high = there - here, np.zeros(len(here)), np.ones(len(here))
     for _ in range(BISECTIONS if over.any() else 0):
@@ -42,11 +40,11 @@ def first_change(interface: ContactProblem, state: Equilibrium, ahead: DualSolut
     if not interface.contact:
         return 1.0, 1.0
     solver, nodes = interface.solver, interface.nodes
-    tension = np.maximum(interface.force_noise(state.solution), interface.force_noise(ahead))
+    tension = np.maximum(interface.scales.force_noise(state.solution), interface.scales.force_noise(ahead))
     closed = state.status == CLOSED
     shares = [shares_to_zero(-state.solution.lam[nodes.row][closed], -ahead.lam[nodes.row][closed], tension[closed])]
     is_open, here, there = state.status == OPEN, state.solution.jump[nodes.row], ahead.jump[nodes.row]
-    noise = max(interface.gap_noise(state.solution.strain), interface.gap_noise(ahead.strain))
+    noise = max(interface.scales.gap_noise(state.solution.strain), interface.scales.gap_noise(ahead.strain))
     if solver.natural.unconstrained_modes.shape[1]:
         shares.append(admissible_share(solver.comm, solver.natural, nodes, is_open, here, there, noise))
     else:

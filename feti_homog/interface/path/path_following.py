@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
-from feti_homog.interface.laws.bond_criterion import BondCriterion
+from feti_homog.interface.laws.bond_law import BondLaw
 from feti_homog.interface.loads.load import Load
 from feti_homog.interface.path.later_leg import LaterLeg
 from feti_homog.interface.path.path_points import (
@@ -23,22 +23,19 @@ from feti_homog.interface.path.path_points import (
     Energies,
     PathState,
     Point,
-    count_on_all_ranks,
-    fracture_energy,
+    break_bonds,
     most_utilised,
 )
 
 
-def events(
-    cell: CoupledInterfaces, criterion: BondCriterion, waypoints: Sequence[Load], begin: PathState
-) -> Iterator[Point]:
+def events(cell: CoupledInterfaces, law: BondLaw, waypoints: Sequence[Load], begin: PathState) -> Iterator[Point]:
     """Every break along zero -> waypoints[0] -> ..., and the end of each leg.  Collective.
 
     A leg begins with what the state has of the components that its waypoint gives, strain or stress.  A point's state
     is the one before its bonds break.  On later legs the changes of contact are points too, with `broke` = 0: between
     points the response is straight.  The last point is one that did not converge, if there is one.
     """
-    for point in _legs(cell, criterion, waypoints, begin):
+    for point in _legs(cell, law, waypoints, begin):
         yield point
         if not point.state.converged:
             # What breaks next cannot be decided on a state that does not hold.
@@ -47,7 +44,7 @@ def events(
 
 def increments(
     cell: CoupledInterfaces,
-    criterion: BondCriterion,
+    law: BondLaw,
     waypoints: Sequence[Load],
     steps: int,
     worst_only: bool,
@@ -65,70 +62,62 @@ def increments(
         origin, end = begin.last if begins_here else begin.origin, waypoints[leg]
         start = cell.leg_start(origin, waypoints[leg - 1] if leg else None, end)
         load = start.after(step * len(waypoints) / steps - leg, end)
-        point = _increment(cell, criterion, load, worst_only, begin)
-        after = PathState(step, 0.0, point.state.status, point.state.multipliers, origin, point.after.last)
+        point = _increment(cell, law, load, worst_only, begin)
+        after = PathState(step, 0.0, point.state.bonds, point.state.multipliers, origin, point.after.last)
         begin = after
         yield Point(step / steps, 1.0, point.state, point.broke, point.energies, point.used, after)
         if not point.state.converged:
             return
 
 
-def _increment(
-    cell: CoupledInterfaces, criterion: BondCriterion, load: Load, worst_only: bool, begin: PathState
-) -> Point:
+def _increment(cell: CoupledInterfaces, law: BondLaw, load: Load, worst_only: bool, begin: PathState) -> Point:
     """The state under a load after all overloaded bonds have broken."""
-    status, lam, here, broke = begin.status, begin.lam, begin, 0
+    bonds, lam, here, broke = begin.bonds, begin.lam, begin, 0
     energies = NO_ENERGIES
     while True:
-        state = cell.equilibrium(load, status, lam)
-        status, lam, reached = state.status, state.multipliers, cell.macroscopic(state.solutions)
+        state = cell.equilibrium(load, bonds, lam)
+        lam, reached = state.multipliers, cell.macroscopic(state.solutions)
         energies = energies.plus(here.energies_to(reached))
-        used, largest, which = most_utilised(cell, criterion, state)
-        here = PathState(begin.leg, 0.0, status, lam, begin.origin, reached)
+        used, largest, which = most_utilised(cell, law, state)
+        here = PathState(begin.leg, 0.0, state.bonds, lam, begin.origin, reached)
         if largest <= 1.0 + UTILISATION_TIE or not state.converged:
             return Point(0.0, 1.0, state, broke, energies, used, here)
         if not worst_only:
             which = used > 1.0
-        fracture = fracture_energy(cell, criterion, which, cell.traction(state.solutions))
-        broke += count_on_all_ranks(cell, which)
-        status = cell.plane.debond(status, which, lam.plane)
-        here = PathState(begin.leg, 0.0, status, lam, begin.origin, reached, fracture)
+        bonds, parted, fracture = break_bonds(cell, law, which, state)
+        broke += parted
+        here = PathState(begin.leg, 0.0, bonds, lam, begin.origin, reached, fracture)
 
 
-def _legs(
-    cell: CoupledInterfaces, criterion: BondCriterion, waypoints: Sequence[Load], begin: PathState
-) -> Iterator[Point]:
+def _legs(cell: CoupledInterfaces, law: BondLaw, waypoints: Sequence[Load], begin: PathState) -> Iterator[Point]:
     legs = len(waypoints)
     if begin.leg == 0:
-        for point in _first_leg(cell, criterion, waypoints[0], legs, begin):
+        for point in _first_leg(cell, law, waypoints[0], legs, begin):
             yield point
             begin = point.after
     for leg in range(max(begin.leg, 1), legs):
-        for point in LaterLeg(cell, criterion, waypoints, leg, begin).points():
+        for point in LaterLeg(cell, law, waypoints, leg, begin).points():
             yield point
             begin = point.after
 
 
-def _first_leg(
-    cell: CoupledInterfaces, criterion: BondCriterion, load: Load, legs: int, begin: PathState
-) -> Iterator[Point]:
+def _first_leg(cell: CoupledInterfaces, law: BondLaw, load: Load, legs: int, begin: PathState) -> Iterator[Point]:
     """From zero to the load through all equilibria; with the bonds of now, a state under t times the load is t times
     the state, for t >= 0."""
     factor = begin.position
     while True:
-        state = cell.equilibrium(load, begin.status, begin.lam)
+        state = cell.equilibrium(load, begin.bonds, begin.lam)
         whole, lam = cell.macroscopic(state.solutions), state.multipliers
         here = whole.scaled(factor)
         energies = begin.energies_to(here)
-        used, largest, worst = most_utilised(cell, criterion, state)
+        used, largest, worst = most_utilised(cell, law, state)
         factor = 1.0 / max(largest, 1.0)
         reached = whole.scaled(factor)
         energies = energies.plus(Energies(reached.stored - here.stored, 0.0, 0.0))
         if largest <= 1.0:
-            after = PathState(1, 0.0, state.status, lam, reached, reached)
+            after = PathState(1, 0.0, state.bonds, lam, reached, reached)
             yield Point(1.0 / legs, 1.0, state, 0, energies, used, after)
             return
-        fracture = fracture_energy(cell, criterion, worst, cell.traction(state.solutions))
-        broke, status = count_on_all_ranks(cell, worst), cell.plane.debond(state.status, worst, lam.plane)
-        begin = PathState(0, factor, status, lam, begin.origin, reached, fracture)
+        bonds, broke, fracture = break_bonds(cell, law, worst, state)
+        begin = PathState(0, factor, bonds, lam, begin.origin, reached, fracture)
         yield Point(factor / legs, factor, state, broke, energies, used / largest, begin)

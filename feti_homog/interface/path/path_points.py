@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from mpi4py import MPI
 
-from feti_homog.interface.contact.contact_problem import BONDED, Equilibrium, Status
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
-from feti_homog.interface.laws.bond_criterion import BondCriterion, spring_criterion
+from feti_homog.interface.contact.states import BONDED, BondState, Equilibrium
+from feti_homog.interface.laws.bond_law import BondLaw
 from feti_homog.interface.loads.coupled_solution import Multipliers
 from feti_homog.interface.loads.macroscopic import Macroscopic
 from feti_homog.typing import Bool, Float
@@ -27,16 +27,16 @@ class PathState:
     Attributes:
         leg, position: the load is the share `position`, 0..1, of the way to waypoint `leg`; of increments, `leg` is the
             number of those done.
-        status, lam: contact states (k,) and multipliers to begin with.
+        bonds, lam: states of the interface nodes and multipliers to begin with.
         origin: where the leg began.
         last: the last point's state.
-        broken: toughness G_c of the bonds that broke there, in the mode in which each broke, times its length, per area
-            of the cell, 0 of bonds without toughness; None if none broke.
+        broken: fracture energy of the bonds that broke there, in the mode in which each broke, per area of the cell, 0
+            of bonds without toughness; None if none broke.
     """
 
     leg: int
     position: float
-    status: Status
+    bonds: BondState
     lam: Multipliers
     origin: Macroscopic
     last: Macroscopic
@@ -90,31 +90,48 @@ class Point:
     after: PathState
 
 
-def unloaded(cell: CoupledInterfaces, status: Status) -> PathState:
-    """The beginning of a path with the debonded nodes of `status`."""
+class Break(NamedTuple):
+    """Break of some bonds: the state of the interface after it, how many part on all ranks, and the fracture energy per
+    area of the cell."""
+
+    bonds: BondState
+    parted: int
+    fracture: float
+
+
+def unloaded(cell: CoupledInterfaces, bonds: BondState) -> PathState:
+    """The beginning of a path with the debonded nodes of `bonds`."""
     nothing = Macroscopic(np.zeros(len(cell.loads)), np.zeros(len(cell.loads)))
-    return PathState(0, 0.0, status, cell.no_multipliers(), nothing, nothing)
+    return PathState(0, 0.0, bonds, cell.no_multipliers(), nothing, nothing)
 
 
-def fracture_energy(cell: CoupledInterfaces, criterion: BondCriterion, which: Bool, traction: Float) -> float:
-    """Toughness times length of the bonds of `which` (k,) under tractions (k, c) of any size, per area; collective."""
-    springs = spring_criterion(criterion)
-    if springs is None:
+def break_bonds(cell: CoupledInterfaces, law: BondLaw, which: Bool, state: Equilibrium) -> Break:
+    """Break the bonds `which` (k,) in the modes of an equilibrium, whatever its size.  Collective."""
+    traction = cell.traction(state.solutions)
+    history, parts = law.after(state.bonds, which, traction)
+    status = cell.plane.debond(state.status, parts, state.multipliers.plane)
+    energy = _fracture_energy(cell, law, which, state.bonds, traction)
+    return Break(BondState(status, history), _count_on_all_ranks(cell, parts), energy)
+
+
+def _fracture_energy(cell: CoupledInterfaces, law: BondLaw, which: Bool, bonds: BondState, traction: Float) -> float:
+    """Fracture energy of the bonds `which` (k,) under tractions (k, c), times their lengths, per area; collective."""
+    if not law.has_toughness:
         return 0.0
-    energy = float(springs.at(np.flatnonzero(which)).fracture_toughness(traction[which]) @ cell.nodes.length[which])
+    energy = float(law.fracture(bonds, which, traction) @ cell.nodes.length[which])
     return float(cell.comm.allreduce(energy) / cell.area)
 
 
-def most_utilised(cell: CoupledInterfaces, criterion: BondCriterion, state: Equilibrium) -> tuple[Float, float, Bool]:
+def most_utilised(cell: CoupledInterfaces, law: BondLaw, state: Equilibrium) -> tuple[Float, float, Bool]:
     """(k,) share of strength that the nodes of this rank use, 0 of debonded ones; the largest of all, and which (k,)
     have it.  Collective, rank 0 decides."""
     comm = cell.comm
-    used = criterion.law(cell, state.status)(cell.traction(state.solutions))
+    used = law.utilisation(cell, state.bonds)(cell.traction(state.solutions))
     used = np.where(state.status == BONDED, used, 0.0)
     largest = comm.bcast(comm.reduce(used.max(initial=0.0), MPI.MAX))
     return used, float(largest), (used >= largest * (1.0 - UTILISATION_TIE)) & (used > 0.0)
 
 
-def count_on_all_ranks(cell: CoupledInterfaces, which: Bool) -> int:
+def _count_on_all_ranks(cell: CoupledInterfaces, which: Bool) -> int:
     """Number of nodes of `which` (k,) on all ranks; collective."""
     return int(cell.comm.allreduce(int(which.sum())))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from feti_homog.interface.contact.contact_problem import BONDED, Status
+from feti_homog.interface.contact.states import BONDED, Status
 from feti_homog.typing import Bool, Float, Int
 
 

@@ -7,18 +7,19 @@ import math
 import numpy as np
 import pytest
 
-from feti_homog.interface.laws.energy_criterion import EnergyCriterion
-from feti_homog.interface.laws.strength_criterion import StrengthCriterion
-from feti_homog.interface.path.onset import OnsetCriterion
+from feti_homog.interface.laws.bond_law import Utilisation
+from feti_homog.interface.laws.energy import SpringEnergy
+from feti_homog.interface.laws.strength import MaxStrength, QuadraticStrength, Strength
+from feti_homog.interface.path.onset import Onset
 
 CRITERIA = {
-    "max": StrengthCriterion(2.0, 1.5, "max", 3.0),
-    "quadratic": StrengthCriterion(2.0, 1.5, "quadratic", 3.0),
-    "quadratic, only shear": StrengthCriterion(math.inf, 1.5, "quadratic"),
-    "max, only tension": StrengthCriterion(2.0, math.inf, "max"),
-    "energy": EnergyCriterion(5.0, 2.0, 0.4, 0.25, 1.0),
-    "energy of shear like that of tension": EnergyCriterion(5.0, 2.0, 0.4, 1.0),
-    "energy without shear": EnergyCriterion(5.0, 2.0, 0.4, 0.0, 1.0),
+    "max": MaxStrength(2.0, 1.5, 3.0),
+    "quadratic": QuadraticStrength(2.0, 1.5, 3.0),
+    "quadratic, only shear": QuadraticStrength(math.inf, 1.5),
+    "max, only tension": MaxStrength(2.0, math.inf),
+    "energy": SpringEnergy(5.0, 2.0, 0.4, 0.25, 1.0),
+    "energy of shear like that of tension": SpringEnergy(5.0, 2.0, 0.4, 1.0),
+    "energy without shear": SpringEnergy(5.0, 2.0, 0.4, 0.0, 1.0),
 }
 NODES, RAYS = 40, 25
 
@@ -29,12 +30,12 @@ def tractions(components, law):
     before, ahead = random.normal(size=(NODES, components)), random.normal(size=(RAYS, NODES, components))
     before[::3, 0] = -50.0
     before[1::3] *= 0.1
-    used = law.utilisation(before)
+    used = law.share(before)
     return before * np.where(used >= 1.0, 0.9 / np.maximum(used, 1e-300), 1.0)[:, None], ahead
 
 
 def used_at(law, factor, before, ahead):
-    return law.utilisation(before + factor[:, None] * ahead)
+    return law.share(before + factor[:, None] * ahead)
 
 
 @pytest.mark.parametrize("components", [2, 3])
@@ -42,7 +43,7 @@ def used_at(law, factor, before, ahead):
 def test_the_first_bond_of_each_ray(name, components):
     law = CRITERIA[name]
     before, ahead = tractions(components, law)
-    onset = OnsetCriterion(law, np.ones(NODES, bool), None)
+    onset = Onset(Utilisation(law), np.ones(NODES, bool))
     found = onset.factors(ahead, np.zeros(RAYS), before).min(axis=1)
     assert np.isfinite(found).sum() > RAYS / 2
     for factor, ray in zip(found, ahead, strict=True):
@@ -61,7 +62,7 @@ def test_strengths_have_the_factor_of_every_bond(name):
     law = CRITERIA[name]
     before, ahead = tractions(3, law)
     ahead = ahead[0]
-    factor = law.factor(before, ahead)
+    factor = law.first_factor(before, ahead)
     broken = np.isfinite(factor)
     assert np.abs(used_at(law, factor[broken], before[broken], ahead[broken]) - 1).max() < 1e-10
     assert (used_at(law, 0.999999 * factor[broken], before[broken], ahead[broken]) < 1.0).all()
@@ -70,9 +71,9 @@ def test_strengths_have_the_factor_of_every_bond(name):
 def from_zero(law, traction):
     """(n, k) factors at which tractions (n, k, 3) alone break bonds, by the laws' formulas."""
     pull, shear, along = np.maximum(traction[..., 0], 0.0), *np.abs(np.moveaxis(traction[..., 1:], -1, 0))
-    if isinstance(law, StrengthCriterion):
+    if isinstance(law, Strength):
         shares = pull / law.normal, shear / law.tangential, along / law.axial
-        return 1 / (np.max(shares, axis=0) if law.criterion == "max" else np.sqrt(np.square(shares).sum(axis=0)))
+        return 1 / (np.max(shares, axis=0) if isinstance(law, MaxStrength) else np.sqrt(np.square(shares).sum(axis=0)))
     opening = pull**2 / (2 * law.normal_stiffness)
     sliding = shear**2 / (2 * law.tangential_stiffness) + along**2 / (2 * law.axial_stiffness)
     psi = np.arctan2(np.sqrt(sliding), np.sqrt(opening))
@@ -83,7 +84,7 @@ def from_zero(law, traction):
 def test_from_zero_the_factors_are_those_of_the_formulas(name):
     law = CRITERIA[name]
     _, ahead = tractions(3, law)
-    onset = OnsetCriterion(law, np.arange(NODES) != 7, None)
+    onset = Onset(Utilisation(law), np.arange(NODES) != 7)
     factors = onset.factors(ahead, np.zeros(RAYS))
     with np.errstate(divide="ignore"):
         expected = np.where(np.arange(NODES) == 7, np.inf, from_zero(law, ahead))
@@ -93,7 +94,7 @@ def test_from_zero_the_factors_are_those_of_the_formulas(name):
 
 
 def test_what_is_as_little_as_the_error_breaks_nothing():
-    onset = OnsetCriterion(CRITERIA["max"], np.ones(2, bool), None)
+    onset = Onset(Utilisation(CRITERIA["max"]), np.ones(2, bool))
     ahead = np.array([[[1e-9, 0.0], [0.0, 2e-9]]])
     assert np.isinf(onset.factors(ahead, np.array([1e-8]))).all()
     assert np.isfinite(onset.factors(ahead, np.array([1e-10]))).all()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.sparse import coo_matrix
 
-from feti_homog.interface.contact.contact_problem import BONDED, CLOSED, OPEN
+from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN
 from feti_homog.interface.tips.crack_tips import InterfaceChains, closing_work
 
 

@@ -5,21 +5,19 @@ Tavara, Mantic, Graciani, Paris, Eng. Anal. Bound. Elem. 35 (2011) 207; the mode
 
 from __future__ import annotations
 
-import dataclasses
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
+from typing import ClassVar, Self
 
 import numpy as np
 
-from feti_homog.interface.contact.contact_problem import Status
-from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
-from feti_homog.interface.laws.strength_criterion import at_nodes
-from feti_homog.typing import Float, Int
+from feti_homog.interface.contact.states import BondState
+from feti_homog.interface.laws.bond_law import BondLaw, KeyValues
+from feti_homog.typing import Bool, Float
 
 
 @dataclass(frozen=True)
-class EnergyCriterion:
+class SpringEnergy(BondLaw):
     """A bond breaks when the energy of its spring reaches the toughness.
 
     G_I = <t_n>^2 / (2 k_n), G_II = t_t^2 / (2 k_t), tan^2 psi = G_II / G_I;
@@ -42,20 +40,26 @@ class EnergyCriterion:
     mode_sensitivity: float | Float
     axial_stiffness: float | Float = math.inf
 
-    def at(self, node: Int) -> EnergyCriterion:
-        """That of the nodes (p,), one after the other."""
-        return EnergyCriterion(*(at_nodes(getattr(self, each.name), node) for each in dataclasses.fields(self)))
+    has_toughness: ClassVar[bool] = True
+    break_names: ClassVar[tuple[str, ...]] = ("psi",)
 
-    def law(self, cell: CoupledInterfaces, status: Status) -> Callable[[Float], Float]:
-        """`utilisation`, whatever is debonded."""
-        return self.utilisation
+    @classmethod
+    def of_keys(cls, value: KeyValues) -> Self:
+        """Make the law from stiffnesses and toughness; that along the fibre is the tangential one by default."""
+        return cls(
+            value("normal_stiffness"),
+            value("tangential_stiffness"),
+            value("toughness"),
+            value("mode_sensitivity"),
+            value("axial_stiffness", "tangential_stiffness"),
+        )
 
     def mode_factor(self, traction: Float) -> Float:
         """(k,) sqrt(G_Ic / G_c) of the modes of tractions (k, 2)."""
         # 1 / (1 + tan^2 x) = cos^2 x
         return np.asarray(np.cos((1.0 - self.mode_sensitivity) * self.mode_angle(traction)))
 
-    def utilisation(self, traction: Float) -> Float:
+    def share(self, traction: Float) -> Float:
         """(k,) sqrt((G_I + G_II) / G_c) of tractions (k, 2), normal and tangential, or (k, 3), also along the fibre: 1
         breaks.
 
@@ -66,6 +70,14 @@ class EnergyCriterion:
     def fracture_toughness(self, traction: Float) -> Float:
         """(k,) G_c of the modes of tractions (k, 2), energy per area."""
         return np.asarray(self.toughness / self.mode_factor(traction) ** 2)
+
+    def fracture(self, bonds: BondState, which: Bool, traction: Float) -> Float:
+        """(p,) G_c of the bonds `which` (k,) in the modes of tractions (k, c)."""
+        return self.at(np.flatnonzero(which)).fracture_toughness(traction[which])
+
+    def breaks(self, traction: Float) -> Float:
+        """(p, 1) psi of tractions (p, c), in degrees."""
+        return np.degrees(self.mode_angle(traction))[:, None]
 
     def mode_angle(self, traction: Float) -> Float:
         """(k,) psi of tractions (k, 2), in radians: 0 opens, pi/2 shears, under pressure too."""

@@ -9,16 +9,18 @@ part by j = H_ii^-1 lam_i, and the energy of the cell falls, at constant strain,
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
 from feti_homog.errors import ConvergenceError
 from feti_homog.feti.preconditioners.influence import Influence
-from feti_homog.interface.contact.contact_problem import BONDED, ContactProblem, Status
+from feti_homog.interface.contact.contact_problem import ContactProblem
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
-from feti_homog.interface.laws.energy_criterion import EnergyCriterion
+from feti_homog.interface.contact.states import BONDED, BondState, Status
+from feti_homog.interface.laws.bond_law import BondLaw, Utilisation
+from feti_homog.interface.laws.energy import SpringEnergy
 from feti_homog.typing import Bool, Float, Int
 
 # Share of the stiffness beside a bond that the inverse of the dual operator is where only rounding is left of it.
@@ -63,7 +65,7 @@ class Tips:
 
 
 @dataclass(frozen=True)
-class TipCriterion:
+class ReleasedEnergy(BondLaw):
     """Bonds beside a broken one break when that releases G_c l, l being the length that they stand for; others when
     the energy of their spring reaches G_c.
 
@@ -73,49 +75,63 @@ class TipCriterion:
         axial: that of slip along the fibres, where it counts.
     """
 
-    springs: EnergyCriterion
+    springs: SpringEnergy
     influence: Influence
     axial: Influence | None = None
 
-    def law(self, cell: CoupledInterfaces, status: Status) -> Callable[[Float], Float]:
-        """The utilisation (k,) of tractions (k, c) on the interface nodes of this rank, with these bonds.  Collective;
-        what it returns is not."""
-        tips = self.tips(cell, status)
-        own = tips.node
-        springs = self.springs.at(own)
-        whole = springs.toughness * tips.length
+    has_toughness: ClassVar[bool] = True
+    break_names: ClassVar[tuple[str, ...]] = SpringEnergy.break_names
 
-        def utilisation(traction: Float) -> Float:
-            used = self.springs.utilisation(traction)
-            released = tips.released(traction[own], cell.plane.contact)
-            used[own] = np.sqrt(released / whole) * springs.mode_factor(traction[own])
-            return used
+    def at(self, node: Int) -> ReleasedEnergy:
+        """The law of the nodes (p,), one after the other."""
+        return replace(self, springs=self.springs.at(node))
 
-        return utilisation
+    def share(self, traction: Float) -> Float:
+        """(p,) shares of the springs."""
+        return self.springs.share(traction)
 
-    def tips(self, cell: CoupledInterfaces, status: Status) -> Tips:
+    def breaks(self, traction: Float) -> Float:
+        """(p, 1) psi of tractions (p, c), in degrees."""
+        return self.springs.breaks(traction)
+
+    def fracture(self, bonds: BondState, which: Bool, traction: Float) -> Float:
+        """(p,) G_c of the bonds `which` (k,) in the modes of tractions (k, c)."""
+        return self.springs.fracture(bonds, which, traction)
+
+    def mode_angle(self, traction: Float) -> Float:
+        """(p,) psi of tractions (p, c), in radians."""
+        return self.springs.mode_angle(traction)
+
+    def utilisation(self, cell: CoupledInterfaces, bonds: BondState) -> Utilisation:
+        """Utilisation of the nodes of this rank with these bonds.  Collective; what it returns is not."""
+        tips = self.tips(cell, bonds)
+        number = np.full(len(bonds.status), -1)
+        number[tips.node] = np.arange(len(tips.node))
+        return ReleasedUtilisation(self.springs, tips, number, cell.plane.contact)
+
+    def tips(self, cell: CoupledInterfaces, bonds: BondState) -> Tips:
         """The tips that this rank owns.  Collective.
 
         Raises:
             ConvergenceError: rounding hides what breaks release.
         """
-        self._activate(self.influence, cell.plane, status)
-        numbers, mine = self._own(status)
+        self._activate(self.influence, cell.plane, bonds)
+        numbers, mine = self._own(bonds.status)
         rows = self.influence.neighbours.rows[numbers][:, None] + np.arange(2)
         H, axial = self.influence.inverse_blocks(rows)[mine], np.zeros(0)
         stiffness = self.influence.stiffness[rows[mine]]
         own = numbers[mine] - self.influence.neighbours.first
         if self.axial is not None and cell.axial is not None:
-            self._activate(self.axial, cell.axial, status)
+            self._activate(self.axial, cell.axial, bonds)
             rows = self.axial.neighbours.rows[numbers]
             axial = self.axial.inverse_blocks(np.stack([rows, rows], axis=1))[mine, 0, 0]
             stiffness = np.column_stack([stiffness, self.axial.stiffness[rows[mine]]])
         return Tips(own, H, cell.nodes.length[own], stiffness, axial)
 
     @staticmethod
-    def _activate(influence: Influence, interface: ContactProblem, status: Status) -> None:
+    def _activate(influence: Influence, interface: ContactProblem, bonds: BondState) -> None:
         """Let the inverse be that with these bonds.  Collective; raises as `tips`."""
-        interface.solver.activate(interface.active(status))
+        interface.prepare(bonds)
         if not influence.rounding <= MOST_ROUNDING:
             raise ConvergenceError(
                 f'[interface] growth = "released": rounding hides {influence.rounding:.1e} of what breaks release, '
@@ -129,6 +145,35 @@ class TipCriterion:
         everywhere = np.concatenate(neighbours.comm.allgather(status))
         tips = np.flatnonzero((everywhere == BONDED) & (neighbours.adjacency @ (everywhere != BONDED) > 0))
         return tips, (tips >= neighbours.first) & (tips < neighbours.first + len(status))
+
+
+class ReleasedUtilisation(Utilisation):
+    """sqrt(released / (G_c l)) at tips, the utilisation of the springs at other nodes."""
+
+    def __init__(self, law: SpringEnergy, tips: Tips, number: Int, contact: bool) -> None:
+        """`number` (p,) is that of the tip that a node is, or -1; with `contact` faces do not overlap."""
+        super().__init__(law)
+        self._springs, self._tips, self._number, self._contact = law, tips, number, contact
+
+    def __call__(self, traction: Float) -> Float:
+        """(p,) shares that tractions (p, c) at the nodes use."""
+        used = self._springs.share(traction)
+        at = np.flatnonzero(self._number >= 0)
+        tips, springs = self._tips.chosen(self._number[at]), self._springs.at(at)
+        released = tips.released(traction[at], self._contact)
+        used[at] = np.sqrt(released / (springs.toughness * tips.length)) * springs.mode_factor(traction[at])
+        return used
+
+    def at(self, node: Int) -> ReleasedUtilisation:
+        """The same of the nodes (p,), one after the other."""
+        return ReleasedUtilisation(self._springs.at(node), self._tips, self._number[node], self._contact)
+
+    def is_convex(self, p: int) -> Bool:
+        """(p,) False at tips: what their breaks release need not be subadditive."""
+        return np.asarray(self._number < 0)
+
+    def first_factor(self, before: Float, ahead: Float) -> None:
+        """No formula knows what the breaks of tips release."""
 
 
 def released_energy(H: Float, lam: Float, stiffness: Float, contact: bool) -> Float:

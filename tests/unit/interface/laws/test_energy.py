@@ -5,21 +5,21 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from feti_homog.interface.laws.energy_criterion import EnergyCriterion
-from feti_homog.interface.laws.tip_criterion import released_energy
+from feti_homog.interface.laws.energy import SpringEnergy
+from feti_homog.interface.laws.released import released_energy
 
 # Springs stiffer than any H of these tests.
 STIFF = np.array([[9.0, 9.0]])
 
 
 def criterion(mode_sensitivity=0.25):
-    return EnergyCriterion(2025.0, 506.25, 2.0, mode_sensitivity)
+    return SpringEnergy(2025.0, 506.25, 2.0, mode_sensitivity)
 
 
 def test_pure_modes_break_at_their_strength():
     # sigma_c = sqrt(2 k_n G_Ic) = 90 in opening; in shear G_c = G_Ic [1 + tan^2((1 - lambda) 90 degrees)].
     shear = np.sqrt(2 * 506.25 * 2.0 * (1 + np.tan(np.radians(0.75 * 90)) ** 2))
-    used = criterion().utilisation(np.array([[90.0, 0.0], [0.0, shear], [0.0, -shear], [-50.0, shear], [-90.0, 0.0]]))
+    used = criterion().share(np.array([[90.0, 0.0], [0.0, shear], [0.0, -shear], [-50.0, shear], [-90.0, 0.0]]))
     assert used == pytest.approx([1.0, 1.0, 1.0, 1.0, 0.0])
 
 
@@ -27,12 +27,12 @@ def test_a_mixed_mode_breaks_at_its_toughness():
     t_n, t_t = 40.0, 30.0
     first, second = t_n**2 / (2 * 2025.0), t_t**2 / (2 * 506.25)
     toughness = 2.0 * (1 + np.tan(0.75 * np.arctan(np.sqrt(second / first))) ** 2)
-    assert criterion().utilisation(np.array([[t_n, t_t]])) == pytest.approx(np.sqrt((first + second) / toughness))
+    assert criterion().share(np.array([[t_n, t_t]])) == pytest.approx(np.sqrt((first + second) / toughness))
 
 
 @pytest.mark.parametrize("mode_sensitivity", [0.0, 0.25, 1.0])
 def test_utilisation_is_homogeneous_and_convex(mode_sensitivity):
-    law = criterion(mode_sensitivity).utilisation
+    law = criterion(mode_sensitivity).share
     a, b = np.random.default_rng(1).normal(size=(2, 2000, 2)) * 50
     assert law(3.0 * a) == pytest.approx(3.0 * law(a))
     for share in (0.2, 0.5, 0.9):
@@ -40,8 +40,8 @@ def test_utilisation_is_homogeneous_and_convex(mode_sensitivity):
 
 
 def test_no_sensitivity_lets_shear_alone_break_nothing():
-    assert criterion(0.0).utilisation(np.array([[0.0, 1e6]])) == pytest.approx(0.0, abs=1e-8)
-    assert criterion(1.0).utilisation(np.array([[0.0, 45.0]])) == pytest.approx(1.0)
+    assert criterion(0.0).share(np.array([[0.0, 1e6]])) == pytest.approx(0.0, abs=1e-8)
+    assert criterion(1.0).share(np.array([[0.0, 45.0]])) == pytest.approx(1.0)
 
 
 def test_what_a_break_releases_is_continuous_where_its_faces_begin_to_overlap():

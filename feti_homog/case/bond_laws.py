@@ -1,0 +1,74 @@
+"""Registry of the laws of bonds: their names in a case, their keys, and how they are described.
+
+A law is implemented by two classes of the same name, `implementation`: in `interface/laws`, which runs use, and in
+`verify/bond_laws`, which checks results by its own formulas.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class BondLawEntry:
+    """Law of bonds as a case names it.
+
+    Attributes:
+        name: value of [interface] criterion.
+        implementation: "module.Class".
+        keys: keys of [interface] that belong to this law and others that list them.
+        needs: keys that must be given with this law.
+        limits: keys of which one must be finite for any bond to break; none if the law always has a limit.
+        description: of what reaches 1 when a bond breaks, for the key `criterion`.
+        symbols: (symbol, key) pairs that label the law in pictures.
+        has_process_zone: elements must resolve the length along which bonds break.
+    """
+
+    name: str
+    implementation: str
+    keys: tuple[str, ...]
+    description: str
+    symbols: tuple[tuple[str, str], ...]
+    needs: tuple[str, ...] = ()
+    limits: tuple[str, ...] = ()
+    has_process_zone: bool = False
+
+
+STIFFNESSES = ("normal_stiffness", "tangential_stiffness")
+STRENGTHS = ("normal_strength", "tangential_strength", "axial_strength")
+OF_STRENGTHS = ((r"R^\mathrm{n}", "normal_strength"), (r"R^\mathrm{t}", "tangential_strength"))
+
+REGISTRY = (
+    BondLawEntry(
+        "max",
+        "strength.MaxStrength",
+        STRENGTHS,
+        "the largest of t_n / R^n, |t_t| / R^t and along the fibre |t_a| / R^a",
+        OF_STRENGTHS,
+        limits=STRENGTHS,
+    ),
+    BondLawEntry(
+        "quadratic",
+        "strength.QuadraticStrength",
+        STRENGTHS,
+        "the root of the sum of their squares",
+        OF_STRENGTHS,
+        limits=STRENGTHS,
+    ),
+    BondLawEntry(
+        "energy",
+        "energy.SpringEnergy",
+        ("toughness", "growth", "mode_sensitivity"),
+        "the energy of its spring / G_c, see toughness",
+        ((r"G_\mathrm{Ic}", "toughness"),),
+        needs=(*STIFFNESSES, "toughness"),
+        has_process_zone=True,
+    ),
+)
+LAWS = {entry.name: entry for entry in REGISTRY}
+DEFAULT = REGISTRY[0].name
+
+
+def laws_with(key: str) -> tuple[str, ...]:
+    """Names of the laws that a key of [interface] belongs to."""
+    return tuple(entry.name for entry in REGISTRY if key in entry.keys)

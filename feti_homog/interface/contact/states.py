@@ -1,0 +1,98 @@
+"""States of the interface: which bonds hold, what each remembers, and the equilibrium of a cell under one load."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feti_homog.feti.dual_solution import DualSolution
+from feti_homog.interface.loads.coupled_solution import CoupledSolution, Multipliers
+from feti_homog.interface.loads.load import Load
+from feti_homog.typing import Bool, Float
+
+Status = NDArray[np.int8]
+
+BONDED, CLOSED, OPEN = 0, 1, 2
+
+
+@dataclass(frozen=True)
+class BondState:
+    """State of the k interface nodes that this rank owns.
+
+    Attributes:
+        status: (k,) BONDED, CLOSED or OPEN.
+        history: (k, h) internal variables of the law of the bonds, from its `begin`; h = 0 of laws without memory.
+    """
+
+    status: Status
+    history: Float
+
+    @classmethod
+    def without_memory(cls, status: Status) -> BondState:
+        """State of bonds whose law has no internal variables."""
+        return cls(status, np.zeros((len(status), 0)))
+
+    def with_status(self, status: Status) -> BondState:
+        """Replace the status; contact changes no internal variable."""
+        return replace(self, status=status)
+
+
+Softening = Callable[[BondState, Bool], Float | None]
+"""Map a state and which bonds (k,) are pulled, not pressed, to C / C_0 (k, 3) of the springs; None where it is 1."""
+
+
+def never_softens(bonds: BondState, pulled: Bool) -> None:
+    """Softening of springs whose compliance never changes."""
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """The cell under one load with the contact states that hold there.
+
+    Attributes:
+        load: what is prescribed.
+        bonds: state of the interface nodes that this rank owns.
+        solution: of the last dual problem; its multipliers and jumps are those of the state.
+        iterations, solves: Krylov iterations and dual problems that it took.
+        free_motions: number of rigid motions of bodies that no interface force resists; a face that touches without
+            a force resists none.
+        certificate: errors of the KKT conditions, `contact_certificate.kkt_errors`.
+        axial: the same of the displacement along the fibres with these bonds, where that is a problem.
+    """
+
+    load: Load
+    bonds: BondState
+    solution: DualSolution
+    iterations: int
+    solves: int
+    free_motions: int
+    certificate: dict[str, float]
+    axial: Equilibrium | None = None
+
+    @property
+    def status(self) -> Status:
+        """(k,) BONDED, CLOSED or OPEN."""
+        return self.bonds.status
+
+    @property
+    def problems(self) -> tuple[Equilibrium, ...]:
+        """Equilibria of all problems, the one in the plane first."""
+        return (self,) if self.axial is None else (self, self.axial)
+
+    @property
+    def solutions(self) -> CoupledSolution:
+        """Solutions of all problems."""
+        return CoupledSolution(self.solution, None if self.axial is None else self.axial.solution)
+
+    @property
+    def multipliers(self) -> Multipliers:
+        """Multipliers of all problems."""
+        return self.solutions.lam
+
+    @property
+    def converged(self) -> bool:
+        """Return True if the Krylov method solved all problems."""
+        return self.solutions.converged

@@ -1,0 +1,134 @@
+"""Laws of bonds: how much of its strength a traction uses, what a bond becomes that used all of it, what that costs.
+
+A law is a dataclass of constants, one of all nodes or (k,) of each; `BondState.history` has what changes.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import ClassVar, Protocol, Self
+
+import numpy as np
+
+from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
+from feti_homog.interface.contact.states import BondState
+from feti_homog.typing import Bool, Float, Int
+
+# Halvings of an interval of length one, after which double precision tells no more.
+BISECTIONS = 60
+
+
+class KeyValues(Protocol):
+    """Values of a key of [interface] at the nodes, those of the next key where a section has none, inf without any."""
+
+    def __call__(self, key: str, *others: str) -> float | Float:
+        """Return one value of all nodes, or (k,) of each."""
+
+
+class BondLaw(ABC):
+    """Law of all bonds of a cell.  The defaults are those of a law without memory.
+
+    Attributes:
+        has_toughness: bonds have a fracture energy, which `fracture` gives.
+        break_names: what `breaks` gives of tractions with two or three components.
+    """
+
+    has_toughness: ClassVar[bool] = False
+    break_names: ClassVar[Sequence[str]] = ("normal", "tangential", "axial")
+
+    @abstractmethod
+    def share(self, traction: Float) -> Float:
+        """(p,) share of the strength that tractions (p, c) use at the nodes of the law; 1 breaks.
+
+        c = 2 are normal, tension positive, and tangential, 3 also along the fibre.  Homogeneous of degree one in the
+        traction, and convex; 0 of none.
+        """
+
+    @abstractmethod
+    def breaks(self, traction: Float) -> Float:
+        """(p, d) how bonds break under tractions (p, c), with the first d of `break_names`."""
+
+    def at(self, node: Int) -> Self:
+        """The law of the nodes (p,), one after the other."""
+        fields = [field.name for field in dataclasses.fields(self)]  # type: ignore[arg-type]  # laws are dataclasses
+        return type(self)(*(at_nodes(getattr(self, name), node) for name in fields))
+
+    def begin(self, k: int) -> Float:
+        """(k, h) internal variables of k intact bonds."""
+        return np.zeros((k, 0))
+
+    def utilisation(self, cell: CoupledInterfaces, bonds: BondState) -> Utilisation:
+        """Utilisation of the nodes of this rank in a state of all bonds.  Collective; what it returns is not."""
+        return Utilisation(self)
+
+    def after(self, bonds: BondState, which: Bool, traction: Float) -> tuple[Float, Bool]:
+        """(k, h) internal variables after the bonds `which` (k,) used all of their strength under tractions (k, c), and
+        which bonds (k,) part."""
+        return bonds.history, which
+
+    def softening(self, bonds: BondState, pulled: Bool) -> Float | None:
+        """(k, 3) C / C_0 of the normal, tangential and axial springs of bonds `pulled` (k,) or pressed; None of a
+        law that never changes C."""
+        return None
+
+    def fracture(self, bonds: BondState, which: Bool, traction: Float) -> Float:
+        """(p,) energies per area that the p bonds `which` (k,) take to break under tractions (k, c) of any size."""
+        return np.zeros(int(which.sum()))
+
+    def mode_angle(self, traction: Float) -> Float:
+        """(p,) psi of tractions (p, c), in radians: 0 opens, pi/2 shears, under pressure too."""
+        shear = np.linalg.norm(traction[:, 1:], axis=1)
+        return np.asarray(np.arctan2(shear, np.maximum(traction[:, 0], 0.0)))
+
+    def first_factor(self, before: Float, ahead: Float) -> Float | None:
+        """(p,) the least f >= 0 at which `before` + f `ahead`, tractions (p, c), break, inf where none does; None of a
+        law that has no formula for it.  `before` breaks nothing."""
+        return None
+
+
+class Utilisation:
+    """Share of their strength that tractions use at some nodes, with the bonds of one state.
+
+    Attributes:
+        law: of the nodes, with the strengths that they have in the state.
+    """
+
+    def __init__(self, law: BondLaw) -> None:
+        self.law = law
+
+    def __call__(self, traction: Float) -> Float:
+        """(p,) shares that tractions (p, c) at the nodes use; of no meaning where a bond is broken."""
+        return self.law.share(traction)
+
+    def at(self, node: Int) -> Utilisation:
+        """The same of the nodes (p,), one after the other."""
+        return Utilisation(self.law.at(node))
+
+    def is_convex(self, p: int) -> Bool:
+        """(p,) True where the utilisation is sure to be a convex function of the traction, for p nodes."""
+        return np.ones(p, bool)
+
+    def first_factor(self, before: Float, ahead: Float) -> Float | None:
+        """(p,) factors of `BondLaw.first_factor`; None where `crossing` has to find them."""
+        return self.law.first_factor(before, ahead)
+
+    def crossing(self, before: Float, ahead: Float, high: Float) -> Float:
+        """(p,) f at which `before` + f `ahead` (p, c) reach 1, by halving [0, `high`] (p,), which grows if it must."""
+        low, high = np.zeros(len(high)), high.copy()
+        for _ in range(BISECTIONS):
+            below = self(before + high[:, None] * ahead) < 1.0
+            if not below.any():
+                break
+            high[below] *= 2.0
+        for _ in range(BISECTIONS):
+            middle = (low + high) / 2
+            broken = self(before + middle[:, None] * ahead) > 1.0
+            low, high = np.where(broken, low, middle), np.where(broken, middle, high)
+        return high
+
+
+def at_nodes(value: float | Float, node: Int) -> float | Float:
+    """A value of all nodes, or those (k,) of each, at the nodes (p,)."""
+    return value[node] if isinstance(value, np.ndarray) else value
