@@ -9,8 +9,8 @@ import numpy as np
 from feti_homog.homogenization import phase_laws
 from feti_homog.homogenization.averaging import Homogenization, Response
 from feti_homog.homogenization.unit_cell import TornCell
-from feti_homog.interface.contact.states import Equilibrium
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
+from feti_homog.interface.contact.states import Equilibrium
 from feti_homog.interface.loads.load import Load
 from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES
 from feti_homog.typing import Float

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from feti_homog.interface.laws.strength_criterion import StrengthCriterion
+from feti_homog.interface.laws.strength import MaxStrength
 from support import torn_cells
 from support.cases import make_case
 from support.ranks import parallel_assert
@@ -99,7 +99,7 @@ def test_a_path_whose_solve_breaks_down_is_no_result(comm, monkeypatch, method):
 
     monkeypatch.setattr(cell.solver, "solve", broken_down)
     with pytest.raises(ConvergenceError, match="broke down after"):
-        load_path.follow(context, path, StrengthCriterion(10.0, 10.0, "max"))
+        load_path.follow(context, path, MaxStrength(10.0, 10.0))
 
 
 @pytest.mark.parametrize("rtol", [2.0, 1, 0, -1e-8, "small", "nan"])
