@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from feti_homog.interface.laws.strength import MaxStrength
 from support import torn_cells
 from support.cases import make_case
 from support.ranks import parallel_assert
@@ -18,6 +17,7 @@ from feti_homog.analysis.loads import CellLoads
 from feti_homog.case.load_section import LoadPath
 from feti_homog.errors import CaseError, ConvergenceError
 from feti_homog.interface.contact.states import OPEN
+from feti_homog.interface.laws.strength import MaxStrength
 from feti_homog.petsc.options import case_options
 from feti_homog.runtime.progress import Progress
 
