@@ -27,12 +27,28 @@ MADE = re.compile(r"results/|build/|.*DIR|.*\.\.\.")
 # A dotted name below the package, and an attribute of it in brackets; files that runs write look alike.
 SYMBOL = re.compile(r"`([a-z_]+(?:\.(?!csv|h5|json|png|toml|xdmf)[a-z_]+)+(?:\.[A-Z]\w*)?)`(?: \(`(\w+)`)?")
 
+WIDTH = 100
+NOT_WRAPPED = ["scripts/README.md", "tests/README.md", "feti_homog/README.md", "feti_homog/THEORY.md"]
+# A list's mark, then one formula, one piece of code, one link or one word: nowhere to break the line.
+UNBREAKABLE = re.compile(r"\s*(?:(?:[-*]|\d+\.) )?(?:\$[^$]*\$|`[^`]*`|\[[^\]]*\]\([^)]*\)|\S)+")
+
 documents = pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
 
 
 def prose(path):
     """Return the text without its fenced blocks."""
     return re.sub(r"^```.*?^```$", "", path.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+
+
+def lines_of_prose(text):
+    """Return the lines that are no table, heading, picture, display formula or fenced block."""
+    blocks = re.compile(r"^\s*```.*?^\s*```$|^\s*\$\$.*?\$\$", flags=re.MULTILINE | re.DOTALL)
+    return [line for line in blocks.sub("", text).splitlines() if not line.startswith(("|", "#", "!["))]
+
+
+def too_long(text):
+    """Return the lines of prose that are longer than the width and could be broken."""
+    return [line for line in lines_of_prose(text) if len(line) > WIDTH and not UNBREAKABLE.fullmatch(line)]
 
 
 def blocks(path, language):
@@ -74,6 +90,26 @@ def test_the_first_page_is_short():
 
 def test_the_changelog_is_short():
     assert len((ROOT / "CHANGELOG.md").read_text(encoding="utf-8").splitlines()) <= 60
+
+
+@documents
+def test_prose_is_wrapped(path):
+    if str(path.relative_to(ROOT)) not in NOT_WRAPPED:
+        assert not too_long(path.read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize(
+    "ends", [("", ""), ("```\n", "\n```"), ("$$\n", "\n$$"), ("| ", " |"), ("## ", ""), ("![", "](a.png)")]
+)
+def test_lines_of_prose_alone_are_too_long(ends):
+    line = WIDTH // 2 * "a " + "b"
+    assert too_long(line.join(ends)) == ([line] if ends == ("", "") else [])
+
+
+@pytest.mark.parametrize("token", ["`{}`", "[{}](a.md)", "${}$"])
+def test_a_token_may_be_longer_than_a_line(token):
+    token = token.format(WIDTH // 2 * "a " + "b")
+    assert not too_long(f"- {token},") and too_long(f"- see {token}")
 
 
 @documents
